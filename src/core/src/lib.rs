@@ -1,0 +1,21 @@
+//! Contact stepping of reduced-order models: everything that runs inside `doStep`.
+//!
+//! Floor 0. Plain data in, plain data out: no files, no threads, no clock, no printing, and no allocation
+//! between [`Simulation::initialise`] and the end of the run. SI units everywhere (m, kg, s, N, rad).
+//!
+//! The road through the crate is short: a [`Scene`] (settings and a [`Rom`]) is compiled once into a
+//! [`Simulation`]; the simulation owns the [`VariableTable`] that every importer-facing text and call is
+//! derived from, and marches the contact problem from one communication point to the next.
+#![forbid(unsafe_op_in_unsafe_fn)]
+
+mod error;
+pub mod rom;
+pub mod settings;
+pub mod simulation;
+pub mod variables;
+
+pub use error::{Error, Result};
+pub use rom::Rom;
+pub use settings::Scene;
+pub use simulation::Simulation;
+pub use variables::VariableTable;

