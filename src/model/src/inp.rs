@@ -7,7 +7,7 @@ use crate::{Error, Result, element::ElementKind, material::Material, mesh::Mesh}
 
 /// Text of an input file that computes the lowest `frequencies` natural frequencies.
 ///
-/// Every node set of the mesh is written; the nodes of `clamped` (a set name, if any) are fixed in all directions.
+/// Numbers carry 13 significant digits: CalculiX reads at most 20 characters each. Every node set of the mesh is written; the nodes of `clamped` (a set name, if any) are fixed in all directions.
 ///
 /// # Errors
 /// [`Error::Invalid`] when the set does not exist or the mesh is not sound.
@@ -16,8 +16,7 @@ pub fn calculix_input(mesh: &Mesh, material: &Material, clamped: Option<&str>, f
     material.validate()?;
     let mut text = String::from("*HEADING\nUnits: m, kg, s, N\n*NODE, NSET=NALL\n");
     for (index, [x, y, z]) in mesh.nodes.iter().enumerate() {
-        // 17 significant digits: the coordinates read back are the very same numbers.
-        put(&mut text, format_args!("{}, {x:.16e}, {y:.16e}, {z:.16e}\n", index + 1));
+        put(&mut text, format_args!("{}, {x:.12e}, {y:.12e}, {z:.12e}\n", index + 1));
     }
     for kind in ElementKind::ALL {
         write_elements(&mut text, mesh, kind);
@@ -27,11 +26,9 @@ pub fn calculix_input(mesh: &Mesh, material: &Material, clamped: Option<&str>, f
         write_list(&mut text, nodes.iter().map(|node| node + 1));
     }
     let name = material.name.to_uppercase();
-    put(&mut text, format_args!("*MATERIAL, NAME={name}\n*ELASTIC\n"));
-    put(
-        &mut text,
-        format_args!("{:e}, {}\n*DENSITY\n{:e}\n", material.young_modulus, material.poisson_ratio, material.density),
-    );
+    let Material { young_modulus, poisson_ratio, density, .. } = material;
+    put(&mut text, format_args!("*MATERIAL, NAME={name}\n*ELASTIC\n{young_modulus:.12e}, {poisson_ratio:.12e}\n"));
+    put(&mut text, format_args!("*DENSITY\n{density:.12e}\n"));
     put(&mut text, format_args!("*SOLID SECTION, ELSET=EALL, MATERIAL={name}\n"));
     if let Some(set) = clamped {
         mesh.set(set)?;
