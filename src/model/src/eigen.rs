@@ -15,6 +15,8 @@ use crate::{Error, Result};
 pub const TOLERANCE: f64 = 1e-10;
 /// The explicitly formed residual is allowed this much, since it also contains the solve's round-off.
 const CHECKED_TOLERANCE: f64 = 1e-8;
+/// Vectors that this share of the block's largest is left of depend on the basis.
+const DEPENDENT: f64 = 1e-13;
 const BLOCK: usize = 6;
 
 /// Modes of a pencil.
@@ -55,56 +57,64 @@ impl Basis {
         self.mass_vectors.get(.., ..self.size)
     }
 
-    /// Remove the basis from `block` and `mass_block` = M·block; returns the coefficients QᵀM·block.
-    fn project_out(&self, block: &mut Mat<f64>, mass_block: &mut Mat<f64>) -> Mat<f64> {
+    /// Remove the basis from `block`; returns the coefficients QᵀM·block.
+    fn project_out(&self, block: &mut Mat<f64>) -> Mat<f64> {
         let mut coefficients = Mat::zeros(self.size, block.ncols());
         for _pass in 0..2 {
             let part = self.used_mass().transpose() * &*block;
             *block -= self.used() * &part;
-            *mass_block -= self.used_mass() * &part;
             coefficients += part;
         }
         coefficients
     }
 
-    /// Orthonormalise `block` within itself and append it; returns R of block = Q_new R (rows: new vectors).
-    /// Columns that depend on the others are left out.
-    fn append(&mut self, block: &mut Mat<f64>, mass_block: &mut Mat<f64>, scale: f64) -> Mat<f64> {
+    /// Orthonormalise the columns of `block` and append them; returns R of block = Q_new R (rows: new vectors).
+    ///
+    /// Columns that depend on the others are left out. M Q is formed anew from each finished vector: carried along
+    /// through the subtractions it would lose what they cancel.
+    fn append(&mut self, block: &Mat<f64>, mass: &SparseMatrix) -> Mat<f64> {
         let (first, width) = (self.size, block.ncols());
-        let mut rows: Vec<Vec<f64>> = Vec::new();
+        let scale = column_norms(block, &mass.times(block.as_ref())).into_iter().fold(0.0, f64::max);
+        let mut upper = Mat::zeros(width, width);
         for j in 0..width {
             if self.size == self.vectors.ncols() {
                 break;
             }
-            let mut row = vec![0.0; width];
-            // Once against the new vectors, and once more against the whole basis to wipe out cancellation.
-            for from in [first, 0] {
-                let size = self.size;
-                let (q, mq) = (self.vectors.get(.., from..size), self.mass_vectors.get(.., from..size));
-                let h = mq.transpose() * block.col(j);
-                let (change, mass_change) = (q * &h, mq * &h);
-                let mut column = block.col_mut(j);
-                column -= change;
-                let mut mass_column = mass_block.col_mut(j);
-                mass_column -= mass_change;
-                for (i, existing) in rows.iter_mut().enumerate() {
-                    existing[j] += h[first - from + i];
+            let mut column = block.get(.., j..j + 1).to_owned();
+            let mut before = f64::INFINITY;
+            let mut norm = 0.0;
+            let mut mass_column = Mat::zeros(0, 0);
+            // Repeat until a pass takes nothing away any more (Kahan: once more is enough, unless it is round-off).
+            for _pass in 0..6 {
+                let part = self.used_mass().transpose() * &column;
+                column -= self.used() * &part;
+                for i in first..self.size {
+                    upper[(i - first, j)] += part[(i, 0)];
                 }
+                mass_column = mass.times(column.as_ref());
+                norm = column_norms(&column, &mass_column)[0];
+                if norm > 0.5 * before || norm <= DEPENDENT * scale {
+                    break;
+                }
+                before = norm;
             }
-            let norm = (block.col(j).transpose() * mass_block.col(j)).max(0.0).sqrt();
-            if norm <= 1e-12 * scale {
+            if norm <= DEPENDENT * scale {
                 continue;
             }
-            row[j] = norm;
+            upper[(self.size - first, j)] = norm;
             for i in 0..block.nrows() {
-                self.vectors[(i, self.size)] = block[(i, j)] / norm;
-                self.mass_vectors[(i, self.size)] = mass_block[(i, j)] / norm;
+                self.vectors[(i, self.size)] = column[(i, 0)] / norm;
+                self.mass_vectors[(i, self.size)] = mass_column[(i, 0)] / norm;
             }
             self.size += 1;
-            rows.push(row);
         }
-        Mat::from_fn(rows.len(), width, |i, j| rows[i][j])
+        upper.get(..self.size - first, ..).to_owned()
     }
+}
+
+/// √(columnᵀ M column) of every column.
+fn column_norms(block: &Mat<f64>, mass_block: &Mat<f64>) -> Vec<f64> {
+    (0..block.ncols()).map(|j| (block.col(j).transpose() * mass_block.col(j)).max(0.0).sqrt()).collect()
 }
 
 /// The `count` lowest modes of the pencil.
@@ -138,26 +148,20 @@ pub fn lowest_modes(
     let mut projected = Mat::<f64>::zeros(capacity, capacity);
     let mut seed = 0;
     // A first application of the operator makes the random start rich in low modes.
-    let mut block = factor.solve(mass.times(random_block(order, BLOCK.min(order), &mut seed).as_ref()).clone());
-    let mut mass_block = mass.times(block.as_ref());
-    let scale = largest_norm(&block, &mass_block);
+    let block = factor.solve(mass.times(random_block(order, BLOCK.min(order), &mut seed).as_ref()));
     let mut start = 0;
-    basis.append(&mut block, &mut mass_block, scale);
+    basis.append(&block, mass);
     loop {
         let end = basis.size;
         let mut next = factor.solve(basis.mass_vectors.get(.., start..end).to_owned());
-        let mut mass_next = mass.times(next.as_ref());
-        let scale = largest_norm(&next, &mass_next);
-        let coefficients = basis.project_out(&mut next, &mut mass_next);
+        let coefficients = basis.project_out(&mut next);
         projected.get_mut(..end, start..end).copy_from(&coefficients);
-        let mut coupling = basis.append(&mut next, &mut mass_next, scale);
+        let mut coupling = basis.append(&next, mass);
         if basis.size == end && end < capacity {
             // An invariant subspace: continue with directions it does not contain.
             let mut fresh = random_block(order, BLOCK, &mut seed);
-            let mut mass_fresh = mass.times(fresh.as_ref());
-            let scale = largest_norm(&fresh, &mass_fresh);
-            basis.project_out(&mut fresh, &mut mass_fresh);
-            basis.append(&mut fresh, &mut mass_fresh, scale);
+            basis.project_out(&mut fresh);
+            basis.append(&fresh, mass);
             coupling = Mat::zeros(0, end - start);
         }
         let exhausted = basis.size == end;
@@ -212,8 +216,8 @@ fn checked(mass: &SparseMatrix, factor: &Factor, shift: f64, thetas: &[f64], sha
         }
     }
     let mass_residual = mass.times(residual.as_ref());
-    let norm = |k: usize| (residual.col(k).transpose() * mass_residual.col(k)).max(0.0).sqrt();
-    let residuals: Vec<f64> = thetas.iter().enumerate().map(|(k, theta)| norm(k) / theta.abs()).collect();
+    let norms = column_norms(&residual, &mass_residual);
+    let residuals: Vec<f64> = norms.iter().zip(thetas).map(|(norm, theta)| norm / theta.abs()).collect();
     // NaN must count as failure, hence the comparison's direction.
     let converged = residuals.iter().filter(|&&residual| residual <= CHECKED_TOLERANCE).count();
     if converged < thetas.len() {
@@ -222,10 +226,6 @@ fn checked(mass: &SparseMatrix, factor: &Factor, shift: f64, thetas: &[f64], sha
     }
     let eigenvalues = thetas.iter().map(|theta| shift + 1.0 / theta).collect();
     Ok(Modes { eigenvalues, shapes, residuals })
-}
-
-fn largest_norm(block: &Mat<f64>, mass_block: &Mat<f64>) -> f64 {
-    (0..block.ncols()).map(|j| (block.col(j).transpose() * mass_block.col(j)).max(0.0).sqrt()).fold(0.0, f64::max)
 }
 
 /// Entries in [-1, 1) of a fixed sequence (splitmix64), so that results repeat from run to run.
