@@ -190,16 +190,16 @@ struct Ritz {
 /// Largest eigenpairs of the projected operator, with residual bounds ‖R s_last‖ / θ.
 fn ritz_pairs(projected: MatRef<'_, f64>, coupling: MatRef<'_, f64>, count: usize, complete: bool) -> Result<Ritz> {
     let size = projected.nrows();
-    let symmetric = Mat::from_fn(size, size, |i, j| {
-        // The block columns are filled from the left, so the entry of the later column is the complete one.
-        if i <= j { projected[(i, j)] } else { projected[(j, i)] }
-    });
+    // The eigenvalue solver deflates against 1, not against the matrix' norm, so the matrix is scaled to it. The block
+    // columns are filled from the left, so of a pair of entries the later column's is the complete one.
+    let scale = projected.norm_max();
+    let symmetric = Mat::from_fn(size, size, |i, j| projected[(i.min(j), i.max(j))] / scale);
     let eigen = symmetric.self_adjoint_eigen(Side::Lower).map_err(|_| {
         Error::invalid("projected eigenvalue problem", "it did not converge", "Check the mesh and the material")
     })?;
     let order: Vec<usize> = (0..count).map(|k| size - 1 - k).collect();
     let vectors = Mat::from_fn(size, count, |i, k| eigen.U()[(i, order[k])]);
-    let values: Vec<f64> = order.iter().map(|&k| eigen.S()[k]).collect();
+    let values: Vec<f64> = order.iter().map(|&k| scale * eigen.S()[k]).collect();
     let last = vectors.get(size - coupling.ncols().., ..);
     let residuals = coupling * last;
     let bounds =
