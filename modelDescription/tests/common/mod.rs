@@ -91,7 +91,7 @@ pub fn table() -> VariableTable {
         variable.reference = reference;
         reference += u32::try_from(variable.len()).unwrap();
     }
-    VariableTable::new(variables)
+    VariableTable::new(variables).unwrap()
 }
 
 pub fn rom() -> Rom {
