@@ -23,7 +23,7 @@ fn axial_frequency(kind: ElementKind, count: usize) -> f64 {
     let mesh = straight_box(kind, [count, 1, 1], [LENGTH, side, side]);
     let assembled = assemble(&mesh, &material(), &silent).unwrap();
     let free: Vec<usize> =
-        free_dofs(mesh.nodes.len(), &nodes_at(&mesh, 0, 0.0)).into_iter().filter(|dof| dof % 3 == 0).collect();
+        free_dofs(mesh.nodes.len(), &nodes_at(&mesh, 0, 0.0)).into_iter().filter(|dof| dof.is_multiple_of(3)).collect();
     let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
     full_modes(&stiffness, &mass, false, 1, &silent).unwrap().modes.frequencies()[0]
 }
@@ -82,7 +82,8 @@ fn half_beam(kind: ElementKind, count: usize) -> f64 {
     let mesh = straight_box(kind, [count, count / 4, count / 4], [LENGTH, LENGTH / 4.0, LENGTH / 4.0]);
     let assembled = assemble(&mesh, &material(), &silent).unwrap();
     let (symmetry, support) = (nodes_at(&mesh, 0, 0.0), nodes_at(&mesh, 0, LENGTH));
-    let held = |dof: usize| if dof % 3 == 0 { symmetry.contains(&(dof / 3)) } else { support.contains(&(dof / 3)) };
+    let held =
+        |dof: usize| if dof.is_multiple_of(3) { symmetry.contains(&(dof / 3)) } else { support.contains(&(dof / 3)) };
     let free: Vec<usize> = (0..3 * mesh.nodes.len()).filter(|&dof| !held(dof)).collect();
     let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
     full_modes(&stiffness, &mass, false, 1, &silent).unwrap().modes.frequencies()[0]

@@ -217,6 +217,8 @@ fn contact_nodes_are_named_and_spread_along_the_tip() {
         let error = blade.contact_points(count).unwrap_err().to_string();
         assert!(error.starts_with(&format!("number of contact nodes: {count} is outside 2..=33")), "{error}");
     }
+    // With one element through the thickness the line runs through mid-side nodes, which corner stations have only.
+    assert_eq!(blade_mesh(MeshCounts { chord: 8, thickness: 1, span: 4 }).unwrap().contact_points(9).unwrap().len(), 9);
     let error = blade_mesh(MeshCounts { span: 0, ..MeshCounts::default() }).unwrap_err().to_string();
     assert!(error.starts_with("mesh count `span`: it is zero"), "{error}");
 }
