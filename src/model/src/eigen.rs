@@ -18,6 +18,8 @@ const CHECKED_TOLERANCE: f64 = 1e-8;
 /// Vectors that this share of the block's largest is left of depend on the basis.
 const DEPENDENT: f64 = 1e-13;
 const BLOCK: usize = 6;
+/// An ω² below this share of tr K / tr M is round-off of a rigid-body motion.
+const MECHANISM: f64 = 1e-14;
 
 /// Modes of a pencil.
 #[derive(Debug, Clone)]
@@ -115,6 +117,26 @@ impl Basis {
 /// √(columnᵀ M column) of every column.
 fn column_norms(block: &Mat<f64>, mass_block: &Mat<f64>) -> Vec<f64> {
     (0..block.ncols()).map(|j| (block.col(j).transpose() * mass_block.col(j)).max(0.0).sqrt()).collect()
+}
+
+/// Factor of K - σM, refused when the structure is a mechanism that only round-off holds.
+///
+/// Round-off may leave the last pivots just positive. Two inverse iterations then find an ω² that is none.
+///
+/// # Errors
+/// [`Error::NotPositiveDefinite`] with the given name and remedy.
+pub fn positive_factor(shifted: &SparseMatrix, mass: &SparseMatrix, name: &str, remedy: &str) -> Result<Factor> {
+    let factor = shifted.factor(name, remedy)?;
+    if mass.order() == 0 {
+        return Ok(factor);
+    }
+    let start = factor.solve(mass.times(random_block(mass.order(), 1, &mut 0).as_ref()));
+    let mass_start = mass.times(start.as_ref());
+    let next = factor.solve(mass_start.clone());
+    let largest = column_norms(&next, &mass.times(next.as_ref()))[0] / column_norms(&start, &mass_start)[0];
+    // A NaN compares as false and is refused, too.
+    let supported = 1.0 / largest > MECHANISM * shifted.trace() / mass.trace();
+    if supported { Ok(factor) } else { Err(Error::NotPositiveDefinite { matrix: name.into(), remedy: remedy.into() }) }
 }
 
 /// The `count` lowest modes of the pencil.

@@ -86,6 +86,26 @@ fn a_free_body_has_six_rigid_modes_and_the_dense_elastic_ones() {
     assert!(error.to_string().contains("clamp at least three nodes"), "{error}");
 }
 
+/// Held along one edge the body can still turn about it, whether or not round-off lets the factorisation pass.
+#[test]
+fn a_hinged_body_is_refused_as_a_mechanism() {
+    for kind in ElementKind::ALL {
+        let mesh = distorted_box(kind, [4, 2, 2], SIZE, wobble(0.1));
+        let edge: Vec<usize> =
+            nodes_at(&mesh, 0, 0.0).into_iter().filter(|&node| mesh.nodes[node][2].abs() < 1e-9).collect();
+        let error = reduce(mesh, &steel(), &edge, &[], &options(3, Frame::Cartesian), &silent).unwrap_err();
+        assert!(matches!(error, Error::NotPositiveDefinite { .. }), "{kind:?}: {error}");
+    }
+}
+
+#[test]
+fn a_free_body_held_by_two_contact_nodes_is_refused() {
+    let mesh = beam();
+    let contact = contact(&mesh);
+    let error = reduce(mesh, &steel(), &[], &contact, &options(3, Frame::Cartesian), &silent).unwrap_err();
+    assert!(error.to_string().contains("choose at least three contact nodes that are not on one line"), "{error}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -272,7 +292,17 @@ fn wrong_contact_nodes_are_refused_by_name() {
     );
     assert!(refusal(|_, points| points[1].node = points[0].node).starts_with("contact node `high`: its node or name"));
     assert!(refusal(|_, points| points[1].node = 1_000_000).contains("node 1000001 does not exist"));
+    assert!(refusal(|_, points| points[0].name = "high".into()).starts_with("contact node `high`: its node or name"));
     assert!(refusal(|_, points| points.clear()).starts_with("interface: it is empty"));
+}
+
+#[test]
+fn a_contact_node_on_the_axis_has_no_cylindrical_frame() {
+    let mesh = straight_box(ElementKind::Hex8, [2, 1, 1], [0.2, 0.1, 0.1]);
+    let clamped = nodes_at(&mesh, 0, 0.2);
+    let contact = [ContactPoint { name: "centre".into(), node: 0, meridional_slope: 0.0 }];
+    let error = reduce(mesh, &steel(), &clamped, &contact, &options(3, Frame::Cylindrical), &silent).unwrap_err();
+    assert!(error.to_string().starts_with("contact node `centre`: it lies on the z axis"), "{error}");
 }
 
 #[test]
