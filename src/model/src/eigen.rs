@@ -44,11 +44,27 @@ struct Basis {
     vectors: Mat<f64>,
     mass_vectors: Mat<f64>,
     size: usize,
+    /// The basis grows to this size at most.
+    capacity: usize,
 }
 
 impl Basis {
     fn new(order: usize, capacity: usize) -> Self {
-        Self { vectors: Mat::zeros(order, capacity), mass_vectors: Mat::zeros(order, capacity), size: 0 }
+        Self { vectors: Mat::zeros(order, 0), mass_vectors: Mat::zeros(order, 0), size: 0, capacity }
+    }
+
+    fn push(&mut self, column: &Mat<f64>, mass_column: &Mat<f64>, norm: f64) {
+        let order = column.nrows();
+        if self.size == self.vectors.ncols() {
+            let room = (2 * self.size).clamp(8 * BLOCK, self.capacity.max(8 * BLOCK));
+            self.vectors.resize_with(order, room, |_, _| 0.0);
+            self.mass_vectors.resize_with(order, room, |_, _| 0.0);
+        }
+        for i in 0..order {
+            self.vectors[(i, self.size)] = column[(i, 0)] / norm;
+            self.mass_vectors[(i, self.size)] = mass_column[(i, 0)] / norm;
+        }
+        self.size += 1;
     }
 
     fn used(&self) -> MatRef<'_, f64> {
@@ -79,7 +95,7 @@ impl Basis {
         let scale = column_norms(block, &mass.times(block.as_ref())).into_iter().fold(0.0, f64::max);
         let mut upper = Mat::zeros(width, width);
         for j in 0..width {
-            if self.size == self.vectors.ncols() {
+            if self.size == self.capacity {
                 break;
             }
             let mut column = block.get(.., j..j + 1).to_owned();
@@ -104,11 +120,7 @@ impl Basis {
                 continue;
             }
             upper[(self.size - first, j)] = norm;
-            for i in 0..block.nrows() {
-                self.vectors[(i, self.size)] = column[(i, 0)] / norm;
-                self.mass_vectors[(i, self.size)] = mass_column[(i, 0)] / norm;
-            }
-            self.size += 1;
+            self.push(&column, &mass_column, norm);
         }
         upper.get(..self.size - first, ..).to_owned()
     }
@@ -167,7 +179,7 @@ pub fn lowest_modes(
     }
     let capacity = (6 * count + 20 * BLOCK).min(order);
     let mut basis = Basis::new(order, capacity);
-    let mut projected = Mat::<f64>::zeros(capacity, capacity);
+    let mut projected = Mat::<f64>::zeros(0, 0);
     let mut seed = 0;
     // A first application of the operator makes the random start rich in low modes.
     let block = factor.solve(mass.times(random_block(order, BLOCK.min(order), &mut seed).as_ref()));
@@ -177,6 +189,7 @@ pub fn lowest_modes(
         let end = basis.size;
         let mut next = factor.solve(basis.mass_vectors.get(.., start..end).to_owned());
         let coefficients = basis.project_out(&mut next);
+        projected.resize_with(end, end, |_, _| 0.0);
         projected.get_mut(..end, start..end).copy_from(&coefficients);
         let mut coupling = basis.append(&next, mass);
         if basis.size == end && end < capacity {
@@ -188,7 +201,7 @@ pub fn lowest_modes(
         }
         let exhausted = basis.size == end;
         if end >= count && (exhausted || end >= count + BLOCK) {
-            let ritz = ritz_pairs(projected.get(..end, ..end), coupling.as_ref(), count, order == end)?;
+            let ritz = ritz_pairs(projected.as_ref(), coupling.as_ref(), count, order == end)?;
             let converged = ritz.bounds.iter().filter(|&&bound| bound <= TOLERANCE).count();
             report(listener, stage, converged, count);
             if converged == count {
