@@ -16,7 +16,7 @@ color:#1c2430;background:#fff}h1,h2,h3{line-height:1.2;margin:1.6em 0 .5em}h1{ma
 table{border-collapse:collapse;width:100%;margin:.5em 0 1.5em;font-size:.9em}\
 th,td{text-align:left;vertical-align:top;padding:.35em .6em;border-bottom:1px solid #dfe4ea}\
 th{background:#f3f5f8;position:sticky;top:0}td.number,th.number{text-align:right;font-variant-numeric:tabular-nums}\
-code{font-size:.95em;background:#f3f5f8;padding:0 .2em;border-radius:3px;overflow-wrap:anywhere}\
+code{font-size:.95em;background:#f3f5f8;padding:0 .2em;border-radius:3px}td:first-child{white-space:nowrap}\
 dt{font-weight:600}dd{margin:0 0 .5em 1.5em}.warning{border-left:4px solid #c77700;padding-left:.8em}\
 footer{margin-top:3em;color:#5a6675;font-size:.85em}";
 
