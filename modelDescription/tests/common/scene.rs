@@ -63,10 +63,10 @@ pub fn complete() -> Scene {
 }
 
 /// An option as the user guide writes it, and a function that switches it off.
-pub type Option = (&'static str, fn(&mut SceneSettings));
+pub type Switch = (&'static str, fn(&mut SceneSettings));
 
 /// Every option that adds variables.
-pub const OPTIONS: [Option; 8] = [
+pub const OPTIONS: [Switch; 8] = [
     ("`motion = \"rotating\"`", |scene| {
         scene.structures[0].motion = Motion::Still;
         scene.structures[0].speed = 0.0;
