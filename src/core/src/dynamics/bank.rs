@@ -53,6 +53,8 @@ pub struct ModalBank {
     damping_ratios: Vec<f64>,
     /// `[mode][row]`.
     contact_modes: Vec<f64>,
+    /// `[row][mode]`.
+    contact_rows: Vec<f64>,
     coefficients: Vec<ModeCoefficients>,
     /// G = Φ diag(c) Φᵀ, rows × rows: displacement of the contact rows per unit force held for one step (m/N).
     flexibility: DMatrix<f64>,
@@ -60,6 +62,8 @@ pub struct ModalBank {
     state: BankState,
     /// Scratch: increments of the step before.
     increment_before: Vec<f64>,
+    /// Scratch: φᵀf of the sector being corrected.
+    modal_force: Vec<f64>,
 }
 
 impl ModalBank {
@@ -79,6 +83,7 @@ impl ModalBank {
             frequencies: model.frequencies.clone(),
             damping_ratios: model.damping_ratios.clone(),
             contact_modes: model.contact_modes.as_slice().to_vec(),
+            contact_rows: model.contact_modes.transpose().as_slice().to_vec(),
             coefficients: vec![ModeCoefficients::default(); modes],
             flexibility: DMatrix::zeros(rows, rows),
             step: 0.0,
@@ -90,6 +95,7 @@ impl ModalBank {
                 loss: vec![0.0; lanes],
             },
             increment_before: vec![0.0; state_len],
+            modal_force: vec![0.0; modes],
         }
     }
 
@@ -252,18 +258,18 @@ impl ModalBank {
 
     /// Correct one sector for the contact `force` on its rows (N), eq. 11 of the paper.
     pub fn correct(&mut self, sector: usize, force: &[f64], with_loss: bool) {
+        let modal_force = &mut self.modal_force;
+        let contact_rows = &self.contact_rows;
+        self.instruction_set.run(ModalForce { modal_force, contact_rows, force });
         let (rows, width) = (self.rows, self.width);
-        let block = self.modes() * width;
-        let start = sector / width * block + sector % width;
+        let start = sector / width * self.modes() * width + sector % width;
         let position = self.state.position[start..].iter_mut().step_by(width);
         let increment = self.state.increment[start..].iter_mut().step_by(width);
         let before = self.increment_before[start..].iter().step_by(width);
-        let shapes = self.contact_modes.chunks_exact(rows);
         let mut loss = 0.0;
-        for ((((position, increment), before), shapes), coefficients) in
-            position.zip(increment).zip(before).zip(shapes).zip(&self.coefficients)
+        for ((((position, increment), before), modal_force), coefficients) in
+            position.zip(increment).zip(before).zip(&self.modal_force).zip(&self.coefficients)
         {
-            let modal_force: f64 = shapes.iter().zip(force).map(|(shape, value)| shape * value).sum();
             let correction = coefficients.compliance * modal_force;
             if with_loss {
                 let predicted = *increment + before;
@@ -323,6 +329,25 @@ impl ModalBank {
     /// Restore a saved state.
     pub fn restore(&mut self, reader: &mut Reader) {
         self.state.restore(reader);
+    }
+}
+
+/// φᵀf of all modes for the forces on the contact rows of one sector.
+struct ModalForce<'a> {
+    modal_force: &'a mut [f64],
+    contact_rows: &'a [f64],
+    force: &'a [f64],
+}
+
+impl Kernel for ModalForce<'_> {
+    #[inline(always)]
+    fn run(self) {
+        self.modal_force.fill(0.0);
+        for (shapes, force) in self.contact_rows.chunks_exact(self.modal_force.len()).zip(self.force) {
+            for (sum, shape) in self.modal_force.iter_mut().zip(shapes) {
+                *sum += shape * force;
+            }
+        }
     }
 }
 
