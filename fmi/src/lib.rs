@@ -20,6 +20,5 @@ mod fmi2;
 mod fmi3;
 #[forbid(unsafe_code)]
 mod location;
-mod resources;
 #[forbid(unsafe_code)]
 mod slave;

@@ -102,7 +102,7 @@ impl Slave {
     /// # Errors
     /// Unreadable or damaged resources, a token that does not belong to them, a scene that the core refuses.
     pub fn new(dialect: Dialect, resources: &Path, token: &str) -> Result<Self> {
-        let loaded = crate::resources::load_resources(resources).map_err(|error| Refusal::error(error.to_string()))?;
+        let loaded = tiprub_format::load_resources(resources).map_err(|error| Refusal::error(error.to_string()))?;
         if loaded.token != token {
             let (name, file) = match dialect {
                 Dialect::Fmi2 => ("fmuGUID", "attribute guid"),

@@ -52,12 +52,10 @@ const READABLE: States = SETTABLE | UPDATING;
 /// Phases in which values can be set.
 const WRITABLE: States = INSTANTIATED | INITIALISING | STEPPING | UPDATING;
 
-/// One `const` per row, and the whole table for tests.
+/// One `const` per row.
 macro_rules! table {
     ($($constant:ident $name:literal $states:expr;)*) => {
         $(pub const $constant: Rule = Rule { name: $name, states: $states };)*
-        #[cfg(test)]
-        pub const ALL: &[Rule] = &[$($constant),*];
     };
 }
 
