@@ -2,7 +2,7 @@
 //! many elements as the accompanying count says, for the duration of the call) is used here and nowhere else.
 
 use std::ffi::{CStr, c_char, c_void};
-use std::mem::{align_of, size_of};
+use std::mem::size_of;
 
 use crate::slave::{Refusal, Result};
 
@@ -37,7 +37,7 @@ fn check<T>(pointer: *const T, count: usize, name: &str) -> Result<()> {
             "argument {name} is NULL with {count} elements. Pass an array of that length"
         )));
     }
-    if pointer.addr() % align_of::<T>() != 0 {
+    if !pointer.is_aligned() {
         return Err(Refusal::error(format!("argument {name} is not aligned for its type. Pass a proper array")));
     }
     if count > isize::MAX.unsigned_abs() / size_of::<T>().max(1) {
