@@ -8,7 +8,7 @@ use tiprub_core::simulation::Progress;
 use super::Boolean;
 use crate::boundary::{Callbacks, Handle, In, IntermediateUpdate, Out, enter, guard, intermediate_update};
 use crate::slave::order::fmi3 as order;
-use crate::slave::{Refusal, Request, Slave, Status};
+use crate::slave::{Refusal, Request, Result, Slave, Status};
 
 /// How a step ended.
 struct Outcome {
@@ -66,12 +66,12 @@ fn step(instance: Handle, current: f64, size: f64, missing: Option<&str>) -> Out
 }
 
 /// What to do after an internal step.
-fn settle(slave: &mut Slave, progress: Progress, return_at: Option<f64>) -> bool {
+fn settle(slave: &mut Slave, progress: Progress, return_at: Option<f64>) -> Result<bool> {
     let early = !progress.finished && return_at.is_some_and(|time| progress.time >= time);
     if progress.finished || early {
-        slave.end_step(early);
+        slave.end_step(early)?;
     }
-    early
+    Ok(early)
 }
 
 fn march(instance: Handle, callbacks: Callbacks, update: IntermediateUpdate, start: f64) -> Outcome {
@@ -95,7 +95,7 @@ fn march(instance: Handle, callbacks: Callbacks, update: IntermediateUpdate, sta
                 }
                 _ => {}
             }
-            let early = settle(slave, progress, return_at);
+            let early = settle(slave, progress, return_at)?;
             Ok((status, (early, slave.time())))
         });
         worst = worst.max(status);

@@ -140,8 +140,7 @@ impl Slave {
     /// Most value references a single call may bring. More than this can only be a mistaken count, and following it would
     /// read beyond the importer's array; repeating references is legal, hence the margin.
     pub fn reference_limit(&self) -> usize {
-        let elements: usize = self.simulation.table().variables().iter().map(Variable::len).sum();
-        16 * elements + 1024
+        16 * self.simulation.table().references() + 1024
     }
 
     /// Value references of the single elements a request stands for.
@@ -236,11 +235,11 @@ impl Slave {
                 return Err(Refusal::error(format!("{name} (value reference {element}): {problem}")));
             }
         }
-        self.apply(elements, values)?;
-        if let (Phase::Initialising { stale, .. }, false) = (&mut self.phase, elements.is_empty()) {
-            *stale = true;
+        if elements.is_empty() {
+            return Ok(());
         }
-        Ok(())
+        self.invalidate()?;
+        self.apply(elements, values)
     }
 
     /// The core has the last word; what was written before its refusal is taken back.
@@ -289,6 +288,7 @@ impl Slave {
                 )));
             }
         }
+        self.invalidate()?;
         for ((&reference, &order), &value) in references.iter().zip(orders).zip(values) {
             self.simulation.set_input_derivative(reference, order, value)?;
         }

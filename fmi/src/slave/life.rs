@@ -36,18 +36,40 @@ impl Slave {
     /// Nothing is computed yet: parameters may still be set one after the other.
     pub fn enter_initialisation(&mut self, given: Option<Experiment>) {
         if let Phase::Instantiated { experiment } = self.phase {
-            self.phase = Phase::Initialising { experiment: given.unwrap_or(experiment), stale: true };
+            self.phase = Phase::Initialising { experiment: given.unwrap_or(experiment), before: None };
         }
     }
 
-    /// Compute the initial state if a value was set since it was last computed.
+    /// Bring outputs up to date: in Initialization Mode and between internal steps they are computed when asked for.
     ///
     /// # Errors
-    /// The core's refusal; other parameters can then be set and the call repeated.
+    /// The core's refusal to initialise; other parameters can then be set and the call repeated.
     pub(super) fn refresh(&mut self) -> Result<()> {
-        if let Phase::Initialising { experiment, stale: true } = self.phase {
-            self.simulation.initialise(experiment.start)?;
-            self.phase = Phase::Initialising { experiment, stale: false };
+        match &mut self.phase {
+            Phase::Initialising { experiment, before: before @ None } => {
+                let mut state = vec![0; self.simulation.state_size()];
+                self.simulation.save_state(&mut state)?;
+                if let Err(error) = self.simulation.initialise(experiment.start) {
+                    self.simulation.restore_state(&state)?;
+                    return Err(error.into());
+                }
+                *before = Some(state);
+            }
+            Phase::Updating { fresh: fresh @ false, .. } => {
+                self.simulation.update_outputs();
+                *fresh = true;
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A value is about to be set: in Initialization Mode go back to before the outputs were computed.
+    pub(super) fn invalidate(&mut self) -> Result<()> {
+        if let Phase::Initialising { before, .. } = &mut self.phase
+            && let Some(state) = before.take()
+        {
+            self.simulation.restore_state(&state)?;
         }
         Ok(())
     }

@@ -6,7 +6,8 @@
 //! have; they are allowed nowhere ([`NOWHERE`] says so to the importer) or refused by their own message.
 //!
 //! Beyond the standard one thing is tolerated, because importers do it: FMI 2.0 reading of values that have a start
-//! value while the instance is still `Instantiated` (FMI 3.0 allows that).
+//! value while the instance is still `Instantiated` (FMI 3.0 allows that). Stricter than the standard is one row:
+//! `fmi3GetOutputDerivatives` is refused during an intermediate update, because derivatives belong to communication points.
 
 use super::phase::{ANY, FAILED, INITIALISING, INSTANTIATED, STEPPING, States, TERMINATED, UPDATING, names};
 use super::{Dialect, Phase, Refusal, Result};

@@ -10,7 +10,7 @@ pub struct Experiment {
 }
 
 /// Where an instance is in the state machines of the standards.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Phase {
     /// Instantiated: start values can be set.
     Instantiated {
@@ -21,8 +21,9 @@ pub enum Phase {
     Initialising {
         /// As given.
         experiment: Experiment,
-        /// True if a value was set after outputs were last computed.
-        stale: bool,
+        /// `None` if a value was set after outputs were last computed; else the core's state from before they were, to go
+        /// back to when the next value is set.
+        before: Option<Vec<u8>>,
     },
     /// FMI 2.0 stepComplete, FMI 3.0 Step Mode.
     Stepping {
@@ -35,6 +36,8 @@ pub enum Phase {
         stop: Option<f64>,
         /// Internal time reached (s).
         reached: f64,
+        /// Whether the outputs are those of that time.
+        fresh: bool,
     },
     /// FMI 2.0 stepFailed: the state became non-finite. Reset or restore a saved state.
     Failed {

@@ -1,7 +1,7 @@
 //! Saved states: everything that determines the future of an instance, as bytes.
 //!
-//! Layout, little-endian: magic (8 bytes), version u32, length of the token u32, token, phase u8, stale u8, stop defined
-//! u8, zero u8, time f64, stop time f64, length of the core's state u64, the core's state, FNV-1a 64 of all before. The
+//! Layout, little-endian: magic (8 bytes), version u32, length of the token u32, token, phase u8, stop defined u8, two
+//! zero bytes, time f64, stop time f64, length of the core's state u64, the core's state, FNV-1a 64 of all before. The
 //! length is the same for all states of an FMU.
 
 use super::{Experiment, Phase, Refusal, Result, Slave};
@@ -48,28 +48,28 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Fields of a phase as written: tag, stale, time, stop.
+/// Fields of a phase as written: tag, time, stop.
 fn encode_phase(phase: &Phase, out: &mut Snapshot) {
-    let (tag, stale, time, stop) = match *phase {
-        Phase::Instantiated { experiment } => (0, false, experiment.start, experiment.stop),
-        Phase::Initialising { experiment, stale } => (1, stale, experiment.start, experiment.stop),
-        Phase::Stepping { stop } | Phase::Updating { stop, .. } => (2, false, 0.0, stop),
-        Phase::Failed { last_good } => (3, false, last_good, None),
-        Phase::Terminated { time } => (4, false, time, None),
+    let (tag, time, stop) = match *phase {
+        Phase::Instantiated { experiment } => (0, experiment.start, experiment.stop),
+        Phase::Initialising { experiment, .. } => (1, experiment.start, experiment.stop),
+        Phase::Stepping { stop } | Phase::Updating { stop, .. } => (2, 0.0, stop),
+        Phase::Failed { last_good } => (3, last_good, None),
+        Phase::Terminated { time } => (4, time, None),
     };
-    out.extend([tag, u8::from(stale), u8::from(stop.is_some()), 0]);
+    out.extend([tag, u8::from(stop.is_some()), 0, 0]);
     out.extend(time.to_le_bytes());
     out.extend(stop.unwrap_or(0.0).to_le_bytes());
 }
 
 fn decode_phase(reader: &mut Reader<'_>) -> Result<Phase> {
-    let [tag, stale, has_stop, _] = reader.array()?;
+    let [tag, has_stop, _, _] = reader.array()?;
     let time = f64::from_le_bytes(reader.array()?);
     let stop = Some(f64::from_le_bytes(reader.array()?)).filter(|_| has_stop != 0);
     let experiment = Experiment { start: time, stop };
     match tag {
         0 => Ok(Phase::Instantiated { experiment }),
-        1 => Ok(Phase::Initialising { experiment, stale: stale != 0 }),
+        1 => Ok(Phase::Initialising { experiment, before: None }),
         2 => Ok(Phase::Stepping { stop }),
         3 => Ok(Phase::Failed { last_good: time }),
         4 => Ok(Phase::Terminated { time }),
@@ -167,7 +167,11 @@ impl Slave {
         out.extend(u64::try_from(state).map_err(damaged)?.to_le_bytes());
         let start = out.len();
         out.resize(start + state, 0);
-        self.simulation.save_state(&mut out[start..])?;
+        match &self.phase {
+            // Outputs computed in Initialization Mode are computed again when asked for.
+            Phase::Initialising { before: Some(before), .. } => out[start..].copy_from_slice(before),
+            _ => self.simulation.save_state(&mut out[start..])?,
+        }
         out.extend(checksum(&out).to_le_bytes());
         Ok(out)
     }

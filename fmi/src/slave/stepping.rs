@@ -34,7 +34,7 @@ impl Slave {
         self.simulation.begin_step(current_time, step_size)?;
         #[cfg(feature = "test-panic")]
         assert!(step_size.to_bits() != PANIC_STEP_SIZE.to_bits(), "panic asked for by the test of panics");
-        self.phase = Phase::Updating { stop, reached: self.simulation.time() };
+        self.phase = Phase::Updating { stop, reached: self.simulation.time(), fresh: false };
         Ok(())
     }
 
@@ -48,18 +48,23 @@ impl Slave {
             return Err(Refusal::error("no step is under way"));
         };
         let progress = self.simulation.advance().inspect_err(|_| self.phase = Phase::Failed { last_good })?;
-        self.phase = Phase::Updating { stop, reached: progress.time };
+        self.phase = Phase::Updating { stop, reached: progress.time, fresh: progress.finished };
         Ok(progress)
     }
 
     /// End the communication step: at its end, or at the internal step reached (early return).
-    pub fn end_step(&mut self, early: bool) {
+    ///
+    /// # Errors
+    /// Early: the state is not finite; the phase is [`Phase::Failed`] then.
+    pub fn end_step(&mut self, early: bool) -> Result<()> {
+        let last_good = self.simulation.time();
         if let Phase::Updating { stop, .. } = self.phase {
             if early {
-                self.simulation.end_step_early();
+                self.simulation.end_step_early().inspect_err(|_| self.phase = Phase::Failed { last_good })?;
             }
             self.phase = Phase::Stepping { stop };
         }
+        Ok(())
     }
 
     /// A whole communication step.
@@ -69,7 +74,6 @@ impl Slave {
     pub fn step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
         self.begin_step(current_time, step_size)?;
         while !self.advance()?.finished {}
-        self.end_step(false);
-        Ok(())
+        self.end_step(false)
     }
 }
