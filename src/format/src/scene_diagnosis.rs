@@ -35,11 +35,18 @@ struct Place<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// A refusal of the field `path` (with indices from 1), located where the document holds it.
+    /// A refusal of a field that [`SceneSettings::validate`](tiprub_core::settings::SceneSettings::validate) names by
+    /// its path, with or without indices; located where the document holds exactly one such field.
     pub fn refusal(&self, path: &str, problem: String, remedy: String) -> Error {
         let bare = path.replace('`', "");
-        let span = self.places().into_iter().find(|place| place.path == bare).map(|place| place.span);
-        self.error(span, path, problem, remedy)
+        let mut candidates: Vec<_> = self.places().into_iter().filter(|place| place.path == bare).collect();
+        if candidates.is_empty() {
+            candidates = self.places().into_iter().filter(|place| place.fields == bare).collect();
+            candidates.retain(|place| !place.path.ends_with(']'));
+        }
+        let only = candidates.first().filter(|first| candidates.iter().all(|place| place.path == first.path));
+        let what = only.map_or(path, |place| &place.path);
+        self.error(only.map(|place| place.span.clone()), what, problem, remedy)
     }
 
     fn error(&self, span: Option<Range<usize>>, what: &str, problem: String, remedy: String) -> Error {
@@ -168,7 +175,14 @@ pub fn check_brackets(document: &Document) -> Result<(), Error> {
         let problem = format!("{} found, {problem}", value.get_ref().type_str());
         return Err(document.error(Some(key.span()), name, problem, format!("Write {}", header(name))));
     }
-    Ok(())
+    match document.places().into_iter().find(|place| place.fields == "surface.shape" && !place.value.is_table()) {
+        Some(place) => {
+            let problem = format!("{} found, a table expected", place.value.type_str());
+            let remedy = "Write it as { kind = \"circular\" } or with the keys of another kind";
+            Err(document.error(Some(place.span), &place.path, problem, remedy.into()))
+        }
+        None => Ok(()),
+    }
 }
 
 /// The first value below `path` that the library would describe as `found`.
@@ -212,7 +226,6 @@ fn plain(expected: &str) -> &str {
         "f64" => "a number",
         "u32" | "usize" => "a whole number, not negative",
         "a sequence" => "a list",
-        "internally tagged enum Shape" => "a table such as { kind = \"circular\" }",
         "a boolean" => "true or false",
         other => other,
     }
