@@ -570,7 +570,7 @@ fn two_threads_with_an_instance_each_and_two_on_one() {
         for step in 0..300 {
             slave.expect(slave.step(f64::from(step) * 1e-4, 1e-4));
         }
-        let reals: Vec<_> = slave.reals(&[0, 1, 2, 9, 10, 11]).into_iter().map(f64::to_bits).collect();
+        let reals: Vec<_> = slave.reals(&[0, 1, 2, 11, 12, 13]).into_iter().map(f64::to_bits).collect();
         reals
     };
     let run3 = || {
@@ -579,7 +579,7 @@ fn two_threads_with_an_instance_each_and_two_on_one() {
         for step in 0..300 {
             assert_eq!(slave.step(f64::from(step) * 1e-4, 1e-4).status, OK);
         }
-        let reals: Vec<_> = slave.reals(&[0, 1, 2, 9, 10, 11], 6).into_iter().map(f64::to_bits).collect();
+        let reals: Vec<_> = slave.reals(&[0, 1, 2, 11, 12, 13], 6).into_iter().map(f64::to_bits).collect();
         reals
     };
     let alone = run2();
