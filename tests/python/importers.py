@@ -1,5 +1,7 @@
 """FMPy's instances under one roof: values by FMI 2.0 scalar name, messages collected."""
 
+from ctypes import byref
+
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
     FMU2Slave,
@@ -10,6 +12,7 @@ from fmpy.fmi2 import (
     fmi2StepFinishedTYPE,
 )
 from fmpy.fmi3 import FMU3Slave
+from fmpy.logging import addLoggerProxy
 
 
 class Importer:
@@ -73,13 +76,14 @@ class Two(Importer):
         allocate, free = fmi2CallbackAllocateMemoryTYPE(0), fmi2CallbackFreeMemoryTYPE(0)
         self.callbacks = fmi2CallbackFunctions(logger, allocate, free, fmi2StepFinishedTYPE(0), None)
         self.alive = logger
+        # FMPy's own C function, which formats the variadic message before it comes here.
+        addLoggerProxy(byref(self.callbacks))
         try:
             self.fmu.instantiate(callbacks=self.callbacks, loggingOn=False)
         except Exception as error:
             raise RuntimeError(self.log) from error
 
     def collect(self, _environment, _name, _status, _category, message):
-        # FMPy's callback type has no variadic part: what arrives is the format.
         self.messages.append(message.decode())
 
     def enter(self, start=0.0, stop=None):

@@ -1,11 +1,13 @@
 //! Callers that break every rule of the standards short of passing dangling pointers. Each case ends in Error (or NULL)
 //! with a message that names the culprit, changes nothing, and leaves the instance usable.
 
+#![allow(clippy::float_cmp, reason = "values are compared for being untouched")]
+
 use std::ffi::{CString, c_void};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use tiprub_tests::api::Fmi3Api;
-use tiprub_tests::scene::{Resources, SCENE, rom};
+use tiprub_tests::scene::{Resources, SCENE, reference, rom};
 use tiprub_tests::{DISCARD, ERROR, OK, fmi2, fmi3, shipped};
 
 /// Cases tried, for the summary.
@@ -76,7 +78,7 @@ fn instantiation_refuses_and_says_why() {
         (fmi3::Arguments { path: text("resources"), ..good.clone() }, "not absolute"),
         (fmi3::Arguments { event_mode: true, ..good.clone() }, "Event Mode"),
         (fmi3::Arguments { intermediate: vec![99_999], ..good.clone() }, "99999"),
-        (fmi3::Arguments { intermediate: vec![2], ..good.clone() }, "neither input nor output"),
+        (fmi3::Arguments { intermediate: vec![reference("gap_offset")], ..good.clone() }, "neither input nor output"),
     ];
     for (arguments, reason) in cases3 {
         refused(ERROR, &fmi3::Slave::try_new(&api3, &arguments).expect_err("must be refused"), reason);
@@ -185,7 +187,8 @@ fn arguments_of_get_and_set() {
     let slave = fmi2::Slave::initialised(&api, &resources);
     let handle = slave.handle;
     let (null_in, null_out) = (std::ptr::null(), std::ptr::null_mut());
-    let (speed, mut out) = ([1_u32], [7.5_f64; 4]);
+    let (speed, friction, output) = ([reference("speed")], reference("friction_coefficient"), reference("rotor_angle"));
+    let mut out = [7.5_f64; 4];
     // SAFETY: every pointer is NULL or to an array of at least the elements that a correct library touches.
     unsafe {
         // Nothing to do is legal, with NULL arrays too.
@@ -206,7 +209,7 @@ fn arguments_of_get_and_set() {
         }
         let (status, log) = get(speed.as_ptr().byte_add(1), 1, out.as_mut_ptr());
         refused(status, &log, "not aligned");
-        let unknown = [1, 4_000_000_000];
+        let unknown = [speed[0], 4_000_000_000];
         let (status, log) = get(unknown.as_ptr(), 2, out.as_mut_ptr());
         refused(status, &log, "4000000000 does not exist");
         assert!(out.iter().all(|value| *value == 7.5), "a failing get writes nothing: {out:?}");
@@ -219,25 +222,25 @@ fn arguments_of_get_and_set() {
         refused((api.fmi2SetReal)(handle, speed.as_ptr(), 1, null_in), &slave.log(), "argument value is NULL");
         // The first is fine, the second is not: neither is set.
         for (second, value, reason) in [
-            (2, f64::NAN, "friction_coefficient"),
-            (2, f64::INFINITY, "not finite"),
-            (2, -0.1, "outside 0 to"),
+            (friction, f64::NAN, "friction_coefficient"),
+            (friction, f64::INFINITY, "not finite"),
+            (friction, -0.1, "outside 0 to"),
             (0, 1.0, "time"),
-            (12, 1.0, "cannot be set"),
+            (output, 1.0, "cannot be set"),
         ] {
-            let (references, values) = ([1_u32, second], [310.0, value]);
+            let (references, values) = ([speed[0], second], [310.0, value]);
             let status = (api.fmi2SetReal)(handle, references.as_ptr(), 2, values.as_ptr());
             refused(status, &slave.log(), reason);
             assert_eq!(slave.reals(&speed), [300.0], "nothing is set");
         }
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            refused(slave.set_reals(&speed, &[value]), &slave.log(), "speed (value reference 1)");
+            refused(slave.set_reals(&speed, &[value]), &slave.log(), "speed (value reference");
             refused(slave.set_derivatives(&speed, 1, &[value]), &slave.log(), "not finite");
         }
         for order in [0, 2, -1, i32::MAX] {
             refused(slave.set_derivatives(&speed, order, &[1.0]), &slave.log(), "order");
         }
-        refused(slave.set_derivatives(&[2], 1, &[1.0]), &slave.log(), "not a continuous input");
+        refused(slave.set_derivatives(&[friction], 1, &[1.0]), &slave.log(), "not a continuous input");
     }
     slave.expect(slave.step(0.0, 1e-4));
     summary("get and set");
@@ -486,7 +489,7 @@ unsafe extern "C" fn misbehave(
         let (api, handle): (&Fmi3Api, _) = (&*(*context).api, (*context).handle);
         let (mut a, mut b, mut c, mut d) = (false, false, false, 0.0);
         let mut state = std::ptr::null_mut();
-        let (friction, value) = (2_u32, 0.5);
+        let (friction, value) = (reference("friction_coefficient"), 0.5);
         let statuses = [
             (api.fmi3DoStep)(handle, 0.0, 1e-6, true, &raw mut a, &raw mut b, &raw mut c, &raw mut d),
             (api.fmi3Reset)(handle),
@@ -565,12 +568,14 @@ unsafe impl Sync for Shared {}
 fn two_threads_with_an_instance_each_and_two_on_one() {
     let path = shipped();
     let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), Resources::new(false));
+    let references =
+        ["time", "rotor_angle", "clearance_minimum", "force_x", "normal_impulse", "blade[1].clearance"].map(reference);
     let run2 = || {
         let slave = fmi2::Slave::initialised(&api2, &resources);
         for step in 0..300 {
             slave.expect(slave.step(f64::from(step) * 1e-4, 1e-4));
         }
-        let reals: Vec<_> = slave.reals(&[0, 1, 2, 11, 12, 13]).into_iter().map(f64::to_bits).collect();
+        let reals: Vec<_> = slave.reals(&references).into_iter().map(f64::to_bits).collect();
         reals
     };
     let run3 = || {
@@ -579,7 +584,7 @@ fn two_threads_with_an_instance_each_and_two_on_one() {
         for step in 0..300 {
             assert_eq!(slave.step(f64::from(step) * 1e-4, 1e-4).status, OK);
         }
-        let reals: Vec<_> = slave.reals(&[0, 1, 2, 11, 12, 13], 6).into_iter().map(f64::to_bits).collect();
+        let reals: Vec<_> = slave.reals(&references, references.len()).into_iter().map(f64::to_bits).collect();
         reals
     };
     let alone = run2();

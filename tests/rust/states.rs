@@ -213,11 +213,12 @@ fn derivatives_of_inputs_are_part_of_the_state() {
     let api = fmi2::load(&shipped());
     let (resources, references) = (Resources::new(false), references());
     let slave = fmi2::Slave::initialised(&api, &resources);
-    slave.expect(slave.set_derivatives(&[1], 1, &[5e4]));
+    let speed = tiprub_tests::scene::reference("speed");
+    slave.expect(slave.set_derivatives(&[speed], 1, &[5e4]));
     let state = slave.save();
     let first = march(&slave, &references, 0, 30);
     slave.expect(slave.restore(state));
-    slave.expect(slave.set_reals(&[1], &[300.0]));
+    slave.expect(slave.set_reals(&[speed], &[300.0]));
     assert!(march(&slave, &references, 0, 30) != first, "setting the input ends its derivative");
     slave.expect(slave.restore(state));
     assert_eq!(march(&slave, &references, 0, 30), first);
