@@ -1,0 +1,253 @@
+//! Line plots as SVG: axes with units, a legend, light colours, series shortened without losing peaks.
+
+use plotters::{
+    coord::Shift,
+    prelude::*,
+    style::text_anchor::{HPos, Pos, VPos},
+};
+
+use super::decimate::decimate;
+use crate::{Failure, Result};
+
+/// Plots are drawn at twice the size they are shown at: the SVG backend rounds to whole units.
+const SCALE: u32 = 2;
+const WIDTH: u32 = 920 * SCALE;
+const BUCKETS: usize = 700;
+const INK: RGBColor = RGBColor(52, 58, 66);
+const GRID: RGBColor = RGBColor(232, 235, 239);
+
+/// Line colours, distinguishable with colour-vision deficiency and on grey paper.
+pub const COLORS: [RGBColor; 5] = [
+    RGBColor(31, 93, 160),
+    RGBColor(214, 112, 24),
+    RGBColor(36, 140, 118),
+    RGBColor(170, 52, 116),
+    RGBColor(110, 116, 124),
+];
+
+/// One line of a plot.
+#[derive(Debug, Clone)]
+pub struct Series {
+    /// Legend text.
+    pub label: String,
+    /// Points, x ascending.
+    pub points: Vec<(f64, f64)>,
+    /// Draw as dots with stems (few discrete values) instead of a line.
+    pub stems: bool,
+}
+
+impl Series {
+    /// A line.
+    pub fn line(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self { label: label.into(), points, stems: false }
+    }
+}
+
+/// One plot.
+#[derive(Debug, Clone)]
+pub struct Plot {
+    /// Axis label with unit.
+    pub x_label: String,
+    /// Axis label with unit.
+    pub y_label: String,
+    /// Lines, at most as many as [`COLORS`].
+    pub series: Vec<Series>,
+    /// Height in CSS pixels at a width of 920.
+    pub height: u32,
+    /// Horizontal lines with a meaning (value, text).
+    pub levels: Vec<(f64, String)>,
+    /// Logarithmic y axis; values ≤ 0 are left out.
+    pub logarithmic: bool,
+}
+
+impl Plot {
+    /// An empty plot with linear axes.
+    pub fn new(x_label: impl Into<String>, y_label: impl Into<String>, series: Vec<Series>) -> Self {
+        let (x_label, y_label) = (x_label.into(), y_label.into());
+        Self { x_label, y_label, series, height: 260, levels: Vec::new(), logarithmic: false }
+    }
+
+    /// The SVG element.
+    ///
+    /// # Errors
+    /// The plotting library refuses (never seen with finite data).
+    pub fn to_svg(&self) -> Result<String> {
+        let mut svg = String::new();
+        {
+            let area = SVGBackend::with_string(&mut svg, (WIDTH, self.height * SCALE)).into_drawing_area();
+            self.draw(&area).map_err(|error| Failure::new("report plot", error, ""))?;
+            area.present().map_err(|error| Failure::new("report plot", error, ""))?;
+        }
+        Ok(svg)
+    }
+
+    fn draw(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), String> {
+        let x_range = padded(self.finite_points().map(|point| point.0), 0.0);
+        let levels = self.levels.iter().map(|level| level.0);
+        if self.logarithmic {
+            let positive = self.finite_points().map(|point| point.1).filter(|value| *value > 0.0);
+            let y_range = padded(positive.map(f64::log10), 0.06);
+            let range = (10_f64.powf(y_range.start)..10_f64.powf(y_range.end)).log_scale();
+            let chart = chart_frame(area).build_cartesian_2d(x_range, range).map_err(|error| error.to_string())?;
+            return self.draw_in(chart);
+        }
+        let y_range = padded(self.finite_points().map(|point| point.1).chain(levels), 0.06);
+        let chart = chart_frame(area).build_cartesian_2d(x_range, y_range).map_err(|error| error.to_string())?;
+        self.draw_in(chart)
+    }
+
+    fn draw_in<'a, 'b: 'a, Y>(
+        &self,
+        mut chart: ChartContext<'a, SVGBackend<'b>, Cartesian2d<plotters::coord::types::RangedCoordf64, Y>>,
+    ) -> Result<(), String>
+    where
+        Y: Ranged<ValueType = f64> + plotters::coord::ranged1d::ValueFormatter<f64>,
+    {
+        let text = ("sans-serif", 15 * SCALE).into_font().color(&INK);
+        chart
+            .configure_mesh()
+            .x_desc(&self.x_label)
+            .y_desc(&self.y_label)
+            .axis_desc_style(text.clone())
+            .label_style(("sans-serif", 14 * SCALE).into_font().color(&INK))
+            .x_labels(10)
+            .y_labels(6)
+            .max_light_lines(1)
+            .bold_line_style(GRID.stroke_width(SCALE))
+            .light_line_style(TRANSPARENT)
+            .axis_style(INK.mix(0.5).stroke_width(SCALE))
+            .y_label_formatter(&|value| tick(*value))
+            .x_label_formatter(&|value| tick(*value))
+            .draw()
+            .map_err(|error| error.to_string())?;
+        let x_range = padded(self.finite_points().map(|point| point.0), 0.0);
+        for (level, label) in &self.levels {
+            let ends = [(x_range.start, *level), (x_range.end, *level)];
+            let style = INK.mix(0.55).stroke_width(SCALE);
+            chart.draw_series(DashedLineSeries::new(ends, 10, 8, style)).map_err(|error| error.to_string())?;
+            let small = ("sans-serif", 13 * SCALE).into_font().color(&INK.mix(0.8)).pos(Pos::new(HPos::Right, VPos::Bottom));
+            let place = (x_range.end, *level);
+            chart
+                .draw_series(std::iter::once(EmptyElement::at(place) + Text::new(label.clone(), (-6, -6), small)))
+                .map_err(|error| error.to_string())?;
+        }
+        self.draw_series(&mut chart)?;
+        if self.series.len() > 1 {
+            chart
+                .configure_series_labels()
+                .position(SeriesLabelPosition::UpperRight)
+                .background_style(WHITE.mix(0.85))
+                .border_style(TRANSPARENT)
+                .label_font(("sans-serif", 14 * SCALE).into_font().color(&INK))
+                .legend_area_size(28 * i32::try_from(SCALE).unwrap_or(1))
+                .draw()
+                .map_err(|error| error.to_string())?;
+        }
+        Ok(())
+    }
+
+    fn draw_series<'a, 'b: 'a, Y>(
+        &self,
+        chart: &mut ChartContext<'a, SVGBackend<'b>, Cartesian2d<plotters::coord::types::RangedCoordf64, Y>>,
+    ) -> Result<(), String>
+    where
+        Y: Ranged<ValueType = f64>,
+    {
+        for (series, color) in self.series.iter().zip(COLORS) {
+            let finite = series.points.iter().copied().filter(|point| self.is_drawable(*point)).collect::<Vec<_>>();
+            let points = decimate(&finite, BUCKETS);
+            let style = color.stroke_width(SCALE + SCALE / 2);
+            let drawn = if series.stems {
+                chart.draw_series(points.into_iter().map(|point| Circle::new(point, 4 * SCALE, color.filled())))
+            } else {
+                chart.draw_series(LineSeries::new(points, style).map(|element| element))
+            };
+            let stroke = color.stroke_width(2 * SCALE);
+            drawn
+                .map_err(|error| error.to_string())?
+                .label(series.label.clone())
+                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 40, y)], stroke));
+        }
+        Ok(())
+    }
+
+    fn is_drawable(&self, point: (f64, f64)) -> bool {
+        point.0.is_finite() && point.1.is_finite() && (!self.logarithmic || point.1 > 0.0)
+    }
+
+    fn finite_points(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.series.iter().flat_map(|series| series.points.iter().copied()).filter(|point| self.is_drawable(*point))
+    }
+}
+
+fn chart_frame<'a, 'b>(
+    area: &'a DrawingArea<SVGBackend<'b>, Shift>,
+) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
+    let mut builder = ChartBuilder::on(area);
+    builder.margin(8 * SCALE).x_label_area_size(42 * SCALE).y_label_area_size(78 * SCALE);
+    builder
+}
+
+/// Smallest range that holds the values, with a margin; never empty.
+fn padded(values: impl Iterator<Item = f64>, margin: f64) -> std::ops::Range<f64> {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    if !(low.is_finite() && high.is_finite()) {
+        return 0.0..1.0;
+    }
+    let span = high - low;
+    if span > 1e-12 * high.abs().max(low.abs()) {
+        low - margin * span..high + margin * span
+    } else {
+        let half = if high == 0.0 { 1.0 } else { 0.1 * high.abs() };
+        low - half..high + half
+    }
+}
+
+/// Axis number without trailing zeros or round-off digits.
+fn tick(value: f64) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    if !(1e-3..1e5).contains(&value.abs()) {
+        let text = format!("{value:.2e}");
+        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
+        return format!("{mantissa}e{exponent}");
+    }
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_short() {
+        let ticks = [0.0, 0.30000000000000004, -1500.0, 2e-7, 1e6, -0.25].map(tick);
+        assert_eq!(ticks, ["0", "0.3", "-1500", "2e-7", "1e6", "-0.25"]);
+    }
+
+    #[test]
+    fn a_plot_shows_its_labels_and_stays_small() {
+        let points: Vec<(f64, f64)> = (0..200_000).map(|i| (f64::from(i), f64::from(i % 977))).collect();
+        let mut plot = Plot::new("time (ms)", "gap (µm)", vec![Series::line("leading edge", points)]);
+        plot.levels.push((500.0, "nominal".into()));
+        plot.series.push(Series::line("empty", Vec::new()));
+        let svg = plot.to_svg().unwrap();
+        for text in ["time (ms)", "gap (µm)", "leading edge", "nominal"] {
+            assert!(svg.contains(text), "{text}");
+        }
+        assert!(svg.len() < 60_000, "{} bytes", svg.len());
+    }
+
+    #[test]
+    fn degenerate_data_are_drawn_too() {
+        for points in [vec![], vec![(0.0, 0.0)], vec![(1.0, f64::NAN), (2.0, 3.0)], vec![(0.0, 7.0), (1.0, 7.0)]] {
+            for logarithmic in [false, true] {
+                let plot = Plot { logarithmic, ..Plot::new("x", "y", vec![Series::line("a", points.clone())]) };
+                assert!(plot.to_svg().unwrap().starts_with("<svg"));
+            }
+        }
+    }
+}
