@@ -8,13 +8,20 @@
 //! derived from, and marches the contact problem from one communication point to the next.
 #![forbid(unsafe_op_in_unsafe_fn)]
 
+pub mod contact;
+pub mod dynamics;
 mod error;
+mod ledger;
+pub mod persist;
 pub mod rom;
 pub mod settings;
 pub mod simulation;
+pub mod stability;
+pub mod system;
 pub mod variables;
 
 pub use error::{Error, Result};
+pub use ledger::{Ledger, Sum};
 pub use rom::Rom;
 pub use settings::Scene;
 pub use simulation::Simulation;

@@ -1,1 +1,30 @@
-//! Under construction.
+//! Scene files (TOML), ROM files (safetensors) and the `resources/` directory of an FMU: text and bytes to the plain
+//! data of `tiprub-core`, and back.
+//!
+//! Everything here is used twice: by the command line, which writes, and by the library inside the FMU, which reads
+//! what the command line wrote. Nothing is trusted: every length, shape, key and value is checked, and every refusal
+//! names the file, the place in it, what is wrong, and the remedy.
+#![forbid(unsafe_code)]
+
+mod error;
+mod load;
+mod resources;
+mod rom_file;
+mod rom_layout;
+mod scene_diagnosis;
+mod scene_file;
+mod scene_layout;
+mod suggestion;
+
+pub use error::Error;
+pub use load::{BUILTIN_PREFIX, load_scene};
+pub use resources::{
+    PACKAGE_FILE, RESOURCES_FORMAT_VERSION, Resources, SCENE_FILE, instantiation_token, load_resources, resource_files,
+};
+pub use rom_file::{read_rom, write_rom};
+pub use rom_layout::{ARRAYS, ArrayLayout, METADATA, MetadataLayout, ROM_FORMAT, ROM_FORMAT_VERSION};
+pub use scene_file::{parse_scene, write_scene};
+pub use scene_layout::{FIELDS, REPEATED_TABLES, SINGLE_TABLES, SceneField};
+
+/// Result of this crate.
+pub type Result<T, E = Error> = core::result::Result<T, E>;

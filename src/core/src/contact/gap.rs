@@ -1,0 +1,221 @@
+//! Gap functions: where the master nodes are with respect to the slave, as affine functions of their displacement.
+//!
+//! Within one step the gap of node i is g = offset + n·u (eq. 3 of the paper with the closest point at the node's
+//! undeformed place in the turning frame). For a surface of revolution with shape s(θ) and meridional slope m,
+//! F = r_c(θ, z) − r has the gradient (−1, s'/r, m) with respect to (radial, tangential, axial) displacement; dividing
+//! by its length N gives the unit normal from the casing to the blade and the gap F/N. The slope terms are what lets
+//! a frictionless lobe draw power from the shaft.
+
+use super::surface::Surface;
+use crate::settings::Meridian;
+use crate::{Error, Result, Rom};
+
+/// Prescribed motion of rotor and casing at one instant.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Drive {
+    /// Angle of the rotor θ_r (rad).
+    pub rotor_angle: f64,
+    /// Speed of the rotor Ω (rad/s).
+    pub speed: f64,
+    /// Added to every radial clearance (m).
+    pub gap_offset: f64,
+    /// Factor on the shape of the casing (-), ramp included.
+    pub shape_factor: f64,
+    /// Rotation of the shape about +z (rad).
+    pub shape_rotation: f64,
+    /// Uniform change of the casing radius (m).
+    pub radius_change: f64,
+}
+
+/// Gap offsets and unit normals of one instant, arrays `[node · lanes + lane]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Geometry {
+    /// Gap of the undeformed node (m).
+    pub offset: Vec<f64>,
+    /// Components of the unit normal, pointing from the slave to the master.
+    pub normal: [Vec<f64>; 3],
+}
+
+impl Geometry {
+    fn new(len: usize) -> Self {
+        Self { offset: vec![0.0; len], normal: [vec![0.0; len], vec![0.0; len], vec![0.0; len]] }
+    }
+
+    /// Unit normal of one node of one lane.
+    pub fn normal_at(&self, index: usize) -> [f64; 3] {
+        [self.normal[0][index], self.normal[1][index], self.normal[2][index]]
+    }
+}
+
+/// A gap function compiled for stepping.
+#[derive(Debug, Clone, PartialEq)]
+pub enum GapLaw {
+    /// Constant normals and gaps: plane obstacles and node-to-node pairs.
+    Fixed(FixedGap),
+    /// Sectors around an axis inside a rigid surface of revolution.
+    Revolution(RevolutionGap),
+}
+
+/// Constant normals, gaps and sliding velocities of one group of contacts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FixedGap {
+    /// Unit normal of each contact, from the slave to the master.
+    pub normals: Vec<[f64; 3]>,
+    /// Initial gap of each contact (m).
+    pub gaps: Vec<f64>,
+    /// Prescribed velocity of the master relative to the slave (m/s), on top of the deformation.
+    pub sliding: Vec<[f64; 3]>,
+}
+
+/// Contact nodes of equally spaced sectors facing a surface of revolution.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RevolutionGap {
+    surface: Surface,
+    lanes: usize,
+    sectors: usize,
+    /// Angle in the rotating frame, `[node · lanes + lane]` (rad).
+    angles: Vec<f64>,
+    /// Radius per node (m).
+    radii: Vec<f64>,
+    /// Meridional slope per node.
+    slopes: Vec<f64>,
+    /// Radial clearance per lane (m).
+    clearances: Vec<f64>,
+}
+
+impl RevolutionGap {
+    /// Place `rom.sectors` sectors around the axis; `clearances` holds one radial clearance (m) per sector.
+    ///
+    /// # Errors
+    /// Wrong number of clearances.
+    pub fn new(rom: &Rom, surface: Surface, clearances: &[f64], meridian: Meridian, lanes: usize) -> Result<Self> {
+        let sectors = rom.sectors;
+        if clearances.len() != sectors {
+            return Err(Error::invalid(
+                "contact.sector_gaps",
+                format!("{} values for {sectors} sectors", clearances.len()),
+                "Give one gap (m) per sector, or remove the line to use `gap` for all",
+            ));
+        }
+        let mut angles = vec![0.0; rom.contact_nodes.len() * lanes];
+        for (node, contact) in rom.contact_nodes.iter().enumerate() {
+            for sector in 0..sectors {
+                angles[node * lanes + sector] = contact.position[1] + sector_angle(sector, sectors);
+            }
+        }
+        let mut padded = vec![f64::MAX; lanes];
+        padded[..sectors].copy_from_slice(clearances);
+        Ok(Self {
+            surface,
+            lanes,
+            sectors,
+            angles,
+            radii: rom.contact_nodes.iter().map(|node| node.position[0]).collect(),
+            slopes: rom
+                .contact_nodes
+                .iter()
+                .map(|node| if meridian == Meridian::Contour { node.meridional_slope } else { 0.0 })
+                .collect(),
+            clearances: padded,
+        })
+    }
+
+    /// Fixed-frame angle of a node (rad) for a rotor angle.
+    pub fn angle(&self, node: usize, sector: usize, rotor_angle: f64) -> f64 {
+        self.angles[node * self.lanes + sector] + rotor_angle
+    }
+
+    /// Radius of a contact node (m).
+    pub fn radius(&self, node: usize) -> f64 {
+        self.radii[node]
+    }
+
+    fn evaluate(&self, drive: &Drive, geometry: &mut Geometry) {
+        let opening = drive.gap_offset + drive.radius_change;
+        let turned = drive.rotor_angle - drive.shape_rotation;
+        for node in 0..self.radii.len() {
+            let (slope, radius) = (self.slopes[node], self.radii[node]);
+            let start = node * self.lanes;
+            for sector in 0..self.sectors {
+                let index = start + sector;
+                let (shape, turn) = match &self.surface {
+                    Surface::Circular => (0.0, 0.0),
+                    surface => surface.evaluate(self.angles[index] + turned),
+                };
+                let tangential = drive.shape_factor * turn / radius;
+                let length = (1.0 + tangential * tangential + slope * slope).sqrt();
+                geometry.offset[index] = (self.clearances[sector] + opening + drive.shape_factor * shape) / length;
+                geometry.normal[0][index] = -1.0 / length;
+                geometry.normal[1][index] = tangential / length;
+                geometry.normal[2][index] = slope / length;
+            }
+        }
+    }
+}
+
+/// Angle of sector `sector` of `sectors` (rad).
+pub fn sector_angle(sector: usize, sectors: usize) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
+    let fraction = sector as f64 / sectors as f64;
+    std::f64::consts::TAU * fraction
+}
+
+impl GapLaw {
+    /// Number of contact nodes per sector.
+    pub fn nodes(&self) -> usize {
+        match self {
+            Self::Fixed(law) => law.gaps.len(),
+            Self::Revolution(law) => law.radii.len(),
+        }
+    }
+
+    /// Arrays of the right size, filled once for laws that never change.
+    pub fn geometry(&self, lanes: usize) -> Geometry {
+        // Padding lanes keep an infinite clearance, so that they never touch.
+        let mut geometry = Geometry::new(self.nodes() * lanes);
+        geometry.offset.fill(f64::INFINITY);
+        if let Self::Fixed(law) = self {
+            for (node, (normal, gap)) in law.normals.iter().zip(&law.gaps).enumerate() {
+                geometry.offset[node * lanes] = *gap;
+                for component in 0..3 {
+                    geometry.normal[component][node * lanes] = normal[component];
+                }
+            }
+        }
+        geometry
+    }
+
+    /// Offsets and normals at an instant.
+    pub fn evaluate(&self, drive: &Drive, geometry: &mut Geometry) {
+        match self {
+            Self::Fixed(_) => {}
+            Self::Revolution(law) => law.evaluate(drive, geometry),
+        }
+    }
+
+    /// Prescribed velocity of the master relative to the slave (m/s), without deformation.
+    pub fn sliding_velocity(&self, node: usize, drive: &Drive) -> [f64; 3] {
+        match self {
+            Self::Fixed(law) => law.sliding[node],
+            Self::Revolution(law) => [0.0, drive.speed * law.radii[node], 0.0],
+        }
+    }
+
+    /// Unit slip direction of the master in the tangent plane, from the predicted relative velocity (m/s); zero
+    /// when nothing slides. On surfaces of revolution axial slip is neglected, as in section 4.3 of the paper.
+    pub fn slip_direction(&self, velocity: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
+        let candidate = match self {
+            Self::Fixed(_) => velocity,
+            Self::Revolution(_) => [0.0, velocity[1], 0.0],
+        };
+        let along = dot(candidate, normal);
+        let tangent: [f64; 3] = std::array::from_fn(|i| candidate[i] - along * normal[i]);
+        let length = dot(tangent, tangent).sqrt();
+        if length > 0.0 { tangent.map(|value| value / length) } else { [0.0; 3] }
+    }
+}
+
+/// Scalar product.
+pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

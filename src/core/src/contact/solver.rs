@@ -1,0 +1,295 @@
+//! The unilateral contact problem of one step on one group of coupled nodes.
+//!
+//! With g the predicted gaps and W = C_Nᵀ A⁻¹ C_NT the Delassus matrix (normal gap of node i per multiplier of
+//! node j, friction included), the corrected gaps are g + Wλ.
+//!
+//! * [`ContactSolver::film`]: the paper's rule (eqs 10-11). Penetration is detected once; equality is enforced on that set, and
+//!   neither a negative λ nor a penetration caused elsewhere is looked at again.
+//! * [`ContactSolver::lcp`]: 0 ≤ λ ⟂ g + Wλ ≥ 0 on all nodes by block principal pivoting, started from the last step's
+//!   set. When the number of infeasible nodes stops falling it continues with Murty's least-index rule, which is
+//!   finite for every P-matrix (J. J. Júdice, F. M. Pires, Computers & Operations Research 21, 1994).
+
+use nalgebra::DMatrix;
+
+/// Pivots below this fraction of the largest diagonal belong to redundant contacts (coincident nodes).
+const REDUNDANT_PIVOT: f64 = 1e-12;
+/// Gaps and multipliers within this fraction of their scale count as zero.
+const ZERO_FRACTION: f64 = 1e-13;
+/// Block exchanges allowed without progress before Murty's rule takes over.
+const PATIENCE: usize = 8;
+
+/// What one solve did, and whether it succeeded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Outcome {
+    /// The complementarity conditions hold.
+    pub solved: bool,
+    /// Linear systems factorised.
+    pub factorisations: usize,
+}
+
+/// Scratch of one problem size; allocates only when made.
+#[derive(Debug, Clone)]
+pub struct ContactSolver {
+    size: usize,
+    /// Delassus matrix, filled by the caller.
+    pub delassus: DMatrix<f64>,
+    /// Predicted gaps (m), filled by the caller; corrected gaps on return.
+    pub gaps: Vec<f64>,
+    /// Multipliers (N), set by the solvers.
+    pub multipliers: Vec<f64>,
+    /// Active set: for the complementarity solver, start and result.
+    pub active: Vec<bool>,
+    factor: DMatrix<f64>,
+    right: Vec<f64>,
+    members: Vec<usize>,
+    corrected: Vec<f64>,
+}
+
+impl ContactSolver {
+    /// Room for problems of exactly `size` nodes.
+    pub fn new(size: usize) -> Self {
+        Self {
+            size,
+            delassus: DMatrix::zeros(size, size),
+            gaps: vec![0.0; size],
+            multipliers: vec![0.0; size],
+            active: vec![false; size],
+            factor: DMatrix::zeros(size, size),
+            right: vec![0.0; size],
+            members: Vec::with_capacity(size),
+            corrected: vec![0.0; size],
+        }
+    }
+
+    /// Number of nodes.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// The paper's correction (eqs 10-11): equality on the nodes that penetrate in the prediction.
+    pub fn film(&mut self) -> Outcome {
+        for node in 0..self.size {
+            self.active[node] = self.gaps[node] < 0.0;
+        }
+        self.solve_active();
+        self.correct_gaps();
+        std::mem::swap(&mut self.gaps, &mut self.corrected);
+        Outcome { solved: true, factorisations: 1 }
+    }
+
+    /// Complementarity on all nodes; `active` is the starting guess and returns the set found.
+    pub fn lcp(&mut self) -> Outcome {
+        let scale = self.gaps.iter().fold(0.0, |largest: f64, gap| largest.max(gap.abs()));
+        for node in 0..self.size {
+            self.active[node] |= self.gaps[node] < 0.0;
+        }
+        let limit = 100 + 20 * self.size + (1 << self.size.min(14));
+        let (mut best, mut patience) = (usize::MAX, PATIENCE);
+        for factorisations in 1..=limit {
+            self.solve_active();
+            self.correct_gaps();
+            let largest = self.multipliers.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+            let (count, last) = self.count_infeasible(scale, largest);
+            if count == 0 {
+                self.settle();
+                return Outcome { solved: true, factorisations };
+            }
+            if count < best {
+                (best, patience) = (count, PATIENCE);
+            } else {
+                patience = patience.saturating_sub(1);
+            }
+            if patience > 0 {
+                self.exchange_all(scale, largest);
+            } else {
+                self.active[last] = !self.active[last];
+            }
+        }
+        Outcome { solved: false, factorisations: limit }
+    }
+
+    fn infeasible(&self, node: usize, gap_scale: f64, multiplier_scale: f64) -> bool {
+        if self.active[node] {
+            self.multipliers[node] < -ZERO_FRACTION * multiplier_scale
+        } else {
+            self.corrected[node] < -ZERO_FRACTION * gap_scale
+        }
+    }
+
+    fn count_infeasible(&self, gap_scale: f64, multiplier_scale: f64) -> (usize, usize) {
+        let infeasible = (0..self.size).filter(|node| self.infeasible(*node, gap_scale, multiplier_scale));
+        infeasible.fold((0, 0), |(count, _), node| (count + 1, node))
+    }
+
+    fn exchange_all(&mut self, gap_scale: f64, multiplier_scale: f64) {
+        for node in 0..self.size {
+            if self.infeasible(node, gap_scale, multiplier_scale) {
+                self.active[node] = !self.active[node];
+            }
+        }
+    }
+
+    /// Remove rounding from the accepted solution: λ ≥ 0 exactly, gap ≥ 0 exactly.
+    fn settle(&mut self) {
+        for node in 0..self.size {
+            self.multipliers[node] = self.multipliers[node].max(0.0);
+            self.gaps[node] = if self.active[node] { 0.0 } else { self.corrected[node].max(0.0) };
+            self.active[node] = self.multipliers[node] > 0.0;
+        }
+    }
+
+    fn correct_gaps(&mut self) {
+        for row in 0..self.size {
+            let moved: f64 =
+                self.members.iter().map(|column| self.delassus[(row, *column)] * self.multipliers[*column]).sum();
+            self.corrected[row] = self.gaps[row] + moved;
+        }
+    }
+
+    /// W_AA λ_A = −g_A on the active set by elimination with diagonal pivoting, λ = 0 elsewhere. A P-matrix needs no
+    /// other pivots; a vanishing pivot marks a contact that the others already enforce, and its λ stays 0.
+    fn solve_active(&mut self) {
+        self.members.clear();
+        self.members.extend((0..self.size).filter(|node| self.active[*node]));
+        self.multipliers.fill(0.0);
+        let count = self.members.len();
+        for (row, i) in self.members.iter().enumerate() {
+            self.right[row] = -self.gaps[*i];
+            for (column, j) in self.members.iter().enumerate() {
+                self.factor[(row, column)] = self.delassus[(*i, *j)];
+            }
+        }
+        let largest = (0..count).fold(0.0, |largest: f64, row| largest.max(self.factor[(row, row)].abs()));
+        let mut rank = 0;
+        while rank < count {
+            let pivot = (rank..count).fold(rank, |best, row| {
+                if self.factor[(row, row)].abs() > self.factor[(best, best)].abs() { row } else { best }
+            });
+            if self.factor[(pivot, pivot)].abs() <= REDUNDANT_PIVOT * largest {
+                break;
+            }
+            self.exchange_members(rank, pivot, count);
+            self.eliminate(rank, count);
+            rank += 1;
+        }
+        for row in (0..rank).rev() {
+            let known: f64 = (row + 1..rank).map(|column| self.factor[(row, column)] * self.right[column]).sum();
+            self.right[row] = (self.right[row] - known) / self.factor[(row, row)];
+            self.multipliers[self.members[row]] = self.right[row];
+        }
+        self.members.truncate(rank);
+    }
+
+    fn exchange_members(&mut self, a: usize, b: usize, count: usize) {
+        if a == b {
+            return;
+        }
+        self.members.swap(a, b);
+        self.right.swap(a, b);
+        for other in 0..count {
+            self.factor.swap((a, other), (b, other));
+        }
+        for other in 0..count {
+            self.factor.swap((other, a), (other, b));
+        }
+    }
+
+    fn eliminate(&mut self, rank: usize, count: usize) {
+        for row in rank + 1..count {
+            let ratio = self.factor[(row, rank)] / self.factor[(rank, rank)];
+            if ratio == 0.0 {
+                continue;
+            }
+            for column in rank + 1..count {
+                let value = self.factor[(rank, column)];
+                self.factor[(row, column)] -= ratio * value;
+            }
+            self.right[row] -= ratio * self.right[rank];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// The solution by trying every active set: independent of pivoting rules.
+    fn brute_force(w: &DMatrix<f64>, g: &[f64]) -> Vec<f64> {
+        let n = g.len();
+        for set in 0..1_usize << n {
+            let members: Vec<usize> = (0..n).filter(|i| set >> i & 1 == 1).collect();
+            let sub = DMatrix::from_fn(members.len(), members.len(), |i, j| w[(members[i], members[j])]);
+            let right = nalgebra::DVector::from_fn(members.len(), |i, _| -g[members[i]]);
+            let solution = if members.is_empty() { Some(right) } else { sub.lu().solve(&right) };
+            let Some(solution) = solution else { continue };
+            let mut lambda = vec![0.0; n];
+            for (index, member) in members.iter().enumerate() {
+                lambda[*member] = solution[index];
+            }
+            let feasible = (0..n).all(|i| {
+                let gap = g[i] + (0..n).map(|j| w[(i, j)] * lambda[j]).sum::<f64>();
+                lambda[i] >= -1e-12 && (gap >= -1e-12)
+            });
+            if feasible {
+                return lambda;
+            }
+        }
+        panic!("no solution: not a P-matrix");
+    }
+
+    /// A random matrix with positive definite symmetric part, hence a P-matrix.
+    fn p_matrix(entries: &[f64], n: usize) -> DMatrix<f64> {
+        let a = DMatrix::from_fn(n, n, |i, j| entries[i * n + j]);
+        let skew = DMatrix::from_fn(n, n, |i, j| 0.3 * (entries[i * n + j] - entries[j * n + i]));
+        &a * a.transpose() + DMatrix::identity(n, n) * 0.05 + skew
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(1000))]
+        #[test]
+        fn complementarity_solution_equals_brute_force(
+            n in 1_usize..7,
+            entries in prop::collection::vec(-1.0..1.0_f64, 49),
+            gaps in prop::collection::vec(-1.0..1.0_f64, 7),
+            warm in prop::collection::vec(any::<bool>(), 7),
+        ) {
+            let w = p_matrix(&entries, n);
+            let mut solver = ContactSolver::new(n);
+            solver.delassus.copy_from(&w);
+            solver.gaps.copy_from_slice(&gaps[..n]);
+            solver.active.copy_from_slice(&warm[..n]);
+            let outcome = solver.lcp();
+            prop_assert!(outcome.solved);
+            let expected = brute_force(&w, &gaps[..n]);
+            let scale = expected.iter().fold(1.0_f64, |a, b| a.max(b.abs()));
+            for (found, expected) in solver.multipliers.iter().zip(&expected) {
+                prop_assert!((found - expected).abs() < 1e-9 * scale, "{found} vs {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn coincident_nodes_share_one_constraint() {
+        let mut solver = ContactSolver::new(3);
+        solver.delassus.copy_from_slice(&[2.0, 2.0, 0.1, 2.0, 2.0, 0.1, 0.1, 0.1, 1.0]);
+        solver.gaps.copy_from_slice(&[-1.0, -1.0, 0.5]);
+        let outcome = solver.lcp();
+        assert!(outcome.solved);
+        assert!((solver.multipliers[0] + solver.multipliers[1] - 0.5).abs() < 1e-12);
+        assert!(solver.gaps.iter().all(|gap| *gap >= 0.0));
+    }
+
+    #[test]
+    fn film_leaves_what_it_does_not_look_at() {
+        // Pushing node 1 out pulls node 2 in: FILM does not notice, complementarity does.
+        let mut solver = ContactSolver::new(2);
+        solver.delassus.copy_from_slice(&[1.0, -0.9, -0.9, 1.0]);
+        solver.gaps.copy_from_slice(&[-1.0, 0.1]);
+        let mut exact = solver.clone();
+        solver.film();
+        assert!(solver.gaps[1] < -0.7 && solver.gaps[0].abs() < 1e-15);
+        exact.lcp();
+        assert!(exact.gaps.iter().all(|gap| *gap >= 0.0) && exact.multipliers.iter().all(|value| *value > 0.0));
+    }
+}

@@ -1,0 +1,396 @@
+//! State of all modes of all sectors, and the fused pass of one step.
+//!
+//! Layout: sectors are SIMD lanes in chunks of [`LANES`]; within a chunk the modes follow each other,
+//! `state[(chunk · modes + mode) · width + lane]`. The pass predicts (eq. 9 of the paper without contact), recovers
+//! the displacements of the contact rows and adds up the damping loss while a chunk is in registers; no horizontal
+//! sum occurs. Contact forces are then applied to the few sectors that touch.
+
+use nalgebra::DMatrix;
+
+use super::dispatch::InstructionSet;
+use super::modal::ModalModel;
+use super::scheme::{ModeCoefficients, free_increment, resample};
+use crate::persist::{Persist, Reader, Writer, persist_fields};
+use crate::settings::Scheme;
+
+/// Lanes of one chunk: one 512-bit register of f64.
+pub const LANES: usize = 8;
+
+/// Amplitudes below this are flushed to zero now and then: idle damped modes would decay into denormals.
+const FLUSH_BELOW: f64 = 1e-150;
+
+/// Everything that moves.
+#[derive(Debug, Clone, PartialEq)]
+struct BankState {
+    /// q at the current step.
+    position: Vec<f64>,
+    /// d = q − q⁻.
+    increment: Vec<f64>,
+    /// Displacements of the contact rows at the current step, `[row][lane]`.
+    displacement: Vec<f64>,
+    /// The same one step earlier.
+    displacement_before: Vec<f64>,
+    /// Damping loss per lane since the last collection (J).
+    loss: Vec<f64>,
+}
+
+persist_fields!(BankState { position, increment, displacement, displacement_before, loss });
+
+/// Identical uncoupled sectors in modal coordinates, stepped together.
+#[derive(Debug, Clone)]
+pub struct ModalBank {
+    instruction_set: InstructionSet,
+    sectors: usize,
+    width: usize,
+    chunks: usize,
+    rows: usize,
+    frequencies: Vec<f64>,
+    damping_ratios: Vec<f64>,
+    /// `[mode][row]`.
+    contact_modes: Vec<f64>,
+    coefficients: Vec<ModeCoefficients>,
+    /// G = Φ diag(c) Φᵀ, rows × rows: displacement of the contact rows per unit force held for one step (m/N).
+    flexibility: DMatrix<f64>,
+    step: f64,
+    state: BankState,
+    /// Scratch: increments of the step before.
+    increment_before: Vec<f64>,
+}
+
+impl ModalBank {
+    /// All sectors at rest; [`ModalBank::set_step`] must be called before stepping.
+    pub fn new(model: &ModalModel, sectors: usize) -> Self {
+        let width = if sectors == 1 { 1 } else { LANES };
+        let chunks = sectors.div_ceil(width);
+        let (rows, modes) = (model.contact_modes.nrows(), model.len());
+        let state_len = chunks * modes * width;
+        let lanes = chunks * width;
+        Self {
+            instruction_set: InstructionSet::detect(),
+            sectors,
+            width,
+            chunks,
+            rows,
+            frequencies: model.frequencies.clone(),
+            damping_ratios: model.damping_ratios.clone(),
+            contact_modes: model.contact_modes.as_slice().to_vec(),
+            coefficients: vec![ModeCoefficients::default(); modes],
+            flexibility: DMatrix::zeros(rows, rows),
+            step: 0.0,
+            state: BankState {
+                position: vec![0.0; state_len],
+                increment: vec![0.0; state_len],
+                displacement: vec![0.0; rows * lanes],
+                displacement_before: vec![0.0; rows * lanes],
+                loss: vec![0.0; lanes],
+            },
+            increment_before: vec![0.0; state_len],
+        }
+    }
+
+    /// Number of sectors.
+    pub fn sectors(&self) -> usize {
+        self.sectors
+    }
+
+    /// Lanes of a displacement row: sectors rounded up to whole chunks.
+    pub fn lanes(&self) -> usize {
+        self.chunks * self.width
+    }
+
+    /// Number of contact rows (3 per contact node).
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of modes of one sector.
+    pub fn modes(&self) -> usize {
+        self.frequencies.len()
+    }
+
+    /// Step size of the coefficients in use (s).
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// Flexibility of the contact rows over one step (m/N), rows × rows.
+    pub fn flexibility(&self) -> &DMatrix<f64> {
+        &self.flexibility
+    }
+
+    /// Displacements of the contact rows at the current step (m), `[row][lane]`.
+    pub fn displacement(&self) -> &[f64] {
+        &self.state.displacement
+    }
+
+    /// Displacements of the contact rows one step earlier (m), `[row][lane]`.
+    pub fn displacement_before(&self) -> &[f64] {
+        &self.state.displacement_before
+    }
+
+    /// Displacement of one contact row of one sector (m).
+    pub fn row(&self, row: usize, sector: usize) -> f64 {
+        self.state.displacement[row * self.lanes() + sector]
+    }
+
+    /// The same one step earlier (m).
+    pub fn row_before(&self, row: usize, sector: usize) -> f64 {
+        self.state.displacement_before[row * self.lanes() + sector]
+    }
+
+    fn index(&self, mode: usize, sector: usize) -> usize {
+        (sector / self.width * self.modes() + mode) * self.width + sector % self.width
+    }
+
+    /// Modal position and increment of one mode of one sector.
+    pub fn modal_state(&self, mode: usize, sector: usize) -> (f64, f64) {
+        let index = self.index(mode, sector);
+        (self.state.position[index], self.state.increment[index])
+    }
+
+    /// Set a sector's modal position q and velocity q̇; the increment is that of free motion under no force.
+    pub fn set_modal_state(&mut self, mode: usize, sector: usize, position: f64, velocity: f64) {
+        let (frequency, ratio, step) = (self.frequencies[mode], self.damping_ratios[mode], self.step);
+        let index = self.index(mode, sector);
+        self.state.position[index] = position;
+        self.state.increment[index] = free_increment(frequency, ratio, position, velocity, step);
+    }
+
+    /// Recompute the contact displacements from the modal state (after setting it).
+    pub fn recover(&mut self) {
+        let lanes = self.lanes();
+        self.state.displacement.fill(0.0);
+        self.state.displacement_before.fill(0.0);
+        for sector in 0..self.sectors {
+            for mode in 0..self.modes() {
+                let (position, increment) = self.modal_state(mode, sector);
+                for row in 0..self.rows {
+                    let shape = self.contact_modes[mode * self.rows + row];
+                    self.state.displacement[row * lanes + sector] += shape * position;
+                    self.state.displacement_before[row * lanes + sector] += shape * (position - increment);
+                }
+            }
+        }
+    }
+
+    /// Everything at rest and undeformed.
+    pub fn rest(&mut self) {
+        for values in [
+            &mut self.state.position,
+            &mut self.state.increment,
+            &mut self.state.displacement,
+            &mut self.state.displacement_before,
+            &mut self.state.loss,
+        ] {
+            values.fill(0.0);
+        }
+    }
+
+    /// New step size: coefficients and flexibility. The state is not touched (see [`ModalBank::resample`]).
+    pub fn set_step(&mut self, scheme: Scheme, step: f64) {
+        self.step = step;
+        for (mode, coefficients) in self.coefficients.iter_mut().enumerate() {
+            *coefficients = ModeCoefficients::new(scheme, self.frequencies[mode], self.damping_ratios[mode], step);
+        }
+        for row in 0..self.rows {
+            for column in 0..self.rows {
+                let terms = self.coefficients.iter().enumerate().map(|(mode, coefficients)| {
+                    let shapes = &self.contact_modes[mode * self.rows..][..self.rows];
+                    shapes[row] * coefficients.compliance * shapes[column]
+                });
+                self.flexibility[(row, column)] = terms.sum();
+            }
+        }
+    }
+
+    /// Modal damping ratio of all modes (takes effect with the next [`ModalBank::set_step`]).
+    pub fn set_damping_ratio(&mut self, damping_ratio: f64) {
+        self.damping_ratios.fill(damping_ratio);
+    }
+
+    /// Carry the state from the step size in use to `new_step`, each sector under its last contact force
+    /// (`forces[row · lanes + sector]`, N), then use the new coefficients.
+    pub fn resample(&mut self, scheme: Scheme, new_step: f64, forces: &[f64]) {
+        let lanes = self.lanes();
+        for sector in 0..self.sectors {
+            for mode in 0..self.modes() {
+                let shapes = &self.contact_modes[mode * self.rows..][..self.rows];
+                let force = shapes.iter().enumerate().map(|(row, shape)| shape * forces[row * lanes + sector]).sum();
+                let index = self.index(mode, sector);
+                self.state.increment[index] = resample(
+                    self.frequencies[mode],
+                    self.damping_ratios[mode],
+                    self.state.position[index],
+                    self.state.increment[index],
+                    force,
+                    self.step,
+                    new_step,
+                );
+            }
+        }
+        self.set_step(scheme, new_step);
+        self.recover();
+    }
+
+    /// Predict one step without contact (eq. 9 of the paper) and recover the contact displacements.
+    pub fn predict(&mut self, with_loss: bool) {
+        std::mem::swap(&mut self.state.increment, &mut self.increment_before);
+        std::mem::swap(&mut self.state.displacement, &mut self.state.displacement_before);
+        let instruction_set = self.instruction_set;
+        match (self.width, with_loss) {
+            (1, true) => instruction_set.run(|| predict_chunks::<1, true>(self)),
+            (1, false) => instruction_set.run(|| predict_chunks::<1, false>(self)),
+            (_, true) => instruction_set.run(|| predict_chunks::<LANES, true>(self)),
+            (_, false) => instruction_set.run(|| predict_chunks::<LANES, false>(self)),
+        }
+    }
+
+    /// Correct one sector for the contact `force` on its rows (N), eq. 11 of the paper.
+    pub fn correct(&mut self, sector: usize, force: &[f64], with_loss: bool) {
+        let rows = self.rows;
+        let mut loss = 0.0;
+        for mode in 0..self.modes() {
+            let shapes = &self.contact_modes[mode * rows..][..rows];
+            let modal_force: f64 = shapes.iter().zip(force).map(|(shape, value)| shape * value).sum();
+            let coefficients = &self.coefficients[mode];
+            let correction = coefficients.compliance * modal_force;
+            let index = self.index(mode, sector);
+            if with_loss {
+                let predicted = self.state.increment[index] + self.increment_before[index];
+                loss += coefficients.loss * correction * (2.0 * predicted + correction);
+            }
+            self.state.position[index] += correction;
+            self.state.increment[index] += correction;
+        }
+        self.state.loss[sector] += loss;
+        let lanes = self.lanes();
+        for row in 0..rows {
+            let moved: f64 = (0..rows).map(|column| self.flexibility[(row, column)] * force[column]).sum();
+            self.state.displacement[row * lanes + sector] += moved;
+        }
+    }
+
+    /// Kinetic and strain energy of all sectors (J), in the quantity the scheme conserves (see [`super::scheme`]).
+    pub fn energies(&self) -> (f64, f64) {
+        let (mut kinetic, mut strain) = (0.0, 0.0);
+        for sector in 0..self.sectors {
+            for (mode, coefficients) in self.coefficients.iter().enumerate() {
+                let (position, increment) = self.modal_state(mode, sector);
+                kinetic += coefficients.inertia * increment * increment;
+                strain += coefficients.spring * position * (position - increment);
+            }
+        }
+        (kinetic, strain)
+    }
+
+    /// Damping loss since the last call (J).
+    pub fn collect_loss(&mut self) -> f64 {
+        let loss = self.state.loss[..self.sectors].iter().sum();
+        self.state.loss.fill(0.0);
+        loss
+    }
+
+    /// Set amplitudes that have decayed to nothing to exactly zero, so that no denormals arise.
+    pub fn flush(&mut self) {
+        for values in [&mut self.state.position, &mut self.state.increment] {
+            for value in values.iter_mut().filter(|value| value.abs() < FLUSH_BELOW) {
+                *value = 0.0;
+            }
+        }
+    }
+
+    /// True when every modal coordinate is finite.
+    pub fn is_finite(&self) -> bool {
+        self.state.position.iter().chain(&self.state.increment).all(|value| value.is_finite())
+    }
+
+    /// Save the state (not the step size).
+    pub fn save(&self, writer: &mut Writer) {
+        self.state.save(writer);
+    }
+
+    /// Restore a saved state.
+    pub fn restore(&mut self, reader: &mut Reader) {
+        self.state.restore(reader);
+    }
+}
+
+/// The fused pass over all chunks. `increment_before` holds d, `state.increment` receives d⁺.
+#[inline(always)]
+fn predict_chunks<const WIDTH: usize, const LOSS: bool>(bank: &mut ModalBank) {
+    let (modes, rows) = (bank.frequencies.len(), bank.rows);
+    let lanes = bank.chunks * WIDTH;
+    let block = modes * WIDTH;
+    for chunk in 0..bank.chunks {
+        let position = &mut bank.state.position[chunk * block..][..block];
+        let before = &bank.increment_before[chunk * block..][..block];
+        let increment = &mut bank.state.increment[chunk * block..][..block];
+        let loss = &mut bank.state.loss[chunk * WIDTH..][..WIDTH];
+        advance_modes::<WIDTH, LOSS>(&bank.coefficients, position, before, increment, loss);
+        // Nine rows (three contact nodes) fit the registers of the widest set; more go in further passes.
+        let mut row = 0;
+        while row < rows {
+            let displacement = &mut bank.state.displacement[row * lanes + chunk * WIDTH..];
+            let shapes = &bank.contact_modes[row..];
+            row += match rows - row {
+                9.. => recover_rows::<WIDTH, 9>(position, shapes, rows, lanes, displacement),
+                6.. => recover_rows::<WIDTH, 6>(position, shapes, rows, lanes, displacement),
+                _ => recover_rows::<WIDTH, 3>(position, shapes, rows, lanes, displacement),
+            };
+        }
+    }
+}
+
+#[inline(always)]
+fn advance_modes<const WIDTH: usize, const LOSS: bool>(
+    coefficients: &[ModeCoefficients],
+    position: &mut [f64],
+    before: &[f64],
+    increment: &mut [f64],
+    loss: &mut [f64],
+) {
+    let mut lost = [0.0; WIDTH];
+    let (position, _) = position.as_chunks_mut::<WIDTH>();
+    let (before, _) = before.as_chunks::<WIDTH>();
+    let (increment, _) = increment.as_chunks_mut::<WIDTH>();
+    for (((k, q), d), next) in coefficients.iter().zip(position).zip(before).zip(increment) {
+        for lane in 0..WIDTH {
+            next[lane] = k.beta * d[lane] - k.kappa * q[lane];
+            q[lane] += next[lane];
+            if LOSS {
+                let twice = next[lane] + d[lane];
+                lost[lane] += k.loss * (twice * twice);
+            }
+        }
+    }
+    if LOSS {
+        for lane in 0..WIDTH {
+            loss[lane] += lost[lane];
+        }
+    }
+}
+
+/// Displacements of `ROWS` contact rows of one chunk; `displacement[row · lanes + lane]`. Returns `ROWS`.
+#[inline(always)]
+fn recover_rows<const WIDTH: usize, const ROWS: usize>(
+    position: &[f64],
+    shapes: &[f64],
+    stride: usize,
+    lanes: usize,
+    displacement: &mut [f64],
+) -> usize {
+    let mut sums = [[0.0; WIDTH]; ROWS];
+    let (position, _) = position.as_chunks::<WIDTH>();
+    for (q, shapes) in position.iter().zip(shapes.chunks(stride)) {
+        let shapes = &shapes[..ROWS];
+        for row in 0..ROWS {
+            for lane in 0..WIDTH {
+                sums[row][lane] += shapes[row] * q[lane];
+            }
+        }
+    }
+    for row in 0..ROWS {
+        displacement[row * lanes..][..WIDTH].copy_from_slice(&sums[row]);
+    }
+    ROWS
+}

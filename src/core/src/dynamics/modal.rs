@@ -1,0 +1,162 @@
+//! Modal form of a reduced-order model: M q̈ + D q̇ + K q = f becomes q̈ + 2ξω q̇ + ω² q = φᵀf per mode.
+//!
+//! For modal damping the two forms are algebraically identical; prediction then costs O(number of modes).
+
+use nalgebra::{DMatrix, SymmetricEigen};
+
+use crate::{Error, Result, Rom};
+
+/// Eigenvalues below this fraction of the largest are rigid modes (ω = 0).
+const RIGID_FRACTION: f64 = 1e-13;
+
+/// Modes of the reduced pencil (K, M), mass-normalised.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModalModel {
+    /// Undamped angular frequencies ω (rad/s), ascending; exactly 0 for rigid modes.
+    pub frequencies: Vec<f64>,
+    /// Damping ratios ξ (-), one per mode.
+    pub damping_ratios: Vec<f64>,
+    /// Displacement of the contact rows per unit modal coordinate, rows × modes.
+    pub contact_modes: DMatrix<f64>,
+    /// Mass-normalised mode shapes in reduced coordinates, n × modes: reduced = shapes · modal.
+    pub shapes: DMatrix<f64>,
+}
+
+impl ModalModel {
+    /// Solve the symmetric eigenproblem of the ROM's matrices and attach one damping ratio to all modes.
+    ///
+    /// # Errors
+    /// Invalid ROM, or a stiffness that is not positive semidefinite.
+    pub fn from_rom(rom: &Rom, damping_ratio: f64) -> Result<Self> {
+        rom.validate()?;
+        if !(0.0..1.0).contains(&damping_ratio) {
+            return Err(Error::invalid(
+                "damping_ratio",
+                format!("{damping_ratio} is not in 0 ≤ ξ < 1"),
+                "Give the modal damping ratio as a fraction of critical, for example 0.005",
+            ));
+        }
+        let (eigenvalues, shapes) = generalised_modes(rom)?;
+        let contact_modes = &rom.contact_map * &shapes;
+        Ok(Self {
+            damping_ratios: vec![damping_ratio; eigenvalues.len()],
+            frequencies: eigenvalues.iter().map(|value| value.sqrt()).collect(),
+            contact_modes,
+            shapes,
+        })
+    }
+
+    /// Several structures side by side as one: modes concatenated, contact rows relative (master − slave).
+    ///
+    /// `pairs` lists (master structure, master node, slave) with an optional slave (structure, node); the rows of
+    /// the result are the relative displacements of the pairs, three components each.
+    ///
+    /// # Errors
+    /// A structure or node index that does not exist.
+    pub fn combined(structures: &[Self], pairs: &[NodePair]) -> Result<Self> {
+        let modes = structures.iter().map(|structure| structure.frequencies.len()).sum();
+        let mut contact_modes = DMatrix::zeros(3 * pairs.len(), modes);
+        let offsets: Vec<usize> = structures
+            .iter()
+            .scan(0, |offset, structure| {
+                let start = *offset;
+                *offset += structure.frequencies.len();
+                Some(start)
+            })
+            .collect();
+        for (row, pair) in pairs.iter().enumerate() {
+            for (reference, sign) in [(Some(pair.master), 1.0), (pair.slave, -1.0)] {
+                let Some((structure, node)) = reference else { continue };
+                let source = structures.get(structure).filter(|s| 3 * node + 2 < s.contact_modes.nrows());
+                let Some(source) = source else {
+                    return Err(Error::invalid(
+                        format!("contact pair {}", row + 1),
+                        format!("structure {structure} has no contact node {node}"),
+                        "Use 0-based indices of existing structures and contact nodes",
+                    ));
+                };
+                for component in 0..3 {
+                    for mode in 0..source.frequencies.len() {
+                        contact_modes[(3 * row + component, offsets[structure] + mode)] +=
+                            sign * source.contact_modes[(3 * node + component, mode)];
+                    }
+                }
+            }
+        }
+        let mut shapes = DMatrix::zeros(structures.iter().map(|s| s.shapes.nrows()).sum(), modes);
+        let mut row = 0;
+        for (structure, offset) in structures.iter().zip(&offsets) {
+            shapes.view_mut((row, *offset), structure.shapes.shape()).copy_from(&structure.shapes);
+            row += structure.shapes.nrows();
+        }
+        Ok(Self {
+            frequencies: structures.iter().flat_map(|s| s.frequencies.iter().copied()).collect(),
+            damping_ratios: structures.iter().flat_map(|s| s.damping_ratios.iter().copied()).collect(),
+            contact_modes,
+            shapes,
+        })
+    }
+
+    /// Number of modes.
+    pub fn len(&self) -> usize {
+        self.frequencies.len()
+    }
+
+    /// True when there is no mode at all.
+    pub fn is_empty(&self) -> bool {
+        self.frequencies.is_empty()
+    }
+
+    /// Largest undamped angular frequency (rad/s).
+    pub fn largest_frequency(&self) -> f64 {
+        self.frequencies.iter().fold(0.0, |largest, value| f64::max(largest, *value))
+    }
+}
+
+/// A node of one structure against a node of another, or against something rigid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NodePair {
+    /// (structure, contact node) of the master.
+    pub master: (usize, usize),
+    /// (structure, contact node) of the slave; `None` for a rigid one.
+    pub slave: Option<(usize, usize)>,
+}
+
+/// Eigenvalues ω² (ascending, rigid ones exactly 0) and mass-normalised modes of K φ = ω² M φ.
+fn generalised_modes(rom: &Rom) -> Result<(Vec<f64>, DMatrix<f64>)> {
+    let Some(cholesky) = rom.mass.clone().cholesky() else {
+        return Err(Error::invalid("ROM array `mass`", "not positive definite", "Write the ROM again"));
+    };
+    let lower = cholesky.l();
+    let half = lower.solve_lower_triangular(&rom.stiffness).unwrap_or_else(|| rom.stiffness.clone());
+    let full = lower.solve_lower_triangular(&half.transpose()).unwrap_or(half);
+    let eigen = SymmetricEigen::new((&full + full.transpose()) * 0.5);
+    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+    order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+    let largest = eigen.eigenvalues.amax();
+    let smallest = eigen.eigenvalues[order[0]];
+    if smallest < -1e-9 * largest {
+        return Err(Error::invalid(
+            "ROM array `stiffness`",
+            format!("not positive semidefinite: eigenvalue {smallest:.3e} rad²/s² at largest {largest:.3e}"),
+            "Write the ROM again",
+        ));
+    }
+    let vectors =
+        DMatrix::from_columns(&order.iter().map(|index| eigen.eigenvectors.column(*index)).collect::<Vec<_>>());
+    let mut shapes = lower.transpose().solve_upper_triangular(&vectors).unwrap_or(vectors);
+    fix_signs(&mut shapes);
+    let values = order.iter().map(|index| eigen.eigenvalues[*index]);
+    let values = values.map(|value| if value < RIGID_FRACTION * largest { 0.0 } else { value }).collect();
+    Ok((values, shapes))
+}
+
+/// An eigenvector's sign is arbitrary; make its largest entry positive so that saved numbers are comparable.
+fn fix_signs(shapes: &mut DMatrix<f64>) {
+    for mut column in shapes.column_iter_mut() {
+        let largest = column.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+        if largest < 0.0 {
+            column.neg_mut();
+        }
+    }
+}

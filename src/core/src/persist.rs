@@ -1,0 +1,150 @@
+//! Saving and restoring state as bytes: one list of fields per struct serves size, save and restore.
+
+/// Appends little-endian values to a buffer of sufficient size.
+#[derive(Debug)]
+pub struct Writer<'a> {
+    buffer: &'a mut [u8],
+    at: usize,
+}
+
+impl<'a> Writer<'a> {
+    /// Start at the beginning of `buffer`.
+    pub fn new(buffer: &'a mut [u8]) -> Self {
+        Self { buffer, at: 0 }
+    }
+
+    /// Bytes written so far, counted even where the buffer is too short (so an empty buffer measures the size).
+    pub fn written(&self) -> usize {
+        self.at
+    }
+
+    fn put(&mut self, bytes: &[u8]) {
+        if let Some(target) = self.buffer.get_mut(self.at..self.at + bytes.len()) {
+            target.copy_from_slice(bytes);
+        }
+        self.at += bytes.len();
+    }
+}
+
+/// Takes little-endian values from a buffer; past its end it yields zeros (the length is checked beforehand).
+#[derive(Debug)]
+pub struct Reader<'a> {
+    buffer: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Reader<'a> {
+    /// Start at the beginning of `buffer`.
+    pub fn new(buffer: &'a [u8]) -> Self {
+        Self { buffer, at: 0 }
+    }
+
+    fn take<const N: usize>(&mut self) -> [u8; N] {
+        let mut bytes = [0; N];
+        if let Some(source) = self.buffer.get(self.at..self.at + N) {
+            bytes.copy_from_slice(source);
+        }
+        self.at += N;
+        bytes
+    }
+}
+
+/// A value that belongs to the state.
+pub trait Persist {
+    /// Append it.
+    fn save(&self, writer: &mut Writer);
+    /// Read it back, in the same order.
+    fn restore(&mut self, reader: &mut Reader);
+}
+
+impl Persist for f64 {
+    fn save(&self, writer: &mut Writer) {
+        writer.put(&self.to_bits().to_le_bytes());
+    }
+    fn restore(&mut self, reader: &mut Reader) {
+        *self = Self::from_bits(u64::from_le_bytes(reader.take()));
+    }
+}
+
+impl Persist for u64 {
+    fn save(&self, writer: &mut Writer) {
+        writer.put(&self.to_le_bytes());
+    }
+    fn restore(&mut self, reader: &mut Reader) {
+        *self = Self::from_le_bytes(reader.take());
+    }
+}
+
+impl Persist for i32 {
+    fn save(&self, writer: &mut Writer) {
+        writer.put(&self.to_le_bytes());
+    }
+    fn restore(&mut self, reader: &mut Reader) {
+        *self = Self::from_le_bytes(reader.take());
+    }
+}
+
+impl Persist for bool {
+    fn save(&self, writer: &mut Writer) {
+        writer.put(&[u8::from(*self)]);
+    }
+    fn restore(&mut self, reader: &mut Reader) {
+        let [byte] = reader.take();
+        *self = byte != 0;
+    }
+}
+
+impl<T: Persist> Persist for [T] {
+    fn save(&self, writer: &mut Writer) {
+        for value in self {
+            value.save(writer);
+        }
+    }
+    fn restore(&mut self, reader: &mut Reader) {
+        for value in self {
+            value.restore(reader);
+        }
+    }
+}
+
+impl<T: Persist> Persist for Vec<T> {
+    fn save(&self, writer: &mut Writer) {
+        self.as_slice().save(writer);
+    }
+    fn restore(&mut self, reader: &mut Reader) {
+        self.as_mut_slice().restore(reader);
+    }
+}
+
+impl<T: Persist, const N: usize> Persist for [T; N] {
+    fn save(&self, writer: &mut Writer) {
+        self.as_slice().save(writer);
+    }
+    fn restore(&mut self, reader: &mut Reader) {
+        self.as_mut_slice().restore(reader);
+    }
+}
+
+/// Implements [`Persist`] for a struct from the list of its fields; a field left out does not compile.
+macro_rules! persist_fields {
+    ($name:ident { $($field:ident),+ $(,)? }) => {
+        impl $crate::persist::Persist for $name {
+            fn save(&self, writer: &mut $crate::persist::Writer) {
+                let Self { $($field),+ } = self;
+                $($crate::persist::Persist::save($field, writer);)+
+            }
+            fn restore(&mut self, reader: &mut $crate::persist::Reader) {
+                let Self { $($field),+ } = self;
+                $($crate::persist::Persist::restore($field, reader);)+
+            }
+        }
+    };
+}
+pub(crate) use persist_fields;
+
+/// FNV-1a over bytes, for fingerprints and checksums of saved states (not for security).
+pub fn fingerprint(bytes: &[u8], seed: u64) -> u64 {
+    bytes
+        .iter()
+        .fold(seed ^ 0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3))
+}

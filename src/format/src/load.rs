@@ -1,0 +1,79 @@
+//! A scene file and the ROM files it names.
+
+use std::fs;
+use std::path::Path;
+
+use tiprub_core::settings::StructureSettings;
+use tiprub_core::{Rom, Scene};
+
+use crate::{Error, Result, parse_scene, read_rom};
+
+/// Start of a `rom` entry that names a model which comes with the program.
+pub const BUILTIN_PREFIX: &str = "builtin:";
+
+/// Read a scene file and its ROM files, which are named relative to it. Names after `builtin:` are handed to
+/// `builtin`, which answers `None` for a name it does not know, and otherwise a ROM or why there is none.
+///
+/// # Errors
+/// [`Error::File`] for files that cannot be read, else as [`parse_scene`] and [`read_rom`].
+pub fn load_scene(path: &Path, builtin: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
+    let text = read_text(path, "Give the path of a scene file (TOML)")?;
+    let settings = parse_scene(&text, &path.display().to_string())?;
+    let directory = path.parent().unwrap_or(Path::new(""));
+    let rom = |(index, structure): (usize, &StructureSettings)| match structure.rom.strip_prefix(BUILTIN_PREFIX) {
+        Some(name) => builtin_rom(path, index, name, builtin(name)),
+        None => {
+            let remedy = format!(
+                "structure[{}].rom in {} names this file, relative to the scene file; correct the name, or write the \
+                 file with `tiprub reduce`",
+                index + 1,
+                path.display()
+            );
+            rom_file(&directory.join(&structure.rom), &remedy)
+        }
+    };
+    let roms = settings.structures.iter().enumerate().map(rom).collect::<Result<_>>()?;
+    Ok(Scene { settings, roms })
+}
+
+fn builtin_rom(scene: &Path, index: usize, name: &str, answer: Option<Result<Rom, String>>) -> Result<Rom> {
+    let refuse = |problem: String, remedy: &str| Error::Scene {
+        origin: scene.display().to_string(),
+        position: None,
+        what: format!("structure[{}].rom", index + 1),
+        problem,
+        remedy: remedy.into(),
+    };
+    match answer {
+        Some(Ok(rom)) => rom.validate().map(|()| rom).map_err(|error| {
+            refuse(format!("the built-in model `{name}` is not usable: {error}"), "Report this to the developers")
+        }),
+        Some(Err(problem)) => Err(refuse(
+            format!("the built-in model `{name}` could not be made: {problem}"),
+            "Give a ROM file instead, or remove the cause named",
+        )),
+        None => Err(refuse(
+            format!("there is no built-in model `{name}`"),
+            "Give the name of a ROM file, or that of a built-in model such as `builtin:rotor37`",
+        )),
+    }
+}
+
+/// Read one ROM file; `remedy` says what to do where it cannot be opened.
+pub(crate) fn rom_file(path: &Path, remedy: &str) -> Result<Rom> {
+    read_rom(&read_bytes(path, remedy)?, &path.display().to_string())
+}
+
+pub(crate) fn read_bytes(path: &Path, remedy: &str) -> Result<Vec<u8>> {
+    fs::read(path).map_err(|error| Error::file(path, format!("cannot be read: {error}"), remedy))
+}
+
+pub(crate) fn read_text(path: &Path, remedy: &str) -> Result<String> {
+    String::from_utf8(read_bytes(path, remedy)?).map_err(|error| text_error(path, &error))
+}
+
+pub(crate) fn text_error(path: &Path, error: &std::string::FromUtf8Error) -> Error {
+    let offset = error.utf8_error().valid_up_to();
+    let line = error.as_bytes()[..offset].iter().filter(|byte| **byte == b'\n').count() + 1;
+    Error::file(path, format!("not UTF-8 text in line {line} (byte {offset})"), "Save the file as UTF-8")
+}

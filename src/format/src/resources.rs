@@ -1,0 +1,143 @@
+//! The `resources/` directory of an FMU: the scene, its ROMs, and how the variables were packaged.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use tiprub_core::{Rom, Scene};
+
+use crate::load::{read_bytes, text_error};
+use crate::{Error, Result, parse_scene, read_rom, write_rom, write_scene};
+
+/// File name of the scene inside `resources/`.
+pub const SCENE_FILE: &str = "scene.toml";
+/// File name of the packaging choices inside `resources/`.
+pub const PACKAGE_FILE: &str = "package.toml";
+/// Version of the layout of `resources/`.
+pub const RESOURCES_FORMAT_VERSION: u32 = 1;
+
+const INTACT: &str = "The FMU is damaged or was changed: import it again, or write it again with `tiprub package`";
+
+/// What an FMU instance needs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Resources {
+    /// Settings and ROMs.
+    pub scene: Scene,
+    /// Instantiation token (FMI 2.0: GUID) that belongs to these resources.
+    pub token: String,
+    /// Whether the FMI 3.0 description has arrays (else scalars, as FMI 2.0 has).
+    pub fmi3_arrays: bool,
+}
+
+/// The content of `package.toml`.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Package {
+    format_version: u32,
+    fmi3_arrays: bool,
+}
+
+/// The files of `resources/`, in fixed order with fixed content for a given scene: the scene (each `rom` replaced by
+/// the file name beside it), one ROM file per structure, the packaging choices.
+pub fn resource_files(scene: &Scene, fmi3_arrays: bool) -> Vec<(String, Vec<u8>)> {
+    let mut settings = scene.settings.clone();
+    for index in 0..settings.structures.len() {
+        settings.structures[index].rom = rom_file_name(scene, index);
+    }
+    let mut files = vec![(SCENE_FILE.to_owned(), write_scene(&settings).into_bytes())];
+    for (structure, rom) in settings.structures.iter().zip(&scene.roms) {
+        files.push((structure.rom.clone(), write_rom(rom)));
+    }
+    let package = Package { format_version: RESOURCES_FORMAT_VERSION, fmi3_arrays };
+    let package = toml::to_string(&package).expect("a number and a flag can be written");
+    files.push((PACKAGE_FILE.to_owned(), package.into_bytes()));
+    files
+}
+
+/// `<structure>.rom.safetensors`, in characters that every file system and zip reader takes. Names that would
+/// collide get their number.
+fn rom_file_name(scene: &Scene, index: usize) -> String {
+    let safe = |name: &str| {
+        let keep = |c: char| if c.is_ascii_alphanumeric() || c == '_' || c == '-' { c } else { '_' };
+        name.chars().map(keep).collect::<String>()
+    };
+    let structures = &scene.settings.structures;
+    let name = safe(&structures[index].name);
+    // Case is ignored as some file systems do.
+    let same = structures.iter().filter(|other| safe(&other.name).eq_ignore_ascii_case(&name)).count();
+    let number = if same > 1 { format!(".{}", index + 1) } else { String::new() };
+    format!("{name}{number}.rom.safetensors")
+}
+
+/// The instantiation token of a set of resource files: `{8-4-4-4-12}` hexadecimal digits of a SHA-256 over the release
+/// of this library and over names and contents, so that a description never meets other resources or another release.
+pub fn instantiation_token(files: &[(String, Vec<u8>)]) -> String {
+    let mut hash = Sha256::new();
+    let mut item = |bytes: &[u8]| {
+        hash.update((bytes.len() as u64).to_le_bytes());
+        hash.update(bytes);
+    };
+    item(env!("CARGO_PKG_VERSION").as_bytes());
+    for (name, content) in files {
+        item(name.as_bytes());
+        item(content);
+    }
+    let mut token = String::from("{");
+    for (index, byte) in hash.finalize().iter().take(16).enumerate() {
+        if matches!(index, 4 | 6 | 8 | 10) {
+            token.push('-');
+        }
+        let _ = write!(token, "{byte:02x}"); // writing to a String cannot fail
+    }
+    token.push('}');
+    token
+}
+
+/// Read the `resources/` directory of an unpacked FMU.
+///
+/// # Errors
+/// [`Error::File`] with the path of a file that is missing, unreadable or from another release; else as
+/// [`parse_scene`] and [`read_rom`].
+pub fn load_resources(directory: &Path) -> Result<Resources> {
+    if !directory.is_dir() {
+        return Err(Error::file(directory, "no such directory (the FMU's resources are expected here)", INTACT));
+    }
+    let mut files = Vec::new();
+    let scene_path = directory.join(SCENE_FILE);
+    let settings = parse_scene(&read_into(directory, SCENE_FILE, &mut files)?, &scene_path.display().to_string())?;
+    let mut roms: Vec<Rom> = Vec::new();
+    for (index, structure) in settings.structures.iter().enumerate() {
+        let name = &structure.rom;
+        if Path::new(name).file_name() != Some(name.as_ref()) || name.contains(['/', '\\']) {
+            let problem = format!("structure[{}].rom = {name:?} is not a file name inside resources/", index + 1);
+            return Err(Error::file(&scene_path, problem, INTACT));
+        }
+        let path = directory.join(name);
+        let bytes = read_bytes(&path, INTACT)?;
+        roms.push(read_rom(&bytes, &path.display().to_string())?);
+        files.push((name.clone(), bytes));
+    }
+    let package = read_into(directory, PACKAGE_FILE, &mut files)?;
+    let package = parse_package(&directory.join(PACKAGE_FILE), &package)?;
+    let token = instantiation_token(&files);
+    Ok(Resources { scene: Scene { settings, roms }, token, fmi3_arrays: package.fmi3_arrays })
+}
+
+fn read_into(directory: &Path, name: &str, files: &mut Vec<(String, Vec<u8>)>) -> Result<String> {
+    let path = directory.join(name);
+    let bytes = read_bytes(&path, INTACT)?;
+    files.push((name.to_owned(), bytes.clone()));
+    String::from_utf8(bytes).map_err(|error| text_error(&path, &error))
+}
+
+fn parse_package(path: &Path, text: &str) -> Result<Package> {
+    let table: toml::Table = toml::from_str(text).map_err(|error| Error::file(path, error.message(), INTACT))?;
+    let version = table.get("format_version").and_then(toml::Value::as_integer);
+    if version != Some(i64::from(RESOURCES_FORMAT_VERSION)) {
+        let found = version.map_or("none".to_owned(), |version| version.to_string());
+        let problem = format!("format_version {found} found, {RESOURCES_FORMAT_VERSION} expected");
+        return Err(Error::file(path, problem, "Write the FMU again with `tiprub package` of the same release"));
+    }
+    table.try_into().map_err(|error: toml::de::Error| Error::file(path, error.message(), INTACT))
+}

@@ -1,0 +1,391 @@
+//! The ROM file: safetensors with the arrays and metadata of [`crate::rom_layout`].
+
+use std::collections::BTreeMap;
+
+use nalgebra::DMatrix;
+use safetensors::{Dtype, SafeTensorError, SafeTensors};
+use sha2::{Digest, Sha256};
+use tiprub_core::Rom;
+use tiprub_core::rom::{ContactNode, Frame, RomChecks};
+
+use crate::rom_layout::{ARRAYS, METADATA, ROM_FORMAT, ROM_FORMAT_VERSION, units_text};
+use crate::{Error, Result, suggestion};
+
+const WRITE_AGAIN: &str = "Write the ROM again; the ROM file chapter of the user guide lists arrays and metadata";
+
+/// An array of the file: shape and values in row-major order.
+struct Array {
+    shape: Vec<usize>,
+    values: Vec<f64>,
+}
+
+type Arrays = BTreeMap<String, Array>;
+type Metadata = BTreeMap<String, String>;
+
+/// Read a ROM from the bytes of a ROM file; `origin` names the file in messages.
+///
+/// # Errors
+/// [`Error::Rom`] naming `origin`, the array or metadata entry, expected and found, and the remedy. The ROM returned
+/// has passed [`Rom::validate`].
+pub fn read_rom(bytes: &[u8], origin: &str) -> Result<Rom> {
+    Reader { origin }.read(bytes)
+}
+
+struct Reader<'a> {
+    origin: &'a str,
+}
+
+impl Reader<'_> {
+    fn read(&self, bytes: &[u8]) -> Result<Rom> {
+        let (arrays, metadata) = self.content(bytes)?;
+        let rom = self.rom(&arrays, &metadata)?;
+        self.checksum(&arrays, &metadata)?;
+        rom.validate().map_err(|error| match error {
+            tiprub_core::Error::Invalid { what, problem, remedy } => self.error(what, problem, remedy),
+            other => self.error("ROM", other.to_string(), WRITE_AGAIN),
+        })?;
+        Ok(rom)
+    }
+
+    fn error(&self, what: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
+        Error::Rom { origin: self.origin.to_owned(), what: what.into(), problem: problem.into(), remedy: remedy.into() }
+    }
+
+    /// Arrays and metadata of the container, names and data types checked.
+    fn content(&self, bytes: &[u8]) -> Result<(Arrays, Metadata)> {
+        let (_, header) = SafeTensors::read_metadata(bytes).map_err(|error| self.container_error(&error, bytes))?;
+        let metadata: Metadata = header.metadata().iter().flatten().map(|(k, v)| (k.clone(), v.clone())).collect();
+        self.check_format(&metadata)?;
+        let known: Vec<&str> = METADATA.iter().map(|entry| entry.name).collect();
+        if let Some(unknown) = metadata.keys().find(|key| !known.contains(&key.as_str())) {
+            return Err(self.error(
+                format!("metadata `{unknown}`"),
+                "no such entry in a ROM file",
+                suggestion::remedy(unknown, &known),
+            ));
+        }
+        let container = SafeTensors::deserialize(bytes).map_err(|error| self.container_error(&error, bytes))?;
+        let mut views = container.tensors();
+        views.sort_by(|a, b| a.0.cmp(&b.0));
+        let known: Vec<&str> = ARRAYS.iter().map(|array| array.name).collect();
+        let mut arrays = Arrays::new();
+        for (name, view) in views {
+            if !known.contains(&name.as_str()) {
+                let remedy = suggestion::remedy(&name, &known);
+                return Err(self.error(format!("array `{name}`"), "no such array in a ROM file", remedy));
+            }
+            if view.dtype() != Dtype::F64 {
+                return Err(self.error(
+                    format!("array `{name}`"),
+                    format!("data type {:?} found, F64 expected", view.dtype()),
+                    "Convert it to 64-bit floating point before saving, in NumPy with `.astype(numpy.float64)`",
+                ));
+            }
+            let (words, _) = view.data().as_chunks::<8>();
+            let values = words.iter().map(|word| f64::from_le_bytes(*word)).collect();
+            arrays.insert(name, Array { shape: view.shape().to_vec(), values });
+        }
+        Ok((arrays, metadata))
+    }
+
+    fn container_error(&self, error: &SafeTensorError, bytes: &[u8]) -> Error {
+        let problem = match error {
+            SafeTensorError::HeaderTooSmall => format!("{} bytes only, too short for a header", bytes.len()),
+            SafeTensorError::HeaderTooLarge | SafeTensorError::InvalidHeaderLength => {
+                format!("header length does not fit the file of {} bytes", bytes.len())
+            }
+            SafeTensorError::MetadataIncompleteBuffer => {
+                format!("the header promises another length than the {} bytes found: truncated or damaged", bytes.len())
+            }
+            other => format!("damaged header ({other})"),
+        };
+        self.error("not a readable safetensors file", problem, "Copy the file again, or write it again")
+    }
+
+    fn check_format(&self, metadata: &Metadata) -> Result<()> {
+        let format = metadata.get("format").map(String::as_str);
+        if format != Some(ROM_FORMAT) {
+            return Err(self.error(
+                "metadata `format`",
+                format!("{} found, \"{ROM_FORMAT}\" expected: not a tiprub ROM file", quoted(format)),
+                "Give a file written by `tiprub reduce`, or add the metadata named in the ROM file chapter",
+            ));
+        }
+        let version = metadata.get("format_version").map(String::as_str);
+        if version != Some(ROM_FORMAT_VERSION) {
+            return Err(self.error(
+                "metadata `format_version`",
+                format!("{} found, \"{ROM_FORMAT_VERSION}\" expected", quoted(version)),
+                "Use the tiprub release that wrote the file, or write the ROM again with this one",
+            ));
+        }
+        Ok(())
+    }
+
+    fn rom(&self, arrays: &Arrays, metadata: &Metadata) -> Result<Rom> {
+        let mass = self.required(arrays, "mass", 2)?;
+        let order = mass.shape[0];
+        let positions = self.required(arrays, "contact_positions", 2)?;
+        let nodes = positions.shape[0];
+        self.shape("mass", mass, &[order, order], "square")?;
+        let stiffness = self.required(arrays, "stiffness", 2)?;
+        self.shape("stiffness", stiffness, &[order, order], "that of `mass`")?;
+        self.shape("contact_positions", positions, &[nodes, 3], "three coordinates per node")?;
+        let map = self.required(arrays, "contact_map", 3)?;
+        let reason = "nodes as in `contact_positions`, 3 components, coordinates as in `mass`";
+        self.shape("contact_map", map, &[nodes, 3, order], reason)?;
+        Ok(Rom {
+            name: self.entry(metadata, "name")?.to_owned(),
+            origin: metadata.get("origin").cloned().unwrap_or_default(),
+            sectors: self.number(metadata, "sectors")?,
+            frame: self.frame(metadata)?,
+            mass: DMatrix::from_row_slice(order, order, &mass.values),
+            stiffness: DMatrix::from_row_slice(order, order, &stiffness.values),
+            damping_ratio: if metadata.contains_key("damping_ratio") {
+                self.number(metadata, "damping_ratio")?
+            } else {
+                0.0
+            },
+            contact_map: DMatrix::from_row_slice(3 * nodes, order, &map.values),
+            contact_nodes: self.contact_nodes(arrays, metadata, positions)?,
+            checks: RomChecks {
+                full_frequencies: self.check_values(arrays, "full_frequencies")?,
+                reduced_frequencies: self.check_values(arrays, "reduced_frequencies")?,
+                frequency_deviation: self.check_values(arrays, "frequency_deviation")?,
+                residual_criterion: self.check_values(arrays, "residual_criterion")?,
+            },
+        })
+    }
+
+    fn required<'a>(&self, arrays: &'a Arrays, name: &str, dimensions: usize) -> Result<&'a Array> {
+        let layout = ARRAYS.iter().find(|array| array.name == name).map_or("", |array| array.shape);
+        let what = format!("array `{name}`");
+        let Some(array) = arrays.get(name) else {
+            let held = arrays.keys().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ");
+            let problem = format!("missing; the file holds {}", if held.is_empty() { "no array" } else { &held });
+            return Err(self.error(what, problem, format!("Add it with shape {layout}")));
+        };
+        if array.shape.len() != dimensions {
+            return Err(self.error(what, format!("shape {:?} found, {layout} expected", array.shape), WRITE_AGAIN));
+        }
+        Ok(array)
+    }
+
+    fn shape(&self, name: &str, array: &Array, expected: &[usize], reason: &str) -> Result<()> {
+        if array.shape == expected {
+            return Ok(());
+        }
+        let problem = format!("shape {:?} found, {expected:?} expected ({reason})", array.shape);
+        Err(self.error(format!("array `{name}`"), problem, WRITE_AGAIN))
+    }
+
+    fn contact_nodes(&self, arrays: &Arrays, metadata: &Metadata, positions: &Array) -> Result<Vec<ContactNode>> {
+        let nodes = positions.shape[0];
+        let slopes = match arrays.get("contact_meridional_slopes") {
+            None => vec![0.0; nodes],
+            Some(array) => {
+                self.shape("contact_meridional_slopes", array, &[nodes], "nodes as in `contact_positions`")?;
+                array.values.clone()
+            }
+        };
+        let names = match metadata.get("contact_names") {
+            None => (1..=nodes).map(|index| format!("node_{index}")).collect(),
+            Some(text) => self.contact_names(text, nodes)?,
+        };
+        let (triples, _) = positions.values.as_chunks::<3>();
+        Ok(names
+            .into_iter()
+            .zip(triples)
+            .zip(slopes)
+            .map(|((name, &position), meridional_slope)| ContactNode { name, position, meridional_slope })
+            .collect())
+    }
+
+    fn contact_names(&self, text: &str, nodes: usize) -> Result<Vec<String>> {
+        let what = "metadata `contact_names`";
+        let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
+        if names.len() != nodes {
+            let problem = format!("{} names found, {nodes} expected (nodes in `contact_positions`)", names.len());
+            return Err(self.error(what, problem, "Give one name per contact node, separated by commas"));
+        }
+        for (index, name) in names.iter().enumerate() {
+            let starts_well = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
+            if !starts_well || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
+                let remedy = "Use letters, digits and underscores, not starting with a digit";
+                return Err(self.error(what, format!("{name:?} cannot be part of a variable name"), remedy));
+            }
+            if names[..index].contains(name) {
+                return Err(self.error(
+                    what,
+                    format!("{name:?} appears twice"),
+                    "Give every contact node its own name",
+                ));
+            }
+        }
+        Ok(names)
+    }
+
+    fn check_values(&self, arrays: &Arrays, name: &str) -> Result<Vec<f64>> {
+        let Some(array) = arrays.get(name) else { return Ok(Vec::new()) };
+        self.shape(name, array, &[array.values.len()], "one value per mode")?;
+        if let Some(index) = array.values.iter().position(|value| !value.is_finite()) {
+            let problem = format!("entry {index} is {}", array.values[index]);
+            return Err(self.error(format!("array `{name}`"), problem, "Leave the array out where a value is unknown"));
+        }
+        Ok(array.values.clone())
+    }
+
+    fn entry<'a>(&self, metadata: &'a Metadata, key: &str) -> Result<&'a str> {
+        let layout = METADATA.iter().find(|entry| entry.name == key).map_or("", |entry| entry.description);
+        let value = metadata.get(key).ok_or_else(|| {
+            self.error(format!("metadata `{key}`"), "missing", format!("Add this string to the metadata: {layout}"))
+        })?;
+        Ok(value)
+    }
+
+    fn number<T: std::str::FromStr>(&self, metadata: &Metadata, key: &str) -> Result<T> {
+        let text = self.entry(metadata, key)?;
+        text.trim().parse().map_err(|_| {
+            let layout = METADATA.iter().find(|entry| entry.name == key).map_or("", |entry| entry.description);
+            self.error(format!("metadata `{key}`"), format!("{text:?} is not such a number"), layout)
+        })
+    }
+
+    fn frame(&self, metadata: &Metadata) -> Result<Frame> {
+        match self.entry(metadata, "frame")? {
+            "cylindrical" => Ok(Frame::Cylindrical),
+            "cartesian" => Ok(Frame::Cartesian),
+            other => Err(self.error(
+                "metadata `frame`",
+                format!("{other:?} is not a frame"),
+                suggestion::remedy(other, &["cylindrical", "cartesian"]),
+            )),
+        }
+    }
+
+    fn checksum(&self, arrays: &Arrays, metadata: &Metadata) -> Result<()> {
+        let Some(stated) = metadata.get("checksum") else { return Ok(()) };
+        let found = checksum(arrays, metadata);
+        if *stated == found {
+            return Ok(());
+        }
+        Err(self.error(
+            "metadata `checksum`",
+            format!("\"{stated}\" stated, \"{found}\" found: the content was damaged or changed after writing"),
+            "Copy the file again; where it was changed on purpose, remove the entry `checksum` from the metadata",
+        ))
+    }
+}
+
+fn quoted(value: Option<&str>) -> String {
+    value.map_or_else(|| "nothing".to_owned(), |value| format!("{value:?}"))
+}
+
+/// SHA-256 over metadata (without the checksum itself) and arrays, both by name, every item with its length.
+fn checksum(arrays: &Arrays, metadata: &Metadata) -> String {
+    let mut hash = Sha256::new();
+    let mut item = |bytes: &[u8]| {
+        hash.update((bytes.len() as u64).to_le_bytes());
+        hash.update(bytes);
+    };
+    for (key, value) in metadata.iter().filter(|(key, _)| *key != "checksum") {
+        item(key.as_bytes());
+        item(value.as_bytes());
+    }
+    for (name, array) in arrays {
+        item(name.as_bytes());
+        item(format!("{:?}", array.shape).as_bytes());
+        item(&little_endian(&array.values));
+    }
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn little_endian(values: &[f64]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
+}
+
+/// The bytes of a ROM file; equal ROMs give equal bytes.
+///
+/// A ROM that does not pass [`Rom::validate`], or whose contact node names are not distinct identifiers, gives a file
+/// that [`read_rom`] refuses.
+pub fn write_rom(rom: &Rom) -> Vec<u8> {
+    let arrays = rom_arrays(rom);
+    let mut metadata = rom_metadata(rom);
+    metadata.insert("checksum".into(), checksum(&arrays, &metadata));
+    container(&arrays, &metadata)
+}
+
+fn rom_metadata(rom: &Rom) -> Metadata {
+    let frame = match rom.frame {
+        Frame::Cylindrical => "cylindrical",
+        Frame::Cartesian => "cartesian",
+    };
+    let names = rom.contact_nodes.iter().map(|node| node.name.as_str()).collect::<Vec<_>>().join(",");
+    [
+        ("format", ROM_FORMAT.to_owned()),
+        ("format_version", ROM_FORMAT_VERSION.to_owned()),
+        ("name", rom.name.clone()),
+        ("origin", rom.origin.clone()),
+        ("sectors", rom.sectors.to_string()),
+        ("frame", frame.to_owned()),
+        ("damping_ratio", rom.damping_ratio.to_string()),
+        ("contact_names", names),
+        ("units", units_text()),
+    ]
+    .into_iter()
+    .map(|(key, value)| (key.to_owned(), value))
+    .collect()
+}
+
+fn rom_arrays(rom: &Rom) -> Arrays {
+    let nodes = rom.contact_nodes.len();
+    let matrix = |matrix: &DMatrix<f64>, shape: Vec<usize>| Array {
+        shape,
+        values: matrix.transpose().as_slice().to_vec(), // nalgebra stores columns, the file stores rows
+    };
+    let list = |values: Vec<f64>, shape: Vec<usize>| Array { shape, values };
+    let square = |m: &DMatrix<f64>| matrix(m, vec![m.nrows(), m.ncols()]);
+    let mut arrays = vec![
+        ("mass", square(&rom.mass)),
+        ("stiffness", square(&rom.stiffness)),
+        ("contact_map", matrix(&rom.contact_map, vec![nodes, 3, rom.contact_map.ncols()])),
+        ("contact_positions", list(rom.contact_nodes.iter().flat_map(|node| node.position).collect(), vec![nodes, 3])),
+        (
+            "contact_meridional_slopes",
+            list(rom.contact_nodes.iter().map(|node| node.meridional_slope).collect(), vec![nodes]),
+        ),
+    ];
+    let checks = &rom.checks;
+    for (name, values) in [
+        ("full_frequencies", &checks.full_frequencies),
+        ("reduced_frequencies", &checks.reduced_frequencies),
+        ("frequency_deviation", &checks.frequency_deviation),
+        ("residual_criterion", &checks.residual_criterion),
+    ] {
+        if !values.is_empty() {
+            arrays.push((name, list(values.clone(), vec![values.len()])));
+        }
+    }
+    arrays.into_iter().map(|(name, array)| (name.to_owned(), array)).collect()
+}
+
+/// The safetensors container: header length, JSON header padded to 8 bytes, data. Written here because the library's
+/// writer takes the metadata from a hash map, whose order, and so the bytes, differ from run to run. Keys are inserted
+/// in alphabetical order, so that serde_json gives the same text whether or not it keeps insertion order.
+fn container(arrays: &Arrays, metadata: &Metadata) -> Vec<u8> {
+    let mut header = serde_json::Map::new();
+    header.insert("__metadata__".into(), serde_json::json!(metadata));
+    let mut data = Vec::new();
+    for (name, array) in arrays {
+        let start = data.len();
+        data.extend(little_endian(&array.values));
+        let entry = serde_json::json!({ "data_offsets": [start, data.len()], "dtype": "F64", "shape": array.shape });
+        header.insert(name.clone(), entry);
+    }
+    let mut text = serde_json::Value::Object(header).to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(8), b' ');
+    let mut bytes = (text.len() as u64).to_le_bytes().to_vec();
+    bytes.extend(text);
+    bytes.extend(data);
+    bytes
+}

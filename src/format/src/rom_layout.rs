@@ -1,0 +1,100 @@
+//! What a ROM file contains: one list for reader, writer and user guide.
+
+/// Value of the metadata entry `format`.
+pub const ROM_FORMAT: &str = "tiprub-rom";
+/// Value of the metadata entry `format_version`.
+pub const ROM_FORMAT_VERSION: &str = "1";
+
+/// One named array of the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ArrayLayout {
+    /// Name in the file.
+    pub name: &'static str,
+    /// Shape in words: `n` reduced coordinates, `nodes` contact nodes of one sector.
+    pub shape: &'static str,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Whether a file must have it.
+    pub required: bool,
+    /// One sentence.
+    pub description: &'static str,
+}
+
+/// One entry of the string metadata.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MetadataLayout {
+    /// Key.
+    pub name: &'static str,
+    /// Default where the entry may be left out.
+    pub default: Option<&'static str>,
+    /// One sentence.
+    pub description: &'static str,
+}
+
+const fn array(
+    name: &'static str,
+    shape: &'static str,
+    unit: &'static str,
+    required: bool,
+    description: &'static str,
+) -> ArrayLayout {
+    ArrayLayout { name, shape, unit, required, description }
+}
+
+/// Every array, in file order.
+pub const ARRAYS: [ArrayLayout; 9] = [
+    array("mass", "[n, n]", "kg", true, "Reduced mass matrix of one sector: symmetric, positive definite."),
+    array("stiffness", "[n, n]", "N/m", true, "Reduced stiffness matrix: symmetric, positive semidefinite."),
+    array(
+        "contact_map",
+        "[nodes, 3, n]",
+        "m per unit coordinate",
+        true,
+        "Displacement components of each contact node caused by each reduced coordinate.",
+    ),
+    array(
+        "contact_positions",
+        "[nodes, 3]",
+        "m, rad, m (cylindrical) or m (cartesian)",
+        true,
+        "Undeformed positions: (r, theta, z) or (x, y, z).",
+    ),
+    array(
+        "contact_meridional_slopes",
+        "[nodes]",
+        "1",
+        false,
+        "Slope dr/dz of the tip contour at each contact node; zero where left out.",
+    ),
+    array("full_frequencies", "[modes]", "Hz", false, "Natural frequencies of the full model, ascending."),
+    array("reduced_frequencies", "[modes]", "Hz", false, "Natural frequencies of the reduced model, ascending."),
+    array("frequency_deviation", "[modes]", "%", false, "Frequency deviation per mode."),
+    array("residual_criterion", "[modes]", "%", false, "Residual convergence criterion per mode."),
+];
+
+const fn entry(name: &'static str, default: Option<&'static str>, description: &'static str) -> MetadataLayout {
+    MetadataLayout { name, default, description }
+}
+
+/// Every metadata entry.
+pub const METADATA: [MetadataLayout; 10] = [
+    entry("format", None, "Always `tiprub-rom`."),
+    entry("format_version", None, "Always `1`."),
+    entry("name", None, "Name of the structure."),
+    entry("origin", Some(""), "Where the model came from: mesh, material, reduction; free text."),
+    entry(
+        "sectors",
+        None,
+        "Number of identical uncoupled copies around the axis, at least 1; 1 is a single structure.",
+    ),
+    entry("frame", None, "`cylindrical` or `cartesian`: directions of positions and displacements."),
+    entry("damping_ratio", Some("0"), "Modal damping ratio, from 0 to below 1; a scene may override it."),
+    entry("contact_names", Some("node_1,node_2,..."), "Names of the contact nodes, separated by commas."),
+    entry("units", Some(""), "Text for the reader of the file: one line per array."),
+    entry("checksum", Some(""), "SHA-256 of the content, checked where present; leave it out when writing by hand."),
+];
+
+/// The text of the metadata entry `units`.
+pub fn units_text() -> String {
+    ARRAYS.iter().map(|array| format!("{} {}: {}", array.name, array.shape, array.unit)).collect::<Vec<_>>().join("\n")
+}

@@ -1,0 +1,231 @@
+//! From what the TOML library says about a wrong scene file to a message a user can act on.
+//!
+//! The library reports a span of the text and a sentence. The field path is found again by searching the parsed
+//! document for that span; inside the tagged table `shape`, where the library only knows the whole table, the key or
+//! value meant is found by its name or by its description in the sentence.
+
+use std::ops::Range;
+
+use toml::Spanned;
+use toml::de::{DeArray, DeTable, DeValue};
+
+use crate::scene_layout::{FIELDS, REPEATED_TABLES, SINGLE_TABLES, header};
+use crate::{Error, suggestion};
+
+/// A syntactically correct scene file.
+pub struct Document<'a> {
+    pub text: &'a str,
+    pub origin: &'a str,
+    pub root: &'a DeTable<'a>,
+}
+
+/// Line and column, both from 1, of a byte offset; columns count characters.
+pub fn position(text: &str, offset: usize) -> (usize, usize) {
+    let before = text.get(..offset.min(text.len())).unwrap_or(text);
+    let line_start = before.rfind('\n').map_or(0, |index| index + 1);
+    (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+}
+
+/// A key, table or value of the document. `fields` is the path without indices, as in [`FIELDS`].
+struct Place<'a> {
+    path: String,
+    fields: String,
+    span: Range<usize>,
+    value: &'a DeValue<'a>,
+}
+
+impl<'a> Document<'a> {
+    /// A refusal of the field `path` (with indices from 1), located where the document holds it.
+    pub fn refusal(&self, path: &str, problem: String, remedy: String) -> Error {
+        let bare = path.replace('`', "");
+        let span = self.places().into_iter().find(|place| place.path == bare).map(|place| place.span);
+        self.error(span, path, problem, remedy)
+    }
+
+    fn error(&self, span: Option<Range<usize>>, what: &str, problem: String, remedy: String) -> Error {
+        Error::Scene {
+            origin: self.origin.to_owned(),
+            position: span.map(|span| position(self.text, span.start)),
+            what: what.to_owned(),
+            problem,
+            remedy,
+        }
+    }
+
+    fn places(&self) -> Vec<Place<'a>> {
+        let mut places = Vec::new();
+        collect_table(self.root, "", "", &mut places);
+        places
+    }
+
+    /// The narrowest place that covers `span`; of equals the deepest.
+    fn covering(&self, span: &Range<usize>) -> Option<Place<'a>> {
+        let covers = |place: &Place| place.span.start <= span.start && span.end <= place.span.end;
+        let candidates = self.places().into_iter().filter(covers);
+        candidates.min_by_key(|place| (place.span.len(), std::cmp::Reverse(place.path.matches(['.', '[']).count())))
+    }
+}
+
+fn collect_table<'a>(table: &'a DeTable<'a>, path: &str, fields: &str, places: &mut Vec<Place<'a>>) {
+    for (key, value) in table {
+        let name: &str = key.get_ref();
+        let join = |head: &str| if head.is_empty() { name.to_owned() } else { format!("{head}.{name}") };
+        let (path, fields) = (join(path), join(fields));
+        places.push(Place { path: path.clone(), fields: fields.clone(), span: key.span(), value: value.get_ref() });
+        collect_value(value, &path, &fields, places);
+    }
+}
+
+fn collect_value<'a>(value: &'a Spanned<DeValue<'a>>, path: &str, fields: &str, places: &mut Vec<Place<'a>>) {
+    places.push(Place { path: path.into(), fields: fields.into(), span: value.span(), value: value.get_ref() });
+    match value.get_ref() {
+        DeValue::Table(table) => collect_table(table, path, fields, places),
+        DeValue::Array(array) => {
+            for (index, element) in array.iter().enumerate() {
+                collect_value(element, &format!("{path}[{}]", index + 1), fields, places);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// The refusal of a document that does not fit the settings.
+pub fn diagnose(document: &Document, error: &toml::de::Error) -> Error {
+    let message = error.message();
+    // The library marks a key missing at the top level with the empty span at the start of the text.
+    let place = error.span().filter(|span| !span.is_empty()).and_then(|span| document.covering(&span));
+    if let Some(name) = quoted(message, "missing field") {
+        return missing(document, place, name);
+    }
+    let Some(place) = place else {
+        return document.error(error.span(), "scene", message.to_owned(), "See the scene file chapter".into());
+    };
+    if let Some(name) = quoted(message, "unknown field") {
+        return unknown_key(document, &place, name, &accepted(message));
+    }
+    if let Some(name) = quoted(message, "unknown variant") {
+        let remedy = suggestion::remedy(name, &accepted(message));
+        return document.error(Some(place.span), &place.path, format!("\"{name}\" is not one of its values"), remedy);
+    }
+    wrong_value(document, place, message)
+}
+
+fn missing(document: &Document, place: Option<Place>, name: &str) -> Error {
+    let (path, fields) = place.as_ref().map_or(("", ""), |place| (&place.path, &place.fields));
+    let join = |head: &str| if head.is_empty() { name.to_owned() } else { format!("{head}.{name}") };
+    let remedy = match FIELDS.iter().find(|field| field.path == join(fields)) {
+        Some(field) => format!("Add `{name} = ...` to {}: {}", header(fields), requirement(field.path)),
+        None => format!("Add a table {}", header(name)),
+    };
+    document.error(place.as_ref().map(|place| place.span.clone()), &join(path), "missing".into(), remedy)
+}
+
+fn unknown_key(document: &Document, place: &Place, name: &str, accepted: &[&str]) -> Error {
+    // The span is that of the key itself, or (in `shape`) that of the table which holds it.
+    let is_key = place.path.rsplit('.').next() == Some(name);
+    let path = if is_key { place.path.clone() } else { format!("{}.{name}", place.path) };
+    let span = document.places().into_iter().find(|other| other.path == path).map(|other| other.span);
+    let mut remedy = suggestion::remedy(name, accepted);
+    if let Some(field) = FIELDS.iter().find(|field| field.key() == name) {
+        remedy = format!("`{name}` belongs to {}. {remedy}", header(field.table()));
+    }
+    document.error(span.or(Some(place.span.clone())), &path, "unknown key".into(), remedy)
+}
+
+fn wrong_value(document: &Document, place: Place, message: &str) -> Error {
+    let rest = message.strip_prefix("invalid type: ").or(message.strip_prefix("invalid value: "));
+    let (found, expected) = rest.and_then(|rest| rest.rsplit_once(", expected ")).unzip();
+    let place = match found {
+        Some(found) if place.fields == "surface.shape" => culprit(document, &place.path, found).unwrap_or(place),
+        _ => place,
+    };
+    let problem = match (found, expected) {
+        (Some(found), Some(expected)) => format!("{found} found, {} expected", plain(expected)),
+        _ => message.to_owned(),
+    };
+    let requirement = requirement(&place.fields);
+    let remedy = if requirement.is_empty() {
+        "See the scene file chapter".into()
+    } else {
+        format!("Expected here: {requirement}")
+    };
+    document.error(Some(place.span), &place.path, problem, remedy)
+}
+
+/// `[contact]` where `[[contact]]` is meant, and the reverse. Checked before the settings are filled in, since the
+/// library would take a list of values in place of a table of named ones.
+pub fn check_brackets(document: &Document) -> Result<(), Error> {
+    for (key, value) in document.root {
+        let name: &str = key.get_ref();
+        let all_tables = |list: &DeArray| list.iter().all(|element| element.get_ref().is_table());
+        let problem = if REPEATED_TABLES.contains(&name) && !value.get_ref().as_array().is_some_and(all_tables) {
+            "a list of tables expected"
+        } else if SINGLE_TABLES.contains(&name) && !value.get_ref().is_table() {
+            "a single table expected"
+        } else {
+            continue;
+        };
+        let problem = format!("{} found, {problem}", value.get_ref().type_str());
+        return Err(document.error(Some(key.span()), name, problem, format!("Write {}", header(name))));
+    }
+    Ok(())
+}
+
+/// The first value below `path` that the library would describe as `found`.
+fn culprit<'a>(document: &Document<'a>, path: &str, found: &str) -> Option<Place<'a>> {
+    let below = format!("{path}.");
+    document
+        .places()
+        .into_iter()
+        .filter(|place| place.path.starts_with(&below) && description(place.value) == found)
+        .max_by_key(|place| place.path.len())
+}
+
+/// A value as the TOML library names it in messages.
+fn description(value: &DeValue) -> String {
+    match value {
+        DeValue::String(text) => format!("string {text:?}"),
+        DeValue::Integer(number) => i64::from_str_radix(&number.as_str().replace('_', ""), number.radix())
+            .map_or_else(|_| "integer".into(), |number| format!("integer `{number}`")),
+        DeValue::Float(number) => {
+            let text =
+                number.as_str().replace('_', "").parse::<f64>().map_or(String::new(), |number| number.to_string());
+            format!("floating point `{text}{}`", if text.contains('.') { "" } else { ".0" })
+        }
+        DeValue::Boolean(value) => format!("boolean `{value}`"),
+        DeValue::Array(_) => "sequence".into(),
+        DeValue::Table(_) => "map".into(),
+        DeValue::Datetime(_) => "date".into(),
+    }
+}
+
+/// Type, range and meaning of a field, for a remedy; empty for unknown paths.
+fn requirement(fields: &str) -> String {
+    let Some(field) = FIELDS.iter().find(|field| field.path == fields) else { return String::new() };
+    let range = if field.range.is_empty() { String::new() } else { format!(" ({})", field.range) };
+    format!("{}{range}. {}", field.value, field.description.trim_end_matches('.'))
+}
+
+/// The library's names of Rust types in words.
+fn plain(expected: &str) -> &str {
+    match expected {
+        "f64" => "a number",
+        "u32" | "usize" => "a whole number, not negative",
+        "a sequence" => "a list",
+        "internally tagged enum Shape" => "a table such as { kind = \"circular\" }",
+        "a boolean" => "true or false",
+        other => other,
+    }
+}
+
+/// The names that a message of the library lists after `expected`, each between backticks.
+fn accepted(message: &str) -> Vec<&str> {
+    let list = message.split_once(", expected ").map_or("", |(_, list)| list);
+    list.split('`').skip(1).step_by(2).collect()
+}
+
+/// The name quoted in a message such as "unknown field `x`, expected ...".
+fn quoted<'a>(message: &'a str, start: &str) -> Option<&'a str> {
+    let rest = message.strip_prefix(start)?.strip_prefix(" `")?;
+    Some(rest.split_once("`, ").map_or_else(|| rest.trim_end_matches('`'), |(name, _)| name))
+}

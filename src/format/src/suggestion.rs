@@ -1,0 +1,43 @@
+//! Did-you-mean for misspelt names.
+
+use strsim::{damerau_levenshtein, jaro_winkler};
+
+/// The accepted name closest to `given`, if one is close enough to be meant.
+pub fn closest<'a>(given: &str, accepted: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let given = normalised(given);
+    let similarity = |name: &str| jaro_winkler(&given, &normalised(name));
+    let best = accepted.into_iter().max_by(|a, b| similarity(a).total_cmp(&similarity(b)))?;
+    let distance = damerau_levenshtein(&given, &normalised(best));
+    let allowed = (given.chars().count() / 3).max(2);
+    (distance <= allowed || similarity(best) > 0.9).then_some(best)
+}
+
+/// Case and the choice between `-` and `_` are the commonest slips: they do not count as differences.
+fn normalised(name: &str) -> String {
+    name.to_lowercase().replace('-', "_")
+}
+
+/// `Did you mean `x`? Accepted here: `x`, `y`, `z`` (the question only where a name is close).
+pub fn remedy(given: &str, accepted: &[&str]) -> String {
+    let list = accepted.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    match closest(given, accepted.iter().copied()) {
+        Some(name) => format!("Did you mean `{name}`? Accepted here: {list}"),
+        None => format!("Accepted here: {list}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slips_are_recognised_and_strangers_are_not() {
+        let names = ["gap", "friction", "sector_gaps", "master", "slave"];
+        assert_eq!(closest("gpa", names), Some("gap"));
+        assert_eq!(closest("Sector-Gaps", names), Some("sector_gaps"));
+        assert_eq!(closest("frction", names), Some("friction"));
+        assert_eq!(closest("viscosity", names), None);
+        assert_eq!(closest("x", []), None);
+        assert_eq!(remedy("viscosity", &["gap"]), "Accepted here: `gap`");
+    }
+}

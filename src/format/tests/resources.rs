@@ -1,0 +1,158 @@
+//! The resources directory of an FMU, and scenes with their ROM files.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use nalgebra::DMatrix;
+use tiprub_core::rom::{ContactNode, Frame, RomChecks};
+use tiprub_core::{Rom, Scene};
+use tiprub_format::{
+    instantiation_token, load_resources, load_scene, read_rom, resource_files, write_rom, write_scene,
+};
+
+fn rom() -> Rom {
+    Rom {
+        name: "blade".into(),
+        origin: "by hand".into(),
+        sectors: 2,
+        frame: Frame::Cylindrical,
+        mass: DMatrix::identity(2, 2),
+        stiffness: DMatrix::from_row_slice(2, 2, &[3e6, -1e6, -1e6, 4e6]),
+        damping_ratio: 0.001,
+        contact_map: DMatrix::from_row_slice(3, 2, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]),
+        contact_nodes: vec![ContactNode {
+            name: "leading_edge".into(),
+            position: [0.25, 0.0, 0.01],
+            meridional_slope: -0.1,
+        }],
+        checks: RomChecks::default(),
+    }
+}
+
+fn scene() -> Scene {
+    Scene { settings: common::complete_scene(), roms: vec![rom()] }
+}
+
+fn write(directory: &Path, files: &[(String, Vec<u8>)]) {
+    for (name, content) in files {
+        fs::write(directory.join(name), content).unwrap();
+    }
+}
+
+#[test]
+fn resources_come_back_with_their_token() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut scene = scene();
+    scene.settings.structures[0].rom = "../elsewhere/some file.safetensors".into();
+    for arrays in [true, false] {
+        let files = resource_files(&scene, arrays);
+        let names: Vec<_> = files.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["scene.toml", "rotor.rom.safetensors", "package.toml"]);
+        write(directory.path(), &files);
+        let read = load_resources(directory.path()).unwrap();
+        assert_eq!(read.token, instantiation_token(&files));
+        assert_eq!(read.fmi3_arrays, arrays);
+        assert_eq!(read.scene.roms, scene.roms);
+        let mut expected = scene.settings.clone();
+        expected.structures[0].rom = "rotor.rom.safetensors".into();
+        assert_eq!(read.scene.settings, expected);
+        assert_eq!(resource_files(&read.scene, arrays), files, "the files are a fixed point");
+    }
+}
+
+#[test]
+fn the_token_is_a_guid_and_sees_every_change() {
+    let files = resource_files(&scene(), true);
+    let token = instantiation_token(&files);
+    let groups: Vec<_> = token.trim_matches(['{', '}']).split('-').map(str::len).collect();
+    assert_eq!((token.len(), groups), (38, vec![8, 4, 4, 4, 12]));
+    assert!(token.chars().all(|c| "{}-0123456789abcdef".contains(c)));
+    assert_eq!(token, instantiation_token(&resource_files(&scene(), true)));
+    assert_ne!(token, instantiation_token(&resource_files(&scene(), false)));
+    let mut moved = files.clone();
+    let byte = moved[0].1.remove(0);
+    moved[0].0.push(char::from(byte));
+    assert_ne!(token, instantiation_token(&moved), "names and contents are kept apart");
+}
+
+#[test]
+fn structure_names_become_distinct_plain_file_names() {
+    let mut scene = scene();
+    scene.settings.structures.push(scene.settings.structures[0].clone());
+    scene.roms.push(rom());
+    scene.settings.structures[0].name = "../a/b".into();
+    scene.settings.structures[1].name = "...A.b".into();
+    let files = resource_files(&scene, true);
+    assert_eq!(files[1].0, "___a_b.1.rom.safetensors");
+    assert_eq!(files[2].0, "___A_b.2.rom.safetensors");
+}
+
+#[test]
+fn damaged_resources_are_refused_with_the_path() {
+    let refused = |change: &dyn Fn(&Path), parts: &[&str]| {
+        let directory = tempfile::tempdir().unwrap();
+        write(directory.path(), &resource_files(&scene(), true));
+        change(directory.path());
+        let message = load_resources(directory.path()).unwrap_err().to_string();
+        for part in parts {
+            assert!(message.contains(part), "{part:?} is not in {message:?}");
+        }
+    };
+    for name in ["scene.toml", "rotor.rom.safetensors", "package.toml"] {
+        refused(&|path| fs::remove_file(path.join(name)).unwrap(), &[name, "cannot be read", "tiprub package"]);
+        refused(&|path| fs::write(path.join(name), b"\xff\xfe\x00").unwrap(), &[name]);
+    }
+    refused(&|path| fs::remove_dir_all(path).unwrap(), &["no such directory"]);
+    let package = |text: &'static str| move |path: &Path| fs::write(path.join("package.toml"), text).unwrap();
+    refused(
+        &package("format_version = 2\nfmi3_arrays = true"),
+        &["package.toml", "format_version 2 found, 1 expected"],
+    );
+    refused(&package("fmi3_arrays = true"), &["format_version none found"]);
+    refused(&package("format_version = 1\nfmi3_arrays = 3"), &["package.toml"]);
+    refused(&package("format_version = 1\nfmi3_arrays = true\nx = 1"), &["package.toml", "x"]);
+    for outside in ["/etc/passwd", "../x", "..", "a/b", "", "a\\b"] {
+        let change = |path: &Path| {
+            let mut settings = common::complete_scene();
+            settings.structures[0].rom = outside.into();
+            fs::write(path.join("scene.toml"), write_scene(&settings)).unwrap();
+        };
+        refused(&change, &["structure[1].rom"]);
+    }
+}
+
+#[test]
+fn a_scene_finds_its_roms_beside_it_or_built_in() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("my scene.toml");
+    let mut settings = common::complete_scene();
+    settings.structures[0].rom = "roms/blade.safetensors".into();
+    fs::write(&path, write_scene(&settings)).unwrap();
+    let none = |_: &str| None;
+    let message = load_scene(&path, &none).unwrap_err().to_string();
+    assert!(message.contains("blade.safetensors: cannot be read"), "{message}");
+    assert!(message.contains("structure[1].rom in "), "{message}");
+
+    fs::create_dir(directory.path().join("roms")).unwrap();
+    fs::write(directory.path().join("roms/blade.safetensors"), write_rom(&rom())).unwrap();
+    let scene = load_scene(&path, &none).unwrap();
+    assert_eq!((&scene.settings, &scene.roms), (&settings, &vec![rom()]));
+
+    settings.structures[0].rom = "builtin:blade".into();
+    fs::write(&path, write_scene(&settings)).unwrap();
+    let message = load_scene(&path, &none).unwrap_err().to_string();
+    assert!(message.contains("there is no built-in model `blade`"), "{message}");
+    let failing = |_: &str| Some(Err("out of memory".to_owned()));
+    assert!(load_scene(&path, &failing).unwrap_err().to_string().contains("out of memory"));
+    let known = |name: &str| (name == "blade").then(|| Ok(rom()));
+    assert_eq!(load_scene(&path, &known).unwrap().roms, [rom()]);
+
+    fs::write(&path, b"name = \"a\"\nx = \"\xff\"").unwrap();
+    let message = load_scene(&path, &none).unwrap_err().to_string();
+    assert!(message.contains("not UTF-8 text in line 2"), "{message}");
+    let message = load_scene(&directory.path().join("absent.toml"), &none).unwrap_err().to_string();
+    assert!(message.contains("absent.toml: cannot be read"), "{message}");
+    assert!(read_rom(&fs::read(&path).unwrap(), "scene").is_err());
+}
