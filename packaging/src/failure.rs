@@ -85,6 +85,21 @@ impl fmt::Display for Failure {
 
 impl std::error::Error for Failure {}
 
+impl From<tiprub_format::Error> for Failure {
+    fn from(error: tiprub_format::Error) -> Self {
+        match error {
+            tiprub_format::Error::Rom { origin, what, problem, remedy } => {
+                Self::new(format!("{origin}: {what}"), problem, remedy)
+            }
+            tiprub_format::Error::Scene { origin, position, what, problem, remedy } => {
+                let place = position.map(|(line, column)| format!(":{line}:{column}")).unwrap_or_default();
+                Self::new(format!("{origin}{place}: {what}"), problem, remedy)
+            }
+            tiprub_format::Error::File { path, problem, remedy } => Self::new(path, problem, remedy),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -20,7 +20,9 @@ pub mod library;
 pub mod native;
 pub mod output_file;
 pub mod recording;
+pub mod reduction;
 pub mod report;
+pub mod rom_facts;
 pub mod scene_source;
 pub mod schedule;
 
