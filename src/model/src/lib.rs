@@ -1,1 +1,28 @@
-//! Under construction.
+//! From a finite-element mesh to a reduced-order model of contact nodes.
+//!
+//! Floor 1. A [`Mesh`] of the six solid [elements](element) is [assembled](assembly) into sparse stiffness and mass,
+//! its lowest modes are found by [shift-invert Lanczos](eigen), and [Craig-Bampton](craig_bampton) leaves a small dense
+//! pencil in the displacements of the contact nodes: a [`tiprub_core::Rom`] with the checks that come with it
+//! (eqs 12 and 13 of the paper). [`rotor37`] is the blade that ships. Nothing is printed: a caller passes a
+//! [listener](progress) and shows what it likes. SI units everywhere.
+#![forbid(unsafe_code)]
+
+pub mod assembly;
+pub mod craig_bampton;
+pub mod eigen;
+pub mod element;
+mod error;
+pub mod inp;
+pub mod material;
+pub mod mesh;
+pub mod progress;
+pub mod reduce;
+pub mod rotor37;
+pub mod sparse;
+
+pub use error::{Error, Result};
+pub use material::Material;
+pub use mesh::{Mesh, surface_quads};
+pub use progress::{Progress, Stage};
+pub use reduce::{Reduction, reduce};
+pub use rotor37::{Rotor37Options, reduce_rotor37};

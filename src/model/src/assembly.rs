@@ -1,0 +1,112 @@
+//! Global stiffness and mass: symbolic pattern from the mesh, numeric values from the elements.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use crate::element::{consistent_mass, stiffness};
+use crate::material::Material;
+use crate::mesh::Mesh;
+use crate::progress::{Listener, Stage, report};
+use crate::sparse::{Pattern, SparseMatrix};
+use crate::{Error, Result};
+
+/// How many elements are computed in parallel before their matrices are added to the global ones.
+const CHUNK: usize = 256;
+
+/// Stiffness (N/m) and consistent mass (kg) of the whole mesh; dof 3·node + component, no boundary applied.
+#[derive(Debug, Clone)]
+pub struct Assembled {
+    /// K.
+    pub stiffness: SparseMatrix,
+    /// M, with the pattern of K.
+    pub mass: SparseMatrix,
+}
+
+/// Neighbours of each node, itself included, ascending.
+fn neighbours(mesh: &Mesh) -> Vec<Vec<usize>> {
+    let mut lists = vec![Vec::new(); mesh.nodes.len()];
+    for element in &mesh.elements {
+        for &node in &element.nodes {
+            lists[node].extend_from_slice(&element.nodes);
+        }
+    }
+    lists.par_iter_mut().for_each(|list| {
+        list.sort_unstable();
+        list.dedup();
+    });
+    lists
+}
+
+fn pattern(neighbours: &[Vec<usize>]) -> Pattern {
+    let entries = 9 * neighbours.iter().map(Vec::len).sum::<usize>();
+    let mut starts = Vec::with_capacity(3 * neighbours.len() + 1);
+    let mut rows = Vec::with_capacity(entries);
+    starts.push(0);
+    for list in neighbours {
+        for _ in 0..3 {
+            rows.extend(list.iter().flat_map(|node| (0..3).map(move |component| 3 * node + component)));
+            starts.push(rows.len());
+        }
+    }
+    Pattern { starts, rows }
+}
+
+/// Assemble K and M.
+///
+/// # Errors
+/// [`Error::Invalid`] for an unsound mesh or material, [`Error::NegativeJacobian`] naming the element.
+pub fn assemble(mesh: &Mesh, material: &Material, listener: Listener<'_>) -> Result<Assembled> {
+    mesh.validate()?;
+    material.validate()?;
+    if mesh.elements.is_empty() {
+        return Err(Error::invalid("mesh", "it has no element", "Give a mesh with solid elements"));
+    }
+    let neighbours = neighbours(mesh);
+    let pattern = Arc::new(pattern(&neighbours));
+    let mut stiffness_values = vec![0.0; pattern.rows.len()];
+    let mut mass_values = vec![0.0; pattern.rows.len()];
+    for (chunk_index, chunk) in mesh.elements.chunks(CHUNK).enumerate() {
+        report(listener, Stage::Assembly, chunk_index * CHUNK, mesh.elements.len());
+        let matrices: Vec<Result<(DMatrix<f64>, DMatrix<f64>)>> = chunk
+            .par_iter()
+            .enumerate()
+            .map(|(offset, element)| {
+                let (number, coordinates) = (chunk_index * CHUNK + offset, mesh.coordinates(element));
+                let stiffness = stiffness(element.kind, &coordinates, material, number)?;
+                Ok((stiffness, consistent_mass(element.kind, &coordinates, material.density, number)?))
+            })
+            .collect();
+        for (element, pair) in chunk.iter().zip(matrices) {
+            let (element_stiffness, element_mass) = pair?;
+            for (b, &column) in element.nodes.iter().enumerate() {
+                for (a, &row) in element.nodes.iter().enumerate() {
+                    let place =
+                        neighbours[column].binary_search(&row).expect("the pattern holds every element's pairs");
+                    for j in 0..3 {
+                        let start = pattern.starts[3 * column + j] + 3 * place;
+                        for i in 0..3 {
+                            stiffness_values[start + i] += element_stiffness[(3 * a + i, 3 * b + j)];
+                        }
+                        mass_values[start + j] += element_mass[(a, b)];
+                    }
+                }
+            }
+        }
+    }
+    report(listener, Stage::Assembly, 1, 1);
+    Ok(Assembled {
+        stiffness: SparseMatrix { pattern: Arc::clone(&pattern), values: stiffness_values },
+        mass: SparseMatrix { pattern, values: mass_values },
+    })
+}
+
+/// The dofs that remain when some nodes are clamped, ascending.
+pub fn free_dofs(node_count: usize, clamped: &[usize]) -> Vec<usize> {
+    let mut fixed = vec![false; node_count];
+    for &node in clamped {
+        fixed[node] = true;
+    }
+    (0..3 * node_count).filter(|dof| !fixed[dof / 3]).collect()
+}

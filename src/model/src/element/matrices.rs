@@ -1,0 +1,149 @@
+//! Element matrices of linear isotropic elasticity.
+
+use nalgebra::{DMatrix, Matrix3, SMatrix};
+
+use super::{ElementKind, QuadraturePoint, Shape};
+use crate::{Error, Result, material::Material};
+
+/// Shape functions at an integration point with gradients turned to physical space.
+struct Mapped {
+    shape: Shape,
+    /// Quadrature weight times Jacobian determinant (m³).
+    volume: f64,
+}
+
+/// Jacobian matrix ∂x_i/∂ξ_j.
+fn jacobian(shape: &Shape, coordinates: &[[f64; 3]]) -> Matrix3<f64> {
+    let mut matrix = Matrix3::zeros();
+    for (x, gradient) in coordinates.iter().zip(&shape.gradients) {
+        for i in 0..3 {
+            for j in 0..3 {
+                matrix[(i, j)] += x[i] * gradient[j];
+            }
+        }
+    }
+    matrix
+}
+
+fn map_point(
+    kind: ElementKind,
+    coordinates: &[[f64; 3]],
+    quadrature: &QuadraturePoint,
+    number: (usize, usize),
+) -> Result<Mapped> {
+    let mut shape = kind.shape(quadrature.point);
+    let jacobian = jacobian(&shape, coordinates);
+    let determinant = jacobian.determinant();
+    // The comparison is written so that a NaN coordinate is refused, too.
+    let inverse = if determinant > 0.0 { jacobian.try_inverse() } else { None };
+    let Some(inverse) = inverse else {
+        let (element, point) = (number.0 + 1, number.1 + 1);
+        return Err(Error::NegativeJacobian { element, kind, point, determinant });
+    };
+    for gradient in &mut shape.gradients[..coordinates.len()] {
+        let natural = *gradient;
+        *gradient = core::array::from_fn(|i| (0..3).map(|j| natural[j] * inverse[(j, i)]).sum());
+    }
+    Ok(Mapped { shape, volume: quadrature.weight * determinant })
+}
+
+/// Stiffness matrix, 3n × 3n in N/m, dofs ordered (node, component).
+///
+/// K_ab = ∫ λ ∇N_a ∇N_bᵀ + µ ∇N_b ∇N_aᵀ + µ (∇N_a·∇N_b) I dV with Lamé's constants λ, µ.
+///
+/// # Errors
+/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+pub fn stiffness(
+    kind: ElementKind,
+    coordinates: &[[f64; 3]],
+    material: &Material,
+    element: usize,
+) -> Result<DMatrix<f64>> {
+    let nodes = kind.node_count();
+    let (lambda, shear) = material.lame();
+    let mut matrix = DMatrix::zeros(3 * nodes, 3 * nodes);
+    for (index, quadrature) in kind.stiffness_rule().iter().enumerate() {
+        let mapped = map_point(kind, coordinates, quadrature, (element, index))?;
+        let gradients = &mapped.shape.gradients;
+        for b in 0..nodes {
+            for a in 0..=b {
+                let (ga, gb) = (gradients[a], gradients[b]);
+                let dot = shear * mapped.volume * (ga[0] * gb[0] + ga[1] * gb[1] + ga[2] * gb[2]);
+                for j in 0..3 {
+                    for i in 0..3 {
+                        matrix[(3 * a + i, 3 * b + j)] +=
+                            mapped.volume * (lambda * ga[i] * gb[j] + shear * ga[j] * gb[i]);
+                    }
+                    matrix[(3 * a + j, 3 * b + j)] += dot;
+                }
+            }
+        }
+    }
+    matrix.fill_lower_triangle_with_upper_triangle();
+    Ok(matrix)
+}
+
+/// Consistent mass matrix per node pair, n × n in kg; each entry holds for all three displacement components.
+///
+/// # Errors
+/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+pub fn consistent_mass(
+    kind: ElementKind,
+    coordinates: &[[f64; 3]],
+    density: f64,
+    element: usize,
+) -> Result<DMatrix<f64>> {
+    let nodes = kind.node_count();
+    let mut matrix = DMatrix::zeros(nodes, nodes);
+    for (index, quadrature) in kind.mass_rule().iter().enumerate() {
+        let mapped = map_point(kind, coordinates, quadrature, (element, index))?;
+        for b in 0..nodes {
+            let scaled = density * mapped.volume * mapped.shape.values[b];
+            for a in 0..nodes {
+                matrix[(a, b)] += scaled * mapped.shape.values[a];
+            }
+        }
+    }
+    Ok(matrix)
+}
+
+/// Lumped mass per node (kg): the consistent diagonal scaled to the element's mass (Hinton, Rock, Zienkiewicz 1976).
+///
+/// # Errors
+/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+pub fn lumped_mass(kind: ElementKind, coordinates: &[[f64; 3]], density: f64, element: usize) -> Result<Vec<f64>> {
+    let consistent = consistent_mass(kind, coordinates, density, element)?;
+    let scale = consistent.sum() / consistent.trace();
+    Ok(consistent.diagonal().iter().map(|mass| mass * scale).collect())
+}
+
+/// Small strains (εxx, εyy, εzz, γxy, γyz, γzx) at a natural point, from nodal displacements in m.
+///
+/// # Errors
+/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+pub fn strain(
+    kind: ElementKind,
+    coordinates: &[[f64; 3]],
+    displacements: &[[f64; 3]],
+    point: [f64; 3],
+    element: usize,
+) -> Result<[f64; 6]> {
+    let mapped = map_point(kind, coordinates, &QuadraturePoint { point, weight: 1.0 }, (element, 0))?;
+    let mut slope = SMatrix::<f64, 3, 3>::zeros();
+    for (u, gradient) in displacements.iter().zip(&mapped.shape.gradients) {
+        for i in 0..3 {
+            for j in 0..3 {
+                slope[(i, j)] += u[i] * gradient[j];
+            }
+        }
+    }
+    let shear = |i, j| slope[(i, j)] + slope[(j, i)];
+    Ok([slope[(0, 0)], slope[(1, 1)], slope[(2, 2)], shear(0, 1), shear(1, 2), shear(2, 0)])
+}
+
+/// Stresses (σxx, σyy, σzz, τxy, τyz, τzx) in Pa of the strains of [`strain`].
+pub fn stress(material: &Material, strain: [f64; 6]) -> [f64; 6] {
+    let (lambda, shear) = material.lame();
+    let pressure = lambda * (strain[0] + strain[1] + strain[2]);
+    core::array::from_fn(|i| if i < 3 { pressure + 2.0 * shear * strain[i] } else { shear * strain[i] })
+}

@@ -1,0 +1,82 @@
+//! One error type for the crate: every variant names what, where and the remedy.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use crate::element::ElementKind;
+
+/// What can go wrong on the way from a mesh to a reduced model.
+#[derive(Debug, Error)]
+pub enum Error {
+    /// A value, set or count is outside what the method allows.
+    #[error("{what}: {problem}. {remedy}")]
+    Invalid {
+        /// The field, set or array.
+        what: String,
+        /// What is wrong with it, with its value.
+        problem: String,
+        /// What to do about it.
+        remedy: String,
+    },
+    /// An element is turned inside out or degenerate.
+    #[error(
+        "element {element} ({}): the Jacobian determinant at integration point {point} is {determinant:.3e}, not \
+         positive. Check its node order and its distortion",
+        kind.calculix_name()
+    )]
+    NegativeJacobian {
+        /// Number of the element, counted from 1 as in an exported file.
+        element: usize,
+        /// Its kind.
+        kind: ElementKind,
+        /// Integration point, counted from 1.
+        point: usize,
+        /// Jacobian determinant there (m³ per unit of natural volume).
+        determinant: f64,
+    },
+    /// A Cholesky factorisation met a pivot that is not positive.
+    #[error("the matrix {matrix} is not positive definite. {remedy}")]
+    NotPositiveDefinite {
+        /// Which matrix.
+        matrix: String,
+        /// What to do about it.
+        remedy: String,
+    },
+    /// The eigenvalue iteration ended before all wanted pairs were found.
+    #[error(
+        "only {converged} of {wanted} eigenpairs converged to {tolerance:.1e} in a Krylov basis of {basis} vectors. Ask \
+         for fewer modes, or check the mesh for parts that hang loosely together"
+    )]
+    NotConverged {
+        /// Pairs asked for.
+        wanted: usize,
+        /// Pairs that reached the tolerance.
+        converged: usize,
+        /// Size of the basis when it gave up.
+        basis: usize,
+        /// Relative tolerance.
+        tolerance: f64,
+    },
+    /// The reduced model was refused by the stepping floor.
+    #[error(transparent)]
+    Core(#[from] tiprub_core::Error),
+    /// A file could not be written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// Which file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+impl Error {
+    /// Shorthand for [`Error::Invalid`].
+    pub fn invalid(what: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::Invalid { what: what.into(), problem: problem.into(), remedy: remedy.into() }
+    }
+}
+
+/// Result of this floor.
+pub type Result<T, E = Error> = core::result::Result<T, E>;

@@ -1,0 +1,130 @@
+//! Nodes, elements and named node sets.
+
+use std::collections::{BTreeMap, HashMap};
+
+use crate::{Error, Result, element::ElementKind};
+
+/// One solid element.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Element {
+    /// Kind.
+    pub kind: ElementKind,
+    /// Node indices (from 0) in the kind's order.
+    pub nodes: Vec<usize>,
+}
+
+/// A finite-element mesh. All indices count from 0; exported files count from 1.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Mesh {
+    /// Node coordinates (x, y, z) in m.
+    pub nodes: Vec<[f64; 3]>,
+    /// Elements.
+    pub elements: Vec<Element>,
+    /// Named sets of node indices, ascending.
+    pub sets: BTreeMap<String, Vec<usize>>,
+}
+
+impl Mesh {
+    /// Coordinates of an element's nodes in the element's order (m).
+    pub fn coordinates(&self, element: &Element) -> Vec<[f64; 3]> {
+        element.nodes.iter().map(|&node| self.nodes[node]).collect()
+    }
+
+    /// The nodes of a named set.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] listing the sets there are.
+    pub fn set(&self, name: &str) -> Result<&[usize]> {
+        self.sets.get(name).map(Vec::as_slice).ok_or_else(|| {
+            let names: Vec<_> = self.sets.keys().map(String::as_str).collect();
+            Error::invalid(
+                format!("node set `{name}`"),
+                "the mesh has no such set",
+                format!("It has: {}", names.join(", ")),
+            )
+        })
+    }
+
+    /// Check node counts and indices of the elements, coordinates, and that every node belongs to an element.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the element, node or set.
+    pub fn validate(&self) -> Result<()> {
+        if let Some(index) = self.nodes.iter().position(|node| node.iter().any(|x| !x.is_finite())) {
+            let problem = format!("coordinates {:?} are not finite", self.nodes[index]);
+            return Err(Error::invalid(format!("node {}", index + 1), problem, "Correct the mesh"));
+        }
+        let mut used = vec![false; self.nodes.len()];
+        for (index, element) in self.elements.iter().enumerate() {
+            let what = || format!("element {} ({})", index + 1, element.kind.calculix_name());
+            if element.nodes.len() != element.kind.node_count() {
+                let problem = format!("{} nodes where {} are needed", element.nodes.len(), element.kind.node_count());
+                return Err(Error::invalid(what(), problem, "Correct the element's line"));
+            }
+            for &node in &element.nodes {
+                let Some(flag) = used.get_mut(node) else {
+                    let problem = format!("node {} does not exist; there are {}", node + 1, self.nodes.len());
+                    return Err(Error::invalid(what(), problem, "Correct the element's line"));
+                };
+                *flag = true;
+            }
+        }
+        if let Some(node) = used.iter().position(|&flag| !flag) {
+            let problem = "it belongs to no element, so it has neither stiffness nor mass";
+            return Err(Error::invalid(format!("node {}", node + 1), problem, "Remove it from the mesh"));
+        }
+        for (name, nodes) in &self.sets {
+            if let Some(&node) = nodes.iter().find(|&&node| node >= self.nodes.len()) {
+                let problem = format!("node {} does not exist; there are {}", node + 1, self.nodes.len());
+                return Err(Error::invalid(format!("node set `{name}`"), problem, "Correct the set"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The same mesh with quadratic elements: a node is added in the middle of every edge of a linear element.
+    #[must_use]
+    pub fn quadratic(&self) -> Self {
+        let mut mesh = self.clone();
+        let mut middles: HashMap<(usize, usize), usize> = HashMap::new();
+        for element in &mut mesh.elements {
+            if element.kind == element.kind.quadratic() {
+                continue;
+            }
+            for &[a, b] in element.kind.edges() {
+                let (a, b) = (element.nodes[a], element.nodes[b]);
+                let middle = *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                    let (p, q) = (mesh.nodes[a], mesh.nodes[b]);
+                    mesh.nodes.push(core::array::from_fn(|i| 0.5 * (p[i] + q[i])));
+                    mesh.nodes.len() - 1
+                });
+                element.nodes.push(middle);
+            }
+            element.kind = element.kind.quadratic();
+        }
+        mesh
+    }
+}
+
+/// Corner nodes of the outer faces, three or four per face, counter-clockwise seen from outside.
+///
+/// A face is an outer one when it belongs to a single element.
+pub fn surface_quads(mesh: &Mesh) -> Vec<Vec<usize>> {
+    let mut count: HashMap<Vec<usize>, usize> = HashMap::new();
+    let faces: Vec<Vec<usize>> = mesh
+        .elements
+        .iter()
+        .flat_map(|element| {
+            element.kind.faces().iter().map(|face| face.iter().map(|&corner| element.nodes[corner]).collect())
+        })
+        .collect();
+    let sorted = |face: &Vec<usize>| {
+        let mut key = face.clone();
+        key.sort_unstable();
+        key
+    };
+    for face in &faces {
+        *count.entry(sorted(face)).or_default() += 1;
+    }
+    faces.into_iter().filter(|face| count[&sorted(face)] == 1).collect()
+}

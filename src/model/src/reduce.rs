@@ -1,0 +1,350 @@
+//! From a mesh to a checked reduced-order model.
+
+use std::time::Instant;
+
+use faer::Mat;
+use nalgebra::DMatrix;
+use tiprub_core::Rom;
+use tiprub_core::rom::{ContactNode, Frame, RomChecks};
+
+use crate::assembly::{assemble, free_dofs};
+use crate::craig_bampton::{CraigBampton, craig_bampton, dense_modes};
+use crate::eigen::{Modes, lowest_modes};
+use crate::material::Material;
+use crate::mesh::Mesh;
+use crate::progress::{Listener, Stage, report};
+use crate::sparse::{Factor, SparseMatrix, principal_pair};
+use crate::{Error, Result};
+
+/// A contact node before the reduction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContactPoint {
+    /// Name, for example `leading_edge`.
+    pub name: String,
+    /// Node index in the mesh (from 0).
+    pub node: usize,
+    /// Slope dr/dz of the structure's contour in the meridional plane.
+    pub meridional_slope: f64,
+}
+
+/// What to reduce to, and what to call it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReductionOptions {
+    /// Name of the structure.
+    pub name: String,
+    /// Number of fixed-interface modes.
+    pub fixed_interface_modes: usize,
+    /// Number of modes of the full model that are computed and compared with the reduced ones.
+    pub checked_modes: usize,
+    /// Number of identical uncoupled copies around the axis.
+    pub sectors: usize,
+    /// Directions of the contact displacements.
+    pub frame: Frame,
+    /// Modal damping ratio proposed with the model.
+    pub damping_ratio: f64,
+}
+
+/// A mode of the full model, for pictures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mode {
+    /// Natural frequency (Hz).
+    pub frequency: f64,
+    /// Displacement (x, y, z) of every node of the mesh, mass-normalised (1/√kg).
+    pub shape: Vec<[f64; 3]>,
+}
+
+/// Wall time of the parts of a reduction (s).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Timings {
+    /// Mesh, element matrices and assembly.
+    pub assembly: f64,
+    /// Factorisation and modes of the full model.
+    pub full_modes: f64,
+    /// Fixed-interface and constraint modes.
+    pub reduction: f64,
+    /// Frequency deviation and residual criterion.
+    pub checks: f64,
+}
+
+impl Timings {
+    /// Sum of the parts (s).
+    pub fn total(&self) -> f64 {
+        self.assembly + self.full_modes + self.reduction + self.checks
+    }
+}
+
+/// A reduced-order model with what it came from.
+#[derive(Debug, Clone)]
+pub struct Reduction {
+    /// The reduced-order model, checks included.
+    pub rom: Rom,
+    /// The mesh it was made of.
+    pub mesh: Mesh,
+    /// Material of all elements.
+    pub material: Material,
+    /// Modes of the full model, ascending.
+    pub modes: Vec<Mode>,
+    /// Largest relative residual of those modes, see [`Modes::residuals`].
+    pub largest_residual: f64,
+    /// Degrees of freedom that are not clamped.
+    pub free_dofs: usize,
+    /// All natural angular frequencies of the reduced model (rad/s), ascending; the last one bounds explicit steps.
+    pub reduced_angular_frequencies: Vec<f64>,
+    /// Natural frequencies with the contact nodes held (Hz).
+    pub fixed_interface_frequencies: Vec<f64>,
+    /// Wall times.
+    pub timings: Timings,
+}
+
+/// Reduce a mesh to its contact nodes and fixed-interface modes.
+///
+/// The reduced coordinates are the displacements of the contact nodes in `options.frame`, node by node, then the
+/// fixed-interface modes; so `contact_map` is \[I 0\]. A structure without clamped nodes keeps its rigid-body modes.
+///
+/// # Errors
+/// [`Error::Invalid`] for contact nodes that are clamped, repeated or on the axis; and whatever assembly, eigenvalue
+/// iteration and the ROM's own validation refuse.
+pub fn reduce(
+    mesh: Mesh,
+    material: &Material,
+    clamped: &[usize],
+    contact: &[ContactPoint],
+    options: &ReductionOptions,
+    listener: Listener<'_>,
+) -> Result<Reduction> {
+    let mut timings = Timings::default();
+    let (assembled, free) = timed(&mut timings.assembly, || {
+        check_nodes(&mesh, clamped, contact)?;
+        Ok((assemble(&mesh, material, listener)?, free_dofs(mesh.nodes.len(), clamped)))
+    })?;
+    let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
+    let full = timed(&mut timings.full_modes, || {
+        full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)
+    })?;
+    let craig_bampton = timed(&mut timings.reduction, || {
+        let interface = interface_dofs(&free, contact)?;
+        let cartesian = craig_bampton(&stiffness, &mass, &interface, options.fixed_interface_modes, listener)?;
+        Ok(rotated(cartesian, &mesh, contact, options.frame))
+    })?;
+    let (checks, squares) = timed(&mut timings.checks, || {
+        report(listener, Stage::Checks, 0, 1);
+        let (squares, vectors) = dense_modes(&craig_bampton.stiffness, &craig_bampton.mass)?;
+        let checks = compare(&full, &mass, &craig_bampton, &squares, &vectors);
+        report(listener, Stage::Checks, 1, 1);
+        Ok((checks, squares))
+    })?;
+    let rom = build_rom(&mesh, material, clamped.len(), contact, options, &craig_bampton, checks)?;
+    Ok(Reduction {
+        rom,
+        modes: node_modes(&full.modes, &free, mesh.nodes.len()),
+        largest_residual: full.modes.residuals.iter().copied().fold(0.0, f64::max),
+        free_dofs: free.len(),
+        reduced_angular_frequencies: squares.iter().map(|square| square.max(0.0).sqrt()).collect(),
+        fixed_interface_frequencies: craig_bampton.fixed_interface_frequencies,
+        material: material.clone(),
+        mesh,
+        timings,
+    })
+}
+
+/// Modes of the full model, and the factor and shift they were found with.
+#[derive(Debug, Clone)]
+pub struct FullModes {
+    /// The modes.
+    pub modes: Modes,
+    /// K - σM.
+    shifted: SparseMatrix,
+    /// Its factor.
+    factor: Factor,
+    /// σ.
+    shift: f64,
+}
+
+/// Lowest modes of a structure; `free` when it can move as a rigid body, which needs a negative shift.
+///
+/// # Errors
+/// [`Error::NotPositiveDefinite`] when a structure said to be supported is not; and those of [`lowest_modes`].
+pub fn full_modes(
+    stiffness: &SparseMatrix,
+    mass: &SparseMatrix,
+    free: bool,
+    count: usize,
+    listener: Listener<'_>,
+) -> Result<FullModes> {
+    // tr K / tr M is of the order of the highest ω²; a millionth of it lies among the lowest elastic ones.
+    let shift = if free { -1e-6 * stiffness.trace() / mass.trace() } else { 0.0 };
+    let shifted = stiffness.plus_scaled(-shift, mass);
+    let factor = shifted.factor(
+        "K (stiffness of the supported structure)",
+        "The structure can move as a rigid body: clamp at least three nodes that are not on one line",
+    )?;
+    let modes = lowest_modes(mass, &factor, shift, count.min(mass.order()), Stage::FullModes, listener)?;
+    Ok(FullModes { modes, shifted, factor, shift })
+}
+
+/// Frequency deviation (eq. 13) and residual convergence criterion (eq. 12) of the lowest modes, both in %.
+///
+/// Eq. 12: ε = rᵀKr / (zᵀTᵀKTz) with r = K⁻¹(K - ω²M)Tz, ω and z of the reduced model. With K - σM for K where the
+/// structure is free, so that the norm exists.
+fn compare(
+    full: &FullModes,
+    mass: &SparseMatrix,
+    reduced: &CraigBampton,
+    squares: &[f64],
+    vectors: &DMatrix<f64>,
+) -> RomChecks {
+    let count = full.modes.eigenvalues.len().min(squares.len());
+    let small = Mat::from_fn(vectors.nrows(), count, |i, k| vectors[(i, k)]);
+    let shapes = &reduced.transformation * &small;
+    let mut residuals = full.factor.solve(mass.times(shapes.as_ref()));
+    for k in 0..count {
+        for i in 0..shapes.nrows() {
+            residuals[(i, k)] = shapes[(i, k)] - (squares[k] - full.shift) * residuals[(i, k)];
+        }
+    }
+    let energy = |columns: &Mat<f64>| -> Vec<f64> {
+        let forces = full.shifted.times(columns.as_ref());
+        (0..count).map(|k| columns.col(k).transpose() * forces.col(k)).collect()
+    };
+    let residual_criterion =
+        energy(&residuals).iter().zip(energy(&shapes)).map(|(residual, strain)| residual / strain * 100.0).collect();
+    let to_hertz = |square: &f64| square.max(0.0).sqrt() / core::f64::consts::TAU;
+    let full_frequencies: Vec<f64> = full.modes.eigenvalues[..count].iter().map(to_hertz).collect();
+    let reduced_frequencies: Vec<f64> = squares[..count].iter().map(to_hertz).collect();
+    // A rigid-body mode has no frequency to deviate from.
+    let deviation = |(f, r): (&f64, &f64)| if *f > 0.0 { (r - f) / f * 100.0 } else { 0.0 };
+    let frequency_deviation = full_frequencies.iter().zip(&reduced_frequencies).map(deviation).collect();
+    RomChecks { full_frequencies, reduced_frequencies, frequency_deviation, residual_criterion }
+}
+
+fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> Result<T>) -> Result<T> {
+    let start = Instant::now();
+    let result = work();
+    *seconds += start.elapsed().as_secs_f64();
+    result
+}
+
+fn check_nodes(mesh: &Mesh, clamped: &[usize], contact: &[ContactPoint]) -> Result<()> {
+    for &node in clamped.iter().chain(contact.iter().map(|point| &point.node)) {
+        if node >= mesh.nodes.len() {
+            let problem = format!("node {} does not exist; there are {}", node + 1, mesh.nodes.len());
+            return Err(Error::invalid("clamped or contact nodes", problem, "Name nodes of the mesh"));
+        }
+    }
+    for (index, point) in contact.iter().enumerate() {
+        let what = || format!("contact node `{}`", point.name);
+        if clamped.contains(&point.node) {
+            return Err(Error::invalid(what(), "it is clamped", "Choose a node that can move"));
+        }
+        if contact[..index].iter().any(|other| other.node == point.node || other.name == point.name) {
+            return Err(Error::invalid(what(), "its node or name appears twice", "Name every contact node once"));
+        }
+    }
+    Ok(())
+}
+
+/// Rows of the contact nodes' dofs among the free ones, node by node.
+fn interface_dofs(free: &[usize], contact: &[ContactPoint]) -> Result<Vec<usize>> {
+    contact
+        .iter()
+        .flat_map(|point| (0..3).map(move |component| (point, 3 * point.node + component)))
+        .map(|(point, dof)| {
+            free.binary_search(&dof).map_err(|_| {
+                Error::invalid(format!("contact node `{}`", point.name), "it is clamped", "Choose a node that can move")
+            })
+        })
+        .collect()
+}
+
+/// (cos θ, sin θ) of a point about the z axis.
+fn direction([x, y, _]: [f64; 3]) -> (f64, f64) {
+    let radius = x.hypot(y);
+    (x / radius, y / radius)
+}
+
+/// The same reduced model with interface displacements in the given frame.
+fn rotated(mut model: CraigBampton, mesh: &Mesh, contact: &[ContactPoint], frame: Frame) -> CraigBampton {
+    if frame == Frame::Cartesian {
+        return model;
+    }
+    let order = model.mass.nrows();
+    let mut rotation = DMatrix::<f64>::identity(order, order);
+    for (index, point) in contact.iter().enumerate() {
+        let (cos, sin) = direction(mesh.nodes[point.node]);
+        let first = 3 * index;
+        // Columns: the Cartesian parts of the radial and the tangential unit vector.
+        rotation[(first, first)] = cos;
+        rotation[(first + 1, first)] = sin;
+        rotation[(first, first + 1)] = -sin;
+        rotation[(first + 1, first + 1)] = cos;
+    }
+    let symmetric = |matrix: DMatrix<f64>| 0.5 * (&matrix + matrix.transpose());
+    model.mass = symmetric(rotation.transpose() * &model.mass * &rotation);
+    model.stiffness = symmetric(rotation.transpose() * &model.stiffness * &rotation);
+    model.transformation = &model.transformation * Mat::from_fn(order, order, |i, j| rotation[(i, j)]);
+    model
+}
+
+fn contact_node(mesh: &Mesh, point: &ContactPoint, frame: Frame) -> ContactNode {
+    let [x, y, z] = mesh.nodes[point.node];
+    let position = match frame {
+        Frame::Cartesian => [x, y, z],
+        Frame::Cylindrical => [x.hypot(y), y.atan2(x), z],
+    };
+    ContactNode { name: point.name.clone(), position, meridional_slope: point.meridional_slope }
+}
+
+fn build_rom(
+    mesh: &Mesh,
+    material: &Material,
+    clamped: usize,
+    contact: &[ContactPoint],
+    options: &ReductionOptions,
+    model: &CraigBampton,
+    checks: RomChecks,
+) -> Result<Rom> {
+    let (boundary, order) = (3 * contact.len(), model.mass.nrows());
+    let origin = format!(
+        "{} nodes, {} elements ({}), {clamped} nodes clamped; E = {:e} Pa, nu = {}, rho = {} kg/m3; Craig-Bampton with \
+         {boundary} interface degrees of freedom and {} fixed-interface modes",
+        mesh.nodes.len(),
+        mesh.elements.len(),
+        element_names(mesh),
+        material.young_modulus,
+        material.poisson_ratio,
+        material.density,
+        order - boundary,
+    );
+    let rom = Rom {
+        name: options.name.clone(),
+        origin,
+        sectors: options.sectors,
+        frame: options.frame,
+        mass: model.mass.clone(),
+        stiffness: model.stiffness.clone(),
+        damping_ratio: options.damping_ratio,
+        contact_map: DMatrix::identity(boundary, order),
+        contact_nodes: contact.iter().map(|point| contact_node(mesh, point, options.frame)).collect(),
+        checks,
+    };
+    rom.validate()?;
+    Ok(rom)
+}
+
+fn element_names(mesh: &Mesh) -> String {
+    let mut names: Vec<_> = mesh.elements.iter().map(|element| element.kind.calculix_name()).collect();
+    names.sort_unstable();
+    names.dedup();
+    names.join(", ")
+}
+
+fn node_modes(modes: &Modes, free: &[usize], nodes: usize) -> Vec<Mode> {
+    let mode = |(k, frequency)| {
+        let mut shape = vec![[0.0; 3]; nodes];
+        for (row, dof) in free.iter().enumerate() {
+            shape[dof / 3][dof % 3] = modes.shapes[(row, k)];
+        }
+        Mode { frequency, shape }
+    };
+    modes.frequencies().into_iter().enumerate().map(mode).collect()
+}

@@ -1,0 +1,220 @@
+//! Structured quadratic mesh of the blade.
+
+use std::collections::BTreeMap;
+
+use super::{Section, SurfacePoint, sections};
+use crate::element::ElementKind;
+use crate::mesh::{Element, Mesh};
+use crate::reduce::ContactPoint;
+use crate::{Error, Result};
+
+/// Numbers of elements in the three directions of the blade.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MeshCounts {
+    /// Leading to trailing edge.
+    pub chord: usize,
+    /// Through the thickness.
+    pub thickness: usize,
+    /// Hub to tip.
+    pub span: usize,
+}
+
+impl Default for MeshCounts {
+    fn default() -> Self {
+        Self { chord: 16, thickness: 2, span: 14 }
+    }
+}
+
+/// The blade's mesh with the structure it was made by.
+#[derive(Debug, Clone)]
+pub struct BladeMesh {
+    /// Hex20 elements; node sets `hub`, `tip`, `leading_edge`, `trailing_edge`.
+    pub mesh: Mesh,
+    /// Nodes on the tip's mid-thickness line, leading to trailing edge.
+    pub tip_line: Vec<usize>,
+    /// Slope dr/dz of the tip section at each of them.
+    pub tip_slopes: Vec<f64>,
+}
+
+/// Mesh of one blade, mirrored so that its design speed is positive about +z.
+///
+/// Nodes lie on a grid of twice the element counts. Each section is divided evenly along its chord and across its
+/// thickness; lines of equal division are joined over the twelve sections by natural cubic splines of z, r and θ
+/// over the mean radius, and divided evenly in it.
+///
+/// # Errors
+/// [`Error::Invalid`] when a count is zero.
+pub fn blade_mesh(counts: MeshCounts) -> Result<BladeMesh> {
+    for (name, count) in [("chord", counts.chord), ("thickness", counts.thickness), ("span", counts.span)] {
+        if count == 0 {
+            let remedy = "Give at least one element in every direction; 16 x 2 x 14 is the default";
+            return Err(Error::invalid(format!("mesh count `{name}`"), "it is zero", remedy));
+        }
+    }
+    let fine = [2 * counts.chord, 2 * counts.thickness, 2 * counts.span];
+    let span = SpanInterpolation::new(fine[2]);
+    let mut numbers = BTreeMap::new();
+    let mut mesh = Mesh::default();
+    for i in 0..=fine[0] {
+        for j in 0..=fine[1] {
+            let line: Vec<SurfacePoint> =
+                sections().iter().map(|section| grid_point(section, ratio(i, fine[0]), ratio(j, fine[1]))).collect();
+            // A serendipity brick has nodes on its edges only: at most one index is odd.
+            for k in (0..=fine[2]).filter(|k| i % 2 + j % 2 + k % 2 < 2) {
+                numbers.insert([i, j, k], mesh.nodes.len());
+                mesh.nodes.push(span.cartesian(&line, k));
+            }
+        }
+    }
+    mesh.elements = elements(counts, &numbers);
+    mesh.sets = node_sets(fine, &numbers);
+    let tip_line: Vec<usize> = (0..=fine[0]).filter_map(|i| numbers.get(&[i, fine[1] / 2, fine[2]]).copied()).collect();
+    let tip = &sections()[sections().len() - 1];
+    let tip_slopes = (0..=fine[0])
+        .filter(|&i| numbers.contains_key(&[i, fine[1] / 2, fine[2]]))
+        .map(|i| tip.meridional_slope(plane_point(tip, ratio(i, fine[0]), 0.5)[0]))
+        .collect();
+    Ok(BladeMesh { mesh, tip_line, tip_slopes })
+}
+
+impl BladeMesh {
+    /// `count` contact nodes spread along the tip's mid-thickness line: `leading_edge`, `tip_2`, ..., `trailing_edge`,
+    /// the middle one of an odd count being `mid_chord`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for fewer than two or more than the line has.
+    pub fn contact_points(&self, count: usize) -> Result<Vec<ContactPoint>> {
+        let available = self.tip_line.len();
+        if count < 2 || count > available {
+            return Err(Error::invalid(
+                "number of contact nodes",
+                format!("{count} is outside 2..={available}, the nodes on the tip's mid-thickness line of this mesh"),
+                "Ask for another number or for more elements along the chord",
+            ));
+        }
+        let point = |index: usize| {
+            // Rounded to the nearest node of the line.
+            let place = (2 * index * (available - 1) + count - 1) / (2 * (count - 1));
+            let name = match index {
+                0 => "leading_edge".to_owned(),
+                _ if index + 1 == count => "trailing_edge".to_owned(),
+                _ if 2 * index + 1 == count => "mid_chord".to_owned(),
+                _ => format!("tip_{}", index + 1),
+            };
+            ContactPoint { name, node: self.tip_line[place], meridional_slope: self.tip_slopes[place] }
+        };
+        Ok((0..count).map(point).collect())
+    }
+}
+
+fn ratio(index: usize, count: usize) -> f64 {
+    index as f64 / count as f64
+}
+
+/// Plane coordinates of a grid point: `along` the chord and `across` the thickness, both 0 to 1.
+fn plane_point(section: &Section, along: f64, across: f64) -> [f64; 2] {
+    let [leading, trailing] =
+        section.edge_radii().map(|radius| core::f64::consts::FRAC_PI_4 * radius / section.chord());
+    let u = -leading + along * (1.0 + leading + trailing);
+    let [camber, half] = section.sides(u);
+    section.plane(u, camber + (2.0 * across - 1.0) * half)
+}
+
+fn grid_point(section: &Section, along: f64, across: f64) -> SurfacePoint {
+    section.on_surface(plane_point(section, along, across))
+}
+
+/// Interpolation over the sections at the span stations of the mesh.
+struct SpanInterpolation {
+    /// Weights of the twelve sections, one row per station.
+    weights: Vec<Vec<f64>>,
+}
+
+impl SpanInterpolation {
+    fn new(fine: usize) -> Self {
+        let radii: Vec<f64> = sections().iter().map(Section::mean_radius).collect();
+        let (first, last) = (radii[0], radii[radii.len() - 1]);
+        // The spline of each unit vector gives the weights, since interpolation is linear in the data.
+        let columns: Vec<Vec<f64>> = (0..radii.len())
+            .map(|section| {
+                let data: Vec<f64> = (0..radii.len()).map(|other| if other == section { 1.0 } else { 0.0 }).collect();
+                let curvature = natural_spline(&radii, &data);
+                (0..=fine)
+                    .map(|k| evaluate_spline(&radii, &data, &curvature, first + (last - first) * ratio(k, fine)))
+                    .collect()
+            })
+            .collect();
+        Self { weights: (0..=fine).map(|k| columns.iter().map(|column| column[k]).collect()).collect() }
+    }
+
+    /// Cartesian coordinates at a station, mirrored in θ.
+    fn cartesian(&self, line: &[SurfacePoint], station: usize) -> [f64; 3] {
+        let mix = |pick: fn(&SurfacePoint) -> f64| -> f64 {
+            line.iter().zip(&self.weights[station]).map(|(point, weight)| weight * pick(point)).sum()
+        };
+        let (r, theta) = (mix(|point| point.r), -mix(|point| point.theta));
+        [r * theta.cos(), r * theta.sin(), mix(|point| point.z)]
+    }
+}
+
+/// Second derivatives at the knots of the natural cubic spline (Thomas algorithm).
+fn natural_spline(x: &[f64], y: &[f64]) -> Vec<f64> {
+    let n = x.len();
+    let (mut upper, mut right) = (vec![0.0; n], vec![0.0; n]);
+    for i in 1..n - 1 {
+        let (before, after) = (x[i] - x[i - 1], x[i + 1] - x[i]);
+        let load = 6.0 * ((y[i + 1] - y[i]) / after - (y[i] - y[i - 1]) / before);
+        let pivot = 2.0 * (before + after) - before * upper[i - 1];
+        upper[i] = after / pivot;
+        right[i] = (load - before * right[i - 1]) / pivot;
+    }
+    let mut curvature = vec![0.0; n];
+    for i in (1..n - 1).rev() {
+        curvature[i] = right[i] - upper[i] * curvature[i + 1];
+    }
+    curvature
+}
+
+fn evaluate_spline(x: &[f64], y: &[f64], curvature: &[f64], at: f64) -> f64 {
+    let i = x[1..x.len() - 1].iter().take_while(|&&knot| knot <= at).count();
+    let h = x[i + 1] - x[i];
+    let (a, b) = ((x[i + 1] - at) / h, (at - x[i]) / h);
+    a * y[i] + b * y[i + 1] + ((a.powi(3) - a) * curvature[i] + (b.powi(3) - b) * curvature[i + 1]) * h * h / 6.0
+}
+
+fn elements(counts: MeshCounts, numbers: &BTreeMap<[usize; 3], usize>) -> Vec<Element> {
+    let kind = ElementKind::Hex20;
+    let mut elements = Vec::with_capacity(counts.chord * counts.thickness * counts.span);
+    for k in 0..counts.span {
+        for j in 0..counts.thickness {
+            for i in 0..counts.chord {
+                let base = [2 * i, 2 * j, 2 * k];
+                let node = |natural: &[f64; 3]| {
+                    let place = core::array::from_fn(|d| match natural[d] {
+                        x if x < 0.0 => base[d],
+                        x if x > 0.0 => base[d] + 2,
+                        _ => base[d] + 1,
+                    });
+                    numbers[&place]
+                };
+                elements.push(Element { kind, nodes: kind.natural_nodes().iter().map(node).collect() });
+            }
+        }
+    }
+    elements
+}
+
+fn node_sets(fine: [usize; 3], numbers: &BTreeMap<[usize; 3], usize>) -> BTreeMap<String, Vec<usize>> {
+    let set = |direction: usize, value: usize| {
+        let mut nodes: Vec<usize> =
+            numbers.iter().filter(|(place, _)| place[direction] == value).map(|(_, &node)| node).collect();
+        nodes.sort_unstable();
+        nodes
+    };
+    BTreeMap::from([
+        ("hub".to_owned(), set(2, 0)),
+        ("tip".to_owned(), set(2, fine[2])),
+        ("leading_edge".to_owned(), set(0, 0)),
+        ("trailing_edge".to_owned(), set(0, fine[0])),
+    ])
+}

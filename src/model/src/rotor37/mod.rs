@@ -1,0 +1,99 @@
+//! The blade of NASA rotor 37: geometry, mesh and reduced model.
+//!
+//! **Origin.** Moore and Reid, *Performance of single-stage axial-flow transonic compressor with rotor and stator aspect
+//! ratios of 1.19 and 1.26, respectively, and with design pressure ratio of 2.05*, NASA TP-1659 (1980), table IV: 12
+//! surfaces of revolution from the hub intersection to the blade tip, 100 stations each. What is embedded is a fit,
+//! [`Section`], not the table: all 2400 points of the table lie within 0.02 mm of it (the tests state the figure).
+//!
+//! **Direction of rotation.** In the table θ grows from the leading to the trailing edge, so the rotor of the table
+//! turns towards negative θ. The mesh is mirrored (θ → -θ) so that its design speed is *positive* about +z.
+//!
+//! **Edges.** The geometry has round edges. The mesh ends in flat faces instead: as wide as the sides are there and
+//! π/4 of the edge radius beyond the arc's centre, which keeps the section's area (rectangle π/4 R · 2R = half disk).
+//! The first and last mesh node therefore sit about 0.21 edge radii (0.03 to 0.06 mm) behind the nose.
+
+mod blade_mesh;
+mod section;
+mod sections;
+
+pub use blade_mesh::{BladeMesh, MeshCounts, blade_mesh};
+pub use section::{Section, SurfacePoint};
+
+use tiprub_core::rom::Frame;
+
+use crate::Result;
+use crate::material::Material;
+use crate::progress::{Listener, Stage, report};
+use crate::reduce::{Reduction, ReductionOptions, reduce};
+
+/// Number of blades.
+pub const BLADES: usize = 36;
+/// Design speed (rad/s), positive about +z for the mesh of this module.
+pub const DESIGN_SPEED: f64 = 1800.0;
+/// Running tip clearance at design speed (m).
+pub const TIP_GAP: f64 = 0.356e-3;
+
+/// The twelve sections, hub to tip.
+pub fn sections() -> &'static [Section] {
+    &sections::SECTIONS
+}
+
+/// What to build.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rotor37Options {
+    /// Number of elements along chord, thickness and span.
+    pub mesh: MeshCounts,
+    /// Number of contact nodes along the tip's mid-thickness line, ends included (at least 2).
+    pub contact_nodes: usize,
+    /// Number of fixed-interface modes.
+    pub fixed_interface_modes: usize,
+    /// Number of modes compared with the full model.
+    pub checked_modes: usize,
+    /// Modal damping ratio proposed with the model.
+    pub damping_ratio: f64,
+    /// Material.
+    pub material: Material,
+}
+
+impl Default for Rotor37Options {
+    fn default() -> Self {
+        Self {
+            mesh: MeshCounts::default(),
+            contact_nodes: 3,
+            fixed_interface_modes: 20,
+            checked_modes: 10,
+            damping_ratio: 0.005,
+            material: Material::maraging_steel(),
+        }
+    }
+}
+
+/// Build, reduce and check the blade: hub section clamped, contact nodes on the tip's mid-thickness line.
+///
+/// # Errors
+/// [`Error::Invalid`](crate::Error::Invalid) for counts that are too small or more contact nodes than the mesh has, and
+/// those of [`reduce`].
+pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Result<Reduction> {
+    let start = std::time::Instant::now();
+    report(listener, Stage::Mesh, 0, 1);
+    let blade = blade_mesh(options.mesh)?;
+    let contact = blade.contact_points(options.contact_nodes)?;
+    report(listener, Stage::Mesh, 1, 1);
+    let meshing = start.elapsed().as_secs_f64();
+    let clamped = blade.mesh.set("hub")?.to_vec();
+    let reduction_options = ReductionOptions {
+        name: "rotor37".into(),
+        fixed_interface_modes: options.fixed_interface_modes,
+        checked_modes: options.checked_modes,
+        sectors: BLADES,
+        frame: Frame::Cylindrical,
+        damping_ratio: options.damping_ratio,
+    };
+    let mut reduction = reduce(blade.mesh, &options.material, &clamped, &contact, &reduction_options, listener)?;
+    reduction.timings.assembly += meshing;
+    reduction.rom.origin = format!(
+        "Blade of NASA rotor 37 (fit of the coordinates of NASA TP-1659), hub clamped: {}",
+        reduction.rom.origin
+    );
+    Ok(reduction)
+}

@@ -1,0 +1,167 @@
+//! Symmetric sparse matrices with a shared pattern, and their Cholesky factors.
+//!
+//! Both triangles are stored: a column is then also a row, products are independent dot products, and a principal
+//! submatrix is a copy. The factorisation is faer's supernodal LLᵀ.
+
+use std::sync::Arc;
+
+use faer::linalg::solvers::Solve;
+use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Mat, MatRef, Side};
+use rayon::prelude::*;
+
+use crate::{Error, Result};
+
+/// Where the entries of a symmetric matrix are: compressed columns, rows ascending, both triangles.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pattern {
+    /// Start of each column in `rows`, and the end of the last one.
+    pub starts: Vec<usize>,
+    /// Row index of each entry.
+    pub rows: Vec<usize>,
+}
+
+impl Pattern {
+    /// Number of rows and columns.
+    pub fn order(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// Pattern of the rows and columns `keep` (ascending), and for each of its entries the entry it is here.
+    pub fn principal(&self, keep: &[usize]) -> (Self, Vec<usize>) {
+        let mut position = vec![usize::MAX; self.order()];
+        for (new, &old) in keep.iter().enumerate() {
+            position[old] = new;
+        }
+        let mut starts = Vec::with_capacity(keep.len() + 1);
+        let (mut rows, mut entries) = (Vec::new(), Vec::new());
+        starts.push(0);
+        for &column in keep {
+            for entry in self.starts[column]..self.starts[column + 1] {
+                let row = position[self.rows[entry]];
+                if row != usize::MAX {
+                    rows.push(row);
+                    entries.push(entry);
+                }
+            }
+            starts.push(rows.len());
+        }
+        (Self { starts, rows }, entries)
+    }
+}
+
+/// A symmetric sparse matrix.
+#[derive(Debug, Clone)]
+pub struct SparseMatrix {
+    /// Where the entries are.
+    pub pattern: Arc<Pattern>,
+    /// The entries, in the order of the pattern.
+    pub values: Vec<f64>,
+}
+
+impl SparseMatrix {
+    /// Number of rows and columns.
+    pub fn order(&self) -> usize {
+        self.pattern.order()
+    }
+
+    /// Product with a dense matrix, n × m.
+    pub fn times(&self, dense: MatRef<'_, f64>) -> Mat<f64> {
+        assert_eq!(dense.nrows(), self.order(), "the product's inner dimensions must agree");
+        let columns: Vec<Vec<f64>> = (0..dense.ncols())
+            .into_par_iter()
+            .map(|column| {
+                let x: Vec<f64> = dense.col(column).iter().copied().collect();
+                (0..self.order()).map(|row| self.row_times(row, &x)).collect()
+            })
+            .collect();
+        Mat::from_fn(self.order(), dense.ncols(), |i, j| columns[j][i])
+    }
+
+    fn row_times(&self, row: usize, x: &[f64]) -> f64 {
+        let range = self.pattern.starts[row]..self.pattern.starts[row + 1];
+        self.pattern.rows[range.clone()].iter().zip(&self.values[range]).map(|(&i, value)| value * x[i]).sum()
+    }
+
+    /// self + factor · other, for matrices of one pattern.
+    #[must_use]
+    pub fn plus_scaled(&self, factor: f64, other: &Self) -> Self {
+        assert_eq!(self.pattern, other.pattern, "the two matrices must share their pattern");
+        let values = self.values.iter().zip(&other.values).map(|(a, b)| a + factor * b).collect();
+        Self { pattern: Arc::clone(&self.pattern), values }
+    }
+
+    /// Dense block of some rows and columns.
+    pub fn block(&self, rows: &[usize], columns: &[usize]) -> Mat<f64> {
+        let mut position = vec![usize::MAX; self.order()];
+        for (new, &old) in rows.iter().enumerate() {
+            position[old] = new;
+        }
+        let mut dense = Mat::zeros(rows.len(), columns.len());
+        for (j, &column) in columns.iter().enumerate() {
+            for entry in self.pattern.starts[column]..self.pattern.starts[column + 1] {
+                let i = position[self.pattern.rows[entry]];
+                if i != usize::MAX {
+                    dense[(i, j)] = self.values[entry];
+                }
+            }
+        }
+        dense
+    }
+
+    /// Sum of the diagonal.
+    pub fn trace(&self) -> f64 {
+        let diagonal = |column: usize| {
+            let range = self.pattern.starts[column]..self.pattern.starts[column + 1];
+            let found = self.pattern.rows[range.clone()].binary_search(&column);
+            found.map_or(0.0, |offset| self.values[range.start + offset])
+        };
+        (0..self.order()).map(diagonal).sum()
+    }
+
+    /// The Cholesky factor; `name` and `remedy` go into the error.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`].
+    pub fn factor(&self, name: &str, remedy: &str) -> Result<Factor> {
+        let fail = || Error::NotPositiveDefinite { matrix: name.into(), remedy: remedy.into() };
+        let order = self.order();
+        let symbolic =
+            SymbolicSparseColMatRef::new_checked(order, order, &self.pattern.starts, None, &self.pattern.rows);
+        let matrix = SparseColMatRef::new(symbolic, self.values.as_slice());
+        let llt = SymbolicLlt::try_new(symbolic, Side::Lower)
+            .ok()
+            .and_then(|symbolic| Llt::try_new_with_symbolic(symbolic, matrix, Side::Lower).ok());
+        llt.map(|llt| Factor { llt }).ok_or_else(fail)
+    }
+}
+
+/// Two matrices restricted to the same rows and columns; the result shares one pattern.
+pub fn principal_pair(first: &SparseMatrix, second: &SparseMatrix, keep: &[usize]) -> (SparseMatrix, SparseMatrix) {
+    assert_eq!(first.pattern, second.pattern, "the two matrices must share their pattern");
+    let (pattern, entries) = first.pattern.principal(keep);
+    let pattern = Arc::new(pattern);
+    let pick = |matrix: &SparseMatrix| SparseMatrix {
+        pattern: Arc::clone(&pattern),
+        values: entries.iter().map(|&entry| matrix.values[entry]).collect(),
+    };
+    (pick(first), pick(second))
+}
+
+/// Sparse Cholesky factor.
+#[derive(Debug, Clone)]
+pub struct Factor {
+    llt: Llt<usize, f64>,
+}
+
+impl Factor {
+    /// Solution of A x = b for every column of `right`, n × m.
+    pub fn solve(&self, mut right: Mat<f64>) -> Mat<f64> {
+        // Columns are independent: a share of them per thread beats threads inside the triangular solves.
+        let share = right.ncols().div_ceil(rayon::current_num_threads()).max(1);
+        let chunks: Vec<_> = right.as_mut().par_col_chunks_mut(share).collect();
+        chunks.into_par_iter().for_each(|chunk| self.llt.solve_in_place(chunk));
+        right
+    }
+}
