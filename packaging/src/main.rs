@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use tiprub::{cli::Cli, commands, console::Console};
+use tiprub_packaging::{cli::Cli, commands, console::Console};
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
