@@ -244,7 +244,139 @@ impl SceneSettings {
     /// # Errors
     /// [`Error::Invalid`] naming the field as written in the scene file.
     pub fn validate(&self) -> Result<()> {
-        let _ = Error::invalid("", "", "");
+        let word = |text: &str| {
+            text.starts_with(|c: char| c.is_ascii_alphabetic())
+                && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+        };
+        let names = self.structures.iter().map(|s| ("structure.name", &s.name));
+        let names = names.chain(self.surfaces.iter().map(|s| ("surface.name", &s.name)));
+        for (field, name) in names.chain([("name", &self.name)]) {
+            if !word(name) {
+                return Err(Error::invalid(
+                    field,
+                    format!("`{name}` is not a plain name"),
+                    "Use letters, digits and underscores, starting with a letter",
+                ));
+            }
+        }
+        if self.structures.is_empty() || self.contacts.is_empty() {
+            return Err(Error::invalid(
+                "scene",
+                format!("{} structures and {} contacts", self.structures.len(), self.contacts.len()),
+                "A scene needs at least one [[structure]] and one [[contact]]",
+            ));
+        }
+        self.structures.iter().try_for_each(StructureSettings::validate)?;
+        self.surfaces.iter().try_for_each(SurfaceSettings::validate)?;
+        self.contacts.iter().try_for_each(|contact| contact.validate(self))?;
+        positive("time.step", self.time.step, "s")?;
+        finite("experiment.start", self.experiment.start)?;
+        positive("experiment.communication_step", self.experiment.communication_step, "s")?;
+        if !(self.experiment.stop.is_finite() && self.experiment.stop > self.experiment.start) {
+            return Err(Error::invalid(
+                "experiment.stop",
+                format!("{} s is not after experiment.start = {} s", self.experiment.stop, self.experiment.start),
+                "Give a stop time after the start time",
+            ));
+        }
+        if self.outputs.watched_sectors.contains(&0) {
+            return Err(Error::invalid("outputs.watched_sectors", "sector 0", "Sectors are counted from 1"));
+        }
+        let mut seen = self.outputs.watched_sectors.clone();
+        seen.sort_unstable();
+        if seen.windows(2).any(|pair| pair[0] == pair[1]) {
+            return Err(Error::invalid("outputs.watched_sectors", "a sector is listed twice", "List each sector once"));
+        }
         Ok(())
+    }
+}
+
+impl StructureSettings {
+    fn validate(&self) -> Result<()> {
+        finite("structure.speed", self.speed)?;
+        if let Some(ratio) = self.damping_ratio {
+            within("structure.damping_ratio", ratio, 0.0, MAX_DAMPING)?;
+        }
+        if self.motion == Motion::Still && self.speed != 0.0 {
+            return Err(Error::invalid(
+                "structure.speed",
+                format!("{} rad/s for a structure that stands still", self.speed),
+                "Remove the speed, or set motion = \"rotating\"",
+            ));
+        }
+        Ok(())
+    }
+}
+
+impl SurfaceSettings {
+    fn validate(&self) -> Result<()> {
+        within("surface.ramp_time", self.ramp_time, 0.0, 1e9)?;
+        match &self.shape {
+            Shape::Circular {} => Ok(()),
+            Shape::Lobes { amplitude, order, phase } => {
+                finite("surface.shape.amplitude", *amplitude)?;
+                finite("surface.shape.phase", *phase)?;
+                if *order == 0 {
+                    let remedy = "Use order ≥ 1, or gap and radius change for a uniform clearance";
+                    return Err(Error::invalid("surface.shape.order", "0 lobes", remedy));
+                }
+                Ok(())
+            }
+            Shape::TwoLobe { depth, width, phase } => {
+                finite("surface.shape.depth", *depth)?;
+                finite("surface.shape.phase", *phase)?;
+                within("surface.shape.width", *width, 1e-3, 0.25)
+            }
+            Shape::Table { radius_change } => {
+                crate::contact::surface::Surface::new(&Shape::Table { radius_change: radius_change.clone() }, 0.0)
+                    .map(|_| ())
+            }
+        }
+    }
+}
+
+impl ContactSettings {
+    fn validate(&self, scene: &SceneSettings) -> Result<()> {
+        let structures: Vec<&str> = scene.structures.iter().map(|s| s.name.as_str()).collect();
+        let surfaces: Vec<&str> = scene.surfaces.iter().map(|s| s.name.as_str()).collect();
+        for (field, name, known) in
+            [("contact.master", &self.master, &structures), ("contact.slave", &self.slave, &surfaces)]
+        {
+            if !known.contains(&name.as_str()) {
+                return Err(Error::invalid(
+                    field,
+                    format!("`{name}` is not defined"),
+                    format!("Use one of: {}", known.join(", ")),
+                ));
+            }
+        }
+        positive("contact.gap", self.gap, "m")?;
+        self.sector_gaps.iter().try_for_each(|gap| positive("contact.sector_gaps", *gap, "m"))?;
+        within("contact.friction", self.friction, 0.0, MAX_FRICTION)
+    }
+}
+
+/// Largest friction coefficient accepted.
+pub const MAX_FRICTION: f64 = 2.0;
+/// Largest damping ratio accepted.
+pub const MAX_DAMPING: f64 = 0.99;
+
+fn finite(field: &str, value: f64) -> Result<()> {
+    if value.is_finite() { Ok(()) } else { Err(Error::invalid(field, format!("{value}"), "Give a finite number")) }
+}
+
+fn positive(field: &str, value: f64, unit: &str) -> Result<()> {
+    if value.is_finite() && value > 0.0 {
+        Ok(())
+    } else {
+        Err(Error::invalid(field, format!("{value} {unit}"), "Give a finite value > 0"))
+    }
+}
+
+fn within(field: &str, value: f64, low: f64, high: f64) -> Result<()> {
+    if (low..=high).contains(&value) {
+        Ok(())
+    } else {
+        Err(Error::invalid(field, format!("{value}"), format!("Give a value between {low} and {high}")))
     }
 }

@@ -49,7 +49,7 @@ pub struct SystemSettings {
     pub solver: Solver,
     /// Coulomb coefficient µ.
     pub friction: f64,
-    /// Keep the energy ledger.
+    /// Gather the damping loss, without which the ledger does not close.
     pub ledger: bool,
 }
 
@@ -246,9 +246,7 @@ impl System {
     /// # Errors
     /// [`StepFailure`]; the state is then not meaningful any more.
     pub fn step(&mut self, drive: &Drive) -> Result<(), StepFailure> {
-        if self.settings.ledger {
-            self.displacement_oldest.copy_from_slice(self.bank.displacement_before());
-        }
+        self.displacement_oldest.copy_from_slice(self.bank.displacement_before());
         self.bank.predict(self.settings.ledger);
         self.law.evaluate(drive, &mut self.geometry);
         std::mem::swap(&mut self.gap_oldest, &mut self.state.gap_before);
@@ -256,13 +254,13 @@ impl System {
         self.evaluate_gaps();
         self.clear_events();
         for sector in 0..self.bank.sectors() {
-            // Written so that NaN counts as touching, and is found out there.
-            if !(self.lowest[sector] >= 0.0) {
+            // NaN counts as touching, and is found out there.
+            if self.lowest[sector] < 0.0 || self.lowest[sector].is_nan() {
                 self.solve_sector(sector, drive)?;
             }
         }
         self.state.steps += 1;
-        if self.state.steps % FLUSH_EVERY == 0 {
+        if self.state.steps.is_multiple_of(FLUSH_EVERY) {
             self.bank.flush();
         }
         Ok(())
@@ -285,7 +283,9 @@ impl System {
                 let moved =
                     normal_0[lane] * u[lane] + normal_1[lane] * u[lanes + lane] + normal_2[lane] * u[2 * lanes + lane];
                 gap[lane] = offset[lane] + moved;
-                self.lowest[lane] = if self.lowest[lane] <= gap[lane] { self.lowest[lane] } else { gap[lane] };
+                let lowest = self.lowest[lane];
+                // NaN sticks.
+                self.lowest[lane] = if lowest <= gap[lane] || lowest.is_nan() { lowest } else { gap[lane] };
             }
         }
     }
@@ -389,8 +389,7 @@ impl System {
             }
             let sliding = dot(self.slip[node], self.slip[node]) > 0.0;
             let tangential = if sliding { self.settings.friction * normal } else { 0.0 };
-            let friction_heat =
-                if self.settings.ledger { self.book(sector, node, normal, tangential, drive) } else { 0.0 };
+            let friction_heat = self.book(sector, node, normal, tangential, drive);
             self.events.push(ContactEvent { sector, node, normal, tangential, force, friction_heat });
         }
     }
@@ -435,7 +434,9 @@ impl System {
     pub fn restore(&mut self, reader: &mut Reader) {
         let mut step = 0.0_f64;
         step.restore(reader);
-        self.bank.set_step(self.settings.scheme, step);
+        if step > 0.0 {
+            self.bank.set_step(self.settings.scheme, step);
+        }
         self.bank.restore(reader);
         self.state.restore(reader);
         self.rebuild_events();

@@ -139,6 +139,92 @@ pub struct Variable {
 pub enum Quantity {
     /// Simulated time.
     Time,
+    /// Ω, input.
+    Speed,
+    /// Factor on the casing shape, input.
+    ShapeFactor,
+    /// Rotation of the casing shape, input.
+    ShapeRotation,
+    /// Uniform change of the casing radius, input.
+    RadiusChange,
+    /// µ, parameter.
+    Friction,
+    /// Added to every clearance, parameter.
+    GapOffset,
+    /// ξ, parameter.
+    DampingRatio,
+    /// Largest internal step, parameter.
+    StepMax,
+    /// Scheme, parameter.
+    SchemeChoice,
+    /// Solver, parameter.
+    SolverChoice,
+    /// θ_r at the start, parameter.
+    InitialAngle,
+    /// Ramp time of the casing shape, parameter.
+    RampTime,
+    /// Name of the scene, constant.
+    SceneName,
+    /// θ_r.
+    RotorAngle,
+    /// Smallest gap of the whole disk within the step.
+    ClearanceMinimum,
+    /// Smallest gap per contact node within the step.
+    NodeClearanceMinimum,
+    /// Gaps of a watched sector (0-based) at the communication point.
+    Clearance(usize),
+    /// Smallest gaps of a watched sector within the step.
+    WatchedClearanceMinimum(usize),
+    /// Mean normal forces of a watched sector.
+    NormalForce(usize),
+    /// Mean friction forces of a watched sector.
+    TangentialForce(usize),
+    /// Normal forces of a watched sector in the last internal step.
+    NormalForceNow(usize),
+    /// Friction forces of a watched sector in the last internal step.
+    TangentialForceNow(usize),
+    /// Mean contact force on the rotor along fixed x, y, z (component 0, 1, 2).
+    Force(usize),
+    /// Mean contact torque on the rotor about z.
+    Torque,
+    /// Largest λ of any node within the step.
+    NormalForcePeak,
+    /// ∫Σλ dt within the step.
+    NormalImpulse,
+    /// Mean friction power.
+    FrictionPower,
+    /// Nodes in contact at the communication point.
+    ContactCount,
+    /// Any node in contact at the communication point.
+    InContact,
+    /// Smallest gap of each sector within the step.
+    SectorClearanceMinimum,
+    /// Mean normal force of each sector.
+    SectorNormalForce,
+    /// Amplitude of the radial tip displacement per nodal diameter.
+    NodalDiameterAmplitude,
+    /// Kinetic energy.
+    KineticEnergy,
+    /// Strain energy.
+    StrainEnergy,
+    /// Damping loss.
+    DampingLoss,
+    /// Friction loss.
+    FrictionLoss,
+    /// Impact loss.
+    ImpactLoss,
+    /// External work.
+    ExternalWork,
+    /// Energy added by changes of the internal step.
+    StepChangeEnergy,
+    /// Closure residual.
+    EnergyResidual,
+    /// Closure residual relative to initial energy and all work exchanged.
+    EnergyResidualRelative,
+    /// Internal step in use.
+    InternalStep,
+    /// Internal steps done.
+    InternalSteps,
 }
 
 impl Variable {
@@ -184,6 +270,37 @@ pub struct VariableTable {
 }
 
 impl VariableTable {
+    /// A table from rows whose references are consecutive, starting at 0.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where a reference leaves a gap, or a name occurs twice.
+    pub fn new(variables: Vec<Variable>) -> Result<Self> {
+        let mut rows = Vec::new();
+        for (row, variable) in variables.iter().enumerate() {
+            let expected = u32::try_from(rows.len()).unwrap_or(u32::MAX);
+            let repeated = variables[..row].iter().any(|other| other.name == variable.name);
+            if variable.reference != expected || repeated {
+                return Err(Error::invalid(
+                    format!("variable `{}`", variable.name),
+                    format!("reference {} where {expected} follows, or name used twice", variable.reference),
+                    "Give consecutive references and unique names",
+                ));
+            }
+            rows.extend(std::iter::repeat_n(u32::try_from(row).unwrap_or(u32::MAX), variable.len()));
+        }
+        Ok(Self { variables, rows })
+    }
+
+    /// Number of value references (elements of all variables).
+    pub fn references(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// First variable with this quantity.
+    pub fn with_quantity(&self, quantity: Quantity) -> Option<&Variable> {
+        self.variables.iter().find(|variable| variable.quantity == quantity)
+    }
+
     /// All rows.
     pub fn variables(&self) -> &[Variable] {
         &self.variables

@@ -97,6 +97,12 @@ impl ModalModel {
         })
     }
 
+    /// The same modes seen at some of the contact nodes only.
+    pub fn with_nodes(&self, nodes: &[usize]) -> Self {
+        let rows: Vec<usize> = nodes.iter().flat_map(|node| 3 * node..3 * node + 3).collect();
+        Self { contact_modes: self.contact_modes.select_rows(&rows), ..self.clone() }
+    }
+
     /// Number of modes.
     pub fn len(&self) -> usize {
         self.frequencies.len()

@@ -1,0 +1,658 @@
+//! A compiled scene with its state: what an FMU instance, the native run and the tests all drive.
+
+mod compile;
+mod drive;
+mod outputs;
+mod state;
+mod table;
+mod window;
+
+use crate::contact::gap::Drive;
+use crate::system::{StepFailure, System};
+use crate::variables::{Causality, Kind, Quantity, Start, Variability, Variable, VariableTable};
+use crate::{Error, Result, Scene};
+use compile::Compiled;
+use drive::{Input, RotorAngle};
+use window::Window;
+
+/// Communication points may differ from the simulation's own time by this fraction of H (rounding in the importer).
+const TIME_TOLERANCE: f64 = 1e-3;
+/// Step sizes within this fraction of each other are the same step (1/60 computed in several ways).
+const SAME_STEP: f64 = 1e-9;
+/// Most internal steps of one communication step.
+const MOST_STEPS: f64 = 1e12;
+
+/// What one call of [`Simulation::advance`] did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// Internal time reached (s).
+    pub time: f64,
+    /// True when the communication point is reached (and outputs are up to date there).
+    pub finished: bool,
+}
+
+/// Where in its life the simulation is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// Values can be set, nothing is computed.
+    Created,
+    /// At a communication point.
+    Ready,
+    /// Between two communication points.
+    Stepping,
+    /// A step failed; only reset and restore help.
+    Failed,
+}
+
+/// The communication step under way (or the last one).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Communication {
+    /// Start (s).
+    start: f64,
+    /// Length H (s).
+    length: f64,
+    /// Internal steps N it is divided into.
+    count: u64,
+    /// Internal steps done.
+    done: u64,
+}
+
+impl Communication {
+    /// Offset of the internal point `index` from the start, from integer counts (s).
+    fn offset(&self, index: u64) -> f64 {
+        #[expect(clippy::cast_precision_loss, reason = "step counts are below 2^52")]
+        let fraction = index as f64 / self.count as f64;
+        self.length * fraction
+    }
+
+    /// Time of the internal point `index` (s); the last one is start + H exactly.
+    fn time(&self, index: u64) -> f64 {
+        if index == self.count { self.start + self.length } else { self.start + self.offset(index) }
+    }
+}
+
+/// The real inputs, each with its derivative.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Inputs {
+    speed: Input,
+    shape_factor: Input,
+    shape_rotation: Input,
+    radius_change: Input,
+}
+
+impl Inputs {
+    fn get_mut(&mut self, quantity: Quantity) -> Option<&mut Input> {
+        match quantity {
+            Quantity::Speed => Some(&mut self.speed),
+            Quantity::ShapeFactor => Some(&mut self.shape_factor),
+            Quantity::ShapeRotation => Some(&mut self.shape_rotation),
+            Quantity::RadiusChange => Some(&mut self.radius_change),
+            _ => None,
+        }
+    }
+
+    fn shift(&mut self, length: f64) {
+        for input in [&mut self.speed, &mut self.shape_factor, &mut self.shape_rotation, &mut self.radius_change] {
+            input.shift(length);
+        }
+    }
+}
+
+/// A scene compiled into kernels, and its state.
+///
+/// Life: [`Simulation::new`] → set parameters and inputs → [`Simulation::initialise`] → any number of
+/// [`Simulation::do_step`] → ([`Simulation::reset`] and again). The caller (the FMU slave) keeps track of which
+/// calls are legal when; this type only refuses what would be meaningless.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    table: VariableTable,
+    compiled: Compiled,
+    system: System,
+    /// Current value of every reference; strings live in the table.
+    values: Vec<f64>,
+    /// Real outputs at the previous communication point, for derivatives.
+    previous: Vec<f64>,
+    inputs: Inputs,
+    rotor: RotorAngle,
+    window: Window,
+    communication: Communication,
+    /// Length of the step before the last (s), 0 before there was one.
+    previous_length: f64,
+    time: f64,
+    initial_time: f64,
+    phase: Phase,
+    warnings: Vec<String>,
+    /// Parameters for which the limits were last checked.
+    checked: Option<compile::Checked>,
+}
+
+impl Simulation {
+    /// Compile a scene. Start values are in place, nothing is computed yet.
+    ///
+    /// # Errors
+    /// Invalid settings or ROM, refused combinations.
+    pub fn new(scene: &Scene) -> Result<Self> {
+        let compiled = Compiled::new(scene)?;
+        let table = table::build(scene)?;
+        let system = compiled.system()?;
+        let window = Window::new(system.gaps().len());
+        let mut simulation = Self {
+            values: vec![0.0; table.references()],
+            previous: vec![0.0; table.references()],
+            table,
+            compiled,
+            system,
+            inputs: Inputs::default(),
+            rotor: RotorAngle::default(),
+            window,
+            communication: Communication::default(),
+            previous_length: 0.0,
+            time: 0.0,
+            initial_time: 0.0,
+            phase: Phase::Created,
+            warnings: Vec::new(),
+            checked: None,
+        };
+        simulation.reset();
+        Ok(simulation)
+    }
+
+    /// The variable table.
+    pub fn table(&self) -> &VariableTable {
+        &self.table
+    }
+
+    /// The stepped system, for studies that look deeper than the outputs.
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// Read one element of a real variable (inputs and parameters give back what was set).
+    ///
+    /// # Errors
+    /// Unknown reference, or not a real.
+    pub fn real(&self, reference: u32) -> Result<f64> {
+        self.expect_kind(reference, "real", |kind| kind == Kind::Real)?;
+        Ok(self.values[reference as usize])
+    }
+
+    /// Read an integer or enumeration variable.
+    ///
+    /// # Errors
+    /// Unknown reference, or neither integer nor enumeration.
+    pub fn integer(&self, reference: u32) -> Result<i32> {
+        self.expect_kind(reference, "integer", |kind| matches!(kind, Kind::Integer | Kind::Enumeration(_)))?;
+        #[expect(clippy::cast_possible_truncation, reason = "integers are stored as the i32 they were set from")]
+        Ok(self.values[reference as usize] as i32)
+    }
+
+    /// Read a boolean variable.
+    ///
+    /// # Errors
+    /// Unknown reference, or not a boolean.
+    pub fn boolean(&self, reference: u32) -> Result<bool> {
+        self.expect_kind(reference, "boolean", |kind| kind == Kind::Boolean)?;
+        Ok(self.values[reference as usize] != 0.0)
+    }
+
+    /// Read a string variable.
+    ///
+    /// # Errors
+    /// Unknown reference, or not a string.
+    pub fn string(&self, reference: u32) -> Result<&str> {
+        self.expect_kind(reference, "string", |kind| kind == Kind::String)?;
+        match &self.table.locate(reference)?.0.start {
+            Some(Start::String(text)) => Ok(text),
+            _ => Ok(""),
+        }
+    }
+
+    fn expect_kind(&self, reference: u32, wanted: &str, fits: impl Fn(Kind) -> bool) -> Result<()> {
+        let (variable, _) = self.table.locate(reference)?;
+        if fits(variable.kind) {
+            return Ok(());
+        }
+        Err(Error::invalid(
+            format!("variable `{}`", variable.name),
+            format!("is of type {:?}, not {wanted}", variable.kind),
+            "Call the function of the variable's type in modelDescription.xml",
+        ))
+    }
+
+    fn settable(&self, reference: u32) -> Result<(Quantity, String, usize)> {
+        let (variable, element) = self.table.locate(reference)?;
+        if !variable.is_settable() {
+            return Err(Error::invalid(
+                format!("variable `{}`", variable.name),
+                format!("is {:?} and cannot be set", variable.causality),
+                "Set inputs and parameters only",
+            ));
+        }
+        let fixed = variable.causality == Causality::Parameter && variable.variability == Variability::Fixed;
+        if fixed && self.phase != Phase::Created {
+            return Err(Error::invalid(
+                format!("parameter `{}`", variable.name),
+                "is fixed and cannot be set after initialisation",
+                "Set it before initialisation ends, or reset the instance first",
+            ));
+        }
+        Ok((variable.quantity, variable.name.clone(), element))
+    }
+
+    /// Set one element of a real input or parameter. Value must be finite and within min and max. Clears a
+    /// derivative given for the same input.
+    ///
+    /// # Errors
+    /// Unknown reference, wrong kind, not settable, non-finite, out of range; nothing is changed then.
+    pub fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
+        self.check_real(reference, value)?;
+        let quantity = self.table.locate(reference)?.0.quantity;
+        if quantity == Quantity::Friction && self.phase != Phase::Created {
+            let mut parameters = self.parameters();
+            parameters.friction = value;
+            self.check_limits(parameters)?;
+            self.system.set_friction(value);
+        }
+        let offset = self.offset_now();
+        if quantity == Quantity::Speed {
+            self.rotor.rebase(&self.inputs.speed, offset);
+        }
+        if let Some(input) = self.inputs.get_mut(quantity) {
+            input.set(value, offset);
+        }
+        self.values[reference as usize] = value;
+        Ok(())
+    }
+
+    /// Whether [`Simulation::set_real`] would accept the value, apart from stability limits.
+    ///
+    /// # Errors
+    /// As [`Simulation::set_real`].
+    pub fn check_real(&self, reference: u32, value: f64) -> Result<()> {
+        self.expect_kind(reference, "real", |kind| kind == Kind::Real)?;
+        self.settable(reference)?;
+        let (variable, _) = self.table.locate(reference)?;
+        check_range(variable, value)
+    }
+
+    /// Set an integer or enumeration parameter.
+    ///
+    /// # Errors
+    /// As [`Simulation::set_real`].
+    pub fn set_integer(&mut self, reference: u32, value: i32) -> Result<()> {
+        self.check_integer(reference, value)?;
+        self.values[reference as usize] = f64::from(value);
+        Ok(())
+    }
+
+    /// Whether [`Simulation::set_integer`] would accept the value.
+    ///
+    /// # Errors
+    /// As [`Simulation::set_real`].
+    pub fn check_integer(&self, reference: u32, value: i32) -> Result<()> {
+        self.expect_kind(reference, "integer", |kind| matches!(kind, Kind::Integer | Kind::Enumeration(_)))?;
+        let (_, name, _) = self.settable(reference)?;
+        let Kind::Enumeration(choices) = self.table.locate(reference)?.0.kind else { return Ok(()) };
+        let item = usize::try_from(value).unwrap_or(0);
+        if (1..=choices.items.len()).contains(&item) {
+            return Ok(());
+        }
+        let items = choices.items.iter().enumerate().map(|(i, (item, _))| format!("{} = {item}", i + 1));
+        Err(Error::invalid(
+            format!("parameter `{name}`"),
+            format!("{value} is not an item of {}", choices.name),
+            format!("Use one of: {}", items.collect::<Vec<_>>().join(", ")),
+        ))
+    }
+
+    /// Set a boolean parameter.
+    ///
+    /// # Errors
+    /// As [`Simulation::set_real`].
+    pub fn set_boolean(&mut self, reference: u32, value: bool) -> Result<()> {
+        self.expect_kind(reference, "boolean", |kind| kind == Kind::Boolean)?;
+        self.settable(reference)?;
+        self.values[reference as usize] = f64::from(u8::from(value));
+        Ok(())
+    }
+
+    /// Set a string parameter. The table has none, so this always explains why not.
+    ///
+    /// # Errors
+    /// As [`Simulation::set_real`].
+    pub fn set_string(&mut self, reference: u32, _value: &str) -> Result<()> {
+        self.expect_kind(reference, "string", |kind| kind == Kind::String)?;
+        let (_, name, _) = self.settable(reference)?;
+        Err(Error::invalid(format!("variable `{name}`"), "cannot be set", "Leave it as it is"))
+    }
+
+    /// First time derivative of a continuous real input, valid from now until the input is set again.
+    ///
+    /// # Errors
+    /// Unknown reference, not a continuous real input, order other than 1, non-finite.
+    pub fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()> {
+        self.check_input_derivative(reference, order, value)?;
+        let quantity = self.table.locate(reference)?.0.quantity;
+        let offset = self.offset_now();
+        if quantity == Quantity::Speed {
+            self.rotor.rebase(&self.inputs.speed, offset);
+        }
+        if let Some(input) = self.inputs.get_mut(quantity) {
+            input.set_slope(value, offset);
+        }
+        Ok(())
+    }
+
+    /// Whether [`Simulation::set_input_derivative`] would accept the value.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn check_input_derivative(&self, reference: u32, order: i32, value: f64) -> Result<()> {
+        let (variable, _) = self.table.locate(reference)?;
+        let what = format!("derivative of `{}`", variable.name);
+        if variable.causality != Causality::Input || variable.kind != Kind::Real {
+            return Err(Error::invalid(
+                what,
+                "the variable is not a real input",
+                "Give derivatives of real inputs only",
+            ));
+        }
+        if order != 1 {
+            return Err(Error::invalid(what, format!("order {order}"), "Inputs are linear in time: give order 1"));
+        }
+        if !value.is_finite() {
+            return Err(Error::invalid(what, format!("{value}"), "Give a finite number"));
+        }
+        Ok(())
+    }
+
+    /// First time derivative of a continuous real output at the last communication point.
+    ///
+    /// Clearances and the rotor angle give their own rate; the others the change since the communication point
+    /// before (for means: between the middles of the last two steps). 0 before there are two points.
+    ///
+    /// # Errors
+    /// Unknown reference, not a continuous real output, order other than 1.
+    pub fn output_derivative(&self, reference: u32, order: i32) -> Result<f64> {
+        let (variable, element) = self.table.locate(reference)?;
+        let what = format!("derivative of `{}`", variable.name);
+        let continuous = variable.causality == Causality::Output && variable.variability == Variability::Continuous;
+        if !continuous || variable.kind != Kind::Real {
+            let remedy = "Ask for derivatives of continuous real outputs only";
+            return Err(Error::invalid(what, "the variable is not a continuous real output", remedy));
+        }
+        if order != 1 {
+            return Err(Error::invalid(what, format!("order {order}"), "Only derivatives of order 1 are provided"));
+        }
+        Ok(self.derivative_of(variable, element, reference))
+    }
+
+    /// Check parameters against stability and solvability limits and set the state to the start.
+    ///
+    /// # Errors
+    /// Refusals with numbers and remedy; the instance can be given other parameters and asked again.
+    pub fn initialise(&mut self, start_time: f64) -> Result<()> {
+        if !start_time.is_finite() {
+            return Err(Error::invalid("start time", format!("{start_time}"), "Give a finite start time"));
+        }
+        let parameters = self.parameters();
+        self.warnings.clear();
+        self.check_limits(parameters)?;
+        self.system.set_methods(parameters.scheme, parameters.solver);
+        self.system.set_friction(parameters.friction);
+        self.system.bank_mut().rest();
+        self.system.bank_mut().set_damping_ratio(parameters.damping_ratio);
+        self.time = start_time;
+        self.initial_time = start_time;
+        self.communication = Communication { start: start_time, length: 0.0, count: 1, done: 1 };
+        self.previous_length = 0.0;
+        self.rotor = RotorAngle::new(self.value_of(Quantity::InitialAngle));
+        let drive = self.drive(0.0, start_time);
+        self.system.bank_mut().set_step(parameters.scheme, parameters.step);
+        self.system.start(&drive);
+        self.check_initial_gaps()?;
+        self.window.open(self.system.gaps());
+        self.phase = Phase::Ready;
+        self.update_outputs();
+        self.previous.copy_from_slice(&self.values);
+        Ok(())
+    }
+
+    /// Warnings collected by the last [`Simulation::initialise`] (unresolved modes and the like).
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Current time (s): the end of the last finished (or early-returned) step.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    fn offset_now(&self) -> f64 {
+        match self.phase {
+            Phase::Stepping => self.communication.offset(self.communication.done),
+            _ => 0.0,
+        }
+    }
+
+    fn value_of(&self, quantity: Quantity) -> f64 {
+        self.table.with_quantity(quantity).map_or(0.0, |variable| self.values[variable.reference as usize])
+    }
+
+    /// Prescribed motion at an offset from the start of the communication step, at the time `time`.
+    fn drive(&self, offset: f64, time: f64) -> Drive {
+        let speed = &self.inputs.speed;
+        Drive {
+            rotor_angle: self.rotor.phase(speed, offset),
+            speed: speed.at(offset),
+            gap_offset: self.values_gap_offset(),
+            shape_factor: self.inputs.shape_factor.at(offset) * self.ramp(time),
+            shape_rotation: self.inputs.shape_rotation.at(offset),
+            radius_change: self.inputs.radius_change.at(offset),
+        }
+    }
+
+    fn values_gap_offset(&self) -> f64 {
+        self.values[self.compiled.references.gap_offset]
+    }
+
+    /// Share of the casing shape that has grown in: ½(1 − cos(πt/T)) until T.
+    fn ramp(&self, time: f64) -> f64 {
+        let Some(reference) = self.compiled.references.ramp_time else { return 1.0 };
+        let (length, elapsed) = (self.values[reference], time - self.initial_time);
+        if elapsed >= length { 1.0 } else { 0.5 * (1.0 - libm::cos(std::f64::consts::PI * elapsed / length)) }
+    }
+
+    /// Begin a communication step of length H from the current time, landing exactly on `current_time + step_size`.
+    ///
+    /// # Errors
+    /// Step size not positive and finite, or `current_time` further than 1e-3·H from [`Simulation::time`].
+    pub fn begin_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
+        match self.phase {
+            Phase::Ready => {}
+            Phase::Failed => return Err(failed_before()),
+            Phase::Created | Phase::Stepping => {
+                return Err(Error::invalid(
+                    "doStep",
+                    "called outside a communication point",
+                    "Initialise the instance first",
+                ));
+            }
+        }
+        self.check_step(current_time, step_size)?;
+        let limit = self.values[self.compiled.references.step_max];
+        let ratio = step_size / limit;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 ≤ value ≤ 1e12")]
+        let count = (ratio * (1.0 - SAME_STEP)).ceil().max(1.0) as u64;
+        #[expect(clippy::cast_precision_loss, reason = "count ≤ 1e12")]
+        let step = step_size / count as f64;
+        if (step - self.system.bank().step()).abs() > SAME_STEP * step {
+            self.system.set_step(step);
+        }
+        self.previous.copy_from_slice(&self.values);
+        self.previous_length = self.communication.length;
+        self.communication = Communication { start: current_time, length: step_size, count, done: 0 };
+        self.window.open(self.system.gaps());
+        self.phase = Phase::Stepping;
+        Ok(())
+    }
+
+    fn check_step(&self, current_time: f64, step_size: f64) -> Result<()> {
+        if !(step_size.is_finite() && step_size > 0.0) {
+            return Err(Error::invalid(
+                "communicationStepSize",
+                format!("{step_size} s at t = {} s", self.time),
+                "Give a finite communication step > 0",
+            ));
+        }
+        if !current_time.is_finite() || (current_time - self.time).abs() > TIME_TOLERANCE * step_size {
+            return Err(Error::invalid(
+                "currentCommunicationPoint",
+                format!("{current_time} s, but this instance is at t = {} s", self.time),
+                "Continue from the end of the last step, or restore a saved state",
+            ));
+        }
+        if current_time + step_size <= current_time {
+            return Err(Error::invalid(
+                "communicationStepSize",
+                format!("{step_size} s does not change the time {current_time} s in double precision"),
+                "Use a longer communication step or a start time closer to 0",
+            ));
+        }
+        let ratio = step_size / self.values[self.compiled.references.step_max];
+        if ratio > MOST_STEPS {
+            return Err(Error::invalid(
+                "communicationStepSize",
+                format!("{step_size} s would need {ratio:.3e} internal steps"),
+                "Use a shorter communication step or a larger internal_step_max",
+            ));
+        }
+        Ok(())
+    }
+
+    /// March one internal step of the communication step begun. Inputs may be set between calls.
+    ///
+    /// # Errors
+    /// Non-finite state; the simulation must then be reset or restored.
+    pub fn advance(&mut self) -> Result<Progress> {
+        if self.phase != Phase::Stepping {
+            return Err(Error::invalid("doStep", "no communication step is under way", "Begin a step first"));
+        }
+        let next = self.communication.done + 1;
+        let (offset, time) = (self.communication.offset(next), self.communication.time(next));
+        let drive = self.drive(offset, time);
+        if let Err(failure) = self.system.step(&drive) {
+            return Err(self.fail(failure, time));
+        }
+        self.window.add(&self.system, drive.rotor_angle, self.system.bank().step());
+        self.communication.done = next;
+        let finished = next == self.communication.count;
+        if finished {
+            self.finish(offset, time)?;
+        }
+        Ok(Progress { time, finished })
+    }
+
+    fn finish(&mut self, offset: f64, time: f64) -> Result<()> {
+        if !self.system.is_finite() {
+            return Err(self.fail(StepFailure::NonFinite, time));
+        }
+        self.rotor.rebase(&self.inputs.speed, offset);
+        self.update_outputs();
+        self.rotor.shift(offset);
+        self.inputs.shift(offset);
+        self.time = time;
+        self.phase = Phase::Ready;
+        Ok(())
+    }
+
+    fn fail(&mut self, failure: StepFailure, time: f64) -> Error {
+        self.phase = Phase::Failed;
+        match failure {
+            StepFailure::NonFinite => Error::NonFinite {
+                last_good_time: self.time,
+                time,
+                remedy: "Restore a saved state or reset, and use a smaller internal step or smaller loads".to_owned(),
+            },
+            StepFailure::Unsolved { sector } => Error::Unstable {
+                problem: format!(
+                    "the contact problem of sector {} has no solution at t = {time} s (last good time {} s)",
+                    sector + 1,
+                    self.time
+                ),
+                remedy: "Use less friction or another internal step; restore a saved state or reset first".to_owned(),
+            },
+        }
+    }
+
+    /// End the communication step here, before its end (early return): outputs cover the part done.
+    ///
+    /// # Errors
+    /// No step under way, no internal step done yet, or a non-finite state.
+    pub fn end_step_early(&mut self) -> Result<()> {
+        if self.phase != Phase::Stepping || self.communication.done == 0 {
+            return Err(Error::invalid("early return", "no internal step is done", "Return after an internal step"));
+        }
+        let done = self.communication.done;
+        let (offset, time) = (self.communication.offset(done), self.communication.time(done));
+        self.communication = Communication { length: offset, count: done, ..self.communication };
+        self.finish(offset, time)
+    }
+
+    /// `begin_step`, then `advance` to the end.
+    ///
+    /// # Errors
+    /// As those two.
+    pub fn do_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
+        self.begin_step(current_time, step_size)?;
+        while !self.advance()?.finished {}
+        Ok(())
+    }
+
+    /// Back to the state after [`Simulation::new`]: start values everywhere.
+    pub fn reset(&mut self) {
+        self.values.fill(0.0);
+        self.previous.fill(0.0);
+        self.inputs = Inputs::default();
+        self.inputs.shape_factor.value = 1.0;
+        for variable in self.table.variables() {
+            let reference = variable.reference as usize;
+            match &variable.start {
+                Some(Start::Real(values)) => {
+                    self.values[reference..][..values.len()].copy_from_slice(values);
+                    if let Some(input) = self.inputs.get_mut(variable.quantity) {
+                        input.set(values[0], 0.0);
+                    }
+                }
+                Some(Start::Integer(value)) => self.values[reference] = f64::from(*value),
+                Some(Start::Boolean(value)) => self.values[reference] = f64::from(u8::from(*value)),
+                Some(Start::String(_)) | None => {}
+            }
+        }
+        self.system.bank_mut().rest();
+        self.rotor = RotorAngle::default();
+        self.communication = Communication::default();
+        self.previous_length = 0.0;
+        (self.time, self.initial_time) = (0.0, 0.0);
+        self.warnings.clear();
+        self.phase = Phase::Created;
+    }
+}
+
+fn check_range(variable: &Variable, value: f64) -> Result<()> {
+    let (low, high) = (variable.min.unwrap_or(f64::MIN), variable.max.unwrap_or(f64::MAX));
+    if (low..=high).contains(&value) {
+        return Ok(());
+    }
+    let problem = if value.is_finite() {
+        format!("{value} is outside {low} … {high}")
+    } else {
+        format!("{value} is not finite")
+    };
+    let remedy = if value.is_finite() { "Give a value within min and max" } else { "Give a finite number" };
+    Err(Error::invalid(format!("variable `{}`", variable.name), problem, remedy))
+}
+
+fn failed_before() -> Error {
+    Error::invalid("doStep", "an earlier step of this instance failed", "Restore a saved state or reset the instance")
+}

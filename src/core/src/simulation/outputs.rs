@@ -1,0 +1,141 @@
+//! Outputs from state and window.
+
+use super::{Phase, Simulation};
+use crate::contact::gap::sector_angle;
+use crate::variables::{Causality, Quantity, Span, Variable};
+
+impl Simulation {
+    /// Bring the outputs up to the internal time reached (means cover the part of the step done). Done by itself
+    /// at every communication point; an importer that looks inside a step needs it.
+    pub fn update_outputs(&mut self) {
+        let elapsed = self.communication.offset(self.communication.done);
+        let mean = if elapsed > 0.0 && self.communication.length > 0.0 { 1.0 / elapsed } else { 0.0 };
+        self.system.close_books();
+        let mut values = std::mem::take(&mut self.values);
+        for variable in self.table.variables() {
+            if variable.causality == Causality::Output {
+                let start = variable.reference as usize;
+                self.fill(variable.quantity, mean, elapsed, &mut values[start..start + variable.len()]);
+            } else if variable.causality == Causality::Independent {
+                values[variable.reference as usize] = self.communication.time(self.communication.done);
+            }
+        }
+        self.values = values;
+    }
+
+    /// Elements of one output.
+    fn fill(&self, quantity: Quantity, mean: f64, elapsed: f64, out: &mut [f64]) {
+        let (system, window) = (&self.system, &self.window);
+        let lanes = system.bank().lanes();
+        let sectors = system.bank().sectors();
+        let smallest = |values: &[f64]| values.iter().fold(f64::INFINITY, |low: f64, value| low.min(*value));
+        match quantity {
+            Quantity::ClearanceMinimum => out[0] = smallest(&window.lowest),
+            Quantity::NodeClearanceMinimum => {
+                for (node, value) in out.iter_mut().enumerate() {
+                    *value = smallest(&window.lowest[node * lanes..][..sectors]);
+                }
+            }
+            Quantity::SectorClearanceMinimum => {
+                for (sector, value) in out.iter_mut().enumerate() {
+                    *value = window.lowest.chunks(lanes).fold(f64::INFINITY, |low, row| low.min(row[sector]));
+                }
+            }
+            Quantity::SectorNormalForce => {
+                for (sector, value) in out.iter_mut().enumerate() {
+                    *value = mean * window.normal_impulse.chunks(lanes).map(|row| row[sector]).sum::<f64>();
+                }
+            }
+            Quantity::NodalDiameterAmplitude => self.fill_nodal_diameters(out),
+            Quantity::Clearance(_)
+            | Quantity::WatchedClearanceMinimum(_)
+            | Quantity::NormalForce(_)
+            | Quantity::TangentialForce(_)
+            | Quantity::NormalForceNow(_)
+            | Quantity::TangentialForceNow(_) => self.fill_watched(quantity, mean, out),
+            _ => out[0] = self.scalar(quantity, mean, elapsed),
+        }
+    }
+
+    fn fill_watched(&self, quantity: Quantity, mean: f64, out: &mut [f64]) {
+        let lanes = self.system.bank().lanes();
+        for (node, value) in out.iter_mut().enumerate() {
+            let index = |sector: usize| node * lanes + sector;
+            *value = match quantity {
+                Quantity::Clearance(sector) => self.system.gaps()[index(sector)],
+                Quantity::WatchedClearanceMinimum(sector) => self.window.lowest[index(sector)],
+                Quantity::NormalForce(sector) => mean * self.window.normal_impulse[index(sector)],
+                Quantity::TangentialForce(sector) => mean * self.window.tangential_impulse[index(sector)],
+                Quantity::NormalForceNow(sector) => self.system.multiplier(node, sector),
+                Quantity::TangentialForceNow(sector) => {
+                    let event = self.system.events().iter().find(|event| (event.sector, event.node) == (sector, node));
+                    event.map_or(0.0, |event| event.tangential)
+                }
+                _ => 0.0,
+            };
+        }
+    }
+
+    fn scalar(&self, quantity: Quantity, mean: f64, elapsed: f64) -> f64 {
+        let (system, window) = (&self.system, &self.window);
+        let ledger = system.ledger();
+        let mechanical = |part: fn((f64, f64)) -> f64| part(system.energies());
+        #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
+        match quantity {
+            Quantity::RotorAngle => self.rotor.total(&self.inputs.speed, elapsed),
+            Quantity::Force(component) => mean * window.force_impulse[component],
+            Quantity::Torque => mean * window.torque_impulse,
+            Quantity::NormalForcePeak => window.normal_peak,
+            Quantity::NormalImpulse => window.normal_impulse.iter().sum(),
+            Quantity::FrictionPower => mean * window.friction_heat,
+            Quantity::ContactCount => system.events().len() as f64,
+            Quantity::InContact => f64::from(u8::from(!system.events().is_empty())),
+            Quantity::KineticEnergy => mechanical(|(kinetic, _)| kinetic),
+            Quantity::StrainEnergy => mechanical(|(_, strain)| strain),
+            Quantity::DampingLoss => ledger.damping_loss.value(),
+            Quantity::FrictionLoss => ledger.friction_loss.value(),
+            Quantity::ImpactLoss => ledger.impact_loss.value(),
+            Quantity::ExternalWork => ledger.external_work.value(),
+            Quantity::StepChangeEnergy => ledger.step_change.value(),
+            Quantity::EnergyResidual => ledger.residual(mechanical(|(kinetic, strain)| kinetic + strain)),
+            Quantity::EnergyResidualRelative => {
+                let residual = ledger.residual(mechanical(|(kinetic, strain)| kinetic + strain));
+                if ledger.scale() > 0.0 { residual / ledger.scale() } else { 0.0 }
+            }
+            Quantity::InternalStep => system.bank().step(),
+            Quantity::InternalSteps => system.steps() as f64,
+            _ => 0.0,
+        }
+    }
+
+    /// |(2/N) Σ_b u_b e^(−i n θ_b)| (1/N for n = 0 and n = N/2) of the radial displacement of the middle node.
+    fn fill_nodal_diameters(&self, out: &mut [f64]) {
+        let bank = self.system.bank();
+        let sectors = bank.sectors();
+        let row = 3 * (bank.rows() / 6);
+        #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
+        for (diameter, value) in out.iter_mut().enumerate() {
+            let (mut real, mut imaginary) = (0.0, 0.0);
+            for sector in 0..sectors {
+                let (sine, cosine) = libm::sincos(diameter as f64 * sector_angle(sector, sectors));
+                real += bank.row(row, sector) * cosine;
+                imaginary += bank.row(row, sector) * sine;
+            }
+            let weight = if diameter == 0 || 2 * diameter == sectors { 1.0 } else { 2.0 };
+            *value = weight / sectors as f64 * libm::hypot(real, imaginary);
+        }
+    }
+
+    pub(super) fn derivative_of(&self, variable: &Variable, element: usize, reference: u32) -> f64 {
+        let (now, before) = (self.values[reference as usize], self.previous[reference as usize]);
+        let length = self.communication.length;
+        match (variable.quantity, variable.span) {
+            _ if self.phase == Phase::Created || length == 0.0 => 0.0,
+            (Quantity::Clearance(sector), _) => self.system.gap_rate(element, sector),
+            (Quantity::RotorAngle, _) => self.inputs.speed.at(0.0),
+            (_, Span::Mean) if self.previous_length == 0.0 => 0.0,
+            (_, Span::Mean) => (now - before) / (0.5 * (length + self.previous_length)),
+            _ => (now - before) / length,
+        }
+    }
+}
