@@ -1,1 +1,70 @@
-//! Under construction.
+//! The variable table as `modelDescription.xml` of FMI 2.0 and FMI 3.0, and as a page for people.
+//!
+//! Nothing here decides anything about a variable: names, references, units, causality and start values come from the
+//! [`VariableTable`], which the FMU's get and set functions use as well.
+#![forbid(unsafe_code)]
+
+mod element;
+mod fmi2;
+mod fmi3;
+mod html;
+mod row;
+mod shared;
+mod text;
+
+use tiprub_core::{Rom, VariableTable};
+
+pub use fmi2::fmi2_xml;
+pub use fmi3::fmi3_xml;
+pub use html::html;
+pub use row::meaning_of_span;
+pub use shared::LOG_CATEGORIES;
+
+/// Everything a model description says. Two equal descriptions give equal text.
+#[derive(Debug, Clone)]
+pub struct Description<'a> {
+    /// Name of the model.
+    pub model_name: &'a str,
+    /// Model identifier: the file name of the library without its extension.
+    pub identifier: &'a str,
+    /// Instantiation token (FMI 2.0: GUID) that the library computes from the resources.
+    pub token: &'a str,
+    /// One or a few sentences for an importer's catalogue.
+    pub description: &'a str,
+    /// Generation date as `xs:dateTime`, for example `2026-01-31T12:00:00Z`. The caller decides, so that equal input
+    /// can give equal files.
+    pub generated: &'a str,
+    /// Program that generated the FMU, with its version.
+    pub generation_tool: &'a str,
+    /// Version of the model.
+    pub version: &'a str,
+    /// Author or organisation.
+    pub author: &'a str,
+    /// Copyright notice.
+    pub copyright: &'a str,
+    /// Licence.
+    pub license: &'a str,
+    /// Proposal for the importer.
+    pub experiment: Experiment,
+    /// The variables.
+    pub table: &'a VariableTable,
+    /// FMI 3.0: arrays as arrays, else flattened to scalars as in FMI 2.0.
+    pub fmi3_arrays: bool,
+    /// Structures of the scene with their ROMs, for the page.
+    pub structures: Vec<(&'a str, &'a Rom)>,
+    /// Limits of validity, for the page; one sentence each.
+    pub limits: Vec<String>,
+    /// Warnings about this scene, for the page; one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Default experiment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Experiment {
+    /// Start time (s).
+    pub start: f64,
+    /// Stop time (s).
+    pub stop: f64,
+    /// Communication step H (s).
+    pub step: f64,
+}

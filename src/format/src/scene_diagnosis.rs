@@ -35,11 +35,18 @@ struct Place<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// A refusal of the field `path` (with indices from 1), located where the document holds it.
+    /// A refusal of a field that [`SceneSettings::validate`](tiprub_core::settings::SceneSettings::validate) names by
+    /// its path, with or without indices; located where the document holds exactly one such field.
     pub fn refusal(&self, path: &str, problem: String, remedy: String) -> Error {
         let bare = path.replace('`', "");
-        let span = self.places().into_iter().find(|place| place.path == bare).map(|place| place.span);
-        self.error(span, path, problem, remedy)
+        let mut candidates: Vec<_> = self.places().into_iter().filter(|place| place.path == bare).collect();
+        if candidates.is_empty() {
+            candidates = self.places().into_iter().filter(|place| place.fields == bare).collect();
+            candidates.retain(|place| !place.path.ends_with(']'));
+        }
+        let only = candidates.first().filter(|first| candidates.iter().all(|place| place.path == first.path));
+        let what = only.map_or(path, |place| &place.path);
+        self.error(only.map(|place| place.span.clone()), what, problem, remedy)
     }
 
     fn error(&self, span: Option<Range<usize>>, what: &str, problem: String, remedy: String) -> Error {

@@ -54,9 +54,9 @@ const fn field(
 
 /// Every key, in file order.
 pub const FIELDS: [SceneField; 35] = [
-    field("name", "text", None, "letters, digits, underscore", "Name of the model."),
+    field("name", "text", None, "letters, digits, underscore; starts with a letter", "Name of the model."),
     field("description", "text", Some("empty"), "any", "One or a few sentences for the importer's catalogue."),
-    field("structure.name", "text", None, "unique among structures", "Name by which contacts refer to it."),
+    field("structure.name", "text", None, "as `name` of the scene", "Name by which contacts refer to it."),
     field(
         "structure.rom",
         "text",
@@ -71,15 +71,21 @@ pub const FIELDS: [SceneField; 35] = [
         "`rotating`, `still`",
         "Rigid motion: turning about the z axis with the input `speed`, or standing still.",
     ),
-    field("structure.speed", "number, rad/s", Some("0"), "finite", "Start value of the speed input."),
+    field(
+        "structure.speed",
+        "number, rad/s",
+        Some("0"),
+        "finite; 0 for `still`",
+        "Start value of the speed input, about +z.",
+    ),
     field(
         "structure.damping_ratio",
         "number",
         Some("that of the ROM"),
-        "0 ≤ ξ < 1",
+        "0 to 0.99",
         "Modal damping ratio, the same for all modes.",
     ),
-    field("surface.name", "text", None, "unique among surfaces", "Name by which contacts refer to it."),
+    field("surface.name", "text", None, "as `name` of the scene", "Name by which contacts refer to it."),
     field("surface.shape", "table", None, "see the shapes below", "Shape around the circumference."),
     field(
         "surface.shape.kind",
@@ -114,7 +120,7 @@ pub const FIELDS: [SceneField; 35] = [
         "surface.shape.width",
         "number",
         Some("0.15"),
-        "> 0",
+        "0.001 to 0.25",
         "`two-lobe`: width of a bump as a fraction of half a turn.",
     ),
     field(
@@ -129,7 +135,7 @@ pub const FIELDS: [SceneField; 35] = [
         "surface.ramp_time",
         "number, s",
         Some("0"),
-        "≥ 0",
+        "0 to 1e9",
         "Time over which the shape grows smoothly from circular to full; 0 is at once.",
     ),
     field(
@@ -149,13 +155,7 @@ pub const FIELDS: [SceneField; 35] = [
         "> 0, one value per sector",
         "Clearance of each sector where they differ; replaces `gap`.",
     ),
-    field(
-        "contact.friction",
-        "number",
-        Some("0"),
-        "0 ≤ µ ≤ 2",
-        "Coulomb friction coefficient µ; 0 leaves friction out.",
-    ),
+    field("contact.friction", "number", Some("0"), "0 to 2", "Coulomb friction coefficient µ; 0 leaves friction out."),
     field(
         "contact.solver",
         "text",
@@ -189,7 +189,7 @@ pub const FIELDS: [SceneField; 35] = [
         "outputs.watched_sectors",
         "list of whole numbers",
         Some("[1]"),
-        "from 1 to the number of sectors",
+        "from 1 to the number of sectors, each once",
         "Sectors with clearances and forces per contact node.",
     ),
     field(

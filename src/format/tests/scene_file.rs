@@ -102,6 +102,18 @@ fn wrong_syntax_is_located() {
 }
 
 #[test]
+fn values_out_of_range_are_located() {
+    refused("gap = 1e-3", "gap = -1e-3", ":11:1", &["contact[1].gap: -0.001", "> 0"]);
+    refused("gap = 1e-3", "gap = nan", ":11:1", &["contact[1].gap: NaN"]);
+    refused("gap = 1e-3", "gap = 1\nsector_gaps = [1, inf]", ":12:1", &["contact[1].sector_gaps: inf"]);
+    refused("step = 1e-6", "step = 0", ":13:1", &["time.step: 0 s"]);
+    refused("order = 2", "order = 0", ":7:45", &["surface[1].shape.order: 0 lobes"]);
+    refused("stop = 1.0", "start = 2.0\nstop = 1.0", ":16:1", &["experiment.stop: 1 s is not after"]);
+    refused("master = \"rotor\"", "master = \"disk\"", ":9:1", &["contact[1].master: `disk`", "rotor"]);
+    refused("\"demo\"", "\"rotor 37\"", ":1:1", &["name: `rotor 37`", "letters, digits"]);
+}
+
+#[test]
 fn no_text_panics() {
     for text in
         ["", "\n", "[", "[[structure]]", "structure = 3", "time = []", "shape", "\u{feff}", "name = nan", "a.b.c = 1"]
@@ -125,7 +137,7 @@ proptest! {
         order in 1..50u32,
         kind in 0..4usize,
         choices in prop::array::uniform6(any::<bool>()),
-        watched in prop::collection::vec(1..36usize, 0..4),
+        watched in prop::collection::hash_set(1..36usize, 0..4),
     ) {
         let mut scene = common::complete_scene();
         scene.name = name;
@@ -135,7 +147,7 @@ proptest! {
         scene.surfaces[0].shape = match kind {
             0 => Shape::Circular {},
             1 => Shape::Lobes { amplitude: numbers[2], order, phase: -numbers[3] },
-            2 => Shape::TwoLobe { depth: numbers[2], width: numbers[3], phase: -0.0 },
+            2 => Shape::TwoLobe { depth: numbers[2], width: 1e-3 + numbers[3] / 1e4, phase: -0.0 },
             _ => Shape::Table { radius_change: numbers.to_vec() },
         };
         scene.contacts[0].gap = numbers[4];
@@ -143,12 +155,13 @@ proptest! {
         scene.contacts[0].solver = if choices[1] { Solver::Film } else { Solver::Lcp };
         scene.time.scheme = if choices[2] { Scheme::CentralDifference } else { Scheme::ModalExact };
         scene.time.step = numbers[5];
-        scene.outputs.watched_sectors = watched;
+        scene.outputs.watched_sectors = watched.into_iter().collect();
         scene.outputs.nodal_diameters = choices[3].then_some(4);
-        scene.experiment.stop = scene.experiment.start + numbers[6];
+        scene.experiment.start = -numbers[7];
+        scene.experiment.stop = numbers[6];
         scene.experiment.communication_step = numbers[7];
         let text = write_scene(&scene);
-        let again: SceneSettings = toml::from_str(&text).unwrap();
+        let again = parse_scene(&text, "written").unwrap();
         prop_assert_eq!(&again, &scene);
         prop_assert_eq!(write_scene(&again), text);
     }

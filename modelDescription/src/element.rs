@@ -1,0 +1,81 @@
+//! A small element tree, written with quick-xml.
+
+use quick_xml::Writer;
+use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
+
+use crate::text::clean;
+
+/// An XML element without text content: model descriptions have attributes only.
+pub struct Element {
+    name: &'static str,
+    attributes: Vec<(&'static str, String)>,
+    children: Vec<Element>,
+}
+
+impl Element {
+    pub fn new(name: &'static str) -> Self {
+        Self { name, attributes: Vec::new(), children: Vec::new() }
+    }
+
+    /// Add an attribute; the value is cleaned here and escaped on writing.
+    pub fn with(mut self, key: &'static str, value: impl AsRef<str>) -> Self {
+        self.attributes.push((key, clean(value.as_ref())));
+        self
+    }
+
+    /// Add an attribute where there is a value.
+    pub fn with_some(self, key: &'static str, value: Option<impl AsRef<str>>) -> Self {
+        match value {
+            Some(value) => self.with(key, value),
+            None => self,
+        }
+    }
+
+    /// Add an attribute where the text is not empty.
+    pub fn with_text(self, key: &'static str, value: &str) -> Self {
+        self.with_some(key, (!value.is_empty()).then_some(value))
+    }
+
+    pub fn child(mut self, child: Element) -> Self {
+        self.children.push(child);
+        self
+    }
+
+    pub fn children(mut self, children: impl IntoIterator<Item = Element>) -> Self {
+        self.children.extend(children);
+        self
+    }
+
+    /// The element if it has children: the schemas forbid most empty lists.
+    pub fn unless_empty(self) -> Option<Self> {
+        (!self.children.is_empty()).then_some(self)
+    }
+
+    /// The document with this element as its root.
+    pub fn document(&self) -> String {
+        let mut writer = Writer::new_with_indent(Vec::new(), b' ', 2);
+        let declaration = BytesDecl::new("1.0", Some("UTF-8"), None);
+        writer
+            .write_event(Event::Decl(declaration))
+            .and_then(|()| self.write(&mut writer))
+            .expect("writing to memory does not fail");
+        let mut text = String::from_utf8(writer.into_inner()).expect("the writer was given UTF-8 only");
+        text.push('\n');
+        text
+    }
+
+    fn write(&self, writer: &mut Writer<Vec<u8>>) -> std::io::Result<()> {
+        let mut start = BytesStart::new(self.name);
+        for (key, value) in &self.attributes {
+            start.push_attribute((*key, value.as_str()));
+        }
+        if self.children.is_empty() {
+            return writer.write_event(Event::Empty(start));
+        }
+        writer.write_event(Event::Start(start))?;
+        for child in &self.children {
+            child.write(writer)?;
+        }
+        writer.write_event(Event::End(BytesEnd::new(self.name)))
+    }
+}

@@ -1,0 +1,93 @@
+//! `modelDescription.xml` of FMI 2.0 for co-simulation.
+
+use tiprub_core::variables::Kind;
+
+use crate::Description;
+use crate::element::Element;
+use crate::row::{Row, causality, rows, variability};
+use crate::shared::{default_experiment, enumerations, items, log_categories, root_attributes, unit_definitions};
+use crate::text::number;
+
+/// The model description of FMI 2.0: arrays are flattened to scalars `name[i]`.
+pub fn fmi2_xml(description: &Description) -> String {
+    let rows = rows(description.table, false);
+    let root = Element::new("fmiModelDescription")
+        .with("fmiVersion", "2.0")
+        .with("modelName", description.model_name)
+        .with("guid", description.token);
+    root_attributes(root, description)
+        .child(co_simulation(description))
+        .children(unit_definitions(description))
+        .children(type_definitions(description))
+        .child(log_categories())
+        .child(default_experiment(description))
+        .child(Element::new("ModelVariables").children(rows.iter().map(scalar_variable)))
+        .child(model_structure(&rows))
+        .document()
+}
+
+fn co_simulation(description: &Description) -> Element {
+    Element::new("CoSimulation")
+        .with("modelIdentifier", description.identifier)
+        .with("needsExecutionTool", "false")
+        .with("canHandleVariableCommunicationStepSize", "true")
+        .with("canInterpolateInputs", "true")
+        .with("maxOutputDerivativeOrder", "1")
+        .with("canRunAsynchronuously", "false")
+        .with("canBeInstantiatedOnlyOncePerProcess", "false")
+        .with("canNotUseMemoryManagementFunctions", "true")
+        .with("canGetAndSetFMUstate", "true")
+        .with("canSerializeFMUstate", "true")
+        .with("providesDirectionalDerivative", "false")
+}
+
+fn type_definitions(description: &Description) -> Option<Element> {
+    let definition = |enumeration: &'static tiprub_core::variables::Enumeration| {
+        Element::new("SimpleType")
+            .with("name", enumeration.name)
+            .with_text("description", enumeration.description)
+            .child(Element::new("Enumeration").children(items(enumeration)))
+    };
+    Element::new("TypeDefinitions").children(enumerations(description).into_iter().map(definition)).unless_empty()
+}
+
+fn scalar_variable(row: &Row) -> Element {
+    let variable = row.variable;
+    Element::new("ScalarVariable")
+        .with("name", &row.name)
+        .with("valueReference", row.reference.to_string())
+        .with_text("description", &variable.description)
+        .with("causality", causality(variable.causality))
+        .with("variability", variability(variable.variability))
+        .with_some("initial", row.initial())
+        .child(typed(row))
+}
+
+fn typed(row: &Row) -> Element {
+    let variable = row.variable;
+    let element = match variable.kind {
+        Kind::Real => Element::new("Real")
+            .with_some("unit", variable.unit.map(|unit| unit.name))
+            .with_some("displayUnit", row.display_unit())
+            .with_some("min", variable.min.map(number))
+            .with_some("max", variable.max.map(number))
+            .with_some("nominal", variable.nominal.map(number)),
+        Kind::Integer => Element::new("Integer"),
+        Kind::Boolean => Element::new("Boolean"),
+        Kind::String => Element::new("String"),
+        Kind::Enumeration(enumeration) => Element::new("Enumeration").with("declaredType", enumeration.name),
+    };
+    element.with_some("start", row.start.as_ref())
+}
+
+/// Outputs and initial unknowns by index. No `dependencies`: each may depend on every input and parameter.
+fn model_structure(rows: &[Row]) -> Element {
+    Element::new("ModelStructure")
+        .children(unknowns("Outputs", rows.iter().filter(|row| row.is_output())))
+        .children(unknowns("InitialUnknowns", rows.iter().filter(|row| row.is_initial_unknown())))
+}
+
+fn unknowns<'a>(name: &'static str, rows: impl Iterator<Item = &'a Row<'a>>) -> Option<Element> {
+    let unknown = |row: &Row| Element::new("Unknown").with("index", row.index.to_string());
+    Element::new(name).children(rows.map(unknown)).unless_empty()
+}

@@ -1,0 +1,104 @@
+//! `modelDescription.xml` of FMI 3.0 for co-simulation.
+
+use tiprub_core::variables::{Causality, Kind, Variability};
+
+use crate::Description;
+use crate::element::Element;
+use crate::row::{Row, causality, rows, variability};
+use crate::shared::{default_experiment, enumerations, items, log_categories, root_attributes, unit_definitions};
+use crate::text::number;
+
+/// The model description of FMI 3.0, with arrays as arrays or flattened as the description asks.
+pub fn fmi3_xml(description: &Description) -> String {
+    let rows = rows(description.table, description.fmi3_arrays);
+    let root = Element::new("fmiModelDescription")
+        .with("fmiVersion", "3.0")
+        .with("modelName", description.model_name)
+        .with("instantiationToken", description.token);
+    root_attributes(root, description)
+        .child(co_simulation(description))
+        .children(unit_definitions(description))
+        .children(type_definitions(description))
+        .child(log_categories())
+        .child(default_experiment(description))
+        .child(Element::new("ModelVariables").children(rows.iter().map(variable)))
+        .child(model_structure(&rows))
+        .document()
+}
+
+fn co_simulation(description: &Description) -> Element {
+    Element::new("CoSimulation")
+        .with("modelIdentifier", description.identifier)
+        .with("needsExecutionTool", "false")
+        .with("canBeInstantiatedOnlyOncePerProcess", "false")
+        .with("canGetAndSetFMUState", "true")
+        .with("canSerializeFMUState", "true")
+        .with("providesDirectionalDerivatives", "false")
+        .with("providesAdjointDerivatives", "false")
+        .with("canHandleVariableCommunicationStepSize", "true")
+        .with("maxOutputDerivativeOrder", "1")
+        .with("providesIntermediateUpdate", "true")
+        .with("mightReturnEarlyFromDoStep", "true")
+        .with("canReturnEarlyAfterIntermediateUpdate", "true")
+        .with("hasEventMode", "false")
+}
+
+fn type_definitions(description: &Description) -> Option<Element> {
+    let definition = |enumeration: &'static tiprub_core::variables::Enumeration| {
+        Element::new("EnumerationType")
+            .with("name", enumeration.name)
+            .with_text("description", enumeration.description)
+            .children(items(enumeration))
+    };
+    Element::new("TypeDefinitions").children(enumerations(description).into_iter().map(definition)).unless_empty()
+}
+
+fn variable(row: &Row) -> Element {
+    let variable = row.variable;
+    let name = match variable.kind {
+        Kind::Real => "Float64",
+        Kind::Integer => "Int32",
+        Kind::Boolean => "Boolean",
+        Kind::String => "String",
+        Kind::Enumeration(_) => "Enumeration",
+    };
+    let mut element = Element::new(name)
+        .with("name", &row.name)
+        .with("valueReference", row.reference.to_string())
+        .with_text("description", &variable.description)
+        .with("causality", causality(variable.causality))
+        .with("variability", variability(variable.variability))
+        .with_some("initial", row.initial())
+        .with_some("intermediateUpdate", takes_intermediate_values(row).then_some("true"))
+        .with_some("declaredType", row.type_name());
+    if variable.kind == Kind::Real {
+        element = element
+            .with_some("unit", variable.unit.map(|unit| unit.name))
+            .with_some("displayUnit", row.display_unit())
+            .with_some("min", variable.min.map(number))
+            .with_some("max", variable.max.map(number))
+            .with_some("nominal", variable.nominal.map(number));
+    }
+    let dimension = row.dimension.map(|size| Element::new("Dimension").with("start", size.to_string()));
+    match (variable.kind, &row.start) {
+        // The start of texts is an element, one per array element.
+        (Kind::String, Some(text)) => {
+            let start = |_| Element::new("Start").with("value", text);
+            element.children(dimension).children((0..row.dimension.unwrap_or(1)).map(start))
+        }
+        (_, start) => element.with_some("start", start.as_ref()).children(dimension),
+    }
+}
+
+/// Continuous inputs may be set in intermediate update mode.
+fn takes_intermediate_values(row: &Row) -> bool {
+    row.variable.causality == Causality::Input && row.variable.variability == Variability::Continuous
+}
+
+/// Outputs and initial unknowns. No `dependencies`: each may depend on every input and parameter.
+fn model_structure(rows: &[Row]) -> Element {
+    let unknown = |name: &'static str, row: &Row| Element::new(name).with("valueReference", row.reference.to_string());
+    Element::new("ModelStructure")
+        .children(rows.iter().filter(|row| row.is_output()).map(|row| unknown("Output", row)))
+        .children(rows.iter().filter(|row| row.is_initial_unknown()).map(|row| unknown("InitialUnknown", row)))
+}

@@ -1,0 +1,116 @@
+//! Rows of the variable table as a description lists them: arrays as one row or as their elements.
+
+use tiprub_core::VariableTable;
+use tiprub_core::variables::{Causality, Kind, Span, Start, Variability, Variable};
+
+use crate::text::number;
+
+/// A variable of the description: a scalar, an element of an array, or a whole array.
+pub struct Row<'a> {
+    pub name: String,
+    pub reference: u32,
+    /// Number of elements for a whole array.
+    pub dimension: Option<usize>,
+    /// Start value as an attribute has it (arrays: separated by spaces); texts are separate, see `start_text`.
+    pub start: Option<String>,
+    /// Position in the description, from 1, as FMI 2.0 counts.
+    pub index: usize,
+    pub variable: &'a Variable,
+}
+
+/// Every variable in order of value references; `arrays` keeps arrays whole.
+pub fn rows(table: &VariableTable, arrays: bool) -> Vec<Row<'_>> {
+    let mut rows = Vec::new();
+    for variable in table.variables() {
+        let elements = if arrays { 1 } else { variable.len() };
+        for (element, reference) in (0..elements).zip(variable.reference..) {
+            let whole = arrays && variable.dimension.is_some();
+            rows.push(Row {
+                name: if whole { variable.name.clone() } else { variable.element_name(element) },
+                reference,
+                dimension: variable.dimension.filter(|_| whole),
+                start: start(variable, if whole { 0..variable.len() } else { element..element + 1 }),
+                index: rows.len() + 1,
+                variable,
+            });
+        }
+    }
+    rows
+}
+
+fn start(variable: &Variable, elements: std::ops::Range<usize>) -> Option<String> {
+    let repeated = |text: String| vec![text; elements.len()].join(" ");
+    Some(match variable.start.as_ref()? {
+        Start::Real(values) => values[elements].iter().map(|value| number(*value)).collect::<Vec<_>>().join(" "),
+        Start::Integer(value) => repeated(value.to_string()),
+        Start::Boolean(value) => repeated(value.to_string()),
+        Start::String(text) => text.clone(),
+    })
+}
+
+impl Row<'_> {
+    /// Whether it belongs to the list of outputs of the model structure.
+    pub fn is_output(&self) -> bool {
+        self.variable.causality == Causality::Output
+    }
+
+    /// Whether it belongs to the initial unknowns: outputs that are computed during initialisation.
+    pub fn is_initial_unknown(&self) -> bool {
+        self.is_output() && self.variable.initial_is_exact() == Some(false)
+    }
+
+    /// The attribute `initial`, absent for inputs and time.
+    pub fn initial(&self) -> Option<&'static str> {
+        self.variable.initial_is_exact().map(|exact| if exact { "exact" } else { "calculated" })
+    }
+
+    /// The name of the display unit, if one is better than SI.
+    pub fn display_unit(&self) -> Option<&'static str> {
+        let unit = self.variable.unit?;
+        self.variable.display.and_then(|index| unit.display.get(index)).map(|(name, _)| *name)
+    }
+
+    /// The enumeration of an enumeration variable.
+    pub fn type_name(&self) -> Option<&'static str> {
+        match self.variable.kind {
+            Kind::Enumeration(enumeration) => Some(enumeration.name),
+            _ => None,
+        }
+    }
+}
+
+/// The attribute `causality`.
+pub fn causality(causality: Causality) -> &'static str {
+    match causality {
+        Causality::Independent => "independent",
+        Causality::Input => "input",
+        Causality::Parameter => "parameter",
+        Causality::Output => "output",
+        Causality::Local => "local",
+    }
+}
+
+/// The attribute `variability`.
+pub fn variability(variability: Variability) -> &'static str {
+    match variability {
+        Variability::Constant => "constant",
+        Variability::Fixed => "fixed",
+        Variability::Tunable => "tunable",
+        Variability::Discrete => "discrete",
+        Variability::Continuous => "continuous",
+    }
+}
+
+/// A span in words: (short name, explanation).
+pub fn meaning_of_span(span: Span) -> (&'static str, &'static str) {
+    match span {
+        Span::Point => ("point", "the value at the communication point"),
+        Span::Mean => (
+            "mean",
+            "the average over the communication step just finished: multiplied by the length of the step it gives \
+             exactly the impulse or energy handed over",
+        ),
+        Span::Window => ("window", "the smallest, largest or summed value within the communication step just finished"),
+        Span::Total => ("total", "accumulated since the start of the simulation"),
+    }
+}

@@ -1,0 +1,44 @@
+//! Numbers and texts as XML has them.
+
+/// A number as `xs:double`, shortest form that reads back to the same bits.
+pub fn number(value: f64) -> String {
+    if value.is_nan() {
+        return "NaN".into();
+    }
+    if value.is_infinite() {
+        return if value > 0.0 { "INF".into() } else { "-INF".into() };
+    }
+    let magnitude = value.abs();
+    if magnitude != 0.0 && !(1e-4..1e7).contains(&magnitude) { format!("{value:e}") } else { format!("{value:?}") }
+}
+
+/// Text for an attribute: line breaks and tabs become spaces, as XML readers make them, and characters that XML 1.0
+/// has no way to write become the replacement character.
+pub fn clean(text: &str) -> String {
+    let replace = |c: char| match c {
+        '\n' | '\r' | '\t' => ' ',
+        '\u{0}'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => '\u{fffd}',
+        other => other,
+    };
+    text.chars().map(replace).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_back_to_the_same_bits() {
+        for value in [0.0, -0.0, 1.0, 0.1, 1e-6, 3.56e-4, 1800.0, 1e7, 2.2e-308, 5e-324, f64::MAX, -1.0 / 3.0] {
+            assert_eq!(number(value).parse::<f64>().unwrap().to_bits(), value.to_bits());
+        }
+        assert_eq!(number(1e-6), "1e-6");
+        assert_eq!(number(1800.0), "1800.0");
+        assert_eq!((number(f64::INFINITY).as_str(), number(f64::NEG_INFINITY).as_str()), ("INF", "-INF"));
+    }
+
+    #[test]
+    fn text_is_legal_xml() {
+        assert_eq!(clean("a\nb\tc\u{1}d\u{ffff}é"), "a b c\u{fffd}d\u{fffd}é");
+    }
+}

@@ -1,0 +1,140 @@
+//! A synthetic table with every kind of variable, and a description around it.
+
+use nalgebra::DMatrix;
+use tiprub_core::rom::{ContactNode, Frame, RomChecks};
+use tiprub_core::variables::*;
+use tiprub_core::{Rom, VariableTable};
+use tiprub_model_description::{Description, Experiment};
+
+pub static METRE: Unit = Unit { name: "m", exponents: [0, 1, 0, 0], display: &[("mm", 1e3), ("µm", 1e6)] };
+pub static SECOND: Unit = Unit { name: "s", exponents: [0, 0, 1, 0], display: &[] };
+pub static NEWTON: Unit = Unit { name: "N", exponents: [1, 1, -2, 0], display: &[("kN", 1e-3)] };
+pub static SPEED: Unit =
+    Unit { name: "rad/s", exponents: [0, 0, -1, 1], display: &[("rpm", 30.0 / std::f64::consts::PI)] };
+pub static SCHEME: Enumeration = Enumeration {
+    name: "Scheme",
+    description: "Time-stepping scheme",
+    items: &[("central_difference", "Explicit <central> differences"), ("modal_exact", "Exact in free flight")],
+};
+
+/// A scalar output without a start value; the tests change what they need.
+fn variable(name: &str, kind: Kind, causality: Causality, variability: Variability) -> Variable {
+    Variable {
+        name: name.into(),
+        reference: 0,
+        dimension: None,
+        kind,
+        causality,
+        variability,
+        span: Span::Point,
+        unit: None,
+        display: None,
+        min: None,
+        max: None,
+        nominal: None,
+        start: None,
+        description: format!("About {name}"),
+        quantity: Quantity::Time,
+    }
+}
+
+pub fn table() -> VariableTable {
+    use Causality::*;
+    use Variability::*;
+    let metres = |variable: Variable| Variable { unit: Some(&METRE), display: Some(1), ..variable };
+    let mut variables = vec![
+        Variable { unit: Some(&SECOND), ..variable("time", Kind::Real, Independent, Continuous) },
+        Variable {
+            unit: Some(&SPEED),
+            display: Some(0),
+            start: Some(Start::Real(vec![1800.0])),
+            ..variable("rotor.speed", Kind::Real, Input, Continuous)
+        },
+        Variable {
+            start: Some(Start::Real(vec![0.15])),
+            min: Some(0.0),
+            max: Some(2.0),
+            description: "Friction coefficient: 0 ≤ µ & \"smooth\" < 2\nsecond line".into(),
+            ..variable("casing.friction", Kind::Real, Parameter, Tunable)
+        },
+        metres(Variable {
+            dimension: Some(3),
+            start: Some(Start::Real(vec![3.5e-4, 3.6e-4, 1e-7])),
+            min: Some(0.0),
+            ..variable("sector_gap", Kind::Real, Parameter, Fixed)
+        }),
+        Variable { start: Some(Start::Integer(2)), ..variable("scheme", Kind::Enumeration(&SCHEME), Parameter, Fixed) },
+        Variable { start: Some(Start::Boolean(true)), ..variable("energies", Kind::Boolean, Parameter, Fixed) },
+        Variable {
+            start: Some(Start::String("a \"b\" <c>".into())),
+            ..variable("comment", Kind::String, Parameter, Fixed)
+        },
+        metres(Variable {
+            dimension: Some(3),
+            span: Span::Window,
+            nominal: Some(1e-4),
+            ..variable("blade[1].clearance", Kind::Real, Output, Continuous)
+        }),
+        Variable {
+            unit: Some(&NEWTON),
+            span: Span::Mean,
+            nominal: Some(1e3),
+            ..variable("contact.force", Kind::Real, Output, Discrete)
+        },
+        variable("steps", Kind::Integer, Output, Discrete),
+        variable("in_contact", Kind::Boolean, Output, Discrete),
+        Variable { start: Some(Start::Integer(36)), ..variable("sectors", Kind::Integer, Local, Constant) },
+        Variable { span: Span::Total, ..variable("wall_time", Kind::Real, Local, Discrete) },
+    ];
+    let mut reference = 0;
+    for variable in &mut variables {
+        variable.reference = reference;
+        reference += u32::try_from(variable.len()).unwrap();
+    }
+    VariableTable::new(variables).unwrap()
+}
+
+pub fn rom() -> Rom {
+    Rom {
+        name: "blade".into(),
+        origin: "hex20 mesh of <many> nodes".into(),
+        sectors: 36,
+        frame: Frame::Cylindrical,
+        mass: DMatrix::identity(2, 2),
+        stiffness: DMatrix::identity(2, 2),
+        damping_ratio: 0.001,
+        contact_map: DMatrix::zeros(3, 2),
+        contact_nodes: vec![ContactNode {
+            name: "leading_edge".into(),
+            position: [0.25, 0.0, 0.0],
+            meridional_slope: 0.0,
+        }],
+        checks: RomChecks {
+            full_frequencies: vec![812.345678, 2345.6],
+            reduced_frequencies: vec![812.35, 2345.7],
+            frequency_deviation: vec![5.3e-4, 0.0043],
+            residual_criterion: vec![0.1],
+        },
+    }
+}
+
+pub fn description<'a>(table: &'a VariableTable, rom: &'a Rom, fmi3_arrays: bool) -> Description<'a> {
+    Description {
+        model_name: "rotor37_rub",
+        identifier: "tiprub",
+        token: "{01234567-89ab-cdef-0123-456789abcdef}",
+        description: "Tip rub of 36 blades & a casing",
+        generated: "2026-01-31T12:00:00Z",
+        generation_tool: "tiprub 0.1.0",
+        version: "0.1.0",
+        author: "The tiprub developers",
+        copyright: "© the tiprub developers",
+        license: "MIT OR Apache-2.0",
+        experiment: Experiment { start: 0.0, stop: 0.1, step: 1e-5 },
+        table,
+        fmi3_arrays,
+        structures: vec![("rotor", rom)],
+        limits: vec!["Small displacements within <each> structure.".into()],
+        warnings: vec!["ω·h = 2.5 > 2".into()],
+    }
+}
