@@ -41,11 +41,13 @@ pub enum Command {
                             tiprub reduce rotor37 --modes 30 --contact-nodes 5 --mesh 10x2x16 -o fine.rom.safetensors")]
     Reduce(ReduceArguments),
     /// From a scene to .fmu files. Compiles nothing: the library is generic, scene and ROM are data.
-    #[command(after_help = "Examples:\n  tiprub package scene.toml                 both FMUs beside each other here\n  \
+    #[command(
+        after_help = "Examples:\n  tiprub package scene.toml                 both FMUs beside each other here\n  \
                             tiprub package scene.toml --fmi 3 -o rub.fmu\n  \
                             tiprub package scene.toml --scalars       no arrays in the FMI 3 variables\n\n\
                             Same inputs, same bytes. The optional generation date is left out, unless \
-                            SOURCE_DATE_EPOCH (seconds since 1970) is set.")]
+                            SOURCE_DATE_EPOCH (seconds since 1970) is set."
+    )]
     Package(PackageArguments),
     /// Run a scene natively, without FMI; one row per communication point.
     #[command(after_help = "Examples:\n  tiprub run scene.toml --csv rub.csv\n  \
@@ -53,8 +55,10 @@ pub enum Command {
                             Column names are the FMI 2.0 variable names; numbers read back to the same bits.")]
     Run(RunArguments),
     /// What is in an .fmu, a ROM or a scene file, and whether it is sound.
-    #[command(after_help = "Examples:\n  tiprub inspect rotor37_fmi2.fmu\n  tiprub inspect rotor37.rom.safetensors\n  \
-                            tiprub inspect scene.toml --json")]
+    #[command(
+        after_help = "Examples:\n  tiprub inspect rotor37_fmi2.fmu\n  tiprub inspect rotor37.rom.safetensors\n  \
+                            tiprub inspect scene.toml --json"
+    )]
     Inspect(InspectArguments),
 }
 
@@ -68,7 +72,7 @@ pub struct DemoArguments {
     #[arg(long, value_name = "FILE")]
     pub library: Option<PathBuf>,
     /// Revolutions of the rotor to simulate (the scene's own stop time when absent).
-    #[arg(long, value_name = "N", value_parser = positive)]
+    #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     pub revolutions: Option<f64>,
 }
 

@@ -100,8 +100,9 @@ fn build(workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> 
         let lines = Vec::from(last_lines).join("\n");
         return Err(failed(format!("cargo ended with {status}:\n{lines}\n"), "Correct what it names, then try again"));
     }
-    artifact(&messages.join().unwrap_or_default())
-        .ok_or_else(|| failed("cargo reported no shared library".into(), "Is this Linux? Otherwise give --library FILE"))
+    artifact(&messages.join().unwrap_or_default()).ok_or_else(|| {
+        failed("cargo reported no shared library".into(), "Is this Linux? Otherwise give --library FILE")
+    })
 }
 
 /// The shared library in cargo's JSON messages, one per line.

@@ -107,9 +107,8 @@ fn set(simulation: &mut Simulation, name: &str, text: &str) -> Result<()> {
             Kind::Enumeration(enumeration) => {
                 let items = enumeration.items.iter().map(|(item, _)| *item).collect::<Vec<_>>();
                 let item = items.iter().zip(1..).find(|(item, _)| **item == text).map(|(_, value)| value);
-                let unknown = || {
-                    Failure::usage(&option, "no such choice", format!("Choose one of {}", items.join(", ")))
-                };
+                let unknown =
+                    || Failure::usage(&option, "no such choice", format!("Choose one of {}", items.join(", ")));
                 simulation.set_integer(reference, item.or_else(|| text.parse().ok()).ok_or_else(unknown)?)
             }
         };
@@ -135,13 +134,18 @@ fn locate(table: &VariableTable, name: &str) -> Result<(Kind, Vec<u32>)> {
         return Ok((variable.kind, (variable.reference..).take(count).collect()));
     }
     for variable in table.variables() {
-        let element = (0..variable.len()).zip(variable.reference..).find(|(index, _)| variable.element_name(*index) == name);
+        let element =
+            (0..variable.len()).zip(variable.reference..).find(|(index, _)| variable.element_name(*index) == name);
         if let Some((_, reference)) = element {
             return Ok((variable.kind, vec![reference]));
         }
     }
-    let settable: Vec<&str> =
-        table.variables().iter().filter(|variable| variable.is_settable()).map(|variable| variable.name.as_str()).collect();
+    let settable: Vec<&str> = table
+        .variables()
+        .iter()
+        .filter(|variable| variable.is_settable())
+        .map(|variable| variable.name.as_str())
+        .collect();
     Err(Failure::usage(format!("--set {name}"), "no such variable", suggestion(name, &settable)))
 }
 
@@ -167,7 +171,10 @@ mod tests {
     #[test]
     fn wrong_values_say_what_is_wanted() {
         let failure = number::<f64>("--set speed=fast", "fast").unwrap_err();
-        assert_eq!(failure.to_string(), "--set speed=fast: \"fast\" is not a number, for example 1.5e-3. Give a number, for example 1.5e-3.");
+        assert_eq!(
+            failure.to_string(),
+            "--set speed=fast: \"fast\" is not a number, for example 1.5e-3. Give a number, for example 1.5e-3."
+        );
         assert!(number::<bool>("--set a=1", "1").unwrap_err().remedy.contains("true or false"));
         assert!(number::<i32>("--set a=1.5", "1.5").unwrap_err().remedy.contains("whole number"));
     }

@@ -84,13 +84,8 @@ impl Recording {
                 "Both runs must come from the same scene and the same communication points",
             ));
         }
-        let mut agreement = Agreement {
-            points: self.rows(),
-            variables: self.names.len(),
-            different: 0,
-            largest: 0.0,
-            first: None,
-        };
+        let mut agreement =
+            Agreement { points: self.rows(), variables: self.names.len(), different: 0, largest: 0.0, first: None };
         for row in 0..self.rows() {
             let times = (self.times[row], other.times[row]);
             agreement.note(times, "time", times.0);

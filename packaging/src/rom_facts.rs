@@ -90,7 +90,8 @@ impl RomFacts {
         let _ = writeln!(text, "  contact nodes             {} ({})", nodes.len(), nodes.join(", "));
         let _ = writeln!(text, "  damping ratio             {}", rom.damping_ratio);
         let _ = writeln!(text, "  largest frequency         {:.6e} rad/s", self.largest_angular_frequency);
-        let _ = writeln!(text, "  largest stable step h     central-difference {:.4e} s", self.central_difference_limit);
+        let _ =
+            writeln!(text, "  largest stable step h     central-difference {:.4e} s", self.central_difference_limit);
         let _ = writeln!(
             text,
             "                            modal-exact: none; resolves all modes up to {:.4e} s",

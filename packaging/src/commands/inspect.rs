@@ -183,7 +183,11 @@ fn describe_scene(scene: &Scene) -> Result<(String, Value)> {
 fn scene_text(settings: &SceneSettings) -> String {
     let mut text = format!("scene {}: {}\n", settings.name, settings.description);
     for structure in &settings.structures {
-        let _ = writeln!(text, "  structure     {} from {}, speed {} rad/s", structure.name, structure.rom, structure.speed);
+        let _ = writeln!(
+            text,
+            "  structure     {} from {}, speed {} rad/s",
+            structure.name, structure.rom, structure.speed
+        );
     }
     for surface in &settings.surfaces {
         let shape = serde_json::to_string(&surface.shape).unwrap_or_default();
@@ -197,7 +201,10 @@ fn scene_text(settings: &SceneSettings) -> String {
             contact.slave,
             contact.gap,
             contact.friction,
-            serde_json::to_value(contact.solver).ok().and_then(|name| name.as_str().map(String::from)).unwrap_or_default()
+            serde_json::to_value(contact.solver)
+                .ok()
+                .and_then(|name| name.as_str().map(String::from))
+                .unwrap_or_default()
         );
     }
     let scheme = serde_json::to_value(settings.time.scheme).ok();

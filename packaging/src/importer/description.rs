@@ -92,7 +92,8 @@ pub fn parse(text: &str) -> Result<ImportedDescription> {
     let mut parser = Parser::default();
     loop {
         let position = reader.buffer_position();
-        let event = reader.read_event().map_err(|error| wrong(format!("not well-formed at byte {position}: {error}")))?;
+        let event =
+            reader.read_event().map_err(|error| wrong(format!("not well-formed at byte {position}: {error}")))?;
         match event {
             Event::Start(element) => parser.open(&element, true)?,
             Event::Empty(element) => parser.open(&element, false)?,
@@ -223,7 +224,8 @@ impl Parser {
         if description.fmi_version.is_empty() {
             return Err(wrong("no fmiModelDescription element with an fmiVersion"));
         }
-        let needed = [("guid/instantiationToken", &description.token), ("modelIdentifier", &description.model_identifier)];
+        let needed =
+            [("guid/instantiationToken", &description.token), ("modelIdentifier", &description.model_identifier)];
         match needed.iter().find(|(_, value)| value.is_empty()) {
             Some((name, _)) => Err(wrong(format!("no {name} for co-simulation"))),
             None => Ok(description),
@@ -285,7 +287,10 @@ mod tests {
     #[test]
     fn both_versions_are_read() {
         let two = parse(FMI2).unwrap();
-        assert_eq!((two.fmi_version.as_str(), two.model_name.as_str(), two.token.as_str()), ("2.0", "rub & more", "{1}"));
+        assert_eq!(
+            (two.fmi_version.as_str(), two.model_name.as_str(), two.token.as_str()),
+            ("2.0", "rub & more", "{1}")
+        );
         let outputs: Vec<_> = two.numeric_outputs().map(|variable| (variable.name.as_str(), variable.kind)).collect();
         assert_eq!(outputs, [("f[1]", VariableType::Float64), ("count", VariableType::Int32)]);
         assert_eq!(two.variables[1].unit.as_deref(), Some("N"));

@@ -29,15 +29,8 @@ struct Callbacks {
     component_environment: *mut c_void,
 }
 
-type Instantiate = unsafe extern "C" fn(
-    *const c_char,
-    i32,
-    *const c_char,
-    *const c_char,
-    *const Callbacks,
-    i32,
-    i32,
-) -> Component;
+type Instantiate =
+    unsafe extern "C" fn(*const c_char, i32, *const c_char, *const c_char, *const Callbacks, i32, i32) -> Component;
 type SetupExperiment = unsafe extern "C" fn(Component, i32, f64, f64, i32, f64) -> Status;
 type PhaseChange = unsafe extern "C" fn(Component) -> Status;
 type DoStep = unsafe extern "C" fn(Component, f64, f64, i32) -> Status;
@@ -86,8 +79,7 @@ unsafe extern "C" fn log_message(
 
 #[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
 fn logger() -> Option<Logger> {
-    type Plain =
-        unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, *const c_char);
+    type Plain = unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, *const c_char);
     // SAFETY: same registers for the first six arguments, as said at `log_message`.
     Some(unsafe { std::mem::transmute::<Plain, Logger>(log_message) })
 }

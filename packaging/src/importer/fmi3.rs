@@ -33,8 +33,7 @@ type Instantiate = unsafe extern "C" fn(
 ) -> Instance;
 type EnterInitialization = unsafe extern "C" fn(Instance, bool, f64, f64, bool, f64) -> Status;
 type PhaseChange = unsafe extern "C" fn(Instance) -> Status;
-type DoStep =
-    unsafe extern "C" fn(Instance, f64, f64, bool, *mut bool, *mut bool, *mut bool, *mut f64) -> Status;
+type DoStep = unsafe extern "C" fn(Instance, f64, f64, bool, *mut bool, *mut bool, *mut bool, *mut f64) -> Status;
 type Get<T> = unsafe extern "C" fn(Instance, *const Reference, usize, *mut T, usize) -> Status;
 type FreeInstance = unsafe extern "C" fn(Instance);
 

@@ -70,7 +70,8 @@ pub fn read_entry(archive: &mut ZipArchive<impl Read + std::io::Seek>, index: us
         )
     };
     let entry = archive.by_index(index).map_err(|error| damaged(&format!("{}", index + 1), &error))?;
-    let name = entry.name().to_string();
+    let name = entry.name().map(std::borrow::Cow::into_owned);
+    let name = name.map_err(|error| damaged(&format!("{}", index + 1), &error))?;
     if entry.size() > LARGEST_FILE {
         return Err(damaged(&name, &format!("{} bytes announced", entry.size())));
     }
@@ -181,7 +182,8 @@ mod tests {
 
     #[test]
     fn flipped_bits_anywhere_never_panic() {
-        let (_root, path) = archive_with(&[Entry::new("modelDescription.xml", "<a/>".repeat(50)), Entry::new("b", "c")]);
+        let (_root, path) =
+            archive_with(&[Entry::new("modelDescription.xml", "<a/>".repeat(50)), Entry::new("b", "c")]);
         let bytes = fs::read(&path).unwrap();
         for at in 0..bytes.len() {
             let mut damaged = bytes.clone();

@@ -110,10 +110,18 @@ fn header(input: &ReportInput<'_>) -> String {
         ("per internal step".into(), format!("{} µs", rounded(per_step)), "whole disk, native".into()),
     ];
     if let Some((_, peak)) = results.extremes(Quantity::NormalForcePeak) {
-        cards.push(("largest contact force".into(), format!("{} N", rounded(peak)), "one node, one internal step".into()));
+        cards.push((
+            "largest contact force".into(),
+            format!("{} N", rounded(peak)),
+            "one node, one internal step".into(),
+        ));
     }
     if let Some((low, high)) = results.extremes(Quantity::EnergyResidualRelative) {
-        cards.push(("energy residual".into(), format!("{:.1e}", low.abs().max(high.abs())), "relative, largest".into()));
+        cards.push((
+            "energy residual".into(),
+            format!("{:.1e}", low.abs().max(high.abs())),
+            "relative, largest".into(),
+        ));
     }
     if !input.imported.is_empty() {
         let labels: Vec<&str> = input.imported.iter().map(|run| run.label.as_str()).collect();
@@ -146,9 +154,18 @@ fn rom_section(facts: &[RomFacts]) -> String {
             ("sectors", rom.sectors.to_string()),
             ("reduced coordinates per sector", rom.order().to_string()),
             ("contact nodes", escape(&nodes.join(", "))),
-            ("largest angular frequency ω<sub>max</sub>", format!("{} rad/s", scientific(fact.largest_angular_frequency))),
-            ("largest stable h, central differences", format!("{} s (2/ω<sub>max</sub>)", scientific(fact.central_difference_limit))),
-            ("largest stable h, modal-exact", "no limit; contact on all modes is resolved up to the value above".into()),
+            (
+                "largest angular frequency ω<sub>max</sub>",
+                format!("{} rad/s", scientific(fact.largest_angular_frequency)),
+            ),
+            (
+                "largest stable h, central differences",
+                format!("{} s (2/ω<sub>max</sub>)", scientific(fact.central_difference_limit)),
+            ),
+            (
+                "largest stable h, modal-exact",
+                "no limit; contact on all modes is resolved up to the value above".into(),
+            ),
             ("contact problem solvable up to µ", format!("{friction} (all nodes closed; tried up to 2)")),
         ]));
         html.push_str(&checks_table(&fact.checks()));

@@ -96,7 +96,14 @@ pub fn draw(
         let _ = write!(
             svg,
             r##"<path d="M{} {}L{} {}L{} {}L{} {}Z" fill="{color}" stroke="{color}"/>"##,
-            corners[0].0, corners[0].1, corners[1].0, corners[1].1, corners[2].0, corners[2].1, corners[3].0, corners[3].1
+            corners[0].0,
+            corners[0].1,
+            corners[1].0,
+            corners[1].1,
+            corners[2].0,
+            corners[2].1,
+            corners[3].0,
+            corners[3].1
         );
     }
     for mark in marks {
@@ -155,10 +162,7 @@ impl Frame {
     /// SVG coordinates, to a tenth of a unit.
     fn place(&self, projected: [f64; 3]) -> (f64, f64) {
         let tenth = |value: f64| (value * 10.0).round() / 10.0;
-        (
-            tenth((projected[0] - self.left) * self.magnification),
-            tenth((self.top - projected[1]) * self.magnification),
-        )
+        (tenth((projected[0] - self.left) * self.magnification), tenth((self.top - projected[1]) * self.magnification))
     }
 }
 
@@ -171,7 +175,8 @@ pub fn color_scale(low: &str, high: &str) -> String {
         let color = hex(viridis((f64::from(step) + 0.5) / 50.0));
         let _ = write!(svg, r##"<rect x="{}" y="8" width="4.2" height="14" fill="{color}"/>"##, 100 + 4 * step);
     }
-    let _ = write!(svg, r##"<text x="92" y="20" text-anchor="end">{low}</text><text x="308" y="20">{high}</text></svg>"##);
+    let _ =
+        write!(svg, r##"<text x="92" y="20" text-anchor="end">{low}</text><text x="308" y="20">{high}</text></svg>"##);
     svg
 }
 
@@ -193,9 +198,7 @@ fn viridis(share: f64) -> [f64; 3] {
     let place = share.clamp(0.0, 1.0) * last as f64;
     let index = (1..last).rev().find(|index| place >= *index as f64).unwrap_or(0);
     let fraction = place - index as f64;
-    std::array::from_fn(|channel| {
-        VIRIDIS[index][channel] * (1.0 - fraction) + VIRIDIS[index + 1][channel] * fraction
-    })
+    std::array::from_fn(|channel| VIRIDIS[index][channel] * (1.0 - fraction) + VIRIDIS[index + 1][channel] * fraction)
 }
 
 fn hex(color: [f64; 3]) -> String {
@@ -247,7 +250,8 @@ mod tests {
         let surface = two_squares();
         // From above: the radial direction (x) points towards the observer.
         let view = View::of_blade(&surface, 0.0, std::f64::consts::FRAC_PI_2);
-        let displacement = [[0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0; 3], [0.0; 3]];
+        let displacement =
+            [[0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0; 3], [0.0; 3]];
         let frame = Frame::around(&surface, &view, 0.1);
         let svg = draw(&surface, Some((&displacement, 0.0)), &[[1.0, 0.0, 0.5]], &frame, &view);
         let far = svg.find(&hex_prefix(0.5)).expect("displaced square is drawn");

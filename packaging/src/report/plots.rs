@@ -125,7 +125,8 @@ impl Plot {
             let ends = [(x_range.start, *level), (x_range.end, *level)];
             let style = INK.mix(0.55).stroke_width(SCALE);
             chart.draw_series(DashedLineSeries::new(ends, 10, 8, style)).map_err(|error| error.to_string())?;
-            let small = ("sans-serif", 13 * SCALE).into_font().color(&INK.mix(0.8)).pos(Pos::new(HPos::Right, VPos::Bottom));
+            let small =
+                ("sans-serif", 13 * SCALE).into_font().color(&INK.mix(0.8)).pos(Pos::new(HPos::Right, VPos::Bottom));
             let place = (x_range.end, *level);
             chart
                 .draw_series(std::iter::once(EmptyElement::at(place) + Text::new(label.clone(), (-6, -6), small)))
@@ -160,7 +161,7 @@ impl Plot {
             let drawn = if series.stems {
                 chart.draw_series(points.into_iter().map(|point| Circle::new(point, 4 * SCALE, color.filled())))
             } else {
-                chart.draw_series(LineSeries::new(points, style).map(|element| element))
+                chart.draw_series(LineSeries::new(points, style))
             };
             let stroke = color.stroke_width(2 * SCALE);
             drawn
@@ -180,9 +181,7 @@ impl Plot {
     }
 }
 
-fn chart_frame<'a, 'b>(
-    area: &'a DrawingArea<SVGBackend<'b>, Shift>,
-) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
+fn chart_frame<'a, 'b>(area: &'a DrawingArea<SVGBackend<'b>, Shift>) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
     let mut builder = ChartBuilder::on(area);
     builder.margin(8 * SCALE).x_label_area_size(42 * SCALE).y_label_area_size(78 * SCALE);
     builder
@@ -190,7 +189,8 @@ fn chart_frame<'a, 'b>(
 
 /// Smallest range that holds the values, with a margin; never empty.
 fn padded(values: impl Iterator<Item = f64>, margin: f64) -> std::ops::Range<f64> {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    let (low, high) =
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     if !(low.is_finite() && high.is_finite()) {
         return 0.0..1.0;
     }

@@ -54,7 +54,11 @@ impl<'a> Results<'a> {
     /// Smallest and largest value of a scalar quantity.
     pub fn extremes(&self, quantity: Quantity) -> Option<(f64, f64)> {
         let column = self.column(quantity)?;
-        Some(column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value))))
+        Some(
+            column
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value))),
+        )
     }
 
     /// Time in ms against value times `factor`.
@@ -65,7 +69,11 @@ impl<'a> Results<'a> {
     /// One series per element, labelled with the names of the contact nodes.
     fn per_node(&self, quantity: Quantity, nodes: &[String], factor: f64) -> Vec<Series> {
         let columns = self.columns(quantity);
-        nodes.iter().zip(&columns).map(|(node, column)| Series::line(readable(node), self.points(column, factor))).collect()
+        nodes
+            .iter()
+            .zip(&columns)
+            .map(|(node, column)| Series::line(readable(node), self.points(column, factor)))
+            .collect()
     }
 
     fn series(&self, label: &str, quantity: Quantity, factor: f64) -> Option<Series> {
@@ -91,9 +99,9 @@ pub(super) fn figures(input: &ReportInput<'_>) -> Result<Vec<(&'static str, Stri
         let mut html = String::new();
         for figure in figures {
             number += 1;
-            let _ = write!(
+            let _ = writeln!(
                 html,
-                "<figure>{}<figcaption><b>Figure {number}.</b> {}</figcaption></figure>\n",
+                "<figure>{}<figcaption><b>Figure {number}.</b> {}</figcaption></figure>",
                 figure.body, figure.caption
             );
         }
@@ -112,7 +120,11 @@ fn watched(input: &ReportInput<'_>) -> usize {
 }
 
 fn node_names(input: &ReportInput<'_>) -> Vec<String> {
-    input.scene.roms.first().map_or_else(Vec::new, |rom| rom.contact_nodes.iter().map(|node| node.name.clone()).collect())
+    input
+        .scene
+        .roms
+        .first()
+        .map_or_else(Vec::new, |rom| rom.contact_nodes.iter().map(|node| node.name.clone()).collect())
 }
 
 /// `leading_edge` as people write it.
@@ -189,8 +201,9 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>>
         plot.height = 220;
         figures.push(Figure {
             body: plot.to_svg()?,
-            caption: "Reaction torque of the casing on the shaft, mean over the communication step; negative values brake."
-                .into(),
+            caption:
+                "Reaction torque of the casing on the shaft, mean over the communication step; negative values brake."
+                    .into(),
         });
     }
     Ok(figures)
@@ -209,7 +222,8 @@ fn energies(results: &Results<'_>) -> Result<Vec<Figure>> {
         (&stored[..], "Energy of vibration of all blades."),
         (&exchanged[..], "Work put in by the drive and the casing, and where it went, accumulated from the start."),
     ] {
-        let series: Vec<Series> = list.iter().filter_map(|(label, quantity)| results.series(label, *quantity, 1.0)).collect();
+        let series: Vec<Series> =
+            list.iter().filter_map(|(label, quantity)| results.series(label, *quantity, 1.0)).collect();
         if !series.is_empty() {
             let body = Plot::new("time (ms)", "energy (J)", series).to_svg()?;
             figures.push(Figure { body, caption: caption.into() });
@@ -218,14 +232,18 @@ fn energies(results: &Results<'_>) -> Result<Vec<Figure>> {
     let residual = results.column(Quantity::EnergyResidualRelative);
     if let (Some(column), Some(_)) = (residual, results.variable(Quantity::EnergyResidualRelative)) {
         let magnitude: Vec<f64> = column.iter().map(|value| value.abs()).collect();
-        let mut plot =
-            Plot::new("time (ms)", "|residual| / energy (-)", vec![Series::line("residual", results.points(&magnitude, 1.0))]);
+        let mut plot = Plot::new(
+            "time (ms)",
+            "|residual| / energy (-)",
+            vec![Series::line("residual", results.points(&magnitude, 1.0))],
+        );
         (plot.height, plot.logarithmic) = (200, true);
         figures.push(Figure {
             body: plot.to_svg()?,
-            caption: "Closure of the energy ledger: kinetic + strain + losses − initial − work put in, relative to initial \
+            caption:
+                "Closure of the energy ledger: kinetic + strain + losses − initial − work put in, relative to initial \
                       energy and all work exchanged. What remains is round-off."
-                .into(),
+                    .into(),
         });
     }
     Ok(figures)
@@ -246,7 +264,8 @@ fn mode_shapes(reduction: &Reduction) -> Figure {
     let radii = surface.points.iter().map(|point| point[0].hypot(point[1]));
     let (low, high) = radii.fold((f64::INFINITY, 0.0_f64), |(low, high), radius| (low.min(radius), high.max(radius)));
     for (mode, number) in reduction.modes.iter().take(MODES_SHOWN).zip(1..) {
-        let largest = mode.shape.iter().map(|vector| vector.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max);
+        let largest =
+            mode.shape.iter().map(|vector| vector.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max);
         let scale = DRAWN_DISPLACEMENT * (high - low) / f64::max(largest, f64::MIN_POSITIVE);
         let drawn = picture::draw(&surface, Some((&mode.shape, scale)), &[], &frame, &view);
         let _ = write!(body, "<div>{drawn}<span>mode {number}: {:.1} Hz</span></div>", mode.frequency);
