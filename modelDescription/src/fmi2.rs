@@ -80,14 +80,14 @@ fn typed(row: &Row) -> Element {
     element.with_some("start", row.start.as_ref())
 }
 
-/// Outputs and initial unknowns by index. No `dependencies`: each may depend on every input and parameter.
+/// Outputs and initial unknowns by index.
 fn model_structure(rows: &[Row]) -> Element {
-    Element::new("ModelStructure")
-        .children(unknowns("Outputs", rows.iter().filter(|row| row.is_output())))
-        .children(unknowns("InitialUnknowns", rows.iter().filter(|row| row.is_initial_unknown())))
-}
-
-fn unknowns<'a>(name: &'static str, rows: impl Iterator<Item = &'a Row<'a>>) -> Option<Element> {
     let unknown = |row: &Row| Element::new("Unknown").with("index", row.index.to_string());
-    Element::new(name).children(rows.map(unknown)).unless_empty()
+    let output = |row: &Row| unknown(row).with("dependencies", row.output_dependencies());
+    let initial = |row: &Row| unknown(row).with_some("dependencies", row.initial_dependencies());
+    let outputs = rows.iter().filter(|row| row.is_output()).map(output);
+    let initial_unknowns = rows.iter().filter(|row| row.is_initial_unknown()).map(initial);
+    Element::new("ModelStructure")
+        .children(Element::new("Outputs").children(outputs).unless_empty())
+        .children(Element::new("InitialUnknowns").children(initial_unknowns).unless_empty())
 }

@@ -95,10 +95,12 @@ fn takes_intermediate_values(row: &Row) -> bool {
     row.variable.causality == Causality::Input && row.variable.variability == Variability::Continuous
 }
 
-/// Outputs and initial unknowns. No `dependencies`: each may depend on every input and parameter.
+/// Outputs and initial unknowns by value reference.
 fn model_structure(rows: &[Row]) -> Element {
-    let unknown = |name: &'static str, row: &Row| Element::new(name).with("valueReference", row.reference.to_string());
+    let unknown = |name, row: &Row| Element::new(name).with("valueReference", row.reference.to_string());
+    let output = |row: &Row| unknown("Output", row).with("dependencies", row.output_dependencies());
+    let initial = |row: &Row| unknown("InitialUnknown", row).with_some("dependencies", row.initial_dependencies());
     Element::new("ModelStructure")
-        .children(rows.iter().filter(|row| row.is_output()).map(|row| unknown("Output", row)))
-        .children(rows.iter().filter(|row| row.is_initial_unknown()).map(|row| unknown("InitialUnknown", row)))
+        .children(rows.iter().filter(|row| row.is_output()).map(output))
+        .children(rows.iter().filter(|row| row.is_initial_unknown()).map(initial))
 }

@@ -59,6 +59,18 @@ impl Row<'_> {
         self.is_output() && self.variable.initial_is_exact() == Some(false)
     }
 
+    /// The attribute `dependencies` of an output: none. Outputs are computed by `doStep` and stay as they are until the
+    /// next one, whatever inputs are set in between, so that importers find no algebraic loop through this FMU.
+    pub fn output_dependencies(&self) -> &'static str {
+        ""
+    }
+
+    /// The attribute `dependencies` of an initial unknown: nothing has been averaged or accumulated at the start, so
+    /// that means and totals are zero; everything else may depend on every input and parameter, said by its absence.
+    pub fn initial_dependencies(&self) -> Option<&'static str> {
+        matches!(self.variable.span, Span::Mean | Span::Total).then_some("")
+    }
+
     /// The attribute `initial`, absent for inputs and time.
     pub fn initial(&self) -> Option<&'static str> {
         self.variable.initial_is_exact().map(|exact| if exact { "exact" } else { "calculated" })

@@ -170,6 +170,20 @@ fn the_model_structure_is_complete() {
 }
 
 #[test]
+fn outputs_depend_on_the_step_only_and_means_start_at_zero() {
+    for (version, elements) in all() {
+        let (outputs, initial) = match version {
+            "2.0" => ("/ModelStructure/Outputs/Unknown", "/ModelStructure/InitialUnknowns/Unknown"),
+            _ => ("/ModelStructure/Output", "/ModelStructure/InitialUnknown"),
+        };
+        assert!(at(&elements, outputs).iter().all(|unknown| unknown["dependencies"].is_empty()));
+        let free: Vec<_> = at(&elements, initial).into_iter().filter(|u| u.contains_key("dependencies")).collect();
+        assert_eq!(free.len(), 1, "`contact.force` is the one mean of the table");
+        assert!(free[0]["dependencies"].is_empty());
+    }
+}
+
+#[test]
 fn units_and_types_used_are_defined() {
     for (version, elements) in all() {
         let names =

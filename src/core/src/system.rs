@@ -100,13 +100,14 @@ impl System {
             lowest: vec![0.0; lanes],
             slip: vec![[0.0; 3]; nodes],
             force: vec![0.0; 3 * nodes],
-            gap_oldest: vec![0.0; contacts],
+            gap_oldest: vec![f64::INFINITY; contacts],
             displacement_oldest: vec![0.0; 3 * contacts],
             state: SystemState {
                 steps: 0,
                 factorisations: 0,
-                gap: vec![0.0; contacts],
-                gap_before: vec![0.0; contacts],
+                // Padding lanes keep an infinite gap.
+                gap: vec![f64::INFINITY; contacts],
+                gap_before: vec![f64::INFINITY; contacts],
                 multiplier: vec![0.0; contacts],
                 force: vec![0.0; 3 * contacts],
                 ledger: Ledger::default(),
@@ -219,8 +220,7 @@ impl System {
         self.state.multiplier.fill(0.0);
         self.state.force.fill(0.0);
         self.events.clear();
-        self.law.evaluate(drive, &mut self.geometry);
-        self.evaluate_gaps();
+        self.evaluate_gaps(drive);
         self.state.gap_before.copy_from_slice(&self.state.gap);
         self.state.ledger = Ledger { initial: self.mechanical_energy(), ..Ledger::default() };
     }
@@ -248,10 +248,9 @@ impl System {
     pub fn step(&mut self, drive: &Drive) -> Result<(), StepFailure> {
         self.displacement_oldest.copy_from_slice(self.bank.displacement_before());
         self.bank.predict(self.settings.ledger);
-        self.law.evaluate(drive, &mut self.geometry);
         std::mem::swap(&mut self.gap_oldest, &mut self.state.gap_before);
         std::mem::swap(&mut self.state.gap_before, &mut self.state.gap);
-        self.evaluate_gaps();
+        self.evaluate_gaps(drive);
         self.clear_events();
         for sector in 0..self.bank.sectors() {
             // NaN counts as touching, and is found out there.
@@ -267,25 +266,13 @@ impl System {
     }
 
     /// Gap of every node, and the smallest of each lane.
-    fn evaluate_gaps(&mut self) {
-        let lanes = self.bank.lanes();
-        let displacement = self.bank.displacement();
+    fn evaluate_gaps(&mut self, drive: &Drive) {
+        self.law.evaluate(drive, self.bank.displacement(), &mut self.geometry, &mut self.state.gap);
         self.lowest.fill(f64::INFINITY);
-        for node in 0..self.law.nodes() {
-            let span = node * lanes..(node + 1) * lanes;
-            let [normal_0, normal_1, normal_2] = &self.geometry.normal;
-            let offset = &self.geometry.offset[span.clone()];
-            let (normal_0, normal_1, normal_2) =
-                (&normal_0[span.clone()], &normal_1[span.clone()], &normal_2[span.clone()]);
-            let u = &displacement[3 * node * lanes..][..3 * lanes];
-            let gap = &mut self.state.gap[span];
-            for lane in 0..lanes {
-                let moved =
-                    normal_0[lane] * u[lane] + normal_1[lane] * u[lanes + lane] + normal_2[lane] * u[2 * lanes + lane];
-                gap[lane] = offset[lane] + moved;
-                let lowest = self.lowest[lane];
+        for row in self.state.gap.chunks(self.bank.lanes()) {
+            for (lowest, gap) in self.lowest.iter_mut().zip(row) {
                 // NaN sticks.
-                self.lowest[lane] = if lowest <= gap[lane] || lowest.is_nan() { lowest } else { gap[lane] };
+                *lowest = if *lowest <= *gap || lowest.is_nan() { *lowest } else { *gap };
             }
         }
     }

@@ -1,15 +1,25 @@
 //! Reduce the rotor 37 blade and print what came of it: counts, frequencies, checks, times.
 //!
-//!     cargo run --release -p tiprub-model --example rotor37 [-- file.inp]
+//!     cargo run --release -p tiprub-model --example rotor37 [-- file.inp [chord thickness span]]
 //!
-//! With a file name, the mesh is also written as a CalculiX input file (`*FREQUENCY`, ten modes).
+//! With a file name, the mesh is also written as a CalculiX input file (`*FREQUENCY`, ten modes). Three more numbers are
+//! the element counts of the mesh.
 
 use std::path::Path;
 
-use tiprub_model::{Rotor37Options, inp, reduce_rotor37};
+use tiprub_model::rotor37::MeshCounts;
+use tiprub_model::{Error, Rotor37Options, inp, reduce_rotor37};
 
 fn main() -> tiprub_model::Result<()> {
-    let reduction = reduce_rotor37(&Rotor37Options::default(), &tiprub_model::progress::silent)?;
+    let arguments: Vec<String> = std::env::args().collect();
+    let mut options = Rotor37Options::default();
+    if let Some(counts) = arguments.get(2..5) {
+        let count =
+            |text: &String| text.parse().map_err(|_| Error::invalid("element count", text, "Give whole numbers"));
+        options.mesh =
+            MeshCounts { chord: count(&counts[0])?, thickness: count(&counts[1])?, span: count(&counts[2])? };
+    }
+    let reduction = reduce_rotor37(&options, &tiprub_model::progress::silent)?;
     println!("{}", reduction.rom.origin);
     println!(
         "{} nodes, {} elements, {} free dofs",
@@ -38,8 +48,8 @@ fn main() -> tiprub_model::Result<()> {
         println!("{}: r {r:.6} m, theta {theta:.6} rad, z {z:.6} m, dr/dz {:.4}", node.name, node.meridional_slope);
     }
     println!("{:?}, total {:.2} s", reduction.timings, reduction.timings.total());
-    if let Some(path) = std::env::args().nth(1) {
-        inp::write_calculix_input(Path::new(&path), &reduction.mesh, &reduction.material, Some("hub"), 10)?;
+    if let Some(path) = arguments.get(1) {
+        inp::write_calculix_input(Path::new(path), &reduction.mesh, &reduction.material, Some("hub"), 10)?;
     }
     Ok(())
 }

@@ -1,10 +1,10 @@
 //! Gap functions: where the master nodes are with respect to the slave, as affine functions of their displacement.
 //!
-//! Within one step the gap of node i is g = offset + n·u (eq. 3 of the paper with the closest point at the node's
-//! undeformed place in the turning frame). For a surface of revolution with shape s(θ) and meridional slope m,
-//! F = r_c(θ, z) − r has the gradient (−1, s'/r, m) with respect to (radial, tangential, axial) displacement; dividing
-//! by its length N gives the unit normal from the casing to the blade and the gap F/N. The slope terms are what lets
-//! a frictionless lobe draw power from the shaft.
+//! The gap of a node (eq. 3 of the paper) is evaluated at its predicted place and linear in the correction of the
+//! step from there, g = g_p + n·(u − u_p). For a surface of revolution with shape s(θ) and meridional slope m,
+//! F = r_c(θ + u_θ/r, z) − r − u_r + m u_z has the gradient (−1, s'/r, m) with respect to (radial, tangential, axial)
+//! displacement; dividing by its length N gives the unit normal from the casing to the blade and the gap F/N. The
+//! slope is what lets a frictionless lobe draw power from the shaft: r n_θ λ is the torque conjugate to θ_r.
 
 use super::surface::Surface;
 use crate::settings::Meridian;
@@ -27,18 +27,16 @@ pub struct Drive {
     pub radius_change: f64,
 }
 
-/// Gap offsets and unit normals of one instant, arrays `[node · lanes + lane]`.
+/// Unit normals of one instant, arrays `[node · lanes + lane]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Geometry {
-    /// Gap of the undeformed node (m).
-    pub offset: Vec<f64>,
     /// Components of the unit normal, pointing from the slave to the master.
     pub normal: [Vec<f64>; 3],
 }
 
 impl Geometry {
     fn new(len: usize) -> Self {
-        Self { offset: vec![0.0; len], normal: [vec![0.0; len], vec![0.0; len], vec![0.0; len]] }
+        Self { normal: [vec![0.0; len], vec![0.0; len], vec![0.0; len]] }
     }
 
     /// Unit normal of one node of one lane.
@@ -130,23 +128,26 @@ impl RevolutionGap {
         self.radii[node]
     }
 
-    fn evaluate(&self, drive: &Drive, geometry: &mut Geometry) {
+    fn evaluate(&self, drive: &Drive, displacement: &[f64], geometry: &mut Geometry, gap: &mut [f64]) {
         let opening = drive.gap_offset + drive.radius_change;
         let turned = drive.rotor_angle - drive.shape_rotation;
+        let lanes = self.lanes;
         for node in 0..self.radii.len() {
             let (slope, radius) = (self.slopes[node], self.radii[node]);
-            let start = node * self.lanes;
+            let [radial, tangential, axial] =
+                std::array::from_fn(|component| &displacement[(3 * node + component) * lanes..][..lanes]);
             for sector in 0..self.sectors {
-                let index = start + sector;
+                let index = node * lanes + sector;
                 let (shape, turn) = match &self.surface {
                     Surface::Circular => (0.0, 0.0),
-                    surface => surface.evaluate(self.angles[index] + turned),
+                    surface => surface.evaluate(self.angles[index] + turned + tangential[sector] / radius),
                 };
-                let tangential = drive.shape_factor * turn / radius;
-                let length = (1.0 + tangential * tangential + slope * slope).sqrt();
-                geometry.offset[index] = (self.clearances[sector] + opening + drive.shape_factor * shape) / length;
+                let sideways = drive.shape_factor * turn / radius;
+                let length = (1.0 + sideways * sideways + slope * slope).sqrt();
+                let clearance = self.clearances[sector] + opening + drive.shape_factor * shape;
+                gap[index] = (clearance - radial[sector] + slope * axial[sector]) / length;
                 geometry.normal[0][index] = -1.0 / length;
-                geometry.normal[1][index] = tangential / length;
+                geometry.normal[1][index] = sideways / length;
                 geometry.normal[2][index] = slope / length;
             }
         }
@@ -171,12 +172,9 @@ impl GapLaw {
 
     /// Arrays of the right size, filled once for laws that never change.
     pub fn geometry(&self, lanes: usize) -> Geometry {
-        // Padding lanes keep an infinite clearance, so that they never touch.
         let mut geometry = Geometry::new(self.nodes() * lanes);
-        geometry.offset.fill(f64::INFINITY);
         if let Self::Fixed(law) = self {
-            for (node, (normal, gap)) in law.normals.iter().zip(&law.gaps).enumerate() {
-                geometry.offset[node * lanes] = *gap;
+            for (node, normal) in law.normals.iter().enumerate() {
                 for component in 0..3 {
                     geometry.normal[component][node * lanes] = normal[component];
                 }
@@ -185,11 +183,16 @@ impl GapLaw {
         geometry
     }
 
-    /// Offsets and normals at an instant.
-    pub fn evaluate(&self, drive: &Drive, geometry: &mut Geometry) {
+    /// Gaps (m) and normals at an instant, for the displacements `[row · lanes + lane]` of the contact rows (m).
+    /// Gaps of padding lanes are left alone.
+    pub fn evaluate(&self, drive: &Drive, displacement: &[f64], geometry: &mut Geometry, gap: &mut [f64]) {
         match self {
-            Self::Fixed(_) => {}
-            Self::Revolution(law) => law.evaluate(drive, geometry),
+            Self::Fixed(law) => {
+                for (node, (normal, initial)) in law.normals.iter().zip(&law.gaps).enumerate() {
+                    gap[node] = initial + dot(*normal, std::array::from_fn(|i| displacement[3 * node + i]));
+                }
+            }
+            Self::Revolution(law) => law.evaluate(drive, displacement, geometry, gap),
         }
     }
 

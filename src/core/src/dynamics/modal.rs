@@ -166,3 +166,47 @@ fn fix_signs(shapes: &mut DMatrix<f64>) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rom::{ContactNode, Frame, RomChecks};
+
+    /// Random symmetric positive definite pencil.
+    fn rom(order: usize, seed: u64) -> Rom {
+        let mut state = seed;
+        let mut number = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            f64::from(u32::try_from(state >> 33).unwrap()) / f64::from(1_u32 << 30) - 1.0
+        };
+        let a = DMatrix::from_fn(order, order, |_, _| number());
+        let b = DMatrix::from_fn(order, order, |_, _| number());
+        Rom {
+            name: "random".into(),
+            origin: String::new(),
+            sectors: 1,
+            frame: Frame::Cartesian,
+            mass: &a * a.transpose() * 0.1 + DMatrix::identity(order, order),
+            stiffness: &b * b.transpose() * 1e6,
+            damping_ratio: 0.0,
+            contact_map: DMatrix::identity(3, order),
+            contact_nodes: vec![ContactNode { name: "n".into(), position: [0.0; 3], meridional_slope: 0.0 }],
+            checks: RomChecks::default(),
+        }
+    }
+
+    #[test]
+    fn modes_are_orthonormal_and_diagonalise_the_pencil_to_rounding() {
+        for (order, seed) in [(3, 1), (14, 2), (29, 3), (60, 4)] {
+            let rom = rom(order, seed);
+            let model = ModalModel::from_rom(&rom, 0.0).unwrap();
+            let identity = model.shapes.transpose() * &rom.mass * &model.shapes;
+            let error = (identity - DMatrix::identity(order, order)).amax();
+            let squares = model.shapes.transpose() * &rom.stiffness * &model.shapes;
+            let diagonal = nalgebra::DVector::from_iterator(order, model.frequencies.iter().map(|w| w * w));
+            let off = (squares - DMatrix::from_diagonal(&diagonal)).amax() / diagonal.amax();
+            println!("n = {order}: orthonormality {error:.1e}, diagonality {off:.1e}");
+            assert!(error < 1e-13 && off < 1e-13, "n = {order}: {error:e}, {off:e}");
+        }
+    }
+}

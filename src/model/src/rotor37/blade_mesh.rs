@@ -21,7 +21,7 @@ pub struct MeshCounts {
 
 impl Default for MeshCounts {
     fn default() -> Self {
-        Self { chord: 16, thickness: 2, span: 14 }
+        Self { chord: 16, thickness: 2, span: 20 }
     }
 }
 
@@ -47,7 +47,7 @@ pub struct BladeMesh {
 pub fn blade_mesh(counts: MeshCounts) -> Result<BladeMesh> {
     for (name, count) in [("chord", counts.chord), ("thickness", counts.thickness), ("span", counts.span)] {
         if count == 0 {
-            let remedy = "Give at least one element in every direction; 16 x 2 x 14 is the default";
+            let remedy = "Give at least one element in every direction; 16 x 2 x 20 is the default";
             return Err(Error::invalid(format!("mesh count `{name}`"), "it is zero", remedy));
         }
     }

@@ -78,6 +78,16 @@ impl Section {
         SurfacePoint { r: chebyshev(&self.r, t), theta: y / self.mean_radius, z: chebyshev(&self.z, t) }
     }
 
+    /// Plane abscissa X of the parallel circle at axial coordinate z (bisection; z grows with X).
+    pub fn abscissa(&self, z: f64) -> f64 {
+        let [mut low, mut high] = self.meridional_range;
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if self.on_surface([middle, 0.0]).z < z { low = middle } else { high = middle }
+        }
+        0.5 * (low + high)
+    }
+
     /// Slope dr/dz of the surface of revolution at plane abscissa X.
     pub fn meridional_slope(&self, x: f64) -> f64 {
         let step = 1e-4 * (self.meridional_range[1] - self.meridional_range[0]);

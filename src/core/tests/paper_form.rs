@@ -1,0 +1,106 @@
+//! The paper's equations with dense matrices against the modal form of the core: the same numbers.
+
+use nalgebra::{DMatrix, DVector};
+use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw, dot};
+use tiprub_core::dynamics::modal::ModalModel;
+use tiprub_core::rom::{ContactNode, Frame, Rom, RomChecks};
+use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::system::{System, SystemSettings};
+use tiprub_reference::paper::DenseFilm;
+
+const CONTACTS: usize = 3;
+const ORDER: usize = 14;
+const FRICTION: f64 = 0.3;
+const DAMPING: f64 = 0.02;
+
+/// Reproducible numbers in (−1, 1) without a generator to depend on.
+fn number(seed: &mut u64) -> f64 {
+    *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    (*seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
+
+fn rom(seed: &mut u64) -> Rom {
+    let a = DMatrix::from_fn(ORDER, ORDER, |_, _| number(seed));
+    let b = DMatrix::from_fn(ORDER, ORDER, |_, _| number(seed));
+    Rom {
+        name: "random".into(),
+        origin: "random symmetric positive definite matrices".into(),
+        sectors: 1,
+        frame: Frame::Cartesian,
+        mass: &a * a.transpose() * 0.1 + DMatrix::identity(ORDER, ORDER),
+        stiffness: (&b * b.transpose() + DMatrix::identity(ORDER, ORDER) * 0.3) * 1e6,
+        damping_ratio: DAMPING,
+        contact_map: DMatrix::from_fn(3 * CONTACTS, ORDER, |row, column| if row == column { 1.0 } else { 0.0 }),
+        contact_nodes: vec![ContactNode { name: "node".into(), position: [0.0; 3], meridional_slope: 0.0 }; CONTACTS],
+        checks: RomChecks::default(),
+    }
+}
+
+#[test]
+fn a_thousand_contact_steps_agree_to_rounding() {
+    let mut seed = 2010;
+    let rom = rom(&mut seed);
+    let model = ModalModel::from_rom(&rom, DAMPING).unwrap();
+    let step = 0.2 / model.largest_frequency();
+    let normals = vec![[0.6, 0.0, 0.8]; CONTACTS];
+    let tangent = [0.0, 1.0, 0.0];
+    // Sliding so fast that vibration does not turn the slip direction by one rounding error: the case the paper assumes.
+    let sliding = vec![[0.0, 1e18, 0.0]; CONTACTS];
+    // Two nodes are pressed against the obstacle at rest, one touches now and then.
+    let gaps = [-1e-4, 0.1e-4, -0.5e-4];
+    let law = GapLaw::Fixed(FixedGap { normals: normals.clone(), gaps: gaps.to_vec(), sliding });
+    let settings =
+        SystemSettings { scheme: Scheme::CentralDifference, solver: Solver::Film, friction: FRICTION, ledger: true };
+    let mut system = System::new(&model, 1, law, settings);
+    system.set_step(step);
+    let start = DVector::from_fn(ORDER, |_, _| 2e-4 * number(&mut seed));
+    let modal = model.shapes.transpose() * &rom.mass * &start;
+    for mode in 0..ORDER {
+        system.bank_mut().set_modal_state(mode, 0, modal[mode], 0.0);
+    }
+    system.start(&Drive::default());
+    let physical = |system: &System, before: bool| {
+        let coordinates = DVector::from_fn(ORDER, |mode, _| {
+            let (position, increment) = system.bank().modal_state(mode, 0);
+            if before { position - increment } else { position }
+        });
+        &model.shapes * coordinates
+    };
+    // Modal damping projected back to the reduced coordinates: D = M Φ 2ξω Φᵀ M.
+    let rates = DVector::from_fn(ORDER, |mode, _| 2.0 * DAMPING * model.frequencies[mode]);
+    let weighted = &rom.mass * &model.shapes;
+    let damping = &weighted * DMatrix::from_diagonal(&rates) * weighted.transpose();
+    let mut paper = DenseFilm::new(
+        rom.mass.clone(),
+        damping,
+        rom.stiffness.clone(),
+        step,
+        physical(&system, false),
+        physical(&system, true),
+    );
+    let direction = |node: usize| -> [f64; 3] { std::array::from_fn(|i| normals[node][i] - FRICTION * tangent[i]) };
+    let column = |vector: &dyn Fn(usize) -> [f64; 3]| {
+        DMatrix::from_fn(ORDER, CONTACTS, |row, node| if row / 3 == node { vector(node)[row % 3] } else { 0.0 })
+    };
+    let normal = column(&|node| normals[node]);
+    let slip = column(&direction);
+    assert!(dot(normals[0], tangent).abs() < 1e-15);
+    let gaps = DVector::from_row_slice(&gaps);
+    let (mut contact_steps, mut steps, mut worst, mut scale) = (0, 0, 0.0_f64, 0.0_f64);
+    while contact_steps < 1000 {
+        system.step(&Drive::default()).unwrap();
+        let multipliers = paper.step(&normal, &slip, &gaps);
+        let ours = physical(&system, false);
+        worst = worst.max((&ours - &paper.now).amax());
+        scale = scale.max(paper.now.amax());
+        for node in 0..CONTACTS {
+            let touching = multipliers[node] != 0.0;
+            assert_eq!(touching, system.multiplier(node, 0) != 0.0, "contact set differs at step {steps}");
+        }
+        contact_steps += u32::from(multipliers.iter().any(|value| *value != 0.0));
+        steps += 1;
+        assert!(steps < 200_000, "only {contact_steps} contact steps");
+    }
+    println!("{steps} steps, {contact_steps} in contact: largest difference {:.2e} relative", worst / scale);
+    assert!(worst / scale < 1e-11, "{:.3e}", worst / scale);
+}

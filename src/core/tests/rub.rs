@@ -1,0 +1,370 @@
+//! A rub of a synthetic bladed disk through the whole simulation: books, states, time, steps.
+
+mod common;
+
+use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
+use std::cell::Cell;
+use std::collections::BTreeMap;
+
+use tiprub_core::settings::{Scheme, Shape, Solver};
+use tiprub_core::variables::{Causality, Kind};
+use tiprub_core::{Error, Scene, Simulation};
+
+/// Counts allocations of this thread while armed.
+struct Counting;
+
+thread_local! {
+    static ARMED: Cell<bool> = const { Cell::new(false) };
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+}
+
+// SAFETY: forwards to the system allocator; the bookkeeping does not allocate.
+unsafe impl GlobalAlloc for Counting {
+    // SAFETY: the caller's guarantees are those of the system allocator.
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        if ARMED.try_with(Cell::get).unwrap_or(false) {
+            COUNT.with(|count| count.set(count.get() + 1));
+        }
+        // SAFETY: as above.
+        unsafe { SystemAllocator.alloc(layout) }
+    }
+    // SAFETY: as above.
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { SystemAllocator.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn reference(simulation: &Simulation, name: &str) -> u32 {
+    simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
+}
+
+fn real(simulation: &Simulation, name: &str) -> f64 {
+    simulation.real(reference(simulation, name)).unwrap()
+}
+
+/// All real values, by reference, as bits.
+fn bits(simulation: &Simulation) -> BTreeMap<u32, u64> {
+    let rows = simulation.table().variables().iter().filter(|row| row.kind == Kind::Real);
+    rows.flat_map(|row| (0..row.len()).map(|i| row.reference + u32::try_from(i).unwrap()))
+        .map(|reference| (reference, simulation.real(reference).unwrap().to_bits()))
+        .collect()
+}
+
+fn started(scene: &Scene) -> Simulation {
+    let mut simulation = Simulation::new(scene).unwrap();
+    simulation.initialise(0.0).unwrap();
+    simulation
+}
+
+fn run(simulation: &mut Simulation, steps: u32, length: f64) {
+    for _ in 0..steps {
+        let time = simulation.time();
+        simulation.do_step(time, length).unwrap();
+    }
+}
+
+#[test]
+fn the_ledger_closes_for_every_scheme_and_solver() {
+    for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
+        for solver in [Solver::Film, Solver::Lcp] {
+            for friction in [0.0, 0.15] {
+                let mut scene = common::scene(12);
+                scene.settings.time.scheme = scheme;
+                scene.settings.contacts[0].solver = solver;
+                scene.settings.contacts[0].friction = friction;
+                let mut simulation = started(&scene);
+                let mut touched = 0.0;
+                for step in 0..200 {
+                    let length = if step % 3 == 0 { 5e-5 } else { 3.7e-5 };
+                    let time = simulation.time();
+                    simulation.do_step(time, length).unwrap();
+                    touched += real(&simulation, "normal_impulse");
+                    let residual = real(&simulation, "energy_residual_relative");
+                    assert!(residual.abs() < 1e-9, "{scheme:?} {solver:?} µ {friction}: residual {residual:e}");
+                }
+                assert!(touched > 0.0, "no contact: the test would prove nothing");
+                let friction_loss = real(&simulation, "friction_loss");
+                assert!((friction > 0.0) == (friction_loss > 0.0), "friction loss {friction_loss}");
+                assert!(real(&simulation, "impact_loss") > 0.0 || solver == Solver::Film);
+                println!(
+                    "{scheme:?} {solver:?} µ {friction}: residual {:.1e} of {:.3e} J turnover",
+                    real(&simulation, "energy_residual_relative"),
+                    real(&simulation, "energy_residual") / real(&simulation, "energy_residual_relative")
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn shaft_power_is_torque_times_speed() {
+    // Without friction the power comes from the slope of the lobes alone.
+    for friction in [0.0, 0.15] {
+        shaft_power(friction);
+    }
+}
+
+fn shaft_power(friction: f64) {
+    let mut scene = common::scene(12);
+    scene.settings.time.step = 1e-7;
+    scene.settings.contacts[0].friction = friction;
+    let mut simulation = started(&scene);
+    let (mut by_torque, mut steps) = (0.0, 0);
+    // The ramp also works on the blades: count from its end on.
+    run(&mut simulation, 25, 5e-5);
+    let before = real(&simulation, "external_work");
+    while steps < 150 {
+        run(&mut simulation, 1, 5e-5);
+        by_torque -= real(&simulation, "torque") * 1300.0 * 5e-5;
+        steps += 1;
+    }
+    let by_ledger = real(&simulation, "external_work") - before;
+    println!("µ {friction}: shaft work {by_torque} J by torque, {by_ledger} J by ledger");
+    assert!((by_torque / by_ledger - 1.0).abs() < 5e-3, "{by_torque} vs {by_ledger}");
+}
+
+#[test]
+fn lcp_leaves_no_penetration_and_no_adhesion() {
+    let mut simulation = started(&common::scene(12));
+    let mut contacts = 0;
+    for _ in 0..200 {
+        run(&mut simulation, 1, 5e-5);
+        let system = simulation.system();
+        assert!(system.gaps().iter().all(|gap| *gap >= 0.0));
+        assert!(system.events().iter().all(|event| event.normal > 0.0));
+        assert!(real(&simulation, "clearance_minimum") >= 0.0);
+        contacts += system.events().len();
+    }
+    assert!(contacts > 0);
+}
+
+#[test]
+fn a_saved_state_continues_with_identical_bits() {
+    let scene = common::scene(12);
+    let mut simulation = started(&scene);
+    while simulation.system().events().is_empty() {
+        run(&mut simulation, 1, 5e-5);
+    }
+    let mut state = vec![0; simulation.state_size()];
+    simulation.save_state(&mut state).unwrap();
+    let at_save = bits(&simulation);
+    run(&mut simulation, 40, 5e-5);
+    let first = bits(&simulation);
+    simulation.restore_state(&state).unwrap();
+    assert_eq!(bits(&simulation), at_save);
+    run(&mut simulation, 40, 5e-5);
+    assert_eq!(bits(&simulation), first);
+    // Another instance that has done something else meanwhile.
+    let mut other = started(&scene);
+    run(&mut other, 3, 1.3e-5);
+    other.restore_state(&state).unwrap();
+    run(&mut other, 40, 5e-5);
+    assert_eq!(bits(&other), first);
+}
+
+#[test]
+fn a_state_inside_a_communication_step_continues_too() {
+    let scene = common::scene(12);
+    let mut simulation = started(&scene);
+    run(&mut simulation, 40, 5e-5);
+    simulation.begin_step(simulation.time(), 5e-5).unwrap();
+    for _ in 0..20 {
+        simulation.advance().unwrap();
+    }
+    let mut state = vec![0; simulation.state_size()];
+    simulation.save_state(&mut state).unwrap();
+    let mut other = Simulation::new(&scene).unwrap();
+    other.restore_state(&state).unwrap();
+    for simulation in [&mut simulation, &mut other] {
+        while !simulation.advance().unwrap().finished {}
+        run(simulation, 10, 5e-5);
+    }
+    assert_eq!(bits(&simulation), bits(&other));
+}
+
+#[test]
+fn damaged_and_foreign_states_are_refused_and_change_nothing() {
+    let mut simulation = started(&common::scene(12));
+    run(&mut simulation, 30, 5e-5);
+    let mut state = vec![0; simulation.state_size()];
+    simulation.save_state(&mut state).unwrap();
+    let before = bits(&simulation);
+    for position in [0, 9, 17, 40, state.len() / 2, state.len() - 1] {
+        let mut damaged = state.clone();
+        damaged[position] ^= 4;
+        assert!(matches!(simulation.restore_state(&damaged), Err(Error::State { .. })), "byte {position}");
+    }
+    assert!(simulation.restore_state(&state[1..]).is_err());
+    assert!(simulation.save_state(&mut state[1..]).is_err());
+    let mut foreign_scene = common::scene(12);
+    foreign_scene.settings.contacts[0].gap = 4e-4;
+    let foreign = started(&foreign_scene);
+    foreign.save_state(&mut state).unwrap();
+    let message = simulation.restore_state(&state).unwrap_err().to_string();
+    assert!(message.contains("another scene"), "{message}");
+    assert_eq!(bits(&simulation), before);
+}
+
+#[test]
+fn a_thousand_resets_give_identical_bits() {
+    let scene = common::scene(6);
+    let mut simulation = Simulation::new(&scene).unwrap();
+    let mut first = None;
+    for _ in 0..1000 {
+        simulation.initialise(0.0).unwrap();
+        run(&mut simulation, 3, 4e-4);
+        let now = bits(&simulation);
+        assert_eq!(*first.get_or_insert_with(|| now.clone()), now);
+        simulation.set_real(reference(&simulation, "speed"), 77.0).unwrap();
+        simulation.reset();
+    }
+}
+
+#[test]
+fn any_division_of_time_lands_exactly_and_converges() {
+    let scene = common::scene(12);
+    let end = 6e-3;
+    let result = |lengths: &dyn Fn(u32) -> f64, step: f64| {
+        let mut scene = scene.clone();
+        scene.settings.time.step = step;
+        let mut simulation = started(&scene);
+        let mut index = 0;
+        while simulation.time() < end {
+            let time = simulation.time();
+            // Time stays representable differences of the importer's own clock.
+            let length = lengths(index).min(end - time);
+            simulation.do_step(time, length).unwrap();
+            assert_eq!(simulation.time().to_bits(), (time + length).to_bits());
+            index += 1;
+        }
+        (0..12).map(|sector| simulation.system().bank().row(1, sector)).collect::<Vec<f64>>()
+    };
+    let fine = result(&|_| 1e-4, 2e-8);
+    let size = fine.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    let difference = |other: &[f64]| fine.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / size;
+    let regular = difference(&result(&|_| 1e-4, 4e-7));
+    let uneven = difference(&result(&|_| 1.03e-5, 4e-7));
+    let changing = difference(&result(&|i| 1e-5 * (1.0 + f64::from(i % 7)), 4e-7));
+    let odd = difference(&result(&|i| if i % 2 == 0 { 3.3e-7 } else { 8.1e-5 }, 4e-7));
+    println!(
+        "relative differences from the fine run: regular {regular:.1e}, uneven {uneven:.1e}, changing {changing:.1e}, odd {odd:.1e}"
+    );
+    for found in [regular, uneven, changing, odd] {
+        assert!(found < 2e-2, "{found}");
+    }
+}
+
+#[test]
+fn one_sixtieth_computed_in_three_ways_is_one_step() {
+    let mut scene = common::scene(6);
+    scene.settings.time.step = 1e-5;
+    let ways = [1.0 / 60.0, 0.016_666_666_666_666_677, 2.0 / 60.0 - 1.0 / 60.0 + 1e-17];
+    let ends: Vec<Vec<f64>> = ways
+        .iter()
+        .map(|length| {
+            let mut simulation = started(&scene);
+            for _ in 0..3 {
+                let time = simulation.time();
+                simulation.do_step(time, *length).unwrap();
+                assert_eq!(simulation.time().to_bits(), (time + length).to_bits());
+            }
+            (0..6).map(|sector| simulation.system().bank().row(0, sector)).collect()
+        })
+        .collect();
+    let size = ends[0].iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    for other in &ends[1..] {
+        let worst = ends[0].iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(worst < 1e-6 * size, "{worst:e} of {size:e}");
+    }
+}
+
+#[test]
+fn the_step_does_not_allocate() {
+    let mut simulation = started(&common::scene(12));
+    run(&mut simulation, 30, 5e-5);
+    let mut contacts = 0;
+    ARMED.set(true);
+    for index in 0..200 {
+        let time = simulation.time();
+        simulation.do_step(time, if index % 5 == 0 { 3.1e-5 } else { 5e-5 }).unwrap();
+        contacts += simulation.system().events().len();
+    }
+    ARMED.set(false);
+    assert!(contacts > 0);
+    assert_eq!(COUNT.get(), 0, "allocations inside the step");
+}
+
+#[test]
+fn inputs_are_linear_where_derivatives_are_given() {
+    let scene = common::scene(6);
+    let mut simulation = started(&scene);
+    let speed = reference(&simulation, "speed");
+    for _ in 0..10 {
+        let time = simulation.time();
+        simulation.set_real(speed, 1000.0 + 4e5 * time).unwrap();
+        simulation.set_input_derivative(speed, 1, 4e5).unwrap();
+        simulation.do_step(time, 1e-4).unwrap();
+    }
+    let exact = 1000.0 * 1e-3 + 0.5 * 4e5 * 1e-6;
+    assert!((real(&simulation, "rotor_angle") - exact).abs() < 1e-13);
+    assert!(simulation.set_input_derivative(speed, 2, 1.0).is_err());
+    assert!(simulation.set_input_derivative(speed, 1, f64::NAN).is_err());
+}
+
+#[test]
+fn nothing_unsound_enters() {
+    let scene = common::scene(6);
+    let mut simulation = Simulation::new(&scene).unwrap();
+    let rows = simulation.table().variables().to_vec();
+    for row in &rows {
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert!(simulation.set_real(row.reference, value).is_err(), "{} took {value}", row.name);
+        }
+        if !matches!(row.causality, Causality::Input | Causality::Parameter) {
+            assert!(simulation.set_real(row.reference, 1.0).is_err(), "{} could be set", row.name);
+        }
+    }
+    assert!(simulation.set_real(1_000_000, 1.0).is_err());
+    let friction = reference(&simulation, "friction_coefficient");
+    assert!(simulation.set_real(friction, -0.1).is_err() && simulation.set_real(friction, 2.1).is_err());
+    let scheme = reference(&simulation, "scheme");
+    assert!(simulation.set_integer(scheme, 0).is_err() && simulation.set_integer(scheme, 3).is_err());
+    assert!(simulation.initialise(f64::NAN).is_err());
+    simulation.initialise(0.0).unwrap();
+    assert!(simulation.set_integer(scheme, 1).is_err(), "fixed after initialisation");
+    for (time, length) in [(0.0, 0.0), (0.0, -1e-5), (0.0, f64::NAN), (1e-5, 1e-5), (f64::NAN, 1e-5), (0.0, 1e9)] {
+        assert!(simulation.do_step(time, length).is_err(), "step {length} at {time} was taken");
+    }
+    run(&mut simulation, 3, 5e-5);
+}
+
+#[test]
+fn unstable_or_penetrating_starts_are_refused_with_numbers() {
+    let mut scene = common::scene(6);
+    scene.settings.time.scheme = Scheme::CentralDifference;
+    scene.settings.time.step = 2.002 / (std::f64::consts::TAU * 40_000.0);
+    let message = Simulation::new(&scene).unwrap().initialise(0.0).unwrap_err().to_string();
+    assert!(message.contains("ω_max") && message.contains("modal-exact"), "{message}");
+    scene.settings.time.step = 1.998 / (std::f64::consts::TAU * 40_000.0);
+    scene.settings.contacts[0].friction = 0.0;
+    Simulation::new(&scene).unwrap().initialise(0.0).unwrap();
+    // A bump right over sector 1, without a ramp: depth 0.6 intrudes by 0.2 gaps.
+    scene.settings.surfaces[0].ramp_time = 0.0;
+    scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 0.6, width: 0.15, phase: std::f64::consts::FRAC_PI_2 };
+    let message = Simulation::new(&scene).unwrap().initialise(0.0).unwrap_err().to_string();
+    assert!(message.contains("ramp_time") && message.contains("sector"), "{message}");
+}
+
+#[test]
+fn round_casing_never_touches_an_undisturbed_disk() {
+    let mut scene = common::scene(12);
+    scene.settings.surfaces[0].shape = Shape::Circular {};
+    let mut simulation = started(&scene);
+    run(&mut simulation, 20, 1e-3);
+    assert_eq!(real(&simulation, "clearance_minimum"), 3.56e-4 / (1.0_f64 + 0.04).sqrt());
+    assert_eq!(real(&simulation, "kinetic_energy"), 0.0);
+}
