@@ -1,7 +1,7 @@
 //! `tiprub reduce`: from a blade to a ROM file, with its checks.
 
 use serde_json::json;
-use tiprub_model::{Rotor37Options, inp::write_calculix_input, rotor37::MeshCounts};
+use tiprub_model::{Rotor37Options, inp::calculix_input, rotor37::MeshCounts};
 
 use crate::{
     Failure, Result,
@@ -34,9 +34,9 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     let reduction = reduction::rotor37(&options, console)?;
     let facts = RomFacts::of(&reduction.rom)?;
     if let Some(path) = &arguments.inp {
-        let (mesh, material) = (&reduction.mesh, &reduction.material);
-        write_calculix_input(path, mesh, material, Some("hub"), EXPORTED_FREQUENCIES)
+        let text = calculix_input(&reduction.mesh, &reduction.material, Some("hub"), EXPORTED_FREQUENCIES)
             .map_err(|error| Failure::from_below(path.display(), error))?;
+        output_file::write(path, text)?;
     }
     output_file::write(&arguments.output, tiprub_format::write_rom(&reduction.rom))?;
     let mut text = facts.to_text();
