@@ -1,1 +1,109 @@
-//! Helpers shared by the whole-product tests.
+//! Helpers shared by the whole-product tests: a small scene, the built library, and importers over the C ABI.
+#![allow(clippy::missing_panics_doc, reason = "helpers of tests panic where a test fails")]
+
+pub mod api;
+pub mod fmi2;
+pub mod fmi3;
+pub mod scene;
+
+use std::ffi::{CStr, c_char, c_void};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Status numbers of both standards.
+pub const OK: i32 = 0;
+/// Warning.
+pub const WARNING: i32 = 1;
+/// Discard.
+pub const DISCARD: i32 = 2;
+/// Error.
+pub const ERROR: i32 = 3;
+
+/// Root of the workspace.
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests lie inside the workspace").to_path_buf()
+}
+
+/// Build the FMU library as it is shipped (or with the feature that makes it panic on request) and give its path.
+///
+/// It is built alone (`-p`), because a workspace build would unify features, and in its own target directory, because the
+/// one in use may be locked.
+#[track_caller]
+pub fn library(profile: &str, features: &[&str]) -> PathBuf {
+    let target = root().join("target").join(if features.is_empty() { "product" } else { "product-features" });
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(root()).args(["build", "--quiet", "-p", "tiprub-fmi", "--profile", profile]);
+    command.arg("--target-dir").arg(&target);
+    if !features.is_empty() {
+        command.args(["--features", &features.join(",")]);
+    }
+    let output = command.output().expect("cargo can be run");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    target.join(profile).join("libtiprub_fmi.so")
+}
+
+/// The shipped library.
+#[track_caller]
+pub fn shipped() -> PathBuf {
+    library("fmu", &[])
+}
+
+/// One message an importer was given.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Message {
+    /// Status of the message.
+    pub status: i32,
+    /// Category.
+    pub category: String,
+    /// Text.
+    pub text: String,
+}
+
+/// What an instance's environment pointer points to.
+#[derive(Debug, Default)]
+pub struct Journal {
+    /// Messages so far.
+    pub messages: Vec<Message>,
+}
+
+impl Journal {
+    /// All texts, one per line.
+    pub fn text(&self) -> String {
+        self.messages.iter().map(|message| format!("{}\n", message.text)).collect()
+    }
+}
+
+fn owned(text: *const c_char) -> String {
+    assert!(!text.is_null(), "the library passed a NULL text");
+    // SAFETY: not null; texts of log callbacks are NUL-terminated.
+    unsafe { CStr::from_ptr(text) }.to_str().expect("messages are UTF-8").to_owned()
+}
+
+/// FMI 2.0 logger. The library calls it as variadic with the format "%s" and one text, which on the System V ABI arrives
+/// like a sixth fixed argument.
+///
+/// # Safety
+/// `environment` points to a [`Journal`].
+pub unsafe extern "C" fn journal2(
+    environment: *mut c_void,
+    name: *const c_char,
+    status: i32,
+    category: *const c_char,
+    format: *const c_char,
+    text: *const c_char,
+) {
+    assert_eq!((owned(name).as_str(), owned(format).as_str()), ("rub", "%s"));
+    // SAFETY: the caller's promise.
+    let journal = unsafe { &mut *environment.cast::<Journal>() };
+    journal.messages.push(Message { status, category: owned(category), text: owned(text) });
+}
+
+/// FMI 3.0 logger.
+///
+/// # Safety
+/// `environment` points to a [`Journal`].
+pub unsafe extern "C" fn journal3(environment: *mut c_void, status: i32, category: *const c_char, text: *const c_char) {
+    // SAFETY: the caller's promise.
+    let journal = unsafe { &mut *environment.cast::<Journal>() };
+    journal.messages.push(Message { status, category: owned(category), text: owned(text) });
+}

@@ -1,0 +1,169 @@
+//! Calls that both versions of the standard share, differing in names and C types only.
+
+use std::ffi::{CString, c_char};
+
+use super::instance::{Handle, enter, guard};
+use super::{In, Out, Text};
+use crate::slave::order::Rule;
+use crate::slave::{Dialect, Refusal, Request, Result, Slave, Status, Value};
+
+/// Names of the arguments of get and set functions: references, values.
+fn arguments(dialect: Dialect) -> (&'static str, &'static str) {
+    match dialect {
+        Dialect::Fmi2 => ("vr", "value"),
+        Dialect::Fmi3 => ("valueReferences", "values"),
+    }
+}
+
+/// Get values of one type; `convert` makes the C value.
+pub fn get<T: Value, C: Copy>(
+    (handle, rule, type_name): (Handle, &Rule, &'static str),
+    (references, count): (In<u32>, usize),
+    (values, n_values): (Out<C>, usize),
+    convert: impl Fn(T) -> C,
+) -> Status {
+    guard(handle, rule, |slave| {
+        let (reference_argument, value_argument) = arguments(slave.dialect());
+        let references = references.array(count, slave.reference_limit(), reference_argument)?;
+        let window = values.window(n_values, value_argument)?;
+        let read = slave.read::<T>(&Request { type_name, references, values: n_values })?;
+        window.fill(&read.into_iter().map(convert).collect::<Vec<_>>());
+        Ok(Status::Ok)
+    })
+}
+
+/// Set values of one type; `convert` makes the Rust value, or says what is wrong with the C value.
+pub fn set<T: Value, C>(
+    (handle, rule, type_name): (Handle, &Rule, &'static str),
+    (references, count): (In<u32>, usize),
+    (values, n_values): (In<C>, usize),
+    convert: impl Fn(&C) -> Result<T>,
+) -> Status {
+    guard(handle, rule, |slave| {
+        let (reference_argument, value_argument) = arguments(slave.dialect());
+        let references = references.array(count, slave.reference_limit(), reference_argument)?;
+        let elements = slave.elements(&Request { type_name, references, values: n_values })?;
+        let values = values.array(elements.len(), usize::MAX, value_argument)?;
+        slave.write(&elements, &values.iter().map(convert).collect::<Result<Vec<T>>>()?)?;
+        Ok(Status::Ok)
+    })
+}
+
+/// Get texts; they live in the instance until texts are asked for again.
+pub fn strings(
+    (handle, rule): (Handle, &Rule),
+    (references, count): (In<u32>, usize),
+    (values, n_values): (Out<*const c_char>, usize),
+) -> Status {
+    guard(handle, rule, |slave| {
+        let (reference_argument, value_argument) = arguments(slave.dialect());
+        let references = references.array(count, slave.reference_limit(), reference_argument)?;
+        let window = values.window(n_values, value_argument)?;
+        let read = slave.read::<String>(&Request { type_name: "String", references, values: n_values })?;
+        let texts = read.into_iter().map(|text| CString::new(text.replace('\0', " ")).unwrap_or_default()).collect();
+        window.fill(&slave.keep(texts).iter().map(|text| text.as_ptr()).collect::<Vec<_>>());
+        Ok(Status::Ok)
+    })
+}
+
+/// `fmi2SetDebugLogging`, `fmi3SetDebugLogging`.
+pub fn set_debug_logging(handle: Handle, rule: &Rule, on: bool, (categories, count): (In<Text>, usize)) -> Status {
+    let outcome = enter(handle, rule, |_, instance| {
+        let categories = categories.array(count, 64, "categories")?;
+        let names = categories.iter().map(|name| name.required("categories")).collect::<Result<Vec<_>>>()?;
+        instance.log.choose(on, &names).map_err(Refusal::error)?;
+        Ok((Status::Ok, ()))
+    });
+    outcome.0
+}
+
+/// `fmi2FMUstate`, `fmi3FMUState`: an opaque name of a saved state.
+pub type StateHandle = *const Vec<u8>;
+
+/// Saved states.
+pub mod state {
+    use super::*;
+
+    fn required(state: StateHandle) -> Result<StateHandle> {
+        if state.is_null() {
+            return Err(Refusal::error("argument FMUstate is NULL. Pass a state that was got from this instance"));
+        }
+        Ok(state)
+    }
+
+    /// Save into a new state, or into the one that `*state` names.
+    pub fn save(handle: Handle, rule: &Rule, state: Out<StateHandle>) -> Status {
+        guard(handle, rule, |slave| {
+            let window = state.single("FMUstate")?;
+            let existing = window.current().filter(|existing| !existing.is_null());
+            let saved = slave.save(existing)?;
+            window.fill(&[saved]);
+            Ok(Status::Ok)
+        })
+    }
+
+    /// Restore.
+    pub fn restore(handle: Handle, rule: &Rule, state: StateHandle) -> Status {
+        guard(handle, rule, |slave| {
+            slave.restore(required(state)?)?;
+            Ok(Status::Ok)
+        })
+    }
+
+    /// Free; NULL, or a pointer to NULL, is legal.
+    pub fn free(handle: Handle, rule: &Rule, state: Out<StateHandle>) -> Status {
+        guard(handle, rule, |slave| {
+            if state.is_null() {
+                return Ok(Status::Ok);
+            }
+            let window = state.single("FMUstate")?;
+            if let Some(existing) = window.current().filter(|existing| !existing.is_null()) {
+                slave.free_snapshot(existing)?;
+                window.fill(&[std::ptr::null()]);
+            }
+            Ok(Status::Ok)
+        })
+    }
+
+    /// Size in bytes.
+    pub fn size(handle: Handle, rule: &Rule, state: StateHandle, size: Out<usize>) -> Status {
+        guard(handle, rule, |slave| {
+            let window = size.single("size")?;
+            let length = slave.serialised(required(state)?)?.len();
+            window.fill(&[length]);
+            Ok(Status::Ok)
+        })
+    }
+
+    fn check_size(given: usize, needed: usize) -> Result<()> {
+        if given == needed {
+            return Ok(());
+        }
+        Err(Refusal::error(format!(
+            "size = {given}, but a serialised state of this FMU has {needed} bytes. Pass that size"
+        )))
+    }
+
+    /// Serialise.
+    pub fn serialise(handle: Handle, rule: &Rule, state: StateHandle, bytes: Out<u8>, size: usize) -> Status {
+        guard(handle, rule, |slave: &mut Slave| {
+            let saved = slave.serialised(required(state)?)?;
+            check_size(size, saved.len())?;
+            bytes.window(size, "serializedState")?.fill(saved);
+            Ok(Status::Ok)
+        })
+    }
+
+    /// Deserialise into a new state, or into the one that `*state` names.
+    pub fn deserialise(handle: Handle, rule: &Rule, bytes: In<u8>, size: usize, state: Out<StateHandle>) -> Status {
+        guard(handle, rule, |slave| {
+            let window = state.single("FMUstate")?;
+            check_size(size, slave.serialised_size())?;
+            let bytes = bytes.array(size, size, "serializedState")?;
+            let existing = window.current().filter(|existing| !existing.is_null());
+            let saved = slave.deserialise(bytes, existing)?;
+            window.fill(&[saved]);
+            Ok(Status::Ok)
+        })
+    }
+}

@@ -1,0 +1,53 @@
+//! The only unsafe code of the library: C pointers to Rust values and back, callbacks, and the guard around every call.
+
+mod calls;
+mod instance;
+mod log;
+mod panics;
+mod pointers;
+
+pub use calls::{StateHandle, get, set, set_debug_logging, state, strings};
+pub use instance::{
+    Callbacks, Handle, Instantiation, enter, guard, instantiate, refuse_instantiation, release, unsupported,
+};
+pub use log::{Fmi2Logger, Fmi3Logger, Sink};
+pub use pointers::{Environment, In, Out, Text};
+
+/// `fmi3IntermediateUpdateCallback`.
+pub type IntermediateUpdate = unsafe extern "C" fn(
+    environment: Environment,
+    intermediate_update_time: f64,
+    set_requested: u8,
+    get_allowed: u8,
+    step_finished: u8,
+    can_return_early: u8,
+    early_return_requested: *mut u8,
+    early_return_time: *mut f64,
+);
+
+/// Call the importer's intermediate update; the time at which it wants the step to end early, if it does.
+pub fn intermediate_update(
+    callback: IntermediateUpdate,
+    environment: Environment,
+    time: f64,
+    set_requested: bool,
+    can_return_early: bool,
+) -> Option<f64> {
+    let (mut requested, mut at) = (0u8, time);
+    // SAFETY: the importer gave this function at instantiation for exactly this use (FMI 3.0.2, section 4.2.2), the two
+    // pointers are to locals that outlive the call, and no borrow of the instance is held, so that the callback may call
+    // get and set functions on it.
+    unsafe {
+        callback(
+            environment,
+            time,
+            u8::from(set_requested),
+            1,
+            1,
+            u8::from(can_return_early),
+            &raw mut requested,
+            &raw mut at,
+        );
+    }
+    (requested != 0).then_some(at)
+}

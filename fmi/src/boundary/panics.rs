@@ -1,0 +1,45 @@
+//! A panic is a defect of this library: it is caught, logged and nothing is printed.
+//!
+//! The standard library inside this shared library is its own copy, linked statically; its panic hook is therefore seen
+//! by nobody else, not even by a host written in Rust. The hook set here replaces the one that prints.
+
+use std::any::Any;
+use std::cell::Cell;
+use std::panic::{self, PanicHookInfo};
+use std::sync::Once;
+
+/// Where the last panic of a thread happened: the end of the file's path, its length, the line. Without a destructor, so
+/// that the library can be unloaded while threads that used it live on.
+type Place = ([u8; 48], usize, u32);
+
+thread_local! {
+    static PLACE: Cell<Place> = const { Cell::new(([0; 48], 0, 0)) };
+}
+
+static HOOK: Once = Once::new();
+
+/// Make panics of this library silent, once.
+pub fn silence() {
+    HOOK.call_once(|| panic::set_hook(Box::new(remember)));
+}
+
+fn remember(info: &PanicHookInfo<'_>) {
+    let Some(location) = info.location() else { return };
+    let file = location.file().as_bytes();
+    let tail = &file[file.len().saturating_sub(48)..];
+    let mut bytes = [0; 48];
+    bytes[..tail.len()].copy_from_slice(tail);
+    PLACE.set((bytes, tail.len(), location.line()));
+}
+
+/// Message for the importer's log.
+pub fn describe(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message");
+    let (bytes, length, line) = PLACE.get();
+    let file = String::from_utf8_lossy(&bytes[..length]).into_owned();
+    format!(
+        "internal error: {text} (at {file}:{line}). The instance cannot be used any more: free it, and report this message \
+         with the model to the developers"
+    )
+}

@@ -1,0 +1,131 @@
+//! `fmi3DoStep` with intermediate updates, and output derivatives.
+//!
+//! With a callback the communication step is marched internal step by internal step, each in its own passage through the
+//! guard: while the callback runs nothing of the instance is borrowed, and it may get and set variables.
+
+use tiprub_core::simulation::Progress;
+
+use super::Boolean;
+use crate::boundary::{Callbacks, Handle, In, IntermediateUpdate, Out, enter, guard, intermediate_update};
+use crate::slave::order::fmi3 as order;
+use crate::slave::{Refusal, Request, Result, Slave, Status};
+
+/// How a step ended.
+struct Outcome {
+    status: Status,
+    early: bool,
+    time: Option<f64>,
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi3DoStep(
+    instance: Handle,
+    currentCommunicationPoint: f64,
+    communicationStepSize: f64,
+    _noSetFMUStatePriorToCurrentPoint: Boolean,
+    eventHandlingNeeded: Out<Boolean>,
+    terminateSimulation: Out<Boolean>,
+    earlyReturn: Out<Boolean>,
+    lastSuccessfulTime: Out<f64>,
+) -> Status {
+    let names = ["eventHandlingNeeded", "terminateSimulation", "earlyReturn", "lastSuccessfulTime"];
+    let absent = [
+        eventHandlingNeeded.is_null(),
+        terminateSimulation.is_null(),
+        earlyReturn.is_null(),
+        lastSuccessfulTime.is_null(),
+    ];
+    let missing = absent.iter().position(|absent| *absent).map(|index| names[index]);
+    let outcome = step(instance, currentCommunicationPoint, communicationStepSize, missing);
+    eventHandlingNeeded.offer(0);
+    terminateSimulation.offer(0);
+    earlyReturn.offer(Boolean::from(outcome.early));
+    lastSuccessfulTime.offer(outcome.time.unwrap_or(currentCommunicationPoint));
+    outcome.status
+}
+
+fn step(instance: Handle, current: f64, size: f64, missing: Option<&str>) -> Outcome {
+    let mut before = None;
+    let (status, begun) = enter(instance, &order::DO_STEP, |slave, instance| {
+        before = Some(slave.time());
+        if let Some(name) = missing {
+            return Err(Refusal::error(format!("argument {name} is NULL. Pass a place for it")));
+        }
+        let Some(callbacks @ Callbacks { update: Some(update), .. }) = instance.callbacks else {
+            slave.step(current, size)?;
+            return Ok((Status::Ok, (None, slave.time())));
+        };
+        slave.begin_step(current, size)?;
+        Ok((Status::Ok, (Some((callbacks, update)), slave.time())))
+    });
+    match begun {
+        Some((Some((callbacks, update)), start)) => march(instance, callbacks, update, start),
+        Some((None, time)) => Outcome { status, early: false, time: Some(time) },
+        None => Outcome { status, early: false, time: before },
+    }
+}
+
+/// What to do after an internal step.
+fn settle(slave: &mut Slave, progress: Progress, return_at: Option<f64>) -> Result<bool> {
+    let early = !progress.finished && return_at.is_some_and(|time| progress.time >= time);
+    if progress.finished || early {
+        slave.end_step(early)?;
+    }
+    Ok(early)
+}
+
+fn march(instance: Handle, callbacks: Callbacks, update: IntermediateUpdate, start: f64) -> Outcome {
+    let mut return_at: Option<f64> = None;
+    let mut worst = Status::Ok;
+    loop {
+        let (status, advanced) = enter(instance, &order::CONTINUE_STEP, |slave, _| Ok((Status::Ok, slave.advance()?)));
+        let Some(progress) = advanced else { return Outcome { status, early: false, time: Some(start) } };
+        let may_return = callbacks.early_return_allowed && !progress.finished;
+        let request = intermediate_update(update, callbacks.environment, progress.time, !progress.finished, may_return);
+        let (status, settled) = enter(instance, &order::CONTINUE_STEP, |slave, _| {
+            let mut status = Status::Ok;
+            match request {
+                Some(time) if may_return => return_at = Some(time),
+                Some(_) if !progress.finished => {
+                    slave.note(
+                        Status::Warning,
+                        "early return requested, but earlyReturnAllowed was false at instantiation",
+                    );
+                    status = Status::Warning;
+                }
+                _ => {}
+            }
+            let early = settle(slave, progress, return_at)?;
+            Ok((status, (early, slave.time())))
+        });
+        worst = worst.max(status);
+        match settled {
+            None => return Outcome { status, early: false, time: Some(start) },
+            Some((early, time)) if early || progress.finished => {
+                return Outcome { status: worst, early, time: Some(time) };
+            }
+            Some(_) => {}
+        }
+    }
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi3GetOutputDerivatives(
+    instance: Handle,
+    valueReferences: In<u32>,
+    nValueReferences: usize,
+    orders: In<i32>,
+    values: Out<f64>,
+    nValues: usize,
+) -> Status {
+    guard(instance, &order::GET_OUTPUT_DERIVATIVES, |slave| {
+        let limit = slave.reference_limit();
+        let references = valueReferences.array(nValueReferences, limit, "valueReferences")?;
+        let orders = orders.array(nValueReferences, limit, "orders")?;
+        let window = values.window(nValues, "values")?;
+        let elements = slave.elements(&Request { type_name: "Float64", references, values: nValues })?;
+        let orders = slave.orders_of_elements(references, orders);
+        window.fill(&slave.output_derivatives(&elements, &orders)?);
+        Ok(Status::Ok)
+    })
+}

@@ -1,0 +1,172 @@
+//! Getting and setting variables. Reals are `Float64`, integers `Int32`, enumerations `Int64`; the functions of the other
+//! types exist, and refuse every reference because no variable has their type.
+
+use std::ffi::c_char;
+
+use super::Boolean;
+use crate::boundary::{self, Handle, In, Out, Text, guard};
+use crate::slave::order::{Rule, fmi3 as order};
+use crate::slave::{Refusal, Request, Status};
+
+/// Functions of a type that has variables: exported getter and setter, their rules, name of the type, C type, Rust type,
+/// conversions.
+macro_rules! with_variables {
+    ($($get:ident $get_rule:ident $set:ident $set_rule:ident $name:literal $c:ty, $rust:ty, $out:expr, $in:expr;)*) => {$(
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $get(
+            instance: Handle,
+            valueReferences: In<u32>,
+            nValueReferences: usize,
+            values: Out<$c>,
+            nValues: usize,
+        ) -> Status {
+            let convert: fn($rust) -> $c = $out;
+            let target = (instance, &order::$get_rule, $name);
+            boundary::get(target, (valueReferences, nValueReferences), (values, nValues), convert)
+        }
+
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $set(
+            instance: Handle,
+            valueReferences: In<u32>,
+            nValueReferences: usize,
+            values: In<$c>,
+            nValues: usize,
+        ) -> Status {
+            let convert: fn(&$c) -> $rust = $in;
+            let target = (instance, &order::$set_rule, $name);
+            boundary::set(target, (valueReferences, nValueReferences), (values, nValues), |value| Ok(convert(value)))
+        }
+    )*};
+}
+
+with_variables! {
+    fmi3GetFloat64 GET_FLOAT64 fmi3SetFloat64 SET_FLOAT64 "Float64" f64, f64, |value| value, |value| *value;
+    fmi3GetInt32 GET_INT32 fmi3SetInt32 SET_INT32 "Int32" i32, i32, |value| value, |value| *value;
+    fmi3GetInt64 GET_INT64 fmi3SetInt64 SET_INT64 "Int64" i64, i64, |value| value, |value| *value;
+    fmi3GetBoolean GET_BOOLEAN fmi3SetBoolean SET_BOOLEAN "Boolean" Boolean, bool, Boolean::from, |value| *value != 0;
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi3GetString(
+    instance: Handle,
+    valueReferences: In<u32>,
+    nValueReferences: usize,
+    values: Out<*const c_char>,
+    nValues: usize,
+) -> Status {
+    boundary::strings((instance, &order::GET_STRING), (valueReferences, nValueReferences), (values, nValues))
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi3SetString(
+    instance: Handle,
+    valueReferences: In<u32>,
+    nValueReferences: usize,
+    values: In<Text>,
+    nValues: usize,
+) -> Status {
+    let target = (instance, &order::SET_STRING, "String");
+    boundary::set(target, (valueReferences, nValueReferences), (values, nValues), |value: &Text| {
+        value.required("values").map(str::to_owned)
+    })
+}
+
+/// No variable has the type: every reference is refused with the type it really has, no reference is nothing to do.
+fn no_variable(
+    instance: Handle,
+    rule: &Rule,
+    type_name: &'static str,
+    (references, count): (In<u32>, usize),
+) -> Status {
+    guard(instance, rule, |slave| {
+        let references = references.array(count, slave.reference_limit(), "valueReferences")?;
+        slave.elements(&Request { type_name, references, values: 0 })?;
+        if references.is_empty() {
+            Ok(Status::Ok)
+        } else {
+            Err(Refusal::error(format!("no variable is a {type_name}")))
+        }
+    })
+}
+
+/// Functions of a type that no variable has.
+macro_rules! without_variables {
+    ($($get:ident $get_rule:ident $set:ident $set_rule:ident $name:literal $c:ty;)*) => {$(
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $get(
+            instance: Handle,
+            valueReferences: In<u32>,
+            nValueReferences: usize,
+            _values: Out<$c>,
+            _nValues: usize,
+        ) -> Status {
+            no_variable(instance, &order::$get_rule, $name, (valueReferences, nValueReferences))
+        }
+
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $set(
+            instance: Handle,
+            valueReferences: In<u32>,
+            nValueReferences: usize,
+            _values: In<$c>,
+            _nValues: usize,
+        ) -> Status {
+            no_variable(instance, &order::$set_rule, $name, (valueReferences, nValueReferences))
+        }
+    )*};
+}
+
+without_variables! {
+    fmi3GetFloat32 GET_FLOAT32 fmi3SetFloat32 SET_FLOAT32 "Float32" f32;
+    fmi3GetInt8 GET_INT8 fmi3SetInt8 SET_INT8 "Int8" i8;
+    fmi3GetUInt8 GET_UINT8 fmi3SetUInt8 SET_UINT8 "UInt8" u8;
+    fmi3GetInt16 GET_INT16 fmi3SetInt16 SET_INT16 "Int16" i16;
+    fmi3GetUInt16 GET_UINT16 fmi3SetUInt16 SET_UINT16 "UInt16" u16;
+    fmi3GetUInt32 GET_UINT32 fmi3SetUInt32 SET_UINT32 "UInt32" u32;
+    fmi3GetUInt64 GET_UINT64 fmi3SetUInt64 SET_UINT64 "UInt64" u64;
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi3GetBinary(
+    instance: Handle,
+    valueReferences: In<u32>,
+    nValueReferences: usize,
+    _valueSizes: Out<usize>,
+    _values: Out<*const u8>,
+    _nValues: usize,
+) -> Status {
+    no_variable(instance, &order::GET_BINARY, "Binary", (valueReferences, nValueReferences))
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi3SetBinary(
+    instance: Handle,
+    valueReferences: In<u32>,
+    nValueReferences: usize,
+    _valueSizes: In<usize>,
+    _values: In<*const u8>,
+    _nValues: usize,
+) -> Status {
+    no_variable(instance, &order::SET_BINARY, "Binary", (valueReferences, nValueReferences))
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi3GetClock(
+    instance: Handle,
+    valueReferences: In<u32>,
+    nValueReferences: usize,
+    _values: Out<Boolean>,
+) -> Status {
+    no_variable(instance, &order::GET_CLOCK, "Clock", (valueReferences, nValueReferences))
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi3SetClock(
+    instance: Handle,
+    valueReferences: In<u32>,
+    nValueReferences: usize,
+    _values: In<Boolean>,
+) -> Status {
+    no_variable(instance, &order::SET_CLOCK, "Clock", (valueReferences, nValueReferences))
+}

@@ -1,0 +1,150 @@
+//! Where the resources directory is: FMI 2.0 says it with a URI, FMI 3.0 with a native path.
+
+use std::path::{Path, PathBuf};
+
+/// Directory named by `fmuResourceLocation` of `fmi2Instantiate`: `file:///path`, `file:/path` or
+/// `file://localhost/path`, percent-encoded UTF-8. A plain absolute path is taken as it is, because importers pass it.
+///
+/// # Errors
+/// A message naming the location: empty, another scheme or host, not absolute, damaged encoding, no such directory.
+pub fn from_uri(location: &str) -> Result<PathBuf, String> {
+    let remedy = "Pass the URI of the unpacked resources directory, such as file:///tmp/fmu/resources";
+    if location.trim().is_empty() {
+        return Err(format!("fmuResourceLocation is empty, but this FMU reads its model from there. {remedy}"));
+    }
+    if Path::new(location).is_absolute() {
+        return existing(PathBuf::from(location), "fmuResourceLocation", remedy);
+    }
+    let scheme = location.get(..5).filter(|scheme| scheme.eq_ignore_ascii_case("file:"));
+    if scheme.is_none() {
+        return Err(format!("fmuResourceLocation \"{location}\" is not a file: URI. {remedy}"));
+    }
+    let rest = &location[5..];
+    let path = match rest.strip_prefix("//") {
+        None => rest,
+        Some(rest) => {
+            let (host, _) = rest.split_once('/').unwrap_or((rest, ""));
+            if !(host.is_empty() || host.eq_ignore_ascii_case("localhost")) {
+                return Err(format!("fmuResourceLocation \"{location}\" is on another host, \"{host}\". {remedy}"));
+            }
+            &rest[host.len()..]
+        }
+    };
+    let decoded = decode(path).map_err(|problem| format!("fmuResourceLocation \"{location}\" {problem}. {remedy}"))?;
+    existing(PathBuf::from(native(&decoded)), "fmuResourceLocation", remedy)
+}
+
+/// Directory named by `resourcePath` of `fmi3InstantiateCoSimulation`: an absolute native path, with or without a
+/// separator at the end. A `file:` URI is taken as such, because importers pass it.
+///
+/// # Errors
+/// A message naming the path: empty, not absolute, no such directory.
+pub fn from_native(path: &str) -> Result<PathBuf, String> {
+    let remedy = "Pass the absolute native path of the unpacked resources directory, such as /tmp/fmu/resources/";
+    if path.trim().is_empty() {
+        return Err(format!("resourcePath is empty, but this FMU reads its model from there. {remedy}"));
+    }
+    if path.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("file:")) {
+        return from_uri(path);
+    }
+    existing(PathBuf::from(path), "resourcePath", remedy)
+}
+
+fn existing(path: PathBuf, argument: &str, remedy: &str) -> Result<PathBuf, String> {
+    if !path.is_absolute() {
+        return Err(format!("{argument} \"{}\" is not absolute. {remedy}", path.display()));
+    }
+    if !path.is_dir() {
+        return Err(format!("{argument} \"{}\" is not a directory that can be read. {remedy}", path.display()));
+    }
+    Ok(path)
+}
+
+/// Path of a URI as the system writes it: on Windows without the slash before the drive letter.
+fn native(path: &str) -> &str {
+    let drive = cfg!(windows) && path.len() > 2 && path.as_bytes()[2] == b':';
+    if drive { path.trim_start_matches('/') } else { path }
+}
+
+/// Undo percent-encoding (RFC 3986). A percent sign without two hexadecimal digits stands for itself.
+fn decode(text: &str) -> Result<String, String> {
+    let bytes = text.as_bytes();
+    let mut out = Vec::with_capacity(bytes.len());
+    let mut index = 0;
+    while index < bytes.len() {
+        let digits = bytes.get(index + 1..index + 3).and_then(|pair| std::str::from_utf8(pair).ok());
+        let code = digits.filter(|pair| pair.bytes().all(|digit| digit.is_ascii_hexdigit()));
+        match code.and_then(|pair| u8::from_str_radix(pair, 16).ok()) {
+            Some(0) => return Err("contains an encoded NUL".into()),
+            Some(byte) if bytes[index] == b'%' => {
+                out.push(byte);
+                index += 3;
+            }
+            _ => {
+                out.push(bytes[index]);
+                index += 1;
+            }
+        }
+    }
+    String::from_utf8(out).map_err(|_| "is not UTF-8 after decoding".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A directory with a blank, an umlaut and a percent sign in its name.
+    fn directory() -> PathBuf {
+        let path = std::env::temp_dir().join("tiprub location \u{fc} 50% off");
+        std::fs::create_dir_all(&path).unwrap();
+        path
+    }
+
+    #[test]
+    fn every_form_of_the_uri_leads_to_the_directory() {
+        let path = directory();
+        let text = path.to_str().unwrap();
+        let encoded = text.replace('%', "%25").replace(' ', "%20").replace('\u{fc}', "%C3%bc");
+        for uri in [
+            format!("file://{encoded}"),
+            format!("file:{encoded}"),
+            format!("file://localhost{encoded}"),
+            format!("FILE://LOCALHOST{encoded}/"),
+            format!("file://{text}"),
+            text.to_owned(),
+            format!("{text}/"),
+        ] {
+            assert_eq!(from_uri(&uri).as_deref(), Ok(path.as_path()), "{uri}");
+        }
+    }
+
+    #[test]
+    fn wrong_locations_are_refused_with_the_remedy() {
+        for (uri, reason) in [
+            ("", "empty"),
+            ("  ", "empty"),
+            ("http://example.org/resources", "not a file: URI"),
+            ("file://server/share/resources", "another host, \"server\""),
+            ("file:relative/resources", "not absolute"),
+            ("file:///tmp/a%00b", "NUL"),
+            ("file:///tmp/%ff%fe", "UTF-8"),
+            ("file:///no/such/directory", "not a directory"),
+            ("f\u{fc}le", "not a file: URI"),
+        ] {
+            let message = from_uri(uri).unwrap_err();
+            assert!(message.contains(reason) && message.contains("Pass the URI"), "{uri}: {message}");
+        }
+    }
+
+    #[test]
+    fn native_paths() {
+        let path = directory();
+        let text = path.to_str().unwrap();
+        assert_eq!(from_native(text).as_deref(), Ok(path.as_path()));
+        assert_eq!(from_native(&format!("{text}/")).as_deref(), Ok(path.as_path()));
+        assert_eq!(from_native(&format!("file://{}", text.replace('%', "%25"))).as_deref(), Ok(path.as_path()));
+        assert!(from_native("").unwrap_err().contains("empty"));
+        assert!(from_native("resources").unwrap_err().contains("not absolute"));
+        assert!(from_native("/no/such/directory").unwrap_err().contains("not a directory"));
+    }
+}

@@ -1,0 +1,165 @@
+//! The neutral slave: what an FMU instance is, whichever version of the standard it is driven through.
+
+mod access;
+mod life;
+pub mod order;
+mod phase;
+mod snapshot;
+mod stepping;
+
+use std::ffi::CString;
+use std::fmt;
+use std::path::Path;
+
+use tiprub_core::Simulation;
+
+pub use access::{Request, Value};
+pub use phase::{Experiment, Phase};
+
+/// Answer of a call. The numbers are those of `fmi2Status` and `fmi3Status`; `Fatal` (4) is never answered, because in
+/// FMI 2.0 it would condemn all instances of the process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(i32)]
+pub enum Status {
+    /// All well.
+    Ok = 0,
+    /// Done, and the message logged deserves attention.
+    Warning = 1,
+    /// Nothing done, the simulation can go on.
+    Discard = 2,
+    /// Refused or failed, the message logged says why.
+    Error = 3,
+}
+
+/// Which version of the standard an instance was made by: names of types and arguments differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dialect {
+    /// FMI 2.0.
+    Fmi2,
+    /// FMI 3.0.
+    Fmi3,
+}
+
+/// A call that was not carried out, and the message that explains it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// `Error` or `Discard`.
+    pub status: Status,
+    /// What, where, and the remedy.
+    pub message: String,
+}
+
+impl Refusal {
+    /// A refusal that answers `Error`.
+    pub fn error(message: impl Into<String>) -> Self {
+        Self { status: Status::Error, message: message.into() }
+    }
+
+    /// A refusal that answers `Discard`.
+    pub fn discard(message: impl Into<String>) -> Self {
+        Self { status: Status::Discard, message: message.into() }
+    }
+}
+
+impl From<tiprub_core::Error> for Refusal {
+    fn from(error: tiprub_core::Error) -> Self {
+        Self::error(error.to_string())
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.message)
+    }
+}
+
+/// Result of the slave's own calls.
+pub type Result<T, E = Refusal> = std::result::Result<T, E>;
+
+/// One FMU instance without its callbacks.
+#[derive(Debug)]
+pub struct Slave {
+    dialect: Dialect,
+    simulation: Simulation,
+    token: String,
+    arrays: bool,
+    phase: Phase,
+    /// Saved states handed out: the importer holds the address of a box as an opaque handle, which is only ever
+    /// compared, never followed. They are freed with the instance at the latest.
+    ///
+    /// The box is needed: its address is the handle, and must not move when the list grows.
+    #[expect(clippy::vec_box)]
+    snapshots: Vec<Box<snapshot::Snapshot>>,
+    /// Texts handed out by the last call that returned texts.
+    strings: Vec<CString>,
+    /// Messages for the importer that do not come with a refusal.
+    notes: Vec<(Status, String)>,
+}
+
+impl Slave {
+    /// Load the scene from the FMU's resources directory and compile it.
+    ///
+    /// # Errors
+    /// Unreadable or damaged resources, a token that does not belong to them, a scene that the core refuses.
+    pub fn new(dialect: Dialect, resources: &Path, token: &str) -> Result<Self> {
+        let loaded = tiprub_format::load_resources(resources).map_err(|error| Refusal::error(error.to_string()))?;
+        if loaded.token != token {
+            let (name, file) = match dialect {
+                Dialect::Fmi2 => ("fmuGUID", "attribute guid"),
+                Dialect::Fmi3 => ("instantiationToken", "attribute instantiationToken"),
+            };
+            return Err(Refusal::error(format!(
+                "{name} \"{token}\" does not belong to the resources in {}, whose token is \"{}\". Pass the {file} of \
+                 modelDescription.xml of the same FMU, and unpack the FMU completely",
+                resources.display(),
+                loaded.token
+            )));
+        }
+        Ok(Self {
+            dialect,
+            simulation: Simulation::new(&loaded.scene)?,
+            token: loaded.token,
+            arrays: loaded.fmi3_arrays && dialect == Dialect::Fmi3,
+            phase: Phase::Instantiated { experiment: Experiment::default() },
+            snapshots: Vec::new(),
+            strings: Vec::new(),
+            notes: Vec::new(),
+        })
+    }
+
+    /// Version of the standard this instance was made by.
+    pub fn dialect(&self) -> Dialect {
+        self.dialect
+    }
+
+    /// Phase of life.
+    pub fn phase(&self) -> &Phase {
+        &self.phase
+    }
+
+    /// Time of the instance (s): what the importer would call the current time, in any phase.
+    pub fn time(&self) -> f64 {
+        match self.phase {
+            Phase::Instantiated { experiment } | Phase::Initialising { experiment, .. } => experiment.start,
+            Phase::Stepping { .. } => self.simulation.time(),
+            Phase::Updating { reached, .. } => reached,
+            Phase::Failed { last_good: time } | Phase::Terminated { time } => time,
+        }
+    }
+
+    /// Keep texts that are handed out by pointer.
+    pub fn keep(&mut self, texts: Vec<CString>) -> &[CString] {
+        self.strings = texts;
+        &self.strings
+    }
+
+    /// Messages that do not come with a refusal, in order; the list is empty afterwards.
+    pub fn take_notes(&mut self) -> Vec<(Status, String)> {
+        std::mem::take(&mut self.notes)
+    }
+
+    /// Add a message to be handed to the importer after the call.
+    pub fn note(&mut self, status: Status, message: impl Into<String>) {
+        self.notes.push((status, message.into()));
+    }
+}

@@ -1,0 +1,156 @@
+//! The call order of both standards as data: one row per exported function that takes an instance, with the phases in
+//! which it is allowed.
+//!
+//! Sources: FMI 2.0.4, section 4.2.4 (state machine of calling sequence, table of functions against states) and
+//! FMI 3.0.2, sections 2.3 and 4.2. `fmi3EnterEventMode` and the like belong to capabilities that this FMU does not
+//! have; they are allowed nowhere ([`NOWHERE`] says so to the importer) or refused by their own message.
+//!
+//! Beyond the standard one thing is tolerated, because importers do it: FMI 2.0 reading of values that have a start
+//! value while the instance is still `Instantiated` (FMI 3.0 allows that). Stricter than the standard is one row:
+//! `fmi3GetOutputDerivatives` is refused during an intermediate update, because derivatives belong to communication points.
+
+use super::phase::{ANY, FAILED, INITIALISING, INSTANTIATED, STEPPING, States, TERMINATED, UPDATING, names};
+use super::{Dialect, Phase, Refusal, Result};
+
+/// One row of a call-order table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rule {
+    /// Name of the exported function.
+    pub name: &'static str,
+    /// Phases in which it may be called.
+    pub states: States,
+}
+
+impl Rule {
+    /// Version of the standard, by the prefix of the name.
+    pub fn dialect(&self) -> Dialect {
+        if self.name.starts_with("fmi2") { Dialect::Fmi2 } else { Dialect::Fmi3 }
+    }
+
+    /// Refuse a call that is out of order.
+    ///
+    /// # Errors
+    /// The message names the phase and the phases in which the call is allowed.
+    pub fn check(&self, phase: &Phase) -> Result<()> {
+        if self.states & phase.state() != 0 {
+            return Ok(());
+        }
+        let now = names(phase.state());
+        Err(Refusal::error(if self.states == NOWHERE {
+            format!("not allowed in state {now}, nor in any other of this FMU")
+        } else {
+            format!("not allowed in state {now}. Allowed in: {}", names(self.states))
+        }))
+    }
+}
+
+/// No phase.
+pub const NOWHERE: States = 0;
+/// Phases in which the whole state can be saved and restored.
+const SETTABLE: States = INSTANTIATED | INITIALISING | STEPPING | FAILED | TERMINATED;
+/// Phases in which values can be read.
+const READABLE: States = SETTABLE | UPDATING;
+/// Phases in which values can be set.
+const WRITABLE: States = INSTANTIATED | INITIALISING | STEPPING | UPDATING;
+
+/// One `const` per row.
+macro_rules! table {
+    ($($constant:ident $name:literal $states:expr;)*) => {
+        $(pub const $constant: Rule = Rule { name: $name, states: $states };)*
+    };
+}
+
+/// FMI 2.0. Phases: stepComplete is `STEPPING`, stepFailed and error are `FAILED`; stepInProgress and stepCanceled do not
+/// exist in a slave that never steps asynchronously.
+pub mod fmi2 {
+    use super::*;
+
+    table! {
+        SET_DEBUG_LOGGING "fmi2SetDebugLogging" ANY;
+        FREE_INSTANCE "fmi2FreeInstance" ANY;
+        SETUP_EXPERIMENT "fmi2SetupExperiment" INSTANTIATED;
+        ENTER_INITIALIZATION_MODE "fmi2EnterInitializationMode" INSTANTIATED;
+        EXIT_INITIALIZATION_MODE "fmi2ExitInitializationMode" INITIALISING;
+        TERMINATE "fmi2Terminate" STEPPING | FAILED;
+        RESET "fmi2Reset" SETTABLE;
+        GET_REAL "fmi2GetReal" SETTABLE;
+        GET_INTEGER "fmi2GetInteger" SETTABLE;
+        GET_BOOLEAN "fmi2GetBoolean" SETTABLE;
+        GET_STRING "fmi2GetString" SETTABLE;
+        SET_REAL "fmi2SetReal" INSTANTIATED | INITIALISING | STEPPING;
+        SET_INTEGER "fmi2SetInteger" INSTANTIATED | INITIALISING | STEPPING;
+        SET_BOOLEAN "fmi2SetBoolean" INSTANTIATED | INITIALISING | STEPPING;
+        SET_STRING "fmi2SetString" INSTANTIATED | INITIALISING | STEPPING;
+        GET_FMU_STATE "fmi2GetFMUstate" SETTABLE;
+        SET_FMU_STATE "fmi2SetFMUstate" SETTABLE;
+        FREE_FMU_STATE "fmi2FreeFMUstate" SETTABLE;
+        SERIALIZED_FMU_STATE_SIZE "fmi2SerializedFMUstateSize" SETTABLE;
+        SERIALIZE_FMU_STATE "fmi2SerializeFMUstate" SETTABLE;
+        DESERIALIZE_FMU_STATE "fmi2DeSerializeFMUstate" SETTABLE;
+        SET_REAL_INPUT_DERIVATIVES "fmi2SetRealInputDerivatives" INSTANTIATED | INITIALISING | STEPPING;
+        GET_REAL_OUTPUT_DERIVATIVES "fmi2GetRealOutputDerivatives" STEPPING | FAILED | TERMINATED;
+        DO_STEP "fmi2DoStep" STEPPING;
+        CANCEL_STEP "fmi2CancelStep" NOWHERE;
+        GET_STATUS "fmi2GetStatus" STEPPING | FAILED | TERMINATED;
+        GET_REAL_STATUS "fmi2GetRealStatus" STEPPING | FAILED | TERMINATED;
+        GET_INTEGER_STATUS "fmi2GetIntegerStatus" STEPPING | FAILED | TERMINATED;
+        GET_BOOLEAN_STATUS "fmi2GetBooleanStatus" STEPPING | FAILED | TERMINATED;
+        GET_STRING_STATUS "fmi2GetStringStatus" STEPPING | FAILED | TERMINATED;
+    }
+}
+
+/// FMI 3.0 Co-Simulation without Event Mode.
+pub mod fmi3 {
+    use super::*;
+
+    table! {
+        SET_DEBUG_LOGGING "fmi3SetDebugLogging" ANY;
+        FREE_INSTANCE "fmi3FreeInstance" SETTABLE;
+        ENTER_INITIALIZATION_MODE "fmi3EnterInitializationMode" INSTANTIATED;
+        EXIT_INITIALIZATION_MODE "fmi3ExitInitializationMode" INITIALISING;
+        TERMINATE "fmi3Terminate" STEPPING | FAILED;
+        RESET "fmi3Reset" SETTABLE;
+        GET_FLOAT32 "fmi3GetFloat32" READABLE;
+        GET_FLOAT64 "fmi3GetFloat64" READABLE;
+        GET_INT8 "fmi3GetInt8" READABLE;
+        GET_UINT8 "fmi3GetUInt8" READABLE;
+        GET_INT16 "fmi3GetInt16" READABLE;
+        GET_UINT16 "fmi3GetUInt16" READABLE;
+        GET_INT32 "fmi3GetInt32" READABLE;
+        GET_UINT32 "fmi3GetUInt32" READABLE;
+        GET_INT64 "fmi3GetInt64" READABLE;
+        GET_UINT64 "fmi3GetUInt64" READABLE;
+        GET_BOOLEAN "fmi3GetBoolean" READABLE;
+        GET_STRING "fmi3GetString" READABLE;
+        GET_BINARY "fmi3GetBinary" READABLE;
+        GET_CLOCK "fmi3GetClock" READABLE;
+        SET_FLOAT32 "fmi3SetFloat32" WRITABLE;
+        SET_FLOAT64 "fmi3SetFloat64" WRITABLE;
+        SET_INT8 "fmi3SetInt8" WRITABLE;
+        SET_UINT8 "fmi3SetUInt8" WRITABLE;
+        SET_INT16 "fmi3SetInt16" WRITABLE;
+        SET_UINT16 "fmi3SetUInt16" WRITABLE;
+        SET_INT32 "fmi3SetInt32" WRITABLE;
+        SET_UINT32 "fmi3SetUInt32" WRITABLE;
+        SET_INT64 "fmi3SetInt64" WRITABLE;
+        SET_UINT64 "fmi3SetUInt64" WRITABLE;
+        SET_BOOLEAN "fmi3SetBoolean" WRITABLE;
+        SET_STRING "fmi3SetString" WRITABLE;
+        SET_BINARY "fmi3SetBinary" WRITABLE;
+        SET_CLOCK "fmi3SetClock" WRITABLE;
+        GET_FMU_STATE "fmi3GetFMUState" SETTABLE;
+        SET_FMU_STATE "fmi3SetFMUState" SETTABLE;
+        FREE_FMU_STATE "fmi3FreeFMUState" SETTABLE;
+        SERIALIZED_FMU_STATE_SIZE "fmi3SerializedFMUStateSize" SETTABLE;
+        SERIALIZE_FMU_STATE "fmi3SerializeFMUState" SETTABLE;
+        DESERIALIZE_FMU_STATE "fmi3DeserializeFMUState" SETTABLE;
+        GET_OUTPUT_DERIVATIVES "fmi3GetOutputDerivatives" STEPPING | FAILED | TERMINATED;
+        DO_STEP "fmi3DoStep" STEPPING;
+        CONTINUE_STEP "fmi3DoStep" UPDATING;
+    }
+}
+
+/// Row of a function that belongs to a capability this FMU does not have; its own message says so in every phase.
+pub const fn unsupported(name: &'static str) -> Rule {
+    Rule { name, states: ANY }
+}

@@ -1,0 +1,79 @@
+//! Communication steps: whole, or internal step by internal step for FMI 3.0 intermediate updates.
+
+use tiprub_core::simulation::Progress;
+
+use super::{Phase, Refusal, Result, Slave};
+
+/// How far beyond the stop time a step may end, as a fraction of the step: importers add up their communication points,
+/// and the sum of many steps misses the stop time by rounding.
+const STOP_TOLERANCE: f64 = 1e-3;
+
+/// With the feature `test-panic`, the communication step size that makes the step panic: an odd number that nobody uses.
+#[cfg(feature = "test-panic")]
+const PANIC_STEP_SIZE: f64 = 1.234_567_890_123e-5;
+
+impl Slave {
+    /// Begin a communication step; the phase becomes [`Phase::Updating`] until it is ended.
+    ///
+    /// # Errors
+    /// Wrong time, bad step size, a step beyond the stop time; the state is as before.
+    pub fn begin_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
+        let Phase::Stepping { stop } = self.phase else {
+            return Err(Refusal::error("no step can begin in this phase"));
+        };
+        if let Some(stop) = stop {
+            let end = current_time + step_size;
+            let allowance = STOP_TOLERANCE * step_size + 1e-12 * stop.abs();
+            if end - stop > allowance {
+                return Err(Refusal::error(format!(
+                    "the step from t = {current_time} s by {step_size} s ends at {end} s, beyond the stop time {stop} s \
+                     given at initialisation. Step less far, or initialise without a stop time"
+                )));
+            }
+        }
+        self.simulation.begin_step(current_time, step_size)?;
+        #[cfg(feature = "test-panic")]
+        assert!(step_size.to_bits() != PANIC_STEP_SIZE.to_bits(), "panic asked for by the test of panics");
+        self.phase = Phase::Updating { stop, reached: self.simulation.time(), fresh: false };
+        Ok(())
+    }
+
+    /// March one internal step. When it finishes the communication step, the phase is [`Phase::Stepping`] again.
+    ///
+    /// # Errors
+    /// The state became non-finite; the phase is [`Phase::Failed`] then.
+    pub fn advance(&mut self) -> Result<Progress> {
+        let last_good = self.simulation.time();
+        let Phase::Updating { stop, .. } = self.phase else {
+            return Err(Refusal::error("no step is under way"));
+        };
+        let progress = self.simulation.advance().inspect_err(|_| self.phase = Phase::Failed { last_good })?;
+        self.phase = Phase::Updating { stop, reached: progress.time, fresh: progress.finished };
+        Ok(progress)
+    }
+
+    /// End the communication step: at its end, or at the internal step reached (early return).
+    ///
+    /// # Errors
+    /// Early: the state is not finite; the phase is [`Phase::Failed`] then.
+    pub fn end_step(&mut self, early: bool) -> Result<()> {
+        let last_good = self.simulation.time();
+        if let Phase::Updating { stop, .. } = self.phase {
+            if early {
+                self.simulation.end_step_early().inspect_err(|_| self.phase = Phase::Failed { last_good })?;
+            }
+            self.phase = Phase::Stepping { stop };
+        }
+        Ok(())
+    }
+
+    /// A whole communication step.
+    ///
+    /// # Errors
+    /// As [`Slave::begin_step`] and [`Slave::advance`].
+    pub fn step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
+        self.begin_step(current_time, step_size)?;
+        while !self.advance()?.finished {}
+        self.end_step(false)
+    }
+}

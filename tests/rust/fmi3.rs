@@ -1,0 +1,283 @@
+//! A small FMI 3.0 importer: safe calls on an instance, and its handle for unsafe ones.
+
+use std::ffi::{CString, c_void};
+use std::path::Path;
+
+use crate::api::{Fmi3Api, Instance, State, Update};
+use crate::scene::Resources;
+use crate::{Journal, OK, WARNING, journal3};
+
+/// What the instantiation is given; change a field to try something else.
+#[derive(Debug, Clone)]
+pub struct Arguments {
+    /// `instanceName`.
+    pub name: Option<CString>,
+    /// `instantiationToken`.
+    pub token: Option<CString>,
+    /// `resourcePath`.
+    pub path: Option<CString>,
+    /// `eventModeUsed`.
+    pub event_mode: bool,
+    /// `earlyReturnAllowed`.
+    pub early_return: bool,
+    /// `requiredIntermediateVariables`.
+    pub intermediate: Vec<u32>,
+    /// `intermediateUpdate`; it is given the importer's [`Context`].
+    pub update: Option<Update>,
+}
+
+impl Arguments {
+    /// Proper ones.
+    pub fn new(resources: &Resources) -> Self {
+        let text = |text: String| Some(CString::new(text).expect("no NUL"));
+        Self {
+            name: text("rub".into()),
+            token: text(resources.token.clone()),
+            path: text(format!("{}/", resources.path().display())),
+            event_mode: false,
+            early_return: false,
+            intermediate: Vec::new(),
+            update: None,
+        }
+    }
+}
+
+/// What `instanceEnvironment` points to; begins with the journal, so that the logger finds it.
+#[derive(Debug)]
+#[repr(C)]
+pub struct Context {
+    /// Messages.
+    pub journal: Journal,
+    /// The functions, for callbacks.
+    pub api: *const Fmi3Api,
+    /// The instance, for callbacks.
+    pub handle: Instance,
+    /// Whatever a test's callback wants to note.
+    pub notes: Vec<f64>,
+    /// Whatever a test's callback wants to know.
+    pub wish: f64,
+}
+
+/// What `fmi3DoStep` answered.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Status.
+    pub status: i32,
+    /// `eventHandlingNeeded`.
+    pub event: bool,
+    /// `terminateSimulation`.
+    pub terminate: bool,
+    /// `earlyReturn`.
+    pub early: bool,
+    /// `lastSuccessfulTime`.
+    pub time: f64,
+}
+
+/// One instance; freed when dropped.
+#[derive(Debug)]
+pub struct Slave<'a> {
+    /// The functions.
+    pub api: &'a Fmi3Api,
+    /// The instance.
+    pub handle: Instance,
+    /// What callbacks are given.
+    pub context: *mut Context,
+}
+
+/// Load the library.
+#[track_caller]
+pub fn load(path: &Path) -> Fmi3Api {
+    Fmi3Api::load(path)
+}
+
+fn pointer(text: &Option<CString>) -> *const std::ffi::c_char {
+    text.as_ref().map_or(std::ptr::null(), |text| text.as_ptr())
+}
+
+impl<'a> Slave<'a> {
+    /// Instantiate; on failure the messages.
+    ///
+    /// # Errors
+    /// All messages logged.
+    pub fn try_new(api: &'a Fmi3Api, arguments: &Arguments) -> Result<Self, String> {
+        let context = Box::into_raw(Box::new(Context {
+            journal: Journal::default(),
+            api,
+            handle: std::ptr::null_mut(),
+            notes: Vec::new(),
+            wish: 0.0,
+        }));
+        let Arguments { name, token, path, event_mode, early_return, intermediate, update } = arguments;
+        // SAFETY: all pointers are valid for the call or NULL, which the library must bear.
+        let handle = unsafe {
+            (api.fmi3InstantiateCoSimulation)(
+                pointer(name),
+                pointer(token),
+                pointer(path),
+                false,
+                false,
+                *event_mode,
+                *early_return,
+                intermediate.as_ptr(),
+                intermediate.len(),
+                context.cast::<c_void>(),
+                Some(journal3),
+                *update,
+            )
+        };
+        // SAFETY: the context came from a box just now.
+        unsafe { (*context).handle = handle };
+        let slave = Self { api, handle, context };
+        if handle.is_null() { Err(slave.log()) } else { Ok(slave) }
+    }
+
+    /// Instantiate the scene of the tests.
+    #[track_caller]
+    pub fn new(api: &'a Fmi3Api, resources: &Resources) -> Self {
+        Self::try_new(api, &Arguments::new(resources)).unwrap_or_else(|log| panic!("{log}"))
+    }
+
+    /// From instantiated to ready for steps.
+    #[track_caller]
+    pub fn initialise(&self) {
+        self.expect(self.enter(0.0, None));
+        self.expect(self.exit());
+    }
+
+    /// `fmi3EnterInitializationMode`.
+    pub fn enter(&self, start: f64, stop: Option<f64>) -> i32 {
+        let (defined, stop) = (stop.is_some(), stop.unwrap_or(0.0));
+        // SAFETY: the instance is alive.
+        unsafe { (self.api.fmi3EnterInitializationMode)(self.handle, false, 0.0, start, defined, stop) }
+    }
+
+    /// `fmi3ExitInitializationMode`.
+    pub fn exit(&self) -> i32 {
+        // SAFETY: the instance is alive.
+        unsafe { (self.api.fmi3ExitInitializationMode)(self.handle) }
+    }
+
+    /// `fmi3Reset`.
+    pub fn reset(&self) -> i32 {
+        // SAFETY: the instance is alive.
+        unsafe { (self.api.fmi3Reset)(self.handle) }
+    }
+
+    /// `fmi3Terminate`.
+    pub fn terminate(&self) -> i32 {
+        // SAFETY: the instance is alive.
+        unsafe { (self.api.fmi3Terminate)(self.handle) }
+    }
+
+    /// `fmi3DoStep`; the places for the answers hold improper values before.
+    pub fn step(&self, time: f64, size: f64) -> Step {
+        let (mut event, mut terminate, mut early, mut last) = (true, true, true, f64::NAN);
+        // SAFETY: places for the four answers.
+        let status = unsafe {
+            (self.api.fmi3DoStep)(
+                self.handle,
+                time,
+                size,
+                true,
+                &raw mut event,
+                &raw mut terminate,
+                &raw mut early,
+                &raw mut last,
+            )
+        };
+        Step { status, event, terminate, early, time: last }
+    }
+
+    /// `fmi3GetFloat64`.
+    pub fn try_reals(&self, references: &[u32], count: usize) -> Result<Vec<f64>, i32> {
+        let mut values = vec![0.0; count];
+        // SAFETY: arrays of that length.
+        let status = unsafe {
+            (self.api.fmi3GetFloat64)(self.handle, references.as_ptr(), references.len(), values.as_mut_ptr(), count)
+        };
+        if status == OK { Ok(values) } else { Err(status) }
+    }
+
+    /// `fmi3GetFloat64`.
+    #[track_caller]
+    pub fn reals(&self, references: &[u32], count: usize) -> Vec<f64> {
+        self.try_reals(references, count).unwrap_or_else(|status| panic!("status {status}: {}", self.log()))
+    }
+
+    /// `fmi3SetFloat64`.
+    pub fn set_reals(&self, references: &[u32], values: &[f64]) -> i32 {
+        let (count, n) = (references.len(), values.len());
+        // SAFETY: arrays of that length.
+        unsafe { (self.api.fmi3SetFloat64)(self.handle, references.as_ptr(), count, values.as_ptr(), n) }
+    }
+
+    /// `fmi3GetFMUState` into a new state.
+    #[track_caller]
+    pub fn save(&self) -> State {
+        let mut state = std::ptr::null_mut();
+        // SAFETY: a place for the state.
+        self.expect(unsafe { (self.api.fmi3GetFMUState)(self.handle, &raw mut state) });
+        state
+    }
+
+    /// `fmi3SetFMUState`.
+    pub fn restore(&self, state: State) -> i32 {
+        // SAFETY: the instance is alive; the library must bear any state.
+        unsafe { (self.api.fmi3SetFMUState)(self.handle, state) }
+    }
+
+    /// The bytes of a state.
+    #[track_caller]
+    pub fn serialise(&self, state: State) -> Vec<u8> {
+        let mut size = 0;
+        // SAFETY: a place for the size.
+        self.expect(unsafe { (self.api.fmi3SerializedFMUStateSize)(self.handle, state, &raw mut size) });
+        let mut bytes = vec![0; size];
+        // SAFETY: an array of that size.
+        self.expect(unsafe { (self.api.fmi3SerializeFMUState)(self.handle, state, bytes.as_mut_ptr(), size) });
+        bytes
+    }
+
+    /// `fmi3DeserializeFMUState` into a new state.
+    pub fn deserialise(&self, bytes: &[u8]) -> (i32, State) {
+        let mut state = std::ptr::null_mut();
+        // SAFETY: an array of that size, a place for the state.
+        let status =
+            unsafe { (self.api.fmi3DeserializeFMUState)(self.handle, bytes.as_ptr(), bytes.len(), &raw mut state) };
+        (status, state)
+    }
+
+    /// Messages so far; the journal is empty afterwards.
+    pub fn log(&self) -> String {
+        // SAFETY: the context lives as long as this importer, and is only touched between calls.
+        std::mem::take(unsafe { &mut (*self.context).journal }).text()
+    }
+
+    /// What the test's callback noted.
+    pub fn notes(&self) -> Vec<f64> {
+        // SAFETY: as in `log`.
+        std::mem::take(unsafe { &mut (*self.context).notes })
+    }
+
+    /// Tell the test's callback something.
+    pub fn wish(&self, value: f64) {
+        // SAFETY: as in `log`.
+        unsafe { (*self.context).wish = value };
+    }
+
+    /// Require OK or Warning.
+    #[track_caller]
+    pub fn expect(&self, status: i32) {
+        assert!(status == OK || status == WARNING, "status {status}: {}", self.log());
+    }
+}
+
+impl Drop for Slave<'_> {
+    fn drop(&mut self) {
+        // SAFETY: the instance is NULL or alive and not used any more; the context came from a box.
+        unsafe {
+            (self.api.fmi3FreeInstance)(self.handle);
+            drop(Box::from_raw(self.context));
+        }
+    }
+}

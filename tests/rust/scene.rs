@@ -1,0 +1,125 @@
+//! A small scene that touches: six blades with three contact nodes each, light and soft enough to be quick.
+
+use std::path::Path;
+
+use nalgebra::DMatrix;
+use tempfile::TempDir;
+use tiprub_core::rom::{ContactNode, Frame, RomChecks};
+use tiprub_core::{Rom, Scene};
+
+/// Radius of the blade tips (m).
+pub const RADIUS: f64 = 0.25;
+
+/// Three point masses of 10 g, coupled by springs: the stiffest direction of each is near 2 kHz, the softest near 300 Hz;
+/// three more internal coordinates hang on the first three.
+pub fn rom() -> Rom {
+    let order = 12;
+    let mass = DMatrix::from_diagonal_element(order, order, 0.01);
+    let mut stiffness = DMatrix::zeros(order, order);
+    for coordinate in 0..order {
+        // Radial stiff, tangential soft, axial between; internal ones stiffest.
+        let frequency = if coordinate >= 9 { 2500.0 } else { [1800.0, 310.0, 640.0][coordinate % 3] };
+        let omega = std::f64::consts::TAU * frequency;
+        stiffness[(coordinate, coordinate)] += 0.01 * omega * omega;
+    }
+    let springs =
+        [(0, 3, 2e5), (3, 6, 2e5), (1, 4, 3e4), (4, 7, 3e4), (2, 5, 1e4), (5, 8, 1e4), (0, 9, 4e5), (3, 10, 4e5)];
+    let springs = springs.into_iter().chain([(6, 11, 4e5), (0, 1, 1.5e4), (3, 4, 1.5e4), (6, 7, 1.5e4)]);
+    for (one, other, constant) in springs {
+        stiffness[(one, one)] += constant;
+        stiffness[(other, other)] += constant;
+        stiffness[(one, other)] -= constant;
+        stiffness[(other, one)] -= constant;
+    }
+    let node = |name: &str, angle: f64, axial: f64| ContactNode {
+        name: name.into(),
+        position: [RADIUS, angle, axial],
+        meridional_slope: 0.0,
+    };
+    Rom {
+        name: "toy".into(),
+        origin: "three point masses on springs".into(),
+        sectors: 6,
+        frame: Frame::Cylindrical,
+        mass,
+        stiffness,
+        damping_ratio: 0.01,
+        contact_map: DMatrix::identity(9, order),
+        contact_nodes: vec![
+            node("leading_edge", -0.05, 0.0),
+            node("mid_chord", 0.0, 0.02),
+            node("trailing_edge", 0.05, 0.04),
+        ],
+        checks: RomChecks::default(),
+    }
+}
+
+/// The scene file; a two-lobe casing that intrudes by a tenth of the gap makes every blade rub twice a revolution.
+pub const SCENE: &str = r#"
+name = "toy_rub"
+description = "Six blades on springs in a two-lobe casing."
+
+[[structure]]
+name = "rotor"
+rom = "toy.rom.safetensors"
+speed = 300.0
+
+[[surface]]
+name = "casing"
+shape = { kind = "two-lobe", depth = 1.1 }
+
+[[contact]]
+master = "rotor"
+slave = "casing"
+gap = 4e-4
+friction = 0.15
+
+[time]
+step = 2e-6
+
+[outputs]
+all_sectors = true
+
+[experiment]
+stop = 0.1
+communication_step = 1e-4
+"#;
+
+/// The scene as data.
+#[track_caller]
+pub fn scene() -> Scene {
+    let settings = tiprub_format::parse_scene(SCENE, "toy.toml").expect("the scene of the tests is valid");
+    Scene { settings, roms: vec![rom()] }
+}
+
+/// An unpacked FMU's resources.
+#[derive(Debug)]
+pub struct Resources {
+    directory: TempDir,
+    /// The token that belongs to them.
+    pub token: String,
+}
+
+impl Resources {
+    /// Write the scene of the tests.
+    #[track_caller]
+    pub fn new(arrays: bool) -> Self {
+        Self::of(&scene(), arrays)
+    }
+
+    /// Write a scene.
+    #[track_caller]
+    pub fn of(scene: &Scene, arrays: bool) -> Self {
+        let files = tiprub_format::resource_files(scene, arrays);
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        for (name, content) in &files {
+            std::fs::write(directory.path().join(name), content).expect("the temporary directory can be written");
+        }
+        Self { directory, token: tiprub_format::instantiation_token(&files) }
+    }
+
+    /// Where they are.
+    pub fn path(&self) -> &Path {
+        self.directory.path()
+    }
+}

@@ -1,0 +1,292 @@
+//! Steps through both C ABIs against the core driven directly: same bits, exact landing, inputs, intermediate updates.
+
+use std::ffi::c_void;
+
+use tiprub_core::Simulation;
+use tiprub_tests::api::Fmi3Api;
+use tiprub_tests::scene::{Resources, scene};
+use tiprub_tests::{ERROR, OK, WARNING, fmi2, fmi3, shipped};
+
+/// Communication step (s): not a multiple of the internal step of 2 µs.
+const H: f64 = 1.0137e-4;
+/// More than two revolutions at 300 rad/s.
+const STEPS: u32 = 450;
+
+fn simulation() -> Simulation {
+    let mut simulation = Simulation::new(&scene()).expect("the scene is valid");
+    simulation.initialise(0.0).expect("the scene can be initialised");
+    simulation
+}
+
+fn reference_of(simulation: &Simulation, name: &str) -> u32 {
+    simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
+}
+
+/// References of all real elements.
+fn all_reals(simulation: &Simulation) -> Vec<u32> {
+    let count = u32::try_from(simulation.table().references()).expect("few variables");
+    (0..count).filter(|reference| simulation.real(*reference).is_ok()).collect()
+}
+
+fn native(simulation: &Simulation, references: &[u32]) -> Vec<u64> {
+    references.iter().map(|reference| simulation.real(*reference).expect("a real").to_bits()).collect()
+}
+
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+#[test]
+fn both_versions_give_the_bits_of_the_core_with_contact() {
+    let path = shipped();
+    let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
+    let resources = Resources::new(false);
+    let (two, three) = (fmi2::Slave::initialised(&api2, &resources), fmi3::Slave::new(&api3, &resources));
+    three.initialise();
+    let mut core = simulation();
+    let references = all_reals(&core);
+    let impulse = reference_of(&core, "normal_impulse");
+    let (mut time, mut touched) = (0.0, 0);
+    for step in 0..=STEPS {
+        let expected = native(&core, &references);
+        assert_eq!(bits(&two.reals(&references)), expected, "FMI 2.0 at step {step}");
+        assert_eq!(bits(&three.reals(&references, references.len())), expected, "FMI 3.0 at step {step}");
+        touched += u32::from(core.real(impulse).expect("a real") > 0.0);
+        core.do_step(time, H).expect("the step succeeds");
+        two.expect(two.step(time, H));
+        let answer = three.step(time, H);
+        time += H;
+        assert_eq!((answer.status, answer.event, answer.terminate, answer.early), (OK, false, false, false));
+        assert_eq!(answer.time.to_bits(), time.to_bits(), "lands exactly");
+    }
+    assert!(touched > 20, "only {touched} steps with contact: the test shows nothing");
+    println!("{touched} of {STEPS} steps with contact, {} reals each, identical bits in both versions", references.len());
+}
+
+#[test]
+fn step_sizes_that_change_and_sixtieths_land_exactly() {
+    let path = shipped();
+    let (api, resources) = (fmi3::load(&path), Resources::new(true));
+    let slave = fmi3::Slave::new(&api, &resources);
+    slave.initialise();
+    let mut time = 0.0;
+    for step in 1..200_u32 {
+        let size = H * (1.0 + 0.9 * f64::from(step).sin());
+        assert_eq!(slave.step(time, size).status, OK);
+        time += size;
+        assert_eq!(slave.reals(&[0], 1)[0].to_bits(), time.to_bits());
+    }
+    // 1/60 s as importers compute it: the quotient, a rounded literal, and the difference of accumulated times.
+    let accumulated: f64 = (0..7).map(|_| 1.0 / 60.0).sum::<f64>();
+    let difference = (accumulated + 1.0 / 60.0) - accumulated;
+    let mut ends = Vec::new();
+    for size in [1.0 / 60.0, 0.016_666_666_666_666_677, difference] {
+        slave.expect(slave.reset());
+        slave.initialise();
+        let answer = slave.step(0.0, size);
+        assert_eq!((answer.status, answer.time.to_bits()), (OK, size.to_bits()));
+        let simulation = simulation();
+        let values = slave.reals(&[reference_of(&simulation, "rotor_angle"), reference_of(&simulation, "internal_steps")], 2);
+        ends.push(values);
+    }
+    assert!((ends[0][0] - ends[1][0]).abs() < 1e-12 && (ends[0][0] - ends[2][0]).abs() < 1e-12, "{ends:?}");
+    assert!(ends.iter().all(|end| end[1].to_bits() == ends[0][1].to_bits()), "number of internal steps {ends:?}");
+}
+
+#[test]
+fn a_derivative_of_the_speed_gives_the_exact_angle_of_a_ramp() {
+    let path = shipped();
+    let (api, resources) = (fmi2::load(&path), Resources::new(false));
+    let core = simulation();
+    let (speed, angle) = (reference_of(&core, "speed"), reference_of(&core, "rotor_angle"));
+    let (start, ramp, size, steps) = (300.0, 4000.0, 2e-3, 10_u32);
+    let mut errors = Vec::new();
+    for with_derivative in [false, true] {
+        let slave = fmi2::Slave::initialised(&api, &resources);
+        for step in 0..steps {
+            let time = f64::from(step) * size;
+            slave.expect(slave.set_reals(&[speed], &[start + ramp * time]));
+            if with_derivative {
+                slave.expect(slave.set_derivatives(&[speed], 1, &[ramp]));
+            }
+            slave.expect(slave.step(time, size));
+        }
+        let end = f64::from(steps) * size;
+        let exact = start * end + 0.5 * ramp * end * end;
+        errors.push((slave.reals(&[angle])[0] - exact).abs());
+    }
+    // Held inputs lag by half a step: ½·ramp·H per step in angle, H²·ramp/2 each.
+    let lag = 0.5 * ramp * size * size * f64::from(steps);
+    assert!((errors[0] - lag).abs() < 1e-9, "held: {} instead of {lag}", errors[0]);
+    assert!(errors[1] < 1e-12, "with derivative: {}", errors[1]);
+}
+
+#[test]
+fn derivatives_of_outputs_follow_the_outputs() {
+    let path = shipped();
+    let (api, resources) = (fmi3::load(&path), Resources::new(false));
+    let slave = fmi3::Slave::new(&api, &resources);
+    slave.initialise();
+    let angle = reference_of(&simulation(), "rotor_angle");
+    assert_eq!(slave.step(0.0, H).status, OK);
+    let (orders, mut value) = ([1, 2], [0.0]);
+    // SAFETY: arrays of one element.
+    let get = |order: *const i32, value: &mut [f64; 1]| unsafe {
+        (api.fmi3GetOutputDerivatives)(slave.handle, &raw const angle, 1, order, value.as_mut_ptr(), 1)
+    };
+    assert_eq!(get(&raw const orders[0], &mut value), OK);
+    assert!((value[0] - 300.0).abs() < 1e-9, "{value:?}");
+    assert_eq!(get(&raw const orders[1], &mut value), ERROR);
+    assert!(slave.log().contains("order 2"));
+}
+
+/// Notes the time of each internal step, reads time and angle, and sets the speed to the wish if that is not zero.
+unsafe extern "C" fn watch(
+    environment: *mut c_void,
+    time: f64,
+    set_requested: bool,
+    get_allowed: bool,
+    finished: bool,
+    can_return: bool,
+    requested: *mut bool,
+    at: *mut f64,
+) {
+    // SAFETY: the environment is the importer's context, which nobody else touches during a step.
+    let context = unsafe { &mut *environment.cast::<fmi3::Context>() };
+    assert!(get_allowed && finished);
+    // SAFETY: the functions outlive the instance.
+    let api: &Fmi3Api = unsafe { &*context.api };
+    let (references, mut values) = ([0_u32], [0.0]);
+    // SAFETY: arrays of one element, on the instance that is calling.
+    let status = unsafe { (api.fmi3GetFloat64)(context.handle, references.as_ptr(), 1, values.as_mut_ptr(), 1) };
+    assert_eq!((status, values[0].to_bits()), (OK, time.to_bits()), "the time inside a step");
+    context.notes.push(time);
+    if context.wish > 0.0 && can_return && time >= context.wish {
+        // SAFETY: places for the two answers.
+        unsafe { (*requested, *at) = (true, time) };
+    }
+    if context.wish < 0.0 && set_requested {
+        let (reference, speed) = (1_u32, -context.wish + 1000.0 * time);
+        // SAFETY: arrays of one element.
+        let status = unsafe { (api.fmi3SetFloat64)(context.handle, &raw const reference, 1, &raw const speed, 1) };
+        assert_eq!(status, OK);
+    }
+}
+
+fn watched(resources: &Resources, early_return: bool) -> fmi3::Arguments {
+    fmi3::Arguments { update: Some(watch), early_return, ..fmi3::Arguments::new(resources) }
+}
+
+#[test]
+fn intermediate_updates_see_every_internal_step_and_change_nothing_by_looking() {
+    let path = shipped();
+    let (api, resources) = (fmi3::load(&path), Resources::new(false));
+    let core = simulation();
+    // Damping loss is gathered per communication step or per look inside: the energies may differ in the last bits.
+    let energies = ["damping_loss", "energy_residual", "energy_residual_relative"].map(|name| reference_of(&core, name));
+    let references: Vec<_> = all_reals(&core).into_iter().filter(|reference| !energies.contains(reference)).collect();
+    let plain = fmi3::Slave::new(&api, &resources);
+    let looked = fmi3::Slave::try_new(&api, &watched(&resources, true)).unwrap_or_else(|log| panic!("{log}"));
+    plain.initialise();
+    looked.initialise();
+    for step in 0..100 {
+        let time = f64::from(step) * 1e-4;
+        assert_eq!(plain.step(time, 1e-4), looked.step(time, 1e-4));
+        assert_eq!(looked.notes().len(), 50, "one update per internal step of 2 µs");
+        let count = references.len();
+        assert_eq!(bits(&plain.reals(&references, count)), bits(&looked.reals(&references, count)), "step {step}");
+    }
+}
+
+#[test]
+fn early_return_ends_the_step_where_the_importer_wants() {
+    let path = shipped();
+    let (api, resources) = (fmi3::load(&path), Resources::new(true));
+    let slave = fmi3::Slave::try_new(&api, &watched(&resources, true)).unwrap_or_else(|log| panic!("{log}"));
+    slave.initialise();
+    slave.wish(4.1e-5);
+    let answer = slave.step(0.0, 1e-4);
+    assert_eq!((answer.status, answer.early, answer.terminate, answer.event), (OK, true, false, false));
+    assert!((answer.time - 4.2e-5).abs() < 1e-15, "the first internal step at or after the wish: {}", answer.time);
+    assert_eq!(slave.reals(&[0], 1)[0].to_bits(), answer.time.to_bits());
+    // The rest of the step, then a whole one.
+    slave.wish(0.0);
+    let rest = slave.step(answer.time, 1e-4 - answer.time);
+    assert_eq!((rest.status, rest.early), (OK, false));
+    assert_eq!(slave.step(rest.time, 1e-4).status, OK);
+
+    // Without the importer's consent at instantiation a request is not followed, and answered with a warning.
+    let strict = fmi3::Slave::try_new(&api, &watched(&resources, false)).unwrap_or_else(|log| panic!("{log}"));
+    strict.initialise();
+    strict.wish(4.1e-5);
+    let answer = strict.step(0.0, 1e-4);
+    assert_eq!((answer.status, answer.early), (OK, false), "canReturnEarly was false, nothing was requested");
+}
+
+#[test]
+fn inputs_set_during_intermediate_updates_count_from_there() {
+    let path = shipped();
+    let (api, resources) = (fmi3::load(&path), Resources::new(true));
+    let core = simulation();
+    assert_eq!(reference_of(&core, "speed"), 1, "the callback sets reference 1");
+    let angle = reference_of(&core, "rotor_angle");
+    let slave = fmi3::Slave::try_new(&api, &watched(&resources, false)).unwrap_or_else(|log| panic!("{log}"));
+    slave.initialise();
+    slave.wish(-300.0);
+    let (size, steps) = (1e-3, 5);
+    for step in 0..steps {
+        assert_eq!(slave.step(f64::from(step) * size, size).status, OK);
+    }
+    // 300 + 1000·t, held over internal steps of h = 2 µs: the angle lags the exact integral by ½·1000·h·T, and the set at
+    // the end of each step, which is not requested, is missing once a step (another ½... of one h): bounded by 2·1000·h·T.
+    let end = f64::from(steps) * size;
+    let exact = 300.0 * end + 500.0 * end * end;
+    let error = exact - slave.reals(&[angle], 1)[0];
+    let lag = 0.5 * 1000.0 * 2e-6 * end;
+    assert!(error > 0.5 * lag && error < 2.0 * lag, "{error} against {lag}");
+}
+
+#[test]
+fn the_stop_time_is_respected_with_room_for_rounding() {
+    let path = shipped();
+    let (api, resources) = (fmi2::load(&path), Resources::new(false));
+    let slave = fmi2::Slave::new(&api, &resources);
+    slave.expect(slave.setup(0.0, Some(1e-3)));
+    slave.initialise();
+    let mut time = 0.0;
+    for _ in 0..10 {
+        slave.expect(slave.step(time, 1e-4));
+        time += 1e-4;
+    }
+    assert_eq!(slave.step(time, 1e-4), ERROR);
+    let log = slave.log();
+    assert!(log.contains("beyond the stop time 0.001 s"), "{log}");
+    slave.expect(slave.terminate());
+    assert!((slave.reals(&[0])[0] - 1e-3).abs() < 1e-15, "terminate, then get");
+}
+
+#[test]
+fn values_set_before_initialisation_are_start_values() {
+    let path = shipped();
+    let (api, resources) = (fmi2::load(&path), Resources::new(false));
+    let core = simulation();
+    let [speed, friction, angle, clearance] =
+        ["speed", "friction_coefficient", "initial_rotor_angle", "blade[1].clearance"].map(|name| reference_of(&core, name));
+    let slave = fmi2::Slave::new(&api, &resources);
+    slave.expect(slave.set_reals(&[speed, friction], &[250.0, 0.1]));
+    assert_eq!(slave.reals(&[speed, friction]), [250.0, 0.1], "start values can be read back");
+    slave.expect(slave.enter());
+    let before = slave.reals(&[clearance]);
+    slave.expect(slave.set_reals(&[angle], &[1.0]));
+    let after = slave.reals(&[clearance]);
+    assert!(before != after, "outputs follow parameters during initialisation: {before:?}");
+    // A fixed parameter can still be set after outputs were read.
+    slave.expect(slave.set_reals(&[angle], &[0.0]));
+    assert_eq!(slave.reals(&[clearance]), before);
+    assert!([OK, WARNING].contains(&slave.exit()));
+    assert_eq!(slave.set_reals(&[angle], &[0.5]), ERROR);
+    assert!(slave.log().contains("fixed parameter"));
+    slave.expect(slave.set_reals(&[friction], &[0.2]));
+    slave.expect(slave.step(0.0, H));
+    assert_eq!(slave.reals(&[speed, friction]), [250.0, 0.2]);
+}
