@@ -25,18 +25,19 @@ pub struct View {
 /// Length of the picture's longer edge in SVG units.
 const EDGE: f64 = 400.0;
 
-/// Anchors of the sequential colour scale (viridis by S. van der Walt and N. Smith, public domain), 0 to 1.
-const VIRIDIS: [[f64; 3]; 9] = [
-    [68.0, 1.0, 84.0],
-    [72.0, 40.0, 120.0],
-    [62.0, 74.0, 137.0],
-    [49.0, 104.0, 142.0],
-    [38.0, 130.0, 142.0],
-    [31.0, 158.0, 137.0],
-    [53.0, 183.0, 121.0],
-    [109.0, 205.0, 89.0],
-    [253.0, 231.0, 37.0],
+/// Anchors of the sequential colour scale, rest to largest, light to dark so that it also reads in grey.
+const SCALE_COLORS: [[f64; 3]; 7] = [
+    [214.0, 222.0, 231.0],
+    [253.0, 224.0, 178.0],
+    [253.0, 190.0, 122.0],
+    [250.0, 141.0, 89.0],
+    [232.0, 92.0, 62.0],
+    [196.0, 40.0, 36.0],
+    [127.0, 10.0, 30.0],
 ];
+
+/// Every face is drawn as this many by this many patches of constant colour.
+const PATCHES: usize = 2;
 
 impl View {
     /// A view of a blade standing on the z axis: radial direction of its centre upwards, seen from `azimuth` (rad)
@@ -80,31 +81,30 @@ pub fn draw(
         }
         None => surface.points.clone(),
     };
-    let projected: Vec<[f64; 3]> = moved.iter().map(|point| view.project(*point)).collect();
-    let mut order: Vec<(f64, &[usize; 4])> =
-        surface.faces.iter().map(|face| (mean(face, |index| projected[index][2]), face)).collect();
-    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut patches = Vec::new();
+    for face in &surface.faces {
+        let corners = face.map(|index| moved[index]);
+        let facing = normal(&corners);
+        // Faces turned away are hidden by the rest of a closed surface.
+        if dot(facing, view.towards) > 0.0 {
+            let shade = brightness(facing, view);
+            subdivide(&corners, face.map(|index| magnitudes[index] / largest), shade, view, &mut patches);
+        }
+    }
+    patches.sort_by(|a, b| a.depth.total_cmp(&b.depth));
     let mut svg = frame.open();
-    for (_, face) in order {
-        let shade = brightness(face, &moved, view);
-        let base = match displacement {
-            Some(_) => viridis(mean(face, |index| magnitudes[index]) / largest),
-            None => [176.0, 184.0, 194.0],
-        };
-        let color = hex(base.map(|channel| channel * shade));
-        let corners = face.map(|index| frame.place(projected[index]));
+    for patch in &patches {
+        let base = if displacement.is_some() { scale_color(patch.share) } else { [198.0, 205.0, 214.0] };
+        let color = hex(base.map(|channel| channel * patch.shade));
+        let [a, b, c, d] = patch.corners.map(|corner| frame.place(corner));
         let _ = write!(
             svg,
             r##"<path d="M{} {}L{} {}L{} {}L{} {}Z" fill="{color}" stroke="{color}"/>"##,
-            corners[0].0,
-            corners[0].1,
-            corners[1].0,
-            corners[1].1,
-            corners[2].0,
-            corners[2].1,
-            corners[3].0,
-            corners[3].1
+            a.0, a.1, b.0, b.1, c.0, c.1, d.0, d.1
         );
+    }
+    if displacement.is_none() {
+        draw_edges(&mut svg, surface, frame, view);
     }
     for mark in marks {
         let (x, y) = frame.place(view.project(*mark));
@@ -172,7 +172,7 @@ pub fn color_scale(low: &str, high: &str) -> String {
         r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 400 30" font-family="sans-serif" font-size="14" fill="#343a42">"##,
     );
     for step in 0..50_u32 {
-        let color = hex(viridis((f64::from(step) + 0.5) / 50.0));
+        let color = hex(scale_color((f64::from(step) + 0.5) / 50.0));
         let _ = write!(svg, r##"<rect x="{}" y="8" width="4.2" height="14" fill="{color}"/>"##, 100 + 4 * step);
     }
     let _ =
@@ -180,25 +180,72 @@ pub fn color_scale(low: &str, high: &str) -> String {
     svg
 }
 
-fn brightness(face: &[usize; 4], points: &[[f64; 3]], view: &View) -> f64 {
-    let [a, b, c, d] = face.map(|index| points[index]);
-    let normal = cross(combine(1.0, c, -1.0, a), combine(1.0, d, -1.0, b));
+/// A piece of a face, ready to be drawn.
+struct Patch {
+    /// Projected corners.
+    corners: [[f64; 3]; 4],
+    /// Distance towards the observer.
+    depth: f64,
+    /// Displacement as a share of the largest.
+    share: f64,
+    /// Brightness of the surface in the light.
+    shade: f64,
+}
+
+/// Cut a face into patches by bilinear interpolation of corners and shares.
+fn subdivide(corners: &[[f64; 3]; 4], shares: [f64; 4], shade: f64, view: &View, patches: &mut Vec<Patch>) {
+    let weights = |u: f64, v: f64| [(1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v];
+    let point = |u: f64, v: f64| {
+        let weights = weights(u, v);
+        view.project(std::array::from_fn(|axis| (0..4).map(|corner| weights[corner] * corners[corner][axis]).sum()))
+    };
+    let step = 1.0 / PATCHES as f64;
+    for (row, column) in (0..PATCHES).flat_map(|row| (0..PATCHES).map(move |column| (row, column))) {
+        let (u, v) = (row as f64 * step, column as f64 * step);
+        let middle = weights(u + 0.5 * step, v + 0.5 * step);
+        patches.push(Patch {
+            corners: [point(u, v), point(u + step, v), point(u + step, v + step), point(u, v + step)],
+            depth: point(u + 0.5 * step, v + 0.5 * step)[2],
+            share: (0..4).map(|corner| middle[corner] * shares[corner]).sum(),
+            shade,
+        });
+    }
+}
+
+/// The mesh lines of the faces turned to the observer.
+fn draw_edges(svg: &mut String, surface: &Surface, frame: &Frame, view: &View) {
+    svg.push_str(r##"<path fill="none" stroke="#6c7784" stroke-width="0.7" d=""##);
+    for face in &surface.faces {
+        let corners = face.map(|index| surface.points[index]);
+        if dot(normal(&corners), view.towards) > 0.0 {
+            let [a, b, c, d] = corners.map(|corner| frame.place(view.project(corner)));
+            let _ = write!(svg, "M{} {}L{} {}L{} {}L{} {}Z", a.0, a.1, b.0, b.1, c.0, c.1, d.0, d.1);
+        }
+    }
+    svg.push_str(r#""/>"#);
+}
+
+/// Normal of a face from its diagonals, of unit length.
+fn normal([a, b, c, d]: &[[f64; 3]; 4]) -> [f64; 3] {
+    let normal = cross(combine(1.0, *c, -1.0, *a), combine(1.0, *d, -1.0, *b));
     let length = dot(normal, normal).sqrt().max(f64::MIN_POSITIVE);
-    // A light behind the observer's left shoulder; both sides of a face reflect.
+    normal.map(|component| component / length)
+}
+
+fn brightness(normal: [f64; 3], view: &View) -> f64 {
+    // A light behind the observer's left shoulder.
     let light = combine(0.82, view.towards, 1.0, combine(-0.42, view.right, 0.38, view.up));
-    0.55 + 0.45 * (dot(normal, light) / length).abs().min(1.0)
+    0.62 + 0.38 * dot(normal, light).clamp(0.0, 1.0)
 }
 
-fn mean(face: &[usize; 4], value: impl Fn(usize) -> f64) -> f64 {
-    face.iter().map(|index| value(*index)).sum::<f64>() / 4.0
-}
-
-fn viridis(share: f64) -> [f64; 3] {
-    let last = VIRIDIS.len() - 1;
+fn scale_color(share: f64) -> [f64; 3] {
+    let last = SCALE_COLORS.len() - 1;
     let place = share.clamp(0.0, 1.0) * last as f64;
     let index = (1..last).rev().find(|index| place >= *index as f64).unwrap_or(0);
     let fraction = place - index as f64;
-    std::array::from_fn(|channel| VIRIDIS[index][channel] * (1.0 - fraction) + VIRIDIS[index + 1][channel] * fraction)
+    std::array::from_fn(|channel| {
+        SCALE_COLORS[index][channel] * (1.0 - fraction) + SCALE_COLORS[index + 1][channel] * fraction
+    })
 }
 
 fn hex(color: [f64; 3]) -> String {
@@ -254,23 +301,31 @@ mod tests {
             [[0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0; 3], [0.0; 3]];
         let frame = Frame::around(&surface, &view, 0.1);
         let svg = draw(&surface, Some((&displacement, 0.0)), &[[1.0, 0.0, 0.5]], &frame, &view);
-        let far = svg.find(&hex_prefix(0.5)).expect("displaced square is drawn");
-        let near = svg.find(&hex_prefix(0.0)).expect("resting square is drawn");
+        let shade = brightness([1.0, 0.0, 0.0], &view);
+        let color = |share: f64| hex(scale_color(share).map(|channel| channel * shade));
+        let far = svg.find(&color(1.0)).expect("the displaced square is drawn");
+        let near = svg.find(&color(0.0)).expect("the resting square is drawn");
         assert!(far < near, "{svg}");
         assert!(svg.contains("<circle") && svg.ends_with("</svg>"));
+        let numbers = svg.split(['M', 'L', 'Z', ' ']).filter_map(|text| text.parse::<f64>().ok());
+        assert!(numbers.fold(0.0, f64::max) <= EDGE);
     }
 
-    fn hex_prefix(share: f64) -> String {
-        // Facing the light the shade is full, up to the angle of the light.
-        let view = View::of_blade(&two_squares(), 0.0, std::f64::consts::FRAC_PI_2);
-        let shade = brightness(&[0, 1, 2, 3], &two_squares().points, &view);
-        hex(viridis(share).map(|channel| channel * shade))
+    #[test]
+    fn faces_turned_away_are_not_drawn() {
+        let mut surface = two_squares();
+        surface.faces[1].reverse();
+        let view = View::of_blade(&surface, 0.0, std::f64::consts::FRAC_PI_2);
+        let svg = draw(&surface, None, &[], &Frame::around(&surface, &view, 0.1), &view);
+        assert_eq!(svg.matches("<path").count(), PATCHES * PATCHES + 1, "one face and the mesh lines");
     }
 
     #[test]
     fn the_colour_scale_goes_from_dark_to_light() {
-        assert_eq!(hex(viridis(0.0)), "#440154");
-        assert_eq!(hex(viridis(1.0)), "#fde725");
-        assert_eq!(hex(viridis(f64::NAN.max(0.5))), hex(VIRIDIS[4]));
+        assert_eq!(hex(scale_color(0.0)), "#d6dee7");
+        assert_eq!(hex(scale_color(1.0)), "#7f0a1e");
+        assert_eq!(hex(scale_color(0.5)), hex(SCALE_COLORS[3]));
+        let luminance = |share: f64| scale_color(share).iter().sum::<f64>();
+        assert!((0..20).all(|step| luminance(f64::from(step) / 20.0) > luminance(f64::from(step + 1) / 20.0)));
     }
 }

@@ -1,12 +1,14 @@
-//! Line plots as SVG: axes with units, a legend, light colours, series shortened without losing peaks.
+//! Line plots as SVG: axes with units, light colours, series shortened without losing peaks.
+
+use std::fmt::Write as _;
 
 use plotters::{
-    coord::Shift,
+    coord::{Shift, types::RangedCoordf64},
     prelude::*,
     style::text_anchor::{HPos, Pos, VPos},
 };
 
-use super::decimate::decimate;
+use super::{decimate::decimate, page::escape};
 use crate::{Failure, Result};
 
 /// Plots are drawn at twice the size they are shown at: the SVG backend rounds to whole units.
@@ -25,6 +27,8 @@ pub const COLORS: [RGBColor; 5] = [
     RGBColor(110, 116, 124),
 ];
 
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
 /// One line of a plot.
 #[derive(Debug, Clone)]
 pub struct Series {
@@ -32,14 +36,12 @@ pub struct Series {
     pub label: String,
     /// Points, x ascending.
     pub points: Vec<(f64, f64)>,
-    /// Draw as dots with stems (few discrete values) instead of a line.
-    pub stems: bool,
 }
 
 impl Series {
     /// A line.
     pub fn line(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
-        Self { label: label.into(), points, stems: false }
+        Self { label: label.into(), points }
     }
 }
 
@@ -54,7 +56,7 @@ pub struct Plot {
     pub series: Vec<Series>,
     /// Height in CSS pixels at a width of 920.
     pub height: u32,
-    /// Horizontal lines with a meaning (value, text).
+    /// Horizontal lines with a meaning (value, text); for linear axes.
     pub levels: Vec<(f64, String)>,
     /// Logarithmic y axis; values ≤ 0 are left out.
     pub logarithmic: bool,
@@ -65,6 +67,24 @@ impl Plot {
     pub fn new(x_label: impl Into<String>, y_label: impl Into<String>, series: Vec<Series>) -> Self {
         let (x_label, y_label) = (x_label.into(), y_label.into());
         Self { x_label, y_label, series, height: 260, levels: Vec::new(), logarithmic: false }
+    }
+
+    /// Legend (where there is more than one line) and SVG element, as HTML.
+    ///
+    /// # Errors
+    /// As [`Plot::to_svg`].
+    pub fn to_html(&self) -> Result<String> {
+        let mut html = String::new();
+        if self.series.len() > 1 {
+            html.push_str("<div class=\"legend\">");
+            for (series, RGBColor(red, green, blue)) in self.series.iter().zip(COLORS) {
+                let color = format!("rgb({red},{green},{blue})");
+                let _ = write!(html, "<span><i style=\"background:{color}\"></i>{}</span>", escape(&series.label));
+            }
+            html.push_str("</div>");
+        }
+        html.push_str(&self.to_svg()?);
+        Ok(html)
     }
 
     /// The SVG element.
@@ -84,31 +104,27 @@ impl Plot {
     fn draw(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), String> {
         let x_range = padded(self.finite_points().map(|point| point.0), 0.0);
         let levels = self.levels.iter().map(|level| level.0);
-        if self.logarithmic {
-            let positive = self.finite_points().map(|point| point.1).filter(|value| *value > 0.0);
-            let y_range = padded(positive.map(f64::log10), 0.06);
-            let range = (10_f64.powf(y_range.start)..10_f64.powf(y_range.end)).log_scale();
-            let chart = chart_frame(area).build_cartesian_2d(x_range, range).map_err(|error| error.to_string())?;
-            return self.draw_in(chart);
-        }
         let y_range = padded(self.finite_points().map(|point| point.1).chain(levels), 0.06);
-        let chart = chart_frame(area).build_cartesian_2d(x_range, y_range).map_err(|error| error.to_string())?;
-        self.draw_in(chart)
+        let y_range = if self.logarithmic { y_range.start.floor()..y_range.end.ceil() } else { y_range };
+        let mut builder = ChartBuilder::on(area);
+        builder.margin(8 * SCALE).x_label_area_size(42 * SCALE).y_label_area_size(78 * SCALE);
+        let mut chart = builder.build_cartesian_2d(x_range, y_range).map_err(|error| error.to_string())?;
+        self.draw_axes(&mut chart)?;
+        self.draw_levels(&mut chart)?;
+        self.draw_series(&mut chart)
     }
 
-    fn draw_in<'a, 'b: 'a, Y>(
-        &self,
-        mut chart: ChartContext<'a, SVGBackend<'b>, Cartesian2d<plotters::coord::types::RangedCoordf64, Y>>,
-    ) -> Result<(), String>
-    where
-        Y: Ranged<ValueType = f64> + plotters::coord::ranged1d::ValueFormatter<f64>,
-    {
-        let text = ("sans-serif", 15 * SCALE).into_font().color(&INK);
+    fn draw_axes(&self, chart: &mut Chart<'_, '_>) -> Result<(), String> {
+        let y_label = |value: &f64| match self.logarithmic {
+            false => tick(*value),
+            true if value.fract().abs() < 1e-9 => format!("1e{}", value.round()),
+            true => String::new(),
+        };
         chart
             .configure_mesh()
             .x_desc(&self.x_label)
             .y_desc(&self.y_label)
-            .axis_desc_style(text.clone())
+            .axis_desc_style(("sans-serif", 15 * SCALE).into_font().color(&INK))
             .label_style(("sans-serif", 14 * SCALE).into_font().color(&INK))
             .x_labels(10)
             .y_labels(6)
@@ -116,75 +132,46 @@ impl Plot {
             .bold_line_style(GRID.stroke_width(SCALE))
             .light_line_style(TRANSPARENT)
             .axis_style(INK.mix(0.5).stroke_width(SCALE))
-            .y_label_formatter(&|value| tick(*value))
+            .y_label_formatter(&y_label)
             .x_label_formatter(&|value| tick(*value))
             .draw()
-            .map_err(|error| error.to_string())?;
+            .map_err(|error| error.to_string())
+    }
+
+    /// Dashed horizontal lines with their meaning at the right end.
+    fn draw_levels(&self, chart: &mut Chart<'_, '_>) -> Result<(), String> {
         let x_range = padded(self.finite_points().map(|point| point.0), 0.0);
         for (level, label) in &self.levels {
             let ends = [(x_range.start, *level), (x_range.end, *level)];
             let style = INK.mix(0.55).stroke_width(SCALE);
             chart.draw_series(DashedLineSeries::new(ends, 10, 8, style)).map_err(|error| error.to_string())?;
-            let small =
-                ("sans-serif", 13 * SCALE).into_font().color(&INK.mix(0.8)).pos(Pos::new(HPos::Right, VPos::Bottom));
-            let place = (x_range.end, *level);
-            chart
-                .draw_series(std::iter::once(EmptyElement::at(place) + Text::new(label.clone(), (-6, -6), small)))
-                .map_err(|error| error.to_string())?;
-        }
-        self.draw_series(&mut chart)?;
-        if self.series.len() > 1 {
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
-                .background_style(WHITE.mix(0.85))
-                .border_style(TRANSPARENT)
-                .label_font(("sans-serif", 14 * SCALE).into_font().color(&INK))
-                .legend_area_size(28 * i32::try_from(SCALE).unwrap_or(1))
-                .draw()
-                .map_err(|error| error.to_string())?;
+            let font = ("sans-serif", 13 * SCALE).into_font().color(&INK.mix(0.8));
+            let text = Text::new(label.clone(), (-6, -6), font.pos(Pos::new(HPos::Right, VPos::Bottom)));
+            let element = EmptyElement::at((x_range.end, *level)) + text;
+            chart.draw_series(std::iter::once(element)).map_err(|error| error.to_string())?;
         }
         Ok(())
     }
 
-    fn draw_series<'a, 'b: 'a, Y>(
-        &self,
-        chart: &mut ChartContext<'a, SVGBackend<'b>, Cartesian2d<plotters::coord::types::RangedCoordf64, Y>>,
-    ) -> Result<(), String>
-    where
-        Y: Ranged<ValueType = f64>,
-    {
+    fn draw_series(&self, chart: &mut Chart<'_, '_>) -> Result<(), String> {
         for (series, color) in self.series.iter().zip(COLORS) {
-            let finite = series.points.iter().copied().filter(|point| self.is_drawable(*point)).collect::<Vec<_>>();
-            let points = decimate(&finite, BUCKETS);
-            let style = color.stroke_width(SCALE + SCALE / 2);
-            let drawn = if series.stems {
-                chart.draw_series(points.into_iter().map(|point| Circle::new(point, 4 * SCALE, color.filled())))
-            } else {
-                chart.draw_series(LineSeries::new(points, style))
-            };
-            let stroke = color.stroke_width(2 * SCALE);
-            drawn
-                .map_err(|error| error.to_string())?
-                .label(series.label.clone())
-                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 40, y)], stroke));
+            let finite: Vec<_> = self.finite_points_of(series).collect();
+            let line = LineSeries::new(decimate(&finite, BUCKETS), color.stroke_width(SCALE + SCALE / 2));
+            chart.draw_series(line).map_err(|error| error.to_string())?;
         }
         Ok(())
     }
 
-    fn is_drawable(&self, point: (f64, f64)) -> bool {
-        point.0.is_finite() && point.1.is_finite() && (!self.logarithmic || point.1 > 0.0)
+    /// Points that can be drawn; the logarithm of y where the axis is logarithmic.
+    fn finite_points_of<'s>(&self, series: &'s Series) -> impl Iterator<Item = (f64, f64)> + use<'s> {
+        let logarithmic = self.logarithmic;
+        let points = series.points.iter().map(move |(x, y)| (*x, if logarithmic { y.log10() } else { *y }));
+        points.filter(|(x, y)| x.is_finite() && y.is_finite())
     }
 
     fn finite_points(&self) -> impl Iterator<Item = (f64, f64)> {
-        self.series.iter().flat_map(|series| series.points.iter().copied()).filter(|point| self.is_drawable(*point))
+        self.series.iter().flat_map(|series| self.finite_points_of(series))
     }
-}
-
-fn chart_frame<'a, 'b>(area: &'a DrawingArea<SVGBackend<'b>, Shift>) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
-    let mut builder = ChartBuilder::on(area);
-    builder.margin(8 * SCALE).x_label_area_size(42 * SCALE).y_label_area_size(78 * SCALE);
-    builder
 }
 
 /// Smallest range that holds the values, with a margin; never empty.
@@ -234,11 +221,19 @@ mod tests {
         let mut plot = Plot::new("time (ms)", "gap (µm)", vec![Series::line("leading edge", points)]);
         plot.levels.push((500.0, "nominal".into()));
         plot.series.push(Series::line("empty", Vec::new()));
-        let svg = plot.to_svg().unwrap();
+        let svg = plot.to_html().unwrap();
         for text in ["time (ms)", "gap (µm)", "leading edge", "nominal"] {
             assert!(svg.contains(text), "{text}");
         }
         assert!(svg.len() < 60_000, "{} bytes", svg.len());
+    }
+
+    #[test]
+    fn powers_of_ten_are_labelled_on_a_logarithmic_axis() {
+        let points = vec![(0.0, 1e-17), (1.0, 3e-15), (2.0, 0.0)];
+        let plot = Plot { logarithmic: true, ..Plot::new("x", "y", vec![Series::line("a", points)]) };
+        let svg = plot.to_svg().unwrap();
+        assert!(svg.contains("1e-16") && svg.contains("1e-15"), "{svg}");
     }
 
     #[test]

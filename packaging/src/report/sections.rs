@@ -2,10 +2,7 @@
 
 use std::fmt::Write as _;
 
-use tiprub_core::{
-    VariableTable,
-    variables::{Quantity, Variable},
-};
+use tiprub_core::{VariableTable, variables::Quantity};
 use tiprub_model::{Reduction, surface_quads};
 
 use super::{
@@ -13,10 +10,10 @@ use super::{
     picture::{self, Frame, Surface, View},
     plots::{Plot, Series},
 };
-use crate::{Result, recording::Recording};
+use crate::{Failure, Result, recording::Recording};
 
 /// Azimuth and elevation of the blade pictures (rad): suction side, leading edge to the left, a little from above.
-const AZIMUTH: f64 = 0.55;
+const AZIMUTH: f64 = 1.1;
 const ELEVATION: f64 = 0.22;
 /// Displacements are drawn so that the largest is this share of the blade's height.
 const DRAWN_DISPLACEMENT: f64 = 0.12;
@@ -79,13 +76,10 @@ impl<'a> Results<'a> {
     fn series(&self, label: &str, quantity: Quantity, factor: f64) -> Option<Series> {
         self.column(quantity).map(|column| Series::line(label, self.points(&column, factor)))
     }
-
-    fn variable(&self, quantity: Quantity) -> Option<&Variable> {
-        self.table.with_quantity(quantity)
-    }
 }
 
 /// A numbered figure.
+#[derive(Clone)]
 struct Figure {
     body: String,
     caption: String,
@@ -109,7 +103,7 @@ pub(super) fn figures(input: &ReportInput<'_>) -> Result<Vec<(&'static str, Stri
     };
     Ok(vec![
         section("The blade", input.reduction.map(mode_shapes).into_iter().collect()),
-        section("Clearances", clearances(input, &results)?),
+        section("Clearances", [casing(input)?, clearances(input, &results)?].concat()),
         section("Contact forces", forces(input, &results)?),
         section("Energy", energies(&results)?),
     ])
@@ -135,6 +129,31 @@ fn readable(name: &str) -> String {
     }
 }
 
+/// Clearance of an undeformed blade around the circumference, for the first contact.
+fn casing(input: &ReportInput<'_>) -> Result<Vec<Figure>> {
+    let settings = &input.scene.settings;
+    let Some(contact) = settings.contacts.first() else { return Ok(Vec::new()) };
+    let Some(surface) = settings.surfaces.iter().find(|surface| surface.name == contact.slave) else {
+        return Ok(Vec::new());
+    };
+    let shape = tiprub_core::contact::surface::Surface::new(&surface.shape, contact.gap)
+        .map_err(|error| Failure::from_core("casing shape", error))?;
+    let clearance = |degrees: f64| contact.gap + shape.evaluate(degrees.to_radians()).0;
+    let points = (0..=720_u32).map(|half| f64::from(half) / 2.0).map(|degrees| (degrees, 1e6 * clearance(degrees)));
+    let series = vec![Series::line("casing", points.collect())];
+    let mut plot = Plot::new("angle around the casing (°)", "radial clearance (µm)", series);
+    plot.height = 200;
+    plot.levels.push((0.0, "tip of an undeformed blade".into()));
+    let ramp = if surface.ramp_time > 0.0 {
+        format!(", reached {} ms after the start", 1e3 * surface.ramp_time)
+    } else {
+        String::new()
+    };
+    let body = plot.to_html()?;
+    let caption = format!("Casing shape: radial clearance of an undeformed blade around the circumference{ramp}.");
+    Ok(vec![Figure { body, caption }])
+}
+
 fn clearances(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>> {
     let (sector, nodes) = (watched(input), node_names(input));
     let mut figures = Vec::new();
@@ -144,7 +163,7 @@ fn clearances(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figu
         plot.height = 300;
         plot.levels.push((0.0, "contact".into()));
         figures.push(Figure {
-            body: plot.to_svg()?,
+            body: plot.to_html()?,
             caption: format!(
                 "Clearance between blade {} and the casing at its contact nodes, at the communication points. The casing's \
                  bumps pass the blade twice per revolution; between them the blade rings down in its own modes.",
@@ -157,10 +176,10 @@ fn clearances(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figu
         plot.height = 200;
         plot.levels.push((0.0, "contact".into()));
         figures.push(Figure {
-            body: plot.to_svg()?,
-            caption: "Smallest clearance of all blades within each communication step. Contact is resolved without \
-                      penetration: it never falls below zero by more than round-off."
-                .into(),
+            body: plot.to_html()?,
+            caption:
+                "Smallest clearance of all blades within each communication step; zero while any node is in contact."
+                    .into(),
         });
     }
     Ok(figures)
@@ -183,7 +202,7 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>>
     ] {
         let series = results.per_node(quantity, &nodes, 1.0);
         if !series.is_empty() {
-            let body = Plot::new("time (ms)", label, series).to_svg()?;
+            let body = Plot::new("time (ms)", label, series).to_html()?;
             figures.push(Figure { body, caption: caption.replace("{}", &(sector + 1).to_string()) });
         }
     }
@@ -192,7 +211,7 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>>
         plot.height = 190;
         let all = input.scene.roms.iter().map(|rom| rom.sectors * rom.contact_nodes.len()).sum::<usize>();
         figures.push(Figure {
-            body: plot.to_svg()?,
+            body: plot.to_html()?,
             caption: format!("Number of nodes in contact at the communication points, of {all} on the whole disk."),
         });
     }
@@ -200,7 +219,7 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>>
         let mut plot = Plot::new("time (ms)", "torque on the rotor (N·m)", vec![series]);
         plot.height = 220;
         figures.push(Figure {
-            body: plot.to_svg()?,
+            body: plot.to_html()?,
             caption:
                 "Reaction torque of the casing on the shaft, mean over the communication step; negative values brake."
                     .into(),
@@ -211,26 +230,34 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>>
 
 fn energies(results: &Results<'_>) -> Result<Vec<Figure>> {
     let mut figures = Vec::new();
-    let stored = [("kinetic", Quantity::KineticEnergy), ("strain", Quantity::StrainEnergy)];
-    let exchanged = [
-        ("work put in", Quantity::ExternalWork),
+    let vibration = [
+        ("kinetic", Quantity::KineticEnergy),
+        ("strain", Quantity::StrainEnergy),
         ("damping loss", Quantity::DampingLoss),
-        ("friction loss", Quantity::FrictionLoss),
         ("impact loss", Quantity::ImpactLoss),
     ];
-    for (list, caption) in [
-        (&stored[..], "Energy of vibration of all blades."),
-        (&exchanged[..], "Work put in by the drive and the casing, and where it went, accumulated from the start."),
+    let exchanged = [("work put in", Quantity::ExternalWork), ("friction heat", Quantity::FrictionLoss)];
+    for (list, height, caption) in [
+        (
+            &vibration[..],
+            260,
+            "Energy of vibration of all blades, and what damping and impacts took from it since the start.",
+        ),
+        (
+            &exchanged[..],
+            200,
+            "Work put in by the drive and the casing, and friction heat, since the start. The difference is what vibrates, \
+             or was lost to damping and impacts (the figure before).",
+        ),
     ] {
         let series: Vec<Series> =
             list.iter().filter_map(|(label, quantity)| results.series(label, *quantity, 1.0)).collect();
         if !series.is_empty() {
-            let body = Plot::new("time (ms)", "energy (J)", series).to_svg()?;
-            figures.push(Figure { body, caption: caption.into() });
+            let plot = Plot { height, ..Plot::new("time (ms)", "energy (J)", series) };
+            figures.push(Figure { body: plot.to_html()?, caption: caption.into() });
         }
     }
-    let residual = results.column(Quantity::EnergyResidualRelative);
-    if let (Some(column), Some(_)) = (residual, results.variable(Quantity::EnergyResidualRelative)) {
+    if let Some(column) = results.column(Quantity::EnergyResidualRelative) {
         let magnitude: Vec<f64> = column.iter().map(|value| value.abs()).collect();
         let mut plot = Plot::new(
             "time (ms)",
@@ -239,7 +266,7 @@ fn energies(results: &Results<'_>) -> Result<Vec<Figure>> {
         );
         (plot.height, plot.logarithmic) = (200, true);
         figures.push(Figure {
-            body: plot.to_svg()?,
+            body: plot.to_html()?,
             caption:
                 "Closure of the energy ledger: kinetic + strain + losses − initial − work put in, relative to initial \
                       energy and all work exchanged. What remains is round-off."
