@@ -32,6 +32,11 @@ impl Console {
         Self { quiet, json, terminal: std::io::stderr().is_terminal() }
     }
 
+    /// Whether the result is wanted as JSON.
+    pub fn is_json(&self) -> bool {
+        self.json
+    }
+
     /// One line of progress on stderr.
     pub fn say(&self, line: impl std::fmt::Display) {
         if !self.quiet {

@@ -137,7 +137,7 @@ impl Agreement {
 }
 
 /// Shortest decimal that reads back to the same bits; exponent form where the plain one would be long.
-fn shortest(value: f64) -> String {
+pub fn shortest(value: f64) -> String {
     let magnitude = value.abs();
     if magnitude != 0.0 && !(1e-4..1e15).contains(&magnitude) { format!("{value:e}") } else { format!("{value}") }
 }

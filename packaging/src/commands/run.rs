@@ -5,10 +5,12 @@ use std::{path::Path, time::Instant};
 use serde_json::{Map, Value, json};
 
 use crate::{
-    Result,
+    Failure, Result,
     cli::RunArguments,
     console::{Console, Outcome},
-    native, scene_source,
+    native,
+    recording::shortest,
+    scene_source,
     schedule::Schedule,
 };
 
@@ -17,6 +19,10 @@ use crate::{
 /// # Errors
 /// A wrong scene or option, a refused or diverged simulation, a file that cannot be written.
 pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
+    let to_stdout = arguments.csv.as_deref() == Some(Path::new("-"));
+    if to_stdout && console.is_json() {
+        return Err(Failure::usage("--csv -", "and --json both want stdout", "Give --csv a file"));
+    }
     let scene = scene_source::load(&arguments.scene, console)?;
     let schedule = Schedule::new(&scene.settings.experiment, arguments.stop, arguments.step)?;
     let clock = Instant::now();
@@ -28,7 +34,6 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
     for warning in &run.warnings {
         console.say(format_args!("warning: {warning}"));
     }
-    let to_stdout = arguments.csv.as_deref() == Some(Path::new("-"));
     if let Some(path) = arguments.csv.as_deref().filter(|_| !to_stdout) {
         run.recording.write_csv(path)?;
     }
@@ -81,7 +86,7 @@ fn summary(json: &Value, names: &[String], last: &[f64]) -> String {
     );
     let width = names.iter().map(String::len).max().unwrap_or(0);
     for (name, value) in names.iter().zip(last) {
-        text.push_str(&format!("  {name:<width$}  {value}\n"));
+        text.push_str(&format!("  {name:<width$}  {}\n", shortest(*value)));
     }
     if let Some(path) = json["csv"].as_str() {
         text.push_str(&format!("\nwritten: {path}"));

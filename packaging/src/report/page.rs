@@ -117,11 +117,7 @@ fn header(input: &ReportInput<'_>) -> String {
         ));
     }
     if let Some((low, high)) = results.extremes(Quantity::EnergyResidualRelative) {
-        cards.push((
-            "energy residual".into(),
-            format!("{:.1e}", low.abs().max(high.abs())),
-            "relative, largest".into(),
-        ));
+        cards.push(("energy residual".into(), scientific(low.abs().max(high.abs())), "relative, largest".into()));
     }
     if !input.imported.is_empty() {
         let labels: Vec<&str> = input.imported.iter().map(|run| run.label.as_str()).collect();
@@ -216,7 +212,7 @@ fn run_section(input: &ReportInput<'_>) -> String {
     ];
     for (label, quantity) in energies {
         if let Some(value) = results.last(quantity) {
-            rows.push((label, format!("{} J", scientific(value))));
+            rows.push((label, format!("{} J", rounded(value))));
         }
     }
     let mut html = format!("<section><h2>The run</h2>{}", table(&rows));
@@ -317,12 +313,15 @@ fn rounded(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// Four significant digits, powers of ten written out.
+/// At most four significant digits, powers of ten written out.
 fn scientific(value: f64) -> String {
     let text = format!("{value:.3e}");
     match text.split_once('e') {
-        Some((mantissa, "0")) => mantissa.to_string(),
-        Some((mantissa, exponent)) => format!("{mantissa}·10<sup>{}</sup>", exponent.replace('-', "−")),
+        Some((mantissa, exponent)) => {
+            let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
+            let power = format!("·10<sup>{}</sup>", exponent.replace('-', "−"));
+            format!("{mantissa}{}", if exponent == "0" { "" } else { &power })
+        }
         None => text,
     }
 }
@@ -335,7 +334,8 @@ mod tests {
     fn numbers_are_readable() {
         assert_eq!([1234.5, 0.01234, 9.876, 0.0, 123.4].map(rounded), ["1234", "0.0123", "9.88", "0", "123"]);
         assert_eq!(scientific(1.234567e-7), "1.235·10<sup>−7</sup>");
-        assert_eq!(scientific(2.0), "2.000");
+        assert_eq!(scientific(2.0), "2");
+        assert_eq!(scientific(1e-5), "1·10<sup>−5</sup>");
     }
 
     #[test]

@@ -154,7 +154,7 @@ impl Frame {
 
     fn open(&self) -> String {
         format!(
-            r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {:.0} {:.0}" stroke-width="0.6" stroke-linejoin="round">"##,
+            r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {:.0} {:.0}" stroke-width="0.8" stroke-linejoin="round">"##,
             self.width, self.height
         )
     }
@@ -297,8 +297,7 @@ mod tests {
         let surface = two_squares();
         // From above: the radial direction (x) points towards the observer.
         let view = View::of_blade(&surface, 0.0, std::f64::consts::FRAC_PI_2);
-        let displacement =
-            [[0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0; 3], [0.0; 3]];
+        let displacement: Vec<[f64; 3]> = (0..8).map(|index| [0.0, 0.0, f64::from(u8::from(index >= 4))]).collect();
         let frame = Frame::around(&surface, &view, 0.1);
         let svg = draw(&surface, Some((&displacement, 0.0)), &[[1.0, 0.0, 0.5]], &frame, &view);
         let shade = brightness([1.0, 0.0, 0.0], &view);

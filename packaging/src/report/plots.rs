@@ -102,7 +102,7 @@ impl Plot {
     }
 
     fn draw(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), String> {
-        let x_range = padded(self.finite_points().map(|point| point.0), 0.0);
+        let x_range = self.x_range();
         let levels = self.levels.iter().map(|level| level.0);
         let y_range = padded(self.finite_points().map(|point| point.1).chain(levels), 0.06);
         let y_range = if self.logarithmic { y_range.start.floor()..y_range.end.ceil() } else { y_range };
@@ -140,7 +140,7 @@ impl Plot {
 
     /// Dashed horizontal lines with their meaning at the right end.
     fn draw_levels(&self, chart: &mut Chart<'_, '_>) -> Result<(), String> {
-        let x_range = padded(self.finite_points().map(|point| point.0), 0.0);
+        let x_range = self.x_range();
         for (level, label) in &self.levels {
             let ends = [(x_range.start, *level), (x_range.end, *level)];
             let style = INK.mix(0.55).stroke_width(SCALE);
@@ -167,6 +167,12 @@ impl Plot {
         let logarithmic = self.logarithmic;
         let points = series.points.iter().map(move |(x, y)| (*x, if logarithmic { y.log10() } else { *y }));
         points.filter(|(x, y)| x.is_finite() && y.is_finite())
+    }
+
+    /// From the first to the last x of all series, drawable or not, so that plots of one run share their axis.
+    fn x_range(&self) -> std::ops::Range<f64> {
+        let all = self.series.iter().flat_map(|series| series.points.iter().map(|point| point.0));
+        padded(all.filter(|x| x.is_finite()), 0.0)
     }
 
     fn finite_points(&self) -> impl Iterator<Item = (f64, f64)> {

@@ -171,17 +171,6 @@ fn clearances(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figu
             ),
         });
     }
-    if let Some(series) = results.series("smallest clearance", Quantity::ClearanceMinimum, 1e6) {
-        let mut plot = Plot::new("time (ms)", "clearance (µm)", vec![series]);
-        plot.height = 200;
-        plot.levels.push((0.0, "contact".into()));
-        figures.push(Figure {
-            body: plot.to_html()?,
-            caption:
-                "Smallest clearance of all blades within each communication step; zero while any node is in contact."
-                    .into(),
-        });
-    }
     Ok(figures)
 }
 
