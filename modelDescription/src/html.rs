@@ -9,14 +9,14 @@ use tiprub_core::variables::{Causality, Kind, Span, Start, Variable};
 
 use crate::Description;
 use crate::row::{meaning_of_span, rows, variability};
-use crate::text::{clean, number};
+use crate::text::{clean, readable};
 
 const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:72em;margin:2em auto;padding:0 1em;\
 color:#1c2430;background:#fff}h1,h2,h3{line-height:1.2;margin:1.6em 0 .5em}h1{margin-top:0}\
 table{border-collapse:collapse;width:100%;margin:.5em 0 1.5em;font-size:.9em}\
 th,td{text-align:left;vertical-align:top;padding:.35em .6em;border-bottom:1px solid #dfe4ea}\
 th{background:#f3f5f8;position:sticky;top:0}td.number,th.number{text-align:right;font-variant-numeric:tabular-nums}\
-code{font-size:.95em;background:#f3f5f8;padding:0 .2em;border-radius:3px;overflow-wrap:anywhere}\
+code{font-size:.95em;background:#f3f5f8;padding:0 .2em;border-radius:3px}td:first-child{white-space:nowrap}\
 dt{font-weight:600}dd{margin:0 0 .5em 1.5em}.warning{border-left:4px solid #c77700;padding-left:.8em}\
 footer{margin-top:3em;color:#5a6675;font-size:.85em}";
 
@@ -67,9 +67,9 @@ fn time(page: &mut String, description: &Description) {
          <p>A communication step is usually much longer than an impact. Forces and torques are therefore given as \
          averages over the step just finished, and extremes within it stand beside them. The column &#8220;value&#8221; \
          of the tables says which it is:</p>\n<dl>",
-        number(experiment.start),
-        number(experiment.stop),
-        number(experiment.step)
+        readable(experiment.start),
+        readable(experiment.stop),
+        readable(experiment.step)
     );
     for span in [Span::Point, Span::Mean, Span::Window, Span::Total] {
         let (name, meaning) = meaning_of_span(span);
@@ -152,9 +152,9 @@ pub fn range(variable: &Variable) -> String {
     }
     match (variable.min, variable.max) {
         (None, None) => String::new(),
-        (Some(min), None) => format!("≥ {}", number(min)),
-        (None, Some(max)) => format!("≤ {}", number(max)),
-        (Some(min), Some(max)) => format!("{} to {}", number(min), number(max)),
+        (Some(min), None) => format!("≥ {}", readable(min)),
+        (None, Some(max)) => format!("≤ {}", readable(max)),
+        (Some(min), Some(max)) => format!("{} to {}", readable(min), readable(max)),
     }
 }
 
@@ -164,9 +164,9 @@ pub fn start(variable: &Variable) -> String {
         None => String::new(),
         Some(Start::Real(values)) => match values.as_slice() {
             [] => String::new(),
-            [first, rest @ ..] if rest.iter().all(|value| value.to_bits() == first.to_bits()) => number(*first),
-            [first, .., last] => format!("{}, ..., {}", number(*first), number(*last)),
-            [only] => number(*only),
+            [first, rest @ ..] if rest.iter().all(|value| value.to_bits() == first.to_bits()) => readable(*first),
+            [first, .., last] => format!("{}, ..., {}", readable(*first), readable(*last)),
+            [only] => readable(*only),
         },
         Some(Start::Integer(value)) => value.to_string(),
         Some(Start::Boolean(value)) => value.to_string(),
@@ -210,7 +210,7 @@ fn structure(page: &mut String, name: &str, rom: &Rom) {
         if rom.sectors == 1 { "" } else { "s" },
         rom.order(),
         text(&nodes),
-        number(rom.damping_ratio),
+        readable(rom.damping_ratio),
     );
     checks(page, rom);
 }

@@ -12,6 +12,12 @@ pub fn number(value: f64) -> String {
     if magnitude != 0.0 && !(1e-4..1e7).contains(&magnitude) { format!("{value:e}") } else { format!("{value:?}") }
 }
 
+/// A number for people: as [`number`], whole numbers without decimals.
+pub fn readable(value: f64) -> String {
+    let text = number(value);
+    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+}
+
 /// Text for an attribute: line breaks and tabs become spaces, as XML readers make them, and characters that XML 1.0
 /// has no way to write become the replacement character.
 pub fn clean(text: &str) -> String {

@@ -7,6 +7,7 @@ mod scene;
 use std::fs;
 use std::path::Path;
 
+use tiprub_core::settings::{OutputSettings, SceneSettings};
 use tiprub_core::variables::{Causality, Kind, Span, Variable};
 use tiprub_core::{Simulation, VariableTable};
 use tiprub_model_description::meaning_of_span;
@@ -67,9 +68,29 @@ fn means_and_totals_are_zero_at_the_start_whatever_the_inputs() {
     }
 }
 
+#[test]
+fn the_default_is_at_most_fifty_scalars() {
+    let count = |outputs: OutputSettings| {
+        let mut scene = scene::complete();
+        scene.settings.surfaces[0].moving = false;
+        scene.settings.outputs = outputs;
+        Simulation::new(&scene).unwrap().table().references()
+    };
+    let least = count(OutputSettings::default());
+    assert!(least <= 50, "{least} scalars");
+    let more = |change: fn(&mut OutputSettings)| {
+        let mut outputs = OutputSettings::default();
+        change(&mut outputs);
+        count(outputs) - least
+    };
+    assert_eq!(more(|outputs| outputs.watched_sectors = vec![1, 2]), 4 * 3);
+    assert_eq!(more(|outputs| outputs.all_sectors = true), 2 * 36);
+    assert_eq!(more(|outputs| outputs.nodal_diameters = Some(18)), 19);
+}
+
 /// Options without which the variable is not in the table.
 fn needs(name: &str) -> String {
-    let has = |switch_off: fn(&mut tiprub_core::settings::SceneSettings)| {
+    let has = |switch_off: fn(&mut SceneSettings)| {
         let mut scene = scene::complete();
         switch_off(&mut scene.settings);
         Simulation::new(&scene).unwrap().table().find(name).is_some()

@@ -228,7 +228,7 @@ fn the_page_names_every_variable_and_check_and_is_self_contained() {
         "5.300e-4",
         "0.00430",
         "1 = central_difference, 2 = modal_exact",
-        "≥ 0.0",
+        "≥ 0<",
         "0.00035, ..., 1e-7",
         "rad/s (rpm)",
         "hex20 mesh of &lt;many&gt; nodes",
@@ -239,5 +239,31 @@ fn the_page_names_every_variable_and_check_and_is_self_contained() {
     }
     for outside in ["http:", "https:", "<script", "src=", "@import"] {
         assert!(!page.contains(outside), "{outside}");
+    }
+}
+
+proptest::proptest! {
+    #[test]
+    fn any_text_of_a_user_is_written_so_that_it_reads_back(text in "\\PC*|[\\x00-\\x20<>&\"']*") {
+        let (table, rom) = (common::table(), common::rom());
+        let mut description = common::description(&table, &rom, true);
+        description.description = &text;
+        description.limits = vec![text.clone()];
+        let control = |c: char| c.is_ascii_control() && !c.is_ascii_whitespace() || c == '\u{b}' || c == '\u{c}';
+        let expected: String = text
+            .chars()
+            .map(|c| match c {
+                '\n' | '\r' | '\t' => ' ',
+                '\u{fffe}' | '\u{ffff}' => '\u{fffd}',
+                c if control(c) && c != '\u{7f}' => '\u{fffd}',
+                c => c,
+            })
+            .collect();
+        for xml in [fmi2_xml(&description), fmi3_xml(&description)] {
+            let root = &read(&xml)[0].1;
+            proptest::prop_assert_eq!(root.get("description").map_or("", String::as_str), &expected);
+        }
+        let page = html(&description);
+        proptest::prop_assert_eq!(page.matches("<li>").count(), 2);
     }
 }

@@ -63,16 +63,17 @@ pub fn complete() -> Scene {
 }
 
 /// An option as the user guide writes it, and a function that switches it off.
-pub type Option = (&'static str, fn(&mut SceneSettings));
+pub type Switch = (&'static str, fn(&mut SceneSettings));
 
 /// Every option that adds variables.
-pub const OPTIONS: [Option; 8] = [
+pub const OPTIONS: [Switch; 9] = [
     ("`motion = \"rotating\"`", |scene| {
         scene.structures[0].motion = Motion::Still;
         scene.structures[0].speed = 0.0;
     }),
     ("`moving = true`", |scene| scene.surfaces[0].moving = false),
     ("a shape other than `circular`", |scene| scene.surfaces[0].shape = Shape::Circular {}),
+    ("`friction` > 0", |scene| scene.contacts[0].friction = 0.0),
     ("`watched_sectors`", |scene| scene.outputs.watched_sectors.clear()),
     ("`all_sectors = true`", |scene| scene.outputs.all_sectors = false),
     ("`nodal_diameters`", |scene| scene.outputs.nodal_diameters = None),

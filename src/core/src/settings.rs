@@ -266,9 +266,16 @@ impl SceneSettings {
                 "A scene needs at least one [[structure]] and one [[contact]]",
             ));
         }
-        self.structures.iter().try_for_each(StructureSettings::validate)?;
-        self.surfaces.iter().try_for_each(SurfaceSettings::validate)?;
-        self.contacts.iter().try_for_each(|contact| contact.validate(self))?;
+        for (index, structure) in self.structures.iter().enumerate() {
+            structure.validate(&format!("structure[{}]", index + 1))?;
+        }
+        for (index, surface) in self.surfaces.iter().enumerate() {
+            surface.validate(&format!("surface[{}]", index + 1))?;
+        }
+        self.validate_unique_names()?;
+        for (index, contact) in self.contacts.iter().enumerate() {
+            contact.validate(self, &format!("contact[{}]", index + 1))?;
+        }
         positive("time.step", self.time.step, "s")?;
         finite("experiment.start", self.experiment.start)?;
         positive("experiment.communication_step", self.experiment.communication_step, "s")?;
@@ -291,15 +298,31 @@ impl SceneSettings {
     }
 }
 
+impl SceneSettings {
+    fn validate_unique_names(&self) -> Result<()> {
+        let names = self.structures.iter().map(|s| &s.name).chain(self.surfaces.iter().map(|s| &s.name));
+        let mut sorted: Vec<&String> = names.collect();
+        sorted.sort_unstable();
+        match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+            None => Ok(()),
+            Some(pair) => Err(Error::invalid(
+                "name",
+                format!("`{}` is used by two structures or surfaces", pair[0]),
+                "Give each structure and surface a name of its own",
+            )),
+        }
+    }
+}
+
 impl StructureSettings {
-    fn validate(&self) -> Result<()> {
-        finite("structure.speed", self.speed)?;
+    fn validate(&self, at: &str) -> Result<()> {
+        finite(&format!("{at}.speed"), self.speed)?;
         if let Some(ratio) = self.damping_ratio {
-            within("structure.damping_ratio", ratio, 0.0, MAX_DAMPING)?;
+            within(&format!("{at}.damping_ratio"), ratio, 0.0, MAX_DAMPING)?;
         }
         if self.motion == Motion::Still && self.speed != 0.0 {
             return Err(Error::invalid(
-                "structure.speed",
+                format!("{at}.speed"),
                 format!("{} rad/s for a structure that stands still", self.speed),
                 "Remove the speed, or set motion = \"rotating\"",
             ));
@@ -309,23 +332,23 @@ impl StructureSettings {
 }
 
 impl SurfaceSettings {
-    fn validate(&self) -> Result<()> {
-        within("surface.ramp_time", self.ramp_time, 0.0, 1e9)?;
+    fn validate(&self, at: &str) -> Result<()> {
+        within(&format!("{at}.ramp_time"), self.ramp_time, 0.0, 1e9)?;
         match &self.shape {
             Shape::Circular {} => Ok(()),
             Shape::Lobes { amplitude, order, phase } => {
-                finite("surface.shape.amplitude", *amplitude)?;
-                finite("surface.shape.phase", *phase)?;
+                finite(&format!("{at}.shape.amplitude"), *amplitude)?;
+                finite(&format!("{at}.shape.phase"), *phase)?;
                 if *order == 0 {
                     let remedy = "Use order ≥ 1, or gap and radius change for a uniform clearance";
-                    return Err(Error::invalid("surface.shape.order", "0 lobes", remedy));
+                    return Err(Error::invalid(format!("{at}.shape.order"), "0 lobes", remedy));
                 }
                 Ok(())
             }
             Shape::TwoLobe { depth, width, phase } => {
-                finite("surface.shape.depth", *depth)?;
-                finite("surface.shape.phase", *phase)?;
-                within("surface.shape.width", *width, 1e-3, 0.25)
+                finite(&format!("{at}.shape.depth"), *depth)?;
+                finite(&format!("{at}.shape.phase"), *phase)?;
+                within(&format!("{at}.shape.width"), *width, 1e-3, 0.25)
             }
             Shape::Table { radius_change } => {
                 crate::contact::surface::Surface::new(&Shape::Table { radius_change: radius_change.clone() }, 0.0)
@@ -336,23 +359,21 @@ impl SurfaceSettings {
 }
 
 impl ContactSettings {
-    fn validate(&self, scene: &SceneSettings) -> Result<()> {
+    fn validate(&self, scene: &SceneSettings, at: &str) -> Result<()> {
         let structures: Vec<&str> = scene.structures.iter().map(|s| s.name.as_str()).collect();
         let surfaces: Vec<&str> = scene.surfaces.iter().map(|s| s.name.as_str()).collect();
-        for (field, name, known) in
-            [("contact.master", &self.master, &structures), ("contact.slave", &self.slave, &surfaces)]
-        {
+        for (field, name, known) in [("master", &self.master, &structures), ("slave", &self.slave, &surfaces)] {
             if !known.contains(&name.as_str()) {
                 return Err(Error::invalid(
-                    field,
+                    format!("{at}.{field}"),
                     format!("`{name}` is not defined"),
                     format!("Use one of: {}", known.join(", ")),
                 ));
             }
         }
-        positive("contact.gap", self.gap, "m")?;
-        self.sector_gaps.iter().try_for_each(|gap| positive("contact.sector_gaps", *gap, "m"))?;
-        within("contact.friction", self.friction, 0.0, MAX_FRICTION)
+        positive(&format!("{at}.gap"), self.gap, "m")?;
+        self.sector_gaps.iter().try_for_each(|gap| positive(&format!("{at}.sector_gaps"), *gap, "m"))?;
+        within(&format!("{at}.friction"), self.friction, 0.0, MAX_FRICTION)
     }
 }
 

@@ -87,8 +87,11 @@ fn the_ledger_closes_for_every_scheme_and_solver() {
                     assert!(residual.abs() < 1e-9, "{scheme:?} {solver:?} µ {friction}: residual {residual:e}");
                 }
                 assert!(touched > 0.0, "no contact: the test would prove nothing");
-                let friction_loss = real(&simulation, "friction_loss");
-                assert!((friction > 0.0) == (friction_loss > 0.0), "friction loss {friction_loss}");
+                // Without friction its variables do not exist.
+                assert_eq!(simulation.table().find("friction_loss").is_some(), friction > 0.0);
+                if friction > 0.0 {
+                    assert!(real(&simulation, "friction_loss") > 0.0);
+                }
                 assert!(real(&simulation, "impact_loss") > 0.0 || solver == Solver::Film);
                 println!(
                     "{scheme:?} {solver:?} µ {friction}: residual {:.1e} of {:.3e} J turnover",
@@ -365,6 +368,7 @@ fn round_casing_never_touches_an_undisturbed_disk() {
     scene.settings.surfaces[0].shape = Shape::Circular {};
     let mut simulation = started(&scene);
     run(&mut simulation, 20, 1e-3);
-    assert_eq!(real(&simulation, "clearance_minimum"), 3.56e-4 / (1.0_f64 + 0.04).sqrt());
-    assert_eq!(real(&simulation, "kinetic_energy"), 0.0);
+    let clearance = 3.56e-4 / (1.0_f64 + 0.04).sqrt();
+    assert!((real(&simulation, "clearance_minimum") - clearance).abs() < 1e-18);
+    assert!(real(&simulation, "kinetic_energy").abs() < 1e-30);
 }

@@ -175,7 +175,14 @@ pub fn check_brackets(document: &Document) -> Result<(), Error> {
         let problem = format!("{} found, {problem}", value.get_ref().type_str());
         return Err(document.error(Some(key.span()), name, problem, format!("Write {}", header(name))));
     }
-    Ok(())
+    match document.places().into_iter().find(|place| place.fields == "surface.shape" && !place.value.is_table()) {
+        Some(place) => {
+            let problem = format!("{} found, a table expected", place.value.type_str());
+            let remedy = "Write it as { kind = \"circular\" } or with the keys of another kind";
+            Err(document.error(Some(place.span), &place.path, problem, remedy.into()))
+        }
+        None => Ok(()),
+    }
 }
 
 /// The first value below `path` that the library would describe as `found`.
@@ -219,7 +226,6 @@ fn plain(expected: &str) -> &str {
         "f64" => "a number",
         "u32" | "usize" => "a whole number, not negative",
         "a sequence" => "a list",
-        "internally tagged enum Shape" => "a table such as { kind = \"circular\" }",
         "a boolean" => "true or false",
         other => other,
     }

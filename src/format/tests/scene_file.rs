@@ -102,6 +102,13 @@ fn wrong_syntax_is_located() {
 }
 
 #[test]
+fn a_shape_is_a_table_of_named_values() {
+    let shape = "{ kind = \"lobes\", amplitude = 1e-4, order = 2 }";
+    refused(shape, "[\"lobes\", 1e-4, 2, 0.0]", ":7:1", &["surface[1].shape: array found, a table expected"]);
+    refused(shape, "\"circular\"", ":7:1", &["surface[1].shape: string found", "{ kind = \"circular\" }"]);
+}
+
+#[test]
 fn values_out_of_range_are_located() {
     refused("gap = 1e-3", "gap = -1e-3", ":11:1", &["contact[1].gap: -0.001", "> 0"]);
     refused("gap = 1e-3", "gap = nan", ":11:1", &["contact[1].gap: NaN"]);
@@ -129,6 +136,16 @@ fn no_text_panics() {
 }
 
 proptest! {
+    #[test]
+    fn no_slip_of_the_pen_panics(at in any::<prop::sample::Index>(), length in 0..12usize, text in "[\\PC\n\"\\[\\]{}=.]{0,6}") {
+        let start = at.index(GOOD.len());
+        let end = (start + length).min(GOOD.len());
+        let changed = format!("{}{text}{}", &GOOD[..start], &GOOD[end..]);
+        if let Err(error) = parse_scene(&changed, "demo.toml") {
+            prop_assert!(error.to_string().starts_with("demo.toml:"), "{}", error);
+        }
+    }
+
     #[test]
     fn a_scene_survives_writing_and_reading(
         name in "[a-z][a-z0-9_]{0,8}",

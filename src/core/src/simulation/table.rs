@@ -153,7 +153,7 @@ pub fn build(scene: &Scene) -> Result<VariableTable> {
     watched(&mut table, scene)?;
     fields(&mut table, scene)?;
     if scene.settings.outputs.energies {
-        energies(&mut table);
+        energies(&mut table, has_friction(scene));
     }
     let internal = table.output(
         Quantity::InternalStep,
@@ -215,14 +215,16 @@ fn inputs(table: &mut Builder, scene: &Scene) {
 fn parameters(table: &mut Builder, scene: &Scene) {
     let settings = &scene.settings;
     let contact = &settings.contacts[0];
-    let friction = table.parameter(
-        Quantity::Friction,
-        "friction_coefficient",
-        None,
-        contact.friction,
-        "Coulomb friction coefficient between tip and casing",
-    );
-    (friction.min, friction.max, friction.variability) = (Some(0.0), Some(MAX_FRICTION), Variability::Tunable);
+    if has_friction(scene) {
+        let friction = table.parameter(
+            Quantity::Friction,
+            "friction_coefficient",
+            None,
+            contact.friction,
+            "Coulomb friction coefficient between tip and casing",
+        );
+        (friction.min, friction.max, friction.variability) = (Some(0.0), Some(MAX_FRICTION), Variability::Tunable);
+    }
     let offset = table.parameter(
         Quantity::GapOffset,
         "gap_offset",
@@ -267,6 +269,11 @@ fn parameters(table: &mut Builder, scene: &Scene) {
     let name = table.push(Quantity::SceneName, "scene", "Name of the scene this FMU was made from");
     (name.kind, name.causality, name.variability) = (Kind::String, Causality::Local, Variability::Constant);
     name.start = Some(Start::String(settings.name.clone()));
+}
+
+/// A scene that gives no friction coefficient has no friction variables.
+fn has_friction(scene: &Scene) -> bool {
+    scene.settings.contacts[0].friction > 0.0
 }
 
 fn totals(table: &mut Builder, scene: &Scene) {
@@ -325,13 +332,15 @@ fn totals(table: &mut Builder, scene: &Scene) {
         Some((&IMPULSE, 1e-3)),
         "Sum of the normal impulses of all contact nodes within the communication step",
     );
-    table.output(
-        Quantity::FrictionPower,
-        "friction_power",
-        Span::Mean,
-        Some((&POWER, 100.0)),
-        "Friction heat per time, mean over the communication step",
-    );
+    if has_friction(scene) {
+        table.output(
+            Quantity::FrictionPower,
+            "friction_power",
+            Span::Mean,
+            Some((&POWER, 100.0)),
+            "Friction heat per time, mean over the communication step",
+        );
+    }
     let count = table.output(
         Quantity::ContactCount,
         "contact_count",
@@ -414,7 +423,10 @@ fn watched(table: &mut Builder, scene: &Scene) -> Result<()> {
             ),
         ];
         let now = if scene.settings.outputs.instantaneous_forces { &now[..] } else { &[] };
-        for (quantity, name, span, unit, text) in rows.iter().chain(now) {
+        let tangential =
+            |quantity: &Quantity| matches!(quantity, Quantity::TangentialForce(_) | Quantity::TangentialForceNow(_));
+        let chosen = rows.iter().chain(now).filter(|row| has_friction(scene) || !tangential(&row.0));
+        for (quantity, name, span, unit, text) in chosen {
             let name = format!("blade[{sector}].{name}");
             let variable = table.output(*quantity, name, *span, *unit, format!("{text} ({list})"));
             variable.dimension = Some(rom.contact_nodes.len());
@@ -465,7 +477,7 @@ fn fields(table: &mut Builder, scene: &Scene) -> Result<()> {
     Ok(())
 }
 
-fn energies(table: &mut Builder) {
+fn energies(table: &mut Builder, friction: bool) {
     let rows = [
         (
             Quantity::KineticEnergy,
@@ -496,7 +508,7 @@ fn energies(table: &mut Builder) {
         ),
         (Quantity::EnergyResidual, "energy_residual", Span::Point, "Closure residual of the energy ledger"),
     ];
-    for (quantity, name, span, text) in rows {
+    for (quantity, name, span, text) in rows.into_iter().filter(|row| friction || row.0 != Quantity::FrictionLoss) {
         table.output(quantity, name, span, Some((&ENERGY, 1.0)), text);
     }
     table.output(

@@ -1,0 +1,170 @@
+//! The chapters on scene file and ROM file list exactly the keys, arrays and entries that the code knows, and their
+//! examples are accepted.
+
+mod common;
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::PathBuf;
+
+use nalgebra::DMatrix;
+use tiprub_core::rom::{ContactNode, Frame};
+use tiprub_core::settings::{SceneSettings, Shape};
+use tiprub_format::{ARRAYS, FIELDS, METADATA, parse_scene, read_rom, write_scene};
+
+fn chapter(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../docs").join(name)
+}
+
+/// Compare the generated part `what` of a chapter; `UPDATE_SNAPSHOTS=1 cargo test` rewrites it.
+#[track_caller]
+fn compare(name: &str, what: &str, expected: &str) {
+    let text = fs::read_to_string(chapter(name)).unwrap();
+    let begin = format!("<!-- generated: {what} -->\n");
+    let (before, rest) = text.split_once(&begin).expect("start mark");
+    let (found, after) = rest.split_once("<!-- end of generated part -->").expect("end mark");
+    if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
+        fs::write(chapter(name), format!("{before}{begin}{expected}<!-- end of generated part -->{after}")).unwrap();
+    } else {
+        let difference = expected.lines().zip(found.lines()).find(|(expected, found)| expected != found);
+        assert_eq!(difference, None, "run with UPDATE_SNAPSHOTS=1 to write the chapter anew");
+        assert_eq!(expected, found);
+    }
+}
+
+/// Paths of all keys in a scene, indices left out.
+fn keys(scene: &SceneSettings) -> BTreeSet<String> {
+    fn collect(value: &toml::Value, path: &str, keys: &mut BTreeSet<String>) {
+        match value {
+            toml::Value::Table(table) => {
+                for (key, value) in table {
+                    let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+                    keys.insert(path.clone());
+                    collect(value, &path, keys);
+                }
+            }
+            toml::Value::Array(array) => array.iter().for_each(|value| collect(value, path, keys)),
+            _ => {}
+        }
+    }
+    let mut keys = BTreeSet::new();
+    collect(&toml::from_str(&write_scene(scene)).unwrap(), "", &mut keys);
+    keys
+}
+
+#[test]
+fn the_list_of_keys_is_that_of_the_settings() {
+    let mut scene = common::complete_scene();
+    let mut found = keys(&scene);
+    for shape in [
+        Shape::Circular {},
+        Shape::TwoLobe { depth: 1.0, width: 0.15, phase: 0.0 },
+        Shape::Table { radius_change: vec![0.0; 4] },
+    ] {
+        scene.surfaces[0].shape = shape;
+        found.extend(keys(&scene));
+    }
+    // Tables are not keys with values of their own, except the inline table `shape`.
+    for table in ["structure", "surface", "contact", "time", "outputs", "experiment"] {
+        assert!(found.remove(table), "{table}");
+    }
+    let listed: BTreeSet<String> = FIELDS.iter().map(|field| field.path.to_owned()).collect();
+    assert_eq!(listed, found);
+}
+
+/// A scene with every key that has no default.
+fn least() -> String {
+    let mut scene: toml::Table = toml::from_str(&write_scene(&common::complete_scene())).unwrap();
+    for field in FIELDS.iter().filter(|field| field.default.is_some() && field.table() != "surface.shape") {
+        match field.table() {
+            "" => drop(scene.remove(field.key())),
+            table => match scene.get_mut(table) {
+                Some(toml::Value::Array(array)) => drop(array[0].as_table_mut().unwrap().remove(field.key())),
+                Some(toml::Value::Table(table)) => drop(table.remove(field.key())),
+                _ => {}
+            },
+        }
+    }
+    toml::to_string(&scene).unwrap()
+}
+
+#[test]
+fn keys_with_a_default_may_be_left_out_and_the_others_not() {
+    let text = least();
+    parse_scene(&text, "least").unwrap();
+    for field in FIELDS.iter().filter(|field| field.default.is_none() && !field.path.starts_with("surface.shape")) {
+        let lines: Vec<&str> = text.lines().collect();
+        let header = match field.table() {
+            "" => None,
+            table => lines.iter().position(|line| line.trim_matches(['[', ']']) == table),
+        };
+        let start = header.unwrap_or(0);
+        let key = |line: &&str| line.split(" = ").next() == Some(field.key());
+        let line = start + lines[start..].iter().position(key).unwrap();
+        let without = [&lines[..line], &lines[line + 1..]].concat().join("\n");
+        let message = parse_scene(&without, "least").unwrap_err().to_string();
+        assert!(message.contains(&format!("{}: missing", field.key())), "{}: {message}", field.path);
+    }
+}
+
+#[test]
+fn the_chapter_on_scenes_lists_every_key() {
+    let mut text = String::from("| key | value | default | range | meaning |\n|---|---|---|---|---|\n");
+    for field in FIELDS {
+        let default = field.default.unwrap_or("*needed*");
+        let _ = writeln!(
+            text,
+            "| `{}` | {} | {default} | {} | {} |",
+            field.path, field.value, field.range, field.description
+        );
+    }
+    compare("scene-file.md", "keys", &text);
+}
+
+#[test]
+fn the_example_of_the_chapter_on_scenes_is_a_scene() {
+    let chapter = fs::read_to_string(chapter("scene-file.md")).unwrap();
+    let example = chapter.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    let scene = parse_scene(example, "example").unwrap();
+    assert_eq!(scene.structures[0].rom, "builtin:rotor37");
+}
+
+#[test]
+fn the_chapter_on_roms_lists_arrays_and_metadata() {
+    let mut text = String::from("| array | shape | unit | needed | meaning |\n|---|---|---|---|---|\n");
+    for array in ARRAYS {
+        let needed = if array.required { "yes" } else { "no" };
+        let _ = writeln!(
+            text,
+            "| `{}` | {} | {} | {needed} | {} |",
+            array.name, array.shape, array.unit, array.description
+        );
+    }
+    compare("rom-file.md", "arrays", &text);
+    let mut text = String::from("| entry | default | meaning |\n|---|---|---|\n");
+    for entry in METADATA {
+        let default = match entry.default {
+            None => "*needed*".to_owned(),
+            Some("") => "empty".to_owned(),
+            Some(value) => format!("`{value}`"),
+        };
+        let _ = writeln!(text, "| `{}` | {default} | {} |", entry.name, entry.description);
+    }
+    compare("rom-file.md", "metadata", &text);
+}
+
+/// The file was written by running the first Python example of the chapter (safetensors 0.8.0, NumPy 2.4.6).
+#[test]
+fn the_file_that_the_python_example_writes_is_a_rom() {
+    let bytes = include_bytes!("data/written_by_python.rom.safetensors");
+    let rom = read_rom(bytes, "written_by_python").unwrap();
+    assert_eq!((rom.name.as_str(), rom.sectors, rom.frame), ("blade", 12, Frame::Cylindrical));
+    assert_eq!(rom.mass, DMatrix::from_diagonal_element(3, 3, 1e-3));
+    let stiffness = [9e5, 1e5, 0.0, 1e5, 4e4, 0.0, 0.0, 0.0, 2e5];
+    assert_eq!(rom.stiffness, DMatrix::from_row_slice(3, 3, &stiffness));
+    assert_eq!(rom.contact_map, DMatrix::identity(3, 3));
+    let node = ContactNode { name: "mid_chord".into(), position: [0.25, 0.0, 0.02], meridional_slope: 0.0 };
+    assert_eq!(rom.contact_nodes, [node]);
+    assert_eq!(rom.damping_ratio.to_bits(), 0.002f64.to_bits());
+}
