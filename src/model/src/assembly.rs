@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use crate::element::{consistent_mass, stiffness};
+use crate::element::{consistent_mass, lumped_mass, stiffness};
 use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report};
@@ -100,6 +100,20 @@ pub fn assemble(mesh: &Mesh, material: &Material, listener: Listener<'_>) -> Res
         stiffness: SparseMatrix { pattern: Arc::clone(&pattern), values: stiffness_values },
         mass: SparseMatrix { pattern, values: mass_values },
     })
+}
+
+/// Lumped mass of every node (kg), for explicit time stepping of the full model; see [`lumped_mass`].
+///
+/// # Errors
+/// [`Error::Invalid`] for an unsound mesh, [`Error::NegativeJacobian`] naming the element.
+pub fn lumped_masses(mesh: &Mesh, density: f64) -> Result<Vec<f64>> {
+    mesh.validate()?;
+    let mut masses = vec![0.0; mesh.nodes.len()];
+    for (number, element) in mesh.elements.iter().enumerate() {
+        let parts = lumped_mass(element.kind, &mesh.coordinates(element), density, number)?;
+        element.nodes.iter().zip(parts).for_each(|(&node, part)| masses[node] += part);
+    }
+    Ok(masses)
 }
 
 /// The dofs that remain when some nodes are clamped, ascending.

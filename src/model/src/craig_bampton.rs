@@ -7,7 +7,7 @@
 use faer::Mat;
 use nalgebra::DMatrix;
 
-use crate::eigen::{Modes, lowest_modes};
+use crate::eigen::{Modes, lowest_modes, positive_factor};
 use crate::progress::{Listener, Stage, report};
 use crate::sparse::{SparseMatrix, principal_pair};
 use crate::{Error, Result};
@@ -46,7 +46,9 @@ pub fn craig_bampton(
         ));
     }
     let (inner_stiffness, inner_mass) = principal_pair(stiffness, mass, &interior);
-    let factor = inner_stiffness.factor(
+    let factor = positive_factor(
+        &inner_stiffness,
+        &inner_mass,
         "K_ii (stiffness with the interface held)",
         "Clamp the structure, or choose at least three contact nodes that are not on one line",
     )?;

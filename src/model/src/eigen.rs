@@ -15,7 +15,11 @@ use crate::{Error, Result};
 pub const TOLERANCE: f64 = 1e-10;
 /// The explicitly formed residual is allowed this much, since it also contains the solve's round-off.
 const CHECKED_TOLERANCE: f64 = 1e-8;
+/// Vectors that this share of the block's largest is left of depend on the basis.
+const DEPENDENT: f64 = 1e-13;
 const BLOCK: usize = 6;
+/// An ω² below this share of tr K / tr M is round-off of a rigid-body motion.
+const MECHANISM: f64 = 1e-14;
 
 /// Modes of a pencil.
 #[derive(Debug, Clone)]
@@ -40,11 +44,27 @@ struct Basis {
     vectors: Mat<f64>,
     mass_vectors: Mat<f64>,
     size: usize,
+    /// The basis grows to this size at most.
+    capacity: usize,
 }
 
 impl Basis {
     fn new(order: usize, capacity: usize) -> Self {
-        Self { vectors: Mat::zeros(order, capacity), mass_vectors: Mat::zeros(order, capacity), size: 0 }
+        Self { vectors: Mat::zeros(order, 0), mass_vectors: Mat::zeros(order, 0), size: 0, capacity }
+    }
+
+    fn push(&mut self, column: &Mat<f64>, mass_column: &Mat<f64>, norm: f64) {
+        let order = column.nrows();
+        if self.size == self.vectors.ncols() {
+            let room = (2 * self.size).clamp(8 * BLOCK, self.capacity.max(8 * BLOCK));
+            self.vectors.resize_with(order, room, |_, _| 0.0);
+            self.mass_vectors.resize_with(order, room, |_, _| 0.0);
+        }
+        for i in 0..order {
+            self.vectors[(i, self.size)] = column[(i, 0)] / norm;
+            self.mass_vectors[(i, self.size)] = mass_column[(i, 0)] / norm;
+        }
+        self.size += 1;
     }
 
     fn used(&self) -> MatRef<'_, f64> {
@@ -55,56 +75,80 @@ impl Basis {
         self.mass_vectors.get(.., ..self.size)
     }
 
-    /// Remove the basis from `block` and `mass_block` = M·block; returns the coefficients QᵀM·block.
-    fn project_out(&self, block: &mut Mat<f64>, mass_block: &mut Mat<f64>) -> Mat<f64> {
+    /// Remove the basis from `block`; returns the coefficients QᵀM·block.
+    fn project_out(&self, block: &mut Mat<f64>) -> Mat<f64> {
         let mut coefficients = Mat::zeros(self.size, block.ncols());
         for _pass in 0..2 {
             let part = self.used_mass().transpose() * &*block;
             *block -= self.used() * &part;
-            *mass_block -= self.used_mass() * &part;
             coefficients += part;
         }
         coefficients
     }
 
-    /// Orthonormalise `block` within itself and append it; returns R of block = Q_new R (rows: new vectors).
-    /// Columns that depend on the others are left out.
-    fn append(&mut self, block: &mut Mat<f64>, mass_block: &mut Mat<f64>, scale: f64) -> Mat<f64> {
+    /// Orthonormalise the columns of `block` and append them; returns R of block = Q_new R (rows: new vectors).
+    ///
+    /// Columns that depend on the others are left out. M Q is formed anew from each finished vector: carried along
+    /// through the subtractions it would lose what they cancel.
+    fn append(&mut self, block: &Mat<f64>, mass: &SparseMatrix) -> Mat<f64> {
         let (first, width) = (self.size, block.ncols());
-        let mut rows: Vec<Vec<f64>> = Vec::new();
+        let scale = column_norms(block, &mass.times(block.as_ref())).into_iter().fold(0.0, f64::max);
+        let mut upper = Mat::zeros(width, width);
         for j in 0..width {
-            if self.size == self.vectors.ncols() {
+            if self.size == self.capacity {
                 break;
             }
-            let mut row = vec![0.0; width];
-            // Once against the new vectors, and once more against the whole basis to wipe out cancellation.
-            for from in [first, 0] {
-                let size = self.size;
-                let (q, mq) = (self.vectors.get(.., from..size), self.mass_vectors.get(.., from..size));
-                let h = mq.transpose() * block.col(j);
-                let (change, mass_change) = (q * &h, mq * &h);
-                let mut column = block.col_mut(j);
-                column -= change;
-                let mut mass_column = mass_block.col_mut(j);
-                mass_column -= mass_change;
-                for (i, existing) in rows.iter_mut().enumerate() {
-                    existing[j] += h[first - from + i];
+            let mut column = block.get(.., j..j + 1).to_owned();
+            let mut before = f64::INFINITY;
+            let mut norm = 0.0;
+            let mut mass_column = Mat::zeros(0, 0);
+            // Repeat until a pass takes nothing away any more (Kahan: once more is enough, unless it is round-off).
+            for _pass in 0..6 {
+                let part = self.used_mass().transpose() * &column;
+                column -= self.used() * &part;
+                for i in first..self.size {
+                    upper[(i - first, j)] += part[(i, 0)];
                 }
+                mass_column = mass.times(column.as_ref());
+                norm = column_norms(&column, &mass_column)[0];
+                if norm > 0.5 * before || norm <= DEPENDENT * scale {
+                    break;
+                }
+                before = norm;
             }
-            let norm = (block.col(j).transpose() * mass_block.col(j)).max(0.0).sqrt();
-            if norm <= 1e-12 * scale {
+            if norm <= DEPENDENT * scale {
                 continue;
             }
-            row[j] = norm;
-            for i in 0..block.nrows() {
-                self.vectors[(i, self.size)] = block[(i, j)] / norm;
-                self.mass_vectors[(i, self.size)] = mass_block[(i, j)] / norm;
-            }
-            self.size += 1;
-            rows.push(row);
+            upper[(self.size - first, j)] = norm;
+            self.push(&column, &mass_column, norm);
         }
-        Mat::from_fn(rows.len(), width, |i, j| rows[i][j])
+        upper.get(..self.size - first, ..).to_owned()
     }
+}
+
+/// √(columnᵀ M column) of every column.
+fn column_norms(block: &Mat<f64>, mass_block: &Mat<f64>) -> Vec<f64> {
+    (0..block.ncols()).map(|j| (block.col(j).transpose() * mass_block.col(j)).max(0.0).sqrt()).collect()
+}
+
+/// Factor of K - σM, refused when the structure is a mechanism that only round-off holds.
+///
+/// Round-off may leave the last pivots just positive. Two inverse iterations then find an ω² that is none.
+///
+/// # Errors
+/// [`Error::NotPositiveDefinite`] with the given name and remedy.
+pub fn positive_factor(shifted: &SparseMatrix, mass: &SparseMatrix, name: &str, remedy: &str) -> Result<Factor> {
+    let factor = shifted.factor(name, remedy)?;
+    if mass.order() == 0 {
+        return Ok(factor);
+    }
+    let start = factor.solve(mass.times(random_block(mass.order(), 1, &mut 0).as_ref()));
+    let mass_start = mass.times(start.as_ref());
+    let next = factor.solve(mass_start.clone());
+    let largest = column_norms(&next, &mass.times(next.as_ref()))[0] / column_norms(&start, &mass_start)[0];
+    // A NaN compares as false and is refused, too.
+    let supported = 1.0 / largest > MECHANISM * shifted.trace() / mass.trace();
+    if supported { Ok(factor) } else { Err(Error::NotPositiveDefinite { matrix: name.into(), remedy: remedy.into() }) }
 }
 
 /// The `count` lowest modes of the pencil.
@@ -135,34 +179,29 @@ pub fn lowest_modes(
     }
     let capacity = (6 * count + 20 * BLOCK).min(order);
     let mut basis = Basis::new(order, capacity);
-    let mut projected = Mat::<f64>::zeros(capacity, capacity);
+    let mut projected = Mat::<f64>::zeros(0, 0);
     let mut seed = 0;
     // A first application of the operator makes the random start rich in low modes.
-    let mut block = factor.solve(mass.times(random_block(order, BLOCK.min(order), &mut seed).as_ref()).clone());
-    let mut mass_block = mass.times(block.as_ref());
-    let scale = largest_norm(&block, &mass_block);
+    let block = factor.solve(mass.times(random_block(order, BLOCK.min(order), &mut seed).as_ref()));
     let mut start = 0;
-    basis.append(&mut block, &mut mass_block, scale);
+    basis.append(&block, mass);
     loop {
         let end = basis.size;
         let mut next = factor.solve(basis.mass_vectors.get(.., start..end).to_owned());
-        let mut mass_next = mass.times(next.as_ref());
-        let scale = largest_norm(&next, &mass_next);
-        let coefficients = basis.project_out(&mut next, &mut mass_next);
+        let coefficients = basis.project_out(&mut next);
+        projected.resize_with(end, end, |_, _| 0.0);
         projected.get_mut(..end, start..end).copy_from(&coefficients);
-        let mut coupling = basis.append(&mut next, &mut mass_next, scale);
+        let mut coupling = basis.append(&next, mass);
         if basis.size == end && end < capacity {
             // An invariant subspace: continue with directions it does not contain.
             let mut fresh = random_block(order, BLOCK, &mut seed);
-            let mut mass_fresh = mass.times(fresh.as_ref());
-            let scale = largest_norm(&fresh, &mass_fresh);
-            basis.project_out(&mut fresh, &mut mass_fresh);
-            basis.append(&mut fresh, &mut mass_fresh, scale);
+            basis.project_out(&mut fresh);
+            basis.append(&fresh, mass);
             coupling = Mat::zeros(0, end - start);
         }
         let exhausted = basis.size == end;
         if end >= count && (exhausted || end >= count + BLOCK) {
-            let ritz = ritz_pairs(projected.get(..end, ..end), coupling.as_ref(), count, order == end)?;
+            let ritz = ritz_pairs(projected.as_ref(), coupling.as_ref(), count, order == end)?;
             let converged = ritz.bounds.iter().filter(|&&bound| bound <= TOLERANCE).count();
             report(listener, stage, converged, count);
             if converged == count {
@@ -186,16 +225,16 @@ struct Ritz {
 /// Largest eigenpairs of the projected operator, with residual bounds ‖R s_last‖ / θ.
 fn ritz_pairs(projected: MatRef<'_, f64>, coupling: MatRef<'_, f64>, count: usize, complete: bool) -> Result<Ritz> {
     let size = projected.nrows();
-    let symmetric = Mat::from_fn(size, size, |i, j| {
-        // The block columns are filled from the left, so the entry of the later column is the complete one.
-        if i <= j { projected[(i, j)] } else { projected[(j, i)] }
-    });
+    // The eigenvalue solver deflates against 1, not against the matrix' norm, so the matrix is scaled to it. The block
+    // columns are filled from the left, so of a pair of entries the later column's is the complete one.
+    let scale = projected.norm_max();
+    let symmetric = Mat::from_fn(size, size, |i, j| projected[(i.min(j), i.max(j))] / scale);
     let eigen = symmetric.self_adjoint_eigen(Side::Lower).map_err(|_| {
         Error::invalid("projected eigenvalue problem", "it did not converge", "Check the mesh and the material")
     })?;
     let order: Vec<usize> = (0..count).map(|k| size - 1 - k).collect();
     let vectors = Mat::from_fn(size, count, |i, k| eigen.U()[(i, order[k])]);
-    let values: Vec<f64> = order.iter().map(|&k| eigen.S()[k]).collect();
+    let values: Vec<f64> = order.iter().map(|&k| scale * eigen.S()[k]).collect();
     let last = vectors.get(size - coupling.ncols().., ..);
     let residuals = coupling * last;
     let bounds =
@@ -212,8 +251,8 @@ fn checked(mass: &SparseMatrix, factor: &Factor, shift: f64, thetas: &[f64], sha
         }
     }
     let mass_residual = mass.times(residual.as_ref());
-    let norm = |k: usize| (residual.col(k).transpose() * mass_residual.col(k)).max(0.0).sqrt();
-    let residuals: Vec<f64> = thetas.iter().enumerate().map(|(k, theta)| norm(k) / theta.abs()).collect();
+    let norms = column_norms(&residual, &mass_residual);
+    let residuals: Vec<f64> = norms.iter().zip(thetas).map(|(norm, theta)| norm / theta.abs()).collect();
     // NaN must count as failure, hence the comparison's direction.
     let converged = residuals.iter().filter(|&&residual| residual <= CHECKED_TOLERANCE).count();
     if converged < thetas.len() {
@@ -222,10 +261,6 @@ fn checked(mass: &SparseMatrix, factor: &Factor, shift: f64, thetas: &[f64], sha
     }
     let eigenvalues = thetas.iter().map(|theta| shift + 1.0 / theta).collect();
     Ok(Modes { eigenvalues, shapes, residuals })
-}
-
-fn largest_norm(block: &Mat<f64>, mass_block: &Mat<f64>) -> f64 {
-    (0..block.ncols()).map(|j| (block.col(j).transpose() * mass_block.col(j)).max(0.0).sqrt()).fold(0.0, f64::max)
 }
 
 /// Entries in [-1, 1) of a fixed sequence (splitmix64), so that results repeat from run to run.

@@ -9,7 +9,7 @@ use tiprub_core::rom::{ContactNode, Frame, RomChecks};
 
 use crate::assembly::{assemble, free_dofs};
 use crate::craig_bampton::{CraigBampton, craig_bampton, dense_modes};
-use crate::eigen::{Modes, lowest_modes};
+use crate::eigen::{Modes, lowest_modes, positive_factor};
 use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report};
@@ -114,7 +114,7 @@ pub fn reduce(
 ) -> Result<Reduction> {
     let mut timings = Timings::default();
     let (assembled, free) = timed(&mut timings.assembly, || {
-        check_nodes(&mesh, clamped, contact)?;
+        check_nodes(&mesh, clamped, contact, options.frame)?;
         Ok((assemble(&mesh, material, listener)?, free_dofs(mesh.nodes.len(), clamped)))
     })?;
     let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
@@ -174,7 +174,9 @@ pub fn full_modes(
     // tr K / tr M is of the order of the highest ω²; a millionth of it lies among the lowest elastic ones.
     let shift = if free { -1e-6 * stiffness.trace() / mass.trace() } else { 0.0 };
     let shifted = stiffness.plus_scaled(-shift, mass);
-    let factor = shifted.factor(
+    let factor = positive_factor(
+        &shifted,
+        mass,
         "K (stiffness of the supported structure)",
         "The structure can move as a rigid body: clamp at least three nodes that are not on one line",
     )?;
@@ -224,7 +226,7 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> Result<T>) -> Result<T> {
     result
 }
 
-fn check_nodes(mesh: &Mesh, clamped: &[usize], contact: &[ContactPoint]) -> Result<()> {
+fn check_nodes(mesh: &Mesh, clamped: &[usize], contact: &[ContactPoint], frame: Frame) -> Result<()> {
     for &node in clamped.iter().chain(contact.iter().map(|point| &point.node)) {
         if node >= mesh.nodes.len() {
             let problem = format!("node {} does not exist; there are {}", node + 1, mesh.nodes.len());
@@ -235,6 +237,11 @@ fn check_nodes(mesh: &Mesh, clamped: &[usize], contact: &[ContactPoint]) -> Resu
         let what = || format!("contact node `{}`", point.name);
         if clamped.contains(&point.node) {
             return Err(Error::invalid(what(), "it is clamped", "Choose a node that can move"));
+        }
+        let [x, y, _] = mesh.nodes[point.node];
+        if frame == Frame::Cylindrical && x.hypot(y) <= 0.0 {
+            let problem = "it lies on the z axis, where the radial direction is undefined";
+            return Err(Error::invalid(what(), problem, "Choose another node or the Cartesian frame"));
         }
         if contact[..index].iter().any(|other| other.node == point.node || other.name == point.name) {
             return Err(Error::invalid(what(), "its node or name appears twice", "Name every contact node once"));
