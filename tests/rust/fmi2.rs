@@ -1,4 +1,5 @@
 //! A small FMI 2.0 importer: safe calls on an instance, and its handle for unsafe ones.
+#![allow(clippy::not_unsafe_ptr_arg_deref, reason = "saved states are opaque: a correct library never follows them")]
 
 use std::ffi::CString;
 use std::path::Path;

@@ -92,6 +92,13 @@ pub fn scene() -> Scene {
     Scene { settings, roms: vec![rom()] }
 }
 
+/// First value reference of a variable of the scene.
+#[track_caller]
+pub fn reference(name: &str) -> u32 {
+    let simulation = tiprub_core::Simulation::new(&scene()).expect("the scene of the tests is valid");
+    simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
+}
+
 /// An unpacked FMU's resources.
 #[derive(Debug)]
 pub struct Resources {

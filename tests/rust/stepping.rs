@@ -60,7 +60,10 @@ fn both_versions_give_the_bits_of_the_core_with_contact() {
         assert_eq!(answer.time.to_bits(), time.to_bits(), "lands exactly");
     }
     assert!(touched > 20, "only {touched} steps with contact: the test shows nothing");
-    println!("{touched} of {STEPS} steps with contact, {} reals each, identical bits in both versions", references.len());
+    println!(
+        "{touched} of {STEPS} steps with contact, {} reals each, identical bits in both versions",
+        references.len()
+    );
 }
 
 #[test]
@@ -77,7 +80,7 @@ fn step_sizes_that_change_and_sixtieths_land_exactly() {
         assert_eq!(slave.reals(&[0], 1)[0].to_bits(), time.to_bits());
     }
     // 1/60 s as importers compute it: the quotient, a rounded literal, and the difference of accumulated times.
-    let accumulated: f64 = (0..7).map(|_| 1.0 / 60.0).sum::<f64>();
+    let accumulated: f64 = (0..15).map(|_| 1.0 / 60.0).sum::<f64>();
     let difference = (accumulated + 1.0 / 60.0) - accumulated;
     let mut ends = Vec::new();
     for size in [1.0 / 60.0, 0.016_666_666_666_666_677, difference] {
@@ -86,7 +89,8 @@ fn step_sizes_that_change_and_sixtieths_land_exactly() {
         let answer = slave.step(0.0, size);
         assert_eq!((answer.status, answer.time.to_bits()), (OK, size.to_bits()));
         let simulation = simulation();
-        let values = slave.reals(&[reference_of(&simulation, "rotor_angle"), reference_of(&simulation, "internal_steps")], 2);
+        let values =
+            slave.reals(&[reference_of(&simulation, "rotor_angle"), reference_of(&simulation, "internal_steps")], 2);
         ends.push(values);
     }
     assert!((ends[0][0] - ends[1][0]).abs() < 1e-12 && (ends[0][0] - ends[2][0]).abs() < 1e-12, "{ends:?}");
@@ -166,7 +170,7 @@ unsafe extern "C" fn watch(
         unsafe { (*requested, *at) = (true, time) };
     }
     if context.wish < 0.0 && set_requested {
-        let (reference, speed) = (1_u32, -context.wish + 1000.0 * time);
+        let (reference, speed) = (tiprub_tests::scene::reference("speed"), -context.wish + 1000.0 * time);
         // SAFETY: arrays of one element.
         let status = unsafe { (api.fmi3SetFloat64)(context.handle, &raw const reference, 1, &raw const speed, 1) };
         assert_eq!(status, OK);
@@ -183,7 +187,8 @@ fn intermediate_updates_see_every_internal_step_and_change_nothing_by_looking() 
     let (api, resources) = (fmi3::load(&path), Resources::new(false));
     let core = simulation();
     // Damping loss is gathered per communication step or per look inside: the energies may differ in the last bits.
-    let energies = ["damping_loss", "energy_residual", "energy_residual_relative"].map(|name| reference_of(&core, name));
+    let energies =
+        ["damping_loss", "energy_residual", "energy_residual_relative"].map(|name| reference_of(&core, name));
     let references: Vec<_> = all_reals(&core).into_iter().filter(|reference| !energies.contains(reference)).collect();
     let plain = fmi3::Slave::new(&api, &resources);
     let looked = fmi3::Slave::try_new(&api, &watched(&resources, true)).unwrap_or_else(|log| panic!("{log}"));
@@ -228,7 +233,6 @@ fn inputs_set_during_intermediate_updates_count_from_there() {
     let path = shipped();
     let (api, resources) = (fmi3::load(&path), Resources::new(true));
     let core = simulation();
-    assert_eq!(reference_of(&core, "speed"), 1, "the callback sets reference 1");
     let angle = reference_of(&core, "rotor_angle");
     let slave = fmi3::Slave::try_new(&api, &watched(&resources, false)).unwrap_or_else(|log| panic!("{log}"));
     slave.initialise();
@@ -271,7 +275,8 @@ fn values_set_before_initialisation_are_start_values() {
     let (api, resources) = (fmi2::load(&path), Resources::new(false));
     let core = simulation();
     let [speed, friction, angle, clearance] =
-        ["speed", "friction_coefficient", "initial_rotor_angle", "blade[1].clearance"].map(|name| reference_of(&core, name));
+        ["speed", "friction_coefficient", "initial_rotor_angle", "blade[1].clearance"]
+            .map(|name| reference_of(&core, name));
     let slave = fmi2::Slave::new(&api, &resources);
     slave.expect(slave.set_reals(&[speed, friction], &[250.0, 0.1]));
     assert_eq!(slave.reals(&[speed, friction]), [250.0, 0.1], "start values can be read back");

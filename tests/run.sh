@@ -1,0 +1,40 @@
+#!/bin/sh
+# All tests: Rust (workspace, release), then Python (FMPy) against the packaged FMUs of rotor 37.
+# Works from any directory; ends with pytest's summary line; exit code 1 on any failure.
+set -u
+
+here=$(CDPATH= cd -- "$(dirname -- "$0")" && pwd)
+root=$(dirname -- "$here")
+venv=$root/target/tests-venv
+failed=0
+
+section() {
+    printf '\n=== %s ===\n' "$1"
+}
+
+cd "$root" || exit 1
+
+section "Rust: cargo test --workspace --release"
+cargo test --workspace --release || failed=1
+
+section "Command line: cargo build --release"
+cargo build --release || exit 1
+
+section "Python environment: $venv"
+stamp=$venv/requirements.txt
+if ! cmp -s "$here/requirements.txt" "$stamp"; then
+    rm -rf "$venv"
+    python3 -m venv "$venv" || exit 1
+    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$here/requirements.txt" || exit 1
+    cp "$here/requirements.txt" "$stamp" || exit 1
+fi
+echo "ready: $("$venv/bin/python" --version), $(grep -c == "$here/requirements.txt") pinned packages"
+
+if [ "$failed" -ne 0 ]; then
+    echo "the Rust tests failed, see above"
+fi
+
+section "Python: pytest tests/python"
+"$venv/bin/python" -m pytest -p no:cacheprovider "$here/python" || failed=1
+
+exit "$failed"

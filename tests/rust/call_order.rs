@@ -1,0 +1,487 @@
+//! The call order of both standards, pair by pair: every function in every state, through the C ABI.
+//!
+//! The expected tables are written from the text of the standards, apart from the library's own: FMI 2.0.4 section 4.2.4
+//! (table of allowed calls against states) and FMI 3.0.2 sections 2.3 and 4.2 (text of each state). Letters are states in
+//! which a function is allowed; "-" is a function whose capability this FMU does not claim, which must answer Error with a
+//! message in every state.
+
+use std::ffi::{CString, c_void};
+
+use tiprub_tests::api::{Fmi2Api, Fmi3Api};
+use tiprub_tests::scene::Resources;
+use tiprub_tests::{ERROR, fmi2, fmi3, shipped};
+
+/// FMI 2.0: I instantiated, N Initialization Mode, S stepComplete, F stepFailed, T terminated. Getters are allowed in I
+/// beyond the standard, for values that have a start value.
+const FMI2: &str = "
+fmi2SetDebugLogging INSFT
+fmi2SetupExperiment I
+fmi2EnterInitializationMode I
+fmi2ExitInitializationMode N
+fmi2Terminate SF
+fmi2Reset INSFT
+fmi2GetReal INSFT
+fmi2GetInteger INSFT
+fmi2GetBoolean INSFT
+fmi2GetString INSFT
+fmi2SetReal INS
+fmi2SetInteger INS
+fmi2SetBoolean INS
+fmi2SetString INS
+fmi2GetFMUstate INSFT
+fmi2SetFMUstate INSFT
+fmi2FreeFMUstate INSFT
+fmi2SerializedFMUstateSize INSFT
+fmi2SerializeFMUstate INSFT
+fmi2DeSerializeFMUstate INSFT
+fmi2SetRealInputDerivatives INS
+fmi2GetRealOutputDerivatives SFT
+fmi2DoStep S
+fmi2CancelStep
+fmi2GetStatus SFT
+fmi2GetRealStatus SFT
+fmi2GetIntegerStatus SFT
+fmi2GetBooleanStatus SFT
+fmi2GetStringStatus SFT
+fmi2GetDirectionalDerivative -
+fmi2EnterEventMode -
+fmi2NewDiscreteStates -
+fmi2EnterContinuousTimeMode -
+fmi2CompletedIntegratorStep -
+fmi2SetTime -
+fmi2SetContinuousStates -
+fmi2GetDerivatives -
+fmi2GetEventIndicators -
+fmi2GetContinuousStates -
+fmi2GetNominalsOfContinuousStates -
+";
+
+/// Not called on an instance that must survive, or on none at all.
+const FMI2_APART: &str = "fmi2GetTypesPlatform fmi2GetVersion fmi2Instantiate fmi2FreeInstance";
+
+/// FMI 3.0: as above, and U Intermediate Update Mode.
+const FMI3: &str = "
+fmi3SetDebugLogging INSUFT
+fmi3EnterInitializationMode I
+fmi3ExitInitializationMode N
+fmi3Terminate SF
+fmi3Reset INSFT
+fmi3GetFloat32 INSUFT
+fmi3GetFloat64 INSUFT
+fmi3GetInt8 INSUFT
+fmi3GetUInt8 INSUFT
+fmi3GetInt16 INSUFT
+fmi3GetUInt16 INSUFT
+fmi3GetInt32 INSUFT
+fmi3GetUInt32 INSUFT
+fmi3GetInt64 INSUFT
+fmi3GetUInt64 INSUFT
+fmi3GetBoolean INSUFT
+fmi3GetString INSUFT
+fmi3GetBinary INSUFT
+fmi3GetClock INSUFT
+fmi3SetFloat32 INSU
+fmi3SetFloat64 INSU
+fmi3SetInt8 INSU
+fmi3SetUInt8 INSU
+fmi3SetInt16 INSU
+fmi3SetUInt16 INSU
+fmi3SetInt32 INSU
+fmi3SetUInt32 INSU
+fmi3SetInt64 INSU
+fmi3SetUInt64 INSU
+fmi3SetBoolean INSU
+fmi3SetString INSU
+fmi3SetBinary INSU
+fmi3SetClock INSU
+fmi3GetFMUState INSFT
+fmi3SetFMUState INSFT
+fmi3FreeFMUState INSFT
+fmi3SerializedFMUStateSize INSFT
+fmi3SerializeFMUState INSFT
+fmi3DeserializeFMUState INSFT
+fmi3GetOutputDerivatives SFT
+fmi3DoStep S
+fmi3GetNumberOfVariableDependencies -
+fmi3GetVariableDependencies -
+fmi3GetDirectionalDerivative -
+fmi3GetAdjointDerivative -
+fmi3EnterConfigurationMode -
+fmi3ExitConfigurationMode -
+fmi3EnterEventMode -
+fmi3EnterStepMode -
+fmi3EvaluateDiscreteStates -
+fmi3UpdateDiscreteStates -
+fmi3GetIntervalDecimal -
+fmi3GetIntervalFraction -
+fmi3GetShiftDecimal -
+fmi3GetShiftFraction -
+fmi3SetIntervalDecimal -
+fmi3SetIntervalFraction -
+fmi3SetShiftDecimal -
+fmi3SetShiftFraction -
+fmi3EnterContinuousTimeMode -
+fmi3CompletedIntegratorStep -
+fmi3SetTime -
+fmi3SetContinuousStates -
+fmi3GetContinuousStateDerivatives -
+fmi3GetEventIndicators -
+fmi3GetContinuousStates -
+fmi3GetNominalsOfContinuousStates -
+fmi3GetNumberOfEventIndicators -
+fmi3GetNumberOfContinuousStates -
+fmi3ActivateModelPartition -
+";
+
+const FMI3_APART: &str = "fmi3GetVersion fmi3InstantiateModelExchange fmi3InstantiateCoSimulation \
+                          fmi3InstantiateScheduledExecution fmi3FreeInstance";
+
+fn rows(table: &'static str) -> Vec<(&'static str, &'static str)> {
+    let row = |line: &'static str| line.split_once(' ').unwrap_or((line, ""));
+    table.lines().filter(|line| !line.is_empty()).map(row).collect()
+}
+
+#[track_caller]
+fn complete(table: &'static str, apart: &str, names: &[&str]) {
+    let mut listed: Vec<_> = rows(table).into_iter().map(|(name, _)| name).chain(apart.split_whitespace()).collect();
+    let mut names = names.to_vec();
+    listed.sort_unstable();
+    names.sort_unstable();
+    assert_eq!(listed, names, "the expected table has every function once");
+}
+
+/// Compare an answer with the expected row.
+#[track_caller]
+fn judge(name: &str, allowed: &str, state: char, status: i32, log: &str) {
+    let out_of_order = log.contains("not allowed in state");
+    if allowed == "-" {
+        assert!(status == ERROR && log.contains("this FMU has no"), "{name} in {state}: status {status}, {log}");
+    } else if allowed.contains(state) {
+        assert!(!out_of_order, "{name} must be allowed in {state}: {log}");
+        assert!(status != ERROR, "{name} in {state} with proper arguments: status {status}, {log}");
+    } else {
+        assert!(status == ERROR && out_of_order, "{name} must be refused in {state}: status {status}, {log}");
+    }
+    if status != 0 {
+        assert!(log.contains(name), "{name} in {state}: every answer other than OK has a message: {log}");
+    }
+}
+
+/// A scene whose casing an importer can drive to infinity, so that a step fails.
+fn resources() -> Resources {
+    let mut scene = tiprub_tests::scene::scene();
+    scene.settings.surfaces[0].moving = true;
+    Resources::of(&scene, false)
+}
+
+/// References: input, what drives the step to failure, text, enumeration, output with derivative.
+#[derive(Clone, Copy)]
+struct References {
+    input: u32,
+    radius: u32,
+    text: u32,
+    choice: u32,
+    output: u32,
+}
+
+fn references() -> References {
+    let mut scene = tiprub_tests::scene::scene();
+    scene.settings.surfaces[0].moving = true;
+    let simulation = tiprub_core::Simulation::new(&scene).expect("valid");
+    let find = |name: &str| simulation.table().find(name).unwrap_or_else(|| panic!("no {name}")).reference;
+    References {
+        input: find("speed"),
+        radius: find("casing_radius_change"),
+        text: find("scene"),
+        choice: find("scheme"),
+        output: find("rotor_angle"),
+    }
+}
+
+/// Call one function with arguments that are proper where it is allowed.
+fn call2(api: &Fmi2Api, slave: &fmi2::Slave<'_>, name: &str, known: References) -> i32 {
+    let h = slave.handle;
+    let (one, value, mut real, mut integer) = (1, 300.0, 0.0, 0);
+    let (mut text, null) = (std::ptr::null(), std::ptr::null_mut::<c_void>());
+    let (input, output, string, choice) =
+        (&raw const known.input, &raw const known.output, &raw const known.text, &raw const known.choice);
+    let (mut flag, order) = (0, 1);
+    let mut state = null;
+    // SAFETY: all pointers are to single values, or NULL with a count of zero.
+    unsafe {
+        match name {
+            "fmi2SetDebugLogging" => (api.fmi2SetDebugLogging)(h, 0, 0, std::ptr::null()),
+            "fmi2SetupExperiment" => slave.setup(0.0, None),
+            "fmi2EnterInitializationMode" => slave.enter(),
+            "fmi2ExitInitializationMode" => slave.exit(),
+            "fmi2Terminate" => slave.terminate(),
+            "fmi2Reset" => slave.reset(),
+            "fmi2GetReal" => (api.fmi2GetReal)(h, input, 1, &raw mut real),
+            "fmi2GetInteger" => (api.fmi2GetInteger)(h, choice, 1, &raw mut integer),
+            "fmi2GetBoolean" => (api.fmi2GetBoolean)(h, std::ptr::null(), 0, std::ptr::null_mut()),
+            "fmi2GetString" => (api.fmi2GetString)(h, string, 1, &raw mut text),
+            "fmi2SetReal" => (api.fmi2SetReal)(h, input, 1, &raw const value),
+            "fmi2SetInteger" => (api.fmi2SetInteger)(h, std::ptr::null(), 0, std::ptr::null()),
+            "fmi2SetBoolean" => (api.fmi2SetBoolean)(h, std::ptr::null(), 0, std::ptr::null()),
+            "fmi2SetString" => (api.fmi2SetString)(h, std::ptr::null(), 0, std::ptr::null()),
+            "fmi2GetFMUstate" => (api.fmi2GetFMUstate)(h, &raw mut state),
+            "fmi2FreeFMUstate" => (api.fmi2FreeFMUstate)(h, &raw mut state),
+            "fmi2SetFMUstate" | "fmi2SerializedFMUstateSize" | "fmi2SerializeFMUstate" | "fmi2DeSerializeFMUstate" => {
+                let saved = slave.save();
+                let bytes = slave.serialise(saved);
+                match name {
+                    "fmi2SetFMUstate" => slave.restore(saved),
+                    "fmi2DeSerializeFMUstate" => slave.deserialise(&bytes).0,
+                    _ => 0,
+                }
+            }
+            "fmi2SetRealInputDerivatives" => slave.set_derivatives(&[known.input], 1, &[0.0]),
+            "fmi2GetRealOutputDerivatives" => {
+                (api.fmi2GetRealOutputDerivatives)(h, output, 1, &raw const order, &raw mut real)
+            }
+            "fmi2DoStep" => slave.step(1e-4, 1e-4),
+            "fmi2CancelStep" => (api.fmi2CancelStep)(h),
+            "fmi2GetStatus" => (api.fmi2GetStatus)(h, 0, &raw mut integer),
+            "fmi2GetRealStatus" => (api.fmi2GetRealStatus)(h, 2, &raw mut real),
+            "fmi2GetIntegerStatus" => (api.fmi2GetIntegerStatus)(h, 0, &raw mut integer),
+            "fmi2GetBooleanStatus" => (api.fmi2GetBooleanStatus)(h, 3, &raw mut integer),
+            "fmi2GetStringStatus" => (api.fmi2GetStringStatus)(h, 1, &raw mut text),
+            "fmi2GetDirectionalDerivative" => {
+                (api.fmi2GetDirectionalDerivative)(h, output, 1, input, 1, &raw const value, &raw mut real)
+            }
+            "fmi2EnterEventMode" => (api.fmi2EnterEventMode)(h),
+            "fmi2NewDiscreteStates" => (api.fmi2NewDiscreteStates)(h, null),
+            "fmi2EnterContinuousTimeMode" => (api.fmi2EnterContinuousTimeMode)(h),
+            "fmi2CompletedIntegratorStep" => (api.fmi2CompletedIntegratorStep)(h, one, &raw mut integer, &raw mut flag),
+            "fmi2SetTime" => (api.fmi2SetTime)(h, 0.0),
+            "fmi2SetContinuousStates" => (api.fmi2SetContinuousStates)(h, &raw const value, 1),
+            "fmi2GetDerivatives" => (api.fmi2GetDerivatives)(h, &raw mut real, 1),
+            "fmi2GetEventIndicators" => (api.fmi2GetEventIndicators)(h, &raw mut real, 1),
+            "fmi2GetContinuousStates" => (api.fmi2GetContinuousStates)(h, &raw mut real, 1),
+            "fmi2GetNominalsOfContinuousStates" => (api.fmi2GetNominalsOfContinuousStates)(h, &raw mut real, 1),
+            _ => panic!("{name} is not called"),
+        }
+    }
+}
+
+#[test]
+fn fmi2_pair_by_pair() {
+    complete(FMI2, FMI2_APART, Fmi2Api::NAMES);
+    let (api, resources, known) = (fmi2::load(&shipped()), resources(), references());
+    let slave = fmi2::Slave::new(&api, &resources);
+    let mut states = vec![('I', slave.save())];
+    slave.expect(slave.enter());
+    states.push(('N', slave.save()));
+    slave.expect(slave.exit());
+    slave.expect(slave.step(0.0, 1e-4));
+    states.push(('S', slave.save()));
+    slave.expect(slave.set_reals(&[known.radius], &[-1e307]));
+    assert_eq!(slave.step(1e-4, 1e-4), ERROR);
+    states.push(('F', slave.save()));
+    slave.expect(slave.terminate());
+    states.push(('T', slave.save()));
+    let mut pairs = 0;
+    for (name, allowed) in rows(FMI2) {
+        for (state, saved) in &states {
+            slave.expect(slave.restore(*saved));
+            let _ = slave.log();
+            let status = call2(&api, &slave, name, known);
+            judge(name, allowed, *state, status, &slave.log());
+            pairs += 1;
+        }
+    }
+    println!("FMI 2.0: {pairs} pairs of function and state");
+}
+
+/// Call one function with arguments that are proper where it is allowed. Works on the bare handle, so that it can be used
+/// from within an intermediate update.
+unsafe fn call3(api: &Fmi3Api, h: *mut c_void, saved: (*mut c_void, &[u8]), name: &str, known: References) -> i32 {
+    let (value, mut real, mut long, order) = (300.0, 0.0, 0_i64, 1);
+    let (mut text, mut state, null) = (std::ptr::null(), std::ptr::null_mut(), std::ptr::null());
+    let (input, output, string, choice) =
+        (&raw const known.input, &raw const known.output, &raw const known.text, &raw const known.choice);
+    let (mut a, mut b, mut c, mut size) = (false, false, false, 0);
+    let (saved, bytes) = saved;
+    let mut copy = bytes.to_vec();
+    let out = std::ptr::null_mut();
+    /// The same call for the types that no variable has: nothing to get or set.
+    macro_rules! nothing {
+        ($field:ident) => {
+            (api.$field)(h, std::ptr::null(), 0, std::ptr::null_mut(), 0)
+        };
+    }
+    // SAFETY: all pointers are to single values, or NULL with a count of zero, or not touched by refusing functions.
+    unsafe {
+        match name {
+            "fmi3SetDebugLogging" => (api.fmi3SetDebugLogging)(h, false, 0, null),
+            "fmi3EnterInitializationMode" => (api.fmi3EnterInitializationMode)(h, false, 0.0, 0.0, false, 0.0),
+            "fmi3ExitInitializationMode" => (api.fmi3ExitInitializationMode)(h),
+            "fmi3Terminate" => (api.fmi3Terminate)(h),
+            "fmi3Reset" => (api.fmi3Reset)(h),
+            "fmi3GetFloat64" => (api.fmi3GetFloat64)(h, input, 1, &raw mut real, 1),
+            "fmi3GetInt64" => (api.fmi3GetInt64)(h, choice, 1, &raw mut long, 1),
+            "fmi3GetString" => (api.fmi3GetString)(h, string, 1, &raw mut text, 1),
+            "fmi3SetFloat64" => (api.fmi3SetFloat64)(h, input, 1, &raw const value, 1),
+            "fmi3GetFloat32" => nothing!(fmi3GetFloat32),
+            "fmi3GetInt8" => nothing!(fmi3GetInt8),
+            "fmi3GetUInt8" => nothing!(fmi3GetUInt8),
+            "fmi3GetInt16" => nothing!(fmi3GetInt16),
+            "fmi3GetUInt16" => nothing!(fmi3GetUInt16),
+            "fmi3GetInt32" => nothing!(fmi3GetInt32),
+            "fmi3GetUInt32" => nothing!(fmi3GetUInt32),
+            "fmi3GetUInt64" => nothing!(fmi3GetUInt64),
+            "fmi3GetBoolean" => nothing!(fmi3GetBoolean),
+            "fmi3SetFloat32" => nothing!(fmi3SetFloat32),
+            "fmi3SetInt8" => nothing!(fmi3SetInt8),
+            "fmi3SetUInt8" => nothing!(fmi3SetUInt8),
+            "fmi3SetInt16" => nothing!(fmi3SetInt16),
+            "fmi3SetUInt16" => nothing!(fmi3SetUInt16),
+            "fmi3SetInt32" => nothing!(fmi3SetInt32),
+            "fmi3SetUInt32" => nothing!(fmi3SetUInt32),
+            "fmi3SetInt64" => nothing!(fmi3SetInt64),
+            "fmi3SetUInt64" => nothing!(fmi3SetUInt64),
+            "fmi3SetBoolean" => nothing!(fmi3SetBoolean),
+            "fmi3SetString" => nothing!(fmi3SetString),
+            "fmi3GetBinary" => (api.fmi3GetBinary)(h, std::ptr::null(), 0, &raw mut size, std::ptr::null_mut(), 0),
+            "fmi3SetBinary" => (api.fmi3SetBinary)(h, std::ptr::null(), 0, &raw const size, std::ptr::null(), 0),
+            "fmi3GetClock" => (api.fmi3GetClock)(h, std::ptr::null(), 0, std::ptr::null_mut()),
+            "fmi3SetClock" => (api.fmi3SetClock)(h, std::ptr::null(), 0, std::ptr::null()),
+            "fmi3GetFMUState" => (api.fmi3GetFMUState)(h, &raw mut state),
+            "fmi3FreeFMUState" => (api.fmi3FreeFMUState)(h, &raw mut state),
+            "fmi3SetFMUState" => (api.fmi3SetFMUState)(h, saved),
+            "fmi3SerializedFMUStateSize" => (api.fmi3SerializedFMUStateSize)(h, saved, &raw mut size),
+            "fmi3SerializeFMUState" => (api.fmi3SerializeFMUState)(h, saved, copy.as_mut_ptr(), copy.len()),
+            "fmi3DeserializeFMUState" => (api.fmi3DeserializeFMUState)(h, bytes.as_ptr(), bytes.len(), &raw mut state),
+            "fmi3GetOutputDerivatives" => {
+                (api.fmi3GetOutputDerivatives)(h, output, 1, &raw const order, &raw mut real, 1)
+            }
+            "fmi3DoStep" => (api.fmi3DoStep)(h, 1e-4, 1e-4, true, &raw mut a, &raw mut b, &raw mut c, &raw mut real),
+            "fmi3GetNumberOfVariableDependencies" => {
+                (api.fmi3GetNumberOfVariableDependencies)(h, known.output, &raw mut size)
+            }
+            "fmi3GetVariableDependencies" => {
+                let (size, references, kinds) = (std::ptr::null_mut(), std::ptr::null_mut(), std::ptr::null_mut());
+                (api.fmi3GetVariableDependencies)(h, known.output, size, references, size, kinds, 0)
+            }
+            "fmi3GetDirectionalDerivative" => {
+                (api.fmi3GetDirectionalDerivative)(h, output, 1, input, 1, &raw const value, 1, &raw mut real, 1)
+            }
+            "fmi3GetAdjointDerivative" => {
+                (api.fmi3GetAdjointDerivative)(h, output, 1, input, 1, &raw const value, 1, &raw mut real, 1)
+            }
+            "fmi3EnterConfigurationMode" => (api.fmi3EnterConfigurationMode)(h),
+            "fmi3ExitConfigurationMode" => (api.fmi3ExitConfigurationMode)(h),
+            "fmi3EnterEventMode" => (api.fmi3EnterEventMode)(h),
+            "fmi3EnterStepMode" => (api.fmi3EnterStepMode)(h),
+            "fmi3EvaluateDiscreteStates" => (api.fmi3EvaluateDiscreteStates)(h),
+            "fmi3UpdateDiscreteStates" => {
+                let places = (&raw mut a, &raw mut b, &raw mut c);
+                (api.fmi3UpdateDiscreteStates)(h, places.0, places.1, places.2, places.0, places.1, &raw mut real)
+            }
+            "fmi3GetIntervalDecimal" => (api.fmi3GetIntervalDecimal)(h, input, 0, out, std::ptr::null_mut()),
+            "fmi3GetIntervalFraction" => {
+                let counters = std::ptr::null_mut();
+                (api.fmi3GetIntervalFraction)(h, input, 0, counters, counters, std::ptr::null_mut())
+            }
+            "fmi3GetShiftDecimal" => (api.fmi3GetShiftDecimal)(h, input, 0, out),
+            "fmi3GetShiftFraction" => {
+                (api.fmi3GetShiftFraction)(h, input, 0, std::ptr::null_mut(), std::ptr::null_mut())
+            }
+            "fmi3SetIntervalDecimal" => (api.fmi3SetIntervalDecimal)(h, input, 0, out),
+            "fmi3SetIntervalFraction" => (api.fmi3SetIntervalFraction)(h, input, 0, std::ptr::null(), std::ptr::null()),
+            "fmi3SetShiftDecimal" => (api.fmi3SetShiftDecimal)(h, input, 0, out),
+            "fmi3SetShiftFraction" => (api.fmi3SetShiftFraction)(h, input, 0, std::ptr::null(), std::ptr::null()),
+            "fmi3EnterContinuousTimeMode" => (api.fmi3EnterContinuousTimeMode)(h),
+            "fmi3CompletedIntegratorStep" => (api.fmi3CompletedIntegratorStep)(h, true, &raw mut a, &raw mut b),
+            "fmi3SetTime" => (api.fmi3SetTime)(h, 0.0),
+            "fmi3SetContinuousStates" => (api.fmi3SetContinuousStates)(h, &raw const value, 1),
+            "fmi3GetContinuousStateDerivatives" => (api.fmi3GetContinuousStateDerivatives)(h, &raw mut real, 1),
+            "fmi3GetEventIndicators" => (api.fmi3GetEventIndicators)(h, &raw mut real, 1),
+            "fmi3GetContinuousStates" => (api.fmi3GetContinuousStates)(h, &raw mut real, 1),
+            "fmi3GetNominalsOfContinuousStates" => (api.fmi3GetNominalsOfContinuousStates)(h, &raw mut real, 1),
+            "fmi3GetNumberOfEventIndicators" => (api.fmi3GetNumberOfEventIndicators)(h, &raw mut size),
+            "fmi3GetNumberOfContinuousStates" => (api.fmi3GetNumberOfContinuousStates)(h, &raw mut size),
+            "fmi3ActivateModelPartition" => (api.fmi3ActivateModelPartition)(h, 0, 0.0),
+            _ => panic!("{name} is not called"),
+        }
+    }
+}
+
+/// In an intermediate update: call the function whose row number is the wish, note the status.
+unsafe extern "C" fn call_inside(
+    environment: *mut c_void,
+    _time: f64,
+    _set_requested: bool,
+    _get_allowed: bool,
+    finished: bool,
+    _can_return: bool,
+    _requested: *mut bool,
+    _at: *mut f64,
+) {
+    let context: *mut fmi3::Context = environment.cast();
+    // SAFETY: the context outlives the instance; the journal is written to during the call, hence no long borrows.
+    unsafe {
+        let (api, handle, wish) = (&*(*context).api, (*context).handle, (*context).wish);
+        if finished && wish >= 0.0 {
+            let row = (0_u32..).zip(rows(FMI3)).find(|(row, _)| (f64::from(*row) - wish).abs() < 0.5);
+            let Some((_, (name, _))) = row else { return };
+            let status = call3(api, handle, (std::ptr::null_mut(), &[]), name, references());
+            (*context).notes.push(f64::from(status));
+            (*context).wish = -1.0;
+        }
+    }
+}
+
+#[test]
+fn fmi3_pair_by_pair() {
+    complete(FMI3, FMI3_APART, Fmi3Api::NAMES);
+    let (api, resources, known) = (fmi3::load(&shipped()), resources(), references());
+    let arguments = fmi3::Arguments { update: Some(call_inside), ..fmi3::Arguments::new(&resources) };
+    let slave = fmi3::Slave::try_new(&api, &arguments).unwrap_or_else(|log| panic!("{log}"));
+    slave.wish(-1.0);
+    let mut states = vec![('I', slave.save())];
+    slave.expect(slave.enter(0.0, None));
+    states.push(('N', slave.save()));
+    slave.expect(slave.exit());
+    assert_eq!(slave.step(0.0, 1e-4).status, 0);
+    let ready = slave.save();
+    states.push(('S', ready));
+    slave.expect(slave.set_reals(&[known.radius], &[-1e307]));
+    assert_eq!(slave.step(1e-4, 1e-4).status, ERROR);
+    states.push(('F', slave.save()));
+    slave.expect(slave.terminate());
+    states.push(('T', slave.save()));
+    let bytes = slave.serialise(ready);
+    let mut pairs = 0;
+    for (row, (name, allowed)) in rows(FMI3).into_iter().enumerate() {
+        for (state, saved) in &states {
+            slave.expect(slave.restore(*saved));
+            let _ = slave.log();
+            // SAFETY: the instance is alive.
+            let status = unsafe { call3(&api, slave.handle, (*saved, &bytes), name, known) };
+            judge(name, allowed, *state, status, &slave.log());
+            pairs += 1;
+        }
+        slave.expect(slave.restore(ready));
+        let _ = (slave.log(), slave.notes());
+        slave.wish(f64::from(u32::try_from(row).expect("few rows")));
+        let answer = slave.step(1e-4, 1e-4);
+        let (log, notes) = (slave.log(), slave.notes());
+        assert_eq!((answer.status, notes.len()), (0, 1), "{name}: the step itself goes on: {log}");
+        judge(name, allowed, 'U', if notes[0] == 0.0 { 0 } else { ERROR }, &log);
+        pairs += 1;
+    }
+    println!("FMI 3.0: {pairs} pairs of function and state");
+}
+
+#[test]
+fn versions_and_platform() {
+    let path = shipped();
+    let (two, three) = (fmi2::load(&path), fmi3::load(&path));
+    // SAFETY: static texts.
+    let read = |text| unsafe { std::ffi::CStr::from_ptr(text) }.to_owned();
+    // SAFETY: no arguments.
+    let texts =
+        unsafe { [read((two.fmi2GetVersion)()), read((two.fmi2GetTypesPlatform)()), read((three.fmi3GetVersion)())] };
+    assert_eq!(texts, ["2.0", "default", "3.0"].map(|text| CString::new(text).expect("no NUL")));
+}

@@ -1,0 +1,622 @@
+//! Callers that break every rule of the standards short of passing dangling pointers. Each case ends in Error (or NULL)
+//! with a message that names the culprit, changes nothing, and leaves the instance usable.
+
+#![allow(clippy::float_cmp, reason = "values are compared for being untouched")]
+
+use std::ffi::{CString, c_void};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use tiprub_tests::api::Fmi3Api;
+use tiprub_tests::scene::{Resources, SCENE, reference, rom};
+use tiprub_tests::{DISCARD, ERROR, OK, fmi2, fmi3, shipped};
+
+/// Cases tried, for the summary.
+static CASES: AtomicUsize = AtomicUsize::new(0);
+
+#[track_caller]
+fn refused(status: i32, log: &str, reason: &str) {
+    CASES.fetch_add(1, Ordering::Relaxed);
+    assert!(status == ERROR, "status {status} instead of Error: {log}");
+    assert!(log.contains(reason), "the message does not say \"{reason}\": {log}");
+}
+
+fn text(text: &str) -> Option<CString> {
+    Some(CString::new(text).expect("no NUL"))
+}
+
+fn summary(name: &str) {
+    println!("{name}: {} hostile cases so far, all refused as they should be", CASES.load(Ordering::Relaxed));
+}
+
+#[test]
+fn instantiation_refuses_and_says_why() {
+    let path = shipped();
+    let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
+    let resources = Resources::new(true);
+    let empty = tempfile::tempdir().expect("a temporary directory");
+    let good = fmi2::Arguments::new(&resources);
+    let uri = |path: &std::path::Path| text(&format!("file://{}", path.display()));
+    let cases2 = [
+        (fmi2::Arguments { name: None, ..good.clone() }, "instanceName is NULL"),
+        (fmi2::Arguments { kind: 0, ..good.clone() }, "fmuType = 0"),
+        (fmi2::Arguments { kind: -7, ..good.clone() }, "fmuType = -7"),
+        (fmi2::Arguments { token: None, ..good.clone() }, "fmuGUID is NULL"),
+        (fmi2::Arguments { token: text("{wrong}"), ..good.clone() }, "\"{wrong}\" does not belong"),
+        (fmi2::Arguments { token: text(""), ..good.clone() }, "does not belong"),
+        (fmi2::Arguments { location: None, ..good.clone() }, "fmuResourceLocation is NULL"),
+        (fmi2::Arguments { location: text(""), ..good.clone() }, "fmuResourceLocation is empty"),
+        (fmi2::Arguments { location: text("http://example.org/r"), ..good.clone() }, "not a file: URI"),
+        (fmi2::Arguments { location: text("file:///no/such/place"), ..good.clone() }, "/no/such/place"),
+        (fmi2::Arguments { location: uri(empty.path()), ..good }, "scene.toml"),
+    ];
+    for (arguments, reason) in cases2 {
+        // The journal checks the instance name; NULL arrives as "".
+        if arguments.name.is_none() {
+            // SAFETY: NULL is what is tried.
+            let handle = unsafe {
+                let null = std::ptr::null();
+                (api2.fmi2Instantiate)(null, 1, null, null, std::ptr::null(), 0, 0)
+            };
+            assert!(handle.is_null(), "{reason}");
+            CASES.fetch_add(1, Ordering::Relaxed);
+            continue;
+        }
+        let log = fmi2::Slave::try_new(&api2, &arguments).expect_err("must be refused");
+        refused(ERROR, &log, reason);
+    }
+    let token = &resources.token;
+    let log = fmi2::Slave::try_new(&api2, &fmi2::Arguments { token: text("{x}"), ..fmi2::Arguments::new(&resources) });
+    assert!(log.expect_err("refused").contains(token), "the message names both tokens");
+
+    let good = fmi3::Arguments::new(&resources);
+    let cases3 = [
+        (fmi3::Arguments { name: None, ..good.clone() }, "instanceName is NULL"),
+        (fmi3::Arguments { name: text(" \t"), ..good.clone() }, "instanceName is empty"),
+        (fmi3::Arguments { token: text("{wrong}"), ..good.clone() }, "does not belong"),
+        (fmi3::Arguments { path: None, ..good.clone() }, "resourcePath is NULL"),
+        (fmi3::Arguments { path: text(""), ..good.clone() }, "resourcePath is empty"),
+        (fmi3::Arguments { path: text("resources"), ..good.clone() }, "not absolute"),
+        (fmi3::Arguments { event_mode: true, ..good.clone() }, "Event Mode"),
+        (fmi3::Arguments { intermediate: vec![99_999], ..good.clone() }, "99999"),
+        (fmi3::Arguments { intermediate: vec![reference("gap_offset")], ..good.clone() }, "neither input nor output"),
+    ];
+    for (arguments, reason) in cases3 {
+        refused(ERROR, &fmi3::Slave::try_new(&api3, &arguments).expect_err("must be refused"), reason);
+    }
+    // A trailing slash, none, and a URI are all understood.
+    let path = resources.path().display().to_string();
+    for form in [path.clone(), format!("{path}/"), format!("file://{path}")] {
+        let arguments = fmi3::Arguments { path: text(&form), ..good.clone() };
+        assert!(fmi3::Slave::try_new(&api3, &arguments).is_ok(), "{form}");
+    }
+    // Other interfaces of FMI 3.0.
+    let mut context = tiprub_tests::Journal::default();
+    let environment: *mut c_void = (&raw mut context).cast();
+    let null = std::ptr::null();
+    // SAFETY: NULL texts must be borne; the environment is a journal.
+    unsafe {
+        let logger = Some(tiprub_tests::journal3 as tiprub_tests::api::LogMessage);
+        assert!((api3.fmi3InstantiateModelExchange)(null, null, null, false, false, environment, logger).is_null());
+        let none = std::ptr::null();
+        assert!(
+            (api3.fmi3InstantiateScheduledExecution)(
+                null,
+                null,
+                null,
+                false,
+                false,
+                environment,
+                logger,
+                none,
+                none,
+                none
+            )
+            .is_null()
+        );
+    }
+    refused(ERROR, &context.text(), "no Model Exchange interface");
+    refused(ERROR, &context.text(), "no Scheduled Execution interface");
+    summary("instantiation");
+}
+
+#[test]
+fn damaged_resources_are_refused() {
+    let api = fmi2::load(&shipped());
+    for (name, content, reason) in [
+        ("scene.toml", b"name = \"x\"\nwrong = 1\n".to_vec(), "wrong"),
+        ("scene.toml", SCENE.replace("step = 2e-6", "step = nan").into_bytes(), "step"),
+        ("scene.toml", SCENE.replace("gap = 4e-4", "gap = inf").into_bytes(), "gap"),
+        ("scene.toml", b"\xff\xfe".to_vec(), "UTF-8"),
+        ("package.toml", Vec::new(), "package.toml"),
+    ] {
+        let resources = Resources::new(false);
+        std::fs::write(resources.path().join(name), content).expect("writable");
+        let log = fmi2::Slave::try_new(&api, &fmi2::Arguments::new(&resources)).expect_err("must be refused");
+        refused(ERROR, &log, reason);
+    }
+    let resources = Resources::new(false);
+    let rom_file = std::fs::read_dir(resources.path()).expect("readable").flatten().map(|entry| entry.path());
+    let rom_file = rom_file.into_iter().find(|path| path.to_string_lossy().ends_with("safetensors")).expect("a ROM");
+    let bytes = std::fs::read(&rom_file).expect("readable");
+    for length in [0, 7, bytes.len() / 2, bytes.len() - 1] {
+        std::fs::write(&rom_file, &bytes[..length]).expect("writable");
+        let log = fmi2::Slave::try_new(&api, &fmi2::Arguments::new(&resources)).expect_err("must be refused");
+        refused(ERROR, &log, "safetensors");
+    }
+    let mut broken = rom();
+    broken.mass[(0, 0)] = f64::NAN;
+    std::fs::write(&rom_file, tiprub_format::write_rom(&broken)).expect("writable");
+    let log = fmi2::Slave::try_new(&api, &fmi2::Arguments::new(&resources)).expect_err("must be refused");
+    refused(ERROR, &log, "mass");
+    summary("resources");
+}
+
+#[test]
+fn a_null_instance_is_refused_everywhere() {
+    let path = shipped();
+    let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
+    let null = std::ptr::null_mut();
+    let (mut value, reference) = (0.0, 0_u32);
+    // SAFETY: NULL is what is tried; arrays have one element.
+    unsafe {
+        (api2.fmi2FreeInstance)(null);
+        (api3.fmi3FreeInstance)(null);
+        let reference = &raw const reference;
+        assert_eq!((api2.fmi2GetReal)(null, reference, 1, &raw mut value), ERROR);
+        assert_eq!((api2.fmi2SetReal)(null, reference, 1, &raw const value), ERROR);
+        assert_eq!((api2.fmi2DoStep)(null, 0.0, 1e-4, 1), ERROR);
+        assert_eq!((api2.fmi2Reset)(null), ERROR);
+        assert_eq!((api2.fmi2Terminate)(null), ERROR);
+        assert_eq!((api2.fmi2EnterEventMode)(null), ERROR);
+        assert_eq!((api2.fmi2GetFMUstate)(null, std::ptr::null_mut()), ERROR);
+        assert_eq!((api3.fmi3GetFloat64)(null, reference, 1, &raw mut value, 1), ERROR);
+        assert_eq!((api3.fmi3EnterStepMode)(null), ERROR);
+        let (mut one, mut two, mut three, mut last) = (true, true, true, f64::NAN);
+        let status =
+            (api3.fmi3DoStep)(null, 0.5, 1e-4, true, &raw mut one, &raw mut two, &raw mut three, &raw mut last);
+        assert_eq!((status, one, two, three, last), (ERROR, false, false, false, 0.5));
+    }
+    CASES.fetch_add(11, Ordering::Relaxed);
+    summary("NULL instance");
+}
+
+#[test]
+fn arguments_of_get_and_set() {
+    let path = shipped();
+    let (api, resources) = (fmi2::load(&path), Resources::new(false));
+    let slave = fmi2::Slave::initialised(&api, &resources);
+    let handle = slave.handle;
+    let (null_in, null_out) = (std::ptr::null(), std::ptr::null_mut());
+    let (speed, friction, output) = ([reference("speed")], reference("friction_coefficient"), reference("rotor_angle"));
+    let mut out = [7.5_f64; 4];
+    // SAFETY: every pointer is NULL or to an array of at least the elements that a correct library touches.
+    unsafe {
+        // Nothing to do is legal, with NULL arrays too.
+        assert_eq!((api.fmi2GetReal)(handle, std::ptr::null(), 0, null_out), OK);
+        assert_eq!((api.fmi2SetReal)(handle, std::ptr::null(), 0, null_in), OK);
+        assert_eq!((api.fmi2GetString)(handle, std::ptr::null(), 0, std::ptr::null_mut()), OK);
+        let get = |references: *const u32, count, values| {
+            let status = (api.fmi2GetReal)(handle, references, count, values);
+            (status, slave.log())
+        };
+        let (status, log) = get(std::ptr::null(), 1, out.as_mut_ptr());
+        refused(status, &log, "argument vr is NULL");
+        let (status, log) = get(speed.as_ptr(), 1, null_out);
+        refused(status, &log, "argument value is NULL");
+        for count in [usize::MAX, usize::MAX / 8, 1 << 40, 1 << 20] {
+            let (status, log) = get(speed.as_ptr(), count, out.as_mut_ptr());
+            refused(status, &log, "more than this FMU can mean");
+        }
+        let (status, log) = get(speed.as_ptr().byte_add(1), 1, out.as_mut_ptr());
+        refused(status, &log, "not aligned");
+        let unknown = [speed[0], 4_000_000_000];
+        let (status, log) = get(unknown.as_ptr(), 2, out.as_mut_ptr());
+        refused(status, &log, "4000000000 does not exist");
+        assert!(out.iter().all(|value| *value == 7.5), "a failing get writes nothing: {out:?}");
+        // Wrong type.
+        let mut integer = 5;
+        refused((api.fmi2GetInteger)(handle, speed.as_ptr(), 1, &raw mut integer), &slave.log(), "of type Real");
+        refused((api.fmi2GetBoolean)(handle, speed.as_ptr(), 1, &raw mut integer), &slave.log(), "of type Real");
+        refused((api.fmi2SetInteger)(handle, speed.as_ptr(), 1, &raw const integer), &slave.log(), "of type Real");
+        assert_eq!(integer, 5);
+        refused((api.fmi2SetReal)(handle, speed.as_ptr(), 1, null_in), &slave.log(), "argument value is NULL");
+        // The first is fine, the second is not: neither is set.
+        for (second, value, reason) in [
+            (friction, f64::NAN, "friction_coefficient"),
+            (friction, f64::INFINITY, "not finite"),
+            (friction, -0.1, "outside 0 to"),
+            (0, 1.0, "time"),
+            (output, 1.0, "cannot be set"),
+        ] {
+            let (references, values) = ([speed[0], second], [310.0, value]);
+            let status = (api.fmi2SetReal)(handle, references.as_ptr(), 2, values.as_ptr());
+            refused(status, &slave.log(), reason);
+            assert_eq!(slave.reals(&speed), [300.0], "nothing is set");
+        }
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            refused(slave.set_reals(&speed, &[value]), &slave.log(), "speed (value reference");
+            refused(slave.set_derivatives(&speed, 1, &[value]), &slave.log(), "not finite");
+        }
+        for order in [0, 2, -1, i32::MAX] {
+            refused(slave.set_derivatives(&speed, order, &[1.0]), &slave.log(), "order");
+        }
+        refused(slave.set_derivatives(&[friction], 1, &[1.0]), &slave.log(), "not a continuous input");
+    }
+    slave.expect(slave.step(0.0, 1e-4));
+    summary("get and set");
+}
+
+#[test]
+fn arrays_of_fmi3() {
+    let path = shipped();
+    let (api, resources) = (fmi3::load(&path), Resources::new(true));
+    let slave = fmi3::Slave::new(&api, &resources);
+    slave.initialise();
+    let simulation = tiprub_core::Simulation::new(&tiprub_tests::scene::scene()).expect("valid");
+    let array = simulation.table().find("blade[1].clearance").expect("watched").reference;
+    assert_eq!(slave.reals(&[array], 3).len(), 3, "one reference, three values");
+    assert_eq!(slave.reals(&[0, array, 1], 5).len(), 5);
+    for (references, count, reason) in [
+        (vec![array], 1, "stand for 3 values"),
+        (vec![array], 4, "stand for 3 values"),
+        (vec![array, array], 3, "stand for 6 values"),
+        (vec![array + 1], 3, "lies inside the array"),
+        (vec![1], 0, "stand for 1 values"),
+        (vec![], 2, "stand for 0 values"),
+        (vec![1], usize::MAX, "nValues"),
+    ] {
+        let mut values = [0.0; 8];
+        // SAFETY: a correct library touches no more than the values it announces in its message.
+        let status = unsafe {
+            (api.fmi3GetFloat64)(slave.handle, references.as_ptr(), references.len(), values.as_mut_ptr(), count)
+        };
+        let log = slave.log();
+        refused(status, &log, if count == usize::MAX { "" } else { reason });
+    }
+    // Scalars when packaged so.
+    let scalars = Resources::new(false);
+    let scalar = fmi3::Slave::new(&api, &scalars);
+    scalar.initialise();
+    assert_eq!(scalar.reals(&[array + 1], 1).len(), 1);
+    // Types that no variable has.
+    let mut byte = [0_u8];
+    // SAFETY: arrays of one element.
+    unsafe {
+        let reference = &raw const array;
+        refused((api.fmi3GetUInt8)(slave.handle, reference, 1, byte.as_mut_ptr(), 1), &slave.log(), "of type Float64");
+        assert_eq!((api.fmi3GetUInt8)(slave.handle, std::ptr::null(), 0, std::ptr::null_mut(), 0), OK);
+        refused((api.fmi3SetClock)(slave.handle, reference, 1, std::ptr::null()), &slave.log(), "of type Float64");
+    }
+    summary("arrays");
+}
+
+#[test]
+fn texts_enumerations_and_booleans() {
+    let path = shipped();
+    let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), Resources::new(false));
+    let simulation = tiprub_core::Simulation::new(&tiprub_tests::scene::scene()).expect("valid");
+    let find = |name: &str| simulation.table().find(name).unwrap_or_else(|| panic!("no {name}")).reference;
+    let (scheme, scene, touching) = (find("scheme"), find("scene"), find("in_contact"));
+    let (two, three) = (fmi2::Slave::new(&api2, &resources), fmi3::Slave::new(&api3, &resources));
+    let (mut name, mut number, mut long, mut flag) = (std::ptr::null(), 0_i32, 0_i64, true);
+    // SAFETY: arrays of one element.
+    unsafe {
+        two.expect((api2.fmi2GetString)(two.handle, &raw const scene, 1, &raw mut name));
+        two.expect((api2.fmi2GetInteger)(two.handle, &raw const scheme, 1, &raw mut number));
+        // The text lives on while other calls are made, until texts are asked for again.
+        assert_eq!(std::ffi::CStr::from_ptr(name).to_str(), Ok("toy_rub"));
+        assert_eq!(number, 2, "modal-exact");
+        three.expect((api3.fmi3GetInt64)(three.handle, &raw const scheme, 1, &raw mut long, 1));
+        assert_eq!(long, 2);
+        for value in [0_i64, 3, -1, i64::MAX] {
+            let status = (api3.fmi3SetInt64)(three.handle, &raw const scheme, 1, &raw const value, 1);
+            refused(status, &three.log(), "no item of Scheme");
+        }
+        for value in [0, 3, i32::MIN] {
+            let status = (api2.fmi2SetInteger)(two.handle, &raw const scheme, 1, &raw const value);
+            refused(status, &two.log(), "1 = central-difference");
+        }
+        let status = (api3.fmi3GetInt32)(three.handle, &raw const scheme, 1, &raw mut number, 1);
+        refused(status, &three.log(), "of type Int64");
+        let status = (api2.fmi2SetString)(two.handle, &raw const scene, 1, &raw const name);
+        refused(status, &two.log(), "cannot be set");
+        let status = (api2.fmi2SetString)(two.handle, &raw const scene, 1, &std::ptr::null());
+        refused(status, &two.log(), "NULL");
+        let status = (api3.fmi3GetBoolean)(three.handle, &raw const touching, 1, &raw mut flag, 1);
+        refused(status, &three.log(), "no value before initialisation");
+        three.initialise();
+        three.expect((api3.fmi3GetBoolean)(three.handle, &raw const touching, 1, &raw mut flag, 1));
+        assert!(!flag);
+    }
+    summary("types");
+}
+
+#[test]
+fn steps_at_wrong_times_and_of_wrong_sizes() {
+    let path = shipped();
+    let (api, resources) = (fmi2::load(&path), Resources::new(false));
+    let slave = fmi2::Slave::initialised(&api, &resources);
+    slave.expect(slave.step(0.0, 1e-4));
+    let before = slave.serialise(slave.save());
+    for (time, size, reason) in [
+        (0.0, 1e-4, "currentCommunicationPoint"),
+        (1e-3, 1e-4, "currentCommunicationPoint"),
+        (-1e-4, 1e-4, "currentCommunicationPoint"),
+        (f64::NAN, 1e-4, "currentCommunicationPoint"),
+        (f64::INFINITY, 1e-4, "currentCommunicationPoint"),
+        (1e-4, 0.0, "communicationStepSize"),
+        (1e-4, -1e-4, "communicationStepSize"),
+        (1e-4, f64::NAN, "communicationStepSize"),
+        (1e-4, f64::INFINITY, "communicationStepSize"),
+        (1e-4, 1e-300, "communicationStepSize"),
+        (1e-4, 1e300, "communicationStepSize"),
+    ] {
+        refused(slave.step(time, size), &slave.log(), reason);
+        assert!(slave.serialise(slave.save()) == before, "a refused step changes nothing");
+    }
+    slave.expect(slave.step(1e-4, 1e-4));
+    // Status of the last step.
+    let (mut real, mut boolean) = (0.0, 7);
+    // SAFETY: places for one value.
+    unsafe {
+        slave.expect((api.fmi2GetRealStatus)(slave.handle, 2, &raw mut real));
+        slave.expect((api.fmi2GetBooleanStatus)(slave.handle, 3, &raw mut boolean));
+        assert!((real - 2e-4).abs() < 1e-18 && boolean == 0);
+        for kind in [0, 1, -5, 99] {
+            assert_eq!((api.fmi2GetStatus)(slave.handle, kind, &raw mut boolean), DISCARD);
+            assert_eq!((api.fmi2GetRealStatus)(slave.handle, kind, &raw mut real), DISCARD);
+            assert!(slave.log().contains("has no information"));
+        }
+        refused((api.fmi2GetRealStatus)(slave.handle, 2, std::ptr::null_mut()), &slave.log(), "argument value is NULL");
+    }
+    let three = fmi3::load(&path);
+    let third = fmi3::Slave::new(&three, &resources);
+    for (start, stop, reason) in [
+        (f64::NAN, None, "startTime"),
+        (f64::NEG_INFINITY, None, "startTime"),
+        (1.0, Some(0.5), "stopTime"),
+        (0.0, Some(f64::NAN), "stopTime"),
+        (0.0, Some(f64::INFINITY), "stopTime"),
+    ] {
+        refused(slave.setup(start, stop), &slave.log(), "not allowed in state");
+        refused(third.enter(start, stop), &third.log(), reason);
+    }
+    third.initialise();
+    // A missing place for an answer is refused before anything moves; the other three are written.
+    let (mut event, mut early, mut last) = (true, true, f64::NAN);
+    // SAFETY: NULL is what is tried.
+    let status = unsafe {
+        let null = std::ptr::null_mut();
+        (three.fmi3DoStep)(third.handle, 0.0, 1e-4, true, &raw mut event, null, &raw mut early, &raw mut last)
+    };
+    refused(status, &third.log(), "argument terminateSimulation is NULL");
+    assert_eq!((event, early, last), (false, false, 0.0));
+    assert_eq!(third.step(0.0, 1e-4).status, OK);
+    summary("steps");
+}
+
+#[test]
+fn calls_twice_and_on_the_wrong_version() {
+    let path = shipped();
+    let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), Resources::new(false));
+    let slave = fmi2::Slave::initialised(&api2, &resources);
+    slave.expect(slave.step(0.0, 1e-4));
+    slave.expect(slave.reset());
+    slave.expect(slave.reset());
+    refused(slave.exit(), &slave.log(), "not allowed in state Instantiated");
+    slave.initialise();
+    refused(slave.enter(), &slave.log(), "not allowed in state Step Mode");
+    slave.expect(slave.terminate());
+    refused(slave.terminate(), &slave.log(), "not allowed in state Terminated");
+    refused(slave.step(0.0, 1e-4), &slave.log(), "not allowed in state Terminated");
+    slave.expect(slave.reset());
+    slave.initialise();
+    slave.expect(slave.step(0.0, 1e-4));
+    // SAFETY: a live instance, of the other version.
+    let status = unsafe { (api3.fmi3Reset)(slave.handle) };
+    refused(status, &slave.log(), "functions of Fmi2");
+    // SAFETY: as before; it must not be freed.
+    unsafe { (api3.fmi3FreeInstance)(slave.handle) };
+    assert!(slave.log().contains("functions of Fmi2"));
+    slave.expect(slave.step(1e-4, 1e-4));
+    summary("order");
+}
+
+#[test]
+fn loggers() {
+    let path = shipped();
+    let (api, resources) = (fmi2::load(&path), Resources::new(false));
+    let slave = fmi2::Slave::new(&api, &resources);
+    let names = ["logStatusWarning", "nonsense"].map(|name| CString::new(name).expect("no NUL"));
+    let list = [names[0].as_ptr(), names[1].as_ptr()];
+    // SAFETY: arrays of the lengths given.
+    unsafe {
+        refused(
+            (api.fmi2SetDebugLogging)(slave.handle, 1, 2, list.as_ptr()),
+            &slave.log(),
+            "\"nonsense\" does not exist",
+        );
+        refused((api.fmi2SetDebugLogging)(slave.handle, 1, 1, std::ptr::null()), &slave.log(), "categories is NULL");
+        refused((api.fmi2SetDebugLogging)(slave.handle, 1, usize::MAX, list.as_ptr()), &slave.log(), "categories");
+        slave.expect((api.fmi2SetDebugLogging)(slave.handle, 1, 1, list.as_ptr()));
+        assert_eq!(slave.exit(), ERROR);
+        assert_eq!(slave.log(), "", "errors were not asked for");
+        slave.expect((api.fmi2SetDebugLogging)(slave.handle, 0, 0, std::ptr::null()));
+        assert_eq!(slave.exit(), ERROR);
+        assert!(slave.log().contains("fmi2ExitInitializationMode"), "without a choice, errors are explained");
+    }
+    // No callbacks at all, and callbacks without a logger: everything works in silence.
+    let good = fmi2::Arguments::new(&resources);
+    let (name, token, place) = (good.name.expect("set"), good.token.expect("set"), good.location.expect("set"));
+    let none = tiprub_tests::api::Fmi2Callbacks {
+        logger: std::ptr::null(),
+        allocateMemory: std::ptr::null(),
+        freeMemory: std::ptr::null(),
+        stepFinished: std::ptr::null(),
+        componentEnvironment: std::ptr::null_mut(),
+    };
+    for callbacks in [std::ptr::null(), &raw const none] {
+        // SAFETY: all texts live; callbacks are NULL or hold NULL.
+        unsafe {
+            let handle = (api.fmi2Instantiate)(name.as_ptr(), 1, token.as_ptr(), place.as_ptr(), callbacks, 0, 1);
+            assert!(!handle.is_null());
+            assert_eq!((api.fmi2DoStep)(handle, 0.0, 1e-4, 1), ERROR);
+            assert_eq!((api.fmi2EnterInitializationMode)(handle), OK);
+            (api.fmi2FreeInstance)(handle);
+        }
+    }
+    // The callback struct and the texts are copied: those of `Slave::new` are gone by now, and messages still come with the
+    // instance's name, which the journal checks.
+    assert_eq!(slave.step(0.0, 1.0), ERROR);
+    assert!(slave.log().contains("not allowed in state Instantiated"));
+    summary("loggers");
+}
+
+/// Calls from within an intermediate update that are not allowed there.
+unsafe extern "C" fn misbehave(
+    environment: *mut c_void,
+    _time: f64,
+    _set_requested: bool,
+    _get_allowed: bool,
+    _finished: bool,
+    _can_return: bool,
+    requested: *mut bool,
+    at: *mut f64,
+) {
+    let context: *mut fmi3::Context = environment.cast();
+    // SAFETY: the context outlives the instance; logging writes to its journal during these calls, hence no long borrows.
+    unsafe {
+        let (api, handle): (&Fmi3Api, _) = (&*(*context).api, (*context).handle);
+        let (mut a, mut b, mut c, mut d) = (false, false, false, 0.0);
+        let mut state = std::ptr::null_mut();
+        let (friction, value) = (reference("friction_coefficient"), 0.5);
+        let statuses = [
+            (api.fmi3DoStep)(handle, 0.0, 1e-6, true, &raw mut a, &raw mut b, &raw mut c, &raw mut d),
+            (api.fmi3Reset)(handle),
+            (api.fmi3Terminate)(handle),
+            (api.fmi3GetFMUState)(handle, &raw mut state),
+            (api.fmi3SetFMUState)(handle, state),
+            (api.fmi3DeserializeFMUState)(handle, std::ptr::null(), 0, &raw mut state),
+            (api.fmi3EnterInitializationMode)(handle, false, 0.0, 0.0, false, 0.0),
+            (api.fmi3SetFloat64)(handle, &raw const friction, 1, &raw const value, 1),
+        ];
+        (api.fmi3FreeInstance)(handle);
+        (*context).notes.extend(statuses.map(f64::from));
+        (*requested, *at) = (true, f64::NAN);
+    }
+}
+
+#[test]
+fn an_intermediate_update_cannot_pull_the_rug() {
+    let path = shipped();
+    let (api, resources) = (fmi3::load(&path), Resources::new(false));
+    for early_return in [false, true] {
+        let arguments = fmi3::Arguments { update: Some(misbehave), early_return, ..fmi3::Arguments::new(&resources) };
+        let slave = fmi3::Slave::try_new(&api, &arguments).unwrap_or_else(|log| panic!("{log}"));
+        slave.initialise();
+        let answer = slave.step(0.0, 1e-5);
+        let notes = slave.notes();
+        assert_eq!(notes.len(), 5 * 8, "five internal steps of eight forbidden calls");
+        assert!(notes.iter().all(|status| *status == f64::from(ERROR)), "{notes:?}");
+        let log = slave.log();
+        assert!(log.contains("a step is under way, the instance is not freed"), "{log}");
+        assert!(log.contains("not a continuous input"), "{log}");
+        // A request that was not allowed is answered with Warning, one to return at NaN is not fulfilled.
+        assert_eq!((answer.status, answer.early), (i32::from(!early_return), false), "{log}");
+        assert_eq!(answer.time.to_bits(), 1e-5_f64.to_bits());
+        CASES.fetch_add(9, Ordering::Relaxed);
+    }
+    summary("intermediate updates");
+}
+
+#[test]
+fn a_non_finite_state_ends_in_error_with_the_last_good_time() {
+    let path = shipped();
+    let api = fmi2::load(&path);
+    let mut moving = tiprub_tests::scene::scene();
+    moving.settings.surfaces[0].moving = true;
+    let resources = Resources::of(&moving, false);
+    let slave = fmi2::Slave::initialised(&api, &resources);
+    slave.expect(slave.step(0.0, 1e-4));
+    let good = slave.save();
+    let simulation = tiprub_core::Simulation::new(&moving).expect("valid");
+    let radius = simulation.table().find("casing_radius_change").expect("moving").reference;
+    slave.expect(slave.set_reals(&[radius], &[-1e307]));
+    refused(slave.step(1e-4, 1e-4), &slave.log(), "non-finite between t = 0.0001 s");
+    let (mut last, mut terminated) = (0.0, 0);
+    // SAFETY: places for one value.
+    unsafe {
+        slave.expect((api.fmi2GetRealStatus)(slave.handle, 2, &raw mut last));
+        slave.expect((api.fmi2GetBooleanStatus)(slave.handle, 3, &raw mut terminated));
+    }
+    assert_eq!((last, terminated), (1e-4, 1));
+    refused(slave.step(1e-4, 1e-4), &slave.log(), "not allowed in state Step Failed");
+    slave.expect(slave.restore(good));
+    slave.expect(slave.step(1e-4, 1e-4));
+    slave.expect(slave.reset());
+    slave.initialise();
+    slave.expect(slave.step(0.0, 1e-4));
+    summary("non-finite");
+}
+
+/// An instance that two threads use at once, against the rules.
+struct Shared(*mut c_void);
+// SAFETY: the library under test refuses concurrent calls on an instance.
+unsafe impl Sync for Shared {}
+
+#[test]
+fn two_threads_with_an_instance_each_and_two_on_one() {
+    let path = shipped();
+    let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), Resources::new(false));
+    let references =
+        ["time", "rotor_angle", "clearance_minimum", "force_x", "normal_impulse", "blade[1].clearance"].map(reference);
+    let run2 = || {
+        let slave = fmi2::Slave::initialised(&api2, &resources);
+        for step in 0..300 {
+            slave.expect(slave.step(f64::from(step) * 1e-4, 1e-4));
+        }
+        let reals: Vec<_> = slave.reals(&references).into_iter().map(f64::to_bits).collect();
+        reals
+    };
+    let run3 = || {
+        let slave = fmi3::Slave::new(&api3, &resources);
+        slave.initialise();
+        for step in 0..300 {
+            assert_eq!(slave.step(f64::from(step) * 1e-4, 1e-4).status, OK);
+        }
+        let reals: Vec<_> = slave.reals(&references, references.len()).into_iter().map(f64::to_bits).collect();
+        reals
+    };
+    let alone = run2();
+    std::thread::scope(|scope| {
+        let threads = [scope.spawn(run2), scope.spawn(run3), scope.spawn(run2), scope.spawn(run3)];
+        for thread in threads {
+            assert_eq!(thread.join().expect("no thread fails"), alone);
+        }
+    });
+    // Two threads on one instance is against the rules: some calls are refused, none is undefined.
+    let slave = fmi2::Slave::initialised(&api2, &resources);
+    let shared = Shared(slave.handle);
+    let reset = || {
+        let Shared(handle) = &shared;
+        // SAFETY: a live instance; the library serialises access itself.
+        unsafe { (api2.fmi2Reset)(*handle) }
+    };
+    // Messages would go to one journal from two threads: switch them off by asking for a category that never comes.
+    let fatal = CString::new("logStatusFatal").expect("no NUL");
+    let list = [fatal.as_ptr()];
+    // SAFETY: an array of one text.
+    slave.expect(unsafe { (api2.fmi2SetDebugLogging)(slave.handle, 1, 1, list.as_ptr()) });
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                for _ in 0..2000 {
+                    assert!([OK, ERROR].contains(&reset()));
+                }
+            });
+        }
+    });
+    slave.expect(slave.reset());
+    CASES.fetch_add(1, Ordering::Relaxed);
+    summary("threads");
+}
