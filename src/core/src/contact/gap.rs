@@ -7,6 +7,7 @@
 //! slope is what lets a frictionless lobe draw power from the shaft: r n_θ λ is the torque conjugate to θ_r.
 
 use super::surface::Surface;
+use crate::dynamics::dispatch::{InstructionSet, Kernel};
 use crate::settings::Meridian;
 use crate::{Error, Result, Rom};
 
@@ -69,12 +70,14 @@ pub struct FixedGap {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RevolutionGap {
     surface: Surface,
+    instruction_set: InstructionSet,
     lanes: usize,
-    sectors: usize,
     /// Angle in the rotating frame, `[node · lanes + lane]` (rad).
     angles: Vec<f64>,
     /// Radius per node (m).
     radii: Vec<f64>,
+    /// 1/radius per node (1/m).
+    per_radius: Vec<f64>,
     /// Meridional slope per node.
     slopes: Vec<f64>,
     /// Radial clearance per lane (m).
@@ -101,13 +104,15 @@ impl RevolutionGap {
                 angles[node * lanes + sector] = contact.position[1] + sector_angle(sector, sectors);
             }
         }
-        let mut padded = vec![f64::MAX; lanes];
+        // Padding lanes are infinitely far away.
+        let mut padded = vec![f64::INFINITY; lanes];
         padded[..sectors].copy_from_slice(clearances);
         Ok(Self {
             surface,
+            instruction_set: InstructionSet::detect(),
             lanes,
-            sectors,
             angles,
+            per_radius: rom.contact_nodes.iter().map(|node| 1.0 / node.position[0]).collect(),
             radii: rom.contact_nodes.iter().map(|node| node.position[0]).collect(),
             slopes: rom
                 .contact_nodes
@@ -127,28 +132,48 @@ impl RevolutionGap {
     pub fn radius(&self, node: usize) -> f64 {
         self.radii[node]
     }
+}
 
-    fn evaluate(&self, drive: &Drive, displacement: &[f64], geometry: &mut Geometry, gap: &mut [f64]) {
+/// Gaps and normals of all nodes and lanes on a surface of revolution.
+struct Evaluate<'a> {
+    law: &'a RevolutionGap,
+    drive: &'a Drive,
+    displacement: &'a [f64],
+    geometry: &'a mut Geometry,
+    gap: &'a mut [f64],
+}
+
+impl Kernel for Evaluate<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { law, drive, displacement, geometry, gap } = self;
         let opening = drive.gap_offset + drive.radius_change;
         let turned = drive.rotor_angle - drive.shape_rotation;
-        let lanes = self.lanes;
-        for node in 0..self.radii.len() {
-            let (slope, radius) = (self.slopes[node], self.radii[node]);
+        let factor = drive.shape_factor;
+        let lanes = law.lanes;
+        for node in 0..law.radii.len() {
+            let (slope, per_radius) = (law.slopes[node], law.per_radius[node]);
+            let span = node * lanes..(node + 1) * lanes;
             let [radial, tangential, axial] =
                 std::array::from_fn(|component| &displacement[(3 * node + component) * lanes..][..lanes]);
-            for sector in 0..self.sectors {
-                let index = node * lanes + sector;
-                let (shape, turn) = match &self.surface {
-                    Surface::Circular => (0.0, 0.0),
-                    surface => surface.evaluate(self.angles[index] + turned + tangential[sector] / radius),
-                };
-                let sideways = drive.shape_factor * turn / radius;
-                let length = (1.0 + sideways * sideways + slope * slope).sqrt();
-                let clearance = self.clearances[sector] + opening + drive.shape_factor * shape;
-                gap[index] = (clearance - radial[sector] + slope * axial[sector]) / length;
-                geometry.normal[0][index] = -1.0 / length;
-                geometry.normal[1][index] = sideways / length;
-                geometry.normal[2][index] = slope / length;
+            let (angles, clearances) = (&law.angles[span.clone()], &law.clearances[..lanes]);
+            let [normal_0, normal_1, normal_2] = &mut geometry.normal;
+            let normal_0 = &mut normal_0[span.clone()];
+            let (normal_1, normal_2) = (&mut normal_1[span.clone()], &mut normal_2[span.clone()]);
+            let gap = &mut gap[span];
+            // The normal arrays hold angle, shape and slope of the shape until they are overwritten.
+            for lane in 0..lanes {
+                normal_0[lane] = angles[lane] + turned + tangential[lane] * per_radius;
+            }
+            law.surface.evaluate_row(normal_0, normal_1, normal_2);
+            for lane in 0..lanes {
+                let sideways = factor * normal_2[lane] * per_radius;
+                let per_length = 1.0 / (1.0 + sideways * sideways + slope * slope).sqrt();
+                let clearance = clearances[lane] + opening + factor * normal_1[lane];
+                gap[lane] = (clearance - radial[lane] + slope * axial[lane]) * per_length;
+                normal_0[lane] = -per_length;
+                normal_1[lane] = sideways * per_length;
+                normal_2[lane] = slope * per_length;
             }
         }
     }
@@ -184,7 +209,7 @@ impl GapLaw {
     }
 
     /// Gaps (m) and normals at an instant, for the displacements `[row · lanes + lane]` of the contact rows (m).
-    /// Gaps of padding lanes are left alone.
+    /// Gaps of padding lanes are infinite.
     pub fn evaluate(&self, drive: &Drive, displacement: &[f64], geometry: &mut Geometry, gap: &mut [f64]) {
         match self {
             Self::Fixed(law) => {
@@ -192,7 +217,7 @@ impl GapLaw {
                     gap[node] = initial + dot(*normal, std::array::from_fn(|i| displacement[3 * node + i]));
                 }
             }
-            Self::Revolution(law) => law.evaluate(drive, displacement, geometry, gap),
+            Self::Revolution(law) => law.instruction_set.run(Evaluate { law, drive, displacement, geometry, gap }),
         }
     }
 

@@ -7,7 +7,7 @@
 
 use nalgebra::DMatrix;
 
-use super::dispatch::InstructionSet;
+use super::dispatch::{InstructionSet, Kernel};
 use super::modal::ModalModel;
 use super::scheme::{ModeCoefficients, free_increment, resample};
 use crate::persist::{Persist, Reader, Writer, persist_fields};
@@ -243,10 +243,10 @@ impl ModalBank {
         std::mem::swap(&mut self.state.displacement, &mut self.state.displacement_before);
         let instruction_set = self.instruction_set;
         match (self.width, with_loss) {
-            (1, true) => instruction_set.run(|| predict_chunks::<1, true>(self)),
-            (1, false) => instruction_set.run(|| predict_chunks::<1, false>(self)),
-            (_, true) => instruction_set.run(|| predict_chunks::<LANES, true>(self)),
-            (_, false) => instruction_set.run(|| predict_chunks::<LANES, false>(self)),
+            (1, true) => instruction_set.run(Predict::<1, true>(self)),
+            (1, false) => instruction_set.run(Predict::<1, false>(self)),
+            (_, true) => instruction_set.run(Predict::<LANES, true>(self)),
+            (_, false) => instruction_set.run(Predict::<LANES, false>(self)),
         }
     }
 
@@ -321,31 +321,37 @@ impl ModalBank {
 }
 
 /// The fused pass over all chunks. `increment_before` holds d, `state.increment` receives d⁺.
-#[inline(always)]
-fn predict_chunks<const WIDTH: usize, const LOSS: bool>(bank: &mut ModalBank) {
-    let (modes, rows) = (bank.frequencies.len(), bank.rows);
-    let lanes = bank.chunks * WIDTH;
-    let block = modes * WIDTH;
-    for chunk in 0..bank.chunks {
-        let position = &mut bank.state.position[chunk * block..][..block];
-        let before = &bank.increment_before[chunk * block..][..block];
-        let increment = &mut bank.state.increment[chunk * block..][..block];
-        let loss = &mut bank.state.loss[chunk * WIDTH..][..WIDTH];
-        advance_modes::<WIDTH, LOSS>(&bank.coefficients, position, before, increment, loss);
-        // Nine rows (three contact nodes) fit the registers of the widest set; more go in further passes.
-        let mut row = 0;
-        while row < rows {
-            let displacement = &mut bank.state.displacement[row * lanes + chunk * WIDTH..];
-            let shapes = &bank.contact_modes[row..];
-            row += match rows - row {
-                9.. => recover_rows::<WIDTH, 9>(position, shapes, rows, lanes, displacement),
-                6.. => recover_rows::<WIDTH, 6>(position, shapes, rows, lanes, displacement),
-                _ => recover_rows::<WIDTH, 3>(position, shapes, rows, lanes, displacement),
-            };
+struct Predict<'a, const WIDTH: usize, const LOSS: bool>(&'a mut ModalBank);
+
+impl<const WIDTH: usize, const LOSS: bool> Kernel for Predict<'_, WIDTH, LOSS> {
+    #[inline(always)]
+    fn run(self) {
+        let bank = self.0;
+        let (modes, rows) = (bank.frequencies.len(), bank.rows);
+        let lanes = bank.chunks * WIDTH;
+        let block = modes * WIDTH;
+        for chunk in 0..bank.chunks {
+            let position = &mut bank.state.position[chunk * block..][..block];
+            let before = &bank.increment_before[chunk * block..][..block];
+            let increment = &mut bank.state.increment[chunk * block..][..block];
+            let loss = &mut bank.state.loss[chunk * WIDTH..][..WIDTH];
+            advance_modes::<WIDTH, LOSS>(&bank.coefficients, position, before, increment, loss);
+            // Nine rows (three contact nodes) fit the registers of the widest set; more go in further passes.
+            let mut row = 0;
+            while row < rows {
+                let displacement = &mut bank.state.displacement[row * lanes + chunk * WIDTH..];
+                let shapes = &bank.contact_modes[row..];
+                row += match rows - row {
+                    9.. => recover_rows::<WIDTH, 9>(position, shapes, rows, lanes, displacement),
+                    6.. => recover_rows::<WIDTH, 6>(position, shapes, rows, lanes, displacement),
+                    _ => recover_rows::<WIDTH, 3>(position, shapes, rows, lanes, displacement),
+                };
+            }
         }
     }
 }
 
+/// d⁺ = β d − κ q, q⁺ = q + d⁺ for all modes of one chunk; whole arrays at a time, so that they stay in registers.
 #[inline(always)]
 fn advance_modes<const WIDTH: usize, const LOSS: bool>(
     coefficients: &[ModeCoefficients],
@@ -359,13 +365,14 @@ fn advance_modes<const WIDTH: usize, const LOSS: bool>(
     let (before, _) = before.as_chunks::<WIDTH>();
     let (increment, _) = increment.as_chunks_mut::<WIDTH>();
     for (((k, q), d), next) in coefficients.iter().zip(position).zip(before).zip(increment) {
-        for lane in 0..WIDTH {
-            next[lane] = k.beta * d[lane] - k.kappa * q[lane];
-            q[lane] += next[lane];
-            if LOSS {
-                let twice = next[lane] + d[lane];
-                lost[lane] += k.loss * (twice * twice);
-            }
+        let (beta, kappa, factor) = (k.beta, k.kappa, k.loss);
+        let (old, d) = (*q, *d);
+        let new: [f64; WIDTH] = std::array::from_fn(|lane| beta * d[lane] - kappa * old[lane]);
+        *q = std::array::from_fn(|lane| old[lane] + new[lane]);
+        *next = new;
+        if LOSS {
+            let twice: [f64; WIDTH] = std::array::from_fn(|lane| new[lane] + d[lane]);
+            lost = std::array::from_fn(|lane| lost[lane] + factor * (twice[lane] * twice[lane]));
         }
     }
     if LOSS {
@@ -387,11 +394,11 @@ fn recover_rows<const WIDTH: usize, const ROWS: usize>(
     let mut sums = [[0.0; WIDTH]; ROWS];
     let (position, _) = position.as_chunks::<WIDTH>();
     for (q, shapes) in position.iter().zip(shapes.chunks(stride)) {
-        let shapes = &shapes[..ROWS];
+        let (q, shapes) = (*q, &shapes[..ROWS]);
         for row in 0..ROWS {
-            for lane in 0..WIDTH {
-                sums[row][lane] += shapes[row] * q[lane];
-            }
+            let shape = shapes[row];
+            let sum = sums[row];
+            sums[row] = std::array::from_fn(|lane| sum[lane] + shape * q[lane]);
         }
     }
     for row in 0..ROWS {

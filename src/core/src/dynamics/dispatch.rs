@@ -1,9 +1,9 @@
-//! Run-time choice of the instruction set for the one hot loop.
+//! Run-time choice of the instruction set for the hot loops.
 //!
-//! The loop body is the same source for every instruction set and uses neither fused multiply-add nor horizontal
+//! The loop bodies are the same source for every instruction set and uses neither fused multiply-add nor horizontal
 //! sums, so wider registers change the speed and not one bit of the result.
 
-/// Instruction sets the hot loop is compiled for.
+/// Instruction sets the hot loops are compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InstructionSet {
     /// What every target of the build supports (SSE2 on x86-64).
@@ -31,11 +31,11 @@ impl InstructionSet {
         Self::Baseline
     }
 
-    /// Run `kernel` compiled for this instruction set. `kernel` must be `#[inline(always)]` to profit.
+    /// Run `kernel` compiled for this instruction set.
     #[inline]
-    pub fn run<R>(self, kernel: impl FnOnce() -> R) -> R {
+    pub fn run(self, kernel: impl Kernel) {
         match self {
-            Self::Baseline => kernel(),
+            Self::Baseline => kernel.run(),
             // SAFETY: the variants are only made by `detect`, after the processor reported the feature.
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => unsafe { with_avx2(kernel) },
@@ -46,14 +46,20 @@ impl InstructionSet {
     }
 }
 
+/// A loop nest that is compiled once per instruction set. `run` must be `#[inline(always)]`; a closure would not be.
+pub trait Kernel {
+    /// Do the work.
+    fn run(self);
+}
+
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn with_avx2<R>(kernel: impl FnOnce() -> R) -> R {
-    kernel()
+fn with_avx2(kernel: impl Kernel) {
+    kernel.run();
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f")]
-fn with_avx512<R>(kernel: impl FnOnce() -> R) -> R {
-    kernel()
+fn with_avx512(kernel: impl Kernel) {
+    kernel.run();
 }

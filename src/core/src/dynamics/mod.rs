@@ -1,6 +1,6 @@
 //! Modal equations of motion and their time stepping.
 
 pub mod bank;
-mod dispatch;
+pub mod dispatch;
 pub mod modal;
 pub mod scheme;
