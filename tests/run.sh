@@ -17,8 +17,12 @@ cd "$root" || exit 1
 section "Rust: cargo test --workspace --release"
 cargo test --workspace --release || failed=1
 
-section "Command line: cargo build --release"
+section "Command line and FMU library: cargo build"
 cargo build --release || exit 1
+cargo build -p tiprub-fmi --profile fmu --target-dir target/product || exit 1
+TIPRUB=$root/target/release/tiprub
+TIPRUB_LIBRARY=$root/target/product/fmu/libtiprub_fmi.so
+export TIPRUB TIPRUB_LIBRARY
 
 section "Python environment: $venv"
 stamp=$venv/requirements.txt

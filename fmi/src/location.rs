@@ -94,15 +94,14 @@ mod tests {
     use super::*;
 
     /// A directory with a blank, an umlaut and a percent sign in its name.
-    fn directory() -> PathBuf {
-        let path = std::env::temp_dir().join("tiprub location \u{fc} 50% off");
-        std::fs::create_dir_all(&path).unwrap();
-        path
+    fn directory() -> tempfile::TempDir {
+        tempfile::Builder::new().prefix("tiprub location \u{fc} 50% off").tempdir().unwrap()
     }
 
     #[test]
     fn every_form_of_the_uri_leads_to_the_directory() {
-        let path = directory();
+        let directory = directory();
+        let path = directory.path();
         let text = path.to_str().unwrap();
         let encoded = text.replace('%', "%25").replace(' ', "%20").replace('\u{fc}', "%C3%bc");
         for uri in [
@@ -114,7 +113,7 @@ mod tests {
             text.to_owned(),
             format!("{text}/"),
         ] {
-            assert_eq!(from_uri(&uri).as_deref(), Ok(path.as_path()), "{uri}");
+            assert_eq!(from_uri(&uri).as_deref(), Ok(path), "{uri}");
         }
     }
 
@@ -138,11 +137,12 @@ mod tests {
 
     #[test]
     fn native_paths() {
-        let path = directory();
+        let directory = directory();
+        let path = directory.path();
         let text = path.to_str().unwrap();
-        assert_eq!(from_native(text).as_deref(), Ok(path.as_path()));
-        assert_eq!(from_native(&format!("{text}/")).as_deref(), Ok(path.as_path()));
-        assert_eq!(from_native(&format!("file://{}", text.replace('%', "%25"))).as_deref(), Ok(path.as_path()));
+        assert_eq!(from_native(text).as_deref(), Ok(path));
+        assert_eq!(from_native(&format!("{text}/")).as_deref(), Ok(path));
+        assert_eq!(from_native(&format!("file://{}", text.replace('%', "%25"))).as_deref(), Ok(path));
         assert!(from_native("").unwrap_err().contains("empty"));
         assert!(from_native("resources").unwrap_err().contains("not absolute"));
         assert!(from_native("/no/such/directory").unwrap_err().contains("not a directory"));

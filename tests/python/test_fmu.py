@@ -1,12 +1,14 @@
 """The packaged FMUs of rotor 37 in FMPy."""
 
 import math
+import re
 import struct
 import subprocess
 import sys
 import threading
 from pathlib import Path
 
+import fmpy
 import numpy
 import pytest
 from fmpy import simulate_fmu
@@ -303,3 +305,20 @@ def test_messages_name_variable_value_and_remedy(three):
     log = instance.refused(lambda: instance.step(1.0, 1e-5))
     for part in ("currentCommunicationPoint", "1 s", "t = 0 s", "Continue from"):
         assert part in log, (part, log)
+
+
+def declared(version):
+    """Names of the functions that a version's header declares, as FMPy ships it."""
+    header = Path(fmpy.__file__).parent / "c-code" / f"fmi{version}FunctionTypes.h"
+    pattern = rf"typedef\s+[\w* ]+?\s*\*?(fmi{version}[A-Z]\w*)TYPE\s*\("
+    return set(re.findall(pattern, header.read_text()))
+
+
+def test_the_binary_exports_what_the_headers_declare_and_nothing_else(unpacked):
+    two, three = declared(2), declared(3)
+    assert (len(two), len(three)) == (44, 75)
+    for fmu in (unpacked.two, unpacked.three):
+        folder = "linux64" if fmu.description.fmiVersion == "2.0" else "x86_64-linux"
+        binary = Path(fmu.directory) / "binaries" / folder / "tiprub.so"
+        listing = subprocess.run(["nm", "-D", "--defined-only", binary], check=True, capture_output=True, text=True)
+        assert {line.split()[-1] for line in listing.stdout.splitlines()} == two | three
