@@ -44,7 +44,7 @@ pub fn write(target: &Path, entries: &[Entry]) -> Result<()> {
 /// Write the archive into anything seekable.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_into(target: impl Write + Seek, entries: &[Entry]) -> Result<()> {
     check_names(entries)?;
     let mut writer = ZipWriter::new(target);

@@ -9,7 +9,7 @@ fn linked(package: &str) -> BTreeSet<(String, String)> {
             "tree",
             "--offline",
             "--edges",
-            "normal",
+            "normal,no-proc-macro",
             "--prefix",
             "none",
             "--format",
