@@ -322,3 +322,16 @@ def test_the_binary_exports_what_the_headers_declare_and_nothing_else(unpacked):
         binary = Path(fmu.directory) / "binaries" / folder / "tiprub.so"
         listing = subprocess.run(["nm", "-D", "--defined-only", binary], check=True, capture_output=True, text=True)
         assert {line.split()[-1] for line in listing.stdout.splitlines()} == two | three
+
+
+def test_fmpy_drives_the_speed_with_a_signal(fmus):
+    """FMPy sets inputs before initialisation already, and holds them over each communication step."""
+    end, ramp, size = 1e-3, 1e5, 5e-5
+    signal = numpy.array([(0.0, 1800.0), (end, 1800.0 + ramp * end)], dtype=[("time", float), ("speed", float)])
+    for file in (fmus.two, fmus.three):
+        result = simulate_fmu(
+            str(file), stop_time=end, output_interval=size, input=signal, output=["speed", "rotor_angle"]
+        )
+        lag = 0.5 * ramp * size * end
+        assert result["speed"][0] == 1800.0
+        assert result["rotor_angle"][-1] == pytest.approx(1800.0 * end + 0.5 * ramp * end * end - lag, abs=1e-9)

@@ -26,10 +26,15 @@ pub fn root() -> PathBuf {
 
 /// Build the FMU library as it is shipped (or with the feature that makes it panic on request) and give its path.
 ///
-/// It is built alone (`-p`), because a workspace build would unify features, and in its own target directory, because the
+/// The environment variables `TIPRUB_LIBRARY` and `TIPRUB_LIBRARY_TEST_PANIC` name libraries built elsewhere (against an
+/// old glibc, say) to be tested instead. It is built alone (`-p`), because a workspace build would unify features, and in its own target directory, because the
 /// one in use may be locked.
 #[track_caller]
 pub fn library(profile: &str, features: &[&str]) -> PathBuf {
+    let elsewhere = if features.is_empty() { "TIPRUB_LIBRARY" } else { "TIPRUB_LIBRARY_TEST_PANIC" };
+    if let Some(path) = std::env::var_os(elsewhere) {
+        return path.into();
+    }
     let target = root().join("target").join(if features.is_empty() { "product" } else { "product-features" });
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root()).args(["build", "--quiet", "-p", "tiprub-fmi", "--profile", profile]);
