@@ -75,6 +75,7 @@ fn build(workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> 
         .arg(workspace.join("Cargo.toml"))
         .arg("--target-dir")
         .arg(target)
+        .args(without_home_directory())
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -102,6 +103,17 @@ fn build(workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> 
     }
     artifact(&messages.join().unwrap_or_default()).ok_or_else(|| {
         failed("cargo reported no shared library".into(), "Is this Linux? Otherwise give --library FILE")
+    })
+}
+
+/// Cargo options that keep the place of cargo's registry, and with it the builder's name, out of the library: the same
+/// sources then give the same bytes for everybody. Flags of the user's own environment take precedence, as cargo has it.
+fn without_home_directory() -> Vec<String> {
+    let home = env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| env::var_os("HOME").map(|home| Path::new(&home).join(".cargo")));
+    home.map_or_else(Vec::new, |home| {
+        let flag = format!("--remap-path-prefix={}=/cargo", home.display());
+        vec!["--config".into(), format!("target.\"cfg(all())\".rustflags=[{flag:?}]")]
     })
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use tiprub_core::{VariableTable, variables::Quantity};
+use tiprub_core::{VariableTable, settings::Shape, variables::Quantity};
 use tiprub_model::{Reduction, surface_quads};
 
 use super::{
@@ -165,13 +165,23 @@ fn clearances(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figu
         figures.push(Figure {
             body: plot.to_html()?,
             caption: format!(
-                "Clearance between blade {} and the casing at its contact nodes, at the communication points. The casing's \
-                 bumps pass the blade twice per revolution; between them the blade rings down in its own modes.",
-                sector + 1
+                "Clearance between blade {} and the casing at its contact nodes, at the communication points.{}",
+                sector + 1,
+                passing(input)
             ),
         });
     }
     Ok(figures)
+}
+
+/// What the time between contacts shows, for the casing shapes of which it can be said.
+fn passing(input: &ReportInput<'_>) -> &'static str {
+    match input.scene.settings.surfaces.first().map(|surface| &surface.shape) {
+        Some(Shape::TwoLobe { .. }) => {
+            " The casing's bumps pass the blade twice per revolution; between them the blade vibrates freely."
+        }
+        _ => "",
+    }
 }
 
 fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>> {
@@ -258,7 +268,7 @@ fn energies(results: &Results<'_>) -> Result<Vec<Figure>> {
             body: plot.to_html()?,
             caption:
                 "Closure of the energy ledger: kinetic + strain + losses − initial − work put in, relative to initial \
-                      energy and all work exchanged. What remains is round-off."
+                      energy and all work exchanged. Values about 1e-16 are round-off."
                     .into(),
         });
     }
