@@ -1,2 +1,21 @@
-//! Under construction.
-fn main() {}
+//! The `tiprub` command line.
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use tiprub_packaging::{cli::Cli, commands, console::Console};
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let console = Console::new(cli.quiet, cli.json);
+    match commands::run(&cli.command, &console) {
+        Ok(outcome) => {
+            console.deliver(&outcome);
+            ExitCode::SUCCESS
+        }
+        Err(failure) => {
+            console.fail(&failure);
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}

@@ -330,13 +330,16 @@ impl System {
             self.slip[node] =
                 if self.settings.friction > 0.0 { self.law.slip_direction(velocity, normal) } else { [0.0; 3] };
         }
-        let flexibility = self.bank.flexibility();
+        let flexibility = self.bank.flexibility().as_slice();
         for column in 0..nodes {
             let direction = self.force_direction(column, sector);
+            let [first, second, third] =
+                std::array::from_fn(|j| &flexibility[(3 * column + j) * 3 * nodes..][..3 * nodes]);
             for row in 0..nodes {
                 let normal = self.geometry.normal_at(row * lanes + sector);
                 let moved: [f64; 3] = std::array::from_fn(|i| {
-                    (0..3).map(|j| flexibility[(3 * row + i, 3 * column + j)] * direction[j]).sum()
+                    let at = 3 * row + i;
+                    first[at] * direction[0] + second[at] * direction[1] + third[at] * direction[2]
                 });
                 self.problem.delassus[(row, column)] = dot(normal, moved);
             }

@@ -256,8 +256,10 @@ fn any_division_of_time_lands_exactly_and_converges() {
     println!(
         "relative differences from the fine run: regular {regular:.1e}, uneven {uneven:.1e}, changing {changing:.1e}, odd {odd:.1e}"
     );
-    for found in [regular, uneven, changing, odd] {
-        assert!(found < 2e-2, "{found}");
+    assert!(regular < 1e-2, "{regular}");
+    // Uneven steps are as good as even ones: changing h costs no order.
+    for found in [uneven, changing, odd] {
+        assert!(found < 1.2 * regular, "{found}");
     }
 }
 

@@ -53,6 +53,8 @@ pub struct ModalBank {
     damping_ratios: Vec<f64>,
     /// `[mode][row]`.
     contact_modes: Vec<f64>,
+    /// `[row][mode]`.
+    contact_rows: Vec<f64>,
     coefficients: Vec<ModeCoefficients>,
     /// G = Φ diag(c) Φᵀ, rows × rows: displacement of the contact rows per unit force held for one step (m/N).
     flexibility: DMatrix<f64>,
@@ -60,6 +62,8 @@ pub struct ModalBank {
     state: BankState,
     /// Scratch: increments of the step before.
     increment_before: Vec<f64>,
+    /// Scratch: φᵀf of the sector being corrected.
+    modal_force: Vec<f64>,
 }
 
 impl ModalBank {
@@ -79,6 +83,7 @@ impl ModalBank {
             frequencies: model.frequencies.clone(),
             damping_ratios: model.damping_ratios.clone(),
             contact_modes: model.contact_modes.as_slice().to_vec(),
+            contact_rows: model.contact_modes.transpose().as_slice().to_vec(),
             coefficients: vec![ModeCoefficients::default(); modes],
             flexibility: DMatrix::zeros(rows, rows),
             step: 0.0,
@@ -90,6 +95,7 @@ impl ModalBank {
                 loss: vec![0.0; lanes],
             },
             increment_before: vec![0.0; state_len],
+            modal_force: vec![0.0; modes],
         }
     }
 
@@ -252,25 +258,31 @@ impl ModalBank {
 
     /// Correct one sector for the contact `force` on its rows (N), eq. 11 of the paper.
     pub fn correct(&mut self, sector: usize, force: &[f64], with_loss: bool) {
-        let rows = self.rows;
+        let modal_force = &mut self.modal_force;
+        let contact_rows = &self.contact_rows;
+        self.instruction_set.run(ModalForce { modal_force, contact_rows, force });
+        let (rows, width) = (self.rows, self.width);
+        let start = sector / width * self.modes() * width + sector % width;
+        let position = self.state.position[start..].iter_mut().step_by(width);
+        let increment = self.state.increment[start..].iter_mut().step_by(width);
+        let before = self.increment_before[start..].iter().step_by(width);
         let mut loss = 0.0;
-        for mode in 0..self.modes() {
-            let shapes = &self.contact_modes[mode * rows..][..rows];
-            let modal_force: f64 = shapes.iter().zip(force).map(|(shape, value)| shape * value).sum();
-            let coefficients = &self.coefficients[mode];
+        for ((((position, increment), before), modal_force), coefficients) in
+            position.zip(increment).zip(before).zip(&self.modal_force).zip(&self.coefficients)
+        {
             let correction = coefficients.compliance * modal_force;
-            let index = self.index(mode, sector);
             if with_loss {
-                let predicted = self.state.increment[index] + self.increment_before[index];
+                let predicted = *increment + before;
                 loss += coefficients.loss * correction * (2.0 * predicted + correction);
             }
-            self.state.position[index] += correction;
-            self.state.increment[index] += correction;
+            *position += correction;
+            *increment += correction;
         }
         self.state.loss[sector] += loss;
         let lanes = self.lanes();
-        for row in 0..rows {
-            let moved: f64 = (0..rows).map(|column| self.flexibility[(row, column)] * force[column]).sum();
+        // G is symmetric: its columns are its rows.
+        for (row, column) in self.flexibility.as_slice().chunks_exact(rows).enumerate() {
+            let moved: f64 = column.iter().zip(force).map(|(entry, value)| entry * value).sum();
             self.state.displacement[row * lanes + sector] += moved;
         }
     }
@@ -320,6 +332,25 @@ impl ModalBank {
     }
 }
 
+/// φᵀf of all modes for the forces on the contact rows of one sector.
+struct ModalForce<'a> {
+    modal_force: &'a mut [f64],
+    contact_rows: &'a [f64],
+    force: &'a [f64],
+}
+
+impl Kernel for ModalForce<'_> {
+    #[inline(always)]
+    fn run(self) {
+        self.modal_force.fill(0.0);
+        for (shapes, force) in self.contact_rows.chunks_exact(self.modal_force.len()).zip(self.force) {
+            for (sum, shape) in self.modal_force.iter_mut().zip(shapes) {
+                *sum += shape * force;
+            }
+        }
+    }
+}
+
 /// The fused pass over all chunks. `increment_before` holds d, `state.increment` receives d⁺.
 struct Predict<'a, const WIDTH: usize, const LOSS: bool>(&'a mut ModalBank);
 
@@ -335,74 +366,114 @@ impl<const WIDTH: usize, const LOSS: bool> Kernel for Predict<'_, WIDTH, LOSS> {
             let before = &bank.increment_before[chunk * block..][..block];
             let increment = &mut bank.state.increment[chunk * block..][..block];
             let loss = &mut bank.state.loss[chunk * WIDTH..][..WIDTH];
-            advance_modes::<WIDTH, LOSS>(&bank.coefficients, position, before, increment, loss);
+            let displacement = &mut bank.state.displacement[chunk * WIDTH..];
+            let shapes = &bank.contact_modes;
+            let modes = Modes { coefficients: &bank.coefficients, shapes, rows, lanes };
             // Nine rows (three contact nodes) fit the registers of the widest set; more go in further passes.
-            let mut row = 0;
+            let mut row = match rows {
+                9.. => modes.advance::<WIDTH, 9, LOSS>(position, before, increment, loss, displacement),
+                6.. => modes.advance::<WIDTH, 6, LOSS>(position, before, increment, loss, displacement),
+                _ => modes.advance::<WIDTH, 3, LOSS>(position, before, increment, loss, displacement),
+            };
             while row < rows {
-                let displacement = &mut bank.state.displacement[row * lanes + chunk * WIDTH..];
-                let shapes = &bank.contact_modes[row..];
+                let displacement = &mut displacement[row * lanes..];
                 row += match rows - row {
-                    9.. => recover_rows::<WIDTH, 9>(position, shapes, rows, lanes, displacement),
-                    6.. => recover_rows::<WIDTH, 6>(position, shapes, rows, lanes, displacement),
-                    _ => recover_rows::<WIDTH, 3>(position, shapes, rows, lanes, displacement),
+                    9.. => modes.recover::<WIDTH, 9>(row, position, displacement),
+                    6.. => modes.recover::<WIDTH, 6>(row, position, displacement),
+                    _ => modes.recover::<WIDTH, 3>(row, position, displacement),
                 };
             }
         }
     }
 }
 
-/// d⁺ = β d − κ q, q⁺ = q + d⁺ for all modes of one chunk; whole arrays at a time, so that they stay in registers.
-#[inline(always)]
-fn advance_modes<const WIDTH: usize, const LOSS: bool>(
-    coefficients: &[ModeCoefficients],
-    position: &mut [f64],
-    before: &[f64],
-    increment: &mut [f64],
-    loss: &mut [f64],
-) {
-    let mut lost = [0.0; WIDTH];
-    let (position, _) = position.as_chunks_mut::<WIDTH>();
-    let (before, _) = before.as_chunks::<WIDTH>();
-    let (increment, _) = increment.as_chunks_mut::<WIDTH>();
-    for (((k, q), d), next) in coefficients.iter().zip(position).zip(before).zip(increment) {
-        let (beta, kappa, factor) = (k.beta, k.kappa, k.loss);
-        let (old, d) = (*q, *d);
-        let new: [f64; WIDTH] = std::array::from_fn(|lane| beta * d[lane] - kappa * old[lane]);
-        *q = std::array::from_fn(|lane| old[lane] + new[lane]);
-        *next = new;
+/// What the passes over one chunk share.
+struct Modes<'a> {
+    coefficients: &'a [ModeCoefficients],
+    shapes: &'a [f64],
+    rows: usize,
+    lanes: usize,
+}
+
+impl Modes<'_> {
+    /// d⁺ = β d − κ q, q⁺ = q + d⁺ for all modes of one chunk, with the displacements of the first `ROWS` contact rows
+    /// (`displacement[row · lanes + lane]`). Whole arrays at a time stay in registers. Returns `ROWS`.
+    #[inline(always)]
+    fn advance<const WIDTH: usize, const ROWS: usize, const LOSS: bool>(
+        &self,
+        position: &mut [f64],
+        before: &[f64],
+        increment: &mut [f64],
+        loss: &mut [f64],
+        displacement: &mut [f64],
+    ) -> usize {
+        let mut lost = [0.0; WIDTH];
+        let mut sums = [[0.0; WIDTH]; ROWS];
+        let (position, _) = position.as_chunks_mut::<WIDTH>();
+        let (before, _) = before.as_chunks::<WIDTH>();
+        let (increment, _) = increment.as_chunks_mut::<WIDTH>();
+        let modes = self.coefficients.iter().zip(self.shapes.chunks_exact(self.rows));
+        for ((((k, shapes), q), d), next) in modes.zip(position).zip(before).zip(increment) {
+            let (beta, kappa, factor) = (k.beta, k.kappa, k.loss);
+            let (old, d) = (*q, *d);
+            let (mut new, mut moved) = ([0.0; WIDTH], [0.0; WIDTH]);
+            for lane in 0..WIDTH {
+                new[lane] = beta * d[lane] - kappa * old[lane];
+                moved[lane] = old[lane] + new[lane];
+            }
+            *q = moved;
+            *next = new;
+            if LOSS {
+                for lane in 0..WIDTH {
+                    let twice = new[lane] + d[lane];
+                    lost[lane] += factor * (twice * twice);
+                }
+            }
+            add_rows(&mut sums, shapes, &moved);
+        }
         if LOSS {
-            let twice: [f64; WIDTH] = std::array::from_fn(|lane| new[lane] + d[lane]);
-            lost = std::array::from_fn(|lane| lost[lane] + factor * (twice[lane] * twice[lane]));
+            for lane in 0..WIDTH {
+                loss[lane] += lost[lane];
+            }
         }
+        self.store(&sums, displacement)
     }
-    if LOSS {
-        for lane in 0..WIDTH {
-            loss[lane] += lost[lane];
+
+    /// Displacements of `ROWS` further contact rows from `first` on. Returns `ROWS`.
+    #[inline(always)]
+    fn recover<const WIDTH: usize, const ROWS: usize>(
+        &self,
+        first: usize,
+        position: &[f64],
+        displacement: &mut [f64],
+    ) -> usize {
+        let mut sums = [[0.0; WIDTH]; ROWS];
+        let (position, _) = position.as_chunks::<WIDTH>();
+        for (q, shapes) in position.iter().zip(self.shapes.chunks_exact(self.rows)) {
+            add_rows(&mut sums, &shapes[first..], q);
         }
+        self.store(&sums, displacement)
+    }
+
+    #[inline(always)]
+    fn store<const WIDTH: usize, const ROWS: usize>(
+        &self,
+        sums: &[[f64; WIDTH]; ROWS],
+        displacement: &mut [f64],
+    ) -> usize {
+        for (row, sum) in sums.iter().enumerate() {
+            displacement[row * self.lanes..][..WIDTH].copy_from_slice(sum);
+        }
+        ROWS
     }
 }
 
-/// Displacements of `ROWS` contact rows of one chunk; `displacement[row · lanes + lane]`. Returns `ROWS`.
 #[inline(always)]
-fn recover_rows<const WIDTH: usize, const ROWS: usize>(
-    position: &[f64],
-    shapes: &[f64],
-    stride: usize,
-    lanes: usize,
-    displacement: &mut [f64],
-) -> usize {
-    let mut sums = [[0.0; WIDTH]; ROWS];
-    let (position, _) = position.as_chunks::<WIDTH>();
-    for (q, shapes) in position.iter().zip(shapes.chunks(stride)) {
-        let (q, shapes) = (*q, &shapes[..ROWS]);
-        for row in 0..ROWS {
-            let shape = shapes[row];
-            let sum = sums[row];
-            sums[row] = std::array::from_fn(|lane| sum[lane] + shape * q[lane]);
+fn add_rows<const WIDTH: usize, const ROWS: usize>(sums: &mut [[f64; WIDTH]; ROWS], shapes: &[f64], q: &[f64; WIDTH]) {
+    let shapes = &shapes[..ROWS];
+    for row in 0..ROWS {
+        for lane in 0..WIDTH {
+            sums[row][lane] += shapes[row] * q[lane];
         }
     }
-    for row in 0..ROWS {
-        displacement[row * lanes..][..WIDTH].copy_from_slice(&sums[row]);
-    }
-    ROWS
 }

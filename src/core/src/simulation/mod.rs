@@ -398,6 +398,13 @@ impl Simulation {
         let parameters = self.parameters();
         self.warnings.clear();
         self.check_limits(parameters)?;
+        if parameters.friction > 0.0 && self.inputs.speed.value == 0.0 && self.inputs.speed.slope == 0.0 {
+            self.warnings.push(
+                "the rotor starts at speed 0 with friction: the sliding law does not model sticking; results are \
+                 meaningful once the tips slide faster than they vibrate"
+                    .to_owned(),
+            );
+        }
         self.system.set_methods(parameters.scheme, parameters.solver);
         self.system.set_friction(parameters.friction);
         self.system.bank_mut().rest();

@@ -1,0 +1,265 @@
+//! The command line itself: what can be asked for, with defaults, units and examples.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Blade-tip/casing contact (rub) as an FMU.
+#[derive(Debug, Parser)]
+#[command(
+    name = "tiprub",
+    version,
+    about = "Blade-tip/casing contact (rub) as an FMU: reduce, package, run, inspect, demo",
+    long_about = "Turns a bladed disk and a casing into reduced-order models, marches their contact in time, and ships \
+                  that as an FMU for any FMI 2.0 or FMI 3.0 importer.\n\nSI units everywhere (m, kg, s, N, rad).",
+    after_help = "Examples:\n  tiprub demo\n  tiprub run builtin:rotor37 --csv rub.csv\n  \
+                  tiprub package scene.toml -o out/\n\n\
+                  Exit codes: 0 done, 1 the work failed, 2 the command line is wrong."
+)]
+pub struct Cli {
+    /// Print one JSON object with the result on stdout (errors too); progress stays on stderr.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// No progress on stderr; results and errors are still printed.
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// The whole road on a real blade: reduce rotor 37, package both FMUs, import and run them, write a report.
+    #[command(after_help = "Examples:\n  tiprub demo\n  tiprub demo --out /tmp/rub --revolutions 4\n\n\
+                            DIR then holds report.html (opens offline), the two .fmu files, the ROM, the scene and \
+                            the results as CSV.")]
+    Demo(DemoArguments),
+    /// From a blade to a reduced-order model (ROM), with its quality checks.
+    #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  \
+                            tiprub reduce rotor37 --modes 30 --contact-nodes 5 --mesh 10x2x16 -o fine.rom.safetensors")]
+    Reduce(ReduceArguments),
+    /// From a scene to .fmu files. Compiles nothing: the library is generic, scene and ROM are data.
+    #[command(
+        after_help = "Examples:\n  tiprub package scene.toml                 both FMUs beside each other here\n  \
+                            tiprub package scene.toml --fmi 3 -o rub.fmu\n  \
+                            tiprub package scene.toml --scalars       no arrays in the FMI 3 variables\n\n\
+                            Same inputs, same bytes. The optional generation date is left out, unless \
+                            SOURCE_DATE_EPOCH (seconds since 1970) is set."
+    )]
+    Package(PackageArguments),
+    /// Run a scene natively, without FMI; one row per communication point.
+    #[command(after_help = "Examples:\n  tiprub run scene.toml --csv rub.csv\n  \
+                            tiprub run builtin:rotor37 --stop 0.002 --set speed=1700 --csv - | head\n\n\
+                            Column names are the FMI 2.0 variable names; numbers read back to the same bits.")]
+    Run(RunArguments),
+    /// What is in an .fmu, a ROM or a scene file, and whether it is sound.
+    #[command(
+        after_help = "Examples:\n  tiprub inspect rotor37_fmi2.fmu\n  tiprub inspect rotor37.rom.safetensors\n  \
+                            tiprub inspect scene.toml --json"
+    )]
+    Inspect(InspectArguments),
+}
+
+/// Arguments of `tiprub demo`.
+#[derive(Debug, Args)]
+pub struct DemoArguments {
+    /// Directory for everything the demo writes; made if missing.
+    #[arg(long, value_name = "DIR", default_value = "demo")]
+    pub out: PathBuf,
+    /// FMU library to package, instead of the one found or built.
+    #[arg(long, value_name = "FILE")]
+    pub library: Option<PathBuf>,
+    /// Revolutions of the rotor to simulate (the scene's own stop time when absent).
+    #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
+    pub revolutions: Option<f64>,
+}
+
+/// Arguments of `tiprub reduce`.
+#[derive(Debug, Args)]
+pub struct ReduceArguments {
+    /// What to reduce: `rotor37`, the NASA rotor 37 blade that ships with tiprub.
+    #[arg(value_name = "MODEL", value_enum)]
+    pub model: Model,
+    /// Number of fixed-interface modes kept.
+    #[arg(long, value_name = "N")]
+    pub modes: Option<usize>,
+    /// Number of contact nodes along the tip chord, leading edge to trailing edge (≥ 2).
+    #[arg(long, value_name = "N")]
+    pub contact_nodes: Option<usize>,
+    /// Elements along the chord, through the thickness and along the span.
+    #[arg(long, value_name = "CxTxS")]
+    pub mesh: Option<MeshSize>,
+    /// ROM file to write.
+    #[arg(long, short, value_name = "FILE", default_value = "rotor37.rom.safetensors")]
+    pub output: PathBuf,
+    /// Also write the mesh as a CalculiX/Abaqus input file.
+    #[arg(long, value_name = "FILE")]
+    pub inp: Option<PathBuf>,
+}
+
+/// Arguments of `tiprub package`.
+#[derive(Debug, Args)]
+pub struct PackageArguments {
+    /// Scene file (TOML), or `builtin:rotor37`.
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// FMI version of the FMU.
+    #[arg(long, value_enum, default_value_t = FmiChoice::Both)]
+    pub fmi: FmiChoice,
+    /// The .fmu file, or a directory for it (always a directory with `--fmi both`).
+    #[arg(long, short, value_name = "FILE|DIR", default_value = ".")]
+    pub output: PathBuf,
+    /// Write FMI 3 variables as scalars, for importers that read no arrays.
+    #[arg(long)]
+    pub scalars: bool,
+    /// FMU library to package, instead of the one found beside tiprub.
+    #[arg(long, value_name = "FILE")]
+    pub library: Option<PathBuf>,
+}
+
+/// Arguments of `tiprub run`.
+#[derive(Debug, Args)]
+pub struct RunArguments {
+    /// Scene file (TOML), or `builtin:rotor37`.
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// Write all outputs as CSV; `-` is stdout.
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Stop time (s), instead of the scene's.
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    pub stop: Option<f64>,
+    /// Communication step H (s), instead of the scene's.
+    #[arg(long, value_name = "H", allow_negative_numbers = true)]
+    pub step: Option<f64>,
+    /// Start value of an input or parameter; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
+    pub set: Vec<(String, String)>,
+}
+
+/// Arguments of `tiprub inspect`.
+#[derive(Debug, Args)]
+pub struct InspectArguments {
+    /// An .fmu, a ROM (.safetensors) or a scene (.toml).
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+}
+
+/// Models that ship with tiprub.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Model {
+    /// One blade of NASA rotor 37 (36 blades), hub clamped.
+    Rotor37,
+}
+
+/// Which FMUs to write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FmiChoice {
+    /// FMI 2.0.
+    #[value(name = "2")]
+    Two,
+    /// FMI 3.0.
+    #[value(name = "3")]
+    Three,
+    /// Both, as two files.
+    Both,
+}
+
+/// Elements along the chord, through the thickness and along the span.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MeshSize {
+    /// Along the chord.
+    pub chord: usize,
+    /// Through the thickness.
+    pub thickness: usize,
+    /// Along the span.
+    pub span: usize,
+}
+
+impl std::str::FromStr for MeshSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let counts: Result<Vec<usize>, _> = text.split(['x', 'X']).map(str::parse).collect();
+        match counts.as_deref() {
+            Ok([chord, thickness, span]) if [chord, thickness, span].iter().all(|count| (1..=200).contains(*count)) => {
+                Ok(Self { chord: *chord, thickness: *thickness, span: *span })
+            }
+            _ => Err("give three element counts from 1 to 200 as CHORDxTHICKNESSxSPAN, for example 10x1x14".into()),
+        }
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("give a positive number".into()),
+    }
+}
+
+fn assignment(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
+            Ok((name.trim().to_string(), value.trim().to_string()))
+        }
+        _ => Err("give NAME=VALUE, for example speed=1700".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    fn parse(line: &str) -> Result<Cli, clap::Error> {
+        Cli::try_parse_from(std::iter::once("tiprub").chain(line.split_whitespace()))
+    }
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_command_explains_itself_with_an_example() {
+        let mut cli = Cli::command();
+        cli.build();
+        for command in cli.get_subcommands().filter(|command| command.get_name() != "help") {
+            assert!(command.get_about().is_some(), "{}", command.get_name());
+            let example = format!("tiprub {}", command.get_name());
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            assert!(help.contains(&example), "{help}");
+        }
+    }
+
+    #[test]
+    fn options_are_read() {
+        let Command::Run(run) = parse("run a.toml --set speed=-2 --set name=a=b --stop 1e-3 --json").unwrap().command
+        else {
+            panic!("run")
+        };
+        assert_eq!(run.set, [("speed".into(), "-2".into()), ("name".into(), "a=b".into())]);
+        assert_eq!(run.stop, Some(1e-3));
+        let Command::Reduce(reduce) = parse("reduce rotor37 --mesh 10x2x14").unwrap().command else { panic!("reduce") };
+        assert_eq!(reduce.mesh, Some(MeshSize { chord: 10, thickness: 2, span: 14 }));
+    }
+
+    #[test]
+    fn wrong_options_exit_with_two_and_say_what_is_wanted() {
+        for (line, hint) in [
+            ("run a.toml --set speed", "NAME=VALUE"),
+            ("reduce rotor37 --mesh 10x2", "CHORDxTHICKNESSxSPAN"),
+            ("reduce rotor37 --mesh 0x2x3", "CHORDxTHICKNESSxSPAN"),
+            ("demo --revolutions -1", "positive"),
+            ("package a.toml --fmi 4", "possible values: 2, 3, both"),
+            ("reduce rotor38", "rotor37"),
+        ] {
+            let error = parse(line).unwrap_err();
+            assert_eq!(error.exit_code(), 2, "{line}");
+            assert!(error.to_string().contains(hint), "{line}: {error}");
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! `tiprub demo`: the whole road on a real blade, and a report of it.
+
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use serde_json::json;
+use tiprub_core::{Scene, Simulation};
+use tiprub_model::{Reduction, Rotor37Options};
+
+use crate::{
+    Failure, Result,
+    cli::DemoArguments,
+    console::{Console, Outcome},
+    fmu::{FmiVersion, Package},
+    importer::{ImportedRun, UnpackedFmu},
+    library,
+    native::{self, NativeRun},
+    output_file, reduction,
+    report::page::{self, ImportedSummary, ReportFile, ReportInput},
+    rom_facts::RomFacts,
+    scene_source::{self, rotor37_scene_with, rotor37_text},
+    schedule::Schedule,
+};
+
+/// Files the demo writes into its directory.
+const ROM_FILE: &str = "rotor37.rom.safetensors";
+const SCENE_FILE: &str = "rotor37.toml";
+const REPORT_FILE: &str = "report.html";
+const CSV_FILE: &str = "results.csv";
+
+/// Wall times of the parts of the demo.
+#[derive(Debug, Default)]
+struct Stopwatch(Vec<(String, f64)>);
+
+impl Stopwatch {
+    fn measure<T>(&mut self, what: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        let clock = Instant::now();
+        let result = work();
+        self.0.push((what.to_string(), clock.elapsed().as_secs_f64()));
+        result
+    }
+}
+
+/// Reduce, package, import, compare, report.
+///
+/// # Errors
+/// Any of the steps failed, or the runs do not agree bit for bit.
+pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
+    let directory = arguments.out.as_path();
+    output_file::create_directory(directory)?;
+    let mut watch = Stopwatch::default();
+
+    let library = watch.measure("building the FMU library", || library::load(arguments.library.as_deref(), console))?;
+    let reduction = watch.measure("reducing the blade", || reduction::rotor37(&Rotor37Options::default(), console))?;
+    let scene = write_inputs(directory, &reduction, arguments.revolutions)?;
+    let schedule = Schedule::new(&scene.settings.experiment, None, None)?;
+
+    let native = watch.measure("native run", || {
+        let task = console.task("Native run", Some(schedule.count as u64));
+        native::run(&scene, &schedule, &[], &|done| task.at(done as u64))
+    })?;
+    native.recording.write_csv(&directory.join(CSV_FILE))?;
+
+    let package = Package::new(&scene, &library)?;
+    let mut imported = Vec::new();
+    for version in [FmiVersion::Two, FmiVersion::Three] {
+        let label = format!("FMI {}.0", version.digit());
+        let path = fmu_path(directory, version);
+        watch.measure(&format!("packaging, {label}"), || {
+            console.say(format_args!("Packaging {}", path.display()));
+            package.write(&path, version, true)
+        })?;
+        let run = watch.measure(&format!("import and run, {label}"), || import(&path, &label, &schedule, console))?;
+        let agreement = native.recording.compare(&run.recording)?;
+        imported.push(ImportedSummary { label, stepping: run.stepping.as_secs_f64(), agreement });
+    }
+    let facts = scene.roms.iter().map(RomFacts::of).collect::<Result<Vec<_>>>()?;
+    let demo = Demo { directory, scene, schedule, reduction, facts, native, imported, durations: watch.0 };
+    demo.write_report()?;
+    demo.outcome()
+}
+
+/// The ROM and the scene, as files a user can go on with; returns the scene as read back from them.
+fn write_inputs(directory: &Path, reduction: &Reduction, revolutions: Option<f64>) -> Result<Scene> {
+    let embedded = rotor37_scene_with(reduction.rom.clone())?;
+    let settings = &embedded.settings;
+    let speed = settings.structures.first().map_or(0.0, |structure| structure.speed.abs());
+    let turn = std::f64::consts::TAU / speed;
+    let step = settings.experiment.communication_step;
+    // Whole communication steps, so that every importer's last point is a regular one.
+    let stop = revolutions.map_or(settings.experiment.stop, |count| (count * turn / step).ceil() * step);
+    output_file::write(&directory.join(ROM_FILE), tiprub_format::write_rom(&reduction.rom))?;
+    let scene = directory.join(SCENE_FILE);
+    output_file::write(&scene, rotor37_text(ROM_FILE, stop))?;
+    scene_source::load(&scene.display().to_string(), &Console::new(true, false))
+}
+
+fn fmu_path(directory: &Path, version: FmiVersion) -> PathBuf {
+    directory.join(format!("rotor37_fmi{}.fmu", version.digit()))
+}
+
+fn import(path: &Path, label: &str, schedule: &Schedule, console: &Console) -> Result<ImportedRun> {
+    let task = console.task(&format!("Importing and running {label}"), Some(schedule.count as u64));
+    let fmu = UnpackedFmu::open(path)?;
+    let in_file = |failure: Failure| Failure { what: format!("{}: {}", path.display(), failure.what), ..failure };
+    fmu.simulate(schedule, &|done| task.at(done as u64)).map_err(in_file)
+}
+
+/// Everything the demo found out.
+struct Demo<'a> {
+    directory: &'a Path,
+    scene: Scene,
+    schedule: Schedule,
+    reduction: Reduction,
+    facts: Vec<RomFacts>,
+    native: NativeRun,
+    imported: Vec<ImportedSummary>,
+    durations: Vec<(String, f64)>,
+}
+
+impl Demo<'_> {
+    fn write_report(&self) -> Result<()> {
+        let simulation = Simulation::new(&self.scene).map_err(|error| Failure::from_core(SCENE_FILE, error))?;
+        let html = page::render(&ReportInput {
+            scene: &self.scene,
+            table: simulation.table(),
+            reduction: Some(&self.reduction),
+            facts: &self.facts,
+            schedule: &self.schedule,
+            native: &self.native,
+            imported: &self.imported,
+            files: &self.files(),
+            durations: &self.durations,
+        })?;
+        output_file::write(&self.directory.join(REPORT_FILE), html)
+    }
+
+    fn files(&self) -> Vec<ReportFile> {
+        let list = [
+            ("rotor37_fmi2.fmu", "FMU for FMI 2.0 co-simulation"),
+            ("rotor37_fmi3.fmu", "FMU for FMI 3.0 co-simulation"),
+            (CSV_FILE, "all outputs at all communication points"),
+            (SCENE_FILE, "the scene; change it and run `tiprub run` or `tiprub package` on it"),
+            (ROM_FILE, "the reduced-order model of the blade"),
+        ];
+        list.map(|(name, meaning)| ReportFile {
+            name: name.into(),
+            meaning: meaning.into(),
+            bytes: std::fs::metadata(self.directory.join(name)).map_or(0, |metadata| metadata.len()),
+        })
+        .to_vec()
+    }
+
+    /// The result, or a failure if an FMU and the native run differ in any bit (the report is written either way).
+    fn outcome(&self) -> Result<Outcome> {
+        if let Some(run) = self.imported.iter().find(|run| !run.agreement.is_exact()) {
+            let (name, time) = run.agreement.first.clone().unwrap_or_default();
+            return Err(Failure::new(
+                &run.label,
+                format!(
+                    "{} of {} values differ from the native run, first {name} at t = {time} s, by at most {:e}",
+                    run.agreement.different,
+                    run.agreement.points * run.agreement.variables,
+                    run.agreement.largest
+                ),
+                "The library was built from other sources than tiprub itself; build both together",
+            ));
+        }
+        let stepping = self.native.stepping.as_secs_f64();
+        let simulated = self.schedule.stop - self.schedule.start;
+        let per_step = 1e6 * stepping / self.native.internal_steps as f64;
+        let report = self.directory.join(REPORT_FILE);
+        let text = format!(
+            "{}\n\nsimulated      {:.4} ms in {} communication steps, {} internal steps\n\
+             per step       {per_step:.3} µs, {:.3} x real time\n\
+             agreement      {}: all {} outputs at all {} points, bit for bit\n\nopen {}",
+            self.facts.iter().map(RomFacts::to_text).collect::<String>().trim_end(),
+            1e3 * simulated,
+            self.schedule.count,
+            self.native.internal_steps,
+            stepping / simulated,
+            self.imported.iter().map(|run| run.label.as_str()).chain(["native"]).collect::<Vec<_>>().join(" = "),
+            self.native.recording.names.len(),
+            self.native.recording.rows(),
+            report.display()
+        );
+        let json = json!({
+            "model": self.scene.settings.name,
+            "report": report,
+            "files": self.files().iter().map(|file| json!({
+                "name": file.name, "bytes": file.bytes, "meaning": file.meaning,
+            })).collect::<Vec<_>>(),
+            "roms": self.facts.iter().map(RomFacts::to_json).collect::<Vec<_>>(),
+            "simulated_seconds": simulated,
+            "communication_steps": self.schedule.count,
+            "internal_steps": self.native.internal_steps,
+            "microseconds_per_internal_step": per_step,
+            "real_time_factor": stepping / simulated,
+            "agreement": self.imported.iter().map(|run| json!({
+                "run": run.label,
+                "points": run.agreement.points,
+                "outputs": run.agreement.variables,
+                "values_different": run.agreement.different,
+                "seconds_in_do_step": run.stepping,
+            })).collect::<Vec<_>>(),
+            "seconds": self.durations.iter().map(|(what, seconds)| (what.clone(), json!(seconds)))
+                .collect::<serde_json::Map<_, _>>(),
+            "warnings": self.native.warnings,
+        });
+        Ok(Outcome { text, json })
+    }
+}

@@ -1,0 +1,253 @@
+//! `tiprub inspect`: what is in a file, and whether it is sound.
+
+use std::{
+    fmt::Write as _,
+    fs,
+    io::Read,
+    path::{Path, PathBuf},
+};
+
+use serde_json::{Value, json};
+use tiprub_core::{Scene, Simulation, settings::SceneSettings, variables::Causality};
+
+use crate::{
+    Failure, Result,
+    cli::InspectArguments,
+    console::{Console, Outcome},
+    importer::{UnpackedFmu, open_archive, read_entry},
+    rom_facts::RomFacts,
+    scene_source,
+};
+
+/// Kinds of files, told apart by name and, where that does not help, by their first bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FileKind {
+    Fmu,
+    Rom,
+    Scene,
+}
+
+/// Inspect the file.
+///
+/// # Errors
+/// The file is missing, of no known kind, or damaged.
+pub fn run(arguments: &InspectArguments, console: &Console) -> Result<Outcome> {
+    let path = arguments.file.as_path();
+    match kind(path)? {
+        FileKind::Fmu => inspect_fmu(path),
+        FileKind::Rom => {
+            let facts = RomFacts::of(&scene_source::read_rom(path)?)?;
+            Ok(Outcome { text: facts.to_text(), json: json!({ "kind": "rom", "rom": facts.to_json() }) })
+        }
+        FileKind::Scene => {
+            let scene = scene_source::load(&path.display().to_string(), console)?;
+            let (text, json) = describe_scene(&scene)?;
+            Ok(Outcome { text, json: json!({ "kind": "scene", "scene": json }) })
+        }
+    }
+}
+
+fn kind(path: &Path) -> Result<FileKind> {
+    let mut start = Vec::new();
+    fs::File::open(path)
+        .and_then(|file| file.take(9).read_to_end(&mut start))
+        .map_err(|error| Failure::file(path, "cannot be read", &error))?;
+    let extension = path.extension().map(|extension| extension.to_ascii_lowercase()).unwrap_or_default();
+    match extension.to_str() {
+        Some("fmu" | "zip") => Ok(FileKind::Fmu),
+        Some("safetensors") => Ok(FileKind::Rom),
+        Some("toml") => Ok(FileKind::Scene),
+        _ if start.starts_with(b"PK") => Ok(FileKind::Fmu),
+        // safetensors: length of the header (8 bytes), then its JSON.
+        _ if start.len() == 9 && start[8] == b'{' => Ok(FileKind::Rom),
+        _ => Err(Failure::usage(
+            path.display(),
+            "neither .fmu nor .safetensors nor .toml",
+            "Give an FMU, a ROM file or a scene file",
+        )),
+    }
+}
+
+fn inspect_fmu(path: &Path) -> Result<Outcome> {
+    let mut archive = open_archive(path)?;
+    let mut files = Vec::new();
+    for index in 0..archive.len() {
+        let in_file = |failure: Failure| Failure { what: format!("{}: {}", path.display(), failure.what), ..failure };
+        let (name, bytes) = read_entry(&mut archive, index).map_err(in_file)?;
+        files.push((name, bytes.len()));
+    }
+    let fmu = UnpackedFmu::open(path)?;
+    let description = &fmu.description;
+    let count = |causality: &str| description.variables.iter().filter(|row| row.causality == causality).count();
+    let mut text = format!(
+        "{}: FMI {} co-simulation, model {}, identifier {}\n  made by {}, token {}\n\nfiles (all checksums right)\n",
+        path.display(),
+        description.fmi_version,
+        description.model_name,
+        description.model_identifier,
+        description.generation_tool.as_deref().unwrap_or("an unnamed tool"),
+        description.token,
+    );
+    for (name, size) in &files {
+        let _ = writeln!(text, "  {size:>10}  {name}");
+    }
+    let counts = ["input", "parameter", "output", "local"].map(|causality| (causality, count(causality)));
+    let _ = writeln!(text, "\nvariables");
+    for (causality, count) in counts {
+        let _ = writeln!(text, "  {count:>10}  {causality}");
+    }
+    for variable in &description.variables {
+        let elements = variable.elements.map(|elements| format!("[{elements}]")).unwrap_or_default();
+        let unit = variable.unit.as_deref().unwrap_or("-");
+        let meaning = variable.description.as_deref().unwrap_or_default();
+        let name = format!("{}{elements}", variable.name);
+        let _ = writeln!(text, "  {:<11} {name:<34} {unit:<8} {meaning}", variable.causality);
+    }
+    let resources = inspect_resources(&fmu)?;
+    if let Some((scene_text, _)) = &resources {
+        let _ = write!(text, "\n{scene_text}");
+    }
+    let json = json!({
+        "kind": "fmu",
+        "fmi_version": description.fmi_version,
+        "model": description.model_name,
+        "model_identifier": description.model_identifier,
+        "token": description.token,
+        "generation_tool": description.generation_tool,
+        "capabilities": description.capabilities,
+        "default_experiment": description.experiment,
+        "files": files.iter().map(|(name, size)| json!({"name": name, "bytes": size})).collect::<Vec<_>>(),
+        "variables": counts.iter().map(|(causality, count)| ((*causality).to_string(), json!(count)))
+            .collect::<serde_json::Map<_, _>>(),
+        "scene": resources.map(|(_, json)| json),
+    });
+    Ok(Outcome { text, json })
+}
+
+/// The scene inside a tiprub FMU, checked against the token; `None` for FMUs of other tools.
+fn inspect_resources(fmu: &UnpackedFmu) -> Result<Option<(String, Value)>> {
+    let directory: PathBuf = fmu.resources();
+    if !directory.join(tiprub_format::SCENE_FILE).is_file() {
+        return Ok(None);
+    }
+    let resources = tiprub_format::load_resources(&directory)?;
+    if resources.token != fmu.description.token {
+        return Err(Failure::new(
+            "resources/",
+            format!("their token {} is not that of modelDescription.xml", resources.token),
+            "Somebody changed one of them; make the FMU again with `tiprub package`",
+        ));
+    }
+    describe_scene(&resources.scene).map(Some)
+}
+
+fn describe_scene(scene: &Scene) -> Result<(String, Value)> {
+    let settings = &scene.settings;
+    let in_scene = |error| Failure::from_core(format!("scene `{}`", settings.name), error);
+    let mut simulation = Simulation::new(scene).map_err(in_scene)?;
+    simulation.initialise(settings.experiment.start).map_err(in_scene)?;
+    let table = simulation.table();
+    let scalars = |causality| -> usize {
+        table.variables().iter().filter(|row| row.causality == causality).map(|row| row.len()).sum()
+    };
+    let mut text = scene_text(settings);
+    let _ = writeln!(
+        text,
+        "  variables     {} inputs, {} parameters, {} outputs (as scalars)",
+        scalars(Causality::Input),
+        scalars(Causality::Parameter),
+        scalars(Causality::Output)
+    );
+    for warning in simulation.warnings() {
+        let _ = writeln!(text, "  warning       {warning}");
+    }
+    let mut roms = Vec::new();
+    for rom in &scene.roms {
+        let facts = RomFacts::of(rom)?;
+        let _ = write!(text, "\n{}", facts.to_text());
+        roms.push(facts.to_json());
+    }
+    let json = json!({
+        "settings": serde_json::to_value(settings).unwrap_or(Value::Null),
+        "warnings": simulation.warnings(),
+        "variables": {
+            "inputs": scalars(Causality::Input),
+            "parameters": scalars(Causality::Parameter),
+            "outputs": scalars(Causality::Output),
+        },
+        "roms": roms,
+    });
+    Ok((text, json))
+}
+
+fn scene_text(settings: &SceneSettings) -> String {
+    let mut text = format!("scene {}: {}\n", settings.name, settings.description);
+    for structure in &settings.structures {
+        let _ = writeln!(
+            text,
+            "  structure     {} from {}, speed {} rad/s",
+            structure.name, structure.rom, structure.speed
+        );
+    }
+    for surface in &settings.surfaces {
+        let shape = serde_json::to_string(&surface.shape).unwrap_or_default();
+        let _ = writeln!(text, "  surface       {} {shape}, ramp {} s", surface.name, surface.ramp_time);
+    }
+    for contact in &settings.contacts {
+        let _ = writeln!(
+            text,
+            "  contact       {} against {}: gap {} m, friction {}, solver {}",
+            contact.master,
+            contact.slave,
+            contact.gap,
+            contact.friction,
+            serde_json::to_value(contact.solver)
+                .ok()
+                .and_then(|name| name.as_str().map(String::from))
+                .unwrap_or_default()
+        );
+    }
+    let scheme = serde_json::to_value(settings.time.scheme).ok();
+    let scheme = scheme.as_ref().and_then(Value::as_str).unwrap_or_default();
+    let experiment = &settings.experiment;
+    let _ = writeln!(text, "  time          {scheme}, internal step at most {} s", settings.time.step);
+    let _ = writeln!(
+        text,
+        "  experiment    {} s to {} s, communication step {} s",
+        experiment.start, experiment.stop, experiment.communication_step
+    );
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn inspect(name: &str, contents: impl AsRef<[u8]>) -> Result<Outcome> {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join(name);
+        fs::write(&path, contents).unwrap();
+        run(&InspectArguments { file: path }, &Console::new(true, false))
+    }
+
+    #[test]
+    fn wrong_files_are_named_and_never_panic() {
+        for (name, contents, hint) in [
+            ("a.fmu", "no zip", "not a whole zip"),
+            ("a.safetensors", "\u{8}\0\0\0\0\0\0\0{}", "a.safetensors"),
+            ("a.safetensors", "", "a.safetensors"),
+            ("a.toml", "name = ", "a.toml:1"),
+            ("a.txt", "hello", "neither"),
+            ("noextension", "PK\u{3}\u{4}", "not a whole zip"),
+        ] {
+            let text = inspect(name, contents).unwrap_err().to_string();
+            assert!(text.contains(hint), "{name}: {text}");
+        }
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let failure = run(&InspectArguments { file: "/nowhere/x.fmu".into() }, &Console::new(true, false)).unwrap_err();
+        assert!(failure.what.contains("/nowhere/x.fmu"), "{failure}");
+    }
+}

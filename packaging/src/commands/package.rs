@@ -1,0 +1,86 @@
+//! `tiprub package`: from a scene to .fmu files.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use crate::{
+    Failure, Result,
+    cli::{FmiChoice, PackageArguments},
+    console::{Console, Outcome},
+    fmu::{FmiVersion, Package},
+    library, scene_source,
+};
+
+/// Load the scene, find the library, zip.
+///
+/// # Errors
+/// A wrong scene, no library, or files that cannot be written.
+pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
+    // What is wrong with the command line is said before any work.
+    targets(arguments, "model")?;
+    let scene = scene_source::load(&arguments.scene, console)?;
+    let targets = targets(arguments, &scene.settings.name)?;
+    let library = library::load(arguments.library.as_deref(), console)?;
+    let package = Package::new(&scene, &library)?;
+    for (version, path) in &targets {
+        console.say(format_args!("Writing {}", path.display()));
+        package.write(path, *version, !arguments.scalars)?;
+    }
+    let text: Vec<String> = targets
+        .iter()
+        .map(|(version, path)| format!("FMI {}.0: {} ({} kB)", version.digit(), path.display(), size(path) / 1000))
+        .collect();
+    let files: Vec<_> = targets
+        .iter()
+        .map(|(version, path)| json!({"fmi": version.digit().to_string(), "file": path, "bytes": size(path)}))
+        .collect();
+    Ok(Outcome { text: text.join("\n"), json: json!({ "model": scene.settings.name, "fmus": files }) })
+}
+
+fn size(path: &Path) -> u64 {
+    std::fs::metadata(path).map_or(0, |metadata| metadata.len())
+}
+
+/// Which files to write: NAME_fmi2.fmu and NAME_fmi3.fmu in a directory, or one file as named.
+fn targets(arguments: &PackageArguments, name: &str) -> Result<Vec<(FmiVersion, PathBuf)>> {
+    let versions = match arguments.fmi {
+        FmiChoice::Two => vec![FmiVersion::Two],
+        FmiChoice::Three => vec![FmiVersion::Three],
+        FmiChoice::Both => vec![FmiVersion::Two, FmiVersion::Three],
+    };
+    let output = &arguments.output;
+    let is_file = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("fmu")) && !output.is_dir();
+    match (is_file, versions.as_slice()) {
+        (true, [version]) => Ok(vec![(*version, output.clone())]),
+        (true, _) => Err(Failure::usage(
+            format!("--output {}", output.display()),
+            "is one file for two FMUs",
+            "Give a directory, or choose one with --fmi 2 or --fmi 3",
+        )),
+        (false, _) => {
+            let target = |version: FmiVersion| output.join(format!("{name}_fmi{}.fmu", version.digit()));
+            Ok(versions.into_iter().map(|version| (version, target(version))).collect())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arguments(fmi: FmiChoice, output: &str) -> PackageArguments {
+        PackageArguments { scene: "s".into(), fmi, output: output.into(), scalars: false, library: None }
+    }
+
+    #[test]
+    fn files_and_directories_are_told_apart() {
+        let both = targets(&arguments(FmiChoice::Both, "out"), "rub").unwrap();
+        let paths: Vec<_> = both.iter().map(|(_, path)| path.display().to_string()).collect();
+        assert_eq!(paths, ["out/rub_fmi2.fmu", "out/rub_fmi3.fmu"]);
+        let one = targets(&arguments(FmiChoice::Three, "a/x.fmu"), "rub").unwrap();
+        assert_eq!(one, [(FmiVersion::Three, PathBuf::from("a/x.fmu"))]);
+        let failure = targets(&arguments(FmiChoice::Both, "x.fmu"), "rub").unwrap_err();
+        assert!(failure.usage && failure.problem.contains("two FMUs"), "{failure}");
+    }
+}

@@ -1,0 +1,66 @@
+//! `tiprub reduce`: from a blade to a ROM file, with its checks.
+
+use serde_json::json;
+use tiprub_model::{Rotor37Options, inp::calculix_input, rotor37::MeshCounts};
+
+use crate::{
+    Failure, Result,
+    cli::{Model, ReduceArguments},
+    console::{Console, Outcome},
+    output_file, reduction,
+    rom_facts::RomFacts,
+};
+
+/// Frequencies asked for in the exported finite-element model.
+const EXPORTED_FREQUENCIES: usize = 10;
+
+/// Reduce, check, write.
+///
+/// # Errors
+/// Counts that do not fit the mesh, or files that cannot be written.
+pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
+    let Model::Rotor37 = arguments.model;
+    let defaults = Rotor37Options::default();
+    let options = Rotor37Options {
+        mesh: arguments.mesh.map_or(defaults.mesh, |size| MeshCounts {
+            chord: size.chord,
+            thickness: size.thickness,
+            span: size.span,
+        }),
+        contact_nodes: arguments.contact_nodes.unwrap_or(defaults.contact_nodes),
+        fixed_interface_modes: arguments.modes.unwrap_or(defaults.fixed_interface_modes),
+        ..defaults
+    };
+    let reduction = reduction::rotor37(&options, console)?;
+    let facts = RomFacts::of(&reduction.rom)?;
+    if let Some(path) = &arguments.inp {
+        let text = calculix_input(&reduction.mesh, &reduction.material, Some("hub"), EXPORTED_FREQUENCIES)
+            .map_err(|error| Failure::from_below(path.display(), error))?;
+        output_file::write(path, text)?;
+    }
+    output_file::write(&arguments.output, tiprub_format::write_rom(&reduction.rom))?;
+    let mut text = facts.to_text();
+    text.push_str(&format!(
+        "\n  full model: {} nodes, {} elements, {} free degrees of freedom, reduced in {:.2} s\n  written: {}",
+        reduction.mesh.nodes.len(),
+        reduction.mesh.elements.len(),
+        reduction.free_dofs,
+        reduction.timings.total(),
+        arguments.output.display()
+    ));
+    if let Some(path) = &arguments.inp {
+        text.push_str(&format!("\n  written: {}", path.display()));
+    }
+    let json = json!({
+        "rom": facts.to_json(),
+        "full_model": {
+            "nodes": reduction.mesh.nodes.len(),
+            "elements": reduction.mesh.elements.len(),
+            "free_dofs": reduction.free_dofs,
+            "largest_mode_residual": reduction.largest_residual,
+        },
+        "seconds": reduction.timings.total(),
+        "files": { "rom": arguments.output, "inp": arguments.inp },
+    });
+    Ok(Outcome { text, json })
+}

@@ -1,0 +1,95 @@
+//! `tiprub run`: a scene without FMI, one row per communication point.
+
+use std::{path::Path, time::Instant};
+
+use serde_json::{Map, Value, json};
+
+use crate::{
+    Failure, Result,
+    cli::RunArguments,
+    console::{Console, Outcome},
+    native,
+    recording::shortest,
+    scene_source,
+    schedule::Schedule,
+};
+
+/// Load, run, write the CSV, sum up.
+///
+/// # Errors
+/// A wrong scene or option, a refused or diverged simulation, a file that cannot be written.
+pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
+    let to_stdout = arguments.csv.as_deref() == Some(Path::new("-"));
+    if to_stdout && console.is_json() {
+        return Err(Failure::usage("--csv -", "and --json both want stdout", "Give --csv a file"));
+    }
+    let scene = scene_source::load(&arguments.scene, console)?;
+    let schedule = Schedule::new(&scene.settings.experiment, arguments.stop, arguments.step)?;
+    let clock = Instant::now();
+    let run = {
+        let task = console.task(&format!("Running {}", scene.settings.name), Some(schedule.count as u64));
+        native::run(&scene, &schedule, &arguments.set, &|done| task.at(done as u64))?
+    };
+    let wall = clock.elapsed().as_secs_f64();
+    for warning in &run.warnings {
+        console.say(format_args!("warning: {warning}"));
+    }
+    if let Some(path) = arguments.csv.as_deref().filter(|_| !to_stdout) {
+        run.recording.write_csv(path)?;
+    }
+    let stepping = run.stepping.as_secs_f64();
+    let simulated = schedule.stop - schedule.start;
+    let rows = run.recording.rows();
+    let last: Map<String, Value> = run
+        .recording
+        .names
+        .iter()
+        .zip(run.recording.row(rows - 1))
+        .map(|(name, value)| (name.clone(), json!(value)))
+        .collect();
+    let json = json!({
+        "model": scene.settings.name,
+        "start": schedule.start,
+        "stop": schedule.stop,
+        "communication_step": schedule.step,
+        "communication_steps": schedule.count,
+        "internal_steps": run.internal_steps,
+        "seconds": wall,
+        "stepping_seconds": stepping,
+        "microseconds_per_internal_step": 1e6 * stepping / run.internal_steps as f64,
+        "real_time_factor": stepping / simulated,
+        "warnings": run.warnings,
+        "csv": arguments.csv,
+        "last": last,
+    });
+    let text = if to_stdout {
+        run.recording.to_csv()
+    } else {
+        summary(&json, &run.recording.names, run.recording.row(rows - 1))
+    };
+    Ok(Outcome { text, json })
+}
+
+fn summary(json: &Value, names: &[String], last: &[f64]) -> String {
+    let number = |name: &str| json[name].as_f64().unwrap_or(f64::NAN);
+    let mut text = format!(
+        "{}: t = {} s to {} s, {} communication steps, {} internal steps\n\
+         stepping took {:.3} s: {:.3} µs per internal step, {:.3} x real time\n\nat the end:\n",
+        json["model"].as_str().unwrap_or_default(),
+        json["start"],
+        json["stop"],
+        json["communication_steps"],
+        json["internal_steps"],
+        number("stepping_seconds"),
+        number("microseconds_per_internal_step"),
+        number("real_time_factor"),
+    );
+    let width = names.iter().map(String::len).max().unwrap_or(0);
+    for (name, value) in names.iter().zip(last) {
+        text.push_str(&format!("  {name:<width$}  {}\n", shortest(*value)));
+    }
+    if let Some(path) = json["csv"].as_str() {
+        text.push_str(&format!("\nwritten: {path}"));
+    }
+    text
+}

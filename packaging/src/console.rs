@@ -1,0 +1,108 @@
+//! What the user sees while a command works: progress on stderr, one result on stdout.
+
+use std::{
+    io::{IsTerminal, Write},
+    time::Duration,
+};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::Failure;
+
+/// Result of a command, in both forms the user can ask for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// For people.
+    pub text: String,
+    /// For programs: one object.
+    pub json: serde_json::Value,
+}
+
+/// Where progress and results go.
+#[derive(Debug, Clone, Copy)]
+pub struct Console {
+    quiet: bool,
+    json: bool,
+    terminal: bool,
+}
+
+impl Console {
+    /// `quiet` drops progress; `json` prints results as one JSON object instead of text.
+    pub fn new(quiet: bool, json: bool) -> Self {
+        Self { quiet, json, terminal: std::io::stderr().is_terminal() }
+    }
+
+    /// Whether the result is wanted as JSON.
+    pub fn is_json(&self) -> bool {
+        self.json
+    }
+
+    /// One line of progress on stderr.
+    pub fn say(&self, line: impl std::fmt::Display) {
+        if !self.quiet {
+            // A closed stderr must not stop the work.
+            let _ = writeln!(std::io::stderr(), "{line}");
+        }
+    }
+
+    /// A task of known length (`Some(total)`) or of unknown length (`None`: a spinner).
+    pub fn task(&self, title: &str, total: Option<u64>) -> Task {
+        if self.quiet {
+            return Task { bar: ProgressBar::hidden() };
+        }
+        if !self.terminal {
+            self.say(format!("{title} ..."));
+            return Task { bar: ProgressBar::hidden() };
+        }
+        let bar = total.map_or_else(ProgressBar::new_spinner, ProgressBar::new);
+        let template = match total {
+            Some(_) => "{msg:<44} [{bar:30}] {pos}/{len} {elapsed}",
+            None => "{msg:<44} {spinner} {elapsed}",
+        };
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style.progress_chars("=> "));
+        }
+        bar.set_message(title.to_string());
+        bar.enable_steady_tick(Duration::from_millis(120));
+        Task { bar }
+    }
+
+    /// Print the result of the command on stdout.
+    pub fn deliver(&self, outcome: &Outcome) {
+        let text = if self.json { format!("{:#}", outcome.json) } else { outcome.text.trim_end().to_string() };
+        // `tiprub inspect x | head` closes our stdout early; that is not an error.
+        let _ = writeln!(std::io::stdout(), "{text}");
+    }
+
+    /// Print a failure: text on stderr, and with `--json` the object on stdout.
+    pub fn fail(&self, failure: &Failure) {
+        let _ = writeln!(std::io::stderr(), "error: {failure}");
+        if self.json {
+            let _ = writeln!(std::io::stdout(), "{:#}", failure.to_json());
+        }
+    }
+}
+
+/// A running task; its progress line disappears when it is dropped.
+#[derive(Debug)]
+pub struct Task {
+    bar: ProgressBar,
+}
+
+impl Task {
+    /// Units done so far.
+    pub fn at(&self, position: u64) {
+        self.bar.set_position(position);
+    }
+
+    /// What it is doing now.
+    pub fn now(&self, message: &str) {
+        self.bar.set_message(message.to_string());
+    }
+}
+
+impl Drop for Task {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

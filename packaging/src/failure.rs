@@ -1,0 +1,120 @@
+//! The one error of the command line: what, where and the remedy, and the exit code that goes with it.
+
+use std::{fmt, path::Path};
+
+/// Why a command did not do what it was asked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Failure {
+    /// What the trouble is about: a file, an option, a scene field.
+    pub what: String,
+    /// What is wrong with it.
+    pub problem: String,
+    /// What to do about it; empty where the problem already says so.
+    pub remedy: String,
+    /// True when the command line itself was wrong (exit code 2), false when the work failed (exit code 1).
+    pub usage: bool,
+}
+
+/// Result of everything in this crate.
+pub type Result<T, E = Failure> = std::result::Result<T, E>;
+
+impl Failure {
+    /// The work failed: exit code 1.
+    pub fn new(what: impl fmt::Display, problem: impl fmt::Display, remedy: impl fmt::Display) -> Self {
+        Self { what: what.to_string(), problem: problem.to_string(), remedy: remedy.to_string(), usage: false }
+    }
+
+    /// The command line is wrong: exit code 2.
+    pub fn usage(what: impl fmt::Display, problem: impl fmt::Display, remedy: impl fmt::Display) -> Self {
+        Self { usage: true, ..Self::new(what, problem, remedy) }
+    }
+
+    /// An error of a lower floor whose text already names what, where and the remedy, met while handling `what`.
+    pub fn from_below(what: impl fmt::Display, error: impl fmt::Display) -> Self {
+        Self::new(what, error, "")
+    }
+
+    /// An error of the core, met while handling `what`.
+    pub fn from_core(what: impl fmt::Display, error: tiprub_core::Error) -> Self {
+        match error {
+            tiprub_core::Error::Invalid { what: field, problem, remedy } => {
+                Self::new(format!("{what}: {field}"), problem, remedy)
+            }
+            tiprub_core::Error::Unstable { problem, remedy } => Self::new(what, format!("refused: {problem}"), remedy),
+            other => Self::from_below(what, other),
+        }
+    }
+
+    /// A file operation failed.
+    pub fn file(path: &Path, doing: &str, error: &std::io::Error) -> Self {
+        let remedy = match error.kind() {
+            std::io::ErrorKind::NotFound => "Check the path",
+            std::io::ErrorKind::PermissionDenied => "Check the permissions, or choose another place with -o/--out",
+            std::io::ErrorKind::StorageFull => "Free some space, or choose another place with -o/--out",
+            std::io::ErrorKind::IsADirectory => "Name a file, not a directory",
+            _ => "Check the path and the disk",
+        };
+        Self::new(path.display(), format!("{doing}: {error}"), remedy)
+    }
+
+    /// Process exit code.
+    pub fn exit_code(&self) -> u8 {
+        if self.usage { 2 } else { 1 }
+    }
+
+    /// The same as a JSON object, for `--json`.
+    pub fn to_json(&self) -> serde_json::Value {
+        serde_json::json!({
+            "error": { "what": self.what, "problem": self.problem, "remedy": self.remedy, "exit_code": self.exit_code() }
+        })
+    }
+}
+
+/// End `text` with exactly one full stop, unless it ends in a question mark.
+fn sentence(text: &str) -> String {
+    let text = text.trim_end().trim_end_matches('.');
+    if text.ends_with('?') { text.to_string() } else { format!("{text}.") }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{}: {}", self.what, sentence(&self.problem))?;
+        if self.remedy.is_empty() { Ok(()) } else { write!(out, " {}", sentence(&self.remedy)) }
+    }
+}
+
+impl std::error::Error for Failure {}
+
+impl From<tiprub_format::Error> for Failure {
+    fn from(error: tiprub_format::Error) -> Self {
+        match error {
+            tiprub_format::Error::Rom { origin, what, problem, remedy } => {
+                Self::new(format!("{origin}: {what}"), problem, remedy)
+            }
+            tiprub_format::Error::Scene { origin, position, what, problem, remedy } => {
+                let place = position.map(|(line, column)| format!(":{line}:{column}")).unwrap_or_default();
+                Self::new(format!("{origin}{place}: {what}"), problem, remedy)
+            }
+            tiprub_format::Error::File { path, problem, remedy } => Self::new(path, problem, remedy),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_what_problem_remedy() {
+        let failure = Failure::new("a.toml", "no such field `gapp`", "Did you mean `gap`?");
+        assert_eq!(failure.to_string(), "a.toml: no such field `gapp`. Did you mean `gap`?");
+        assert_eq!(Failure::from_below("x.fmu", "truncated.").to_string(), "x.fmu: truncated.");
+    }
+
+    #[test]
+    fn exit_codes_follow_the_cause() {
+        assert_eq!(Failure::new("a", "b", "c").exit_code(), 1);
+        assert_eq!(Failure::usage("a", "b", "c").exit_code(), 2);
+        assert_eq!(Failure::usage("a", "b", "c").to_json()["error"]["exit_code"], 2);
+    }
+}

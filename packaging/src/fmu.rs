@@ -1,0 +1,202 @@
+//! What goes into an .fmu, for both FMI versions: nothing is compiled, everything is data around one library.
+
+use std::{env, path::Path};
+
+use tiprub_core::{Scene, Simulation};
+use tiprub_model_description::{Description, Experiment, fmi2_xml, fmi3_xml, html};
+
+use crate::{
+    Failure, Result,
+    archive::{self, Entry},
+    native,
+    schedule::Schedule,
+};
+
+/// File name of the library inside the FMU, without extension, and `modelIdentifier` of both versions.
+pub const MODEL_IDENTIFIER: &str = "tiprub";
+
+/// Communication steps of the reference result that is packed with the documentation.
+const REFERENCE_STEPS: usize = 100;
+
+const ICON: &[u8] = include_bytes!("../assets/icon.png");
+const THIRD_PARTY: &str = include_str!("../assets/third-party.txt");
+const LICENSE_MIT: &str = include_str!("../../LICENSE-MIT");
+const LICENSE_APACHE: &str = include_str!("../../LICENSE-APACHE");
+const LICENSE: &str = "This FMU and the library in it are licensed under either of\n\
+    - the MIT license (LICENSE-MIT.txt), or\n- the Apache License, Version 2.0 (LICENSE-APACHE.txt)\n\
+    at your option. third-party.txt lists the libraries it contains and their licenses.\n\
+    The scene and the reduced-order models in resources/ belong to whoever made them.\n";
+
+/// Limits of validity that every importer's user should read.
+const LIMITS: [&str; 7] = [
+    "Displacements within each structure are small; the rotation between rotor and casing is not.",
+    "Friction is Coulomb friction in steady sliding along the circumference; sticking is not modelled.",
+    "The casing is a rigid surface of the given shape, parallel to the contour of the blade tips.",
+    "Blades stand on a rigid hub and are not coupled to each other; speed does not stiffen them.",
+    "Forces and torques are means over the communication step, so that the momentum handed over is exact; the force \
+     at an instant of impact grows as 1/h.",
+    "Sliding friction can make the structure itself flutter; a scheme that would add growth of its own is refused.",
+    "The mass of a contact node loses its kinetic energy at impact: an error of first order in mesh size, not in h.",
+];
+
+/// FMI version of a package.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FmiVersion {
+    /// FMI 2.0.
+    Two,
+    /// FMI 3.0.
+    Three,
+}
+
+impl FmiVersion {
+    /// Digit for file names and messages.
+    pub fn digit(self) -> char {
+        match self {
+            Self::Two => '2',
+            Self::Three => '3',
+        }
+    }
+}
+
+/// A scene made ready for packaging.
+#[derive(Debug)]
+pub struct Package<'a> {
+    scene: &'a Scene,
+    simulation: Simulation,
+    library: &'a [u8],
+    reference_csv: String,
+    generated: String,
+}
+
+impl<'a> Package<'a> {
+    /// Compile and initialise the scene (which refuses what an FMU instance would refuse), and run the reference.
+    ///
+    /// # Errors
+    /// The scene is refused, or SOURCE_DATE_EPOCH is set to nonsense.
+    pub fn new(scene: &'a Scene, library: &'a [u8]) -> Result<Self> {
+        let in_scene = |error| Failure::from_core(format!("scene `{}`", scene.settings.name), error);
+        let mut schedule = Schedule::new(&scene.settings.experiment, None, None)?;
+        let mut simulation = Simulation::new(scene).map_err(in_scene)?;
+        simulation.initialise(schedule.start).map_err(in_scene)?;
+        if schedule.count > REFERENCE_STEPS {
+            schedule.count = REFERENCE_STEPS;
+            schedule.stop = schedule.start + REFERENCE_STEPS as f64 * schedule.step;
+        }
+        let reference_csv = native::run(scene, &schedule, &[], &|_| {})?.recording.to_csv();
+        let generated = generation_date(env::var("SOURCE_DATE_EPOCH").ok().as_deref())?;
+        Ok(Self { scene, simulation, library, reference_csv, generated })
+    }
+
+    /// Write the .fmu, whole or not at all. `arrays` is for FMI 3.0 only; FMI 2.0 has scalars.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, target: &Path, version: FmiVersion, arrays: bool) -> Result<()> {
+        archive::write(target, &self.entries(version, arrays))
+    }
+
+    /// Files of the .fmu in their order.
+    pub fn entries(&self, version: FmiVersion, arrays: bool) -> Vec<Entry> {
+        let resources = tiprub_format::resource_files(self.scene, arrays);
+        let token = tiprub_format::instantiation_token(&resources);
+        let description = self.description(&token, arrays);
+        let (xml, platform, icon) = match version {
+            FmiVersion::Two => (fmi2_xml(&description), "linux64", "model.png"),
+            FmiVersion::Three => (fmi3_xml(&description), "x86_64-linux", "terminalsAndIcons/icon.png"),
+        };
+        let mut entries = vec![
+            Entry::new("modelDescription.xml", xml),
+            Entry::new(icon, ICON),
+            Entry::new(format!("binaries/{platform}/{MODEL_IDENTIFIER}.so"), self.library),
+        ];
+        entries.extend(resources.into_iter().map(|(name, bytes)| Entry::new(format!("resources/{name}"), bytes)));
+        entries.extend([
+            Entry::new("documentation/index.html", html(&description)),
+            Entry::new(format!("documentation/{MODEL_IDENTIFIER}_ref.csv"), self.reference_csv.as_str()),
+            Entry::new("documentation/licenses/license.txt", LICENSE),
+            Entry::new("documentation/licenses/LICENSE-MIT.txt", LICENSE_MIT),
+            Entry::new("documentation/licenses/LICENSE-APACHE.txt", LICENSE_APACHE),
+            Entry::new("documentation/licenses/third-party.txt", THIRD_PARTY),
+        ]);
+        entries
+    }
+
+    fn description<'b>(&'b self, token: &'b str, arrays: bool) -> Description<'b> {
+        let settings = &self.scene.settings;
+        let structures = settings.structures.iter().map(|structure| structure.name.as_str());
+        Description {
+            model_name: &settings.name,
+            identifier: MODEL_IDENTIFIER,
+            token,
+            description: &settings.description,
+            generated: &self.generated,
+            generation_tool: concat!("tiprub ", env!("CARGO_PKG_VERSION")),
+            version: env!("CARGO_PKG_VERSION"),
+            author: "The tiprub developers",
+            copyright: "Copyright (c) 2026 The tiprub developers",
+            license: env!("CARGO_PKG_LICENSE"),
+            experiment: Experiment {
+                start: settings.experiment.start,
+                stop: settings.experiment.stop,
+                step: settings.experiment.communication_step,
+            },
+            table: self.simulation.table(),
+            fmi3_arrays: arrays,
+            structures: structures.zip(&self.scene.roms).collect(),
+            limits: LIMITS.map(String::from).to_vec(),
+            warnings: self.simulation.warnings().to_vec(),
+        }
+    }
+}
+
+/// The optional generation date: left out (equal inputs, equal bytes) unless SOURCE_DATE_EPOCH gives one.
+fn generation_date(source_date_epoch: Option<&str>) -> Result<String> {
+    let Some(text) = source_date_epoch else { return Ok(String::new()) };
+    // Four-digit years only: xs:dateTime allows more, importers do not.
+    match text.trim().parse::<i64>() {
+        Ok(seconds) if (0..253_402_300_800).contains(&seconds) => Ok(date_time(seconds)),
+        _ => Err(Failure::usage(
+            "SOURCE_DATE_EPOCH",
+            format!("{text:?} is not a number of seconds since 1970-01-01"),
+            "Unset it, or set it to the output of `git log -1 --format=%ct`",
+        )),
+    }
+}
+
+/// xs:dateTime of a count of seconds since 1970 (UTC), after H. Hinnant's `civil_from_days`.
+fn date_time(seconds: i64) -> String {
+    let (days, rest) = (seconds.div_euclid(86_400), seconds.rem_euclid(86_400));
+    let shifted = days + 719_468;
+    let (era, day_of_era) = (shifted.div_euclid(146_097), shifted.rem_euclid(146_097));
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let march_month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * march_month + 2) / 5 + 1;
+    let month = if march_month < 10 { march_month + 3 } else { march_month - 9 };
+    let year = year_of_era + era * 400 + i64::from(month <= 2);
+    format!("{year:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}Z", rest / 3600, rest / 60 % 60, rest % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        // `date -u -d @SECONDS +%FT%TZ`
+        assert_eq!(date_time(0), "1970-01-01T00:00:00Z");
+        assert_eq!(date_time(951_827_696), "2000-02-29T12:34:56Z");
+        assert_eq!(date_time(1_767_225_599), "2025-12-31T23:59:59Z");
+        assert_eq!(date_time(4_107_542_400), "2100-03-01T00:00:00Z");
+        assert_eq!(date_time(253_402_300_799), "9999-12-31T23:59:59Z");
+    }
+
+    #[test]
+    fn the_date_is_left_out_unless_it_is_given() {
+        assert_eq!(generation_date(None).unwrap(), "");
+        assert_eq!(generation_date(Some("0\n")).unwrap(), "1970-01-01T00:00:00Z");
+        for wrong in ["yesterday", "-1", "", "999999999999999"] {
+            assert_eq!(generation_date(Some(wrong)).unwrap_err().what, "SOURCE_DATE_EPOCH");
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! The `tiprub` command line as a library: reduce, package, run, demo, inspect.
+//!
+//! Top floor: it wires the lower floors together and owns everything that touches files, processes and the
+//! terminal. [`commands`] holds one module per command; the rest are the parts they share.
+//!
+//! - [`scene_source`]: a scene file (or the embedded rotor 37 scene) with its ROMs;
+//! - [`schedule`], [`recording`], [`native`]: communication points, the table of results, the run without FMI;
+//! - [`archive`], [`fmu`], [`library`]: the reproducible zip, its contents, and the shared library that goes in;
+//! - [`importer`]: a packaged FMU driven through its C ABI the way any importer would;
+//! - [`report`]: the HTML report with its pictures and plots.
+
+pub mod archive;
+pub mod cli;
+pub mod commands;
+pub mod console;
+pub mod failure;
+pub mod fmu;
+pub mod importer;
+pub mod library;
+pub mod native;
+pub mod output_file;
+pub mod recording;
+pub mod reduction;
+pub mod report;
+pub mod rom_facts;
+pub mod scene_source;
+pub mod schedule;
+
+pub use failure::{Failure, Result};

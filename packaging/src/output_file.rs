@@ -1,0 +1,115 @@
+//! Files appear whole or not at all: written to a hidden temporary file beside the target, then renamed.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use tempfile::NamedTempFile;
+
+use crate::{Failure, Result};
+
+/// Create the directory (and its parents) if it is not there.
+///
+/// # Errors
+/// The directory cannot be made.
+pub fn create_directory(path: &Path) -> Result<()> {
+    fs::create_dir_all(path).map_err(|error| Failure::file(path, "cannot create the directory", &error))
+}
+
+/// A hidden temporary file in the directory of `target` (which is created if missing). Nothing shows under the
+/// target's name before [`persist`].
+///
+/// # Errors
+/// The directory cannot be written to.
+pub fn begin(target: &Path) -> Result<NamedTempFile> {
+    let directory = parent(target);
+    create_directory(&directory)?;
+    tempfile::Builder::new()
+        .prefix(".tiprub-")
+        .suffix(".part")
+        .tempfile_in(&directory)
+        .map_err(|error| Failure::file(target, "cannot write there", &error))
+}
+
+/// Give the finished temporary file its name, replacing an older file of that name.
+///
+/// # Errors
+/// The rename failed; the temporary file is gone and an older target untouched.
+pub fn persist(file: NamedTempFile, target: &Path) -> Result<()> {
+    set_ordinary_permissions(&file, target)?;
+    file.persist(target).map_err(|error| Failure::file(target, "cannot be put in place", &error.error))?;
+    Ok(())
+}
+
+/// Write `bytes` to `target` in one piece.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write(target: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
+    let mut file = begin(target)?;
+    std::io::Write::write_all(&mut file, bytes.as_ref())
+        .map_err(|error| Failure::file(target, "cannot be written", &error))?;
+    persist(file, target)
+}
+
+fn parent(target: &Path) -> PathBuf {
+    match target.parent() {
+        Some(directory) if !directory.as_os_str().is_empty() => directory.to_path_buf(),
+        _ => PathBuf::from("."),
+    }
+}
+
+/// Temporary files are private (0600); results are ordinary files (0644).
+#[cfg(unix)]
+fn set_ordinary_permissions(file: &NamedTempFile, target: &Path) -> Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.as_file()
+        .set_permissions(fs::Permissions::from_mode(0o644))
+        .map_err(|error| Failure::file(target, "permissions cannot be set", &error))
+}
+
+#[cfg(not(unix))]
+fn set_ordinary_permissions(_file: &NamedTempFile, _target: &Path) -> Result<()> {
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(directory: &Path) -> Vec<String> {
+        let entries = fs::read_dir(directory).unwrap();
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+    }
+
+    #[test]
+    fn missing_directories_are_created_and_only_the_target_stays() {
+        let root = tempfile::tempdir().unwrap();
+        let target = root.path().join("a/b/result.csv");
+        write(&target, "1\n").unwrap();
+        write(&target, "2\n").unwrap();
+        assert_eq!(fs::read_to_string(&target).unwrap(), "2\n");
+        assert_eq!(names(&root.path().join("a/b")), ["result.csv"]);
+    }
+
+    #[test]
+    fn an_abandoned_file_leaves_nothing_and_keeps_the_old_one() {
+        let root = tempfile::tempdir().unwrap();
+        let target = root.path().join("rom.safetensors");
+        write(&target, "old").unwrap();
+        let file = begin(&target).unwrap();
+        assert!(names(root.path()).iter().all(|name| name.starts_with('.') || name == "rom.safetensors"));
+        drop(file);
+        assert_eq!(names(root.path()), ["rom.safetensors"]);
+        assert_eq!(fs::read_to_string(&target).unwrap(), "old");
+    }
+
+    #[test]
+    fn a_target_that_cannot_be_written_says_so() {
+        let root = tempfile::tempdir().unwrap();
+        fs::write(root.path().join("file"), "").unwrap();
+        let failure = write(&root.path().join("file/inside.csv"), "x").unwrap_err();
+        assert!(failure.problem.contains("cannot create the directory"), "{failure}");
+    }
+}

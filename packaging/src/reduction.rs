@@ -1,0 +1,34 @@
+//! The blade that ships, reduced with progress on the way.
+
+use tiprub_model::{
+    Reduction, Rotor37Options,
+    progress::{Progress, Stage},
+    reduce_rotor37,
+};
+
+use crate::{Failure, Result, console::Console};
+
+const STAGES: [Stage; 6] =
+    [Stage::Mesh, Stage::Assembly, Stage::FullModes, Stage::FixedInterfaceModes, Stage::ConstraintModes, Stage::Checks];
+
+/// Reduce rotor 37, showing stage and share done.
+///
+/// # Errors
+/// Counts that the mesh cannot serve, and whatever the reduction refuses.
+pub fn rotor37(options: &Rotor37Options, console: &Console) -> Result<Reduction> {
+    let task = console.task("Reducing rotor 37", Some(100 * STAGES.len() as u64));
+    let listener = |progress: Progress| {
+        let stage = STAGES.iter().position(|stage| *stage == progress.stage).unwrap_or(0);
+        task.now(&format!("Reducing rotor 37: {}", progress.stage));
+        task.at(percent(stage as f64 + progress.fraction));
+    };
+    reduce_rotor37(options, &listener).map_err(|error| match error {
+        tiprub_model::Error::Invalid { what, problem, remedy } => Failure::new(what, problem, remedy),
+        other => Failure::from_below("reducing rotor 37", other),
+    })
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=100 per stage")]
+fn percent(stages: f64) -> u64 {
+    (100.0 * stages.clamp(0.0, STAGES.len() as f64)) as u64
+}

@@ -1,0 +1,345 @@
+//! The page around the figures: header, key figures, tables, links.
+
+use std::fmt::Write as _;
+
+use tiprub_core::{Scene, VariableTable, variables::Quantity};
+use tiprub_model::Reduction;
+
+use super::sections::{Results, figures};
+use crate::{
+    Result,
+    native::NativeRun,
+    recording::Agreement,
+    rom_facts::{CheckRow, RomFacts},
+    schedule::Schedule,
+};
+
+/// What an imported run has to say in the report.
+#[derive(Debug, Clone)]
+pub struct ImportedSummary {
+    /// For example `FMI 2.0`.
+    pub label: String,
+    /// Time spent in doStep (s).
+    pub stepping: f64,
+    /// Comparison with the native run.
+    pub agreement: Agreement,
+}
+
+/// A file beside the report.
+#[derive(Debug, Clone)]
+pub struct ReportFile {
+    /// File name, relative to the report.
+    pub name: String,
+    /// What it is.
+    pub meaning: String,
+    /// Size in bytes.
+    pub bytes: u64,
+}
+
+/// Everything the report shows.
+pub struct ReportInput<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its variables.
+    pub table: &'a VariableTable,
+    /// Full model and modes, where they are at hand.
+    pub reduction: Option<&'a Reduction>,
+    /// Facts of the ROMs.
+    pub facts: &'a [RomFacts],
+    /// Communication points.
+    pub schedule: &'a Schedule,
+    /// The native run.
+    pub native: &'a NativeRun,
+    /// The runs through the C ABIs.
+    pub imported: &'a [ImportedSummary],
+    /// Files beside the report.
+    pub files: &'a [ReportFile],
+    /// Wall times of the parts of the work (what, s).
+    pub durations: &'a [(String, f64)],
+}
+
+const STYLE: &str = include_str!("../../assets/report.css");
+
+/// The whole page.
+///
+/// # Errors
+/// A plot cannot be drawn.
+pub fn render(input: &ReportInput<'_>) -> Result<String> {
+    let title = escape(&input.scene.settings.name);
+    let mut page = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>{title} - tiprub report</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n"
+    );
+    page.push_str(&header(input));
+    let mut figures = figures(input)?.into_iter();
+    if let Some((title, html)) = figures.next() {
+        let _ = writeln!(page, "<section><h2>{title}</h2>{html}</section>");
+    }
+    page.push_str(&rom_section(input.facts));
+    for (title, html) in figures.filter(|(_, html)| !html.is_empty()) {
+        let _ = writeln!(page, "<section><h2>{title}</h2>{html}</section>");
+    }
+    page.push_str(&run_section(input));
+    page.push_str(&agreement_section(input));
+    page.push_str(&scene_section(input));
+    page.push_str(&files_section(input.files));
+    let _ = write!(page, "<footer>tiprub {}</footer>\n</main>\n</body>\n</html>\n", env!("CARGO_PKG_VERSION"));
+    Ok(page)
+}
+
+/// Text for HTML.
+pub fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+fn header(input: &ReportInput<'_>) -> String {
+    let settings = &input.scene.settings;
+    let results = Results::new(input.table, &input.native.recording);
+    let stepping = input.native.stepping.as_secs_f64();
+    let simulated = input.schedule.stop - input.schedule.start;
+    let per_step = 1e6 * stepping / input.native.internal_steps as f64;
+    let exact = input.imported.iter().all(|run| run.agreement.is_exact());
+    let mut cards = vec![
+        ("simulated".into(), format!("{} ms", rounded(1e3 * simulated)), revolutions(&results)),
+        (
+            "real-time factor".into(),
+            rounded(stepping / simulated),
+            "stepping time / simulated time, one core".to_string(),
+        ),
+        ("per internal step".into(), format!("{} µs", rounded(per_step)), "whole disk, native".into()),
+    ];
+    if let Some((_, peak)) = results.extremes(Quantity::NormalForcePeak) {
+        cards.push((
+            "largest contact force".into(),
+            format!("{} N", rounded(peak)),
+            "one node, one internal step".into(),
+        ));
+    }
+    if let Some((low, high)) = results.extremes(Quantity::EnergyResidualRelative) {
+        cards.push(("energy residual".into(), scientific(low.abs().max(high.abs())), "relative, largest".into()));
+    }
+    if !input.imported.is_empty() {
+        let labels: Vec<&str> = input.imported.iter().map(|run| run.label.as_str()).collect();
+        let verdict = if exact { "bit for bit" } else { "different" };
+        cards.push(("agreement".into(), verdict.into(), format!("{} and native", labels.join(", "))));
+    }
+    let mut html = format!("<header><h1>{}</h1><p>{}</p>", escape(&settings.name), escape(&settings.description));
+    html.push_str("<div class=\"cards\">");
+    for (label, value, note) in cards {
+        let label: String = label;
+        let _ = write!(html, "<div><span>{label}</span><b>{value}</b><small>{note}</small></div>");
+    }
+    html.push_str("</div></header>\n");
+    html
+}
+
+fn revolutions(results: &Results<'_>) -> String {
+    let turned = results.column(Quantity::RotorAngle).and_then(|angles| Some(angles.last()? - angles.first()?));
+    turned.map_or_else(String::new, |angle| format!("{} revolutions", rounded(angle / std::f64::consts::TAU)))
+}
+
+fn rom_section(facts: &[RomFacts]) -> String {
+    let mut html = String::from("<section><h2>Reduced-order model</h2>");
+    for fact in facts {
+        let rom = &fact.rom;
+        let _ = write!(html, "<p>{}.</p>", escape(rom.origin.trim_end_matches('.')));
+        let nodes: Vec<&str> = rom.contact_nodes.iter().map(|node| node.name.as_str()).collect();
+        let friction = fact.solvable_friction.map_or("-".into(), |value| format!("{value}"));
+        html.push_str(&table(&[
+            ("sectors", rom.sectors.to_string()),
+            ("reduced coordinates per sector", rom.order().to_string()),
+            ("contact nodes", escape(&nodes.join(", "))),
+            (
+                "largest angular frequency ω<sub>max</sub>",
+                format!("{} rad/s", scientific(fact.largest_angular_frequency)),
+            ),
+            (
+                "largest stable h, central differences",
+                format!("{} s (2/ω<sub>max</sub>)", scientific(fact.central_difference_limit)),
+            ),
+            (
+                "largest stable h, modal-exact",
+                "no limit; contact on all modes is resolved up to the value above".into(),
+            ),
+            ("contact problem solvable up to µ", format!("{friction} (all nodes closed; tried up to 2)")),
+        ]));
+        html.push_str(&checks_table(&fact.checks()));
+    }
+    html.push_str("</section>\n");
+    html
+}
+
+fn checks_table(checks: &[CheckRow]) -> String {
+    if checks.is_empty() {
+        return "<p>This ROM came without checks.</p>".into();
+    }
+    let mut html = String::from(
+        "<table class=\"numbers\"><thead><tr><th>mode</th><th>full model (Hz)</th><th>reduced (Hz)</th>\
+         <th>frequency deviation, eq. 13 (%)</th><th>residual criterion, eq. 12 (%)</th></tr></thead><tbody>",
+    );
+    for (row, mode) in checks.iter().zip(1..) {
+        let _ = write!(
+            html,
+            "<tr><td>{mode}</td><td>{:.3}</td><td>{:.3}</td><td>{:.5}</td><td>{:.5}</td></tr>",
+            row.full, row.reduced, row.deviation, row.residual
+        );
+    }
+    html.push_str("</tbody></table>");
+    html
+}
+
+fn run_section(input: &ReportInput<'_>) -> String {
+    let (native, schedule) = (input.native, input.schedule);
+    let stepping = native.stepping.as_secs_f64();
+    let simulated = schedule.stop - schedule.start;
+    let results = Results::new(input.table, &native.recording);
+    let mut rows = vec![
+        ("communication steps", format!("{} of H = {} s", schedule.count, scientific(schedule.step))),
+        ("internal steps", native.internal_steps.to_string()),
+        ("stepping time", format!("{} s", rounded(stepping))),
+        ("time per internal step", format!("{} µs", rounded(1e6 * stepping / native.internal_steps as f64))),
+        ("real-time factor (stepping time / simulated time)", rounded(stepping / simulated)),
+    ];
+    if let Some(step) = results.last(Quantity::InternalStep) {
+        rows.insert(2, ("internal step h", format!("{} s", scientific(step))));
+    }
+    let energies = [
+        ("friction loss", Quantity::FrictionLoss),
+        ("damping loss", Quantity::DampingLoss),
+        ("impact loss", Quantity::ImpactLoss),
+        ("work put in", Quantity::ExternalWork),
+    ];
+    for (label, quantity) in energies {
+        if let Some(value) = results.last(quantity) {
+            rows.push((label, format!("{} J", rounded(value))));
+        }
+    }
+    let mut html = format!("<section><h2>The run</h2>{}", table(&rows));
+    for warning in &native.warnings {
+        let _ = write!(html, "<p class=\"warning\">{}</p>", escape(warning));
+    }
+    html.push_str("<h3>Where the time went</h3>");
+    let durations: Vec<(&str, String)> =
+        input.durations.iter().map(|(what, seconds)| (what.as_str(), format!("{} s", rounded(*seconds)))).collect();
+    html.push_str(&table(&durations));
+    html.push_str("</section>\n");
+    html
+}
+
+fn agreement_section(input: &ReportInput<'_>) -> String {
+    if input.imported.is_empty() {
+        return String::new();
+    }
+    let mut html = String::from(
+        "<section><h2>FMU against native run</h2><p>Each FMU was unzipped, loaded and driven through its C interface as an \
+         importer does it, with the same communication points as the native run.</p>\
+         <table class=\"numbers\"><thead><tr><th>run</th><th>communication points</th><th>outputs</th>\
+         <th>values that differ in any bit</th><th>largest difference</th><th>time in doStep (s)</th></tr></thead><tbody>",
+    );
+    let _ = write!(
+        html,
+        "<tr><td>native</td><td>{}</td><td>{}</td><td>-</td><td>-</td><td>{}</td></tr>",
+        input.native.recording.rows(),
+        input.native.recording.names.len(),
+        rounded(input.native.stepping.as_secs_f64())
+    );
+    for run in input.imported {
+        let agreement = &run.agreement;
+        let _ = write!(
+            html,
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            escape(&run.label),
+            agreement.points,
+            agreement.variables,
+            agreement.different,
+            agreement.largest,
+            rounded(run.stepping)
+        );
+    }
+    html.push_str("</tbody></table></section>\n");
+    html
+}
+
+fn scene_section(input: &ReportInput<'_>) -> String {
+    format!(
+        "<section><h2>Scene</h2><details><summary>All settings, defaults included</summary><pre>{}</pre></details></section>\n",
+        escape(&tiprub_format::write_scene(&input.scene.settings))
+    )
+}
+
+fn files_section(files: &[ReportFile]) -> String {
+    let mut html = String::from("<section><h2>Files</h2><table><tbody>");
+    for file in files {
+        let _ = write!(
+            html,
+            "<tr><th><a href=\"{0}\">{0}</a></th><td>{1}</td><td class=\"size\">{2} kB</td></tr>",
+            escape(&file.name),
+            escape(&file.meaning),
+            file.bytes.div_ceil(1000)
+        );
+    }
+    html.push_str("</tbody></table></section>\n");
+    html
+}
+
+/// A table of names and values; values are HTML.
+fn table(rows: &[(&str, String)]) -> String {
+    let mut html = String::from("<table><tbody>");
+    for (name, value) in rows {
+        let _ = write!(html, "<tr><th>{name}</th><td>{value}</td></tr>");
+    }
+    html.push_str("</tbody></table>");
+    html
+}
+
+/// Three significant digits.
+fn rounded(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    if !(1e-3..1e6).contains(&value.abs()) {
+        return scientific(value);
+    }
+    let (mut digits, mut magnitude) = (2_usize, value.abs());
+    while magnitude >= 10.0 && digits > 0 {
+        magnitude /= 10.0;
+        digits -= 1;
+    }
+    while magnitude < 1.0 {
+        magnitude *= 10.0;
+        digits += 1;
+    }
+    format!("{value:.digits$}")
+}
+
+/// At most four significant digits, powers of ten written out.
+fn scientific(value: f64) -> String {
+    let text = format!("{value:.3e}");
+    match text.split_once('e') {
+        Some((mantissa, exponent)) => {
+            let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
+            let power = format!("·10<sup>{}</sup>", exponent.replace('-', "−"));
+            format!("{mantissa}{}", if exponent == "0" { "" } else { &power })
+        }
+        None => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_readable() {
+        assert_eq!([1234.5, 0.01234, 9.876, 0.0, 123.4].map(rounded), ["1234", "0.0123", "9.88", "0", "123"]);
+        assert_eq!(scientific(1.234567e-7), "1.235·10<sup>−7</sup>");
+        assert_eq!(scientific(2.0), "2");
+        assert_eq!(scientific(1e-5), "1·10<sup>−5</sup>");
+    }
+
+    #[test]
+    fn text_cannot_break_the_page() {
+        assert_eq!(escape("<a href=\"x\">&"), "&lt;a href=&quot;x&quot;&gt;&amp;");
+    }
+}

@@ -1,0 +1,310 @@
+//! The figures of the report: which quantity goes where, in which unit, under which caption.
+
+use std::fmt::Write as _;
+
+use tiprub_core::{VariableTable, variables::Quantity};
+use tiprub_model::{Reduction, surface_quads};
+
+use super::{
+    page::{ReportInput, escape},
+    picture::{self, Frame, Surface, View},
+    plots::{Plot, Series},
+};
+use crate::{Failure, Result, recording::Recording};
+
+/// Azimuth and elevation of the blade pictures (rad): suction side, leading edge to the left, a little from above.
+const AZIMUTH: f64 = 1.1;
+const ELEVATION: f64 = 0.22;
+/// Displacements are drawn so that the largest is this share of the blade's height.
+const DRAWN_DISPLACEMENT: f64 = 0.12;
+/// Mode shapes shown.
+const MODES_SHOWN: usize = 4;
+
+/// Results of a run, found by what they stand for rather than by name.
+pub struct Results<'a> {
+    table: &'a VariableTable,
+    recording: &'a Recording,
+}
+
+impl<'a> Results<'a> {
+    /// Results of a run of the scene with this table.
+    pub fn new(table: &'a VariableTable, recording: &'a Recording) -> Self {
+        Self { table, recording }
+    }
+
+    /// Columns (one per element) of the variable with this quantity; empty where the scene has none.
+    fn columns(&self, quantity: Quantity) -> Vec<Vec<f64>> {
+        let Some(variable) = self.table.with_quantity(quantity) else { return Vec::new() };
+        (0..variable.len()).filter_map(|index| self.recording.column(&variable.element_name(index))).collect()
+    }
+
+    /// The column of a scalar quantity.
+    pub fn column(&self, quantity: Quantity) -> Option<Vec<f64>> {
+        self.columns(quantity).into_iter().next()
+    }
+
+    /// Last value of a scalar quantity.
+    pub fn last(&self, quantity: Quantity) -> Option<f64> {
+        self.column(quantity)?.last().copied()
+    }
+
+    /// Smallest and largest value of a scalar quantity.
+    pub fn extremes(&self, quantity: Quantity) -> Option<(f64, f64)> {
+        let column = self.column(quantity)?;
+        Some(
+            column
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value))),
+        )
+    }
+
+    /// Time in ms against value times `factor`.
+    fn points(&self, column: &[f64], factor: f64) -> Vec<(f64, f64)> {
+        self.recording.times.iter().zip(column).map(|(time, value)| (1e3 * time, factor * value)).collect()
+    }
+
+    /// One series per element, labelled with the names of the contact nodes.
+    fn per_node(&self, quantity: Quantity, nodes: &[String], factor: f64) -> Vec<Series> {
+        let columns = self.columns(quantity);
+        nodes
+            .iter()
+            .zip(&columns)
+            .map(|(node, column)| Series::line(readable(node), self.points(column, factor)))
+            .collect()
+    }
+
+    fn series(&self, label: &str, quantity: Quantity, factor: f64) -> Option<Series> {
+        self.column(quantity).map(|column| Series::line(label, self.points(&column, factor)))
+    }
+}
+
+/// A numbered figure.
+#[derive(Clone)]
+struct Figure {
+    body: String,
+    caption: String,
+}
+
+/// All figures, numbered in order, as HTML.
+pub(super) fn figures(input: &ReportInput<'_>) -> Result<Vec<(&'static str, String)>> {
+    let results = Results::new(input.table, &input.native.recording);
+    let mut number = 0;
+    let mut section = |title: &'static str, figures: Vec<Figure>| {
+        let mut html = String::new();
+        for figure in figures {
+            number += 1;
+            let _ = writeln!(
+                html,
+                "<figure>{}<figcaption><b>Figure {number}.</b> {}</figcaption></figure>",
+                figure.body, figure.caption
+            );
+        }
+        (title, html)
+    };
+    Ok(vec![
+        section("The blade", input.reduction.map(mode_shapes).into_iter().collect()),
+        section("Clearances", [casing(input)?, clearances(input, &results)?].concat()),
+        section("Contact forces", forces(input, &results)?),
+        section("Energy", energies(&results)?),
+    ])
+}
+
+fn watched(input: &ReportInput<'_>) -> usize {
+    input.scene.settings.outputs.watched_sectors.first().map_or(0, |sector| sector.saturating_sub(1))
+}
+
+fn node_names(input: &ReportInput<'_>) -> Vec<String> {
+    input
+        .scene
+        .roms
+        .first()
+        .map_or_else(Vec::new, |rom| rom.contact_nodes.iter().map(|node| node.name.clone()).collect())
+}
+
+/// `leading_edge` as people write it.
+fn readable(name: &str) -> String {
+    match name {
+        "mid_chord" => "mid-chord".into(),
+        other => other.replace('_', " "),
+    }
+}
+
+/// Clearance of an undeformed blade around the circumference, for the first contact.
+fn casing(input: &ReportInput<'_>) -> Result<Vec<Figure>> {
+    let settings = &input.scene.settings;
+    let Some(contact) = settings.contacts.first() else { return Ok(Vec::new()) };
+    let Some(surface) = settings.surfaces.iter().find(|surface| surface.name == contact.slave) else {
+        return Ok(Vec::new());
+    };
+    let shape = tiprub_core::contact::surface::Surface::new(&surface.shape, contact.gap)
+        .map_err(|error| Failure::from_core("casing shape", error))?;
+    let clearance = |degrees: f64| contact.gap + shape.evaluate(degrees.to_radians()).0;
+    let points = (0..=720_u32).map(|half| f64::from(half) / 2.0).map(|degrees| (degrees, 1e6 * clearance(degrees)));
+    let series = vec![Series::line("casing", points.collect())];
+    let mut plot = Plot::new("angle around the casing (°)", "radial clearance (µm)", series);
+    plot.height = 200;
+    plot.levels.push((0.0, "tip of an undeformed blade".into()));
+    let ramp = if surface.ramp_time > 0.0 {
+        format!(", reached {} ms after the start", 1e3 * surface.ramp_time)
+    } else {
+        String::new()
+    };
+    let body = plot.to_html()?;
+    let caption = format!("Casing shape: radial clearance of an undeformed blade around the circumference{ramp}.");
+    Ok(vec![Figure { body, caption }])
+}
+
+fn clearances(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>> {
+    let (sector, nodes) = (watched(input), node_names(input));
+    let mut figures = Vec::new();
+    let series = results.per_node(Quantity::Clearance(sector), &nodes, 1e6);
+    if !series.is_empty() {
+        let mut plot = Plot::new("time (ms)", "clearance (µm)", series);
+        plot.height = 300;
+        plot.levels.push((0.0, "contact".into()));
+        figures.push(Figure {
+            body: plot.to_html()?,
+            caption: format!(
+                "Clearance between blade {} and the casing at its contact nodes, at the communication points. The casing's \
+                 bumps pass the blade twice per revolution; between them the blade rings down in its own modes.",
+                sector + 1
+            ),
+        });
+    }
+    Ok(figures)
+}
+
+fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>> {
+    let (sector, nodes) = (watched(input), node_names(input));
+    let mut figures = Vec::new();
+    for (quantity, label, caption) in [
+        (
+            Quantity::NormalForce(sector),
+            "normal force (N)",
+            "Normal contact force on each node of blade {}, mean over the communication step (impulse / H).",
+        ),
+        (
+            Quantity::TangentialForce(sector),
+            "friction force (N)",
+            "Friction force on each node of blade {}, mean over the communication step.",
+        ),
+    ] {
+        let series = results.per_node(quantity, &nodes, 1.0);
+        if !series.is_empty() {
+            let body = Plot::new("time (ms)", label, series).to_html()?;
+            figures.push(Figure { body, caption: caption.replace("{}", &(sector + 1).to_string()) });
+        }
+    }
+    if let Some(series) = results.series("nodes in contact", Quantity::ContactCount, 1.0) {
+        let mut plot = Plot::new("time (ms)", "nodes in contact (-)", vec![series]);
+        plot.height = 190;
+        let all = input.scene.roms.iter().map(|rom| rom.sectors * rom.contact_nodes.len()).sum::<usize>();
+        figures.push(Figure {
+            body: plot.to_html()?,
+            caption: format!("Number of nodes in contact at the communication points, of {all} on the whole disk."),
+        });
+    }
+    if let Some(series) = results.series("torque", Quantity::Torque, 1.0) {
+        let mut plot = Plot::new("time (ms)", "torque on the rotor (N·m)", vec![series]);
+        plot.height = 220;
+        figures.push(Figure {
+            body: plot.to_html()?,
+            caption:
+                "Reaction torque of the casing on the shaft, mean over the communication step; negative values brake."
+                    .into(),
+        });
+    }
+    Ok(figures)
+}
+
+fn energies(results: &Results<'_>) -> Result<Vec<Figure>> {
+    let mut figures = Vec::new();
+    let vibration = [
+        ("kinetic", Quantity::KineticEnergy),
+        ("strain", Quantity::StrainEnergy),
+        ("damping loss", Quantity::DampingLoss),
+        ("impact loss", Quantity::ImpactLoss),
+    ];
+    let exchanged = [("work put in", Quantity::ExternalWork), ("friction heat", Quantity::FrictionLoss)];
+    for (list, height, caption) in [
+        (
+            &vibration[..],
+            260,
+            "Energy of vibration of all blades, and what damping and impacts took from it since the start.",
+        ),
+        (
+            &exchanged[..],
+            200,
+            "Work put in by the drive and the casing, and friction heat, since the start. The difference is what vibrates, \
+             or was lost to damping and impacts (the figure before).",
+        ),
+    ] {
+        let series: Vec<Series> =
+            list.iter().filter_map(|(label, quantity)| results.series(label, *quantity, 1.0)).collect();
+        if !series.is_empty() {
+            let plot = Plot { height, ..Plot::new("time (ms)", "energy (J)", series) };
+            figures.push(Figure { body: plot.to_html()?, caption: caption.into() });
+        }
+    }
+    if let Some(column) = results.column(Quantity::EnergyResidualRelative) {
+        let magnitude: Vec<f64> = column.iter().map(|value| value.abs()).collect();
+        let mut plot = Plot::new(
+            "time (ms)",
+            "|residual| / energy (-)",
+            vec![Series::line("residual", results.points(&magnitude, 1.0))],
+        );
+        (plot.height, plot.logarithmic) = (200, true);
+        figures.push(Figure {
+            body: plot.to_html()?,
+            caption:
+                "Closure of the energy ledger: kinetic + strain + losses − initial − work put in, relative to initial \
+                      energy and all work exchanged. What remains is round-off."
+                    .into(),
+        });
+    }
+    Ok(figures)
+}
+
+/// The blade at rest with its contact nodes, and its first mode shapes.
+fn mode_shapes(reduction: &Reduction) -> Figure {
+    let surface = surface_of(reduction);
+    let view = View::of_blade(&surface, AZIMUTH, ELEVATION);
+    let frame = Frame::around(&surface, &view, 0.1);
+    let marks: Vec<[f64; 3]> = reduction.rom.contact_nodes.iter().map(|node| cartesian(node.position)).collect();
+    let mut body = String::from("<div class=\"shapes\">");
+    let _ = write!(
+        body,
+        "<div>{}<span>mesh and contact nodes</span></div>",
+        picture::draw(&surface, None, &marks, &frame, &view)
+    );
+    let radii = surface.points.iter().map(|point| point[0].hypot(point[1]));
+    let (low, high) = radii.fold((f64::INFINITY, 0.0_f64), |(low, high), radius| (low.min(radius), high.max(radius)));
+    for (mode, number) in reduction.modes.iter().take(MODES_SHOWN).zip(1..) {
+        let largest =
+            mode.shape.iter().map(|vector| vector.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max);
+        let scale = DRAWN_DISPLACEMENT * (high - low) / f64::max(largest, f64::MIN_POSITIVE);
+        let drawn = picture::draw(&surface, Some((&mode.shape, scale)), &[], &frame, &view);
+        let _ = write!(body, "<div>{drawn}<span>mode {number}: {:.1} Hz</span></div>", mode.frequency);
+    }
+    let _ = write!(body, "</div><div class=\"scale\">{}</div>", picture::color_scale("0", "largest"));
+    let caption = format!(
+        "{}: finite-element surface with the contact nodes (red), and the first {} mode shapes at rest; colour is the \
+         magnitude of displacement.",
+        escape(&reduction.rom.name),
+        reduction.modes.len().min(MODES_SHOWN)
+    );
+    Figure { body, caption }
+}
+
+fn surface_of(reduction: &Reduction) -> Surface {
+    let corner = |face: &[usize], index: usize| face[index.min(face.len() - 1)];
+    let faces = surface_quads(&reduction.mesh);
+    Surface {
+        points: reduction.mesh.nodes.clone(),
+        faces: faces.iter().map(|face| std::array::from_fn(|index| corner(face, index))).collect(),
+    }
+}
+
+fn cartesian([radius, angle, z]: [f64; 3]) -> [f64; 3] {
+    [radius * angle.cos(), radius * angle.sin(), z]
+}

@@ -1,0 +1,116 @@
+//! A scene file with its ROMs, or the scene that ships with tiprub.
+
+use std::{cell::RefCell, fs, path::Path};
+
+use tiprub_core::{Rom, Scene};
+use tiprub_model::Rotor37Options;
+
+use crate::{Failure, Result, console::Console, reduction};
+
+/// The scene that ships with tiprub, as a user would write it.
+pub const ROTOR37_SCENE: &str = include_str!("../scenes/rotor37.toml");
+
+/// Name by which the embedded scene and the embedded blade are asked for.
+pub const BUILTIN_ROTOR37: &str = "builtin:rotor37";
+
+/// Load a scene: a path, or [`BUILTIN_ROTOR37`]. Built-in blades are reduced on the way, with progress.
+///
+/// # Errors
+/// Missing or wrong files, naming file, line, field and remedy.
+pub fn load(argument: &str, console: &Console) -> Result<Scene> {
+    let reduce = |name: &str| builtin_rom(name, console);
+    if argument == BUILTIN_ROTOR37 {
+        return rotor37_scene(&reduce);
+    }
+    if let Some(name) = argument.strip_prefix("builtin:") {
+        let problem = format!("there is no built-in scene `{name}`");
+        return Err(Failure::usage("SCENE", problem, format!("Give a scene file, or {BUILTIN_ROTOR37}")));
+    }
+    let path = Path::new(argument);
+    if path.is_dir() {
+        return Err(Failure::usage(argument, "is a directory", "Give the scene file (TOML) in it"));
+    }
+    tiprub_format::load_scene(path, &reduce).map_err(Failure::from)
+}
+
+/// The embedded scene with an embedded blade from `reduce`.
+fn rotor37_scene(reduce: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
+    let settings = tiprub_format::parse_scene(ROTOR37_SCENE, BUILTIN_ROTOR37)?;
+    let rom = reduce("rotor37").unwrap_or_else(|| Err("not known".into()));
+    let rom = rom.map_err(|problem| Failure::new(BUILTIN_ROTOR37, problem, ""))?;
+    Ok(Scene { settings, roms: vec![rom] })
+}
+
+/// The embedded scene around a blade reduced before.
+///
+/// # Errors
+/// Never with the scene that ships.
+pub fn rotor37_scene_with(rom: Rom) -> Result<Scene> {
+    let rom = RefCell::new(Some(rom));
+    rotor37_scene(&|_| rom.borrow_mut().take().map(Ok))
+}
+
+/// The embedded scene as text, with its ROM read from `rom_file` and the stop time replaced.
+pub fn rotor37_text(rom_file: &str, stop: f64) -> String {
+    let mut text = String::new();
+    for line in ROTOR37_SCENE.lines() {
+        if line.starts_with("rom = ") {
+            text.push_str(&format!("rom = \"{rom_file}\""));
+        } else if line.starts_with("stop = ") {
+            text.push_str(&format!("stop = {stop:?}"));
+        } else {
+            text.push_str(line);
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn builtin_rom(name: &str, console: &Console) -> Option<Result<Rom, String>> {
+    let reduce = || reduction::rotor37(&Rotor37Options::default(), console).map(|reduction| reduction.rom);
+    (name == "rotor37").then(|| reduce().map_err(|failure| failure.to_string()))
+}
+
+/// Read a ROM file.
+///
+/// # Errors
+/// Missing or damaged file, naming the array.
+pub fn read_rom(path: &Path) -> Result<Rom> {
+    let bytes = fs::read(path).map_err(|error| Failure::file(path, "cannot be read", &error))?;
+    Ok(tiprub_format::read_rom(&bytes, &path.display().to_string())?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_embedded_scene_is_valid_and_its_file_form_differs_in_two_fields_only() {
+        let embedded = tiprub_format::parse_scene(ROTOR37_SCENE, "embedded").unwrap();
+        let written = tiprub_format::parse_scene(&rotor37_text("blade.rom.safetensors", 0.25), "written").unwrap();
+        assert_eq!(written.structures[0].rom, "blade.rom.safetensors");
+        assert_eq!(written.experiment.stop.to_bits(), 0.25_f64.to_bits());
+        let mut restored = written;
+        restored.structures[0].rom.clone_from(&embedded.structures[0].rom);
+        restored.experiment.stop = embedded.experiment.stop;
+        assert_eq!(restored, embedded);
+    }
+
+    #[test]
+    fn missing_files_and_unknown_builtins_are_named() {
+        let console = Console::new(true, false);
+        let missing = load("/nowhere/scene.toml", &console).unwrap_err();
+        assert!(missing.what.contains("/nowhere/scene.toml"), "{missing}");
+        assert!(load("builtin:rotor38", &console).unwrap_err().problem.contains("rotor38"));
+        assert!(load("/", &console).unwrap_err().problem.contains("directory"));
+    }
+
+    #[test]
+    fn a_wrong_scene_names_line_and_field() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("scene.toml");
+        fs::write(&path, ROTOR37_SCENE.replace("gap = ", "gapp = ")).unwrap();
+        let text = load(&path.display().to_string(), &Console::new(true, false)).unwrap_err().to_string();
+        assert!(text.contains("scene.toml:") && text.contains("gapp") && text.contains("`gap`"), "{text}");
+    }
+}

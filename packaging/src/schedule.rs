@@ -1,0 +1,118 @@
+//! Communication points, counted rather than accumulated.
+
+use tiprub_core::settings::ExperimentSettings;
+
+use crate::{Failure, Result};
+
+/// Most communication points one run may have; beyond it the table of results would not fit in memory.
+const MOST_STEPS: f64 = 50e6;
+
+/// Equally spaced communication points from start to stop; the last step is shorter where they do not divide.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Schedule {
+    /// Start time (s).
+    pub start: f64,
+    /// Stop time (s).
+    pub stop: f64,
+    /// Communication step H (s).
+    pub step: f64,
+    /// Number of communication steps.
+    pub count: usize,
+}
+
+impl Schedule {
+    /// The experiment of the scene, with the stop time and the step optionally replaced.
+    ///
+    /// # Errors
+    /// Stop not after start, step not positive, or too many communication points.
+    pub fn new(experiment: &ExperimentSettings, stop: Option<f64>, step: Option<f64>) -> Result<Self> {
+        let start = experiment.start;
+        let (stop_option, stop) = (stop.is_some(), stop.unwrap_or(experiment.stop));
+        let (step_option, step) = (step.is_some(), step.unwrap_or(experiment.communication_step));
+        let name = |given: bool, option: &str, field: &str| if given { option.to_string() } else { field.to_string() };
+        if !(stop.is_finite() && stop > start) {
+            return Err(Failure::usage(
+                name(stop_option, "--stop", "experiment.stop"),
+                format!("{stop} s is not after the start time {start} s"),
+                "Give a later time in seconds",
+            ));
+        }
+        if !(step.is_finite() && step > 0.0) {
+            return Err(Failure::usage(
+                name(step_option, "--step", "experiment.communication_step"),
+                format!("{step} s is not a positive length of time"),
+                "Give the communication step H in seconds, for example 1e-5",
+            ));
+        }
+        let steps = (stop - start) / step;
+        if steps > MOST_STEPS {
+            return Err(Failure::usage(
+                name(step_option, "--step", "experiment.communication_step"),
+                format!("{steps:.3e} communication points between {start} s and {stop} s"),
+                format!("Choose a longer step, so that there are at most {MOST_STEPS:.0e}"),
+            ));
+        }
+        Ok(Self { start, stop, step, count: count_steps(steps) })
+    }
+
+    /// Communication point `index` (0 is the start, `count` the stop): start + index·H.
+    ///
+    /// Points on the grid are never moved to the stop time by round-off, so that importers that count in the
+    /// same way (FMPy among them) ask for exactly these.
+    pub fn time(&self, index: usize) -> f64 {
+        let regular = self.start + index as f64 * self.step;
+        if index == self.count && regular > self.stop && !is_close(regular, self.stop) { self.stop } else { regular }
+    }
+}
+
+/// Relative closeness of two times, as in Python's `math.isclose`.
+fn is_close(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-9 * a.abs().max(b.abs())
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 < steps ≤ MOST_STEPS, checked")]
+fn count_steps(steps: f64) -> usize {
+    // A quotient like 1000.0000000001 is 1000 steps, not 1001.
+    ((steps - 1e-9 * steps).ceil() as usize).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn schedule(start: f64, stop: f64, step: f64) -> Schedule {
+        Schedule::new(&ExperimentSettings { start, stop, communication_step: step }, None, None).unwrap()
+    }
+
+    #[test]
+    fn points_are_counted_not_accumulated() {
+        let schedule = schedule(0.0, 1.0, 0.1);
+        assert_eq!(schedule.count, 10);
+        assert_eq!(schedule.time(3).to_bits(), (3.0_f64 * 0.1).to_bits());
+        assert_eq!(schedule.time(10).to_bits(), 1.0_f64.to_bits());
+    }
+
+    #[test]
+    fn a_step_that_does_not_divide_ends_with_a_shorter_one() {
+        let schedule = schedule(2.0, 2.25, 0.1);
+        assert_eq!(schedule.count, 3);
+        assert_eq!(schedule.time(3).to_bits(), 2.25_f64.to_bits());
+    }
+
+    #[test]
+    fn a_step_longer_than_the_run_is_one_step() {
+        let schedule = schedule(0.0, 1e-3, 1.0);
+        assert_eq!((schedule.count, schedule.time(1).to_bits()), (1, 1e-3_f64.to_bits()));
+    }
+
+    #[test]
+    fn wrong_times_name_the_option_or_the_field() {
+        let experiment = ExperimentSettings { start: 0.0, stop: 1.0, communication_step: 1e-3 };
+        let stop = Schedule::new(&experiment, Some(-1.0), None).unwrap_err();
+        assert_eq!((stop.what.as_str(), stop.usage), ("--stop", true));
+        assert_eq!(Schedule::new(&experiment, None, Some(f64::NAN)).unwrap_err().what, "--step");
+        assert_eq!(Schedule::new(&experiment, None, Some(1e-12)).unwrap_err().what, "--step");
+        let wrong = ExperimentSettings { stop: 0.0, ..experiment };
+        assert_eq!(Schedule::new(&wrong, None, None).unwrap_err().what, "experiment.stop");
+    }
+}

@@ -1,0 +1,284 @@
+//! The `tiprub` program as a user meets it: a small scene, real files, exit codes, and nothing half-written.
+
+use std::{
+    fs,
+    path::PathBuf,
+    process::{Command, Output},
+};
+
+use nalgebra::DMatrix;
+use tempfile::TempDir;
+use tiprub_core::{
+    Rom,
+    rom::{ContactNode, Frame, RomChecks},
+};
+
+const SCENE: &str = r#"
+name = "small"
+[[structure]]
+name = "rotor"
+rom = "small.rom.safetensors"
+speed = 100.0
+[[surface]]
+name = "casing"
+shape = { kind = "lobes", amplitude = 2e-3, order = 2 }
+ramp_time = 0.02
+[[contact]]
+master = "rotor"
+slave = "casing"
+gap = 1e-3
+friction = 0.1
+[time]
+step = 1e-4
+[experiment]
+stop = 0.05
+communication_step = 1e-3
+"#;
+
+/// A directory with a scene of four one-node blades.
+struct Project {
+    root: TempDir,
+}
+
+impl Project {
+    fn new() -> Self {
+        let root = tempfile::tempdir().unwrap();
+        let rom = Rom {
+            name: "small".into(),
+            origin: "One mass on three springs".into(),
+            sectors: 4,
+            frame: Frame::Cylindrical,
+            mass: DMatrix::identity(3, 3) * 0.1,
+            stiffness: DMatrix::identity(3, 3) * 1e5,
+            damping_ratio: 0.01,
+            contact_map: DMatrix::identity(3, 3),
+            contact_nodes: vec![ContactNode { name: "tip".into(), position: [0.25, 0.0, 0.0], meridional_slope: 0.0 }],
+            checks: RomChecks::default(),
+        };
+        fs::write(root.path().join("small.rom.safetensors"), tiprub_format::write_rom(&rom)).unwrap();
+        fs::write(root.path().join("scene.toml"), SCENE).unwrap();
+        // The header of a shared library for Linux on x86-64, which is all that packaging looks at.
+        let mut library = vec![0_u8; 4096];
+        library[..20].copy_from_slice(b"\x7fELF\x02\x01\x01\0\0\0\0\0\0\0\0\0\x03\0\x3e\0");
+        fs::write(root.path().join("library.so"), library).unwrap();
+        Self { root }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.root.path().join(name)
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+        command.current_dir(self.root.path()).env_remove("SOURCE_DATE_EPOCH").args(arguments);
+        command.output().unwrap()
+    }
+
+    #[track_caller]
+    fn succeed(&self, arguments: &[&str]) -> String {
+        let output = self.run(arguments);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {stderr}");
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    /// The error line of a run that must fail with this code.
+    #[track_caller]
+    fn fail(&self, arguments: &[&str], code: i32) -> String {
+        let output = self.run(arguments);
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {stderr}");
+        assert!(!stderr.contains("panicked"), "{stderr}");
+        stderr.lines().find(|line| line.starts_with("error: ")).unwrap_or_else(|| panic!("{stderr}")).to_string()
+    }
+
+    fn files(&self) -> Vec<String> {
+        let names = fs::read_dir(self.root.path()).unwrap();
+        let mut names: Vec<_> = names.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+}
+
+fn columns(csv: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+    let mut lines = csv.lines();
+    let names = lines.next().unwrap().split(',').map(String::from).collect();
+    (names, lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect())
+}
+
+#[test]
+fn a_native_run_writes_one_row_per_communication_point() {
+    let project = Project::new();
+    let json = project.succeed(&["run", "scene.toml", "--csv", "new/out.csv", "--json", "--quiet"]);
+    let summary: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(summary["communication_steps"], 50);
+    assert_eq!(summary["internal_steps"], 500);
+    let (names, rows) = columns(&fs::read_to_string(project.path("new/out.csv")).unwrap());
+    assert_eq!((names[0].as_str(), rows.len()), ("time", 51));
+    let clearance = names.iter().position(|name| name == "clearance_minimum").expect("a column for the clearance");
+    assert!((rows[0][clearance] - rows[50][clearance]).abs() > 1e-6, "the casing's lobes meet the blades");
+    assert!(rows.iter().all(|row| row.len() == names.len()));
+    assert_eq!(rows[50][0].to_bits(), 0.05_f64.to_bits());
+    let again = project.succeed(&["run", "scene.toml", "--csv", "-", "--quiet"]);
+    assert_eq!(columns(&again).1, rows, "the same run gives the same bits");
+}
+
+#[test]
+fn settings_and_times_can_be_replaced() {
+    let project = Project::new();
+    let csv = |arguments: &[&str]| {
+        let all = [&["run", "scene.toml", "--csv", "-", "--quiet"], arguments].concat();
+        columns(&project.succeed(&all)).1
+    };
+    assert_eq!(csv(&["--stop", "0.01", "--step", "0.003"]).len(), 5);
+    assert_ne!(csv(&["--set", "speed=50"]), csv(&[]));
+    assert_eq!(csv(&["--set", "speed=100"]), csv(&[]));
+}
+
+#[test]
+fn wrong_command_lines_exit_with_two_and_say_what_to_do() {
+    let project = Project::new();
+    let unknown = project.fail(&["run", "scene.toml", "--set", "sped=1"], 2);
+    assert!(unknown.contains("no such variable") && unknown.contains("`speed`"), "{unknown}");
+    let wrong = project.fail(&["run", "scene.toml", "--set", "speed=fast"], 2);
+    assert!(wrong.contains("not a number"), "{wrong}");
+    let infinite = project.fail(&["run", "scene.toml", "--set", "speed=inf"], 2);
+    assert!(infinite.contains("--set speed=inf"), "{infinite}");
+    let stop = project.fail(&["run", "scene.toml", "--stop", "-1"], 2);
+    assert!(stop.contains("--stop"), "{stop}");
+    let two = project.fail(&["package", "scene.toml", "-o", "x.fmu"], 2);
+    assert!(two.contains("two FMUs"), "{two}");
+    project.fail(&["package", "scene.toml", "--fmi", "4"], 2);
+    project.fail(&["frobnicate"], 2);
+}
+
+#[test]
+fn failures_exit_with_one_and_are_json_too() {
+    let project = Project::new();
+    let output = project.run(&["run", "missing.toml", "--json"]);
+    assert_eq!(output.status.code(), Some(1));
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(json["error"]["what"].as_str().unwrap().contains("missing.toml"), "{json}");
+    fs::write(project.path("bad.toml"), SCENE.replace("friction = 0.1", "frictoin = 0.1")).unwrap();
+    let bad = project.fail(&["run", "bad.toml"], 1);
+    assert!(bad.contains("bad.toml:") && bad.contains("frictoin") && bad.contains("`friction`"), "{bad}");
+    let rom = fs::read(project.path("small.rom.safetensors")).unwrap();
+    fs::write(project.path("small.rom.safetensors"), &rom[..rom.len() / 2]).unwrap();
+    let truncated = project.fail(&["run", "scene.toml"], 1);
+    assert!(truncated.contains("small.rom.safetensors"), "{truncated}");
+}
+
+#[test]
+fn a_package_is_complete_reproducible_and_inspectable() {
+    let project = Project::new();
+    project.succeed(&["package", "scene.toml", "-o", "a", "--library", "library.so", "--quiet"]);
+    project.succeed(&["package", "scene.toml", "-o", "b", "--library", "library.so", "--quiet"]);
+    for (version, own) in [
+        (2, ["model.png", "binaries/linux64/tiprub.so"]),
+        (3, ["terminalsAndIcons/icon.png", "binaries/x86_64-linux/tiprub.so"]),
+    ] {
+        let name = format!("small_fmi{version}.fmu");
+        let bytes = fs::read(project.path("a").join(&name)).unwrap();
+        assert_eq!(bytes, fs::read(project.path("b").join(&name)).unwrap(), "same inputs, same bytes");
+        let entries = raw_entries(&bytes);
+        assert_eq!(entries[0], "modelDescription.xml");
+        let common = [
+            "resources/scene.toml",
+            "resources/rotor.rom.safetensors",
+            "documentation/index.html",
+            "documentation/tiprub_ref.csv",
+            "documentation/licenses/license.txt",
+            "documentation/licenses/LICENSE-MIT.txt",
+            "documentation/licenses/LICENSE-APACHE.txt",
+            "documentation/licenses/third-party.txt",
+        ];
+        for wanted in common.iter().chain(&own) {
+            assert!(entries.iter().any(|entry| entry == wanted), "{wanted} in {entries:?}");
+        }
+        let json = project.succeed(&["inspect", &format!("a/{name}"), "--json"]);
+        let inspected: serde_json::Value = serde_json::from_str(&json).unwrap();
+        assert_eq!(inspected["fmi_version"], format!("{version}.0"));
+        assert_eq!(inspected["scene"]["settings"]["name"], "small");
+    }
+    assert_eq!(project.files(), ["a", "b", "library.so", "scene.toml", "small.rom.safetensors"]);
+}
+
+#[test]
+fn scalars_and_dates_are_packed_as_asked() {
+    let project = Project::new();
+    let describe = |arguments: &[&str], date: Option<&str>| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+        command.current_dir(project.root.path()).env_remove("SOURCE_DATE_EPOCH");
+        command.args(["package", "scene.toml", "--fmi", "3", "-o", "x.fmu", "--library", "library.so"]).args(arguments);
+        command.envs(date.map(|seconds| ("SOURCE_DATE_EPOCH", seconds)));
+        assert!(command.output().unwrap().status.success());
+        let mut archive = zip::ZipArchive::new(fs::File::open(project.path("x.fmu")).unwrap()).unwrap();
+        std::io::read_to_string(archive.by_index(0).unwrap()).unwrap()
+    };
+    let arrays = describe(&[], None);
+    assert!(arrays.contains("<Dimension") && !arrays.contains("generationDateAndTime"));
+    assert!(!describe(&["--scalars"], None).contains("<Dimension"));
+    assert!(describe(&[], Some("951827696")).contains("generationDateAndTime=\"2000-02-29T12:34:56Z\""));
+}
+
+#[test]
+fn failed_packages_leave_nothing() {
+    let project = Project::new();
+    let before = project.files();
+    let missing = project.fail(&["package", "scene.toml", "--library", "none.so"], 1);
+    assert!(missing.contains("none.so"), "{missing}");
+    let text = project.fail(&["package", "scene.toml", "--library", "scene.toml"], 1);
+    assert!(text.contains("not a shared library"), "{text}");
+    fs::write(project.path("scene.toml"), SCENE.replace("gap = 1e-3", "gap = -1e-3")).unwrap();
+    let gap = project.fail(&["package", "scene.toml", "--library", "library.so"], 1);
+    assert!(gap.contains("gap"), "{gap}");
+    assert_eq!(project.files(), before);
+}
+
+#[test]
+fn damaged_fmus_are_named_by_inspect_at_every_length() {
+    let project = Project::new();
+    project.succeed(&["package", "scene.toml", "--fmi", "2", "-o", "x.fmu", "--library", "library.so"]);
+    let bytes = fs::read(project.path("x.fmu")).unwrap();
+    for share in 0..10 {
+        fs::write(project.path("x.fmu"), &bytes[..bytes.len() * share / 10]).unwrap();
+        let error = project.fail(&["inspect", "x.fmu"], 1);
+        assert!(error.contains("x.fmu") && error.contains("truncated"), "{error}");
+    }
+    // One flipped byte inside the compressed library fails its checksum.
+    let mut damaged = bytes.clone();
+    let at = bytes.windows(3).position(|window| window == b".so").unwrap() + 5;
+    damaged[at] ^= 0x10;
+    fs::write(project.path("x.fmu"), damaged).unwrap();
+    let error = project.fail(&["inspect", "x.fmu"], 1);
+    assert!(error.contains("tiprub.so") && error.contains("damaged"), "{error}");
+}
+
+/// Names of the local headers of a zip, found by walking its bytes; checks what importers trip over on the way.
+fn raw_entries(bytes: &[u8]) -> Vec<String> {
+    let u16_at = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+    let u32_at = |at: usize| usize::from(u16_at(at)) + (usize::from(u16_at(at + 2)) << 16);
+    let (mut at, mut names) = (0, Vec::new());
+    while &bytes[at..at + 4] == b"PK\x03\x04" {
+        let (length, extra) = (usize::from(u16_at(at + 26)), usize::from(u16_at(at + 28)));
+        let name = String::from_utf8(bytes[at + 30..at + 30 + length].to_vec()).unwrap();
+        assert!(u16_at(at + 4) <= 20, "{name} needs zip {}", u16_at(at + 4));
+        assert_eq!(u16_at(at + 6), 0, "flags of {name}: no data descriptor");
+        assert!(matches!(u16_at(at + 8), 0 | 8), "{name} is stored or deflated");
+        assert_eq!((u16_at(at + 10), u16_at(at + 12), extra), (0, 0x21, 0), "time and extra field of {name}");
+        assert!(!name.starts_with("./") && !name.contains('\\') && !name.ends_with('/'), "{name}");
+        at += 30 + length + u32_at(at + 18);
+        names.push(name);
+    }
+    assert_eq!(&bytes[at..at + 4], b"PK\x01\x02", "the central directory follows the last file");
+    names
+}
+
+#[test]
+fn help_is_there_for_every_command() {
+    let project = Project::new();
+    for command in ["demo", "reduce", "package", "run", "inspect"] {
+        let help = project.succeed(&[command, "--help"]);
+        assert!(help.contains("Examples:") && help.contains("--json"), "{help}");
+    }
+}
