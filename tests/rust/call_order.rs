@@ -475,6 +475,49 @@ fn fmi3_pair_by_pair() {
 }
 
 #[test]
+fn after_calls_in_any_order_a_reset_instance_is_as_new() {
+    let (api, resources, known) = (fmi2::load(&shipped()), resources(), references());
+    let run = |slave: &fmi2::Slave<'_>| -> Vec<u64> {
+        slave.expect(slave.setup(0.0, None));
+        slave.initialise();
+        for step in 0..40 {
+            slave.expect(slave.step(f64::from(step) * 1e-4, 1e-4));
+        }
+        slave.reals(&[0, known.output, known.output + 1, known.output + 2]).into_iter().map(f64::to_bits).collect()
+    };
+    let fresh = run(&fmi2::Slave::new(&api, &resources));
+    let names: Vec<_> = rows(FMI2).into_iter().map(|(name, _)| name).collect();
+    // A linear congruential generator (Knuth's MMIX constants): the same calls every time.
+    let mut seed = 42_u64;
+    let mut next = |count: usize| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        usize::try_from(seed >> 33).expect("31 bits") % count
+    };
+    let mut visited = [0_u32; 4];
+    for _ in 0..20 {
+        let slave = fmi2::Slave::new(&api, &resources);
+        for _ in 0..400 {
+            // Some calls more often than others, so that every phase is reached.
+            let name = match next(6) {
+                0 => "fmi2EnterInitializationMode",
+                1 => "fmi2ExitInitializationMode",
+                _ => names[next(names.len())],
+            };
+            if next(50) == 0 {
+                let _ = slave.set_reals(&[known.radius], &[-1e307]);
+            }
+            let status = call2(&api, &slave, name, known);
+            visited[usize::try_from(status).expect("a status")] += 1;
+            let log = slave.log();
+            assert!(status == 0 || log.contains(name), "{name}: {status} without a message: {log}");
+        }
+        slave.expect(slave.reset());
+        assert_eq!(run(&slave), fresh);
+    }
+    println!("statuses OK, Warning, Discard, Error of {} random calls: {visited:?}", 20 * 400);
+}
+
+#[test]
 fn versions_and_platform() {
     let path = shipped();
     let (two, three) = (fmi2::load(&path), fmi3::load(&path));

@@ -7,6 +7,8 @@ use super::{Phase, Refusal, Result, Slave};
 /// How far beyond the stop time a step may end, as a fraction of the step: importers add up their communication points,
 /// and the sum of many steps misses the stop time by rounding.
 const STOP_TOLERANCE: f64 = 1e-3;
+/// The same as a fraction of the stop time, for runs of very many steps.
+const STOP_ROUNDING: f64 = 1e-9;
 
 /// With the feature `test-panic`, the communication step size that makes the step panic: an odd number that nobody uses.
 #[cfg(feature = "test-panic")]
@@ -23,7 +25,7 @@ impl Slave {
         };
         if let Some(stop) = stop {
             let end = current_time + step_size;
-            let allowance = STOP_TOLERANCE * step_size + 1e-12 * stop.abs();
+            let allowance = STOP_TOLERANCE * step_size + STOP_ROUNDING * stop.abs();
             if end - stop > allowance {
                 return Err(Refusal::error(format!(
                     "the step from t = {current_time} s by {step_size} s ends at {end} s, beyond the stop time {stop} s \
