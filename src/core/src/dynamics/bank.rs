@@ -290,11 +290,16 @@ impl ModalBank {
     /// Kinetic and strain energy of all sectors (J), in the quantity the scheme conserves (see [`super::scheme`]).
     pub fn energies(&self) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
-        for sector in 0..self.sectors {
-            for (mode, coefficients) in self.coefficients.iter().enumerate() {
-                let (position, increment) = self.modal_state(mode, sector);
-                kinetic += coefficients.inertia * increment * increment;
-                strain += coefficients.spring * position * (position - increment);
+        let block = self.modes() * self.width;
+        let chunks = self.state.position.chunks_exact(block).zip(self.state.increment.chunks_exact(block));
+        for (position, increment) in chunks {
+            let rows = position.chunks_exact(self.width).zip(increment.chunks_exact(self.width));
+            for ((position, increment), coefficients) in rows.zip(&self.coefficients) {
+                // Padding lanes are zero and add nothing.
+                for (position, increment) in position.iter().zip(increment) {
+                    kinetic += coefficients.inertia * (increment * increment);
+                    strain += coefficients.spring * (position * (position - increment));
+                }
             }
         }
         (kinetic, strain)

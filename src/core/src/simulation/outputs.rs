@@ -4,6 +4,16 @@ use super::{Phase, Simulation};
 use crate::contact::gap::sector_angle;
 use crate::variables::{Causality, Quantity, Span, Variable};
 
+/// What all outputs of one instant share.
+struct Instant {
+    /// 1/time since the communication step began, 0 if none has passed (1/s).
+    mean: f64,
+    /// That time (s).
+    elapsed: f64,
+    /// Kinetic and strain energy (J), if the ledger is kept.
+    energies: (f64, f64),
+}
+
 impl Simulation {
     /// Bring the outputs up to the internal time reached (means cover the part of the step done). Done by itself
     /// at every communication point; an importer that looks inside a step needs it.
@@ -11,11 +21,13 @@ impl Simulation {
         let elapsed = self.communication.offset(self.communication.done);
         let mean = if elapsed > 0.0 && self.communication.length > 0.0 { 1.0 / elapsed } else { 0.0 };
         self.system.close_books();
+        let energies = if self.system.settings().ledger { self.system.energies() } else { (0.0, 0.0) };
+        let instant = Instant { mean, elapsed, energies };
         let mut values = std::mem::take(&mut self.values);
         for variable in self.table.variables() {
             if variable.causality == Causality::Output {
                 let start = variable.reference as usize;
-                self.fill(variable.quantity, mean, elapsed, &mut values[start..start + variable.len()]);
+                self.fill(variable.quantity, &instant, &mut values[start..start + variable.len()]);
             } else if variable.causality == Causality::Independent {
                 values[variable.reference as usize] = self.communication.time(self.communication.done);
             }
@@ -24,8 +36,8 @@ impl Simulation {
     }
 
     /// Elements of one output.
-    fn fill(&self, quantity: Quantity, mean: f64, elapsed: f64, out: &mut [f64]) {
-        let (system, window) = (&self.system, &self.window);
+    fn fill(&self, quantity: Quantity, instant: &Instant, out: &mut [f64]) {
+        let (system, window, mean) = (&self.system, &self.window, instant.mean);
         let lanes = system.bank().lanes();
         let sectors = system.bank().sectors();
         let smallest = |values: &[f64]| values.iter().fold(f64::INFINITY, |low: f64, value| low.min(*value));
@@ -53,7 +65,7 @@ impl Simulation {
             | Quantity::TangentialForce(_)
             | Quantity::NormalForceNow(_)
             | Quantity::TangentialForceNow(_) => self.fill_watched(quantity, mean, out),
-            _ => out[0] = self.scalar(quantity, mean, elapsed),
+            _ => out[0] = self.scalar(quantity, instant),
         }
     }
 
@@ -76,10 +88,10 @@ impl Simulation {
         }
     }
 
-    fn scalar(&self, quantity: Quantity, mean: f64, elapsed: f64) -> f64 {
+    fn scalar(&self, quantity: Quantity, instant: &Instant) -> f64 {
         let (system, window) = (&self.system, &self.window);
         let ledger = system.ledger();
-        let mechanical = |part: fn((f64, f64)) -> f64| part(system.energies());
+        let Instant { mean, elapsed, energies: (kinetic, strain) } = *instant;
         #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
         match quantity {
             Quantity::RotorAngle => self.rotor.total(&self.inputs.speed, elapsed),
@@ -90,16 +102,16 @@ impl Simulation {
             Quantity::FrictionPower => mean * window.friction_heat,
             Quantity::ContactCount => system.events().len() as f64,
             Quantity::InContact => f64::from(u8::from(!system.events().is_empty())),
-            Quantity::KineticEnergy => mechanical(|(kinetic, _)| kinetic),
-            Quantity::StrainEnergy => mechanical(|(_, strain)| strain),
+            Quantity::KineticEnergy => kinetic,
+            Quantity::StrainEnergy => strain,
             Quantity::DampingLoss => ledger.damping_loss.value(),
             Quantity::FrictionLoss => ledger.friction_loss.value(),
             Quantity::ImpactLoss => ledger.impact_loss.value(),
             Quantity::ExternalWork => ledger.external_work.value(),
             Quantity::StepChangeEnergy => ledger.step_change.value(),
-            Quantity::EnergyResidual => ledger.residual(mechanical(|(kinetic, strain)| kinetic + strain)),
+            Quantity::EnergyResidual => ledger.residual(kinetic + strain),
             Quantity::EnergyResidualRelative => {
-                let residual = ledger.residual(mechanical(|(kinetic, strain)| kinetic + strain));
+                let residual = ledger.residual(kinetic + strain);
                 if ledger.scale() > 0.0 { residual / ledger.scale() } else { 0.0 }
             }
             Quantity::InternalStep => system.bank().step(),
