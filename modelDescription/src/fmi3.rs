@@ -69,7 +69,7 @@ fn variable(row: &Row) -> Element {
         .with("causality", causality(variable.causality))
         .with("variability", variability(variable.variability))
         .with_some("initial", row.initial())
-        .with_some("intermediateUpdate", takes_intermediate_values(row).then_some("true"))
+        .with_some("intermediateUpdate", takes_part_in_intermediate_updates(row).then_some("true"))
         .with_some("declaredType", row.type_name());
     if variable.kind == Kind::Real {
         element = element
@@ -90,9 +90,10 @@ fn variable(row: &Row) -> Element {
     }
 }
 
-/// Continuous inputs may be set in intermediate update mode.
-fn takes_intermediate_values(row: &Row) -> bool {
-    row.variable.causality == Causality::Input && row.variable.variability == Variability::Continuous
+/// In intermediate update mode continuous inputs may be set and continuous outputs read.
+fn takes_part_in_intermediate_updates(row: &Row) -> bool {
+    matches!(row.variable.causality, Causality::Input | Causality::Output)
+        && row.variable.variability == Variability::Continuous
 }
 
 /// Outputs and initial unknowns by value reference.

@@ -208,11 +208,16 @@ fn units_and_types_used_are_defined() {
 }
 
 #[test]
-fn only_continuous_inputs_take_intermediate_values() {
+fn continuous_inputs_and_outputs_take_part_in_intermediate_updates() {
     let [_, (_, three), _] = all();
-    let marked: Vec<_> = three.iter().filter(|(_, a)| a.contains_key("intermediateUpdate")).collect();
-    assert_eq!(marked.len(), 1);
-    assert_eq!(marked[0].1["name"], "rotor.speed");
+    let mut counts = [0, 0];
+    for (_, attributes) in three.iter().filter(|(_, attributes)| attributes.contains_key("causality")) {
+        let flow = ["input", "output"].contains(&attributes["causality"].as_str());
+        let wanted = flow && attributes["variability"] == "continuous";
+        assert_eq!(attributes.contains_key("intermediateUpdate"), wanted, "{}", attributes["name"]);
+        counts[usize::from(wanted)] += 1;
+    }
+    assert!(counts[0] > 2 && counts[1] == 2, "{counts:?}");
 }
 
 #[test]

@@ -32,8 +32,9 @@ fn imports_run_one_way() {
     free_of("tiprub-core", &[&offline[..], &floors, &files].concat());
     free_of("tiprub-fmi", &[&offline[..], &floors].concat());
     free_of("tiprub-format", &[&offline[..], &floors, &["tiprub-fmi"]].concat());
-    free_of("tiprub-model", &["tiprub-fmi", "tiprub", "tiprub-model-description", "tiprub-reference"]);
-    free_of("tiprub-model-description", &["faer", "tiprub-model", "tiprub-fmi", "tiprub"]);
+    let above_model = ["tiprub-fmi", "tiprub", "tiprub-model-description", "tiprub-reference"];
+    free_of("tiprub-model", &[&above_model[..], &["quick-xml", "zip", "clap", "toml", "safetensors"]].concat());
+    free_of("tiprub-model-description", &["faer", "tiprub-model", "tiprub-fmi", "tiprub", "toml", "safetensors"]);
     free_of("tiprub", &["tiprub-reference", "tiprub-fmi"]);
 }
 

@@ -192,8 +192,9 @@ pub fn growth_rates(
             map[(i, modes + j)] = map[(modes + i, modes + j)];
         }
     }
-    let radius = map.complex_eigenvalues().iter().fold(0.0, |largest: f64, value| largest.max(value.norm()));
-    Some((continuous, radius.ln() / step))
+    let radius =
+        map.complex_eigenvalues().iter().fold(0.0, |largest: f64, value| largest.max(libm::hypot(value.re, value.im)));
+    Some((continuous, libm::log(radius) / step))
 }
 
 /// Refuse where the scheme adds growth to closed sliding contact; returns a warning where the physics flutters.
