@@ -26,6 +26,7 @@ fn a_report_is_complete_offline_and_small() {
         facts: &[RomFacts::of(&reduction.rom).unwrap()],
         schedule: &schedule,
         native: &run,
+        study: None,
         imported: &[ImportedSummary { label: "FMI 2.0".into(), stepping: 0.1, agreement }],
         files: &[ReportFile { name: "results.csv".into(), meaning: "results".into(), bytes: 1234 }],
         durations: &[("native run".into(), 0.5)],
