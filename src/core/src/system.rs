@@ -10,6 +10,8 @@ use crate::settings::{Scheme, Solver};
 
 /// Denormals are flushed every this many steps.
 const FLUSH_EVERY: u64 = 512;
+/// A contact force is continued over steps at most this many times as long as the one it was found in.
+const FORCE_REACH: f64 = 4.0;
 
 /// One active contact of the last step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -192,11 +194,16 @@ impl System {
 
     /// Use step size `step` (s) from here. A running state is carried over by resampling the modal motion under
     /// the last contact force; the energy this adds is booked in the ledger.
+    ///
+    /// Only a force that lasts is continued: that of a contact closed at both ends of the last step. The multiplier of
+    /// an impact is p/h, an impulse that is over, and means nothing over a step of another length. A much longer
+    /// step reaches back to times of which the last force knows nothing; there it fades out.
     pub fn set_step(&mut self, step: f64) {
         let old = self.bank.step();
         if old > 0.0 && self.state.steps > 0 {
             let before = self.mechanical_energy();
-            self.bank.resample(self.settings.scheme, step, &self.state.force);
+            self.lasting_force(old, step);
+            self.bank.resample(self.settings.scheme, step, &self.displacement_oldest);
             let ratio = step / old;
             for (before, now) in self.state.gap_before.iter_mut().zip(&self.state.gap) {
                 if now.is_finite() {
@@ -208,6 +215,24 @@ impl System {
             self.state.ledger.turnover.add((after - before).abs());
         } else {
             self.bank.set_step(self.settings.scheme, step);
+        }
+    }
+
+    /// Leaves in `displacement_oldest` (scratch between steps) the contact forces without those of impacts.
+    fn lasting_force(&mut self, old: f64, new: f64) {
+        let lanes = self.bank.lanes();
+        let reach = (FORCE_REACH * old / new).min(1.0);
+        for (lasting, force) in self.displacement_oldest.iter_mut().zip(&self.state.force) {
+            *lasting = reach * reach * force;
+        }
+        for (index, gap) in self.state.gap_before.iter().enumerate() {
+            let lasts = *gap <= 0.0 && self.state.gap[index] <= 0.0;
+            if !lasts {
+                let (node, sector) = (index / lanes, index % lanes);
+                for component in 0..3 {
+                    self.displacement_oldest[(3 * node + component) * lanes + sector] = 0.0;
+                }
+            }
         }
     }
 

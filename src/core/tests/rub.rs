@@ -264,6 +264,30 @@ fn any_division_of_time_lands_exactly_and_converges() {
 }
 
 #[test]
+fn a_tiny_communication_step_at_an_impact_adds_no_energy() {
+    // The importer inserts an event: a step of a nanosecond or less, whose impact has a multiplier p/h of meganewtons.
+    for tiny in [1e-8, 1e-10, 1e-12] {
+        let mut simulation = started(&common::scene(12));
+        let (mut impacts, mut worst) = (0, 0.0_f64);
+        for step in 0..4000_u32 {
+            let time = simulation.time();
+            simulation.do_step(time, if step % 2 == 0 { 7.3e-7 } else { tiny }).unwrap();
+            if step % 2 == 1 && !simulation.system().events().is_empty() {
+                impacts += 1;
+            }
+            let energy = real(&simulation, "kinetic_energy") + real(&simulation, "strain_energy");
+            let change = real(&simulation, "step_change_energy");
+            worst = worst.max(change.abs() / (energy + real(&simulation, "impact_loss")).max(1e-3));
+        }
+        println!(
+            "tiny step {tiny:e}: {impacts} tiny steps with contact, largest share of step change energy {worst:.2e}"
+        );
+        assert!(impacts > 10, "no contact in a tiny step: the test would prove nothing");
+        assert!(worst < 0.2, "tiny step {tiny:e}: {worst}");
+    }
+}
+
+#[test]
 fn one_sixtieth_computed_in_three_ways_is_one_step() {
     let mut scene = common::scene(6);
     scene.settings.time.step = 1e-5;

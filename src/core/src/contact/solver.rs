@@ -11,8 +11,11 @@
 
 use nalgebra::DMatrix;
 
-/// Pivots below this fraction of the largest diagonal belong to redundant contacts (coincident nodes).
+/// Pivots below this fraction of their node's own diagonal belong to redundant contacts (coincident nodes).
 const REDUNDANT_PIVOT: f64 = 1e-12;
+/// Share of its diagonal by which a node is softened when redundant contacts ask for different gaps: the deepest of
+/// them then carries the force, and the gap it is left with is this share of the predicted penetration.
+const SOFTENING: f64 = 1e-10;
 /// Gaps and multipliers within this fraction of their scale count as zero.
 const ZERO_FRACTION: f64 = 1e-13;
 /// Block exchanges allowed without progress before Murty's rule takes over.
@@ -40,6 +43,8 @@ pub struct ContactSolver {
     /// Active set: for the complementarity solver, start and result.
     pub active: Vec<bool>,
     factor: DMatrix<f64>,
+    /// Diagonal of W in the order of `members`.
+    diagonal: Vec<f64>,
     right: Vec<f64>,
     members: Vec<usize>,
     corrected: Vec<f64>,
@@ -55,6 +60,7 @@ impl ContactSolver {
             multipliers: vec![0.0; size],
             active: vec![false; size],
             factor: DMatrix::zeros(size, size),
+            diagonal: vec![0.0; size],
             right: vec![0.0; size],
             members: Vec::with_capacity(size),
             corrected: vec![0.0; size],
@@ -84,12 +90,17 @@ impl ContactSolver {
             self.active[node] |= self.gaps[node] < 0.0;
         }
         let limit = 100 + 20 * self.size + (1 << self.size.min(14));
-        let (mut best, mut patience) = (usize::MAX, PATIENCE);
+        let (mut best, mut patience, mut softened) = (usize::MAX, PATIENCE, false);
         for factorisations in 1..=limit {
             self.solve_active();
             self.correct_gaps();
             let largest = self.multipliers.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
             let (count, last) = self.count_infeasible(scale, largest);
+            if count == 0 && !softened && self.redundant_contact_violated(scale) {
+                self.soften();
+                (best, patience, softened) = (usize::MAX, PATIENCE, true);
+                continue;
+            }
             if count == 0 {
                 self.settle();
                 return Outcome { solved: true, factorisations };
@@ -129,12 +140,26 @@ impl ContactSolver {
         }
     }
 
+    /// True when a contact left out as redundant is not closed by the contacts it was taken to depend on.
+    fn redundant_contact_violated(&self, gap_scale: f64) -> bool {
+        let left_out = |node: &usize| self.active[*node] && !self.members.contains(node);
+        (0..self.size).filter(left_out).any(|node| self.corrected[node] < -ZERO_FRACTION * gap_scale)
+    }
+
+    /// Make the contact problem regular: every node yields a little by itself.
+    fn soften(&mut self) {
+        for node in 0..self.size {
+            self.delassus[(node, node)] *= 1.0 + SOFTENING;
+        }
+    }
+
     /// Remove rounding from the accepted solution: λ ≥ 0 exactly, gap ≥ 0 exactly.
     fn settle(&mut self) {
         for node in 0..self.size {
             self.multipliers[node] = self.multipliers[node].max(0.0);
-            self.gaps[node] = if self.active[node] { 0.0 } else { self.corrected[node].max(0.0) };
             self.active[node] = self.multipliers[node] > 0.0;
+            // A redundant contact that carries nothing may stand open.
+            self.gaps[node] = if self.active[node] { 0.0 } else { self.corrected[node].max(0.0) };
         }
     }
 
@@ -159,13 +184,16 @@ impl ContactSolver {
                 self.factor[(row, column)] = self.delassus[(*i, *j)];
             }
         }
-        let largest = (0..count).fold(0.0, |largest: f64, row| largest.max(self.factor[(row, row)].abs()));
+        for row in 0..count {
+            self.diagonal[row] = self.factor[(row, row)].abs();
+        }
         let mut rank = 0;
         while rank < count {
-            let pivot = (rank..count).fold(rank, |best, row| {
-                if self.factor[(row, row)].abs() > self.factor[(best, best)].abs() { row } else { best }
-            });
-            if self.factor[(pivot, pivot)].abs() <= REDUNDANT_PIVOT * largest {
+            // What is left of a node's own flexibility decides: nodes may differ by many orders of magnitude.
+            let left = |row: usize| self.factor[(row, row)].abs() / self.diagonal[row];
+            let pivot = (rank..count).fold(rank, |best, row| if left(row) > left(best) { row } else { best });
+            // Also ends at a node without any flexibility (0/0).
+            if left(pivot).is_nan() || left(pivot) <= REDUNDANT_PIVOT {
                 break;
             }
             self.exchange_members(rank, pivot, count);
@@ -186,6 +214,7 @@ impl ContactSolver {
         }
         self.members.swap(a, b);
         self.right.swap(a, b);
+        self.diagonal.swap(a, b);
         for other in 0..count {
             self.factor.swap((a, other), (b, other));
         }
@@ -278,6 +307,33 @@ mod tests {
         assert!(outcome.solved);
         assert!((solver.multipliers[0] + solver.multipliers[1] - 0.5).abs() < 1e-12);
         assert!(solver.gaps.iter().all(|gap| *gap >= 0.0));
+    }
+
+    #[test]
+    fn of_coincident_nodes_the_deepest_decides() {
+        for (first, second) in [(-1.0, -2.0), (-2.0, -1.0), (-1.0, -1.0 - 1e-6)] {
+            for warm in [[false; 2], [true; 2], [true, false], [false, true]] {
+                let mut solver = ContactSolver::new(2);
+                solver.delassus.fill(2.0);
+                solver.gaps.copy_from_slice(&[first, second]);
+                solver.active.copy_from_slice(&warm);
+                assert!(solver.lcp().solved);
+                let force = solver.multipliers[0] + solver.multipliers[1];
+                let (deepest, shallow) = (first.min(second), first.max(second));
+                assert!((force + 0.5 * deepest).abs() < 1e-9, "{first}, {second}: force {force}");
+                let open = solver.gaps[0].max(solver.gaps[1]);
+                assert!((open - (shallow - deepest)).abs() < 1e-9, "{first}, {second}: gaps {:?}", solver.gaps);
+            }
+        }
+    }
+
+    #[test]
+    fn stiff_nodes_beside_soft_ones_are_not_redundant() {
+        let mut solver = ContactSolver::new(2);
+        solver.delassus.copy_from_slice(&[1.0, 0.0, 0.0, 1e-14]);
+        solver.gaps.copy_from_slice(&[-1.0, -1.0]);
+        assert!(solver.lcp().solved);
+        assert!((solver.multipliers[1] * 1e-14 - 1.0).abs() < 1e-12, "{:?}", solver.multipliers);
     }
 
     #[test]
