@@ -97,6 +97,17 @@ pub fn check_step(model: &ModalModel, scheme: Scheme, step: f64) -> Result<Optio
     }
 }
 
+/// Steps from the largest down at which solvability is looked at: a communication step may be shorter than the
+/// internal step, and W keeps its shape only once ω_max h ≪ 1.
+pub fn steps_to_check(model: &ModalModel, largest: f64) -> impl Iterator<Item = f64> {
+    let resolved = 0.1 / model.largest_frequency();
+    std::iter::successors(Some(largest), |step| Some(0.5 * step)).take(60).scan(true, move |unresolved, step| {
+        let take = *unresolved;
+        *unresolved = step > resolved;
+        take.then_some(step)
+    })
+}
+
 /// Refuse a contact problem without a unique solution.
 ///
 /// # Errors
@@ -267,6 +278,17 @@ mod tests {
         assert!(check_solvable(&model, Scheme::ModalExact, step, 0.49, &radial()).is_ok());
         let refusal = check_solvable(&model, Scheme::ModalExact, step, 0.6, &radial()).unwrap_err();
         assert!(refusal.to_string().contains("µ below 0.5000"), "{refusal}");
+    }
+
+    #[test]
+    fn steps_below_the_largest_are_looked_at() {
+        // At h = 1e-3 the stiff mode is static and Grt ≈ 0; at small h it moves freely and turns the tip inwards.
+        let model = model(&[100.0, 1e5], &[[1.0, 0.0, 0.0], [0.9, -2.0, 0.0]], 0.0);
+        let solvable = |step| check_solvable(&model, Scheme::ModalExact, step, 1.1, &radial()).is_ok();
+        assert!(solvable(1e-3) && !solvable(1e-6));
+        let steps: Vec<f64> = steps_to_check(&model, 1e-3).collect();
+        assert!(steps[0] == 1e-3 && steps.len() == 11 && !solvable(steps[10]), "{steps:?}");
+        assert_eq!(steps_to_check(&model, 1e-7).count(), 1);
     }
 
     #[test]

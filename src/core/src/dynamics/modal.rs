@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 use crate::{Error, Result, Rom};
 
-/// Eigenvalues below this fraction of the largest are rigid modes (ω = 0).
+/// Eigenvalues below this fraction of the largest are not resolved by the eigenproblem; the Rayleigh quotient decides.
 const RIGID_FRACTION: f64 = 1e-13;
 
 /// Modes of the reduced pencil (K, M), mass-normalised.
@@ -152,9 +152,28 @@ fn generalised_modes(rom: &Rom) -> Result<(Vec<f64>, DMatrix<f64>)> {
         DMatrix::from_columns(&order.iter().map(|index| eigen.eigenvectors.column(*index)).collect::<Vec<_>>());
     let mut shapes = lower.transpose().solve_upper_triangular(&vectors).unwrap_or(vectors);
     fix_signs(&mut shapes);
-    let values = order.iter().map(|index| eigen.eigenvalues[*index]);
-    let values = values.map(|value| if value < RIGID_FRACTION * largest { 0.0 } else { value }).collect();
+    let values = order.iter().enumerate().map(|(mode, index)| {
+        let value = eigen.eigenvalues[*index];
+        if value < RIGID_FRACTION * largest { unresolved_eigenvalue(&rom.stiffness, &shapes, mode) } else { value }
+    });
+    let values = values.collect();
     Ok((values, shapes))
+}
+
+/// φᵀKφ of a mode far below the largest: its error is of second order in that of the mode shape, so that it tells a
+/// soft mode from a rigid one (exactly 0) wherever the stiffness matrix itself does.
+fn unresolved_eigenvalue(stiffness: &DMatrix<f64>, shapes: &DMatrix<f64>, mode: usize) -> f64 {
+    let (mut quotient, mut magnitude) = (0.0, 0.0);
+    for column in 0..stiffness.ncols() {
+        for row in 0..stiffness.nrows() {
+            let term = shapes[(row, mode)] * stiffness[(row, column)] * shapes[(column, mode)];
+            quotient += term;
+            magnitude += term.abs();
+        }
+    }
+    #[expect(clippy::cast_precision_loss, reason = "orders are far below 2^52")]
+    let rounding = 16.0 * f64::EPSILON * stiffness.nrows() as f64 * magnitude;
+    if quotient > rounding { quotient } else { 0.0 }
 }
 
 /// An eigenvector's sign is arbitrary; make its largest entry positive so that saved numbers are comparable.
@@ -193,6 +212,32 @@ mod tests {
             contact_nodes: vec![ContactNode { name: "n".into(), position: [0.0; 3], meridional_slope: 0.0 }],
             checks: RomChecks::default(),
         }
+    }
+
+    #[test]
+    fn a_soft_mode_beside_very_stiff_ones_is_not_rigid() {
+        let mut rom = rom(3, 5);
+        rom.mass = DMatrix::identity(3, 3);
+        for ratio in [1e6, 1e7, 1e8, 1e9] {
+            let squares = [1.0, 4.0, ratio * ratio];
+            rom.stiffness = DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&squares));
+            let model = ModalModel::from_rom(&rom, 0.0).unwrap();
+            for (found, expected) in model.frequencies.iter().zip([1.0, 2.0, ratio]) {
+                assert!((found / expected - 1.0).abs() < 1e-12, "ratio {ratio:e}: {:?}", model.frequencies);
+            }
+        }
+    }
+
+    #[test]
+    fn rigid_modes_are_exactly_zero() {
+        // A free chain of three masses: one rigid mode; and nothing but rigid modes without stiffness.
+        let mut rom = rom(3, 6);
+        rom.mass = DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[1.0, 0.3, 7.0]));
+        rom.stiffness = DMatrix::from_row_slice(3, 3, &[1e9, -1e9, 0.0, -1e9, 1e9 + 3e3, -3e3, 0.0, -3e3, 3e3]);
+        let model = ModalModel::from_rom(&rom, 0.0).unwrap();
+        assert!(model.frequencies[0] == 0.0 && model.frequencies[1] > 10.0, "{:?}", model.frequencies);
+        rom.stiffness.fill(0.0);
+        assert_eq!(ModalModel::from_rom(&rom, 0.0).unwrap().frequencies, [0.0; 3]);
     }
 
     #[test]

@@ -128,7 +128,9 @@ impl Compiled {
         let mut warnings: Vec<String> = stability::check_step(&model, scheme, step)?.into_iter().collect();
         for sense in [1.0, -1.0] {
             let directions = self.directions(sense);
-            stability::check_solvable(&model, scheme, step, friction, &directions)?;
+            for step in stability::steps_to_check(&model, step) {
+                stability::check_solvable(&model, scheme, step, friction, &directions)?;
+            }
             // Flutter is looked for with everything closed and with each node alone.
             let alone = |node: usize| model.with_nodes(&[node]);
             warnings.extend(stability::check_growth(&model, scheme, step, friction, &directions)?);
