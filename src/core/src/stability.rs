@@ -99,7 +99,7 @@ pub fn check_step(model: &ModalModel, scheme: Scheme, step: f64) -> Result<Optio
 
 /// Steps from the largest down at which solvability is looked at: a communication step may be shorter than the
 /// internal step, and W keeps its shape only once ω_max h ≪ 1.
-pub fn steps_to_check(model: &ModalModel, largest: f64) -> impl Iterator<Item = f64> {
+fn steps_to_check(model: &ModalModel, largest: f64) -> impl Iterator<Item = f64> {
     let resolved = 0.1 / model.largest_frequency();
     std::iter::successors(Some(largest), |step| Some(0.5 * step)).take(60).scan(true, move |unresolved, step| {
         let take = *unresolved;
@@ -108,7 +108,7 @@ pub fn steps_to_check(model: &ModalModel, largest: f64) -> impl Iterator<Item = 
     })
 }
 
-/// Refuse a contact problem without a unique solution.
+/// Refuse a contact problem without a unique solution at `step` or at any smaller step, in any of the `senses` of slip.
 ///
 /// # Errors
 /// [`Error::Unstable`] naming µ and h.
@@ -117,23 +117,43 @@ pub fn check_solvable(
     scheme: Scheme,
     step: f64,
     friction: f64,
-    directions: &ContactDirections,
+    senses: &[ContactDirections],
 ) -> Result<()> {
-    let solvable = |friction: f64| is_solvable(&delassus(model, scheme, step, friction, directions));
+    let solvable = |friction: f64| {
+        steps_to_check(model, step).all(|step| {
+            let at = |directions| is_solvable(&delassus(model, scheme, step, friction, directions));
+            senses.iter().all(at)
+        })
+    };
     if friction == 0.0 || solvable(friction) {
         return Ok(());
     }
-    let (mut low, mut high) = (0.0, friction);
+    // Solvability is not monotonic in µ: the first µ from 0 on at which it is lost is what helps.
+    let part = |index: u32| friction * f64::from(index) / 64.0;
+    let first = (1..=64).find(|index| !solvable(part(*index))).unwrap_or(64);
+    let (mut low, mut high) = (part(first - 1), part(first));
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
         *(if solvable(middle) { &mut low } else { &mut high }) = middle;
     }
+    let (what, why) = if senses.iter().any(|directions| directions.len() > MINORS_UP_TO) {
+        (
+            "cannot be shown to have a unique solution",
+            "the symmetric part of the Delassus matrix is not positive definite",
+        )
+    } else {
+        ("has no unique solution", "a principal minor of the Delassus matrix is not positive")
+    };
     Err(Error::Unstable {
         problem: format!(
-            "with friction_coefficient µ = {friction} and internal step h = {step:.3e} s the contact problem has no unique \
-             solution (a principal minor of the Delassus matrix is not positive)"
+            "with friction_coefficient µ = {friction} and internal steps up to h = {step:.3e} s the contact problem {what} ({why})"
         ),
-        remedy: format!("Use µ below {low:.4}, or another internal step, for this structure"),
+        remedy: if low > 1e-9 * friction {
+            format!("Use µ below {low:.4} for this structure, or another internal step")
+        } else {
+            "Use no friction, or fewer contact nodes or more modes: with more contacts than modes no friction is safe"
+                .to_owned()
+        },
     })
 }
 
@@ -275,8 +295,8 @@ mod tests {
         // n·G(n − µt) = Grr + µ Grt > 0 fails at µ = −Grr/Grt.
         let model = model(&[1000.0], &[[0.5, -1.0, 0.0]], 0.0);
         let step = 1e-6;
-        assert!(check_solvable(&model, Scheme::ModalExact, step, 0.49, &radial()).is_ok());
-        let refusal = check_solvable(&model, Scheme::ModalExact, step, 0.6, &radial()).unwrap_err();
+        assert!(check_solvable(&model, Scheme::ModalExact, step, 0.49, &[radial()]).is_ok());
+        let refusal = check_solvable(&model, Scheme::ModalExact, step, 0.6, &[radial()]).unwrap_err();
         assert!(refusal.to_string().contains("µ below 0.5000"), "{refusal}");
     }
 
@@ -284,10 +304,11 @@ mod tests {
     fn steps_below_the_largest_are_looked_at() {
         // At h = 1e-3 the stiff mode is static and Grt ≈ 0; at small h it moves freely and turns the tip inwards.
         let model = model(&[100.0, 1e5], &[[1.0, 0.0, 0.0], [0.9, -2.0, 0.0]], 0.0);
-        let solvable = |step| check_solvable(&model, Scheme::ModalExact, step, 1.1, &radial()).is_ok();
+        let solvable = |step| is_solvable(&delassus(&model, Scheme::ModalExact, step, 1.1, &radial()));
         assert!(solvable(1e-3) && !solvable(1e-6));
-        let steps: Vec<f64> = steps_to_check(&model, 1e-3).collect();
-        assert!(steps[0] == 1e-3 && steps.len() == 11 && !solvable(steps[10]), "{steps:?}");
+        let refusal = check_solvable(&model, Scheme::ModalExact, 1e-3, 1.1, &[radial()]).unwrap_err().to_string();
+        // Free masses: 1 + 0.9² − µ·0.9·2 > 0.
+        assert!(refusal.contains("µ below 1.00"), "{refusal}");
         assert_eq!(steps_to_check(&model, 1e-7).count(), 1);
     }
 

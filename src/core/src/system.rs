@@ -35,6 +35,11 @@ pub struct ContactEvent {
 pub enum StepFailure {
     /// A displacement or gap became infinite or NaN.
     NonFinite,
+    /// A node penetrates by more than a tenth of its radius, or meets a flank of the casing steeper than 45°.
+    Implausible {
+        /// Sector (0-based).
+        sector: usize,
+    },
     /// The contact problem of a sector has no solution within the pivoting limit.
     Unsolved {
         /// Sector (0-based).
@@ -320,6 +325,9 @@ impl System {
             let gap = self.state.gap[index];
             if !gap.is_finite() {
                 return Err(StepFailure::NonFinite);
+            }
+            if gap < 0.0 && !self.law.is_plausible(node, gap, self.geometry.normal_at(index)) {
+                return Err(StepFailure::Implausible { sector });
             }
             self.problem.gaps[node] = gap;
             // Closed in the last step: the likeliest guess for this one.

@@ -128,6 +128,11 @@ impl RevolutionGap {
         self.angles[node * self.lanes + sector] + rotor_angle
     }
 
+    /// Angle over which the casing shape changes noticeably (rad).
+    pub fn angular_scale(&self) -> f64 {
+        self.surface.angular_scale()
+    }
+
     /// Radius of a contact node (m).
     pub fn radius(&self, node: usize) -> f64 {
         self.radii[node]
@@ -218,6 +223,15 @@ impl GapLaw {
                 }
             }
             Self::Revolution(law) => law.instruction_set.run(Evaluate { law, drive, displacement, geometry, gap }),
+        }
+    }
+
+    /// Whether a contact is within what small displacements and a casing seen from inside can describe: less deep than
+    /// a tenth of the radius, on a flank below 45°.
+    pub fn is_plausible(&self, node: usize, gap: f64, normal: [f64; 3]) -> bool {
+        match self {
+            Self::Fixed(_) => true,
+            Self::Revolution(law) => gap > -0.1 * law.radii[node] && normal[1].abs() <= -normal[0],
         }
     }
 

@@ -55,6 +55,27 @@ impl Surface {
         })
     }
 
+    /// Largest change of radius, up or down (m).
+    pub fn largest_change(&self) -> f64 {
+        match self {
+            Self::Circular => 0.0,
+            Self::Lobes { amplitude, .. } => amplitude.abs(),
+            Self::TwoLobe { height, .. } => height.abs(),
+            Self::Table { knots } => knots.iter().fold(0.0, |largest, knot| largest.max(knot[0].abs())),
+        }
+    }
+
+    /// Angle over which the shape changes noticeably (rad): a step of the rotor must stay below it.
+    pub fn angular_scale(&self) -> f64 {
+        match self {
+            Self::Circular => std::f64::consts::PI,
+            Self::Lobes { order, .. } => 1.0 / order,
+            Self::TwoLobe { width, .. } => *width,
+            #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
+            Self::Table { knots } => std::f64::consts::TAU / knots.len() as f64,
+        }
+    }
+
     /// Change of radius s (m) and slope ds/dθ (m/rad) at the fixed-frame angle θ (rad).
     #[inline]
     pub fn evaluate(&self, angle: f64) -> (f64, f64) {

@@ -93,6 +93,17 @@ impl Compiled {
         let clearances =
             if contact.sector_gaps.is_empty() { vec![contact.gap; rom.sectors] } else { contact.sector_gaps.clone() };
         let surface = Surface::new(&settings.surfaces[0].shape, contact.gap)?;
+        let smallest = rom.contact_nodes.iter().fold(f64::INFINITY, |low, node| low.min(node.position[0]));
+        if surface.largest_change() > 0.5 * smallest {
+            return Err(Error::invalid(
+                "surface.shape",
+                format!(
+                    "it changes the casing radius by up to {:.3e} m where contact nodes have {smallest:.3e} m",
+                    surface.largest_change()
+                ),
+                "Give a shape that is small against the radius, in metres",
+            ));
+        }
         let lanes = crate::dynamics::bank::lanes(rom.sectors);
         let law = RevolutionGap::new(rom, surface, &clearances, contact.meridian, lanes)?;
         let system_settings = SystemSettings {
@@ -126,11 +137,9 @@ impl Compiled {
         let mut model = self.model.clone();
         model.damping_ratios.fill(damping_ratio);
         let mut warnings: Vec<String> = stability::check_step(&model, scheme, step)?.into_iter().collect();
-        for sense in [1.0, -1.0] {
-            let directions = self.directions(sense);
-            for step in stability::steps_to_check(&model, step) {
-                stability::check_solvable(&model, scheme, step, friction, &directions)?;
-            }
+        let senses = [1.0, -1.0].map(|sense| self.directions(sense));
+        stability::check_solvable(&model, scheme, step, friction, &senses)?;
+        for directions in senses {
             // Flutter is looked for with everything closed and with each node alone.
             let alone = |node: usize| model.with_nodes(&[node]);
             warnings.extend(stability::check_growth(&model, scheme, step, friction, &directions)?);

@@ -7,7 +7,7 @@ mod state;
 mod table;
 mod window;
 
-use crate::contact::gap::Drive;
+use crate::contact::gap::{Drive, GapLaw};
 use crate::system::{StepFailure, System};
 use crate::variables::{Causality, Kind, Quantity, Start, Variability, Variable, VariableTable};
 use crate::{Error, Result, Scene};
@@ -493,6 +493,7 @@ impl Simulation {
         let count = (ratio * (1.0 - SAME_STEP)).ceil().max(1.0) as u64;
         #[expect(clippy::cast_precision_loss, reason = "count ≤ 1e12")]
         let step = step_size / count as f64;
+        self.check_turning(step, step_size)?;
         if (step - self.system.bank().step()).abs() > SAME_STEP * step {
             self.system.set_step(step);
         }
@@ -535,6 +536,26 @@ impl Simulation {
             ));
         }
         Ok(())
+    }
+
+    /// The rotor must not skip over features of the casing shape. Inputs are linear in time: the ends decide.
+    fn check_turning(&self, step: f64, step_size: f64) -> Result<()> {
+        let GapLaw::Revolution(law) = self.system.law() else { return Ok(()) };
+        let scale = law.angular_scale();
+        let speed = |offset: f64| self.inputs.speed.at(offset) - self.inputs.shape_rotation.slope;
+        let turned = step * speed(0.0).abs().max(speed(step_size).abs());
+        if turned <= scale {
+            return Ok(());
+        }
+        Err(Error::invalid(
+            "variable `speed`",
+            format!(
+                "the rotor turns {turned:.3} rad in one internal step of {step:.3e} s at t = {} s, past features of the casing \
+                 shape {scale:.3} rad wide",
+                self.time
+            ),
+            "Use a lower speed or a smaller internal_step_max",
+        ))
     }
 
     /// March one internal step of the communication step begun. Inputs may be set between calls.
@@ -580,6 +601,17 @@ impl Simulation {
                 last_good_time: self.time,
                 time,
                 remedy: "Restore a saved state or reset, and use a smaller internal step or smaller loads".to_owned(),
+            },
+            StepFailure::Implausible { sector } => Error::Unstable {
+                problem: format!(
+                    "at t = {time} s (last good time {} s) a contact node of sector {} is deeper inside the casing than a \
+                     tenth of its radius, or meets a flank of the casing shape steeper than 45°",
+                    self.time,
+                    sector + 1
+                ),
+                remedy: "Check gap, casing shape and its inputs; small displacements cannot describe this. Restore a \
+                         saved state or reset first"
+                    .to_owned(),
             },
             StepFailure::Unsolved { sector } => Error::Unstable {
                 problem: format!(

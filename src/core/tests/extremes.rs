@@ -1,0 +1,131 @@
+//! Extreme cases: each ends in a right answer or in a refusal that says why.
+
+mod common;
+
+use tiprub_core::settings::{Scheme, Shape};
+use tiprub_core::{Scene, Simulation};
+
+fn reference(simulation: &Simulation, name: &str) -> u32 {
+    simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
+}
+
+fn real(simulation: &Simulation, name: &str) -> f64 {
+    simulation.real(reference(simulation, name)).unwrap()
+}
+
+fn started(scene: &Scene) -> Simulation {
+    let mut simulation = Simulation::new(scene).unwrap();
+    simulation.initialise(0.0).unwrap();
+    simulation
+}
+
+/// What a scene of a hundred steps of 0.1 ms is refused with.
+fn refusal(scene: &Scene) -> String {
+    let run = || {
+        let mut simulation = Simulation::new(scene)?;
+        simulation.initialise(0.0)?;
+        for _ in 0..100 {
+            simulation.do_step(simulation.time(), 1e-4)?;
+        }
+        Ok::<_, tiprub_core::Error>(())
+    };
+    run().expect_err("it was not refused").to_string()
+}
+
+#[test]
+fn a_rotor_that_skips_over_the_lobes_is_refused_and_can_go_on_slower() {
+    let mut scene = common::scene(12);
+    for speed in [1e6, -1e6, 1e300] {
+        scene.settings.structures[0].speed = speed;
+        let message = refusal(&scene);
+        assert!(message.contains("speed") && message.contains("internal_step_max"), "{message}");
+    }
+    let mut simulation = started(&scene);
+    assert!(simulation.do_step(0.0, 1e-4).is_err());
+    simulation.set_real(reference(&simulation, "speed"), 1300.0).unwrap();
+    simulation.do_step(0.0, 1e-4).unwrap();
+    scene.settings.structures[0].speed = 1300.0;
+    scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 4e-4, order: 100_000, phase: 0.0 };
+    assert!(refusal(&scene).contains("speed"));
+}
+
+#[test]
+fn casings_that_small_displacements_cannot_describe_are_refused() {
+    let mut scene = common::scene(12);
+    for (depth, word) in [(100.0, "deeper"), (1e6, "surface.shape"), (1e300, "surface.shape")] {
+        scene.settings.surfaces[0].shape = Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
+        let message = refusal(&scene);
+        assert!(message.contains(word), "{depth}: {message}");
+    }
+    // Teeth: 4 mm high, 0.9 mm apart.
+    scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 4e-3, order: 300, phase: 0.0 };
+    assert!(refusal(&scene).contains("45°"));
+}
+
+#[test]
+fn the_friction_a_refusal_proposes_is_accepted() {
+    let mut scene = common::scene(12);
+    for friction in [0.5, 1.0, 2.0] {
+        scene.settings.contacts[0].friction = friction;
+        let message = refusal(&scene);
+        let proposed: f64 =
+            message.split("µ below ").nth(1).and_then(|text| text.split(' ').next()).unwrap().parse().unwrap();
+        scene.settings.contacts[0].friction = 0.999 * proposed;
+        started(&scene);
+    }
+}
+
+#[test]
+fn a_whole_casing_closing_in_presses_every_blade() {
+    let mut scene = common::scene(12);
+    scene.settings.contacts[0].friction = 0.0;
+    scene.settings.structures[0].damping_ratio = Some(0.3);
+    scene.settings.surfaces[0].shape = Shape::Circular {};
+    let mut simulation = started(&scene);
+    let radius = reference(&simulation, "casing_radius_change");
+    let rate = -0.2;
+    for _ in 0..1000 {
+        let time = simulation.time();
+        simulation.set_real(radius, (rate * time).max(-4e-4)).unwrap();
+        simulation.set_input_derivative(radius, 1, if rate * time > -4e-4 { rate } else { 0.0 }).unwrap();
+        simulation.do_step(time, 1e-5).unwrap();
+    }
+    // At rest: no slope, no friction, no torque; all blades alike; work done equals strain energy and losses.
+    let system = simulation.system();
+    assert!(system.events().len() >= 12 && real(&simulation, "torque").abs() < 1e-9);
+    for sector in 1..12 {
+        assert_eq!(system.multiplier(0, sector).to_bits(), system.multiplier(0, 0).to_bits());
+    }
+    let force = real(&simulation, "force_x").hypot(real(&simulation, "force_y"));
+    let total: f64 = system.events().iter().map(|event| event.normal).sum();
+    assert!(force < 1e-12 * total, "resultant {force} of {total} N");
+    assert!(real(&simulation, "kinetic_energy") < 1e-6 * real(&simulation, "strain_energy"));
+}
+
+#[test]
+fn ten_million_undamped_steps_keep_the_energy() {
+    for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
+        let mut scene = common::scene(1);
+        scene.settings.time.scheme = scheme;
+        scene.settings.contacts[0].friction = 0.0;
+        scene.settings.structures[0].damping_ratio = Some(0.0);
+        scene.settings.outputs.watched_sectors = vec![1];
+        scene.settings.outputs.nodal_diameters = None;
+        let mut simulation = started(&scene);
+        for _ in 0..40 {
+            simulation.do_step(simulation.time(), 5e-5).unwrap();
+        }
+        let (factor, offset) = (reference(&simulation, "casing_shape_factor"), reference(&simulation, "gap_offset"));
+        simulation.set_real(factor, 0.0).unwrap();
+        simulation.set_real(offset, 1e-2).unwrap();
+        let energy = |simulation: &Simulation| real(simulation, "kinetic_energy") + real(simulation, "strain_energy");
+        simulation.do_step(simulation.time(), 5e-5).unwrap();
+        let before = energy(&simulation);
+        for _ in 0..100 {
+            simulation.do_step(simulation.time(), 0.1).unwrap();
+        }
+        let drift = energy(&simulation) / before - 1.0;
+        println!("{scheme:?}: relative energy drift {drift:.1e} over 1e7 steps");
+        assert!(before > 1e-3 && drift.abs() < 1e-11, "{scheme:?}: {drift:e} of {before} J");
+    }
+}
