@@ -5,6 +5,7 @@
 //!
 //! - [`scene_source`]: a scene file (or the embedded rotor 37 scene) with its ROMs;
 //! - [`schedule`], [`recording`], [`native`]: communication points, the table of results, the run without FMI;
+//! - [`error_study`]: error against run time for every scheme and solver;
 //! - [`archive`], [`fmu`], [`library`]: the reproducible zip, its contents, and the shared library that goes in;
 //! - [`importer`]: a packaged FMU driven through its C ABI the way any importer would;
 //! - [`report`]: the HTML report with its pictures and plots.
@@ -13,6 +14,7 @@ pub mod archive;
 pub mod cli;
 pub mod commands;
 pub mod console;
+pub mod error_study;
 pub mod failure;
 pub mod fmu;
 pub mod importer;

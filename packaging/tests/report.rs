@@ -1,15 +1,34 @@
 //! The report of a run: complete, offline, small.
 
-use tiprub_core::Simulation;
+use tiprub_core::{
+    Simulation,
+    settings::{Scheme, Solver},
+};
 use tiprub_model::{Rotor37Options, rotor37::MeshCounts};
 use tiprub_packaging::{
     console::Console,
+    error_study::{self, ErrorStudy, METHODS},
     native, reduction,
     report::page::{ImportedSummary, ReportFile, ReportInput, render},
     rom_facts::RomFacts,
     scene_source::rotor37_scene_with,
     schedule::Schedule,
 };
+
+/// The references meet, errors fall with h, and what is refused is a row.
+fn check(study: &ErrorStudy) {
+    assert!(study.references_apart < 1e-3, "{}", study.references_apart);
+    for method in METHODS {
+        let rows: Vec<_> = study.rows.iter().filter(|row| row.method == method).collect();
+        assert_eq!(rows.len(), 6);
+        let errors: Vec<f64> = rows.iter().filter_map(|row| Some(row.outcome.as_ref().ok()?.1.displacement)).collect();
+        assert!(errors.last() < errors.first(), "{method:?}: {errors:?}");
+        assert_eq!(method.0 == Scheme::CentralDifference, rows[0].outcome.is_err(), "{method:?} at 5 µs");
+        let best = rows[5].outcome.as_ref().unwrap().1;
+        assert!(method.1 == Solver::Film || (best.penetration <= 0.0 && best.adhesion >= 0.0), "{best:?}");
+    }
+    assert!(study.cheapest(METHODS[0], 1e-2).is_some() && study.cheapest(METHODS[0], 1e-9).is_none());
+}
 
 #[test]
 fn a_report_is_complete_offline_and_small() {
@@ -19,6 +38,9 @@ fn a_report_is_complete_offline_and_small() {
     let schedule = Schedule::new(&scene.settings.experiment, Some(0.004), Some(2e-6)).unwrap();
     let run = native::run(&scene, &schedule, &[], &|_| {}).unwrap();
     let agreement = run.recording.compare(&run.recording).unwrap();
+    let quiet = Console::new(true, false);
+    let study = error_study::study(&scene, 1.5e-3, &quiet.task("study", None)).unwrap();
+    check(&study);
     let html = render(&ReportInput {
         scene: &scene,
         table: Simulation::new(&scene).unwrap().table(),
@@ -26,6 +48,7 @@ fn a_report_is_complete_offline_and_small() {
         facts: &[RomFacts::of(&reduction.rom).unwrap()],
         schedule: &schedule,
         native: &run,
+        study: Some(&study),
         imported: &[ImportedSummary { label: "FMI 2.0".into(), stepping: 0.1, agreement }],
         files: &[ReportFile { name: "results.csv".into(), meaning: "results".into(), bytes: 1234 }],
         durations: &[("native run".into(), 0.5)],
@@ -45,6 +68,8 @@ fn a_report_is_complete_offline_and_small() {
         "largest stable h",
         "bit for bit",
         "href=\"results.csv\"",
+        "relative error of the displacements",
+        "ω_max·h",
     ] {
         assert!(html.contains(wanted), "{wanted}");
     }

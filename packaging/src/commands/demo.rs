@@ -13,6 +13,7 @@ use crate::{
     Failure, Result,
     cli::DemoArguments,
     console::{Console, Outcome},
+    error_study::{self, ErrorStudy, METHODS},
     fmu::{FmiVersion, Package},
     importer::{ImportedRun, UnpackedFmu},
     library,
@@ -76,8 +77,14 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
         let agreement = native.recording.compare(&run.recording)?;
         imported.push(ImportedSummary { label, stepping: run.stepping.as_secs_f64(), agreement });
     }
+    let study = watch.measure("error study", || {
+        let task = console.task("Error against run time", Some(error_study::runs()));
+        let turn = std::f64::consts::TAU / scene.settings.structures[0].speed.abs();
+        let window = turn.min(schedule.stop - schedule.start);
+        error_study::study(&scene, window, &task)
+    })?;
     let facts = scene.roms.iter().map(RomFacts::of).collect::<Result<Vec<_>>>()?;
-    let demo = Demo { directory, scene, schedule, reduction, facts, native, imported, durations: watch.0 };
+    let demo = Demo { study, directory, scene, schedule, reduction, facts, native, imported, durations: watch.0 };
     demo.write_report()?;
     demo.outcome()
 }
@@ -117,10 +124,25 @@ struct Demo<'a> {
     facts: Vec<RomFacts>,
     native: NativeRun,
     imported: Vec<ImportedSummary>,
+    study: ErrorStudy,
     durations: Vec<(String, f64)>,
 }
 
 impl Demo<'_> {
+    /// Stepping time that each method needs for 1 % and 0.1 % error.
+    fn study_text(&self) -> String {
+        let mut text = format!("error against stepping time over {:.2} ms, displacements:\n", 1e3 * self.study.window);
+        for method in METHODS {
+            let cost = |error| match self.study.cheapest(method, error) {
+                Some(time) => format!("{:>7.1} ms", 1e3 * time),
+                None => "      not".into(),
+            };
+            let name = error_study::name(method);
+            text.push_str(&format!("  {name:<26} 1 %: {}   0.1 %: {}\n", cost(1e-2), cost(1e-3)));
+        }
+        text
+    }
+
     fn write_report(&self) -> Result<()> {
         let simulation = Simulation::new(&self.scene).map_err(|error| Failure::from_core(SCENE_FILE, error))?;
         let html = page::render(&ReportInput {
@@ -131,6 +153,7 @@ impl Demo<'_> {
             schedule: &self.schedule,
             native: &self.native,
             imported: &self.imported,
+            study: Some(&self.study),
             files: &self.files(),
             durations: &self.durations,
         })?;
@@ -175,7 +198,7 @@ impl Demo<'_> {
         let text = format!(
             "{}\n\nsimulated      {:.4} ms in {} communication steps, {} internal steps\n\
              per step       {per_step:.3} µs, {:.3} x real time\n\
-             agreement      {}: all {} outputs at all {} points, bit for bit\n\nopen {}",
+             agreement      {}: all {} outputs at all {} points, bit for bit\n{}\nopen {}",
             self.facts.iter().map(RomFacts::to_text).collect::<String>().trim_end(),
             1e3 * simulated,
             self.schedule.count,
@@ -184,6 +207,7 @@ impl Demo<'_> {
             self.imported.iter().map(|run| run.label.as_str()).chain(["native"]).collect::<Vec<_>>().join(" = "),
             self.native.recording.names.len(),
             self.native.recording.rows(),
+            self.study_text(),
             report.display()
         );
         let json = json!({
@@ -207,6 +231,7 @@ impl Demo<'_> {
             })).collect::<Vec<_>>(),
             "seconds": self.durations.iter().map(|(what, seconds)| (what.clone(), json!(seconds)))
                 .collect::<serde_json::Map<_, _>>(),
+            "error_study": self.study.to_json(),
             "warnings": self.native.warnings,
         });
         Ok(Outcome { text, json })

@@ -8,6 +8,7 @@ use tiprub_model::Reduction;
 use super::sections::{Results, figures};
 use crate::{
     Result,
+    error_study::ErrorStudy,
     native::NativeRun,
     recording::Agreement,
     rom_facts::{CheckRow, RomFacts},
@@ -52,6 +53,8 @@ pub struct ReportInput<'a> {
     pub native: &'a NativeRun,
     /// The runs through the C ABIs.
     pub imported: &'a [ImportedSummary],
+    /// Error against run time, where it was studied.
+    pub study: Option<&'a ErrorStudy>,
     /// Files beside the report.
     pub files: &'a [ReportFile],
     /// Wall times of the parts of the work (what, s).

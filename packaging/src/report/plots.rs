@@ -60,13 +60,25 @@ pub struct Plot {
     pub levels: Vec<(f64, String)>,
     /// Logarithmic y axis; values ≤ 0 are left out.
     pub logarithmic: bool,
+    /// Logarithmic x axis; values ≤ 0 are left out.
+    pub logarithmic_x: bool,
+    /// Mark the points.
+    pub marked: bool,
 }
 
 impl Plot {
     /// An empty plot with linear axes.
     pub fn new(x_label: impl Into<String>, y_label: impl Into<String>, series: Vec<Series>) -> Self {
-        let (x_label, y_label) = (x_label.into(), y_label.into());
-        Self { x_label, y_label, series, height: 260, levels: Vec::new(), logarithmic: false }
+        Self {
+            x_label: x_label.into(),
+            y_label: y_label.into(),
+            series,
+            height: 260,
+            levels: Vec::new(),
+            logarithmic: false,
+            logarithmic_x: false,
+            marked: false,
+        }
     }
 
     /// Legend (where there is more than one line) and SVG element, as HTML.
@@ -120,6 +132,10 @@ impl Plot {
             true if value.fract().abs() < 1e-9 => format!("1e{}", value.round()),
             true => String::new(),
         };
+        let x_label = |value: &f64| match self.logarithmic_x {
+            false => tick(*value),
+            true => tick(10_f64.powf(*value)),
+        };
         chart
             .configure_mesh()
             .x_desc(&self.x_label)
@@ -133,7 +149,7 @@ impl Plot {
             .light_line_style(TRANSPARENT)
             .axis_style(INK.mix(0.5).stroke_width(SCALE))
             .y_label_formatter(&y_label)
-            .x_label_formatter(&|value| tick(*value))
+            .x_label_formatter(&x_label)
             .draw()
             .map_err(|error| error.to_string())
     }
@@ -158,19 +174,27 @@ impl Plot {
             let finite: Vec<_> = self.finite_points_of(series).collect();
             let line = LineSeries::new(decimate(&finite, BUCKETS), color.stroke_width(SCALE + SCALE / 2));
             chart.draw_series(line).map_err(|error| error.to_string())?;
+            if self.marked {
+                let circle = |point: &(f64, f64)| Circle::new(*point, 4 * SCALE, color.filled());
+                chart.draw_series(finite.iter().map(circle)).map_err(|error| error.to_string())?;
+            }
         }
         Ok(())
     }
 
     /// Points that can be drawn; the logarithm of y where the axis is logarithmic.
     fn finite_points_of<'s>(&self, series: &'s Series) -> impl Iterator<Item = (f64, f64)> + use<'s> {
-        let logarithmic = self.logarithmic;
-        let points = series.points.iter().map(move |(x, y)| (*x, if logarithmic { y.log10() } else { *y }));
+        let (x_logarithmic, y_logarithmic) = (self.logarithmic_x, self.logarithmic);
+        let scaled = |value: f64, logarithmic: bool| if logarithmic { value.log10() } else { value };
+        let points = series.points.iter().map(move |(x, y)| (scaled(*x, x_logarithmic), scaled(*y, y_logarithmic)));
         points.filter(|(x, y)| x.is_finite() && y.is_finite())
     }
 
     /// From the first to the last x of all series, drawable or not, so that plots of one run share their axis.
     fn x_range(&self) -> std::ops::Range<f64> {
+        if self.logarithmic_x {
+            return padded(self.finite_points().map(|point| point.0), 0.05);
+        }
         let all = self.series.iter().flat_map(|series| series.points.iter().map(|point| point.0));
         padded(all.filter(|x| x.is_finite()), 0.0)
     }
