@@ -35,7 +35,7 @@ pub struct ContactEvent {
 pub enum StepFailure {
     /// A displacement or gap became infinite or NaN.
     NonFinite,
-    /// A node penetrates by more than a tenth of its radius, or meets a flank of the casing steeper than 45°.
+    /// A node is displaced or penetrates by more than a tenth of its radius, or meets a flank of the casing steeper than 45°.
     Implausible {
         /// Sector (0-based).
         sector: usize,
@@ -441,9 +441,18 @@ impl System {
         heat
     }
 
-    /// True when every coordinate is finite.
-    pub fn is_finite(&self) -> bool {
-        self.bank.is_finite()
+    /// Whether the state is still what the model describes.
+    ///
+    /// # Errors
+    /// Coordinates that are not finite; displacements beyond a tenth of the radius.
+    pub fn check_state(&self) -> Result<(), StepFailure> {
+        if !self.bank.is_finite() {
+            return Err(StepFailure::NonFinite);
+        }
+        let limit = self.law.largest_displacement();
+        let beyond = self.bank.displacement().iter().position(|displacement| displacement.abs() > limit);
+        let sector = beyond.map(|index| index % self.bank.lanes());
+        sector.map_or(Ok(()), |sector| Err(StepFailure::Implausible { sector }))
     }
 
     /// Write everything that determines the future, the step size included.

@@ -52,14 +52,68 @@ fn a_rotor_that_skips_over_the_lobes_is_refused_and_can_go_on_slower() {
 #[test]
 fn casings_that_small_displacements_cannot_describe_are_refused() {
     let mut scene = common::scene(12);
-    for (depth, word) in [(100.0, "deeper"), (1e6, "surface.shape"), (1e300, "surface.shape")] {
+    for depth in [100.0, 1e6, 1e300] {
         scene.settings.surfaces[0].shape = Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
         let message = refusal(&scene);
-        assert!(message.contains(word), "{depth}: {message}");
+        assert!(message.contains("surface.shape") && message.contains("metres"), "{depth}: {message}");
     }
+    // Each length within its limit, together far too deep.
+    scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 30.0, width: 0.15, phase: 0.0 };
+    let mut simulation = started(&scene);
+    simulation.set_real(reference(&simulation, "gap_offset"), -0.02).unwrap();
+    let outcome = (0..100).try_for_each(|_| simulation.do_step(simulation.time(), 1e-4));
+    let message = outcome.unwrap_err().to_string();
+    assert!(message.contains("tenth of") && message.contains("sector"), "{message}");
+    // Millimetres for metres.
+    let mut scene = common::scene(12);
+    scene.settings.contacts[0].gap = 0.356;
+    assert!(refusal(&scene).contains("metres"));
     // Teeth: 4 mm high, 0.9 mm apart.
+    let mut scene = common::scene(12);
     scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 4e-3, order: 300, phase: 0.0 };
     assert!(refusal(&scene).contains("45°"));
+}
+
+#[test]
+fn what_counts_is_the_step_in_use_not_the_largest_allowed() {
+    // Central differences far beyond their limit by internal_step_max, well within it by the communication step.
+    let mut scene = common::scene(12);
+    scene.settings.time.scheme = Scheme::CentralDifference;
+    scene.settings.contacts[0].friction = 0.0;
+    scene.settings.time.step = 1e-3;
+    scene.settings.experiment.communication_step = 1e-6;
+    let mut simulation = started(&scene);
+    for _ in 0..10 {
+        simulation.do_step(simulation.time(), 1e-6).unwrap();
+    }
+    let time = simulation.time();
+    let message = simulation.do_step(time, 1e-4).unwrap_err().to_string();
+    assert!(message.contains("ω_max"), "{message}");
+    // A refused step changes nothing.
+    simulation.do_step(time, 1e-6).unwrap();
+}
+
+#[test]
+fn growth_is_judged_in_the_sense_of_rotation_and_named_by_node() {
+    let mut scene = common::scene(12);
+    scene.settings.time.step = 7.2e-6;
+    scene.settings.experiment.communication_step = 5e-5;
+    let refused = |scene: &Scene| Simulation::new(scene).unwrap().initialise(0.0).unwrap_err().to_string();
+    let message = refused(&scene);
+    assert!(
+        message.contains("trailing_edge") && message.contains("+θ") && message.contains("h = 7.143e-6"),
+        "{message}"
+    );
+    // The same physical step, asked for through the communication step alone.
+    scene.settings.time.step = 1.0;
+    scene.settings.experiment.communication_step = 5e-5 / 7.0;
+    assert_eq!(refused(&scene), message);
+    // Expected to be stepped finely, then stepped coarsely.
+    scene.settings.experiment.communication_step = 1e-6;
+    let mut simulation = started(&scene);
+    simulation.do_step(0.0, 1e-6).unwrap();
+    let message = simulation.do_step(1e-6, 5e-5 / 7.0).unwrap_err().to_string();
+    assert!(message.contains("grows"), "{message}");
 }
 
 #[test]

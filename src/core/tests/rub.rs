@@ -376,9 +376,11 @@ fn unstable_or_penetrating_starts_are_refused_with_numbers() {
     let mut scene = common::scene(6);
     scene.settings.time.scheme = Scheme::CentralDifference;
     scene.settings.time.step = 2.002 / (std::f64::consts::TAU * 40_000.0);
+    scene.settings.experiment.communication_step = scene.settings.time.step;
     let message = Simulation::new(&scene).unwrap().initialise(0.0).unwrap_err().to_string();
     assert!(message.contains("ω_max") && message.contains("modal-exact"), "{message}");
     scene.settings.time.step = 1.998 / (std::f64::consts::TAU * 40_000.0);
+    scene.settings.experiment.communication_step = scene.settings.time.step;
     scene.settings.contacts[0].friction = 0.0;
     Simulation::new(&scene).unwrap().initialise(0.0).unwrap();
     // A bump right over sector 1, without a ramp: depth 0.6 intrudes by 0.2 gaps.

@@ -226,6 +226,14 @@ impl GapLaw {
         }
     }
 
+    /// Largest displacement (m) that counts as small: a tenth of the smallest radius; no limit for fixed obstacles.
+    pub fn largest_displacement(&self) -> f64 {
+        match self {
+            Self::Fixed(_) => f64::INFINITY,
+            Self::Revolution(law) => 0.1 * law.radii.iter().fold(f64::INFINITY, |low: f64, radius| low.min(*radius)),
+        }
+    }
+
     /// Whether a contact is within what small displacements and a casing seen from inside can describe: less deep than
     /// a tenth of the radius, on a flank below 45°.
     pub fn is_plausible(&self, node: usize, gap: f64, normal: [f64; 3]) -> bool {

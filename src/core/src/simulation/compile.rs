@@ -4,13 +4,14 @@ use crate::contact::gap::{GapLaw, RevolutionGap};
 use crate::contact::surface::Surface;
 use crate::dynamics::modal::ModalModel;
 use crate::rom::Frame;
-use crate::settings::{Meridian, Scheme, Solver};
-use crate::stability::{self, ContactDirections};
 use crate::system::{System, SystemSettings};
 use crate::variables::Quantity;
 use crate::{Error, Result, Scene};
 
 use super::Simulation;
+
+/// Gaps, casing shapes and displacements beyond this share of the radius are not what the model describes.
+pub const SMALL_FRACTION: f64 = 0.1;
 
 /// Places of values that the step reads.
 #[derive(Debug, Clone, Copy)]
@@ -23,28 +24,11 @@ pub struct References {
 /// The parts of a scene that do not change while it runs.
 #[derive(Debug, Clone)]
 pub struct Compiled {
-    scene: Scene,
-    model: ModalModel,
+    pub scene: Scene,
+    pub model: ModalModel,
     /// Hash of settings and ROMs; saved states carry it.
     pub fingerprint: u64,
     pub references: References,
-}
-
-/// Parameters that decide stability.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Parameters {
-    pub friction: f64,
-    pub damping_ratio: f64,
-    pub step: f64,
-    pub scheme: Scheme,
-    pub solver: Solver,
-}
-
-/// Result of the last check of limits.
-#[derive(Debug, Clone)]
-pub struct Checked {
-    parameters: Parameters,
-    outcome: Result<Vec<String>>,
 }
 
 impl Compiled {
@@ -94,15 +78,15 @@ impl Compiled {
             if contact.sector_gaps.is_empty() { vec![contact.gap; rom.sectors] } else { contact.sector_gaps.clone() };
         let surface = Surface::new(&settings.surfaces[0].shape, contact.gap)?;
         let smallest = rom.contact_nodes.iter().fold(f64::INFINITY, |low, node| low.min(node.position[0]));
-        if surface.largest_change() > 0.5 * smallest {
-            return Err(Error::invalid(
-                "surface.shape",
-                format!(
-                    "it changes the casing radius by up to {:.3e} m where contact nodes have {smallest:.3e} m",
-                    surface.largest_change()
-                ),
-                "Give a shape that is small against the radius, in metres",
-            ));
+        let largest_gap = clearances.iter().fold(0.0, |largest: f64, gap| largest.max(*gap));
+        for (what, value) in [("surface.shape", surface.largest_change()), ("contact.gap", largest_gap)] {
+            if value > SMALL_FRACTION * smallest {
+                return Err(Error::invalid(
+                    what,
+                    format!("{value:.3e} m is not small against the radius {smallest:.3e} m of the contact nodes"),
+                    "Give lengths in metres, well below a tenth of the radius",
+                ));
+            }
         }
         let lanes = crate::dynamics::bank::lanes(rom.sectors);
         let law = RevolutionGap::new(rom, surface, &clearances, contact.meridian, lanes)?;
@@ -113,44 +97,6 @@ impl Compiled {
             ledger: settings.outputs.energies,
         };
         Ok(System::new(&self.model, rom.sectors, GapLaw::Revolution(law), system_settings))
-    }
-
-    /// Normals and slip directions of the contact nodes `nodes` on a round casing, slipping with `sense` (±1).
-    fn directions(&self, sense: f64) -> ContactDirections {
-        let meridian = self.scene.settings.contacts[0].meridian;
-        let nodes = self.scene.roms[0].contact_nodes.iter();
-        nodes
-            .map(|node| {
-                let slope = if meridian == Meridian::Contour { node.meridional_slope } else { 0.0 };
-                let length = (1.0 + slope * slope).sqrt();
-                ([-1.0 / length, 0.0, slope / length], [0.0, sense, 0.0])
-            })
-            .collect()
-    }
-
-    /// All limits of this scene with these parameters; returns warnings.
-    ///
-    /// # Errors
-    /// Refusals with numbers and remedy.
-    pub fn check(&self, parameters: &Parameters) -> Result<Vec<String>> {
-        let Parameters { friction, damping_ratio, step, scheme, .. } = *parameters;
-        let mut model = self.model.clone();
-        model.damping_ratios.fill(damping_ratio);
-        let mut warnings: Vec<String> = stability::check_step(&model, scheme, step)?.into_iter().collect();
-        let senses = [1.0, -1.0].map(|sense| self.directions(sense));
-        stability::check_solvable(&model, scheme, step, friction, &senses)?;
-        for directions in senses {
-            // Flutter is looked for with everything closed and with each node alone.
-            let alone = |node: usize| model.with_nodes(&[node]);
-            warnings.extend(stability::check_growth(&model, scheme, step, friction, &directions)?);
-            if directions.len() > 1 {
-                for (node, direction) in directions.iter().enumerate() {
-                    let warning = stability::check_growth(&alone(node), scheme, step, friction, &vec![*direction])?;
-                    warnings.extend(warning.map(|text| format!("contact node {}: {text}", node + 1)));
-                }
-            }
-        }
-        Ok(warnings)
     }
 }
 
@@ -168,28 +114,6 @@ fn fingerprint(scene: &Scene) -> u64 {
 }
 
 impl Simulation {
-    pub(super) fn parameters(&self) -> Parameters {
-        let scheme =
-            if self.value_of(Quantity::SchemeChoice) < 1.5 { Scheme::CentralDifference } else { Scheme::ModalExact };
-        let solver = if self.value_of(Quantity::SolverChoice) < 1.5 { Solver::Film } else { Solver::Lcp };
-        Parameters {
-            friction: self.value_of(Quantity::Friction),
-            damping_ratio: self.value_of(Quantity::DampingRatio),
-            step: self.value_of(Quantity::StepMax),
-            scheme,
-            solver,
-        }
-    }
-
-    /// Check limits unless the same parameters were checked last.
-    pub(super) fn check_limits(&mut self, parameters: Parameters) -> Result<()> {
-        let known = self.checked.as_ref().filter(|checked| checked.parameters == parameters);
-        let outcome = known.map_or_else(|| self.compiled.check(&parameters), |checked| checked.outcome.clone());
-        self.checked = Some(Checked { parameters, outcome: outcome.clone() });
-        self.warnings = outcome?;
-        Ok(())
-    }
-
     /// A start in penetration would be an impact of arbitrary strength.
     pub(super) fn check_initial_gaps(&self) -> Result<()> {
         let lanes = self.system.bank().lanes();

@@ -2,6 +2,7 @@
 
 mod compile;
 mod drive;
+mod limits;
 mod outputs;
 mod state;
 mod table;
@@ -122,8 +123,8 @@ pub struct Simulation {
     initial_time: f64,
     phase: Phase,
     warnings: Vec<String>,
-    /// Parameters for which the limits were last checked.
-    checked: Option<compile::Checked>,
+    /// Limits found for the parameters checked last.
+    limits: Option<limits::Limits>,
 }
 
 impl Simulation {
@@ -151,7 +152,7 @@ impl Simulation {
             initial_time: 0.0,
             phase: Phase::Created,
             warnings: Vec::new(),
-            checked: None,
+            limits: None,
         };
         simulation.reset();
         Ok(simulation)
@@ -494,6 +495,7 @@ impl Simulation {
         #[expect(clippy::cast_precision_loss, reason = "count ≤ 1e12")]
         let step = step_size / count as f64;
         self.check_turning(step, step_size)?;
+        self.check_step_size(step)?;
         if (step - self.system.bank().step()).abs() > SAME_STEP * step {
             self.system.set_step(step);
         }
@@ -582,8 +584,8 @@ impl Simulation {
     }
 
     fn finish(&mut self, offset: f64, time: f64) -> Result<()> {
-        if !self.system.is_finite() {
-            return Err(self.fail(StepFailure::NonFinite, time));
+        if let Err(failure) = self.system.check_state() {
+            return Err(self.fail(failure, time));
         }
         self.rotor.rebase(&self.inputs.speed, offset);
         self.update_outputs();
@@ -604,8 +606,8 @@ impl Simulation {
             },
             StepFailure::Implausible { sector } => Error::Unstable {
                 problem: format!(
-                    "at t = {time} s (last good time {} s) a contact node of sector {} is deeper inside the casing than a \
-                     tenth of its radius, or meets a flank of the casing shape steeper than 45°",
+                    "at t = {time} s (last good time {} s) a contact node of sector {} is displaced by more than a tenth of \
+                     its radius, is as deep inside the casing, or meets a flank of the casing shape steeper than 45°",
                     self.time,
                     sector + 1
                 ),

@@ -1,5 +1,7 @@
 //! The variable table of a scene: one row per thing an importer can see. Features that are off have no row.
 
+use super::compile::SMALL_FRACTION;
+use crate::contact::surface::Surface;
 use crate::settings::{MAX_DAMPING, MAX_FRICTION, Motion, Scene, Shape};
 use crate::variables::{
     Causality, Enumeration, Kind, Quantity, Span, Start, Unit, Variability, Variable, VariableTable,
@@ -147,7 +149,7 @@ pub fn build(scene: &Scene) -> Result<VariableTable> {
     let time = table.push(Quantity::Time, "time", "Simulated time");
     time.causality = Causality::Independent;
     time.unit = Some(&TIME);
-    inputs(&mut table, scene);
+    inputs(&mut table, scene)?;
     parameters(&mut table, scene);
     totals(&mut table, scene);
     watched(&mut table, scene)?;
@@ -174,7 +176,13 @@ pub fn build(scene: &Scene) -> Result<VariableTable> {
     VariableTable::new(table.variables)
 }
 
-fn inputs(table: &mut Builder, scene: &Scene) {
+/// Lengths beyond this are not small against the radius of the contact nodes (m).
+fn largest_length(scene: &Scene) -> f64 {
+    let radii = scene.roms[0].contact_nodes.iter().map(|node| node.position[0]);
+    SMALL_FRACTION * radii.fold(f64::INFINITY, f64::min)
+}
+
+fn inputs(table: &mut Builder, scene: &Scene) -> Result<()> {
     let structure = &scene.settings.structures[0];
     if structure.motion == Motion::Rotating {
         let speed =
@@ -191,16 +199,19 @@ fn inputs(table: &mut Builder, scene: &Scene) {
             0.0,
             "Uniform change of the casing radius; positive opens every clearance",
         );
-        change.nominal = Some(1e-4);
-        change.display = Some(1);
+        (change.nominal, change.display) = (Some(1e-4), Some(1));
+        (change.min, change.max) = (Some(-largest_length(scene)), Some(largest_length(scene)));
         if surface.shape != (Shape::Circular {}) {
-            table.input(
+            let factor = table.input(
                 Quantity::ShapeFactor,
                 "casing_shape_factor",
                 None,
                 1.0,
                 "Factor on the casing shape (0 = round, 1 = as in the scene)",
             );
+            let change = Surface::new(&surface.shape, scene.settings.contacts[0].gap)?.largest_change();
+            let largest = if change > 0.0 { largest_length(scene) / change } else { 1.0 };
+            (factor.min, factor.max) = (Some(-largest), Some(largest));
             table.input(
                 Quantity::ShapeRotation,
                 "casing_shape_rotation",
@@ -210,6 +221,7 @@ fn inputs(table: &mut Builder, scene: &Scene) {
             );
         }
     }
+    Ok(())
 }
 
 fn parameters(table: &mut Builder, scene: &Scene) {
@@ -233,6 +245,7 @@ fn parameters(table: &mut Builder, scene: &Scene) {
         "Added to the radial clearance of every sector",
     );
     (offset.display, offset.nominal, offset.variability) = (Some(1), Some(1e-4), Variability::Tunable);
+    (offset.min, offset.max) = (Some(-largest_length(scene)), Some(largest_length(scene)));
     let ratio = settings.structures[0].damping_ratio.unwrap_or(scene.roms[0].damping_ratio);
     let damping =
         table.parameter(Quantity::DampingRatio, "damping_ratio", None, ratio, "Modal damping ratio of the rotor");
