@@ -72,15 +72,16 @@ fn decode(text: &str) -> Result<String, String> {
     let mut out = Vec::with_capacity(bytes.len());
     let mut index = 0;
     while index < bytes.len() {
-        let digits = bytes.get(index + 1..index + 3).and_then(|pair| std::str::from_utf8(pair).ok());
+        let pair = bytes.get(index + 1..index + 3).filter(|_| bytes[index] == b'%');
+        let digits = pair.and_then(|pair| std::str::from_utf8(pair).ok());
         let code = digits.filter(|pair| pair.bytes().all(|digit| digit.is_ascii_hexdigit()));
         match code.and_then(|pair| u8::from_str_radix(pair, 16).ok()) {
             Some(0) => return Err("contains an encoded NUL".into()),
-            Some(byte) if bytes[index] == b'%' => {
+            Some(byte) => {
                 out.push(byte);
                 index += 3;
             }
-            _ => {
+            None => {
                 out.push(bytes[index]);
                 index += 1;
             }
@@ -93,9 +94,9 @@ fn decode(text: &str) -> Result<String, String> {
 mod tests {
     use super::*;
 
-    /// A directory with a blank, an umlaut and a percent sign in its name.
+    /// A directory with a blank, an umlaut, a percent sign and zeros without one in its name.
     fn directory() -> tempfile::TempDir {
-        tempfile::Builder::new().prefix("tiprub location \u{fc} 50% off").tempdir().unwrap()
+        tempfile::Builder::new().prefix("tiprub location \u{fc} 50% off 4400-0041-").tempdir().unwrap()
     }
 
     #[test]
@@ -110,6 +111,7 @@ mod tests {
             format!("file://localhost{encoded}"),
             format!("FILE://LOCALHOST{encoded}/"),
             format!("file://{text}"),
+            format!("file:///{encoded}"),
             text.to_owned(),
             format!("{text}/"),
         ] {

@@ -31,14 +31,15 @@ impl Entry {
     }
 }
 
-/// Write the archive to `target`, whole or not at all.
+/// Write the archive to `target`, whole or not at all. It is made in memory: the zip library prints a message of its own
+/// when an unfinished archive cannot go on being written.
 ///
 /// # Errors
 /// A name that breaks the rules above, a file that is too large, or a disk that does not take it.
 pub fn write(target: &Path, entries: &[Entry]) -> Result<()> {
-    let mut file = output_file::begin(target)?;
-    write_into(&mut file, entries).map_err(|failure| Failure { what: target.display().to_string(), ..failure })?;
-    output_file::persist(file, target)
+    let mut archive = std::io::Cursor::new(Vec::new());
+    write_into(&mut archive, entries).map_err(|failure| Failure { what: target.display().to_string(), ..failure })?;
+    output_file::write(target, archive.into_inner())
 }
 
 /// Write the archive into anything seekable.

@@ -2,12 +2,13 @@
 
 use std::{
     io::{IsTerminal, Write},
+    path::Path,
     time::Duration,
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::Failure;
+use crate::{Failure, Result};
 
 /// Result of a command, in both forms the user can ask for.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,10 +69,18 @@ impl Console {
     }
 
     /// Print the result of the command on stdout.
-    pub fn deliver(&self, outcome: &Outcome) {
+    ///
+    /// # Errors
+    /// Stdout takes it not or in part, such as a file on a full disk. A reader that closes it early (`| head`) is fine.
+    pub fn deliver(&self, outcome: &Outcome) -> Result<()> {
         let text = if self.json { format!("{:#}", outcome.json) } else { outcome.text.trim_end().to_string() };
-        // `tiprub inspect x | head` closes our stdout early; that is not an error.
-        let _ = writeln!(std::io::stdout(), "{text}");
+        let mut stdout = std::io::stdout().lock();
+        match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
+            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                Err(Failure::file(Path::new("stdout"), "cannot be written", &error))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Print a failure: text on stderr, and with `--json` the object on stdout.

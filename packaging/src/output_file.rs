@@ -1,4 +1,5 @@
-//! Files appear whole or not at all: written to a hidden temporary file beside the target, then renamed.
+//! Files appear whole or not at all: written to a hidden temporary file beside the target, then renamed. Symbolic links
+//! are followed. Devices and pipes (`/dev/stdout`, `/dev/null`, a FIFO) are written to, never replaced.
 
 use std::{
     fs,
@@ -17,13 +18,36 @@ pub fn create_directory(path: &Path) -> Result<()> {
     fs::create_dir_all(path).map_err(|error| Failure::file(path, "cannot create the directory", &error))
 }
 
+/// What already is under the name of a target.
+enum Place {
+    /// Nothing, or a file to replace, at this path (symbolic links resolved).
+    File(PathBuf),
+    /// Something that takes bytes but is no file: a device or a pipe.
+    Stream,
+}
+
+fn place(target: &Path) -> Result<Place> {
+    let Ok(metadata) = fs::metadata(target) else { return Ok(Place::File(target.to_path_buf())) };
+    if metadata.is_dir() {
+        return Err(Failure::new(target.display(), "is a directory", "Name a file"));
+    }
+    if !metadata.is_file() {
+        return Ok(Place::Stream);
+    }
+    let real = fs::canonicalize(target).map_err(|error| Failure::file(target, "cannot be found", &error))?;
+    Ok(Place::File(real))
+}
+
 /// A hidden temporary file in the directory of `target` (which is created if missing). Nothing shows under the
 /// target's name before [`persist`].
 ///
 /// # Errors
-/// The directory cannot be written to.
+/// The directory cannot be written to, or `target` is itself a directory.
 pub fn begin(target: &Path) -> Result<NamedTempFile> {
-    let directory = parent(target);
+    let directory = match place(target)? {
+        Place::File(path) => parent(&path),
+        Place::Stream => std::env::temp_dir(),
+    };
     create_directory(&directory)?;
     tempfile::Builder::new()
         .prefix(".tiprub-")
@@ -35,11 +59,20 @@ pub fn begin(target: &Path) -> Result<NamedTempFile> {
 /// Give the finished temporary file its name, replacing an older file of that name.
 ///
 /// # Errors
-/// The rename failed; the temporary file is gone and an older target untouched.
+/// The rename failed, and the temporary file is gone and an older target untouched; or a device or pipe took only a part.
 pub fn persist(file: NamedTempFile, target: &Path) -> Result<()> {
+    let Place::File(path) = place(target)? else { return copy_into_stream(&file, target) };
     set_ordinary_permissions(&file, target)?;
-    file.persist(target).map_err(|error| Failure::file(target, "cannot be put in place", &error.error))?;
+    file.persist(path).map_err(|error| Failure::file(target, "cannot be put in place", &error.error))?;
     Ok(())
+}
+
+fn copy_into_stream(file: &NamedTempFile, target: &Path) -> Result<()> {
+    let copied = file.reopen().and_then(|mut finished| {
+        let mut stream = fs::OpenOptions::new().write(true).open(target)?;
+        std::io::copy(&mut finished, &mut stream)
+    });
+    copied.map(drop).map_err(|error| Failure::file(target, "cannot be written", &error))
 }
 
 /// Write `bytes` to `target` in one piece.
@@ -103,6 +136,43 @@ mod tests {
         drop(file);
         assert_eq!(names(root.path()), ["rom.safetensors"]);
         assert_eq!(fs::read_to_string(&target).unwrap(), "old");
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn links_are_followed_and_stay_links() {
+        let root = tempfile::tempdir().unwrap();
+        let (real, link) = (root.path().join("elsewhere/real.csv"), root.path().join("link.csv"));
+        write(&real, "old").unwrap();
+        std::os::unix::fs::symlink(&real, &link).unwrap();
+        write(&link, "new").unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read_to_string(&real).unwrap(), "new");
+    }
+
+    /// Links stand for the devices here: replacing a real one would damage the machine that runs the tests.
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn devices_are_written_to_and_never_replaced() {
+        let root = tempfile::tempdir().unwrap();
+        for (device, works) in [("/dev/null", true), ("/dev/full", false)] {
+            let link = root.path().join("device");
+            std::os::unix::fs::symlink(device, &link).unwrap();
+            let outcome = write(&link, "bytes");
+            assert_eq!(outcome.is_ok(), works, "{device}");
+            assert!(outcome.err().is_none_or(|failure| failure.problem.contains("cannot be written")), "{device}");
+            assert!(fs::symlink_metadata(&link).unwrap().is_symlink(), "{device} was replaced");
+            assert_eq!(names(root.path()), ["device"]);
+            fs::remove_file(&link).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_directory_is_not_a_target() {
+        let root = tempfile::tempdir().unwrap();
+        let failure = write(root.path(), "x").unwrap_err();
+        assert!(failure.problem.contains("is a directory"), "{failure}");
+        assert_eq!(names(root.path()).len(), 0);
     }
 
     #[test]

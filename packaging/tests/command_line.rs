@@ -282,3 +282,20 @@ fn help_is_there_for_every_command() {
         assert!(help.contains("Examples:") && help.contains("--json"), "{help}");
     }
 }
+
+#[test]
+#[cfg(target_os = "linux")]
+fn results_that_stdout_does_not_take_are_a_failure() {
+    let project = Project::new();
+    let onto = |stdout: fs::File| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+        command.current_dir(project.root.path()).args(["run", "scene.toml", "--csv", "-", "-q"]);
+        command.stdout(stdout).output().unwrap()
+    };
+    let full = onto(fs::OpenOptions::new().write(true).open("/dev/full").unwrap());
+    assert_eq!(full.status.code(), Some(1));
+    let message = String::from_utf8(full.stderr).unwrap();
+    assert!(message.contains("stdout: cannot be written"), "{message}");
+    let good = onto(fs::File::create(project.path("good.csv")).unwrap());
+    assert_eq!(good.status.code(), Some(0));
+}

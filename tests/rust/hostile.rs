@@ -620,3 +620,76 @@ fn two_threads_with_an_instance_each_and_two_on_one() {
     CASES.fetch_add(1, Ordering::Relaxed);
     summary("threads");
 }
+
+/// Floating-point control of the host: what `fenv.h` and the compilers' intrinsics set, without their flags.
+#[cfg(target_arch = "x86_64")]
+mod control {
+    /// All but the six sticky flags.
+    const CONTROL: u32 = !0x3F;
+
+    pub fn get() -> u32 {
+        let mut value = 0_u32;
+        // SAFETY: writes the four bytes given.
+        unsafe { std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut value, options(nostack)) };
+        value
+    }
+
+    pub fn set(value: u32) {
+        // SAFETY: reads the four bytes given; only bits that exist are ever set.
+        unsafe { std::arch::asm!("ldmxcsr [{}]", in(reg) &raw const value, options(nostack)) };
+    }
+
+    /// Do something under another control word, and check that it is still the same afterwards and no flag is raised.
+    pub fn under<T>(word: u32, action: impl FnOnce() -> T) -> T {
+        let before = get();
+        set(word);
+        let answer = action();
+        let after = get();
+        set(before);
+        assert_eq!(after & CONTROL, word, "the host's control word changed");
+        assert_eq!(after & !CONTROL, 0, "a floating-point exception leaked into the host");
+        answer
+    }
+}
+
+/// An unmasked exception ends this very process with SIGFPE: then no test of this file passes.
+#[test]
+#[cfg(target_arch = "x86_64")]
+fn the_floating_point_environment_of_the_host_neither_matters_nor_changes() {
+    const MASKED: u32 = 0x1F80;
+    let traps = MASKED & !(0x0080 | 0x0200 | 0x0400 | 0x0800); // invalid, division by zero, overflow, underflow
+    let (path, resources) = (shipped(), Resources::new(false));
+    let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
+    let references =
+        ["rotor_angle", "clearance_minimum", "force_x", "normal_impulse", "energy_residual"].map(reference);
+    let run = |word: u32| {
+        let slave = control::under(word, || fmi2::Slave::new(&api2, &resources));
+        let third = control::under(word, || fmi3::Slave::new(&api3, &resources));
+        slave.expect(control::under(word, || slave.enter()));
+        slave.expect(control::under(word, || slave.exit()));
+        third.expect(control::under(word, || third.enter(0.0, None)));
+        third.expect(control::under(word, || third.exit()));
+        let mut values = Vec::new();
+        for step in 0..300 {
+            let time = f64::from(step) * 1e-4;
+            slave.expect(control::under(word, || slave.step(time, 1e-4)));
+            assert_eq!(control::under(word, || third.step(time, 1e-4)).status, OK);
+            let reals = control::under(word, || slave.reals(&references));
+            assert_eq!(control::under(word, || third.reals(&references, references.len())), reals);
+            values.extend(reals.into_iter().map(f64::to_bits));
+        }
+        values
+    };
+    let expected = run(MASKED);
+    for (name, word) in [
+        ("traps", traps),
+        ("round down", MASKED | 0x2000),
+        ("round up", MASKED | 0x4000),
+        ("round to zero", MASKED | 0x6000),
+        ("denormals to zero", MASKED | 0x8040),
+    ] {
+        assert_eq!(run(word), expected, "{name}");
+        CASES.fetch_add(1, Ordering::Relaxed);
+    }
+    summary("floating-point environment");
+}

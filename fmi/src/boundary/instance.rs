@@ -4,6 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::{Mutex, TryLockError};
 
+use super::float_environment::StandardFloats;
 use super::log::{Log, Sink};
 use super::{Environment, IntermediateUpdate, Text, panics};
 use crate::slave::order::{self, Rule};
@@ -78,6 +79,7 @@ pub fn instantiate(request: Instantiation<'_>) -> Handle {
     let function = request.function;
     let log = Log::new(request.sink, request.logging_on);
     let built = catch_unwind(AssertUnwindSafe(|| {
+        let _floats = StandardFloats::enter();
         let name = request.name.required("instanceName")?;
         if name.trim().is_empty() {
             return Err(Refusal::error("instanceName is empty. Pass a name with at least one visible character"));
@@ -142,7 +144,8 @@ fn other_version(instance: &Instance) -> String {
 }
 
 /// The guard: every call on an instance goes through here. It checks the instance, that it is not faulted, that the call
-/// is allowed now; it catches panics, hands messages to the importer and gives the status. `None` if not carried out.
+/// is allowed now; it puts the caller's floating-point environment aside (callbacks have it again), catches panics, hands
+/// messages to the importer and gives the status. `None` if not carried out.
 pub fn enter<T>(
     handle: Handle,
     rule: &Rule,
@@ -150,6 +153,7 @@ pub fn enter<T>(
 ) -> (Status, Option<T>) {
     let Some(instance) = handle.instance() else { return (Status::Error, None) };
     let call = catch_unwind(AssertUnwindSafe(|| {
+        let _floats = StandardFloats::enter();
         let mut slave = instance.slave.try_lock().map_err(|error| {
             Refusal::error(match error {
                 TryLockError::Poisoned(_) => "the instance is out of order after an internal error. Free it",

@@ -1,6 +1,7 @@
 //! The only unsafe code of the library: C pointers to Rust values and back, callbacks, and the guard around every call.
 
 mod calls;
+mod float_environment;
 mod instance;
 mod log;
 mod panics;

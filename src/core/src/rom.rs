@@ -9,6 +9,10 @@ use nalgebra::DMatrix;
 
 use crate::{Error, Result};
 
+/// Most sectors of a ROM. Bladed disks have tens to a few hundred; a damaged or hostile file must not ask for all memory,
+/// which ends the process of the importer.
+pub const MAX_SECTORS: usize = 10_000;
+
 /// Which directions the three displacement components of a contact node have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Frame {
@@ -49,7 +53,7 @@ pub struct Rom {
     pub name: String,
     /// Where it came from: mesh counts, material, reduction, in one or a few sentences.
     pub origin: String,
-    /// Number of identical uncoupled copies around the axis (≥ 1).
+    /// Number of identical uncoupled copies around the axis (1 to [`MAX_SECTORS`]).
     pub sectors: usize,
     /// Directions of the displacement components.
     pub frame: Frame,
@@ -110,6 +114,13 @@ impl Rom {
         }
         if self.sectors == 0 {
             return Err(Error::invalid("ROM metadata `sectors`", "zero sectors", remedy));
+        }
+        if self.sectors > MAX_SECTORS {
+            return Err(Error::invalid(
+                "ROM metadata `sectors`",
+                format!("{} sectors, more than {MAX_SECTORS}", self.sectors),
+                remedy,
+            ));
         }
         if !(0.0..1.0).contains(&self.damping_ratio) {
             return Err(Error::invalid(

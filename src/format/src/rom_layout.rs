@@ -85,7 +85,7 @@ pub const METADATA: [MetadataLayout; 10] = [
     entry(
         "sectors",
         None,
-        "Number of identical uncoupled copies around the axis, at least 1; 1 is a single structure.",
+        "Number of identical uncoupled copies around the axis, at least 1 and at most 10000; 1 is a single structure.",
     ),
     entry("frame", None, "`cylindrical` or `cartesian`: directions of positions and displacements."),
     entry("damping_ratio", Some("0"), "Modal damping ratio, from 0 to below 1; a scene may override it."),

@@ -250,6 +250,9 @@ fn wrong_metadata_is_refused_by_key() {
     ByHand::example().without("sectors").refused_with(&["metadata `sectors`: missing", "at least 1"]);
     ByHand::example().with("sectors", "-3").refused_with(&["metadata `sectors`: \"-3\" is not such a number"]);
     ByHand::example().with("sectors", "0").refused_with(&["`sectors`", "zero sectors"]);
+    for many in ["10001", "1000000000", "18446744073709551615"] {
+        ByHand::example().with("sectors", many).refused_with(&["`sectors`", many, "more than 10000"]);
+    }
     ByHand::example().with("frame", "Cylindric").refused_with(&["metadata `frame`", "Did you mean `cylindrical`?"]);
     ByHand::example().with("damping_ratio", "1.5").refused_with(&["`damping_ratio`", "1.5"]);
     ByHand::example().with("dampingratio", "0.1").refused_with(&["`dampingratio`", "Did you mean `damping_ratio`?"]);
