@@ -146,12 +146,9 @@ impl RomFacts {
 /// Largest µ tried for which the contact problem is solvable for both slip directions.
 fn solvable_friction(rom: &Rom, model: &ModalModel) -> Option<f64> {
     let step = 1.0 / model.largest_frequency();
-    let solvable = |friction: f64| {
-        [1.0, -1.0].iter().all(|sign| {
-            let directions = closed_contacts(rom, *sign);
-            stability::check_solvable(model, Scheme::ModalExact, step, friction, &directions).is_ok()
-        })
-    };
+    let senses = [1.0, -1.0].map(|sign| closed_contacts(rom, sign));
+    let solvable =
+        |friction: f64| stability::check_solvable(model, Scheme::ModalExact, step, friction, &senses).is_ok();
     (0..=FRICTION_STEPS).map(|step| f64::from(step) * FRICTION_STEP).take_while(|friction| solvable(*friction)).last()
 }
 

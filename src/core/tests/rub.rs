@@ -131,6 +131,70 @@ fn shaft_power(friction: f64) {
 }
 
 #[test]
+fn forces_and_torque_are_those_of_the_touching_blade_in_the_fixed_frame() {
+    // A round casing moved by 0.4 mm towards 0.7 rad + π: blades are pressed inwards at 0.7 rad and dragged against +z.
+    let mut scene = common::scene(12);
+    scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 4.1e-4, order: 1, phase: 0.7 };
+    let nodes = scene.roms[0].contact_nodes.clone();
+    let mut simulation = started(&scene);
+    let (mut checked, mut normal) = (0, [0.0; 2]);
+    while simulation.time() < 4e-3 {
+        run(&mut simulation, 1, 1e-6);
+        let angle = real(&simulation, "rotor_angle");
+        let (mut force, mut torque, mut size) = ([0.0; 3], 0.0, 0.0);
+        for event in simulation.system().events() {
+            let [r, theta, _] = nodes[event.node].position;
+            let theta = theta + std::f64::consts::TAU * event.sector as f64 / 12.0 + angle;
+            let [radial, tangential, axial] = event.force;
+            let (fx, fy) =
+                (radial * theta.cos() - tangential * theta.sin(), radial * theta.sin() + tangential * theta.cos());
+            force = [force[0] + fx, force[1] + fy, force[2] + axial];
+            // (x, y) × (F_x, F_y)
+            torque += r * theta.cos() * fy - r * theta.sin() * fx;
+            size += event.normal;
+            (normal[0], normal[1]) = (normal[0] + radial * theta.cos(), normal[1] + radial * theta.sin());
+            assert!(radial < 0.0 && tangential < 0.0 && axial < 0.0);
+            checked += 1;
+        }
+        for (name, expected) in [("force_x", force[0]), ("force_y", force[1]), ("force_z", force[2])] {
+            assert!((real(&simulation, name) - expected).abs() <= 1e-11 * size, "{name}");
+        }
+        assert!((real(&simulation, "torque") - torque).abs() <= 1e-11 * size);
+    }
+    let direction = (-normal[1]).atan2(-normal[0]);
+    println!("{checked} contacts; inward push at {direction:.3} rad, the casing is closest at 0.7 rad");
+    assert!(checked > 100 && (direction - 0.7).abs() < 0.3, "{checked} contacts at {direction}");
+}
+
+#[test]
+fn a_pressed_blade_stays_at_rest_however_time_is_divided() {
+    // Closed contact under a constant force: carrying (q, d) to another h must neither push nor pull.
+    let mut scene = common::scene(1);
+    scene.settings.contacts[0].friction = 0.0;
+    scene.settings.structures[0].damping_ratio = Some(0.3);
+    scene.settings.surfaces[0].shape = Shape::Circular {};
+    scene.settings.outputs.watched_sectors = vec![1];
+    scene.settings.outputs.nodal_diameters = None;
+    scene.settings.time.step = 4e-6;
+    let mut simulation = started(&scene);
+    let radius = reference(&simulation, "casing_radius_change");
+    while simulation.time() < 1e-2 {
+        let time = simulation.time();
+        simulation.set_real(radius, (-0.2 * time).max(-4e-4)).unwrap();
+        simulation.set_input_derivative(radius, 1, if time < 2e-3 { -0.2 } else { 0.0 }).unwrap();
+        simulation.do_step(time, 1e-5).unwrap();
+    }
+    let force = |simulation: &Simulation| simulation.system().events().iter().map(|event| event.normal).sum::<f64>();
+    let (at_rest, mut worst) = (force(&simulation), 0.0_f64);
+    for step in 0..300 {
+        run(&mut simulation, 1, [4e-6, 1.5e-6, 3e-6, 1e-6][step % 4]);
+        worst = worst.max((force(&simulation) / at_rest - 1.0).abs());
+    }
+    println!("{at_rest} N at rest, largest relative change {worst:.1e}");
+    assert!(at_rest > 100.0 && worst < 1e-6, "{worst} of {at_rest} N");
+}
+
+#[test]
 fn lcp_leaves_no_penetration_and_no_adhesion() {
     let mut simulation = started(&common::scene(12));
     let mut contacts = 0;
