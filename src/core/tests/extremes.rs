@@ -96,6 +96,7 @@ fn what_counts_is_the_step_in_use_not_the_largest_allowed() {
 #[test]
 fn growth_is_judged_in_the_sense_of_rotation_and_named_by_node() {
     let mut scene = common::scene(12);
+    scene.settings.time.scheme = Scheme::CentralDifference;
     scene.settings.time.step = 7.2e-6;
     scene.settings.experiment.communication_step = 5e-5;
     let refused = |scene: &Scene| Simulation::new(scene).unwrap().initialise(0.0).unwrap_err().to_string();
