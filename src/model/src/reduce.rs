@@ -112,6 +112,8 @@ pub fn reduce(
     options: &ReductionOptions,
     listener: Listener<'_>,
 ) -> Result<Reduction> {
+    // The library's own threads split sums by their number, and a ROM must have the same bits on every number of threads.
+    faer::set_global_parallelism(faer::Par::Seq);
     let mut timings = Timings::default();
     let (assembled, free) = timed(&mut timings.assembly, || {
         check_nodes(&mesh, clamped, contact, options.frame)?;

@@ -149,6 +149,9 @@ pub fn principal_pair(first: &SparseMatrix, second: &SparseMatrix, keep: &[usize
     (pick(first), pick(second))
 }
 
+/// Columns solved together.
+const SHARE: usize = 3;
+
 /// Sparse Cholesky factor.
 #[derive(Debug, Clone)]
 pub struct Factor {
@@ -158,9 +161,9 @@ pub struct Factor {
 impl Factor {
     /// Solution of A x = b for every column of `right`, n × m.
     pub fn solve(&self, mut right: Mat<f64>) -> Mat<f64> {
-        // Columns are independent: a share of them per thread beats threads inside the triangular solves.
-        let share = right.ncols().div_ceil(rayon::current_num_threads()).max(1);
-        let chunks: Vec<_> = right.as_mut().par_col_chunks_mut(share).collect();
+        // Columns are independent: shares of them beat threads inside the triangular solves. The width of a share is fixed,
+        // because the kernels round differently for different widths, and a ROM must not depend on the number of threads.
+        let chunks: Vec<_> = right.as_mut().par_col_chunks_mut(SHARE).collect();
         chunks.into_par_iter().for_each(|chunk| self.llt.solve_in_place(chunk));
         right
     }

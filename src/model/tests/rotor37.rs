@@ -311,3 +311,15 @@ fn exported_file_is_complete_and_nothing_is_left_behind_on_failure() {
     assert_eq!(std::fs::read_to_string(&target).unwrap(), text);
     std::fs::remove_dir_all(&folder).unwrap();
 }
+
+#[test]
+fn the_rom_has_the_same_bits_on_any_number_of_threads() {
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| reduce_rotor37(&Rotor37Options::default(), &silent)).unwrap().rom
+    };
+    let alone = on(1);
+    for threads in [2, 5] {
+        assert!(on(threads) == alone, "{threads} threads");
+    }
+}
