@@ -276,7 +276,7 @@ impl SceneSettings {
         for (index, contact) in self.contacts.iter().enumerate() {
             contact.validate(self, &format!("contact[{}]", index + 1))?;
         }
-        positive("time.step", self.time.step, "s")?;
+        within("time.step", self.time.step, SHORTEST_STEP, LONGEST_STEP)?;
         finite("experiment.start", self.experiment.start)?;
         positive("experiment.communication_step", self.experiment.communication_step, "s")?;
         if !(self.experiment.stop.is_finite() && self.experiment.stop > self.experiment.start) {
@@ -377,6 +377,10 @@ impl ContactSettings {
     }
 }
 
+/// Shortest internal step accepted (s): far below the period of any mode of a blade.
+pub const SHORTEST_STEP: f64 = 1e-12;
+/// Longest internal step accepted (s): far above it.
+pub const LONGEST_STEP: f64 = 1.0;
 /// Largest friction coefficient accepted.
 pub const MAX_FRICTION: f64 = 2.0;
 /// Largest damping ratio accepted.
@@ -398,6 +402,6 @@ fn within(field: &str, value: f64, low: f64, high: f64) -> Result<()> {
     if (low..=high).contains(&value) {
         Ok(())
     } else {
-        Err(Error::invalid(field, format!("{value}"), format!("Give a value between {low} and {high}")))
+        Err(Error::invalid(field, format!("{value}"), format!("Give a value between {low:?} and {high:?}")))
     }
 }

@@ -113,7 +113,7 @@ pub fn check_step(model: &ModalModel, scheme: Scheme, step: f64) -> Result<Optio
 /// internal step, and W keeps its shape only once ω_max h ≪ 1.
 fn steps_to_check(model: &ModalModel, largest: f64) -> impl Iterator<Item = f64> {
     let resolved = 0.1 / model.largest_frequency();
-    std::iter::successors(Some(largest), |step| Some(0.5 * step)).take(60).scan(true, move |unresolved, step| {
+    std::iter::successors(Some(largest), |step| Some(0.5 * step)).take(24).scan(true, move |unresolved, step| {
         let take = *unresolved;
         *unresolved = step > resolved;
         take.then_some(step)
@@ -242,7 +242,7 @@ pub fn growth(
     let damping = &projected * scaled(&|mode| -2.0 * step * model.damping_ratios[mode] * model.frequencies[mode]);
     let identity = DMatrix::identity(free, free);
     let flow = blocks([&DMatrix::zeros(free, free), &identity, &stiffness, &damping]);
-    let continuous = flow.complex_eigenvalues().iter().fold(f64::MIN, |largest, value| largest.max(value.re)) / step;
+    let continuous = eigenvalues(flow)?.iter().fold(f64::MIN, |largest, value| largest.max(value.re)) / step;
 
     // q⁺ = R(q + β d − κ q) with R = I − c B_f W⁻¹ B_nᵀ, d⁺ = q⁺ − q.
     let mode_coefficients =
@@ -256,8 +256,15 @@ pub fn growth(
     let increment = &corrected * scaled(&|mode| coefficients[mode].beta);
     let map = blocks([&position, &increment, &(&position - &identity), &increment]);
     let size = |value: &nalgebra::Complex<f64>| libm::hypot(value.re, value.im);
-    let radius = map.complex_eigenvalues().iter().fold(0.0, |largest: f64, value| largest.max(size(value)));
+    let radius = eigenvalues(map)?.iter().fold(0.0, |largest: f64, value| largest.max(size(value)));
     Some(Growth { continuous, stepped: libm::log(radius) / step, noise: GROWTH_NOISE / step })
+}
+
+/// Eigenvalues of a general matrix; `None` where the iteration does not end (entries of extreme size).
+fn eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<nalgebra::Complex<f64>>> {
+    let iterations = 100 * matrix.nrows();
+    let schur = nalgebra::Schur::try_new(matrix, f64::EPSILON, iterations)?;
+    Some(schur.complex_eigenvalues().iter().copied().collect())
 }
 
 /// Orthonormal basis of the vectors that `rows` maps to zero; `None` if it is empty.
@@ -280,12 +287,12 @@ fn blocks([a, b, c, d]: [&DMatrix<f64>; 4]) -> DMatrix<f64> {
     matrix
 }
 
-/// Steps at which growth is looked at, from `largest` down to where every mode is resolved well.
+/// Steps at which growth is looked at, from `largest` down to where every mode is resolved well (at most 12 octaves).
 pub fn growth_steps(model: &ModalModel, largest: f64) -> impl Iterator<Item = f64> {
     let resolved = 0.1 / model.largest_frequency();
     std::iter::successors(Some(largest), |step| Some(step * std::f64::consts::FRAC_1_SQRT_2))
         .take_while(move |step| *step > resolved)
-        .take(80)
+        .take(24)
 }
 
 #[cfg(test)]

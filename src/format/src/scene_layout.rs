@@ -147,7 +147,13 @@ pub const FIELDS: [SceneField; 35] = [
     ),
     field("contact.master", "text", None, "name of a structure", "Structure whose contact nodes are the masters."),
     field("contact.slave", "text", None, "name of a surface", "Surface they meet."),
-    field("contact.gap", "number, m", None, "> 0", "Radial tip clearance of the undeformed structure."),
+    field(
+        "contact.gap",
+        "number, m",
+        None,
+        "> 0, up to a tenth of the radius",
+        "Radial tip clearance of the undeformed structure.",
+    ),
     field(
         "contact.sector_gaps",
         "list of numbers, m",
@@ -182,7 +188,7 @@ pub const FIELDS: [SceneField; 35] = [
         "time.step",
         "number, s",
         None,
-        "> 0",
+        "1e-12 to 1",
         "Largest internal step; the step used divides the communication step evenly.",
     ),
     field(

@@ -21,7 +21,7 @@ const TIME_TOLERANCE: f64 = 1e-3;
 /// Step sizes within this fraction of each other are the same step (1/60 computed in several ways).
 const SAME_STEP: f64 = 1e-9;
 /// Most internal steps of one communication step.
-const MOST_STEPS: f64 = 1e12;
+const MOST_STEPS: f64 = 1e9;
 
 /// What one call of [`Simulation::advance`] did.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -490,9 +490,9 @@ impl Simulation {
         self.check_step(current_time, step_size)?;
         let limit = self.values[self.compiled.references.step_max];
         let ratio = step_size / limit;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 ≤ value ≤ 1e12")]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 ≤ value ≤ 1e9")]
         let count = (ratio * (1.0 - SAME_STEP)).ceil().max(1.0) as u64;
-        #[expect(clippy::cast_precision_loss, reason = "count ≤ 1e12")]
+        #[expect(clippy::cast_precision_loss, reason = "count ≤ 1e9")]
         let step = step_size / count as f64;
         self.check_turning(step, step_size)?;
         self.check_step_size(step)?;

@@ -2,7 +2,7 @@
 
 use super::compile::SMALL_FRACTION;
 use crate::contact::surface::Surface;
-use crate::settings::{MAX_DAMPING, MAX_FRICTION, Motion, Scene, Shape};
+use crate::settings::{LONGEST_STEP, MAX_DAMPING, MAX_FRICTION, Motion, SHORTEST_STEP, Scene, Shape};
 use crate::variables::{
     Causality, Enumeration, Kind, Quantity, Span, Start, Unit, Variability, Variable, VariableTable,
 };
@@ -257,7 +257,8 @@ fn parameters(table: &mut Builder, scene: &Scene) {
         settings.time.step,
         "Largest internal time step; the step in use divides the communication step evenly",
     );
-    (step.min, step.max, step.nominal, step.display) = (Some(1e-15), Some(1e6), Some(settings.time.step), Some(1));
+    (step.min, step.max) = (Some(SHORTEST_STEP), Some(LONGEST_STEP));
+    (step.nominal, step.display) = (Some(settings.time.step), Some(1));
     let scheme = settings.time.scheme as i32 + 1;
     table.choice(Quantity::SchemeChoice, "scheme", &SCHEMES, scheme, "Time-stepping scheme");
     table.choice(Quantity::SolverChoice, "solver", &SOLVERS, contact.solver as i32 + 1, "Contact solver");
