@@ -67,7 +67,12 @@ fn wrong_words_get_a_suggestion() {
 
 #[test]
 fn missing_keys_are_named_with_their_unit_and_range() {
-    refused("gap = 1e-3\n", "", ":8:1", &["contact[1].gap: missing", "to [[contact]]", "number, m (> 0, up to a tenth"]);
+    refused(
+        "gap = 1e-3\n",
+        "",
+        ":8:1",
+        &["contact[1].gap: missing", "to [[contact]]", "number, m (> 0, up to a tenth"],
+    );
     refused("name = \"demo\"\n", "", "", &["name: missing", "before the first [table]"]);
     refused("[time]\nstep = 1e-6\n", "", "", &["time: missing", "Add a table [time]"]);
     refused("amplitude = 1e-4, ", "", ":7:9", &["surface[1].shape.amplitude: missing", "`shape` of [[surface]]"]);

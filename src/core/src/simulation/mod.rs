@@ -1,5 +1,6 @@
 //! A compiled scene with its state: what an FMU instance, the native run and the tests all drive.
 
+mod access;
 mod compile;
 mod drive;
 mod limits;
@@ -10,7 +11,7 @@ mod window;
 
 use crate::contact::gap::{Drive, GapLaw};
 use crate::system::{StepFailure, System};
-use crate::variables::{Causality, Kind, Quantity, Start, Variability, Variable, VariableTable};
+use crate::variables::{Quantity, Start, VariableTable};
 use crate::{Error, Result, Scene};
 use compile::Compiled;
 use drive::{Input, RotorAngle};
@@ -166,226 +167,6 @@ impl Simulation {
     /// The stepped system, for studies that look deeper than the outputs.
     pub fn system(&self) -> &System {
         &self.system
-    }
-
-    /// Read one element of a real variable (inputs and parameters give back what was set).
-    ///
-    /// # Errors
-    /// Unknown reference, or not a real.
-    pub fn real(&self, reference: u32) -> Result<f64> {
-        self.expect_kind(reference, "real", |kind| kind == Kind::Real)?;
-        Ok(self.values[reference as usize])
-    }
-
-    /// Read an integer or enumeration variable.
-    ///
-    /// # Errors
-    /// Unknown reference, or neither integer nor enumeration.
-    pub fn integer(&self, reference: u32) -> Result<i32> {
-        self.expect_kind(reference, "integer", |kind| matches!(kind, Kind::Integer | Kind::Enumeration(_)))?;
-        #[expect(clippy::cast_possible_truncation, reason = "integers are stored as the i32 they were set from")]
-        Ok(self.values[reference as usize] as i32)
-    }
-
-    /// Read a boolean variable.
-    ///
-    /// # Errors
-    /// Unknown reference, or not a boolean.
-    pub fn boolean(&self, reference: u32) -> Result<bool> {
-        self.expect_kind(reference, "boolean", |kind| kind == Kind::Boolean)?;
-        Ok(self.values[reference as usize] != 0.0)
-    }
-
-    /// Read a string variable.
-    ///
-    /// # Errors
-    /// Unknown reference, or not a string.
-    pub fn string(&self, reference: u32) -> Result<&str> {
-        self.expect_kind(reference, "string", |kind| kind == Kind::String)?;
-        match &self.table.locate(reference)?.0.start {
-            Some(Start::String(text)) => Ok(text),
-            _ => Ok(""),
-        }
-    }
-
-    fn expect_kind(&self, reference: u32, wanted: &str, fits: impl Fn(Kind) -> bool) -> Result<()> {
-        let (variable, _) = self.table.locate(reference)?;
-        if fits(variable.kind) {
-            return Ok(());
-        }
-        Err(Error::invalid(
-            format!("variable `{}`", variable.name),
-            format!("is of type {:?}, not {wanted}", variable.kind),
-            "Call the function of the variable's type in modelDescription.xml",
-        ))
-    }
-
-    fn settable(&self, reference: u32) -> Result<(Quantity, String, usize)> {
-        let (variable, element) = self.table.locate(reference)?;
-        if !variable.is_settable() {
-            return Err(Error::invalid(
-                format!("variable `{}`", variable.name),
-                format!("is {:?} and cannot be set", variable.causality),
-                "Set inputs and parameters only",
-            ));
-        }
-        let fixed = variable.causality == Causality::Parameter && variable.variability == Variability::Fixed;
-        if fixed && self.phase != Phase::Created {
-            return Err(Error::invalid(
-                format!("parameter `{}`", variable.name),
-                "is fixed and cannot be set after initialisation",
-                "Set it before initialisation ends, or reset the instance first",
-            ));
-        }
-        Ok((variable.quantity, variable.name.clone(), element))
-    }
-
-    /// Set one element of a real input or parameter. Value must be finite and within min and max. Clears a
-    /// derivative given for the same input.
-    ///
-    /// # Errors
-    /// Unknown reference, wrong kind, not settable, non-finite, out of range; nothing is changed then.
-    pub fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
-        self.check_real(reference, value)?;
-        let quantity = self.table.locate(reference)?.0.quantity;
-        if quantity == Quantity::Friction && self.phase != Phase::Created {
-            let mut parameters = self.parameters();
-            parameters.friction = value;
-            self.check_limits(parameters)?;
-            self.system.set_friction(value);
-        }
-        let offset = self.offset_now();
-        if quantity == Quantity::Speed {
-            self.rotor.rebase(&self.inputs.speed, offset);
-        }
-        if let Some(input) = self.inputs.get_mut(quantity) {
-            input.set(value, offset);
-        }
-        self.values[reference as usize] = value;
-        Ok(())
-    }
-
-    /// Whether [`Simulation::set_real`] would accept the value, apart from stability limits.
-    ///
-    /// # Errors
-    /// As [`Simulation::set_real`].
-    pub fn check_real(&self, reference: u32, value: f64) -> Result<()> {
-        self.expect_kind(reference, "real", |kind| kind == Kind::Real)?;
-        self.settable(reference)?;
-        let (variable, _) = self.table.locate(reference)?;
-        check_range(variable, value)
-    }
-
-    /// Set an integer or enumeration parameter.
-    ///
-    /// # Errors
-    /// As [`Simulation::set_real`].
-    pub fn set_integer(&mut self, reference: u32, value: i32) -> Result<()> {
-        self.check_integer(reference, value)?;
-        self.values[reference as usize] = f64::from(value);
-        Ok(())
-    }
-
-    /// Whether [`Simulation::set_integer`] would accept the value.
-    ///
-    /// # Errors
-    /// As [`Simulation::set_real`].
-    pub fn check_integer(&self, reference: u32, value: i32) -> Result<()> {
-        self.expect_kind(reference, "integer", |kind| matches!(kind, Kind::Integer | Kind::Enumeration(_)))?;
-        let (_, name, _) = self.settable(reference)?;
-        let Kind::Enumeration(choices) = self.table.locate(reference)?.0.kind else { return Ok(()) };
-        let item = usize::try_from(value).unwrap_or(0);
-        if (1..=choices.items.len()).contains(&item) {
-            return Ok(());
-        }
-        let items = choices.items.iter().enumerate().map(|(i, (item, _))| format!("{} = {item}", i + 1));
-        Err(Error::invalid(
-            format!("parameter `{name}`"),
-            format!("{value} is not an item of {}", choices.name),
-            format!("Use one of: {}", items.collect::<Vec<_>>().join(", ")),
-        ))
-    }
-
-    /// Set a boolean parameter.
-    ///
-    /// # Errors
-    /// As [`Simulation::set_real`].
-    pub fn set_boolean(&mut self, reference: u32, value: bool) -> Result<()> {
-        self.expect_kind(reference, "boolean", |kind| kind == Kind::Boolean)?;
-        self.settable(reference)?;
-        self.values[reference as usize] = f64::from(u8::from(value));
-        Ok(())
-    }
-
-    /// Set a string parameter. The table has none, so this always explains why not.
-    ///
-    /// # Errors
-    /// As [`Simulation::set_real`].
-    pub fn set_string(&mut self, reference: u32, _value: &str) -> Result<()> {
-        self.expect_kind(reference, "string", |kind| kind == Kind::String)?;
-        let (_, name, _) = self.settable(reference)?;
-        Err(Error::invalid(format!("variable `{name}`"), "cannot be set", "Leave it as it is"))
-    }
-
-    /// First time derivative of a continuous real input, valid from now until the input is set again.
-    ///
-    /// # Errors
-    /// Unknown reference, not a continuous real input, order other than 1, non-finite.
-    pub fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()> {
-        self.check_input_derivative(reference, order, value)?;
-        let quantity = self.table.locate(reference)?.0.quantity;
-        let offset = self.offset_now();
-        if quantity == Quantity::Speed {
-            self.rotor.rebase(&self.inputs.speed, offset);
-        }
-        if let Some(input) = self.inputs.get_mut(quantity) {
-            input.set_slope(value, offset);
-        }
-        Ok(())
-    }
-
-    /// Whether [`Simulation::set_input_derivative`] would accept the value.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn check_input_derivative(&self, reference: u32, order: i32, value: f64) -> Result<()> {
-        let (variable, _) = self.table.locate(reference)?;
-        let what = format!("derivative of `{}`", variable.name);
-        if variable.causality != Causality::Input || variable.kind != Kind::Real {
-            return Err(Error::invalid(
-                what,
-                "the variable is not a real input",
-                "Give derivatives of real inputs only",
-            ));
-        }
-        if order != 1 {
-            return Err(Error::invalid(what, format!("order {order}"), "Inputs are linear in time: give order 1"));
-        }
-        if !value.is_finite() {
-            return Err(Error::invalid(what, format!("{value}"), "Give a finite number"));
-        }
-        Ok(())
-    }
-
-    /// First time derivative of a continuous real output at the last communication point.
-    ///
-    /// Clearances and the rotor angle give their own rate; the others the change since the communication point
-    /// before (for means: between the middles of the last two steps). 0 before there are two points.
-    ///
-    /// # Errors
-    /// Unknown reference, not a continuous real output, order other than 1.
-    pub fn output_derivative(&self, reference: u32, order: i32) -> Result<f64> {
-        let (variable, element) = self.table.locate(reference)?;
-        let what = format!("derivative of `{}`", variable.name);
-        let continuous = variable.causality == Causality::Output && variable.variability == Variability::Continuous;
-        if !continuous || variable.kind != Kind::Real {
-            let remedy = "Ask for derivatives of continuous real outputs only";
-            return Err(Error::invalid(what, "the variable is not a continuous real output", remedy));
-        }
-        if order != 1 {
-            return Err(Error::invalid(what, format!("order {order}"), "Only derivatives of order 1 are provided"));
-        }
-        Ok(self.derivative_of(variable, element, reference))
     }
 
     /// Check parameters against stability and solvability limits and set the state to the start.
@@ -678,20 +459,6 @@ impl Simulation {
         self.warnings.clear();
         self.phase = Phase::Created;
     }
-}
-
-fn check_range(variable: &Variable, value: f64) -> Result<()> {
-    let (low, high) = (variable.min.unwrap_or(f64::MIN), variable.max.unwrap_or(f64::MAX));
-    if (low..=high).contains(&value) {
-        return Ok(());
-    }
-    let problem = if value.is_finite() {
-        format!("{value} is outside {low} … {high}")
-    } else {
-        format!("{value} is not finite")
-    };
-    let remedy = if value.is_finite() { "Give a value within min and max" } else { "Give a finite number" };
-    Err(Error::invalid(format!("variable `{}`", variable.name), problem, remedy))
 }
 
 fn failed_before() -> Error {
