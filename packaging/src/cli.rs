@@ -20,7 +20,7 @@ pub struct Cli {
     /// Print one JSON object with the result on stdout (errors too); progress stays on stderr.
     #[arg(long, global = true)]
     pub json: bool,
-    /// No progress on stderr; results and errors are still printed.
+    /// No progress on stderr; results, warnings and errors are still printed.
     #[arg(long, short, global = true)]
     pub quiet: bool,
     /// What to do.
@@ -94,6 +94,9 @@ pub struct ReduceArguments {
     /// ROM file to write.
     #[arg(long, short, value_name = "FILE", default_value = "rotor37.rom.safetensors")]
     pub output: PathBuf,
+    /// Replace files that are there already and hold something else.
+    #[arg(long)]
+    pub force: bool,
     /// Also write the mesh as a CalculiX/Abaqus input file.
     #[arg(long, value_name = "FILE")]
     pub inp: Option<PathBuf>,

@@ -27,7 +27,7 @@ pub struct Console {
 }
 
 impl Console {
-    /// `quiet` drops progress; `json` prints results as one JSON object instead of text.
+    /// `quiet` drops progress (warnings and errors stay); `json` prints results as one JSON object instead of text.
     pub fn new(quiet: bool, json: bool) -> Self {
         Self { quiet, json, terminal: std::io::stderr().is_terminal() }
     }
@@ -42,6 +42,14 @@ impl Console {
         if !self.quiet {
             // A closed stderr must not stop the work.
             let _ = writeln!(std::io::stderr(), "{line}");
+        }
+    }
+
+    /// Warnings of the work, one line each on stderr; `quiet` does not silence them.
+    pub fn warn(&self, warnings: &[String]) {
+        for warning in warnings {
+            // A closed stderr must not stop the work.
+            let _ = writeln!(std::io::stderr(), "warning: {warning}");
         }
     }
 

@@ -31,9 +31,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
         native::run(&scene, &schedule, &arguments.set, &|done| task.at(done as u64))?
     };
     let wall = clock.elapsed().as_secs_f64();
-    for warning in &run.warnings {
-        console.say(format_args!("warning: {warning}"));
-    }
+    console.warn(&run.warnings);
     if let Some(path) = arguments.csv.as_deref().filter(|_| !to_stdout) {
         run.recording.write_csv(path)?;
     }
