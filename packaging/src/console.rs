@@ -56,11 +56,11 @@ impl Console {
     /// A task of known length (`Some(total)`) or of unknown length (`None`: a spinner).
     pub fn task(&self, title: &str, total: Option<u64>) -> Task {
         if self.quiet {
-            return Task { bar: ProgressBar::hidden() };
+            return Task { bar: ProgressBar::hidden(), lines: false };
         }
         if !self.terminal {
             self.say(format!("{title} ..."));
-            return Task { bar: ProgressBar::hidden() };
+            return Task { bar: ProgressBar::hidden(), lines: true };
         }
         let bar = total.map_or_else(ProgressBar::new_spinner, ProgressBar::new);
         let template = match total {
@@ -72,7 +72,7 @@ impl Console {
         }
         bar.set_message(title.to_string());
         bar.enable_steady_tick(Duration::from_millis(120));
-        Task { bar }
+        Task { bar, lines: false }
     }
 
     /// Print the result of the command on stdout.
@@ -95,12 +95,22 @@ impl Console {
 #[derive(Debug)]
 pub struct Task {
     bar: ProgressBar,
+    /// Progress goes out line by line: stderr is no terminal, and not to be quiet.
+    lines: bool,
 }
 
 impl Task {
     /// Units done so far.
     pub fn at(&self, position: u64) {
         self.bar.set_position(position);
+    }
+
+    /// A line of a long task, for where no progress bar shows: into a log, minutes without a sign look like a hang.
+    pub fn line(&self, line: &str) {
+        if self.lines {
+            // A closed stderr must not stop the work.
+            let _ = writeln!(std::io::stderr(), "  {line}");
+        }
     }
 
     /// What it is doing now.
