@@ -10,7 +10,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
     name = "tiprub",
     version,
     about = "Blade-tip/casing contact (rub) as an FMU: reduce, package, run, inspect, demo",
-    long_about = "Turns a bladed disk and a casing into reduced-order models, marches their contact in time, and ships \
+    long_about = "Marches the contact of a bladed disk (a reduced-order model) with a rigid casing in time, and ships \
                   that as an FMU for any FMI 2.0 or FMI 3.0 importer.\n\nSI units everywhere (m, kg, s, N, rad).",
     after_help = "Examples:\n  tiprub demo\n  tiprub run builtin:rotor37 --csv rub.csv\n  \
                   tiprub package scene.toml -o out/\n\n\
@@ -38,7 +38,8 @@ pub enum Command {
     Demo(DemoArguments),
     /// From a blade to a reduced-order model (ROM), with its quality checks.
     #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  \
-                            tiprub reduce rotor37 --modes 30 --contact-nodes 5 --mesh 10x2x16 -o fine.rom.safetensors")]
+                            tiprub reduce rotor37 --modes 30 --contact-nodes 5 --mesh 10x2x16 -o fine.rom.safetensors\n\n\
+                            Meshes of your own are not read; docs/rom-file.md shows how to write a ROM from Python.")]
     Reduce(ReduceArguments),
     /// From a scene to .fmu files. Compiles nothing: the library is generic, scene and ROM are data.
     #[command(

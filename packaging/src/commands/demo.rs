@@ -209,7 +209,7 @@ impl Demo<'_> {
         let report = self.directory.join(REPORT_FILE);
         let text = format!(
             "{}\n\nsimulated      {:.4} ms in {} communication steps, {} internal steps\n\
-             per step       {per_step:.3} µs, {:.3} x real time\n\
+             per step       {per_step:.3} µs, {:.3} s of computing per simulated second\n\
              agreement      {}: all {} outputs at all {} points, bit for bit\n{}\nopen {}",
             self.facts.iter().map(RomFacts::to_text).collect::<String>().trim_end(),
             1e3 * simulated,
