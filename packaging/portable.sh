@@ -12,7 +12,10 @@ if [ ! -x "$venv/bin/cargo-zigbuild" ]; then
     python3 -m venv "$venv"
     "$venv/bin/pip" install --quiet --disable-pip-version-check ziglang==0.17.0 cargo-zigbuild==0.24.0
 fi
-PATH=$(cd "$venv/bin" && pwd):$PATH cargo zigbuild -p tiprub-fmi --profile fmu --target x86_64-unknown-linux-gnu.2.17
+cargo fetch --locked --quiet
+. packaging/remap.sh
+CARGO_ENCODED_RUSTFLAGS=$library_flags PATH=$(cd "$venv/bin" && pwd):$PATH \
+    cargo zigbuild -p tiprub-fmi --profile fmu --target x86_64-unknown-linux-gnu.2.17
 cp "$target_dir/x86_64-unknown-linux-gnu/fmu/libtiprub_fmi.so" "$target_dir/portable/tiprub.so"
 library=$target_dir/portable/tiprub.so
 echo "$library: $(stat -c %s "$library") bytes"

@@ -19,7 +19,8 @@ cargo test --workspace --release || failed=1
 
 section "Command line and FMU library: cargo build"
 cargo build --release || exit 1
-cargo build -p tiprub-fmi --profile fmu --target-dir target/product || exit 1
+. packaging/remap.sh
+CARGO_ENCODED_RUSTFLAGS=$library_flags cargo build -p tiprub-fmi --profile fmu --target-dir target/product || exit 1
 TIPRUB=$root/target/release/tiprub
 TIPRUB_LIBRARY=$root/target/product/fmu/libtiprub_fmi.so
 export TIPRUB TIPRUB_LIBRARY

@@ -10,7 +10,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
     name = "tiprub",
     version,
     about = "Blade-tip/casing contact (rub) as an FMU: reduce, package, run, inspect, demo",
-    long_about = "Turns a bladed disk and a casing into reduced-order models, marches their contact in time, and ships \
+    long_about = "Marches the contact of a bladed disk (a reduced-order model) with a rigid casing in time, and ships \
                   that as an FMU for any FMI 2.0 or FMI 3.0 importer.\n\nSI units everywhere (m, kg, s, N, rad).",
     after_help = "Examples:\n  tiprub demo\n  tiprub run builtin:rotor37 --csv rub.csv\n  \
                   tiprub package scene.toml -o out/\n\n\
@@ -20,7 +20,7 @@ pub struct Cli {
     /// Print one JSON object with the result on stdout (errors too); progress stays on stderr.
     #[arg(long, global = true)]
     pub json: bool,
-    /// No progress on stderr; results and errors are still printed.
+    /// No progress on stderr; results, warnings and errors are still printed.
     #[arg(long, short, global = true)]
     pub quiet: bool,
     /// What to do.
@@ -38,7 +38,8 @@ pub enum Command {
     Demo(DemoArguments),
     /// From a blade to a reduced-order model (ROM), with its quality checks.
     #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  \
-                            tiprub reduce rotor37 --modes 30 --contact-nodes 5 --mesh 10x2x16 -o fine.rom.safetensors")]
+                            tiprub reduce rotor37 --modes 30 --contact-nodes 5 --mesh 10x2x16 -o fine.rom.safetensors\n\n\
+                            Meshes of your own are not read; docs/rom-file.md shows how to write a ROM from Python.")]
     Reduce(ReduceArguments),
     /// From a scene to .fmu files. Compiles nothing: the library is generic, scene and ROM are data.
     #[command(
@@ -94,6 +95,9 @@ pub struct ReduceArguments {
     /// ROM file to write.
     #[arg(long, short, value_name = "FILE", default_value = "rotor37.rom.safetensors")]
     pub output: PathBuf,
+    /// Replace files that are there already and hold something else.
+    #[arg(long)]
+    pub force: bool,
     /// Also write the mesh as a CalculiX/Abaqus input file.
     #[arg(long, value_name = "FILE")]
     pub inp: Option<PathBuf>,

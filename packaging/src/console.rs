@@ -28,7 +28,7 @@ pub struct Console {
 }
 
 impl Console {
-    /// `quiet` drops progress; `json` prints results as one JSON object instead of text.
+    /// `quiet` drops progress (warnings and errors stay); `json` prints results as one JSON object instead of text.
     pub fn new(quiet: bool, json: bool) -> Self {
         Self { quiet, json, terminal: std::io::stderr().is_terminal() }
     }
@@ -46,14 +46,22 @@ impl Console {
         }
     }
 
+    /// Warnings of the work, one line each on stderr; `quiet` does not silence them.
+    pub fn warn(&self, warnings: &[String]) {
+        for warning in warnings {
+            // A closed stderr must not stop the work.
+            let _ = writeln!(std::io::stderr(), "warning: {warning}");
+        }
+    }
+
     /// A task of known length (`Some(total)`) or of unknown length (`None`: a spinner).
     pub fn task(&self, title: &str, total: Option<u64>) -> Task {
         if self.quiet {
-            return Task { bar: ProgressBar::hidden() };
+            return Task { bar: ProgressBar::hidden(), lines: false };
         }
         if !self.terminal {
             self.say(format!("{title} ..."));
-            return Task { bar: ProgressBar::hidden() };
+            return Task { bar: ProgressBar::hidden(), lines: true };
         }
         let bar = total.map_or_else(ProgressBar::new_spinner, ProgressBar::new);
         let template = match total {
@@ -65,7 +73,7 @@ impl Console {
         }
         bar.set_message(title.to_string());
         bar.enable_steady_tick(Duration::from_millis(120));
-        Task { bar }
+        Task { bar, lines: false }
     }
 
     /// Print the result of the command on stdout.
@@ -96,12 +104,22 @@ impl Console {
 #[derive(Debug)]
 pub struct Task {
     bar: ProgressBar,
+    /// Progress goes out line by line: stderr is no terminal, and not to be quiet.
+    lines: bool,
 }
 
 impl Task {
     /// Units done so far.
     pub fn at(&self, position: u64) {
         self.bar.set_position(position);
+    }
+
+    /// A line of a long task, for where no progress bar shows: into a log, minutes without a sign look like a hang.
+    pub fn line(&self, line: &str) {
+        if self.lines {
+            // A closed stderr must not stop the work.
+            let _ = writeln!(std::io::stderr(), "  {line}");
+        }
     }
 
     /// What it is doing now.

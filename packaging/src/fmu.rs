@@ -87,6 +87,11 @@ impl<'a> Package<'a> {
         Ok(Self { scene, simulation, library, reference_csv, generated })
     }
 
+    /// Warnings of the initialisation: what an FMU instance would log.
+    pub fn warnings(&self) -> &[String] {
+        self.simulation.warnings()
+    }
+
     /// Write the .fmu, whole or not at all. `arrays` is for FMI 3.0 only; FMI 2.0 has scalars.
     ///
     /// # Errors

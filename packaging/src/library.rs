@@ -75,7 +75,7 @@ fn build(workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> 
         .arg(workspace.join("Cargo.toml"))
         .arg("--target-dir")
         .arg(target)
-        .args(without_home_directory())
+        .args(without_builder_paths(workspace))
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -91,6 +91,7 @@ fn build(workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> 
     let mut last_lines = VecDeque::new();
     for line in stderr.into_iter().flat_map(|pipe| BufReader::new(pipe).lines().map_while(Result::ok)) {
         task.now(&format!("Building the FMU library: {}", line.trim()));
+        task.line(line.trim());
         last_lines.push_back(line);
         if last_lines.len() > LINES_KEPT {
             last_lines.pop_front();
@@ -106,15 +107,33 @@ fn build(workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> 
     })
 }
 
-/// Cargo options that keep the place of cargo's registry, and with it the builder's name, out of the library: the same
-/// sources then give the same bytes for everybody. Flags of the user's own environment take precedence, as cargo has it.
-fn without_home_directory() -> Vec<String> {
+/// Cargo options that keep the places of cargo's home, its registry and the workspace, and with them the builder's name
+/// and the registry's host, out of the library: the same sources then give the same bytes for everybody. Flags of the
+/// user's own environment take precedence, as cargo has it. `remap.sh` does the same for the scripts.
+fn without_builder_paths(workspace: &Path) -> Vec<String> {
     let home = env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| env::var_os("HOME").map(|home| Path::new(&home).join(".cargo")));
-    home.map_or_else(Vec::new, |home| {
-        let flag = format!("--remap-path-prefix={}=/cargo", home.display());
-        vec!["--config".into(), format!("target.\"cfg(all())\".rustflags=[{flag:?}]")]
-    })
+    let flags: Vec<String> = remaps(home.as_deref(), workspace)
+        .iter()
+        .map(|(from, to)| format!("{:?}", format!("--remap-path-prefix={}={to}", from.display())))
+        .collect();
+    vec!["--config".into(), format!("target.\"cfg(all())\".rustflags=[{}]", flags.join(","))]
+}
+
+/// Directories and the neutral names that stand for them; of two that match, rustc takes the later.
+fn remaps(home: Option<&Path>, workspace: &Path) -> Vec<(PathBuf, &'static str)> {
+    let mut remaps = Vec::new();
+    if let Ok(workspace) = workspace.canonicalize() {
+        remaps.push((workspace, "tiprub"));
+    }
+    if let Some(home) = home {
+        remaps.push((home.to_path_buf(), "cargo"));
+        let registries = std::fs::read_dir(home.join("registry/src")).into_iter().flatten().flatten();
+        let mut registries: Vec<PathBuf> = registries.map(|registry| registry.path()).collect();
+        registries.sort();
+        remaps.extend(registries.into_iter().map(|registry| (registry, "crates")));
+    }
+    remaps
 }
 
 /// The shared library in cargo's JSON messages, one per line.
@@ -166,6 +185,18 @@ mod tests {
         assert!(load(Some(&path), &console).unwrap_err().problem.contains("not a shared library"));
         let missing = load(Some(&root.path().join("none.so")), &console).unwrap_err();
         assert!(missing.what.ends_with("none.so") && missing.problem.contains("cannot be read"), "{missing}");
+    }
+
+    #[test]
+    fn places_of_the_builder_get_neutral_names() {
+        let root = tempfile::tempdir().unwrap();
+        let home = root.path().join("home");
+        let registry = home.join("registry/src/index.example-0123");
+        std::fs::create_dir_all(&registry).unwrap();
+        let workspace = root.path().canonicalize().unwrap();
+        let expected = [(workspace, "tiprub"), (home.clone(), "cargo"), (registry, "crates")];
+        assert_eq!(remaps(Some(&home), root.path()), expected);
+        assert_eq!(remaps(None, &root.path().join("missing")), []);
     }
 
     #[test]

@@ -120,11 +120,17 @@ fn set(simulation: &mut Simulation, name: &str, text: &str) -> Result<()> {
 fn number<T: std::str::FromStr>(option: &str, text: &str) -> Result<T> {
     let kind = std::any::type_name::<T>();
     let wanted = match kind {
-        "f64" => "a number, for example 1.5e-3",
+        "f64" => "a number",
         "bool" => "true or false",
         _ => "a whole number",
     };
-    text.parse().map_err(|_| Failure::usage(option, format!("{text:?} is not {wanted}"), format!("Give {wanted}")))
+    text.parse().map_err(|_| {
+        Failure::usage(option, format!("{text:?} is not {wanted}"), format!("Give {wanted}{}", example(kind)))
+    })
+}
+
+fn example(kind: &str) -> &'static str {
+    if kind == "f64" { ", for example 1.5e-3" } else { "" }
 }
 
 /// Kind and value references of a variable or of one of its elements.
@@ -173,7 +179,7 @@ mod tests {
         let failure = number::<f64>("--set speed=fast", "fast").unwrap_err();
         assert_eq!(
             failure.to_string(),
-            "--set speed=fast: \"fast\" is not a number, for example 1.5e-3. Give a number, for example 1.5e-3."
+            "--set speed=fast: \"fast\" is not a number. Give a number, for example 1.5e-3."
         );
         assert!(number::<bool>("--set a=1", "1").unwrap_err().remedy.contains("true or false"));
         assert!(number::<i32>("--set a=1.5", "1.5").unwrap_err().remedy.contains("whole number"));

@@ -86,6 +86,19 @@ pub fn write(target: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
     persist(file, target)
 }
 
+/// Refuse to replace a file that holds something else than `bytes`: what a user changed is not lost without notice.
+///
+/// # Errors
+/// The file is there and differs (or cannot be read); `remedy` says what to do.
+pub fn refuse_to_replace(target: &Path, bytes: impl AsRef<[u8]>, remedy: &str) -> Result<()> {
+    match fs::read(target) {
+        Ok(present) if present == bytes.as_ref() => Ok(()),
+        Ok(_) => Err(Failure::new(target.display(), "is there already and differs from what would be written", remedy)),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(Failure::file(target, "cannot be compared with what would be written", &error)),
+    }
+}
+
 fn parent(target: &Path) -> PathBuf {
     match target.parent() {
         Some(directory) if !directory.as_os_str().is_empty() => directory.to_path_buf(),
@@ -173,6 +186,17 @@ mod tests {
         let failure = write(root.path(), "x").unwrap_err();
         assert!(failure.problem.contains("is a directory"), "{failure}");
         assert_eq!(names(root.path()).len(), 0);
+    }
+
+    #[test]
+    fn only_a_file_with_other_contents_is_protected() {
+        let root = tempfile::tempdir().unwrap();
+        let target = root.path().join("scene.toml");
+        refuse_to_replace(&target, "old", "Move it").unwrap();
+        write(&target, "old").unwrap();
+        refuse_to_replace(&target, "old", "Move it").unwrap();
+        let failure = refuse_to_replace(&target, "new", "Move it").unwrap_err();
+        assert!(failure.what.ends_with("scene.toml") && failure.remedy == "Move it", "{failure}");
     }
 
     #[test]

@@ -16,6 +16,12 @@ use crate::{Failure, Result};
 const FRICTION_STEPS: u32 = 40;
 const FRICTION_STEP: f64 = 0.05;
 
+/// Modes that a warning of the checks is about: those that blade-tip contact excites most.
+const FIRST_MODES: usize = 6;
+/// Largest frequency deviation (eq. 13) and residual convergence criterion (eq. 12) without a warning, in %.
+const DEVIATION_LIMIT: f64 = 0.3;
+const RESIDUAL_LIMIT: f64 = 1.0;
+
 /// Facts of one ROM.
 #[derive(Debug, Clone)]
 pub struct RomFacts {
@@ -62,6 +68,20 @@ impl RomFacts {
             central_difference_limit: stability::central_difference_limit(&model),
             solvable_friction: solvable_friction(rom, &model),
         })
+    }
+
+    /// What its checks say against a ROM: one line per mode beyond the limits, first modes only.
+    pub fn warnings(&self) -> Vec<String> {
+        let poor = |row: &CheckRow| row.deviation.abs() > DEVIATION_LIMIT || row.residual > RESIDUAL_LIMIT;
+        let rows = (1..).zip(self.checks()).take(FIRST_MODES).filter(|(_, row)| poor(row));
+        rows.map(|(mode, row)| {
+            format!(
+                "ROM `{}`: mode {mode} ({:.1} Hz) deviates by {:.3} % from the full model (eq. 13) with a residual of \
+                 {:.3} % (eq. 12); good models stay below {DEVIATION_LIMIT} % and {RESIDUAL_LIMIT} %. Keep more modes",
+                self.rom.name, row.full, row.deviation, row.residual
+            )
+        })
+        .collect()
     }
 
     /// The checks that came with the ROM, mode by mode; empty where it came without.

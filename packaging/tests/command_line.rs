@@ -275,6 +275,61 @@ fn raw_entries(bytes: &[u8]) -> Vec<String> {
 }
 
 #[test]
+fn warnings_are_on_stderr_even_when_quiet_and_in_json() {
+    let project = Project::new();
+    // Longer than 2/omega_max = 2 ms of the springs.
+    let coarse =
+        SCENE.replace("step = 1e-4", "step = 2.5e-3").replace("communication_step = 1e-3", "communication_step = 5e-3");
+    fs::write(project.path("scene.toml"), coarse).unwrap();
+    for arguments in [
+        &["run", "scene.toml", "--json", "--quiet"][..],
+        &["package", "scene.toml", "-o", "x", "--library", "library.so", "--json", "--quiet"],
+        &["inspect", "scene.toml", "--json", "--quiet"],
+        &["inspect", "x/small_fmi2.fmu", "--json", "--quiet"],
+    ] {
+        let output = project.run(arguments);
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        let shown: Vec<&str> = stderr.lines().filter_map(|line| line.strip_prefix("warning: ")).collect();
+        assert!(output.status.success() && shown.len() == 1, "{arguments:?}: {stderr}");
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let warnings = if arguments[0] == "inspect" { &json["scene"]["warnings"] } else { &json["warnings"] };
+        assert_eq!(warnings, &serde_json::json!(shown), "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_changed_scene_stops_the_demo_before_any_work() {
+    let project = Project::new();
+    fs::create_dir(project.path("demo")).unwrap();
+    for (changed, kept) in [("rotor37.toml", SCENE), ("rotor37.toml", "")] {
+        fs::write(project.path("demo").join(changed), kept).unwrap();
+        let error = project.fail(&["demo", "--library", "none.so"], 1);
+        assert!(error.contains("rotor37.toml") && error.contains("--out"), "{error}");
+        assert_eq!(fs::read_to_string(project.path("demo").join(changed)).unwrap(), kept);
+    }
+    assert_eq!(fs::read_dir(project.path("demo")).unwrap().count(), 1);
+}
+
+#[test]
+fn a_reduction_replaces_another_rom_only_by_force_and_warns_of_a_poor_one() {
+    let project = Project::new();
+    let coarse = ["reduce", "rotor37", "--mesh", "4x1x6", "-o", "blade.rom.safetensors", "--quiet"];
+    project.succeed(&coarse);
+    project.succeed(&coarse);
+    let before = fs::read(project.path("blade.rom.safetensors")).unwrap();
+    let poor = [&coarse[..], &["--modes", "0"]].concat();
+    let error = project.fail(&poor, 1);
+    assert!(error.contains("blade.rom.safetensors") && error.contains("--force"), "{error}");
+    assert_eq!(fs::read(project.path("blade.rom.safetensors")).unwrap(), before);
+    let forced = project.run(&[&poor[..], &["--force", "--json"]].concat());
+    let stderr = String::from_utf8(forced.stderr).unwrap();
+    assert!(forced.status.success() && stderr.contains("warning: ROM") && stderr.contains("eq. 13"), "{stderr}");
+    let json: serde_json::Value = serde_json::from_slice(&forced.stdout).unwrap();
+    assert_eq!(json["warnings"].as_array().unwrap().len(), stderr.matches("warning: ").count());
+    assert_ne!(fs::read(project.path("blade.rom.safetensors")).unwrap(), before);
+}
+
+#[test]
 fn help_is_there_for_every_command() {
     let project = Project::new();
     for command in ["demo", "reduce", "package", "run", "inspect"] {

@@ -21,7 +21,7 @@ use crate::{
     output_file, reduction,
     report::page::{self, ImportedSummary, ReportFile, ReportInput},
     rom_facts::RomFacts,
-    scene_source::{self, rotor37_scene_with, rotor37_text},
+    scene_source::{self, ROTOR37_SCENE, rotor37_text},
     schedule::Schedule,
 };
 
@@ -30,6 +30,9 @@ const ROM_FILE: &str = "rotor37.rom.safetensors";
 const SCENE_FILE: &str = "rotor37.toml";
 const REPORT_FILE: &str = "report.html";
 const CSV_FILE: &str = "results.csv";
+
+/// What to do about a scene or a ROM in the directory that somebody changed.
+const KEEP: &str = "Give the demo another directory with --out, or copy your file elsewhere and delete it here";
 
 /// Wall times of the parts of the demo.
 #[derive(Debug, Default)]
@@ -50,18 +53,21 @@ impl Stopwatch {
 /// Any of the steps failed, or the runs do not agree bit for bit.
 pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
     let directory = arguments.out.as_path();
+    let scene_text = scene_text(arguments.revolutions)?;
+    output_file::refuse_to_replace(&directory.join(SCENE_FILE), &scene_text, KEEP)?;
     output_file::create_directory(directory)?;
     let mut watch = Stopwatch::default();
 
     let library = watch.measure("building the FMU library", || library::load(arguments.library.as_deref(), console))?;
     let reduction = watch.measure("reducing the blade", || reduction::rotor37(&Rotor37Options::default(), console))?;
-    let scene = write_inputs(directory, &reduction, arguments.revolutions)?;
+    let scene = write_inputs(directory, &reduction, &scene_text)?;
     let schedule = Schedule::new(&scene.settings.experiment, None, None)?;
 
     let native = watch.measure("native run", || {
         let task = console.task("Native run", Some(schedule.count as u64));
         native::run(&scene, &schedule, &[], &|done| task.at(done as u64))
     })?;
+    console.warn(&native.warnings);
     native.recording.write_csv(&directory.join(CSV_FILE))?;
 
     let package = Package::new(&scene, &library)?;
@@ -89,18 +95,24 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
     demo.outcome()
 }
 
-/// The ROM and the scene, as files a user can go on with; returns the scene as read back from them.
-fn write_inputs(directory: &Path, reduction: &Reduction, revolutions: Option<f64>) -> Result<Scene> {
-    let embedded = rotor37_scene_with(reduction.rom.clone())?;
-    let settings = &embedded.settings;
+/// The scene as text, over so many revolutions (the stop time of the scene that ships where `None`).
+fn scene_text(revolutions: Option<f64>) -> Result<String> {
+    let settings = tiprub_format::parse_scene(ROTOR37_SCENE, SCENE_FILE)?;
     let speed = settings.structures.first().map_or(0.0, |structure| structure.speed.abs());
     let turn = std::f64::consts::TAU / speed;
     let step = settings.experiment.communication_step;
     // Whole communication steps, so that every importer's last point is a regular one.
     let stop = revolutions.map_or(settings.experiment.stop, |count| (count * turn / step).ceil() * step);
-    output_file::write(&directory.join(ROM_FILE), tiprub_format::write_rom(&reduction.rom))?;
+    Ok(rotor37_text(ROM_FILE, stop))
+}
+
+/// The ROM and the scene, as files a user can go on with; returns the scene as read back from them.
+fn write_inputs(directory: &Path, reduction: &Reduction, scene_text: &str) -> Result<Scene> {
+    let rom = tiprub_format::write_rom(&reduction.rom);
+    output_file::refuse_to_replace(&directory.join(ROM_FILE), &rom, KEEP)?;
+    output_file::write(&directory.join(ROM_FILE), rom)?;
     let scene = directory.join(SCENE_FILE);
-    output_file::write(&scene, rotor37_text(ROM_FILE, stop))?;
+    output_file::write(&scene, scene_text)?;
     scene_source::load(&scene.display().to_string(), &Console::new(true, false))
 }
 
@@ -197,7 +209,7 @@ impl Demo<'_> {
         let report = self.directory.join(REPORT_FILE);
         let text = format!(
             "{}\n\nsimulated      {:.4} ms in {} communication steps, {} internal steps\n\
-             per step       {per_step:.3} µs, {:.3} x real time\n\
+             per step       {per_step:.3} µs, {:.3} s of computing per simulated second\n\
              agreement      {}: all {} outputs at all {} points, bit for bit\n{}\nopen {}",
             self.facts.iter().map(RomFacts::to_text).collect::<String>().trim_end(),
             1e3 * simulated,

@@ -34,14 +34,14 @@ enum FileKind {
 pub fn run(arguments: &InspectArguments, console: &Console) -> Result<Outcome> {
     let path = arguments.file.as_path();
     match kind(path)? {
-        FileKind::Fmu => inspect_fmu(path),
+        FileKind::Fmu => inspect_fmu(path, console),
         FileKind::Rom => {
             let facts = RomFacts::of(&scene_source::read_rom(path)?)?;
             Ok(Outcome { text: facts.to_text(), json: json!({ "kind": "rom", "rom": facts.to_json() }) })
         }
         FileKind::Scene => {
             let scene = scene_source::load(&path.display().to_string(), console)?;
-            let (text, json) = describe_scene(&scene)?;
+            let (text, json) = describe_scene(&scene, console)?;
             Ok(Outcome { text, json: json!({ "kind": "scene", "scene": json }) })
         }
     }
@@ -68,7 +68,7 @@ fn kind(path: &Path) -> Result<FileKind> {
     }
 }
 
-fn inspect_fmu(path: &Path) -> Result<Outcome> {
+fn inspect_fmu(path: &Path, console: &Console) -> Result<Outcome> {
     let mut archive = open_archive(path)?;
     let mut files = Vec::new();
     for index in 0..archive.len() {
@@ -103,7 +103,7 @@ fn inspect_fmu(path: &Path) -> Result<Outcome> {
         let name = format!("{}{elements}", variable.name);
         let _ = writeln!(text, "  {:<11} {name:<34} {unit:<8} {meaning}", variable.causality);
     }
-    let resources = inspect_resources(&fmu)?;
+    let resources = inspect_resources(&fmu, console)?;
     if let Some((scene_text, _)) = &resources {
         let _ = write!(text, "\n{scene_text}");
     }
@@ -125,7 +125,7 @@ fn inspect_fmu(path: &Path) -> Result<Outcome> {
 }
 
 /// The scene inside a tiprub FMU, checked against the token; `None` for FMUs of other tools.
-fn inspect_resources(fmu: &UnpackedFmu) -> Result<Option<(String, Value)>> {
+fn inspect_resources(fmu: &UnpackedFmu, console: &Console) -> Result<Option<(String, Value)>> {
     let directory: PathBuf = fmu.resources();
     if !directory.join(tiprub_format::SCENE_FILE).is_file() {
         return Ok(None);
@@ -138,10 +138,10 @@ fn inspect_resources(fmu: &UnpackedFmu) -> Result<Option<(String, Value)>> {
             "Somebody changed one of them; make the FMU again with `tiprub package`",
         ));
     }
-    describe_scene(&resources.scene).map(Some)
+    describe_scene(&resources.scene, console).map(Some)
 }
 
-fn describe_scene(scene: &Scene) -> Result<(String, Value)> {
+fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
     let settings = &scene.settings;
     let in_scene = |error| Failure::from_core(format!("scene `{}`", settings.name), error);
     let mut simulation = Simulation::new(scene).map_err(in_scene)?;
@@ -158,9 +158,7 @@ fn describe_scene(scene: &Scene) -> Result<(String, Value)> {
         scalars(Causality::Parameter),
         scalars(Causality::Output)
     );
-    for warning in simulation.warnings() {
-        let _ = writeln!(text, "  warning       {warning}");
-    }
+    console.warn(simulation.warnings());
     let mut roms = Vec::new();
     for rom in &scene.roms {
         let facts = RomFacts::of(rom)?;

@@ -23,6 +23,7 @@ pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
     let targets = targets(arguments, &scene.settings.name)?;
     let library = library::load(arguments.library.as_deref(), console)?;
     let package = Package::new(&scene, &library)?;
+    console.warn(package.warnings());
     for (version, path) in &targets {
         console.say(format_args!("Writing {}", path.display()));
         package.write(path, *version, !arguments.scalars)?;
@@ -35,7 +36,8 @@ pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
         .iter()
         .map(|(version, path)| json!({"fmi": version.digit().to_string(), "file": path, "bytes": size(path)}))
         .collect();
-    Ok(Outcome { text: text.join("\n"), json: json!({ "model": scene.settings.name, "fmus": files }) })
+    let json = json!({ "model": scene.settings.name, "fmus": files, "warnings": package.warnings() });
+    Ok(Outcome { text: text.join("\n"), json })
 }
 
 fn size(path: &Path) -> u64 {

@@ -33,12 +33,22 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     };
     let reduction = reduction::rotor37(&options, console)?;
     let facts = RomFacts::of(&reduction.rom)?;
+    let mut files = vec![(&arguments.output, tiprub_format::write_rom(&reduction.rom))];
     if let Some(path) = &arguments.inp {
         let text = calculix_input(&reduction.mesh, &reduction.material, Some("hub"), EXPORTED_FREQUENCIES)
             .map_err(|error| Failure::from_below(path.display(), error))?;
-        output_file::write(path, text)?;
+        files.push((path, text.into_bytes()));
     }
-    output_file::write(&arguments.output, tiprub_format::write_rom(&reduction.rom))?;
+    if !arguments.force {
+        for (path, bytes) in &files {
+            output_file::refuse_to_replace(path, bytes, "Choose another file, or replace it with --force")?;
+        }
+    }
+    for (path, bytes) in &files {
+        output_file::write(path, bytes)?;
+    }
+    let warnings = facts.warnings();
+    console.warn(&warnings);
     let mut text = facts.to_text();
     text.push_str(&format!(
         "\n  full model: {} nodes, {} elements, {} free degrees of freedom, reduced in {:.2} s\n  written: {}",
@@ -60,6 +70,7 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
             "largest_mode_residual": reduction.largest_residual,
         },
         "seconds": reduction.timings.total(),
+        "warnings": warnings,
         "files": { "rom": arguments.output, "inp": arguments.inp },
     });
     Ok(Outcome { text, json })

@@ -31,9 +31,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
         native::run(&scene, &schedule, &arguments.set, &|done| task.at(done as u64))?
     };
     let wall = clock.elapsed().as_secs_f64();
-    for warning in &run.warnings {
-        console.say(format_args!("warning: {warning}"));
-    }
+    console.warn(&run.warnings);
     if let Some(path) = arguments.csv.as_deref().filter(|_| !to_stdout) {
         run.recording.write_csv(path)?;
     }
@@ -73,8 +71,8 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
 fn summary(json: &Value, names: &[String], last: &[f64]) -> String {
     let number = |name: &str| json[name].as_f64().unwrap_or(f64::NAN);
     let mut text = format!(
-        "{}: t = {} s to {} s, {} communication steps, {} internal steps\n\
-         stepping took {:.3} s: {:.3} µs per internal step, {:.3} x real time\n\nat the end:\n",
+        "{}: t = {} s to {} s, communication steps: {}, internal steps: {}\n\
+         stepping took {:.3} s: {:.3} µs per internal step, {:.3} s of computing per simulated second\n\nat the end:\n",
         json["model"].as_str().unwrap_or_default(),
         json["start"],
         json["stop"],

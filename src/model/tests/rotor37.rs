@@ -108,10 +108,12 @@ fn fit_is_within_two_hundredths_of_a_millimetre_of_the_sample() {
     assert_fit(&stations, "thinned table");
 }
 
-/// Runs on all 2400 points when the variable names the table; there is nothing to compare with otherwise.
+/// All 2400 points. The table does not ship: `TIPRUB_ROTOR37_COORDINATES=FILE cargo test --release -p tiprub-model --test
+/// rotor37 -- --ignored --nocapture` with FILE holding table IV of NASA TP-1659 runs it.
 #[test]
+#[ignore = "needs the complete table of NASA TP-1659 in the file named by TIPRUB_ROTOR37_COORDINATES"]
 fn fit_is_within_two_hundredths_of_a_millimetre_of_the_complete_table() {
-    let Ok(path) = std::env::var("TIPRUB_ROTOR37_COORDINATES") else { return };
+    let path = std::env::var("TIPRUB_ROTOR37_COORDINATES").expect("TIPRUB_ROTOR37_COORDINATES names the table");
     let stations = complete_table(&std::fs::read_to_string(path).unwrap());
     assert_eq!(stations.len(), 1200);
     assert_fit(&stations, "complete table");
