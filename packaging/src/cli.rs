@@ -81,7 +81,7 @@ pub struct DemoArguments {
 #[derive(Debug, Args)]
 pub struct ReduceArguments {
     /// What to reduce: `rotor37`, the NASA rotor 37 blade that ships with tiprub.
-    #[arg(value_name = "MODEL", value_enum)]
+    #[arg(value_name = "MODEL", value_parser = model)]
     pub model: Model,
     /// Number of fixed-interface modes kept.
     #[arg(long, value_name = "N")]
@@ -196,6 +196,14 @@ impl std::str::FromStr for MeshSize {
     }
 }
 
+fn model(text: &str) -> Result<Model, String> {
+    Model::from_str(text, false).map_err(|_| {
+        "only `rotor37` ships with tiprub, and meshes are not read; docs/rom-file.md shows how to write a ROM of your own \
+         model from Python"
+            .into()
+    })
+}
+
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
@@ -260,6 +268,7 @@ mod tests {
             ("demo --revolutions -1", "positive"),
             ("package a.toml --fmi 4", "possible values: 2, 3, both"),
             ("reduce rotor38", "rotor37"),
+            ("reduce blade.inp", "docs/rom-file.md"),
         ] {
             let error = parse(line).unwrap_err();
             assert_eq!(error.exit_code(), 2, "{line}");

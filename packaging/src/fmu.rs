@@ -65,6 +65,7 @@ pub struct Package<'a> {
     simulation: Simulation,
     library: &'a [u8],
     reference_csv: String,
+    warnings: Vec<String>,
     generated: String,
 }
 
@@ -78,18 +79,19 @@ impl<'a> Package<'a> {
         let mut schedule = Schedule::new(&scene.settings.experiment, None, None)?;
         let mut simulation = Simulation::new(scene).map_err(in_scene)?;
         simulation.initialise(schedule.start).map_err(in_scene)?;
+        let warnings = [simulation.warnings(), &schedule.warnings()].concat();
         if schedule.count > REFERENCE_STEPS {
             schedule.count = REFERENCE_STEPS;
             schedule.stop = schedule.start + REFERENCE_STEPS as f64 * schedule.step;
         }
         let reference_csv = native::run(scene, &schedule, &[], &|_| {})?.recording.to_csv();
         let generated = generation_date(env::var("SOURCE_DATE_EPOCH").ok().as_deref())?;
-        Ok(Self { scene, simulation, library, reference_csv, generated })
+        Ok(Self { scene, simulation, library, reference_csv, warnings, generated })
     }
 
-    /// Warnings of the initialisation: what an FMU instance would log.
+    /// Warnings of the initialisation (what an FMU instance would log) and of the experiment proposed.
     pub fn warnings(&self) -> &[String] {
-        self.simulation.warnings()
+        &self.warnings
     }
 
     /// Write the .fmu, whole or not at all. `arrays` is for FMI 3.0 only; FMI 2.0 has scalars.

@@ -18,7 +18,7 @@ pub struct NativeRun {
     pub stepping: Duration,
     /// Internal steps done.
     pub internal_steps: u64,
-    /// Warnings of the initialisation.
+    /// Warnings of the initialisation and of the schedule.
     pub warnings: Vec<String>,
 }
 
@@ -59,7 +59,8 @@ pub fn run(
             stepping += clock.elapsed();
         }
     }
-    Ok(NativeRun { recording, stepping, internal_steps, warnings: simulation.warnings().to_vec() })
+    let warnings = [simulation.warnings(), &schedule.warnings()].concat();
+    Ok(NativeRun { recording, stepping, internal_steps, warnings })
 }
 
 /// The numeric outputs of a table, element by element.

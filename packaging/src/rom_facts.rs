@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use tiprub_core::{
     Rom,
     dynamics::modal::ModalModel,
+    rom::Frame,
     settings::Scheme,
     stability::{self, ContactDirections},
 };
@@ -108,6 +109,16 @@ impl RomFacts {
         let _ = writeln!(text, "  sectors                   {}", rom.sectors);
         let _ = writeln!(text, "  reduced coordinates       {} per sector", rom.order());
         let _ = writeln!(text, "  contact nodes             {} ({})", nodes.len(), nodes.join(", "));
+        for node in &rom.contact_nodes {
+            let [a, b, c] = node.position;
+            let place = match rom.frame {
+                Frame::Cylindrical => {
+                    format!("r {a:.6} m, θ {b:.6} rad, z {c:.6} m, slope {:.4}", node.meridional_slope)
+                }
+                Frame::Cartesian => format!("x {a:.6} m, y {b:.6} m, z {c:.6} m"),
+            };
+            let _ = writeln!(text, "    {:<24}{place}", node.name);
+        }
         let _ = writeln!(text, "  damping ratio             {}", rom.damping_ratio);
         let _ = writeln!(text, "  largest frequency         {:.6e} rad/s", self.largest_angular_frequency);
         let _ =

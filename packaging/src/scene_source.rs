@@ -30,6 +30,16 @@ pub fn load(argument: &str, console: &Console) -> Result<Scene> {
     if path.is_dir() {
         return Err(Failure::usage(argument, "is a directory", "Give the scene file (TOML) in it"));
     }
+    let kind = path.extension().map(|extension| extension.to_ascii_lowercase()).unwrap_or_default();
+    let other = match kind.to_str() {
+        Some("fmu") => Some("is an FMU, not a scene file"),
+        Some("safetensors") => Some("is a ROM, not a scene file"),
+        _ => None,
+    };
+    if let Some(problem) = other {
+        let remedy = "Give a scene file (TOML); `tiprub inspect` shows what is in this one";
+        return Err(Failure::usage(argument, problem, remedy));
+    }
     tiprub_format::load_scene(path, &reduce).map_err(Failure::from)
 }
 
@@ -102,6 +112,10 @@ mod tests {
         let missing = load("/nowhere/scene.toml", &console).unwrap_err();
         assert!(missing.what.contains("/nowhere/scene.toml"), "{missing}");
         assert!(load("builtin:rotor38", &console).unwrap_err().problem.contains("rotor38"));
+        for (name, kind) in [("rub.fmu", "an FMU"), ("blade.rom.safetensors", "a ROM")] {
+            let failure = load(name, &console).unwrap_err();
+            assert!(failure.problem.contains(kind) && failure.remedy.contains("inspect"), "{failure}");
+        }
         assert!(load("/", &console).unwrap_err().problem.contains("directory"));
     }
 

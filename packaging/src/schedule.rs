@@ -55,6 +55,20 @@ impl Schedule {
         Ok(Self { start, stop, step, count: count_steps(steps) })
     }
 
+    /// What is legal but hardly meant: a communication step longer than the whole run.
+    pub fn warnings(&self) -> Vec<String> {
+        let length = self.stop - self.start;
+        let one_step = self.step > length && !is_close(self.step, length);
+        let warning = || {
+            format!(
+                "the communication step {} s is longer than the run of {length} s: one step covers all of it, with no \
+                 point in between; choose a shorter communication step",
+                self.step
+            )
+        };
+        one_step.then(warning).into_iter().collect()
+    }
+
     /// Communication point `index` (0 is the start, `count` the stop): start + index·H.
     ///
     /// Points on the grid are never moved to the stop time by round-off, so that importers that count in the

@@ -298,6 +298,31 @@ fn warnings_are_on_stderr_even_when_quiet_and_in_json() {
 }
 
 #[test]
+fn a_communication_step_longer_than_the_run_is_warned_of() {
+    let project = Project::new();
+    fs::write(project.path("scene.toml"), SCENE.replace("communication_step = 1e-3", "communication_step = 0.1"))
+        .unwrap();
+    for arguments in
+        [&["run", "scene.toml", "-q"][..], &["package", "scene.toml", "-o", "x", "--library", "library.so", "-q"]]
+    {
+        let stderr = String::from_utf8(project.run(arguments).stderr).unwrap();
+        assert!(stderr.starts_with("warning: the communication step 0.1 s is longer"), "{arguments:?}: {stderr}");
+    }
+    assert!(project.run(&["run", "scene.toml", "-q", "--step", "0.05"]).stderr.is_empty());
+}
+
+#[test]
+fn inspect_shows_where_contact_nodes_are_and_what_the_scene_sets() {
+    let project = Project::new();
+    let rom = project.succeed(&["inspect", "small.rom.safetensors"]);
+    assert!(rom.contains("r 0.250000 m, θ 0.000000 rad, z 0.000000 m, slope 0.0000"), "{rom}");
+    let scene = project.succeed(&["inspect", "scene.toml"]);
+    for shown in ["100 rad/s (954.9 rpm)", "damping ratio of the ROM", "\"watched_sectors\":[1]"] {
+        assert!(scene.contains(shown), "{shown}: {scene}");
+    }
+}
+
+#[test]
 fn a_changed_scene_stops_the_demo_before_any_work() {
     let project = Project::new();
     fs::create_dir(project.path("demo")).unwrap();

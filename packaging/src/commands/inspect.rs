@@ -183,13 +183,23 @@ fn scene_text(settings: &SceneSettings) -> String {
     for structure in &settings.structures {
         let _ = writeln!(
             text,
-            "  structure     {} from {}, speed {} rad/s",
-            structure.name, structure.rom, structure.speed
+            "  structure     {} from {}, speed {} rad/s ({:.1} rpm), damping ratio {}",
+            structure.name,
+            structure.rom,
+            structure.speed,
+            structure.speed * 30.0 / std::f64::consts::PI,
+            structure.damping_ratio.map_or("of the ROM".into(), |ratio| ratio.to_string())
         );
     }
     for surface in &settings.surfaces {
         let shape = serde_json::to_string(&surface.shape).unwrap_or_default();
-        let _ = writeln!(text, "  surface       {} {shape}, ramp {} s", surface.name, surface.ramp_time);
+        let _ = writeln!(
+            text,
+            "  surface       {} {shape}, ramp {} s{}",
+            surface.name,
+            surface.ramp_time,
+            if surface.moving { ", moving" } else { "" }
+        );
     }
     for contact in &settings.contacts {
         let _ = writeln!(
@@ -207,6 +217,7 @@ fn scene_text(settings: &SceneSettings) -> String {
     }
     let scheme = serde_json::to_value(settings.time.scheme).ok();
     let scheme = scheme.as_ref().and_then(Value::as_str).unwrap_or_default();
+    let _ = writeln!(text, "  outputs       {}", serde_json::to_string(&settings.outputs).unwrap_or_default());
     let experiment = &settings.experiment;
     let _ = writeln!(text, "  time          {scheme}, internal step at most {} s", settings.time.step);
     let _ = writeln!(
