@@ -31,7 +31,7 @@ const SCENE_FILE: &str = "rotor37.toml";
 const REPORT_FILE: &str = "report.html";
 const CSV_FILE: &str = "results.csv";
 
-/// What to do about a scene or a ROM in the directory that somebody changed.
+/// What to do about a scene in the directory that somebody changed.
 const KEEP: &str = "Give the demo another directory with --out, or copy your file elsewhere and delete it here";
 
 /// Wall times of the parts of the demo.
@@ -54,7 +54,7 @@ impl Stopwatch {
 pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
     let directory = arguments.out.as_path();
     let scene_text = scene_text(arguments.revolutions)?;
-    output_file::refuse_to_replace(&directory.join(SCENE_FILE), &scene_text, KEEP)?;
+    keep_changed_scene(&directory.join(SCENE_FILE), &scene_text)?;
     output_file::create_directory(directory)?;
     let mut watch = Stopwatch::default();
 
@@ -106,10 +106,20 @@ fn scene_text(revolutions: Option<f64>) -> Result<String> {
     Ok(rotor37_text(ROM_FILE, stop))
 }
 
+/// Refuse to lose a scene that the user changed. One that an earlier demo wrote, for whatever number of revolutions, is
+/// nobody's work.
+fn keep_changed_scene(path: &Path, text: &str) -> Result<()> {
+    let present = std::fs::read_to_string(path).unwrap_or_default();
+    let stop = present.lines().find_map(|line| line.strip_prefix("stop = ")?.parse().ok());
+    if stop.is_some_and(|stop| rotor37_text(ROM_FILE, stop) == present) {
+        return Ok(());
+    }
+    output_file::refuse_to_replace(path, text, KEEP)
+}
+
 /// The ROM and the scene, as files a user can go on with; returns the scene as read back from them.
 fn write_inputs(directory: &Path, reduction: &Reduction, scene_text: &str) -> Result<Scene> {
     let rom = tiprub_format::write_rom(&reduction.rom);
-    output_file::refuse_to_replace(&directory.join(ROM_FILE), &rom, KEEP)?;
     output_file::write(&directory.join(ROM_FILE), rom)?;
     let scene = directory.join(SCENE_FILE);
     output_file::write(&scene, scene_text)?;
@@ -247,5 +257,23 @@ impl Demo<'_> {
             "warnings": self.native.warnings,
         });
         Ok(Outcome { text, json })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_scene_that_somebody_changed_is_kept() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join(SCENE_FILE);
+        let text = |stop| rotor37_text(ROM_FILE, stop);
+        keep_changed_scene(&path, &text(0.01)).unwrap();
+        std::fs::write(&path, text(0.02)).unwrap();
+        keep_changed_scene(&path, &text(0.01)).unwrap();
+        std::fs::write(&path, text(0.02).replace("friction = 0.15", "friction = 0.2")).unwrap();
+        let failure = keep_changed_scene(&path, &text(0.02)).unwrap_err();
+        assert!(failure.to_string().contains("differs"), "{failure}");
     }
 }
