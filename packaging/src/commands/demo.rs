@@ -187,7 +187,7 @@ impl Demo<'_> {
             ("rotor37_fmi2.fmu", "FMU for FMI 2.0 co-simulation"),
             ("rotor37_fmi3.fmu", "FMU for FMI 3.0 co-simulation"),
             (CSV_FILE, "all outputs at all communication points"),
-            (SCENE_FILE, "the scene; change it and run `tiprub run` or `tiprub package` on it"),
+            (SCENE_FILE, "the scene; copy it, change it, and give it to tiprub run or tiprub package"),
             (ROM_FILE, "the reduced-order model of the blade"),
         ];
         list.map(|(name, meaning)| ReportFile {

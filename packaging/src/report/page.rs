@@ -276,10 +276,10 @@ fn files_section(files: &[ReportFile]) -> String {
     for file in files {
         let _ = write!(
             html,
-            "<tr><th><a href=\"{0}\">{0}</a></th><td>{1}</td><td class=\"size\">{2} kB</td></tr>",
+            "<tr><th><a href=\"{0}\">{0}</a></th><td>{1}</td><td class=\"size\">{2:.1} kB</td></tr>",
             escape(&file.name),
             escape(&file.meaning),
-            file.bytes.div_ceil(1000)
+            file.bytes as f64 / 1e3
         );
     }
     html.push_str("</tbody></table></section>\n");

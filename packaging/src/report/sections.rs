@@ -202,7 +202,10 @@ fn casing(input: &ReportInput<'_>) -> Result<Vec<Figure>> {
         String::new()
     };
     let body = plot.to_html()?;
-    let caption = format!("Casing shape: radial clearance of an undeformed blade around the circumference{ramp}.");
+    let caption = format!(
+        "Casing shape: radial clearance of an undeformed blade around the circumference{ramp}. The clearances below are normal \
+         to the casing, which runs parallel to the tip contour, and a little smaller."
+    );
     Ok(vec![Figure { body, caption }])
 }
 
