@@ -269,3 +269,35 @@ impl GapLaw {
 pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Shape;
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let lanes = 16;
+        let shape = Shape::TwoLobe { depth: 0.6, width: 0.15, phase: 0.3 };
+        let law = |instruction_set| RevolutionGap {
+            surface: Surface::new(&shape, 3.56e-4).unwrap(),
+            instruction_set,
+            lanes,
+            angles: (0..16).map(|lane| 0.41 * f64::from(lane)).collect(),
+            radii: vec![0.25],
+            per_radius: vec![4.0],
+            slopes: vec![-0.26],
+            clearances: vec![3.56e-4; 16],
+        };
+        let displacement: Vec<f64> = (0..48).map(|i| 1e-4 * f64::from(i).sin()).collect();
+        let drive = Drive { rotor_angle: 1.1, shape_factor: 1.0, ..Drive::default() };
+        let run = |instruction_set| {
+            let law = GapLaw::Revolution(law(instruction_set));
+            let (mut geometry, mut gap) = (law.geometry(lanes), vec![0.0; 16]);
+            law.evaluate(&drive, &displacement, &mut geometry, &mut gap);
+            let all = geometry.normal.iter().flatten().chain(&gap);
+            all.map(|value| value.to_bits()).collect::<Vec<_>>()
+        };
+        assert_eq!(run(InstructionSet::Baseline), run(InstructionSet::detect()));
+    }
+}

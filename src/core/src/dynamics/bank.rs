@@ -482,3 +482,34 @@ fn add_rows<const WIDTH: usize, const ROWS: usize>(sums: &mut [[f64; WIDTH]; ROW
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The widest set against the baseline; a processor without wider registers compares the baseline with itself.
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let modes = 11;
+        let model = ModalModel {
+            frequencies: (1..=modes).map(|mode| 700.0 * f64::from(mode).powi(2)).collect(),
+            damping_ratios: vec![0.005; 11],
+            contact_modes: DMatrix::from_fn(15, 11, |row, mode| (1.7 * row as f64 + 0.9 * mode as f64).sin()),
+            shapes: DMatrix::identity(11, 11),
+        };
+        let run = |instruction_set| {
+            let mut bank = ModalBank::new(&model, 13);
+            bank.instruction_set = instruction_set;
+            bank.set_step(Scheme::ModalExact, 1e-6);
+            let force: Vec<f64> = (0..15).map(|row| f64::from(row).cos()).collect();
+            for step in 0..500 {
+                bank.predict(true);
+                bank.correct(step % 13, &force, true);
+            }
+            let state = &bank.state;
+            let all = [&state.position, &state.increment, &state.displacement, &state.loss];
+            all.iter().flat_map(|values| values.iter().map(|value| value.to_bits())).collect::<Vec<_>>()
+        };
+        assert_eq!(run(InstructionSet::Baseline), run(InstructionSet::detect()));
+    }
+}
