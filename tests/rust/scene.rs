@@ -51,6 +51,7 @@ pub fn rom() -> Rom {
             node("trailing_edge", 0.05, 0.04),
         ],
         checks: RomChecks::default(),
+        extras: tiprub_core::rom::RomExtras::default(),
     }
 }
 

@@ -115,6 +115,7 @@ pub fn rom() -> Rom {
             frequency_deviation: vec![5.3e-4, 0.0043],
             residual_criterion: vec![0.1],
         },
+        extras: tiprub_core::rom::RomExtras::default(),
     }
 }
 

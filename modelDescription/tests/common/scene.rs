@@ -19,6 +19,7 @@ fn rom() -> Rom {
         contact_map: DMatrix::identity(9, 9),
         contact_nodes: vec![node("leading_edge", 0.0), node("mid_chord", 0.02), node("trailing_edge", 0.04)],
         checks: RomChecks::default(),
+        extras: tiprub_core::rom::RomExtras::default(),
     }
 }
 
@@ -33,12 +34,14 @@ pub fn complete() -> Scene {
             motion: Motion::Rotating,
             speed: 1800.0,
             damping_ratio: None,
+            ..StructureSettings::default()
         }],
         surfaces: vec![SurfaceSettings {
             name: "casing".into(),
             shape: Shape::TwoLobe { depth: 1.2, width: 0.15, phase: 0.0 },
             ramp_time: 1e-4,
             moving: true,
+            ..SurfaceSettings::default()
         }],
         contacts: vec![ContactSettings {
             master: "rotor".into(),
@@ -48,6 +51,7 @@ pub fn complete() -> Scene {
             friction: 0.15,
             solver: Solver::Lcp,
             meridian: Meridian::Contour,
+            ..ContactSettings::default()
         }],
         time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6 },
         outputs: OutputSettings {
@@ -56,6 +60,7 @@ pub fn complete() -> Scene {
             nodal_diameters: Some(18),
             energies: true,
             instantaneous_forces: true,
+            ..OutputSettings::default()
         },
         experiment: ExperimentSettings { start: 0.0, stop: 0.01, communication_step: 1e-5 },
     };

@@ -46,6 +46,7 @@ fn scene(shape: Shape, energies: bool) -> Scene {
             })
             .collect(),
         checks: RomChecks::default(),
+        extras: tiprub_core::rom::RomExtras::default(),
     };
     let settings = SceneSettings {
         name: "bench".into(),
@@ -56,8 +57,15 @@ fn scene(shape: Shape, energies: bool) -> Scene {
             motion: Motion::Rotating,
             speed: 1300.0,
             damping_ratio: None,
+            ..StructureSettings::default()
         }],
-        surfaces: vec![SurfaceSettings { name: "casing".into(), shape, ramp_time: 2e-3, moving: false }],
+        surfaces: vec![SurfaceSettings {
+            name: "casing".into(),
+            shape,
+            ramp_time: 2e-3,
+            moving: false,
+            ..SurfaceSettings::default()
+        }],
         contacts: vec![ContactSettings {
             master: "rotor".into(),
             slave: "casing".into(),
@@ -66,6 +74,7 @@ fn scene(shape: Shape, energies: bool) -> Scene {
             friction: 0.15,
             solver: Solver::Lcp,
             meridian: Meridian::Contour,
+            ..ContactSettings::default()
         }],
         time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6 },
         outputs: OutputSettings { energies, ..OutputSettings::default() },

@@ -46,6 +46,63 @@ pub struct RomChecks {
     pub residual_criterion: Vec<f64>,
 }
 
+/// What a steady speed Ω about the z axis does to one structure, in its reduced coordinates.
+///
+/// M q̈ + (D + 2ΩG) q̇ + (K + Ω²K₁ + Ω⁴K₂) q = f + Ω²c in the rotating frame; K₁ holds spin softening and centrifugal
+/// stiffening together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spin {
+    /// K₁, n × n, symmetric (kg for physical coordinates).
+    pub stiffness_speed2: DMatrix<f64>,
+    /// K₂, n × n, symmetric (kg·s²).
+    pub stiffness_speed4: DMatrix<f64>,
+    /// G, n × n, skew-symmetric (kg): Coriolis force 2ΩG q̇.
+    pub coriolis: DMatrix<f64>,
+    /// c, n values: centrifugal force per Ω² (kg·m).
+    pub centrifugal_load: Vec<f64>,
+    /// Largest |Ω| that K₁ and K₂ were fitted for (rad/s).
+    pub largest_speed: f64,
+}
+
+/// Part of a structure whose temperature is one number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Patch {
+    /// Angles from and to (rad), from < to ≤ from + 2π.
+    pub angle: [f64; 2],
+    /// Axial positions from and to (m).
+    pub axial: [f64; 2],
+}
+
+/// Thermal loads of one structure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Thermal {
+    /// Force on the reduced coordinates per kelvin of each patch above the reference, n × patches (N/K).
+    pub loads: DMatrix<f64>,
+    /// Where the patches are.
+    pub patches: Vec<Patch>,
+}
+
+/// Contact nodes that form a grid on a closed ring: node `along · around + i` is the i-th of ring `along`, rings in
+/// order of growing z, nodes of a ring at growing angles 2π/around apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ContactGrid {
+    /// Nodes around the circumference.
+    pub around: usize,
+    /// Rings along the axis.
+    pub along: usize,
+}
+
+/// What only some structures have and only some scenes need.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RomExtras {
+    /// Effects of spin.
+    pub spin: Option<Spin>,
+    /// Thermal loads.
+    pub thermal: Option<Thermal>,
+    /// The contact nodes are a grid that a surface spline can be laid through.
+    pub grid: Option<ContactGrid>,
+}
+
 /// Reduced-order model of one structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rom {
@@ -69,6 +126,8 @@ pub struct Rom {
     pub contact_nodes: Vec<ContactNode>,
     /// Quality of the reduction.
     pub checks: RomChecks,
+    /// Spin, heat, contact grid: empty for most structures.
+    pub extras: RomExtras,
 }
 
 impl Rom {
@@ -151,7 +210,95 @@ impl Rom {
                 ));
             }
         }
-        self.validate_definiteness(remedy)
+        self.validate_definiteness(remedy)?;
+        self.validate_spin(remedy)?;
+        self.validate_thermal(remedy)?;
+        self.validate_grid(remedy)
+    }
+
+    fn validate_spin(&self, remedy: &str) -> Result<()> {
+        let Some(spin) = &self.extras.spin else { return Ok(()) };
+        let order = self.order();
+        let matrices = [
+            ("stiffness_speed2", &spin.stiffness_speed2, 1.0),
+            ("stiffness_speed4", &spin.stiffness_speed4, 1.0),
+            ("coriolis", &spin.coriolis, -1.0),
+        ];
+        for (name, matrix, sign) in matrices {
+            let what = format!("ROM array `{name}`");
+            if matrix.shape() != (order, order) || matrix.iter().any(|value| !value.is_finite()) {
+                let problem = format!("shape {:?}, {order} x {order} finite values expected", matrix.shape());
+                return Err(Error::invalid(what, problem, remedy));
+            }
+            let asymmetry = (matrix - matrix.transpose() * sign).amax();
+            if asymmetry > 1e-8 * matrix.amax() {
+                let kind = if sign > 0.0 { "symmetric" } else { "skew-symmetric" };
+                let problem = format!("not {kind}: off by {asymmetry:.3e} at largest entry {:.3e}", matrix.amax());
+                return Err(Error::invalid(what, problem, remedy));
+            }
+        }
+        let load = &spin.centrifugal_load;
+        if load.len() != order || load.iter().any(|value| !value.is_finite()) {
+            let problem = format!("{} values, {order} finite ones expected", load.len());
+            return Err(Error::invalid("ROM array `centrifugal_load`", problem, remedy));
+        }
+        if !(spin.largest_speed.is_finite() && spin.largest_speed > 0.0) {
+            let problem = format!("{} rad/s is not a finite speed > 0", spin.largest_speed);
+            return Err(Error::invalid("ROM metadata `largest_speed`", problem, remedy));
+        }
+        Ok(())
+    }
+
+    fn validate_thermal(&self, remedy: &str) -> Result<()> {
+        let Some(thermal) = &self.extras.thermal else { return Ok(()) };
+        let expected = (self.order(), thermal.patches.len());
+        if thermal.loads.shape() != expected || expected.1 == 0 || thermal.loads.iter().any(|v| !v.is_finite()) {
+            let problem = format!("shape {:?}, {expected:?} finite values expected", thermal.loads.shape());
+            return Err(Error::invalid("ROM array `thermal_loads`", problem, remedy));
+        }
+        for (index, patch) in thermal.patches.iter().enumerate() {
+            let finite = patch.angle.iter().chain(&patch.axial).all(|value| value.is_finite());
+            let turn = patch.angle[1] - patch.angle[0];
+            let ordered =
+                turn > 0.0 && turn <= std::f64::consts::TAU * (1.0 + 1e-12) && patch.axial[0] < patch.axial[1];
+            if !(finite && ordered) {
+                return Err(Error::invalid(
+                    format!("ROM array `thermal_patches`, patch {}", index + 1),
+                    format!("angles {:?} rad and axial positions {:?} m are no patch", patch.angle, patch.axial),
+                    remedy,
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn validate_grid(&self, remedy: &str) -> Result<()> {
+        let Some(grid) = self.extras.grid else { return Ok(()) };
+        let refuse = |problem: String| Err(Error::invalid("ROM metadata `contact_grid`", problem, remedy));
+        if self.frame != Frame::Cylindrical || self.sectors != 1 {
+            return refuse("a contact grid needs a cylindrical frame and one sector".to_owned());
+        }
+        if grid.around.checked_mul(grid.along) != Some(self.contact_nodes.len()) || grid.around < 4 || grid.along < 2 {
+            let nodes = self.contact_nodes.len();
+            return refuse(format!("{} around x {} along, at least 4 x 2 of {nodes} nodes", grid.around, grid.along));
+        }
+        #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
+        let step = std::f64::consts::TAU / grid.around as f64;
+        for (along, ring) in self.contact_nodes.chunks(grid.around).enumerate() {
+            let (first, axial) = (self.contact_nodes[0].position[1], ring[0].position[2]);
+            for (i, node) in ring.iter().enumerate() {
+                #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
+                let turns = (node.position[1] - first - step * i as f64) / std::f64::consts::TAU;
+                let off = (turns - turns.round()).abs() * std::f64::consts::TAU;
+                if off > 1e-3 * step || (node.position[2] - axial).abs() > 1e-3 * step * node.position[0] {
+                    return refuse(format!("node {} of ring {} is not at its place of the grid", i + 1, along + 1));
+                }
+            }
+            if along > 0 && axial <= self.contact_nodes[(along - 1) * grid.around].position[2] {
+                return refuse(format!("ring {} does not lie beyond ring {along} in z", along + 1));
+            }
+        }
+        Ok(())
     }
 
     fn validate_definiteness(&self, remedy: &str) -> Result<()> {

@@ -13,6 +13,9 @@ pub enum Scheme {
     /// Two-step recurrence that is exact in free flight and at rest under constant force (default).
     #[default]
     ModalExact,
+    /// The highest modes, three per contact node, are quasi-static: contact acts through their residual flexibility
+    /// (Monjaraz-Tec, Gross, Krack, J. Sound Vib. 2022); the other modes take the contact force one step later.
+    MasslessBoundary,
 }
 
 /// Solver of the unilateral contact problem of one step.
@@ -24,6 +27,8 @@ pub enum Solver {
     /// Linear complementarity over all contact nodes (default).
     #[default]
     Lcp,
+    /// Coulomb friction with sticking: De Saxcé's form by Gauss-Seidel with exact local solutions.
+    Coulomb,
 }
 
 /// Shape of a rigid surface of revolution: radial clearance change around the circumference.
@@ -80,8 +85,40 @@ pub enum Motion {
     Still,
 }
 
+impl Default for Shape {
+    fn default() -> Self {
+        Self::Circular {}
+    }
+}
+
+/// Effects of spin on a rotating structure, each off unless asked for. They need a ROM with spin matrices.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SpinSettings {
+    /// Centrifugal stiffening and spin softening.
+    pub stiffening: bool,
+    /// Centrifugal growth: the static load Ω²c.
+    pub growth: bool,
+    /// Coriolis force.
+    pub coriolis: bool,
+}
+
+/// Radial line load amplitude·cos(order·θ − phase) on the contact grid of a structure that stands still.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoadSettings {
+    /// Nodal diameter.
+    pub order: u32,
+    /// Start value of the amplitude input (N per metre of circumference, outward positive).
+    #[serde(default)]
+    pub amplitude: f64,
+    /// Start value of the phase input (rad).
+    #[serde(default)]
+    pub phase: f64,
+}
+
 /// One flexible structure.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StructureSettings {
     /// Name by which contacts refer to it.
@@ -97,15 +134,108 @@ pub struct StructureSettings {
     /// Modal damping ratio ξ (-), 0 ≤ ξ < 1; the ROM's own when absent.
     #[serde(default)]
     pub damping_ratio: Option<f64>,
+    /// Effects of spin.
+    #[serde(default)]
+    pub spin: SpinSettings,
+    /// Make the displacement of the shaft's centre in x and y inputs.
+    #[serde(default)]
+    pub whirl: bool,
+    /// Make the axial displacement of the rotor an input.
+    #[serde(default)]
+    pub axial_shift: bool,
+    /// Mistuning: factor on the natural frequencies of each sector, one value per sector; empty = all equal.
+    #[serde(default)]
+    pub frequency_factors: Vec<f64>,
+    /// Make the temperatures of the ROM's patches inputs.
+    #[serde(default)]
+    pub thermal: bool,
+    /// Nodal-diameter load with amplitude and phase as inputs.
+    #[serde(default)]
+    pub load: Option<LoadSettings>,
 }
 
-/// One rigid surface of revolution about the z axis, parallel to the tip contour of the structure it faces.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// What happens to a surface spline where it closes around the circumference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Closure {
+    /// Continuous first and second derivatives (fig. 8b of the paper; default).
+    #[default]
+    Smooth,
+    /// Free ends that only meet in position at the seam θ = 0 (fig. 8a of the paper).
+    FreeEnds,
+}
+
+/// How a surface runs between its data points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Interpolation {
+    /// Bicubic uniform B-spline (default).
+    #[default]
+    Spline,
+    /// Bilinear facets, whose normals jump from one to the next: only to compare with.
+    Facets,
+}
+
+/// A surface through data points, with the closest point as the contact point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SplineSettings {
+    /// Data points around the circumference; those of the structure's contact grid where the surface has a structure.
+    #[serde(default = "default_around")]
+    pub around: usize,
+    /// Rings of data points along the axis; those of the structure's contact grid where the surface has a structure.
+    #[serde(default = "default_along")]
+    pub along: usize,
+    /// Closure around the circumference.
+    #[serde(default)]
+    pub closure: Closure,
+    /// Between the data points.
+    #[serde(default)]
+    pub interpolation: Interpolation,
+}
+
+impl Default for SplineSettings {
+    fn default() -> Self {
+        Self {
+            around: default_around(),
+            along: default_along(),
+            closure: Closure::default(),
+            interpolation: Interpolation::default(),
+        }
+    }
+}
+
+fn default_around() -> usize {
+    72
+}
+
+fn default_along() -> usize {
+    5
+}
+
+/// Equal parts of the circumference and of the axial extent of the contact, for friction power.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PatchSettings {
+    /// Parts around the circumference, the first from θ = 0.
+    pub around: usize,
+    /// Parts along the axis.
+    #[serde(default = "one_part")]
+    pub along: usize,
+}
+
+fn one_part() -> usize {
+    1
+}
+
+/// One surface around the z axis, parallel to the tip contour of the structure it faces.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceSettings {
     /// Name by which contacts refer to it.
     pub name: String,
     /// Shape around the circumference.
+    #[serde(default)]
     pub shape: Shape,
     /// Time over which the shape grows smoothly from circular to full (s), 0 = at once.
     #[serde(default)]
@@ -113,6 +243,35 @@ pub struct SurfaceSettings {
     /// Make the shape amplitude factor, its rotation and the uniform radius change inputs.
     #[serde(default)]
     pub moving: bool,
+    /// Structure that carries the surface and deforms it; its ROM needs a contact grid. Rigid where absent.
+    #[serde(default)]
+    pub structure: Option<String>,
+    /// Surface spline through data points; the analytical surface of revolution where absent (always a spline on a
+    /// structure).
+    #[serde(default)]
+    pub spline: Option<SplineSettings>,
+    /// Friction power of each of these patches as an output; those of the ROM where the structure is thermal.
+    #[serde(default)]
+    pub patches: Option<PatchSettings>,
+}
+
+/// Abradable coating on a surface: cells of rods that yield and harden (Legrand, Batailly, Pierre, J. Comput.
+/// Nonlinear Dyn. 2012). Its unworn surface is where `gap` ends; the hard surface lies `thickness` behind it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CoatingSettings {
+    /// Thickness h₀ (m), > 0.
+    pub thickness: f64,
+    /// Modulus E (Pa), > 0.
+    pub modulus: f64,
+    /// Yield stress Y (Pa), ≥ 0.
+    pub yield_stress: f64,
+    /// Linear hardening modulus K (Pa), ≥ 0.
+    pub hardening: f64,
+    /// Cells around the circumference.
+    pub cells_around: usize,
+    /// Cells along the axis, over the axial extent of the contact nodes.
+    pub cells_along: usize,
 }
 
 /// Whether the contact normal follows the meridional slope of the tip contour.
@@ -127,7 +286,7 @@ pub enum Meridian {
 }
 
 /// One contact pair: master nodes of a structure against a slave.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ContactSettings {
     /// Structure whose contact nodes are the masters.
@@ -148,6 +307,12 @@ pub struct ContactSettings {
     /// Direction of the normal in the meridional plane.
     #[serde(default)]
     pub meridian: Meridian,
+    /// Abradable coating of the slave.
+    #[serde(default)]
+    pub coating: Option<CoatingSettings>,
+    /// Share of the friction heat that goes into the slave (-), 0 to 1; the patch outputs carry this share.
+    #[serde(default)]
+    pub heat_to_slave: Option<f64>,
 }
 
 /// Internal time stepping.
@@ -175,6 +340,10 @@ pub struct OutputSettings {
     pub energies: bool,
     /// Values at the communication point in addition to averages over the step.
     pub instantaneous_forces: bool,
+    /// Wear depth of every coating cell.
+    pub wear: bool,
+    /// Radial displacement of every contact-grid node of the flexible slave.
+    pub slave_displacement: bool,
 }
 
 impl Default for OutputSettings {
@@ -185,6 +354,8 @@ impl Default for OutputSettings {
             nodal_diameters: None,
             energies: true,
             instantaneous_forces: false,
+            wear: false,
+            slave_displacement: false,
         }
     }
 }

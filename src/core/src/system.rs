@@ -336,7 +336,7 @@ impl System {
         self.fill_delassus(sector, drive);
         let outcome = match self.settings.solver {
             Solver::Film => self.problem.film(),
-            Solver::Lcp => self.problem.lcp(),
+            Solver::Lcp | Solver::Coulomb => self.problem.lcp(),
         };
         self.state.factorisations += outcome.factorisations as u64;
         if self.problem.multipliers.iter().any(|value| !value.is_finite()) {

@@ -35,6 +35,7 @@ fn bar(elements: usize, end: usize) -> Rom {
         contact_map: map,
         contact_nodes: vec![ContactNode { name: "end".into(), position: [0.0; 3], meridional_slope: 0.0 }],
         checks: RomChecks::default(),
+        extras: tiprub_core::rom::RomExtras::default(),
     }
 }
 

@@ -33,6 +33,7 @@ fn rom(seed: &mut u64) -> Rom {
         contact_map: DMatrix::from_fn(3 * CONTACTS, ORDER, |row, column| if row == column { 1.0 } else { 0.0 }),
         contact_nodes: vec![ContactNode { name: "node".into(), position: [0.0; 3], meridional_slope: 0.0 }; CONTACTS],
         checks: RomChecks::default(),
+        extras: tiprub_core::rom::RomExtras::default(),
     }
 }
 

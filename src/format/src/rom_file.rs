@@ -154,6 +154,7 @@ impl Reader<'_> {
                 frequency_deviation: self.check_values(arrays, "frequency_deviation")?,
                 residual_criterion: self.check_values(arrays, "residual_criterion")?,
             },
+            extras: tiprub_core::rom::RomExtras::default(),
         })
     }
 

@@ -28,6 +28,7 @@ fn rom() -> Rom {
             meridional_slope: -0.1,
         }],
         checks: RomChecks::default(),
+        extras: tiprub_core::rom::RomExtras::default(),
     }
 }
 

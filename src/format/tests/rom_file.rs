@@ -44,6 +44,7 @@ fn random_rom(seed: u64, order: usize, nodes: usize, modes: usize, text: String)
             frequency_deviation: numbers(seed + 8, modes / 2),
             residual_criterion: Vec::new(),
         },
+        extras: tiprub_core::rom::RomExtras::default(),
     }
 }
 

@@ -5,7 +5,7 @@ use std::time::Instant;
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, Frame, RomChecks};
+use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
 
 use crate::assembly::{assemble, free_dofs};
 use crate::craig_bampton::{CraigBampton, craig_bampton, dense_modes};
@@ -335,6 +335,7 @@ fn build_rom(
         contact_map: DMatrix::identity(boundary, order),
         contact_nodes: contact.iter().map(|point| contact_node(mesh, point, options.frame)).collect(),
         checks,
+        extras: RomExtras::default(),
     };
     rom.validate()?;
     Ok(rom)

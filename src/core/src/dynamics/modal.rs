@@ -211,6 +211,7 @@ mod tests {
             contact_map: DMatrix::identity(3, order),
             contact_nodes: vec![ContactNode { name: "n".into(), position: [0.0; 3], meridional_slope: 0.0 }],
             checks: RomChecks::default(),
+            extras: crate::rom::RomExtras::default(),
         }
     }
 

@@ -45,7 +45,7 @@ impl ModeCoefficients {
                 let square = frequency * step;
                 ((1.0 - decay) / divisor, square * square / divisor, step * step / divisor)
             }
-            Scheme::ModalExact => modal_exact(frequency, damping_ratio, step, decay),
+            Scheme::ModalExact | Scheme::MasslessBoundary => modal_exact(frequency, damping_ratio, step, decay),
         };
         Self {
             beta,

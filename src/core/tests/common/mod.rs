@@ -40,6 +40,7 @@ pub fn rom(sectors: usize) -> Rom {
             })
             .collect(),
         checks: RomChecks::default(),
+        extras: tiprub_core::rom::RomExtras::default(),
     }
 }
 
@@ -54,12 +55,14 @@ pub fn scene(sectors: usize) -> Scene {
             motion: Motion::Rotating,
             speed: 1300.0,
             damping_ratio: None,
+            ..StructureSettings::default()
         }],
         surfaces: vec![SurfaceSettings {
             name: "casing".into(),
             shape: Shape::TwoLobe { depth: 0.6, width: 0.15, phase: 0.0 },
             ramp_time: 1e-3,
             moving: true,
+            ..SurfaceSettings::default()
         }],
         contacts: vec![ContactSettings {
             master: "rotor".into(),
@@ -69,6 +72,7 @@ pub fn scene(sectors: usize) -> Scene {
             friction: 0.15,
             solver: Solver::Lcp,
             meridian: Meridian::Contour,
+            ..ContactSettings::default()
         }],
         time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6 },
         outputs: OutputSettings {
@@ -77,6 +81,7 @@ pub fn scene(sectors: usize) -> Scene {
             nodal_diameters: Some(1),
             energies: true,
             instantaneous_forces: true,
+            ..OutputSettings::default()
         },
         experiment: ExperimentSettings { start: 0.0, stop: 0.01, communication_step: 5e-5 },
     };

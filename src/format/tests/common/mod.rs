@@ -13,12 +13,14 @@ pub fn complete_scene() -> SceneSettings {
             motion: Motion::Rotating,
             speed: 1800.0,
             damping_ratio: Some(0.01),
+            ..StructureSettings::default()
         }],
         surfaces: vec![SurfaceSettings {
             name: "casing".into(),
             shape: Shape::Lobes { amplitude: 1e-4, order: 2, phase: 0.5 },
             ramp_time: 0.01,
             moving: true,
+            ..SurfaceSettings::default()
         }],
         contacts: vec![ContactSettings {
             master: "rotor".into(),
@@ -28,6 +30,7 @@ pub fn complete_scene() -> SceneSettings {
             friction: 0.15,
             solver: Solver::Lcp,
             meridian: Meridian::Contour,
+            ..ContactSettings::default()
         }],
         time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6 },
         outputs: OutputSettings { nodal_diameters: Some(4), ..OutputSettings::default() },
