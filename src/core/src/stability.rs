@@ -11,7 +11,6 @@ use nalgebra::DMatrix;
 
 use crate::contact::gap::dot;
 use crate::dynamics::modal::ModalModel;
-use crate::dynamics::scheme::ModeCoefficients;
 use crate::settings::Scheme;
 use crate::{Error, Result};
 
@@ -43,10 +42,7 @@ pub fn delassus(
     directions: &ContactDirections,
 ) -> DMatrix<f64> {
     let (normals, forces) = directional_modes(model, friction, directions);
-    let compliance = model.frequencies.iter().zip(&model.damping_ratios);
-    let compliance: Vec<f64> = compliance
-        .map(|(frequency, ratio)| ModeCoefficients::new(scheme, *frequency, *ratio, step).compliance)
-        .collect();
+    let compliance: Vec<f64> = model.coefficients(scheme, step).iter().map(|mode| mode.compliance).collect();
     let scaled = DMatrix::from_fn(forces.nrows(), forces.ncols(), |row, mode| forces[(row, mode)] * compliance[mode]);
     normals * scaled.transpose()
 }
@@ -223,7 +219,7 @@ pub fn growth(
     friction: f64,
     directions: &ContactDirections,
 ) -> Option<Growth> {
-    if friction == 0.0 || model.len() > GROWTH_UP_TO {
+    if friction == 0.0 || model.len() > GROWTH_UP_TO || scheme == Scheme::MasslessBoundary {
         return None;
     }
     let modes = model.len();
@@ -245,9 +241,7 @@ pub fn growth(
     let continuous = eigenvalues(flow)?.iter().fold(f64::MIN, |largest, value| largest.max(value.re)) / step;
 
     // q⁺ = R(q + β d − κ q) with R = I − c B_f W⁻¹ B_nᵀ, d⁺ = q⁺ − q.
-    let mode_coefficients =
-        |mode: usize| ModeCoefficients::new(scheme, model.frequencies[mode], model.damping_ratios[mode], step);
-    let coefficients: Vec<ModeCoefficients> = (0..modes).map(mode_coefficients).collect();
+    let coefficients = model.coefficients(scheme, step);
     let inverse = delassus(model, scheme, step, friction, directions).try_inverse()?;
     let response =
         DMatrix::from_fn(modes, directions.len(), |mode, node| coefficients[mode].compliance * forces[(node, mode)]);
@@ -307,6 +301,7 @@ mod tests {
             damping_ratios: vec![damping; modes],
             contact_modes: DMatrix::from_fn(3, modes, |row, mode| shapes[mode][row]),
             shapes: DMatrix::identity(modes, modes),
+            quasi_static: 0,
         }
     }
 

@@ -363,7 +363,7 @@ impl System {
             self.slip[node] =
                 if self.settings.friction > 0.0 { self.law.slip_direction(velocity, normal) } else { [0.0; 3] };
         }
-        let flexibility = self.bank.flexibility().as_slice();
+        let flexibility = self.bank.flexibility(sector).as_slice();
         for column in 0..nodes {
             let direction = self.force_direction(column, sector);
             let [first, second, third] =
