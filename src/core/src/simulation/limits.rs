@@ -14,6 +14,8 @@ const ALL_COMBINATIONS_UP_TO: usize = 3;
 pub struct Parameters {
     pub friction: f64,
     pub damping_ratio: f64,
+    /// Of the structure that carries the surface.
+    pub slave_damping_ratio: Option<f64>,
     /// Largest internal step (s).
     pub step: f64,
     pub scheme: Scheme,
@@ -34,13 +36,22 @@ pub struct Limits {
 
 impl Simulation {
     pub(super) fn parameters(&self) -> Parameters {
-        let scheme =
-            if self.value_of(Quantity::SchemeChoice) < 1.5 { Scheme::CentralDifference } else { Scheme::ModalExact };
-        let solver = if self.value_of(Quantity::SolverChoice) < 1.5 { Solver::Film } else { Solver::Lcp };
+        let chosen = |quantity| self.value_of(quantity);
+        let scheme = match chosen(Quantity::SchemeChoice) {
+            ..1.5 => Scheme::CentralDifference,
+            1.5..2.5 => Scheme::ModalExact,
+            _ => Scheme::MasslessBoundary,
+        };
+        let solver = match chosen(Quantity::SolverChoice) {
+            ..1.5 => Solver::Film,
+            1.5..2.5 => Solver::Lcp,
+            _ => Solver::Coulomb,
+        };
         let speed = self.inputs.speed.value;
         Parameters {
             friction: self.value_of(Quantity::Friction),
             damping_ratio: self.value_of(Quantity::DampingRatio),
+            slave_damping_ratio: self.compiled.roles.carrier.map(|_| self.value_of(Quantity::SlaveDampingRatio)),
             step: self.value_of(Quantity::StepMax),
             scheme,
             solver,
@@ -141,8 +152,8 @@ impl Checking<'_> {
 
     /// Normals and slip directions of the contact nodes on a round casing.
     fn directions(&self, sense: f64) -> ContactDirections {
-        let meridian = self.compiled.scene.settings.contacts[0].meridian;
-        let nodes = self.compiled.scene.roms[0].contact_nodes.iter();
+        let meridian = self.compiled.contact().meridian;
+        let nodes = self.compiled.master().1.contact_nodes.iter();
         nodes
             .map(|node| {
                 let slope = if meridian == Meridian::Contour { node.meridional_slope } else { 0.0 };
@@ -154,7 +165,7 @@ impl Checking<'_> {
 
     /// Sets of closed contact nodes: all combinations of a few; of many every one alone, neighbours, and all.
     fn combinations(&self) -> Vec<Vec<usize>> {
-        let nodes = self.compiled.scene.roms[0].contact_nodes.len();
+        let nodes = self.compiled.master().1.contact_nodes.len();
         if nodes <= ALL_COMBINATIONS_UP_TO {
             let members = |set: usize| (0..nodes).filter(|node| set >> node & 1 == 1).collect();
             return (1..1 << nodes).map(members).collect();
@@ -190,7 +201,7 @@ impl Checking<'_> {
     /// Which contact is meant.
     fn contact(&self, nodes: &[usize], sense: f64) -> String {
         let names: Vec<&str> =
-            nodes.iter().map(|node| self.compiled.scene.roms[0].contact_nodes[*node].name.as_str()).collect();
+            nodes.iter().map(|node| self.compiled.master().1.contact_nodes[*node].name.as_str()).collect();
         let direction = if sense > 0.0 { "+θ" } else { "−θ" };
         format!(
             "with µ = {}, contact closed at {} and sliding in {direction}",

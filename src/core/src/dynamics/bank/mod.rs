@@ -546,6 +546,9 @@ impl ModalBank {
     /// Work of the modal loads over the step just done (J), once contact has corrected it. A quasi-static mode
     /// follows the load of its own instant, so that over this step the load before did the work.
     pub fn finish_loads(&mut self) -> f64 {
+        if !self.options.loads {
+            return 0.0;
+        }
         let mut work = 0.0;
         for mode in 0..self.modes() {
             let dynamic = mode < self.model.dynamic_modes(self.scheme);
