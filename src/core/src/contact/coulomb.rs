@@ -164,7 +164,14 @@ impl CoulombSolver {
             if self.problem.residual() <= TOLERANCE {
                 return true;
             }
-            if std::env::var("DBG").is_ok() { eprintln!("prox {softening:e} followed {followed} res {:e} fact {} rmax {:e}", self.problem.residual(), self.newton.factorisations, self.problem.reaction.iter().fold(0.0_f64, |m,v| m.max(v.abs()))); }
+            if std::env::var("DBG").is_ok() {
+                eprintln!(
+                    "prox {softening:e} followed {followed} res {:e} fact {} rmax {:e}",
+                    self.problem.residual(),
+                    self.newton.factorisations,
+                    self.problem.reaction.iter().fold(0.0_f64, |m, v| m.max(v.abs()))
+                );
+            }
             softening = if followed { (0.1 * softening).max(PROXIMAL) } else { 20.0 * softening };
             if softening > 1.0 / SOFTENING {
                 break;

@@ -84,9 +84,13 @@ impl SplineGap {
             let angle = self.layout.angles[index] + drive.rotor_angle - drive.shape_rotation;
             let frame = Frame::new(angle);
             let [x, y, z] = drive.shaft;
-            let [radial, tangential, axial] =
-                if x == 0.0 && y == 0.0 { [0.0, 0.0, z] } else { Frame::new(angle + drive.shape_rotation).local([x, y, z]) };
-            let clearance = self.layout.clearances[lane] - self.nominal_clearance + drive.gap_offset + drive.radius_change;
+            let [radial, tangential, axial] = if x == 0.0 && y == 0.0 {
+                [0.0, 0.0, z]
+            } else {
+                Frame::new(angle + drive.shape_rotation).local([x, y, z])
+            };
+            let clearance =
+                self.layout.clearances[lane] - self.nominal_clearance + drive.gap_offset + drive.radius_change;
             let place = [
                 self.layout.radii[node] - clearance + local[0] + radial,
                 local[1] + tangential,

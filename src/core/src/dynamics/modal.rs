@@ -218,11 +218,16 @@ pub struct NodePair {
 fn modal_already(rom: &Rom, stiffness: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let order = rom.order();
     let diagonal: Vec<f64> = (0..order).map(|mode| stiffness[(mode, mode)]).collect();
-    let ascending = diagonal.windows(2).all(|pair| pair[0] <= pair[1]) && diagonal.first().is_some_and(|low| *low >= 0.0);
+    let ascending =
+        diagonal.windows(2).all(|pair| pair[0] <= pair[1]) && diagonal.first().is_some_and(|low| *low >= 0.0);
     let diagonal_only = |(index, value): (usize, &f64)| index % order == index / order || *value == 0.0;
     let is_modal = ascending
         && stiffness.iter().enumerate().all(diagonal_only)
-        && rom.mass.iter().enumerate().all(|(index, value)| *value == f64::from(u8::from(index % order == index / order)));
+        && rom
+            .mass
+            .iter()
+            .enumerate()
+            .all(|(index, value)| *value == f64::from(u8::from(index % order == index / order)));
     is_modal.then(|| (diagonal, DMatrix::identity(order, order)))
 }
 

@@ -68,7 +68,15 @@ impl ModeCoefficients {
     /// A mode without inertia: q = f/ω² at once.
     pub fn quasi_static(frequency: f64) -> Self {
         let square = frequency * frequency;
-        Self { beta: 0.0, kappa: 1.0, compliance: 1.0 / square, delayed: 0.0, loss: 0.0, inertia: 0.0, spring: 0.5 * square }
+        Self {
+            beta: 0.0,
+            kappa: 1.0,
+            compliance: 1.0 / square,
+            delayed: 0.0,
+            loss: 0.0,
+            inertia: 0.0,
+            spring: 0.5 * square,
+        }
     }
 
     /// Take contact forces one step after they were found.

@@ -3,6 +3,7 @@
 use crate::contact::coating::Coating;
 use crate::contact::gap::{GapLaw, RevolutionGap};
 use crate::contact::layout::Layout;
+use crate::contact::spline_gap::SplineGap;
 use crate::contact::surface::Surface;
 use crate::dynamics::bank::BankOptions;
 use crate::dynamics::modal::{ModalModel, ModalSpin};
@@ -51,7 +52,8 @@ impl Roles {
         let contact = &settings.contacts[0];
         let structure = |name: &str| settings.structures.iter().position(|structure| structure.name == name);
         let surface = settings.surfaces.iter().position(|surface| surface.name == contact.slave).unwrap_or(0);
-        let carrier = settings.surfaces.get(surface).and_then(|surface| surface.structure.as_deref()).and_then(structure);
+        let carrier =
+            settings.surfaces.get(surface).and_then(|surface| surface.structure.as_deref()).and_then(structure);
         let roles = Self { master: structure(&contact.master).unwrap_or(0), surface, carrier };
         let counts = [settings.structures.len(), settings.surfaces.len(), settings.contacts.len()];
         let expected = [1 + usize::from(carrier.is_some()), 1, 1];
@@ -167,13 +169,18 @@ impl Compiled {
     /// Beyond 1.05 times the largest fitted speed.
     pub fn check_speed(&self, speed: f64) -> Result<()> {
         let (structure, rom) = self.master();
-        let Some(spin) = rom.extras.spin.as_ref().filter(|_| structure.spin != Default::default()) else { return Ok(()) };
+        let Some(spin) = rom.extras.spin.as_ref().filter(|_| structure.spin != Default::default()) else {
+            return Ok(());
+        };
         if speed.abs() <= 1.05 * spin.largest_speed {
             return Ok(());
         }
         Err(Error::invalid(
             "variable `speed`",
-            format!("{speed} rad/s is beyond the {} rad/s that stiffening and growth were fitted for", spin.largest_speed),
+            format!(
+                "{speed} rad/s is beyond the {} rad/s that stiffening and growth were fitted for",
+                spin.largest_speed
+            ),
             "Reduce the structure again with a larger speed (`tiprub reduce --spin`), or leave spin out",
         ))
     }
@@ -275,6 +282,15 @@ impl Compiled {
         Ok(Some(coating))
     }
 
+    /// The carrier's modes at the control points; empty without one.
+    pub fn slave_modes(&self, law: &SplineGap) -> ModalModel {
+        let carrier = self.roles.carrier.zip(self.carrier.as_ref());
+        carrier.map_or_else(
+            || self.model.with_nodes(&[]),
+            |(index, model)| control_modes(Carrier { rom: &self.scene.roms[index], model }, law),
+        )
+    }
+
     /// Whether `coulomb` can be chosen: a coupled problem of all sectors has room for it only if the scene says so.
     pub fn may_stick(&self) -> bool {
         let contact = self.contact();
@@ -301,7 +317,8 @@ impl Compiled {
             return refuse("parameter `scheme`", "`massless-boundary` does not take the Coriolis force", remedy);
         }
         if scheme == Scheme::MasslessBoundary && self.model.dynamic_modes(scheme) == 0 {
-            let problem = "`massless-boundary` makes the highest modes quasi-static, three per contact node: none is left";
+            let problem =
+                "`massless-boundary` makes the highest modes quasi-static, three per contact node: none is left";
             return refuse("parameter `scheme`", problem, "Use more modes or fewer contact nodes, or modal-exact");
         }
         Ok(())

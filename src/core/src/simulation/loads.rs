@@ -1,9 +1,9 @@
 //! Loads beside contact, in modal coordinates: centrifugal growth, heat, nodal-diameter loads.
 
 use super::Inputs;
+use crate::Rom;
 use crate::dynamics::modal::ModalModel;
 use crate::settings::{LoadSettings, StructureSettings};
-use crate::Rom;
 
 /// Modal load vectors per unit of what drives them; empty where a scene does not ask for them.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -75,5 +75,7 @@ fn nodal_load(rom: &Rom, model: &ModalModel, load: LoadSettings, phase: f64) -> 
         position[0] * share * libm::cos(f64::from(load.order) * position[1] - phase)
     };
     let nodes = rom.contact_nodes.len();
-    (0..model.len()).map(|mode| (0..nodes).map(|node| model.contact_modes[(3 * node, mode)] * force(node)).sum()).collect()
+    (0..model.len())
+        .map(|mode| (0..nodes).map(|node| model.contact_modes[(3 * node, mode)] * force(node)).sum())
+        .collect()
 }

@@ -318,6 +318,12 @@ impl Simulation {
         }
     }
 
+    /// Factor on the casing shape at the internal time reached (-), ramp included.
+    pub fn shape_factor(&self) -> f64 {
+        let (offset, done) = (self.offset_now(), self.communication.done);
+        self.inputs.shape_factor.at(offset) * self.ramp(self.communication.time(done))
+    }
+
     fn values_gap_offset(&self) -> f64 {
         self.values[self.compiled.references.gap_offset]
     }

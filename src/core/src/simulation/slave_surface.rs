@@ -111,7 +111,9 @@ fn carried_grid(rom: &Rom, contour: &Contour) -> Result<Grid> {
     if first < low || last > high {
         return Err(Error::invalid(
             format!("ROM `{}`", rom.name),
-            format!("its contact grid spans z = {low:.4e} to {high:.4e} m, the contact nodes {first:.4e} to {last:.4e} m"),
+            format!(
+                "its contact grid spans z = {low:.4e} to {high:.4e} m, the contact nodes {first:.4e} to {last:.4e} m"
+            ),
             "Give a casing that covers the blade tips",
         ));
     }
@@ -192,8 +194,8 @@ impl Contour {
         let t = (inside - a.0) / length;
         let bend = |t: f64| t * t * t - t;
         let value = (1.0 - t) * a.1 + t * b.1 + length * length / 6.0 * (bend(1.0 - t) * a.2 + bend(t) * b.2);
-        let slope =
-            (b.1 - a.1) / length + length / 6.0 * ((3.0 * t * t - 1.0) * b.2 - (3.0 * (1.0 - t) * (1.0 - t) - 1.0) * a.2);
+        let slope = (b.1 - a.1) / length
+            + length / 6.0 * ((3.0 * t * t - 1.0) * b.2 - (3.0 * (1.0 - t) * (1.0 - t) - 1.0) * a.2);
         value + slope * (z - inside)
     }
 }

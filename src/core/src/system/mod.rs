@@ -231,6 +231,11 @@ impl System {
         }
     }
 
+    /// Normals and places of the last step.
+    pub fn geometry(&self) -> &Geometry {
+        &self.state.geometry
+    }
+
     /// The structure that carries the slave surface.
     pub fn slave(&self) -> Option<&Slave> {
         self.slave.as_ref()

@@ -74,7 +74,8 @@ impl Coupling {
             let (second, fourth) = (square - reference, square * square - reference * reference);
             for row in 0..modes {
                 for column in 0..modes {
-                    let entries = (self.spin.stiffness_speed2[(row, column)], self.spin.stiffness_speed4[(row, column)]);
+                    let entries =
+                        (self.spin.stiffness_speed2[(row, column)], self.spin.stiffness_speed4[(row, column)]);
                     let both = row < dynamic && column < dynamic;
                     self.stiffness[row * modes + column] =
                         if both { second * entries.0 + fourth * entries.1 } else { 0.0 };

@@ -128,8 +128,10 @@ impl ModalBank {
         let (state_len, lanes) = (chunks * modes * width, chunks * width);
         let sets = if options.frequency_factors.is_empty() { 1 } else { sectors };
         let special = options.loads || sets > 1;
-        let coupling =
-            options.coupling.clone().map(|(spin, stiffening, coriolis)| Coupling::new(spin, stiffening, coriolis, sets));
+        let coupling = options
+            .coupling
+            .clone()
+            .map(|(spin, stiffening, coriolis)| Coupling::new(spin, stiffening, coriolis, sets));
         Self {
             instruction_set: InstructionSet::detect(),
             sectors,

@@ -43,8 +43,10 @@ pub fn inputs(table: &mut Builder, scene: &Parts) {
         (row.min, row.max) = (Some(-LARGEST_TEMPERATURE), Some(LARGEST_TEMPERATURE));
     }
     if let Some(load) = carrier.load {
-        let text = format!("Amplitude of the radial line load with {} nodal diameters on the casing, outwards", load.order);
-        let row = table.input(Quantity::LoadAmplitude, "casing_load_amplitude", Some(&LINE_LOAD), load.amplitude, &text);
+        let text =
+            format!("Amplitude of the radial line load with {} nodal diameters on the casing, outwards", load.order);
+        let row =
+            table.input(Quantity::LoadAmplitude, "casing_load_amplitude", Some(&LINE_LOAD), load.amplitude, &text);
         row.nominal = Some(1e4);
         let text = "Phase of the nodal-diameter load: amplitude cos(n theta - phase)";
         table.input(Quantity::LoadPhase, "casing_load_phase", Some(&ANGLE), load.phase, text).display = Some(0);
