@@ -91,14 +91,20 @@ pub fn scene(sectors: usize) -> Scene {
 /// Casing ring of analytic modes (M = I): nodal diameters 0 to 4 in pairs, each with a constant and a tilting axial
 /// shape; radial w = cos nθ with the inextensional tangential motion v = −sin(nθ)/n. Thermal patches: quarters.
 pub fn casing(around: usize, along: usize) -> Rom {
+    casing_of(around, along, 5)
+}
+
+/// The same with as many nodal diameters as asked.
+pub fn casing_of(around: usize, along: usize, diameters: u32) -> Rom {
     use tiprub_core::rom::{ContactGrid, Patch, RomExtras, Thermal};
     let z = |ring: usize| -0.02 + 0.07 * ring as f64 / (along - 1) as f64;
     let angle = |i: usize| std::f64::consts::TAU * i as f64 / around as f64;
     let mut modes: Vec<(f64, f64, f64, f64)> = Vec::new();
-    for n in 0..5 {
+    for n in 0..diameters as usize {
         for tilt in [0.0, 1.0] {
             for phase in if n == 0 { vec![0.0] } else { vec![0.0, std::f64::consts::FRAC_PI_2] } {
-                let frequency = [9000.0, 900.0, 400.0, 1100.0, 2100.0][n] * (1.0 + 0.6 * tilt);
+                let lowest = [9000.0, 900.0, 400.0, 1100.0, 2100.0];
+                let frequency = lowest.get(n).copied().unwrap_or(131.25 * (n * n) as f64) * (1.0 + 0.6 * tilt);
                 modes.push((frequency, n as f64, tilt, phase));
             }
         }
