@@ -2,4 +2,5 @@
 
 pub mod gap;
 pub mod solver;
+pub mod spline;
 pub mod surface;
