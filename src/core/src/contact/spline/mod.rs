@@ -196,6 +196,10 @@ impl SurfaceSpline {
     /// The place `turns` revolutions about z further, to start from when the rotor has turned.
     pub fn advance(&self, place: Place, turns: f64) -> Place {
         let whole = real(self.around);
+        let s = place.s + turns * whole;
+        if (0.0..1.0).contains(&s) {
+            return Place { s, ..place };
+        }
         let moved = (real(place.patch[0]) + place.s + turns * whole) / whole;
         let (p, s) = split((moved - moved.floor()) * whole, self.around);
         Place { patch: [p, place.patch[1]], s, t: place.t }

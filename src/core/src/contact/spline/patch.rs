@@ -106,30 +106,34 @@ impl SurfaceSpline {
     #[inline]
     pub fn evaluate(&self, place: Place) -> Evaluation {
         match self.interpolation {
-            Interpolation::Spline => self.evaluate_bicubic(place),
+            Interpolation::Spline => self.evaluate_bicubic::<true>(place),
             Interpolation::Facets => self.evaluate_bilinear(place),
         }
     }
 
+    /// Without `SECOND` the second derivatives are left zero.
     #[inline(always)]
-    fn evaluate_bicubic(&self, place: Place) -> Evaluation {
+    pub(super) fn evaluate_bicubic<const SECOND: bool>(&self, place: Place) -> Evaluation {
         let ([p, q], width) = (place.patch, self.around + 3);
         let (around, along) = (cubic(place.s), cubic(place.t));
+        let orders = if SECOND { 3 } else { 2 };
         let mut rows = [[[0.0; 4]; 4]; 3];
         for ring in 0..4 {
             let start = (q + ring) * width + p;
             let window = self.mesh[start..].first_chunk().expect("the mesh has three columns more than patches");
-            for order in 0..3 {
+            for order in 0..orders {
                 rows[order][ring] = combine(&around[order], window);
             }
         }
+        let second =
+            |along: &[f64; 4], rows: &[[f64; 4]; 4]| if SECOND { three(combine(along, rows)) } else { [0.0; 3] };
         Evaluation {
             point: three(combine(&along[0], &rows[0])),
             d_s: three(combine(&along[0], &rows[1])),
             d_t: three(combine(&along[1], &rows[0])),
-            d_ss: three(combine(&along[0], &rows[2])),
-            d_st: three(combine(&along[1], &rows[1])),
-            d_tt: three(combine(&along[2], &rows[0])),
+            d_ss: second(&along[0], &rows[2]),
+            d_st: second(&along[1], &rows[1]),
+            d_tt: second(&along[2], &rows[0]),
         }
     }
 

@@ -39,8 +39,14 @@ pub enum Projection {
 const EDGE_TOLERANCE: f64 = 1e-9;
 /// Newton steps below this (in patches) end the iteration.
 const STEP_TOLERANCE: f64 = 1e-11;
+/// Tangents closer to parallel than this (squared sine) are no surface.
+const DEGENERATE: f64 = 1e-24;
+/// Curvature of f, relative to that for a plane, below which Newton steps are not trusted.
+const CONVEX: f64 = 1e-3;
 /// Rounding of the coordinates of x − S, relative to |x|.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// Evaluations near a good start: the Hessian of the start makes each correction a hundredth of the one before, or less.
+const MAX_CORRECTIONS: usize = 6;
 /// Far beyond what starts on the opposite side of the casing need (about 20).
 const MAX_ITERATIONS: usize = 100;
 /// Halvings of a step before giving up.
@@ -71,7 +77,11 @@ type Room = [[f64; 2]; 2];
 
 impl Foot {
     fn at(surface: &SurfaceSpline, x: [f64; 3], place: Place) -> Self {
-        let evaluation = surface.evaluate(place);
+        Self::seen(x, place, surface.evaluate(place))
+    }
+
+    #[inline(always)]
+    fn seen(x: [f64; 3], place: Place, evaluation: Evaluation) -> Self {
         let residual: [f64; 3] = std::array::from_fn(|i| x[i] - evaluation.point[i]);
         Self { place, evaluation, residual, half_square: 0.5 * dot(residual, residual), held: [Held::No; 2] }
     }
@@ -88,6 +98,15 @@ impl Foot {
         [dot(*d_s, *d_s), dot(*d_s, *d_t), dot(*d_t, *d_t)]
     }
 
+    /// Second derivatives of f [ss, st, tt] and their determinant.
+    #[inline]
+    fn hessian(&self, metric: [f64; 3]) -> ([f64; 3], f64) {
+        let Evaluation { d_ss, d_st, d_tt, .. } = &self.evaluation;
+        let bend = [dot(self.residual, *d_ss), dot(self.residual, *d_st), dot(self.residual, *d_tt)];
+        let hessian: [f64; 3] = std::array::from_fn(|i| metric[i] - bend[i]);
+        (hessian, hessian[0] * hessian[2] - hessian[1] * hessian[1])
+    }
+
     /// Change of f along a step, to first order.
     fn slope(&self, step: [f64; 2]) -> f64 {
         let gradient = self.gradient();
@@ -98,12 +117,10 @@ impl Foot {
     #[inline]
     fn newton_step(&mut self, room: &Room, metric: [f64; 3]) -> Option<[f64; 2]> {
         let gradient = self.gradient();
-        let Evaluation { d_ss, d_st, d_tt, .. } = &self.evaluation;
-        let bend = [dot(self.residual, *d_ss), dot(self.residual, *d_st), dot(self.residual, *d_tt)];
-        let hessian: [f64; 3] = std::array::from_fn(|i| metric[i] - bend[i]);
+        let (hessian, determinant) = self.hessian(metric);
         let area = metric[0] * metric[2] - metric[1] * metric[1];
         // NaN counts as degenerate.
-        if !(area > 1e-24 * metric[0] * metric[2]) {
+        if !(area > DEGENERATE * metric[0] * metric[2]) {
             return None;
         }
         let position = [self.place.s, self.place.t];
@@ -119,7 +136,7 @@ impl Foot {
         let alone = |axis: usize| {
             let (curvature, length) = (hessian[2 * axis], metric[2 * axis]);
             let mut step = [0.0; 2];
-            step[axis] = -gradient[axis] / if curvature > 1e-3 * length { curvature } else { length };
+            step[axis] = -gradient[axis] / if curvature > CONVEX * length { curvature } else { length };
             step
         };
         match self.held.map(|held| held == Held::No) {
@@ -128,14 +145,12 @@ impl Foot {
             [false, true] => return Some(alone(1)),
             [true, true] => {}
         }
-        let determinant = hessian[0] * hessian[2] - hessian[1] * hessian[1];
-        let is_convex = hessian[0] > 0.0 && determinant > 1e-3 * area;
+        let is_convex = hessian[0] > 0.0 && determinant > CONVEX * area;
         if !is_convex && let Some(step) = escape(gradient, hessian, metric, determinant) {
             return Some(step);
         }
-        let ([a, b, c], determinant) = if is_convex { (hessian, determinant) } else { (metric, area) };
-        let inverse = 1.0 / determinant;
-        let step = [(b * gradient[1] - c * gradient[0]) * inverse, (b * gradient[0] - a * gradient[1]) * inverse];
+        let step =
+            if is_convex { solve(hessian, 1.0 / determinant, gradient) } else { solve(metric, 1.0 / area, gradient) };
         // The other coordinate may push this one over a bound that it would leave inwards alone.
         let blocked = |axis: usize| {
             (position[axis] <= room[axis][0] && step[axis] < 0.0)
@@ -149,12 +164,25 @@ impl Foot {
     }
 
     /// Unit normal S_t × S_s/|S_t × S_s|: around × axial points away from the axis.
+    #[inline]
     fn normal(&self) -> [f64; 3] {
         let ([a, b, c], [d, e, f]) = (self.evaluation.d_t, self.evaluation.d_s);
         let cross = [b * f - c * e, c * d - a * f, a * e - b * d];
         let per_length = 1.0 / dot(cross, cross).sqrt();
         cross.map(|value| value * per_length)
     }
+
+    #[inline]
+    fn found(&self) -> Projection {
+        let normal = self.normal();
+        Projection::Found { place: self.place, point: self.evaluation.point, normal, gap: dot(self.residual, normal) }
+    }
+}
+
+/// −matrix⁻¹ gradient.
+#[inline(always)]
+fn solve([a, b, c]: [f64; 3], per_determinant: f64, gradient: [f64; 2]) -> [f64; 2] {
+    [(b * gradient[1] - c * gradient[0]) * per_determinant, (b * gradient[0] - a * gradient[1]) * per_determinant]
 }
 
 /// On top of a maximum or a saddle of f, where the gradient vanishes: half a patch along the negative curvature.
@@ -182,6 +210,9 @@ impl SurfaceSpline {
     /// # Panics
     /// A guess on a patch that does not exist.
     pub fn project(&self, x: [f64; 3], guess: Place) -> Projection {
+        if let Some(projection) = self.project_nearby(x, guess) {
+            return projection;
+        }
         if !x.iter().all(|value| value.is_finite()) {
             return Projection::Lost;
         }
@@ -195,8 +226,45 @@ impl SurfaceSpline {
         if self.is_over_edge(&foot) {
             return Projection::BeyondEdge { place: foot.place };
         }
-        let normal = foot.normal();
-        Projection::Found { place: foot.place, point: foot.evaluation.point, normal, gap: dot(foot.residual, normal) }
+        foot.found()
+    }
+
+    /// A Newton step that stays in its patch, then corrections with the same Hessian until the next one is within the
+    /// tolerance: nearly every projection of a run. None where anything is out of the ordinary.
+    #[inline]
+    fn project_nearby(&self, x: [f64; 3], guess: Place) -> Option<Projection> {
+        if self.interpolation == Interpolation::Facets {
+            return None;
+        }
+        let mut foot = Foot::seen(x, guess, self.evaluate_bicubic::<true>(guess));
+        let metric = foot.metric();
+        let (hessian, determinant) = foot.hessian(metric);
+        let area = metric[0] * metric[2] - metric[1] * metric[1];
+        if !(area > DEGENERATE * metric[0] * metric[2] && hessian[0] > 0.0 && determinant > CONVEX * area) {
+            return None;
+        }
+        let inverse = 1.0 / determinant;
+        for _ in 0..MAX_CORRECTIONS {
+            let step = solve(hessian, inverse, foot.gradient());
+            let is_within = |limit: f64| step[0].abs() <= limit && step[1].abs() <= limit;
+            if is_within(STEP_TOLERANCE) {
+                let is_inside = foot.place.t >= 0.0 && foot.place.t <= 1.0;
+                return (is_inside && self.is_far_from_seam(&foot, metric[0])).then(|| foot.found());
+            }
+            let place = Place { s: foot.place.s + step[0], t: foot.place.t + step[1], ..guess };
+            let stays = (0.0..1.0).contains(&place.s) && (0.0..1.0).contains(&place.t);
+            if !(stays && is_within(0.1)) {
+                return None;
+            }
+            foot = Foot::seen(x, place, self.evaluate_bicubic::<false>(place));
+        }
+        None
+    }
+
+    /// Whether the seam of free ends is too far away to hold a closer point on its other side.
+    fn is_far_from_seam(&self, foot: &Foot, length_s: f64) -> bool {
+        let column = foot.place.patch[0];
+        self.closure == Closure::Smooth || (column > 0 && column + 1 < self.around && 8.0 * foot.half_square < length_s)
     }
 
     fn has_creases(&self) -> bool {
