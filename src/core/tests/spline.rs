@@ -1,10 +1,15 @@
 //! The surface spline: what it is by definition, exact transfer of forces, and the closest point.
 
+#![allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+
 use std::f64::consts::TAU;
 
 use tiprub_core::contact::gap::dot;
 use tiprub_core::contact::spline::{Evaluation, Place, Projection, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
+
+#[path = "../examples/facets_and_spline/sliding.rs"]
+mod sliding;
 
 const RADIUS: f64 = 0.25;
 const EPS: f64 = f64::EPSILON;
@@ -49,6 +54,8 @@ fn data(around: usize, along: usize, radius: impl Fn(f64, f64) -> f64) -> Vec<[f
         })
         .collect()
 }
+
+type Casing = fn(f64, f64) -> f64;
 
 fn round(_angle: f64, _z: f64) -> f64 {
     RADIUS
@@ -375,8 +382,7 @@ fn found(projection: Projection) -> (Place, [f64; 3], [f64; 3], f64) {
 #[test]
 fn the_closest_point_is_found_from_anywhere_around() {
     let mut random = Random(6);
-    let casings: [(&str, fn(f64, f64) -> f64); 3] = [("round", round), ("conical", conical), ("lobed", lobed)];
-    for (name, casing) in casings {
+    for (name, casing) in [("round", round as Casing), ("conical", conical), ("lobed", lobed)] {
         for (around, along) in [(36, 5), (72, 3), (7, 4), (12, 2)] {
             let surface = spline(&data(around, along, casing), around, along);
             let (mut offset, mut gradient, mut away): (f64, f64, f64) = (0.0, 0.0, 0.0);
@@ -429,7 +435,7 @@ fn no_sampled_point_is_closer() {
             let points = data(around, along, lobed);
             let surface = SurfaceSpline::new(&points, around, along, closure, interpolation).unwrap();
             let (mut closer, mut farther): (f64, f64) = (0.0, 0.0);
-            let samples = 2400 / around;
+            let samples = 1500 / around;
             for index in 0..40 {
                 let mut at = Place { t: random.within(0.05, 0.95), ..random.place(&surface) };
                 // Half of the nodes stand next to a border of patches, where facets and free ends kink.
@@ -472,6 +478,28 @@ fn the_seam_of_a_smooth_surface_is_no_special_place() {
         guess = place;
     }
     assert_below("gap along a path over the seam (m)", worst, 4e-16);
+}
+
+#[test]
+fn starts_on_the_opposite_side_lead_back() {
+    for (closure, interpolation) in KINDS {
+        for around in [4, 36, 500] {
+            let points = data(around, 3, conical);
+            let surface = SurfaceSpline::new(&points, around, 3, closure, interpolation).unwrap();
+            for p in [0, 1, around / 2, around - 1] {
+                for s in [0.0, 1e-12, 0.4, 1.0] {
+                    // Next to the exact opposite, where f has its maximum, and on it.
+                    let guess = place(p, 1, s, 0.5);
+                    let across = surface.evaluate(guess).point;
+                    let scale = (RADIUS - 1e-3) / RADIUS;
+                    let x = [-scale * across[0], -scale * across[1], across[2]];
+                    let (_, point, _, _) = found(surface.project(x, guess));
+                    let direct = found(surface.project(x, surface.locate(x))).1;
+                    assert!((distance(point, x) - distance(direct, x)).abs() < 1e-15, "{around}, {guess:?}");
+                }
+            }
+        }
+    }
 }
 
 #[test]
@@ -526,7 +554,7 @@ fn a_round_casing_is_met_to_fourth_order() {
 #[test]
 fn facets_meet_a_node_on_the_flat_and_at_corners() {
     let around = 12;
-    let facets = |radius: fn(f64, f64) -> f64| {
+    let facets = |radius: Casing| {
         let points = data(around, 3, radius);
         SurfaceSpline::new(&points, around, 3, Closure::Smooth, Interpolation::Facets).unwrap()
     };
@@ -635,4 +663,60 @@ fn bad_data_is_refused_with_its_place() {
     let before = surface.clone();
     assert!(surface.set_data(&spoilt(9, [0.1, f64::NAN, 0.0])).is_err());
     assert_eq!(surface, before, "a refused set of data changes nothing");
+}
+
+#[test]
+fn a_start_from_the_last_step_ends_where_a_start_from_elsewhere_does() {
+    let mut random = Random(11);
+    for (closure, interpolation) in KINDS {
+        let (around, along, turn) = (36, 5, 1e-3);
+        let surface = SurfaceSpline::new(&data(around, along, lobed), around, along, closure, interpolation).unwrap();
+        let (mut normals, mut gaps): (f64, f64) = (0.0, 0.0);
+        let mut guess = place(34, 1, 0.2, 0.5);
+        for step in 0..2500 {
+            let (angle, z) = (TAU * f64::from(step) * turn - 0.1, 0.02 * (0.01 * f64::from(step)).sin());
+            let r = lobed(angle - 0.3, z) - 4e-4 + 5e-4 * (0.3 * f64::from(step)).sin();
+            let x = [r * angle.cos(), r * angle.sin(), z];
+            let warm = found(surface.project(x, surface.advance(guess, turn)));
+            let located = found(surface.project(x, surface.locate(x)));
+            let cold = found(surface.project(x, Place { t: 0.5, ..random.place(&surface) }));
+            for other in [located, cold] {
+                gaps = gaps.max((warm.3 - other.3).abs());
+                // Two facets or two sides of the seam may be equally far away.
+                if (warm.3 - other.3).abs() > 0.0 || distance(warm.1, other.1) < 1e-9 {
+                    normals = normals.max(distance(warm.2, other.2));
+                }
+            }
+            guess = warm.0;
+        }
+        assert_below(&format!("{closure:?}, {interpolation:?}: gaps apart (m)"), gaps, 4e-16);
+        assert_below(&format!("{closure:?}, {interpolation:?}: normals apart"), normals, 1e-10);
+    }
+}
+
+#[test]
+fn a_sliding_node_is_kicked_at_every_border_of_facets_and_nowhere_on_the_spline() {
+    use sliding::{AROUND, INTERFERENCE, MASS, SPEED, STEP, STIFFNESS, casing, slide};
+    let largest = |history: &sliding::History| history.changes().into_iter().fold(0.0, f64::max);
+    let facets = slide(&casing(Closure::Smooth, Interpolation::Facets));
+    let free = slide(&casing(Closure::FreeEnds, Interpolation::Spline));
+    let smooth = slide(&casing(Closure::Smooth, Interpolation::Spline));
+    // Once per border: the radial velocity turns from +v tan(π/n) to −v tan(π/n).
+    let kicks = facets.force.iter().filter(|force| **force > 1e4).count();
+    assert!((AROUND - 1..=2 * AROUND).contains(&kicks), "{kicks} kicks");
+    let half = TAU / (2 * AROUND) as f64;
+    let impulse: f64 = facets.force.iter().filter(|force| **force > 5e3).map(|force| force * STEP).sum();
+    let expected = 2.0 * MASS * SPEED * sliding::RADIUS * half.tan() / half.cos();
+    let relative = impulse / expected / AROUND as f64 - 1.0;
+    println!("impulse per border {expected:.4e} N·s; found {relative:+.2e} relative to it");
+    assert!(relative.abs() < 0.05, "{relative}");
+    // The spline leaves the force of the spring, to the depth that it is off the circle.
+    let [least, most] = smooth.range();
+    let ripple = 1.5 * STIFFNESS * 6.1e-7;
+    assert!(least > STIFFNESS * INTERFERENCE - ripple && most < STIFFNESS * INTERFERENCE + ripple, "{least}..{most}");
+    println!("largest changes: {:.3e} {:.3e} {:.3e} N", largest(&facets), largest(&free), largest(&smooth));
+    assert!(largest(&smooth) < 1e-2 && largest(&facets) > 6e4 && largest(&free) > 3e4);
+    // Far from the seam both closures are the same.
+    let far = |history: &sliding::History| history.changes()[100..5000].iter().copied().fold(0.0, f64::max);
+    assert!(far(&free) < 2e-2, "{:e}", far(&free));
 }

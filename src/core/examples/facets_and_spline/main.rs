@@ -16,7 +16,7 @@ use tiprub_core::settings::{Closure, Interpolation};
 
 const KINDS: [(&str, &str, Closure, Interpolation); 3] = [
     ("facets", "#d67018", Closure::Smooth, Interpolation::Facets),
-    ("spline, free ends", "#248c76", Closure::FreeEnds, Interpolation::Spline),
+    ("spline, free ends at 180°", "#248c76", Closure::FreeEnds, Interpolation::Spline),
     ("spline, smooth", "#1f5da0", Closure::Smooth, Interpolation::Spline),
 ];
 
@@ -28,7 +28,7 @@ fn main() -> std::io::Result<()> {
     for ((name, ..), history) in KINDS.iter().zip(&histories) {
         let largest = history.changes().into_iter().fold(0.0, f64::max);
         let [least, most] = history.range();
-        println!("{name:>18}: force {least:.2} to {most:.2} N, largest change in one step {largest:.3e} N");
+        println!("{name:>26}: force {least:.2} to {most:.2} N, largest change in one step {largest:.3e} N");
     }
     std::fs::write(path(0, "facets-and-spline.csv"), table(&histories))?;
     std::fs::write(path(1, "facets-and-spline.svg"), picture(&histories))
@@ -59,7 +59,7 @@ fn picture(histories: &[History; 3]) -> String {
         },
         Panel {
             label: "change per step (N)",
-            range: [-6.0, 6.0],
+            range: [-4.0, 6.0],
             spacing: 2.0,
             logarithmic: true,
             series: series(&changes),

@@ -7,7 +7,7 @@ const LEFT: f64 = 92.0;
 const RIGHT: f64 = 12.0;
 const INK: &str = "#343a42";
 const GRID: &str = "#e8ebef";
-const BUCKETS: usize = 700;
+const BUCKETS: usize = 540;
 
 /// One line.
 pub struct Series<'a> {
@@ -27,7 +27,7 @@ pub struct Panel<'a> {
     pub range: [f64; 2],
     /// Distance of the grid lines.
     pub spacing: f64,
-    /// Draw decimal logarithms.
+    /// Draw decimal logarithms, and of each bucket the largest value only.
     pub logarithmic: bool,
     /// Lines, drawn in this order.
     pub series: Vec<Series<'a>>,
@@ -35,8 +35,8 @@ pub struct Panel<'a> {
 
 /// Panels above each other over a common axis in degrees, 0 to 360.
 pub fn draw(angles: &[f64], panels: &[Panel<'_>], title: &str) -> String {
-    let (height, gap) = (230.0, 62.0);
-    let total = 40.0 + (height + gap) * panels.len() as f64;
+    let (height, gap) = (230.0, 84.0);
+    let total = 40.0 + (height + gap) * panels.len() as f64 - 32.0;
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {total}\" font-family=\"sans-serif\" \
          font-size=\"14\" fill=\"{INK}\">\n<title>{title}</title>\n<rect width=\"{WIDTH}\" height=\"{total}\" fill=\"#fff\"/>\n"
@@ -117,14 +117,20 @@ fn draw_legend(svg: &mut String, panel: &Panel<'_>, top: f64) {
     }
 }
 
-/// Least and largest value of each bucket, so that no peak is lost.
+/// Least and largest value of each bucket in their order, so that no peak is lost.
 fn path(angles: &[f64], values: &[f64], panel: &Panel<'_>, top: f64, height: f64) -> String {
     let bucket = values.len().div_ceil(BUCKETS);
     let mut path = String::new();
     for (angles, values) in angles.chunks(bucket).zip(values.chunks(bucket)) {
         let by_value = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
-        let ends = [(0..values.len()).min_by(by_value), (0..values.len()).max_by(by_value)].map(|end| end.unwrap_or(0));
-        for index in [ends[0].min(ends[1]), ends[0].max(ends[1])] {
+        let largest = (0..values.len()).max_by(by_value).unwrap_or(0);
+        let least = (0..values.len()).min_by(by_value).unwrap_or(0);
+        let mut ends = vec![largest];
+        if !panel.logarithmic && least != largest {
+            ends.push(least);
+        }
+        ends.sort_unstable();
+        for index in ends {
             let command = if path.is_empty() { 'M' } else { 'L' };
             let _ = write!(path, "{command}{:.1} {:.1}", x_of(angles[index]), y_of(values[index], panel, top, height));
         }

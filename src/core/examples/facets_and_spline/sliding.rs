@@ -48,10 +48,10 @@ impl History {
     }
 }
 
-/// The casing: three rings of [`AROUND`] points.
+/// The casing: three rings of [`AROUND`] points, the first at 180°.
 pub fn casing(closure: Closure, interpolation: Interpolation) -> SurfaceSpline {
     let point = |index: usize| {
-        let (sine, cosine) = libm::sincos(TAU * (index % AROUND) as f64 / AROUND as f64);
+        let (sine, cosine) = libm::sincos(TAU * (0.5 + (index % AROUND) as f64 / AROUND as f64));
         [RADIUS * cosine, RADIUS * sine, 0.01 * (index / AROUND) as f64]
     };
     let data: Vec<[f64; 3]> = (0..3 * AROUND).map(point).collect();

@@ -15,6 +15,8 @@
 //! [`SurfaceSpline::weights`] and [`SurfaceSpline::transfer`], the transposes of the same two maps: virtual work is
 //! exact.
 
+mod creases;
+mod foot;
 mod interpolation;
 mod patch;
 mod projection;
