@@ -111,11 +111,16 @@ impl SurfaceSpline {
         }
     }
 
+    #[inline(always)]
+    fn assert_exists(&self, place: Place) {
+        assert!(place.patch[0] < self.around && place.patch[1] < self.along - 1, "no such patch");
+    }
+
     /// Without `SECOND` the second derivatives are left zero.
     #[inline(always)]
     pub(super) fn evaluate_bicubic<const SECOND: bool>(&self, place: Place) -> Evaluation {
         let ([p, q], width) = (place.patch, self.around + 3);
-        assert!(p < self.around && q + 1 < self.along, "patch {:?} exists", place.patch);
+        self.assert_exists(place);
         let (around, along) = (cubic(place.s), cubic(place.t));
         let orders = if SECOND { 3 } else { 2 };
         let mut rows = [[[0.0; 4]; 4]; 3];
@@ -140,7 +145,7 @@ impl SurfaceSpline {
 
     fn evaluate_bilinear(&self, place: Place) -> Evaluation {
         let (width, s, t) = (self.around + 3, place.s, place.t);
-        assert!(place.patch[0] < self.around && place.patch[1] + 1 < self.along, "patch {:?} exists", place.patch);
+        self.assert_exists(place);
         let start = (place.patch[1] + 1) * width + place.patch[0] + 1;
         let at = |slot: usize| three(self.mesh[start + slot]);
         let (a, b, c, d) = (at(0), at(1), at(width), at(width + 1));
@@ -161,7 +166,7 @@ impl SurfaceSpline {
     /// # Panics
     /// A patch that does not exist.
     pub fn weights(&self, place: Place) -> Weights {
-        assert!(place.patch[0] < self.around && place.patch[1] + 1 < self.along, "patch {:?} exists", place.patch);
+        self.assert_exists(place);
         let (around, along) = match self.interpolation {
             Interpolation::Spline => (self.fold_around(place), self.fold_along(place)),
             Interpolation::Facets => self.fold_facet(place),
