@@ -531,17 +531,8 @@ fn a_node_on_the_edge_is_in_and_one_beyond_it_is_out() {
 
 #[test]
 fn a_round_casing_is_met_to_fourth_order() {
-    let error = |around: usize| {
-        let surface = spline(&data(around, 3, round), around, 3);
-        let mut worst: f64 = 0.0;
-        for index in 0..4000 {
-            let point = surface.evaluate(place(index % around, 1, index as f64 / 4000.0, 0.4)).point;
-            worst = worst.max((libm::hypot(point[0], point[1]) - RADIUS).abs());
-        }
-        worst
-    };
+    let error = |around| off_the_circle(around, Closure::Smooth, Interpolation::Spline);
     let errors: Vec<f64> = [24, 36, 72, 144, 288].into_iter().map(error).collect();
-    println!("radius error of a circle of 0.25 m for 24, 36, 72, 144, 288 points: {errors:.3?}");
     for (count, error) in [24, 36, 72, 144, 288].into_iter().zip(&errors) {
         println!("  {count:>3} points: {:.3e} m = {:.3e} R", error, error / RADIUS);
     }
@@ -549,6 +540,28 @@ fn a_round_casing_is_met_to_fourth_order() {
         .map(|(a, b, ratio)| (errors[a] / errors[b]).ln() / ratio.ln());
     println!("  rates {rates:.3?}");
     assert!(rates.iter().all(|rate| (rate - 4.0).abs() < 0.05), "{rates:?}");
+}
+
+/// Largest distance from the circle, of all patches.
+fn off_the_circle(around: usize, closure: Closure, interpolation: Interpolation) -> f64 {
+    let surface = SurfaceSpline::new(&data(around, 3, round), around, 3, closure, interpolation).unwrap();
+    let radius = |index: usize| {
+        let point = surface.evaluate(place(index % around, 1, (index / around) as f64 / 100.0, 0.4)).point;
+        libm::hypot(point[0], point[1])
+    };
+    (0..100 * around).map(|index| (radius(index) - RADIUS).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn free_ends_and_facets_miss_a_circle_by_the_second_order() {
+    let kinds = [(Closure::FreeEnds, Interpolation::Spline), (Closure::Smooth, Interpolation::Facets)];
+    for (closure, interpolation) in kinds {
+        let errors = [36, 72].map(|around| off_the_circle(around, closure, interpolation));
+        println!("{closure:?}, {interpolation:?}: {:.3e} m with 36 points, {:.3e} m with 72", errors[0], errors[1]);
+        assert!(((errors[0] / errors[1]).log2() - 2.0).abs() < 0.02);
+    }
+    let (sagitta, facets) = (RADIUS * (1.0 - (TAU / 72.0).cos()), off_the_circle(36, kinds[1].0, kinds[1].1));
+    assert!((facets - sagitta).abs() < 1e-15, "{facets} is the height of the arc, {sagitta}");
 }
 
 #[test]
@@ -622,6 +635,12 @@ fn hopeless_nodes_are_lost_without_panic() {
         let start = place(0, 0, 0.5, 0.5);
         for x in [[f64::NAN, 0.0, 0.0], [0.1, f64::INFINITY, 0.0], [0.1, 0.1, f64::NEG_INFINITY]] {
             assert_eq!(surface.project(x, start), Projection::Lost);
+        }
+        assert_eq!(surface.project([0.2, 0.1, 0.0], place(0, 0, f64::NAN, 0.5)), Projection::Lost);
+        let x = node(&surface, start, 1e-4);
+        for (s, t) in [(7.3, 0.5), (0.5, -40.0), (f64::INFINITY, f64::NEG_INFINITY), (1.01, 1.01)] {
+            let gap = found(surface.project(x, place(0, 0, s, t))).3;
+            assert!((gap - 1e-4).abs() < 4e-16, "started from a place that is none: {gap:e}");
         }
         let mut folded = surface.clone();
         folded.set_control_points(&vec![[0.1, 0.2, 0.3]; surface.around() * surface.along()]);

@@ -20,7 +20,7 @@ pub struct Evaluation {
     pub d_tt: [f64; 3],
 }
 
-/// Control points that act on a place: S = Σ values[k] · Q[indices[k]], k < len, for every Q.
+/// Control points that act on a place: S = Σ `values[k]` · Q of `indices[k]`, k < `len`, for every Q.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weights {
     /// Control points, each at most once.
@@ -149,14 +149,13 @@ impl SurfaceSpline {
         let start = (place.patch[1] + 1) * width + place.patch[0] + 1;
         let at = |slot: usize| three(self.mesh[start + slot]);
         let (a, b, c, d) = (at(0), at(1), at(width), at(width + 1));
-        let each = |value: &dyn Fn(usize) -> f64| [value(0), value(1), value(2)];
         let r = 1.0 - s;
         Evaluation {
-            point: each(&|i| (1.0 - t) * (r * a[i] + s * b[i]) + t * (r * c[i] + s * d[i])),
-            d_s: each(&|i| (1.0 - t) * (b[i] - a[i]) + t * (d[i] - c[i])),
-            d_t: each(&|i| r * (c[i] - a[i]) + s * (d[i] - b[i])),
+            point: std::array::from_fn(|i| (1.0 - t) * (r * a[i] + s * b[i]) + t * (r * c[i] + s * d[i])),
+            d_s: std::array::from_fn(|i| (1.0 - t) * (b[i] - a[i]) + t * (d[i] - c[i])),
+            d_t: std::array::from_fn(|i| r * (c[i] - a[i]) + s * (d[i] - b[i])),
             d_ss: [0.0; 3],
-            d_st: each(&|i| (d[i] - c[i]) - (b[i] - a[i])),
+            d_st: std::array::from_fn(|i| (d[i] - c[i]) - (b[i] - a[i])),
             d_tt: [0.0; 3],
         }
     }

@@ -62,7 +62,8 @@ impl SurfaceSpline {
         if !x.iter().all(|value| value.is_finite()) {
             return Projection::Lost;
         }
-        let Some(mut foot) = self.descend(x, guess) else { return Projection::Lost };
+        let (s, t) = (guess.s.clamp(0.0, 1.0), guess.t.clamp(-EDGE_TOLERANCE, 1.0 + EDGE_TOLERANCE));
+        let Some(mut foot) = self.descend(x, Place { s, t, ..guess }) else { return Projection::Lost };
         if self.has_creases() {
             match self.search_sheets(x, foot) {
                 Some(closest) => foot = closest,
