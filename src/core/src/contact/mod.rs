@@ -6,5 +6,4 @@ pub mod gap;
 pub mod layout;
 pub mod solver;
 pub mod spline;
-pub mod spline_gap;
 pub mod surface;

@@ -30,7 +30,7 @@ const MIRROR: f64 = -0.25;
 
 impl Line {
     /// No interpolation problem.
-    pub fn facets(_count: usize) -> Self {
+    pub fn facets() -> Self {
         Self { kind: Kind::Facets, pivots: Vec::new() }
     }
 

@@ -15,6 +15,8 @@
 //! [`SurfaceSpline::weights`] and [`SurfaceSpline::transfer`], the transposes of the same two maps: virtual work is
 //! exact.
 
+mod creases;
+mod foot;
 mod interpolation;
 mod patch;
 mod projection;
@@ -86,7 +88,7 @@ impl SurfaceSpline {
             return Err(Error::invalid("surface spline", format!("{counts}, but {} data points", data.len()), remedy));
         }
         let lines = match interpolation {
-            Interpolation::Facets => [Line::facets(around), Line::facets(along)],
+            Interpolation::Facets => [Line::facets(), Line::facets()],
             Interpolation::Spline => {
                 let ring = match closure {
                     Closure::Smooth => Line::closed(around),

@@ -20,7 +20,7 @@ pub struct Evaluation {
     pub d_tt: [f64; 3],
 }
 
-/// Control points that act on a place: S = Σ values[k] · Q[indices[k]], k < len, for every Q.
+/// Control points that act on a place: S = Σ `values[k]` · Q of `indices[k]`, k < `len`, for every Q.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weights {
     /// Control points, each at most once.
@@ -111,10 +111,16 @@ impl SurfaceSpline {
         }
     }
 
+    #[inline(always)]
+    fn assert_exists(&self, place: Place) {
+        assert!(place.patch[0] < self.around && place.patch[1] < self.along - 1, "no such patch");
+    }
+
     /// Without `SECOND` the second derivatives are left zero.
     #[inline(always)]
     pub(super) fn evaluate_bicubic<const SECOND: bool>(&self, place: Place) -> Evaluation {
         let ([p, q], width) = (place.patch, self.around + 3);
+        self.assert_exists(place);
         let (around, along) = (cubic(place.s), cubic(place.t));
         let orders = if SECOND { 3 } else { 2 };
         let mut rows = [[[0.0; 4]; 4]; 3];
@@ -139,17 +145,17 @@ impl SurfaceSpline {
 
     fn evaluate_bilinear(&self, place: Place) -> Evaluation {
         let (width, s, t) = (self.around + 3, place.s, place.t);
+        self.assert_exists(place);
         let start = (place.patch[1] + 1) * width + place.patch[0] + 1;
         let at = |slot: usize| three(self.mesh[start + slot]);
         let (a, b, c, d) = (at(0), at(1), at(width), at(width + 1));
-        let each = |value: &dyn Fn(usize) -> f64| [value(0), value(1), value(2)];
         let r = 1.0 - s;
         Evaluation {
-            point: each(&|i| (1.0 - t) * (r * a[i] + s * b[i]) + t * (r * c[i] + s * d[i])),
-            d_s: each(&|i| (1.0 - t) * (b[i] - a[i]) + t * (d[i] - c[i])),
-            d_t: each(&|i| r * (c[i] - a[i]) + s * (d[i] - b[i])),
+            point: std::array::from_fn(|i| (1.0 - t) * (r * a[i] + s * b[i]) + t * (r * c[i] + s * d[i])),
+            d_s: std::array::from_fn(|i| (1.0 - t) * (b[i] - a[i]) + t * (d[i] - c[i])),
+            d_t: std::array::from_fn(|i| r * (c[i] - a[i]) + s * (d[i] - b[i])),
             d_ss: [0.0; 3],
-            d_st: each(&|i| (d[i] - c[i]) - (b[i] - a[i])),
+            d_st: std::array::from_fn(|i| (d[i] - c[i]) - (b[i] - a[i])),
             d_tt: [0.0; 3],
         }
     }
@@ -159,7 +165,7 @@ impl SurfaceSpline {
     /// # Panics
     /// A patch that does not exist.
     pub fn weights(&self, place: Place) -> Weights {
-        assert!(place.patch[0] < self.around && place.patch[1] + 1 < self.along, "patch {:?} exists", place.patch);
+        self.assert_exists(place);
         let (around, along) = match self.interpolation {
             Interpolation::Spline => (self.fold_around(place), self.fold_along(place)),
             Interpolation::Facets => self.fold_facet(place),
