@@ -242,6 +242,13 @@ impl GapLaw {
         }
     }
 
+    /// The rotor has turned by `angle` (rad) since the last evaluation: closest points are sought from there.
+    pub fn turn(&mut self, angle: f64) {
+        if let Self::Spline(law) = self {
+            law.turned = angle / std::f64::consts::TAU;
+        }
+    }
+
     /// Largest displacement (m) that counts as small: a tenth of the smallest radius; no limit for fixed obstacles.
     pub fn largest_displacement(&self) -> f64 {
         let radii = self.layout().map(|layout| layout.radii.iter());

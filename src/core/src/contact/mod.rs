@@ -6,4 +6,5 @@ pub mod gap;
 pub mod layout;
 pub mod solver;
 pub mod spline;
+pub mod spline_gap;
 pub mod surface;

@@ -26,6 +26,8 @@ pub struct SplineGap {
     /// Control points in use.
     control: Vec<[f64; 3]>,
     factor: f64,
+    /// Revolutions of the rotor over the step under way.
+    pub turned: f64,
 }
 
 impl SplineGap {
@@ -38,7 +40,17 @@ impl SplineGap {
         angular_scale: f64,
     ) -> Self {
         let round = surface.control_points().to_vec();
-        Self { layout, nominal_clearance, surface, control: round.clone(), round, shape, angular_scale, factor: 0.0 }
+        Self {
+            layout,
+            nominal_clearance,
+            surface,
+            control: round.clone(),
+            round,
+            shape,
+            angular_scale,
+            factor: 0.0,
+            turned: 0.0,
+        }
     }
 
     /// Move the control points: shape factor, and displacements `moved` (m, three per control point; empty = rigid).
@@ -97,7 +109,8 @@ impl SplineGap {
                 self.layout.axial[node] + local[2] + axial,
             ];
             let point = frame.fixed(place);
-            let start = guess.map_or_else(|| self.surface.locate(point), |places| places[index]);
+            let start = guess
+                .map_or_else(|| self.surface.locate(point), |places| self.surface.advance(places[index], self.turned));
             match self.surface.project(point, start) {
                 Projection::Found { place, normal, gap: found, .. } => {
                     *gap = found;

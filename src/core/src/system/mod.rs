@@ -456,6 +456,7 @@ impl System {
         std::mem::swap(&mut self.geometry_before, &mut self.state.geometry);
         self.state.angle_before = self.state.angle;
         self.state.angle = drive.rotor_angle;
+        self.law.turn(self.state.angle - self.state.angle_before);
         self.evaluate_gaps(drive, true);
         self.retire_events();
         if self.slave.is_some() {
