@@ -267,11 +267,11 @@ impl GapLaw {
 
     /// Prescribed velocity of the master relative to the slave (m/s), without deformation; `index` is
     /// `node · lanes + lane`.
-    pub fn sliding_velocity(&self, index: usize, drive: &Drive) -> [f64; 3] {
+    pub fn sliding_velocity(&self, node: usize, index: usize, drive: &Drive) -> [f64; 3] {
         match self {
             Self::Fixed(law) => law.sliding[index],
-            Self::Revolution(RevolutionGap { layout, .. }) => layout.rigid_velocity(index, drive),
-            Self::Spline(law) => law.layout.rigid_velocity(index, drive),
+            Self::Revolution(RevolutionGap { layout, .. }) => layout.rigid_velocity(node, index, drive),
+            Self::Spline(law) => law.layout.rigid_velocity(node, index, drive),
         }
     }
 

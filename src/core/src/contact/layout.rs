@@ -60,8 +60,7 @@ impl Layout {
     }
 
     /// Velocity of an undeformed node with the rotor (m/s), in the directions of its own frame.
-    pub fn rigid_velocity(&self, index: usize, drive: &Drive) -> [f64; 3] {
-        let node = index / self.lanes;
+    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &Drive) -> [f64; 3] {
         let spin = drive.speed * self.radii[node];
         let [x, y, z] = drive.shaft_velocity;
         if x == 0.0 && y == 0.0 {

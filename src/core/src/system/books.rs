@@ -33,12 +33,12 @@ impl System {
         let geometry = if before { &self.geometry_before } else { &self.state.geometry };
         let normal = geometry.normal_at(index);
         let angle = if before { self.state.angle_before } else { self.state.angle };
-        let moved = self.relative_motion(index, geometry, angle);
+        let moved = self.relative_motion(event, index, geometry, angle);
         let tangential: [f64; 3] = std::array::from_fn(|i| event.force[i] - event.normal * normal[i]);
         let approach = -0.5 * (self.state.gap[index] - self.gap_oldest[index]);
         let closing = event.normal * approach;
         let pushed = event.normal * dot(normal, moved) + closing;
-        let supplied = -dot(tangential, self.law.sliding_velocity(index, drive)) * self.bank.step();
+        let supplied = -dot(tangential, self.law.sliding_velocity(event.node, index, drive)) * self.bank.step();
         let heat = supplied - dot(tangential, moved);
         let ledger = &mut self.state.ledger;
         let worn = event.coating * approach;
@@ -51,9 +51,9 @@ impl System {
     }
 
     /// Half the displacement of a node relative to the slave over the last two steps (m), in its own directions.
-    fn relative_motion(&self, index: usize, geometry: &Geometry, angle: f64) -> [f64; 3] {
+    fn relative_motion(&self, event: &ContactEvent, index: usize, geometry: &Geometry, angle: f64) -> [f64; 3] {
         let lanes = self.bank.lanes();
-        let (node, sector) = (index / lanes, index % lanes);
+        let (node, sector) = (event.node, event.sector);
         let mut moved: [f64; 3] = std::array::from_fn(|component| {
             let row = (3 * node + component) * lanes + sector;
             0.5 * (self.bank.displacement()[row] - self.displacement_oldest[row])

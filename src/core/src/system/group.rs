@@ -7,6 +7,17 @@ use crate::settings::Solver;
 /// Nodes outside a group count as penetrating beyond this fraction of the largest gap of the group.
 const VIOLATED_FRACTION: f64 = 1e-13;
 
+/// A contact node of one sector.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Member {
+    /// Contact node.
+    pub node: usize,
+    /// Sector.
+    pub sector: usize,
+    /// `node · lanes + sector`.
+    pub index: usize,
+}
+
 /// Forces of one group.
 #[derive(Debug, Clone, Default)]
 pub struct Solution {
@@ -40,9 +51,9 @@ impl System {
             // NaN counts as touching, and is found out there.
             if self.lowest[sector] < 0.0 || self.lowest[sector].is_nan() {
                 self.members.clear();
-                self.members.extend((0..nodes).map(|node| node * lanes + sector));
+                self.members.extend((0..nodes).map(|node| Member { node, sector, index: node * lanes + sector }));
                 self.solve_group(drive)?;
-                self.apply(drive);
+                self.apply();
             }
         }
         Ok(())
@@ -66,8 +77,8 @@ impl System {
         loop {
             self.members.clear();
             for sector in 0..self.bank.sectors() {
-                let places = (0..self.law.nodes()).map(|node| node * lanes + sector);
-                self.members.extend(places.filter(|index| self.chosen[*index]));
+                let places = (0..self.law.nodes()).map(|node| Member { node, sector, index: node * lanes + sector });
+                self.members.extend(places.filter(|member| self.chosen[member.index]));
             }
             self.solve_group(drive)?;
             self.respond(drive);
@@ -75,7 +86,7 @@ impl System {
                 break;
             }
         }
-        self.apply(drive);
+        self.apply();
         Ok(())
     }
 
@@ -92,7 +103,7 @@ impl System {
     }
 
     fn add_violated(&mut self) -> bool {
-        let scale = self.members.iter().fold(0.0, |scale: f64, index| scale.max(self.state.gap[*index].abs()));
+        let scale = self.members.iter().fold(0.0, |scale: f64, member| scale.max(self.state.gap[member.index].abs()));
         let mut found = false;
         for index in 0..self.chosen.len() {
             let after = self.state.gap[index] + self.response[index];
@@ -106,14 +117,13 @@ impl System {
 
     /// Fill and solve the problem of `members`.
     fn solve_group(&mut self, drive: &Drive) -> Result<(), StepFailure> {
-        let lanes = self.bank.lanes();
-        for &index in &self.members {
-            let (node, gap) = (index / lanes, self.state.gap[index]);
+        for &Member { node, sector, index } in &self.members {
+            let gap = self.state.gap[index];
             if !gap.is_finite() {
                 return Err(StepFailure::NonFinite);
             }
             if gap < 0.0 && !self.law.is_plausible(node, gap, self.state.geometry.normal_at(index)) {
-                return Err(StepFailure::Implausible { sector: index % lanes });
+                return Err(StepFailure::Implausible { sector });
             }
         }
         self.fill_directions(drive);
@@ -128,14 +138,15 @@ impl System {
         if self.solution.values().iter().any(|value| !value.is_finite()) {
             return Err(StepFailure::NonFinite);
         }
-        if solved { Ok(()) } else { Err(StepFailure::Unsolved { sector: self.members[0] % lanes }) }
+        if solved { Ok(()) } else { Err(StepFailure::Unsolved { sector: self.members[0].sector }) }
     }
 
     /// Rows n and columns n − µt per contact; n, t₁, t₂ for both where contacts may stick.
     fn fill_directions(&mut self, drive: &Drive) {
         let friction = self.settings.friction;
         for member in 0..self.members.len() {
-            let index = self.members[member];
+            let at = self.members[member];
+            let index = at.index;
             let normal = self.state.geometry.normal_at(index);
             if self.settings.solver == Solver::Coulomb {
                 let [first, second] = tangents(normal);
@@ -146,8 +157,8 @@ impl System {
                 continue;
             }
             let slip = if friction > 0.0 {
-                let mut velocity = self.law.sliding_velocity(index, drive);
-                let moved = self.slip_of_deformation(index);
+                let mut velocity = self.law.sliding_velocity(at.node, index, drive);
+                let moved = self.slip_of_deformation(at);
                 for (value, moved) in velocity.iter_mut().zip(moved) {
                     *value += moved / self.bank.step();
                 }
@@ -161,9 +172,7 @@ impl System {
     }
 
     /// Displacement of a node relative to the slave over the step, prediction included (m), without rigid motion.
-    fn slip_of_deformation(&self, index: usize) -> [f64; 3] {
-        let lanes = self.bank.lanes();
-        let (node, sector) = (index / lanes, index % lanes);
+    fn slip_of_deformation(&self, Member { node, sector, index }: Member) -> [f64; 3] {
         let mut moved: [f64; 3] = std::array::from_fn(|component| {
             let row = 3 * node + component;
             self.bank.row(row, sector) - self.bank.row_before(row, sector)
@@ -178,7 +187,7 @@ impl System {
 
     /// W = C_Nᵀ A⁻¹ C_NT of the group: sectors by their flexibility, coupled through the slave's modes.
     fn fill_delassus(&mut self) {
-        let (lanes, nodes, per) = (self.bank.lanes(), self.law.nodes(), self.directions());
+        let (nodes, per) = (self.law.nodes(), self.directions());
         let matrix = match (&mut self.coating, &mut self.coulomb) {
             (Some((_, problem)), _) => {
                 problem.clear();
@@ -187,16 +196,15 @@ impl System {
             (None, Some(solver)) if self.settings.solver == Solver::Coulomb => &mut solver.delassus,
             _ => &mut self.problem.delassus,
         };
-        for (member, &column) in self.members.iter().enumerate() {
-            let (column_node, sector) = (column / lanes, column % lanes);
+        for (member, &Member { node: column_node, sector, .. }) in self.members.iter().enumerate() {
             let flexibility = self.bank.flexibility(sector).as_slice();
             let [first, second, third] =
                 std::array::from_fn(|j| &flexibility[(3 * column_node + j) * 3 * nodes..][..3 * nodes]);
             for along in per * member..per * (member + 1) {
                 let direction = self.column_directions[along];
-                for (other, &row) in self.members.iter().enumerate() {
-                    let at = 3 * (row / lanes);
-                    let same = row % lanes == sector;
+                for (other, row) in self.members.iter().enumerate() {
+                    let at = 3 * row.node;
+                    let same = row.sector == sector;
                     let moved: [f64; 3] = std::array::from_fn(|i| {
                         let i = at + i;
                         first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2]
@@ -208,7 +216,7 @@ impl System {
             }
         }
         if let (Some(slave), GapLaw::Spline(law)) = (&mut self.slave, &self.law) {
-            for (member, &index) in self.members.iter().enumerate() {
+            for (member, &Member { index, .. }) in self.members.iter().enumerate() {
                 let frame = law.frame(index, self.state.angle);
                 let span = per * member..per * (member + 1);
                 let (rows, columns) = (&self.row_directions[span.clone()], &self.column_directions[span]);
@@ -226,7 +234,7 @@ impl System {
     fn solve_normal(&mut self) -> bool {
         let size = self.members.len();
         self.problem.set_size(size);
-        for (member, &index) in self.members.iter().enumerate() {
+        for (member, &Member { index, .. }) in self.members.iter().enumerate() {
             self.problem.gaps[member] = self.state.gap[index];
             // Closed in the last step: the likeliest guess for this one.
             self.problem.active[member] = self.state.gap_before[index] <= 0.0;
@@ -245,15 +253,14 @@ impl System {
         let Some((coating, problem)) = &mut self.coating else { return false };
         for blade in self.members.chunks_exact(nodes) {
             if let Some(layout) = self.law.layout() {
-                for (angle, index) in self.angles.iter_mut().zip(blade) {
-                    let lane = index % lanes;
-                    let tangential = self.bank.displacement()[(3 * (index / lanes) + 1) * lanes + lane];
-                    *angle = layout.angles[*index] + drive.rotor_angle + tangential * layout.per_radius[index / lanes];
+                for (angle, at) in self.angles.iter_mut().zip(blade) {
+                    let tangential = self.bank.displacement()[(3 * at.node + 1) * lanes + at.sector];
+                    *angle = layout.angles[at.index] + drive.rotor_angle + tangential * layout.per_radius[at.node];
                 }
             }
             coating.locate(problem, &self.angles);
         }
-        for (member, &index) in self.members.iter().enumerate() {
+        for (member, &Member { index, .. }) in self.members.iter().enumerate() {
             problem.gaps[member] = self.state.gap[index];
             problem.closed[member] = self.state.gap_before[index] <= -coating.thickness();
         }
@@ -272,10 +279,10 @@ impl System {
     fn solve_coulomb(&mut self, drive: &Drive) -> bool {
         let (lanes, step) = (self.bank.lanes(), self.bank.step());
         for member in 0..self.members.len() {
-            let index = self.members[member];
-            let (node, sector) = (index / lanes, index % lanes);
-            let sliding = self.law.sliding_velocity(index, drive);
-            let moved = self.slip_of_deformation(index);
+            let at = self.members[member];
+            let Member { node, sector, index } = at;
+            let sliding = self.law.sliding_velocity(node, index, drive);
+            let moved = self.slip_of_deformation(at);
             let slip: [f64; 3] = std::array::from_fn(|i| sliding[i] * step + moved[i]);
             let last: [f64; 3] = std::array::from_fn(|i| self.force_before[(3 * node + i) * lanes + sector]);
             let Some(solver) = &mut self.coulomb else { return false };
@@ -317,7 +324,7 @@ impl System {
         let (lanes, nodes) = (self.bank.lanes(), self.law.nodes());
         self.response.fill(0.0);
         for member in 0..self.members.len() {
-            let (column, sector) = (self.members[member] / lanes, self.members[member] % lanes);
+            let Member { node: column, sector, .. } = self.members[member];
             let force = self.force_on(member);
             let flexibility = self.bank.flexibility(sector);
             for node in 0..nodes {
@@ -338,8 +345,7 @@ impl System {
     }
 
     /// Let the solution act on both structures, and record it.
-    fn apply(&mut self, _drive: &Drive) {
-        let lanes = self.bank.lanes();
+    fn apply(&mut self) {
         if self.slave.is_some() {
             for (gap, response) in self.state.gap.iter_mut().zip(&self.response) {
                 *gap += response;
@@ -347,13 +353,13 @@ impl System {
         }
         let mut next = 0;
         while next < self.members.len() {
-            let sector = self.members[next] % lanes;
+            let sector = self.members[next].sector;
             self.force.fill(0.0);
-            while next < self.members.len() && self.members[next] % lanes == sector {
-                let index = self.members[next];
+            while next < self.members.len() && self.members[next].sector == sector {
+                let Member { node, index, .. } = self.members[next];
                 self.state.gap[index] = self.corrected[next];
                 let force = self.force_on(next);
-                self.force[3 * (index / lanes)..][..3].copy_from_slice(&force);
+                self.force[3 * node..][..3].copy_from_slice(&force);
                 self.record(next, force);
                 next += 1;
             }
@@ -369,12 +375,11 @@ impl System {
 
     fn record(&mut self, member: usize, force: [f64; 3]) {
         let lanes = self.bank.lanes();
-        let index = self.members[member];
+        let Member { node, sector, index } = self.members[member];
         let normal = self.solution.values[self.directions() * member];
         if normal == 0.0 {
             return;
         }
-        let (node, sector) = (index / lanes, index % lanes);
         self.state.multiplier[index] = normal;
         self.state.coating_force[index] = self.coating_share[member];
         for (component, value) in force.iter().enumerate() {

@@ -13,7 +13,7 @@ use crate::dynamics::modal::ModalModel;
 use crate::ledger::Ledger;
 use crate::persist::{Persist, Reader, Writer, persist_fields};
 use crate::settings::{Scheme, Solver};
-pub use group::Solution;
+pub use group::{Member, Solution};
 pub use slave::Slave;
 
 /// Denormals are flushed every this many steps.
@@ -142,8 +142,8 @@ pub struct System {
     events: Vec<ContactEvent>,
     events_before: Vec<ContactEvent>,
     lowest: Vec<f64>,
-    /// The group being solved: nodes `node · lanes + lane`, sector by sector.
-    members: Vec<usize>,
+    /// The group being solved, sector by sector.
+    members: Vec<Member>,
     chosen: Vec<bool>,
     row_directions: Vec<[f64; 3]>,
     column_directions: Vec<[f64; 3]>,
@@ -518,7 +518,7 @@ impl System {
     /// The contacts of the last step become those of the step before.
     fn retire_events(&mut self) {
         let lanes = self.bank.lanes();
-        if self.coulomb.is_some() {
+        if self.settings.solver == Solver::Coulomb {
             self.force_before.copy_from_slice(&self.state.force);
         }
         std::mem::swap(&mut self.events, &mut self.events_before);

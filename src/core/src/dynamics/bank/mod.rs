@@ -453,6 +453,26 @@ impl ModalBank {
 
     /// Add `correction` to the modes of one sector.
     fn move_modes(&mut self, sector: usize, with_loss: bool) {
+        let correction = std::mem::take(&mut self.correction);
+        self.move_each(sector, with_loss, correction.iter(), |_, correction| *correction);
+        self.correction = correction;
+    }
+
+    /// Add c φᵀf to the modes of one sector.
+    fn respond_and_move(&mut self, sector: usize, with_loss: bool) {
+        let modal_force = std::mem::take(&mut self.modal_force);
+        self.move_each(sector, with_loss, modal_force.iter(), |k, force| k.compliance * force);
+        self.modal_force = modal_force;
+    }
+
+    #[inline(always)]
+    fn move_each<'a>(
+        &mut self,
+        sector: usize,
+        with_loss: bool,
+        values: impl Iterator<Item = &'a f64>,
+        correction: impl Fn(&ModeCoefficients, &f64) -> f64,
+    ) {
         let (modes, width, set) = (self.modes(), self.width, self.set_of(sector));
         let coefficients = &self.coefficients[set * modes..][..modes];
         let start = sector / width * modes * width + sector % width;
@@ -460,9 +480,10 @@ impl ModalBank {
         let increment = self.state.increment[start..].iter_mut().step_by(width);
         let before = self.increment_before[start..].iter().step_by(width);
         let mut loss = 0.0;
-        for ((((position, increment), before), correction), coefficients) in
-            position.zip(increment).zip(before).zip(&self.correction).zip(coefficients)
+        for ((((position, increment), before), value), coefficients) in
+            position.zip(increment).zip(before).zip(values).zip(coefficients)
         {
+            let correction = correction(coefficients, value);
             if with_loss {
                 let predicted = *increment + before;
                 loss += coefficients.loss * correction * (2.0 * predicted + correction);
@@ -492,11 +513,23 @@ impl ModalBank {
     /// Correct one sector for the contact `force` on its rows (N), eq. 11 of the paper.
     pub fn correct(&mut self, sector: usize, force: &[f64], with_loss: bool) {
         self.project(force);
-        self.respond(sector);
-        self.move_modes(sector, with_loss);
+        if self.coupling.is_some() {
+            self.respond(sector);
+            self.move_modes(sector, with_loss);
+        } else {
+            self.respond_and_move(sector, with_loss);
+        }
         let lanes = self.lanes();
-        let flexibility = &self.flexibility[self.set_of(sector)];
-        for (column, value) in flexibility.as_slice().chunks_exact(self.rows).zip(force).filter(|(_, f)| **f != 0.0) {
+        let flexibility = self.flexibility[self.set_of(sector)].as_slice();
+        if self.coupling.is_none() {
+            // G is symmetric: its columns are its rows.
+            for (row, column) in flexibility.chunks_exact(self.rows).enumerate() {
+                let moved: f64 = column.iter().zip(force).map(|(entry, value)| entry * value).sum();
+                self.state.displacement[row * lanes + sector] += moved;
+            }
+            return;
+        }
+        for (column, value) in flexibility.chunks_exact(self.rows).zip(force) {
             for (row, entry) in column.iter().enumerate() {
                 self.state.displacement[row * lanes + sector] += entry * value;
             }
