@@ -9,6 +9,8 @@
 //! continuous, piecewise linear and invertible function of the prediction where the symmetric part of W is positive
 //! definite, so the line meets every combination of branches at most once.
 
+mod linear;
+
 use nalgebra::DMatrix;
 
 use super::{Branch, CellContact, Rod, number};
@@ -18,10 +20,6 @@ use crate::contact::solver::Outcome;
 const ZERO_FRACTION: f64 = 1e-12;
 /// Rounding of a depth relative to the depths it is the difference of.
 const ROUNDING: f64 = 1e-15;
-/// Pivots below this fraction of their column belong to redundant contacts (coincident nodes).
-const REDUNDANT_PIVOT: f64 = 1e-12;
-/// Share of its diagonal by which every node is softened then.
-const SOFTENING: f64 = 1e-10;
 /// Block exchanges allowed without progress before the path is followed.
 const PATIENCE: usize = 8;
 /// Golden ratio: multiples of it, without their whole part, are spread evenly.
@@ -58,6 +56,8 @@ pub struct CoatedProblem {
     corrected: Vec<f64>,
     /// Gaps and hard forces of the point reached on the path.
     reached: [Vec<f64>; 2],
+    /// Largest force on a node (N).
+    largest: f64,
     softened: bool,
     pub(super) factorisations: usize,
     /// Nodes that carry force, and where each is among them.
@@ -82,6 +82,7 @@ impl CoatedProblem {
             contacts: Vec::with_capacity(contacts),
             corrected: vec![0.0; nodes],
             reached: [vec![0.0; nodes], vec![0.0; nodes]],
+            largest: 0.0,
             softened: false,
             factorisations: 0,
             members: Vec::with_capacity(nodes),
@@ -132,7 +133,7 @@ impl CoatedProblem {
     pub fn solve(&mut self) -> Outcome {
         self.guess();
         let solved = self.exchange_blocks() || self.follow_path();
-        Outcome { solved, factorisations: self.factorisations, ..Outcome::default() }
+        Outcome { solved, factorisations: self.factorisations }
     }
 
     /// Start from the prediction and from the nodes that the caller says are closed.
@@ -243,12 +244,8 @@ impl CoatedProblem {
             .fold(0.0_f64, |depth, node| depth.max(self.gaps[*node].abs()).max(self.corrected[*node].abs()));
         let scale = depth / self.thickness + contact.plastic;
         let (_, modulus) = self.rod.line(Branch::Elastic, 0.0);
-        let idle = self.largest_force() / (contact.area * modulus);
+        let idle = self.largest / (contact.area * modulus);
         (ROUNDING * scale).max(ZERO_FRACTION * scale.min(idle))
-    }
-
-    fn largest_force(&self) -> f64 {
-        self.members.iter().fold(0.0, |largest, node| largest.max(self.coating[*node].abs() + self.hard[*node].abs()))
     }
 
     fn next_branch(&self, index: usize) -> Option<Branch> {
@@ -259,7 +256,7 @@ impl CoatedProblem {
 
     fn node_violated(&self, node: usize) -> bool {
         if self.closed[node] {
-            self.hard[node] < -ZERO_FRACTION * self.largest_force()
+            self.hard[node] < -ZERO_FRACTION * self.largest
         } else {
             let scale = self.gaps[node].abs().max(self.thickness);
             self.corrected[node] + self.thickness < -ZERO_FRACTION * scale
@@ -289,149 +286,6 @@ impl CoatedProblem {
             self.hard[node] = self.hard[node].max(0.0);
             self.gaps[node] = self.corrected[node].max(-self.thickness);
             self.closed[node] = self.hard[node] > 0.0;
-        }
-    }
-
-    /// Gaps and forces for the present branches; redundant contacts are softened first.
-    fn solve_branches(&mut self) -> bool {
-        if self.solve_linear() {
-            return true;
-        }
-        if !self.softened {
-            self.softened = true;
-            for node in 0..self.size {
-                self.delassus[(node, node)] *= 1.0 + SOFTENING;
-            }
-            return self.solve_linear();
-        }
-        false
-    }
-
-    fn solve_linear(&mut self) -> bool {
-        self.factorisations += 1;
-        self.find_members();
-        self.fill_nodes();
-        for index in 0..self.contacts.len() {
-            self.fill_rod(index);
-        }
-        let regular = self.eliminate();
-        if regular {
-            self.distribute();
-        }
-        regular
-    }
-
-    /// Only nodes that carry force need an equation; the others follow.
-    fn find_members(&mut self) {
-        self.slot[..self.size].fill(usize::MAX);
-        self.members.clear();
-        let (slot, members) = (&mut self.slot, &mut self.members);
-        let mut add = |node: usize| {
-            if slot[node] == usize::MAX {
-                slot[node] = members.len();
-                members.push(node);
-            }
-        };
-        for contact in self.contacts.iter().filter(|contact| contact.branch != Branch::Free) {
-            contact.nodes.into_iter().for_each(&mut add);
-        }
-        (0..self.size).filter(|node| self.closed[*node]).for_each(&mut add);
-    }
-
-    /// g − Wλ = g_p, one unknown per node: the gap where it is open, λ where it is closed and g = −h₀.
-    fn fill_nodes(&mut self) {
-        for (row, i) in self.members.iter().enumerate() {
-            self.right[row] = self.gaps[*i] + if self.closed[*i] { self.thickness } else { 0.0 };
-            for (column, j) in self.members.iter().enumerate() {
-                let own = if row == column { 1.0 } else { 0.0 };
-                self.factor[(row, column)] = if self.closed[*j] { -self.delassus[(*i, *j)] } else { own };
-            }
-        }
-    }
-
-    /// Add − W Nᵀ(f − kNg) of one rod.
-    fn fill_rod(&mut self, index: usize) {
-        let CellContact { nodes, weights, area, plastic, branch, .. } = self.contacts[index];
-        if branch == Branch::Free {
-            return;
-        }
-        let (offset, tangent) = self.rod.line(branch, plastic);
-        let (constant, stiffness) = (area * offset, area * tangent / self.thickness);
-        for (row, i) in self.members.iter().enumerate() {
-            let reach: f64 = (0..2).map(|end| self.delassus[(*i, nodes[end])] * weights[end]).sum();
-            self.right[row] += reach * constant;
-            for (node, weight) in nodes.into_iter().zip(weights) {
-                if self.closed[node] {
-                    self.right[row] += reach * stiffness * weight * self.thickness;
-                } else {
-                    self.factor[(row, self.slot[node])] += reach * stiffness * weight;
-                }
-            }
-        }
-    }
-
-    /// Gaussian elimination with row exchanges; the solution is left in `right`.
-    fn eliminate(&mut self) -> bool {
-        let count = self.members.len();
-        for column in 0..count {
-            self.column_scale[column] = (0..count).fold(0.0, |s: f64, row| s.max(self.factor[(row, column)].abs()));
-        }
-        for rank in 0..count {
-            let size = |row: usize| self.factor[(row, rank)].abs();
-            let pivot = (rank..count).fold(rank, |best, row| if size(row) > size(best) { row } else { best });
-            // Also false at a node without any flexibility (0) and at values that are not numbers.
-            let regular = size(pivot) > REDUNDANT_PIVOT * self.column_scale[rank];
-            if !regular {
-                return false;
-            }
-            if pivot != rank {
-                self.right.swap(rank, pivot);
-                (rank..count).for_each(|column| self.factor.swap((rank, column), (pivot, column)));
-            }
-            for row in rank + 1..count {
-                let ratio = self.factor[(row, rank)] / self.factor[(rank, rank)];
-                if ratio != 0.0 {
-                    for column in rank + 1..count {
-                        let value = self.factor[(rank, column)];
-                        self.factor[(row, column)] -= ratio * value;
-                    }
-                    self.right[row] -= ratio * self.right[rank];
-                }
-            }
-        }
-        for row in (0..count).rev() {
-            let known: f64 = (row + 1..count).map(|column| self.factor[(row, column)] * self.right[column]).sum();
-            self.right[row] = (self.right[row] - known) / self.factor[(row, row)];
-        }
-        true
-    }
-
-    /// From the solution of the members to gaps and forces of all nodes.
-    fn distribute(&mut self) {
-        self.coating[..self.size].fill(0.0);
-        self.hard[..self.size].fill(0.0);
-        for (row, node) in self.members.iter().enumerate() {
-            let solution = self.right[row];
-            if self.closed[*node] {
-                (self.hard[*node], self.corrected[*node]) = (solution, -self.thickness);
-            } else {
-                self.corrected[*node] = solution;
-            }
-        }
-        for index in 0..self.contacts.len() {
-            let contact = self.contacts[index];
-            if contact.branch != Branch::Free {
-                let force = self.force(&contact, &self.corrected);
-                for (node, weight) in contact.nodes.into_iter().zip(contact.weights) {
-                    self.coating[node] += weight * force;
-                }
-            }
-        }
-        for node in 0..self.size {
-            if self.slot[node] == usize::MAX {
-                let moved = self.members.iter().map(|j| self.delassus[(node, *j)] * (self.coating[*j] + self.hard[*j]));
-                self.corrected[node] = self.gaps[node] + moved.sum::<f64>();
-            }
         }
     }
 }
