@@ -133,7 +133,7 @@ impl CoatedProblem {
     pub fn solve(&mut self) -> Outcome {
         self.guess();
         let solved = self.exchange_blocks() || self.follow_path();
-        Outcome { solved, factorisations: self.factorisations }
+        Outcome { solved, factorisations: self.factorisations, ..Outcome::default() }
     }
 
     /// Start from the prediction and from the nodes that the caller says are closed.
