@@ -475,21 +475,21 @@ impl ModalBank {
     ) {
         let (modes, width, set) = (self.modes(), self.width, self.set_of(sector));
         let coefficients = &self.coefficients[set * modes..][..modes];
-        let start = sector / width * modes * width + sector % width;
-        let position = self.state.position[start..].iter_mut().step_by(width);
-        let increment = self.state.increment[start..].iter_mut().step_by(width);
-        let before = self.increment_before[start..].iter().step_by(width);
+        let (block, lane) = (sector / width * modes * width, sector % width);
+        let position = self.state.position[block..][..modes * width].chunks_exact_mut(width);
+        let increment = self.state.increment[block..][..modes * width].chunks_exact_mut(width);
+        let before = self.increment_before[block..][..modes * width].chunks_exact(width);
         let mut loss = 0.0;
         for ((((position, increment), before), value), coefficients) in
             position.zip(increment).zip(before).zip(values).zip(coefficients)
         {
             let correction = correction(coefficients, value);
             if with_loss {
-                let predicted = *increment + before;
+                let predicted = increment[lane] + before[lane];
                 loss += coefficients.loss * correction * (2.0 * predicted + correction);
             }
-            *position += correction;
-            *increment += correction;
+            position[lane] += correction;
+            increment[lane] += correction;
         }
         self.state.loss[sector] += loss;
     }
