@@ -22,12 +22,25 @@ const ZERO_FRACTION: f64 = 1e-13;
 const PATIENCE: usize = 8;
 
 /// What one solve did, and whether it succeeded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
     /// The complementarity conditions hold.
     pub solved: bool,
     /// Linear systems factorised.
     pub factorisations: usize,
+    /// Gauss-Seidel sweeps (Coulomb solver only).
+    pub sweeps: usize,
+    /// Largest residual, relative to the terms it is made of (Coulomb solver only; 0 otherwise).
+    pub residual: f64,
+    /// Newton's method had to help the sweeps (Coulomb solver only).
+    pub fallback: bool,
+}
+
+impl Outcome {
+    /// The outcome of a direct method.
+    pub(super) fn direct(solved: bool, factorisations: usize) -> Self {
+        Self { solved, factorisations, sweeps: 0, residual: 0.0, fallback: false }
+    }
 }
 
 /// Scratch of one problem size; allocates only when made.
@@ -80,7 +93,7 @@ impl ContactSolver {
         self.solve_active();
         self.correct_gaps();
         std::mem::swap(&mut self.gaps, &mut self.corrected);
-        Outcome { solved: true, factorisations: 1 }
+        Outcome::direct(true, 1)
     }
 
     /// Complementarity on all nodes; `active` is the starting guess and returns the set found.
@@ -103,7 +116,7 @@ impl ContactSolver {
             }
             if count == 0 {
                 self.settle();
-                return Outcome { solved: true, factorisations };
+                return Outcome::direct(true, factorisations);
             }
             if count < best {
                 (best, patience) = (count, PATIENCE);
@@ -116,7 +129,7 @@ impl ContactSolver {
                 self.active[last] = !self.active[last];
             }
         }
-        Outcome { solved: false, factorisations: limit }
+        Outcome::direct(false, limit)
     }
 
     fn infeasible(&self, node: usize, gap_scale: f64, multiplier_scale: f64) -> bool {
