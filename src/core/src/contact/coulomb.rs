@@ -29,7 +29,7 @@ use super::solver::Outcome;
 /// Residual at which a problem counts as solved, relative to the terms that displacements and forces are made of.
 const TOLERANCE: f64 = 1e-12;
 /// Changes between sweeps and Newton's method before giving up.
-const ROUNDS: u32 = 4;
+const ROUNDS: u32 = 6;
 /// Sweeps of the first round before Newton's method may take over; doubled every round.
 const SWEEPS: usize = 6;
 /// A round ends after this many times its least number of sweeps.

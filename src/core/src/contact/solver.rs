@@ -21,6 +21,9 @@ const ZERO_FRACTION: f64 = 1e-13;
 /// Block exchanges allowed without progress before Murty's rule takes over.
 const PATIENCE: usize = 8;
 
+/// Largest problem with an unreduced limit of factorisations.
+const FULL_PATIENCE: usize = 64;
+
 /// What one solve did, and whether it succeeded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
@@ -43,28 +46,31 @@ impl Outcome {
     }
 }
 
-/// Scratch of one problem size; allocates only when made.
+/// Scratch for problems up to a largest size; allocates only when made. Arrays have the largest size, and a solve uses
+/// their first `size` entries (the leading block of the matrix).
 #[derive(Debug, Clone)]
 pub struct ContactSolver {
     size: usize,
-    /// Delassus matrix, filled by the caller.
+    /// Delassus matrix (m/N), filled by the caller.
     pub delassus: DMatrix<f64>,
     /// Predicted gaps (m), filled by the caller; corrected gaps on return.
     pub gaps: Vec<f64>,
-    /// Multipliers (N), set by the solvers.
+    /// Multipliers (N), set by the solvers; 0 beyond the size.
     pub multipliers: Vec<f64>,
-    /// Active set: for the complementarity solver, start and result.
+    /// Active set: for the complementarity solver, start and result; false beyond the size.
     pub active: Vec<bool>,
     factor: DMatrix<f64>,
     /// Diagonal of W in the order of `members`.
     diagonal: Vec<f64>,
     right: Vec<f64>,
     members: Vec<usize>,
+    /// Node i is one of `members`.
+    enforced: Vec<bool>,
     corrected: Vec<f64>,
 }
 
 impl ContactSolver {
-    /// Room for problems of exactly `size` nodes.
+    /// Room for problems of up to `size` nodes, and set to that size.
     pub fn new(size: usize) -> Self {
         Self {
             size,
@@ -76,6 +82,7 @@ impl ContactSolver {
             diagonal: vec![0.0; size],
             right: vec![0.0; size],
             members: Vec::with_capacity(size),
+            enforced: vec![false; size],
             corrected: vec![0.0; size],
         }
     }
@@ -83,6 +90,22 @@ impl ContactSolver {
     /// Number of nodes.
     pub fn size(&self) -> usize {
         self.size
+    }
+
+    /// Largest number of nodes.
+    pub fn capacity(&self) -> usize {
+        self.gaps.len()
+    }
+
+    /// Set the number of nodes of the next problems. Does not allocate.
+    ///
+    /// # Panics
+    /// When `size` exceeds the capacity.
+    pub fn set_size(&mut self, size: usize) {
+        assert!(size <= self.capacity(), "{size} contact nodes in a solver made for {}", self.capacity());
+        self.size = size;
+        self.multipliers[size..].fill(0.0);
+        self.active[size..].fill(false);
     }
 
     /// The paper's correction (eqs 10-11): equality on the nodes that penetrate in the prediction.
@@ -98,16 +121,17 @@ impl ContactSolver {
 
     /// Complementarity on all nodes; `active` is the starting guess and returns the set found.
     pub fn lcp(&mut self) -> Outcome {
-        let scale = self.gaps.iter().fold(0.0, |largest: f64, gap| largest.max(gap.abs()));
+        let scale = self.gaps[..self.size].iter().fold(0.0, |largest: f64, gap| largest.max(gap.abs()));
         for node in 0..self.size {
             self.active[node] |= self.gaps[node] < 0.0;
         }
-        let limit = 100 + 20 * self.size + (1 << self.size.min(14));
+        let limit = factorisation_limit(self.size);
         let (mut best, mut patience, mut softened) = (usize::MAX, PATIENCE, false);
         for factorisations in 1..=limit {
             self.solve_active();
             self.correct_gaps();
-            let largest = self.multipliers.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+            let largest =
+                self.multipliers[..self.size].iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
             let (count, last) = self.count_infeasible(scale, largest);
             if count == 0 && !softened && self.redundant_contact_violated(scale) {
                 self.soften();
@@ -155,7 +179,7 @@ impl ContactSolver {
 
     /// True when a contact left out as redundant is not closed by the contacts it was taken to depend on.
     fn redundant_contact_violated(&self, gap_scale: f64) -> bool {
-        let left_out = |node: &usize| self.active[*node] && !self.members.contains(node);
+        let left_out = |node: &usize| self.active[*node] && !self.enforced[*node];
         (0..self.size).filter(left_out).any(|node| self.corrected[node] < -ZERO_FRACTION * gap_scale)
     }
 
@@ -177,10 +201,16 @@ impl ContactSolver {
     }
 
     fn correct_gaps(&mut self) {
-        for row in 0..self.size {
-            let moved: f64 =
-                self.members.iter().map(|column| self.delassus[(row, *column)] * self.multipliers[*column]).sum();
-            self.corrected[row] = self.gaps[row] + moved;
+        let size = self.size;
+        self.corrected[..size].fill(-0.0);
+        for member in &self.members {
+            let (multiplier, column) = (self.multipliers[*member], self.delassus.column(*member));
+            for (moved, flexibility) in self.corrected[..size].iter_mut().zip(column.iter()) {
+                *moved += flexibility * multiplier;
+            }
+        }
+        for (corrected, gap) in self.corrected[..size].iter_mut().zip(&self.gaps) {
+            *corrected += gap;
         }
     }
 
@@ -193,7 +223,9 @@ impl ContactSolver {
         let count = self.members.len();
         for (row, i) in self.members.iter().enumerate() {
             self.right[row] = -self.gaps[*i];
-            for (column, j) in self.members.iter().enumerate() {
+        }
+        for (column, j) in self.members.iter().enumerate() {
+            for (row, i) in self.members.iter().enumerate() {
                 self.factor[(row, column)] = self.delassus[(*i, *j)];
             }
         }
@@ -219,6 +251,10 @@ impl ContactSolver {
             self.multipliers[self.members[row]] = self.right[row];
         }
         self.members.truncate(rank);
+        self.enforced.fill(false);
+        for member in &self.members {
+            self.enforced[*member] = true;
+        }
     }
 
     fn exchange_members(&mut self, a: usize, b: usize, count: usize) {
@@ -236,19 +272,33 @@ impl ContactSolver {
         }
     }
 
+    /// Column by column, as the matrix is stored. Zero multipliers are left out: infinite entries stay where they are.
     fn eliminate(&mut self, rank: usize, count: usize) {
-        for row in rank + 1..count {
-            let ratio = self.factor[(row, rank)] / self.factor[(rank, rank)];
-            if ratio == 0.0 {
-                continue;
+        let order = self.factor.nrows();
+        let (left, trailing) = self.factor.as_mut_slice().split_at_mut((rank + 1) * order);
+        let pivot_column = &mut left[rank * order..];
+        let pivot = pivot_column[rank];
+        let known = self.right[rank];
+        for (ratio, right) in pivot_column[rank + 1..count].iter_mut().zip(&mut self.right[rank + 1..count]) {
+            *ratio /= pivot;
+            *right = if *ratio == 0.0 { *right } else { *right - *ratio * known };
+        }
+        let ratios = &pivot_column[rank + 1..count];
+        for column in trailing.chunks_exact_mut(order).take(count - rank - 1) {
+            let value = column[rank];
+            for (entry, ratio) in column[rank + 1..count].iter_mut().zip(ratios) {
+                *entry = if *ratio == 0.0 { *entry } else { *entry - ratio * value };
             }
-            for column in rank + 1..count {
-                let value = self.factor[(rank, column)];
-                self.factor[(row, column)] -= ratio * value;
-            }
-            self.right[row] -= ratio * self.right[rank];
         }
     }
+}
+
+/// Factorisations until a problem is given up. Block exchanges need about ten; the least-index rule may need 2ⁿ, which
+/// is granted to small problems. Beyond `FULL_PATIENCE` nodes the number falls with the square of the size, so that the
+/// whole effort, size³ each, grows no faster than the size.
+fn factorisation_limit(size: usize) -> usize {
+    let limit = 100 + 20 * size + (1 << size.min(14));
+    if size <= FULL_PATIENCE { limit } else { (limit * FULL_PATIENCE * FULL_PATIENCE / (size * size)).max(100) }
 }
 
 #[cfg(test)]

@@ -14,6 +14,10 @@ use crate::dynamics::dispatch::InstructionSet;
 /// blocks without full rank have a unique next reaction.
 const LOCAL_PROXIMAL: f64 = 1e-10;
 
+/// Terms of a displacement beyond this many times the prediction excuse no larger residual: forces that cancel each
+/// other, of a node pinched without room to give way, must not pass for a solution because they are large.
+const LARGEST_TERMS: f64 = 1e5;
+
 /// A problem of `size` contacts in scaled variables; entries contact by contact (normal, tangent 1, tangent 2).
 #[derive(Debug, Clone)]
 pub(super) struct Problem {
@@ -27,8 +31,9 @@ pub(super) struct Problem {
     pub(super) reaction: Vec<f64>,
     /// û = free + Ŵ r̂, kept up to date by the sweeps.
     pub(super) relative: Vec<f64>,
-    /// Sum of the magnitudes û was added up from, at the last refresh.
+    /// Sum of the magnitudes û was added up from, at the last refresh, but at most `ceiling`.
     magnitude: Vec<f64>,
+    ceiling: f64,
     /// Diagonal of Ŵ and predicted displacements while the problem is softened.
     hard: (Vec<f64>, Vec<f64>),
     pub(super) instructions: InstructionSet,
@@ -46,6 +51,7 @@ impl Problem {
             reaction: vec![0.0; order],
             relative: vec![0.0; order],
             magnitude: vec![0.0; order],
+            ceiling: 0.0,
             hard: (vec![0.0; order], vec![0.0; order]),
             instructions: InstructionSet::detect(),
         }
@@ -81,8 +87,17 @@ impl Problem {
         for contact in 0..self.size {
             self.project(contact);
         }
+        self.ceiling = LARGEST_TERMS * self.largest_prediction();
         let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
         finite(&self.matrix[..order * order]) && finite(&self.free[..order]) && finite(&self.friction[..self.size])
+    }
+
+    /// Largest predicted displacement of the contacts that penetrate, or of all when none does.
+    fn largest_prediction(&self) -> f64 {
+        let contacts = self.free[..self.order()].chunks_exact(3);
+        let largest = |most: f64, contact: &[f64]| contact.iter().fold(most, |most, value| most.max(value.abs()));
+        let closed = contacts.clone().filter(|contact| contact[0] < 0.0).fold(0.0, largest);
+        if closed > 0.0 { closed } else { contacts.fold(0.0, largest) }
     }
 
     /// Reactions (N) and relative displacements (m).
@@ -168,6 +183,9 @@ impl Problem {
             self.instructions.run(AddColumns { columns, factors, target: &mut self.relative[..order] });
             let terms = AddColumns { columns, factors, target: &mut self.magnitude[..order] };
             self.instructions.run(AddMagnitudes(terms));
+        }
+        for magnitude in &mut self.magnitude[..order] {
+            *magnitude = magnitude.min(self.ceiling);
         }
     }
 
