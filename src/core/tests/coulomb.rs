@@ -185,7 +185,12 @@ fn random_problems_are_all_solved() {
         let outcome = solver.solve(contacts);
         let worst = violation(&w, &free, &friction, &solver.reactions);
         let what = format!("case {case}, kind {kind}, {contacts} contacts, friction {common}");
-        if std::env::var("CASES").is_ok() { if !outcome.solved { println!("{what} {outcome:?}"); } continue; }
+        if std::env::var("CASES").is_ok() {
+            if !outcome.solved {
+                println!("{what} {outcome:?}");
+            }
+            continue;
+        }
         assert!(outcome.solved && outcome.residual <= 1e-12, "{what}: {outcome:?}");
         assert!(worst <= 2e-12, "{what}: violation {worst:e}");
         let sum = |row: usize| free[row] + (0..3 * contacts).map(|j| w[(row, j)] * solver.reactions[j]).sum::<f64>();

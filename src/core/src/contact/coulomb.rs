@@ -241,3 +241,31 @@ struct Run {
     sweeps: usize,
     residual: f64,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::dispatch::InstructionSet;
+
+    /// Twenty contacts on forty modes, for all instruction sets.
+    #[test]
+    fn instruction_sets_give_the_same_bits() {
+        let phase =
+            |row: usize, mode: usize| libm::sin(1.7 * (row * row) as f64 + 0.9 * (mode * row) as f64 + mode as f64);
+        let shapes = DMatrix::from_fn(60, 70, phase);
+        let mut wide = CoulombSolver::new(20);
+        wide.delassus = &shapes * shapes.transpose() * 1e-9;
+        for k in 0..60 {
+            wide.free[k] = 1e-6 * (libm::sin(3.1 * (k * k) as f64) - if k % 3 == 0 { 0.5 } else { 0.0 });
+        }
+        wide.friction.fill(0.6);
+        let mut baseline = wide.clone();
+        baseline.problem.instructions = InstructionSet::Baseline;
+        let outcome = wide.solve(20);
+        assert!(outcome.solved && outcome.fallback, "{outcome:?}");
+        assert_eq!(baseline.solve(20), outcome);
+        for k in 0..60 {
+            assert_eq!(baseline.reactions[k].to_bits(), wide.reactions[k].to_bits());
+        }
+    }
+}

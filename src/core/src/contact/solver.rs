@@ -7,7 +7,10 @@
 //!   neither a negative λ nor a penetration caused elsewhere is looked at again.
 //! * [`ContactSolver::lcp`]: 0 ≤ λ ⟂ g + Wλ ≥ 0 on all nodes by block principal pivoting, started from the last step's
 //!   set. When the number of infeasible nodes stops falling it continues with Murty's least-index rule, which is
-//!   finite for every P-matrix (J. J. Júdice, F. M. Pires, Computers & Operations Research 21, 1994).
+//!   finite for every P-matrix (J. J. Júdice, F. M. Pires, Computers & Operations Research 21, 1994). With more than a
+//!   few nodes finite can mean 2ⁿ, and the violated contacts are driven to closure one by one instead.
+
+mod drive;
 
 use nalgebra::DMatrix;
 
@@ -21,8 +24,12 @@ const ZERO_FRACTION: f64 = 1e-13;
 /// Block exchanges allowed without progress before Murty's rule takes over.
 const PATIENCE: usize = 8;
 
-/// Largest problem with an unreduced limit of factorisations.
-const FULL_PATIENCE: usize = 64;
+/// Largest problem on which the least-index rule may try every active set.
+const ENUMERABLE: usize = 14;
+/// Factorisations allowed to larger ones before contacts are driven one by one; block exchanges need about ten.
+const BLOCK_LIMIT: usize = 50;
+/// Largest problem with an unreduced limit of factorisations for driving.
+const FULL_PATIENCE: usize = 256;
 
 /// What one solve did, and whether it succeeded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,6 +74,9 @@ pub struct ContactSolver {
     /// Node i is one of `members`.
     enforced: Vec<bool>,
     corrected: Vec<f64>,
+    /// Multipliers and gaps while contacts are driven to closure.
+    pressure: Vec<f64>,
+    slack: Vec<f64>,
 }
 
 impl ContactSolver {
@@ -84,6 +94,8 @@ impl ContactSolver {
             members: Vec::with_capacity(size),
             enforced: vec![false; size],
             corrected: vec![0.0; size],
+            pressure: vec![0.0; size],
+            slack: vec![0.0; size],
         }
     }
 
@@ -113,7 +125,7 @@ impl ContactSolver {
         for node in 0..self.size {
             self.active[node] = self.gaps[node] < 0.0;
         }
-        self.solve_active();
+        self.solve_active(None);
         self.correct_gaps();
         std::mem::swap(&mut self.gaps, &mut self.corrected);
         Outcome::direct(true, 1)
@@ -125,10 +137,10 @@ impl ContactSolver {
         for node in 0..self.size {
             self.active[node] |= self.gaps[node] < 0.0;
         }
-        let limit = factorisation_limit(self.size);
+        let limit = exchange_limit(self.size);
         let (mut best, mut patience, mut softened) = (usize::MAX, PATIENCE, false);
         for factorisations in 1..=limit {
-            self.solve_active();
+            self.solve_active(None);
             self.correct_gaps();
             let largest =
                 self.multipliers[..self.size].iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
@@ -153,7 +165,8 @@ impl ContactSolver {
                 self.active[last] = !self.active[last];
             }
         }
-        Outcome::direct(false, limit)
+        let driven = self.drive_all(scale, drive_limit(self.size));
+        Outcome::direct(driven.solved, limit + driven.factorisations)
     }
 
     fn infeasible(&self, node: usize, gap_scale: f64, multiplier_scale: f64) -> bool {
@@ -216,13 +229,14 @@ impl ContactSolver {
 
     /// W_AA λ_A = −g_A on the active set by elimination with diagonal pivoting, λ = 0 elsewhere. A P-matrix needs no
     /// other pivots; a vanishing pivot marks a contact that the others already enforce, and its λ stays 0.
-    fn solve_active(&mut self) {
+    /// With a driven node the right-hand side is −W_Ad instead: how λ_A follows that node's multiplier.
+    fn solve_active(&mut self, driven: Option<usize>) {
         self.members.clear();
         self.members.extend((0..self.size).filter(|node| self.active[*node]));
         self.multipliers.fill(0.0);
         let count = self.members.len();
         for (row, i) in self.members.iter().enumerate() {
-            self.right[row] = -self.gaps[*i];
+            self.right[row] = -driven.map_or(self.gaps[*i], |driven| self.delassus[(*i, driven)]);
         }
         for (column, j) in self.members.iter().enumerate() {
             for (row, i) in self.members.iter().enumerate() {
@@ -293,12 +307,16 @@ impl ContactSolver {
     }
 }
 
-/// Factorisations until a problem is given up. Block exchanges need about ten; the least-index rule may need 2ⁿ, which
-/// is granted to small problems. Beyond `FULL_PATIENCE` nodes the number falls with the square of the size, so that the
-/// whole effort, size³ each, grows no faster than the size.
-fn factorisation_limit(size: usize) -> usize {
-    let limit = 100 + 20 * size + (1 << size.min(14));
-    if size <= FULL_PATIENCE { limit } else { (limit * FULL_PATIENCE * FULL_PATIENCE / (size * size)).max(100) }
+/// Factorisations of the exchange rules.
+fn exchange_limit(size: usize) -> usize {
+    if size <= ENUMERABLE { 100 + 20 * size + (1 << size) } else { BLOCK_LIMIT }
+}
+
+/// Factorisations of the drives: twenty per contact. Beyond `FULL_PATIENCE` contacts the number falls with the square of
+/// the size, so that the whole effort, size³ each, grows no faster than the square of the size.
+fn drive_limit(size: usize) -> usize {
+    let limit = 100 + 20 * size;
+    if size <= FULL_PATIENCE { limit } else { limit * FULL_PATIENCE * FULL_PATIENCE / (size * size) }
 }
 
 #[cfg(test)]
@@ -410,5 +428,97 @@ mod tests {
         assert!(solver.gaps[1] < -0.7 && solver.gaps[0].abs() < 1e-15);
         exact.lcp();
         assert!(exact.gaps.iter().all(|gap| *gap >= 0.0) && exact.multipliers.iter().all(|value| *value > 0.0));
+    }
+
+    /// Random P-matrices of the sizes of whole casings, some of them far from symmetric.
+    #[test]
+    fn large_problems_fulfil_complementarity() {
+        let mut seed = 1_u64;
+        let mut uniform = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / 9_007_199_254_740_992.0 * 2.0 - 1.0
+        };
+        for (size, skew) in [(48, 0.0), (48, 0.5), (48, 5.0), (168, 0.0), (168, 0.5), (168, 5.0)] {
+            for modes in [size / 2, size, 2 * size] {
+                let shapes = DMatrix::from_fn(size, modes, |_, _| uniform());
+                let mut w = &shapes * shapes.transpose() + DMatrix::identity(size, size) * 1e-3;
+                for (row, column) in (0..size).flat_map(|row| (0..row).map(move |column| (row, column))) {
+                    let value = skew * uniform();
+                    w[(row, column)] += value;
+                    w[(column, row)] -= value;
+                }
+                let g: Vec<f64> = (0..size).map(|_| uniform() - 0.3).collect();
+                let mut solver = ContactSolver::new(size);
+                solver.delassus.copy_from(&w);
+                solver.gaps.copy_from_slice(&g);
+                let outcome = solver.lcp();
+                assert!(outcome.solved && outcome.factorisations <= 400, "{size} {skew} {modes}: {outcome:?}");
+                for row in 0..size {
+                    let terms = || (0..size).map(|column| w[(row, column)] * solver.multipliers[column]);
+                    let gap = g[row] + terms().sum::<f64>();
+                    let scale = g[row].abs() + terms().map(f64::abs).sum::<f64>();
+                    let (multiplier, limit) = (solver.multipliers[row], 1e-10 * scale);
+                    assert!(multiplier >= 0.0 && gap >= -limit, "{size} {skew} {modes}: {multiplier}, {gap}");
+                    assert!(gap <= limit || multiplier == 0.0, "{size} {skew} {modes}: {multiplier}, {gap}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_smaller_problem_in_a_larger_solver_has_the_same_bits() {
+        let entries: Vec<f64> = (0..49).map(|k| libm::sin(1.3 * f64::from(k * k))).collect();
+        let w = p_matrix(&entries, 7);
+        let g: Vec<f64> = (0..7).map(|k| libm::sin(f64::from(3 * k)) - 0.4).collect();
+        let mut exact = ContactSolver::new(7);
+        let mut roomy = ContactSolver::new(20);
+        roomy.delassus.fill(f64::NAN);
+        roomy.gaps.fill(f64::NAN);
+        roomy.active.fill(true);
+        roomy.multipliers.fill(1.0);
+        roomy.set_size(7);
+        roomy.active[..7].fill(false);
+        for film in [false, true] {
+            for solver in [&mut exact, &mut roomy] {
+                solver.delassus.view_mut((0, 0), (7, 7)).copy_from(&w);
+                solver.gaps[..7].copy_from_slice(&g);
+            }
+            let outcomes = [&mut exact, &mut roomy].map(|solver| if film { solver.film() } else { solver.lcp() });
+            assert_eq!(outcomes[0], outcomes[1]);
+            for node in 0..7 {
+                assert_eq!(exact.multipliers[node].to_bits(), roomy.multipliers[node].to_bits());
+                assert_eq!(exact.gaps[node].to_bits(), roomy.gaps[node].to_bits());
+            }
+            assert!(roomy.multipliers[7..].iter().all(|value| *value == 0.0));
+        }
+    }
+
+    #[test]
+    fn effort_is_bounded_for_every_size() {
+        assert_eq!(exchange_limit(14), 100 + 280 + 16_384);
+        assert!(exchange_limit(15) == BLOCK_LIMIT && exchange_limit(2000) == BLOCK_LIMIT);
+        assert_eq!([14, 168, 256, 2000].map(drive_limit), [380, 3460, 5220, 656]);
+    }
+
+    #[test]
+    fn driving_contacts_one_by_one_finds_the_same_solution() {
+        for case in 0..200 {
+            let n = 1 + case % 7;
+            let entries: Vec<f64> = (0..49).map(|k| libm::sin(1.3 * f64::from(k * k) + case as f64)).collect();
+            let gaps: Vec<f64> = (0..n).map(|k| libm::sin((3 * k + 2 * case) as f64)).collect();
+            let mut block = ContactSolver::new(n);
+            block.delassus.copy_from(&p_matrix(&entries, n));
+            block.gaps.copy_from_slice(&gaps);
+            let mut driven = block.clone();
+            for node in 0..n {
+                driven.active[node] = (case >> node) % 2 == 1;
+            }
+            assert!(block.lcp().solved && driven.drive_all(1.0, 1000).solved);
+            let largest = block.multipliers.iter().fold(0.0_f64, |most, value| most.max(*value));
+            for node in 0..n {
+                assert!((block.multipliers[node] - driven.multipliers[node]).abs() <= 1e-11 * largest);
+                assert!((block.gaps[node] - driven.gaps[node]).abs() <= 1e-11);
+            }
+        }
     }
 }
