@@ -168,7 +168,7 @@ fn random_problem(lcg: &mut Lcg, contacts: usize, kind: usize) -> (DMatrix<f64>,
 #[test]
 fn random_problems_are_all_solved() {
     let mut lcg = Lcg(20);
-    for case in 0..std::env::var("CASES").map_or(1000, |v| v.parse().unwrap()) {
+    for case in 0..1000 {
         let (kind, contacts) = (case % 8, 1 + lcg.below(30));
         let contacts = if kind == 1 { contacts.next_multiple_of(3) } else { contacts };
         let (w, free) = random_problem(&mut lcg, contacts, kind);
@@ -185,12 +185,6 @@ fn random_problems_are_all_solved() {
         let outcome = solver.solve(contacts);
         let worst = violation(&w, &free, &friction, &solver.reactions);
         let what = format!("case {case}, kind {kind}, {contacts} contacts, friction {common}");
-        if std::env::var("CASES").is_ok() {
-            if !outcome.solved {
-                println!("{what} {outcome:?}");
-            }
-            continue;
-        }
         assert!(outcome.solved && outcome.residual <= 1e-12, "{what}: {outcome:?}");
         assert!(worst <= 2e-12, "{what}: violation {worst:e}");
         let sum = |row: usize| free[row] + (0..3 * contacts).map(|j| w[(row, j)] * solver.reactions[j]).sum::<f64>();

@@ -194,7 +194,7 @@ impl Problem {
         let order = self.order();
         for contact in 0..self.size {
             let factors: [f64; 3] = std::array::from_fn(|k| direction[3 * contact + k]);
-            if factors != [0.0; 3] {
+            if factors.iter().any(|factor| *factor != 0.0) {
                 let columns = &self.matrix[3 * contact * order..(3 * contact + 3) * order];
                 self.instructions.run(AddColumns { columns, factors, target });
             }
@@ -225,7 +225,7 @@ impl Problem {
         });
         let new = one_contact::solve(&block, without, self.friction[contact]);
         let factors: [f64; 3] = std::array::from_fn(|i| relaxation * (new[i] - old[i]));
-        if factors == [0.0; 3] {
+        if factors.iter().all(|factor| *factor == 0.0) {
             return;
         }
         for i in 0..3 {
