@@ -12,8 +12,8 @@
 //! solution along proximal points, and failing that the sweeps go on, longer and under-relaxed. V. Acary, M. Brémond and
 //! O. Huber compare these and other methods (in Advanced Topics in Nonsmooth Dynamics, Springer 2018).
 //!
-//! For W of full rank a solution exists for every µ; it need not be unique when µ is large. When some motion opens all
-//! contacts at once a solution exists for singular W too (coincident nodes), with reactions that are not unique.
+//! For W of full rank a solution exists for every µ; it need not be unique when µ is large. For singular W (coincident
+//! nodes) one exists when some motion opens all contacts at once with u_N > µ‖u_T‖; its reactions are not unique.
 
 mod linear;
 mod newton;

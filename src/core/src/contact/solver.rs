@@ -34,6 +34,9 @@ const BLOCK_LIMIT: usize = 50;
 /// Largest problem with an unreduced limit of factorisations for driving.
 const FULL_PATIENCE: usize = 256;
 
+/// Systems from this order on are worked on column by column, as they are stored.
+const LARGE: usize = 32;
+
 /// What one solve did, and whether it succeeded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
@@ -76,7 +79,7 @@ pub struct ContactSolver {
     remaining: Vec<f64>,
     right: Vec<f64>,
     members: Vec<usize>,
-    /// Node i is one of `members`.
+    /// Node i is one of `members`; made when some active node is not.
     enforced: Vec<bool>,
     corrected: Vec<f64>,
     /// Multipliers and gaps while contacts are driven to closure.
@@ -199,7 +202,15 @@ impl ContactSolver {
     }
 
     /// True when a contact left out as redundant is not closed by the contacts it was taken to depend on.
-    fn redundant_contact_violated(&self, gap_scale: f64) -> bool {
+    fn redundant_contact_violated(&mut self, gap_scale: f64) -> bool {
+        let active = self.active[..self.size].iter().filter(|active| **active).count();
+        if active == self.members.len() {
+            return false;
+        }
+        self.enforced.fill(false);
+        for member in &self.members {
+            self.enforced[*member] = true;
+        }
         let left_out = |node: &usize| self.active[*node] && !self.enforced[*node];
         (0..self.size).filter(left_out).any(|node| self.corrected[node] < -ZERO_FRACTION * gap_scale)
     }
@@ -223,6 +234,14 @@ impl ContactSolver {
 
     fn correct_gaps(&mut self) {
         let size = self.size;
+        if size < LARGE {
+            for row in 0..size {
+                let terms = self.members.iter().map(|column| self.delassus[(row, *column)] * self.multipliers[*column]);
+                self.corrected[row] = self.gaps[row] + terms.sum::<f64>();
+            }
+            return;
+        }
+        // The same sums, columns outside; like the sum of an iterator they start from −0.
         self.corrected[..size].fill(-0.0);
         for member in &self.members {
             let (multiplier, column) = (self.multipliers[*member], self.delassus.column(*member));
@@ -251,10 +270,6 @@ impl ContactSolver {
                 self.factor[(row, column)] = self.delassus[(*i, *j)];
             }
         }
-        for row in 0..count {
-            self.remaining[row] = self.factor[(row, row)];
-            self.diagonal[row] = self.factor[(row, row)].abs();
-        }
         let rank = self.eliminate(count);
         for row in (0..rank).rev() {
             let known: f64 = (row + 1..rank).map(|column| self.factor[(row, column)] * self.right[column]).sum();
@@ -262,10 +277,6 @@ impl ContactSolver {
             self.multipliers[self.members[row]] = self.right[row];
         }
         self.members.truncate(rank);
-        self.enforced.fill(false);
-        for member in &self.members {
-            self.enforced[*member] = true;
-        }
     }
 }
 

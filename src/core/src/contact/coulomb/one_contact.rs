@@ -8,7 +8,7 @@
 //!
 //! g(α) = µ (A_NT·y − b_N D)/A_NN − ‖y‖ = 0,
 //!
-//! whose square is the quartic of O. Bonnefon, G. Daviet (INRIA report 00553859, 2011). Outside the stick cone
+//! whose square is the quartic of O. Bonnefon, G. Daviet (INRIA report, 2011, HAL inria-00553859). Outside the stick cone
 //! g(0) < 0, and g grows like α² because b_N < 0: a root is always bracketed, and Newton's method polishes it.
 
 /// Newton and bisection steps of the sliding root; bisection alone would need about 60.

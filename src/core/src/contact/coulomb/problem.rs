@@ -68,7 +68,7 @@ impl Problem {
         for contact in 0..self.size {
             let largest = (3 * contact..3 * contact + 3).fold(0.0, |most: f64, k| most.max(delassus[(k, k)]));
             self.unit[contact] = unit(largest);
-            self.friction[contact] = friction[contact].max(0.0);
+            self.friction[contact] = if friction[contact] < 0.0 { 0.0 } else { friction[contact] };
         }
         for column in 0..order {
             let across = 1.0 / self.unit[column / 3];

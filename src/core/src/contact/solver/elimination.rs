@@ -3,35 +3,36 @@
 //! Large systems update the trailing block only after a panel of pivots, so that each pass through it does more work; until
 //! then only the diagonal, which the next pivot is chosen by, and the pivot's own row and column are brought up to date.
 
-use super::{ContactSolver, REDUNDANT_PIVOT};
-use crate::dynamics::dispatch::{InstructionSet, Kernel};
+use super::{ContactSolver, LARGE, REDUNDANT_PIVOT};
+use crate::dynamics::dispatch::Kernel;
 
 /// Pivots per pass.
 const PANEL: usize = 8;
-/// Systems from this order on are worth postponing updates.
-const LARGE: usize = 32;
 
 impl ContactSolver {
     /// Eliminate the system of the first `count` entries of `members`; returns its rank. Pivots and right-hand side are
     /// then reduced, and `members` is in the order of the pivots.
+    #[inline]
     pub(super) fn eliminate(&mut self, count: usize) -> usize {
-        let panel = if count < LARGE { 1 } else { PANEL };
+        for row in 0..count {
+            self.remaining[row] = self.factor[(row, row)];
+            self.diagonal[row] = self.remaining[row].abs();
+        }
         let (mut start, mut rank) = (0, 0);
         while rank < count {
-            // What is left of a node's own flexibility decides: nodes may differ by many orders of magnitude.
-            let left = |row: usize| self.remaining[row].abs() / self.diagonal[row];
-            let pivot = (rank..count).fold(rank, |best, row| if left(row) > left(best) { row } else { best });
-            // Also ends at a node without any flexibility (0/0).
-            if left(pivot).is_nan() || left(pivot) <= REDUNDANT_PIVOT {
-                break;
-            }
+            let Some(pivot) = self.next_pivot(rank, count) else { break };
             self.exchange_members(rank, pivot, count);
+            if count < LARGE {
+                self.reduce(rank, count);
+                rank += 1;
+                continue;
+            }
             if start < rank {
                 self.catch_up(start, rank, count);
             }
             self.divide(rank, count);
             rank += 1;
-            if rank - start == panel {
+            if rank - start == PANEL {
                 self.update_trailing(start, rank, count);
                 start = rank;
             }
@@ -39,6 +40,40 @@ impl ContactSolver {
         rank
     }
 
+    /// The node with the largest share of its own flexibility left: nodes may differ by many orders of magnitude.
+    /// None when the others are redundant.
+    #[inline]
+    fn next_pivot(&self, rank: usize, count: usize) -> Option<usize> {
+        let left = |row: usize| self.remaining[row].abs() / self.diagonal[row];
+        let pivot = (rank..count).fold(rank, |best, row| if left(row) > left(best) { row } else { best });
+        // False for a node without any flexibility (0/0), too.
+        (left(pivot) > REDUNDANT_PIVOT).then_some(pivot)
+    }
+
+    /// One pivot of a small system, at once.
+    #[inline]
+    fn reduce(&mut self, rank: usize, count: usize) {
+        let order = self.factor.nrows();
+        let (left, trailing) = self.factor.as_mut_slice().split_at_mut((rank + 1) * order);
+        let column = &mut left[rank * order..rank * order + count];
+        let (pivot, ratios) = (column[rank], &mut column[rank + 1..]);
+        let (head, below) = self.right[..count].split_at_mut(rank + 1);
+        let mut dense = true;
+        for (ratio, right) in ratios.iter_mut().zip(below) {
+            *ratio /= pivot;
+            dense &= *ratio != 0.0;
+            *right = reduced(*right, *ratio, head[rank]);
+        }
+        for (column, local) in trailing.chunks_exact_mut(order).zip(0..ratios.len()) {
+            let (value, entries) = (column[rank], &mut column[rank + 1..count]);
+            for (entry, ratio) in entries.iter_mut().zip(&*ratios) {
+                *entry = if dense { *entry - ratio * value } else { reduced(*entry, *ratio, value) };
+            }
+            self.remaining[rank + 1 + local] = entries[local];
+        }
+    }
+
+    #[inline]
     fn exchange_members(&mut self, a: usize, b: usize, count: usize) {
         if a == b {
             return;
@@ -86,9 +121,7 @@ impl ContactSolver {
         let order = self.factor.nrows();
         let (left, trailing) = self.factor.as_mut_slice().split_at_mut(rank * order);
         let update = Trailing { order, multipliers: &left[start * order..], trailing, start, rank, count };
-        // Too little work to be worth leaving the caller's code.
-        let instructions = if count < LARGE { InstructionSet::Baseline } else { self.instructions };
-        instructions.run(update);
+        self.instructions.run(update);
     }
 }
 
