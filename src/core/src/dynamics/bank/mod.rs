@@ -110,6 +110,8 @@ pub struct ModalBank {
     modal_force: Vec<f64>,
     /// Scratch: change of the modal coordinates of the sector being corrected.
     correction: Vec<f64>,
+    /// Scratch: displacements of the rows of one sector.
+    moved: Vec<f64>,
     /// Scratch: modal coordinates and increments of one sector.
     gathered: [Vec<f64>; 2],
 }
@@ -158,6 +160,7 @@ impl ModalBank {
             increment_before: vec![0.0; state_len],
             modal_force: vec![0.0; modes],
             correction: vec![0.0; modes],
+            moved: vec![0.0; rows],
             gathered: [vec![0.0; modes], vec![0.0; modes]],
             coupling,
             options,
@@ -521,18 +524,14 @@ impl ModalBank {
         }
         let lanes = self.lanes();
         let flexibility = self.flexibility[self.set_of(sector)].as_slice();
-        if self.coupling.is_none() {
-            // G is symmetric: its columns are its rows.
-            for (row, column) in flexibility.chunks_exact(self.rows).enumerate() {
-                let moved: f64 = column.iter().zip(force).map(|(entry, value)| entry * value).sum();
-                self.state.displacement[row * lanes + sector] += moved;
-            }
-            return;
-        }
+        self.moved.fill(0.0);
         for (column, value) in flexibility.chunks_exact(self.rows).zip(force) {
-            for (row, entry) in column.iter().enumerate() {
-                self.state.displacement[row * lanes + sector] += entry * value;
+            for (moved, entry) in self.moved.iter_mut().zip(column) {
+                *moved += entry * value;
             }
+        }
+        for (row, moved) in self.state.displacement.chunks_exact_mut(lanes).zip(&self.moved) {
+            row[sector] += moved;
         }
     }
 
