@@ -376,7 +376,7 @@ impl System {
             self.bank.correct(sector, &self.force, self.settings.ledger);
         }
         if let Some(slave) = &mut self.slave {
-            slave.apply(&self.solution, self.settings.ledger);
+            slave.apply(self.settings.ledger);
         }
         if let Some((coating, problem)) = &mut self.coating {
             coating.commit(problem);

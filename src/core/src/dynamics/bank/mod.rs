@@ -16,7 +16,7 @@ use super::scheme::{ModeCoefficients, free_increment, resample};
 use crate::persist::{Persist, Reader, Writer, persist_fields};
 use crate::settings::Scheme;
 use coupling::Coupling;
-use predict::{ModalForce, Predict};
+use predict::{Accumulate, ModalForce, Predict};
 
 /// Lanes of one chunk: one 512-bit register of f64.
 pub const LANES: usize = 8;
@@ -500,6 +500,11 @@ impl ModalBank {
     /// Add the displacement of the contact rows by `correction`.
     fn move_rows(&mut self, sector: usize) {
         let lanes = self.lanes();
+        if lanes == 1 {
+            let (sums, matrix) = (&mut self.state.displacement, &self.contact_modes);
+            self.instruction_set.run(Accumulate { sums, matrix, values: &self.correction });
+            return;
+        }
         for (shapes, correction) in self.contact_modes.chunks_exact(self.rows.max(1)).zip(&self.correction) {
             for (row, shape) in shapes.iter().enumerate() {
                 self.state.displacement[row * lanes + sector] += shape * correction;
@@ -535,12 +540,23 @@ impl ModalBank {
         }
     }
 
-    /// Correct one sector for contact forces given as modal forces.
-    pub fn correct_modal(&mut self, sector: usize, modal_force: &[f64], with_loss: bool) {
+    /// Displacement of the contact rows of a single structure by contact forces given as modal forces (m).
+    pub fn response_to_modal(&mut self, modal_force: &[f64], displacement: &mut [f64]) {
         self.modal_force.copy_from_slice(modal_force);
-        self.respond(sector);
-        self.move_modes(sector, with_loss);
-        self.move_rows(sector);
+        self.respond(0);
+        displacement.fill(0.0);
+        let (matrix, values) = (&self.contact_modes[..], &self.correction[..]);
+        self.instruction_set.run(Accumulate { sums: displacement, matrix, values });
+    }
+
+    /// Correct a single structure for contact forces given as modal forces, with the response of its rows to them.
+    pub fn correct_modal(&mut self, modal_force: &[f64], response: &[f64], with_loss: bool) {
+        self.modal_force.copy_from_slice(modal_force);
+        self.respond(0);
+        self.move_modes(0, with_loss);
+        for (displacement, response) in self.state.displacement.iter_mut().zip(response) {
+            *displacement += response;
+        }
     }
 
     /// `correction` ← T c φᵀf.
