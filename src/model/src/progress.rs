@@ -11,6 +11,8 @@ pub enum Stage {
     Assembly,
     /// Modes of the full model.
     FullModes,
+    /// Static equilibria under spin, only when asked for.
+    Spin,
     /// Fixed-interface modes.
     FixedInterfaceModes,
     /// Constraint modes.
@@ -25,6 +27,7 @@ impl fmt::Display for Stage {
             Self::Mesh => "mesh",
             Self::Assembly => "assembly",
             Self::FullModes => "modes of the full model",
+            Self::Spin => "equilibrium under spin",
             Self::FixedInterfaceModes => "fixed-interface modes",
             Self::ConstraintModes => "constraint modes",
             Self::Checks => "checks",

@@ -14,6 +14,7 @@ use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report};
 use crate::sparse::{Factor, SparseMatrix, principal_pair};
+use crate::spin::{ReducedSpin, Rotating, SpinCheck, SpinningStates, reduced_spin};
 use crate::{Error, Result};
 
 /// A contact node before the reduction.
@@ -62,6 +63,8 @@ pub struct Timings {
     pub full_modes: f64,
     /// Fixed-interface and constraint modes.
     pub reduction: f64,
+    /// Equilibria under spin, spin arrays and their checks; zero where no spin was asked for.
+    pub spin: f64,
     /// Frequency deviation and residual criterion.
     pub checks: f64,
 }
@@ -69,7 +72,7 @@ pub struct Timings {
 impl Timings {
     /// Sum of the parts (s).
     pub fn total(&self) -> f64 {
-        self.assembly + self.full_modes + self.reduction + self.checks
+        self.assembly + self.full_modes + self.reduction + self.spin + self.checks
     }
 }
 
@@ -92,6 +95,8 @@ pub struct Reduction {
     pub reduced_angular_frequencies: Vec<f64>,
     /// Natural frequencies with the contact nodes held (Hz).
     pub fixed_interface_frequencies: Vec<f64>,
+    /// How well the spin arrays hold, at half the largest speed and at the largest; empty where none were asked for.
+    pub spin_checks: Vec<SpinCheck>,
     /// Wall times.
     pub timings: Timings,
 }
@@ -112,6 +117,40 @@ pub fn reduce(
     options: &ReductionOptions,
     listener: Listener<'_>,
 ) -> Result<Reduction> {
+    reduced(mesh, (material, clamped, contact), options, None, listener)
+}
+
+/// [`reduce`] with the effects of spin up to `largest_speed` (rad/s), in [`RomExtras::spin`]; see [`crate::spin`].
+///
+/// Two shapes are added to the reduced coordinates, after the fixed-interface modes: what these and the constraint
+/// modes leave of the static shapes under spin.
+///
+/// # Errors
+/// Those of [`reduce`]; [`Error::Invalid`] for a speed that is not a finite number above zero, for a structure without
+/// clamped nodes, and where the structure finds no equilibrium with the centrifugal force.
+pub fn reduce_spinning(
+    mesh: Mesh,
+    material: &Material,
+    clamped: &[usize],
+    contact: &[ContactPoint],
+    options: &ReductionOptions,
+    largest_speed: f64,
+    listener: Listener<'_>,
+) -> Result<Reduction> {
+    if !(largest_speed.is_finite() && largest_speed > 0.0) {
+        let problem = format!("{largest_speed} rad/s is not a finite speed > 0");
+        return Err(Error::invalid("largest speed", problem, "Give the largest speed that is to be computed"));
+    }
+    reduced(mesh, (material, clamped, contact), options, Some(largest_speed), listener)
+}
+
+fn reduced(
+    mesh: Mesh,
+    (material, clamped, contact): (&Material, &[usize], &[ContactPoint]),
+    options: &ReductionOptions,
+    largest_speed: Option<f64>,
+    listener: Listener<'_>,
+) -> Result<Reduction> {
     // The library's own threads split sums by their number, and a ROM must have the same bits on every number of threads.
     faer::set_global_parallelism(faer::Par::Seq);
     let mut timings = Timings::default();
@@ -123,11 +162,17 @@ pub fn reduce(
     let full = timed(&mut timings.full_modes, || {
         full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)
     })?;
-    let craig_bampton = timed(&mut timings.reduction, || {
-        let interface = interface_dofs(&free, contact)?;
-        let cartesian = craig_bampton(&stiffness, &mass, &interface, options.fixed_interface_modes, listener)?;
-        Ok(rotated(cartesian, &mesh, contact, options.frame))
+    let states = timed(&mut timings.spin, || {
+        let Some(speed) = largest_speed else { return Ok(None) };
+        let body = Rotating::new(&mesh, material, &assembled, &free, &stiffness)?;
+        SpinningStates::find(&body, free.len(), speed, listener).map(Some)
     })?;
+    let interface = interface_dofs(&free, contact)?;
+    let component_modes = |stiffness: &SparseMatrix| {
+        let cartesian = craig_bampton(stiffness, &mass, &interface, options.fixed_interface_modes, listener)?;
+        Ok(rotated(cartesian, &mesh, contact, options.frame))
+    };
+    let craig_bampton = timed(&mut timings.reduction, || component_modes(&stiffness))?;
     let (checks, squares) = timed(&mut timings.checks, || {
         report(listener, Stage::Checks, 0, 1);
         let (squares, vectors) = dense_modes(&craig_bampton.stiffness, &craig_bampton.mass)?;
@@ -135,7 +180,17 @@ pub fn reduce(
         report(listener, Stage::Checks, 1, 1);
         Ok((checks, squares))
     })?;
-    let rom = build_rom(&mesh, material, clamped.len(), contact, options, &craig_bampton, checks)?;
+    let spin = timed(&mut timings.spin, || {
+        let Some(states) = &states else { return Ok(None) };
+        let spinning = [component_modes(&states.middle.stiffness)?, component_modes(&states.largest.stiffness)?];
+        let [middle, largest] = &spinning;
+        let modes = options.checked_modes;
+        reduced_spin(states, &craig_bampton, [middle, largest], &mass, &free, &interface, modes).map(Some)
+    })?;
+    let (spin, spin_checks) = spin.map_or((None, Vec::new()), |ReducedSpin { spin, checks }| (Some(spin), checks));
+    let mut rom = build_rom(&mesh, material, clamped.len(), contact, options, &craig_bampton, checks)?;
+    rom.extras.spin = spin;
+    rom.validate()?;
     Ok(Reduction {
         rom,
         modes: node_modes(&full.modes, &free, mesh.nodes.len()),
@@ -143,6 +198,7 @@ pub fn reduce(
         free_dofs: free.len(),
         reduced_angular_frequencies: squares.iter().map(|square| square.max(0.0).sqrt()).collect(),
         fixed_interface_frequencies: craig_bampton.fixed_interface_frequencies,
+        spin_checks,
         material: material.clone(),
         mesh,
         timings,

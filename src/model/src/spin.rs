@@ -1,0 +1,74 @@
+//! Effects of a steady spin about the z axis on a structure that turns, in the rotating frame.
+//!
+//! At speed Ω the structure rests in the equilibrium u(Ω) of elastic and centrifugal forces, found without linearising
+//! either ([`Rotating::equilibrium`]). Small motions about it obey
+//!
+//! M ü + (D + 2ΩG) u̇ + K(Ω) (u - u(Ω)) = f, K(Ω) = K_T(u(Ω)) - Ω²M_xy, G = ∫ρ Nᵀ \[0 -1 0; 1 0 0; 0 0 0\] N,
+//!
+//! with the tangent stiffness K_T (elasticity of the deformed structure, its stress) and the spin softening -Ω²M_xy.
+//! All is projected on the reduced coordinates of the resting structure, to which the shapes u(Ω) are added
+//! ([`with_static_shapes`]), and K(Ω) is fitted by K₀ + Ω²K₁ + Ω⁴K₂ through three speeds: 0, Ω/√2 and Ω
+//! ([`reduced_spin`]). The load Ω²c = K(Ω) u(Ω) then gives the static growth exactly at the largest speed.
+//! The fit over the speed is that of Sternchüss and Balmès, Proc. ISMA 2006, pp. 3925-3939.
+
+mod equilibrium;
+mod reduced;
+
+pub use equilibrium::{Rotating, SpinningState, turned_about_axis, without_axial};
+pub use reduced::{ReducedSpin, SpinCheck, SpinningStates, reduced_spin};
+
+use nalgebra::{DMatrix, DVector};
+use tiprub_core::{Rom, rom::Spin};
+
+use crate::craig_bampton::dense_modes;
+use crate::{Error, Result};
+
+/// Stiffness of a reduced model at a speed (rad/s): K₀ + Ω²K₁ + Ω⁴K₂.
+pub fn stiffness_at(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> DMatrix<f64> {
+    let square = speed * speed;
+    resting + &spin.stiffness_speed2 * square + &spin.stiffness_speed4 * (square * square)
+}
+
+/// Static growth of a reduced model at a speed (rad/s): K(Ω)⁻¹ Ω²c, in reduced coordinates.
+///
+/// # Errors
+/// [`Error::NotPositiveDefinite`] when K(Ω) is not, as at speeds far beyond the fitted ones.
+pub fn static_growth(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> Result<DVector<f64>> {
+    let factor = stiffness_at(resting, spin, speed).cholesky().ok_or_else(|| Error::NotPositiveDefinite {
+        matrix: format!("K (reduced stiffness at {speed} rad/s)"),
+        remedy: format!("Stay within the {} rad/s that the spin matrices were fitted for", spin.largest_speed),
+    })?;
+    Ok(factor.solve(&(DVector::from_column_slice(&spin.centrifugal_load) * (speed * speed))))
+}
+
+/// Natural frequencies (Hz) at a speed (rad/s), ascending, with or without the Coriolis force, undamped.
+///
+/// With ω² and the modes of K(Ω), Λ = diag(ω) and G in modal coordinates, the motion is d/dt (Λq, q̇) = A (Λq, q̇) with
+/// A = \[0 Λ; -Λ -2ΩG\] skew-symmetric: its eigenvalues are ±iω, those of AᵀA the squares, each twice.
+///
+/// # Errors
+/// [`Error::Invalid`] for a ROM without spin matrices, [`Error::NotPositiveDefinite`] for a mass matrix that is none.
+pub fn frequencies_at(rom: &Rom, speed: f64, coriolis: bool) -> Result<Vec<f64>> {
+    let Some(spin) = &rom.extras.spin else {
+        let remedy = "Reduce it with `--spin` and the largest speed";
+        return Err(Error::invalid(format!("ROM `{}`", rom.name), "it has no spin matrices", remedy));
+    };
+    let (squares, vectors) = dense_modes(&stiffness_at(&rom.stiffness, spin, speed), &rom.mass)?;
+    let omega: Vec<f64> = squares.iter().map(|square| square.max(0.0).sqrt()).collect();
+    let to_hertz = |omega: f64| omega / core::f64::consts::TAU;
+    if !coriolis {
+        return Ok(omega.into_iter().map(to_hertz).collect());
+    }
+    let order = omega.len();
+    let gyroscopic = vectors.transpose() * &spin.coriolis * &vectors * (2.0 * speed);
+    let mut system = DMatrix::zeros(2 * order, 2 * order);
+    system.view_mut((order, order), (order, order)).copy_from(&-gyroscopic);
+    for (k, omega) in omega.into_iter().enumerate() {
+        system[(k, order + k)] = omega;
+        system[(order + k, k)] = -omega;
+    }
+    let mut squares: Vec<f64> = (system.transpose() * &system).symmetric_eigenvalues().iter().copied().collect();
+    squares.sort_by(f64::total_cmp);
+    let pair = |pair: &[f64]| to_hertz((0.5 * (pair[0] + pair[1])).max(0.0).sqrt());
+    Ok(squares.chunks_exact(2).map(pair).collect())
+}
