@@ -14,7 +14,7 @@ use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report};
 use crate::sparse::{Factor, SparseMatrix, principal_pair};
-use crate::spin::{ReducedSpin, Rotating, SpinCheck, SpinningStates, reduced_spin};
+use crate::spin::{ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, SpinningStates, reduced_spin};
 use crate::{Error, Result};
 
 /// A contact node before the reduction.
@@ -165,14 +165,14 @@ fn reduced(
     let states = timed(&mut timings.spin, || {
         let Some(speed) = largest_speed else { return Ok(None) };
         let body = Rotating::new(&mesh, material, &assembled, &free, &stiffness)?;
-        SpinningStates::find(&body, free.len(), speed, listener).map(Some)
+        SpinningStates::find(&body, speed, listener).map(Some)
     })?;
     let interface = interface_dofs(&free, contact)?;
-    let component_modes = |stiffness: &SparseMatrix| {
-        let cartesian = craig_bampton(stiffness, &mass, &interface, options.fixed_interface_modes, listener)?;
+    let component_modes = |stiffness: &SparseMatrix, modes: usize| {
+        let cartesian = craig_bampton(stiffness, &mass, &interface, modes, listener)?;
         Ok(rotated(cartesian, &mesh, contact, options.frame))
     };
-    let craig_bampton = timed(&mut timings.reduction, || component_modes(&stiffness))?;
+    let craig_bampton = timed(&mut timings.reduction, || component_modes(&stiffness, options.fixed_interface_modes))?;
     let (checks, squares) = timed(&mut timings.checks, || {
         report(listener, Stage::Checks, 0, 1);
         let (squares, vectors) = dense_modes(&craig_bampton.stiffness, &craig_bampton.mass)?;
@@ -182,10 +182,11 @@ fn reduced(
     })?;
     let spin = timed(&mut timings.spin, || {
         let Some(states) = &states else { return Ok(None) };
-        let spinning = [component_modes(&states.middle.stiffness)?, component_modes(&states.largest.stiffness)?];
-        let [middle, largest] = &spinning;
-        let modes = options.checked_modes;
-        reduced_spin(states, &craig_bampton, [middle, largest], &mass, &free, &interface, modes).map(Some)
+        let modes = (options.fixed_interface_modes + SPARE_MODES).min(free.len() - interface.len());
+        let middle = component_modes(&states.middle.stiffness, modes)?;
+        let largest = component_modes(&states.largest.stiffness, modes)?;
+        let resting = Resting { model: &craig_bampton, mass: &mass, free: &free, interface: &interface };
+        reduced_spin(states, resting, &middle, &largest, options.checked_modes).map(Some)
     })?;
     let (spin, spin_checks) = spin.map_or((None, Vec::new()), |ReducedSpin { spin, checks }| (Some(spin), checks));
     let mut rom = build_rom(&mesh, material, clamped.len(), contact, options, &craig_bampton, checks)?;

@@ -6,16 +6,19 @@
 //! M ü + (D + 2ΩG) u̇ + K(Ω) (u - u(Ω)) = f, K(Ω) = K_T(u(Ω)) - Ω²M_xy, G = ∫ρ Nᵀ \[0 -1 0; 1 0 0; 0 0 0\] N,
 //!
 //! with the tangent stiffness K_T (elasticity of the deformed structure, its stress) and the spin softening -Ω²M_xy.
-//! All is projected on the reduced coordinates of the resting structure, to which the shapes u(Ω) are added
-//! ([`with_static_shapes`]), and K(Ω) is fitted by K₀ + Ω²K₁ + Ω⁴K₂ through three speeds: 0, Ω/√2 and Ω
-//! ([`reduced_spin`]). The load Ω²c = K(Ω) u(Ω) then gives the static growth exactly at the largest speed.
+//! Craig-Bampton reduces each of these states with its own constraint and fixed-interface modes, turned so that the
+//! coordinates and the mass matrix stay those of the resting structure; its stiffness K(Ω) is fitted by
+//! K₀ + Ω²K₁ + Ω⁴K₂ through three speeds, 0, 0.6 Ω and Ω ([`reduced_spin`]). With modes of its own a state needs no more
+//! coordinates than the resting structure. In the resting modes the untwist would cost membrane strain that is not there.
+//! The load Ω²c + Ω⁴c₂ is such that its static response under K(Ω) is the growth u(Ω) of the contact nodes, exactly at
+//! 0.6 Ω and Ω.
 //! The fit over the speed is that of Sternchüss and Balmès, Proc. ISMA 2006, pp. 3925-3939.
 
 mod equilibrium;
 mod reduced;
 
 pub use equilibrium::{Rotating, SpinningState, turned_about_axis, without_axial};
-pub use reduced::{ReducedSpin, SpinCheck, SpinningStates, reduced_spin};
+pub use reduced::{CHECKED, MIDDLE, ReducedSpin, Resting, SPARE_MODES, SpinCheck, SpinningStates, reduced_spin};
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::{Rom, rom::Spin};
@@ -29,7 +32,7 @@ pub fn stiffness_at(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> DMatrix<
     resting + &spin.stiffness_speed2 * square + &spin.stiffness_speed4 * (square * square)
 }
 
-/// Static growth of a reduced model at a speed (rad/s): K(Ω)⁻¹ Ω²c, in reduced coordinates.
+/// Static growth of a reduced model at a speed (rad/s): K(Ω)⁻¹ (Ω²c + Ω⁴c₂), in reduced coordinates.
 ///
 /// # Errors
 /// [`Error::NotPositiveDefinite`] when K(Ω) is not, as at speeds far beyond the fitted ones.
@@ -38,7 +41,13 @@ pub fn static_growth(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> Result<
         matrix: format!("K (reduced stiffness at {speed} rad/s)"),
         remedy: format!("Stay within the {} rad/s that the spin matrices were fitted for", spin.largest_speed),
     })?;
-    Ok(factor.solve(&(DVector::from_column_slice(&spin.centrifugal_load) * (speed * speed))))
+    let square = speed * speed;
+    let (second, fourth) = (&spin.centrifugal_load, &spin.centrifugal_load_speed4);
+    let load = DVector::from_iterator(
+        second.len(),
+        second.iter().zip(fourth).map(|(second, fourth)| square * (second + square * fourth)),
+    );
+    Ok(factor.solve(&load))
 }
 
 /// Natural frequencies (Hz) at a speed (rad/s), ascending, with or without the Coriolis force, undamped.

@@ -69,7 +69,12 @@ impl<'a> Rotating<'a> {
         Ok(Self { mesh, material, assembled, free, reduced: (Arc::clone(&stiffness.pattern), entries) })
     }
 
-    /// Equilibrium at `speed` (rad/s) by Newton's iteration from `start` (free dofs, one column; zero for the first).
+    /// The displacement of the resting body: zero.
+    pub fn at_rest(&self) -> Mat<f64> {
+        Mat::zeros(self.free.len(), 1)
+    }
+
+    /// Equilibrium at `speed` (rad/s) by Newton's iteration from `start` (free dofs, one column).
     ///
     /// Internal force (total Lagrangian, St. Venant-Kirchhoff) = Ω² ∫ρ Nᵀ(x, y, 0) at the *displaced* position (x, y).
     ///

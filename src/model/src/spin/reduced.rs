@@ -1,7 +1,7 @@
 //! Effects of spin in reduced coordinates: shapes added to the basis, the fit over the speed, and its checks.
 
 use faer::Mat;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use tiprub_core::rom::Spin;
 
 use super::{Rotating, SpinningState, static_growth, stiffness_at, turned_about_axis};
@@ -11,8 +11,16 @@ use crate::reduce::full_modes;
 use crate::sparse::SparseMatrix;
 use crate::{Error, Result};
 
-/// A shape of which the basis leaves less than this share is in it already.
-const DEPENDENT: f64 = 1e-9;
+/// Share of the largest speed through which the fit over the speed goes beside 0 and 1. Interpolation in Ω² from here to
+/// the largest speed leaves about the same error above and, down to half of the largest speed, below it.
+pub const MIDDLE: f64 = 0.6;
+/// Share of the largest speed at which the fit is checked: about where it is worst.
+pub const CHECKED: f64 = 0.8;
+/// A spinning state is searched for this many more fixed-interface modes than the resting one has, since the order of
+/// frequencies changes with the speed.
+pub const SPARE_MODES: usize = 10;
+/// Least share that every resting fixed-interface mode must have in the spinning ones.
+const OVERLAP: f64 = 0.5;
 
 /// How well the reduced model holds at one speed.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +33,7 @@ pub struct SpinCheck {
     pub reduced_frequencies: Vec<f64>,
     /// Static growth of the contact degrees of freedom in the full model (m), in the ROM's frame.
     pub full_growth: Vec<f64>,
-    /// The same of the reduced model: K(Ω)⁻¹Ω²c (m).
+    /// The same of the reduced model: K(Ω)⁻¹(Ω²c + Ω⁴c₂) (m).
     pub reduced_growth: Vec<f64>,
 }
 
@@ -48,17 +56,17 @@ impl SpinCheck {
 pub struct ReducedSpin {
     /// The arrays.
     pub spin: Spin,
-    /// At the largest speed, where the fit is exact, and at half of it, where it is not.
+    /// At [`CHECKED`] of the largest speed, where the fit is not exact, and at the largest, where it is.
     pub checks: Vec<SpinCheck>,
 }
 
 /// The equilibria that the spin arrays are made and checked with.
 #[derive(Debug)]
 pub struct SpinningStates {
-    /// At Ω/2: checked.
-    pub half: SpinningState,
-    /// At Ω/√2: fitted.
+    /// At [`MIDDLE`] Ω: fitted.
     pub middle: SpinningState,
+    /// At [`CHECKED`] Ω: checked.
+    pub checked: SpinningState,
     /// At Ω: fitted and checked.
     pub largest: SpinningState,
 }
@@ -68,131 +76,152 @@ impl SpinningStates {
     ///
     /// # Errors
     /// Those of [`Rotating::equilibrium`].
-    pub fn find(body: &Rotating<'_>, order: usize, largest_speed: f64, listener: Listener<'_>) -> Result<Self> {
+    pub fn find(body: &Rotating<'_>, largest_speed: f64, listener: Listener<'_>) -> Result<Self> {
+        let scaled = |state: &SpinningState, share: f64| {
+            let ratio = share * largest_speed / state.speed;
+            faer::Scale(ratio * ratio) * &state.displacement
+        };
         report(listener, Stage::Spin, 0, 3);
-        let half = body.equilibrium(0.5 * largest_speed, Mat::zeros(order, 1))?;
+        let middle = body.equilibrium(MIDDLE * largest_speed, body.at_rest())?;
         report(listener, Stage::Spin, 1, 3);
-        let middle_speed = largest_speed * core::f64::consts::FRAC_1_SQRT_2;
-        let middle = body.equilibrium(middle_speed, faer::Scale(2.0) * &half.displacement)?;
+        let checked = body.equilibrium(CHECKED * largest_speed, scaled(&middle, CHECKED))?;
         report(listener, Stage::Spin, 2, 3);
-        let largest = body.equilibrium(largest_speed, faer::Scale(2.0) * &middle.displacement)?;
+        let largest = body.equilibrium(largest_speed, scaled(&checked, 1.0))?;
         report(listener, Stage::Spin, 3, 3);
-        Ok(Self { half, middle, largest })
-    }
-
-    /// Displacements of the equilibria that the arrays are made of (free dofs).
-    pub fn fitted_shapes(&self) -> [&Mat<f64>; 2] {
-        [&self.middle.displacement, &self.largest.displacement]
+        Ok(Self { middle, checked, largest })
     }
 }
 
-/// A reduced model about a spinning state in the coordinates and with the mass matrix of the resting one.
+/// The reduced model at rest, in whose coordinates the spin arrays are.
+#[derive(Debug, Clone, Copy)]
+pub struct Resting<'a> {
+    /// The model; its first coordinates are the contact displacements.
+    pub model: &'a CraigBampton,
+    /// Mass matrix of the free dofs.
+    pub mass: &'a SparseMatrix,
+    /// The free dofs (3·node + component), ascending.
+    pub free: &'a [usize],
+    /// Which of them are the contact displacements.
+    pub interface: &'a [usize],
+}
+
+/// What one speed says of the arrays, in the coordinates and with the mass matrix of the resting model.
 ///
-/// T = \[Ψ Φ\] of the spinning state becomes TR, R = \[I 0; A B\]: contact displacements stay what they are; B is the
-/// rotation that brings the fixed-interface modes closest to the resting ones (polar factor of ΦᵀMΦ₀), and
-/// A = B M̂₀_mb - M̂_mb couples them to the interface as at rest. Then (TR)ᵀM(TR) = M̂₀ but for the part of the interface
-/// mass that the fixed-interface modes do not carry, M̂_bb - M̂_bm M̂_mb, whose change with speed is neglected.
-struct Aligned {
-    /// RᵀK̂R.
-    stiffness: DMatrix<f64>,
+/// T = \[Ψ Φ\] of the spinning state becomes TR, R = \[I 0; BA B\]: contact displacements stay what they are; BᵀB = I
+/// picks and turns the fixed-interface modes to come closest to the resting ones (polar factor of ΦᵀMΦ₀), and
+/// A = M̂₀_mb - BᵀM̂_mb couples them to the interface as at rest. Then (TR)ᵀM(TR) = M̂₀ but for the part of the interface
+/// mass that these modes do not carry, M̂_bb - M̂_bm BBᵀM̂_mb, whose change with speed is neglected.
+struct AtSpeed {
+    /// Ω² (rad²/s²).
+    square: f64,
     /// TR.
     basis: Mat<f64>,
+    /// (RᵀK̂R - K̂₀)/Ω².
+    stiffness: DMatrix<f64>,
+    /// (TR)ᵀ K(Ω) u(Ω)/Ω², one column. The model's static response to it has the contact displacements of u(Ω), since
+    /// constraint modes are K-orthogonal to what they leave of it.
+    load: DMatrix<f64>,
 }
 
-impl Aligned {
-    fn new(spinning: &CraigBampton, resting: &CraigBampton, mass: &SparseMatrix, boundary: usize) -> Result<Self> {
-        let order = resting.mass.nrows();
-        let inner = order - boundary;
-        let modes = spinning.transformation.get(.., boundary..);
-        let overlap = modes.transpose() * mass.times(resting.transformation.get(.., boundary..));
-        let overlap = DMatrix::from_fn(inner, inner, |i, j| overlap[(i, j)]);
-        let turn = rotation_of(overlap)?;
-        let coupling = |model: &CraigBampton| model.mass.view((boundary, 0), (inner, boundary)).into_owned();
-        let shift = &turn * coupling(resting) - coupling(spinning);
-        let mut change = DMatrix::identity(order, order);
-        change.view_mut((boundary, 0), (inner, boundary)).copy_from(&shift);
-        change.view_mut((boundary, boundary), (inner, inner)).copy_from(&turn);
+impl AtSpeed {
+    fn new(state: &SpinningState, spinning: &CraigBampton, resting: Resting<'_>) -> Result<Self> {
+        let (boundary, order, wide) = (resting.interface.len(), resting.model.mass.nrows(), spinning.mass.nrows());
+        let (inner, wide_inner) = (order - boundary, wide - boundary);
+        let resting_modes = resting.model.transformation.get(.., boundary..);
+        let overlap = spinning.transformation.get(.., boundary..).transpose() * resting.mass.times(resting_modes);
+        let turn = closest_modes(DMatrix::from_fn(wide_inner, inner, |i, j| overlap[(i, j)]))?;
+        let coupling = |model: &CraigBampton, modes| model.mass.view((boundary, 0), (modes, boundary)).into_owned();
+        let shift = coupling(resting.model, inner) - turn.transpose() * coupling(spinning, wide_inner);
+        let mut change = DMatrix::identity(wide, order);
+        change.view_mut((boundary, 0), (wide_inner, boundary)).copy_from(&(&turn * shift));
+        change.view_mut((boundary, boundary), (wide_inner, inner)).copy_from(&turn);
         let stiffness = change.transpose() * &spinning.stiffness * &change;
+        let basis = &spinning.transformation * Mat::from_fn(wide, order, |i, j| change[(i, j)]);
+        let load = basis.transpose() * state.stiffness.times(state.displacement.as_ref());
+        let square = state.speed * state.speed;
         Ok(Self {
-            stiffness: 0.5 * (&stiffness + stiffness.transpose()),
-            basis: &spinning.transformation * Mat::from_fn(order, order, |i, j| change[(i, j)]),
+            square,
+            basis,
+            stiffness: (0.5 * (&stiffness + stiffness.transpose()) - &resting.model.stiffness) / square,
+            load: DMatrix::from_fn(order, 1, |i, j| load[(i, j)] / square),
         })
     }
 }
 
-/// The orthogonal factor of a matrix' polar decomposition.
-fn rotation_of(matrix: DMatrix<f64>) -> Result<DMatrix<f64>> {
-    let parts = matrix.svd(true, true);
+/// The orthonormal columns closest to those of a matrix: its polar factor.
+fn closest_modes(overlap: DMatrix<f64>) -> Result<DMatrix<f64>> {
+    let parts = overlap.svd(true, true);
+    let smallest = parts.singular_values.iter().copied().fold(1.0, f64::min);
     match (parts.u, parts.v_t) {
-        (Some(left), Some(right)) => Ok(left * right),
-        _ => Err(Error::invalid("fixed-interface modes under spin", "they cannot be aligned", "Ask for fewer modes")),
+        (Some(left), Some(right)) if smallest >= OVERLAP => Ok(left * right),
+        _ => Err(Error::invalid(
+            "fixed-interface modes under spin",
+            format!("one of them has only {smallest:.2} in common with those at rest"),
+            "Ask for another number of modes, or for a lower largest speed",
+        )),
     }
 }
 
-/// Spin arrays in the coordinates of `resting`, from the reduced models about the fitted equilibria.
+/// a and b of a + b s through the values at two s.
+fn line(first: (f64, &DMatrix<f64>), second: (f64, &DMatrix<f64>)) -> (DMatrix<f64>, DMatrix<f64>) {
+    let slope = (second.1 - first.1) / (second.0 - first.0);
+    (first.1 - &slope * first.0, slope)
+}
+
+/// Spin arrays in the coordinates of `resting`, from the reduced models about the two fitted equilibria.
 ///
-/// `mass` is that of the `free` dofs; the models' first `boundary` coordinates are the contact displacements. `modes`
-/// frequencies are checked.
-///
-/// K₁ and K₂ follow from ΔK = K(Ω) - K₀ at s/2 and s = Ω²:
-/// K₁ = (4ΔK(s/2) - ΔK(s))/s, K₂ = (2ΔK(s) - 4ΔK(s/2))/s².
+/// Those models have the contact displacements of `resting` and at least as many modes, better [`SPARE_MODES`] more.
+/// `modes` frequencies are checked. (K(Ω) - K₀)/Ω² = K₁ + Ω²K₂ and the load over Ω², c + Ω²c₂, are straight lines in Ω²
+/// through the two speeds; G is that of the largest speed.
 ///
 /// # Errors
-/// Those of [`full_modes`]; [`Error::NotPositiveDefinite`] for an unstable reduced model.
+/// Those of [`full_modes`]; [`Error::NotPositiveDefinite`] for an unstable reduced model; [`Error::Invalid`] when the
+/// modes change beyond recognition.
 pub fn reduced_spin(
     states: &SpinningStates,
-    resting: &CraigBampton,
-    [middle, largest]: [&CraigBampton; 2],
-    mass: &SparseMatrix,
-    free: &[usize],
-    interface: &[usize],
+    resting: Resting<'_>,
+    middle: &CraigBampton,
+    largest: &CraigBampton,
     modes: usize,
 ) -> Result<ReducedSpin> {
-    let boundary = interface.len();
-    let middle = Aligned::new(middle, resting, mass, boundary)?;
-    let largest = Aligned::new(largest, resting, mass, boundary)?;
-    let square = states.largest.speed * states.largest.speed;
-    let (half_change, change) = (&middle.stiffness - &resting.stiffness, &largest.stiffness - &resting.stiffness);
-    let product = largest.basis.transpose() * mass.times(turned_about_axis(free, &largest.basis).as_ref());
-    let order = resting.mass.nrows();
-    let mut spin = Spin {
-        stiffness_speed2: (&half_change * 4.0 - &change) / square,
-        stiffness_speed4: (&change * 2.0 - &half_change * 4.0) / (square * square),
+    let middle = AtSpeed::new(&states.middle, middle, resting)?;
+    let largest = AtSpeed::new(&states.largest, largest, resting)?;
+    let (stiffness_speed2, stiffness_speed4) =
+        line((middle.square, &middle.stiffness), (largest.square, &largest.stiffness));
+    let (load, load_speed4) = line((middle.square, &middle.load), (largest.square, &largest.load));
+    let turned = turned_about_axis(resting.free, &largest.basis);
+    let product = largest.basis.transpose() * resting.mass.times(turned.as_ref());
+    let order = resting.model.mass.nrows();
+    let spin = Spin {
+        stiffness_speed2,
+        stiffness_speed4,
         coriolis: DMatrix::from_fn(order, order, |i, j| 0.5 * (product[(i, j)] - product[(j, i)])),
-        centrifugal_load: Vec::new(),
+        centrifugal_load: load.iter().copied().collect(),
+        centrifugal_load_speed4: load_speed4.iter().copied().collect(),
         largest_speed: states.largest.speed,
     };
-    let growth = |state: &SpinningState, basis: &Mat<f64>| -> DVector<f64> {
-        // Contact displacements as they are; the modes take the mass-nearest share of the rest.
-        let projected = basis.transpose() * mass.times(state.displacement.as_ref());
-        let contact = contact_growth(resting, state, interface);
-        let coupling = resting.mass.view((boundary, 0), (order - boundary, boundary));
-        let shares = DVector::from_fn(order - boundary, |i, _| projected[(boundary + i, 0)]) - coupling * &contact;
-        DVector::from_iterator(order, contact.iter().chain(shares.iter()).copied())
-    };
-    let load = &largest.stiffness * growth(&states.largest, &largest.basis) / square;
-    spin.centrifugal_load = load.iter().copied().collect();
-    let load_m = &middle.stiffness * growth(&states.middle, &middle.basis) / square * 2.0;
-    println!("c  {:.5?}\ncm {:.5?}", load.as_slice(), load_m.as_slice());
-    let mut checks = Vec::new();
-    for state in [&states.half, &states.middle, &states.largest] {
-        let full_frequencies = full_modes(&state.stiffness, mass, false, modes, &silent)?.modes.frequencies();
-        let (squares, _) = dense_modes(&stiffness_at(&resting.stiffness, &spin, state.speed), &resting.mass)?;
-        let to_hertz = |square: &f64| square.max(0.0).sqrt() / core::f64::consts::TAU;
-        checks.push(SpinCheck {
-            speed: state.speed,
-            reduced_frequencies: squares.iter().take(full_frequencies.len()).map(to_hertz).collect(),
-            full_frequencies,
-            full_growth: contact_growth(resting, state, interface).iter().copied().collect(),
-            reduced_growth: static_growth(&resting.stiffness, &spin, state.speed)?.iter().take(boundary).copied().collect(),
-        });
-    }
-    Ok(ReducedSpin { spin, checks })
+    let checks = [&states.checked, &states.largest].map(|state| check(state, resting, &spin, modes));
+    Ok(ReducedSpin { checks: checks.into_iter().collect::<Result<_>>()?, spin })
 }
 
 /// A state's displacements at the contact in the ROM's frame. There the transformation is the rotation into that frame.
-fn contact_growth(resting: &CraigBampton, state: &SpinningState, interface: &[usize]) -> DVector<f64> {
-    let rotation = &resting.transformation;
-    let component = |j: usize| interface.iter().map(|&row| rotation[(row, j)] * state.displacement[(row, 0)]).sum();
-    DVector::from_fn(interface.len(), |j, _| component(j))
+fn contact_growth(state: &SpinningState, resting: Resting<'_>) -> Vec<f64> {
+    let (rows, rotation) = (resting.interface, &resting.model.transformation);
+    let component = |j: usize| rows.iter().map(|&row| rotation[(row, j)] * state.displacement[(row, 0)]).sum();
+    (0..rows.len()).map(component).collect()
+}
+
+fn check(state: &SpinningState, resting: Resting<'_>, spin: &Spin, modes: usize) -> Result<SpinCheck> {
+    let (model, mass) = (resting.model, resting.mass);
+    let full_frequencies = full_modes(&state.stiffness, mass, false, modes, &silent)?.modes.frequencies();
+    let (squares, _) = dense_modes(&stiffness_at(&model.stiffness, spin, state.speed), &model.mass)?;
+    let to_hertz = |square: &f64| square.max(0.0).sqrt() / core::f64::consts::TAU;
+    let growth = static_growth(&model.stiffness, spin, state.speed)?;
+    Ok(SpinCheck {
+        speed: state.speed,
+        reduced_frequencies: squares.iter().take(full_frequencies.len()).map(to_hertz).collect(),
+        full_frequencies,
+        full_growth: contact_growth(state, resting),
+        reduced_growth: growth.iter().take(resting.interface.len()).copied().collect(),
+    })
 }
