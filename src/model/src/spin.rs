@@ -52,9 +52,6 @@ pub fn static_growth(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> Result<
 
 /// Natural frequencies (Hz) at a speed (rad/s), ascending, with or without the Coriolis force, undamped.
 ///
-/// With ω² and the modes of K(Ω), Λ = diag(ω) and G in modal coordinates, the motion is d/dt (Λq, q̇) = A (Λq, q̇) with
-/// A = \[0 Λ; -Λ -2ΩG\] skew-symmetric: its eigenvalues are ±iω, those of AᵀA the squares, each twice.
-///
 /// # Errors
 /// [`Error::Invalid`] for a ROM without spin matrices, [`Error::NotPositiveDefinite`] for a mass matrix that is none.
 pub fn frequencies_at(rom: &Rom, speed: f64, coriolis: bool) -> Result<Vec<f64>> {
@@ -63,21 +60,25 @@ pub fn frequencies_at(rom: &Rom, speed: f64, coriolis: bool) -> Result<Vec<f64>>
         return Err(Error::invalid(format!("ROM `{}`", rom.name), "it has no spin matrices", remedy));
     };
     let (squares, vectors) = dense_modes(&stiffness_at(&rom.stiffness, spin, speed), &rom.mass)?;
-    let omega: Vec<f64> = squares.iter().map(|square| square.max(0.0).sqrt()).collect();
-    let to_hertz = |omega: f64| omega / core::f64::consts::TAU;
-    if !coriolis {
-        return Ok(omega.into_iter().map(to_hertz).collect());
-    }
-    let order = omega.len();
-    let gyroscopic = vectors.transpose() * &spin.coriolis * &vectors * (2.0 * speed);
+    let strength = if coriolis { 2.0 * speed } else { 0.0 };
+    Ok(gyroscopic_frequencies(&squares, &(vectors.transpose() * &spin.coriolis * &vectors * strength)))
+}
+
+/// Natural frequencies (Hz), ascending, of q̈ + g q̇ + diag(ω²) q = 0 with a skew-symmetric g (1/s) and `squares` ω².
+///
+/// With Λ = diag(ω) the motion is d/dt (Λq, q̇) = A (Λq, q̇), A = \[0 Λ; -Λ -g\] skew-symmetric: its eigenvalues are ±iω,
+/// so those of AᵀA are the squares, each twice.
+pub fn gyroscopic_frequencies(squares: &[f64], gyroscopic: &DMatrix<f64>) -> Vec<f64> {
+    let order = squares.len();
     let mut system = DMatrix::zeros(2 * order, 2 * order);
     system.view_mut((order, order), (order, order)).copy_from(&-gyroscopic);
-    for (k, omega) in omega.into_iter().enumerate() {
+    for (k, square) in squares.iter().enumerate() {
+        let omega = square.max(0.0).sqrt();
         system[(k, order + k)] = omega;
         system[(order + k, k)] = -omega;
     }
-    let mut squares: Vec<f64> = (system.transpose() * &system).symmetric_eigenvalues().iter().copied().collect();
-    squares.sort_by(f64::total_cmp);
-    let pair = |pair: &[f64]| to_hertz((0.5 * (pair[0] + pair[1])).max(0.0).sqrt());
-    Ok(squares.chunks_exact(2).map(pair).collect())
+    let mut doubled: Vec<f64> = (system.transpose() * &system).symmetric_eigenvalues().iter().copied().collect();
+    doubled.sort_by(f64::total_cmp);
+    let mean = |pair: &[f64]| (0.5 * (pair[0] + pair[1])).max(0.0).sqrt() / core::f64::consts::TAU;
+    doubled.chunks_exact(2).map(mean).collect()
 }

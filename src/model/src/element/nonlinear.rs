@@ -16,6 +16,8 @@ pub struct Tangent {
     pub stiffness: DMatrix<f64>,
     /// Internal force on every node (N).
     pub force: Vec<[f64; 3]>,
+    /// Largest component of the Green strain E at any integration point.
+    pub largest_strain: f64,
 }
 
 /// Deformation gradient F at a mapped point.
@@ -27,10 +29,14 @@ fn deformation(mapped: &Mapped, displacements: &[[f64; 3]]) -> Matrix3<f64> {
     gradient
 }
 
-/// Second Piola-Kirchhoff stress S of a deformation gradient (Pa).
-fn second_stress(material: &Material, deformation: &Matrix3<f64>) -> Matrix3<f64> {
+/// Green strain E of a deformation gradient.
+fn green_strain(deformation: &Matrix3<f64>) -> Matrix3<f64> {
+    0.5 * (deformation.transpose() * deformation - Matrix3::identity())
+}
+
+/// Second Piola-Kirchhoff stress S of a Green strain (Pa).
+fn second_stress(material: &Material, strain: &Matrix3<f64>) -> Matrix3<f64> {
     let (lambda, shear) = material.lame();
-    let strain = 0.5 * (deformation.transpose() * deformation - Matrix3::identity());
     Matrix3::identity() * (lambda * strain.trace()) + strain * (2.0 * shear)
 }
 
@@ -47,7 +53,7 @@ pub fn second_stresses(
 ) -> Result<Vec<[f64; 6]>> {
     let point = |(index, quadrature)| {
         let mapped = map_point(kind, coordinates, quadrature, (element, index))?;
-        let s = second_stress(material, &deformation(&mapped, displacements));
+        let s = second_stress(material, &green_strain(&deformation(&mapped, displacements)));
         Ok([s[(0, 0)], s[(1, 1)], s[(2, 2)], s[(0, 1)], s[(1, 2)], s[(2, 0)]])
     };
     kind.stiffness_rule().iter().enumerate().map(point).collect()
@@ -108,10 +114,13 @@ pub fn tangent(
     let mut stiffness = DMatrix::zeros(3 * nodes, 3 * nodes);
     let mut geometric = DMatrix::zeros(nodes, nodes);
     let mut force = vec![[0.0; 3]; nodes];
+    let mut largest_strain = 0.0_f64;
     for (index, quadrature) in kind.stiffness_rule().iter().enumerate() {
         let mapped = map_point(kind, coordinates, quadrature, (element, index))?;
         let deformation = deformation(&mapped, displacements);
-        let stress = second_stress(material, &deformation);
+        let strain = green_strain(&deformation);
+        largest_strain = largest_strain.max(strain.amax());
+        let stress = second_stress(material, &strain);
         let first_stress = deformation * stress * mapped.volume;
         for (part, gradient) in force.iter_mut().zip(&mapped.shape.gradients) {
             let traction = first_stress * Vector3::from(*gradient);
@@ -126,7 +135,7 @@ pub fn tangent(
         }
     }
     stiffness.fill_lower_triangle_with_upper_triangle();
-    Ok(Tangent { stiffness, force })
+    Ok(Tangent { stiffness, force, largest_strain })
 }
 
 /// Add a point's part of the material stiffness to the blocks on and above the diagonal.

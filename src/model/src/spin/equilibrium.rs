@@ -20,6 +20,31 @@ const CORRECTION: f64 = 1e-8;
 /// Corrections before it is given up.
 const ITERATIONS: usize = 20;
 
+/// Largest strain for which a linear law between Green strain and stress is taken for an elastic solid.
+const STRAIN: f64 = 0.1;
+const APART: &str = "The body flies apart at this speed: give a lower largest speed, or check units and supports";
+
+/// Forces and stiffness of the free dofs at a displacement.
+struct Linearised {
+    /// Tangent stiffness of the elastic force.
+    tangent: SparseMatrix,
+    /// The same with the spin softening -Ω²M_xy.
+    softened: SparseMatrix,
+    /// Centrifugal less internal force.
+    unbalanced: Mat<f64>,
+    /// Largest centrifugal force.
+    load: f64,
+    largest_strain: f64,
+}
+
+/// Elastic part of [`Linearised`], all dofs.
+struct Elastic {
+    /// Entries of the tangent stiffness.
+    values: Vec<f64>,
+    forces: Vec<f64>,
+    largest_strain: f64,
+}
+
 /// A supported body that can be turned about the z axis.
 #[derive(Debug)]
 pub struct Rotating<'a> {
@@ -44,6 +69,8 @@ pub struct SpinningState {
     pub iterations: usize,
     /// Largest unbalanced force over the largest centrifugal one.
     pub residual: f64,
+    /// Largest component of the Green strain.
+    pub largest_strain: f64,
 }
 
 impl<'a> Rotating<'a> {
@@ -79,20 +106,39 @@ impl<'a> Rotating<'a> {
     /// Internal force (total Lagrangian, St. Venant-Kirchhoff) = Ω² ∫ρ Nᵀ(x, y, 0) at the *displaced* position (x, y).
     ///
     /// # Errors
-    /// [`Error::Invalid`] when the iteration does not converge, [`Error::NotPositiveDefinite`] when the body flies apart.
+    /// [`Error::Invalid`] when the iteration does not converge or strains exceed 0.1, [`Error::NotPositiveDefinite`] when the
+    /// body flies apart.
     pub fn equilibrium(&self, speed: f64, start: Mat<f64>) -> Result<SpinningState> {
         let mut displacement = start;
         let mut correction = f64::INFINITY;
         for iterations in 0..=ITERATIONS {
-            let (stiffness, unbalanced, load) = self.linearised(speed, &displacement)?;
+            let Linearised { tangent, softened, unbalanced, load, largest_strain } =
+                self.linearised(speed, &displacement)?;
             if correction <= CORRECTION {
+                if largest_strain > STRAIN {
+                    let problem =
+                        format!("strains of {largest_strain:.2}, beyond the {STRAIN} that elasticity is taken for");
+                    return Err(Error::invalid(format!("static equilibrium at {speed} rad/s"), problem, APART));
+                }
                 let residual = unbalanced.norm_max() / load.max(f64::MIN_POSITIVE);
-                return Ok(SpinningState { speed, displacement, stiffness, iterations, residual });
+                return Ok(SpinningState {
+                    speed,
+                    displacement,
+                    stiffness: softened,
+                    iterations,
+                    residual,
+                    largest_strain,
+                });
             }
-            let remedy = "The body flies apart at this speed: give a lower largest speed, or check units and supports";
-            let step = stiffness.factor(&format!("K (stiffness at {speed} rad/s)"), remedy)?.solve(unbalanced);
+            let name = format!("K (stiffness at {speed} rad/s)");
+            let full = softened.factor(&name, APART);
+            // A slender body is held in place by the tension that the first step only brings about: that step, and none
+            // that may be the last, leaves the force where the body was.
+            let lagging = full.is_err();
+            let step = full.or_else(|_| tangent.factor(&name, APART))?.solve(unbalanced);
             displacement += &step;
             correction = match step.norm_max() {
+                _ if lagging => f64::INFINITY,
                 0.0 => 0.0,
                 size => size / displacement.norm_max(),
             };
@@ -100,24 +146,26 @@ impl<'a> Rotating<'a> {
         Err(Error::invalid(
             format!("static equilibrium at {speed} rad/s"),
             format!("Newton's iteration still moves by {correction:.1e} of the displacement after {ITERATIONS} steps"),
-            "Give a lower largest speed, or check units and supports",
+            APART,
         ))
     }
 
-    /// Tangent stiffness, unbalanced force and largest centrifugal force at a displacement.
-    fn linearised(&self, speed: f64, displacement: &Mat<f64>) -> Result<(SparseMatrix, Mat<f64>, f64)> {
+    fn linearised(&self, speed: f64, displacement: &Mat<f64>) -> Result<Linearised> {
         let moved = self.node_displacements(displacement);
-        let (values, internal) = self.tangent(&moved)?;
+        let Elastic { values, forces: internal, largest_strain } = self.elastic(&moved)?;
         let square = speed * speed;
         let centrifugal = self.centrifugal_force(&moved);
+        let load = self.free.iter().map(|&dof| (square * centrifugal[dof]).abs()).fold(0.0, f64::max);
         let unbalanced =
             Mat::from_fn(self.free.len(), 1, |i, _| square * centrifugal[self.free[i]] - internal[self.free[i]]);
-        let load = self.free.iter().map(|&dof| (square * centrifugal[dof]).abs()).fold(0.0, f64::max);
         let whole = SparseMatrix { pattern: Arc::clone(&self.assembled.mass.pattern), values };
         let softened = whole.plus_scaled(-square, &without_axial(&self.assembled.mass));
         let (pattern, entries) = &self.reduced;
-        let values = entries.iter().map(|&entry| softened.values[entry]).collect();
-        Ok((SparseMatrix { pattern: Arc::clone(pattern), values }, unbalanced, load))
+        let of_free = |matrix: &SparseMatrix| SparseMatrix {
+            pattern: Arc::clone(pattern),
+            values: entries.iter().map(|&entry| matrix.values[entry]).collect(),
+        };
+        Ok(Linearised { tangent: of_free(&whole), softened: of_free(&softened), unbalanced, load, largest_strain })
     }
 
     /// ∫ρ Nᵀ(x, y, 0) at the displaced positions, all dofs (kg·m). Positions are interpolated by the same functions as
@@ -138,10 +186,10 @@ impl<'a> Rotating<'a> {
         moved
     }
 
-    /// Entries of the tangent stiffness and internal forces, all dofs.
-    fn tangent(&self, moved: &[[f64; 3]]) -> Result<(Vec<f64>, Vec<f64>)> {
+    fn elastic(&self, moved: &[[f64; 3]]) -> Result<Elastic> {
         let pattern = &self.assembled.stiffness.pattern;
         let (mut values, mut forces) = (vec![0.0; pattern.rows.len()], vec![0.0; 3 * moved.len()]);
+        let mut largest_strain = 0.0_f64;
         for (chunk_index, chunk) in self.mesh.elements.chunks(CHUNK).enumerate() {
             let tangents: Vec<Result<Tangent>> = chunk
                 .par_iter()
@@ -153,7 +201,8 @@ impl<'a> Rotating<'a> {
                 })
                 .collect();
             for (element, tangent) in chunk.iter().zip(tangents) {
-                let Tangent { stiffness, force } = tangent?;
+                let Tangent { stiffness, force, largest_strain: strain } = tangent?;
+                largest_strain = largest_strain.max(strain);
                 for_each_block(pattern, &element.nodes, |a, b, starts| {
                     for (j, start) in starts.into_iter().enumerate() {
                         for i in 0..3 {
@@ -166,7 +215,7 @@ impl<'a> Rotating<'a> {
                 }
             }
         }
-        Ok((values, forces))
+        Ok(Elastic { values, forces, largest_strain })
     }
 }
 
