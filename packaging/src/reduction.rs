@@ -12,10 +12,10 @@ const STAGES: [Stage; 7] = [
     Stage::Mesh,
     Stage::Assembly,
     Stage::FullModes,
-    Stage::Spin,
     Stage::FixedInterfaceModes,
     Stage::ConstraintModes,
     Stage::Checks,
+    Stage::Spin,
 ];
 
 /// Reduce rotor 37, showing stage and share done.

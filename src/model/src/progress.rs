@@ -11,14 +11,14 @@ pub enum Stage {
     Assembly,
     /// Modes of the full model.
     FullModes,
-    /// Static equilibria under spin, only when asked for.
-    Spin,
     /// Fixed-interface modes.
     FixedInterfaceModes,
     /// Constraint modes.
     ConstraintModes,
     /// Frequency deviation and residual criterion.
     Checks,
+    /// Effects of spin, only when asked for.
+    Spin,
 }
 
 impl fmt::Display for Stage {
@@ -27,10 +27,10 @@ impl fmt::Display for Stage {
             Self::Mesh => "mesh",
             Self::Assembly => "assembly",
             Self::FullModes => "modes of the full model",
-            Self::Spin => "equilibrium under spin",
             Self::FixedInterfaceModes => "fixed-interface modes",
             Self::ConstraintModes => "constraint modes",
             Self::Checks => "checks",
+            Self::Spin => "effects of spin",
         })
     }
 }

@@ -12,7 +12,7 @@ use crate::craig_bampton::{CraigBampton, craig_bampton, dense_modes};
 use crate::eigen::{Modes, lowest_modes, positive_factor};
 use crate::material::Material;
 use crate::mesh::Mesh;
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, Stage, report, silent};
 use crate::sparse::{Factor, SparseMatrix, principal_pair};
 use crate::spin::{ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, SpinningStates, reduced_spin};
 use crate::{Error, Result};
@@ -122,8 +122,7 @@ pub fn reduce(
 
 /// [`reduce`] with the effects of spin up to `largest_speed` (rad/s), in [`RomExtras::spin`]; see [`crate::spin`].
 ///
-/// Two shapes are added to the reduced coordinates, after the fixed-interface modes: what these and the constraint
-/// modes leave of the static shapes under spin.
+/// The rest of the ROM is that of [`reduce`], bit for bit.
 ///
 /// # Errors
 /// Those of [`reduce`]; [`Error::Invalid`] for a speed that is not a finite number above zero, for a structure without
@@ -162,17 +161,13 @@ fn reduced(
     let full = timed(&mut timings.full_modes, || {
         full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)
     })?;
-    let states = timed(&mut timings.spin, || {
-        let Some(speed) = largest_speed else { return Ok(None) };
-        let body = Rotating::new(&mesh, material, &assembled, &free, &stiffness)?;
-        SpinningStates::find(&body, speed, listener).map(Some)
-    })?;
     let interface = interface_dofs(&free, contact)?;
-    let component_modes = |stiffness: &SparseMatrix, modes: usize| {
+    let component_modes = |stiffness: &SparseMatrix, modes: usize, listener: Listener<'_>| {
         let cartesian = craig_bampton(stiffness, &mass, &interface, modes, listener)?;
         Ok(rotated(cartesian, &mesh, contact, options.frame))
     };
-    let craig_bampton = timed(&mut timings.reduction, || component_modes(&stiffness, options.fixed_interface_modes))?;
+    let craig_bampton =
+        timed(&mut timings.reduction, || component_modes(&stiffness, options.fixed_interface_modes, listener))?;
     let (checks, squares) = timed(&mut timings.checks, || {
         report(listener, Stage::Checks, 0, 1);
         let (squares, vectors) = dense_modes(&craig_bampton.stiffness, &craig_bampton.mass)?;
@@ -181,12 +176,18 @@ fn reduced(
         Ok((checks, squares))
     })?;
     let spin = timed(&mut timings.spin, || {
-        let Some(states) = &states else { return Ok(None) };
-        let modes = (options.fixed_interface_modes + SPARE_MODES).min(free.len() - interface.len());
-        let middle = component_modes(&states.middle.stiffness, modes)?;
-        let largest = component_modes(&states.largest.stiffness, modes)?;
+        let Some(speed) = largest_speed else { return Ok(None) };
+        let body = Rotating::new(&mesh, material, &assembled, &free, &stiffness)?;
         let resting = Resting { model: &craig_bampton, mass: &mass, free: &free, interface: &interface };
-        reduced_spin(states, resting, &middle, &largest, options.checked_modes).map(Some)
+        let states = SpinningStates::find(&body, speed, &|done| report(listener, Stage::Spin, done, 6))?;
+        let modes = (options.fixed_interface_modes + SPARE_MODES).min(free.len() - interface.len());
+        let middle = component_modes(&states.middle.stiffness, modes, &silent)?;
+        report(listener, Stage::Spin, 4, 6);
+        let largest = component_modes(&states.largest.stiffness, modes, &silent)?;
+        report(listener, Stage::Spin, 5, 6);
+        let spin = reduced_spin(&states, resting, &middle, &largest, options.checked_modes)?;
+        report(listener, Stage::Spin, 6, 6);
+        Ok(Some(spin))
     })?;
     let (spin, spin_checks) = spin.map_or((None, Vec::new()), |ReducedSpin { spin, checks }| (Some(spin), checks));
     let mut rom = build_rom(&mesh, material, clamped.len(), contact, options, &craig_bampton, checks)?;

@@ -9,7 +9,7 @@ use tiprub_model::reduce::full_modes;
 use tiprub_model::rotor37::{DESIGN_SPEED, MeshCounts, blade_mesh};
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::spin::{
-    Rotating, SpinningState, frequencies_at, gyroscopic_frequencies, static_growth, turned_about_axis,
+    Rotating, SpinningState, frequencies_at, gyroscopic_frequencies, static_growth, stiffness_at, turned_about_axis,
 };
 use tiprub_model::{Material, Mesh, Reduction, Rotor37Options, reduce_rotor37};
 
@@ -71,8 +71,7 @@ fn the_full_model_under_spin_agrees_with_calculix() {
                 let row = blade.free.binary_search(&(3 * (node - 1) + i)).unwrap();
                 let deviation = (state.displacement[(row, 0)] - expected) / largest;
                 worst = worst.max(deviation.abs());
-                // CalculiX ends its iteration at residual forces of half a percent, the step after which is this small.
-                assert!(deviation.abs() < 2e-5, "{speed} rad/s, node {node}, direction {i}: off by {deviation:e}");
+                assert!(deviation.abs() < 1e-6, "{speed} rad/s, node {node}, direction {i}: off by {deviation:e}");
             }
         }
         println!(
@@ -100,7 +99,8 @@ fn the_full_model_under_spin_agrees_with_calculix() {
                 found - still,
                 expected[0] - still
             );
-            assert!((found / expected[0] - 1.0).abs() < 1e-6);
+            // The last printed digit is 1 mHz, CalculiX' own iteration stops about as far away; shifts reach 200 mHz.
+            assert!((found - expected[0]).abs() < 3e-3);
         }
     }
 }
@@ -140,6 +140,33 @@ fn the_reduced_model_under_spin_agrees_with_calculix() {
         }
         println!("{speed} rad/s: growth off by {:.3} % of the largest", worst / largest * 100.0);
         assert!(worst < 0.005 * largest);
+    }
+}
+
+/// Unit forces on the contact nodes: the reduced model yields as the full one does about the same spinning state.
+#[test]
+fn contact_nodes_yield_under_spin_as_in_the_full_model() {
+    let (blade, rom) = (Blade::new(), &reduced().rom);
+    let spin = rom.extras.spin.as_ref().unwrap();
+    let nodes = [103, 1927, 3751].map(|number: usize| number - 1);
+    let rows: Vec<usize> = nodes
+        .iter()
+        .flat_map(|node| (0..3).map(move |i| 3 * node + i))
+        .map(|dof| blade.free.binary_search(&dof).unwrap())
+        .collect();
+    let mut turn = DMatrix::<f64>::identity(9, 9);
+    for (k, contact) in rom.contact_nodes.iter().enumerate() {
+        let (sin, cos) = contact.position[1].sin_cos();
+        turn.view_mut((3 * k, 3 * k), (2, 2)).copy_from_slice(&[cos, sin, -sin, cos]);
+    }
+    for (speed, tolerance) in [(1300.0, 2e-3), (1800.0, 1e-7)] {
+        let unit = faer::Mat::from_fn(blade.free.len(), 9, |i, j| if i == rows[j] { 1.0 } else { 0.0 });
+        let response = blade.at(speed).stiffness.factor("K", "").unwrap().solve(unit);
+        let full = turn.transpose() * DMatrix::from_fn(9, 9, |i, j| response[(rows[i], j)]) * &turn;
+        let reduced = stiffness_at(&rom.stiffness, spin, speed).cholesky().unwrap().inverse();
+        let deviation = (reduced.view((0, 0), (9, 9)) - &full).amax() / full.amax();
+        println!("{speed} rad/s: compliance of the contact nodes off by {deviation:.1e}");
+        assert!(deviation < tolerance);
     }
 }
 

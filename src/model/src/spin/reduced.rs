@@ -6,7 +6,7 @@ use tiprub_core::rom::Spin;
 
 use super::{Rotating, SpinningState, static_growth, stiffness_at, turned_about_axis};
 use crate::craig_bampton::{CraigBampton, dense_modes};
-use crate::progress::{Listener, Stage, report, silent};
+use crate::progress::silent;
 use crate::reduce::full_modes;
 use crate::sparse::SparseMatrix;
 use crate::{Error, Result};
@@ -72,22 +72,23 @@ pub struct SpinningStates {
 }
 
 impl SpinningStates {
-    /// Find the three equilibria up to `largest_speed` (rad/s), each from the one before, scaled by the force.
+    /// Find the three equilibria up to `largest_speed` (rad/s), each from the one before, scaled by the force; `found` is
+    /// told how many there are.
     ///
     /// # Errors
     /// Those of [`Rotating::equilibrium`].
-    pub fn find(body: &Rotating<'_>, largest_speed: f64, listener: Listener<'_>) -> Result<Self> {
+    pub fn find(body: &Rotating<'_>, largest_speed: f64, found: &dyn Fn(usize)) -> Result<Self> {
         let scaled = |state: &SpinningState, share: f64| {
             let ratio = share * largest_speed / state.speed;
             faer::Scale(ratio * ratio) * &state.displacement
         };
-        report(listener, Stage::Spin, 0, 3);
+        found(0);
         let middle = body.equilibrium(MIDDLE * largest_speed, body.at_rest())?;
-        report(listener, Stage::Spin, 1, 3);
+        found(1);
         let checked = body.equilibrium(CHECKED * largest_speed, scaled(&middle, CHECKED))?;
-        report(listener, Stage::Spin, 2, 3);
+        found(2);
         let largest = body.equilibrium(largest_speed, scaled(&checked, 1.0))?;
-        report(listener, Stage::Spin, 3, 3);
+        found(3);
         Ok(Self { middle, checked, largest })
     }
 }
