@@ -60,8 +60,8 @@ pub struct Spin {
     pub coriolis: DMatrix<f64>,
     /// c, n values: centrifugal force per Ω² (kg·m).
     pub centrifugal_load: Vec<f64>,
-    /// c₂, n values (kg·m·s²): since K(Ω) is the stiffness of small motions about the stretched shape, the load that holds
-    /// this shape is not Ω²c alone.
+    /// c₂, n values (kg·m·s²). K(Ω) is the stiffness of small motions about the stretched shape, so that the load which
+    /// holds this shape against it is not Ω²c alone. With the resting stiffness K in place of K(Ω), Ω²c alone is right.
     pub centrifugal_load_speed4: Vec<f64>,
     /// Largest |Ω| that K₁ and K₂ were fitted for (rad/s).
     pub largest_speed: f64,

@@ -12,6 +12,7 @@
 //! coordinates than the resting structure. In the resting modes the untwist would cost membrane strain that is not there.
 //! The load Ω²c + Ω⁴c₂ is such that its static response under K(Ω) is the growth u(Ω) of the contact nodes, exactly at
 //! 0.6 Ω and Ω.
+//!
 //! The fit over the speed is that of Sternchüss and Balmès, Proc. ISMA 2006, pp. 3925-3939.
 
 mod equilibrium;

@@ -436,6 +436,16 @@ fn spin_adds_its_arrays_and_changes_nothing_else() {
     assert!(spinning[1].spin_checks[1].growth_deviation() < 1e-6, "exact at the largest speed");
 }
 
+#[test]
+fn a_blade_without_component_modes_still_spins() {
+    let (mesh, clamped, contact) = blade();
+    let options = ReductionOptions { fixed_interface_modes: 0, ..options(Frame::Cylindrical) };
+    let reduction = reduce_spinning(mesh, &material(0.3), &clamped, &contact, &options, 1200.0, &silent).unwrap();
+    assert_eq!(reduction.rom.order(), 6);
+    let (checked, largest) = (&reduction.spin_checks[0], &reduction.spin_checks[1]);
+    assert!(checked.growth_deviation() < 1.0 && largest.growth_deviation() < 1e-6, "{}", checked.growth_deviation());
+}
+
 /// With all modes kept the reduced model about a spinning state must have the spinning state's own spectrum, but for the
 /// neglected change of the interface's residual mass, which there is none of then.
 #[test]

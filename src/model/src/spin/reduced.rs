@@ -1,4 +1,4 @@
-//! Effects of spin in reduced coordinates: shapes added to the basis, the fit over the speed, and its checks.
+//! Effects of spin in reduced coordinates: states aligned with the resting one, the fit over the speed, and its checks.
 
 use faer::Mat;
 use nalgebra::DMatrix;
@@ -151,6 +151,9 @@ impl AtSpeed {
 
 /// The orthonormal columns closest to those of a matrix: its polar factor.
 fn closest_modes(overlap: DMatrix<f64>) -> Result<DMatrix<f64>> {
+    if overlap.is_empty() {
+        return Ok(overlap);
+    }
     let parts = overlap.svd(true, true);
     let smallest = parts.singular_values.iter().copied().fold(1.0, f64::min);
     match (parts.u, parts.v_t) {
