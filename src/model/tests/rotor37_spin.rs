@@ -33,8 +33,8 @@ struct Blade {
 }
 
 impl Blade {
-    fn new() -> Self {
-        let mesh = blade_mesh(MeshCounts::default()).unwrap().mesh;
+    fn new(counts: MeshCounts) -> Self {
+        let mesh = blade_mesh(counts).unwrap().mesh;
         let assembled = assemble(&mesh, &Material::maraging_steel(), &silent).unwrap();
         let free = free_dofs(mesh.nodes.len(), mesh.set("hub").unwrap());
         let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
@@ -59,7 +59,7 @@ fn reduced() -> &'static Reduction {
 
 #[test]
 fn the_full_model_under_spin_agrees_with_calculix() {
-    let blade = Blade::new();
+    let blade = Blade::new(MeshCounts::default());
     for speed in [900.0, 1300.0, 1800.0] {
         let state = blade.at(speed);
         println!("{speed} rad/s: {} corrections, residual {:.1e}", state.iterations, state.residual);
@@ -147,7 +147,7 @@ fn the_reduced_model_under_spin_agrees_with_calculix() {
 /// Unit forces on the contact nodes: the reduced model yields as the full one does about the same spinning state.
 #[test]
 fn contact_nodes_yield_under_spin_as_in_the_full_model() {
-    let (blade, rom) = (Blade::new(), &reduced().rom);
+    let (blade, rom) = (Blade::new(MeshCounts::default()), &reduced().rom);
     let spin = rom.extras.spin.as_ref().unwrap();
     let nodes = [103, 1927, 3751].map(|number: usize| number - 1);
     let rows: Vec<usize> = nodes
@@ -171,26 +171,27 @@ fn contact_nodes_yield_under_spin_as_in_the_full_model() {
     }
 }
 
-/// φᵢᵀGφⱼ between the first six modes about the spinning state, which are defined but for their signs. G is that of the
-/// largest speed; at others the modes see it from a slightly different shape.
+/// φᵢᵀGφⱼ between the first six modes about the spinning state, which are defined but for their signs. These entries are
+/// small, since the blade hardly moves across its flat sides, and sensitive to the shapes: 20 component modes of the
+/// default mesh leave 6 % of the largest, 80 leave 0.2 %.
 #[test]
 fn coriolis_couples_the_modes_as_in_the_full_model() {
-    let (blade, rom) = (Blade::new(), &reduced().rom);
+    let mesh = MeshCounts { chord: 8, thickness: 1, span: 10 };
+    let options =
+        Rotor37Options { mesh, fixed_interface_modes: 80, spin: Some(DESIGN_SPEED), ..Rotor37Options::default() };
+    let (blade, rom) = (Blade::new(mesh), reduce_rotor37(&options, &silent).unwrap().rom);
     let spin = rom.extras.spin.as_ref().unwrap();
-    for (speed, tolerance) in [(900.0, 0.08), (1800.0, 0.02)] {
-        let modes = full_modes(&blade.at(speed).stiffness, &blade.mass, false, 6, &silent).unwrap().modes;
-        let full = modes.shapes.transpose() * blade.mass.times(turned_about_axis(&blade.free, &modes.shapes).as_ref());
-        let (_, vectors) = dense_modes(&stiffness_at(&rom.stiffness, spin, speed), &rom.mass).unwrap();
-        let reduced = vectors.transpose() * &spin.coriolis * &vectors;
-        let pairs = (0..6).flat_map(|i| (0..i).map(move |j| (i, j)));
-        let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
-        for (i, j) in pairs {
-            worst = worst.max((full[(i, j)].abs() - reduced[(i, j)].abs()).abs());
-            largest = largest.max(full[(i, j)].abs());
-        }
-        println!("{speed} rad/s: largest entry {largest:.4}, off by up to {worst:.1e}");
-        assert!(largest > 0.02 && worst < tolerance * largest);
+    let modes = full_modes(&blade.at(DESIGN_SPEED).stiffness, &blade.mass, false, 6, &silent).unwrap().modes;
+    let full = modes.shapes.transpose() * blade.mass.times(turned_about_axis(&blade.free, &modes.shapes).as_ref());
+    let (_, vectors) = dense_modes(&stiffness_at(&rom.stiffness, spin, DESIGN_SPEED), &rom.mass).unwrap();
+    let reduced = vectors.transpose() * &spin.coriolis * &vectors;
+    let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
+    for (i, j) in (0..6).flat_map(|i| (0..i).map(move |j| (i, j))) {
+        worst = worst.max((full[(i, j)].abs() - reduced[(i, j)].abs()).abs());
+        largest = largest.max(full[(i, j)].abs());
     }
+    println!("Coriolis coupling: largest entry {largest:.5}, off by up to {worst:.1e}");
+    assert!(largest > 0.01 && worst < 0.01 * largest);
 }
 
 /// Campbell table: frequencies over the speed rise by stress stiffness; the Coriolis force shifts them little, more the
