@@ -18,7 +18,7 @@ use tiprub_model::spin::{
 use tiprub_model::{Material, Mesh, reduce, reduce_spinning};
 
 fn material(poisson_ratio: f64) -> Material {
-    Material { name: "steel".into(), young_modulus: 200e9, poisson_ratio, density: 8000.0 }
+    Material { young_modulus: 200e9, poisson_ratio, ..Material::maraging_steel() }
 }
 
 /// Coordinates of an irregular element of a kind: one out of the middle of a distorted box.
