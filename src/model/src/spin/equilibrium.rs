@@ -15,8 +15,8 @@ use crate::{Error, Result};
 /// How many elements are computed in parallel before they are added to the global matrix.
 const CHUNK: usize = 256;
 /// Newton's iteration ends when its last correction was below this share of the displacement. It converges quadratically,
-/// so the error that is left is round-off.
-const CORRECTION: f64 = 1e-8;
+/// so the error that is left is of the order of the square of it.
+const CORRECTION: f64 = 1e-6;
 /// Corrections before it is given up.
 const ITERATIONS: usize = 20;
 
