@@ -15,6 +15,7 @@ mod matrices;
 mod quadrature;
 mod shape;
 
+pub use matrices::thermal_load;
 pub use matrices::{consistent_mass, lumped_mass, stiffness, strain, stress};
 pub use quadrature::QuadraturePoint;
 pub use shape::Shape;
