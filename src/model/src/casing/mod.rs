@@ -6,12 +6,14 @@
 //! **casing37** is ours: NASA TP-1659 describes the flow path, not the wall of the rig. Its inner contour is the tip
 //! section of the blade [`TIP_GAP`] further out, continued straight to both sides.
 
+mod condense;
 mod contour;
 mod grid;
 mod modal_form;
 mod reduction;
 mod ring_mesh;
 
+pub use condense::condense;
 pub use contour::Contour;
 pub use grid::GridNodes;
 pub use modal_form::{ModalForm, modal_form};
@@ -61,34 +63,38 @@ pub struct CasingOptions {
     pub rings: ContactRings,
     /// Thermal patches around and along; none where either is zero.
     pub patches: [usize; 2],
-    /// Largest number of fixed-interface modes, see [`CasingReductionOptions`].
+    /// Number of fixed-interface modes, see [`CasingReductionOptions`].
     pub fixed_interface_modes: usize,
+    /// Number of modes delivered as they are, see [`CasingReductionOptions`].
+    pub modes: usize,
     /// Number of modes compared with the full model.
     pub checked_modes: usize,
     /// Modal damping ratio proposed with the model.
     pub damping_ratio: f64,
 }
 
-/// Axial extent of casing37 (m): the blade's tip, 6.2 to 34.3 mm, and 16 mm to both sides.
-const AXIAL: [f64; 2] = [-0.010, 0.050];
-/// First and last contact ring of casing37 (m): 4 mm before and behind the blade's tip, the middle one in its middle.
-const RING_AXIAL: [f64; 2] = [2.3e-3, 38.3e-3];
+/// Axial extent of casing37 (m); the tip of the blade is at 6.2 to 34.3 mm.
+const AXIAL: [f64; 2] = [-0.038, 0.042];
+/// First and last contact ring of casing37 (m): 3.7 mm before and behind the tip of the blade.
+const RING_AXIAL: [f64; 2] = [2.6e-3, 38.0e-3];
 
 impl Default for CasingOptions {
-    /// casing37: steel, 4 mm thick, flanges of 5 mm x 10 mm, held at the low end face.
+    /// casing37: steel, 4 mm thick, held at the end face of a flange of 5 mm x 10 mm at low z; a flange of 4 mm x 6 mm
+    /// at high z.
     fn default() -> Self {
-        let flange = Some(Flange { thickness: 5e-3, height: 10e-3 });
-        let geometry = RingGeometry { contour: casing37_contour(), thickness: 4e-3, flanges: [flange, flange] };
+        let flanges = [Flange { thickness: 5e-3, height: 10e-3 }, Flange { thickness: 4e-3, height: 6e-3 }].map(Some);
+        let geometry = RingGeometry { contour: casing37_contour(), thickness: 4e-3, flanges };
         Self {
             name: CASING37.into(),
             geometry,
-            counts: RingCounts { around: 72, through: 1, along: 10, flange: 1 },
+            counts: RingCounts { around: 72, through: 1, along: 12, flange: 1 },
             kind: ElementKind::Hex20,
             material: Material::steel(),
             support: Support::Low,
             rings: ContactRings { around: 24, along: 3, axial: RING_AXIAL },
             patches: [12, 1],
-            fixed_interface_modes: 60,
+            fixed_interface_modes: 156,
+            modes: 60,
             checked_modes: 20,
             damping_ratio: 0.005,
         }
@@ -127,6 +133,7 @@ pub fn reduce_ring(options: &CasingOptions, listener: Listener<'_>) -> Result<Re
     let reduction_options = CasingReductionOptions {
         name: options.name.clone(),
         fixed_interface_modes: options.fixed_interface_modes,
+        modes: options.modes,
         checked_modes: options.checked_modes,
         damping_ratio: options.damping_ratio,
     };

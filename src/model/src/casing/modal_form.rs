@@ -14,8 +14,10 @@ use crate::{Error, Result};
 pub struct ModalForm {
     /// ω² (rad²/s²): exactly zero for the rigid-body modes, which come first; then ascending.
     pub squares: Vec<f64>,
-    /// Mass-normalised modes in reduced coordinates, n × n.
+    /// Mass-normalised modes in reduced coordinates, n × modes.
     pub shapes: DMatrix<f64>,
+    /// Number of modes that are such of the pencil itself, where the others stand for static responses only.
+    pub condensed_from: Option<usize>,
 }
 
 /// Modes of the pencil; `rigid` holds the rigid-body motions in reduced coordinates, n × their number, in any scale.
@@ -48,7 +50,7 @@ pub fn modal_form(stiffness: &DMatrix<f64>, mass: &DMatrix<f64>, rigid: &DMatrix
     all.columns_mut(loose, order - loose).copy_from(&shapes);
     let rigid_squares = core::iter::repeat_n(0.0, loose);
     let squares = rigid_squares.chain(elastic.iter().map(|&k| 1.0 / eigen.eigenvalues[k])).collect();
-    Ok(ModalForm { squares, shapes: all })
+    Ok(ModalForm { squares, shapes: all, condensed_from: None })
 }
 
 /// The same space with columns orthonormal in the mass.

@@ -1,15 +1,18 @@
 //! Reduction of a casing: Craig-Bampton on a grid of contact nodes, with static responses to the thermal loads.
 //!
-//! The reduced model is delivered in all of its own modes. Nothing is truncated: the interface's static flexibility sits
-//! in the highest of them, and without it neither contact nor heat would meet the right stiffness.
+//! Craig-Bampton needs many fixed-interface modes to represent the casing between its contact nodes. The pencil it leaves
+//! is therefore brought to its own modes and [condensed](super::condense): modes above a cut-off give way to the static
+//! response they stand for, so that contact and heat meet the stiffness of the whole finite-element model.
 
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Rom;
 use tiprub_core::rom::{Frame, Patch, RomChecks, RomExtras, Thermal};
 
+use super::condense::condense;
 use super::grid::GridNodes;
 use super::modal_form::{ModalForm, modal_form};
+use crate::Result;
 use crate::assembly::{assemble, free_dofs};
 use crate::craig_bampton::{CraigBampton, InnerBasis, craig_bampton_with};
 use crate::material::Material;
@@ -20,7 +23,6 @@ use crate::reduce::{
 };
 use crate::sparse::principal_pair;
 use crate::thermal::patch_loads;
-use crate::Result;
 
 /// Rigid-body motions of a free structure.
 const RIGID: usize = 6;
@@ -30,8 +32,11 @@ const RIGID: usize = 6;
 pub struct CasingReductionOptions {
     /// Name of the structure.
     pub name: String,
-    /// Largest number of fixed-interface modes; one fewer is kept where the last would be half of a double mode.
+    /// Number of fixed-interface modes to reduce with; one fewer where the last would be half of a double mode.
     pub fixed_interface_modes: usize,
+    /// Number of modes of the reduced pencil to deliver as they are; one fewer where the last would be half of a double
+    /// mode. Of those above only the response at rest remains, to forces on the contact nodes and to heat.
+    pub modes: usize,
     /// Number of modes of the full model that are computed and compared with the reduced ones.
     pub checked_modes: usize,
     /// Modal damping ratio proposed with the model.
@@ -70,13 +75,15 @@ pub fn reduce_casing(
     let full = timed(&mut timings.full_modes, || {
         full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)
     })?;
-    let (reduced, modes) = timed(&mut timings.reduction, || {
+    let (reduced, modes, reduced_loads) = timed(&mut timings.reduction, || {
         let inner = InnerBasis { modes: options.fixed_interface_modes, whole_pairs: true, loads: Some(loads.as_ref()) };
         let reduced = craig_bampton_with(&stiffness, &mass, &interface_dofs(&free, grid), &inner, listener)?;
         let order = reduced.mass.nrows();
         let rigid = if clamped.is_empty() { rigid_motions(&mesh, grid, order) } else { DMatrix::zeros(order, 0) };
         let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
-        Ok((reduced, modes))
+        let reduced_loads = reduced_loads(grid, &reduced, &loads);
+        let modes = condense(&modes, options.modes, &reduced_loads);
+        Ok((reduced, modes, reduced_loads))
     })?;
     let checks = timed(&mut timings.checks, || {
         report(listener, Stage::Checks, 0, 1);
@@ -86,7 +93,7 @@ pub fn reduce_casing(
     })?;
     let rom = Rom {
         name: options.name.clone(),
-        origin: origin(&mesh, material, clamped.len(), grid, patches, &reduced),
+        origin: origin(&mesh, material, clamped.len(), grid, &reduced, &modes),
         sectors: 1,
         frame: Frame::Cylindrical,
         mass: DMatrix::identity(modes.squares.len(), modes.squares.len()),
@@ -96,7 +103,7 @@ pub fn reduce_casing(
         contact_nodes: grid.contact_nodes(&mesh),
         checks,
         extras: RomExtras {
-            thermal: thermal(&loads, patches, &reduced, &modes),
+            thermal: thermal(&reduced_loads, patches, &modes),
             grid: Some(grid.shape()),
             ..RomExtras::default()
         },
@@ -175,14 +182,23 @@ fn contact_map(mesh: &Mesh, grid: &GridNodes, modes: &ModalForm) -> DMatrix<f64>
     map
 }
 
+/// Unit forces on the contact nodes, then the thermal loads, in the coordinates of Craig-Bampton.
+fn reduced_loads(grid: &GridNodes, reduced: &CraigBampton, thermal: &Mat<f64>) -> DMatrix<f64> {
+    let boundary = 3 * grid.nodes.len();
+    let thermal = reduced.transformation.transpose() * thermal;
+    DMatrix::from_fn(thermal.nrows(), boundary + thermal.ncols(), |i, k| match k.checked_sub(boundary) {
+        Some(patch) => thermal[(i, patch)],
+        None if i == k => 1.0,
+        None => 0.0,
+    })
+}
+
 /// Thermal loads on the modes; none on rigid-body motions, which strain nothing.
-fn thermal(loads: &Mat<f64>, patches: &[Patch], reduced: &CraigBampton, modes: &ModalForm) -> Option<Thermal> {
+fn thermal(loads: &DMatrix<f64>, patches: &[Patch], modes: &ModalForm) -> Option<Thermal> {
     if patches.is_empty() {
         return None;
     }
-    let projected = reduced.transformation.transpose() * loads;
-    let projected = DMatrix::from_fn(projected.nrows(), projected.ncols(), |i, k| projected[(i, k)]);
-    let mut loads = modes.shapes.transpose() * projected;
+    let mut loads = modes.shapes.transpose() * loads.columns(loads.ncols() - patches.len(), patches.len());
     for (mode, _) in modes.squares.iter().enumerate().filter(|(_, square)| **square <= 0.0) {
         loads.row_mut(mode).fill(0.0);
     }
@@ -202,15 +218,20 @@ fn origin(
     material: &Material,
     clamped: usize,
     grid: &GridNodes,
-    patches: &[Patch],
     reduced: &CraigBampton,
+    modes: &ModalForm,
 ) -> String {
-    let (order, boundary) = (reduced.mass.nrows(), 3 * grid.nodes.len());
-    let modes = reduced.fixed_interface_frequencies.len();
+    let cut_off = match modes.condensed_from {
+        Some(kept) => format!(
+            "; {kept} modes up to {:.0} Hz as they are, above it the static response in {} more",
+            modes.squares[..kept].last().map_or(0.0, |square| square.sqrt() / core::f64::consts::TAU),
+            modes.squares.len() - kept
+        ),
+        None => format!("; all of its {} modes", modes.squares.len()),
+    };
     format!(
         "{} nodes, {} elements ({}), {clamped} nodes clamped; {}: E = {:e} Pa, nu = {}, rho = {} kg/m3, alpha = {:e} 1/K; \
-         Craig-Bampton with {} x {} contact nodes, {modes} fixed-interface modes and {} static responses to {} thermal \
-         patches, in all of its {order} modes",
+         Craig-Bampton with {} x {} contact nodes, {} fixed-interface modes and static responses to the thermal loads{cut_off}",
         mesh.nodes.len(),
         mesh.elements.len(),
         element_names(mesh),
@@ -221,7 +242,6 @@ fn origin(
         material.expansion,
         grid.around,
         grid.along(),
-        order - boundary - modes,
-        patches.len(),
+        reduced.fixed_interface_frequencies.len(),
     )
 }
