@@ -28,6 +28,10 @@ pub fn condense(modes: &ModalForm, count: usize, loads: &DMatrix<f64>) -> ModalF
         row /= *square;
     }
     let basis = orthonormal(answers);
+    if basis.ncols() == 0 {
+        let shapes = modes.shapes.columns(0, kept).into_owned();
+        return ModalForm { squares: squares[..kept].to_vec(), shapes, condensed_from: Some(kept) };
+    }
     let mut stiff = basis.clone();
     for (mut row, square) in stiff.row_iter_mut().zip(&squares[kept..]) {
         row *= *square;

@@ -3,9 +3,7 @@
 //! [`reduce_ring`] builds and reduces a ring that follows a blade's tip contour; its default is `casing37`, around rotor
 //! 37. [`reduce_casing`] does the same for a mesh from elsewhere whose contact nodes form a grid.
 //!
-//! **casing37** is ours: NASA TP-1659 describes the flow path, not the wall of the rig. Its inner contour is the tip
-//! section of the blade [`TIP_GAP`] further out, continued straight to both sides.
-
+mod casing37;
 mod condense;
 mod contour;
 mod grid;
@@ -13,6 +11,7 @@ mod modal_form;
 mod reduction;
 mod ring_mesh;
 
+pub use casing37::{CASING37, casing37_contour};
 pub use condense::condense;
 pub use contour::Contour;
 pub use grid::GridNodes;
@@ -25,11 +24,7 @@ use crate::element::ElementKind;
 use crate::material::Material;
 use crate::progress::{Listener, Stage, report};
 use crate::reduce::Reduction;
-use crate::rotor37::{TIP_GAP, sections};
 use crate::thermal::equal_patches;
-
-/// Name of the default casing.
-pub const CASING37: &str = "casing37";
 
 /// Where a ring is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,50 +66,6 @@ pub struct CasingOptions {
     pub checked_modes: usize,
     /// Modal damping ratio proposed with the model.
     pub damping_ratio: f64,
-}
-
-/// Axial extent of casing37 (m); the tip of the blade is at 6.2 to 34.3 mm.
-const AXIAL: [f64; 2] = [-0.038, 0.042];
-/// First and last contact ring of casing37 (m): 3.7 mm before and behind the tip of the blade.
-const RING_AXIAL: [f64; 2] = [2.6e-3, 38.0e-3];
-
-impl Default for CasingOptions {
-    /// casing37: steel, 4 mm thick, held at the end face of a flange of 5 mm x 10 mm at low z; a flange of 4 mm x 6 mm
-    /// at high z.
-    fn default() -> Self {
-        let flanges = [Flange { thickness: 5e-3, height: 10e-3 }, Flange { thickness: 4e-3, height: 6e-3 }].map(Some);
-        let geometry = RingGeometry { contour: casing37_contour(), thickness: 4e-3, flanges };
-        Self {
-            name: CASING37.into(),
-            geometry,
-            counts: RingCounts { around: 72, through: 1, along: 12, flange: 1 },
-            kind: ElementKind::Hex20,
-            material: Material::steel(),
-            support: Support::Low,
-            rings: ContactRings { around: 24, along: 3, axial: RING_AXIAL },
-            patches: [12, 1],
-            fixed_interface_modes: 156,
-            modes: 60,
-            checked_modes: 20,
-            damping_ratio: 0.005,
-        }
-    }
-}
-
-/// Inner contour of casing37: points 1 mm apart along the tip of rotor 37, straight from its ends on.
-pub fn casing37_contour() -> Contour {
-    let tip = &sections()[sections().len() - 1];
-    let point = |z: f64| {
-        let x = tip.abscissa(z);
-        let on = tip.on_surface([x, 0.0]);
-        ([on.z, on.r + TIP_GAP], tip.meridional_slope(x))
-    };
-    let inner: Vec<_> = (7..=34).map(|millimetre: i32| point(1e-3 * f64::from(millimetre))).collect();
-    let beyond = |([z, r], slope): ([f64; 2], f64), to: f64| [to, r + slope * (to - z)];
-    let mut points = vec![beyond(inner[0], AXIAL[0])];
-    points.extend(inner.iter().map(|(point, _)| *point));
-    points.push(beyond(inner[inner.len() - 1], AXIAL[1]));
-    Contour::new(&points).expect("the tip of the blade that ships is a contour")
 }
 
 /// Build, reduce and check a ring.
