@@ -179,10 +179,12 @@ pub fn name((scheme, solver): Method) -> String {
     let scheme = match scheme {
         Scheme::ModalExact => "modal-exact",
         Scheme::CentralDifference => "central-difference",
+        Scheme::MasslessBoundary => "massless-boundary",
     };
     let solver = match solver {
         Solver::Lcp => "lcp",
         Solver::Film => "film",
+        Solver::Coulomb => "coulomb",
     };
     format!("{scheme} + {solver}")
 }

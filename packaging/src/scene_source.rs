@@ -3,7 +3,7 @@
 use std::{cell::RefCell, fs, path::Path};
 
 use tiprub_core::{Rom, Scene};
-use tiprub_model::Rotor37Options;
+use tiprub_model::{CasingOptions, Rotor37Options, casing::CASING37};
 
 use crate::{Failure, Result, console::Console, reduction};
 
@@ -77,8 +77,12 @@ pub fn rotor37_text(rom_file: &str, stop: f64) -> String {
 }
 
 fn builtin_rom(name: &str, console: &Console) -> Option<Result<Rom, String>> {
-    let reduce = || reduction::rotor37(&Rotor37Options::default(), console).map(|reduction| reduction.rom);
-    (name == "rotor37").then(|| reduce().map_err(|failure| failure.to_string()))
+    let reduction = match name {
+        "rotor37" => reduction::rotor37(&Rotor37Options::default(), console),
+        CASING37 => reduction::casing(&CasingOptions::default(), console),
+        _ => return None,
+    };
+    Some(reduction.map(|reduction| reduction.rom).map_err(|failure| failure.to_string()))
 }
 
 /// Read a ROM file.

@@ -54,6 +54,7 @@ impl Project {
             contact_map: DMatrix::identity(3, 3),
             contact_nodes: vec![ContactNode { name: "tip".into(), position: [0.25, 0.0, 0.0], meridional_slope: 0.0 }],
             checks: RomChecks::default(),
+            extras: tiprub_core::rom::RomExtras::default(),
         };
         fs::write(root.path().join("small.rom.safetensors"), tiprub_format::write_rom(&rom)).unwrap();
         fs::write(root.path().join("scene.toml"), SCENE).unwrap();
