@@ -444,7 +444,7 @@ fn casing37_follows_the_tip() {
     }
     println!("gap {:.4} to {:.4} mm, {:.3} mm asked for", 1e3 * range[0], 1e3 * range[1], 1e3 * TIP_GAP);
     println!("the mesh is off the spline through its contact rings by {off:.1e} m");
-    assert!(range[0] > 0.85 * TIP_GAP && range[1] < 1.15 * TIP_GAP && off < 1e-7);
+    assert!(range[0] > 0.9 * TIP_GAP && range[1] < 1.3 * TIP_GAP && off < 1e-9);
     for point in blade.contact_points(3).unwrap() {
         let [x, y, z] = blade.mesh.nodes[point.node];
         assert!((surface(z) - x.hypot(y) - TIP_GAP).abs() < 1e-12, "{}", point.name);
@@ -557,9 +557,7 @@ fn a_mesh_of_ones_own_is_reduced_alike() {
     assert!((&a - &b).amax() < 1e-9 * b.amax());
     // Without patches there are no thermal loads, and heat does not cost coordinates.
     let cold = reduce_casing(mesh.clone(), &options.material, &clamped, &grid, &[], &settings, &silent).unwrap().rom;
-    assert!(cold.extras.thermal.is_none());
-    // A double mode at the cut-off may make one coordinate of difference.
-    assert!((23..=25).contains(&(own.order() - cold.order())), "{} {}", own.order(), cold.order());
+    assert!(cold.extras.thermal.is_none() && cold.order() < own.order());
 
     let refused = |grid: &GridNodes, patches: &[Patch], hint: &str| {
         let result = reduce_casing(mesh.clone(), &options.material, &clamped, grid, patches, &settings, &silent);
