@@ -27,7 +27,7 @@ impl GridNodes {
     /// [`Error::Invalid`] when the nodes cannot be shared out evenly or do not exist. Whether they do form a grid is
     /// checked with the ROM.
     pub fn sorted(mesh: &Mesh, nodes: &[usize], along: usize) -> Result<Self> {
-        if along < 2 || nodes.len() % along != 0 || nodes.len() / along < 4 {
+        if along < 2 || !nodes.len().is_multiple_of(along) || nodes.len() / along < 4 {
             return Err(Error::invalid(
                 "contact nodes of the casing",
                 format!("{} nodes are not {along} rings of at least 4", nodes.len()),

@@ -153,7 +153,7 @@ fn check_counts(counts: RingCounts, rings: ContactRings, kind: ElementKind) -> R
         let problem = format!("{} around x {} along", rings.around, rings.along);
         return Err(Error::invalid("casing, contact nodes", problem, "Give at least 4 around and 2 along"));
     }
-    if around % rings.around != 0 {
+    if !around.is_multiple_of(rings.around) {
         let next = around.div_ceil(rings.around) * rings.around;
         let problem = format!("{around} is not a multiple of the {} contact nodes around", rings.around);
         let remedy = format!("Give {next} elements around, or another number of contact nodes");
