@@ -45,7 +45,7 @@ pub enum Command {
                             tiprub reduce casing --material titanium --thickness 0.003 --high-flange none\n  \
                             tiprub reduce casing --contour=-0.02:0.256,0.04:0.245 --contact-axial 0.0:0.03\n\n\
                             Meshes of your own are not read; docs/rom-file.md shows how to write a ROM from Python.")]
-    Reduce(ReduceArguments),
+    Reduce(Box<ReduceArguments>),
     /// From a scene to .fmu files. Compiles nothing: the library is generic, scene and ROM are data.
     #[command(
         after_help = "Examples:\n  tiprub package scene.toml                 both FMUs beside each other here\n  \
