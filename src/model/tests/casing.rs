@@ -570,6 +570,8 @@ fn a_mesh_of_ones_own_is_reduced_alike() {
     let mut shifted = grid.clone();
     shifted.nodes.swap(3, 4);
     refused(&shifted, &patches, "not at its place of the grid");
+    refused(&GridNodes { around: 0, ..grid.clone() }, &patches, "72 nodes and 3 slopes for rings of 0");
+    refused(&GridNodes { slopes: vec![0.0; 2], ..grid.clone() }, &patches, "72 nodes and 2 slopes for rings of 24");
     let outside = Patch { angle: [0.0, 1.0], axial: [1.0, 2.0] };
     refused(&grid, &[patches[0], outside], "thermal patch 2: no element");
     refused(&grid, &[patches[0], patches[0]], "thermal patches 1 and 2: both hold element");
@@ -611,6 +613,20 @@ fn what_does_not_fit_is_refused_by_name() {
     for points in [vec![[0.0, 0.25]], vec![[0.0, 0.25], [0.0, 0.26]], vec![[0.0, 0.25], [0.1, -0.2]]] {
         assert!(Contour::new(&points).unwrap_err().to_string().starts_with("contour of the casing"));
     }
+}
+
+/// With no mode at all the static response is still that of the full model, and rigid-body modes stay.
+#[test]
+fn a_casing_without_modes_is_still_exact_at_rest() {
+    let full = reduce_ring(&coarse(Support::Free), &silent).unwrap().rom;
+    let options = CasingOptions { fixed_interface_modes: 0, modes: 0, ..coarse(Support::Free) };
+    let rom = reduce_ring(&options, &silent).unwrap().rom;
+    let rigid = rom.stiffness.diagonal().iter().filter(|square| **square == 0.0).count();
+    assert_eq!((rigid, rom.order()), (6, 216 + 24));
+    let temperatures: Vec<f64> = (0..24).map(|k| f64::from(k * k % 7)).collect();
+    let (a, b) = (heated(&full, &temperatures), heated(&rom, &temperatures));
+    println!("no modes: at rest off the usual model by {:.1e}", (&a - &b).amax() / a.amax());
+    assert!((&a - &b).amax() < 1e-8 * a.amax());
 }
 
 #[test]

@@ -21,7 +21,9 @@ pub fn condense(modes: &ModalForm, count: usize, loads: &DMatrix<f64>) -> ModalF
         return modes.clone();
     }
     let halved = count > 0 && squares[count] - squares[count - 1] < DOUBLE * squares[count];
-    let kept = if halved { count - 1 } else { count };
+    // A rigid-body mode has no static response that could stand for it.
+    let rigid = squares.iter().filter(|square| **square <= 0.0).count();
+    let kept = if halved { count - 1 } else { count }.max(rigid);
     let high = modes.shapes.columns(kept, squares.len() - kept);
     let mut answers = high.transpose() * loads;
     for (mut row, square) in answers.row_iter_mut().zip(&squares[kept..]) {

@@ -55,6 +55,20 @@ impl GridNodes {
         Ok(grid)
     }
 
+    /// Check that nodes and slopes fill whole rings.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] giving the counts.
+    pub fn validate(&self) -> Result<()> {
+        let whole = self.around > 0 && self.nodes.len().is_multiple_of(self.around);
+        if whole && self.slopes.len() == self.along() {
+            return Ok(());
+        }
+        let problem =
+            format!("{} nodes and {} slopes for rings of {}", self.nodes.len(), self.slopes.len(), self.around);
+        Err(Error::invalid("contact nodes of the casing", problem, "Give every ring its nodes and one slope"))
+    }
+
     /// Number of rings.
     pub fn along(&self) -> usize {
         self.nodes.len() / self.around

@@ -65,6 +65,7 @@ pub fn reduce_casing(
     faer::set_global_parallelism(faer::Par::Seq);
     let mut timings = Timings::default();
     let (assembled, loads, free) = timed(&mut timings.assembly, || {
+        grid.validate()?;
         check_nodes(&mesh, clamped, &contact_points(grid), Frame::Cylindrical)?;
         let free = free_dofs(mesh.nodes.len(), clamped);
         let loads = patch_loads(&mesh, material, patches)?;
