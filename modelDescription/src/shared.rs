@@ -41,7 +41,7 @@ pub fn unit_definitions(description: &Description) -> Option<Element> {
 
 fn unit_definition(unit: &Unit) -> Element {
     let mut base = Element::new("BaseUnit");
-    for (key, exponent) in ["kg", "m", "s", "rad"].into_iter().zip(unit.exponents) {
+    for (key, exponent) in ["kg", "m", "s", "rad", "K"].into_iter().zip(unit.exponents) {
         base = base.with_some(key, (exponent != 0).then(|| exponent.to_string()));
     }
     let display =

@@ -101,6 +101,9 @@ pub fn options(arguments: &ReduceArguments) -> Result<CasingOptions> {
         let remedy = "Give --contact-grid AxL for a casing";
         return Err(Failure::usage("--contact-nodes", "it belongs to `rotor37`", remedy));
     }
+    if arguments.spin.is_some() {
+        return Err(Failure::usage("--spin", "it belongs to `rotor37`", "Leave it out: a casing stands still"));
+    }
     let defaults = CasingOptions::default();
     let asked = arguments.casing.clone();
     let mut options = defaults.clone();

@@ -99,6 +99,9 @@ pub struct ReduceArguments {
     /// casing around, through the thickness and along the axis [default: 72x1x12].
     #[arg(long, value_name = "NxNxN")]
     pub mesh: Option<MeshSize>,
+    /// Of the blade, also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s).
+    #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true)]
+    pub spin: Option<f64>,
     /// ROM file to write [default: rotor37.rom.safetensors; casing37.rom.safetensors, or casing.rom.safetensors where
     /// options change it].
     #[arg(long, short, value_name = "FILE")]

@@ -3,7 +3,7 @@
 use std::{cell::RefCell, fs, path::Path};
 
 use tiprub_core::{Rom, Scene};
-use tiprub_model::{CasingOptions, Rotor37Options, casing::CASING37};
+use tiprub_model::{CasingOptions, Rotor37Options, casing::CASING37, rotor37::DESIGN_SPEED};
 
 use crate::{Failure, Result, console::Console, reduction};
 
@@ -76,13 +76,16 @@ pub fn rotor37_text(rom_file: &str, stop: f64) -> String {
     text
 }
 
+/// What ships: the blade at rest, the blade with the effects of spin up to its design speed, the casing around it.
 fn builtin_rom(name: &str, console: &Console) -> Option<Result<Rom, String>> {
-    let reduction = match name {
-        "rotor37" => reduction::rotor37(&Rotor37Options::default(), console),
+    let blade = |spin| reduction::rotor37(&Rotor37Options { spin, ..Rotor37Options::default() }, console);
+    let reduced = match name {
+        "rotor37" => blade(None),
+        "rotor37-spin" => blade(Some(DESIGN_SPEED)),
         CASING37 => reduction::casing(&CasingOptions::default(), console),
         _ => return None,
     };
-    Some(reduction.map(|reduction| reduction.rom).map_err(|failure| failure.to_string()))
+    Some(reduced.map(|reduction| reduction.rom).map_err(|failure| failure.to_string()))
 }
 
 /// Read a ROM file.

@@ -6,11 +6,11 @@ use tiprub_core::variables::*;
 use tiprub_core::{Rom, VariableTable};
 use tiprub_model_description::{Description, Experiment};
 
-pub static METRE: Unit = Unit { name: "m", exponents: [0, 1, 0, 0], display: &[("mm", 1e3), ("µm", 1e6)] };
-pub static SECOND: Unit = Unit { name: "s", exponents: [0, 0, 1, 0], display: &[] };
-pub static NEWTON: Unit = Unit { name: "N", exponents: [1, 1, -2, 0], display: &[("kN", 1e-3)] };
+pub static METRE: Unit = Unit { name: "m", exponents: [0, 1, 0, 0, 0], display: &[("mm", 1e3), ("µm", 1e6)] };
+pub static SECOND: Unit = Unit { name: "s", exponents: [0, 0, 1, 0, 0], display: &[] };
+pub static NEWTON: Unit = Unit { name: "N", exponents: [1, 1, -2, 0, 0], display: &[("kN", 1e-3)] };
 pub static SPEED: Unit =
-    Unit { name: "rad/s", exponents: [0, 0, -1, 1], display: &[("rpm", 30.0 / std::f64::consts::PI)] };
+    Unit { name: "rad/s", exponents: [0, 0, -1, 1, 0], display: &[("rpm", 30.0 / std::f64::consts::PI)] };
 pub static SCHEME: Enumeration = Enumeration {
     name: "Scheme",
     description: "Time-stepping scheme",

@@ -2,15 +2,19 @@
 //!
 //! `cargo bench -p tiprub-core` prints one table. Each row is the median of repeated batches; ratios are what counts,
 //! absolute times depend on the machine. The baseline "two dense products" is the paper's prediction (eq. 9) with
-//! its two matrices multiplied out beforehand, in the reduced coordinates of all blades.
+//! its two matrices multiplied out beforehand, in the reduced coordinates of all blades. An argument after `--` selects
+//! rows by a part of their name.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
 
 use std::time::Instant;
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::rom::{ContactNode, Frame, Rom, RomChecks};
 use tiprub_core::settings::{
-    ContactSettings, ExperimentSettings, Meridian, Motion, OutputSettings, SceneSettings, Scheme, Shape, Solver,
-    StructureSettings, SurfaceSettings, TimeSettings,
+    CoatingSettings, ContactSettings, ExperimentSettings, Meridian, Motion, OutputSettings, SceneSettings, Scheme,
+    Shape, Solver, SplineSettings, StructureSettings, SurfaceSettings, TimeSettings,
 };
 use tiprub_core::{Scene, Simulation};
 
@@ -83,6 +87,28 @@ fn scene(shape: Shape, energies: bool) -> Scene {
     Scene { settings, roms: vec![rom] }
 }
 
+fn coated(scene: &mut Scene) {
+    scene.settings.contacts[0].coating = Some(CoatingSettings {
+        thickness: 3e-4,
+        modulus: 2e9,
+        yield_stress: 5e6,
+        hardening: 2e8,
+        cells_around: 1000,
+        cells_along: 20,
+    });
+}
+
+fn flexible(scene: &mut Scene) {
+    scene.settings.structures.push(StructureSettings {
+        name: "ring".into(),
+        rom: "ring".into(),
+        motion: Motion::Still,
+        ..StructureSettings::default()
+    });
+    scene.roms.push(common::casing_of(36, 3, 34));
+    scene.settings.surfaces[0].structure = Some("ring".into());
+}
+
 /// Median time per call (s) of `batches` batches of `calls` calls.
 fn median(batches: usize, calls: u32, mut work: impl FnMut()) -> f64 {
     let mut times: Vec<f64> = (0..batches)
@@ -114,12 +140,26 @@ fn stepping(scene: &Scene) -> (f64, f64) {
 
 fn main() {
     let bump = |depth| Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
+    let with = |change: fn(&mut Scene)| {
+        let mut scene = scene(bump(0.6), true);
+        change(&mut scene);
+        scene
+    };
     let rows = [
         ("round casing, no contact, no ledger", scene(Shape::Circular {}, false)),
         ("round casing, no contact", scene(Shape::Circular {}, true)),
         ("two lobes, no contact", scene(bump(0.3), true)),
         ("two lobes, light rub", scene(bump(0.6), true)),
         ("two lobes, heavy rub", scene(bump(1.0), true)),
+        ("light rub, coulomb", with(|scene| scene.settings.contacts[0].solver = Solver::Coulomb)),
+        ("light rub, mistuned", with(|scene| scene.settings.structures[0].frequency_factors = vec![1.0; SECTORS])),
+        ("light rub, whirl", with(|scene| scene.settings.structures[0].whirl = true)),
+        (
+            "light rub, surface spline",
+            with(|scene| scene.settings.surfaces[0].spline = Some(SplineSettings::default())),
+        ),
+        ("light rub, coating", with(coated)),
+        ("light rub, casing of 135 modes, 36 x 3 grid", with(flexible)),
     ];
     let order = SECTORS * MODES;
     let matrices = [0.5, -0.25].map(|value| DMatrix::from_fn(order, order, |i, j| value / (1.0 + (i + j) as f64)));
@@ -134,7 +174,9 @@ fn main() {
     println!("{SECTORS} blades x {MODES} modes, {} contact nodes; times per internal step", 3 * SECTORS);
     println!("{:<40} {:>12} {:>10} {:>16}", "", "time (µs)", "contacts", "dense / this");
     println!("{:<40} {:>12.2} {:>10} {:>16.1}", "two dense products (eq. 9), no contact", dense * 1e6, "-", 1.0);
-    for (name, scene) in rows {
+    // Part of a row's name as argument: only such rows.
+    let wanted = std::env::args().skip(1).find(|argument| !argument.starts_with('-')).unwrap_or_default();
+    for (name, scene) in rows.into_iter().filter(|(name, _)| name.contains(&wanted)) {
         let (time, contacts) = stepping(&scene);
         println!("{name:<40} {:>12.3} {contacts:>10.1} {:>16.0}", time * 1e6, dense / time);
     }

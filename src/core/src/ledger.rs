@@ -1,4 +1,5 @@
-//! Energy ledger: kinetic + strain = initial + external work + step changes − damping − friction − impact losses.
+//! Energy ledger: kinetic + strain = initial + external work + load work + step changes − damping − friction − impact
+//! losses − wear work.
 //!
 //! All terms are those of the discrete equations (see [`crate::dynamics::scheme`]), so the closure residual measures
 //! rounding and programming errors, not the scheme's truncation error.
@@ -40,6 +41,10 @@ pub struct Ledger {
     pub friction_loss: Sum,
     /// Energy the contact nodes lose when a gap closes within a step.
     pub impact_loss: Sum,
+    /// Work that the coating absorbs: wear, hardening, and what its rods store and give back when the blade has left.
+    pub wear_work: Sum,
+    /// Work of centrifugal, thermal and nodal-diameter loads.
+    pub load_work: Sum,
     /// Work done by the shaft and by a moving casing through the contacts.
     pub external_work: Sum,
     /// Energy added (or removed) by carrying the state to another step size.
@@ -48,7 +53,17 @@ pub struct Ledger {
     pub turnover: Sum,
 }
 
-persist_fields!(Ledger { initial, damping_loss, friction_loss, impact_loss, external_work, step_change, turnover });
+persist_fields!(Ledger {
+    initial,
+    damping_loss,
+    friction_loss,
+    impact_loss,
+    wear_work,
+    load_work,
+    external_work,
+    step_change,
+    turnover
+});
 
 impl Ledger {
     /// Energy that should be there minus what is (J), given kinetic + strain energy now.
@@ -60,6 +75,8 @@ impl Ledger {
         balance.add(-self.damping_loss.value());
         balance.add(-self.friction_loss.value());
         balance.add(-self.impact_loss.value());
+        balance.add(-self.wear_work.value());
+        balance.add(self.load_work.value());
         balance.add(-mechanical);
         balance.value()
     }

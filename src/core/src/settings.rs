@@ -1,8 +1,11 @@
 //! The scene: every setting with its unit, default and range. `tiprub-format` reads it from TOML.
 
+mod validation;
+
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, Result, Rom};
+use crate::Rom;
+pub use validation::{LONGEST_STEP, MAX_DAMPING, MAX_FRICTION, SHORTEST_STEP};
 
 /// Time-stepping scheme of the modal equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -66,6 +69,16 @@ pub enum Shape {
     },
 }
 
+/// A written scene leaves out newer keys at their default, so that it reads as if they did not exist.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// A negative zero is written, so that it comes back bit by bit.
+fn is_positive_zero(value: &f64) -> bool {
+    value.to_bits() == 0
+}
+
 fn one() -> f64 {
     1.0
 }
@@ -96,10 +109,13 @@ impl Default for Shape {
 #[serde(deny_unknown_fields, default)]
 pub struct SpinSettings {
     /// Centrifugal stiffening and spin softening.
+    #[serde(skip_serializing_if = "is_default")]
     pub stiffening: bool,
     /// Centrifugal growth: the static load Ω²c.
+    #[serde(skip_serializing_if = "is_default")]
     pub growth: bool,
     /// Coriolis force.
+    #[serde(skip_serializing_if = "is_default")]
     pub coriolis: bool,
 }
 
@@ -110,10 +126,10 @@ pub struct LoadSettings {
     /// Nodal diameter.
     pub order: u32,
     /// Start value of the amplitude input (N per metre of circumference, outward positive).
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_positive_zero")]
     pub amplitude: f64,
     /// Start value of the phase input (rad).
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_positive_zero")]
     pub phase: f64,
 }
 
@@ -135,22 +151,22 @@ pub struct StructureSettings {
     #[serde(default)]
     pub damping_ratio: Option<f64>,
     /// Effects of spin.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub spin: SpinSettings,
     /// Make the displacement of the shaft's centre in x and y inputs.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub whirl: bool,
     /// Make the axial displacement of the rotor an input.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub axial_shift: bool,
     /// Mistuning: factor on the natural frequencies of each sector, one value per sector; empty = all equal.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub frequency_factors: Vec<f64>,
     /// Make the temperatures of the ROM's patches inputs.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub thermal: bool,
     /// Nodal-diameter load with amplitude and phase as inputs.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub load: Option<LoadSettings>,
 }
 
@@ -181,16 +197,16 @@ pub enum Interpolation {
 #[serde(deny_unknown_fields)]
 pub struct SplineSettings {
     /// Data points around the circumference; those of the structure's contact grid where the surface has a structure.
-    #[serde(default = "default_around")]
+    #[serde(default = "default_around", skip_serializing_if = "is_default_around")]
     pub around: usize,
     /// Rings of data points along the axis; those of the structure's contact grid where the surface has a structure.
-    #[serde(default = "default_along")]
+    #[serde(default = "default_along", skip_serializing_if = "is_default_along")]
     pub along: usize,
     /// Closure around the circumference.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub closure: Closure,
     /// Between the data points.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub interpolation: Interpolation,
 }
 
@@ -213,6 +229,14 @@ fn default_along() -> usize {
     5
 }
 
+fn is_default_around(around: &usize) -> bool {
+    *around == default_around()
+}
+
+fn is_default_along(along: &usize) -> bool {
+    *along == default_along()
+}
+
 /// Equal parts of the circumference and of the axial extent of the contact, for friction power.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -220,12 +244,16 @@ pub struct PatchSettings {
     /// Parts around the circumference, the first from θ = 0.
     pub around: usize,
     /// Parts along the axis.
-    #[serde(default = "one_part")]
+    #[serde(default = "one_part", skip_serializing_if = "is_one_part")]
     pub along: usize,
 }
 
 fn one_part() -> usize {
     1
+}
+
+fn is_one_part(parts: &usize) -> bool {
+    *parts == one_part()
 }
 
 /// One surface around the z axis, parallel to the tip contour of the structure it faces.
@@ -244,14 +272,14 @@ pub struct SurfaceSettings {
     #[serde(default)]
     pub moving: bool,
     /// Structure that carries the surface and deforms it; its ROM needs a contact grid. Rigid where absent.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub structure: Option<String>,
     /// Surface spline through data points; the analytical surface of revolution where absent (always a spline on a
     /// structure).
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spline: Option<SplineSettings>,
     /// Friction power of each of these patches as an output; those of the ROM where the structure is thermal.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub patches: Option<PatchSettings>,
 }
 
@@ -308,10 +336,10 @@ pub struct ContactSettings {
     #[serde(default)]
     pub meridian: Meridian,
     /// Abradable coating of the slave.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coating: Option<CoatingSettings>,
     /// Share of the friction heat that goes into the slave (-), 0 to 1; the patch outputs carry this share.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub heat_to_slave: Option<f64>,
 }
 
@@ -341,8 +369,10 @@ pub struct OutputSettings {
     /// Values at the communication point in addition to averages over the step.
     pub instantaneous_forces: bool,
     /// Wear depth of every coating cell.
+    #[serde(skip_serializing_if = "is_default")]
     pub wear: bool,
     /// Radial displacement of every contact-grid node of the flexible slave.
+    #[serde(skip_serializing_if = "is_default")]
     pub slave_displacement: bool,
 }
 
@@ -407,172 +437,4 @@ pub struct Scene {
     pub settings: SceneSettings,
     /// One ROM per entry of `settings.structures`.
     pub roms: Vec<Rom>,
-}
-
-impl SceneSettings {
-    /// Check every value against its documented range, and the names against each other.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] naming the field as written in the scene file.
-    pub fn validate(&self) -> Result<()> {
-        let word = |text: &str| {
-            text.starts_with(|c: char| c.is_ascii_alphabetic())
-                && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
-        };
-        let names = self.structures.iter().map(|s| ("structure.name", &s.name));
-        let names = names.chain(self.surfaces.iter().map(|s| ("surface.name", &s.name)));
-        for (field, name) in names.chain([("name", &self.name)]) {
-            if !word(name) {
-                return Err(Error::invalid(
-                    field,
-                    format!("`{name}` is not a plain name"),
-                    "Use letters, digits and underscores, starting with a letter",
-                ));
-            }
-        }
-        if self.structures.is_empty() || self.contacts.is_empty() {
-            return Err(Error::invalid(
-                "scene",
-                format!("{} structures and {} contacts", self.structures.len(), self.contacts.len()),
-                "A scene needs at least one [[structure]] and one [[contact]]",
-            ));
-        }
-        for (index, structure) in self.structures.iter().enumerate() {
-            structure.validate(&format!("structure[{}]", index + 1))?;
-        }
-        for (index, surface) in self.surfaces.iter().enumerate() {
-            surface.validate(&format!("surface[{}]", index + 1))?;
-        }
-        self.validate_unique_names()?;
-        for (index, contact) in self.contacts.iter().enumerate() {
-            contact.validate(self, &format!("contact[{}]", index + 1))?;
-        }
-        within("time.step", self.time.step, SHORTEST_STEP, LONGEST_STEP)?;
-        finite("experiment.start", self.experiment.start)?;
-        positive("experiment.communication_step", self.experiment.communication_step, "s")?;
-        if !(self.experiment.stop.is_finite() && self.experiment.stop > self.experiment.start) {
-            return Err(Error::invalid(
-                "experiment.stop",
-                format!("{} s is not after experiment.start = {} s", self.experiment.stop, self.experiment.start),
-                "Give a stop time after the start time",
-            ));
-        }
-        if self.outputs.watched_sectors.contains(&0) {
-            return Err(Error::invalid("outputs.watched_sectors", "sector 0", "Sectors are counted from 1"));
-        }
-        let mut seen = self.outputs.watched_sectors.clone();
-        seen.sort_unstable();
-        if seen.windows(2).any(|pair| pair[0] == pair[1]) {
-            return Err(Error::invalid("outputs.watched_sectors", "a sector is listed twice", "List each sector once"));
-        }
-        Ok(())
-    }
-}
-
-impl SceneSettings {
-    fn validate_unique_names(&self) -> Result<()> {
-        let names = self.structures.iter().map(|s| &s.name).chain(self.surfaces.iter().map(|s| &s.name));
-        let mut sorted: Vec<&String> = names.collect();
-        sorted.sort_unstable();
-        match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            None => Ok(()),
-            Some(pair) => Err(Error::invalid(
-                "name",
-                format!("`{}` is used by two structures or surfaces", pair[0]),
-                "Give each structure and surface a name of its own",
-            )),
-        }
-    }
-}
-
-impl StructureSettings {
-    fn validate(&self, at: &str) -> Result<()> {
-        finite(&format!("{at}.speed"), self.speed)?;
-        if let Some(ratio) = self.damping_ratio {
-            within(&format!("{at}.damping_ratio"), ratio, 0.0, MAX_DAMPING)?;
-        }
-        if self.motion == Motion::Still && self.speed != 0.0 {
-            return Err(Error::invalid(
-                format!("{at}.speed"),
-                format!("{} rad/s for a structure that stands still", self.speed),
-                "Remove the speed, or set motion = \"rotating\"",
-            ));
-        }
-        Ok(())
-    }
-}
-
-impl SurfaceSettings {
-    fn validate(&self, at: &str) -> Result<()> {
-        within(&format!("{at}.ramp_time"), self.ramp_time, 0.0, 1e9)?;
-        match &self.shape {
-            Shape::Circular {} => Ok(()),
-            Shape::Lobes { amplitude, order, phase } => {
-                finite(&format!("{at}.shape.amplitude"), *amplitude)?;
-                finite(&format!("{at}.shape.phase"), *phase)?;
-                if *order == 0 {
-                    let remedy = "Use order ≥ 1, or gap and radius change for a uniform clearance";
-                    return Err(Error::invalid(format!("{at}.shape.order"), "0 lobes", remedy));
-                }
-                Ok(())
-            }
-            Shape::TwoLobe { depth, width, phase } => {
-                finite(&format!("{at}.shape.depth"), *depth)?;
-                finite(&format!("{at}.shape.phase"), *phase)?;
-                within(&format!("{at}.shape.width"), *width, 1e-3, 0.25)
-            }
-            Shape::Table { radius_change } => {
-                crate::contact::surface::Surface::new(&Shape::Table { radius_change: radius_change.clone() }, 0.0)
-                    .map(|_| ())
-            }
-        }
-    }
-}
-
-impl ContactSettings {
-    fn validate(&self, scene: &SceneSettings, at: &str) -> Result<()> {
-        let structures: Vec<&str> = scene.structures.iter().map(|s| s.name.as_str()).collect();
-        let surfaces: Vec<&str> = scene.surfaces.iter().map(|s| s.name.as_str()).collect();
-        for (field, name, known) in [("master", &self.master, &structures), ("slave", &self.slave, &surfaces)] {
-            if !known.contains(&name.as_str()) {
-                return Err(Error::invalid(
-                    format!("{at}.{field}"),
-                    format!("`{name}` is not defined"),
-                    format!("Use one of: {}", known.join(", ")),
-                ));
-            }
-        }
-        positive(&format!("{at}.gap"), self.gap, "m")?;
-        self.sector_gaps.iter().try_for_each(|gap| positive(&format!("{at}.sector_gaps"), *gap, "m"))?;
-        within(&format!("{at}.friction"), self.friction, 0.0, MAX_FRICTION)
-    }
-}
-
-/// Shortest internal step accepted (s): far below the period of any mode of a blade.
-pub const SHORTEST_STEP: f64 = 1e-12;
-/// Longest internal step accepted (s): far above it.
-pub const LONGEST_STEP: f64 = 1.0;
-/// Largest friction coefficient accepted.
-pub const MAX_FRICTION: f64 = 2.0;
-/// Largest damping ratio accepted.
-pub const MAX_DAMPING: f64 = 0.99;
-
-fn finite(field: &str, value: f64) -> Result<()> {
-    if value.is_finite() { Ok(()) } else { Err(Error::invalid(field, format!("{value}"), "Give a finite number")) }
-}
-
-fn positive(field: &str, value: f64, unit: &str) -> Result<()> {
-    if value.is_finite() && value > 0.0 {
-        Ok(())
-    } else {
-        Err(Error::invalid(field, format!("{value} {unit}"), "Give a finite value > 0"))
-    }
-}
-
-fn within(field: &str, value: f64, low: f64, high: f64) -> Result<()> {
-    if (low..=high).contains(&value) {
-        Ok(())
-    } else {
-        Err(Error::invalid(field, format!("{value}"), format!("Give a value between {low:?} and {high:?}")))
-    }
 }

@@ -62,13 +62,13 @@ pub struct Enumeration {
     pub items: &'static [(&'static str, &'static str)],
 }
 
-/// A unit with its SI exponents (kg, m, s, rad) and the display units an importer may offer.
+/// A unit with its SI exponents (kg, m, s, rad, K) and the display units an importer may offer.
 #[derive(Debug, PartialEq)]
 pub struct Unit {
     /// Unit name.
     pub name: &'static str,
-    /// Exponents of kg, m, s, rad.
-    pub exponents: [i32; 4],
+    /// Exponents of kg, m, s, rad, K.
+    pub exponents: [i32; 5],
     /// (name, factor): display value = factor · SI value.
     pub display: &'static [(&'static str, f64)],
 }
@@ -147,12 +147,24 @@ pub enum Quantity {
     ShapeRotation,
     /// Uniform change of the casing radius, input.
     RadiusChange,
+    /// Displacement of the shaft's centre along x, y (whirl), z (axial shift) by component 0, 1, 2; input.
+    ShaftDisplacement(usize),
+    /// Temperature of each casing patch above the reference, input.
+    CasingTemperature,
+    /// Amplitude of the nodal-diameter load, input.
+    LoadAmplitude,
+    /// Phase of the nodal-diameter load, input.
+    LoadPhase,
     /// µ, parameter.
     Friction,
     /// Added to every clearance, parameter.
     GapOffset,
     /// ξ, parameter.
     DampingRatio,
+    /// ξ of the structure that carries the slave surface, parameter.
+    SlaveDampingRatio,
+    /// Share of the friction heat that goes into the slave, parameter.
+    HeatToSlave,
     /// Largest internal step, parameter.
     StepMax,
     /// Scheme, parameter.
@@ -193,6 +205,18 @@ pub enum Quantity {
     NormalImpulse,
     /// Mean friction power.
     FrictionPower,
+    /// Mean friction power into each patch of the slave.
+    PatchFrictionPower,
+    /// Mean friction power into the master.
+    MasterFrictionPower,
+    /// Wear depth of each coating cell.
+    WearDepth,
+    /// Largest wear depth.
+    WearDepthMaximum,
+    /// Volume worn off the coating.
+    WornVolume,
+    /// Radial displacement of the contact grid of the flexible slave.
+    SlaveDisplacement,
     /// Nodes in contact at the communication point.
     ContactCount,
     /// Any node in contact at the communication point.
@@ -213,6 +237,10 @@ pub enum Quantity {
     FrictionLoss,
     /// Impact loss.
     ImpactLoss,
+    /// Work absorbed by the coating.
+    WearWork,
+    /// Work of centrifugal, thermal and nodal-diameter loads.
+    LoadWork,
     /// External work.
     ExternalWork,
     /// Energy added by changes of the internal step.

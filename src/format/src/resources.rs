@@ -5,6 +5,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use tiprub_core::rom::RomExtras;
+use tiprub_core::settings::{SceneSettings, SpinSettings, StructureSettings};
 use tiprub_core::{Rom, Scene};
 
 use crate::load::{read_bytes, text_error};
@@ -39,7 +41,7 @@ struct Package {
 }
 
 /// The files of `resources/`, in fixed order with fixed content for a given scene: the scene (each `rom` replaced by
-/// the file name beside it), one ROM file per structure, the packaging choices.
+/// the file name beside it), one ROM file per structure with what this scene needs of it, the packaging choices.
 pub fn resource_files(scene: &Scene, fmi3_arrays: bool) -> Vec<(String, Vec<u8>)> {
     let mut settings = scene.settings.clone();
     for index in 0..settings.structures.len() {
@@ -47,12 +49,27 @@ pub fn resource_files(scene: &Scene, fmi3_arrays: bool) -> Vec<(String, Vec<u8>)
     }
     let mut files = vec![(SCENE_FILE.to_owned(), write_scene(&settings).into_bytes())];
     for (structure, rom) in settings.structures.iter().zip(&scene.roms) {
-        files.push((structure.rom.clone(), write_rom(rom)));
+        files.push((
+            structure.rom.clone(),
+            write_rom(&Rom { extras: needed(structure, rom, &settings), ..rom.clone() }),
+        ));
     }
     let package = Package { format_version: RESOURCES_FORMAT_VERSION, fmi3_arrays };
     let package = toml::to_string(&package).expect("a number and a flag can be written");
     files.push((PACKAGE_FILE.to_owned(), package.into_bytes()));
     files
+}
+
+/// What is off leaves no data in the FMU.
+fn needed(structure: &StructureSettings, rom: &Rom, settings: &SceneSettings) -> RomExtras {
+    let spins = structure.spin != SpinSettings::default();
+    let carries = settings.surfaces.iter().any(|surface| surface.structure.as_ref() == Some(&structure.name));
+    RomExtras {
+        spin: rom.extras.spin.clone().filter(|_| spins),
+        thermal: rom.extras.thermal.clone().filter(|_| structure.thermal),
+        // A nodal-diameter load is laid on the grid too.
+        grid: rom.extras.grid.filter(|_| carries || structure.load.is_some()),
+    }
 }
 
 /// `<structure>.rom.safetensors`, in characters that every file system and zip reader takes. Names that would

@@ -8,6 +8,8 @@ use sha2::{Digest, Sha256};
 use tiprub_core::Rom;
 use tiprub_core::rom::{ContactNode, Frame, RomChecks};
 
+mod extras;
+
 use crate::rom_layout::{ARRAYS, METADATA, ROM_FORMAT, ROM_FORMAT_VERSION, units_text};
 use crate::{Error, Result, suggestion};
 
@@ -154,7 +156,7 @@ impl Reader<'_> {
                 frequency_deviation: self.check_values(arrays, "frequency_deviation")?,
                 residual_criterion: self.check_values(arrays, "residual_criterion")?,
             },
-            extras: tiprub_core::rom::RomExtras::default(),
+            extras: self.extras(arrays, metadata, order)?,
         })
     }
 
@@ -311,12 +313,12 @@ fn little_endian(values: &[f64]) -> Vec<u8> {
 /// that [`read_rom`] refuses.
 pub fn write_rom(rom: &Rom) -> Vec<u8> {
     let arrays = rom_arrays(rom);
-    let mut metadata = rom_metadata(rom);
+    let mut metadata = rom_metadata(rom, &arrays);
     metadata.insert("checksum".into(), checksum(&arrays, &metadata));
     container(&arrays, &metadata)
 }
 
-fn rom_metadata(rom: &Rom) -> Metadata {
+fn rom_metadata(rom: &Rom, arrays: &Arrays) -> Metadata {
     let frame = match rom.frame {
         Frame::Cylindrical => "cylindrical",
         Frame::Cartesian => "cartesian",
@@ -331,25 +333,29 @@ fn rom_metadata(rom: &Rom) -> Metadata {
         ("frame", frame.to_owned()),
         ("damping_ratio", rom.damping_ratio.to_string()),
         ("contact_names", names),
-        ("units", units_text()),
+        ("units", units_text(|name| arrays.contains_key(name))),
     ]
     .into_iter()
+    .chain(extras::metadata(&rom.extras))
     .map(|(key, value)| (key.to_owned(), value))
     .collect()
 }
 
+/// The file stores rows, nalgebra columns.
+fn matrix(matrix: &DMatrix<f64>) -> Array {
+    Array { shape: vec![matrix.nrows(), matrix.ncols()], values: matrix.transpose().as_slice().to_vec() }
+}
+
+fn list(values: Vec<f64>, shape: Vec<usize>) -> Array {
+    Array { shape, values }
+}
+
 fn rom_arrays(rom: &Rom) -> Arrays {
     let nodes = rom.contact_nodes.len();
-    let matrix = |matrix: &DMatrix<f64>, shape: Vec<usize>| Array {
-        shape,
-        values: matrix.transpose().as_slice().to_vec(), // nalgebra stores columns, the file stores rows
-    };
-    let list = |values: Vec<f64>, shape: Vec<usize>| Array { shape, values };
-    let square = |m: &DMatrix<f64>| matrix(m, vec![m.nrows(), m.ncols()]);
     let mut arrays = vec![
-        ("mass", square(&rom.mass)),
-        ("stiffness", square(&rom.stiffness)),
-        ("contact_map", matrix(&rom.contact_map, vec![nodes, 3, rom.contact_map.ncols()])),
+        ("mass", matrix(&rom.mass)),
+        ("stiffness", matrix(&rom.stiffness)),
+        ("contact_map", Array { shape: vec![nodes, 3, rom.contact_map.ncols()], ..matrix(&rom.contact_map) }),
         ("contact_positions", list(rom.contact_nodes.iter().flat_map(|node| node.position).collect(), vec![nodes, 3])),
         (
             "contact_meridional_slopes",
@@ -367,6 +373,7 @@ fn rom_arrays(rom: &Rom) -> Arrays {
             arrays.push((name, list(values.clone(), vec![values.len()])));
         }
     }
+    arrays.extend(extras::arrays(&rom.extras));
     arrays.into_iter().map(|(name, array)| (name.to_owned(), array)).collect()
 }
 

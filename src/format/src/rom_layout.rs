@@ -41,8 +41,12 @@ const fn array(
     ArrayLayout { name, shape, unit, required, description }
 }
 
-/// Every array, in file order.
-pub const ARRAYS: [ArrayLayout; 9] = [
+/// How many of [`ARRAYS`] every structure may have; the others belong to structures that spin, heat up or carry a
+/// surface. Only files that hold one of those mention it.
+const GENERAL_ARRAYS: usize = 9;
+
+/// Every array.
+pub const ARRAYS: [ArrayLayout; 15] = [
     array("mass", "[n, n]", "kg", true, "Reduced mass matrix of one sector: symmetric, positive definite."),
     array("stiffness", "[n, n]", "N/m", true, "Reduced stiffness matrix: symmetric, positive semidefinite."),
     array(
@@ -70,14 +74,45 @@ pub const ARRAYS: [ArrayLayout; 9] = [
     array("reduced_frequencies", "[modes]", "Hz", false, "Natural frequencies of the reduced model, ascending."),
     array("frequency_deviation", "[modes]", "%", false, "Frequency deviation per mode."),
     array("residual_criterion", "[modes]", "%", false, "Residual convergence criterion per mode."),
+    array(
+        "stiffness_speed2",
+        "[n, n]",
+        "kg",
+        false,
+        "Stiffness per square of the speed: centrifugal stiffening and spin softening, symmetric. Spin arrays come all \
+         together, with `largest_speed`.",
+    ),
+    array("stiffness_speed4", "[n, n]", "kg s^2", false, "Stiffness per fourth power of the speed, symmetric."),
+    array("coriolis", "[n, n]", "kg", false, "G of the Coriolis force 2ΩG q': skew-symmetric."),
+    array("centrifugal_load", "[n]", "kg m", false, "Centrifugal force per square of the speed."),
+    array(
+        "thermal_loads",
+        "[n, patches]",
+        "N/K",
+        false,
+        "Force on the reduced coordinates per kelvin of each patch above the reference. It comes with \
+         `thermal_patches`.",
+    ),
+    array(
+        "thermal_patches",
+        "[patches, 4]",
+        "rad, rad, m, m",
+        false,
+        "Where each patch is: angle from and to, axial position from and to.",
+    ),
 ];
+
+/// The arrays of a structure that spins: all or none.
+pub const SPIN_ARRAYS: [&str; 4] = ["stiffness_speed2", "stiffness_speed4", "coriolis", "centrifugal_load"];
+/// The arrays of a structure that heats up: both or none.
+pub const THERMAL_ARRAYS: [&str; 2] = ["thermal_loads", "thermal_patches"];
 
 const fn entry(name: &'static str, default: Option<&'static str>, description: &'static str) -> MetadataLayout {
     MetadataLayout { name, default, description }
 }
 
 /// Every metadata entry.
-pub const METADATA: [MetadataLayout; 10] = [
+pub const METADATA: [MetadataLayout; 12] = [
     entry("format", None, "Always `tiprub-rom`."),
     entry("format_version", None, "Always `1`."),
     entry("name", None, "Name of the structure."),
@@ -90,11 +125,24 @@ pub const METADATA: [MetadataLayout; 10] = [
     entry("frame", None, "`cylindrical` or `cartesian`: directions of positions and displacements."),
     entry("damping_ratio", Some("0"), "Modal damping ratio, from 0 to below 1; a scene may override it."),
     entry("contact_names", Some("node_1,node_2,..."), "Names of the contact nodes, separated by commas."),
+    entry(
+        "largest_speed",
+        Some(""),
+        "Largest speed (rad/s) that the spin arrays are valid for; needed with them and not allowed without.",
+    ),
+    entry(
+        "contact_grid",
+        Some(""),
+        "`around,along`, for example `72,5`: the contact nodes form a grid on a closed ring that can carry a surface. \
+         Node along·around + i is the i-th of its ring, rings in order of growing z, angles growing by 2π/around.",
+    ),
     entry("units", Some(""), "Text for the reader of the file: one line per array."),
     entry("checksum", Some(""), "SHA-256 of the content, checked where present; leave it out when writing by hand."),
 ];
 
-/// The text of the metadata entry `units`.
-pub fn units_text() -> String {
-    ARRAYS.iter().map(|array| format!("{} {}: {}", array.name, array.shape, array.unit)).collect::<Vec<_>>().join("\n")
+/// The text of the metadata entry `units` of a file, given which arrays it holds.
+pub fn units_text(holds: impl Fn(&str) -> bool) -> String {
+    let (general, special) = ARRAYS.split_at(GENERAL_ARRAYS);
+    let listed = general.iter().chain(special.iter().filter(|array| holds(array.name)));
+    listed.map(|array| format!("{} {}: {}", array.name, array.shape, array.unit)).collect::<Vec<_>>().join("\n")
 }

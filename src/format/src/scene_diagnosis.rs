@@ -9,7 +9,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
-use crate::scene_layout::{FIELDS, REPEATED_TABLES, SINGLE_TABLES, header};
+use crate::scene_layout::{FIELDS, INNER_TABLES, REPEATED_TABLES, SINGLE_TABLES, header};
 use crate::{Error, suggestion};
 
 /// A syntactically correct scene file.
@@ -175,11 +175,12 @@ pub fn check_brackets(document: &Document) -> Result<(), Error> {
         let problem = format!("{} found, {problem}", value.get_ref().type_str());
         return Err(document.error(Some(key.span()), name, problem, format!("Write {}", header(name))));
     }
-    match document.places().into_iter().find(|place| place.fields == "surface.shape" && !place.value.is_table()) {
+    let example = |place: &Place| INNER_TABLES.iter().find(|(table, _)| place.fields == *table).map(|(_, text)| *text);
+    match document.places().into_iter().find(|place| example(place).is_some() && !place.value.is_table()) {
         Some(place) => {
             let problem = format!("{} found, a table expected", place.value.type_str());
-            let remedy = "Write it as { kind = \"circular\" } or with the keys of another kind";
-            Err(document.error(Some(place.span), &place.path, problem, remedy.into()))
+            let remedy = format!("Write it as {}", example(&place).unwrap_or_default());
+            Err(document.error(Some(place.span), &place.path, problem, remedy))
         }
         None => Ok(()),
     }

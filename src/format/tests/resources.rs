@@ -6,7 +6,8 @@ use std::fs;
 use std::path::Path;
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{ContactNode, Frame, RomChecks};
+use tiprub_core::rom::{ContactGrid, ContactNode, Frame, Patch, RomChecks, RomExtras, Spin, Thermal};
+use tiprub_core::settings::{LoadSettings, Motion, SpinSettings, StructureSettings};
 use tiprub_core::{Rom, Scene};
 use tiprub_format::{
     instantiation_token, load_resources, load_scene, read_rom, resource_files, write_rom, write_scene,
@@ -156,4 +157,68 @@ fn a_scene_finds_its_roms_beside_it_or_built_in() {
     let message = load_scene(&directory.path().join("absent.toml"), &none).unwrap_err().to_string();
     assert!(message.contains("absent.toml: cannot be read"), "{message}");
     assert!(read_rom(&fs::read(&path).unwrap(), "scene").is_err());
+}
+
+#[test]
+fn what_a_scene_leaves_off_leaves_no_data_in_the_fmu() {
+    let mut scene = scene();
+    let node = |index: u32| {
+        let (along, i) = (index / 4, index % 4);
+        let position = [0.25, f64::from(i) * std::f64::consts::FRAC_PI_2, 0.01 * f64::from(along)];
+        ContactNode { name: format!("n{index}"), position, meridional_slope: 0.0 }
+    };
+    let plain = rom();
+    let mut full = Rom {
+        sectors: 1,
+        contact_map: DMatrix::from_element(24, 2, 0.5),
+        contact_nodes: (0..8).map(node).collect(),
+        ..plain.clone()
+    };
+    let bare = full.clone();
+    full.extras = RomExtras {
+        spin: Some(Spin {
+            stiffness_speed2: DMatrix::identity(2, 2),
+            stiffness_speed4: DMatrix::zeros(2, 2),
+            coriolis: DMatrix::zeros(2, 2),
+            centrifugal_load: vec![1.0, 2.0],
+            largest_speed: 2000.0,
+        }),
+        thermal: Some(Thermal {
+            loads: DMatrix::from_element(2, 1, 3.0),
+            patches: vec![Patch { angle: [0.0, 1.0], axial: [0.0, 0.01] }],
+        }),
+        grid: Some(ContactGrid { around: 4, along: 2 }),
+    };
+    full.validate().unwrap();
+    let still = StructureSettings { name: "ring".into(), motion: Motion::Still, ..StructureSettings::default() };
+    scene.settings.structures.push(still);
+    scene.roms = vec![full.clone(), full.clone()];
+    let read = |scene: &Scene| -> Vec<Rom> {
+        let files = resource_files(scene, true);
+        (1..3).map(|index| read_rom(&files[index].1, "rom").unwrap()).collect()
+    };
+    let extras = |scene: &Scene| read(scene).into_iter().map(|rom| rom.extras).collect::<Vec<_>>();
+    assert_eq!(read(&scene), [bare.clone(), bare.clone()]);
+    assert_eq!(resource_files(&scene, true)[1].1, write_rom(&bare), "as if the extras had never been there");
+
+    let only = |spin: bool, thermal: bool, grid: bool| {
+        let RomExtras { spin: s, thermal: t, grid: g } = full.extras.clone();
+        RomExtras { spin: s.filter(|_| spin), thermal: t.filter(|_| thermal), grid: g.filter(|_| grid) }
+    };
+    for spin in [
+        SpinSettings { stiffening: true, ..SpinSettings::default() },
+        SpinSettings { growth: true, ..SpinSettings::default() },
+        SpinSettings { coriolis: true, ..SpinSettings::default() },
+    ] {
+        let mut scene = scene.clone();
+        scene.settings.structures[0].spin = spin;
+        assert_eq!(extras(&scene), [only(true, false, false), only(false, false, false)]);
+    }
+    scene.settings.structures[1].thermal = true;
+    assert_eq!(extras(&scene), [only(false, false, false), only(false, true, false)]);
+    scene.settings.surfaces[0].structure = Some("ring".into());
+    assert_eq!(extras(&scene), [only(false, false, false), only(false, true, true)]);
+    scene.settings.surfaces[0].structure = None;
+    scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 0.0, phase: 0.0 });
+    assert_eq!(extras(&scene), [only(false, false, false), only(false, true, true)], "a load lies on the grid");
 }

@@ -6,10 +6,15 @@
 //! displacement; dividing by its length N gives the unit normal from the casing to the blade and the gap F/N. The
 //! slope is what lets a frictionless lobe draw power from the shaft: r n_θ λ is the torque conjugate to θ_r.
 
+use super::layout::Layout;
+pub use super::layout::sector_angle;
+use super::spline::Place;
+use super::spline_gap::{SplineGap, faces_inwards};
 use super::surface::Surface;
 use crate::dynamics::dispatch::{InstructionSet, Kernel};
+use crate::persist::persist_fields;
 use crate::settings::Meridian;
-use crate::{Error, Result, Rom};
+use crate::{Result, Rom};
 
 /// Prescribed motion of rotor and casing at one instant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -26,6 +31,10 @@ pub struct Drive {
     pub shape_rotation: f64,
     /// Uniform change of the casing radius (m).
     pub radius_change: f64,
+    /// Displacement of the shaft's centre along fixed x, y and z (m): whirl and axial shift.
+    pub shaft: [f64; 3],
+    /// Its velocity (m/s).
+    pub shaft_velocity: [f64; 3],
 }
 
 /// Unit normals of one instant, arrays `[node · lanes + lane]`.
@@ -33,11 +42,15 @@ pub struct Drive {
 pub struct Geometry {
     /// Components of the unit normal, pointing from the slave to the master.
     pub normal: [Vec<f64>; 3],
+    /// Closest places on a surface spline; empty for other surfaces.
+    pub places: Vec<Place>,
 }
 
+persist_fields!(Geometry { normal, places });
+
 impl Geometry {
-    fn new(len: usize) -> Self {
-        Self { normal: [vec![0.0; len], vec![0.0; len], vec![0.0; len]] }
+    fn new(len: usize, places: usize) -> Self {
+        Self { normal: [vec![0.0; len], vec![0.0; len], vec![0.0; len]], places: vec![Place::default(); places] }
     }
 
     /// Unit normal of one node of one lane.
@@ -53,6 +66,8 @@ pub enum GapLaw {
     Fixed(FixedGap),
     /// Sectors around an axis inside a rigid surface of revolution.
     Revolution(RevolutionGap),
+    /// Sectors around an axis inside a surface through data points, rigid or carried by a structure.
+    Spline(Box<SplineGap>),
 }
 
 /// Constant normals, gaps and sliding velocities of one group of contacts.
@@ -71,17 +86,11 @@ pub struct FixedGap {
 pub struct RevolutionGap {
     surface: Surface,
     instruction_set: InstructionSet,
-    lanes: usize,
-    /// Angle in the rotating frame, `[node · lanes + lane]` (rad).
-    angles: Vec<f64>,
-    /// Radius per node (m).
-    radii: Vec<f64>,
-    /// 1/radius per node (1/m).
-    per_radius: Vec<f64>,
+    layout: Layout,
     /// Meridional slope per node.
     slopes: Vec<f64>,
-    /// Radial clearance per lane (m).
-    clearances: Vec<f64>,
+    /// The shaft's centre moves.
+    shaft_moves: bool,
 }
 
 impl RevolutionGap {
@@ -90,57 +99,24 @@ impl RevolutionGap {
     /// # Errors
     /// Wrong number of clearances.
     pub fn new(rom: &Rom, surface: Surface, clearances: &[f64], meridian: Meridian, lanes: usize) -> Result<Self> {
-        let sectors = rom.sectors;
-        if clearances.len() != sectors {
-            return Err(Error::invalid(
-                "contact.sector_gaps",
-                format!("{} values for {sectors} sectors", clearances.len()),
-                "Give one gap (m) per sector, or remove the line to use `gap` for all",
-            ));
-        }
-        let mut angles = vec![0.0; rom.contact_nodes.len() * lanes];
-        for (node, contact) in rom.contact_nodes.iter().enumerate() {
-            for sector in 0..sectors {
-                angles[node * lanes + sector] = contact.position[1] + sector_angle(sector, sectors);
-            }
-        }
-        // Padding lanes are infinitely far away.
-        let mut padded = vec![f64::INFINITY; lanes];
-        padded[..sectors].copy_from_slice(clearances);
+        let slope = |slope: f64| if meridian == Meridian::Contour { slope } else { 0.0 };
         Ok(Self {
             surface,
             instruction_set: InstructionSet::detect(),
-            lanes,
-            angles,
-            per_radius: rom.contact_nodes.iter().map(|node| 1.0 / node.position[0]).collect(),
-            radii: rom.contact_nodes.iter().map(|node| node.position[0]).collect(),
-            slopes: rom
-                .contact_nodes
-                .iter()
-                .map(|node| if meridian == Meridian::Contour { node.meridional_slope } else { 0.0 })
-                .collect(),
-            clearances: padded,
+            layout: Layout::new(rom, clearances, lanes)?,
+            slopes: rom.contact_nodes.iter().map(|node| slope(node.meridional_slope)).collect(),
+            shaft_moves: false,
         })
     }
 
-    /// Fixed-frame angle of a node (rad) for a rotor angle.
-    pub fn angle(&self, node: usize, sector: usize, rotor_angle: f64) -> f64 {
-        self.angles[node * self.lanes + sector] + rotor_angle
-    }
-
-    /// Angle over which the casing shape changes noticeably (rad).
-    pub fn angular_scale(&self) -> f64 {
-        self.surface.angular_scale()
-    }
-
-    /// Radius of a contact node (m).
-    pub fn radius(&self, node: usize) -> f64 {
-        self.radii[node]
+    /// Let whirl and axial shift of the shaft act.
+    pub fn with_moving_shaft(self, shaft_moves: bool) -> Self {
+        Self { shaft_moves, ..self }
     }
 }
 
-/// Gaps and normals of all nodes and lanes on a surface of revolution.
-struct Evaluate<'a> {
+/// Gaps and normals of all nodes and lanes on a surface of revolution. `SHAFT`: the shaft's centre moves.
+struct Evaluate<'a, const SHAFT: bool> {
     law: &'a RevolutionGap,
     drive: &'a Drive,
     displacement: &'a [f64],
@@ -148,20 +124,20 @@ struct Evaluate<'a> {
     gap: &'a mut [f64],
 }
 
-impl Kernel for Evaluate<'_> {
+impl<const SHAFT: bool> Kernel for Evaluate<'_, SHAFT> {
     #[inline(always)]
     fn run(self) {
         let Self { law, drive, displacement, geometry, gap } = self;
         let opening = drive.gap_offset + drive.radius_change;
         let turned = drive.rotor_angle - drive.shape_rotation;
         let factor = drive.shape_factor;
-        let lanes = law.lanes;
-        for node in 0..law.radii.len() {
-            let (slope, per_radius) = (law.slopes[node], law.per_radius[node]);
+        let lanes = law.layout.lanes;
+        for node in 0..law.layout.radii.len() {
+            let (slope, per_radius) = (law.slopes[node], law.layout.per_radius[node]);
             let span = node * lanes..(node + 1) * lanes;
             let [radial, tangential, axial] =
                 std::array::from_fn(|component| &displacement[(3 * node + component) * lanes..][..lanes]);
-            let (angles, clearances) = (&law.angles[span.clone()], &law.clearances[..lanes]);
+            let (angles, clearances) = (&law.layout.angles[span.clone()], &law.layout.clearances[..lanes]);
             let [normal_0, normal_1, normal_2] = &mut geometry.normal;
             let normal_0 = &mut normal_0[span.clone()];
             let (normal_1, normal_2) = (&mut normal_1[span.clone()], &mut normal_2[span.clone()]);
@@ -169,12 +145,21 @@ impl Kernel for Evaluate<'_> {
             // The normal arrays hold angle, shape and slope of the shape until they are overwritten.
             for lane in 0..lanes {
                 normal_0[lane] = angles[lane] + turned + tangential[lane] * per_radius;
+                if SHAFT {
+                    let (sine, cosine) = libm::sincos(angles[lane] + drive.rotor_angle);
+                    normal_0[lane] += (drive.shaft[1] * cosine - drive.shaft[0] * sine) * per_radius;
+                    // Outward displacement of the shaft closes the gap; set before the gap is written.
+                    gap[lane] = drive.shaft[0] * cosine + drive.shaft[1] * sine - slope * drive.shaft[2];
+                }
             }
             law.surface.evaluate_row(normal_0, normal_1, normal_2);
             for lane in 0..lanes {
                 let sideways = factor * normal_2[lane] * per_radius;
                 let per_length = 1.0 / (1.0 + sideways * sideways + slope * slope).sqrt();
-                let clearance = clearances[lane] + opening + factor * normal_1[lane];
+                let mut clearance = clearances[lane] + opening + factor * normal_1[lane];
+                if SHAFT {
+                    clearance -= gap[lane];
+                }
                 gap[lane] = (clearance - radial[lane] + slope * axial[lane]) * per_length;
                 normal_0[lane] = -per_length;
                 normal_1[lane] = sideways * per_length;
@@ -184,25 +169,38 @@ impl Kernel for Evaluate<'_> {
     }
 }
 
-/// Angle of sector `sector` of `sectors` (rad).
-pub fn sector_angle(sector: usize, sectors: usize) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
-    let fraction = sector as f64 / sectors as f64;
-    std::f64::consts::TAU * fraction
-}
-
 impl GapLaw {
     /// Number of contact nodes per sector.
     pub fn nodes(&self) -> usize {
         match self {
             Self::Fixed(law) => law.gaps.len(),
-            Self::Revolution(law) => law.radii.len(),
+            Self::Revolution(law) => law.layout.nodes(),
+            Self::Spline(law) => law.layout.nodes(),
+        }
+    }
+
+    /// Where the nodes stand around the axis, if there is one.
+    pub fn layout(&self) -> Option<&Layout> {
+        match self {
+            Self::Fixed(_) => None,
+            Self::Revolution(law) => Some(&law.layout),
+            Self::Spline(law) => Some(&law.layout),
+        }
+    }
+
+    /// Angle over which the casing shape changes noticeably (rad).
+    pub fn angular_scale(&self) -> f64 {
+        match self {
+            Self::Fixed(_) => f64::INFINITY,
+            Self::Revolution(law) => law.surface.angular_scale(),
+            Self::Spline(law) => law.angular_scale,
         }
     }
 
     /// Arrays of the right size, filled once for laws that never change.
     pub fn geometry(&self, lanes: usize) -> Geometry {
-        let mut geometry = Geometry::new(self.nodes() * lanes);
+        let len = self.nodes() * lanes;
+        let mut geometry = Geometry::new(len, if matches!(self, Self::Spline(_)) { len } else { 0 });
         if let Self::Fixed(law) = self {
             for (node, normal) in law.normals.iter().enumerate() {
                 for component in 0..3 {
@@ -213,25 +211,48 @@ impl GapLaw {
         geometry
     }
 
-    /// Gaps (m) and normals at an instant, for the displacements `[row · lanes + lane]` of the contact rows (m).
-    /// Gaps of padding lanes are infinite.
-    pub fn evaluate(&self, drive: &Drive, displacement: &[f64], geometry: &mut Geometry, gap: &mut [f64]) {
+    /// Gaps (m) and normals at an instant, for the displacements `[row · lanes + lane]` of the contact rows (m) and
+    /// `moved` of the control points of a surface that is carried by a structure. `before` is the geometry of the step
+    /// before, from which closest points are sought. Gaps of padding lanes are infinite.
+    pub fn evaluate(
+        &mut self,
+        drive: &Drive,
+        displacement: &[f64],
+        moved: &[f64],
+        before: Option<&Geometry>,
+        geometry: &mut Geometry,
+        gap: &mut [f64],
+    ) {
         match self {
             Self::Fixed(law) => {
                 for (node, (normal, initial)) in law.normals.iter().zip(&law.gaps).enumerate() {
                     gap[node] = initial + dot(*normal, std::array::from_fn(|i| displacement[3 * node + i]));
                 }
             }
-            Self::Revolution(law) => law.instruction_set.run(Evaluate { law, drive, displacement, geometry, gap }),
+            Self::Revolution(law) if law.shaft_moves => {
+                law.instruction_set.run(Evaluate::<true> { law, drive, displacement, geometry, gap });
+            }
+            Self::Revolution(law) => {
+                law.instruction_set.run(Evaluate::<false> { law, drive, displacement, geometry, gap });
+            }
+            Self::Spline(law) => {
+                let guess = before.map(|before| &before.places[..]);
+                law.evaluate(drive, displacement, moved, guess, geometry, gap);
+            }
+        }
+    }
+
+    /// The rotor has turned by `angle` (rad) since the last evaluation: closest points are sought from there.
+    pub fn turn(&mut self, angle: f64) {
+        if let Self::Spline(law) = self {
+            law.turned = angle / std::f64::consts::TAU;
         }
     }
 
     /// Largest displacement (m) that counts as small: a tenth of the smallest radius; no limit for fixed obstacles.
     pub fn largest_displacement(&self) -> f64 {
-        match self {
-            Self::Fixed(_) => f64::INFINITY,
-            Self::Revolution(law) => 0.1 * law.radii.iter().fold(f64::INFINITY, |low: f64, radius| low.min(*radius)),
-        }
+        let radii = self.layout().map(|layout| layout.radii.iter());
+        radii.map_or(f64::INFINITY, |radii| 0.1 * radii.fold(f64::INFINITY, |low: f64, radius| low.min(*radius)))
     }
 
     /// Whether a contact is within what small displacements and a casing seen from inside can describe: less deep than
@@ -239,15 +260,18 @@ impl GapLaw {
     pub fn is_plausible(&self, node: usize, gap: f64, normal: [f64; 3]) -> bool {
         match self {
             Self::Fixed(_) => true,
-            Self::Revolution(law) => gap > -0.1 * law.radii[node] && normal[1].abs() <= -normal[0],
+            Self::Revolution(law) => gap > -0.1 * law.layout.radii[node] && normal[1].abs() <= -normal[0],
+            Self::Spline(law) => gap > -0.1 * law.layout.radii[node] && faces_inwards(normal),
         }
     }
 
-    /// Prescribed velocity of the master relative to the slave (m/s), without deformation.
-    pub fn sliding_velocity(&self, node: usize, drive: &Drive) -> [f64; 3] {
+    /// Prescribed velocity of the master relative to the slave (m/s), without deformation; `index` is
+    /// `node · lanes + lane`.
+    pub fn sliding_velocity(&self, node: usize, index: usize, drive: &Drive) -> [f64; 3] {
         match self {
-            Self::Fixed(law) => law.sliding[node],
-            Self::Revolution(law) => [0.0, drive.speed * law.radii[node], 0.0],
+            Self::Fixed(law) => law.sliding[index],
+            Self::Revolution(RevolutionGap { layout, .. }) => layout.rigid_velocity(node, index, drive),
+            Self::Spline(law) => law.layout.rigid_velocity(node, index, drive),
         }
     }
 
@@ -256,7 +280,7 @@ impl GapLaw {
     pub fn slip_direction(&self, velocity: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
         let candidate = match self {
             Self::Fixed(_) => velocity,
-            Self::Revolution(_) => [0.0, velocity[1], 0.0],
+            Self::Revolution(_) | Self::Spline(_) => [0.0, velocity[1], 0.0],
         };
         let along = dot(candidate, normal);
         let tangent: [f64; 3] = std::array::from_fn(|i| candidate[i] - along * normal[i]);
@@ -282,19 +306,23 @@ mod tests {
         let law = |instruction_set| RevolutionGap {
             surface: Surface::new(&shape, 3.56e-4).unwrap(),
             instruction_set,
-            lanes,
-            angles: (0..16).map(|lane| 0.41 * f64::from(lane)).collect(),
-            radii: vec![0.25],
-            per_radius: vec![4.0],
+            layout: Layout {
+                lanes,
+                angles: (0..16).map(|lane| 0.41 * f64::from(lane)).collect(),
+                radii: vec![0.25],
+                per_radius: vec![4.0],
+                axial: vec![0.0],
+                clearances: vec![3.56e-4; 16],
+            },
             slopes: vec![-0.26],
-            clearances: vec![3.56e-4; 16],
+            shaft_moves: false,
         };
         let displacement: Vec<f64> = (0..48).map(|i| 1e-4 * f64::from(i).sin()).collect();
         let drive = Drive { rotor_angle: 1.1, shape_factor: 1.0, ..Drive::default() };
         let run = |instruction_set| {
-            let law = GapLaw::Revolution(law(instruction_set));
+            let mut law = GapLaw::Revolution(law(instruction_set));
             let (mut geometry, mut gap) = (law.geometry(lanes), vec![0.0; 16]);
-            law.evaluate(&drive, &displacement, &mut geometry, &mut gap);
+            law.evaluate(&drive, &displacement, &[], None, &mut geometry, &mut gap);
             let all = geometry.normal.iter().flatten().chain(&gap);
             all.map(|value| value.to_bits()).collect::<Vec<_>>()
         };

@@ -4,6 +4,8 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
+use super::scheme::ModeCoefficients;
+use crate::settings::Scheme;
 use crate::{Error, Result, Rom};
 
 /// Eigenvalues below this fraction of the largest are not resolved by the eigenproblem; the Rayleigh quotient decides.
@@ -20,6 +22,43 @@ pub struct ModalModel {
     pub contact_modes: DMatrix<f64>,
     /// Mass-normalised mode shapes in reduced coordinates, n × modes: reduced = shapes · modal.
     pub shapes: DMatrix<f64>,
+    /// Number of the highest modes that massless-boundary treats as quasi-static.
+    pub quasi_static: usize,
+}
+
+/// Effects of spin in modal coordinates (see [`crate::rom::Spin`]).
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModalSpin {
+    /// Speed whose stiffness the modes are those of (rad/s).
+    pub reference_speed: f64,
+    /// φᵀK₁φ, modes².
+    pub stiffness_speed2: DMatrix<f64>,
+    /// φᵀK₂φ, modes².
+    pub stiffness_speed4: DMatrix<f64>,
+    /// φᵀGφ, modes², skew-symmetric.
+    pub coriolis: DMatrix<f64>,
+    /// φᵀc per mode.
+    pub centrifugal_load: Vec<f64>,
+}
+
+impl ModalSpin {
+    /// Project the spin matrices of a ROM; `reference_speed` is the speed `model` was made for.
+    pub fn new(spin: &crate::rom::Spin, model: &ModalModel, reference_speed: f64) -> Self {
+        let shapes = &model.shapes;
+        let project = |matrix: &DMatrix<f64>| shapes.transpose() * matrix * shapes;
+        let symmetric = |matrix: &DMatrix<f64>| {
+            let projected = project(matrix);
+            (&projected + projected.transpose()) * 0.5
+        };
+        let coriolis = project(&spin.coriolis);
+        Self {
+            reference_speed,
+            stiffness_speed2: symmetric(&spin.stiffness_speed2),
+            stiffness_speed4: symmetric(&spin.stiffness_speed4),
+            coriolis: (&coriolis - coriolis.transpose()) * 0.5,
+            centrifugal_load: model.modal_load(&spin.centrifugal_load),
+        }
+    }
 }
 
 impl ModalModel {
@@ -28,6 +67,21 @@ impl ModalModel {
     /// # Errors
     /// Invalid ROM, or a stiffness that is not positive semidefinite.
     pub fn from_rom(rom: &Rom, damping_ratio: f64) -> Result<Self> {
+        Self::at_stiffness(rom, &rom.stiffness, damping_ratio)
+    }
+
+    /// Modes at a steady speed Ω (rad/s): those of K + Ω²K₁ + Ω⁴K₂ where the ROM has spin matrices.
+    ///
+    /// # Errors
+    /// As [`ModalModel::from_rom`]; a speed at which the stiffness is lost.
+    pub fn at_speed(rom: &Rom, damping_ratio: f64, speed: f64) -> Result<Self> {
+        let Some(spin) = &rom.extras.spin else { return Self::from_rom(rom, damping_ratio) };
+        let square = speed * speed;
+        let stiffness = &rom.stiffness + &spin.stiffness_speed2 * square + &spin.stiffness_speed4 * (square * square);
+        Self::at_stiffness(rom, &stiffness, damping_ratio)
+    }
+
+    fn at_stiffness(rom: &Rom, stiffness: &DMatrix<f64>, damping_ratio: f64) -> Result<Self> {
         rom.validate()?;
         if !(0.0..1.0).contains(&damping_ratio) {
             return Err(Error::invalid(
@@ -36,14 +90,45 @@ impl ModalModel {
                 "Give the modal damping ratio as a fraction of critical, for example 0.005",
             ));
         }
-        let (eigenvalues, shapes) = generalised_modes(rom)?;
+        let (eigenvalues, shapes) = match modal_already(rom, stiffness) {
+            Some(modes) => modes,
+            None => generalised_modes(rom, stiffness)?,
+        };
         let contact_modes = &rom.contact_map * &shapes;
         Ok(Self {
             damping_ratios: vec![damping_ratio; eigenvalues.len()],
             frequencies: eigenvalues.iter().map(|value| value.sqrt()).collect(),
+            quasi_static: contact_modes.nrows(),
             contact_modes,
             shapes,
         })
+    }
+
+    /// φᵀf of a load on the reduced coordinates.
+    pub fn modal_load(&self, load: &[f64]) -> Vec<f64> {
+        self.shapes.column_iter().map(|shape| shape.iter().zip(load).map(|(a, b)| a * b).sum()).collect()
+    }
+
+    /// Number of modes with inertia under a scheme; the others are the highest.
+    pub fn dynamic_modes(&self, scheme: Scheme) -> usize {
+        if scheme == Scheme::MasslessBoundary { self.len().saturating_sub(self.quasi_static) } else { self.len() }
+    }
+
+    /// Coefficients of one mode at the step size `step` (s), its frequency times `factor` (mistuning; 1 = tuned).
+    pub fn coefficient(&self, mode: usize, factor: f64, scheme: Scheme, step: f64) -> ModeCoefficients {
+        let (frequency, ratio) = (self.frequencies[mode] * factor, self.damping_ratios[mode]);
+        if scheme != Scheme::MasslessBoundary {
+            ModeCoefficients::new(scheme, frequency, ratio, step)
+        } else if mode < self.dynamic_modes(scheme) {
+            ModeCoefficients::new(scheme, frequency, ratio, step).delay()
+        } else {
+            ModeCoefficients::quasi_static(frequency)
+        }
+    }
+
+    /// Coefficients of all modes at the step size `step` (s).
+    pub fn coefficients(&self, scheme: Scheme, step: f64) -> Vec<ModeCoefficients> {
+        (0..self.len()).map(|mode| self.coefficient(mode, 1.0, scheme, step)).collect()
     }
 
     /// Several structures side by side as one: modes concatenated, contact rows relative (master − slave).
@@ -94,6 +179,7 @@ impl ModalModel {
             damping_ratios: structures.iter().flat_map(|s| s.damping_ratios.iter().copied()).collect(),
             contact_modes,
             shapes,
+            quasi_static: 0,
         })
     }
 
@@ -128,13 +214,30 @@ pub struct NodePair {
     pub slave: Option<(usize, usize)>,
 }
 
+/// A ROM delivered in modal coordinates (M = I, K diagonal and ascending) needs no eigenproblem.
+fn modal_already(rom: &Rom, stiffness: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+    let order = rom.order();
+    let diagonal: Vec<f64> = (0..order).map(|mode| stiffness[(mode, mode)]).collect();
+    let ascending =
+        diagonal.windows(2).all(|pair| pair[0] <= pair[1]) && diagonal.first().is_some_and(|low| *low >= 0.0);
+    let diagonal_only = |(index, value): (usize, &f64)| index % order == index / order || *value == 0.0;
+    let is_modal = ascending
+        && stiffness.iter().enumerate().all(diagonal_only)
+        && rom
+            .mass
+            .iter()
+            .enumerate()
+            .all(|(index, value)| *value == f64::from(u8::from(index % order == index / order)));
+    is_modal.then(|| (diagonal, DMatrix::identity(order, order)))
+}
+
 /// Eigenvalues ω² (ascending, rigid ones exactly 0) and mass-normalised modes of K φ = ω² M φ.
-fn generalised_modes(rom: &Rom) -> Result<(Vec<f64>, DMatrix<f64>)> {
+fn generalised_modes(rom: &Rom, stiffness: &DMatrix<f64>) -> Result<(Vec<f64>, DMatrix<f64>)> {
     let Some(cholesky) = rom.mass.clone().cholesky() else {
         return Err(Error::invalid("ROM array `mass`", "not positive definite", "Write the ROM again"));
     };
     let lower = cholesky.l();
-    let half = lower.solve_lower_triangular(&rom.stiffness).unwrap_or_else(|| rom.stiffness.clone());
+    let half = lower.solve_lower_triangular(stiffness).unwrap_or_else(|| stiffness.clone());
     let full = lower.solve_lower_triangular(&half.transpose()).unwrap_or(half);
     let eigen = SymmetricEigen::new((&full + full.transpose()) * 0.5);
     let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
@@ -154,7 +257,7 @@ fn generalised_modes(rom: &Rom) -> Result<(Vec<f64>, DMatrix<f64>)> {
     fix_signs(&mut shapes);
     let values = order.iter().enumerate().map(|(mode, index)| {
         let value = eigen.eigenvalues[*index];
-        if value < RIGID_FRACTION * largest { unresolved_eigenvalue(&rom.stiffness, &shapes, mode) } else { value }
+        if value < RIGID_FRACTION * largest { unresolved_eigenvalue(stiffness, &shapes, mode) } else { value }
     });
     let values = values.collect();
     Ok((values, shapes))

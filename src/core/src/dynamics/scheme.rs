@@ -15,6 +15,11 @@
 //! d̃ = h(1 − β)/c, so that multiplying with (q⁺ − q⁻)/2 gives the balance that the ledger closes to rounding:
 //! E = ½ m̃ (d/h)² + ½ ω² q q⁻ changes by f (q⁺ − q⁻)/2 − d̃ h ((q⁺ − q⁻)/2h)². Modal-exact is thus central
 //! differences with the modal mass that makes the discrete frequency exact.
+//!
+//! * massless-boundary (A. Monjaraz-Tec, J. Gross, M. Krack, J. Sound Vib. 2022, arXiv 2111.07693): the highest modes are
+//!   quasi-static, q = φᵀf/ω² (β = 0, κ = 1, c = 1/ω²), so that contact acts through their residual flexibility alone; the
+//!   other modes are stepped by modal-exact and take the contact force one step later, which makes them explicit. With
+//!   the force f of time n known when q(n+1) is, f (u⁺ − u⁻)/2 changes the same E: of a static mode only ½ ω² q q⁻ is left.
 
 use crate::settings::Scheme;
 
@@ -25,8 +30,10 @@ pub struct ModeCoefficients {
     pub beta: f64,
     /// κ = 1 − a − b = c ω².
     pub kappa: f64,
-    /// c: displacement per unit modal force held for one step (s²).
+    /// c: displacement per unit modal force held for one step (s²); of contact forces of the same step.
     pub compliance: f64,
+    /// The same for contact forces that act one step after they were found (massless-boundary); else 0.
+    pub delayed: f64,
     /// (1 − β)/(4c): damping loss per (d⁺ + d)².
     pub loss: f64,
     /// (1 + β)/(4c): kinetic energy per d².
@@ -51,10 +58,35 @@ impl ModeCoefficients {
             beta,
             kappa,
             compliance,
+            delayed: 0.0,
             loss: (1.0 - beta) / (4.0 * compliance),
             inertia: (1.0 + beta) / (4.0 * compliance),
             spring: 0.5 * frequency * frequency,
         }
+    }
+
+    /// A mode without inertia: q = f/ω² at once.
+    pub fn quasi_static(frequency: f64) -> Self {
+        let square = frequency * frequency;
+        Self {
+            beta: 0.0,
+            kappa: 1.0,
+            compliance: 1.0 / square,
+            delayed: 0.0,
+            loss: 0.0,
+            inertia: 0.0,
+            spring: 0.5 * square,
+        }
+    }
+
+    /// Take contact forces one step after they were found.
+    pub fn delay(self) -> Self {
+        Self { compliance: 0.0, delayed: self.compliance, ..self }
+    }
+
+    /// Displacement per unit of a modal force that is known beforehand (s²).
+    pub fn load_compliance(&self) -> f64 {
+        self.compliance + self.delayed
     }
 }
 

@@ -84,7 +84,8 @@ impl Simulation {
     /// Unknown reference, wrong kind, not settable, non-finite, out of range; nothing is changed then.
     pub fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
         self.check_real(reference, value)?;
-        let quantity = self.table.locate(reference)?.0.quantity;
+        let (variable, element) = self.table.locate(reference)?;
+        let quantity = variable.quantity;
         if quantity == Quantity::Friction && self.phase != Phase::Created {
             let mut parameters = self.parameters();
             parameters.friction = value;
@@ -95,7 +96,7 @@ impl Simulation {
         if quantity == Quantity::Speed {
             self.rotor.rebase(&self.inputs.speed, offset);
         }
-        if let Some(input) = self.inputs.get_mut(quantity) {
+        if let Some(input) = self.inputs.get_mut(quantity, element) {
             input.set(value, offset);
         }
         self.values[reference as usize] = value;
@@ -170,12 +171,13 @@ impl Simulation {
     /// Unknown reference, not a continuous real input, order other than 1, non-finite.
     pub fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()> {
         self.check_input_derivative(reference, order, value)?;
-        let quantity = self.table.locate(reference)?.0.quantity;
+        let (variable, element) = self.table.locate(reference)?;
+        let quantity = variable.quantity;
         let offset = self.offset_now();
         if quantity == Quantity::Speed {
             self.rotor.rebase(&self.inputs.speed, offset);
         }
-        if let Some(input) = self.inputs.get_mut(quantity) {
+        if let Some(input) = self.inputs.get_mut(quantity, element) {
             input.set_slope(value, offset);
         }
         Ok(())

@@ -1,17 +1,27 @@
 //! From settings to kernels: what is decided once, before anything moves.
 
+use crate::contact::coating::Coating;
 use crate::contact::gap::{GapLaw, RevolutionGap};
+use crate::contact::layout::Layout;
+use crate::contact::spline_gap::SplineGap;
 use crate::contact::surface::Surface;
-use crate::dynamics::modal::ModalModel;
+use crate::dynamics::bank::BankOptions;
+use crate::dynamics::modal::{ModalModel, ModalSpin};
 use crate::rom::Frame;
-use crate::system::{System, SystemSettings};
+use crate::settings::{ContactSettings, Scheme, Solver, StructureSettings, SurfaceSettings};
+use crate::system::{System, SystemParts, SystemSettings};
 use crate::variables::Quantity;
-use crate::{Error, Result, Scene};
+use crate::{Error, Result, Rom, Scene};
 
 use super::Simulation;
+use super::loads::LoadVectors;
+use super::patches::Patches;
+use super::slave_surface::{Carrier, control_modes, spline_law};
 
 /// Gaps, casing shapes and displacements beyond this share of the radius are not what the model describes.
 pub const SMALL_FRACTION: f64 = 0.1;
+/// Most contact nodes of all sectors together that a flexible slave couples: their Delassus matrix is dense.
+const MOST_COUPLED: usize = 2000;
 
 /// Places of values that the step reads.
 #[derive(Debug, Clone, Copy)]
@@ -21,42 +31,74 @@ pub struct References {
     pub ramp_time: Option<usize>,
 }
 
+/// Which parts of a scene meet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Roles {
+    /// Structure whose contact nodes are the masters.
+    pub master: usize,
+    /// Surface they meet.
+    pub surface: usize,
+    /// Structure that carries the surface.
+    pub carrier: Option<usize>,
+}
+
+impl Roles {
+    /// Find them in a validated scene.
+    ///
+    /// # Errors
+    /// More than one contact, or a structure or surface that takes no part.
+    pub fn new(scene: &Scene) -> Result<Self> {
+        let settings = &scene.settings;
+        let contact = &settings.contacts[0];
+        let structure = |name: &str| settings.structures.iter().position(|structure| structure.name == name);
+        let surface = settings.surfaces.iter().position(|surface| surface.name == contact.slave).unwrap_or(0);
+        let carrier =
+            settings.surfaces.get(surface).and_then(|surface| surface.structure.as_deref()).and_then(structure);
+        let roles = Self { master: structure(&contact.master).unwrap_or(0), surface, carrier };
+        let counts = [settings.structures.len(), settings.surfaces.len(), settings.contacts.len()];
+        let expected = [1 + usize::from(carrier.is_some()), 1, 1];
+        if counts != expected || scene.roms.len() != counts[0] || carrier == Some(roles.master) {
+            return Err(Error::invalid(
+                "scene",
+                format!("{} structures, {} surfaces, {} contacts", counts[0], counts[1], counts[2]),
+                "This version takes one rotor against one surface, which one other structure may carry \
+                 (surface.structure): remove what takes no part",
+            ));
+        }
+        Ok(roles)
+    }
+}
+
 /// The parts of a scene that do not change while it runs.
 #[derive(Debug, Clone)]
 pub struct Compiled {
     pub scene: Scene,
+    pub roles: Roles,
+    /// Modes of the master, at the reference speed where spin stiffens it.
     pub model: ModalModel,
+    /// Speed whose stiffness `model` has (rad/s).
+    pub reference_speed: f64,
+    /// Modes of the structure that carries the surface, seen at its contact grid.
+    pub carrier: Option<ModalModel>,
+    pub loads: LoadVectors,
+    pub patches: Option<Patches>,
     /// Hash of settings and ROMs; saved states carry it.
     pub fingerprint: u64,
     pub references: References,
 }
 
 impl Compiled {
-    /// Validate the scene and solve the reduced eigenproblem.
+    /// Validate the scene and solve the reduced eigenproblems.
     ///
     /// # Errors
-    /// Invalid settings or ROM; scenes with more than one structure, surface or contact.
+    /// Invalid settings or ROM; ROMs without what the scene asks of them.
     pub fn new(scene: &Scene) -> Result<Self> {
         scene.settings.validate()?;
-        let settings = &scene.settings;
-        let counts = [settings.structures.len(), settings.surfaces.len(), settings.contacts.len()];
-        if counts != [1, 1, 1] || scene.roms.len() != 1 {
-            return Err(Error::invalid(
-                "scene",
-                format!("{} structures, {} surfaces, {} contacts", counts[0], counts[1], counts[2]),
-                "This version takes one structure against one rigid surface of revolution: remove the others",
-            ));
+        let roles = Roles::new(scene)?;
+        for (structure, rom) in scene.settings.structures.iter().zip(&scene.roms) {
+            check_rom(structure, rom)?;
         }
-        let rom = &scene.roms[0];
-        if rom.frame != Frame::Cylindrical {
-            return Err(Error::invalid(
-                format!("ROM `{}`", rom.name),
-                "its contact displacements are Cartesian; a surface of revolution needs (radial, tangential, axial)",
-                "Write the ROM with frame = cylindrical",
-            ));
-        }
-        let ratio = settings.structures[0].damping_ratio.unwrap_or(rom.damping_ratio);
-        let model = ModalModel::from_rom(rom, ratio)?;
+        let carrier = roles.carrier.map(|index| modes(scene, index, 0.0)).transpose()?;
         let table = super::table::build(scene)?;
         let place = |quantity| table.with_quantity(quantity).map(|variable| variable.reference as usize);
         let references = References {
@@ -64,19 +106,95 @@ impl Compiled {
             gap_offset: place(Quantity::GapOffset).unwrap_or(0),
             ramp_time: place(Quantity::RampTime),
         };
-        Ok(Self { fingerprint: fingerprint(scene), scene: scene.clone(), model, references })
+        let mut compiled = Self {
+            fingerprint: fingerprint(scene),
+            scene: scene.clone(),
+            roles,
+            model: modes(scene, roles.master, 0.0)?,
+            reference_speed: 0.0,
+            carrier,
+            loads: LoadVectors::default(),
+            patches: Patches::new(scene, roles),
+            references,
+        };
+        compiled.set_reference_speed(scene.settings.structures[roles.master].speed)?;
+        Ok(compiled)
+    }
+
+    /// The master.
+    pub fn master(&self) -> (&StructureSettings, &Rom) {
+        (&self.scene.settings.structures[self.roles.master], &self.scene.roms[self.roles.master])
+    }
+
+    /// The contact pair.
+    pub fn contact(&self) -> &ContactSettings {
+        &self.scene.settings.contacts[0]
+    }
+
+    fn surface(&self) -> &SurfaceSettings {
+        &self.scene.settings.surfaces[self.roles.surface]
+    }
+
+    /// Whether modes or loads of the master depend on the speed.
+    pub fn spins(&self) -> bool {
+        let spin = self.master().0.spin;
+        spin.stiffening || spin.growth || spin.coriolis
+    }
+
+    /// Take the modes of the master at a steady speed (rad/s).
+    ///
+    /// # Errors
+    /// A speed at which the stiffness is lost, or beyond what the ROM was fitted for.
+    pub fn set_reference_speed(&mut self, speed: f64) -> Result<()> {
+        let (structure, rom) = self.master();
+        let (structure, rom) = (structure.clone(), rom.clone());
+        self.check_speed(speed)?;
+        if structure.spin.stiffening {
+            self.model = modes(&self.scene, self.roles.master, speed)?;
+        }
+        self.reference_speed = speed;
+        self.loads = LoadVectors {
+            centrifugal: LoadVectors::of_master(&structure, &rom, &self.model),
+            ..LoadVectors::default()
+        };
+        if let (Some(index), Some(model)) = (self.roles.carrier, &self.carrier) {
+            self.loads.add_slave(&self.scene.settings.structures[index], &self.scene.roms[index], model);
+        }
+        Ok(())
+    }
+
+    /// Refuse speeds that the spin matrices were not fitted for.
+    ///
+    /// # Errors
+    /// Beyond 1.05 times the largest fitted speed.
+    pub fn check_speed(&self, speed: f64) -> Result<()> {
+        let (structure, rom) = self.master();
+        let Some(spin) = rom.extras.spin.as_ref().filter(|_| structure.spin != Default::default()) else {
+            return Ok(());
+        };
+        if speed.abs() <= 1.05 * spin.largest_speed {
+            return Ok(());
+        }
+        Err(Error::invalid(
+            "variable `speed`",
+            format!(
+                "{speed} rad/s is beyond the {} rad/s that stiffening and growth were fitted for",
+                spin.largest_speed
+            ),
+            "Reduce the structure again with a larger speed (`tiprub reduce --spin`), or leave spin out",
+        ))
     }
 
     /// Fresh kernels at rest.
     ///
     /// # Errors
-    /// Wrong number of sector gaps, bad shape table.
+    /// Wrong number of sector gaps or frequency factors, bad shape table, surfaces that do not fit the nodes.
     pub fn system(&self) -> Result<System> {
-        let (settings, rom) = (&self.scene.settings, &self.scene.roms[0]);
-        let contact = &settings.contacts[0];
+        let (settings, contact) = (&self.scene.settings, self.contact());
+        let (structure, rom) = self.master();
         let clearances =
             if contact.sector_gaps.is_empty() { vec![contact.gap; rom.sectors] } else { contact.sector_gaps.clone() };
-        let surface = Surface::new(&settings.surfaces[0].shape, contact.gap)?;
+        let surface = Surface::new(&self.surface().shape, contact.gap)?;
         let smallest = rom.contact_nodes.iter().fold(f64::INFINITY, |low, node| low.min(node.position[0]));
         let largest_gap = clearances.iter().fold(0.0, |largest: f64, gap| largest.max(*gap));
         for (what, value) in [("surface.shape", surface.largest_change()), ("contact.gap", largest_gap)] {
@@ -89,21 +207,174 @@ impl Compiled {
             }
         }
         let lanes = crate::dynamics::bank::lanes(rom.sectors);
-        let law = RevolutionGap::new(rom, surface, &clearances, contact.meridian, lanes)?;
+        let (law, slave) = self.law(surface, &clearances, lanes)?;
         let system_settings = SystemSettings {
             scheme: settings.time.scheme,
             solver: contact.solver,
             friction: contact.friction,
             ledger: settings.outputs.energies,
         };
-        Ok(System::new(&self.model, rom.sectors, GapLaw::Revolution(law), system_settings))
+        let parts = SystemParts {
+            bank: self.bank_options(structure, rom),
+            slave: slave.map(|model| (model, self.loads.on_slave())),
+            coating: self.coating(rom)?,
+            sticking: self.may_stick(),
+        };
+        Ok(System::with_parts(&self.model, rom.sectors, law, system_settings, parts))
     }
+
+    fn law(&self, surface: Surface, clearances: &[f64], lanes: usize) -> Result<(GapLaw, Option<ModalModel>)> {
+        let (structure, rom) = self.master();
+        let (contact, settings) = (self.contact(), self.surface());
+        if settings.spline.is_none() && self.roles.carrier.is_none() {
+            let law = RevolutionGap::new(rom, surface, clearances, contact.meridian, lanes)?;
+            let law = law.with_moving_shaft(structure.whirl || structure.axial_shift);
+            return Ok((GapLaw::Revolution(law), None));
+        }
+        let layout = Layout::new(rom, clearances, lanes)?;
+        let carrier = self.roles.carrier.zip(self.carrier.as_ref());
+        let carrier = carrier.map(|(index, model)| Carrier { rom: &self.scene.roms[index], model });
+        let law = spline_law(rom, layout, contact, settings, carrier)?;
+        let contacts = rom.sectors * rom.contact_nodes.len();
+        if carrier.is_some() && contacts > MOST_COUPLED {
+            return Err(Error::invalid(
+                "surface.structure",
+                format!("{contacts} contact nodes of all sectors together, more than {MOST_COUPLED}"),
+                "Use fewer contact nodes or sectors, or a rigid surface",
+            ));
+        }
+        let slave = match (&law, carrier) {
+            (GapLaw::Spline(law), Some(carrier)) => Some(control_modes(carrier, law)),
+            _ => None,
+        };
+        Ok((law, slave))
+    }
+
+    fn bank_options(&self, structure: &StructureSettings, rom: &Rom) -> BankOptions {
+        let coupled = structure.spin.stiffening || structure.spin.coriolis;
+        let spin = rom.extras.spin.as_ref().filter(|_| coupled);
+        let coupling = spin.map(|spin| {
+            let modal = ModalSpin::new(spin, &self.model, self.reference_speed);
+            (modal, structure.spin.stiffening, structure.spin.coriolis)
+        });
+        BankOptions {
+            frequency_factors: structure.frequency_factors.clone(),
+            loads: !self.loads.centrifugal.is_empty(),
+            coupling,
+            flexibility: true,
+        }
+    }
+
+    fn coating(&self, rom: &Rom) -> Result<Option<Coating>> {
+        let Some(settings) = &self.contact().coating else { return Ok(None) };
+        let nodes = || rom.contact_nodes.iter();
+        let axial: Vec<f64> = nodes().map(|node| node.position[2]).collect();
+        let radii: Vec<f64> = nodes().map(|node| node.position[0]).collect();
+        let low = axial.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = axial.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let coating = if high - low > 1e-6 * radii[0] {
+            Coating::new(settings, &axial, &radii, rom.sectors)?
+        } else {
+            // One node stands for a strip as wide as a tenth of its radius.
+            let half = 0.05 * radii[0];
+            Coating::with_extent(settings, &axial, &radii, [low - half, high + half], rom.sectors)?
+        };
+        Ok(Some(coating))
+    }
+
+    /// The carrier's modes at the control points; empty without one.
+    pub fn slave_modes(&self, law: &SplineGap) -> ModalModel {
+        let carrier = self.roles.carrier.zip(self.carrier.as_ref());
+        carrier.map_or_else(
+            || self.model.with_nodes(&[]),
+            |(index, model)| control_modes(Carrier { rom: &self.scene.roms[index], model }, law),
+        )
+    }
+
+    /// Whether `coulomb` can be chosen: a coupled problem of all sectors has room for it only if the scene says so.
+    pub fn may_stick(&self) -> bool {
+        let contact = self.contact();
+        let uncoupled = self.roles.carrier.is_none() && contact.friction > 0.0 && contact.coating.is_none();
+        contact.solver == Solver::Coulomb || uncoupled
+    }
+
+    /// Combinations of scheme and solver that this scene cannot be stepped with.
+    ///
+    /// # Errors
+    /// Naming parameter and remedy.
+    pub fn check_methods(&self, scheme: Scheme, solver: Solver) -> Result<()> {
+        let refuse = |what: &str, problem: &str, remedy: &str| Err(Error::invalid(what, problem, remedy));
+        let (structure, _) = self.master();
+        if solver == Solver::Coulomb && !self.may_stick() {
+            let remedy = "Package the scene with friction and contact.solver = \"coulomb\", without coating";
+            return refuse("parameter `solver`", "`coulomb` is not prepared in this scene", remedy);
+        }
+        if self.contact().coating.is_some() && solver != Solver::Lcp {
+            return refuse("parameter `solver`", "a coating is solved with `lcp` only", "Use lcp, or no coating");
+        }
+        if scheme == Scheme::MasslessBoundary && structure.spin.coriolis {
+            let remedy = "Use modal-exact, or leave coriolis out";
+            return refuse("parameter `scheme`", "`massless-boundary` does not take the Coriolis force", remedy);
+        }
+        if scheme == Scheme::MasslessBoundary && self.model.dynamic_modes(scheme) == 0 {
+            let problem =
+                "`massless-boundary` makes the highest modes quasi-static, three per contact node: none is left";
+            return refuse("parameter `scheme`", problem, "Use more modes or fewer contact nodes, or modal-exact");
+        }
+        Ok(())
+    }
+}
+
+fn modes(scene: &Scene, index: usize, speed: f64) -> Result<ModalModel> {
+    let (structure, rom) = (&scene.settings.structures[index], &scene.roms[index]);
+    let ratio = structure.damping_ratio.unwrap_or(rom.damping_ratio);
+    if structure.spin.stiffening { ModalModel::at_speed(rom, ratio, speed) } else { ModalModel::from_rom(rom, ratio) }
+}
+
+/// What a structure asks of its ROM.
+fn check_rom(structure: &StructureSettings, rom: &Rom) -> Result<()> {
+    let what = format!("ROM `{}`", rom.name);
+    if rom.frame != Frame::Cylindrical {
+        return Err(Error::invalid(
+            what,
+            "its contact displacements are Cartesian; surfaces around an axis need (radial, tangential, axial)",
+            "Write the ROM with frame = cylindrical",
+        ));
+    }
+    let spin = structure.spin.stiffening || structure.spin.growth || structure.spin.coriolis;
+    if spin && rom.extras.spin.is_none() {
+        let problem = format!("it has no spin matrices, which `spin` of structure `{}` needs", structure.name);
+        return Err(Error::invalid(what, problem, "Reduce it with `tiprub reduce --spin`, or leave spin out"));
+    }
+    if structure.thermal && rom.extras.thermal.is_none() {
+        let problem = format!("it has no thermal loads, which `thermal` of structure `{}` needs", structure.name);
+        return Err(Error::invalid(what, problem, "Reduce it with thermal patches, or leave thermal out"));
+    }
+    if structure.load.is_some() && rom.extras.grid.is_none() {
+        let problem = format!("it has no contact grid, which `load` of structure `{}` needs", structure.name);
+        return Err(Error::invalid(what, problem, "Give a ROM with a contact grid, or leave the load out"));
+    }
+    let factors = structure.frequency_factors.len();
+    if factors != 0 && factors != rom.sectors {
+        return Err(Error::invalid(
+            "structure.frequency_factors",
+            format!("{factors} values for {} sectors", rom.sectors),
+            "Give one factor per sector, or remove the line",
+        ));
+    }
+    Ok(())
 }
 
 fn fingerprint(scene: &Scene) -> u64 {
     let mut hash = crate::persist::fingerprint(format!("{:?}", scene.settings).as_bytes(), 0);
     for rom in &scene.roms {
-        for matrix in [&rom.mass, &rom.stiffness, &rom.contact_map] {
+        let mut matrices = vec![&rom.mass, &rom.stiffness, &rom.contact_map];
+        if let Some(spin) = &rom.extras.spin {
+            matrices.extend([&spin.stiffness_speed2, &spin.stiffness_speed4, &spin.coriolis]);
+            hash = crate::persist::fingerprint(format!("{:?}", spin.centrifugal_load).as_bytes(), hash);
+        }
+        matrices.extend(rom.extras.thermal.iter().map(|thermal| &thermal.loads));
+        for matrix in matrices {
             for value in matrix.iter() {
                 hash = crate::persist::fingerprint(&value.to_bits().to_le_bytes(), hash);
             }
@@ -127,7 +398,7 @@ impl Simulation {
             return Ok(());
         }
         let touching = self.system.gaps().iter().filter(|gap| **gap < 0.0).count();
-        let node = &self.compiled.scene.roms[0].contact_nodes[deepest.0 / lanes].name;
+        let node = &self.compiled.master().1.contact_nodes[deepest.0 / lanes].name;
         Err(Error::invalid(
             "initial clearance",
             format!(

@@ -1,10 +1,14 @@
 //! Stability and solvability of a scene at the step sizes it can be stepped with.
 
 use super::{Compiled, Simulation};
+use crate::contact::gap::{GapLaw, dot};
+use crate::contact::spline_gap::{Frame, SplineGap};
+use crate::dynamics::modal::ModalModel;
 use crate::settings::{Meridian, Scheme, Solver};
-use crate::stability::{self, ContactDirections, Growth};
+use crate::stability::{self, ContactDirections, Growth, massless};
 use crate::variables::Quantity;
 use crate::{Error, Result};
+use nalgebra::DMatrix;
 
 /// Contact nodes up to this number are looked at in every combination; beyond, alone, in neighbouring pairs, and all.
 const ALL_COMBINATIONS_UP_TO: usize = 3;
@@ -14,6 +18,8 @@ const ALL_COMBINATIONS_UP_TO: usize = 3;
 pub struct Parameters {
     pub friction: f64,
     pub damping_ratio: f64,
+    /// Of the structure that carries the surface.
+    pub slave_damping_ratio: Option<f64>,
     /// Largest internal step (s).
     pub step: f64,
     pub scheme: Scheme,
@@ -30,17 +36,28 @@ pub struct Limits {
     outcome: Result<Vec<String>>,
     /// Largest step of each range of step sizes, descending, and why it is refused, if it is.
     ranges: Vec<(f64, Option<Error>)>,
+    /// Step (s) from which on massless-boundary is unstable in closed contact; infinite for other schemes.
+    massless: f64,
 }
 
 impl Simulation {
     pub(super) fn parameters(&self) -> Parameters {
-        let scheme =
-            if self.value_of(Quantity::SchemeChoice) < 1.5 { Scheme::CentralDifference } else { Scheme::ModalExact };
-        let solver = if self.value_of(Quantity::SolverChoice) < 1.5 { Solver::Film } else { Solver::Lcp };
+        let chosen = |quantity| self.value_of(quantity);
+        let scheme = match chosen(Quantity::SchemeChoice) {
+            ..1.5 => Scheme::CentralDifference,
+            1.5..2.5 => Scheme::ModalExact,
+            _ => Scheme::MasslessBoundary,
+        };
+        let solver = match chosen(Quantity::SolverChoice) {
+            ..1.5 => Solver::Film,
+            1.5..2.5 => Solver::Lcp,
+            _ => Solver::Coulomb,
+        };
         let speed = self.inputs.speed.value;
         Parameters {
             friction: self.value_of(Quantity::Friction),
             damping_ratio: self.value_of(Quantity::DampingRatio),
+            slave_damping_ratio: self.compiled.roles.carrier.map(|_| self.value_of(Quantity::SlaveDampingRatio)),
             step: self.value_of(Quantity::StepMax),
             scheme,
             solver,
@@ -51,7 +68,7 @@ impl Simulation {
     /// Check limits unless the same parameters were checked last.
     pub(super) fn check_limits(&mut self, parameters: Parameters) -> Result<()> {
         if self.limits.as_ref().is_none_or(|limits| limits.parameters != parameters) {
-            self.limits = Some(self.compiled.limits(parameters));
+            self.limits = Some(self.compiled.limits(parameters, self.system.law()));
         }
         self.warnings = match &self.limits {
             Some(limits) => limits.outcome.clone()?,
@@ -63,7 +80,14 @@ impl Simulation {
     /// Refuse a step size (s) whose range was found unstable. Only looks up, so that a step does not allocate.
     pub(super) fn check_step_size(&self, step: f64) -> Result<()> {
         let Some(limits) = &self.limits else { return Ok(()) };
-        stability::check_step_allowed(&self.compiled.model, limits.parameters.scheme, step)?;
+        let scheme = limits.parameters.scheme;
+        stability::check_step_allowed(&self.compiled.model, self.compiled.stiffest(), scheme, step)?;
+        if let Some(carrier) = &self.compiled.carrier {
+            stability::check_step_allowed(carrier, 1.0, scheme, step)?;
+        }
+        if step >= limits.massless {
+            return Err(massless::refusal(step, limits.massless));
+        }
         // The range a step belongs to is that of the smallest entry not below it.
         let range = limits.ranges.iter().rev().find(|(largest, _)| step <= largest * (1.0 + super::SAME_STEP));
         match range {
@@ -80,12 +104,27 @@ impl Compiled {
         length / (length / largest * (1.0 - super::SAME_STEP)).ceil().max(1.0)
     }
 
-    fn limits(&self, parameters: Parameters) -> Limits {
+    /// Largest factor on the frequencies of the master.
+    fn stiffest(&self) -> f64 {
+        self.master().0.frequency_factors.iter().fold(1.0, |largest: f64, factor| largest.max(*factor))
+    }
+
+    fn limits(&self, parameters: Parameters, law: &GapLaw) -> Limits {
         let mut model = self.model.clone();
         model.damping_ratios.fill(parameters.damping_ratio);
         let at = Checking { compiled: self, model, parameters };
         let expected = self.expected_step(parameters.step);
-        let outcome = at.expected(expected);
+        let (mut outcome, mut limit) = (at.expected(expected), f64::INFINITY);
+        if let Ok(warnings) = &mut outcome {
+            match at.slave(expected, law).and_then(|found| Ok((found, at.massless(expected, law)?))) {
+                Ok((found, (more, step))) => {
+                    warnings.extend(found);
+                    warnings.extend(more);
+                    limit = step;
+                }
+                Err(error) => outcome = Err(error),
+            }
+        }
         let ranges = if parameters.friction == 0.0 {
             Vec::new()
         } else {
@@ -94,8 +133,47 @@ impl Compiled {
             let refusal = |step| senses.iter().find_map(|sense| at.growth(step, *sense, false).err());
             steps.map(|step| (step, refusal(step))).collect()
         };
-        Limits { parameters, outcome, ranges: at.with_expected(ranges, expected) }
+        Limits { parameters, outcome, ranges: at.with_expected(ranges, expected), massless: limit }
     }
+}
+
+/// Angles at which the flexible slave is looked at.
+const SLAVE_ANGLES: u32 = 48;
+
+/// The slave's modes along normals and tangents of the contact nodes of a blade at `angle` (rad), nodes × modes.
+fn slave_at(law: &SplineGap, modes: &ModalModel, angle: f64) -> (DMatrix<f64>, DMatrix<f64>) {
+    let nodes = law.layout.nodes();
+    let mut seen = (DMatrix::zeros(nodes, modes.len()), DMatrix::zeros(nodes, modes.len()));
+    for node in 0..nodes {
+        let turned = angle + law.layout.angles[node * law.layout.lanes];
+        let frame = Frame::new(turned);
+        let place = law.surface.locate(frame.fixed([law.layout.radii[node], 0.0, law.layout.axial[node]]));
+        for (index, weight) in law.surface.weights(place).iter() {
+            for mode in 0..modes.len() {
+                let shape = frame.local(std::array::from_fn(|i| modes.contact_modes[(3 * index + i, mode)]));
+                seen.0[(node, mode)] -= weight * dot([1.0, 0.0, 0.0], shape);
+                seen.1[(node, mode)] += weight * dot([0.0, 1.0, 0.0], shape);
+            }
+        }
+    }
+    seen
+}
+
+/// Lowest eigenvalue of the symmetric part of the slave's Delassus matrix relative to the largest.
+fn lowest_ratio(
+    (normals, tangents): &(DMatrix<f64>, DMatrix<f64>),
+    modes: &ModalModel,
+    scheme: Scheme,
+    step: f64,
+    friction: f64,
+) -> f64 {
+    let scheme = if scheme == Scheme::MasslessBoundary { Scheme::ModalExact } else { scheme };
+    let compliance: Vec<f64> = modes.coefficients(scheme, step).iter().map(|mode| mode.compliance).collect();
+    let forces = normals - tangents * friction;
+    let weighted = DMatrix::from_fn(forces.nrows(), forces.ncols(), |i, mode| forces[(i, mode)] * compliance[mode]);
+    let matrix = normals * weighted.transpose();
+    let eigenvalues = ((&matrix + matrix.transpose()) * 0.5).symmetric_eigenvalues();
+    if eigenvalues.max() > 0.0 { eigenvalues.min() / eigenvalues.max() } else { 0.0 }
 }
 
 /// A scene with some parameters, about to be checked.
@@ -109,7 +187,9 @@ impl Checking<'_> {
     /// Everything at the step to expect; returns warnings.
     fn expected(&self, step: f64) -> Result<Vec<String>> {
         let Parameters { friction, scheme, .. } = self.parameters;
-        let mut warnings: Vec<String> = stability::check_step(&self.model, scheme, step)?.into_iter().collect();
+        let stiffest = self.compiled.stiffest();
+        let mut warnings: Vec<String> =
+            stability::check_step(&self.model, stiffest, scheme, step)?.into_iter().collect();
         let directions = [1.0, -1.0].map(|sense| self.directions(sense));
         stability::check_solvable(&self.model, scheme, self.parameters.step, friction, &directions)?;
         if friction > 0.0 {
@@ -124,6 +204,65 @@ impl Checking<'_> {
             }
         }
         Ok(warnings)
+    }
+
+    /// The structure that carries the surface: its own step limit, and whether its part of the contact problem can
+    /// spoil solvability.
+    fn slave(&self, step: f64, law: &GapLaw) -> Result<Vec<String>> {
+        let (Some(model), GapLaw::Spline(spline)) = (&self.compiled.carrier, law) else { return Ok(Vec::new()) };
+        let Parameters { friction, scheme, .. } = self.parameters;
+        let mut warnings: Vec<String> = stability::check_step(model, 1.0, scheme, step)?.into_iter().collect();
+        for warning in &mut warnings {
+            *warning = format!("casing: {warning}");
+        }
+        let modes = self.compiled.slave_modes(spline);
+        let (mut worst, mut at) = (0.0, 0.0);
+        for place in 0..SLAVE_ANGLES {
+            let angle = std::f64::consts::TAU * f64::from(place) / f64::from(SLAVE_ANGLES);
+            let seen = slave_at(spline, &modes, angle);
+            for sense in [1.0, -1.0] {
+                let ratio = lowest_ratio(&seen, &modes, scheme, step, sense * friction);
+                if ratio < worst {
+                    (worst, at) = (ratio, angle);
+                }
+            }
+        }
+        if worst < -1e-9 && self.parameters.solver != Solver::Coulomb {
+            warnings.push(format!(
+                "with µ = {friction} the casing's part of the Delassus matrix is not positive semidefinite (lowest eigenvalue \
+                 {worst:.2e} of the largest, at θ = {at:.2} rad): where the blades add less flexibility than that, a step \
+                 may have no unique solution and is then refused"
+            ));
+        }
+        Ok(warnings)
+    }
+
+    /// Largest step of massless-boundary, and a warning where many blades in contact at once may lower it.
+    fn massless(&self, step: f64, law: &GapLaw) -> Result<(Vec<String>, f64)> {
+        if self.parameters.scheme != Scheme::MasslessBoundary {
+            return Ok((Vec::new(), f64::INFINITY));
+        }
+        let modes = match (&self.compiled.carrier, law) {
+            (Some(_), GapLaw::Spline(spline)) => Some((self.compiled.slave_modes(spline), spline)),
+            _ => None,
+        };
+        let slave = modes.as_ref().map(|(modes, spline)| (slave_at(spline, modes, 0.0).0, modes));
+        let normals = self.directions(1.0).into_iter().map(|(normal, _)| normal).collect();
+        let check = massless::MasslessCheck { model: &self.model, normals, slave };
+        let limit = check.limit(self.parameters.step.max(step))?;
+        if step >= limit {
+            return Err(massless::refusal(step, limit));
+        }
+        let mut warnings = Vec::new();
+        let sectors = f64::from(u32::try_from(self.compiled.master().1.sectors).unwrap_or(u32::MAX));
+        if let Some((master, slave)) = check.eigenvalues(step).filter(|(a, b)| a + sectors * b >= 4.0) {
+            warnings.push(format!(
+                "massless-boundary is shown stable for up to {:.0} blades in contact with the casing at once, not for all \
+                 {sectors}",
+                ((4.0 - master) / slave).floor()
+            ));
+        }
+        Ok((warnings, limit))
     }
 
     /// Senses of slip to expect.
@@ -141,8 +280,8 @@ impl Checking<'_> {
 
     /// Normals and slip directions of the contact nodes on a round casing.
     fn directions(&self, sense: f64) -> ContactDirections {
-        let meridian = self.compiled.scene.settings.contacts[0].meridian;
-        let nodes = self.compiled.scene.roms[0].contact_nodes.iter();
+        let meridian = self.compiled.contact().meridian;
+        let nodes = self.compiled.master().1.contact_nodes.iter();
         nodes
             .map(|node| {
                 let slope = if meridian == Meridian::Contour { node.meridional_slope } else { 0.0 };
@@ -154,7 +293,7 @@ impl Checking<'_> {
 
     /// Sets of closed contact nodes: all combinations of a few; of many every one alone, neighbours, and all.
     fn combinations(&self) -> Vec<Vec<usize>> {
-        let nodes = self.compiled.scene.roms[0].contact_nodes.len();
+        let nodes = self.compiled.master().1.contact_nodes.len();
         if nodes <= ALL_COMBINATIONS_UP_TO {
             let members = |set: usize| (0..nodes).filter(|node| set >> node & 1 == 1).collect();
             return (1..1 << nodes).map(members).collect();
@@ -190,7 +329,7 @@ impl Checking<'_> {
     /// Which contact is meant.
     fn contact(&self, nodes: &[usize], sense: f64) -> String {
         let names: Vec<&str> =
-            nodes.iter().map(|node| self.compiled.scene.roms[0].contact_nodes[*node].name.as_str()).collect();
+            nodes.iter().map(|node| self.compiled.master().1.contact_nodes[*node].name.as_str()).collect();
         let direction = if sense > 0.0 { "+θ" } else { "−θ" };
         format!(
             "with µ = {}, contact closed at {} and sliding in {direction}",

@@ -4,12 +4,16 @@ mod access;
 mod compile;
 mod drive;
 mod limits;
+mod loads;
 mod outputs;
+mod patches;
+mod slave_surface;
 mod state;
 mod table;
 mod window;
 
-use crate::contact::gap::{Drive, GapLaw};
+use crate::contact::gap::Drive;
+use crate::settings::Solver;
 use crate::system::{StepFailure, System};
 use crate::variables::{Quantity, Start, VariableTable};
 use crate::{Error, Result, Scene};
@@ -74,29 +78,55 @@ impl Communication {
 }
 
 /// The real inputs, each with its derivative.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 struct Inputs {
     speed: Input,
     shape_factor: Input,
     shape_rotation: Input,
     radius_change: Input,
+    /// Whirl x, whirl y, axial shift.
+    shaft: [Input; 3],
+    load_amplitude: Input,
+    load_phase: Input,
+    /// One per patch.
+    temperatures: Vec<Input>,
 }
 
 impl Inputs {
-    fn get_mut(&mut self, quantity: Quantity) -> Option<&mut Input> {
+    fn get_mut(&mut self, quantity: Quantity, element: usize) -> Option<&mut Input> {
         match quantity {
             Quantity::Speed => Some(&mut self.speed),
             Quantity::ShapeFactor => Some(&mut self.shape_factor),
             Quantity::ShapeRotation => Some(&mut self.shape_rotation),
             Quantity::RadiusChange => Some(&mut self.radius_change),
+            Quantity::ShaftDisplacement(component) => self.shaft.get_mut(component),
+            Quantity::LoadAmplitude => Some(&mut self.load_amplitude),
+            Quantity::LoadPhase => Some(&mut self.load_phase),
+            Quantity::CasingTemperature => self.temperatures.get_mut(element),
             _ => None,
         }
     }
 
+    fn all_mut(&mut self) -> impl Iterator<Item = &mut Input> {
+        let single = [
+            &mut self.speed,
+            &mut self.shape_factor,
+            &mut self.shape_rotation,
+            &mut self.radius_change,
+            &mut self.load_amplitude,
+            &mut self.load_phase,
+        ];
+        single.into_iter().chain(&mut self.shaft).chain(&mut self.temperatures)
+    }
+
     fn shift(&mut self, length: f64) {
-        for input in [&mut self.speed, &mut self.shape_factor, &mut self.shape_rotation, &mut self.radius_change] {
-            input.shift(length);
-        }
+        self.all_mut().for_each(|input| input.shift(length));
+    }
+
+    /// Start values everywhere.
+    fn clear(&mut self) {
+        self.all_mut().for_each(|input| *input = Input::default());
+        self.shape_factor.value = 1.0;
     }
 }
 
@@ -137,14 +167,15 @@ impl Simulation {
         let compiled = Compiled::new(scene)?;
         let table = table::build(scene)?;
         let system = compiled.system()?;
-        let window = Window::new(system.gaps().len());
+        let window = Window::new(system.gaps().len(), compiled.patches.as_ref().map_or(0, patches::Patches::len));
+        let temperatures = vec![Input::default(); compiled.loads.thermal.len()];
         let mut simulation = Self {
             values: vec![0.0; table.references()],
             previous: vec![0.0; table.references()],
             table,
             compiled,
             system,
-            inputs: Inputs::default(),
+            inputs: Inputs { temperatures, ..Inputs::default() },
             rotor: RotorAngle::default(),
             window,
             communication: Communication::default(),
@@ -179,8 +210,11 @@ impl Simulation {
         }
         let parameters = self.parameters();
         self.warnings.clear();
+        self.compiled.check_methods(parameters.scheme, parameters.solver)?;
+        self.follow_reference_speed(self.inputs.speed.value)?;
         self.check_limits(parameters)?;
-        if parameters.friction > 0.0 && self.inputs.speed.value == 0.0 && self.inputs.speed.slope == 0.0 {
+        let sliding = parameters.solver != Solver::Coulomb;
+        if sliding && parameters.friction > 0.0 && self.inputs.speed.value == 0.0 && self.inputs.speed.slope == 0.0 {
             self.warnings.push(
                 "the rotor starts at speed 0 with friction: the sliding law does not model sticking; results are \
                  meaningful once the tips slide faster than they vibrate"
@@ -189,8 +223,7 @@ impl Simulation {
         }
         self.system.set_methods(parameters.scheme, parameters.solver);
         self.system.set_friction(parameters.friction);
-        self.system.bank_mut().rest();
-        self.system.bank_mut().set_damping_ratio(parameters.damping_ratio);
+        self.rest(parameters);
         self.time = start_time;
         self.initial_time = start_time;
         self.communication = Communication { start: start_time, length: 0.0, count: 1, done: 1 };
@@ -198,6 +231,10 @@ impl Simulation {
         self.rotor = RotorAngle::new(self.value_of(Quantity::InitialAngle));
         let drive = self.drive(0.0, start_time);
         self.system.bank_mut().set_step(parameters.scheme, parameters.step);
+        if let Some(slave) = self.system.slave_mut() {
+            slave.bank.set_step(parameters.scheme, parameters.step);
+        }
+        self.settle(drive.speed);
         self.system.start(&drive);
         self.check_initial_gaps()?;
         self.window.open(self.system.gaps());
@@ -205,6 +242,44 @@ impl Simulation {
         self.update_outputs();
         self.previous.copy_from_slice(&self.values);
         Ok(())
+    }
+
+    /// With stiffening, the modes are those at the speed of the start.
+    fn follow_reference_speed(&mut self, speed: f64) -> Result<()> {
+        if !self.compiled.spins() || self.compiled.reference_speed.to_bits() == speed.to_bits() {
+            return Ok(());
+        }
+        self.compiled.set_reference_speed(speed)?;
+        self.system = self.compiled.system()?;
+        self.limits = None;
+        Ok(())
+    }
+
+    /// Undeformed and at rest, with the damping of the parameters.
+    fn rest(&mut self, parameters: limits::Parameters) {
+        self.system.bank_mut().rest();
+        self.system.bank_mut().set_damping_ratio(parameters.damping_ratio);
+        if let Some(slave) = self.system.slave_mut() {
+            slave.bank.rest();
+            if let Some(ratio) = parameters.slave_damping_ratio {
+                slave.bank.set_damping_ratio(ratio);
+            }
+        }
+    }
+
+    /// Static equilibrium under the loads of the start.
+    fn settle(&mut self, speed: f64) {
+        let loads = &self.compiled.loads;
+        if !loads.centrifugal.is_empty() {
+            let mut push = vec![0.0; loads.centrifugal.len()];
+            loads.fill_master(speed, &mut push);
+            self.system.bank_mut().settle(&push);
+        }
+        if let (true, Some(slave)) = (loads.on_slave(), self.system.slave_mut()) {
+            let mut push = vec![0.0; slave.bank.modes()];
+            loads.fill_slave(&self.inputs, 0.0, &mut push);
+            slave.bank.settle(&push);
+        }
     }
 
     /// Warnings collected by the last [`Simulation::initialise`] (unresolved modes and the like).
@@ -238,7 +313,15 @@ impl Simulation {
             shape_factor: self.inputs.shape_factor.at(offset) * self.ramp(time),
             shape_rotation: self.inputs.shape_rotation.at(offset),
             radius_change: self.inputs.radius_change.at(offset),
+            shaft: self.inputs.shaft.map(|input| input.at(offset)),
+            shaft_velocity: self.inputs.shaft.map(|input| input.slope),
         }
+    }
+
+    /// Factor on the casing shape at the internal time reached (-), ramp included.
+    pub fn shape_factor(&self) -> f64 {
+        let (offset, done) = (self.offset_now(), self.communication.done);
+        self.inputs.shape_factor.at(offset) * self.ramp(self.communication.time(done))
     }
 
     fn values_gap_offset(&self) -> f64 {
@@ -279,6 +362,11 @@ impl Simulation {
         self.check_step_size(step)?;
         if (step - self.system.bank().step()).abs() > SAME_STEP * step {
             self.system.set_step(step);
+        }
+        if self.compiled.spins() {
+            let (first, last) = (self.inputs.speed.at(0.0), self.inputs.speed.at(step_size));
+            self.compiled.check_speed(if first.abs() > last.abs() { first } else { last })?;
+            self.system.set_speed(0.5 * (first + last));
         }
         self.previous.copy_from_slice(&self.values);
         self.previous_length = self.communication.length;
@@ -323,8 +411,7 @@ impl Simulation {
 
     /// The rotor must not skip over features of the casing shape. Inputs are linear in time: the ends decide.
     fn check_turning(&self, step: f64, step_size: f64) -> Result<()> {
-        let GapLaw::Revolution(law) = self.system.law() else { return Ok(()) };
-        let scale = law.angular_scale();
+        let scale = self.system.law().angular_scale();
         let speed = |offset: f64| self.inputs.speed.at(offset) - self.inputs.shape_rotation.slope;
         let turned = step * speed(0.0).abs().max(speed(step_size).abs());
         if turned <= scale {
@@ -352,16 +439,29 @@ impl Simulation {
         let next = self.communication.done + 1;
         let (offset, time) = (self.communication.offset(next), self.communication.time(next));
         let drive = self.drive(offset, time);
+        self.load(drive.speed, offset);
         if let Err(failure) = self.system.step(&drive) {
             return Err(self.fail(failure, time));
         }
         self.window.add(&self.system, drive.rotor_angle, self.system.bank().step());
+        self.window.add_heat(&self.system, drive.rotor_angle, self.compiled.patches.as_ref());
         self.communication.done = next;
         let finished = next == self.communication.count;
         if finished {
             self.finish(offset, time)?;
         }
         Ok(Progress { time, finished })
+    }
+
+    /// Loads beside contact for the step that ends at `offset`.
+    fn load(&mut self, speed: f64, offset: f64) {
+        let loads = &self.compiled.loads;
+        if !loads.centrifugal.is_empty() {
+            loads.fill_master(speed, self.system.bank_mut().loads_mut());
+        }
+        if let (true, Some(slave)) = (loads.on_slave(), self.system.slave_mut()) {
+            loads.fill_slave(&self.inputs, offset, slave.bank.loads_mut());
+        }
     }
 
     fn finish(&mut self, offset: f64, time: f64) -> Result<()> {
@@ -435,15 +535,16 @@ impl Simulation {
     pub fn reset(&mut self) {
         self.values.fill(0.0);
         self.previous.fill(0.0);
-        self.inputs = Inputs::default();
-        self.inputs.shape_factor.value = 1.0;
+        self.inputs.clear();
         for variable in self.table.variables() {
             let reference = variable.reference as usize;
             match &variable.start {
                 Some(Start::Real(values)) => {
                     self.values[reference..][..values.len()].copy_from_slice(values);
-                    if let Some(input) = self.inputs.get_mut(variable.quantity) {
-                        input.set(values[0], 0.0);
+                    for (element, value) in values.iter().enumerate() {
+                        if let Some(input) = self.inputs.get_mut(variable.quantity, element) {
+                            input.set(*value, 0.0);
+                        }
                     }
                 }
                 Some(Start::Integer(value)) => self.values[reference] = f64::from(*value),

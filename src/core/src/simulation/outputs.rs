@@ -1,6 +1,7 @@
 //! Outputs from state and window.
 
 use super::{Phase, Simulation};
+use crate::contact::coating::Coating;
 use crate::contact::gap::sector_angle;
 use crate::variables::{Causality, Quantity, Span, Variable};
 
@@ -12,6 +13,8 @@ struct Instant {
     elapsed: f64,
     /// Kinetic and strain energy (J), if the ledger is kept.
     energies: (f64, f64),
+    /// Share of the friction heat that goes into the slave; all of it where the scene does not say.
+    slave_share: f64,
 }
 
 impl Simulation {
@@ -22,7 +25,9 @@ impl Simulation {
         let mean = if elapsed > 0.0 && self.communication.length > 0.0 { 1.0 / elapsed } else { 0.0 };
         self.system.close_books();
         let energies = if self.system.settings().ledger { self.system.energies() } else { (0.0, 0.0) };
-        let instant = Instant { mean, elapsed, energies };
+        let slave_share = self.table.with_quantity(Quantity::HeatToSlave);
+        let slave_share = slave_share.map_or(1.0, |variable| self.values[variable.reference as usize]);
+        let instant = Instant { mean, elapsed, energies, slave_share };
         let mut values = std::mem::take(&mut self.values);
         for variable in self.table.variables() {
             if variable.causality == Causality::Output {
@@ -59,6 +64,17 @@ impl Simulation {
                 }
             }
             Quantity::NodalDiameterAmplitude => self.fill_nodal_diameters(out),
+            Quantity::PatchFrictionPower => {
+                for (value, heat) in out.iter_mut().zip(&window.patch_heat) {
+                    *value = mean * instant.slave_share * heat;
+                }
+            }
+            Quantity::WearDepth => {
+                for (cell, value) in out.iter_mut().enumerate() {
+                    *value = system.coating().map_or(0.0, |coating| coating.wear_depth(cell));
+                }
+            }
+            Quantity::SlaveDisplacement => self.fill_slave_displacement(out),
             Quantity::Clearance(_)
             | Quantity::WatchedClearanceMinimum(_)
             | Quantity::NormalForce(_)
@@ -91,7 +107,7 @@ impl Simulation {
     fn scalar(&self, quantity: Quantity, instant: &Instant) -> f64 {
         let (system, window) = (&self.system, &self.window);
         let ledger = system.ledger();
-        let Instant { mean, elapsed, energies: (kinetic, strain) } = *instant;
+        let Instant { mean, elapsed, energies: (kinetic, strain), .. } = *instant;
         #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
         match quantity {
             Quantity::RotorAngle => self.rotor.total(&self.inputs.speed, elapsed),
@@ -100,6 +116,9 @@ impl Simulation {
             Quantity::NormalForcePeak => window.normal_peak,
             Quantity::NormalImpulse => window.normal_impulse.iter().sum(),
             Quantity::FrictionPower => mean * window.friction_heat,
+            Quantity::MasterFrictionPower => mean * (1.0 - instant.slave_share) * window.friction_heat,
+            Quantity::WearDepthMaximum => system.coating().map_or(0.0, Coating::largest_wear_depth),
+            Quantity::WornVolume => system.coating().map_or(0.0, Coating::worn_volume),
             Quantity::ContactCount => system.events().len() as f64,
             Quantity::InContact => f64::from(u8::from(!system.events().is_empty())),
             Quantity::KineticEnergy => kinetic,
@@ -107,6 +126,8 @@ impl Simulation {
             Quantity::DampingLoss => ledger.damping_loss.value(),
             Quantity::FrictionLoss => ledger.friction_loss.value(),
             Quantity::ImpactLoss => ledger.impact_loss.value(),
+            Quantity::WearWork => ledger.wear_work.value(),
+            Quantity::LoadWork => ledger.load_work.value(),
             Quantity::ExternalWork => ledger.external_work.value(),
             Quantity::StepChangeEnergy => ledger.step_change.value(),
             Quantity::EnergyResidual => ledger.residual(kinetic + strain),
@@ -117,6 +138,18 @@ impl Simulation {
             Quantity::InternalStep => system.bank().step(),
             Quantity::InternalSteps => system.steps() as f64,
             _ => 0.0,
+        }
+    }
+
+    /// Radial displacement of the contact grid of the carrier.
+    fn fill_slave_displacement(&self, out: &mut [f64]) {
+        let (Some(slave), Some(model)) = (self.system.slave(), &self.compiled.carrier) else { return };
+        out.fill(0.0);
+        for mode in 0..model.len() {
+            let position = slave.bank.modal_state(mode, 0).0;
+            for (node, value) in out.iter_mut().enumerate() {
+                *value += model.contact_modes[(3 * node, mode)] * position;
+            }
         }
     }
 

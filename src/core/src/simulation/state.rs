@@ -8,11 +8,20 @@ use crate::persist::{Persist, Reader, Writer, fingerprint, persist_fields};
 use crate::{Error, Result};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 const CHECKSUM_BYTES: usize = 8;
 
 persist_fields!(Communication { start, length, count, done });
-persist_fields!(Inputs { speed, shape_factor, shape_rotation, radius_change });
+persist_fields!(Inputs {
+    speed,
+    shape_factor,
+    shape_rotation,
+    radius_change,
+    shaft,
+    load_amplitude,
+    load_phase,
+    temperatures
+});
 
 impl Persist for Phase {
     fn save(&self, writer: &mut Writer) {
@@ -81,8 +90,7 @@ impl Simulation {
         if fingerprint(content, 0).to_le_bytes() != checksum {
             return damaged("its checksum does not match: the bytes were changed");
         }
-        self.read(&mut reader);
-        Ok(())
+        self.read(&mut reader)
     }
 
     fn check_size(&self, found: usize) -> Result<()> {
@@ -107,10 +115,11 @@ impl Simulation {
         self.window.save(writer);
         self.values.save(writer);
         self.previous.save(writer);
+        self.compiled.reference_speed.save(writer);
         self.system.save(writer);
     }
 
-    fn read(&mut self, reader: &mut Reader) {
+    fn read(&mut self, reader: &mut Reader) -> Result<()> {
         self.phase.restore(reader);
         self.time.restore(reader);
         self.initial_time.restore(reader);
@@ -123,9 +132,13 @@ impl Simulation {
         self.previous.restore(reader);
         // What the step takes from parameters follows from the restored values.
         let parameters = self.parameters();
+        let mut speed = 0.0_f64;
+        speed.restore(reader);
+        self.follow_reference_speed(speed)?;
         self.system.set_methods(parameters.scheme, parameters.solver);
         self.system.set_friction(parameters.friction);
-        self.system.bank_mut().set_damping_ratio(parameters.damping_ratio);
+        self.rest(parameters);
         self.system.restore(reader);
+        Ok(())
     }
 }

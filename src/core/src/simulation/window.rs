@@ -1,6 +1,6 @@
 //! What is gathered over one communication step: impulses, extremes, friction heat.
 
-use crate::contact::gap::GapLaw;
+use super::patches::Patches;
 use crate::persist::persist_fields;
 use crate::system::System;
 
@@ -21,6 +21,8 @@ pub struct Window {
     pub friction_heat: f64,
     /// Largest λ (N).
     pub normal_peak: f64,
+    /// Friction heat per patch (J); empty where the scene has none.
+    pub patch_heat: Vec<f64>,
 }
 
 persist_fields!(Window {
@@ -30,12 +32,13 @@ persist_fields!(Window {
     force_impulse,
     torque_impulse,
     friction_heat,
-    normal_peak
+    normal_peak,
+    patch_heat
 });
 
 impl Window {
-    /// Room for `len` nodes of all lanes.
-    pub fn new(len: usize) -> Self {
+    /// Room for `len` nodes of all lanes and a number of patches.
+    pub fn new(len: usize, patches: usize) -> Self {
         Self {
             lowest: vec![f64::INFINITY; len],
             normal_impulse: vec![0.0; len],
@@ -44,6 +47,7 @@ impl Window {
             torque_impulse: 0.0,
             friction_heat: 0.0,
             normal_peak: 0.0,
+            patch_heat: vec![0.0; patches],
         }
     }
 
@@ -56,6 +60,7 @@ impl Window {
         self.torque_impulse = 0.0;
         self.friction_heat = 0.0;
         self.normal_peak = 0.0;
+        self.patch_heat.fill(0.0);
     }
 
     /// Add the internal step just done, of length `step` (s), at the rotor phase `phase` (rad).
@@ -68,19 +73,30 @@ impl Window {
             let index = event.node * lanes + event.sector;
             self.normal_impulse[index] += event.normal * step;
             self.tangential_impulse[index] += event.tangential * step;
-            self.friction_heat += event.friction_heat;
             self.normal_peak = self.normal_peak.max(event.normal);
             let [first, second, third] = event.force;
-            if let GapLaw::Revolution(law) = system.law() {
-                let (sine, cosine) = libm::sincos(law.angle(event.node, event.sector, phase));
+            if let Some(layout) = system.law().layout() {
+                let (sine, cosine) = libm::sincos(layout.angles[index] + phase);
                 self.force_impulse[0] += step * (first * cosine - second * sine);
                 self.force_impulse[1] += step * (first * sine + second * cosine);
-                self.torque_impulse += step * second * law.radius(event.node);
+                self.torque_impulse += step * second * layout.radii[event.node];
             } else {
                 self.force_impulse[0] += step * first;
                 self.force_impulse[1] += step * second;
             }
             self.force_impulse[2] += step * third;
+        }
+    }
+
+    /// Add the friction heat of the internal step just done.
+    pub fn add_heat(&mut self, system: &System, phase: f64, patches: Option<&Patches>) {
+        for event in system.heated() {
+            self.friction_heat += event.friction_heat;
+            if let (Some(patches), Some(layout)) = (patches, system.law().layout()) {
+                let index = event.node * layout.lanes + event.sector;
+                let patch = patches.find(layout.angles[index] + phase, layout.axial[event.node]);
+                self.patch_heat[patch] += event.friction_heat;
+            }
         }
     }
 }

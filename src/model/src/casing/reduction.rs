@@ -117,6 +117,7 @@ pub fn reduce_casing(
         free_dofs: free.len(),
         reduced_angular_frequencies: modes.squares.iter().map(|square| square.sqrt()).collect(),
         fixed_interface_frequencies: reduced.fixed_interface_frequencies,
+        spin_checks: Vec::new(),
         material: material.clone(),
         mesh,
         timings,

@@ -1,36 +1,42 @@
 //! The variable table of a scene: one row per thing an importer can see. Features that are off have no row.
 
-use super::compile::SMALL_FRACTION;
+mod features;
+
+use super::compile::{Roles, SMALL_FRACTION};
+use super::patches::Patches;
 use crate::contact::surface::Surface;
-use crate::settings::{LONGEST_STEP, MAX_DAMPING, MAX_FRICTION, Motion, SHORTEST_STEP, Scene, Shape};
+use crate::settings::{
+    LONGEST_STEP, MAX_DAMPING, MAX_FRICTION, Motion, SHORTEST_STEP, Scene, SceneSettings, Shape, StructureSettings,
+    SurfaceSettings,
+};
 use crate::variables::{
     Causality, Enumeration, Kind, Quantity, Span, Start, Unit, Variability, Variable, VariableTable,
 };
-use crate::{Error, Result};
+use crate::{Error, Result, Rom};
 
 /// rad/s.
 static ANGULAR_SPEED: Unit =
-    Unit { name: "rad/s", exponents: [0, 0, -1, 1], display: &[("rpm", 9.549_296_585_513_72)] };
+    Unit { name: "rad/s", exponents: [0, 0, -1, 1, 0], display: &[("rpm", 9.549_296_585_513_72)] };
 /// rad.
 static ANGLE: Unit = Unit {
     name: "rad",
-    exponents: [0, 0, 0, 1],
+    exponents: [0, 0, 0, 1, 0],
     display: &[("deg", 57.295_779_513_082_32), ("rev", 0.159_154_943_091_895_35)],
 };
 /// m.
-static LENGTH: Unit = Unit { name: "m", exponents: [0, 1, 0, 0], display: &[("mm", 1e3), ("um", 1e6)] };
+static LENGTH: Unit = Unit { name: "m", exponents: [0, 1, 0, 0, 0], display: &[("mm", 1e3), ("um", 1e6)] };
 /// s.
-static TIME: Unit = Unit { name: "s", exponents: [0, 0, 1, 0], display: &[("ms", 1e3), ("us", 1e6)] };
+static TIME: Unit = Unit { name: "s", exponents: [0, 0, 1, 0, 0], display: &[("ms", 1e3), ("us", 1e6)] };
 /// N.
-static FORCE: Unit = Unit { name: "N", exponents: [1, 1, -2, 0], display: &[("kN", 1e-3)] };
+static FORCE: Unit = Unit { name: "N", exponents: [1, 1, -2, 0, 0], display: &[("kN", 1e-3)] };
 /// N.m.
-static TORQUE: Unit = Unit { name: "N.m", exponents: [1, 2, -2, 0], display: &[] };
+static TORQUE: Unit = Unit { name: "N.m", exponents: [1, 2, -2, 0, 0], display: &[] };
 /// N.s.
-static IMPULSE: Unit = Unit { name: "N.s", exponents: [1, 1, -1, 0], display: &[] };
+static IMPULSE: Unit = Unit { name: "N.s", exponents: [1, 1, -1, 0, 0], display: &[] };
 /// W.
-static POWER: Unit = Unit { name: "W", exponents: [1, 2, -3, 0], display: &[("kW", 1e-3)] };
+static POWER: Unit = Unit { name: "W", exponents: [1, 2, -3, 0, 0], display: &[("kW", 1e-3)] };
 /// J.
-static ENERGY: Unit = Unit { name: "J", exponents: [1, 2, -2, 0], display: &[("mJ", 1e3)] };
+static ENERGY: Unit = Unit { name: "J", exponents: [1, 2, -2, 0, 0], display: &[("mJ", 1e3)] };
 
 static SCHEMES: Enumeration = Enumeration {
     name: "Scheme",
@@ -38,6 +44,7 @@ static SCHEMES: Enumeration = Enumeration {
     items: &[
         ("central-difference", "Explicit central differences (eq. 9), stable for omega h < 2"),
         ("modal-exact", "Exact in free flight and under constant force"),
+        ("massless-boundary", "Highest modes quasi-static; the others take contact forces one step later"),
     ],
 };
 
@@ -47,8 +54,44 @@ static SOLVERS: Enumeration = Enumeration {
     items: &[
         ("film", "Forward-increment Lagrange multipliers: equality on the nodes that penetrate in the prediction"),
         ("lcp", "Complementarity over all contact nodes"),
+        ("coulomb", "Coulomb friction with sticking"),
     ],
 };
+
+/// K; temperatures are differences from the reference, so that there is no degC.
+static TEMPERATURE: Unit = Unit { name: "K", exponents: [0, 0, 0, 0, 1], display: &[] };
+/// N/m.
+static LINE_LOAD: Unit = Unit { name: "N/m", exponents: [1, 0, -2, 0, 0], display: &[("kN/m", 1e-3)] };
+/// m³.
+static VOLUME: Unit = Unit { name: "m3", exponents: [0, 3, 0, 0, 0], display: &[("mm3", 1e9)] };
+
+/// What of a scene the variables depend on.
+struct Parts<'a> {
+    settings: &'a SceneSettings,
+    master: &'a StructureSettings,
+    rom: &'a Rom,
+    surface: &'a SurfaceSettings,
+    carrier: Option<(&'a StructureSettings, &'a Rom)>,
+    /// Patches that friction power is gathered for.
+    patches: usize,
+}
+
+impl<'a> Parts<'a> {
+    fn new(scene: &'a Scene) -> Result<Self> {
+        let roles = Roles::new(scene)?;
+        let settings = &scene.settings;
+        let structure = |index: usize| (&settings.structures[index], &scene.roms[index]);
+        let (master, rom) = structure(roles.master);
+        Ok(Self {
+            settings,
+            master,
+            rom,
+            surface: &settings.surfaces[roles.surface],
+            carrier: roles.carrier.map(structure),
+            patches: Patches::new(scene, roles).as_ref().map_or(0, Patches::len),
+        })
+    }
+}
 
 /// Collects rows and hands out references.
 struct Builder {
@@ -145,17 +188,21 @@ impl Builder {
 /// # Errors
 /// A watched sector or nodal diameter the ROM does not have.
 pub fn build(scene: &Scene) -> Result<VariableTable> {
+    let scene = &Parts::new(scene)?;
     let mut table = Builder { variables: Vec::new(), next: 0 };
     let time = table.push(Quantity::Time, "time", "Simulated time");
     time.causality = Causality::Independent;
     time.unit = Some(&TIME);
     inputs(&mut table, scene)?;
+    features::inputs(&mut table, scene);
     parameters(&mut table, scene);
+    features::parameters(&mut table, scene);
     totals(&mut table, scene);
     watched(&mut table, scene)?;
     fields(&mut table, scene)?;
+    features::outputs(&mut table, scene);
     if scene.settings.outputs.energies {
-        energies(&mut table, has_friction(scene));
+        energies(&mut table, scene);
     }
     let internal = table.output(
         Quantity::InternalStep,
@@ -177,20 +224,20 @@ pub fn build(scene: &Scene) -> Result<VariableTable> {
 }
 
 /// Lengths beyond this are not small against the radius of the contact nodes (m).
-fn largest_length(scene: &Scene) -> f64 {
-    let radii = scene.roms[0].contact_nodes.iter().map(|node| node.position[0]);
+fn largest_length(scene: &Parts) -> f64 {
+    let radii = scene.rom.contact_nodes.iter().map(|node| node.position[0]);
     SMALL_FRACTION * radii.fold(f64::INFINITY, f64::min)
 }
 
-fn inputs(table: &mut Builder, scene: &Scene) -> Result<()> {
-    let structure = &scene.settings.structures[0];
+fn inputs(table: &mut Builder, scene: &Parts) -> Result<()> {
+    let structure = scene.master;
     if structure.motion == Motion::Rotating {
         let speed =
             table.input(Quantity::Speed, "speed", Some(&ANGULAR_SPEED), structure.speed, "Speed of the rotor about +z");
         speed.display = Some(0);
         speed.nominal = Some(1000.0);
     }
-    let surface = &scene.settings.surfaces[0];
+    let surface = scene.surface;
     if surface.moving {
         let change = table.input(
             Quantity::RadiusChange,
@@ -212,19 +259,21 @@ fn inputs(table: &mut Builder, scene: &Scene) -> Result<()> {
             let change = Surface::new(&surface.shape, scene.settings.contacts[0].gap)?.largest_change();
             let largest = if change > 0.0 { largest_length(scene) / change } else { 1.0 };
             (factor.min, factor.max) = (Some(-largest), Some(largest));
-            table.input(
-                Quantity::ShapeRotation,
-                "casing_shape_rotation",
-                Some(&ANGLE),
-                0.0,
-                "Rotation of the casing shape about +z",
-            );
+            if scene.carrier.is_none() {
+                table.input(
+                    Quantity::ShapeRotation,
+                    "casing_shape_rotation",
+                    Some(&ANGLE),
+                    0.0,
+                    "Rotation of the casing shape about +z",
+                );
+            }
         }
     }
     Ok(())
 }
 
-fn parameters(table: &mut Builder, scene: &Scene) {
+fn parameters(table: &mut Builder, scene: &Parts) {
     let settings = &scene.settings;
     let contact = &settings.contacts[0];
     if has_friction(scene) {
@@ -246,7 +295,7 @@ fn parameters(table: &mut Builder, scene: &Scene) {
     );
     (offset.display, offset.nominal, offset.variability) = (Some(1), Some(1e-4), Variability::Tunable);
     (offset.min, offset.max) = (Some(-largest_length(scene)), Some(largest_length(scene)));
-    let ratio = settings.structures[0].damping_ratio.unwrap_or(scene.roms[0].damping_ratio);
+    let ratio = scene.master.damping_ratio.unwrap_or(scene.rom.damping_ratio);
     let damping =
         table.parameter(Quantity::DampingRatio, "damping_ratio", None, ratio, "Modal damping ratio of the rotor");
     (damping.min, damping.max) = (Some(0.0), Some(MAX_DAMPING));
@@ -270,12 +319,12 @@ fn parameters(table: &mut Builder, scene: &Scene) {
         "Angle of the rotor about +z at the start",
     );
     angle.display = Some(0);
-    if settings.surfaces[0].shape != (Shape::Circular {}) {
+    if scene.surface.shape != (Shape::Circular {}) {
         let ramp = table.parameter(
             Quantity::RampTime,
             "casing_ramp_time",
             Some(&TIME),
-            settings.surfaces[0].ramp_time,
+            scene.surface.ramp_time,
             "Time over which the casing shape grows smoothly from round to full after the start",
         );
         (ramp.min, ramp.max) = (Some(0.0), Some(1e9));
@@ -286,13 +335,13 @@ fn parameters(table: &mut Builder, scene: &Scene) {
 }
 
 /// A scene that gives no friction coefficient has no friction variables.
-fn has_friction(scene: &Scene) -> bool {
+fn has_friction(scene: &Parts) -> bool {
     scene.settings.contacts[0].friction > 0.0
 }
 
-fn totals(table: &mut Builder, scene: &Scene) {
+fn totals(table: &mut Builder, scene: &Parts) {
     let gap = Some((&LENGTH, scene.settings.contacts[0].gap));
-    let (force, nodes) = (Some((&FORCE, 100.0)), scene.roms[0].contact_nodes.len());
+    let (force, nodes) = (Some((&FORCE, 100.0)), scene.rom.contact_nodes.len());
     table
         .output(Quantity::RotorAngle, "rotor_angle", Span::Point, Some((&ANGLE, 1.0)), "Angle of the rotor about +z")
         .display = Some(0);
@@ -373,13 +422,13 @@ fn totals(table: &mut Builder, scene: &Scene) {
     (touching.kind, touching.variability) = (Kind::Boolean, Variability::Discrete);
 }
 
-fn node_list(scene: &Scene) -> String {
-    let names: Vec<&str> = scene.roms[0].contact_nodes.iter().map(|node| node.name.as_str()).collect();
+fn node_list(scene: &Parts) -> String {
+    let names: Vec<&str> = scene.rom.contact_nodes.iter().map(|node| node.name.as_str()).collect();
     names.join(", ")
 }
 
-fn watched(table: &mut Builder, scene: &Scene) -> Result<()> {
-    let rom = &scene.roms[0];
+fn watched(table: &mut Builder, scene: &Parts) -> Result<()> {
+    let rom = scene.rom;
     let (gap, force) = (Some((&LENGTH, scene.settings.contacts[0].gap)), Some((&FORCE, 100.0)));
     for sector in &scene.settings.outputs.watched_sectors {
         if *sector == 0 || *sector > rom.sectors {
@@ -450,8 +499,8 @@ fn watched(table: &mut Builder, scene: &Scene) -> Result<()> {
     Ok(())
 }
 
-fn fields(table: &mut Builder, scene: &Scene) -> Result<()> {
-    let (outputs, sectors) = (&scene.settings.outputs, scene.roms[0].sectors);
+fn fields(table: &mut Builder, scene: &Parts) -> Result<()> {
+    let (outputs, sectors) = (&scene.settings.outputs, scene.rom.sectors);
     let gap = scene.settings.contacts[0].gap;
     if outputs.all_sectors {
         let clearance = table.output(
@@ -491,7 +540,7 @@ fn fields(table: &mut Builder, scene: &Scene) -> Result<()> {
     Ok(())
 }
 
-fn energies(table: &mut Builder, friction: bool) {
+fn energies(table: &mut Builder, scene: &Parts) {
     let rows = [
         (
             Quantity::KineticEnergy,
@@ -509,6 +558,18 @@ fn energies(table: &mut Builder, friction: bool) {
             "Energy lost by contact nodes stopping at the casing since the start",
         ),
         (
+            Quantity::WearWork,
+            "wear_work",
+            Span::Total,
+            "Work absorbed by the coating since the start: wear, hardening and what its rods spring back with",
+        ),
+        (
+            Quantity::LoadWork,
+            "load_work",
+            Span::Total,
+            "Work of centrifugal, thermal and nodal-diameter loads since the start",
+        ),
+        (
             Quantity::ExternalWork,
             "external_work",
             Span::Total,
@@ -522,7 +583,13 @@ fn energies(table: &mut Builder, friction: bool) {
         ),
         (Quantity::EnergyResidual, "energy_residual", Span::Point, "Closure residual of the energy ledger"),
     ];
-    for (quantity, name, span, text) in rows.into_iter().filter(|row| friction || row.0 != Quantity::FrictionLoss) {
+    let exists = |quantity| match quantity {
+        Quantity::FrictionLoss => has_friction(scene),
+        Quantity::WearWork => scene.settings.contacts[0].coating.is_some(),
+        Quantity::LoadWork => features::is_loaded(scene),
+        _ => true,
+    };
+    for (quantity, name, span, text) in rows.into_iter().filter(|row| exists(row.0)) {
         table.output(quantity, name, span, Some((&ENERGY, 1.0)), text);
     }
     table.output(

@@ -1,12 +1,20 @@
 //! One internal step: prediction, gaps, correction (section 4.3 of the paper), and the books kept on the way.
 
+mod books;
+mod group;
+mod slave;
+
+use crate::contact::coating::{CoatedProblem, Coating};
+use crate::contact::coulomb::CoulombSolver;
 use crate::contact::gap::{Drive, GapLaw, Geometry, dot};
 use crate::contact::solver::ContactSolver;
-use crate::dynamics::bank::ModalBank;
+use crate::dynamics::bank::{BankOptions, ModalBank};
 use crate::dynamics::modal::ModalModel;
 use crate::ledger::Ledger;
 use crate::persist::{Persist, Reader, Writer, persist_fields};
 use crate::settings::{Scheme, Solver};
+pub use group::{Member, Solution};
+pub use slave::Slave;
 
 /// Denormals are flushed every this many steps.
 const FLUSH_EVERY: u64 = 512;
@@ -22,12 +30,37 @@ pub struct ContactEvent {
     pub node: usize,
     /// Multiplier λ: normal force (N).
     pub normal: f64,
-    /// Friction force µλ (N) in the direction against slip; 0 without slip.
+    /// Magnitude of the friction force (N): µλ against slip, less where the contact sticks; 0 without slip.
     pub tangential: f64,
     /// Force on the master (N) in the directions of the structure's frame.
     pub force: [f64; 3],
+    /// Part of λ that a coating carries (N).
+    pub coating: f64,
     /// Friction heat of the step (J).
     pub friction_heat: f64,
+}
+
+impl ContactEvent {
+    fn new(sector: usize, node: usize, normal: f64, force: [f64; 3], coating: f64) -> Self {
+        let square = dot(force, force) - normal * normal;
+        // What rounding leaves of a frictionless contact is no friction.
+        let tangential = if square > 1e-14 * normal * normal { square.sqrt() } else { 0.0 };
+        Self { sector, node, normal, tangential, force, coating, friction_heat: 0.0 }
+    }
+}
+
+/// What only some scenes need; what is off takes neither time nor memory.
+#[derive(Debug, Clone, Default)]
+pub struct SystemParts {
+    /// Options of the master's modes.
+    pub bank: BankOptions,
+    /// Modes of the structure that carries the slave surface, one contact row per component of every control point,
+    /// and whether it is loaded beside contact. The gap function must be [`GapLaw::Spline`].
+    pub slave: Option<(ModalModel, bool)>,
+    /// Abradable coating.
+    pub coating: Option<Coating>,
+    /// The solver may be [`Solver::Coulomb`].
+    pub sticking: bool,
 }
 
 /// Why a step failed.
@@ -72,42 +105,110 @@ struct SystemState {
     multiplier: Vec<f64>,
     /// Contact force of the last step on each row (N), `[row · lanes + lane]`.
     force: Vec<f64>,
+    /// Part of λ that the coating carries (N); empty without one.
+    coating_force: Vec<f64>,
+    /// Normals and places of the last step.
+    geometry: Geometry,
+    /// Rotor angle of the last step and of the one before (rad).
+    angle: f64,
+    angle_before: f64,
     ledger: Ledger,
 }
 
-persist_fields!(SystemState { steps, factorisations, gap, gap_before, multiplier, force, ledger });
+persist_fields!(SystemState {
+    steps,
+    factorisations,
+    gap,
+    gap_before,
+    multiplier,
+    force,
+    coating_force,
+    geometry,
+    angle,
+    angle_before,
+    ledger
+});
 
 /// Modes, gap function and contact solver put together.
 #[derive(Debug, Clone)]
 pub struct System {
     bank: ModalBank,
+    slave: Option<Slave>,
     law: GapLaw,
     settings: SystemSettings,
-    geometry: Geometry,
     problem: ContactSolver,
+    coulomb: Option<CoulombSolver>,
+    coating: Option<(Coating, CoatedProblem)>,
     events: Vec<ContactEvent>,
+    events_before: Vec<ContactEvent>,
     lowest: Vec<f64>,
-    slip: Vec<[f64; 3]>,
+    /// The group being solved, sector by sector.
+    members: Vec<Member>,
+    chosen: Vec<bool>,
+    row_directions: Vec<[f64; 3]>,
+    column_directions: Vec<[f64; 3]>,
+    solution: Solution,
+    corrected: Vec<f64>,
+    coating_share: Vec<f64>,
+    /// Change of all gaps by the solution of a coupled group.
+    response: Vec<f64>,
+    /// Contact force on the rows of one sector.
     force: Vec<f64>,
+    /// Contact force of the step before on all rows; only where it is needed.
+    force_before: Vec<f64>,
+    /// Fixed-frame angles of the nodes of one blade.
+    angles: Vec<f64>,
     gap_oldest: Vec<f64>,
+    geometry_before: Geometry,
     displacement_oldest: Vec<f64>,
     state: SystemState,
 }
 
 impl System {
-    /// All sectors at rest. [`System::set_step`] and [`System::start`] come before the first step.
+    /// All sectors at rest against something rigid. [`System::set_step`] and [`System::start`] come before the first step.
     pub fn new(model: &ModalModel, sectors: usize, law: GapLaw, settings: SystemSettings) -> Self {
-        let bank = ModalBank::new(model, sectors);
+        let sticking = settings.solver == Solver::Coulomb;
+        Self::with_parts(model, sectors, law, settings, SystemParts { sticking, ..SystemParts::default() })
+    }
+
+    /// The same with parts that only some scenes need.
+    pub fn with_parts(
+        model: &ModalModel,
+        sectors: usize,
+        law: GapLaw,
+        settings: SystemSettings,
+        parts: SystemParts,
+    ) -> Self {
+        let bank = ModalBank::with_options(model, sectors, parts.bank);
         let (lanes, nodes) = (bank.lanes(), law.nodes());
         let contacts = nodes * lanes;
+        let coupled = parts.slave.is_some();
+        let group = if coupled { nodes * sectors } else { nodes };
+        let directions = if parts.sticking { 3 } else { 1 };
+        let coating = parts.coating.map(|coating| {
+            let problem = coating.problem(group / nodes);
+            (coating, problem)
+        });
         Self {
-            geometry: law.geometry(lanes),
-            problem: ContactSolver::new(nodes),
+            slave: parts.slave.map(|(model, loads)| Slave::new(&model, loads, group, directions)),
+            problem: ContactSolver::new(group),
+            coulomb: parts.sticking.then(|| CoulombSolver::new(group)),
             events: Vec::with_capacity(contacts),
+            events_before: Vec::with_capacity(contacts),
             lowest: vec![0.0; lanes],
-            slip: vec![[0.0; 3]; nodes],
+            members: Vec::with_capacity(group),
+            chosen: vec![false; if coupled { contacts } else { 0 }],
+            row_directions: vec![[0.0; 3]; directions * group],
+            column_directions: vec![[0.0; 3]; directions * group],
+            solution: Solution::new(directions * group),
+            corrected: vec![0.0; group],
+            coating_share: vec![0.0; group],
+            response: vec![0.0; if coupled { contacts } else { 0 }],
             force: vec![0.0; 3 * nodes],
+            force_before: vec![0.0; 3 * contacts],
+            angles: vec![0.0; nodes],
             gap_oldest: vec![f64::INFINITY; contacts],
+            geometry_before: law.geometry(lanes),
             displacement_oldest: vec![0.0; 3 * contacts],
             state: SystemState {
                 steps: 0,
@@ -117,12 +218,48 @@ impl System {
                 gap_before: vec![f64::INFINITY; contacts],
                 multiplier: vec![0.0; contacts],
                 force: vec![0.0; 3 * contacts],
+                coating_force: vec![0.0; contacts],
+                geometry: law.geometry(lanes),
+                angle: 0.0,
+                angle_before: 0.0,
                 ledger: Ledger::default(),
             },
             bank,
             law,
             settings,
+            coating,
         }
+    }
+
+    /// Normals and places of the last step.
+    pub fn geometry(&self) -> &Geometry {
+        &self.state.geometry
+    }
+
+    /// The structure that carries the slave surface.
+    pub fn slave(&self) -> Option<&Slave> {
+        self.slave.as_ref()
+    }
+
+    /// The same, to set loads and initial conditions.
+    pub fn slave_mut(&mut self) -> Option<&mut Slave> {
+        self.slave.as_mut()
+    }
+
+    /// The coating.
+    pub fn coating(&self) -> Option<&Coating> {
+        self.coating.as_ref().map(|(coating, _)| coating)
+    }
+
+    /// Contacts whose friction heat was entered for the last step: those of that step, or with massless-boundary those of
+    /// the step before, whose forces acted over it.
+    pub fn heated(&self) -> &[ContactEvent] {
+        if self.is_delayed() { &self.events_before } else { &self.events }
+    }
+
+    /// Contact forces act one step after they were found.
+    fn is_delayed(&self) -> bool {
+        self.settings.scheme == Scheme::MasslessBoundary
     }
 
     /// The modes.
@@ -209,6 +346,9 @@ impl System {
             let before = self.mechanical_energy();
             self.lasting_force(old, step);
             self.bank.resample(self.settings.scheme, step, &self.displacement_oldest);
+            if let Some(slave) = &mut self.slave {
+                slave.set_step(self.settings.scheme, step);
+            }
             let ratio = step / old;
             for (before, now) in self.state.gap_before.iter_mut().zip(&self.state.gap) {
                 if now.is_finite() {
@@ -220,6 +360,9 @@ impl System {
             self.state.ledger.turnover.add((after - before).abs());
         } else {
             self.bank.set_step(self.settings.scheme, step);
+            if let Some(slave) = &mut self.slave {
+                slave.set_step(self.settings.scheme, step);
+            }
         }
     }
 
@@ -245,30 +388,53 @@ impl System {
     pub fn start(&mut self, drive: &Drive) {
         self.bank.recover();
         self.bank.collect_loss();
+        if let Some(slave) = &mut self.slave {
+            slave.start();
+        }
+        if let Some((coating, _)) = &mut self.coating {
+            coating.reset();
+        }
         self.state.steps = 0;
         self.state.factorisations = 0;
         self.state.multiplier.fill(0.0);
         self.state.force.fill(0.0);
+        self.state.coating_force.fill(0.0);
         self.events.clear();
-        self.evaluate_gaps(drive);
+        self.events_before.clear();
+        (self.state.angle, self.state.angle_before) = (drive.rotor_angle, drive.rotor_angle);
+        self.evaluate_gaps(drive, false);
         self.state.gap_before.copy_from_slice(&self.state.gap);
         self.state.ledger = Ledger { initial: self.mechanical_energy(), ..Ledger::default() };
     }
 
     fn mechanical_energy(&self) -> f64 {
-        let (kinetic, strain) = self.bank.energies();
+        let (kinetic, strain) = self.energies();
         kinetic + strain
     }
 
-    /// Kinetic and strain energy (J).
+    /// Kinetic and strain energy of both structures (J).
     pub fn energies(&self) -> (f64, f64) {
-        self.bank.energies()
+        let (kinetic, strain) = self.bank.energies();
+        let slave = self.slave.as_ref().map_or((0.0, 0.0), |slave| slave.bank.energies());
+        (kinetic + slave.0, strain + slave.1)
+    }
+
+    /// Follow the speed of the rotor (rad/s) where its modes depend on it; the strain energy this adds is work of the
+    /// shaft.
+    pub fn set_speed(&mut self, speed: f64) {
+        let work = self.bank.set_speed(speed);
+        self.state.ledger.external_work.add(work);
+        self.state.ledger.turnover.add(work.abs());
     }
 
     /// Move the damping loss gathered in the step kernel to the ledger.
     pub fn close_books(&mut self) {
         let loss = self.bank.collect_loss();
         self.state.ledger.damping_loss.add(loss);
+        if let Some(slave) = &mut self.slave {
+            let loss = slave.bank.collect_loss();
+            self.state.ledger.damping_loss.add(loss);
+        }
     }
 
     /// One internal step to the instant described by `drive`.
@@ -276,28 +442,70 @@ impl System {
     /// # Errors
     /// [`StepFailure`]; the state is then not meaningful any more.
     pub fn step(&mut self, drive: &Drive) -> Result<(), StepFailure> {
+        let (delayed, ledger) = (self.is_delayed(), self.settings.ledger);
         self.displacement_oldest.copy_from_slice(self.bank.displacement_before());
-        self.bank.predict(self.settings.ledger);
+        self.bank.predict(ledger);
+        if let Some(slave) = &mut self.slave {
+            slave.predict(delayed, ledger);
+        }
+        if delayed {
+            self.act_delayed();
+        }
         std::mem::swap(&mut self.gap_oldest, &mut self.state.gap_before);
         std::mem::swap(&mut self.state.gap_before, &mut self.state.gap);
-        self.evaluate_gaps(drive);
-        self.clear_events();
-        for sector in 0..self.bank.sectors() {
-            // NaN counts as touching, and is found out there.
-            if self.lowest[sector] < 0.0 || self.lowest[sector].is_nan() {
-                self.solve_sector(sector, drive)?;
-            }
+        std::mem::swap(&mut self.geometry_before, &mut self.state.geometry);
+        self.state.angle_before = self.state.angle;
+        self.state.angle = drive.rotor_angle;
+        self.law.turn(self.state.angle - self.state.angle_before);
+        self.evaluate_gaps(drive, true);
+        self.retire_events();
+        if self.slave.is_some() {
+            self.solve_coupled(drive)?;
+        } else {
+            self.solve_sectors(drive)?;
         }
+        self.book_all(drive);
+        self.finish_loads();
         self.state.steps += 1;
         if self.state.steps.is_multiple_of(FLUSH_EVERY) {
             self.bank.flush();
+            if let Some(slave) = &mut self.slave {
+                slave.bank.flush();
+            }
         }
         Ok(())
     }
 
+    /// Contact forces of the last step act on the modes with inertia.
+    fn act_delayed(&mut self) {
+        let lanes = self.bank.lanes();
+        for sector in 0..self.bank.sectors() {
+            for (row, force) in self.force.iter_mut().enumerate() {
+                *force = self.state.force[row * lanes + sector];
+            }
+            if self.force.iter().any(|force| *force != 0.0) {
+                self.bank.act_delayed(sector, &self.force, self.settings.ledger);
+            }
+        }
+    }
+
+    fn finish_loads(&mut self) {
+        let mut work = self.bank.finish_loads();
+        if let Some(slave) = &mut self.slave {
+            work += slave.bank.finish_loads();
+        }
+        if work != 0.0 {
+            self.state.ledger.load_work.add(work);
+            self.state.ledger.turnover.add(work.abs());
+        }
+    }
+
     /// Gap of every node, and the smallest of each lane.
-    fn evaluate_gaps(&mut self, drive: &Drive) {
-        self.law.evaluate(drive, self.bank.displacement(), &mut self.geometry, &mut self.state.gap);
+    fn evaluate_gaps(&mut self, drive: &Drive, warm: bool) {
+        let moved = self.slave.as_ref().map_or(&[][..], |slave| slave.bank.displacement());
+        let before = warm.then_some(&self.geometry_before);
+        let state = &mut self.state;
+        self.law.evaluate(drive, self.bank.displacement(), moved, before, &mut state.geometry, &mut state.gap);
         self.lowest.fill(f64::INFINITY);
         for row in self.state.gap.chunks(self.bank.lanes()) {
             for (lowest, gap) in self.lowest.iter_mut().zip(row) {
@@ -307,10 +515,16 @@ impl System {
         }
     }
 
-    fn clear_events(&mut self) {
+    /// The contacts of the last step become those of the step before.
+    fn retire_events(&mut self) {
         let lanes = self.bank.lanes();
-        for event in &self.events {
+        if self.settings.solver == Solver::Coulomb {
+            self.force_before.copy_from_slice(&self.state.force);
+        }
+        std::mem::swap(&mut self.events, &mut self.events_before);
+        for event in &self.events_before {
             self.state.multiplier[event.node * lanes + event.sector] = 0.0;
+            self.state.coating_force[event.node * lanes + event.sector] = 0.0;
             for component in 0..3 {
                 self.state.force[(3 * event.node + component) * lanes + event.sector] = 0.0;
             }
@@ -318,135 +532,12 @@ impl System {
         self.events.clear();
     }
 
-    fn solve_sector(&mut self, sector: usize, drive: &Drive) -> Result<(), StepFailure> {
-        let (lanes, nodes) = (self.bank.lanes(), self.law.nodes());
-        for node in 0..nodes {
-            let index = node * lanes + sector;
-            let gap = self.state.gap[index];
-            if !gap.is_finite() {
-                return Err(StepFailure::NonFinite);
-            }
-            if gap < 0.0 && !self.law.is_plausible(node, gap, self.geometry.normal_at(index)) {
-                return Err(StepFailure::Implausible { sector });
-            }
-            self.problem.gaps[node] = gap;
-            // Closed in the last step: the likeliest guess for this one.
-            self.problem.active[node] = self.state.gap_before[index] <= 0.0;
-        }
-        self.fill_delassus(sector, drive);
-        let outcome = match self.settings.solver {
-            Solver::Film => self.problem.film(),
-            Solver::Lcp | Solver::Coulomb => self.problem.lcp(),
-        };
-        self.state.factorisations += outcome.factorisations as u64;
-        if self.problem.multipliers.iter().any(|value| !value.is_finite()) {
-            return Err(StepFailure::NonFinite);
-        }
-        if !outcome.solved {
-            return Err(StepFailure::Unsolved { sector });
-        }
-        self.apply(sector);
-        self.record(sector, drive);
-        Ok(())
-    }
-
-    /// W_ij = n_iᵀ G_ij (n_j − µ t_j).
-    fn fill_delassus(&mut self, sector: usize, drive: &Drive) {
-        let (lanes, nodes) = (self.bank.lanes(), self.law.nodes());
-        for node in 0..nodes {
-            let normal = self.geometry.normal_at(node * lanes + sector);
-            let mut velocity = self.law.sliding_velocity(node, drive);
-            for (component, value) in velocity.iter_mut().enumerate() {
-                let row = 3 * node + component;
-                *value += (self.bank.row(row, sector) - self.bank.row_before(row, sector)) / self.bank.step();
-            }
-            self.slip[node] =
-                if self.settings.friction > 0.0 { self.law.slip_direction(velocity, normal) } else { [0.0; 3] };
-        }
-        let flexibility = self.bank.flexibility().as_slice();
-        for column in 0..nodes {
-            let direction = self.force_direction(column, sector);
-            let [first, second, third] =
-                std::array::from_fn(|j| &flexibility[(3 * column + j) * 3 * nodes..][..3 * nodes]);
-            for row in 0..nodes {
-                let normal = self.geometry.normal_at(row * lanes + sector);
-                let moved: [f64; 3] = std::array::from_fn(|i| {
-                    let at = 3 * row + i;
-                    first[at] * direction[0] + second[at] * direction[1] + third[at] * direction[2]
-                });
-                self.problem.delassus[(row, column)] = dot(normal, moved);
-            }
-        }
-    }
-
-    /// n − µ t: force on the master per unit multiplier.
-    fn force_direction(&self, node: usize, sector: usize) -> [f64; 3] {
-        let normal = self.geometry.normal_at(node * self.bank.lanes() + sector);
-        std::array::from_fn(|i| normal[i] - self.settings.friction * self.slip[node][i])
-    }
-
-    fn apply(&mut self, sector: usize) {
-        let lanes = self.bank.lanes();
-        for node in 0..self.law.nodes() {
-            let direction = self.force_direction(node, sector);
-            for component in 0..3 {
-                self.force[3 * node + component] = self.problem.multipliers[node] * direction[component];
-            }
-            self.state.gap[node * lanes + sector] = self.problem.gaps[node];
-        }
-        self.bank.correct(sector, &self.force, self.settings.ledger);
-    }
-
-    fn record(&mut self, sector: usize, drive: &Drive) {
-        let lanes = self.bank.lanes();
-        for node in 0..self.law.nodes() {
-            let normal = self.problem.multipliers[node];
-            if normal == 0.0 {
-                continue;
-            }
-            let index = node * lanes + sector;
-            self.state.multiplier[index] = normal;
-            let force = std::array::from_fn(|i| self.force[3 * node + i]);
-            for component in 0..3 {
-                self.state.force[(3 * node + component) * lanes + sector] = force[component];
-            }
-            let sliding = dot(self.slip[node], self.slip[node]) > 0.0;
-            let tangential = if sliding { self.settings.friction * normal } else { 0.0 };
-            let friction_heat = self.book(sector, node, normal, tangential, drive);
-            self.events.push(ContactEvent { sector, node, normal, tangential, force, friction_heat });
-        }
-    }
-
-    /// Enter one contact's work into the ledger; returns its friction heat (J).
-    ///
-    /// The work on the structure is f·(u⁺ − u⁻)/2. Its normal part splits into what the approach of the node costs
-    /// (λ times half the change of gap) and what the moving surface does; its friction part into the heat µλ·slip
-    /// and what the prescribed sliding supplies.
-    fn book(&mut self, sector: usize, node: usize, normal: f64, tangential: f64, drive: &Drive) -> f64 {
-        let lanes = self.bank.lanes();
-        let index = node * lanes + sector;
-        let moved: [f64; 3] = std::array::from_fn(|component| {
-            let row = (3 * node + component) * lanes + sector;
-            0.5 * (self.bank.displacement()[row] - self.displacement_oldest[row])
-        });
-        let closing = -0.5 * normal * (self.state.gap[index] - self.gap_oldest[index]);
-        let pushed = normal * dot(self.geometry.normal_at(index), moved) + closing;
-        let supplied = tangential * dot(self.slip[node], self.law.sliding_velocity(node, drive)) * self.bank.step();
-        let heat = tangential * dot(self.slip[node], moved) + supplied;
-        let ledger = &mut self.state.ledger;
-        ledger.impact_loss.add(closing);
-        ledger.friction_loss.add(heat);
-        ledger.external_work.add(pushed + supplied);
-        ledger.turnover.add(pushed.abs() + supplied.abs());
-        heat
-    }
-
     /// Whether the state is still what the model describes.
     ///
     /// # Errors
     /// Coordinates that are not finite; displacements beyond a tenth of the radius.
     pub fn check_state(&self) -> Result<(), StepFailure> {
-        if !self.bank.is_finite() {
+        if !self.bank.is_finite() || self.slave.as_ref().is_some_and(|slave| !slave.bank.is_finite()) {
             return Err(StepFailure::NonFinite);
         }
         let limit = self.law.largest_displacement();
@@ -459,6 +550,12 @@ impl System {
     pub fn save(&self, writer: &mut Writer) {
         self.bank.step().save(writer);
         self.bank.save(writer);
+        if let Some(slave) = &self.slave {
+            slave.save(writer);
+        }
+        if let Some((coating, _)) = &self.coating {
+            coating.save(writer);
+        }
         self.state.save(writer);
     }
 
@@ -468,8 +565,17 @@ impl System {
         step.restore(reader);
         if step > 0.0 {
             self.bank.set_step(self.settings.scheme, step);
+            if let Some(slave) = &mut self.slave {
+                slave.bank.set_step(self.settings.scheme, step);
+            }
         }
         self.bank.restore(reader);
+        if let Some(slave) = &mut self.slave {
+            slave.restore(reader);
+        }
+        if let Some((coating, _)) = &mut self.coating {
+            coating.restore(reader);
+        }
         self.state.restore(reader);
         self.rebuild_events();
     }
@@ -483,9 +589,8 @@ impl System {
                 let normal = self.state.multiplier[node * lanes + sector];
                 if normal != 0.0 {
                     let force = std::array::from_fn(|i| self.state.force[(3 * node + i) * lanes + sector]);
-                    let square = dot(force, force) - normal * normal;
-                    let tangential = square.max(0.0).sqrt();
-                    self.events.push(ContactEvent { sector, node, normal, tangential, force, friction_heat: 0.0 });
+                    let coating = self.state.coating_force[node * lanes + sector];
+                    self.events.push(ContactEvent::new(sector, node, normal, force, coating));
                 }
             }
         }

@@ -7,11 +7,12 @@
 //!   scheme adds growth: the spectral radius of the constrained step map is compared with the growth of the
 //!   constrained differential equation.
 
+pub mod massless;
+
 use nalgebra::DMatrix;
 
 use crate::contact::gap::dot;
 use crate::dynamics::modal::ModalModel;
-use crate::dynamics::scheme::ModeCoefficients;
 use crate::settings::Scheme;
 use crate::{Error, Result};
 
@@ -43,10 +44,7 @@ pub fn delassus(
     directions: &ContactDirections,
 ) -> DMatrix<f64> {
     let (normals, forces) = directional_modes(model, friction, directions);
-    let compliance = model.frequencies.iter().zip(&model.damping_ratios);
-    let compliance: Vec<f64> = compliance
-        .map(|(frequency, ratio)| ModeCoefficients::new(scheme, *frequency, *ratio, step).compliance)
-        .collect();
+    let compliance: Vec<f64> = model.coefficients(scheme, step).iter().map(|mode| mode.compliance).collect();
     let scaled = DMatrix::from_fn(forces.nrows(), forces.ncols(), |row, mode| forces[(row, mode)] * compliance[mode]);
     normals * scaled.transpose()
 }
@@ -71,21 +69,21 @@ fn directional_modes(
     (normals, forces)
 }
 
-/// Refuse step sizes beyond the linear limit. Allocates only to refuse.
+/// Refuse step sizes beyond the linear limit, with all frequencies times `factor` (mistuning). Allocates only to refuse.
 ///
 /// # Errors
 /// [`Error::Unstable`] for central differences at or beyond ω_max h = 2.
-pub fn check_step_allowed(model: &ModalModel, scheme: Scheme, step: f64) -> Result<()> {
-    let product = model.largest_frequency() * step;
+pub fn check_step_allowed(model: &ModalModel, factor: f64, scheme: Scheme, step: f64) -> Result<()> {
+    let product = factor * model.largest_frequency() * step;
     match scheme {
         Scheme::CentralDifference if product >= 2.0 * (1.0 - CENTRAL_MARGIN) => Err(Error::Unstable {
             problem: format!(
                 "central-difference with internal step {step:.6e} s has ω_max·h = {product:.4} ≥ 2 (ω_max = {:.6e} rad/s)",
-                model.largest_frequency()
+                factor * model.largest_frequency()
             ),
             remedy: format!(
                 "Set the internal step below {:.6e} s, or use the scheme modal-exact",
-                central_difference_limit(model)
+                central_difference_limit(model) / factor
             ),
         }),
         _ => Ok(()),
@@ -96,9 +94,9 @@ pub fn check_step_allowed(model: &ModalModel, scheme: Scheme, step: f64) -> Resu
 ///
 /// # Errors
 /// As there.
-pub fn check_step(model: &ModalModel, scheme: Scheme, step: f64) -> Result<Option<String>> {
-    check_step_allowed(model, scheme, step)?;
-    let product = model.largest_frequency() * step;
+pub fn check_step(model: &ModalModel, factor: f64, scheme: Scheme, step: f64) -> Result<Option<String>> {
+    check_step_allowed(model, factor, scheme, step)?;
+    let product = factor * model.largest_frequency() * step;
     match scheme {
         Scheme::ModalExact if product > 2.0 => Ok(Some(format!(
             "ω_max·h = {product:.2} > 2: modes above {:.4e} rad/s are not resolved by the internal step {step:.3e} s; \
@@ -223,7 +221,7 @@ pub fn growth(
     friction: f64,
     directions: &ContactDirections,
 ) -> Option<Growth> {
-    if friction == 0.0 || model.len() > GROWTH_UP_TO {
+    if friction == 0.0 || model.len() > GROWTH_UP_TO || scheme == Scheme::MasslessBoundary {
         return None;
     }
     let modes = model.len();
@@ -245,9 +243,7 @@ pub fn growth(
     let continuous = eigenvalues(flow)?.iter().fold(f64::MIN, |largest, value| largest.max(value.re)) / step;
 
     // q⁺ = R(q + β d − κ q) with R = I − c B_f W⁻¹ B_nᵀ, d⁺ = q⁺ − q.
-    let mode_coefficients =
-        |mode: usize| ModeCoefficients::new(scheme, model.frequencies[mode], model.damping_ratios[mode], step);
-    let coefficients: Vec<ModeCoefficients> = (0..modes).map(mode_coefficients).collect();
+    let coefficients = model.coefficients(scheme, step);
     let inverse = delassus(model, scheme, step, friction, directions).try_inverse()?;
     let response =
         DMatrix::from_fn(modes, directions.len(), |mode, node| coefficients[mode].compliance * forces[(node, mode)]);
@@ -307,6 +303,7 @@ mod tests {
             damping_ratios: vec![damping; modes],
             contact_modes: DMatrix::from_fn(3, modes, |row, mode| shapes[mode][row]),
             shapes: DMatrix::identity(modes, modes),
+            quasi_static: 0,
         }
     }
 
@@ -319,10 +316,10 @@ mod tests {
         let model = model(&[100.0, 4000.0], &[[1.0, 0.0, 0.0], [0.5, 0.0, 0.0]], 0.01);
         for (factor, stable) in [(0.9, true), (0.999, true), (1.001, false), (10.0, false)] {
             let step = factor * central_difference_limit(&model);
-            assert_eq!(check_step(&model, Scheme::CentralDifference, step).is_ok(), stable, "factor {factor}");
-            assert!(check_step(&model, Scheme::ModalExact, step).is_ok());
+            assert_eq!(check_step(&model, 1.0, Scheme::CentralDifference, step).is_ok(), stable, "factor {factor}");
+            assert!(check_step(&model, 1.0, Scheme::ModalExact, step).is_ok());
         }
-        assert!(check_step(&model, Scheme::ModalExact, 1e-3).unwrap().is_some());
+        assert!(check_step(&model, 1.0, Scheme::ModalExact, 1e-3).unwrap().is_some());
     }
 
     #[test]

@@ -1,0 +1,249 @@
+//! Abradable coating: cells around the circumference and along the axis, each a rod that the blade wears off.
+//!
+//! A blade is a line in θ through its contact nodes. Axial row j of cells sees the penetration δ_j = −Σ N_ij g_i
+//! interpolated between its two neighbouring nodes, and returns its force F_j = σ·r Δθ Δz to them by the transpose
+//! of the same N, so that virtual work is exact. Gaps are measured to the unworn surface; the hard casing lies h₀
+//! behind it, g ≥ −h₀. [`CoatedProblem`] finds gaps, rod forces and hard contact forces of one step together; wear
+//! grows only in [`Coating::commit`].
+
+mod problem;
+mod rod;
+#[cfg(test)]
+mod tests;
+
+use std::f64::consts::TAU;
+
+pub use problem::CoatedProblem;
+pub use rod::{Branch, Rod};
+
+use crate::persist::{Persist, Reader, Writer};
+use crate::settings::CoatingSettings;
+use crate::{Error, Result};
+
+/// Contact nodes closer than this share of the axial extent are at the same place.
+const SAME_PLACE: f64 = 1e-6;
+
+/// Cells of one axial position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Row {
+    /// Contact nodes of the blade that see it.
+    nodes: [usize; 2],
+    /// Their weights, sum 1.
+    weights: [f64; 2],
+    /// Area of one cell (m²).
+    area: f64,
+    /// Centre (m).
+    axial: f64,
+}
+
+/// A cell in front of a blade.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct CellContact {
+    cell: usize,
+    /// Nodes within the group.
+    nodes: [usize; 2],
+    weights: [f64; 2],
+    area: f64,
+    /// Plastic strain before the step.
+    plastic: f64,
+    branch: Branch,
+}
+
+/// The coating of one slave: material, cells, wear.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coating {
+    rod: Rod,
+    thickness: f64,
+    around: usize,
+    /// Contact nodes per blade.
+    nodes: usize,
+    rows: Vec<Row>,
+    /// Plastic strain, `[row · around + place around]`.
+    plastic: Vec<f64>,
+}
+
+impl Coating {
+    /// Unworn coating under the axial extent of the contact nodes of one blade: positions z (m) and radii (m) in any
+    /// order; `blades` pass it.
+    ///
+    /// # Errors
+    /// As [`Coating::with_extent`]; fewer than two axial positions, which have no extent.
+    pub fn new(settings: &CoatingSettings, axial: &[f64], radii: &[f64], blades: usize) -> Result<Self> {
+        let low = axial.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = axial.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Self::with_extent(settings, axial, radii, [low, high], blades)
+    }
+
+    /// As [`Coating::new`], from axial position `extent[0]` to `extent[1]` (m). Rows beyond the outermost nodes, and
+    /// all rows of a single node, see the penetration of the nearest node.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming what does not fit: no extent, two nodes at one axial position, too few cells to give
+    /// every blade its own.
+    pub fn with_extent(
+        settings: &CoatingSettings,
+        axial: &[f64],
+        radii: &[f64],
+        extent: [f64; 2],
+        blades: usize,
+    ) -> Result<Self> {
+        let order = sorted(axial, radii, extent)?;
+        let (around, along) = (settings.cells_around, settings.cells_along);
+        // Two cells per pitch: deformed blades never share a cell.
+        if around < 2 * blades || along == 0 {
+            return Err(Error::invalid(
+                "contact.coating.cells_around, cells_along",
+                format!("{around} x {along} cells for {blades} blades"),
+                "Give at least two cells around per blade and one along",
+            ));
+        }
+        let width = (extent[1] - extent[0]) / number(along);
+        let row = |index: usize| {
+            let centre = extent[0] + (number(index) + 0.5) * width;
+            let (nodes, weights) = neighbours(axial, &order, centre);
+            let radius = weights[0] * radii[nodes[0]] + weights[1] * radii[nodes[1]];
+            Row { nodes, weights, area: radius * TAU / number(around) * width, axial: centre }
+        };
+        Ok(Self {
+            rod: Rod::new(settings),
+            thickness: settings.thickness,
+            around,
+            nodes: axial.len(),
+            rows: (0..along).map(row).collect(),
+            plastic: vec![0.0; around * along],
+        })
+    }
+
+    /// Scratch for groups of at most `blades` coupled blades.
+    pub fn problem(&self, blades: usize) -> CoatedProblem {
+        CoatedProblem::new(self.rod, self.thickness, blades * self.nodes, blades * self.rows.len())
+    }
+
+    /// Append a blade to a group: its nodes follow those already there, one cell of each row faces it. `angles` are
+    /// those of its contact nodes in the fixed frame (rad), in the order of the positions given at construction.
+    pub fn locate(&self, problem: &mut CoatedProblem, angles: &[f64]) {
+        let first = problem.append_nodes(self.nodes);
+        for (index, row) in self.rows.iter().enumerate() {
+            let [a, b] = row.nodes;
+            let apart = angles[b] - angles[a];
+            // Neighbouring nodes are less than half a turn apart, whichever turn their angles are given in.
+            let angle = angles[a] + row.weights[1] * (apart - TAU * (apart / TAU).round());
+            let cell = index * self.around + place(angle, self.around);
+            problem.append_contact(CellContact {
+                cell,
+                nodes: [first + a, first + b],
+                weights: row.weights,
+                area: row.area,
+                plastic: self.plastic[cell],
+                branch: Branch::Free,
+            });
+        }
+    }
+
+    /// Take over the wear of a solved problem; returns the work spent on it (J), plastic and hardening part.
+    pub fn commit(&mut self, problem: &CoatedProblem) -> f64 {
+        let mut work = 0.0;
+        for (contact, after) in problem.worn() {
+            let before = self.plastic[contact.cell];
+            if after > before {
+                work += contact.area * self.thickness * self.rod.wear_work(before, after);
+                self.plastic[contact.cell] = after;
+            }
+        }
+        work
+    }
+
+    /// Number of cells; cell `row · around + i` is the i-th of its axial row.
+    pub fn cells(&self) -> usize {
+        self.plastic.len()
+    }
+
+    /// Angle (rad, in the fixed frame) and axial position (m) of the centre of a cell.
+    pub fn centre(&self, cell: usize) -> (f64, f64) {
+        let angle = (number(cell % self.around) + 0.5) * TAU / number(self.around);
+        (angle, self.rows[cell / self.around].axial)
+    }
+
+    /// Wear depth of a cell (m).
+    pub fn wear_depth(&self, cell: usize) -> f64 {
+        self.plastic[cell] * self.thickness
+    }
+
+    /// Largest wear depth (m).
+    pub fn largest_wear_depth(&self) -> f64 {
+        self.plastic.iter().copied().fold(0.0, f64::max) * self.thickness
+    }
+
+    /// Volume worn off (m³).
+    pub fn worn_volume(&self) -> f64 {
+        let cells = self.rows.iter().zip(self.plastic.chunks(self.around));
+        cells.map(|(row, plastic)| row.area * plastic.iter().sum::<f64>()).sum::<f64>() * self.thickness
+    }
+
+    /// Thickness h₀ (m).
+    pub fn thickness(&self) -> f64 {
+        self.thickness
+    }
+
+    /// Unworn again.
+    pub fn reset(&mut self) {
+        self.plastic.fill(0.0);
+    }
+}
+
+/// The wear is the state; material and cells belong to the scene.
+impl Persist for Coating {
+    fn save(&self, writer: &mut Writer) {
+        self.plastic.save(writer);
+    }
+    fn restore(&mut self, reader: &mut Reader) {
+        self.plastic.restore(reader);
+    }
+}
+
+/// Nodes in order of growing z, all at different places of a finite extent.
+fn sorted(axial: &[f64], radii: &[f64], extent: [f64; 2]) -> Result<Vec<usize>> {
+    let length = extent[1] - extent[0];
+    let refuse = |problem: String, remedy: &str| Err(Error::invalid("contact.coating", problem, remedy));
+    let mut order: Vec<usize> = (0..axial.len()).collect();
+    order.sort_by(|a, b| axial[*a].total_cmp(&axial[*b]));
+    if !(length.is_finite() && length > 0.0) || radii.len() != axial.len() {
+        let problem = format!("{} contact nodes per blade over {length} m along the axis", axial.len());
+        return refuse(problem, "A coating needs a ROM with contact nodes at two or more axial positions");
+    }
+    match order.windows(2).find(|pair| axial[pair[1]] - axial[pair[0]] <= SAME_PLACE * length) {
+        None => Ok(order),
+        Some(pair) => refuse(
+            format!("contact nodes {} and {} are at the same axial position", pair[0] + 1, pair[1] + 1),
+            "Reduce the model again with one contact node per axial position",
+        ),
+    }
+}
+
+/// The two nodes around an axial position and their weights.
+fn neighbours(axial: &[f64], order: &[usize], position: f64) -> ([usize; 2], [f64; 2]) {
+    let above = order.partition_point(|node| axial[*node] <= position);
+    if above == 0 || above == order.len() {
+        let node = order[above.saturating_sub(1)];
+        return ([node; 2], [1.0, 0.0]);
+    }
+    let [a, b] = [order[above - 1], order[above]];
+    let share = (position - axial[a]) / (axial[b] - axial[a]);
+    ([a, b], [1.0 - share, share])
+}
+
+/// Which of `around` equal parts of the circumference holds an angle (rad).
+fn place(angle: f64, around: usize) -> usize {
+    let turns = angle / TAU;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ cells around")]
+    let index = ((turns - turns.floor()) * number(around)) as usize;
+    // The fraction of a tiny negative angle rounds to 1.
+    index.min(around - 1)
+}
+
+/// A count as a factor.
+fn number(count: usize) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "counts of cells are far below 2^52")]
+    let number = count as f64;
+    number
+}

@@ -1,0 +1,291 @@
+//! One step of a group of coupled nodes on a coating: rods that are free, elastic or yielding, and hard contact.
+//!
+//! g = g_p + W(NᵀF(−Ng) + λ), λ ⟂ g + h₀ ≥ 0. With every rod on one branch (F = f + kδ) and every node open or closed
+//! the equations are linear in the gaps of the open and the λ of the closed nodes. The branches are found by block
+//! exchanges as in [`ContactSolver`](crate::contact::solver::ContactSolver): every rod and node whose condition is
+//! violated moves on by one branch. When the number of violated conditions stops falling, Katzenelson's method takes
+//! over (J. Katzenelson, Bell Syst. Tech. J. 44, 1965): starting without contact, the prediction is approached on a
+//! straight line, and whenever a rod or node comes to the end of its branch this one alone is exchanged. Gaps are a
+//! continuous, piecewise linear and invertible function of the prediction where the symmetric part of W is positive
+//! definite, so the line meets every combination of branches at most once.
+
+mod linear;
+
+use nalgebra::DMatrix;
+
+use super::{Branch, CellContact, Rod, number};
+use crate::contact::solver::Outcome;
+
+/// Depths and forces within this fraction of their scale count as zero.
+const ZERO_FRACTION: f64 = 1e-12;
+/// Rounding of a depth relative to the depths it is the difference of.
+const ROUNDING: f64 = 1e-15;
+/// Block exchanges allowed without progress before the path is followed.
+const PATIENCE: usize = 8;
+/// Golden ratio: multiples of it, without their whole part, are spread evenly.
+const GOLDEN: f64 = 1.618_033_988_749_895;
+
+/// One step of the path.
+#[derive(Debug, Clone, Copy)]
+enum Change {
+    Rod(usize, Branch),
+    Node(usize),
+}
+
+/// The contact problem of one group of blades on a coating; allocates only when made.
+///
+/// Per group: [`clear`](Self::clear), [`Coating::locate`](super::Coating::locate) for each blade, fill `delassus`, `gaps`
+/// and (as a guess) `closed` of the first [`size`](Self::size) nodes, then [`solve`](Self::solve).
+#[derive(Debug, Clone)]
+pub struct CoatedProblem {
+    rod: Rod,
+    thickness: f64,
+    size: usize,
+    /// Normal gap of node i per multiplier of node j (m/N), friction included; capacity × capacity, the leading
+    /// `size` × `size` part in use.
+    pub delassus: DMatrix<f64>,
+    /// Predicted gaps to the unworn surface (m); corrected gaps on return.
+    pub gaps: Vec<f64>,
+    /// Part of each node's multiplier that the coating carries (N).
+    pub coating: Vec<f64>,
+    /// Part of each node's multiplier that the hard casing carries (N).
+    pub hard: Vec<f64>,
+    /// Nodes on the hard casing: guess and result.
+    pub closed: Vec<bool>,
+    pub(super) contacts: Vec<CellContact>,
+    corrected: Vec<f64>,
+    /// Gaps and hard forces of the point reached on the path.
+    reached: [Vec<f64>; 2],
+    /// Largest force on a node (N).
+    largest: f64,
+    softened: bool,
+    pub(super) factorisations: usize,
+    /// Nodes that carry force, and where each is among them.
+    members: Vec<usize>,
+    slot: Vec<usize>,
+    factor: DMatrix<f64>,
+    right: Vec<f64>,
+    column_scale: Vec<f64>,
+}
+
+impl CoatedProblem {
+    pub(super) fn new(rod: Rod, thickness: f64, nodes: usize, contacts: usize) -> Self {
+        Self {
+            rod,
+            thickness,
+            size: 0,
+            delassus: DMatrix::zeros(nodes, nodes),
+            gaps: vec![0.0; nodes],
+            coating: vec![0.0; nodes],
+            hard: vec![0.0; nodes],
+            closed: vec![false; nodes],
+            contacts: Vec::with_capacity(contacts),
+            corrected: vec![0.0; nodes],
+            reached: [vec![0.0; nodes], vec![0.0; nodes]],
+            largest: 0.0,
+            softened: false,
+            factorisations: 0,
+            members: Vec::with_capacity(nodes),
+            slot: vec![0; nodes],
+            factor: DMatrix::zeros(nodes, nodes),
+            right: vec![0.0; nodes],
+            column_scale: vec![0.0; nodes],
+        }
+    }
+
+    /// Start a new group.
+    pub fn clear(&mut self) {
+        self.size = 0;
+        self.contacts.clear();
+    }
+
+    /// Number of nodes of the group.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Room for another blade; returns its first node.
+    pub(super) fn append_nodes(&mut self, nodes: usize) -> usize {
+        let first = self.size;
+        self.size += nodes;
+        self.closed[first..self.size].fill(false);
+        first
+    }
+
+    pub(super) fn append_contact(&mut self, contact: CellContact) {
+        debug_assert!(self.contacts.len() < self.contacts.capacity());
+        self.contacts.push(contact);
+    }
+
+    /// Cells that the last solution wears, and their plastic strain after it.
+    pub(super) fn worn(&self) -> impl Iterator<Item = (&CellContact, f64)> {
+        let yielding = self.contacts.iter().filter(|contact| contact.branch == Branch::Plastic);
+        yielding.map(|contact| (contact, self.rod.worn(self.strain(contact, &self.gaps))))
+    }
+
+    /// Cells that the last solution loads, with their force (N).
+    pub fn loaded_cells(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let loaded = self.contacts.iter().filter(|contact| contact.branch != Branch::Free);
+        loaded.map(|contact| (contact.cell, self.force(contact, &self.gaps).max(0.0)))
+    }
+
+    /// Gaps, coating and hard forces of the step.
+    pub fn solve(&mut self) -> Outcome {
+        self.guess();
+        let solved = self.exchange_blocks() || self.follow_path();
+        Outcome { solved, factorisations: self.factorisations, ..Outcome::default() }
+    }
+
+    /// Start from the prediction and from the nodes that the caller says are closed.
+    pub(super) fn guess(&mut self) {
+        for index in 0..self.contacts.len() {
+            let contact = self.contacts[index];
+            self.contacts[index].branch = self.rod.branch(self.strain(&contact, &self.gaps), contact.plastic);
+        }
+        for node in 0..self.size {
+            self.closed[node] |= self.gaps[node] < -self.thickness;
+        }
+        (self.softened, self.factorisations) = (false, 0);
+    }
+
+    pub(super) fn exchange_blocks(&mut self) -> bool {
+        let (mut best, mut patience) = (usize::MAX, PATIENCE);
+        while patience > 0 && self.solve_branches() {
+            let count = self.violated();
+            if count == 0 {
+                self.settle();
+                return true;
+            }
+            (best, patience) = if count < best { (count, PATIENCE) } else { (best, patience - 1) };
+            self.exchange_all();
+        }
+        false
+    }
+
+    /// From no contact to the prediction, one exchange at a time.
+    pub(super) fn follow_path(&mut self) -> bool {
+        for index in 0..self.contacts.len() {
+            self.contacts[index].branch = Branch::Free;
+        }
+        self.closed[..self.size].fill(false);
+        self.reached[1][..self.size].fill(0.0);
+        for node in 0..self.size {
+            // Different for every node, lest rods close at the same point of the path.
+            let apart = 1.0 + (GOLDEN * number(node + 1)).fract();
+            self.reached[0][node] = self.gaps[node].max(0.0) + apart * self.thickness;
+        }
+        let limit = 100 + 20 * (self.size + 2 * self.contacts.len());
+        for _ in 0..limit {
+            if !self.solve_branches() {
+                return false;
+            }
+            let Some((share, change)) = self.first_end() else {
+                self.settle();
+                return true;
+            };
+            for node in 0..self.size {
+                let [gap, hard] = &mut self.reached;
+                gap[node] += share * (self.corrected[node] - gap[node]);
+                hard[node] += share * (self.hard[node] - hard[node]);
+            }
+            match change {
+                Change::Rod(index, next) => self.contacts[index].branch = next,
+                Change::Node(node) => self.closed[node] = !self.closed[node],
+            }
+        }
+        false
+    }
+
+    /// Which branch ends first between the point reached and the solution of the present branches, and after which
+    /// share of the way; `None` if all hold at that solution.
+    fn first_end(&self) -> Option<(f64, Change)> {
+        let share = |from: f64, to: f64, end: f64| ((end - from) / (to - from)).clamp(0.0, 1.0);
+        let rods = (0..self.contacts.len()).filter_map(|index| {
+            let (contact, next) = (&self.contacts[index], self.next_branch(index)?);
+            let end = self.rod.border(contact.branch, next, contact.plastic);
+            let way = share(self.strain(contact, &self.reached[0]), self.strain(contact, &self.corrected), end);
+            Some((way, Change::Rod(index, next)))
+        });
+        let nodes = (0..self.size).filter(|node| self.node_violated(*node)).map(|node| {
+            let way = if self.closed[node] {
+                share(self.reached[1][node], self.hard[node], 0.0)
+            } else {
+                share(self.reached[0][node], self.corrected[node], -self.thickness)
+            };
+            (way, Change::Node(node))
+        });
+        rods.chain(nodes).min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    fn strain(&self, contact: &CellContact, gaps: &[f64]) -> f64 {
+        let ([a, b], [share_a, share_b]) = (contact.nodes, contact.weights);
+        -(share_a * gaps[a] + share_b * gaps[b]) / self.thickness
+    }
+
+    /// On the straight line of its branch, below zero where that branch does not hold.
+    fn force(&self, contact: &CellContact, gaps: &[f64]) -> f64 {
+        let (offset, tangent) = self.rod.line(contact.branch, contact.plastic);
+        let strain = self.strain(contact, gaps);
+        // As a difference the elastic force keeps its digits close to zero.
+        let stress = if contact.branch == Branch::Elastic {
+            tangent * (strain - contact.plastic)
+        } else {
+            offset + tangent * strain
+        };
+        contact.area * stress
+    }
+
+    /// Strain by which a condition may be violated: rounding of what it is computed from, or a force that does not
+    /// matter beside the largest.
+    fn slack(&self, contact: &CellContact) -> f64 {
+        let depth = contact
+            .nodes
+            .iter()
+            .fold(0.0_f64, |depth, node| depth.max(self.gaps[*node].abs()).max(self.corrected[*node].abs()));
+        let scale = depth / self.thickness + contact.plastic;
+        let (_, modulus) = self.rod.line(Branch::Elastic, 0.0);
+        let idle = self.largest / (contact.area * modulus);
+        (ROUNDING * scale).max(ZERO_FRACTION * scale.min(idle))
+    }
+
+    fn next_branch(&self, index: usize) -> Option<Branch> {
+        let contact = &self.contacts[index];
+        let strain = self.strain(contact, &self.corrected);
+        self.rod.next(contact.branch, strain, contact.plastic, self.slack(contact))
+    }
+
+    fn node_violated(&self, node: usize) -> bool {
+        if self.closed[node] {
+            self.hard[node] < -ZERO_FRACTION * self.largest
+        } else {
+            let scale = self.gaps[node].abs().max(self.thickness);
+            self.corrected[node] + self.thickness < -ZERO_FRACTION * scale
+        }
+    }
+
+    fn violated(&self) -> usize {
+        let rods = (0..self.contacts.len()).filter(|index| self.next_branch(*index).is_some()).count();
+        rods + (0..self.size).filter(|node| self.node_violated(*node)).count()
+    }
+
+    fn exchange_all(&mut self) {
+        for index in 0..self.contacts.len() {
+            if let Some(next) = self.next_branch(index) {
+                self.contacts[index].branch = next;
+            }
+        }
+        for node in 0..self.size {
+            self.closed[node] ^= self.node_violated(node);
+        }
+    }
+
+    /// Remove rounding from the accepted solution.
+    fn settle(&mut self) {
+        for node in 0..self.size {
+            self.coating[node] = self.coating[node].max(0.0);
+            self.hard[node] = self.hard[node].max(0.0);
+            self.gaps[node] = self.corrected[node].max(-self.thickness);
+            self.closed[node] = self.hard[node] > 0.0;
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! The linear equations of one combination of branches.
+
+use super::CoatedProblem;
+use crate::contact::coating::{Branch, CellContact};
+
+/// Pivots below this fraction of their column belong to redundant contacts (coincident nodes).
+const REDUNDANT_PIVOT: f64 = 1e-12;
+/// Share of its diagonal by which every node is softened then.
+const SOFTENING: f64 = 1e-10;
+
+impl CoatedProblem {
+    /// Gaps and forces for the present branches; redundant contacts are softened first.
+    pub(super) fn solve_branches(&mut self) -> bool {
+        if self.solve_linear() {
+            return true;
+        }
+        if !self.softened {
+            self.softened = true;
+            for node in 0..self.size {
+                self.delassus[(node, node)] *= 1.0 + SOFTENING;
+            }
+            return self.solve_linear();
+        }
+        false
+    }
+
+    fn solve_linear(&mut self) -> bool {
+        self.factorisations += 1;
+        self.find_members();
+        self.fill_nodes();
+        for index in 0..self.contacts.len() {
+            self.fill_rod(index);
+        }
+        let regular = self.eliminate();
+        if regular {
+            self.distribute();
+        }
+        regular
+    }
+
+    /// Only nodes that carry force need an equation; the others follow.
+    fn find_members(&mut self) {
+        self.slot[..self.size].fill(usize::MAX);
+        self.members.clear();
+        let (slot, members) = (&mut self.slot, &mut self.members);
+        let mut add = |node: usize| {
+            if slot[node] == usize::MAX {
+                slot[node] = members.len();
+                members.push(node);
+            }
+        };
+        for contact in self.contacts.iter().filter(|contact| contact.branch != Branch::Free) {
+            contact.nodes.into_iter().for_each(&mut add);
+        }
+        (0..self.size).filter(|node| self.closed[*node]).for_each(&mut add);
+    }
+
+    /// g − Wλ = g_p, one unknown per node: the gap where it is open, λ where it is closed and g = −h₀.
+    fn fill_nodes(&mut self) {
+        for (row, i) in self.members.iter().enumerate() {
+            self.right[row] = self.gaps[*i] + if self.closed[*i] { self.thickness } else { 0.0 };
+            for (column, j) in self.members.iter().enumerate() {
+                let own = if row == column { 1.0 } else { 0.0 };
+                self.factor[(row, column)] = if self.closed[*j] { -self.delassus[(*i, *j)] } else { own };
+            }
+        }
+    }
+
+    /// Add − W Nᵀ(f − kNg) of one rod.
+    fn fill_rod(&mut self, index: usize) {
+        let CellContact { nodes, weights, area, plastic, branch, .. } = self.contacts[index];
+        if branch == Branch::Free {
+            return;
+        }
+        let (offset, tangent) = self.rod.line(branch, plastic);
+        let (constant, stiffness) = (area * offset, area * tangent / self.thickness);
+        for (row, i) in self.members.iter().enumerate() {
+            let reach: f64 = (0..2).map(|end| self.delassus[(*i, nodes[end])] * weights[end]).sum();
+            self.right[row] += reach * constant;
+            for (node, weight) in nodes.into_iter().zip(weights) {
+                if self.closed[node] {
+                    self.right[row] += reach * stiffness * weight * self.thickness;
+                } else {
+                    self.factor[(row, self.slot[node])] += reach * stiffness * weight;
+                }
+            }
+        }
+    }
+
+    /// Gaussian elimination with row exchanges; the solution is left in `right`.
+    fn eliminate(&mut self) -> bool {
+        let count = self.members.len();
+        for column in 0..count {
+            self.column_scale[column] = (0..count).fold(0.0, |s: f64, row| s.max(self.factor[(row, column)].abs()));
+        }
+        for rank in 0..count {
+            let size = |row: usize| self.factor[(row, rank)].abs();
+            let pivot = (rank..count).fold(rank, |best, row| if size(row) > size(best) { row } else { best });
+            // Also false at a node without any flexibility (0) and at values that are not numbers.
+            let regular = size(pivot) > REDUNDANT_PIVOT * self.column_scale[rank];
+            if !regular {
+                return false;
+            }
+            if pivot != rank {
+                self.right.swap(rank, pivot);
+                (rank..count).for_each(|column| self.factor.swap((rank, column), (pivot, column)));
+            }
+            self.reduce(rank, count);
+        }
+        for row in (0..count).rev() {
+            let known: f64 = (row + 1..count).map(|column| self.factor[(row, column)] * self.right[column]).sum();
+            self.right[row] = (self.right[row] - known) / self.factor[(row, row)];
+        }
+        true
+    }
+
+    /// Subtract row `rank` from those below it, column by column as they lie in memory.
+    fn reduce(&mut self, rank: usize, count: usize) {
+        let stride = self.factor.nrows();
+        let pivot = self.factor[(rank, rank)];
+        let (done, rest) = self.factor.as_mut_slice().split_at_mut((rank + 1) * stride);
+        let ratios = &mut done[rank * stride..][rank + 1..count];
+        ratios.iter_mut().for_each(|ratio| *ratio /= pivot);
+        for column in rest.chunks_mut(stride).take(count - rank - 1) {
+            let value = column[rank];
+            for (entry, ratio) in column[rank + 1..count].iter_mut().zip(&*ratios) {
+                *entry -= ratio * value;
+            }
+        }
+        let value = self.right[rank];
+        for (entry, ratio) in self.right[rank + 1..count].iter_mut().zip(&*ratios) {
+            *entry -= ratio * value;
+        }
+    }
+
+    /// From the solution of the members to gaps and forces of all nodes.
+    fn distribute(&mut self) {
+        self.coating[..self.size].fill(0.0);
+        self.hard[..self.size].fill(0.0);
+        for (row, node) in self.members.iter().enumerate() {
+            let solution = self.right[row];
+            if self.closed[*node] {
+                (self.hard[*node], self.corrected[*node]) = (solution, -self.thickness);
+            } else {
+                self.corrected[*node] = solution;
+            }
+        }
+        for index in 0..self.contacts.len() {
+            let contact = self.contacts[index];
+            if contact.branch != Branch::Free {
+                let force = self.force(&contact, &self.corrected);
+                for (node, weight) in contact.nodes.into_iter().zip(contact.weights) {
+                    self.coating[node] += weight * force;
+                }
+            }
+        }
+        let force = |node: &usize| self.coating[*node].abs() + self.hard[*node].abs();
+        self.largest = self.members.iter().map(force).fold(0.0, f64::max);
+        for node in 0..self.size {
+            if self.slot[node] == usize::MAX {
+                let moved = self.members.iter().map(|j| self.delassus[(node, *j)] * (self.coating[*j] + self.hard[*j]));
+                self.corrected[node] = self.gaps[node] + moved.sum::<f64>();
+            }
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Where the contact nodes of all sectors stand around the axis, and how they move as a whole.
+
+use super::gap::Drive;
+use crate::{Error, Result, Rom};
+
+/// Contact nodes of equally spaced sectors, arrays `[node · lanes + lane]` where they differ by sector.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    /// Lanes of a row: sectors and padding.
+    pub lanes: usize,
+    /// Angle in the rotating frame (rad), `[node · lanes + lane]`.
+    pub angles: Vec<f64>,
+    /// Radius per node (m).
+    pub radii: Vec<f64>,
+    /// 1/radius per node (1/m).
+    pub per_radius: Vec<f64>,
+    /// Axial position per node (m).
+    pub axial: Vec<f64>,
+    /// Radial clearance per lane (m); infinite in padding lanes.
+    pub clearances: Vec<f64>,
+}
+
+impl Layout {
+    /// Place `rom.sectors` sectors around the axis; `clearances` holds one radial clearance (m) per sector.
+    ///
+    /// # Errors
+    /// Wrong number of clearances.
+    pub fn new(rom: &Rom, clearances: &[f64], lanes: usize) -> Result<Self> {
+        let sectors = rom.sectors;
+        if clearances.len() != sectors {
+            return Err(Error::invalid(
+                "contact.sector_gaps",
+                format!("{} values for {sectors} sectors", clearances.len()),
+                "Give one gap (m) per sector, or remove the line to use `gap` for all",
+            ));
+        }
+        let mut angles = vec![0.0; rom.contact_nodes.len() * lanes];
+        for (node, contact) in rom.contact_nodes.iter().enumerate() {
+            for sector in 0..sectors {
+                angles[node * lanes + sector] = contact.position[1] + sector_angle(sector, sectors);
+            }
+        }
+        // Padding lanes are infinitely far away.
+        let mut padded = vec![f64::INFINITY; lanes];
+        padded[..sectors].copy_from_slice(clearances);
+        let nodes = || rom.contact_nodes.iter();
+        Ok(Self {
+            lanes,
+            angles,
+            radii: nodes().map(|node| node.position[0]).collect(),
+            per_radius: nodes().map(|node| 1.0 / node.position[0]).collect(),
+            axial: nodes().map(|node| node.position[2]).collect(),
+            clearances: padded,
+        })
+    }
+
+    /// Number of contact nodes per sector.
+    pub fn nodes(&self) -> usize {
+        self.radii.len()
+    }
+
+    /// Velocity of an undeformed node with the rotor (m/s), in the directions of its own frame.
+    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &Drive) -> [f64; 3] {
+        let spin = drive.speed * self.radii[node];
+        let [x, y, z] = drive.shaft_velocity;
+        if x == 0.0 && y == 0.0 {
+            return [0.0, spin, z];
+        }
+        let (sine, cosine) = libm::sincos(self.angles[index] + drive.rotor_angle);
+        [x * cosine + y * sine, spin + y * cosine - x * sine, z]
+    }
+}
+
+/// Angle of sector `sector` of `sectors` (rad).
+pub fn sector_angle(sector: usize, sectors: usize) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
+    let fraction = sector as f64 / sectors as f64;
+    std::f64::consts::TAU * fraction
+}

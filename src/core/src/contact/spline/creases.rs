@@ -1,0 +1,85 @@
+//! Closest points where the surface kinks: between facets, and at the seam of free ends.
+//!
+//! Between its creases the surface is a smooth sheet with its own closest point, which may lie on a crease.
+
+use super::foot::{Foot, Held, noise};
+use super::projection::ROUNDING;
+use super::{Place, SurfaceSpline};
+use crate::contact::gap::dot;
+use crate::settings::Interpolation;
+
+/// The eight sheets around one.
+const NEIGHBOURS: [[i8; 2]; 8] = [[-1, 0], [1, 0], [0, -1], [0, 1], [-1, -1], [1, -1], [-1, 1], [1, 1]];
+
+impl SurfaceSpline {
+    /// The closest of the minima of this sheet and, where a crease is near, of those beside it.
+    ///
+    /// A sheet across a crease at the distance b along this one can only hold a closer point if b < |r| tan(φ/2) for a
+    /// fold of angle φ: b ≤ 2|r| covers folds up to 126°.
+    pub(super) fn search_sheets(&self, x: [f64; 3], start: Foot) -> Option<Foot> {
+        let rounding = ROUNDING * dot(x, x).sqrt();
+        let mut best = start;
+        // Every round lowers f, and a start on the opposite side has half the facets to walk over.
+        for _ in 0..self.around + self.along {
+            let from = best;
+            for sides in NEIGHBOURS {
+                let Some(place) = self.across(&from, sides) else { continue };
+                let candidate = self.descend(x, place)?;
+                if candidate.half_square < best.half_square - noise(&best, rounding) {
+                    best = candidate;
+                }
+            }
+            if best.place == from.place {
+                return Some(self.face_squarely(x, best));
+            }
+        }
+        None
+    }
+
+    /// The place across the creases on these sides, where they are near.
+    fn across(&self, foot: &Foot, sides: [i8; 2]) -> Option<Place> {
+        let (room, [length_s, _, length_t]) = (self.room(foot.place), foot.metric());
+        let Place { patch: [p, q], s, t } = foot.place;
+        let near = |side: i8, position: f64, [low, high]: [f64; 2], length: f64| {
+            let distance = if side < 0 { position - low } else { high - position };
+            side == 0 || distance * distance * length <= 8.0 * foot.half_square || distance <= 0.0
+        };
+        if !(near(sides[0], s, room[0], length_s) && near(sides[1], t, room[1], length_t)) {
+            return None;
+        }
+        let (column, s) = match (sides[0], self.interpolation) {
+            (0, _) => (p, s),
+            (-1, Interpolation::Facets) => ((p + self.around - 1) % self.around, 1.0),
+            (-1, Interpolation::Spline) => (self.around - 1, 1.0),
+            (_, Interpolation::Facets) => ((p + 1) % self.around, 0.0),
+            (_, Interpolation::Spline) => (0, 0.0),
+        };
+        let (ring, t) = match sides[1] {
+            0 => (q, t),
+            -1 if self.interpolation == Interpolation::Facets && q > 0 => (q - 1, 1.0),
+            1 if self.interpolation == Interpolation::Facets && q + 2 < self.along => (q + 1, 0.0),
+            _ => return None,
+        };
+        Some(Place { patch: [column, ring], s, t: if sides[0] == 0 { t } else { t.clamp(0.0, 1.0) } })
+    }
+
+    /// On a crease, the sheet whose normal is nearest to the direction of the node.
+    fn face_squarely(&self, x: [f64; 3], foot: Foot) -> Foot {
+        let mut best = foot;
+        let squareness = |foot: &Foot| dot(foot.residual, foot.normal()).abs();
+        for sides in NEIGHBOURS {
+            let stays =
+                |axis: usize| matches!((sides[axis], foot.held[axis]), (0, _) | (-1, Held::Low) | (1, Held::High));
+            if !(stays(0) && stays(1)) {
+                continue;
+            }
+            let Some(place) = self.across(&foot, sides) else { continue };
+            let held = std::array::from_fn(|axis| if sides[axis] == 0 { foot.held[axis] } else { Held::No });
+            let candidate = Foot { held, ..Foot::at(self, x, place) };
+            if squareness(&candidate) > squareness(&best) {
+                best = candidate;
+            }
+        }
+        best
+    }
+}

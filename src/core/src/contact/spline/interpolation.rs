@@ -1,0 +1,166 @@
+//! The interpolation problem in one direction, and its transpose.
+//!
+//! (Q_{i−1} + 4 Q_i + Q_{i+1})/6 = P_i with cyclic indices, or between free ends: zero second derivative at an end makes
+//! Q_end = P_end, and what is left is tridiagonal. Both matrices are symmetric, so that the transposed problem uses the
+//! same factor. O(n), in place.
+
+use super::SurfaceSpline;
+
+/// Interpolation problem of one row of data points.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Line {
+    kind: Kind,
+    /// Reciprocal pivots of the tridiagonal matrix.
+    pivots: Vec<f64>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Kind {
+    /// Control points are the data points.
+    Facets,
+    /// Cyclic matrix = tridiagonal one + rank one; the vector is A'⁻¹u/(1 + vᵀA'⁻¹u) of Sherman and Morrison.
+    Closed { correction: Vec<f64> },
+    /// The unknowns are the points 1.. between point 0 and point `last`.
+    Free { last: usize },
+}
+
+/// u and v of the rank-one part, u = (−4, 0, …, 0, 1) and v = (1, 0, …, 0, −¼): A = A' + u vᵀ.
+const CORNER: [f64; 2] = [-4.0, 1.0];
+const MIRROR: f64 = -0.25;
+
+impl Line {
+    /// No interpolation problem.
+    pub fn facets() -> Self {
+        Self { kind: Kind::Facets, pivots: Vec::new() }
+    }
+
+    /// Closed with continuous first and second derivatives.
+    pub fn closed(count: usize) -> Self {
+        let mut diagonal = vec![4.0; count];
+        diagonal[0] -= CORNER[0];
+        diagonal[count - 1] -= CORNER[1] * MIRROR;
+        let mut line = Self { kind: Kind::Facets, pivots: pivots(&diagonal) };
+        let mut image = vec![[0.0; 3]; count];
+        (image[0][0], image[count - 1][0]) = (CORNER[0], CORNER[1]);
+        line.solve_tridiagonal(&mut image, 0, 1);
+        let scale = 1.0 + image[0][0] + MIRROR * image[count - 1][0];
+        line.kind = Kind::Closed { correction: image.iter().map(|value| value[0] / scale).collect() };
+        line
+    }
+
+    /// Free ends at the first and the last point.
+    pub fn free_ends(count: usize) -> Self {
+        Self { kind: Kind::Free { last: count - 1 }, pivots: pivots(&vec![4.0; count - 2]) }
+    }
+
+    /// Free ends that both lie at the first point.
+    pub fn free_ends_meeting(count: usize) -> Self {
+        Self { kind: Kind::Free { last: 0 }, pivots: pivots(&vec![4.0; count - 1]) }
+    }
+
+    /// Data points to control points, at `start`, `start + stride`, …
+    pub fn interpolate(&self, values: &mut [[f64; 3]], start: usize, stride: usize) {
+        match &self.kind {
+            Kind::Facets => {}
+            Kind::Closed { correction } => self.solve_closed(correction, values, start, stride),
+            Kind::Free { last } => {
+                let inner = start + stride;
+                let unknowns = self.pivots.len();
+                for index in 0..unknowns {
+                    values[inner + index * stride] = values[inner + index * stride].map(|value| 6.0 * value);
+                }
+                if unknowns > 0 {
+                    subtract(values, inner, start);
+                    subtract(values, inner + (unknowns - 1) * stride, start + last * stride);
+                }
+                self.solve_tridiagonal(values, inner, stride);
+            }
+        }
+    }
+
+    /// Forces on control points to forces on data points: the transpose of [`Line::interpolate`].
+    pub fn transfer(&self, forces: &mut [[f64; 3]], start: usize, stride: usize) {
+        match &self.kind {
+            Kind::Facets => {}
+            Kind::Closed { correction } => self.solve_closed(correction, forces, start, stride),
+            Kind::Free { last } => {
+                let inner = start + stride;
+                let unknowns = self.pivots.len();
+                self.solve_tridiagonal(forces, inner, stride);
+                if unknowns > 0 {
+                    subtract(forces, start, inner);
+                    subtract(forces, start + last * stride, inner + (unknowns - 1) * stride);
+                }
+                for index in 0..unknowns {
+                    forces[inner + index * stride] = forces[inner + index * stride].map(|value| 6.0 * value);
+                }
+            }
+        }
+    }
+
+    fn solve_closed(&self, correction: &[f64], values: &mut [[f64; 3]], start: usize, stride: usize) {
+        let last = start + (self.pivots.len() - 1) * stride;
+        self.solve_tridiagonal(values, start, stride);
+        let share: [f64; 3] = std::array::from_fn(|i| values[start][i] + MIRROR * values[last][i]);
+        for (index, factor) in correction.iter().enumerate() {
+            let value = &mut values[start + index * stride];
+            *value = std::array::from_fn(|i| 6.0 * (value[i] - factor * share[i]));
+        }
+    }
+
+    /// Thomas algorithm for off-diagonals 1.
+    fn solve_tridiagonal(&self, values: &mut [[f64; 3]], start: usize, stride: usize) {
+        let mut before = [0.0; 3];
+        for (index, pivot) in self.pivots.iter().enumerate() {
+            let value = &mut values[start + index * stride];
+            *value = std::array::from_fn(|i| (value[i] - before[i]) * pivot);
+            before = *value;
+        }
+        let mut after = [0.0; 3];
+        for (index, pivot) in self.pivots.iter().enumerate().rev() {
+            let value = &mut values[start + index * stride];
+            *value = std::array::from_fn(|i| value[i] - pivot * after[i]);
+            after = *value;
+        }
+    }
+}
+
+/// Reciprocal pivots of a tridiagonal matrix with off-diagonals 1.
+fn pivots(diagonal: &[f64]) -> Vec<f64> {
+    let mut before = 0.0;
+    diagonal
+        .iter()
+        .map(|entry| {
+            before = 1.0 / (entry - before);
+            before
+        })
+        .collect()
+}
+
+fn subtract(values: &mut [[f64; 3]], from: usize, what: usize) {
+    values[from] = std::array::from_fn(|i| values[from][i] - values[what][i]);
+}
+
+impl SurfaceSpline {
+    /// Solve the interpolation problem in place: data points, or their displacements (the map is linear), become
+    /// control points, or their displacements; around × along of them.
+    ///
+    /// # Panics
+    /// Wrong number of values.
+    pub fn interpolate(&self, values: &mut [[f64; 3]]) {
+        assert_eq!(values.len(), self.around * self.along, "one value per data point");
+        (0..self.along).for_each(|ring| self.lines[0].interpolate(values, ring * self.around, 1));
+        (0..self.around).for_each(|column| self.lines[1].interpolate(values, column, self.around));
+    }
+
+    /// Forces on the control points become forces on the data points of the same virtual work, in place: the
+    /// transpose of [`SurfaceSpline::interpolate`].
+    ///
+    /// # Panics
+    /// Wrong number of values.
+    pub fn transfer(&self, forces: &mut [[f64; 3]]) {
+        assert_eq!(forces.len(), self.around * self.along, "one force per control point");
+        (0..self.around).for_each(|column| self.lines[1].transfer(forces, column, self.around));
+        (0..self.along).for_each(|ring| self.lines[0].transfer(forces, ring * self.around, 1));
+    }
+}

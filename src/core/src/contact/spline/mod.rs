@@ -1,0 +1,253 @@
+//! Surface through a grid of data points: the slave surface of a flexible or measured casing.
+//!
+//! Bicubic uniform B-spline, eqs (6)-(7) of the paper: on patch (p, q), with s around and t along the axis,
+//!
+//! S(s, t) = (s³, s², s, 1) H Q_pq Hᵀ (t³, t², t, 1)ᵀ,   H = ⅙ [−1 3 −3 1; 3 −6 3 0; −3 0 3 0; 1 4 1 0],
+//!
+//! with the 4 × 4 control points Q_{p−1..p+2, q−1..q+2}. The control points solve the interpolation problem
+//! S(data point) = P. Along the axis both edges are free: S_tt = 0 there. Around, the surface closes with continuous
+//! first and second derivatives ([`Closure::Smooth`], fig. 8b), or with free ends that meet in position only
+//! ([`Closure::FreeEnds`], fig. 8a). [`Interpolation::Facets`] replaces all of it by bilinear patches.
+//!
+//! A free end is the phantom control point Q₋₁ = 2 Q₀ − Q₁, so that phantoms depend on the others and there is exactly
+//! one control point per data point, with the same index. Displacements of the data points become displacements of the
+//! control points by [`SurfaceSpline::interpolate`], and forces at a place become forces on the data points by
+//! [`SurfaceSpline::weights`] and [`SurfaceSpline::transfer`], the transposes of the same two maps: virtual work is
+//! exact.
+
+mod creases;
+mod foot;
+mod interpolation;
+mod patch;
+mod projection;
+
+pub use patch::{Evaluation, Weights};
+pub use projection::Projection;
+
+use crate::settings::{Closure, Interpolation};
+use crate::{Error, Result};
+use interpolation::Line;
+
+/// Fewest data points around: below them the four control points of a patch would not be different ones.
+pub const FEWEST_AROUND: usize = 4;
+/// Fewest rings of data points along the axis.
+pub const FEWEST_ALONG: usize = 2;
+
+/// A place on the surface: a patch and the parameters in it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Place {
+    /// Patch (p, q): p < around counts around from the first data point, q < along − 1 along the axis.
+    pub patch: [usize; 2],
+    /// Parameter around, 0 at data point p and 1 at p + 1.
+    pub s: f64,
+    /// Parameter along the axis, 0 at ring q and 1 at ring q + 1; beyond that by rounding at the two edges.
+    pub t: f64,
+}
+
+/// A closed surface through around × along data points, index `along · around + i`: rings in order of growing z, the
+/// points of a ring at angles growing by 2π/around about z. Nothing but construction allocates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfaceSpline {
+    around: usize,
+    along: usize,
+    closure: Closure,
+    interpolation: Interpolation,
+    /// Interpolation problems around and along.
+    lines: [Line; 2],
+    /// Control points (m), one per data point.
+    control: Vec<[f64; 3]>,
+    /// Control points with phantoms and repetitions, (along + 2) rings of (around + 3), so that a patch is a window of
+    /// 4 × 4; three coordinates and a zero.
+    mesh: Vec<[f64; 4]>,
+    /// Angle of the first data point of each ring (rad), undeformed.
+    first_angle: f64,
+    /// Mean axial position of each ring (m), undeformed.
+    rings: Vec<f64>,
+}
+
+impl SurfaceSpline {
+    /// Surface through `data`, Cartesian points (m).
+    ///
+    /// # Errors
+    /// Fewer than 4 × 2 points, a wrong number of them, points that are not finite or not at their place of the grid
+    /// (more than a quarter of the spacing 2π/around off in angle; rings that do not lie beyond each other in z).
+    pub fn new(
+        data: &[[f64; 3]],
+        around: usize,
+        along: usize,
+        closure: Closure,
+        interpolation: Interpolation,
+    ) -> Result<Self> {
+        let remedy = "Give at least 4 points around and 2 rings along the axis";
+        let counts = format!("{around} points around and {along} rings");
+        if around < FEWEST_AROUND || along < FEWEST_ALONG {
+            return Err(Error::invalid("surface spline", counts, remedy));
+        }
+        let addressable = around.checked_mul(along).is_some_and(|count| u32::try_from(count).is_ok());
+        if !addressable || around * along != data.len() {
+            return Err(Error::invalid("surface spline", format!("{counts}, but {} data points", data.len()), remedy));
+        }
+        let lines = match interpolation {
+            Interpolation::Facets => [Line::facets(), Line::facets()],
+            Interpolation::Spline => {
+                let ring = match closure {
+                    Closure::Smooth => Line::closed(around),
+                    Closure::FreeEnds => Line::free_ends_meeting(around),
+                };
+                [ring, Line::free_ends(along)]
+            }
+        };
+        let mut surface = Self {
+            around,
+            along,
+            closure,
+            interpolation,
+            lines,
+            control: vec![[0.0; 3]; around * along],
+            mesh: vec![[0.0; 4]; (around + 3) * (along + 2)],
+            first_angle: 0.0,
+            rings: vec![0.0; along],
+        };
+        surface.set_data(data)?;
+        Ok(surface)
+    }
+
+    /// Replace the data points (m) and what [`SurfaceSpline::locate`] knows of them.
+    ///
+    /// # Errors
+    /// As [`SurfaceSpline::new`]; the surface is then unchanged.
+    pub fn set_data(&mut self, data: &[[f64; 3]]) -> Result<()> {
+        self.check(data)?;
+        self.first_angle = libm::atan2(data[0][1], data[0][0]);
+        for (ring, points) in self.rings.iter_mut().zip(data.chunks(self.around)) {
+            *ring = mean_axial(points);
+        }
+        let mut control = std::mem::take(&mut self.control);
+        control.copy_from_slice(data);
+        self.interpolate(&mut control);
+        self.control = control;
+        self.fill_mesh();
+        Ok(())
+    }
+
+    fn check(&self, data: &[[f64; 3]]) -> Result<()> {
+        let refuse = |what: String, problem: String| {
+            let remedy = "Give rings of growing z, each with points at angles growing by 2π/around about z";
+            Err(Error::invalid(what, problem, remedy))
+        };
+        if data.len() != self.around * self.along {
+            let problem = format!("{} data points for {} x {}", data.len(), self.around, self.along);
+            return refuse("surface spline".into(), problem);
+        }
+        if let Some(index) = data.iter().position(|point| point.iter().any(|value| !value.is_finite())) {
+            return refuse(format!("surface spline, data point {}", index + 1), format!("{:?} m", data[index]));
+        }
+        let spacing = std::f64::consts::TAU / real(self.around);
+        let first = libm::atan2(data[0][1], data[0][0]);
+        for (index, point) in data.iter().enumerate() {
+            let expected = first + spacing * real(index % self.around);
+            let turns = (libm::atan2(point[1], point[0]) - expected) / std::f64::consts::TAU;
+            let off = (turns - libm::round(turns)).abs() * std::f64::consts::TAU;
+            if off > 0.25 * spacing || (point[0] == 0.0 && point[1] == 0.0) {
+                let problem = format!("{point:?} m is {off:.3e} rad from its place in the ring");
+                return refuse(format!("surface spline, data point {}", index + 1), problem);
+            }
+        }
+        let rings = data.chunks(self.around);
+        if let Some(ring) = rings.clone().zip(rings.skip(1)).position(|(a, b)| mean_axial(a) >= mean_axial(b)) {
+            return refuse("surface spline".into(), format!("ring {} does not lie beyond ring {}", ring + 2, ring + 1));
+        }
+        Ok(())
+    }
+
+    /// Replace the control points (m), for example by those of the undeformed surface plus a linear combination of
+    /// interpolated mode shapes.
+    ///
+    /// # Panics
+    /// Wrong number of points.
+    pub fn set_control_points(&mut self, control: &[[f64; 3]]) {
+        self.control.copy_from_slice(control);
+        self.fill_mesh();
+    }
+
+    /// Control points (m), index `along · around + i` as the data points.
+    pub fn control_points(&self) -> &[[f64; 3]] {
+        &self.control
+    }
+
+    /// Data points around the circumference.
+    pub fn around(&self) -> usize {
+        self.around
+    }
+
+    /// Rings of data points along the axis.
+    pub fn along(&self) -> usize {
+        self.along
+    }
+
+    /// Place at about the angle and the axial position of a point (m), on the edge for points beyond it: the start
+    /// for [`SurfaceSpline::project`] when there is none from the last step.
+    pub fn locate(&self, point: [f64; 3]) -> Place {
+        let turns = (libm::atan2(point[1], point[0]) - self.first_angle) / std::f64::consts::TAU;
+        let (p, s) = split((turns - turns.floor()) * real(self.around), self.around);
+        let q = self.rings[1..self.along - 1].iter().filter(|axial| **axial <= point[2]).count();
+        let t = (point[2] - self.rings[q]) / (self.rings[q + 1] - self.rings[q]);
+        Place { patch: [p, q], s, t: if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 } }
+    }
+
+    /// The place `turns` revolutions about z further, to start from when the rotor has turned.
+    pub fn advance(&self, place: Place, turns: f64) -> Place {
+        let whole = real(self.around);
+        let s = place.s + turns * whole;
+        if (0.0..1.0).contains(&s) {
+            return Place { s, ..place };
+        }
+        let moved = (real(place.patch[0]) + place.s + turns * whole) / whole;
+        let (p, s) = split((moved - moved.floor()) * whole, self.around);
+        Place { patch: [p, place.patch[1]], s, t: place.t }
+    }
+
+    /// Write phantoms and repetitions around the control points.
+    fn fill_mesh(&mut self) {
+        let (around, width) = (self.around, self.around + 3);
+        for (ring, points) in self.control.chunks_exact(around).enumerate() {
+            let row = &mut self.mesh[(ring + 1) * width..(ring + 2) * width];
+            for (slot, [x, y, z]) in row[1..=around].iter_mut().zip(points) {
+                *slot = [*x, *y, *z, 0.0];
+            }
+            let ends = match (self.interpolation, self.closure) {
+                (Interpolation::Spline, Closure::FreeEnds) => {
+                    [phantom(row[1], row[2]), row[1], phantom(row[1], row[around])]
+                }
+                _ => [row[around], row[1], row[2]],
+            };
+            [row[0], row[around + 1], row[around + 2]] = ends;
+        }
+        let last = self.along * width;
+        for slot in 0..width {
+            self.mesh[slot] = phantom(self.mesh[width + slot], self.mesh[2 * width + slot]);
+            self.mesh[last + width + slot] = phantom(self.mesh[last + slot], self.mesh[last - width + slot]);
+        }
+    }
+}
+
+/// Control point beyond a free end, Q₋₁ = 2 Q₀ − Q₁.
+fn phantom(end: [f64; 4], inner: [f64; 4]) -> [f64; 4] {
+    std::array::from_fn(|i| 2.0 * end[i] - inner[i])
+}
+
+fn mean_axial(points: &[[f64; 3]]) -> f64 {
+    points.iter().map(|point| point[2]).sum::<f64>() / real(points.len())
+}
+
+/// Whole part below `count` and the rest of a value in [0, count].
+fn split(value: f64, count: usize) -> (usize, f64) {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ count")]
+    let whole = (value as usize).min(count - 1);
+    (whole, value - real(whole))
+}
+
+#[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
+fn real(count: usize) -> f64 {
+    count as f64
+}

@@ -1,0 +1,211 @@
+//! Closest point of the surface to a node.
+//!
+//! Newton on f = ½|x − S|², r = x − S: gradient −(S_s·r, S_t·r), Hessian [S_s·S_s − r·S_ss, S_s·S_t − r·S_st; …], and
+//! the first fundamental form in its place where it is not positive definite. Steps are cut until f falls, so iterations
+//! never cycle. Patch borders are crossed freely where the surface is smooth. At the edges in z, and at creases (borders
+//! of facets, the seam of free ends), the step is projected onto the sheet between them; neighbouring sheets are then
+//! searched for a closer point.
+
+use super::foot::{CONVEX, DEGENERATE, Foot, Held, Room, noise, solve};
+use super::{Place, SurfaceSpline};
+use crate::contact::gap::dot;
+use crate::settings::{Closure, Interpolation};
+
+/// Result of a projection.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// The closest point lies on the surface.
+    Found {
+        /// Where it is; start of the next projection of this node.
+        place: Place,
+        /// The closest point S (m).
+        point: [f64; 3],
+        /// Unit normal from the casing towards the axis. On a crease it is that of the facet which faces the node
+        /// most squarely.
+        normal: [f64; 3],
+        /// (x − S)·n (m), negative outside the casing.
+        gap: f64,
+    },
+    /// The node has left the surface over a free edge in z.
+    BeyondEdge {
+        /// The closest point of the edge; start of the next projection of this node.
+        place: Place,
+    },
+    /// No closest point: the coordinates are not finite, or the surface is folded beyond use.
+    Lost,
+}
+
+/// A node this far (in patches) beyond an edge in z is still on the surface, so that rounding does not decide for nodes
+/// that stand exactly on it.
+const EDGE_TOLERANCE: f64 = 1e-9;
+/// Newton steps below this (in patches) end the iteration.
+const STEP_TOLERANCE: f64 = 1e-11;
+/// Rounding of the coordinates of x − S, relative to |x|.
+pub(super) const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// Corrections near a good start; one or two are the rule.
+const MAX_CORRECTIONS: usize = 6;
+/// Far beyond what starts on the opposite side of the casing need (about 30).
+const MAX_ITERATIONS: usize = 100;
+/// Halvings of a step before giving up.
+const MAX_HALVINGS: usize = 40;
+
+impl SurfaceSpline {
+    /// Closest point to `x` (m), found from `guess`: the place of the last step, moved along by
+    /// [`SurfaceSpline::advance`] or not, or [`SurfaceSpline::locate`].
+    ///
+    /// # Panics
+    /// A guess on a patch that does not exist.
+    pub fn project(&self, x: [f64; 3], guess: Place) -> Projection {
+        if let Some(projection) = self.project_nearby(x, guess) {
+            return projection;
+        }
+        if !x.iter().all(|value| value.is_finite()) {
+            return Projection::Lost;
+        }
+        let (s, t) = (guess.s.clamp(0.0, 1.0), guess.t.clamp(-EDGE_TOLERANCE, 1.0 + EDGE_TOLERANCE));
+        let Some(mut foot) = self.descend(x, Place { s, t, ..guess }) else { return Projection::Lost };
+        if self.has_creases() {
+            match self.search_sheets(x, foot) {
+                Some(closest) => foot = closest,
+                None => return Projection::Lost,
+            }
+        }
+        if self.is_over_edge(&foot) {
+            return Projection::BeyondEdge { place: foot.place };
+        }
+        foot.found()
+    }
+
+    /// A Newton step that stays in its patch, then corrections with the same Hessian until the next one is within the
+    /// tolerance: nearly every projection of a run. None where anything is out of the ordinary.
+    #[inline]
+    fn project_nearby(&self, x: [f64; 3], guess: Place) -> Option<Projection> {
+        if self.interpolation == Interpolation::Facets {
+            return None;
+        }
+        let mut foot = Foot::seen(x, guess, self.evaluate_bicubic::<true>(guess));
+        let metric = foot.metric();
+        let (hessian, determinant) = foot.hessian(metric);
+        let area = metric[0] * metric[2] - metric[1] * metric[1];
+        if !(area > DEGENERATE * metric[0] * metric[2] && hessian[0] > 0.0 && determinant > CONVEX * area) {
+            return None;
+        }
+        let inverse = 1.0 / determinant;
+        for _ in 0..MAX_CORRECTIONS {
+            let step = solve(hessian, inverse, foot.gradient());
+            let is_within = |limit: f64| step[0].abs() <= limit && step[1].abs() <= limit;
+            if is_within(STEP_TOLERANCE) {
+                let is_inside = foot.place.t >= 0.0 && foot.place.t <= 1.0;
+                return (is_inside && self.is_far_from_seam(&foot, metric[0])).then(|| foot.found());
+            }
+            let place = Place { s: foot.place.s + step[0], t: foot.place.t + step[1], ..guess };
+            let stays = (0.0..1.0).contains(&place.s) && (0.0..1.0).contains(&place.t);
+            if !(stays && is_within(0.1)) {
+                return None;
+            }
+            foot = Foot::seen(x, place, self.evaluate_bicubic::<false>(place));
+        }
+        None
+    }
+
+    /// Whether the seam of free ends is too far away to hold a closer point on its other side.
+    fn is_far_from_seam(&self, foot: &Foot, length_s: f64) -> bool {
+        let column = foot.place.patch[0];
+        self.closure == Closure::Smooth || (column > 0 && column + 1 < self.around && 8.0 * foot.half_square < length_s)
+    }
+
+    fn has_creases(&self) -> bool {
+        self.interpolation == Interpolation::Facets || self.closure == Closure::FreeEnds
+    }
+
+    fn is_over_edge(&self, foot: &Foot) -> bool {
+        let ring = foot.place.patch[1];
+        match foot.held[1] {
+            Held::No => false,
+            Held::Low => ring == 0 || self.interpolation == Interpolation::Spline,
+            Held::High => ring + 2 == self.along || self.interpolation == Interpolation::Spline,
+        }
+    }
+
+    /// The sheet around a place: a facet, or everything up to the edges and the seam.
+    #[inline]
+    pub(super) fn room(&self, place: Place) -> Room {
+        let [p, q] = place.patch.map(super::real);
+        if self.interpolation == Interpolation::Facets {
+            let low = if place.patch[1] == 0 { -EDGE_TOLERANCE } else { 0.0 };
+            let high = if place.patch[1] + 2 == self.along { 1.0 + EDGE_TOLERANCE } else { 1.0 };
+            return [[0.0, 1.0], [low, high]];
+        }
+        let around = match self.closure {
+            Closure::Smooth => [f64::NEG_INFINITY, f64::INFINITY],
+            Closure::FreeEnds => [-p, super::real(self.around) - p],
+        };
+        [around, [-q - EDGE_TOLERANCE, super::real(self.along - 1) - q + EDGE_TOLERANCE]]
+    }
+
+    /// A place with parameters beyond its patch, expressed in the patch where it lies.
+    #[inline]
+    fn settle(&self, patch: [usize; 2], s: f64, t: f64) -> Place {
+        if self.interpolation == Interpolation::Facets || ((0.0..1.0).contains(&s) && (0.0..1.0).contains(&t)) {
+            return Place { patch, s, t };
+        }
+        let [p, q] = patch.map(super::real);
+        let whole = super::real(self.around);
+        let mut column = p + s.floor();
+        if self.closure == Closure::Smooth {
+            column -= whole * (column / whole).floor();
+        }
+        let column = column.clamp(0.0, whole - 1.0);
+        let ring = (q + t.floor()).clamp(0.0, super::real(self.along - 2));
+        let s = match self.closure {
+            Closure::Smooth => s - s.floor(),
+            Closure::FreeEnds => s - (column - p),
+        };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the patches")]
+        let patch = [column as usize, ring as usize];
+        Place { patch, s, t: t - (ring - q) }
+    }
+
+    /// Minimum of f on the sheet of `start`.
+    pub(super) fn descend(&self, x: [f64; 3], start: Place) -> Option<Foot> {
+        let rounding = ROUNDING * dot(x, x).sqrt();
+        let longest = (0.125 * super::real(self.around)).max(1.0);
+        let mut foot = Foot::at(self, x, start);
+        for _ in 0..MAX_ITERATIONS {
+            let room = self.room(foot.place);
+            let metric = foot.metric();
+            let step = foot.newton_step(&room, metric)?;
+            let floor = rounding * rounding;
+            let is_small = |axis: usize| {
+                let length = metric[2 * axis];
+                step[axis] * step[axis] * length <= (STEP_TOLERANCE * STEP_TOLERANCE * length).max(floor)
+            };
+            if is_small(0) && is_small(1) {
+                return Some(foot);
+            }
+            let largest = step[0].abs().max(step[1].abs());
+            let limit = if largest > longest { longest / largest } else { 1.0 };
+            foot = self.search_line(x, &foot, step.map(|value| value * limit), &room, rounding)?;
+        }
+        None
+    }
+
+    /// The first of the halved steps that lowers f enough (Armijo's condition on the projected step).
+    #[inline]
+    fn search_line(&self, x: [f64; 3], from: &Foot, step: [f64; 2], room: &Room, rounding: f64) -> Option<Foot> {
+        let mut factor = 1.0;
+        for _ in 0..MAX_HALVINGS {
+            let s = (from.place.s + factor * step[0]).clamp(room[0][0], room[0][1]);
+            let t = (from.place.t + factor * step[1]).clamp(room[1][0], room[1][1]);
+            let foot = Foot::at(self, x, self.settle(from.place.patch, s, t));
+            let gain = 1e-4 * from.slope([s - from.place.s, t - from.place.t]).min(0.0);
+            if foot.half_square <= from.half_square + gain
+                || foot.half_square <= from.half_square + noise(from, rounding)
+            {
+                return Some(foot);
+            }
+            factor *= 0.5;
+        }
+        None
+    }
+}

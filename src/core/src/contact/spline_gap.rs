@@ -1,0 +1,190 @@
+//! Gaps to a surface through data points: closest point, normal, and the place where the force is handed over.
+
+use super::gap::{Drive, Geometry, dot};
+use super::layout::Layout;
+use super::spline::{Place, Projection, SurfaceSpline};
+use crate::persist::{Persist, Reader, Writer};
+
+/// Gap reported for a node that has left the surface at a free edge (m).
+pub const BEYOND_EDGE: f64 = 1.0;
+
+/// Contact nodes of equally spaced sectors facing a surface spline.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SplineGap {
+    /// Where the nodes are.
+    pub layout: Layout,
+    /// Clearance that the data points were placed with (m).
+    pub nominal_clearance: f64,
+    /// The surface as it is now.
+    pub surface: SurfaceSpline,
+    /// Control points of the round surface (m).
+    pub round: Vec<[f64; 3]>,
+    /// What the shape adds to them at factor 1 (m); empty for a round surface.
+    pub shape: Vec<[f64; 3]>,
+    /// Angle over which the shape changes noticeably (rad).
+    pub angular_scale: f64,
+    /// Control points in use.
+    control: Vec<[f64; 3]>,
+    factor: f64,
+    /// Revolutions of the rotor over the step under way.
+    pub turned: f64,
+}
+
+impl SplineGap {
+    /// `surface` is the round one; `shape` its change of control points at factor 1, empty if there is none.
+    pub fn new(
+        layout: Layout,
+        nominal_clearance: f64,
+        surface: SurfaceSpline,
+        shape: Vec<[f64; 3]>,
+        angular_scale: f64,
+    ) -> Self {
+        let round = surface.control_points().to_vec();
+        Self {
+            layout,
+            nominal_clearance,
+            surface,
+            control: round.clone(),
+            round,
+            shape,
+            angular_scale,
+            factor: 0.0,
+            turned: 0.0,
+        }
+    }
+
+    /// Move the control points: shape factor, and displacements `moved` (m, three per control point; empty = rigid).
+    fn follow(&mut self, factor: f64, moved: &[f64]) {
+        if moved.is_empty() && (self.shape.is_empty() || factor.to_bits() == self.factor.to_bits()) {
+            return;
+        }
+        self.factor = factor;
+        self.control.copy_from_slice(&self.round);
+        for (point, shape) in self.control.iter_mut().zip(&self.shape) {
+            for component in 0..3 {
+                point[component] += factor * shape[component];
+            }
+        }
+        let (moved, _) = moved.as_chunks::<3>();
+        for (point, moved) in self.control.iter_mut().zip(moved) {
+            for component in 0..3 {
+                point[component] += moved[component];
+            }
+        }
+        self.surface.set_control_points(&self.control);
+    }
+
+    /// Gaps (m), normals and places of all nodes, for the displacements of the contact rows (m) and of the control
+    /// points. `guess` holds the places of the step before; without one (`None`) the search starts from the angle.
+    pub fn evaluate(
+        &mut self,
+        drive: &Drive,
+        displacement: &[f64],
+        moved: &[f64],
+        guess: Option<&[Place]>,
+        geometry: &mut Geometry,
+        gap: &mut [f64],
+    ) {
+        self.follow(drive.shape_factor, moved);
+        let lanes = self.layout.lanes;
+        for (index, gap) in gap.iter_mut().enumerate() {
+            let (node, lane) = (index / lanes, index % lanes);
+            if self.layout.clearances[lane].is_infinite() {
+                continue;
+            }
+            let local: [f64; 3] = std::array::from_fn(|component| displacement[(3 * node + component) * lanes + lane]);
+            let angle = self.layout.angles[index] + drive.rotor_angle - drive.shape_rotation;
+            let frame = Frame::new(angle);
+            let [x, y, z] = drive.shaft;
+            let [radial, tangential, axial] = if x == 0.0 && y == 0.0 {
+                [0.0, 0.0, z]
+            } else {
+                Frame::new(angle + drive.shape_rotation).local([x, y, z])
+            };
+            let clearance =
+                self.layout.clearances[lane] - self.nominal_clearance + drive.gap_offset + drive.radius_change;
+            let place = [
+                self.layout.radii[node] - clearance + local[0] + radial,
+                local[1] + tangential,
+                self.layout.axial[node] + local[2] + axial,
+            ];
+            let point = frame.fixed(place);
+            let start = guess
+                .map_or_else(|| self.surface.locate(point), |places| self.surface.advance(places[index], self.turned));
+            match self.surface.project(point, start) {
+                Projection::Found { place, normal, gap: found, .. } => {
+                    *gap = found;
+                    let normal = frame.local(normal);
+                    for component in 0..3 {
+                        geometry.normal[component][index] = normal[component];
+                    }
+                    geometry.places[index] = place;
+                }
+                Projection::BeyondEdge { place } => {
+                    *gap = BEYOND_EDGE;
+                    for (component, value) in [-1.0, 0.0, 0.0].into_iter().enumerate() {
+                        geometry.normal[component][index] = value;
+                    }
+                    geometry.places[index] = place;
+                }
+                // Found out by the caller: the state is not what the model describes any more.
+                Projection::Lost => *gap = f64::NAN,
+            }
+        }
+    }
+
+    /// Radial, tangential and axial directions of a node at a rotor angle (rad), in the fixed frame.
+    pub fn frame(&self, index: usize, rotor_angle: f64) -> Frame {
+        Frame::new(self.layout.angles[index] + rotor_angle)
+    }
+}
+
+/// Radial and tangential direction at an angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    sine: f64,
+    cosine: f64,
+}
+
+impl Frame {
+    /// At `angle` (rad).
+    pub fn new(angle: f64) -> Self {
+        let (sine, cosine) = libm::sincos(angle);
+        Self { sine, cosine }
+    }
+
+    /// (radial, tangential, axial) of a vector given in fixed directions.
+    pub fn local(self, v: [f64; 3]) -> [f64; 3] {
+        [v[0] * self.cosine + v[1] * self.sine, v[1] * self.cosine - v[0] * self.sine, v[2]]
+    }
+
+    /// Fixed directions of a vector given as (radial, tangential, axial).
+    pub fn fixed(self, v: [f64; 3]) -> [f64; 3] {
+        [v[0] * self.cosine - v[1] * self.sine, v[0] * self.sine + v[1] * self.cosine, v[2]]
+    }
+}
+
+/// Whether a normal seen from a node is one of a casing seen from inside, on a flank below 45°.
+pub fn faces_inwards(normal: [f64; 3]) -> bool {
+    let sideways = dot([0.0, normal[1], normal[2]], [0.0, normal[1], normal[2]]).sqrt();
+    sideways <= -normal[0]
+}
+
+impl Persist for Place {
+    fn save(&self, writer: &mut Writer) {
+        for part in self.patch {
+            u64::try_from(part).unwrap_or(u64::MAX).save(writer);
+        }
+        self.s.save(writer);
+        self.t.save(writer);
+    }
+    fn restore(&mut self, reader: &mut Reader) {
+        for part in &mut self.patch {
+            let mut value = 0_u64;
+            value.restore(reader);
+            *part = usize::try_from(value).unwrap_or(0);
+        }
+        self.s.restore(reader);
+        self.t.restore(reader);
+    }
+}

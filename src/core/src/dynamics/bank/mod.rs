@@ -1,0 +1,700 @@
+//! State of all modes of all sectors, and the fused pass of one step.
+//!
+//! Layout: sectors are SIMD lanes in chunks of [`LANES`]; within a chunk the modes follow each other,
+//! `state[(chunk · modes + mode) · width + lane]`. The pass predicts (eq. 9 of the paper without contact), recovers
+//! the displacements of the contact rows and adds up the damping loss while a chunk is in registers; no horizontal
+//! sum occurs. Contact forces are then applied to the few sectors that touch.
+
+mod coupling;
+mod predict;
+
+use nalgebra::DMatrix;
+
+use super::dispatch::InstructionSet;
+use super::modal::{ModalModel, ModalSpin};
+use super::scheme::{ModeCoefficients, free_increment, resample};
+use crate::persist::{Persist, Reader, Writer, persist_fields};
+use crate::settings::Scheme;
+use coupling::Coupling;
+use predict::{Accumulate, ModalForce, Predict};
+
+/// Lanes of one chunk: one 512-bit register of f64.
+pub const LANES: usize = 8;
+
+/// Amplitudes below this are flushed to zero now and then: idle damped modes would decay into denormals.
+const FLUSH_BELOW: f64 = 1e-150;
+
+/// Lanes of a displacement row for this many sectors: rounded up to whole chunks, except for a single structure.
+pub fn lanes(sectors: usize) -> usize {
+    if sectors == 1 { 1 } else { sectors.div_ceil(LANES) * LANES }
+}
+
+/// What only some structures need; what is off takes neither time nor memory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BankOptions {
+    /// Factor on the frequencies of every sector (mistuning); empty = all tuned.
+    pub frequency_factors: Vec<f64>,
+    /// Modal loads beside contact: centrifugal growth, heat, nodal-diameter loads.
+    pub loads: bool,
+    /// Spin in modal coordinates, with what of it couples the modes: (stiffening, coriolis).
+    pub coupling: Option<(ModalSpin, bool, bool)>,
+    /// Keep G = Φ diag(c) Φᵀ; a slave with many contact rows goes through its modes instead.
+    pub flexibility: bool,
+}
+
+impl Default for BankOptions {
+    fn default() -> Self {
+        Self { frequency_factors: Vec::new(), loads: false, coupling: None, flexibility: true }
+    }
+}
+
+/// Everything that moves.
+#[derive(Debug, Clone, PartialEq)]
+struct BankState {
+    /// q at the current step.
+    position: Vec<f64>,
+    /// d = q − q⁻.
+    increment: Vec<f64>,
+    /// Displacements of the contact rows at the current step, `[row][lane]`.
+    displacement: Vec<f64>,
+    /// The same one step earlier.
+    displacement_before: Vec<f64>,
+    /// Damping loss per lane since the last collection (J).
+    loss: Vec<f64>,
+    /// Modal loads of the step before; empty without loads.
+    push_before: Vec<f64>,
+    /// Speed of the coupling (rad/s).
+    speed: f64,
+}
+
+persist_fields!(BankState { position, increment, displacement, displacement_before, loss, push_before, speed });
+
+/// What the special pass needs per mode and lane.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct LaneCoefficients {
+    beta: f64,
+    kappa: f64,
+    /// Displacement per unit modal load; 0 in padding lanes.
+    load: f64,
+    loss: f64,
+}
+
+/// Identical uncoupled sectors in modal coordinates, stepped together.
+#[derive(Debug, Clone)]
+pub struct ModalBank {
+    instruction_set: InstructionSet,
+    model: ModalModel,
+    options: BankOptions,
+    sectors: usize,
+    width: usize,
+    chunks: usize,
+    rows: usize,
+    /// `[mode][row]`.
+    contact_modes: Vec<f64>,
+    /// `[row][mode]`.
+    contact_rows: Vec<f64>,
+    /// `[set][mode]`: one set for all sectors, or one each where they are mistuned.
+    coefficients: Vec<ModeCoefficients>,
+    lane_coefficients: Vec<LaneCoefficients>,
+    /// G per set: displacement of the contact rows per unit force held for one step (m/N), rows × rows.
+    flexibility: Vec<DMatrix<f64>>,
+    coupling: Option<Coupling>,
+    scheme: Scheme,
+    step: f64,
+    state: BankState,
+    /// Modal loads of the step under way.
+    push: Vec<f64>,
+    /// Scratch: increments of the step before.
+    increment_before: Vec<f64>,
+    /// Scratch: φᵀf of the sector being corrected.
+    modal_force: Vec<f64>,
+    /// Scratch: change of the modal coordinates of the sector being corrected.
+    correction: Vec<f64>,
+    /// Scratch: displacements of the rows of one sector.
+    moved: Vec<f64>,
+    /// Scratch: modal coordinates and increments of one sector.
+    gathered: [Vec<f64>; 2],
+}
+
+impl ModalBank {
+    /// All sectors at rest, nothing optional; [`ModalBank::set_step`] must be called before stepping.
+    pub fn new(model: &ModalModel, sectors: usize) -> Self {
+        Self::with_options(model, sectors, BankOptions::default())
+    }
+
+    /// The same with options.
+    pub fn with_options(model: &ModalModel, sectors: usize, options: BankOptions) -> Self {
+        let width = if sectors == 1 { 1 } else { LANES };
+        let chunks = sectors.div_ceil(width);
+        let (rows, modes) = (model.contact_modes.nrows(), model.len());
+        let (state_len, lanes) = (chunks * modes * width, chunks * width);
+        let sets = if options.frequency_factors.is_empty() { 1 } else { sectors };
+        let special = options.loads || sets > 1;
+        let coupling = options
+            .coupling
+            .clone()
+            .map(|(spin, stiffening, coriolis)| Coupling::new(spin, stiffening, coriolis, sets));
+        Self {
+            instruction_set: InstructionSet::detect(),
+            sectors,
+            width,
+            chunks,
+            rows,
+            contact_modes: model.contact_modes.as_slice().to_vec(),
+            contact_rows: model.contact_modes.transpose().as_slice().to_vec(),
+            coefficients: vec![ModeCoefficients::default(); sets * modes],
+            lane_coefficients: vec![LaneCoefficients::default(); if special { state_len } else { 0 }],
+            flexibility: vec![DMatrix::zeros(rows, rows); if options.flexibility { sets } else { 0 }],
+            scheme: Scheme::default(),
+            step: 0.0,
+            state: BankState {
+                position: vec![0.0; state_len],
+                increment: vec![0.0; state_len],
+                displacement: vec![0.0; rows * lanes],
+                displacement_before: vec![0.0; rows * lanes],
+                loss: vec![0.0; lanes],
+                push_before: vec![0.0; if options.loads { modes } else { 0 }],
+                speed: coupling.as_ref().map_or(0.0, Coupling::speed),
+            },
+            push: vec![0.0; if special { modes } else { 0 }],
+            increment_before: vec![0.0; state_len],
+            modal_force: vec![0.0; modes],
+            correction: vec![0.0; modes],
+            moved: vec![0.0; rows],
+            gathered: [vec![0.0; modes], vec![0.0; modes]],
+            coupling,
+            options,
+            model: model.clone(),
+        }
+    }
+
+    /// Number of sectors.
+    pub fn sectors(&self) -> usize {
+        self.sectors
+    }
+
+    /// Lanes of a displacement row: sectors rounded up to whole chunks.
+    pub fn lanes(&self) -> usize {
+        self.chunks * self.width
+    }
+
+    /// Number of contact rows (3 per contact node).
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of modes of one sector.
+    pub fn modes(&self) -> usize {
+        self.model.len()
+    }
+
+    /// The modes.
+    pub fn model(&self) -> &ModalModel {
+        &self.model
+    }
+
+    /// Step size of the coefficients in use (s).
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+
+    fn set_of(&self, sector: usize) -> usize {
+        if self.options.frequency_factors.is_empty() { 0 } else { sector }
+    }
+
+    /// Coefficients of the modes of one sector.
+    pub fn coefficients(&self, sector: usize) -> &[ModeCoefficients] {
+        &self.coefficients[self.set_of(sector) * self.modes()..][..self.modes()]
+    }
+
+    /// Flexibility of the contact rows of one sector over one step (m/N), rows × rows; not symmetric with Coriolis force.
+    pub fn flexibility(&self, sector: usize) -> &DMatrix<f64> {
+        &self.flexibility[self.set_of(sector)]
+    }
+
+    /// Displacement of one contact row per unit of each modal coordinate.
+    pub fn contact_row(&self, row: usize) -> &[f64] {
+        &self.contact_rows[row * self.modes()..][..self.modes()]
+    }
+
+    /// Displacements of the contact rows at the current step (m), `[row][lane]`.
+    pub fn displacement(&self) -> &[f64] {
+        &self.state.displacement
+    }
+
+    /// Displacements of the contact rows one step earlier (m), `[row][lane]`.
+    pub fn displacement_before(&self) -> &[f64] {
+        &self.state.displacement_before
+    }
+
+    /// Displacement of one contact row of one sector (m).
+    pub fn row(&self, row: usize, sector: usize) -> f64 {
+        self.state.displacement[row * self.lanes() + sector]
+    }
+
+    /// The same one step earlier (m).
+    pub fn row_before(&self, row: usize, sector: usize) -> f64 {
+        self.state.displacement_before[row * self.lanes() + sector]
+    }
+
+    fn index(&self, mode: usize, sector: usize) -> usize {
+        (sector / self.width * self.modes() + mode) * self.width + sector % self.width
+    }
+
+    /// Modal position and increment of one mode of one sector.
+    pub fn modal_state(&self, mode: usize, sector: usize) -> (f64, f64) {
+        let index = self.index(mode, sector);
+        (self.state.position[index], self.state.increment[index])
+    }
+
+    fn frequency(&self, mode: usize, sector: usize) -> f64 {
+        self.model.frequencies[mode] * self.options.frequency_factors.get(sector).copied().unwrap_or(1.0)
+    }
+
+    /// Set a sector's modal position q and velocity q̇; the increment is that of free motion under no force. A
+    /// quasi-static mode carries neither and stays 0.
+    pub fn set_modal_state(&mut self, mode: usize, sector: usize, position: f64, velocity: f64) {
+        if mode >= self.model.dynamic_modes(self.scheme) {
+            return;
+        }
+        let (frequency, ratio, step) = (self.frequency(mode, sector), self.model.damping_ratios[mode], self.step);
+        let index = self.index(mode, sector);
+        self.state.position[index] = position;
+        self.state.increment[index] = free_increment(frequency, ratio, position, velocity, step);
+    }
+
+    /// Static equilibrium under the modal loads `push` for every sector: q = L/ω², rigid modes at 0.
+    pub fn settle(&mut self, push: &[f64]) {
+        self.rest();
+        self.state.push_before.copy_from_slice(push);
+        for sector in 0..self.sectors {
+            for (mode, load) in push.iter().enumerate() {
+                let (frequency, index) = (self.frequency(mode, sector), self.index(mode, sector));
+                self.state.position[index] = if frequency > 0.0 { load / (frequency * frequency) } else { 0.0 };
+            }
+        }
+        self.recover();
+    }
+
+    /// Recompute the contact displacements from the modal state (after setting it).
+    pub fn recover(&mut self) {
+        let lanes = self.lanes();
+        self.state.displacement.fill(0.0);
+        self.state.displacement_before.fill(0.0);
+        for sector in 0..self.sectors {
+            for mode in 0..self.modes() {
+                let (position, increment) = self.modal_state(mode, sector);
+                for row in 0..self.rows {
+                    let shape = self.contact_modes[mode * self.rows + row];
+                    self.state.displacement[row * lanes + sector] += shape * position;
+                    self.state.displacement_before[row * lanes + sector] += shape * (position - increment);
+                }
+            }
+        }
+    }
+
+    /// Everything at rest and undeformed.
+    pub fn rest(&mut self) {
+        for values in [
+            &mut self.state.position,
+            &mut self.state.increment,
+            &mut self.state.displacement,
+            &mut self.state.displacement_before,
+            &mut self.state.loss,
+            &mut self.state.push_before,
+            &mut self.push,
+        ] {
+            values.fill(0.0);
+        }
+        if let Some((spin, ..)) = &self.options.coupling {
+            self.state.speed = spin.reference_speed;
+        }
+    }
+
+    /// New step size: coefficients and flexibility. The state is not touched (see [`ModalBank::resample`]).
+    pub fn set_step(&mut self, scheme: Scheme, step: f64) {
+        (self.scheme, self.step) = (scheme, step);
+        let modes = self.modes();
+        for (index, coefficients) in self.coefficients.iter_mut().enumerate() {
+            let factor = self.options.frequency_factors.get(index / modes).copied().unwrap_or(1.0);
+            *coefficients = self.model.coefficient(index % modes, factor, scheme, step);
+        }
+        if !self.lane_coefficients.is_empty() {
+            self.spread_coefficients();
+        }
+        self.refresh_coupling();
+    }
+
+    fn spread_coefficients(&mut self) {
+        for sector in 0..self.sectors {
+            for mode in 0..self.modes() {
+                let k = self.coefficients(sector)[mode];
+                let lane = LaneCoefficients { beta: k.beta, kappa: k.kappa, load: k.load_compliance(), loss: k.loss };
+                let index = self.index(mode, sector);
+                self.lane_coefficients[index] = lane;
+            }
+        }
+    }
+
+    fn refresh_coupling(&mut self) {
+        if let Some(coupling) = &mut self.coupling {
+            let dynamic = self.model.dynamic_modes(self.scheme);
+            coupling.refresh(self.state.speed, self.step, dynamic, &self.coefficients);
+        }
+        for set in 0..self.flexibility.len() {
+            self.fill_flexibility(set);
+        }
+    }
+
+    fn fill_flexibility(&mut self, set: usize) {
+        let (modes, rows) = (self.modes(), self.rows);
+        for column in 0..rows {
+            for mode in 0..modes {
+                let compliance = self.coefficients[set * modes + mode].compliance;
+                self.correction[mode] = compliance * self.contact_modes[mode * rows + column];
+            }
+            if let Some(coupling) = &mut self.coupling {
+                coupling.transform(set, &mut self.correction);
+            }
+            for row in 0..rows {
+                let terms = self.correction.iter().enumerate();
+                let sum = terms.map(|(mode, value)| self.contact_modes[mode * rows + row] * value).sum();
+                self.flexibility[set][(row, column)] = sum;
+            }
+        }
+    }
+
+    /// Follow the speed of the rotor (rad/s) where modes are coupled by it; only between steps. Returns the change of
+    /// strain energy (J), which is work of the shaft.
+    pub fn set_speed(&mut self, speed: f64) -> f64 {
+        let Some(coupling) = &self.coupling else { return 0.0 };
+        if coupling.speed().to_bits() == speed.to_bits() {
+            return 0.0;
+        }
+        let before = self.energies().1;
+        self.state.speed = speed;
+        self.refresh_coupling();
+        self.energies().1 - before
+    }
+
+    /// Modal damping ratio of all modes (takes effect with the next [`ModalBank::set_step`]).
+    pub fn set_damping_ratio(&mut self, damping_ratio: f64) {
+        self.model.damping_ratios.fill(damping_ratio);
+    }
+
+    /// Carry the state from the step size in use to `new_step`, each sector under its last contact force
+    /// (`forces[row · lanes + sector]`, N; none for an empty slice) and the modal loads, then use the new coefficients.
+    pub fn resample(&mut self, scheme: Scheme, new_step: f64, forces: &[f64]) {
+        let lanes = self.lanes();
+        let dynamic = self.model.dynamic_modes(self.scheme);
+        for sector in 0..self.sectors {
+            for mode in 0..dynamic {
+                let shapes = &self.contact_modes[mode * self.rows..][..self.rows];
+                let rows = shapes.iter().enumerate().filter(|(row, _)| row * lanes + sector < forces.len());
+                let contact: f64 = rows.map(|(row, shape)| shape * forces[row * lanes + sector]).sum();
+                let force = contact + self.state.push_before.get(mode).copied().unwrap_or(0.0);
+                let index = self.index(mode, sector);
+                self.state.increment[index] = resample(
+                    self.frequency(mode, sector),
+                    self.model.damping_ratios[mode],
+                    self.state.position[index],
+                    self.state.increment[index],
+                    force,
+                    self.step,
+                    new_step,
+                );
+            }
+        }
+        self.set_step(scheme, new_step);
+        self.recover();
+    }
+
+    /// Modal loads of the next step (for every sector), to be set before [`ModalBank::predict`].
+    pub fn loads_mut(&mut self) -> &mut [f64] {
+        &mut self.push
+    }
+
+    /// Predict one step without contact (eq. 9 of the paper) and recover the contact displacements.
+    pub fn predict(&mut self, with_loss: bool) {
+        std::mem::swap(&mut self.state.increment, &mut self.increment_before);
+        std::mem::swap(&mut self.state.displacement, &mut self.state.displacement_before);
+        let instruction_set = self.instruction_set;
+        match (self.width, with_loss, self.lane_coefficients.is_empty()) {
+            (1, true, true) => instruction_set.run(Predict::<1, true, false>(self)),
+            (1, false, true) => instruction_set.run(Predict::<1, false, false>(self)),
+            (_, true, true) => instruction_set.run(Predict::<LANES, true, false>(self)),
+            (_, false, true) => instruction_set.run(Predict::<LANES, false, false>(self)),
+            (1, true, false) => instruction_set.run(Predict::<1, true, true>(self)),
+            (1, false, false) => instruction_set.run(Predict::<1, false, true>(self)),
+            (_, true, false) => instruction_set.run(Predict::<LANES, true, true>(self)),
+            (_, false, false) => instruction_set.run(Predict::<LANES, false, true>(self)),
+        }
+        if self.coupling.as_ref().is_some_and(Coupling::is_active) {
+            self.couple(with_loss);
+        }
+    }
+
+    fn couple(&mut self, with_loss: bool) {
+        let Some(mut coupling) = self.coupling.take() else { return };
+        for sector in 0..self.sectors {
+            for mode in 0..self.modes() {
+                let index = self.index(mode, sector);
+                let predicted = self.state.increment[index];
+                self.gathered[0][mode] = self.state.position[index] - predicted;
+                self.gathered[1][mode] = self.increment_before[index];
+                self.correction[mode] = predicted;
+            }
+            let mut correction = std::mem::take(&mut self.correction);
+            let [position, increment] = &self.gathered;
+            coupling.couple(self.set_of(sector), self.coefficients(sector), position, increment, &mut correction);
+            self.correction = correction;
+            self.move_modes(sector, with_loss);
+            self.move_rows(sector);
+        }
+        self.coupling = Some(coupling);
+    }
+
+    /// Add `correction` to the modes of one sector.
+    fn move_modes(&mut self, sector: usize, with_loss: bool) {
+        let correction = std::mem::take(&mut self.correction);
+        self.move_each(sector, with_loss, correction.iter(), |_, correction| *correction);
+        self.correction = correction;
+    }
+
+    /// Add c φᵀf to the modes of one sector.
+    fn respond_and_move(&mut self, sector: usize, with_loss: bool) {
+        let modal_force = std::mem::take(&mut self.modal_force);
+        self.move_each(sector, with_loss, modal_force.iter(), |k, force| k.compliance * force);
+        self.modal_force = modal_force;
+    }
+
+    #[inline(always)]
+    fn move_each<'a>(
+        &mut self,
+        sector: usize,
+        with_loss: bool,
+        values: impl Iterator<Item = &'a f64>,
+        correction: impl Fn(&ModeCoefficients, &f64) -> f64,
+    ) {
+        let (modes, width, set) = (self.modes(), self.width, self.set_of(sector));
+        let coefficients = &self.coefficients[set * modes..][..modes];
+        let (block, lane) = (sector / width * modes * width, sector % width);
+        let position = self.state.position[block..][..modes * width].chunks_exact_mut(width);
+        let increment = self.state.increment[block..][..modes * width].chunks_exact_mut(width);
+        let before = self.increment_before[block..][..modes * width].chunks_exact(width);
+        let mut loss = 0.0;
+        for ((((position, increment), before), value), coefficients) in
+            position.zip(increment).zip(before).zip(values).zip(coefficients)
+        {
+            let correction = correction(coefficients, value);
+            if with_loss {
+                let predicted = increment[lane] + before[lane];
+                loss += coefficients.loss * correction * (2.0 * predicted + correction);
+            }
+            position[lane] += correction;
+            increment[lane] += correction;
+        }
+        self.state.loss[sector] += loss;
+    }
+
+    /// Add the displacement of the contact rows by `correction`.
+    fn move_rows(&mut self, sector: usize) {
+        let lanes = self.lanes();
+        if lanes == 1 {
+            let (sums, matrix) = (&mut self.state.displacement, &self.contact_modes);
+            self.instruction_set.run(Accumulate { sums, matrix, values: &self.correction });
+            return;
+        }
+        for (shapes, correction) in self.contact_modes.chunks_exact(self.rows.max(1)).zip(&self.correction) {
+            for (row, shape) in shapes.iter().enumerate() {
+                self.state.displacement[row * lanes + sector] += shape * correction;
+            }
+        }
+    }
+
+    /// φᵀf of one sector, for the force on its rows (N), into the scratch `modal_force`.
+    fn project(&mut self, force: &[f64]) {
+        let (modal_force, contact_rows) = (&mut self.modal_force, &self.contact_rows);
+        self.instruction_set.run(ModalForce { modal_force, contact_rows, force });
+    }
+
+    /// Correct one sector for the contact `force` on its rows (N), eq. 11 of the paper.
+    pub fn correct(&mut self, sector: usize, force: &[f64], with_loss: bool) {
+        self.project(force);
+        if self.coupling.is_some() {
+            self.respond(sector);
+            self.move_modes(sector, with_loss);
+        } else {
+            self.respond_and_move(sector, with_loss);
+        }
+        let lanes = self.lanes();
+        let flexibility = self.flexibility[self.set_of(sector)].as_slice();
+        self.moved.fill(0.0);
+        for (column, value) in flexibility.chunks_exact(self.rows).zip(force) {
+            for (moved, entry) in self.moved.iter_mut().zip(column) {
+                *moved += entry * value;
+            }
+        }
+        for (row, moved) in self.state.displacement.chunks_exact_mut(lanes).zip(&self.moved) {
+            row[sector] += moved;
+        }
+    }
+
+    /// Displacement of the contact rows of a single structure by contact forces given as modal forces (m).
+    pub fn response_to_modal(&mut self, modal_force: &[f64], displacement: &mut [f64]) {
+        self.modal_force.copy_from_slice(modal_force);
+        self.respond(0);
+        displacement.fill(0.0);
+        let (matrix, values) = (&self.contact_modes[..], &self.correction[..]);
+        self.instruction_set.run(Accumulate { sums: displacement, matrix, values });
+    }
+
+    /// Correct a single structure for contact forces given as modal forces, with the response of its rows to them.
+    pub fn correct_modal(&mut self, modal_force: &[f64], response: &[f64], with_loss: bool) {
+        self.modal_force.copy_from_slice(modal_force);
+        self.respond(0);
+        self.move_modes(0, with_loss);
+        for (displacement, response) in self.state.displacement.iter_mut().zip(response) {
+            *displacement += response;
+        }
+    }
+
+    /// `correction` ← T c φᵀf.
+    fn respond(&mut self, sector: usize) {
+        let (modes, set) = (self.modes(), self.set_of(sector));
+        let coefficients = &self.coefficients[set * modes..][..modes];
+        for ((correction, force), k) in self.correction.iter_mut().zip(&self.modal_force).zip(coefficients) {
+            *correction = k.compliance * force;
+        }
+        if let Some(coupling) = &mut self.coupling {
+            coupling.transform(set, &mut self.correction);
+        }
+    }
+
+    /// Let contact forces found in the step before act on one sector (massless-boundary), after the prediction.
+    pub fn act_delayed(&mut self, sector: usize, force: &[f64], with_loss: bool) {
+        self.project(force);
+        self.act_delayed_modal_force(sector, with_loss);
+    }
+
+    /// The same for modal forces.
+    pub fn act_delayed_modal(&mut self, sector: usize, modal_force: &[f64], with_loss: bool) {
+        self.modal_force.copy_from_slice(modal_force);
+        self.act_delayed_modal_force(sector, with_loss);
+    }
+
+    fn act_delayed_modal_force(&mut self, sector: usize, with_loss: bool) {
+        let (modes, set) = (self.modes(), self.set_of(sector));
+        let coefficients = &self.coefficients[set * modes..][..modes];
+        for ((correction, force), k) in self.correction.iter_mut().zip(&self.modal_force).zip(coefficients) {
+            *correction = k.delayed * force;
+        }
+        self.move_modes(sector, with_loss);
+        self.move_rows(sector);
+    }
+
+    /// Work of the modal loads over the step just done (J), once contact has corrected it. A quasi-static mode
+    /// follows the load of its own instant, so that over this step the load before did the work.
+    pub fn finish_loads(&mut self) -> f64 {
+        if !self.options.loads {
+            return 0.0;
+        }
+        let mut work = 0.0;
+        for mode in 0..self.modes() {
+            let dynamic = mode < self.model.dynamic_modes(self.scheme);
+            let load = if dynamic { self.push[mode] } else { self.state.push_before[mode] };
+            if load != 0.0 {
+                let twice: f64 = (0..self.sectors)
+                    .map(|sector| self.index(mode, sector))
+                    .map(|index| self.state.increment[index] + self.increment_before[index])
+                    .sum();
+                work += 0.5 * load * twice;
+            }
+        }
+        self.state.push_before.copy_from_slice(&self.push);
+        work
+    }
+
+    /// Kinetic and strain energy of all sectors (J), in the quantity the scheme conserves (see [`super::scheme`]).
+    pub fn energies(&self) -> (f64, f64) {
+        let (mut kinetic, mut strain) = (0.0, 0.0);
+        for sector in 0..self.sectors {
+            for (mode, k) in self.coefficients(sector).iter().enumerate() {
+                let (position, increment) = self.modal_state(mode, sector);
+                kinetic += k.inertia * (increment * increment);
+                strain += k.spring * (position * (position - increment));
+            }
+            if let Some(coupling) = &self.coupling {
+                let position = |mode| self.modal_state(mode, sector).0;
+                strain += coupling.strain(position, |mode| position(mode) - self.modal_state(mode, sector).1);
+            }
+        }
+        (kinetic, strain)
+    }
+
+    /// Damping loss since the last call (J).
+    pub fn collect_loss(&mut self) -> f64 {
+        let loss = self.state.loss[..self.sectors].iter().sum();
+        self.state.loss.fill(0.0);
+        loss
+    }
+
+    /// Set amplitudes that have decayed to nothing to exactly zero, so that no denormals arise.
+    pub fn flush(&mut self) {
+        for values in [&mut self.state.position, &mut self.state.increment] {
+            for value in values.iter_mut().filter(|value| value.abs() < FLUSH_BELOW) {
+                *value = 0.0;
+            }
+        }
+    }
+
+    /// True when every modal coordinate is finite.
+    pub fn is_finite(&self) -> bool {
+        self.state.position.iter().chain(&self.state.increment).all(|value| value.is_finite())
+    }
+
+    /// Save the state (not the step size).
+    pub fn save(&self, writer: &mut Writer) {
+        self.state.save(writer);
+    }
+
+    /// Restore a saved state, after [`ModalBank::set_step`].
+    pub fn restore(&mut self, reader: &mut Reader) {
+        self.state.restore(reader);
+        if self.coupling.is_some() && self.step > 0.0 {
+            self.refresh_coupling();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The widest set against the baseline; a processor without wider registers compares the baseline with itself.
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let modes = 11;
+        let model = ModalModel {
+            frequencies: (1..=modes).map(|mode| 700.0 * f64::from(mode).powi(2)).collect(),
+            damping_ratios: vec![0.005; 11],
+            contact_modes: DMatrix::from_fn(15, 11, |row, mode| (1.7 * row as f64 + 0.9 * mode as f64).sin()),
+            shapes: DMatrix::identity(11, 11),
+            quasi_static: 0,
+        };
+        let run = |instruction_set| {
+            let mut bank = ModalBank::new(&model, 13);
+            bank.instruction_set = instruction_set;
+            bank.set_step(Scheme::ModalExact, 1e-6);
+            let force: Vec<f64> = (0..15).map(|row| f64::from(row).cos()).collect();
+            for step in 0..500 {
+                bank.predict(true);
+                bank.correct(step % 13, &force, true);
+            }
+            let state = &bank.state;
+            let all = [&state.position, &state.increment, &state.displacement, &state.loss];
+            all.iter().flat_map(|values| values.iter().map(|value| value.to_bits())).collect::<Vec<_>>()
+        };
+        assert_eq!(run(InstructionSet::Baseline), run(InstructionSet::detect()));
+    }
+}

@@ -1,0 +1,326 @@
+//! The documented range of every setting, and how settings go together.
+
+use super::{
+    CoatingSettings, ContactSettings, Motion, SceneSettings, Scheme, Shape, Solver, SplineSettings, StructureSettings,
+    SurfaceSettings,
+};
+use crate::{Error, Result};
+
+impl SceneSettings {
+    /// Check every value against its documented range, and the names against each other.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field as written in the scene file.
+    pub fn validate(&self) -> Result<()> {
+        let word = |text: &str| {
+            text.starts_with(|c: char| c.is_ascii_alphabetic())
+                && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+        };
+        let names = self.structures.iter().map(|s| ("structure.name", &s.name));
+        let names = names.chain(self.surfaces.iter().map(|s| ("surface.name", &s.name)));
+        for (field, name) in names.chain([("name", &self.name)]) {
+            if !word(name) {
+                return Err(Error::invalid(
+                    field,
+                    format!("`{name}` is not a plain name"),
+                    "Use letters, digits and underscores, starting with a letter",
+                ));
+            }
+        }
+        if self.structures.is_empty() || self.contacts.is_empty() {
+            return Err(Error::invalid(
+                "scene",
+                format!("{} structures and {} contacts", self.structures.len(), self.contacts.len()),
+                "A scene needs at least one [[structure]] and one [[contact]]",
+            ));
+        }
+        for (index, structure) in self.structures.iter().enumerate() {
+            structure.validate(&format!("structure[{}]", index + 1))?;
+        }
+        for (index, surface) in self.surfaces.iter().enumerate() {
+            surface.validate(self, &format!("surface[{}]", index + 1))?;
+        }
+        self.validate_unique_names()?;
+        for (index, contact) in self.contacts.iter().enumerate() {
+            contact.validate(self, &format!("contact[{}]", index + 1))?;
+        }
+        self.validate_scheme()?;
+        within("time.step", self.time.step, SHORTEST_STEP, LONGEST_STEP)?;
+        finite("experiment.start", self.experiment.start)?;
+        positive("experiment.communication_step", self.experiment.communication_step, "s")?;
+        if !(self.experiment.stop.is_finite() && self.experiment.stop > self.experiment.start) {
+            return Err(Error::invalid(
+                "experiment.stop",
+                format!("{} s is not after experiment.start = {} s", self.experiment.stop, self.experiment.start),
+                "Give a stop time after the start time",
+            ));
+        }
+        if self.outputs.watched_sectors.contains(&0) {
+            return Err(Error::invalid("outputs.watched_sectors", "sector 0", "Sectors are counted from 1"));
+        }
+        let mut seen = self.outputs.watched_sectors.clone();
+        seen.sort_unstable();
+        if seen.windows(2).any(|pair| pair[0] == pair[1]) {
+            return Err(Error::invalid("outputs.watched_sectors", "a sector is listed twice", "List each sector once"));
+        }
+        Ok(())
+    }
+}
+
+impl SceneSettings {
+    fn validate_scheme(&self) -> Result<()> {
+        let coriolis = self.structures.iter().position(|structure| structure.spin.coriolis);
+        match coriolis {
+            Some(index) if self.time.scheme == Scheme::MasslessBoundary => Err(Error::invalid(
+                format!("structure[{}].spin.coriolis", index + 1),
+                "the Coriolis force is not available with time.scheme = \"massless-boundary\"",
+                "Use scheme = \"modal-exact\", or leave the Coriolis force out",
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    fn validate_unique_names(&self) -> Result<()> {
+        let names = self.structures.iter().map(|s| &s.name).chain(self.surfaces.iter().map(|s| &s.name));
+        let mut sorted: Vec<&String> = names.collect();
+        sorted.sort_unstable();
+        match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+            None => Ok(()),
+            Some(pair) => Err(Error::invalid(
+                "name",
+                format!("`{}` is used by two structures or surfaces", pair[0]),
+                "Give each structure and surface a name of its own",
+            )),
+        }
+    }
+}
+
+impl StructureSettings {
+    fn validate(&self, at: &str) -> Result<()> {
+        finite(&format!("{at}.speed"), self.speed)?;
+        if let Some(ratio) = self.damping_ratio {
+            within(&format!("{at}.damping_ratio"), ratio, 0.0, MAX_DAMPING)?;
+        }
+        if self.motion == Motion::Still && self.speed != 0.0 {
+            return Err(Error::invalid(
+                format!("{at}.speed"),
+                format!("{} rad/s for a structure that stands still", self.speed),
+                "Remove the speed, or set motion = \"rotating\"",
+            ));
+        }
+        for (index, factor) in self.frequency_factors.iter().enumerate() {
+            let [low, high] = FREQUENCY_FACTORS;
+            within(&format!("{at}.frequency_factors[{}]", index + 1), *factor, low, high)?;
+        }
+        if let Some(load) = &self.load {
+            finite(&format!("{at}.load.amplitude"), load.amplitude)?;
+            finite(&format!("{at}.load.phase"), load.phase)?;
+        }
+        self.validate_motion(at)
+    }
+
+    /// What only rotating structures have, and what only those have that stand still.
+    fn validate_motion(&self, at: &str) -> Result<()> {
+        let still = self.motion == Motion::Still;
+        let refused = [
+            ("spin.stiffening", self.spin.stiffening, still),
+            ("spin.growth", self.spin.growth, still),
+            ("spin.coriolis", self.spin.coriolis, still),
+            ("whirl", self.whirl, still),
+            ("axial_shift", self.axial_shift, still),
+            ("thermal", self.thermal, !still),
+            ("load", self.load.is_some(), !still),
+        ];
+        match refused.into_iter().find(|(_, asked, wrong)| *asked && *wrong) {
+            None => Ok(()),
+            Some((field, ..)) if still => Err(Error::invalid(
+                format!("{at}.{field}"),
+                "only a rotating structure has it, and this one stands still",
+                format!("Remove `{field}`, or set motion = \"rotating\""),
+            )),
+            Some((field, ..)) => Err(Error::invalid(
+                format!("{at}.{field}"),
+                "only a structure that stands still has it, and this one rotates",
+                format!("Remove `{field}`, or set motion = \"still\""),
+            )),
+        }
+    }
+}
+
+impl SurfaceSettings {
+    fn validate(&self, scene: &SceneSettings, at: &str) -> Result<()> {
+        within(&format!("{at}.ramp_time"), self.ramp_time, 0.0, 1e9)?;
+        self.validate_carrier(scene, at)?;
+        if let Some(SplineSettings { around, along, .. }) = self.spline {
+            let ([least_around, most_around], [least_along, most_along]) = (SPLINE_AROUND, SPLINE_ALONG);
+            count(&format!("{at}.spline.around"), around, least_around, most_around)?;
+            count(&format!("{at}.spline.along"), along, least_along, most_along)?;
+        }
+        if let Some(patches) = self.patches {
+            count(&format!("{at}.patches.around"), patches.around, 1, MAX_PATCHES)?;
+            count(&format!("{at}.patches.along"), patches.along, 1, MAX_PATCHES)?;
+            product(&format!("{at}.patches"), "patches", patches.around, patches.along, MAX_PATCHES)?;
+        }
+        self.validate_shape(at)
+    }
+
+    /// The structure that carries the surface.
+    fn validate_carrier(&self, scene: &SceneSettings, at: &str) -> Result<()> {
+        let Some(name) = &self.structure else { return Ok(()) };
+        let still = |structure: &&StructureSettings| structure.motion == Motion::Still;
+        let candidates: Vec<&str> = scene.structures.iter().filter(still).map(|s| s.name.as_str()).collect();
+        let problem = match scene.structures.iter().find(|structure| structure.name == *name) {
+            None => format!("`{name}` is not defined"),
+            Some(structure) if structure.motion != Motion::Still => {
+                format!("`{name}` rotates, and a surface stands still")
+            }
+            Some(_) => return Ok(()),
+        };
+        let remedy = if candidates.is_empty() {
+            "Add a [[structure]] with motion = \"still\", or remove the line for a rigid surface".to_owned()
+        } else {
+            format!("Use one of: {}; or remove the line for a rigid surface", candidates.join(", "))
+        };
+        Err(Error::invalid(format!("{at}.structure"), problem, remedy))
+    }
+
+    fn validate_shape(&self, at: &str) -> Result<()> {
+        match &self.shape {
+            Shape::Circular {} => Ok(()),
+            Shape::Lobes { amplitude, order, phase } => {
+                finite(&format!("{at}.shape.amplitude"), *amplitude)?;
+                finite(&format!("{at}.shape.phase"), *phase)?;
+                if *order == 0 {
+                    let remedy = "Use order ≥ 1, or gap and radius change for a uniform clearance";
+                    return Err(Error::invalid(format!("{at}.shape.order"), "0 lobes", remedy));
+                }
+                Ok(())
+            }
+            Shape::TwoLobe { depth, width, phase } => {
+                finite(&format!("{at}.shape.depth"), *depth)?;
+                finite(&format!("{at}.shape.phase"), *phase)?;
+                within(&format!("{at}.shape.width"), *width, 1e-3, 0.25)
+            }
+            Shape::Table { radius_change } => {
+                crate::contact::surface::Surface::new(&Shape::Table { radius_change: radius_change.clone() }, 0.0)
+                    .map(|_| ())
+            }
+        }
+    }
+}
+
+impl ContactSettings {
+    fn validate(&self, scene: &SceneSettings, at: &str) -> Result<()> {
+        let structures: Vec<&str> = scene.structures.iter().map(|s| s.name.as_str()).collect();
+        let surfaces: Vec<&str> = scene.surfaces.iter().map(|s| s.name.as_str()).collect();
+        for (field, name, known) in [("master", &self.master, &structures), ("slave", &self.slave, &surfaces)] {
+            if !known.contains(&name.as_str()) {
+                return Err(Error::invalid(
+                    format!("{at}.{field}"),
+                    format!("`{name}` is not defined"),
+                    format!("Use one of: {}", known.join(", ")),
+                ));
+            }
+        }
+        let slave = scene.surfaces.iter().find(|surface| surface.name == self.slave);
+        if slave.and_then(|surface| surface.structure.as_ref()) == Some(&self.master) {
+            return Err(Error::invalid(
+                format!("{at}.slave"),
+                format!("`{}` is the surface of `{}`, which is the master of this contact", self.slave, self.master),
+                "Give the surface of another structure, or a rigid one",
+            ));
+        }
+        positive(&format!("{at}.gap"), self.gap, "m")?;
+        self.sector_gaps.iter().try_for_each(|gap| positive(&format!("{at}.sector_gaps"), *gap, "m"))?;
+        within(&format!("{at}.friction"), self.friction, 0.0, MAX_FRICTION)?;
+        if let Some(share) = self.heat_to_slave {
+            within(&format!("{at}.heat_to_slave"), share, 0.0, 1.0)?;
+        }
+        let Some(coating) = &self.coating else { return Ok(()) };
+        if self.solver != Solver::Lcp {
+            let name = if self.solver == Solver::Film { "film" } else { "coulomb" };
+            return Err(Error::invalid(
+                format!("{at}.solver"),
+                format!("\"{name}\" cannot solve a contact with a coating"),
+                "Use solver = \"lcp\", or remove the coating",
+            ));
+        }
+        coating.validate(&format!("{at}.coating"))
+    }
+}
+
+impl CoatingSettings {
+    fn validate(&self, at: &str) -> Result<()> {
+        positive(&format!("{at}.thickness"), self.thickness, "m")?;
+        within(&format!("{at}.thickness"), self.thickness, 0.0, MAX_THICKNESS)?;
+        positive(&format!("{at}.modulus"), self.modulus, "Pa")?;
+        within(&format!("{at}.modulus"), self.modulus, 0.0, MAX_STRESS)?;
+        within(&format!("{at}.yield_stress"), self.yield_stress, 0.0, MAX_STRESS)?;
+        within(&format!("{at}.hardening"), self.hardening, 0.0, MAX_STRESS)?;
+        count(&format!("{at}.cells_around"), self.cells_around, 2, MAX_CELLS)?;
+        count(&format!("{at}.cells_along"), self.cells_along, 1, MAX_CELLS)?;
+        product(at, "cells", self.cells_around, self.cells_along, MAX_CELLS)
+    }
+}
+
+/// Shortest internal step accepted (s): far below the period of any mode of a blade.
+pub const SHORTEST_STEP: f64 = 1e-12;
+/// Longest internal step accepted (s): far above it.
+pub const LONGEST_STEP: f64 = 1.0;
+/// Largest friction coefficient accepted.
+pub const MAX_FRICTION: f64 = 2.0;
+/// Largest damping ratio accepted.
+pub const MAX_DAMPING: f64 = 0.99;
+/// Mistuning beyond these factors is another blade.
+const FREQUENCY_FACTORS: [f64; 2] = [0.5, 2.0];
+/// Fewest data points that a closed cubic spline needs, and more than any mesh has.
+const SPLINE_AROUND: [usize; 2] = [4, 2000];
+/// Rings of data points.
+const SPLINE_ALONG: [usize; 2] = [2, 200];
+/// Each patch is an output.
+const MAX_PATCHES: usize = 10_000;
+/// Thickest coating (m); real ones have millimetres.
+const MAX_THICKNESS: f64 = 0.1;
+/// Largest modulus, yield stress and hardening of a coating (Pa), beyond any solid.
+const MAX_STRESS: f64 = 1e13;
+/// Most cells of a coating: 80 megabytes of state.
+const MAX_CELLS: usize = 10_000_000;
+
+fn finite(field: &str, value: f64) -> Result<()> {
+    if value.is_finite() { Ok(()) } else { Err(Error::invalid(field, format!("{value}"), "Give a finite number")) }
+}
+
+fn positive(field: &str, value: f64, unit: &str) -> Result<()> {
+    if value.is_finite() && value > 0.0 {
+        Ok(())
+    } else {
+        Err(Error::invalid(field, format!("{value} {unit}"), "Give a finite value > 0"))
+    }
+}
+
+fn within(field: &str, value: f64, low: f64, high: f64) -> Result<()> {
+    if (low..=high).contains(&value) {
+        Ok(())
+    } else {
+        let shown = |value: f64| if value.abs() < 1e7 { format!("{value:?}") } else { format!("{value:e}") };
+        let remedy = format!("Give a value between {} and {}", shown(low), shown(high));
+        Err(Error::invalid(field, format!("{value}"), remedy))
+    }
+}
+
+fn count(field: &str, value: usize, least: usize, most: usize) -> Result<()> {
+    if (least..=most).contains(&value) {
+        Ok(())
+    } else {
+        Err(Error::invalid(field, format!("{value}"), format!("Give a whole number from {least} to {most}")))
+    }
+}
+
+fn product(field: &str, what: &str, around: usize, along: usize, most: usize) -> Result<()> {
+    if around.checked_mul(along).is_some_and(|total| total <= most) {
+        Ok(())
+    } else {
+        let problem = format!("{around} around x {along} along are more than {most} {what}");
+        Err(Error::invalid(field, problem, format!("Give at most {most} {what} in all")))
+    }
+}

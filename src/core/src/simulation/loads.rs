@@ -1,0 +1,81 @@
+//! Loads beside contact, in modal coordinates: centrifugal growth, heat, nodal-diameter loads.
+
+use super::Inputs;
+use crate::Rom;
+use crate::dynamics::modal::ModalModel;
+use crate::settings::{LoadSettings, StructureSettings};
+
+/// Modal load vectors per unit of what drives them; empty where a scene does not ask for them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LoadVectors {
+    /// Master: per Ω².
+    pub centrifugal: Vec<f64>,
+    /// Slave: per kelvin of each patch.
+    pub thermal: Vec<Vec<f64>>,
+    /// Slave: nodal-diameter load with phase 0 and a quarter period, per unit amplitude.
+    pub nodal: Option<[Vec<f64>; 2]>,
+}
+
+impl LoadVectors {
+    /// Loads of the master.
+    pub fn of_master(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<f64> {
+        match &rom.extras.spin {
+            Some(spin) if structure.spin.growth => model.modal_load(&spin.centrifugal_load),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Loads of the slave; `model` sees the contact grid of `rom`.
+    pub fn add_slave(&mut self, structure: &StructureSettings, rom: &Rom, model: &ModalModel) {
+        if let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) {
+            self.thermal = thermal.loads.column_iter().map(|load| model.modal_load(load.as_slice())).collect();
+        }
+        if let Some(load) = structure.load {
+            let quarter = std::f64::consts::FRAC_PI_2;
+            self.nodal = Some([0.0, quarter].map(|phase| nodal_load(rom, model, load, phase)));
+        }
+    }
+
+    /// Whether the slave is loaded.
+    pub fn on_slave(&self) -> bool {
+        !self.thermal.is_empty() || self.nodal.is_some()
+    }
+
+    /// Modal loads of the master at speed Ω (rad/s).
+    pub fn fill_master(&self, speed: f64, loads: &mut [f64]) {
+        for (load, centrifugal) in loads.iter_mut().zip(&self.centrifugal) {
+            *load = speed * speed * centrifugal;
+        }
+    }
+
+    /// Modal loads of the slave for the inputs at `offset`.
+    pub(super) fn fill_slave(&self, inputs: &Inputs, offset: f64, loads: &mut [f64]) {
+        loads.fill(0.0);
+        for (vector, input) in self.thermal.iter().zip(&inputs.temperatures) {
+            let temperature = input.at(offset);
+            loads.iter_mut().zip(vector).for_each(|(load, value)| *load += temperature * value);
+        }
+        if let Some([first, second]) = &self.nodal {
+            let amplitude = inputs.load_amplitude.at(offset);
+            let (sine, cosine) = libm::sincos(inputs.load_phase.at(offset));
+            for ((load, first), second) in loads.iter_mut().zip(first).zip(second) {
+                *load += amplitude * (cosine * first + sine * second);
+            }
+        }
+    }
+}
+
+/// Modal load of the line load cos(nθ − φ) (N/m of circumference, outwards), shared by the rings of the contact grid.
+fn nodal_load(rom: &Rom, model: &ModalModel, load: LoadSettings, phase: f64) -> Vec<f64> {
+    let Some(grid) = rom.extras.grid else { return vec![0.0; model.len()] };
+    #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
+    let share = std::f64::consts::TAU / (grid.around as f64 * grid.along as f64);
+    let force = |node: usize| {
+        let position = rom.contact_nodes[node].position;
+        position[0] * share * libm::cos(f64::from(load.order) * position[1] - phase)
+    };
+    let nodes = rom.contact_nodes.len();
+    (0..model.len())
+        .map(|mode| (0..nodes).map(|node| model.contact_modes[(3 * node, mode)] * force(node)).sum())
+        .collect()
+}

@@ -1,0 +1,69 @@
+//! Patches of the slave surface that friction power is gathered for.
+
+use super::compile::Roles;
+use crate::Scene;
+use crate::rom::Patch;
+use crate::settings::PatchSettings;
+
+/// Where heat is counted.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Patches {
+    /// Equal parts of the circumference and of an axial extent (m).
+    Equal {
+        /// Parts.
+        parts: PatchSettings,
+        /// From and to (m).
+        extent: [f64; 2],
+    },
+    /// Those of the structure that carries the surface.
+    Listed(Vec<Patch>),
+}
+
+impl Patches {
+    /// What the scene asks for: its own patches, else those of a thermal structure.
+    pub fn new(scene: &Scene, roles: Roles) -> Option<Self> {
+        if let Some(parts) = scene.settings.surfaces[roles.surface].patches {
+            let axial = || scene.roms[roles.master].contact_nodes.iter().map(|node| node.position[2]);
+            let extent = [axial().fold(f64::INFINITY, f64::min), axial().fold(f64::NEG_INFINITY, f64::max)];
+            return Some(Self::Equal { parts, extent });
+        }
+        let carrier = roles.carrier.filter(|index| scene.settings.structures[*index].thermal)?;
+        scene.roms[carrier].extras.thermal.as_ref().map(|thermal| Self::Listed(thermal.patches.clone()))
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Equal { parts, .. } => parts.around * parts.along,
+            Self::Listed(patches) => patches.len(),
+        }
+    }
+
+    /// Patch at an angle (rad, fixed frame) and an axial position (m); the nearest in z beyond their extent.
+    pub fn find(&self, angle: f64, axial: f64) -> usize {
+        let turn = |angle: f64| angle - std::f64::consts::TAU * (angle / std::f64::consts::TAU).floor();
+        match self {
+            Self::Equal { parts, extent } => {
+                let around = part(turn(angle) / std::f64::consts::TAU, parts.around);
+                let length = extent[1] - extent[0];
+                let along = if length > 0.0 { part((axial - extent[0]) / length, parts.along) } else { 0 };
+                along * parts.around + around
+            }
+            Self::Listed(patches) => {
+                let within = |patch: &Patch| turn(angle - patch.angle[0]) <= patch.angle[1] - patch.angle[0];
+                let beyond = |patch: &Patch| (patch.axial[0] - axial).max(axial - patch.axial[1]).max(0.0);
+                let candidates = patches.iter().enumerate().filter(|(_, patch)| within(patch));
+                candidates.min_by(|a, b| beyond(a.1).total_cmp(&beyond(b.1))).map_or(0, |(index, _)| index)
+            }
+        }
+    }
+}
+
+/// Which of `parts` equal parts of [0, 1] holds `share`.
+fn part(share: f64, parts: usize) -> usize {
+    #[expect(clippy::cast_precision_loss, reason = "part counts are far below 2^52")]
+    let place = share * parts as f64;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0 … parts − 1")]
+    let index = place.max(0.0) as usize;
+    index.min(parts - 1)
+}

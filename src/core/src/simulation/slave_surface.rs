@@ -1,0 +1,217 @@
+//! The slave surface of a scene, laid through data points, and the modes of the structure that carries it.
+
+use crate::contact::gap::GapLaw;
+use crate::contact::layout::Layout;
+use crate::contact::spline::SurfaceSpline;
+use crate::contact::spline_gap::SplineGap;
+use crate::contact::surface::Surface;
+use crate::dynamics::modal::ModalModel;
+use crate::settings::{ContactSettings, Meridian, SplineSettings, SurfaceSettings};
+use crate::{Error, Result, Rom};
+
+/// Rings of a rigid spline reach beyond the contact nodes by this share of their axial extent, and at least by that
+/// share of the radius.
+const MARGIN_OF_EXTENT: f64 = 0.25;
+const MARGIN_OF_RADIUS: f64 = 0.02;
+/// The surface and the contact grid of its structure may differ by this share of the radius.
+const SAME_RADIUS: f64 = 0.1;
+
+/// Where the data points of a surface are.
+#[derive(Debug, Clone)]
+struct Grid {
+    around: usize,
+    first_angle: f64,
+    rings: Vec<f64>,
+}
+
+/// A structure that carries the surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Carrier<'a> {
+    /// Its ROM.
+    pub rom: &'a Rom,
+    /// Its modes, seen at its contact grid.
+    pub model: &'a ModalModel,
+}
+
+/// The gap function against a surface spline.
+///
+/// # Errors
+/// A structure without contact grid, a grid that the contact nodes stand beyond or far from, too few points.
+pub fn spline_law(
+    master: &Rom,
+    layout: Layout,
+    contact: &ContactSettings,
+    surface: &SurfaceSettings,
+    carrier: Option<Carrier<'_>>,
+) -> Result<GapLaw> {
+    if contact.meridian == Meridian::Cylinder {
+        return Err(Error::invalid(
+            "contact.meridian",
+            "`cylinder` with a surface spline, whose normal follows from its closest point",
+            "Remove the line",
+        ));
+    }
+    let settings = surface.spline.unwrap_or_default();
+    let contour = Contour::new(master);
+    let grid = match carrier {
+        Some(carrier) => carried_grid(carrier.rom, &contour)?,
+        None => rigid_grid(settings, &contour),
+    };
+    let round = data(&grid, |z, _| contour.radius(z) + contact.gap);
+    if let Some(carrier) = carrier {
+        check_radii(carrier.rom, &round)?;
+    }
+    let spline = SurfaceSpline::new(&round, grid.around, grid.rings.len(), settings.closure, settings.interpolation)?;
+    let shape = Surface::new(&surface.shape, contact.gap)?;
+    let mut change = data(&grid, |_, angle| shape.evaluate(angle).0);
+    change.iter_mut().for_each(|point| point[2] = 0.0);
+    if shape == Surface::Circular {
+        change.clear();
+    } else {
+        spline.interpolate(&mut change);
+    }
+    Ok(GapLaw::Spline(Box::new(SplineGap::new(layout, contact.gap, spline, change, shape.angular_scale()))))
+}
+
+/// The carrier's modes, seen at the control points along x, y, z.
+pub fn control_modes(carrier: Carrier<'_>, law: &SplineGap) -> ModalModel {
+    let nodes = carrier.rom.contact_nodes.len();
+    let mut model = carrier.model.clone();
+    let mut points = vec![[0.0; 3]; nodes];
+    for mode in 0..model.len() {
+        for (node, point) in points.iter_mut().enumerate() {
+            let [radial, tangential, axial] =
+                std::array::from_fn(|component| carrier.model.contact_modes[(3 * node + component, mode)]);
+            let (sine, cosine) = libm::sincos(carrier.rom.contact_nodes[node].position[1]);
+            *point = [radial * cosine - tangential * sine, radial * sine + tangential * cosine, axial];
+        }
+        law.surface.interpolate(&mut points);
+        for (node, point) in points.iter().enumerate() {
+            for (component, value) in point.iter().enumerate() {
+                model.contact_modes[(3 * node + component, mode)] = *value;
+            }
+        }
+    }
+    // Contact acts on the master's residual flexibility; all modes of the slave keep their inertia.
+    model.quasi_static = 0;
+    model
+}
+
+fn carried_grid(rom: &Rom, contour: &Contour) -> Result<Grid> {
+    let Some(grid) = rom.extras.grid else {
+        return Err(Error::invalid(
+            format!("ROM `{}`", rom.name),
+            "it has no contact grid for a surface",
+            "Reduce the casing with `tiprub reduce casing`, or add the metadata `contact_grid`",
+        ));
+    };
+    let rings: Vec<f64> = rom.contact_nodes.chunks(grid.around).map(|ring| ring[0].position[2]).collect();
+    let (low, high) = (rings[0], rings[rings.len() - 1]);
+    let [first, last] = contour.extent();
+    if first < low || last > high {
+        return Err(Error::invalid(
+            format!("ROM `{}`", rom.name),
+            format!(
+                "its contact grid spans z = {low:.4e} to {high:.4e} m, the contact nodes {first:.4e} to {last:.4e} m"
+            ),
+            "Give a casing that covers the blade tips",
+        ));
+    }
+    Ok(Grid { around: grid.around, first_angle: rom.contact_nodes[0].position[1], rings })
+}
+
+fn rigid_grid(settings: SplineSettings, contour: &Contour) -> Grid {
+    let [first, last] = contour.extent();
+    let margin = (MARGIN_OF_EXTENT * (last - first)).max(MARGIN_OF_RADIUS * contour.points[0].1);
+    let (low, length) = (first - margin, last - first + 2.0 * margin);
+    #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
+    let ring = |ring: usize| low + length * ring as f64 / (settings.along - 1) as f64;
+    Grid { around: settings.around, first_angle: 0.0, rings: (0..settings.along).map(ring).collect() }
+}
+
+/// Points of all rings at the radius (m) given for (z, θ).
+fn data(grid: &Grid, radius: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
+    let mut points = Vec::with_capacity(grid.rings.len() * grid.around);
+    for z in &grid.rings {
+        for index in 0..grid.around {
+            #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
+            let angle = grid.first_angle + std::f64::consts::TAU * index as f64 / grid.around as f64;
+            let (sine, cosine) = libm::sincos(angle);
+            let radius = radius(*z, angle);
+            points.push([radius * cosine, radius * sine, *z]);
+        }
+    }
+    points
+}
+
+fn check_radii(rom: &Rom, points: &[[f64; 3]]) -> Result<()> {
+    for (node, point) in rom.contact_nodes.iter().zip(points) {
+        let (own, wanted) = (node.position[0], libm::hypot(point[0], point[1]));
+        if (own - wanted).abs() > SAME_RADIUS * wanted {
+            return Err(Error::invalid(
+                format!("ROM `{}`", rom.name),
+                format!("node `{}` has radius {own:.4e} m where tip contour and gap give {wanted:.4e} m", node.name),
+                "Give the casing of this rotor, in metres",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Tip contour r(z) through the contact nodes: natural cubic spline through three or more, straight through fewer and
+/// beyond the ends.
+struct Contour {
+    /// (z, r, r''), ascending in z.
+    points: Vec<(f64, f64, f64)>,
+    /// dr/dz where there is a single point.
+    slope: f64,
+}
+
+impl Contour {
+    fn new(rom: &Rom) -> Self {
+        let mut points: Vec<(f64, f64, f64)> =
+            rom.contact_nodes.iter().map(|node| (node.position[2], node.position[0], 0.0)).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let apart = 1e-9 * points[0].1;
+        points.dedup_by(|a, b| (a.0 - b.0).abs() < apart);
+        second_derivatives(&mut points);
+        Self { points, slope: rom.contact_nodes[0].meridional_slope }
+    }
+
+    fn extent(&self) -> [f64; 2] {
+        [self.points[0].0, self.points[self.points.len() - 1].0]
+    }
+
+    fn radius(&self, z: f64) -> f64 {
+        let [first, last] = self.extent();
+        if self.points.len() == 1 {
+            return self.points[0].1 + self.slope * (z - first);
+        }
+        let inside = z.clamp(first, last);
+        let upper = self.points.iter().position(|point| inside <= point.0).unwrap_or(1).max(1);
+        let (a, b) = (self.points[upper - 1], self.points[upper]);
+        let length = b.0 - a.0;
+        let t = (inside - a.0) / length;
+        let bend = |t: f64| t * t * t - t;
+        let value = (1.0 - t) * a.1 + t * b.1 + length * length / 6.0 * (bend(1.0 - t) * a.2 + bend(t) * b.2);
+        let slope = (b.1 - a.1) / length
+            + length / 6.0 * ((3.0 * t * t - 1.0) * b.2 - (3.0 * (1.0 - t) * (1.0 - t) - 1.0) * a.2);
+        value + slope * (z - inside)
+    }
+}
+
+/// Natural cubic spline by the tridiagonal (Thomas) recurrence.
+fn second_derivatives(points: &mut [(f64, f64, f64)]) {
+    let count = points.len();
+    let mut upper = vec![0.0; count];
+    for i in 1..count.saturating_sub(1) {
+        let (low, high) = (points[i].0 - points[i - 1].0, points[i + 1].0 - points[i].0);
+        let right = 6.0 * ((points[i + 1].1 - points[i].1) / high - (points[i].1 - points[i - 1].1) / low);
+        let pivot = 2.0 * (low + high) - low * upper[i - 1];
+        upper[i] = high / pivot;
+        points[i].2 = (right - low * points[i - 1].2) / pivot;
+    }
+    for i in (1..count.saturating_sub(1)).rev() {
+        points[i].2 -= upper[i] * points[i + 1].2;
+    }
+}

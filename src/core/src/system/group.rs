@@ -1,0 +1,442 @@
+//! The contact problem of one group of coupled nodes: Delassus matrix, solution, and what it does to the structures.
+
+use super::{ContactEvent, StepFailure, System};
+use crate::contact::gap::{Drive, GapLaw, dot};
+use crate::settings::Solver;
+use nalgebra::DMatrix;
+
+/// Nodes outside a group count as penetrating beyond this fraction of the largest gap of the group.
+const VIOLATED_FRACTION: f64 = 1e-13;
+
+/// A contact node of one sector.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Member {
+    /// Contact node.
+    pub node: usize,
+    /// Sector.
+    pub sector: usize,
+    /// `node · lanes + sector`.
+    pub index: usize,
+}
+
+/// Forces of one group.
+#[derive(Debug, Clone, Default)]
+pub struct Solution {
+    /// Multipliers along the columns of the Delassus matrix (N): one per contact, or (normal, tangent, tangent).
+    values: Vec<f64>,
+    len: usize,
+}
+
+impl Solution {
+    /// Room for `len` values.
+    pub fn new(len: usize) -> Self {
+        Self { values: vec![0.0; len], len: 0 }
+    }
+
+    /// The values.
+    pub fn values(&self) -> &[f64] {
+        &self.values[..self.len]
+    }
+}
+
+impl System {
+    /// Directions per contact in the Delassus matrix.
+    pub(super) fn directions(&self) -> usize {
+        if self.settings.solver == Solver::Coulomb { 3 } else { 1 }
+    }
+
+    /// All nodes of the sectors that touch, each sector by itself.
+    pub(super) fn solve_sectors(&mut self, drive: &Drive) -> Result<(), StepFailure> {
+        let (lanes, nodes) = (self.bank.lanes(), self.law.nodes());
+        for sector in 0..self.bank.sectors() {
+            // NaN counts as touching, and is found out there.
+            if self.lowest[sector] < 0.0 || self.lowest[sector].is_nan() {
+                self.members.clear();
+                self.members.extend((0..nodes).map(|node| Member { node, sector, index: node * lanes + sector }));
+                self.solve_group(drive)?;
+                self.apply();
+            }
+        }
+        Ok(())
+    }
+
+    /// Sectors coupled through the slave: the nodes that penetrate or touched last, then those that their solution
+    /// makes penetrate, until there are none.
+    pub(super) fn solve_coupled(&mut self, drive: &Drive) -> Result<(), StepFailure> {
+        if self.lowest.iter().all(|gap| *gap >= 0.0) {
+            return Ok(());
+        }
+        let film = self.settings.solver == Solver::Film;
+        let lanes = self.bank.lanes();
+        self.chosen.fill(false);
+        for index in 0..self.chosen.len() {
+            let touched = self.state.gap_before[index] <= 0.0 && !film;
+            if self.state.gap[index] < 0.0 || self.state.gap[index].is_nan() || touched {
+                self.choose(index);
+            }
+        }
+        loop {
+            self.members.clear();
+            for sector in 0..self.bank.sectors() {
+                let places = (0..self.law.nodes()).map(|node| Member { node, sector, index: node * lanes + sector });
+                self.members.extend(places.filter(|member| self.chosen[member.index]));
+            }
+            self.solve_group(drive)?;
+            self.respond(drive);
+            if film || !self.add_violated() {
+                break;
+            }
+        }
+        self.apply();
+        Ok(())
+    }
+
+    /// Take a node into the group; on a coating the whole blade, whose nodes share cells.
+    fn choose(&mut self, index: usize) {
+        let lanes = self.bank.lanes();
+        if self.coating.is_none() {
+            self.chosen[index] = true;
+            return;
+        }
+        for node in 0..self.law.nodes() {
+            self.chosen[node * lanes + index % lanes] = true;
+        }
+    }
+
+    fn add_violated(&mut self) -> bool {
+        let scale = self.members.iter().fold(0.0, |scale: f64, member| scale.max(self.state.gap[member.index].abs()));
+        let mut found = false;
+        for index in 0..self.chosen.len() {
+            let after = self.state.gap[index] + self.response[index];
+            if !self.chosen[index] && after < -VIOLATED_FRACTION * scale {
+                self.choose(index);
+                found = true;
+            }
+        }
+        found
+    }
+
+    /// Fill and solve the problem of `members`.
+    fn solve_group(&mut self, drive: &Drive) -> Result<(), StepFailure> {
+        for &Member { node, sector, index } in &self.members {
+            let gap = self.state.gap[index];
+            if !gap.is_finite() {
+                return Err(StepFailure::NonFinite);
+            }
+            if gap < 0.0 && !self.law.is_plausible(node, gap, self.state.geometry.normal_at(index)) {
+                return Err(StepFailure::Implausible { sector });
+            }
+        }
+        self.fill_directions(drive);
+        self.fill_delassus();
+        let solved = if self.coating.is_some() {
+            self.solve_coated(drive)
+        } else if self.settings.solver == Solver::Coulomb {
+            self.solve_coulomb(drive)
+        } else {
+            self.solve_normal()
+        };
+        if self.solution.values().iter().any(|value| !value.is_finite()) {
+            return Err(StepFailure::NonFinite);
+        }
+        if solved { Ok(()) } else { Err(StepFailure::Unsolved { sector: self.members[0].sector }) }
+    }
+
+    /// Rows n and columns n − µt per contact; n, t₁, t₂ for both where contacts may stick.
+    fn fill_directions(&mut self, drive: &Drive) {
+        let friction = self.settings.friction;
+        for member in 0..self.members.len() {
+            let at = self.members[member];
+            let index = at.index;
+            let normal = self.state.geometry.normal_at(index);
+            if self.settings.solver == Solver::Coulomb {
+                let [first, second] = tangents(normal);
+                for (direction, value) in [normal, first, second].into_iter().enumerate() {
+                    self.row_directions[3 * member + direction] = value;
+                    self.column_directions[3 * member + direction] = value;
+                }
+                continue;
+            }
+            let slip = if friction > 0.0 {
+                let mut velocity = self.law.sliding_velocity(at.node, index, drive);
+                let moved = self.slip_of_deformation(at);
+                for (value, moved) in velocity.iter_mut().zip(moved) {
+                    *value += moved / self.bank.step();
+                }
+                self.law.slip_direction(velocity, normal)
+            } else {
+                [0.0; 3]
+            };
+            self.row_directions[member] = normal;
+            self.column_directions[member] = std::array::from_fn(|i| normal[i] - friction * slip[i]);
+        }
+    }
+
+    /// Displacement of a node relative to the slave over the step, prediction included (m), without rigid motion.
+    fn slip_of_deformation(&self, Member { node, sector, index }: Member) -> [f64; 3] {
+        let mut moved: [f64; 3] = std::array::from_fn(|component| {
+            let row = 3 * node + component;
+            self.bank.row(row, sector) - self.bank.row_before(row, sector)
+        });
+        if let (Some(slave), GapLaw::Spline(law)) = (&self.slave, &self.law) {
+            let frame = self.frame(index, self.state.angle);
+            let slave = slave.moved_last(&law.surface, self.state.geometry.places[index], frame);
+            moved = std::array::from_fn(|i| moved[i] - slave[i]);
+        }
+        moved
+    }
+
+    /// W = C_Nᵀ A⁻¹ C_NT of the group: sectors by their flexibility, coupled through the slave's modes.
+    fn fill_delassus(&mut self) {
+        let (nodes, per) = (self.law.nodes(), self.directions());
+        let matrix = match (&mut self.coating, &mut self.coulomb) {
+            (Some((_, problem)), _) => {
+                problem.clear();
+                &mut problem.delassus
+            }
+            (None, Some(solver)) if self.settings.solver == Solver::Coulomb => &mut solver.delassus,
+            _ => &mut self.problem.delassus,
+        };
+        if self.slave.is_none() {
+            let flexibility = self.bank.flexibility(self.members[0].sector).as_slice();
+            let (rows, columns) = (&self.row_directions[..per * nodes], &self.column_directions[..per * nodes]);
+            match per {
+                1 => fill_sector::<1>(matrix, flexibility, rows, columns),
+                _ => fill_sector::<3>(matrix, flexibility, rows, columns),
+            }
+            return;
+        }
+        for (member, &Member { node: column_node, sector, .. }) in self.members.iter().enumerate() {
+            let flexibility = self.bank.flexibility(sector).as_slice();
+            let [first, second, third] =
+                std::array::from_fn(|j| &flexibility[(3 * column_node + j) * 3 * nodes..][..3 * nodes]);
+            for along in per * member..per * (member + 1) {
+                let direction = self.column_directions[along];
+                for (other, row) in self.members.iter().enumerate() {
+                    let at = 3 * row.node;
+                    let same = row.sector == sector;
+                    let moved: [f64; 3] = std::array::from_fn(|i| {
+                        let i = at + i;
+                        first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2]
+                    });
+                    for across in per * other..per * (other + 1) {
+                        matrix[(across, along)] = if same { dot(self.row_directions[across], moved) } else { 0.0 };
+                    }
+                }
+            }
+        }
+        if let (Some(slave), GapLaw::Spline(law)) = (&mut self.slave, &self.law) {
+            for (member, &Member { index, .. }) in self.members.iter().enumerate() {
+                let frame = law.frame(index, self.state.angle);
+                let span = per * member..per * (member + 1);
+                let (rows, columns) = (&self.row_directions[span.clone()], &self.column_directions[span]);
+                slave.see(member, &law.surface, self.state.geometry.places[index], frame, rows, columns);
+            }
+            for column in 0..per * self.members.len() {
+                slave.prepare_column(column);
+                for row in 0..per * self.members.len() {
+                    matrix[(row, column)] += slave.delassus(row);
+                }
+            }
+        }
+    }
+
+    fn solve_normal(&mut self) -> bool {
+        let size = self.members.len();
+        self.problem.set_size(size);
+        for (member, &Member { index, .. }) in self.members.iter().enumerate() {
+            self.problem.gaps[member] = self.state.gap[index];
+            // Closed in the last step: the likeliest guess for this one.
+            self.problem.active[member] = self.state.gap_before[index] <= 0.0;
+        }
+        let outcome = if self.settings.solver == Solver::Film { self.problem.film() } else { self.problem.lcp() };
+        self.state.factorisations += outcome.factorisations as u64;
+        self.solution.len = size;
+        self.solution.values[..size].copy_from_slice(&self.problem.multipliers[..size]);
+        self.corrected[..size].copy_from_slice(&self.problem.gaps[..size]);
+        self.coating_share[..size].fill(0.0);
+        outcome.solved
+    }
+
+    fn solve_coated(&mut self, drive: &Drive) -> bool {
+        let (lanes, nodes) = (self.bank.lanes(), self.law.nodes());
+        let Some((coating, problem)) = &mut self.coating else { return false };
+        for blade in self.members.chunks_exact(nodes) {
+            if let Some(layout) = self.law.layout() {
+                for (angle, at) in self.angles.iter_mut().zip(blade) {
+                    let tangential = self.bank.displacement()[(3 * at.node + 1) * lanes + at.sector];
+                    *angle = layout.angles[at.index] + drive.rotor_angle + tangential * layout.per_radius[at.node];
+                }
+            }
+            coating.locate(problem, &self.angles);
+        }
+        for (member, &Member { index, .. }) in self.members.iter().enumerate() {
+            problem.gaps[member] = self.state.gap[index];
+            problem.closed[member] = self.state.gap_before[index] <= -coating.thickness();
+        }
+        let outcome = problem.solve();
+        self.state.factorisations += outcome.factorisations as u64;
+        let size = self.members.len();
+        self.solution.len = size;
+        for member in 0..size {
+            self.solution.values[member] = problem.coating[member] + problem.hard[member];
+            self.corrected[member] = problem.gaps[member];
+            self.coating_share[member] = problem.coating[member];
+        }
+        outcome.solved
+    }
+
+    fn solve_coulomb(&mut self, drive: &Drive) -> bool {
+        let (lanes, step) = (self.bank.lanes(), self.bank.step());
+        for member in 0..self.members.len() {
+            let at = self.members[member];
+            let Member { node, sector, index } = at;
+            let sliding = self.law.sliding_velocity(node, index, drive);
+            let moved = self.slip_of_deformation(at);
+            let slip: [f64; 3] = std::array::from_fn(|i| sliding[i] * step + moved[i]);
+            let last: [f64; 3] = std::array::from_fn(|i| self.force_before[(3 * node + i) * lanes + sector]);
+            let Some(solver) = &mut self.coulomb else { return false };
+            solver.friction[member] = self.settings.friction;
+            for along in 0..3 {
+                let direction = self.row_directions[3 * member + along];
+                solver.free[3 * member + along] = dot(direction, slip);
+                solver.reactions[3 * member + along] = dot(direction, last);
+            }
+            solver.free[3 * member] = self.state.gap[index];
+        }
+        let size = self.members.len();
+        let Some(solver) = &mut self.coulomb else { return false };
+        let outcome = solver.solve(size);
+        self.state.factorisations += outcome.factorisations as u64;
+        self.solution.len = 3 * size;
+        self.solution.values[..3 * size].copy_from_slice(&solver.reactions[..3 * size]);
+        for member in 0..size {
+            let touching = solver.reactions[3 * member] > 0.0;
+            self.corrected[member] = if touching { 0.0 } else { solver.relative[3 * member].max(0.0) };
+            self.coating_share[member] = 0.0;
+        }
+        outcome.solved
+    }
+
+    /// Force on the master at a member of the group (N), in its own directions.
+    fn force_on(&self, member: usize) -> [f64; 3] {
+        let per = self.directions();
+        let mut force = [0.0; 3];
+        for along in per * member..per * (member + 1) {
+            let (value, direction) = (self.solution.values[along], self.column_directions[along]);
+            force = std::array::from_fn(|i| force[i] + value * direction[i]);
+        }
+        force
+    }
+
+    /// Change of every gap by the solution (m), members and others.
+    fn respond(&mut self, drive: &Drive) {
+        let (lanes, nodes) = (self.bank.lanes(), self.law.nodes());
+        self.response.fill(0.0);
+        for member in 0..self.members.len() {
+            let Member { node: column, sector, .. } = self.members[member];
+            let force = self.force_on(member);
+            let flexibility = self.bank.flexibility(sector);
+            for node in 0..nodes {
+                let index = node * lanes + sector;
+                let moved: [f64; 3] = std::array::from_fn(|i| {
+                    (0..3).map(|j| flexibility[(3 * node + i, 3 * column + j)] * force[j]).sum()
+                });
+                self.response[index] += dot(self.state.geometry.normal_at(index), moved);
+            }
+        }
+        let (Some(slave), GapLaw::Spline(law)) = (&mut self.slave, &self.law) else { return };
+        slave.respond(&self.solution);
+        for index in (0..self.response.len()).filter(|index| index % lanes < self.bank.sectors()) {
+            let place = self.state.geometry.places[index];
+            let moved = slave.responded(&law.surface, place, law.frame(index, drive.rotor_angle));
+            self.response[index] -= dot(self.state.geometry.normal_at(index), moved);
+        }
+    }
+
+    /// Let the solution act on both structures, and record it.
+    fn apply(&mut self) {
+        if self.slave.is_some() {
+            for (gap, response) in self.state.gap.iter_mut().zip(&self.response) {
+                *gap += response;
+            }
+        }
+        let mut next = 0;
+        while next < self.members.len() {
+            let sector = self.members[next].sector;
+            self.force.fill(0.0);
+            while next < self.members.len() && self.members[next].sector == sector {
+                let Member { node, index, .. } = self.members[next];
+                self.state.gap[index] = self.corrected[next];
+                let force = self.force_on(next);
+                self.force[3 * node..][..3].copy_from_slice(&force);
+                self.record(next, force);
+                next += 1;
+            }
+            self.bank.correct(sector, &self.force, self.settings.ledger);
+        }
+        if let Some(slave) = &mut self.slave {
+            slave.apply(self.settings.ledger);
+        }
+        if let Some((coating, problem)) = &mut self.coating {
+            coating.commit(problem);
+        }
+    }
+
+    fn record(&mut self, member: usize, force: [f64; 3]) {
+        let lanes = self.bank.lanes();
+        let Member { node, sector, index } = self.members[member];
+        let normal = self.solution.values[self.directions() * member];
+        if normal == 0.0 {
+            return;
+        }
+        self.state.multiplier[index] = normal;
+        self.state.coating_force[index] = self.coating_share[member];
+        for (component, value) in force.iter().enumerate() {
+            self.state.force[(3 * node + component) * lanes + sector] = *value;
+        }
+        let event = ContactEvent::new(sector, node, normal, force, self.coating_share[member]);
+        self.events.push(event);
+    }
+}
+
+/// W of all nodes of one sector with `PER` directions each; `flexibility` is G column by column.
+fn fill_sector<const PER: usize>(
+    matrix: &mut DMatrix<f64>,
+    flexibility: &[f64],
+    rows: &[[f64; 3]],
+    columns: &[[f64; 3]],
+) {
+    let components = 3 * columns.len() / PER;
+    let leading = matrix.nrows();
+    let targets = matrix.as_mut_slice().chunks_exact_mut(leading);
+    for ((along, direction), target) in columns.iter().enumerate().zip(targets) {
+        let three = &flexibility[along / PER * 3 * components..][..3 * components];
+        let (first, rest) = three.split_at(components);
+        let (second, third) = rest.split_at(components);
+        let nodes = first.as_chunks::<3>().0.iter().zip(second.as_chunks::<3>().0).zip(third.as_chunks::<3>().0);
+        let targets = target.as_chunks_mut::<PER>().0.iter_mut().zip(rows.as_chunks::<PER>().0);
+        for (((first, second), third), (target, rows)) in nodes.zip(targets) {
+            let moved: [f64; 3] =
+                std::array::from_fn(|i| first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2]);
+            for (value, row) in target.iter_mut().zip(rows) {
+                *value = dot(*row, moved);
+            }
+        }
+    }
+}
+
+/// Two unit tangents; the first as near to the direction of sliding (second component) as the normal allows.
+fn tangents(normal: [f64; 3]) -> [[f64; 3]; 2] {
+    let start = if normal[1].abs() < 0.9 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
+    let along = dot(start, normal);
+    let first: [f64; 3] = std::array::from_fn(|i| start[i] - along * normal[i]);
+    let length = dot(first, first).sqrt();
+    let first = first.map(|value| value / length);
+    let second = [
+        normal[1] * first[2] - normal[2] * first[1],
+        normal[2] * first[0] - normal[0] * first[2],
+        normal[0] * first[1] - normal[1] * first[0],
+    ];
+    [first, second]
+}

@@ -1,0 +1,177 @@
+//! The structure that carries the slave surface: its modes, and the control points they move.
+
+use super::Solution;
+use crate::contact::spline::{Place, SurfaceSpline};
+use crate::contact::spline_gap::Frame;
+use crate::dynamics::bank::{BankOptions, ModalBank};
+use crate::dynamics::modal::ModalModel;
+use crate::persist::{Persist, Reader, Writer};
+use crate::settings::Scheme;
+
+/// A flexible slave in the fixed frame.
+#[derive(Debug, Clone)]
+pub struct Slave {
+    /// Its modes; the contact rows are x, y, z of every control point.
+    pub bank: ModalBank,
+    /// Modal contact force of the last step, which acts in the next one (massless-boundary).
+    delayed: Vec<f64>,
+    /// Scratch: displacements of the control points two steps before the one that is under way.
+    oldest: Vec<f64>,
+    /// Modes seen at the contacts of a group, along the rows and columns of the Delassus matrix.
+    rows: Vec<f64>,
+    columns: Vec<f64>,
+    /// Scratch: modes seen at one place along x, y, z.
+    seen: [Vec<f64>; 3],
+    /// Scratch: modal forces and modal displacements.
+    force: Vec<f64>,
+    /// Displacement of the control points by the forces of a solution (m).
+    pub response: Vec<f64>,
+}
+
+impl Slave {
+    /// `model` has one contact row per component of every control point; at most `contacts` contacts at once, with
+    /// `directions` directions each.
+    pub fn new(model: &ModalModel, loads: bool, contacts: usize, directions: usize) -> Self {
+        let options = BankOptions { loads, flexibility: false, ..BankOptions::default() };
+        let bank = ModalBank::with_options(model, 1, options);
+        let modes = bank.modes();
+        Self {
+            delayed: vec![0.0; modes],
+            oldest: vec![0.0; bank.rows()],
+            rows: vec![0.0; contacts * directions * modes],
+            columns: vec![0.0; contacts * directions * modes],
+            seen: std::array::from_fn(|_| vec![0.0; modes]),
+            force: vec![0.0; modes],
+            response: vec![0.0; bank.rows()],
+            bank,
+        }
+    }
+
+    /// Predict one step; `delayed`: the contact forces of the last step act now.
+    pub fn predict(&mut self, delayed: bool, with_loss: bool) {
+        self.oldest.copy_from_slice(self.bank.displacement_before());
+        self.bank.predict(with_loss);
+        if delayed && self.delayed.iter().any(|force| *force != 0.0) {
+            self.bank.act_delayed_modal(0, &self.delayed, with_loss);
+        }
+        self.delayed.fill(0.0);
+    }
+
+    /// Nothing has touched yet.
+    pub fn start(&mut self) {
+        self.bank.recover();
+        self.bank.collect_loss();
+        self.delayed.fill(0.0);
+    }
+
+    /// Carry the state to another step size under the contact forces that last, `share` of those of the last step.
+    pub fn set_step(&mut self, scheme: Scheme, step: f64) {
+        if self.bank.step() > 0.0 { self.bank.resample(scheme, step, &[]) } else { self.bank.set_step(scheme, step) }
+    }
+
+    /// Half the displacement of a place over the last two steps, in the directions of `frame` (m).
+    pub fn moved(&self, surface: &SurfaceSpline, place: Place, frame: Frame) -> [f64; 3] {
+        let (now, oldest) = (self.bank.displacement(), &self.oldest);
+        frame.local(self.at(surface, place, |row| 0.5 * (now[row] - oldest[row])))
+    }
+
+    /// Displacement of a place over the last step, in the directions of `frame` (m).
+    pub fn moved_last(&self, surface: &SurfaceSpline, place: Place, frame: Frame) -> [f64; 3] {
+        let (now, before) = (self.bank.displacement(), self.bank.displacement_before());
+        frame.local(self.at(surface, place, |row| now[row] - before[row]))
+    }
+
+    /// Displacement of a place by the last [`Slave::respond`], in the directions of `frame` (m).
+    pub fn responded(&self, surface: &SurfaceSpline, place: Place, frame: Frame) -> [f64; 3] {
+        frame.local(self.at(surface, place, |row| self.response[row]))
+    }
+
+    fn at(&self, surface: &SurfaceSpline, place: Place, value: impl Fn(usize) -> f64) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for (index, weight) in surface.weights(place).iter() {
+            for (component, sum) in sum.iter_mut().enumerate() {
+                *sum += weight * value(3 * index + component);
+            }
+        }
+        sum
+    }
+
+    /// Project the modes on the directions (in `frame`) of contact `member` of the group.
+    pub fn see(
+        &mut self,
+        member: usize,
+        surface: &SurfaceSpline,
+        place: Place,
+        frame: Frame,
+        rows: &[[f64; 3]],
+        columns: &[[f64; 3]],
+    ) {
+        let modes = self.bank.modes();
+        for (component, seen) in self.seen.iter_mut().enumerate() {
+            seen.fill(0.0);
+            for (index, weight) in surface.weights(place).iter() {
+                let shapes = self.bank.contact_row(3 * index + component);
+                seen.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += weight * shape);
+            }
+        }
+        let [x, y, z] = &self.seen;
+        for (directions, target) in [(rows, &mut self.rows), (columns, &mut self.columns)] {
+            for (index, direction) in directions.iter().enumerate() {
+                let [a, b, c] = frame.fixed(*direction);
+                let target = &mut target[(member * directions.len() + index) * modes..][..modes];
+                for (((value, x), y), z) in target.iter_mut().zip(x).zip(y).zip(z) {
+                    *value = a * x + b * y + c * z;
+                }
+            }
+        }
+    }
+
+    /// Entry (row, column) of the slave's part of the Delassus matrix (m/N); [`Slave::prepare_column`] comes before.
+    pub fn delassus(&self, row: usize) -> f64 {
+        let modes = self.bank.modes();
+        self.rows[row * modes..][..modes].iter().zip(&self.force).map(|(shape, moved)| shape * moved).sum()
+    }
+
+    /// Modal displacement per unit force along a column of the Delassus matrix.
+    pub fn prepare_column(&mut self, column: usize) {
+        let modes = self.bank.modes();
+        let shapes = &self.columns[column * modes..][..modes];
+        for ((value, shape), k) in self.force.iter_mut().zip(shapes).zip(self.bank.coefficients(0)) {
+            *value = k.compliance * shape;
+        }
+    }
+
+    /// Modal force −Σ F_j λ_j of a solution into the scratch.
+    fn gather(&mut self, solution: &Solution) {
+        let modes = self.bank.modes();
+        self.force.fill(0.0);
+        for (column, value) in solution.values().iter().enumerate().filter(|(_, value)| **value != 0.0) {
+            let shapes = &self.columns[column * modes..][..modes];
+            self.force.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum -= value * shape);
+        }
+    }
+
+    /// What the forces of a solution would do to the control points.
+    pub fn respond(&mut self, solution: &Solution) {
+        self.gather(solution);
+        self.bank.response_to_modal(&self.force, &mut self.response);
+    }
+
+    /// Let the forces of the solution act that [`Slave::respond`] was asked about last.
+    pub fn apply(&mut self, with_loss: bool) {
+        self.delayed.copy_from_slice(&self.force);
+        self.bank.correct_modal(&self.force, &self.response, with_loss);
+    }
+
+    /// Write everything that determines the future.
+    pub fn save(&self, writer: &mut Writer) {
+        self.bank.save(writer);
+        self.delayed.save(writer);
+    }
+
+    /// Restore a saved state, after the step size is set.
+    pub fn restore(&mut self, reader: &mut Reader) {
+        self.bank.restore(reader);
+        self.delayed.restore(reader);
+    }
+}

@@ -1,0 +1,124 @@
+//! Sticking and sliding against closed forms: a block on a belt, held by a spring (den Hartog's stick-slip oscillator).
+//!
+//! The block sticks until the spring pulls with F_s, then slides under F_k. Sliding it moves as
+//! x = F_k/k + a cos ωt + (v/ω) sin ωt, a = (F_s − F_k)/k, until it has the belt's velocity v again after
+//! (2π − 2 atan(aω/v))/ω; it then sticks for 2a/v. Amplitude √(a² + v²/ω²).
+
+use nalgebra::DMatrix;
+use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw};
+use tiprub_core::dynamics::bank::BankOptions;
+use tiprub_core::dynamics::modal::ModalModel;
+use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::system::{System, SystemParts, SystemSettings};
+
+const MASS: f64 = 2.0;
+const OMEGA: f64 = 50.0;
+const BELT: f64 = 0.1;
+const FRICTION: f64 = 0.4;
+
+/// Block on the belt: a mode along the belt (spring), one across (free), pressed on by a load.
+fn block(scheme: Scheme, step: f64) -> System {
+    let model = ModalModel {
+        frequencies: vec![0.0, OMEGA],
+        damping_ratios: vec![0.0; 2],
+        contact_modes: DMatrix::from_row_slice(3, 2, &[0.0, 1.0, 0.0, 0.0, 1.0, 0.0]) / MASS.sqrt(),
+        shapes: DMatrix::identity(2, 2),
+        quasi_static: 0,
+    };
+    let law = GapLaw::Fixed(FixedGap {
+        normals: vec![[0.0, 0.0, 1.0]],
+        gaps: vec![0.0],
+        // The belt runs towards +x: the block slides back on it.
+        sliding: vec![[-BELT, 0.0, 0.0]],
+    });
+    let settings = SystemSettings { scheme, solver: Solver::Coulomb, friction: FRICTION, ledger: true };
+    let bank = BankOptions { loads: true, ..BankOptions::default() };
+    let mut system =
+        System::with_parts(&model, 1, law, settings, SystemParts { bank, sticking: true, ..SystemParts::default() });
+    system.set_step(step);
+    system.bank_mut().set_modal_state(1, 0, 0.0, BELT * MASS.sqrt());
+    system.start(&Drive::default());
+    system
+}
+
+struct Record {
+    /// Position of the block (m) and whether it stuck, step by step.
+    position: Vec<f64>,
+    stuck: Vec<bool>,
+    residual: f64,
+}
+
+/// The normal force is `sticking` (N) while the block sticks and `sliding` (N) while it slides.
+fn run(scheme: Scheme, step: f64, sticking: f64, sliding: f64, steps: usize) -> Record {
+    let mut system = block(scheme, step);
+    let mut record = Record { position: Vec::new(), stuck: Vec::new(), residual: 0.0 };
+    let mut stuck = true;
+    for _ in 0..steps {
+        system.bank_mut().loads_mut()[0] = -(if stuck { sticking } else { sliding }) / MASS.sqrt();
+        let before = system.bank().row(0, 0);
+        system.step(&Drive::default()).unwrap();
+        let now = system.bank().row(0, 0);
+        let slip = now - before - BELT * step;
+        stuck = slip.abs() < 1e-9 * BELT * step;
+        record.position.push(now);
+        record.stuck.push(stuck);
+    }
+    system.close_books();
+    let (kinetic, strain) = system.energies();
+    record.residual = system.ledger().residual(kinetic + strain) / system.ledger().scale();
+    record
+}
+
+#[test]
+fn stick_slip_has_the_amplitude_and_the_times_of_the_closed_form() {
+    let (static_force, kinetic_force) = (FRICTION * 300.0, FRICTION * 200.0);
+    let stiffness = MASS * OMEGA * OMEGA;
+    let a = (static_force - kinetic_force) / stiffness;
+    let amplitude = (a * a + (BELT / OMEGA).powi(2)).sqrt();
+    let slide_time = (std::f64::consts::TAU - 2.0 * (a * OMEGA / BELT).atan()) / OMEGA;
+    let stick_time = 2.0 * a / BELT;
+    let first_slip = static_force / stiffness / BELT;
+    for scheme in [Scheme::ModalExact, Scheme::CentralDifference] {
+        let mut errors = Vec::new();
+        for step in [1e-4, 5e-5, 2.5e-5] {
+            let steps = (1.5 / step) as usize;
+            let record = run(scheme, step, 300.0, 200.0, steps);
+            let changes: Vec<usize> = (1..steps).filter(|i| record.stuck[*i] != record.stuck[i - 1]).collect();
+            let at = |index: usize| step * (changes[index] + 1) as f64;
+            let largest =
+                record.position[changes[0]..].iter().fold(0.0, |a: f64, x| a.max(*x)) - kinetic_force / stiffness;
+            let found = [
+                (at(0) - first_slip) / first_slip,
+                (at(1) - at(0) - slide_time) / slide_time,
+                (at(2) - at(1) - stick_time) / stick_time,
+                (at(4) - at(2) - slide_time - stick_time) / (slide_time + stick_time),
+                (largest - amplitude) / amplitude,
+            ];
+            println!(
+                "{scheme:?} h = {step:e}: first slip, slide, stick, period, amplitude off by {}; ledger {:.1e}",
+                found.map(|error| format!("{error:.1e}")).join(", "),
+                record.residual
+            );
+            errors.push(found.iter().fold(0.0, |a: f64, e| a.max(e.abs())));
+            assert!(record.residual.abs() < 1e-12);
+        }
+        // Times are known to a step: first order.
+        assert!(errors[0] < 3e-3 && errors[2] < 0.3 * errors[0], "{errors:?}");
+    }
+}
+
+#[test]
+fn with_one_coefficient_the_block_swings_about_the_friction_force() {
+    let (step, load) = (2.5e-5, 250.0);
+    let steps = 40_000;
+    let record = run(Scheme::ModalExact, step, load, load, steps);
+    let rest = FRICTION * load / (MASS * OMEGA * OMEGA);
+    let first = record.stuck.iter().position(|stuck| !stuck).unwrap() as f64 * step;
+    assert!((first - rest / BELT).abs() < 2.0 * step, "slips at {first} s");
+    let (low, high) =
+        record.position[steps / 2..].iter().fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(*x), b.max(*x)));
+    let (middle, swing) = (0.5 * (low + high), 0.5 * (high - low));
+    println!("middle off by {:.1e}, swing by {:.1e}", middle / rest - 1.0, swing / (BELT / OMEGA) - 1.0);
+    assert!((middle / rest - 1.0).abs() < 1e-3);
+    assert!((swing / (BELT / OMEGA) - 1.0).abs() < 5e-3);
+}

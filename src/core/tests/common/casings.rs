@@ -1,0 +1,116 @@
+//! Casings through data points, and random places on them.
+
+#![allow(dead_code, reason = "each test binary uses its part")]
+
+use std::f64::consts::TAU;
+
+use tiprub_core::contact::gap::dot;
+use tiprub_core::contact::spline::{Place, SurfaceSpline};
+use tiprub_core::settings::{Closure, Interpolation};
+
+pub const RADIUS: f64 = 0.25;
+pub const EPS: f64 = f64::EPSILON;
+
+/// Random numbers that are the same everywhere.
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    pub fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next()
+    }
+
+    pub fn vector(&mut self, size: f64) -> [f64; 3] {
+        [(); 3].map(|()| self.within(-size, size))
+    }
+
+    pub fn below(&mut self, count: usize) -> usize {
+        ((self.next() * count as f64) as usize).min(count - 1)
+    }
+
+    pub fn place(&mut self, surface: &SurfaceSpline) -> Place {
+        Place { patch: [self.below(surface.around()), self.below(surface.along() - 1)], s: self.next(), t: self.next() }
+    }
+}
+
+/// Rings of a casing, unevenly spaced in z, from a radius r(θ, z).
+pub fn data(around: usize, along: usize, radius: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
+    let axial = |ring: usize| {
+        let x = ring as f64 / (along - 1) as f64;
+        -0.03 + 0.06 * (x + 0.08 * (TAU * x).sin())
+    };
+    (0..around * along)
+        .map(|index| {
+            let (angle, z) = (0.3 + TAU * (index % around) as f64 / around as f64, axial(index / around));
+            let r = radius(angle, z);
+            [r * angle.cos(), r * angle.sin(), z]
+        })
+        .collect()
+}
+
+pub type Casing = fn(f64, f64) -> f64;
+
+pub fn round(_angle: f64, _z: f64) -> f64 {
+    RADIUS
+}
+
+pub fn conical(_angle: f64, z: f64) -> f64 {
+    RADIUS - 0.3 * z
+}
+
+pub fn lobed(angle: f64, z: f64) -> f64 {
+    RADIUS - 0.2 * z - 1.5e-3 * (3.0 * angle + 10.0 * z).cos() + 2.0 * z * z
+}
+
+/// A casing with random dents of 20 µm.
+pub fn rough(around: usize, along: usize, seed: u64) -> Vec<[f64; 3]> {
+    let mut random = Random(seed);
+    let mut points = data(around, along, lobed);
+    points.iter_mut().for_each(|point| {
+        let dent = random.vector(2e-5);
+        *point = std::array::from_fn(|i| point[i] + dent[i]);
+    });
+    points
+}
+
+pub const KINDS: [(Closure, Interpolation); 3] = [
+    (Closure::Smooth, Interpolation::Spline),
+    (Closure::FreeEnds, Interpolation::Spline),
+    (Closure::Smooth, Interpolation::Facets),
+];
+pub const GRIDS: [(usize, usize); 6] = [(4, 2), (5, 3), (7, 4), (36, 5), (72, 2), (144, 9)];
+
+pub fn every_surface() -> Vec<(SurfaceSpline, Vec<[f64; 3]>)> {
+    let mut surfaces = Vec::new();
+    for (around, along) in GRIDS {
+        for (closure, interpolation) in KINDS {
+            let points = rough(around, along, 7 + around as u64);
+            surfaces.push((SurfaceSpline::new(&points, around, along, closure, interpolation).unwrap(), points));
+        }
+    }
+    surfaces
+}
+
+pub fn spline(points: &[[f64; 3]], around: usize, along: usize) -> SurfaceSpline {
+    SurfaceSpline::new(points, around, along, Closure::Smooth, Interpolation::Spline).unwrap()
+}
+
+pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let apart: [f64; 3] = std::array::from_fn(|i| a[i] - b[i]);
+    dot(apart, apart).sqrt()
+}
+
+pub fn place(p: usize, q: usize, s: f64, t: f64) -> Place {
+    Place { patch: [p, q], s, t }
+}
+
+/// The larger of two errors and an absolute bound on it, reported when it fails.
+#[track_caller]
+pub fn assert_below(name: &str, error: f64, bound: f64) {
+    println!("{name}: {error:.2e} (bound {bound:.1e})");
+    assert!(error <= bound, "{name}: {error:e} > {bound:e}");
+}

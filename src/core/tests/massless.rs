@@ -1,0 +1,137 @@
+//! Massless boundary: no impact loss, and the step limit that closed contact sets.
+
+use nalgebra::DMatrix;
+use tiprub_core::Rom;
+use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw};
+use tiprub_core::dynamics::modal::ModalModel;
+use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
+use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::stability::massless::MasslessCheck;
+use tiprub_core::system::{System, SystemSettings};
+
+/// The bars of N. J. Carpenter, R. L. Taylor, M. G. Katona, Int. J. Numer. Methods Eng. 32 (1991): half of the
+/// symmetric problem, a bar that hits a rigid wall.
+const YOUNG: f64 = 206.8e9;
+const DENSITY: f64 = 7844.066;
+const AREA: f64 = 6.4516e-4;
+const LENGTH: f64 = 0.254;
+const SPEED: f64 = 5.13588;
+const GAP: f64 = 0.508e-3 / 2.0;
+
+/// `end_mass`: share of its lumped mass that the node at the wall keeps. `clamped`: the far end is held.
+fn bar(elements: usize, end_mass: f64, clamped: bool) -> ModalModel {
+    let size = LENGTH / elements as f64;
+    let (stiffness, mass) = (YOUNG * AREA / size, DENSITY * AREA * size);
+    let nodes = elements + 1;
+    let (mut k, mut m) = (DMatrix::zeros(nodes, nodes), DMatrix::zeros(nodes, nodes));
+    for element in 0..elements {
+        for (i, j, sign) in [(0, 0, 1.0), (1, 1, 1.0), (0, 1, -1.0), (1, 0, -1.0)] {
+            k[(element + i, element + j)] += sign * stiffness;
+        }
+        m[(element, element)] += mass / 2.0;
+        m[(element + 1, element + 1)] += mass / 2.0;
+    }
+    m[(elements, elements)] *= end_mass;
+    let mut map = DMatrix::zeros(3, nodes);
+    map[(0, elements)] = 1.0;
+    let first = usize::from(clamped);
+    let (k, m) = [k, m].map(|matrix| matrix.view((first, first), (nodes - first, nodes - first)).into_owned()).into();
+    let map = map.columns(first, nodes - first).into_owned();
+    let rom = Rom {
+        name: "bar".into(),
+        origin: "linear rod elements, lumped mass".into(),
+        sectors: 1,
+        frame: Frame::Cartesian,
+        mass: m,
+        stiffness: k,
+        damping_ratio: 0.0,
+        contact_map: map,
+        contact_nodes: vec![ContactNode { name: "end".into(), position: [0.0; 3], meridional_slope: 0.0 }],
+        checks: RomChecks::default(),
+        extras: RomExtras::default(),
+    };
+    ModalModel { quasi_static: 1, ..ModalModel::from_rom(&rom, 0.0).unwrap() }
+}
+
+fn system(model: &ModalModel, scheme: Scheme, step: f64) -> System {
+    let law = GapLaw::Fixed(FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![GAP], sliding: vec![[0.0; 3]] });
+    let settings = SystemSettings { scheme, solver: Solver::Lcp, friction: 0.0, ledger: true };
+    let mut system = System::new(model, 1, law, settings);
+    system.set_step(step);
+    system
+}
+
+#[test]
+fn a_bar_bounces_off_without_impact_loss() {
+    // With 1e-4 of its mass one mode stands for the flexibility of the end node alone.
+    for (scheme, end_mass, losses) in
+        [(Scheme::MasslessBoundary, 1e-4, [0.0, 1e-3]), (Scheme::ModalExact, 1.0, [5e-3, 0.02])]
+    {
+        let model = bar(40, end_mass, false);
+        let step = 1e-7;
+        let mut system = system(&model, scheme, step);
+        // Rigid translation at SPEED: mode 0.
+        let total = DENSITY * AREA * (LENGTH - 0.5 * LENGTH / 40.0 * (1.0 - end_mass));
+        system.bank_mut().set_modal_state(0, 0, 0.0, SPEED * total.sqrt());
+        system.start(&Drive::default());
+        let before = system.energies();
+        let (mut impulse, mut touched, mut released) = (0.0, f64::NAN, 0.0);
+        for index in 1..=3000 {
+            system.step(&Drive::default()).unwrap();
+            let force: f64 = system.events().iter().map(|event| event.normal).sum();
+            impulse += force * step;
+            if force > 0.0 {
+                released = f64::from(index) * step;
+                if touched.is_nan() {
+                    touched = released;
+                }
+            }
+        }
+        let (kinetic, strain) = system.energies();
+        let loss = 1.0 - (kinetic + strain) / (before.0 + before.1);
+        println!(
+            "{scheme:?}: impulse {impulse:.4} N.s, contact {:.2} to {:.2} us, loss {loss:.2e}, booked {:.2e}, ledger {:.1e}",
+            touched * 1e6,
+            released * 1e6,
+            system.ledger().impact_loss.value() / (before.0 + before.1),
+            system.ledger().residual(kinetic + strain) / (before.0 + before.1)
+        );
+        // Exact: touch at 49.46, release at 148.39 us, impulse 13.203 N.s (the article's closed form).
+        assert!((touched - 49.46e-6).abs() < 0.3e-6 && (released - 148.39e-6).abs() < 3e-6);
+        assert!((impulse - 13.203).abs() < 0.02 * 13.203);
+        assert!((losses[0]..losses[1]).contains(&loss), "{loss:e}");
+        assert!((system.ledger().residual(kinetic + strain) / (before.0 + before.1)).abs() < 1e-12);
+    }
+}
+
+/// Above the limit that is computed closed contact grows without bound, below it stays.
+#[test]
+fn closed_contact_is_stable_up_to_the_limit_and_not_beyond() {
+    let model = bar(12, 1e-4, true);
+    let check = MasslessCheck { model: &model, normals: vec![[-1.0, 0.0, 0.0]], slave: None };
+    let limit = check.limit(1.0).unwrap();
+    let largest = |factor: f64| {
+        let law = FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![-1e-4], sliding: vec![[0.0; 3]] };
+        let settings =
+            SystemSettings { scheme: Scheme::MasslessBoundary, solver: Solver::Lcp, friction: 0.0, ledger: true };
+        // Pressed onto the wall by the clamped end for good.
+        let mut pressed = System::new(&model, 1, GapLaw::Fixed(law), settings);
+        pressed.set_step(factor * limit);
+        pressed.start(&Drive::default());
+        let mut most: f64 = 0.0;
+        for _ in 0..400 {
+            if pressed.step(&Drive::default()).is_err() {
+                return f64::INFINITY;
+            }
+            let (kinetic, strain) = pressed.energies();
+            most = most.max((kinetic + strain).abs());
+        }
+        most
+    };
+    let (stable, unstable) = (largest(0.95), largest(1.1));
+    println!(
+        "limit {limit:.3e} s, {:.2} of 2/ω_max; energy {stable:.1e} J below, {unstable:.1e} J above",
+        limit * model.largest_frequency() / 2.0
+    );
+    assert!(unstable > 1e3 * stable);
+}

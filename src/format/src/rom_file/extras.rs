@@ -1,0 +1,108 @@
+//! What only some structures have: spin, heat, contact grid. Files without it are those of the first release.
+
+use nalgebra::DMatrix;
+use tiprub_core::rom::{ContactGrid, Patch, RomExtras, Spin, Thermal};
+
+use super::{Array, Arrays, Metadata, Reader, WRITE_AGAIN, list, matrix};
+use crate::Result;
+use crate::rom_layout::{SPIN_ARRAYS, THERMAL_ARRAYS};
+
+impl Reader<'_> {
+    pub(super) fn extras(&self, arrays: &Arrays, metadata: &Metadata, order: usize) -> Result<RomExtras> {
+        Ok(RomExtras {
+            spin: self.spin(arrays, metadata, order)?,
+            thermal: self.thermal(arrays, order)?,
+            grid: self.grid(metadata)?,
+        })
+    }
+
+    /// Whether the arrays of a group are there: all or none.
+    fn group(&self, arrays: &Arrays, names: &[&str]) -> Result<bool> {
+        let Some(given) = names.iter().find(|name| arrays.contains_key(**name)) else { return Ok(false) };
+        match names.iter().find(|name| !arrays.contains_key(**name)) {
+            None => Ok(true),
+            Some(missing) => {
+                let list = names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+                let problem = format!("missing, although `{given}` is there");
+                Err(self.error(format!("array `{missing}`"), problem, format!("Give all of {list}, or none of them")))
+            }
+        }
+    }
+
+    fn spin(&self, arrays: &Arrays, metadata: &Metadata, order: usize) -> Result<Option<Spin>> {
+        if !self.group(arrays, &SPIN_ARRAYS)? {
+            if metadata.contains_key("largest_speed") {
+                let problem = format!("given without the array `{}`", SPIN_ARRAYS[0]);
+                let remedy = "Remove the entry, or add the spin arrays";
+                return Err(self.error("metadata `largest_speed`", problem, remedy));
+            }
+            return Ok(None);
+        }
+        let square = |name: &str| {
+            let array = self.required(arrays, name, 2)?;
+            self.shape(name, array, &[order, order], "that of `mass`")?;
+            Ok(DMatrix::from_row_slice(order, order, &array.values))
+        };
+        let load = self.required(arrays, "centrifugal_load", 1)?;
+        self.shape("centrifugal_load", load, &[order], "coordinates as in `mass`")?;
+        Ok(Some(Spin {
+            stiffness_speed2: square("stiffness_speed2")?,
+            stiffness_speed4: square("stiffness_speed4")?,
+            coriolis: square("coriolis")?,
+            centrifugal_load: load.values.clone(),
+            largest_speed: self.number(metadata, "largest_speed")?,
+        }))
+    }
+
+    fn thermal(&self, arrays: &Arrays, order: usize) -> Result<Option<Thermal>> {
+        if !self.group(arrays, &THERMAL_ARRAYS)? {
+            return Ok(None);
+        }
+        let places = self.required(arrays, "thermal_patches", 2)?;
+        let count = places.shape[0];
+        self.shape("thermal_patches", places, &[count, 4], "two angles and two axial positions per patch")?;
+        let loads = self.required(arrays, "thermal_loads", 2)?;
+        let reason = "coordinates as in `mass`, patches as in `thermal_patches`";
+        self.shape("thermal_loads", loads, &[order, count], reason)?;
+        let (places, _) = places.values.as_chunks::<4>();
+        let patch = |&[from, to, low, high]: &[f64; 4]| Patch { angle: [from, to], axial: [low, high] };
+        let loads = DMatrix::from_row_slice(order, count, &loads.values);
+        Ok(Some(Thermal { loads, patches: places.iter().map(patch).collect() }))
+    }
+
+    fn grid(&self, metadata: &Metadata) -> Result<Option<ContactGrid>> {
+        let Some(text) = metadata.get("contact_grid") else { return Ok(None) };
+        let numbers = text.split_once(',').map(|(around, along)| (around.trim().parse(), along.trim().parse()));
+        let Some((Ok(around), Ok(along))) = numbers else {
+            let problem = format!("{text:?} is not two whole numbers with a comma between them");
+            return Err(self.error("metadata `contact_grid`", problem, WRITE_AGAIN));
+        };
+        Ok(Some(ContactGrid { around, along }))
+    }
+}
+
+pub(super) fn arrays(extras: &RomExtras) -> Vec<(&'static str, Array)> {
+    let mut arrays = Vec::new();
+    if let Some(spin) = &extras.spin {
+        arrays.extend([
+            ("stiffness_speed2", matrix(&spin.stiffness_speed2)),
+            ("stiffness_speed4", matrix(&spin.stiffness_speed4)),
+            ("coriolis", matrix(&spin.coriolis)),
+            ("centrifugal_load", list(spin.centrifugal_load.clone(), vec![spin.centrifugal_load.len()])),
+        ]);
+    }
+    if let Some(thermal) = &extras.thermal {
+        let places = thermal.patches.iter().flat_map(|patch| patch.angle.into_iter().chain(patch.axial)).collect();
+        arrays.extend([
+            ("thermal_loads", matrix(&thermal.loads)),
+            ("thermal_patches", list(places, vec![thermal.patches.len(), 4])),
+        ]);
+    }
+    arrays
+}
+
+pub(super) fn metadata(extras: &RomExtras) -> Vec<(&'static str, String)> {
+    let speed = extras.spin.as_ref().map(|spin| ("largest_speed", spin.largest_speed.to_string()));
+    let grid = extras.grid.map(|grid| ("contact_grid", format!("{},{}", grid.around, grid.along)));
+    speed.into_iter().chain(grid).collect()
+}

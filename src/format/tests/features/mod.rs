@@ -1,0 +1,42 @@
+//! A scene that uses what most scenes leave off.
+
+use tiprub_core::settings::*;
+
+use crate::common::complete_scene;
+
+/// What `complete_scene` leaves at its default: a coated flexible casing around a spinning, mistuned rotor.
+pub fn scene_with_every_feature() -> SceneSettings {
+    let mut scene = complete_scene();
+    let rotor = &mut scene.structures[0];
+    rotor.spin = SpinSettings { stiffening: true, growth: true, coriolis: true };
+    (rotor.whirl, rotor.axial_shift, rotor.frequency_factors) = (true, true, vec![0.99, 1.01]);
+    scene.structures.push(StructureSettings {
+        name: "ring".into(),
+        rom: "ring.rom.safetensors".into(),
+        motion: Motion::Still,
+        thermal: true,
+        load: Some(LoadSettings { order: 2, amplitude: 100.0, phase: -0.0 }),
+        ..StructureSettings::default()
+    });
+    let surface = &mut scene.surfaces[0];
+    surface.structure = Some("ring".into());
+    surface.spline =
+        Some(SplineSettings { around: 90, along: 6, closure: Closure::FreeEnds, interpolation: Interpolation::Facets });
+    surface.patches = Some(PatchSettings { around: 8, along: 2 });
+    scene.contacts[0].coating = Some(coating());
+    scene.contacts[0].heat_to_slave = Some(0.4);
+    (scene.outputs.wear, scene.outputs.slave_displacement) = (true, true);
+    scene
+}
+
+/// A coating with values of its own.
+fn coating() -> CoatingSettings {
+    CoatingSettings {
+        thickness: 5e-3,
+        modulus: 1e9,
+        yield_stress: 1e7,
+        hardening: 1e8,
+        cells_around: 1000,
+        cells_along: 20,
+    }
+}

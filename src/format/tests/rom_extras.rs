@@ -1,0 +1,249 @@
+//! What only some ROM files hold: spin, heat, contact grid.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DMatrix;
+use proptest::prelude::*;
+use sha2::{Digest, Sha256};
+use tiprub_core::Rom;
+use tiprub_core::rom::{ContactGrid, ContactNode, Frame, Patch, RomChecks, RomExtras, Spin, Thermal};
+use tiprub_format::{read_rom, write_rom};
+
+const AROUND: usize = 6;
+const ALONG: usize = 2;
+
+/// A ring of 6 x 2 contact nodes with `order` coordinates; `value` gives its numbers one by one.
+fn ring(order: usize, value: &mut dyn FnMut() -> f64) -> Rom {
+    let nodes = AROUND * ALONG;
+    let node = |index: usize| ContactNode {
+        name: format!("n{index}"),
+        position: [
+            0.25,
+            (index % AROUND) as f64 * std::f64::consts::TAU / AROUND as f64,
+            (index / AROUND) as f64 * 0.02,
+        ],
+        meridional_slope: 0.0,
+    };
+    Rom {
+        name: "ring".into(),
+        origin: "by hand".into(),
+        sectors: 1,
+        frame: Frame::Cylindrical,
+        mass: DMatrix::identity(order, order),
+        stiffness: DMatrix::identity(order, order) * 1e6,
+        damping_ratio: 0.001,
+        contact_map: DMatrix::from_fn(3 * nodes, order, |_, _| value()),
+        contact_nodes: (0..nodes).map(node).collect(),
+        checks: RomChecks::default(),
+        extras: RomExtras::default(),
+    }
+}
+
+fn spin(order: usize, value: &mut dyn FnMut() -> f64) -> Spin {
+    let mut square = |sign: f64| {
+        let matrix = DMatrix::from_fn(order, order, |_, _| value());
+        (&matrix + matrix.transpose() * sign) * 0.5
+    };
+    Spin {
+        stiffness_speed2: square(1.0),
+        stiffness_speed4: square(1.0) * 1e-9,
+        coriolis: square(-1.0),
+        centrifugal_load: (0..order).map(|_| value()).collect(),
+        largest_speed: 1800.0 + value(),
+    }
+}
+
+fn thermal(order: usize, patches: usize, value: &mut dyn FnMut() -> f64) -> Thermal {
+    let patch = |value: &mut dyn FnMut() -> f64| {
+        let (angle, axial) = (value(), value());
+        Patch { angle: [angle, angle + 1.0 + value()], axial: [axial, axial + 1.0 + value().abs()] }
+    };
+    Thermal {
+        loads: DMatrix::from_fn(order, patches, |_, _| value()),
+        patches: (0..patches).map(|_| patch(value)).collect(),
+    }
+}
+
+/// Numbers in (-1, 1), one after the other.
+fn numbers(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        f64::from(u32::try_from(state >> 32).unwrap()) / f64::from(u32::MAX) * 1.999 - 0.9995
+    }
+}
+
+fn complete(seed: u64, order: usize, patches: usize) -> Rom {
+    let mut value = numbers(seed);
+    let mut rom = ring(order, &mut value);
+    rom.extras.spin = Some(spin(order, &mut value));
+    rom.extras.thermal = Some(thermal(order, patches, &mut value));
+    rom.extras.grid = Some(ContactGrid { around: AROUND, along: ALONG });
+    rom
+}
+
+proptest! {
+    #[test]
+    fn extras_survive_writing_and_reading_bit_for_bit(
+        seed in 0..u64::MAX / 2, order in 1..7usize, patches in 1..5usize, has in prop::array::uniform3(any::<bool>()),
+    ) {
+        let mut rom = complete(seed, order, patches);
+        let RomExtras { spin, thermal, grid } = rom.extras;
+        rom.extras = RomExtras {
+            spin: spin.filter(|_| has[0]), thermal: thermal.filter(|_| has[1]), grid: grid.filter(|_| has[2]),
+        };
+        let bytes = write_rom(&rom);
+        let again = read_rom(&bytes, "rom").unwrap();
+        prop_assert_eq!(&again, &rom);
+        prop_assert_eq!(write_rom(&again), bytes);
+    }
+}
+
+/// Written by the release before there were extras.
+#[test]
+fn a_file_without_extras_is_what_it_always_was() {
+    let mut value = numbers(5);
+    let bytes = write_rom(&ring(3, &mut value));
+    let digest: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+    assert_eq!(
+        (bytes.len(), digest.as_str()),
+        (2392, "d97baeef343c74d1d34917d6b55eb51abd1011bf1a3b2eb47abda1920d904261")
+    );
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    for name in ["stiffness_speed2", "coriolis", "centrifugal", "thermal", "largest_speed", "contact_grid"] {
+        assert!(!text.contains(name), "{name}");
+    }
+}
+
+#[test]
+fn units_are_listed_for_the_arrays_in_the_file() {
+    let units = |rom: &Rom| {
+        let bytes = write_rom(rom);
+        let (_, header) = safetensors::SafeTensors::read_metadata(&bytes).unwrap();
+        header.metadata().as_ref().unwrap()["units"].clone()
+    };
+    let mut rom = complete(3, 2, 2);
+    assert!(units(&rom).contains("\nstiffness_speed4 [n, n]: kg s^2\n"), "{}", units(&rom));
+    assert!(units(&rom).ends_with("\nthermal_patches [patches, 4]: rad, rad, m, m"), "{}", units(&rom));
+    rom.extras.spin = None;
+    assert!(units(&rom).contains("thermal_loads") && !units(&rom).contains("speed"), "{}", units(&rom));
+}
+
+/// The file as arrays and entries that a test may change before it is written again, without checksum.
+struct Loose {
+    arrays: BTreeMap<String, (Vec<usize>, Vec<f64>)>,
+    entries: BTreeMap<String, String>,
+}
+
+impl Loose {
+    fn new() -> Self {
+        let bytes = write_rom(&complete(9, 2, 2));
+        let (_, header) = safetensors::SafeTensors::read_metadata(&bytes).unwrap();
+        let mut entries: BTreeMap<_, _> = header.metadata().clone().unwrap().into_iter().collect();
+        entries.remove("checksum");
+        let container = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+        let values = |data: &[u8]| data.as_chunks::<8>().0.iter().map(|word| f64::from_le_bytes(*word)).collect();
+        let array = |(name, view): (String, safetensors::tensor::TensorView)| {
+            (name, (view.shape().to_vec(), values(view.data())))
+        };
+        Self { arrays: container.tensors().into_iter().map(array).collect(), entries }
+    }
+
+    fn array(&mut self, name: &str) -> &mut (Vec<usize>, Vec<f64>) {
+        self.arrays.get_mut(name).unwrap()
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        let mut header = serde_json::Map::from_iter([("__metadata__".to_owned(), serde_json::json!(self.entries))]);
+        let mut data: Vec<u8> = Vec::new();
+        for (name, (shape, values)) in &self.arrays {
+            let start = data.len();
+            data.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+            let entry = serde_json::json!({"dtype": "F64", "shape": shape, "data_offsets": [start, data.len()]});
+            header.insert(name.clone(), entry);
+        }
+        let header = serde_json::Value::Object(header).to_string();
+        [u64::try_from(header.len()).unwrap().to_le_bytes().as_slice(), header.as_bytes(), &data].concat()
+    }
+}
+
+#[track_caller]
+fn refused(change: impl FnOnce(&mut Loose), parts: &[&str]) {
+    let mut file = Loose::new();
+    assert_eq!(read_rom(&file.bytes(), "ring.rom").unwrap(), complete(9, 2, 2));
+    change(&mut file);
+    let message = read_rom(&file.bytes(), "ring.rom").unwrap_err().to_string();
+    for part in ["ring.rom: "].iter().chain(parts) {
+        assert!(message.contains(part), "{part:?} is not in {message:?}");
+    }
+}
+
+#[test]
+fn groups_of_arrays_are_all_there_or_none() {
+    for name in ["stiffness_speed2", "stiffness_speed4", "coriolis", "centrifugal_load"] {
+        let missing = format!("array `{name}`: missing, although `");
+        refused(|file| drop(file.arrays.remove(name)), &[&missing, "Give all of `stiffness_speed2`, "]);
+    }
+    for (name, other) in [("thermal_loads", "thermal_patches"), ("thermal_patches", "thermal_loads")] {
+        let missing = format!("array `{name}`: missing, although `{other}` is there");
+        refused(|file| drop(file.arrays.remove(name)), &[&missing]);
+    }
+    refused(|file| drop(file.entries.remove("largest_speed")), &["metadata `largest_speed`: missing", "(rad/s)"]);
+    let without = |file: &mut Loose| file.arrays.retain(|name, _| !name.contains("speed") && !name.starts_with('c'));
+    refused(
+        |file| {
+            let kept = ["contact_map", "contact_positions", "contact_meridional_slopes"];
+            let kept = kept.map(|name| (name.to_owned(), file.arrays[name].clone()));
+            without(file);
+            file.arrays.extend(kept);
+        },
+        &["metadata `largest_speed`: given without the array `stiffness_speed2`"],
+    );
+}
+
+#[test]
+fn wrong_shapes_are_refused_by_name() {
+    for name in ["stiffness_speed2", "stiffness_speed4", "coriolis"] {
+        let shape = format!("array `{name}`: shape [4, 1] found, [2, 2] expected");
+        refused(|file| file.array(name).0 = vec![4, 1], &[&shape]);
+        let dimensions = format!("array `{name}`: shape [4] found, [n, n] expected");
+        refused(|file| file.array(name).0 = vec![4], &[&dimensions]);
+    }
+    let parts = ["array `centrifugal_load`: shape [2, 1] found, [n] expected"];
+    refused(|file| file.array("centrifugal_load").0 = vec![2, 1], &parts);
+    let parts = ["array `thermal_patches`: shape [4, 2] found, [4, 4] expected", "two angles and two axial"];
+    refused(|file| file.array("thermal_patches").0 = vec![4, 2], &parts);
+    let parts = ["array `thermal_loads`: shape [1, 4] found, [2, 2] expected"];
+    refused(|file| file.array("thermal_loads").0 = vec![1, 4], &parts);
+    refused(|file| drop(file.arrays.insert("thermal_load".into(), (vec![1], vec![0.0]))), &["`thermal_loads`?"]);
+}
+
+#[test]
+fn values_that_cannot_be_are_refused() {
+    refused(|file| file.array("stiffness_speed2").1[1] += 1.0, &["array `stiffness_speed2`: not symmetric"]);
+    refused(|file| file.array("coriolis").1[0] += 1.0, &["array `coriolis`: not skew-symmetric"]);
+    refused(|file| file.array("centrifugal_load").1[0] = f64::NAN, &["array `centrifugal_load`"]);
+    refused(|file| file.array("thermal_loads").1[0] = f64::INFINITY, &["array `thermal_loads`"]);
+    refused(|file| file.array("thermal_patches").1[5] = -9.0, &["array `thermal_patches`, patch 2", "are no patch"]);
+    for speed in ["0", "-1", "inf", "NaN"] {
+        let change = |file: &mut Loose| drop(file.entries.insert("largest_speed".into(), speed.into()));
+        refused(change, &["ROM metadata `largest_speed`", "not a finite speed > 0"]);
+    }
+    let entry = |name: &'static str, text: &'static str| {
+        move |file: &mut Loose| drop(file.entries.insert(name.into(), text.into()))
+    };
+    refused(entry("largest_speed", "fast"), &["metadata `largest_speed`: \"fast\" is not such a number"]);
+    for text in ["", "6", "6,2,1", "6x2", "-6,2", "6.0,2", "99999999999999999999,2"] {
+        refused(entry("contact_grid", text), &["metadata `contact_grid`", "is not two whole numbers with a comma"]);
+    }
+    refused(entry("contact_grid", "2,6"), &["metadata `contact_grid`: 2 around x 6 along"]);
+    refused(entry("contact_grid", "18446744073709551615,2"), &["metadata `contact_grid`"]);
+    refused(entry("contact_grid", "4,3"), &["metadata `contact_grid`", "is not at its place of the grid"]);
+    refused(entry("sectors", "3"), &["metadata `contact_grid`", "one sector"]);
+    let spaces = |file: &mut Loose| drop(file.entries.insert("contact_grid".into(), " 6 , 2 ".into()));
+    let mut file = Loose::new();
+    spaces(&mut file);
+    assert_eq!(read_rom(&file.bytes(), "ring").unwrap().extras.grid, Some(ContactGrid { around: 6, along: 2 }));
+}
