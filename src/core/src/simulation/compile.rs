@@ -445,7 +445,7 @@ impl Simulation {
                 deepest.1,
                 deepest.0 % lanes + 1
             ),
-            "Enlarge the gap, let the casing shape grow in with ramp_time (casing_ramp_time), or start at another rotor angle",
+            "Enlarge the gap, let the casing shape grow in with ramp_time (casing_ramp_time), start at another rotor angle, or start with smaller loads on casing and rotor",
         ))
     }
 }
