@@ -5,6 +5,8 @@
 //! the displacements of the contact rows and adds up the damping loss while a chunk is in registers; no horizontal
 //! sum occurs. Contact forces are then applied to the few sectors that touch.
 
+mod coefficients;
+mod correction;
 mod coupling;
 mod predict;
 
@@ -12,11 +14,11 @@ use nalgebra::DMatrix;
 
 use super::dispatch::InstructionSet;
 use super::modal::{ModalModel, ModalSpin};
-use super::scheme::{ModeCoefficients, free_increment, resample};
+use super::scheme::{ModeCoefficients, free_increment};
 use crate::persist::{Persist, Reader, Writer, persist_fields};
 use crate::settings::Scheme;
 use coupling::Coupling;
-use predict::{Accumulate, ModalForce, Predict};
+use predict::Predict;
 
 /// Lanes of one chunk: one 512-bit register of f64.
 pub const LANES: usize = 8;
@@ -311,104 +313,6 @@ impl ModalBank {
         }
     }
 
-    /// New step size: coefficients and flexibility. The state is not touched (see [`ModalBank::resample`]).
-    pub fn set_step(&mut self, scheme: Scheme, step: f64) {
-        (self.scheme, self.step) = (scheme, step);
-        let modes = self.modes();
-        for (index, coefficients) in self.coefficients.iter_mut().enumerate() {
-            let factor = self.options.frequency_factors.get(index / modes).copied().unwrap_or(1.0);
-            *coefficients = self.model.coefficient(index % modes, factor, scheme, step);
-        }
-        if !self.lane_coefficients.is_empty() {
-            self.spread_coefficients();
-        }
-        self.refresh_coupling();
-    }
-
-    fn spread_coefficients(&mut self) {
-        for sector in 0..self.sectors {
-            for mode in 0..self.modes() {
-                let k = self.coefficients(sector)[mode];
-                let lane = LaneCoefficients { beta: k.beta, kappa: k.kappa, load: k.load_compliance(), loss: k.loss };
-                let index = self.index(mode, sector);
-                self.lane_coefficients[index] = lane;
-            }
-        }
-    }
-
-    fn refresh_coupling(&mut self) {
-        if let Some(coupling) = &mut self.coupling {
-            let dynamic = self.model.dynamic_modes(self.scheme);
-            coupling.refresh(self.state.speed, self.step, dynamic, &self.coefficients);
-        }
-        for set in 0..self.flexibility.len() {
-            self.fill_flexibility(set);
-        }
-    }
-
-    fn fill_flexibility(&mut self, set: usize) {
-        let (modes, rows) = (self.modes(), self.rows);
-        for column in 0..rows {
-            for mode in 0..modes {
-                let compliance = self.coefficients[set * modes + mode].compliance;
-                self.correction[mode] = compliance * self.contact_modes[mode * rows + column];
-            }
-            if let Some(coupling) = &mut self.coupling {
-                coupling.transform(set, &mut self.correction);
-            }
-            for row in 0..rows {
-                let terms = self.correction.iter().enumerate();
-                let sum = terms.map(|(mode, value)| self.contact_modes[mode * rows + row] * value).sum();
-                self.flexibility[set][(row, column)] = sum;
-            }
-        }
-    }
-
-    /// Follow the speed of the rotor (rad/s) where modes are coupled by it; only between steps. Returns the change of
-    /// strain energy (J), which is work of the shaft.
-    pub fn set_speed(&mut self, speed: f64) -> f64 {
-        let Some(coupling) = &self.coupling else { return 0.0 };
-        if coupling.speed().to_bits() == speed.to_bits() {
-            return 0.0;
-        }
-        let before = self.energies().1;
-        self.state.speed = speed;
-        self.refresh_coupling();
-        self.energies().1 - before
-    }
-
-    /// Modal damping ratio of all modes (takes effect with the next [`ModalBank::set_step`]).
-    pub fn set_damping_ratio(&mut self, damping_ratio: f64) {
-        self.model.damping_ratios.fill(damping_ratio);
-    }
-
-    /// Carry the state from the step size in use to `new_step`, each sector under its last contact force
-    /// (`forces[row · lanes + sector]`, N; none for an empty slice) and the modal loads, then use the new coefficients.
-    pub fn resample(&mut self, scheme: Scheme, new_step: f64, forces: &[f64]) {
-        let lanes = self.lanes();
-        let dynamic = self.model.dynamic_modes(self.scheme);
-        for sector in 0..self.sectors {
-            for mode in 0..dynamic {
-                let shapes = &self.contact_modes[mode * self.rows..][..self.rows];
-                let rows = shapes.iter().enumerate().filter(|(row, _)| row * lanes + sector < forces.len());
-                let contact: f64 = rows.map(|(row, shape)| shape * forces[row * lanes + sector]).sum();
-                let force = contact + self.state.push_before.get(mode).copied().unwrap_or(0.0);
-                let index = self.index(mode, sector);
-                self.state.increment[index] = resample(
-                    self.frequency(mode, sector),
-                    self.model.damping_ratios[mode],
-                    self.state.position[index],
-                    self.state.increment[index],
-                    force,
-                    self.step,
-                    new_step,
-                );
-            }
-        }
-        self.set_step(scheme, new_step);
-        self.recover();
-    }
-
     /// Modal loads of the next step (for every sector), to be set before [`ModalBank::predict`].
     pub fn loads_mut(&mut self) -> &mut [f64] {
         &mut self.push
@@ -452,167 +356,6 @@ impl ModalBank {
             self.move_rows(sector);
         }
         self.coupling = Some(coupling);
-    }
-
-    /// Add `correction` to the modes of one sector.
-    fn move_modes(&mut self, sector: usize, with_loss: bool) {
-        let correction = std::mem::take(&mut self.correction);
-        self.move_each(sector, with_loss, correction.iter(), |_, correction| *correction);
-        self.correction = correction;
-    }
-
-    /// Add c φᵀf to the modes of one sector.
-    fn respond_and_move(&mut self, sector: usize, with_loss: bool) {
-        let modal_force = std::mem::take(&mut self.modal_force);
-        self.move_each(sector, with_loss, modal_force.iter(), |k, force| k.compliance * force);
-        self.modal_force = modal_force;
-    }
-
-    #[inline(always)]
-    fn move_each<'a>(
-        &mut self,
-        sector: usize,
-        with_loss: bool,
-        values: impl Iterator<Item = &'a f64>,
-        correction: impl Fn(&ModeCoefficients, &f64) -> f64,
-    ) {
-        let (modes, width, set) = (self.modes(), self.width, self.set_of(sector));
-        let coefficients = &self.coefficients[set * modes..][..modes];
-        let (block, lane) = (sector / width * modes * width, sector % width);
-        let position = self.state.position[block..][..modes * width].chunks_exact_mut(width);
-        let increment = self.state.increment[block..][..modes * width].chunks_exact_mut(width);
-        let before = self.increment_before[block..][..modes * width].chunks_exact(width);
-        let mut loss = 0.0;
-        for ((((position, increment), before), value), coefficients) in
-            position.zip(increment).zip(before).zip(values).zip(coefficients)
-        {
-            let correction = correction(coefficients, value);
-            if with_loss {
-                let predicted = increment[lane] + before[lane];
-                loss += coefficients.loss * correction * (2.0 * predicted + correction);
-            }
-            position[lane] += correction;
-            increment[lane] += correction;
-        }
-        self.state.loss[sector] += loss;
-    }
-
-    /// Add the displacement of the contact rows by `correction`.
-    fn move_rows(&mut self, sector: usize) {
-        let lanes = self.lanes();
-        if lanes == 1 {
-            let (sums, matrix) = (&mut self.state.displacement, &self.contact_modes);
-            self.instruction_set.run(Accumulate { sums, matrix, values: &self.correction });
-            return;
-        }
-        for (shapes, correction) in self.contact_modes.chunks_exact(self.rows.max(1)).zip(&self.correction) {
-            for (row, shape) in shapes.iter().enumerate() {
-                self.state.displacement[row * lanes + sector] += shape * correction;
-            }
-        }
-    }
-
-    /// φᵀf of one sector, for the force on its rows (N), into the scratch `modal_force`.
-    fn project(&mut self, force: &[f64]) {
-        let (modal_force, contact_rows) = (&mut self.modal_force, &self.contact_rows);
-        self.instruction_set.run(ModalForce { modal_force, contact_rows, force });
-    }
-
-    /// Correct one sector for the contact `force` on its rows (N), eq. 11 of the paper.
-    pub fn correct(&mut self, sector: usize, force: &[f64], with_loss: bool) {
-        self.project(force);
-        if self.coupling.is_some() {
-            self.respond(sector);
-            self.move_modes(sector, with_loss);
-        } else {
-            self.respond_and_move(sector, with_loss);
-        }
-        let lanes = self.lanes();
-        let flexibility = self.flexibility[self.set_of(sector)].as_slice();
-        self.moved.fill(0.0);
-        for (column, value) in flexibility.chunks_exact(self.rows).zip(force) {
-            for (moved, entry) in self.moved.iter_mut().zip(column) {
-                *moved += entry * value;
-            }
-        }
-        for (row, moved) in self.state.displacement.chunks_exact_mut(lanes).zip(&self.moved) {
-            row[sector] += moved;
-        }
-    }
-
-    /// Displacement of the contact rows of a single structure by contact forces given as modal forces (m).
-    pub fn response_to_modal(&mut self, modal_force: &[f64], displacement: &mut [f64]) {
-        self.modal_force.copy_from_slice(modal_force);
-        self.respond(0);
-        displacement.fill(0.0);
-        let (matrix, values) = (&self.contact_modes[..], &self.correction[..]);
-        self.instruction_set.run(Accumulate { sums: displacement, matrix, values });
-    }
-
-    /// Correct a single structure for contact forces given as modal forces, with the response of its rows to them.
-    pub fn correct_modal(&mut self, modal_force: &[f64], response: &[f64], with_loss: bool) {
-        self.modal_force.copy_from_slice(modal_force);
-        self.respond(0);
-        self.move_modes(0, with_loss);
-        for (displacement, response) in self.state.displacement.iter_mut().zip(response) {
-            *displacement += response;
-        }
-    }
-
-    /// `correction` ← T c φᵀf.
-    fn respond(&mut self, sector: usize) {
-        let (modes, set) = (self.modes(), self.set_of(sector));
-        let coefficients = &self.coefficients[set * modes..][..modes];
-        for ((correction, force), k) in self.correction.iter_mut().zip(&self.modal_force).zip(coefficients) {
-            *correction = k.compliance * force;
-        }
-        if let Some(coupling) = &mut self.coupling {
-            coupling.transform(set, &mut self.correction);
-        }
-    }
-
-    /// Let contact forces found in the step before act on one sector (massless-boundary), after the prediction.
-    pub fn act_delayed(&mut self, sector: usize, force: &[f64], with_loss: bool) {
-        self.project(force);
-        self.act_delayed_modal_force(sector, with_loss);
-    }
-
-    /// The same for modal forces.
-    pub fn act_delayed_modal(&mut self, sector: usize, modal_force: &[f64], with_loss: bool) {
-        self.modal_force.copy_from_slice(modal_force);
-        self.act_delayed_modal_force(sector, with_loss);
-    }
-
-    fn act_delayed_modal_force(&mut self, sector: usize, with_loss: bool) {
-        let (modes, set) = (self.modes(), self.set_of(sector));
-        let coefficients = &self.coefficients[set * modes..][..modes];
-        for ((correction, force), k) in self.correction.iter_mut().zip(&self.modal_force).zip(coefficients) {
-            *correction = k.delayed * force;
-        }
-        self.move_modes(sector, with_loss);
-        self.move_rows(sector);
-    }
-
-    /// Work of the modal loads over the step just done (J), once contact has corrected it. A quasi-static mode
-    /// follows the load of its own instant, so that over this step the load before did the work.
-    pub fn finish_loads(&mut self) -> f64 {
-        if !self.options.loads {
-            return 0.0;
-        }
-        let mut work = 0.0;
-        for mode in 0..self.modes() {
-            let dynamic = mode < self.model.dynamic_modes(self.scheme);
-            let load = if dynamic { self.push[mode] } else { self.state.push_before[mode] };
-            if load != 0.0 {
-                let twice: f64 = (0..self.sectors)
-                    .map(|sector| self.index(mode, sector))
-                    .map(|index| self.state.increment[index] + self.increment_before[index])
-                    .sum();
-                work += 0.5 * load * twice;
-            }
-        }
-        self.state.push_before.copy_from_slice(&self.push);
-        work
     }
 
     /// Kinetic and strain energy of all sectors (J), in the quantity the scheme conserves (see [`super::scheme`]).

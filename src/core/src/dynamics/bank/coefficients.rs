@@ -1,0 +1,105 @@
+//! What depends on step size, scheme, damping and speed, and the state carried from one of them to the next.
+
+use super::{LaneCoefficients, ModalBank};
+use crate::dynamics::scheme::resample;
+use crate::settings::Scheme;
+
+impl ModalBank {
+    /// New step size: coefficients and flexibility. The state is not touched (see [`ModalBank::resample`]).
+    pub fn set_step(&mut self, scheme: Scheme, step: f64) {
+        (self.scheme, self.step) = (scheme, step);
+        let modes = self.modes();
+        for (index, coefficients) in self.coefficients.iter_mut().enumerate() {
+            let factor = self.options.frequency_factors.get(index / modes).copied().unwrap_or(1.0);
+            *coefficients = self.model.coefficient(index % modes, factor, scheme, step);
+        }
+        if !self.lane_coefficients.is_empty() {
+            self.spread_coefficients();
+        }
+        self.refresh_coupling();
+    }
+
+    fn spread_coefficients(&mut self) {
+        for sector in 0..self.sectors {
+            for mode in 0..self.modes() {
+                let k = self.coefficients(sector)[mode];
+                let lane = LaneCoefficients { beta: k.beta, kappa: k.kappa, load: k.load_compliance(), loss: k.loss };
+                let index = self.index(mode, sector);
+                self.lane_coefficients[index] = lane;
+            }
+        }
+    }
+
+    pub(super) fn refresh_coupling(&mut self) {
+        if let Some(coupling) = &mut self.coupling {
+            let dynamic = self.model.dynamic_modes(self.scheme);
+            coupling.refresh(self.state.speed, self.step, dynamic, &self.coefficients);
+        }
+        for set in 0..self.flexibility.len() {
+            self.fill_flexibility(set);
+        }
+    }
+
+    fn fill_flexibility(&mut self, set: usize) {
+        let (modes, rows) = (self.modes(), self.rows);
+        for column in 0..rows {
+            for mode in 0..modes {
+                let compliance = self.coefficients[set * modes + mode].compliance;
+                self.correction[mode] = compliance * self.contact_modes[mode * rows + column];
+            }
+            if let Some(coupling) = &mut self.coupling {
+                coupling.transform(set, &mut self.correction);
+            }
+            for row in 0..rows {
+                let terms = self.correction.iter().enumerate();
+                let sum = terms.map(|(mode, value)| self.contact_modes[mode * rows + row] * value).sum();
+                self.flexibility[set][(row, column)] = sum;
+            }
+        }
+    }
+
+    /// Follow the speed of the rotor (rad/s) where modes are coupled by it; only between steps. Returns the change of
+    /// strain energy (J), which is work of the shaft.
+    pub fn set_speed(&mut self, speed: f64) -> f64 {
+        let Some(coupling) = &self.coupling else { return 0.0 };
+        if coupling.speed().to_bits() == speed.to_bits() {
+            return 0.0;
+        }
+        let before = self.energies().1;
+        self.state.speed = speed;
+        self.refresh_coupling();
+        self.energies().1 - before
+    }
+
+    /// Modal damping ratio of all modes (takes effect with the next [`ModalBank::set_step`]).
+    pub fn set_damping_ratio(&mut self, damping_ratio: f64) {
+        self.model.damping_ratios.fill(damping_ratio);
+    }
+
+    /// Carry the state from the step size in use to `new_step`, each sector under its last contact force
+    /// (`forces[row · lanes + sector]`, N; none for an empty slice) and the modal loads, then use the new coefficients.
+    pub fn resample(&mut self, scheme: Scheme, new_step: f64, forces: &[f64]) {
+        let lanes = self.lanes();
+        let dynamic = self.model.dynamic_modes(self.scheme);
+        for sector in 0..self.sectors {
+            for mode in 0..dynamic {
+                let shapes = &self.contact_modes[mode * self.rows..][..self.rows];
+                let rows = shapes.iter().enumerate().filter(|(row, _)| row * lanes + sector < forces.len());
+                let contact: f64 = rows.map(|(row, shape)| shape * forces[row * lanes + sector]).sum();
+                let force = contact + self.state.push_before.get(mode).copied().unwrap_or(0.0);
+                let index = self.index(mode, sector);
+                self.state.increment[index] = resample(
+                    self.frequency(mode, sector),
+                    self.model.damping_ratios[mode],
+                    self.state.position[index],
+                    self.state.increment[index],
+                    force,
+                    self.step,
+                    new_step,
+                );
+            }
+        }
+        self.set_step(scheme, new_step);
+        self.recover();
+    }
+}
