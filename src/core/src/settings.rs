@@ -278,7 +278,8 @@ pub struct SurfaceSettings {
     /// structure).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spline: Option<SplineSettings>,
-    /// Friction power of each of these patches as an output; those of the ROM where the structure is thermal.
+    /// Friction power of each of these patches as an output; the heated patches of the ROM where absent and the
+    /// structure is thermal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub patches: Option<PatchSettings>,
 }

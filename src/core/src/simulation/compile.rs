@@ -354,6 +354,7 @@ fn check_rom(structure: &StructureSettings, rom: &Rom) -> Result<()> {
         let problem = format!("it has no contact grid, which `load` of structure `{}` needs", structure.name);
         return Err(Error::invalid(what, problem, "Give a ROM with a contact grid, or leave the load out"));
     }
+    check_order(structure, rom)?;
     let factors = structure.frequency_factors.len();
     if factors != 0 && factors != rom.sectors {
         return Err(Error::invalid(
@@ -363,6 +364,18 @@ fn check_rom(structure: &StructureSettings, rom: &Rom) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// A nodal diameter that the contact grid cannot tell from a lower one would load that one instead.
+fn check_order(structure: &StructureSettings, rom: &Rom) -> Result<()> {
+    match (structure.load, rom.extras.grid) {
+        (Some(load), Some(grid)) if 2 * u64::from(load.order) >= grid.around as u64 => Err(Error::invalid(
+            "structure.load.order",
+            format!("{} nodal diameters on the {} nodes around of ROM `{}`", load.order, grid.around, rom.name),
+            "Use fewer than half as many nodal diameters as nodes around, or a ROM with a finer contact grid",
+        )),
+        _ => Ok(()),
+    }
 }
 
 fn fingerprint(scene: &Scene) -> u64 {
