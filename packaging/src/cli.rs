@@ -92,6 +92,9 @@ pub struct ReduceArguments {
     /// Elements along the chord, through the thickness and along the span.
     #[arg(long, value_name = "CxTxS")]
     pub mesh: Option<MeshSize>,
+    /// Also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s).
+    #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true)]
+    pub spin: Option<f64>,
     /// ROM file to write.
     #[arg(long, short, value_name = "FILE", default_value = "rotor37.rom.safetensors")]
     pub output: PathBuf,

@@ -8,8 +8,15 @@ use tiprub_model::{
 
 use crate::{Failure, Result, console::Console};
 
-const STAGES: [Stage; 6] =
-    [Stage::Mesh, Stage::Assembly, Stage::FullModes, Stage::FixedInterfaceModes, Stage::ConstraintModes, Stage::Checks];
+const STAGES: [Stage; 7] = [
+    Stage::Mesh,
+    Stage::Assembly,
+    Stage::FullModes,
+    Stage::FixedInterfaceModes,
+    Stage::ConstraintModes,
+    Stage::Checks,
+    Stage::Spin,
+];
 
 /// Reduce rotor 37, showing stage and share done.
 ///

@@ -3,7 +3,7 @@
 use std::{cell::RefCell, fs, path::Path};
 
 use tiprub_core::{Rom, Scene};
-use tiprub_model::Rotor37Options;
+use tiprub_model::{Rotor37Options, rotor37::DESIGN_SPEED};
 
 use crate::{Failure, Result, console::Console, reduction};
 
@@ -76,9 +76,15 @@ pub fn rotor37_text(rom_file: &str, stop: f64) -> String {
     text
 }
 
+/// The blades that ship: at rest, and with the effects of spin up to its design speed.
 fn builtin_rom(name: &str, console: &Console) -> Option<Result<Rom, String>> {
-    let reduce = || reduction::rotor37(&Rotor37Options::default(), console).map(|reduction| reduction.rom);
-    (name == "rotor37").then(|| reduce().map_err(|failure| failure.to_string()))
+    let spin = match name {
+        "rotor37" => None,
+        "rotor37-spin" => Some(DESIGN_SPEED),
+        _ => return None,
+    };
+    let reduced = reduction::rotor37(&Rotor37Options { spin, ..Rotor37Options::default() }, console);
+    Some(reduced.map(|reduction| reduction.rom).map_err(|failure| failure.to_string()))
 }
 
 /// Read a ROM file.

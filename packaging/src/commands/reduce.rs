@@ -29,6 +29,7 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
         }),
         contact_nodes: arguments.contact_nodes.unwrap_or(defaults.contact_nodes),
         fixed_interface_modes: arguments.modes.unwrap_or(defaults.fixed_interface_modes),
+        spin: arguments.spin,
         ..defaults
     };
     let reduction = reduction::rotor37(&options, console)?;
@@ -61,6 +62,16 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     if let Some(path) = &arguments.inp {
         text.push_str(&format!("\n  written: {}", path.display()));
     }
+    for check in &reduction.spin_checks {
+        let worst =
+            check.frequency_deviation().into_iter().fold(0.0, |worst: f64, deviation| worst.max(deviation.abs()));
+        text.push_str(&format!(
+            "\n  at {} rad/s: {:.2} Hz first; frequencies off by up to {worst:.3} %, growth by {:.3} %",
+            check.speed,
+            check.reduced_frequencies.first().copied().unwrap_or(0.0),
+            check.growth_deviation()
+        ));
+    }
     let json = json!({
         "rom": facts.to_json(),
         "full_model": {
@@ -69,6 +80,12 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
             "free_dofs": reduction.free_dofs,
             "largest_mode_residual": reduction.largest_residual,
         },
+        "spin": reduction.spin_checks.iter().map(|check| json!({
+            "speed": check.speed,
+            "full_frequencies": check.full_frequencies,
+            "reduced_frequencies": check.reduced_frequencies,
+            "growth_deviation": check.growth_deviation(),
+        })).collect::<Vec<_>>(),
         "seconds": reduction.timings.total(),
         "warnings": warnings,
         "files": { "rom": arguments.output, "inp": arguments.inp },

@@ -2,7 +2,8 @@
 //!
 //! `cargo bench -p tiprub-core` prints one table. Each row is the median of repeated batches; ratios are what counts,
 //! absolute times depend on the machine. The baseline "two dense products" is the paper's prediction (eq. 9) with
-//! its two matrices multiplied out beforehand, in the reduced coordinates of all blades.
+//! its two matrices multiplied out beforehand, in the reduced coordinates of all blades. An argument after `--` selects
+//! rows by a part of their name.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -173,7 +174,9 @@ fn main() {
     println!("{SECTORS} blades x {MODES} modes, {} contact nodes; times per internal step", 3 * SECTORS);
     println!("{:<40} {:>12} {:>10} {:>16}", "", "time (µs)", "contacts", "dense / this");
     println!("{:<40} {:>12.2} {:>10} {:>16.1}", "two dense products (eq. 9), no contact", dense * 1e6, "-", 1.0);
-    for (name, scene) in rows {
+    // Part of a row's name as argument: only such rows.
+    let wanted = std::env::args().skip(1).find(|argument| !argument.starts_with('-')).unwrap_or_default();
+    for (name, scene) in rows.into_iter().filter(|(name, _)| name.contains(&wanted)) {
         let (time, contacts) = stepping(&scene);
         println!("{name:<40} {:>12.3} {contacts:>10.1} {:>16.0}", time * 1e6, dense / time);
     }

@@ -48,7 +48,7 @@ pub struct RomChecks {
 
 /// What a steady speed Ω about the z axis does to one structure, in its reduced coordinates.
 ///
-/// M q̈ + (D + 2ΩG) q̇ + (K + Ω²K₁ + Ω⁴K₂) q = f + Ω²c in the rotating frame; K₁ holds spin softening and centrifugal
+/// M q̈ + (D + 2ΩG) q̇ + (K + Ω²K₁ + Ω⁴K₂) q = f + Ω²c + Ω⁴c₂ in the rotating frame; K₁ holds spin softening and centrifugal
 /// stiffening together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spin {
@@ -60,6 +60,9 @@ pub struct Spin {
     pub coriolis: DMatrix<f64>,
     /// c, n values: centrifugal force per Ω² (kg·m).
     pub centrifugal_load: Vec<f64>,
+    /// c₂, n values (kg·m·s²). K(Ω) is the stiffness of small motions about the stretched shape, so that the load which
+    /// holds this shape against it is not Ω²c alone. With the resting stiffness K in place of K(Ω), Ω²c alone is right.
+    pub centrifugal_load_speed4: Vec<f64>,
     /// Largest |Ω| that K₁ and K₂ were fitted for (rad/s).
     pub largest_speed: f64,
 }
@@ -237,10 +240,13 @@ impl Rom {
                 return Err(Error::invalid(what, problem, remedy));
             }
         }
-        let load = &spin.centrifugal_load;
-        if load.len() != order || load.iter().any(|value| !value.is_finite()) {
-            let problem = format!("{} values, {order} finite ones expected", load.len());
-            return Err(Error::invalid("ROM array `centrifugal_load`", problem, remedy));
+        let loads =
+            [("centrifugal_load", &spin.centrifugal_load), ("centrifugal_load_speed4", &spin.centrifugal_load_speed4)];
+        for (name, load) in loads {
+            if load.len() != order || load.iter().any(|value| !value.is_finite()) {
+                let problem = format!("{} values, {order} finite ones expected", load.len());
+                return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
+            }
         }
         if !(spin.largest_speed.is_finite() && spin.largest_speed > 0.0) {
             let problem = format!("{} rad/s is not a finite speed > 0", spin.largest_speed);

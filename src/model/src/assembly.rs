@@ -53,6 +53,18 @@ fn pattern(neighbours: &[Vec<usize>]) -> Pattern {
     Pattern { starts, rows }
 }
 
+/// For every node pair (a, b) of an element: where the three columns of its 3 × 3 block begin among the entries.
+pub(crate) fn for_each_block(pattern: &Pattern, nodes: &[usize], mut visit: impl FnMut(usize, usize, [usize; 3])) {
+    for (b, &column) in nodes.iter().enumerate() {
+        let start = pattern.starts[3 * column];
+        let rows = &pattern.rows[start..pattern.starts[3 * column + 1]];
+        for (a, &row) in nodes.iter().enumerate() {
+            let place = rows.binary_search(&(3 * row)).expect("the pattern holds every element's pairs");
+            visit(a, b, core::array::from_fn(|j| pattern.starts[3 * column + j] + place));
+        }
+    }
+}
+
 /// Assemble K and M.
 ///
 /// # Errors
@@ -80,19 +92,14 @@ pub fn assemble(mesh: &Mesh, material: &Material, listener: Listener<'_>) -> Res
             .collect();
         for (element, pair) in chunk.iter().zip(matrices) {
             let (element_stiffness, element_mass) = pair?;
-            for (b, &column) in element.nodes.iter().enumerate() {
-                for (a, &row) in element.nodes.iter().enumerate() {
-                    let place =
-                        neighbours[column].binary_search(&row).expect("the pattern holds every element's pairs");
-                    for j in 0..3 {
-                        let start = pattern.starts[3 * column + j] + 3 * place;
-                        for i in 0..3 {
-                            stiffness_values[start + i] += element_stiffness[(3 * a + i, 3 * b + j)];
-                        }
-                        mass_values[start + j] += element_mass[(a, b)];
+            for_each_block(&pattern, &element.nodes, |a, b, starts| {
+                for (j, start) in starts.into_iter().enumerate() {
+                    for i in 0..3 {
+                        stiffness_values[start + i] += element_stiffness[(3 * a + i, 3 * b + j)];
                     }
+                    mass_values[start + j] += element_mass[(a, b)];
                 }
-            }
+            });
         }
     }
     report(listener, Stage::Assembly, 1, 1);

@@ -19,10 +19,11 @@ pub mod progress;
 pub mod reduce;
 pub mod rotor37;
 pub mod sparse;
+pub mod spin;
 
 pub use error::{Error, Result};
 pub use material::Material;
 pub use mesh::{Mesh, surface_quads};
 pub use progress::{Progress, Stage};
-pub use reduce::{Reduction, reduce};
+pub use reduce::{Reduction, reduce, reduce_spinning};
 pub use rotor37::{Rotor37Options, reduce_rotor37};

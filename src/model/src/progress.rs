@@ -17,6 +17,8 @@ pub enum Stage {
     ConstraintModes,
     /// Frequency deviation and residual criterion.
     Checks,
+    /// Effects of spin, only when asked for.
+    Spin,
 }
 
 impl fmt::Display for Stage {
@@ -28,6 +30,7 @@ impl fmt::Display for Stage {
             Self::FixedInterfaceModes => "fixed-interface modes",
             Self::ConstraintModes => "constraint modes",
             Self::Checks => "checks",
+            Self::Spin => "effects of spin",
         })
     }
 }

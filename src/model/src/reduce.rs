@@ -12,8 +12,9 @@ use crate::craig_bampton::{CraigBampton, craig_bampton, dense_modes};
 use crate::eigen::{Modes, lowest_modes, positive_factor};
 use crate::material::Material;
 use crate::mesh::Mesh;
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, Stage, report, silent};
 use crate::sparse::{Factor, SparseMatrix, principal_pair};
+use crate::spin::{ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, SpinningStates, reduced_spin};
 use crate::{Error, Result};
 
 /// A contact node before the reduction.
@@ -62,6 +63,8 @@ pub struct Timings {
     pub full_modes: f64,
     /// Fixed-interface and constraint modes.
     pub reduction: f64,
+    /// Equilibria under spin, spin arrays and their checks; zero where no spin was asked for.
+    pub spin: f64,
     /// Frequency deviation and residual criterion.
     pub checks: f64,
 }
@@ -69,7 +72,7 @@ pub struct Timings {
 impl Timings {
     /// Sum of the parts (s).
     pub fn total(&self) -> f64 {
-        self.assembly + self.full_modes + self.reduction + self.checks
+        self.assembly + self.full_modes + self.reduction + self.spin + self.checks
     }
 }
 
@@ -92,6 +95,8 @@ pub struct Reduction {
     pub reduced_angular_frequencies: Vec<f64>,
     /// Natural frequencies with the contact nodes held (Hz).
     pub fixed_interface_frequencies: Vec<f64>,
+    /// How well the spin arrays hold, at half the largest speed and at the largest; empty where none were asked for.
+    pub spin_checks: Vec<SpinCheck>,
     /// Wall times.
     pub timings: Timings,
 }
@@ -112,6 +117,39 @@ pub fn reduce(
     options: &ReductionOptions,
     listener: Listener<'_>,
 ) -> Result<Reduction> {
+    reduced(mesh, (material, clamped, contact), options, None, listener)
+}
+
+/// [`reduce`] with the effects of spin up to `largest_speed` (rad/s), in [`RomExtras::spin`]; see [`crate::spin`].
+///
+/// The rest of the ROM is that of [`reduce`], bit for bit.
+///
+/// # Errors
+/// Those of [`reduce`]; [`Error::Invalid`] for a speed that is not a finite number above zero, for a structure without
+/// clamped nodes, and where the structure finds no equilibrium with the centrifugal force.
+pub fn reduce_spinning(
+    mesh: Mesh,
+    material: &Material,
+    clamped: &[usize],
+    contact: &[ContactPoint],
+    options: &ReductionOptions,
+    largest_speed: f64,
+    listener: Listener<'_>,
+) -> Result<Reduction> {
+    if !(largest_speed.is_finite() && largest_speed > 0.0) {
+        let problem = format!("{largest_speed} rad/s is not a finite speed > 0");
+        return Err(Error::invalid("largest speed", problem, "Give the largest speed that is to be computed"));
+    }
+    reduced(mesh, (material, clamped, contact), options, Some(largest_speed), listener)
+}
+
+fn reduced(
+    mesh: Mesh,
+    (material, clamped, contact): (&Material, &[usize], &[ContactPoint]),
+    options: &ReductionOptions,
+    largest_speed: Option<f64>,
+    listener: Listener<'_>,
+) -> Result<Reduction> {
     // The library's own threads split sums by their number, and a ROM must have the same bits on every number of threads.
     faer::set_global_parallelism(faer::Par::Seq);
     let mut timings = Timings::default();
@@ -123,11 +161,13 @@ pub fn reduce(
     let full = timed(&mut timings.full_modes, || {
         full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)
     })?;
-    let craig_bampton = timed(&mut timings.reduction, || {
-        let interface = interface_dofs(&free, contact)?;
-        let cartesian = craig_bampton(&stiffness, &mass, &interface, options.fixed_interface_modes, listener)?;
+    let interface = interface_dofs(&free, contact)?;
+    let component_modes = |stiffness: &SparseMatrix, modes: usize, listener: Listener<'_>| {
+        let cartesian = craig_bampton(stiffness, &mass, &interface, modes, listener)?;
         Ok(rotated(cartesian, &mesh, contact, options.frame))
-    })?;
+    };
+    let craig_bampton =
+        timed(&mut timings.reduction, || component_modes(&stiffness, options.fixed_interface_modes, listener))?;
     let (checks, squares) = timed(&mut timings.checks, || {
         report(listener, Stage::Checks, 0, 1);
         let (squares, vectors) = dense_modes(&craig_bampton.stiffness, &craig_bampton.mass)?;
@@ -135,7 +175,24 @@ pub fn reduce(
         report(listener, Stage::Checks, 1, 1);
         Ok((checks, squares))
     })?;
-    let rom = build_rom(&mesh, material, clamped.len(), contact, options, &craig_bampton, checks)?;
+    let spin = timed(&mut timings.spin, || {
+        let Some(speed) = largest_speed else { return Ok(None) };
+        let body = Rotating::new(&mesh, material, &assembled, &free, &stiffness)?;
+        let resting = Resting { model: &craig_bampton, mass: &mass, free: &free, interface: &interface };
+        let states = SpinningStates::find(&body, speed, &|done| report(listener, Stage::Spin, done, 6))?;
+        let modes = (options.fixed_interface_modes + SPARE_MODES).min(free.len() - interface.len());
+        let middle = component_modes(&states.middle.stiffness, modes, &silent)?;
+        report(listener, Stage::Spin, 4, 6);
+        let largest = component_modes(&states.largest.stiffness, modes, &silent)?;
+        report(listener, Stage::Spin, 5, 6);
+        let spin = reduced_spin(&states, resting, &middle, &largest, options.checked_modes)?;
+        report(listener, Stage::Spin, 6, 6);
+        Ok(Some(spin))
+    })?;
+    let (spin, spin_checks) = spin.map_or((None, Vec::new()), |ReducedSpin { spin, checks }| (Some(spin), checks));
+    let mut rom = build_rom(&mesh, material, clamped.len(), contact, options, &craig_bampton, checks)?;
+    rom.extras.spin = spin;
+    rom.validate()?;
     Ok(Reduction {
         rom,
         modes: node_modes(&full.modes, &free, mesh.nodes.len()),
@@ -143,6 +200,7 @@ pub fn reduce(
         free_dofs: free.len(),
         reduced_angular_frequencies: squares.iter().map(|square| square.max(0.0).sqrt()).collect(),
         fixed_interface_frequencies: craig_bampton.fixed_interface_frequencies,
+        spin_checks,
         material: material.clone(),
         mesh,
         timings,

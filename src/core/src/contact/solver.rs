@@ -7,9 +7,15 @@
 //!   neither a negative λ nor a penetration caused elsewhere is looked at again.
 //! * [`ContactSolver::lcp`]: 0 ≤ λ ⟂ g + Wλ ≥ 0 on all nodes by block principal pivoting, started from the last step's
 //!   set. When the number of infeasible nodes stops falling it continues with Murty's least-index rule, which is
-//!   finite for every P-matrix (J. J. Júdice, F. M. Pires, Computers & Operations Research 21, 1994).
+//!   finite for every P-matrix (J. J. Júdice, F. M. Pires, Computers & Operations Research 21, 1994). With more than a
+//!   few nodes finite can mean 2ⁿ, and the violated contacts are driven to closure one by one instead.
+
+mod drive;
+mod elimination;
 
 use nalgebra::DMatrix;
+
+use crate::dynamics::dispatch::InstructionSet;
 
 /// Pivots below this fraction of their node's own diagonal belong to redundant contacts (coincident nodes).
 const REDUNDANT_PIVOT: f64 = 1e-12;
@@ -20,6 +26,16 @@ const SOFTENING: f64 = 1e-10;
 const ZERO_FRACTION: f64 = 1e-13;
 /// Block exchanges allowed without progress before Murty's rule takes over.
 const PATIENCE: usize = 8;
+
+/// Largest problem on which the least-index rule may try every active set.
+const ENUMERABLE: usize = 14;
+/// Factorisations allowed to larger ones before contacts are driven one by one; block exchanges need about ten.
+const BLOCK_LIMIT: usize = 50;
+/// Largest problem with an unreduced limit of factorisations for driving.
+const FULL_PATIENCE: usize = 256;
+
+/// Systems from this order on are worked on column by column, as they are stored.
+const LARGE: usize = 32;
 
 /// What one solve did, and whether it succeeded.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -43,28 +59,37 @@ impl Outcome {
     }
 }
 
-/// Scratch of one problem size; allocates only when made.
+/// Scratch for problems up to a largest size; allocates only when made. Arrays have the largest size, and a solve uses
+/// their first `size` entries (the leading block of the matrix).
 #[derive(Debug, Clone)]
 pub struct ContactSolver {
     size: usize,
-    /// Delassus matrix, filled by the caller.
+    /// Delassus matrix (m/N), filled by the caller.
     pub delassus: DMatrix<f64>,
     /// Predicted gaps (m), filled by the caller; corrected gaps on return.
     pub gaps: Vec<f64>,
-    /// Multipliers (N), set by the solvers.
+    /// Multipliers (N), set by the solvers; 0 beyond the size.
     pub multipliers: Vec<f64>,
-    /// Active set: for the complementarity solver, start and result.
+    /// Active set: for the complementarity solver, start and result; false beyond the size.
     pub active: Vec<bool>,
     factor: DMatrix<f64>,
-    /// Diagonal of W in the order of `members`.
+    /// Diagonal of W_AA in the order of `members`, without sign.
     diagonal: Vec<f64>,
+    /// What elimination has left of it.
+    remaining: Vec<f64>,
     right: Vec<f64>,
     members: Vec<usize>,
+    /// Node i is one of `members`; made when some active node is not.
+    enforced: Vec<bool>,
     corrected: Vec<f64>,
+    /// Multipliers and gaps while contacts are driven to closure.
+    pressure: Vec<f64>,
+    slack: Vec<f64>,
+    instructions: InstructionSet,
 }
 
 impl ContactSolver {
-    /// Room for problems of exactly `size` nodes.
+    /// Room for problems of up to `size` nodes, and set to that size.
     pub fn new(size: usize) -> Self {
         Self {
             size,
@@ -74,15 +99,15 @@ impl ContactSolver {
             active: vec![false; size],
             factor: DMatrix::zeros(size, size),
             diagonal: vec![0.0; size],
+            remaining: vec![0.0; size],
             right: vec![0.0; size],
             members: Vec::with_capacity(size),
+            enforced: vec![false; size],
             corrected: vec![0.0; size],
+            pressure: vec![0.0; size],
+            slack: vec![0.0; size],
+            instructions: InstructionSet::detect(),
         }
-    }
-
-    /// Solve problems of `size` nodes from now on.
-    pub fn set_size(&mut self, size: usize) {
-        self.size = size;
     }
 
     /// Number of nodes.
@@ -90,12 +115,28 @@ impl ContactSolver {
         self.size
     }
 
+    /// Largest number of nodes.
+    pub fn capacity(&self) -> usize {
+        self.gaps.len()
+    }
+
+    /// Set the number of nodes of the next problems. Does not allocate.
+    ///
+    /// # Panics
+    /// When `size` exceeds the capacity.
+    pub fn set_size(&mut self, size: usize) {
+        assert!(size <= self.capacity(), "{size} contact nodes in a solver made for {}", self.capacity());
+        self.size = size;
+        self.multipliers[size..].fill(0.0);
+        self.active[size..].fill(false);
+    }
+
     /// The paper's correction (eqs 10-11): equality on the nodes that penetrate in the prediction.
     pub fn film(&mut self) -> Outcome {
         for node in 0..self.size {
             self.active[node] = self.gaps[node] < 0.0;
         }
-        self.solve_active();
+        self.solve_active(None);
         self.correct_gaps();
         std::mem::swap(&mut self.gaps, &mut self.corrected);
         Outcome::direct(true, 1)
@@ -103,16 +144,17 @@ impl ContactSolver {
 
     /// Complementarity on all nodes; `active` is the starting guess and returns the set found.
     pub fn lcp(&mut self) -> Outcome {
-        let scale = self.gaps.iter().fold(0.0, |largest: f64, gap| largest.max(gap.abs()));
+        let scale = self.gaps[..self.size].iter().fold(0.0, |largest: f64, gap| largest.max(gap.abs()));
         for node in 0..self.size {
             self.active[node] |= self.gaps[node] < 0.0;
         }
-        let limit = 100 + 20 * self.size + (1 << self.size.min(14));
+        let limit = exchange_limit(self.size);
         let (mut best, mut patience, mut softened) = (usize::MAX, PATIENCE, false);
         for factorisations in 1..=limit {
-            self.solve_active();
+            self.solve_active(None);
             self.correct_gaps();
-            let largest = self.multipliers.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+            let largest =
+                self.multipliers[..self.size].iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
             let (count, last) = self.count_infeasible(scale, largest);
             if count == 0 && !softened && self.redundant_contact_violated(scale) {
                 self.soften();
@@ -134,7 +176,8 @@ impl ContactSolver {
                 self.active[last] = !self.active[last];
             }
         }
-        Outcome::direct(false, limit)
+        let driven = self.drive_all(scale, drive_limit(self.size));
+        Outcome::direct(driven.solved, limit + driven.factorisations)
     }
 
     fn infeasible(&self, node: usize, gap_scale: f64, multiplier_scale: f64) -> bool {
@@ -159,8 +202,16 @@ impl ContactSolver {
     }
 
     /// True when a contact left out as redundant is not closed by the contacts it was taken to depend on.
-    fn redundant_contact_violated(&self, gap_scale: f64) -> bool {
-        let left_out = |node: &usize| self.active[*node] && !self.members.contains(node);
+    fn redundant_contact_violated(&mut self, gap_scale: f64) -> bool {
+        let active = self.active[..self.size].iter().filter(|active| **active).count();
+        if active == self.members.len() {
+            return false;
+        }
+        self.enforced.fill(false);
+        for member in &self.members {
+            self.enforced[*member] = true;
+        }
+        let left_out = |node: &usize| self.active[*node] && !self.enforced[*node];
         (0..self.size).filter(left_out).any(|node| self.corrected[node] < -ZERO_FRACTION * gap_scale)
     }
 
@@ -182,42 +233,44 @@ impl ContactSolver {
     }
 
     fn correct_gaps(&mut self) {
-        for row in 0..self.size {
-            let moved: f64 =
-                self.members.iter().map(|column| self.delassus[(row, *column)] * self.multipliers[*column]).sum();
-            self.corrected[row] = self.gaps[row] + moved;
+        let size = self.size;
+        if size < LARGE {
+            for row in 0..size {
+                let terms = self.members.iter().map(|column| self.delassus[(row, *column)] * self.multipliers[*column]);
+                self.corrected[row] = self.gaps[row] + terms.sum::<f64>();
+            }
+            return;
+        }
+        // The same sums, columns outside; like the sum of an iterator they start from −0.
+        self.corrected[..size].fill(-0.0);
+        for member in &self.members {
+            let (multiplier, column) = (self.multipliers[*member], self.delassus.column(*member));
+            for (moved, flexibility) in self.corrected[..size].iter_mut().zip(column.iter()) {
+                *moved += flexibility * multiplier;
+            }
+        }
+        for (corrected, gap) in self.corrected[..size].iter_mut().zip(&self.gaps) {
+            *corrected += gap;
         }
     }
 
     /// W_AA λ_A = −g_A on the active set by elimination with diagonal pivoting, λ = 0 elsewhere. A P-matrix needs no
     /// other pivots; a vanishing pivot marks a contact that the others already enforce, and its λ stays 0.
-    fn solve_active(&mut self) {
+    /// With a driven node the right-hand side is −W_Ad instead: how λ_A follows that node's multiplier.
+    fn solve_active(&mut self, driven: Option<usize>) {
         self.members.clear();
         self.members.extend((0..self.size).filter(|node| self.active[*node]));
         self.multipliers.fill(0.0);
         let count = self.members.len();
         for (row, i) in self.members.iter().enumerate() {
-            self.right[row] = -self.gaps[*i];
-            for (column, j) in self.members.iter().enumerate() {
+            self.right[row] = -driven.map_or(self.gaps[*i], |driven| self.delassus[(*i, driven)]);
+        }
+        for (column, j) in self.members.iter().enumerate() {
+            for (row, i) in self.members.iter().enumerate() {
                 self.factor[(row, column)] = self.delassus[(*i, *j)];
             }
         }
-        for row in 0..count {
-            self.diagonal[row] = self.factor[(row, row)].abs();
-        }
-        let mut rank = 0;
-        while rank < count {
-            // What is left of a node's own flexibility decides: nodes may differ by many orders of magnitude.
-            let left = |row: usize| self.factor[(row, row)].abs() / self.diagonal[row];
-            let pivot = (rank..count).fold(rank, |best, row| if left(row) > left(best) { row } else { best });
-            // Also ends at a node without any flexibility (0/0).
-            if left(pivot).is_nan() || left(pivot) <= REDUNDANT_PIVOT {
-                break;
-            }
-            self.exchange_members(rank, pivot, count);
-            self.eliminate(rank, count);
-            rank += 1;
-        }
+        let rank = self.eliminate(count);
         for row in (0..rank).rev() {
             let known: f64 = (row + 1..rank).map(|column| self.factor[(row, column)] * self.right[column]).sum();
             self.right[row] = (self.right[row] - known) / self.factor[(row, row)];
@@ -225,145 +278,19 @@ impl ContactSolver {
         }
         self.members.truncate(rank);
     }
+}
 
-    fn exchange_members(&mut self, a: usize, b: usize, count: usize) {
-        if a == b {
-            return;
-        }
-        self.members.swap(a, b);
-        self.right.swap(a, b);
-        self.diagonal.swap(a, b);
-        for other in 0..count {
-            self.factor.swap((a, other), (b, other));
-        }
-        for other in 0..count {
-            self.factor.swap((other, a), (other, b));
-        }
-    }
+/// Factorisations of the exchange rules.
+fn exchange_limit(size: usize) -> usize {
+    if size <= ENUMERABLE { 100 + 20 * size + (1 << size) } else { BLOCK_LIMIT }
+}
 
-    fn eliminate(&mut self, rank: usize, count: usize) {
-        for row in rank + 1..count {
-            let ratio = self.factor[(row, rank)] / self.factor[(rank, rank)];
-            if ratio == 0.0 {
-                continue;
-            }
-            for column in rank + 1..count {
-                let value = self.factor[(rank, column)];
-                self.factor[(row, column)] -= ratio * value;
-            }
-            self.right[row] -= ratio * self.right[rank];
-        }
-    }
+/// Factorisations of the drives: twenty per contact. Beyond `FULL_PATIENCE` contacts the number falls with the square of
+/// the size, so that the whole effort, size³ each, grows no faster than the square of the size.
+fn drive_limit(size: usize) -> usize {
+    let limit = 100 + 20 * size;
+    if size <= FULL_PATIENCE { limit } else { limit * FULL_PATIENCE * FULL_PATIENCE / (size * size) }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    /// The solution by trying every active set: independent of pivoting rules.
-    fn brute_force(w: &DMatrix<f64>, g: &[f64]) -> Vec<f64> {
-        let n = g.len();
-        for set in 0..1_usize << n {
-            let members: Vec<usize> = (0..n).filter(|i| set >> i & 1 == 1).collect();
-            let sub = DMatrix::from_fn(members.len(), members.len(), |i, j| w[(members[i], members[j])]);
-            let right = nalgebra::DVector::from_fn(members.len(), |i, _| -g[members[i]]);
-            let solution = if members.is_empty() { Some(right) } else { sub.lu().solve(&right) };
-            let Some(solution) = solution else { continue };
-            let mut lambda = vec![0.0; n];
-            for (index, member) in members.iter().enumerate() {
-                lambda[*member] = solution[index];
-            }
-            let feasible = (0..n).all(|i| {
-                let gap = g[i] + (0..n).map(|j| w[(i, j)] * lambda[j]).sum::<f64>();
-                lambda[i] >= -1e-12 && (gap >= -1e-12)
-            });
-            if feasible {
-                return lambda;
-            }
-        }
-        panic!("no solution: not a P-matrix");
-    }
-
-    /// A random matrix with positive definite symmetric part, hence a P-matrix.
-    fn p_matrix(entries: &[f64], n: usize) -> DMatrix<f64> {
-        let a = DMatrix::from_fn(n, n, |i, j| entries[i * n + j]);
-        let skew = DMatrix::from_fn(n, n, |i, j| 0.3 * (entries[i * n + j] - entries[j * n + i]));
-        &a * a.transpose() + DMatrix::identity(n, n) * 0.05 + skew
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(1000))]
-        #[test]
-        fn complementarity_solution_equals_brute_force(
-            n in 1_usize..7,
-            entries in prop::collection::vec(-1.0..1.0_f64, 49),
-            gaps in prop::collection::vec(-1.0..1.0_f64, 7),
-            warm in prop::collection::vec(any::<bool>(), 7),
-        ) {
-            let w = p_matrix(&entries, n);
-            let mut solver = ContactSolver::new(n);
-            solver.delassus.copy_from(&w);
-            solver.gaps.copy_from_slice(&gaps[..n]);
-            solver.active.copy_from_slice(&warm[..n]);
-            let outcome = solver.lcp();
-            prop_assert!(outcome.solved);
-            let expected = brute_force(&w, &gaps[..n]);
-            let scale = expected.iter().fold(1.0_f64, |a, b| a.max(b.abs()));
-            for (found, expected) in solver.multipliers.iter().zip(&expected) {
-                prop_assert!((found - expected).abs() < 1e-9 * scale, "{found} vs {expected}");
-            }
-        }
-    }
-
-    #[test]
-    fn coincident_nodes_share_one_constraint() {
-        let mut solver = ContactSolver::new(3);
-        solver.delassus.copy_from_slice(&[2.0, 2.0, 0.1, 2.0, 2.0, 0.1, 0.1, 0.1, 1.0]);
-        solver.gaps.copy_from_slice(&[-1.0, -1.0, 0.5]);
-        let outcome = solver.lcp();
-        assert!(outcome.solved);
-        assert!((solver.multipliers[0] + solver.multipliers[1] - 0.5).abs() < 1e-12);
-        assert!(solver.gaps.iter().all(|gap| *gap >= 0.0));
-    }
-
-    #[test]
-    fn of_coincident_nodes_the_deepest_decides() {
-        for (first, second) in [(-1.0, -2.0), (-2.0, -1.0), (-1.0, -1.0 - 1e-6)] {
-            for warm in [[false; 2], [true; 2], [true, false], [false, true]] {
-                let mut solver = ContactSolver::new(2);
-                solver.delassus.fill(2.0);
-                solver.gaps.copy_from_slice(&[first, second]);
-                solver.active.copy_from_slice(&warm);
-                assert!(solver.lcp().solved);
-                let force = solver.multipliers[0] + solver.multipliers[1];
-                let (deepest, shallow) = (first.min(second), first.max(second));
-                assert!((force + 0.5 * deepest).abs() < 1e-9, "{first}, {second}: force {force}");
-                let open = solver.gaps[0].max(solver.gaps[1]);
-                assert!((open - (shallow - deepest)).abs() < 1e-9, "{first}, {second}: gaps {:?}", solver.gaps);
-            }
-        }
-    }
-
-    #[test]
-    fn stiff_nodes_beside_soft_ones_are_not_redundant() {
-        let mut solver = ContactSolver::new(2);
-        solver.delassus.copy_from_slice(&[1.0, 0.0, 0.0, 1e-14]);
-        solver.gaps.copy_from_slice(&[-1.0, -1.0]);
-        assert!(solver.lcp().solved);
-        assert!((solver.multipliers[1] * 1e-14 - 1.0).abs() < 1e-12, "{:?}", solver.multipliers);
-    }
-
-    #[test]
-    fn film_leaves_what_it_does_not_look_at() {
-        // Pushing node 1 out pulls node 2 in: FILM does not notice, complementarity does.
-        let mut solver = ContactSolver::new(2);
-        solver.delassus.copy_from_slice(&[1.0, -0.9, -0.9, 1.0]);
-        solver.gaps.copy_from_slice(&[-1.0, 0.1]);
-        let mut exact = solver.clone();
-        solver.film();
-        assert!(solver.gaps[1] < -0.7 && solver.gaps[0].abs() < 1e-15);
-        exact.lcp();
-        assert!(exact.gaps.iter().all(|gap| *gap >= 0.0) && exact.multipliers.iter().all(|value| *value > 0.0));
-    }
-}
+mod tests;

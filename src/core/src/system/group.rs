@@ -3,6 +3,7 @@
 use super::{ContactEvent, StepFailure, System};
 use crate::contact::gap::{Drive, GapLaw, dot};
 use crate::settings::Solver;
+use nalgebra::DMatrix;
 
 /// Nodes outside a group count as penetrating beyond this fraction of the largest gap of the group.
 const VIOLATED_FRACTION: f64 = 1e-13;
@@ -196,6 +197,15 @@ impl System {
             (None, Some(solver)) if self.settings.solver == Solver::Coulomb => &mut solver.delassus,
             _ => &mut self.problem.delassus,
         };
+        if self.slave.is_none() {
+            let flexibility = self.bank.flexibility(self.members[0].sector).as_slice();
+            let (rows, columns) = (&self.row_directions[..per * nodes], &self.column_directions[..per * nodes]);
+            match per {
+                1 => fill_sector::<1>(matrix, flexibility, rows, columns),
+                _ => fill_sector::<3>(matrix, flexibility, rows, columns),
+            }
+            return;
+        }
         for (member, &Member { node: column_node, sector, .. }) in self.members.iter().enumerate() {
             let flexibility = self.bank.flexibility(sector).as_slice();
             let [first, second, third] =
@@ -366,7 +376,7 @@ impl System {
             self.bank.correct(sector, &self.force, self.settings.ledger);
         }
         if let Some(slave) = &mut self.slave {
-            slave.apply(&self.solution, self.settings.ledger);
+            slave.apply(self.settings.ledger);
         }
         if let Some((coating, problem)) = &mut self.coating {
             coating.commit(problem);
@@ -387,6 +397,32 @@ impl System {
         }
         let event = ContactEvent::new(sector, node, normal, force, self.coating_share[member]);
         self.events.push(event);
+    }
+}
+
+/// W of all nodes of one sector with `PER` directions each; `flexibility` is G column by column.
+fn fill_sector<const PER: usize>(
+    matrix: &mut DMatrix<f64>,
+    flexibility: &[f64],
+    rows: &[[f64; 3]],
+    columns: &[[f64; 3]],
+) {
+    let components = 3 * columns.len() / PER;
+    let leading = matrix.nrows();
+    let targets = matrix.as_mut_slice().chunks_exact_mut(leading);
+    for ((along, direction), target) in columns.iter().enumerate().zip(targets) {
+        let three = &flexibility[along / PER * 3 * components..][..3 * components];
+        let (first, rest) = three.split_at(components);
+        let (second, third) = rest.split_at(components);
+        let nodes = first.as_chunks::<3>().0.iter().zip(second.as_chunks::<3>().0).zip(third.as_chunks::<3>().0);
+        let targets = target.as_chunks_mut::<PER>().0.iter_mut().zip(rows.as_chunks::<PER>().0);
+        for (((first, second), third), (target, rows)) in nodes.zip(targets) {
+            let moved: [f64; 3] =
+                std::array::from_fn(|i| first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2]);
+            for (value, row) in target.iter_mut().zip(rows) {
+                *value = dot(*row, moved);
+            }
+        }
     }
 }
 

@@ -154,22 +154,13 @@ impl Slave {
     /// What the forces of a solution would do to the control points.
     pub fn respond(&mut self, solution: &Solution) {
         self.gather(solution);
-        let rows = self.bank.rows();
-        self.response.fill(0.0);
-        for (mode, force) in self.force.iter().enumerate() {
-            let moved = self.bank.coefficients(0)[mode].compliance * force;
-            let shapes = &self.bank.model().contact_modes.as_slice()[mode * rows..][..rows];
-            self.response.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += shape * moved);
-        }
+        self.bank.response_to_modal(&self.force, &mut self.response);
     }
 
-    /// Let the forces of a solution act.
-    pub fn apply(&mut self, solution: &Solution, with_loss: bool) {
-        self.gather(solution);
+    /// Let the forces of the solution act that [`Slave::respond`] was asked about last.
+    pub fn apply(&mut self, with_loss: bool) {
         self.delayed.copy_from_slice(&self.force);
-        let force = std::mem::take(&mut self.force);
-        self.bank.correct_modal(0, &force, with_loss);
-        self.force = force;
+        self.bank.correct_modal(&self.force, &self.response, with_loss);
     }
 
     /// Write everything that determines the future.

@@ -6,10 +6,10 @@ use super::{ElementKind, QuadraturePoint, Shape};
 use crate::{Error, Result, material::Material};
 
 /// Shape functions at an integration point with gradients turned to physical space.
-struct Mapped {
-    shape: Shape,
+pub(super) struct Mapped {
+    pub(super) shape: Shape,
     /// Quadrature weight times Jacobian determinant (m³).
-    volume: f64,
+    pub(super) volume: f64,
 }
 
 /// Jacobian matrix ∂x_i/∂ξ_j.
@@ -25,7 +25,7 @@ fn jacobian(shape: &Shape, coordinates: &[[f64; 3]]) -> Matrix3<f64> {
     matrix
 }
 
-fn map_point(
+pub(super) fn map_point(
     kind: ElementKind,
     coordinates: &[[f64; 3]],
     quadrature: &QuadraturePoint,

@@ -12,10 +12,12 @@
 //! All displacement interpolation is isoparametric; no reduced integration, incompatible modes or selective rules.
 
 mod matrices;
+mod nonlinear;
 mod quadrature;
 mod shape;
 
 pub use matrices::{consistent_mass, lumped_mass, stiffness, strain, stress};
+pub use nonlinear::{Tangent, geometric_stiffness, second_stresses, tangent};
 pub use quadrature::QuadraturePoint;
 pub use shape::Shape;
 

@@ -26,7 +26,7 @@ use tiprub_core::rom::Frame;
 use crate::Result;
 use crate::material::Material;
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{Reduction, ReductionOptions, reduce};
+use crate::reduce::{Reduction, ReductionOptions, reduce, reduce_spinning};
 
 /// Number of blades.
 pub const BLADES: usize = 36;
@@ -60,6 +60,8 @@ pub struct Rotor37Options {
     pub damping_ratio: f64,
     /// Material.
     pub material: Material,
+    /// Largest speed (rad/s) for which the effects of spin are computed; none without.
+    pub spin: Option<f64>,
 }
 
 impl Default for Rotor37Options {
@@ -71,6 +73,7 @@ impl Default for Rotor37Options {
             checked_modes: 10,
             damping_ratio: 0.005,
             material: Material::maraging_steel(),
+            spin: None,
         }
     }
 }
@@ -96,7 +99,11 @@ pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Resul
         frame: Frame::Cylindrical,
         damping_ratio: options.damping_ratio,
     };
-    let mut reduction = reduce(blade.mesh, &options.material, &clamped, &contact, &reduction_options, listener)?;
+    let (mesh, material) = (blade.mesh, &options.material);
+    let mut reduction = match options.spin {
+        None => reduce(mesh, material, &clamped, &contact, &reduction_options, listener),
+        Some(speed) => reduce_spinning(mesh, material, &clamped, &contact, &reduction_options, speed, listener),
+    }?;
     reduction.timings.assembly += meshing;
     reduction.rom.origin = format!(
         "Blade of NASA rotor 37 (fit of the coordinates of NASA TP-1659), hub clamped: {}",

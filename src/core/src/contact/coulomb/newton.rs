@@ -15,9 +15,11 @@ use super::one_contact::length;
 use super::problem::Problem;
 
 /// Steps of one attempt.
-const STEPS: usize = 40;
+const STEPS: usize = 20;
 /// Halvings of a step.
 const HALVINGS: usize = 12;
+/// Full steps taken in spite of a larger merit: ‖F‖ is not smooth, and may have valleys without a way down.
+const UPHILL: usize = 6;
 /// A step may exceed the last merit as long as it stays below the largest of this many.
 const MEMORY: usize = 4;
 /// Decrease asked for per length of step.
@@ -36,6 +38,8 @@ pub(super) struct Newton {
     active: Vec<usize>,
     /// Systems factorised since the start of the solve.
     pub(super) factorisations: usize,
+    /// Factor on the flexibilities 1/ρ: moves no solution, but changes the way to it.
+    pub(super) stretch: f64,
 }
 
 impl Newton {
@@ -50,6 +54,7 @@ impl Newton {
             start_relative: vec![0.0; order],
             active: Vec::with_capacity(capacity),
             factorisations: 0,
+            stretch: 1.0,
         }
     }
 
@@ -57,13 +62,20 @@ impl Newton {
     /// the reactions are those of the last step, projected on the cones.
     pub(super) fn attempt(&mut self, problem: &mut Problem, proximal: f64, tolerance: f64) -> bool {
         let mut memory = [0.0_f64; MEMORY];
-        memory[0] = merit(problem);
+        memory[0] = merit(problem, self.stretch);
+        let mut uphill = 0;
         for step in 0..STEPS {
             if !self.direct(problem, proximal) {
                 break;
             }
             let allowed = memory.iter().fold(0.0, |most: f64, value| most.max(*value));
-            let Some(reached) = self.search(problem, allowed) else { break };
+            let reached = self.search(problem, allowed).unwrap_or_else(|| {
+                uphill += 1;
+                self.go(problem, 1.0)
+            });
+            if uphill > UPHILL {
+                break;
+            }
             memory[(step + 1) % MEMORY] = reached;
             if self.finished(problem, tolerance) {
                 return true;
@@ -97,7 +109,7 @@ impl Newton {
     /// Newton direction at the current reactions. False when the system is singular.
     fn direct(&mut self, problem: &Problem, proximal: f64) -> bool {
         self.active.clear();
-        self.active.extend((0..problem.size).filter(|contact| trial(problem, *contact)[0] > 0.0));
+        self.active.extend((0..problem.size).filter(|contact| trial(problem, self.stretch, *contact)[0] > 0.0));
         self.assemble(problem, proximal);
         let order = 3 * self.active.len();
         let mut regular = false;
@@ -139,11 +151,11 @@ impl Newton {
             }
         }
         for local in 0..self.active.len() {
-            let v = trial(problem, self.active[local]);
+            let v = trial(problem, self.stretch, self.active[local]);
             let limit = problem.friction[self.active[local]] * v[0];
             if length([v[1], v[2]]) > limit || limit == 0.0 {
                 let (_, tangent) = problem.flexibility(self.active[local]);
-                self.slide(local, v, limit, problem.friction[self.active[local]], tangent);
+                self.slide(local, v, limit, problem.friction[self.active[local]], tangent * self.stretch);
             }
         }
     }
@@ -185,26 +197,30 @@ impl Newton {
         self.start_relative[..order].copy_from_slice(&problem.relative[..order]);
         let mut step = 1.0;
         for _ in 0..=HALVINGS {
-            for k in 0..order {
-                problem.reaction[k] = self.start_reaction[k] + step * self.direction[k];
-                problem.relative[k] = self.start_relative[k] + step * self.moved[k];
-            }
-            let reached = merit(problem);
+            let reached = self.go(problem, step);
             if reached <= (1.0 - DECREASE * step) * allowed {
                 return Some(reached);
             }
             step *= 0.5;
         }
-        problem.reaction[..order].copy_from_slice(&self.start_reaction[..order]);
-        problem.relative[..order].copy_from_slice(&self.start_relative[..order]);
         None
+    }
+
+    /// Go a part of the direction from the start of the step; returns the merit there.
+    fn go(&self, problem: &mut Problem, step: f64) -> f64 {
+        for k in 0..problem.order() {
+            problem.reaction[k] = self.start_reaction[k] + step * self.direction[k];
+            problem.relative[k] = self.start_relative[k] + step * self.moved[k];
+        }
+        merit(problem, self.stretch)
     }
 }
 
 /// v = r − ρu of one contact.
-fn trial(problem: &Problem, contact: usize) -> [f64; 3] {
+fn trial(problem: &Problem, stretch: f64, contact: usize) -> [f64; 3] {
     let k = 3 * contact;
     let (normal, tangent) = problem.flexibility(contact);
+    let (normal, tangent) = (stretch * normal, stretch * tangent);
     [
         problem.reaction[k] - problem.relative[k] / normal,
         problem.reaction[k + 1] - problem.relative[k + 1] / tangent,
@@ -213,10 +229,10 @@ fn trial(problem: &Problem, contact: usize) -> [f64; 3] {
 }
 
 /// ‖F‖².
-fn merit(problem: &Problem) -> f64 {
+fn merit(problem: &Problem, stretch: f64) -> f64 {
     let mut sum = 0.0;
     for contact in 0..problem.size {
-        let v = trial(problem, contact);
+        let v = trial(problem, stretch, contact);
         let limit = problem.friction[contact] * v[0].max(0.0);
         let size = length([v[1], v[2]]);
         let factor = if size <= limit { 1.0 } else { limit / size };

@@ -8,7 +8,7 @@
 //!
 //! g(α) = µ (A_NT·y − b_N D)/A_NN − ‖y‖ = 0,
 //!
-//! whose square is the quartic of O. Bonnefon, G. Daviet (INRIA report 00553859, 2011). Outside the stick cone
+//! whose square is the quartic of O. Bonnefon, G. Daviet (INRIA report, 2011, HAL inria-00553859). Outside the stick cone
 //! g(0) < 0, and g grows like α² because b_N < 0: a root is always bracketed, and Newton's method polishes it.
 
 /// Newton and bisection steps of the sliding root; bisection alone would need about 60.
@@ -134,4 +134,108 @@ impl Sliding {
 /// Length of a tangential vector.
 pub(super) fn length(vector: [f64; 2]) -> f64 {
     (vector[0] * vector[0] + vector[1] * vector[1]).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix3, Vector3};
+    use proptest::prelude::*;
+
+    /// Relative displacement for a reaction.
+    fn relative(a: &[[f64; 3]; 3], b: [f64; 3], r: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|i| b[i] + a[i][0] * r[0] + a[i][1] * r[1] + a[i][2] * r[2])
+    }
+
+    /// Reaction of a slide with force direction θ at u_N = 0, and the moment of u_T about that direction.
+    fn slide(a: &[[f64; 3]; 3], b: [f64; 3], friction: f64, theta: f64) -> ([f64; 3], f64, f64) {
+        let (sin, cos) = (libm::sin(theta), libm::cos(theta));
+        let normal = -b[0] / (a[0][0] + friction * (a[0][1] * cos + a[0][2] * sin));
+        let r = [normal, friction * normal * cos, friction * normal * sin];
+        let u = relative(a, b, r);
+        (r, u[1] * sin - u[2] * cos, u[1] * cos + u[2] * sin)
+    }
+
+    /// Every solution, found by trying all three cases and all directions of sliding.
+    fn brute_force(a: &[[f64; 3]; 3], b: [f64; 3], friction: f64) -> Vec<[f64; 3]> {
+        let mut found = Vec::new();
+        if b[0] >= 0.0 {
+            found.push([0.0; 3]);
+        }
+        let matrix = Matrix3::from_fn(|i, j| a[i][j]);
+        let stick = matrix.lu().solve(&-Vector3::from(b)).unwrap();
+        if stick[0] >= 0.0 && length([stick[1], stick[2]]) <= friction * stick[0] {
+            found.push(stick.into());
+        }
+        let step = std::f64::consts::TAU / 3600.0;
+        for index in 0..3600 {
+            let (mut low, mut high) = (step * f64::from(index), step * f64::from(index + 1));
+            let side = |theta: f64| slide(a, b, friction, theta).1 > 0.0;
+            if side(low) == side(high) {
+                continue;
+            }
+            let start = side(low);
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                (low, high) = if side(middle) == start { (middle, high) } else { (low, middle) };
+            }
+            let (r, _, along) = slide(a, b, friction, low);
+            if r[0] > 0.0 && r[0].is_finite() && along <= 0.0 {
+                found.push(r);
+            }
+        }
+        found
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+        #[test]
+        fn solution_is_one_of_brute_force(
+            entries in prop::array::uniform32(-1.0..1.0_f64),
+            b in prop::array::uniform3(-1.0..1.0_f64),
+            friction in 0.01..2.0_f64,
+            stiff in prop::array::uniform3(0.05..1.0_f64),
+            slip in 0.01..30.0_f64,
+        ) {
+            let skew = [0.0, entries[24], entries[25], -entries[24], 0.0, entries[26], -entries[25], -entries[26], 0.0];
+            let a: [[f64; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| {
+                let product: f64 = (0..8).map(|k| entries[8 * i + k] * entries[8 * j + k]).sum();
+                stiff[i] * stiff[j] * (product + 0.05 * skew[3 * i + j])
+            }));
+            let b = [b[0], slip * b[1], slip * b[2]];
+            let r = solve(&a, b, friction);
+            let all = brute_force(&a, b, friction);
+            let size = r.iter().fold(1e-300_f64, |most, value| most.max(value.abs()));
+            let off = |other: &[f64; 3]| (0..3).map(|i| (r[i] - other[i]).abs()).fold(0.0, f64::max) / size;
+            prop_assert!(all.iter().any(|other| off(other) < 1e-6), "{r:?} is none of {all:?}");
+            // The law to the last digits.
+            let u = relative(&a, b, r);
+            let terms: [f64; 3] = std::array::from_fn(|i| b[i].abs() + (0..3).map(|j| (a[i][j] * r[j]).abs()).sum::<f64>());
+            prop_assert!(u[0] >= -1e-13 * terms[0] && (r[0] == 0.0 || u[0] <= 1e-13 * terms[0]), "u {u:?}");
+            let (r_t, u_t) = (length([r[1], r[2]]), length([u[1], u[2]]));
+            prop_assert!(r_t <= friction * r[0] * (1.0 + 1e-15));
+            let sideways = length([r[1] * u_t + friction * r[0] * u[1], r[2] * u_t + friction * r[0] * u[2]]);
+            prop_assert!(r[0] == 0.0 || sideways <= 1e-11 * friction * r[0] * terms[1].max(terms[2]), "r {r:?}, u {u:?}");
+        }
+    }
+
+    #[test]
+    fn limits_between_the_cases() {
+        let a = [[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        assert_eq!(solve(&a, [0.0, 1.0, 1.0], 0.5).map(f64::to_bits), [0.0_f64.to_bits(); 3]);
+        // On the edge of the stick cone.
+        let r = solve(&a, [-2.0, -0.5, 0.0], 0.5);
+        assert!((r[0] - 1.0).abs() < 1e-15 && (r[1] - 0.5).abs() < 1e-15);
+        // A slip a million million times the elastic displacement: pure sliding.
+        let r = solve(&a, [-2.0, 3e12, 4e12], 0.5);
+        assert!((r[0] - 1.0).abs() < 1e-15 && (r[1] + 0.3).abs() < 1e-12 && (r[2] + 0.4).abs() < 1e-12);
+        // One mode only: the block has rank one (and beyond µ = 1.79, where sliding jams, there is no solution).
+        let shape = [1.0, 0.5, -0.25];
+        let flat: [[f64; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| shape[i] * shape[j]));
+        for friction in [0.0, 0.1, 1.0, 1.5] {
+            let r = solve(&flat, [-1.0, 0.3, 0.1], friction);
+            let u = relative(&flat, [-1.0, 0.3, 0.1], r);
+            assert!(u[0].abs() < 1e-12 && r.iter().all(|value| value.is_finite()), "{r:?} {u:?}");
+        }
+    }
 }

@@ -14,6 +14,10 @@ use crate::dynamics::dispatch::InstructionSet;
 /// blocks without full rank have a unique next reaction.
 const LOCAL_PROXIMAL: f64 = 1e-10;
 
+/// Terms of a displacement beyond this many times the prediction excuse no larger residual: forces that cancel each
+/// other, of a node pinched without room to give way, must not pass for a solution because they are large.
+const LARGEST_TERMS: f64 = 1e5;
+
 /// A problem of `size` contacts in scaled variables; entries contact by contact (normal, tangent 1, tangent 2).
 #[derive(Debug, Clone)]
 pub(super) struct Problem {
@@ -27,8 +31,9 @@ pub(super) struct Problem {
     pub(super) reaction: Vec<f64>,
     /// û = free + Ŵ r̂, kept up to date by the sweeps.
     pub(super) relative: Vec<f64>,
-    /// Sum of the magnitudes û was added up from, at the last refresh.
+    /// Sum of the magnitudes û was added up from, at the last refresh, but at most `ceiling`.
     magnitude: Vec<f64>,
+    ceiling: f64,
     /// Diagonal of Ŵ and predicted displacements while the problem is softened.
     hard: (Vec<f64>, Vec<f64>),
     pub(super) instructions: InstructionSet,
@@ -46,6 +51,7 @@ impl Problem {
             reaction: vec![0.0; order],
             relative: vec![0.0; order],
             magnitude: vec![0.0; order],
+            ceiling: 0.0,
             hard: (vec![0.0; order], vec![0.0; order]),
             instructions: InstructionSet::detect(),
         }
@@ -62,7 +68,7 @@ impl Problem {
         for contact in 0..self.size {
             let largest = (3 * contact..3 * contact + 3).fold(0.0, |most: f64, k| most.max(delassus[(k, k)]));
             self.unit[contact] = unit(largest);
-            self.friction[contact] = friction[contact].max(0.0);
+            self.friction[contact] = if friction[contact] < 0.0 { 0.0 } else { friction[contact] };
         }
         for column in 0..order {
             let across = 1.0 / self.unit[column / 3];
@@ -81,8 +87,17 @@ impl Problem {
         for contact in 0..self.size {
             self.project(contact);
         }
+        self.ceiling = LARGEST_TERMS * self.largest_prediction();
         let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
         finite(&self.matrix[..order * order]) && finite(&self.free[..order]) && finite(&self.friction[..self.size])
+    }
+
+    /// Largest predicted displacement of the contacts that penetrate, or of all when none does.
+    fn largest_prediction(&self) -> f64 {
+        let contacts = self.free[..self.order()].chunks_exact(3);
+        let largest = |most: f64, contact: &[f64]| contact.iter().fold(most, |most, value| most.max(value.abs()));
+        let closed = contacts.clone().filter(|contact| contact[0] < 0.0).fold(0.0, largest);
+        if closed > 0.0 { closed } else { contacts.fold(0.0, largest) }
     }
 
     /// Reactions (N) and relative displacements (m).
@@ -169,6 +184,9 @@ impl Problem {
             let terms = AddColumns { columns, factors, target: &mut self.magnitude[..order] };
             self.instructions.run(AddMagnitudes(terms));
         }
+        for magnitude in &mut self.magnitude[..order] {
+            *magnitude = magnitude.min(self.ceiling);
+        }
     }
 
     /// `target += Ŵ · direction`.
@@ -176,7 +194,7 @@ impl Problem {
         let order = self.order();
         for contact in 0..self.size {
             let factors: [f64; 3] = std::array::from_fn(|k| direction[3 * contact + k]);
-            if factors != [0.0; 3] {
+            if factors.iter().any(|factor| *factor != 0.0) {
                 let columns = &self.matrix[3 * contact * order..(3 * contact + 3) * order];
                 self.instructions.run(AddColumns { columns, factors, target });
             }
@@ -207,7 +225,7 @@ impl Problem {
         });
         let new = one_contact::solve(&block, without, self.friction[contact]);
         let factors: [f64; 3] = std::array::from_fn(|i| relaxation * (new[i] - old[i]));
-        if factors == [0.0; 3] {
+        if factors.iter().all(|factor| *factor == 0.0) {
             return;
         }
         for i in 0..3 {

@@ -16,7 +16,7 @@ use super::scheme::{ModeCoefficients, free_increment, resample};
 use crate::persist::{Persist, Reader, Writer, persist_fields};
 use crate::settings::Scheme;
 use coupling::Coupling;
-use predict::{ModalForce, Predict};
+use predict::{Accumulate, ModalForce, Predict};
 
 /// Lanes of one chunk: one 512-bit register of f64.
 pub const LANES: usize = 8;
@@ -110,6 +110,8 @@ pub struct ModalBank {
     modal_force: Vec<f64>,
     /// Scratch: change of the modal coordinates of the sector being corrected.
     correction: Vec<f64>,
+    /// Scratch: displacements of the rows of one sector.
+    moved: Vec<f64>,
     /// Scratch: modal coordinates and increments of one sector.
     gathered: [Vec<f64>; 2],
 }
@@ -158,6 +160,7 @@ impl ModalBank {
             increment_before: vec![0.0; state_len],
             modal_force: vec![0.0; modes],
             correction: vec![0.0; modes],
+            moved: vec![0.0; rows],
             gathered: [vec![0.0; modes], vec![0.0; modes]],
             coupling,
             options,
@@ -475,21 +478,21 @@ impl ModalBank {
     ) {
         let (modes, width, set) = (self.modes(), self.width, self.set_of(sector));
         let coefficients = &self.coefficients[set * modes..][..modes];
-        let start = sector / width * modes * width + sector % width;
-        let position = self.state.position[start..].iter_mut().step_by(width);
-        let increment = self.state.increment[start..].iter_mut().step_by(width);
-        let before = self.increment_before[start..].iter().step_by(width);
+        let (block, lane) = (sector / width * modes * width, sector % width);
+        let position = self.state.position[block..][..modes * width].chunks_exact_mut(width);
+        let increment = self.state.increment[block..][..modes * width].chunks_exact_mut(width);
+        let before = self.increment_before[block..][..modes * width].chunks_exact(width);
         let mut loss = 0.0;
         for ((((position, increment), before), value), coefficients) in
             position.zip(increment).zip(before).zip(values).zip(coefficients)
         {
             let correction = correction(coefficients, value);
             if with_loss {
-                let predicted = *increment + before;
+                let predicted = increment[lane] + before[lane];
                 loss += coefficients.loss * correction * (2.0 * predicted + correction);
             }
-            *position += correction;
-            *increment += correction;
+            position[lane] += correction;
+            increment[lane] += correction;
         }
         self.state.loss[sector] += loss;
     }
@@ -497,6 +500,11 @@ impl ModalBank {
     /// Add the displacement of the contact rows by `correction`.
     fn move_rows(&mut self, sector: usize) {
         let lanes = self.lanes();
+        if lanes == 1 {
+            let (sums, matrix) = (&mut self.state.displacement, &self.contact_modes);
+            self.instruction_set.run(Accumulate { sums, matrix, values: &self.correction });
+            return;
+        }
         for (shapes, correction) in self.contact_modes.chunks_exact(self.rows.max(1)).zip(&self.correction) {
             for (row, shape) in shapes.iter().enumerate() {
                 self.state.displacement[row * lanes + sector] += shape * correction;
@@ -521,27 +529,34 @@ impl ModalBank {
         }
         let lanes = self.lanes();
         let flexibility = self.flexibility[self.set_of(sector)].as_slice();
-        if self.coupling.is_none() {
-            // G is symmetric: its columns are its rows.
-            for (row, column) in flexibility.chunks_exact(self.rows).enumerate() {
-                let moved: f64 = column.iter().zip(force).map(|(entry, value)| entry * value).sum();
-                self.state.displacement[row * lanes + sector] += moved;
-            }
-            return;
-        }
+        self.moved.fill(0.0);
         for (column, value) in flexibility.chunks_exact(self.rows).zip(force) {
-            for (row, entry) in column.iter().enumerate() {
-                self.state.displacement[row * lanes + sector] += entry * value;
+            for (moved, entry) in self.moved.iter_mut().zip(column) {
+                *moved += entry * value;
             }
+        }
+        for (row, moved) in self.state.displacement.chunks_exact_mut(lanes).zip(&self.moved) {
+            row[sector] += moved;
         }
     }
 
-    /// Correct one sector for contact forces given as modal forces.
-    pub fn correct_modal(&mut self, sector: usize, modal_force: &[f64], with_loss: bool) {
+    /// Displacement of the contact rows of a single structure by contact forces given as modal forces (m).
+    pub fn response_to_modal(&mut self, modal_force: &[f64], displacement: &mut [f64]) {
         self.modal_force.copy_from_slice(modal_force);
-        self.respond(sector);
-        self.move_modes(sector, with_loss);
-        self.move_rows(sector);
+        self.respond(0);
+        displacement.fill(0.0);
+        let (matrix, values) = (&self.contact_modes[..], &self.correction[..]);
+        self.instruction_set.run(Accumulate { sums: displacement, matrix, values });
+    }
+
+    /// Correct a single structure for contact forces given as modal forces, with the response of its rows to them.
+    pub fn correct_modal(&mut self, modal_force: &[f64], response: &[f64], with_loss: bool) {
+        self.modal_force.copy_from_slice(modal_force);
+        self.respond(0);
+        self.move_modes(0, with_loss);
+        for (displacement, response) in self.state.displacement.iter_mut().zip(response) {
+            *displacement += response;
+        }
     }
 
     /// `correction` ← T c φᵀf.

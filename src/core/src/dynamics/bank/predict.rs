@@ -162,11 +162,7 @@ impl Modes<'_> {
     #[inline(always)]
     fn recover_wide(&self, position: &[f64], displacement: &mut [f64]) {
         displacement.fill(0.0);
-        for (q, shapes) in position.iter().zip(self.shapes.chunks_exact(self.rows)) {
-            for (sum, shape) in displacement.iter_mut().zip(shapes) {
-                *sum += shape * q;
-            }
-        }
+        Accumulate { sums: displacement, matrix: self.shapes, values: position }.run();
     }
 
     #[inline(always)]
@@ -188,6 +184,35 @@ fn add_rows<const WIDTH: usize, const ROWS: usize>(sums: &mut [[f64; WIDTH]; ROW
     for row in 0..ROWS {
         for lane in 0..WIDTH {
             sums[row][lane] += shapes[row] * q[lane];
+        }
+    }
+}
+
+/// `sums` + Σ matrix[mode] · values[mode], with `sums.len()` entries per mode.
+pub(crate) struct Accumulate<'a> {
+    pub sums: &'a mut [f64],
+    pub matrix: &'a [f64],
+    pub values: &'a [f64],
+}
+
+impl Kernel for Accumulate<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let rows = self.sums.len().max(1);
+        // Four modes at once: the sums are read and written once for them.
+        let (fours, rest) = self.values.as_chunks::<4>();
+        let (head, tail) = self.matrix.split_at(4 * fours.len() * rows);
+        for (values, shapes) in fours.iter().zip(head.chunks_exact(4 * rows)) {
+            let (first, other) = shapes.split_at(2 * rows);
+            let ((a, b), (c, d)) = (first.split_at(rows), other.split_at(rows));
+            for ((((sum, a), b), c), d) in self.sums.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+                *sum += (a * values[0] + b * values[1]) + (c * values[2] + d * values[3]);
+            }
+        }
+        for (value, shapes) in rest.iter().zip(tail.chunks_exact(rows)) {
+            for (sum, shape) in self.sums.iter_mut().zip(shapes) {
+                *sum += shape * value;
+            }
         }
     }
 }
