@@ -39,6 +39,7 @@ fn spin() -> Spin {
         stiffness_speed4: DMatrix::zeros(9, 9),
         coriolis: DMatrix::from_fn(9, 9, coriolis),
         centrifugal_load: (0..9).map(|i| if i % 3 == 0 { 1e-6 } else { 0.0 }).collect(),
+        centrifugal_load_speed4: vec![0.0; 9],
         largest_speed: 2000.0,
     }
 }
