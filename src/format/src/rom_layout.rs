@@ -46,7 +46,7 @@ const fn array(
 const GENERAL_ARRAYS: usize = 9;
 
 /// Every array.
-pub const ARRAYS: [ArrayLayout; 15] = [
+pub const ARRAYS: [ArrayLayout; 16] = [
     array("mass", "[n, n]", "kg", true, "Reduced mass matrix of one sector: symmetric, positive definite."),
     array("stiffness", "[n, n]", "N/m", true, "Reduced stiffness matrix: symmetric, positive semidefinite."),
     array(
@@ -86,6 +86,14 @@ pub const ARRAYS: [ArrayLayout; 15] = [
     array("coriolis", "[n, n]", "kg", false, "G of the Coriolis force 2ΩG q': skew-symmetric."),
     array("centrifugal_load", "[n]", "kg m", false, "Centrifugal force per square of the speed."),
     array(
+        "centrifugal_load_speed4",
+        "[n]",
+        "kg m s^2",
+        false,
+        "What the growth of the stiffened structure adds to it, per fourth power of the speed; without stiffening it is \
+         left out.",
+    ),
+    array(
         "thermal_loads",
         "[n, patches]",
         "N/K",
@@ -103,7 +111,8 @@ pub const ARRAYS: [ArrayLayout; 15] = [
 ];
 
 /// The arrays of a structure that spins: all or none.
-pub const SPIN_ARRAYS: [&str; 4] = ["stiffness_speed2", "stiffness_speed4", "coriolis", "centrifugal_load"];
+pub const SPIN_ARRAYS: [&str; 5] =
+    ["stiffness_speed2", "stiffness_speed4", "coriolis", "centrifugal_load", "centrifugal_load_speed4"];
 /// The arrays of a structure that heats up: both or none.
 pub const THERMAL_ARRAYS: [&str; 2] = ["thermal_loads", "thermal_patches"];
 

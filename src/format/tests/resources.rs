@@ -181,6 +181,7 @@ fn what_a_scene_leaves_off_leaves_no_data_in_the_fmu() {
             stiffness_speed4: DMatrix::zeros(2, 2),
             coriolis: DMatrix::zeros(2, 2),
             centrifugal_load: vec![1.0, 2.0],
+            centrifugal_load_speed4: vec![0.1, 0.2],
             largest_speed: 2000.0,
         }),
         thermal: Some(Thermal {

@@ -49,6 +49,7 @@ fn spin(order: usize, value: &mut dyn FnMut() -> f64) -> Spin {
         stiffness_speed4: square(1.0) * 1e-9,
         coriolis: square(-1.0),
         centrifugal_load: (0..order).map(|_| value()).collect(),
+        centrifugal_load_speed4: (0..order).map(|_| value()).collect(),
         largest_speed: 1800.0 + value(),
     }
 }
@@ -182,7 +183,7 @@ fn refused(change: impl FnOnce(&mut Loose), parts: &[&str]) {
 
 #[test]
 fn groups_of_arrays_are_all_there_or_none() {
-    for name in ["stiffness_speed2", "stiffness_speed4", "coriolis", "centrifugal_load"] {
+    for name in ["stiffness_speed2", "stiffness_speed4", "coriolis", "centrifugal_load", "centrifugal_load_speed4"] {
         let missing = format!("array `{name}`: missing, although `");
         refused(|file| drop(file.arrays.remove(name)), &[&missing, "Give all of `stiffness_speed2`, "]);
     }

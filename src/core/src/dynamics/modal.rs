@@ -37,8 +37,6 @@ pub struct ModalSpin {
     pub stiffness_speed4: DMatrix<f64>,
     /// φᵀGφ, modes², skew-symmetric.
     pub coriolis: DMatrix<f64>,
-    /// φᵀc per mode.
-    pub centrifugal_load: Vec<f64>,
 }
 
 impl ModalSpin {
@@ -56,7 +54,6 @@ impl ModalSpin {
             stiffness_speed2: symmetric(&spin.stiffness_speed2),
             stiffness_speed4: symmetric(&spin.stiffness_speed4),
             coriolis: (&coriolis - coriolis.transpose()) * 0.5,
-            centrifugal_load: model.modal_load(&spin.centrifugal_load),
         }
     }
 }

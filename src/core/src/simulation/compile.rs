@@ -384,7 +384,8 @@ fn fingerprint(scene: &Scene) -> u64 {
         let mut matrices = vec![&rom.mass, &rom.stiffness, &rom.contact_map];
         if let Some(spin) = &rom.extras.spin {
             matrices.extend([&spin.stiffness_speed2, &spin.stiffness_speed4, &spin.coriolis]);
-            hash = crate::persist::fingerprint(format!("{:?}", spin.centrifugal_load).as_bytes(), hash);
+            let loads = format!("{:?} {:?}", spin.centrifugal_load, spin.centrifugal_load_speed4);
+            hash = crate::persist::fingerprint(loads.as_bytes(), hash);
         }
         matrices.extend(rom.extras.thermal.iter().map(|thermal| &thermal.loads));
         for matrix in matrices {

@@ -8,8 +8,8 @@ use crate::settings::{LoadSettings, StructureSettings};
 /// Modal load vectors per unit of what drives them; empty where a scene does not ask for them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LoadVectors {
-    /// Master: per Ω².
-    pub centrifugal: Vec<f64>,
+    /// Master: per Ω² and, with stiffening, per Ω⁴.
+    pub centrifugal: Vec<[f64; 2]>,
     /// Slave: per kelvin of each patch.
     pub thermal: Vec<Vec<f64>>,
     /// Slave: nodal-diameter load with phase 0 and a quarter period, per unit amplitude.
@@ -18,11 +18,14 @@ pub struct LoadVectors {
 
 impl LoadVectors {
     /// Loads of the master.
-    pub fn of_master(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<f64> {
-        match &rom.extras.spin {
-            Some(spin) if structure.spin.growth => model.modal_load(&spin.centrifugal_load),
-            _ => Vec::new(),
-        }
+    pub fn of_master(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<[f64; 2]> {
+        let Some(spin) = rom.extras.spin.as_ref().filter(|_| structure.spin.growth) else { return Vec::new() };
+        let second = model.modal_load(&spin.centrifugal_load);
+        // The fourth power belongs to the stiffness of small motions about the stretched shape; with the resting
+        // stiffness Ω²c alone is linear theory.
+        let fourth = model.modal_load(&spin.centrifugal_load_speed4);
+        let share = if structure.spin.stiffening { 1.0 } else { 0.0 };
+        second.into_iter().zip(fourth).map(|(second, fourth)| [second, share * fourth]).collect()
     }
 
     /// Loads of the slave; `model` sees the contact grid of `rom`.
@@ -43,8 +46,9 @@ impl LoadVectors {
 
     /// Modal loads of the master at speed Ω (rad/s).
     pub fn fill_master(&self, speed: f64, loads: &mut [f64]) {
-        for (load, centrifugal) in loads.iter_mut().zip(&self.centrifugal) {
-            *load = speed * speed * centrifugal;
+        let square = speed * speed;
+        for (load, [second, fourth]) in loads.iter_mut().zip(&self.centrifugal) {
+            *load = square * (second + square * fourth);
         }
     }
 

@@ -171,6 +171,7 @@ pub fn spin(order: usize) -> tiprub_core::rom::Spin {
         stiffness_speed4: symmetric(1e-8),
         coriolis: skew,
         centrifugal_load: (0..order).map(|mode| 2e-4 * (1.0 + mode as f64)).collect(),
+        centrifugal_load_speed4: (0..order).map(|mode| 1e-12 * (2.0 - mode as f64)).collect(),
         largest_speed: 2000.0,
     }
 }

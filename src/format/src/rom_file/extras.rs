@@ -43,13 +43,17 @@ impl Reader<'_> {
             self.shape(name, array, &[order, order], "that of `mass`")?;
             Ok(DMatrix::from_row_slice(order, order, &array.values))
         };
-        let load = self.required(arrays, "centrifugal_load", 1)?;
-        self.shape("centrifugal_load", load, &[order], "coordinates as in `mass`")?;
+        let load = |name: &str| {
+            let array = self.required(arrays, name, 1)?;
+            self.shape(name, array, &[order], "coordinates as in `mass`")?;
+            Ok(array.values.clone())
+        };
         Ok(Some(Spin {
             stiffness_speed2: square("stiffness_speed2")?,
             stiffness_speed4: square("stiffness_speed4")?,
             coriolis: square("coriolis")?,
-            centrifugal_load: load.values.clone(),
+            centrifugal_load: load("centrifugal_load")?,
+            centrifugal_load_speed4: load("centrifugal_load_speed4")?,
             largest_speed: self.number(metadata, "largest_speed")?,
         }))
     }
@@ -89,6 +93,10 @@ pub(super) fn arrays(extras: &RomExtras) -> Vec<(&'static str, Array)> {
             ("stiffness_speed4", matrix(&spin.stiffness_speed4)),
             ("coriolis", matrix(&spin.coriolis)),
             ("centrifugal_load", list(spin.centrifugal_load.clone(), vec![spin.centrifugal_load.len()])),
+            (
+                "centrifugal_load_speed4",
+                list(spin.centrifugal_load_speed4.clone(), vec![spin.centrifugal_load_speed4.len()]),
+            ),
         ]);
     }
     if let Some(thermal) = &extras.thermal {

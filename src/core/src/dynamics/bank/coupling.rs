@@ -34,7 +34,7 @@ pub struct Coupling {
 impl Coupling {
     /// Room for `sets` sets of coefficients.
     pub fn new(spin: ModalSpin, stiffening: bool, coriolis: bool, sets: usize) -> Self {
-        let modes = spin.centrifugal_load.len();
+        let modes = spin.coriolis.nrows();
         let square = |on: bool| vec![0.0; if on { modes * modes } else { 0 }];
         Self {
             speed: spin.reference_speed,
