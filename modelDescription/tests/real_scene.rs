@@ -10,7 +10,7 @@ use std::path::Path;
 use tiprub_core::settings::OutputSettings;
 use tiprub_core::variables::{Causality, Kind, Span, Variable};
 use tiprub_core::{Scene, Simulation, VariableTable};
-use tiprub_model_description::{fmi2_xml, fmi3_xml, meaning_of_span};
+use tiprub_model_description::{fmi2_xml, fmi3_xml, html, meaning_of_span};
 
 fn outputs(table: &VariableTable) -> impl Iterator<Item = (u32, Span)> + '_ {
     let real = |variable: &&Variable| variable.causality == Causality::Output && variable.kind == Kind::Real;
@@ -114,6 +114,22 @@ fn array_inputs_and_kelvin_are_described_as_each_version_has_them() {
             assert!(item[..item.find("/>").unwrap()].contains("value=\"3\""), "{xml}");
         }
     }
+}
+
+#[test]
+fn the_page_tells_of_grid_heat_and_spin() {
+    let simulation = Simulation::new(&scene::complete()).unwrap();
+    let roms = scene::complete().roms;
+    let page = html(&scene::description(simulation.table(), &roms, true));
+    for part in [
+        "a grid of 24 around and 3 along",
+        "speeds up to 2000 rad/s",
+        "<td class=\"number\">90.0000 to 180.000</td><td class=\"number\">-0.02000 to 0.06000</td>",
+        "<code>casing_temperature[1..4]</code></td><td>K</td>",
+    ] {
+        assert!(page.contains(part), "{part} is not in {page}");
+    }
+    assert!(!page.contains("c17"), "not every node of the grid by name");
 }
 
 #[test]

@@ -231,6 +231,7 @@ pub fn description<'a>(table: &'a VariableTable, roms: &'a [Rom], fmi3_arrays: b
         table,
         fmi3_arrays,
         structures: ["rotor", "ring"].into_iter().zip(roms).collect(),
+        features: Vec::new(),
         limits: Vec::new(),
         warnings: Vec::new(),
     }
