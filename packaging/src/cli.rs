@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::casing_arguments::CasingArguments;
+
 /// Blade-tip/casing contact (rub) as an FMU.
 #[derive(Debug, Parser)]
 #[command(
@@ -36,11 +38,14 @@ pub enum Command {
                             DIR then holds report.html (opens offline), the two .fmu files, the ROM, the scene and \
                             the results as CSV.")]
     Demo(DemoArguments),
-    /// From a blade to a reduced-order model (ROM), with its quality checks.
+    /// From a blade or a casing to a reduced-order model (ROM), with its quality checks.
     #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  \
-                            tiprub reduce rotor37 --modes 30 --contact-nodes 5 --mesh 10x2x16 -o fine.rom.safetensors\n\n\
+                            tiprub reduce rotor37 --modes 30 --contact-nodes 5 --mesh 10x2x16 -o fine.rom.safetensors\n  \
+                            tiprub reduce casing\n  \
+                            tiprub reduce casing --material titanium --thickness 0.003 --high-flange none\n  \
+                            tiprub reduce casing --contour=-0.02:0.256,0.04:0.245 --contact-axial 0.0:0.03\n\n\
                             Meshes of your own are not read; docs/rom-file.md shows how to write a ROM from Python.")]
-    Reduce(ReduceArguments),
+    Reduce(Box<ReduceArguments>),
     /// From a scene to .fmu files. Compiles nothing: the library is generic, scene and ROM are data.
     #[command(
         after_help = "Examples:\n  tiprub package scene.toml                 both FMUs beside each other here\n  \
@@ -80,30 +85,36 @@ pub struct DemoArguments {
 /// Arguments of `tiprub reduce`.
 #[derive(Debug, Args)]
 pub struct ReduceArguments {
-    /// What to reduce: `rotor37`, the NASA rotor 37 blade that ships with tiprub.
+    /// What to reduce: `rotor37`, the NASA rotor 37 blade that ships with tiprub, or `casing`, a ring around it.
     #[arg(value_name = "MODEL", value_parser = model)]
     pub model: Model,
-    /// Number of fixed-interface modes kept.
+    /// Number of modes kept: fixed-interface modes of the blade [default: 20], modes of the casing below the cut-off
+    /// [default: 60].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
-    /// Number of contact nodes along the tip chord, leading edge to trailing edge (≥ 2).
+    /// Number of contact nodes along the tip chord of `rotor37`, leading edge to trailing edge (≥ 2).
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
-    /// Elements along the chord, through the thickness and along the span.
-    #[arg(long, value_name = "CxTxS")]
+    /// Elements: of the blade along the chord, through the thickness and along the span [default: 16x2x20]; of the
+    /// casing around, through the thickness and along the axis [default: 72x1x12].
+    #[arg(long, value_name = "NxNxN")]
     pub mesh: Option<MeshSize>,
-    /// Also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s).
+    /// Of the blade, also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s).
     #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true)]
     pub spin: Option<f64>,
-    /// ROM file to write.
-    #[arg(long, short, value_name = "FILE", default_value = "rotor37.rom.safetensors")]
-    pub output: PathBuf,
+    /// ROM file to write [default: rotor37.rom.safetensors; casing37.rom.safetensors, or casing.rom.safetensors where
+    /// options change it].
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
     /// Replace files that are there already and hold something else.
     #[arg(long)]
     pub force: bool,
     /// Also write the mesh as a CalculiX/Abaqus input file.
     #[arg(long, value_name = "FILE")]
     pub inp: Option<PathBuf>,
+    /// What describes a casing.
+    #[command(flatten)]
+    pub casing: CasingArguments,
 }
 
 /// Arguments of `tiprub package`.
@@ -159,6 +170,8 @@ pub struct InspectArguments {
 pub enum Model {
     /// One blade of NASA rotor 37 (36 blades), hub clamped.
     Rotor37,
+    /// A flexible casing ring, by default the one around rotor 37.
+    Casing,
 }
 
 /// Which FMUs to write.
@@ -174,16 +187,9 @@ pub enum FmiChoice {
     Both,
 }
 
-/// Elements along the chord, through the thickness and along the span.
+/// Three element counts: chord, thickness and span of a blade; around, through and along of a casing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MeshSize {
-    /// Along the chord.
-    pub chord: usize,
-    /// Through the thickness.
-    pub thickness: usize,
-    /// Along the span.
-    pub span: usize,
-}
+pub struct MeshSize(pub [usize; 3]);
 
 impl std::str::FromStr for MeshSize {
     type Err = String;
@@ -191,17 +197,19 @@ impl std::str::FromStr for MeshSize {
     fn from_str(text: &str) -> Result<Self, String> {
         let counts: Result<Vec<usize>, _> = text.split(['x', 'X']).map(str::parse).collect();
         match counts.as_deref() {
-            Ok([chord, thickness, span]) if [chord, thickness, span].iter().all(|count| (1..=200).contains(*count)) => {
-                Ok(Self { chord: *chord, thickness: *thickness, span: *span })
+            Ok([a, b, c]) if [a, b, c].iter().all(|count| (1..=200).contains(*count)) => Ok(Self([*a, *b, *c])),
+            _ => {
+                Err("give three element counts from 1 to 200: CHORDxTHICKNESSxSPAN of the blade, for example 10x1x14, \
+                      AROUNDxTHROUGHxALONG of the casing, for example 72x1x12"
+                    .into())
             }
-            _ => Err("give three element counts from 1 to 200 as CHORDxTHICKNESSxSPAN, for example 10x1x14".into()),
         }
     }
 }
 
 fn model(text: &str) -> Result<Model, String> {
     Model::from_str(text, false).map_err(|_| {
-        "only `rotor37` ships with tiprub, and meshes are not read; docs/rom-file.md shows how to write a ROM of your own \
+        "only `rotor37` and `casing` ship with tiprub, and meshes are not read; docs/rom-file.md shows how to write a ROM of your own \
          model from Python"
             .into()
     })
@@ -259,7 +267,7 @@ mod tests {
         assert_eq!(run.set, [("speed".into(), "-2".into()), ("name".into(), "a=b".into())]);
         assert_eq!(run.stop, Some(1e-3));
         let Command::Reduce(reduce) = parse("reduce rotor37 --mesh 10x2x14").unwrap().command else { panic!("reduce") };
-        assert_eq!(reduce.mesh, Some(MeshSize { chord: 10, thickness: 2, span: 14 }));
+        assert_eq!(reduce.mesh, Some(MeshSize([10, 2, 14])));
     }
 
     #[test]
@@ -272,6 +280,13 @@ mod tests {
             ("package a.toml --fmi 4", "possible values: 2, 3, both"),
             ("reduce rotor38", "rotor37"),
             ("reduce blade.inp", "docs/rom-file.md"),
+            ("reduce casing --contour 0.1", "z:r"),
+            ("reduce casing --contour=0.1:0.2,0.1:0.2", "does not lie beyond"),
+            ("reduce casing --thickness 0", "positive length"),
+            ("reduce casing --low-flange 5", "TxH"),
+            ("reduce casing --contact-grid 24", "AROUNDxALONG"),
+            ("reduce casing --contact-axial 0.1:0.1", "FROM:TO"),
+            ("reduce casing --support left", "possible values: low, high, both, free"),
         ] {
             let error = parse(line).unwrap_err();
             assert_eq!(error.exit_code(), 2, "{line}");

@@ -9,9 +9,11 @@
 //! - [`error_study`]: error against run time for every scheme and solver;
 //! - [`archive`], [`fmu`], [`library`]: the reproducible zip, its contents, and the shared library that goes in;
 //! - [`importer`]: a packaged FMU driven through its C ABI the way any importer would;
+//! - [`casing_arguments`]: what can be asked for of a casing;
 //! - [`report`]: the HTML report with its pictures and plots.
 
 pub mod archive;
+pub mod casing_arguments;
 pub mod cli;
 pub mod commands;
 pub mod console;

@@ -1,9 +1,9 @@
-//! The blade that ships, reduced with progress on the way.
+//! The blade that ships and casings, reduced with progress on the way.
 
 use tiprub_model::{
-    Reduction, Rotor37Options,
-    progress::{Progress, Stage},
-    reduce_rotor37,
+    CasingOptions, Reduction, Rotor37Options,
+    progress::{Listener, Progress, Stage},
+    reduce_ring, reduce_rotor37,
 };
 
 use crate::{Failure, Result, console::Console};
@@ -23,15 +23,31 @@ const STAGES: [Stage; 7] = [
 /// # Errors
 /// Counts that the mesh cannot serve, and whatever the reduction refuses.
 pub fn rotor37(options: &Rotor37Options, console: &Console) -> Result<Reduction> {
-    let task = console.task("Reducing rotor 37", Some(100 * STAGES.len() as u64));
+    with_progress("Reducing rotor 37", console, &|listener| reduce_rotor37(options, listener))
+}
+
+/// Reduce a casing, showing stage and share done.
+///
+/// # Errors
+/// Lengths, counts and contact rings that do not fit each other, and whatever the reduction refuses.
+pub fn casing(options: &CasingOptions, console: &Console) -> Result<Reduction> {
+    with_progress("Reducing the casing", console, &|listener| reduce_ring(options, listener))
+}
+
+fn with_progress(
+    title: &str,
+    console: &Console,
+    reduce: &dyn Fn(Listener<'_>) -> tiprub_model::Result<Reduction>,
+) -> Result<Reduction> {
+    let task = console.task(title, Some(100 * STAGES.len() as u64));
     let listener = |progress: Progress| {
         let stage = STAGES.iter().position(|stage| *stage == progress.stage).unwrap_or(0);
-        task.now(&format!("Reducing rotor 37: {}", progress.stage));
+        task.now(&format!("{title}: {}", progress.stage));
         task.at(percent(stage as f64 + progress.fraction));
     };
-    reduce_rotor37(options, &listener).map_err(|error| match error {
+    reduce(&listener).map_err(|error| match error {
         tiprub_model::Error::Invalid { what, problem, remedy } => Failure::new(what, problem, remedy),
-        other => Failure::from_below("reducing rotor 37", other),
+        other => Failure::from_below(title, other),
     })
 }
 

@@ -108,8 +108,18 @@ impl RomFacts {
         let _ = writeln!(text, "ROM {}: {}", rom.name, rom.origin);
         let _ = writeln!(text, "  sectors                   {}", rom.sectors);
         let _ = writeln!(text, "  reduced coordinates       {} per sector", rom.order());
-        let _ = writeln!(text, "  contact nodes             {} ({})", nodes.len(), nodes.join(", "));
-        for node in &rom.contact_nodes {
+        // Of a grid, the first node of every ring stands for the others.
+        let shown = match rom.extras.grid {
+            Some(grid) => {
+                let _ = writeln!(text, "  contact nodes             {} around x {} along", grid.around, grid.along);
+                grid.around
+            }
+            None => {
+                let _ = writeln!(text, "  contact nodes             {} ({})", nodes.len(), nodes.join(", "));
+                1
+            }
+        };
+        for node in rom.contact_nodes.iter().step_by(shown.max(1)) {
             let [a, b, c] = node.position;
             let place = match rom.frame {
                 Frame::Cylindrical => {

@@ -3,7 +3,7 @@
 use std::{cell::RefCell, fs, path::Path};
 
 use tiprub_core::{Rom, Scene};
-use tiprub_model::{Rotor37Options, rotor37::DESIGN_SPEED};
+use tiprub_model::{CasingOptions, Rotor37Options, casing::CASING37, rotor37::DESIGN_SPEED};
 
 use crate::{Failure, Result, console::Console, reduction};
 
@@ -76,14 +76,15 @@ pub fn rotor37_text(rom_file: &str, stop: f64) -> String {
     text
 }
 
-/// The blades that ship: at rest, and with the effects of spin up to its design speed.
+/// What ships: the blade at rest, the blade with the effects of spin up to its design speed, the casing around it.
 fn builtin_rom(name: &str, console: &Console) -> Option<Result<Rom, String>> {
-    let spin = match name {
-        "rotor37" => None,
-        "rotor37-spin" => Some(DESIGN_SPEED),
+    let blade = |spin| reduction::rotor37(&Rotor37Options { spin, ..Rotor37Options::default() }, console);
+    let reduced = match name {
+        "rotor37" => blade(None),
+        "rotor37-spin" => blade(Some(DESIGN_SPEED)),
+        CASING37 => reduction::casing(&CasingOptions::default(), console),
         _ => return None,
     };
-    let reduced = reduction::rotor37(&Rotor37Options { spin, ..Rotor37Options::default() }, console);
     Some(reduced.map(|reduction| reduction.rom).map_err(|failure| failure.to_string()))
 }
 

@@ -396,6 +396,30 @@ fn a_reduction_replaces_another_rom_only_by_force_and_warns_of_a_poor_one() {
 }
 
 #[test]
+fn a_casing_is_reduced_and_options_of_the_other_model_are_refused() {
+    let project = Project::new();
+    let coarse = ["reduce", "casing", "--mesh", "24x1x8", "--fixed-interface-modes", "48", "--modes", "36"];
+    let ring = ["--contact-grid", "8x3", "--patches", "4x2", "--material", "titanium", "--high-flange", "none"];
+    let files = ["--inp", "ring.inp", "--json", "--quiet"];
+    let text = project.succeed(&[&coarse[..], &ring[..], &files[..]].concat());
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(json["rom"]["name"], "casing");
+    assert_eq!(json["rom"]["contact_nodes"].as_array().unwrap().len(), 24);
+    let order = json["rom"]["order"].as_u64().unwrap();
+    assert!((36 + 72..=36 + 72 + 8).contains(&order), "{order}");
+    assert!(json["rom"]["origin"].as_str().unwrap().contains("titanium"), "{text}");
+    assert!(project.path("casing.rom.safetensors").is_file());
+    let input = fs::read_to_string(project.path("ring.inp")).unwrap();
+    assert!(input.contains("C3D20") && input.contains("CLAMPED, 1, 3"));
+    let error = project.fail(&["reduce", "rotor37", "--thickness", "0.003"], 2);
+    assert!(error.contains("describes a casing"), "{error}");
+    let error = project.fail(&["reduce", "casing", "--contact-nodes", "3"], 2);
+    assert!(error.contains("--contact-grid"), "{error}");
+    let error = project.fail(&["reduce", "casing", "--mesh", "30x1x8"], 1);
+    assert!(error.contains("not a multiple of the 24 contact nodes"), "{error}");
+}
+
+#[test]
 fn help_is_there_for_every_command() {
     let project = Project::new();
     for command in ["demo", "reduce", "package", "run", "inspect"] {

@@ -1,10 +1,16 @@
-//! `tiprub reduce`: from a blade to a ROM file, with its checks.
+//! `tiprub reduce`: from a blade or a casing to a ROM file, with its checks.
 
 use serde_json::json;
-use tiprub_model::{Rotor37Options, inp::calculix_input, rotor37::MeshCounts};
+use tiprub_model::{
+    Rotor37Options,
+    casing::{CLAMPED, Support},
+    inp::calculix_input,
+    rotor37::MeshCounts,
+};
 
 use crate::{
     Failure, Result,
+    casing_arguments::{self, CasingArguments},
     cli::{Model, ReduceArguments},
     console::{Console, Outcome},
     output_file, reduction,
@@ -19,24 +25,22 @@ const EXPORTED_FREQUENCIES: usize = 10;
 /// # Errors
 /// Counts that do not fit the mesh, or files that cannot be written.
 pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
-    let Model::Rotor37 = arguments.model;
-    let defaults = Rotor37Options::default();
-    let options = Rotor37Options {
-        mesh: arguments.mesh.map_or(defaults.mesh, |size| MeshCounts {
-            chord: size.chord,
-            thickness: size.thickness,
-            span: size.span,
-        }),
-        contact_nodes: arguments.contact_nodes.unwrap_or(defaults.contact_nodes),
-        fixed_interface_modes: arguments.modes.unwrap_or(defaults.fixed_interface_modes),
-        spin: arguments.spin,
-        ..defaults
+    let (reduction, clamped, default_output) = match arguments.model {
+        Model::Rotor37 => {
+            let reduction = reduction::rotor37(&rotor37_options(arguments)?, console)?;
+            (reduction, Some("hub"), "rotor37.rom.safetensors".to_owned())
+        }
+        Model::Casing => {
+            let options = casing_arguments::options(arguments)?;
+            let clamped = (options.support != Support::Free).then_some(CLAMPED);
+            (reduction::casing(&options, console)?, clamped, format!("{}.rom.safetensors", options.name))
+        }
     };
-    let reduction = reduction::rotor37(&options, console)?;
+    let output = &arguments.output.clone().unwrap_or_else(|| default_output.into());
     let facts = RomFacts::of(&reduction.rom)?;
-    let mut files = vec![(&arguments.output, tiprub_format::write_rom(&reduction.rom))];
+    let mut files = vec![(output, tiprub_format::write_rom(&reduction.rom))];
     if let Some(path) = &arguments.inp {
-        let text = calculix_input(&reduction.mesh, &reduction.material, Some("hub"), EXPORTED_FREQUENCIES)
+        let text = calculix_input(&reduction.mesh, &reduction.material, clamped, EXPORTED_FREQUENCIES)
             .map_err(|error| Failure::from_below(path.display(), error))?;
         files.push((path, text.into_bytes()));
     }
@@ -57,7 +61,7 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
         reduction.mesh.elements.len(),
         reduction.free_dofs,
         reduction.timings.total(),
-        arguments.output.display()
+        output.display()
     ));
     if let Some(path) = &arguments.inp {
         text.push_str(&format!("\n  written: {}", path.display()));
@@ -88,7 +92,25 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
         })).collect::<Vec<_>>(),
         "seconds": reduction.timings.total(),
         "warnings": warnings,
-        "files": { "rom": arguments.output, "inp": arguments.inp },
+        "files": { "rom": output, "inp": arguments.inp },
     });
     Ok(Outcome { text, json })
+}
+
+fn rotor37_options(arguments: &ReduceArguments) -> Result<Rotor37Options> {
+    if arguments.casing != CasingArguments::default() {
+        let remedy = "Leave out what `tiprub reduce --help` lists as options of `casing`";
+        return Err(Failure::usage("rotor37", "an option given describes a casing", remedy));
+    }
+    let defaults = Rotor37Options::default();
+    Ok(Rotor37Options {
+        mesh: arguments.mesh.map_or(defaults.mesh, |size| {
+            let [chord, thickness, span] = size.0;
+            MeshCounts { chord, thickness, span }
+        }),
+        contact_nodes: arguments.contact_nodes.unwrap_or(defaults.contact_nodes),
+        fixed_interface_modes: arguments.modes.unwrap_or(defaults.fixed_interface_modes),
+        spin: arguments.spin,
+        ..defaults
+    })
 }

@@ -3,8 +3,12 @@
 //! u = T z with z = (u_b, η): interface displacements as they are, fixed-interface modes Φ (K_ii Φ = M_ii Φ Ω²,
 //! ΦᵀM_iiΦ = I) and constraint modes Ψ = -K_ii⁻¹ K_ib:
 //! T = \[I 0; Ψ Φ\], K̂ = blkdiag(K_bb + K_bi Ψ, Ω²), M̂ = TᵀMT.
+//!
+//! The static response to interface forces is exact. For loads on the interior it is so once the static responses of the
+//! interior to them, K_ii⁻¹ f_i, are added to Φ: residual vectors (Dickens, Nakagawa, Wittbrodt, Computers & Structures
+//! 62(6), 1997). The space of both is then described by its own modes, so that the form of K̂ stays.
 
-use faer::Mat;
+use faer::{Mat, MatRef, Side};
 use nalgebra::DMatrix;
 
 use crate::eigen::{Modes, lowest_modes, positive_factor};
@@ -37,6 +41,33 @@ pub fn craig_bampton(
     modes: usize,
     listener: Listener<'_>,
 ) -> Result<CraigBampton> {
+    let inner = InnerBasis { modes, whole_pairs: false, loads: None };
+    craig_bampton_with(stiffness, mass, interface, &inner, listener)
+}
+
+/// What describes the motion of the interior with the interface held.
+#[derive(Debug, Clone, Copy)]
+pub struct InnerBasis<'a> {
+    /// Number of fixed-interface modes.
+    pub modes: usize,
+    /// Keep one mode less rather than half of a double one, which would split the double modes of the reduced model.
+    pub whole_pairs: bool,
+    /// Loads, full dofs × loads (N), to any combination of which the reduced model is to answer exactly at rest.
+    pub loads: Option<MatRef<'a, f64>>,
+}
+
+/// As [`craig_bampton`], with the interior described as told. A load whose static response is there already adds nothing.
+///
+/// # Errors
+/// Those of [`craig_bampton`].
+pub fn craig_bampton_with(
+    stiffness: &SparseMatrix,
+    mass: &SparseMatrix,
+    interface: &[usize],
+    inner: &InnerBasis<'_>,
+    listener: Listener<'_>,
+) -> Result<CraigBampton> {
+    let modes = inner.modes;
     let interior = interior_dofs(stiffness.order(), interface)?;
     if modes > interior.len() {
         return Err(Error::invalid(
@@ -52,21 +83,105 @@ pub fn craig_bampton(
         "K_ii (stiffness with the interface held)",
         "Clamp the structure, or choose at least three contact nodes that are not on one line",
     )?;
-    let fixed = lowest_modes(&inner_mass, &factor, 0.0, modes, Stage::FixedInterfaceModes, listener)?;
+    let searched = if inner.whole_pairs { (modes + 1).min(interior.len()) } else { modes };
+    let fixed = lowest_modes(&inner_mass, &factor, 0.0, searched, Stage::FixedInterfaceModes, listener)?;
+    let fixed = lowest_of(fixed, modes);
+    let fixed_interface_frequencies = fixed.frequencies();
+    let inner = match inner.loads {
+        Some(loads) if loads.ncols() > 0 => {
+            let responses = factor.solve(Mat::from_fn(interior.len(), loads.ncols(), |i, j| loads[(interior[i], j)]));
+            with_static_responses(fixed, &inner_stiffness, &inner_mass, &responses)?
+        }
+        _ => fixed,
+    };
     report(listener, Stage::ConstraintModes, 0, 1);
     let coupling = stiffness.block(&interior, interface);
     let mut constraint = factor.solve(coupling.clone());
     constraint *= faer::Scale(-1.0);
     let static_stiffness = stiffness.block(interface, interface) + coupling.transpose() * &constraint;
-    let transformation = transformation(stiffness.order(), &interior, interface, &constraint, &fixed);
+    let transformation = transformation(stiffness.order(), &interior, interface, &constraint, &inner);
     let reduced_mass = transformation.transpose() * mass.times(transformation.as_ref());
     report(listener, Stage::ConstraintModes, 1, 1);
     Ok(CraigBampton {
         mass: symmetrised(reduced_mass.nrows(), |i, j| reduced_mass[(i, j)]),
-        stiffness: reduced_stiffness(&static_stiffness, &fixed.eigenvalues),
+        stiffness: reduced_stiffness(&static_stiffness, &inner.eigenvalues),
         transformation,
-        fixed_interface_frequencies: fixed.frequencies(),
+        fixed_interface_frequencies,
     })
+}
+
+/// ω² of a double mode agree to this share.
+const DOUBLE: f64 = 1e-6;
+
+/// The lowest `count` modes, or one fewer where more are there and the next one belongs to the last.
+fn lowest_of(modes: Modes, count: usize) -> Modes {
+    let squares = &modes.eigenvalues;
+    if squares.len() <= count {
+        return modes;
+    }
+    let kept =
+        if count > 0 && squares[count] - squares[count - 1] < DOUBLE * squares[count] { count - 1 } else { count };
+    Modes {
+        eigenvalues: squares[..kept].to_vec(),
+        shapes: modes.shapes.get(.., ..kept).to_owned(),
+        residuals: modes.residuals[..kept].to_vec(),
+    }
+}
+
+/// A static response this small beside its own size, once the modes are taken out of it, is round-off.
+const DEPENDENT: f64 = 1e-10;
+
+/// The space of modes and static responses, described by its own modes.
+fn with_static_responses(
+    fixed: Modes,
+    stiffness: &SparseMatrix,
+    mass: &SparseMatrix,
+    responses: &Mat<f64>,
+) -> Result<Modes> {
+    let mut basis = fixed.shapes.clone();
+    for j in 0..responses.ncols() {
+        if let Some(column) = independent_part(&basis, mass, responses.get(.., j..j + 1).to_owned()) {
+            let size = basis.ncols();
+            basis.resize_with(column.nrows(), size + 1, |i, _| column[(i, 0)]);
+        }
+    }
+    if basis.ncols() == fixed.shapes.ncols() {
+        return Ok(fixed);
+    }
+    // The basis is M-orthonormal, so that its own modes come from the projected stiffness alone.
+    let projected = basis.transpose() * stiffness.times(basis.as_ref());
+    let size = projected.nrows();
+    let scale = projected.norm_max();
+    let symmetric = Mat::from_fn(size, size, |i, j| 0.5 * (projected[(i, j)] + projected[(j, i)]) / scale);
+    let eigen = symmetric.self_adjoint_eigen(Side::Lower).map_err(|_| {
+        Error::invalid("static responses", "their eigenvalue problem did not converge", "Check loads and material")
+    })?;
+    let eigenvalues = (0..size).map(|k| scale * eigen.S()[k]).collect();
+    Ok(Modes { eigenvalues, shapes: basis * eigen.U(), residuals: fixed.residuals })
+}
+
+/// `column` without its part in the M-orthonormal `basis`, scaled to unit mass; `None` where nothing is left.
+fn independent_part(basis: &Mat<f64>, mass: &SparseMatrix, mut column: Mat<f64>) -> Option<Mat<f64>> {
+    let norm =
+        |column: &Mat<f64>, mass_column: &Mat<f64>| (column.col(0).transpose() * mass_column.col(0)).max(0.0).sqrt();
+    let mut mass_column = mass.times(column.as_ref());
+    let first = norm(&column, &mass_column);
+    let mut before = first;
+    // Until a pass takes nothing away any more, as in the Lanczos iteration.
+    for _pass in 0..6 {
+        column -= basis * (basis.transpose() * &mass_column);
+        mass_column = mass.times(column.as_ref());
+        let after = norm(&column, &mass_column);
+        // Not more than, so that a load of zeros is left out, too.
+        if after <= DEPENDENT * first {
+            return None;
+        }
+        if after > 0.5 * before {
+            return Some(column * faer::Scale(1.0 / after));
+        }
+        before = after;
+    }
+    None
 }
 
 fn interior_dofs(order: usize, interface: &[usize]) -> Result<Vec<usize>> {

@@ -92,14 +92,15 @@ impl Basis {
     /// through the subtractions it would lose what they cancel.
     fn append(&mut self, block: &Mat<f64>, mass: &SparseMatrix) -> Mat<f64> {
         let (first, width) = (self.size, block.ncols());
-        let scale = column_norms(block, &mass.times(block.as_ref())).into_iter().fold(0.0, f64::max);
+        let norms = column_norms(block, &mass.times(block.as_ref()));
+        let scale = norms.iter().copied().fold(0.0, f64::max);
         let mut upper = Mat::zeros(width, width);
         for j in 0..width {
             if self.size == self.capacity {
                 break;
             }
             let mut column = block.get(.., j..j + 1).to_owned();
-            let mut before = f64::INFINITY;
+            let mut before = norms[j];
             let mut norm = 0.0;
             let mut mass_column = Mat::zeros(0, 0);
             // Repeat until a pass takes nothing away any more (Kahan: once more is enough, unless it is round-off).

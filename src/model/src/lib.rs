@@ -3,11 +3,12 @@
 //! Floor 1. A [`Mesh`] of the six solid [elements](element) is [assembled](assembly) into sparse stiffness and mass,
 //! its lowest modes are found by [shift-invert Lanczos](eigen), and [Craig-Bampton](craig_bampton) leaves a small dense
 //! pencil in the displacements of the contact nodes: a [`tiprub_core::Rom`] with the checks that come with it
-//! (eqs 12 and 13 of the paper). [`rotor37`] is the blade that ships. Nothing is printed: a caller passes a
+//! (eqs 12 and 13 of the paper). [`rotor37`] is the blade that ships, [`casing`] the ring around it. Nothing is printed: a caller passes a
 //! [listener](progress) and shows what it likes. SI units everywhere.
 #![forbid(unsafe_code)]
 
 pub mod assembly;
+pub mod casing;
 pub mod craig_bampton;
 pub mod eigen;
 pub mod element;
@@ -20,7 +21,9 @@ pub mod reduce;
 pub mod rotor37;
 pub mod sparse;
 pub mod spin;
+pub mod thermal;
 
+pub use casing::{CasingOptions, reduce_casing, reduce_ring};
 pub use error::{Error, Result};
 pub use material::Material;
 pub use mesh::{Mesh, surface_quads};

@@ -13,12 +13,38 @@ pub struct Material {
     pub poisson_ratio: f64,
     /// Density ρ (kg/m³).
     pub density: f64,
+    /// Coefficient of linear thermal expansion α (1/K), secant from the reference temperature.
+    pub expansion: f64,
 }
 
 impl Material {
-    /// Maraging steel as taken for rotor 37: E = 180 GPa, ν = 0.3, ρ = 8000 kg/m³.
+    /// Maraging steel as taken for rotor 37: E = 180 GPa, ν = 0.3, ρ = 8000 kg/m³; α = 10.1e-6 1/K is that of 18Ni
+    /// maraging steel (250 grade, 24 to 284 °C, ASM Metals Handbook).
     pub fn maraging_steel() -> Self {
-        Self { name: "maraging_steel".into(), young_modulus: 180e9, poisson_ratio: 0.3, density: 8000.0 }
+        Self {
+            name: "maraging_steel".into(),
+            young_modulus: 180e9,
+            poisson_ratio: 0.3,
+            density: 8000.0,
+            expansion: 10.1e-6,
+        }
+    }
+
+    /// Plain carbon steel: E = 210 GPa, ν = 0.3, ρ = 7850 kg/m³ (EN 1993-1-1, 3.2.6); α = 11.7e-6 1/K (low-carbon steel
+    /// AISI 1020, 0 to 100 °C, ASM Metals Handbook).
+    pub fn steel() -> Self {
+        Self { name: "steel".into(), young_modulus: 210e9, poisson_ratio: 0.3, density: 7850.0, expansion: 11.7e-6 }
+    }
+
+    /// Titanium Ti-6Al-4V, annealed: E = 113.8 GPa, ν = 0.342, ρ = 4430 kg/m³, α = 8.6e-6 1/K (20 to 100 °C, ASM).
+    pub fn titanium() -> Self {
+        Self {
+            name: "titanium".into(),
+            young_modulus: 113.8e9,
+            poisson_ratio: 0.342,
+            density: 4430.0,
+            expansion: 8.6e-6,
+        }
     }
 
     /// Lamé's constants (λ, µ) in Pa.
@@ -37,7 +63,7 @@ impl Material {
             Err(Error::invalid(
                 format!("material `{}`, {property}", self.name),
                 format!("{value} is outside {range}"),
-                "Give SI units: Pa and kg/m³",
+                "Give SI units: Pa, kg/m³ and 1/K",
             ))
         };
         if !positive(self.young_modulus) {
@@ -48,6 +74,10 @@ impl Material {
         }
         if !(self.poisson_ratio > -1.0 && self.poisson_ratio < 0.5) {
             return fail("Poisson's ratio", self.poisson_ratio, "-1 < ν < 0.5");
+        }
+        // Largest of the metals is below 1e-4; a value given in 1e-6/K must not pass as 1/K.
+        if self.expansion.is_nan() || self.expansion.abs() > 1e-3 {
+            return fail("thermal expansion coefficient", self.expansion, "|α| ≤ 1e-3 1/K");
         }
         Ok(())
     }

@@ -248,7 +248,7 @@ pub fn full_modes(
 ///
 /// Eq. 12: ε = rᵀKr / (zᵀTᵀKTz) with r = K⁻¹(K - ω²M)Tz, ω and z of the reduced model. With K - σM for K where the
 /// structure is free, so that the norm exists.
-fn compare(
+pub(crate) fn compare(
     full: &FullModes,
     mass: &SparseMatrix,
     reduced: &CraigBampton,
@@ -279,14 +279,14 @@ fn compare(
     RomChecks { full_frequencies, reduced_frequencies, frequency_deviation, residual_criterion }
 }
 
-fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> Result<T>) -> Result<T> {
+pub(crate) fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> Result<T>) -> Result<T> {
     let start = Instant::now();
     let result = work();
     *seconds += start.elapsed().as_secs_f64();
     result
 }
 
-fn check_nodes(mesh: &Mesh, clamped: &[usize], contact: &[ContactPoint], frame: Frame) -> Result<()> {
+pub(crate) fn check_nodes(mesh: &Mesh, clamped: &[usize], contact: &[ContactPoint], frame: Frame) -> Result<()> {
     for &node in clamped.iter().chain(contact.iter().map(|point| &point.node)) {
         if node >= mesh.nodes.len() {
             let problem = format!("node {} does not exist; there are {}", node + 1, mesh.nodes.len());
@@ -399,14 +399,14 @@ fn build_rom(
     Ok(rom)
 }
 
-fn element_names(mesh: &Mesh) -> String {
+pub(crate) fn element_names(mesh: &Mesh) -> String {
     let mut names: Vec<_> = mesh.elements.iter().map(|element| element.kind.calculix_name()).collect();
     names.sort_unstable();
     names.dedup();
     names.join(", ")
 }
 
-fn node_modes(modes: &Modes, free: &[usize], nodes: usize) -> Vec<Mode> {
+pub(crate) fn node_modes(modes: &Modes, free: &[usize], nodes: usize) -> Vec<Mode> {
     let mode = |(k, frequency)| {
         let mut shape = vec![[0.0; 3]; nodes];
         for (row, dof) in free.iter().enumerate() {

@@ -12,7 +12,7 @@ use tiprub_model::sparse::principal_pair;
 
 /// Without Poisson's effect the bar and beam theories hold for the solid.
 fn material() -> Material {
-    Material { name: "no_poisson".into(), young_modulus: 200e9, poisson_ratio: 0.0, density: 8000.0 }
+    Material { name: "no_poisson".into(), young_modulus: 200e9, poisson_ratio: 0.0, density: 8000.0, expansion: 0.0 }
 }
 
 const LENGTH: f64 = 1.0;

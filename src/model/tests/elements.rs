@@ -14,7 +14,7 @@ use tiprub_model::progress::silent;
 use tiprub_model::sparse::principal_pair;
 
 fn steel() -> Material {
-    Material { name: "steel".into(), young_modulus: 210e9, poisson_ratio: 0.3, density: 7800.0 }
+    Material { name: "steel".into(), young_modulus: 210e9, poisson_ratio: 0.3, density: 7800.0, expansion: 0.0 }
 }
 
 /// Nodes of one element in physical space: the natural ones, scaled and bent by a smooth map without symmetry.

@@ -18,7 +18,7 @@ use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::{Error, Mesh};
 
 fn steel() -> Material {
-    Material { name: "steel".into(), young_modulus: 210e9, poisson_ratio: 0.3, density: 7800.0 }
+    Material { name: "steel".into(), young_modulus: 210e9, poisson_ratio: 0.3, density: 7800.0, expansion: 0.0 }
 }
 
 const SIZE: [f64; 3] = [0.3, 0.04, 0.05];

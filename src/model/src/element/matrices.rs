@@ -107,6 +107,33 @@ pub fn consistent_mass(
     Ok(matrix)
 }
 
+/// Nodal forces per kelvin of a uniform temperature of the element above the reference, 3n values in N/K.
+///
+/// f_a = ∫ B_aᵀ D α (1, 1, 1, 0, 0, 0)ᵀ dV = (3λ + 2µ) α ∫ ∇N_a dV, with the rule of the stiffness, so that K αx = f holds
+/// to rounding: an element that is free to expand does so without stress.
+///
+/// # Errors
+/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+pub fn thermal_load(
+    kind: ElementKind,
+    coordinates: &[[f64; 3]],
+    material: &Material,
+    element: usize,
+) -> Result<Vec<f64>> {
+    let (lambda, shear) = material.lame();
+    let pressure = (3.0 * lambda + 2.0 * shear) * material.expansion;
+    let mut load = vec![0.0; 3 * kind.node_count()];
+    for (index, quadrature) in kind.stiffness_rule().iter().enumerate() {
+        let mapped = map_point(kind, coordinates, quadrature, (element, index))?;
+        for (a, gradient) in mapped.shape.gradients[..kind.node_count()].iter().enumerate() {
+            for i in 0..3 {
+                load[3 * a + i] += pressure * mapped.volume * gradient[i];
+            }
+        }
+    }
+    Ok(load)
+}
+
 /// Lumped mass per node (kg): the consistent diagonal scaled to the element's mass (Hinton, Rock, Zienkiewicz 1976).
 ///
 /// # Errors

@@ -16,6 +16,7 @@ mod nonlinear;
 mod quadrature;
 mod shape;
 
+pub use matrices::thermal_load;
 pub use matrices::{consistent_mass, lumped_mass, stiffness, strain, stress};
 pub use nonlinear::{Tangent, geometric_stiffness, second_stresses, tangent};
 pub use quadrature::QuadraturePoint;

@@ -1,6 +1,8 @@
 //! Meshes for the tests.
 #![allow(dead_code)] // Every test binary uses its own part of these helpers.
 
+pub mod casing;
+
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::{Element, Mesh};
 

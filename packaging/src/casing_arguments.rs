@@ -1,0 +1,212 @@
+//! Options of `tiprub reduce casing`: a ring described on the command line.
+
+use clap::{Args, ValueEnum};
+use tiprub_model::{
+    CasingOptions, Material,
+    casing::{ContactRings, Contour, Flange, RingCounts, Support},
+    element::ElementKind,
+};
+
+use crate::{Failure, Result, cli::ReduceArguments};
+
+/// Share of a casing's length before the first and behind the last contact ring, where no positions are given.
+const MARGIN: f64 = 0.1;
+
+/// What describes a casing; absent options are those of casing37.
+#[derive(Debug, Clone, PartialEq, Default, Args)]
+#[command(next_help_heading = "Options of `casing`")]
+pub struct CasingArguments {
+    /// Inner contour as points z:r in m, by growing z (the tip of rotor 37 and the design gap when absent).
+    #[arg(long, value_name = "Z:R,Z:R,...", value_parser = contour, allow_hyphen_values = true)]
+    pub contour: Option<Contour>,
+    /// Radial thickness of the shell (m) [default: 0.004].
+    #[arg(long, value_name = "M", value_parser = length)]
+    pub thickness: Option<f64>,
+    /// Flange at the low end of z: axial thickness and radial height (m), or `none` [default: 0.005x0.010].
+    #[arg(long, value_name = "TxH", value_parser = flange)]
+    pub low_flange: Option<FlangeChoice>,
+    /// Flange at the high end of z, in the same way [default: 0.004x0.006].
+    #[arg(long, value_name = "TxH", value_parser = flange)]
+    pub high_flange: Option<FlangeChoice>,
+    /// End faces that are held [default: low].
+    #[arg(long, value_enum)]
+    pub support: Option<SupportChoice>,
+    /// Material [default: steel].
+    #[arg(long, value_enum)]
+    pub material: Option<MaterialChoice>,
+    /// Coefficient of linear thermal expansion (1/K), instead of the material's.
+    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    pub expansion: Option<f64>,
+    /// Elements: quadratic or linear bricks; linear ones are far too stiff in bending [default: hex20].
+    #[arg(long, value_enum)]
+    pub element: Option<ElementChoice>,
+    /// Contact nodes around the circumference and along the axis [default: 24x3].
+    #[arg(long, value_name = "AxL", value_parser = pair)]
+    pub contact_grid: Option<[usize; 2]>,
+    /// Axial positions of the first and the last contact ring (m) [default: around rotor 37; of a contour of your own,
+    /// 10 % of its length from its ends].
+    #[arg(long, value_name = "FROM:TO", value_parser = axial, allow_hyphen_values = true)]
+    pub contact_axial: Option<[f64; 2]>,
+    /// Thermal patches around and along; 0x0 leaves heat out [default: 12x1].
+    #[arg(long, value_name = "AxL", value_parser = pair)]
+    pub patches: Option<[usize; 2]>,
+    /// Fixed-interface modes to reduce with; `--modes` is the number of modes kept in the ROM [default: 156].
+    #[arg(long, value_name = "N")]
+    pub fixed_interface_modes: Option<usize>,
+}
+
+/// A flange, or none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlangeChoice(Option<Flange>);
+
+/// Which end faces are held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SupportChoice {
+    /// The one at low z.
+    Low,
+    /// The one at high z.
+    High,
+    /// Both.
+    Both,
+    /// None: the casing can move as a rigid body.
+    Free,
+}
+
+/// Materials by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MaterialChoice {
+    /// E = 210 GPa, ρ = 7850 kg/m³, α = 11.7e-6 1/K.
+    Steel,
+    /// Ti-6Al-4V: E = 113.8 GPa, ρ = 4430 kg/m³, α = 8.6e-6 1/K.
+    Titanium,
+    /// E = 180 GPa, ρ = 8000 kg/m³, α = 10.1e-6 1/K.
+    MaragingSteel,
+}
+
+/// Elements by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ElementChoice {
+    /// 20 nodes.
+    Hex20,
+    /// 8 nodes.
+    Hex8,
+}
+
+/// The casing asked for.
+///
+/// # Errors
+/// Options of the blade.
+pub fn options(arguments: &ReduceArguments) -> Result<CasingOptions> {
+    if arguments.contact_nodes.is_some() {
+        let remedy = "Give --contact-grid AxL for a casing";
+        return Err(Failure::usage("--contact-nodes", "it belongs to `rotor37`", remedy));
+    }
+    if arguments.spin.is_some() {
+        return Err(Failure::usage("--spin", "it belongs to `rotor37`", "Leave it out: a casing stands still"));
+    }
+    let defaults = CasingOptions::default();
+    let asked = arguments.casing.clone();
+    let mut options = defaults.clone();
+    if let Some(contour) = asked.contour {
+        let [low, high] = contour.axial();
+        let margin = MARGIN * (high - low);
+        options.rings.axial = [low + margin, high - margin];
+        options.geometry.contour = contour;
+    }
+    options.geometry.thickness = asked.thickness.unwrap_or(defaults.geometry.thickness);
+    for (flange, choice) in options.geometry.flanges.iter_mut().zip([asked.low_flange, asked.high_flange]) {
+        *flange = choice.map_or(*flange, |choice| choice.0);
+    }
+    let [around, along] = asked.contact_grid.unwrap_or([defaults.rings.around, defaults.rings.along]);
+    options.rings = ContactRings { around, along, axial: asked.contact_axial.unwrap_or(options.rings.axial) };
+    options.counts = arguments.mesh.map_or(defaults.counts, |size| {
+        let [around, through, along] = size.0;
+        RingCounts { around, through, along, flange: through }
+    });
+    options.support = asked.support.map_or(defaults.support, SupportChoice::support);
+    options.material = asked.material.map_or(defaults.material.clone(), MaterialChoice::material);
+    options.material.expansion = asked.expansion.unwrap_or(options.material.expansion);
+    options.kind = asked.element.map_or(defaults.kind, ElementChoice::kind);
+    options.patches = asked.patches.unwrap_or(defaults.patches);
+    options.fixed_interface_modes = asked.fixed_interface_modes.unwrap_or(defaults.fixed_interface_modes);
+    options.modes = arguments.modes.unwrap_or(defaults.modes);
+    // The name stands for the one casing that ships, and not for any other.
+    if options != defaults {
+        options.name = "casing".into();
+    }
+    Ok(options)
+}
+
+impl SupportChoice {
+    fn support(self) -> Support {
+        match self {
+            Self::Low => Support::Low,
+            Self::High => Support::High,
+            Self::Both => Support::Both,
+            Self::Free => Support::Free,
+        }
+    }
+}
+
+impl MaterialChoice {
+    fn material(self) -> Material {
+        match self {
+            Self::Steel => Material::steel(),
+            Self::Titanium => Material::titanium(),
+            Self::MaragingSteel => Material::maraging_steel(),
+        }
+    }
+}
+
+impl ElementChoice {
+    fn kind(self) -> ElementKind {
+        match self {
+            Self::Hex20 => ElementKind::Hex20,
+            Self::Hex8 => ElementKind::Hex8,
+        }
+    }
+}
+
+fn contour(text: &str) -> Result<Contour, String> {
+    let example = "give points z:r in m by growing z, for example -0.02:0.256,0.04:0.245";
+    let point = |text: &str| -> Option<[f64; 2]> {
+        let (z, r) = text.split_once(':')?;
+        Some([z.trim().parse().ok()?, r.trim().parse().ok()?])
+    };
+    let points: Option<Vec<[f64; 2]>> = text.split(',').map(point).collect();
+    Contour::new(&points.ok_or(example)?).map_err(|error| error.to_string())
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("give a positive length in m".into()),
+    }
+}
+
+fn flange(text: &str) -> Result<FlangeChoice, String> {
+    if text == "none" {
+        return Ok(FlangeChoice(None));
+    }
+    let lengths: Result<Vec<f64>, String> = text.split(['x', 'X']).map(length).collect();
+    match lengths.as_deref() {
+        Ok([thickness, height]) => Ok(FlangeChoice(Some(Flange { thickness: *thickness, height: *height }))),
+        _ => Err("give axial thickness and radial height in m as TxH, for example 0.005x0.010, or `none`".into()),
+    }
+}
+
+fn pair(text: &str) -> Result<[usize; 2], String> {
+    let counts: Result<Vec<usize>, _> = text.split(['x', 'X']).map(str::parse).collect();
+    match counts.as_deref() {
+        Ok([around, along]) if *around <= 360 && *along <= 100 => Ok([*around, *along]),
+        _ => Err("give two counts, at most 360 around and 100 along, as AROUNDxALONG, for example 24x3".into()),
+    }
+}
+
+fn axial(text: &str) -> Result<[f64; 2], String> {
+    let ends = text.split_once(':').map(|(from, to)| [from, to].map(|end| end.trim().parse::<f64>().ok()));
+    match ends {
+        Some([Some(from), Some(to)]) if from < to => Ok([from, to]),
+        _ => Err("give two growing axial positions in m as FROM:TO, for example 0.002:0.038".into()),
+    }
+}

@@ -1,0 +1,77 @@
+//! Fewer modes with the same static response: modes above a cut-off are replaced by what they do at rest.
+//!
+//! Of modes with ω² = Λ and loads F on them, those above the cut-off answer at rest by Λ⁻¹F. An orthonormal basis Q of
+//! these answers, described by the modes of QᵀΛQ, stands for them: the answer to every combination of the loads stays
+//! exact at rest, the modes below the cut-off stay as they are, and there are no more coordinates than loads above it.
+
+use nalgebra::DMatrix;
+
+use super::modal_form::ModalForm;
+
+/// An answer this small beside its own size, once the others are taken out of it, is round-off.
+const DEPENDENT: f64 = 1e-10;
+/// ω² of a double mode agree to this share.
+const DOUBLE: f64 = 1e-6;
+
+/// Keep the lowest `count` modes (one fewer rather than half of a double one; rigid-body modes count) and the static
+/// response of the others to `loads` (reduced coordinates × loads).
+pub fn condense(modes: &ModalForm, count: usize, loads: &DMatrix<f64>) -> ModalForm {
+    let squares = &modes.squares;
+    if count >= squares.len() {
+        return modes.clone();
+    }
+    let halved = count > 0 && squares[count] - squares[count - 1] < DOUBLE * squares[count];
+    // A rigid-body mode has no static response that could stand for it.
+    let rigid = squares.iter().filter(|square| **square <= 0.0).count();
+    let kept = if halved { count - 1 } else { count }.max(rigid);
+    let high = modes.shapes.columns(kept, squares.len() - kept);
+    let mut answers = high.transpose() * loads;
+    for (mut row, square) in answers.row_iter_mut().zip(&squares[kept..]) {
+        row /= *square;
+    }
+    let basis = orthonormal(answers);
+    if basis.ncols() == 0 {
+        let shapes = modes.shapes.columns(0, kept).into_owned();
+        return ModalForm { squares: squares[..kept].to_vec(), shapes, condensed_from: Some(kept) };
+    }
+    let mut stiff = basis.clone();
+    for (mut row, square) in stiff.row_iter_mut().zip(&squares[kept..]) {
+        row *= *square;
+    }
+    let projected = basis.transpose() * stiff;
+    let eigen = (0.5 * (&projected + projected.transpose())).symmetric_eigen();
+    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    let vectors = DMatrix::from_fn(order.len(), order.len(), |i, k| eigen.eigenvectors[(i, order[k])]);
+    let high = high * (basis * vectors);
+    let mut shapes = DMatrix::zeros(modes.shapes.nrows(), kept + high.ncols());
+    shapes.columns_mut(0, kept).copy_from(&modes.shapes.columns(0, kept));
+    shapes.columns_mut(kept, high.ncols()).copy_from(&high);
+    let squares = squares[..kept].iter().copied().chain(order.iter().map(|&k| eigen.eigenvalues[k])).collect();
+    ModalForm { squares, shapes, condensed_from: Some(kept) }
+}
+
+/// Gram-Schmidt, repeated until a pass takes nothing away any more; dependent columns are left out.
+fn orthonormal(mut vectors: DMatrix<f64>) -> DMatrix<f64> {
+    let mut size = 0;
+    for k in 0..vectors.ncols() {
+        let mut column = vectors.column(k).into_owned();
+        let first = column.norm();
+        let mut before = first;
+        for _pass in 0..6 {
+            let part = vectors.columns(0, size).tr_mul(&column);
+            column -= vectors.columns(0, size) * part;
+            let after = column.norm();
+            if after <= DEPENDENT * first {
+                break;
+            }
+            if after > 0.5 * before {
+                vectors.set_column(size, &(column / after));
+                size += 1;
+                break;
+            }
+            before = after;
+        }
+    }
+    vectors.columns(0, size).into_owned()
+}

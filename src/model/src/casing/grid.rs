@@ -1,0 +1,123 @@
+//! Contact nodes of a casing as a grid of rings.
+
+use core::f64::consts::TAU;
+
+use tiprub_core::rom::{ContactGrid, ContactNode};
+
+use crate::mesh::Mesh;
+use crate::{Error, Result};
+
+/// Nodes of a mesh that form rings: node `along · around + i` is the i-th of ring `along`, rings by growing z, nodes of a
+/// ring at growing angles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GridNodes {
+    /// Nodes of a ring.
+    pub around: usize,
+    /// Node indices of the mesh (from 0), ring by ring.
+    pub nodes: Vec<usize>,
+    /// Slope dr/dz of the inner surface at each ring.
+    pub slopes: Vec<f64>,
+}
+
+impl GridNodes {
+    /// Sort nodes into `along` rings by z, and the nodes of a ring by angle. Slopes are those of the parabola through
+    /// the mean radii of a ring and its neighbours.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] when the nodes cannot be shared out evenly or do not exist. Whether they do form a grid is
+    /// checked with the ROM.
+    pub fn sorted(mesh: &Mesh, nodes: &[usize], along: usize) -> Result<Self> {
+        if along < 2 || !nodes.len().is_multiple_of(along) || nodes.len() / along < 4 {
+            return Err(Error::invalid(
+                "contact nodes of the casing",
+                format!("{} nodes are not {along} rings of at least 4", nodes.len()),
+                "Name the nodes of at least two rings, equally many of each",
+            ));
+        }
+        if let Some(node) = nodes.iter().find(|node| **node >= mesh.nodes.len()) {
+            let problem = format!("node {} does not exist; there are {}", node + 1, mesh.nodes.len());
+            return Err(Error::invalid("contact nodes of the casing", problem, "Name nodes of the mesh"));
+        }
+        let around = nodes.len() / along;
+        let mut sorted = nodes.to_vec();
+        sorted.sort_by(|a, b| mesh.nodes[*a][2].total_cmp(&mesh.nodes[*b][2]));
+        let quarter = 0.25 * TAU / around as f64;
+        let angle = |node: usize| mesh.nodes[node][1].atan2(mesh.nodes[node][0]);
+        // Angles from a quarter of a step before zero on, so that rounding moves no node at zero to the end of its ring.
+        let smallest = sorted[..around].iter().map(|node| (angle(*node) + quarter).rem_euclid(TAU)).fold(TAU, f64::min);
+        for ring in sorted.chunks_mut(around) {
+            // Half a step for nodes level with the first one of the first ring.
+            let place = |node: usize| (angle(node) - smallest + 3.0 * quarter).rem_euclid(TAU);
+            ring.sort_by(|a, b| place(*a).total_cmp(&place(*b)));
+        }
+        let mut grid = Self { around, nodes: sorted, slopes: Vec::new() };
+        grid.slopes = grid.parabolic_slopes(mesh);
+        Ok(grid)
+    }
+
+    /// Check that nodes and slopes fill whole rings.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] giving the counts.
+    pub fn validate(&self) -> Result<()> {
+        let whole = self.around > 0 && self.nodes.len().is_multiple_of(self.around);
+        if whole && self.slopes.len() == self.along() {
+            return Ok(());
+        }
+        let problem =
+            format!("{} nodes and {} slopes for rings of {}", self.nodes.len(), self.slopes.len(), self.around);
+        Err(Error::invalid("contact nodes of the casing", problem, "Give every ring its nodes and one slope"))
+    }
+
+    /// Number of rings.
+    pub fn along(&self) -> usize {
+        self.nodes.len() / self.around
+    }
+
+    /// Its shape, as the ROM has it.
+    pub fn shape(&self) -> ContactGrid {
+        ContactGrid { around: self.around, along: self.along() }
+    }
+
+    /// The contact nodes in the cylindrical frame.
+    pub fn contact_nodes(&self, mesh: &Mesh) -> Vec<ContactNode> {
+        let node = |(index, node): (usize, &usize)| {
+            let [x, y, z] = mesh.nodes[*node];
+            let meridional_slope = self.slopes[index / self.around];
+            ContactNode { name: self.name(index), position: [x.hypot(y), y.atan2(x), z], meridional_slope }
+        };
+        self.nodes.iter().enumerate().map(node).collect()
+    }
+
+    /// Name of the contact node with the given index: `ring_1_node_1`, ...
+    pub fn name(&self, index: usize) -> String {
+        format!("ring_{}_node_{}", index / self.around + 1, index % self.around + 1)
+    }
+
+    /// Mean z and r of every ring.
+    fn rings(&self, mesh: &Mesh) -> Vec<[f64; 2]> {
+        let mean = |ring: &[usize], value: &dyn Fn([f64; 3]) -> f64| {
+            ring.iter().map(|node| value(mesh.nodes[*node])).sum::<f64>() / ring.len() as f64
+        };
+        let ring = |ring| [mean(ring, &|[_, _, z]| z), mean(ring, &|[x, y, _]| x.hypot(y))];
+        self.nodes.chunks(self.around).map(ring).collect()
+    }
+
+    fn parabolic_slopes(&self, mesh: &Mesh) -> Vec<f64> {
+        let rings = self.rings(mesh);
+        let secants: Vec<f64> =
+            rings.windows(2).map(|pair| (pair[1][1] - pair[0][1]) / (pair[1][0] - pair[0][0])).collect();
+        let last = secants.len() - 1;
+        if last == 0 {
+            return vec![secants[0]; 2];
+        }
+        let length = |i: usize| rings[i + 1][0] - rings[i][0];
+        let inner = |i: usize| (secants[i - 1] * length(i) + secants[i] * length(i - 1)) / (length(i - 1) + length(i));
+        let slope = |i: usize| match i {
+            0 => 2.0 * secants[0] - inner(1),
+            i if i > last => 2.0 * secants[last] - inner(last),
+            i => inner(i),
+        };
+        (0..rings.len()).map(slope).collect()
+    }
+}

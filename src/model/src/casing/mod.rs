@@ -1,0 +1,142 @@
+//! Flexible casings: a parametric ring, its mesh, and its reduction with contact grid and thermal loads.
+//!
+//! [`reduce_ring`] builds and reduces a ring that follows a blade's tip contour; its default is `casing37`, around rotor
+//! 37. [`reduce_casing`] does the same for a mesh from elsewhere whose contact nodes form a grid.
+//!
+mod casing37;
+mod condense;
+mod contour;
+mod grid;
+mod modal_form;
+mod reduction;
+mod ring_mesh;
+
+pub use casing37::{CASING37, casing37_contour};
+pub use condense::condense;
+pub use contour::Contour;
+pub use grid::GridNodes;
+pub use modal_form::{ModalForm, modal_form};
+pub use reduction::{CasingReductionOptions, reduce_casing};
+pub use ring_mesh::{ContactRings, Flange, RingCounts, RingGeometry, RingMesh, ring_mesh};
+
+use crate::Result;
+use crate::element::ElementKind;
+use crate::material::Material;
+use crate::progress::{Listener, Stage, report};
+use crate::reduce::Reduction;
+use crate::thermal::equal_patches;
+
+/// Where a ring is held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Support {
+    /// The end face at low z, flange included.
+    Low,
+    /// The end face at high z, flange included.
+    High,
+    /// Both end faces.
+    Both,
+    /// Nowhere: six rigid-body modes.
+    Free,
+}
+
+/// What to build.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CasingOptions {
+    /// Name of the structure.
+    pub name: String,
+    /// Contour, thickness, flanges.
+    pub geometry: RingGeometry,
+    /// Numbers of elements.
+    pub counts: RingCounts,
+    /// Hex20, or hex8: cheaper, but far too stiff in bending with one element through the shell.
+    pub kind: ElementKind,
+    /// Material.
+    pub material: Material,
+    /// Where it is held.
+    pub support: Support,
+    /// The contact nodes.
+    pub rings: ContactRings,
+    /// Thermal patches around and along; none where either is zero.
+    pub patches: [usize; 2],
+    /// Number of fixed-interface modes, see [`CasingReductionOptions`].
+    pub fixed_interface_modes: usize,
+    /// Number of modes delivered as they are, see [`CasingReductionOptions`].
+    pub modes: usize,
+    /// Number of modes compared with the full model.
+    pub checked_modes: usize,
+    /// Modal damping ratio proposed with the model.
+    pub damping_ratio: f64,
+}
+
+/// Build, reduce and check a ring.
+///
+/// # Errors
+/// [`Error::Invalid`](crate::Error::Invalid) for lengths, counts and contact rings that do not fit each other, and those of [`reduce_casing`].
+pub fn reduce_ring(options: &CasingOptions, listener: Listener<'_>) -> Result<Reduction> {
+    let start = std::time::Instant::now();
+    report(listener, Stage::Mesh, 0, 1);
+    let ring = supported_ring(options)?;
+    let clamped = if options.support == Support::Free { Vec::new() } else { ring.mesh.set(CLAMPED)?.to_vec() };
+    let [around, along] = options.patches;
+    let patches = equal_patches(around, along, options.geometry.contour.axial());
+    report(listener, Stage::Mesh, 1, 1);
+    let meshing = start.elapsed().as_secs_f64();
+    let reduction_options = CasingReductionOptions {
+        name: options.name.clone(),
+        fixed_interface_modes: options.fixed_interface_modes,
+        modes: options.modes,
+        checked_modes: options.checked_modes,
+        damping_ratio: options.damping_ratio,
+    };
+    let mut reduction =
+        reduce_casing(ring.mesh, &options.material, &clamped, &ring.grid, &patches, &reduction_options, listener)?;
+    reduction.timings.assembly += meshing;
+    reduction.rom.origin = format!("{}: {}", describe(options), reduction.rom.origin);
+    Ok(reduction)
+}
+
+/// Name of the node set that holds the clamped nodes, unless the ring is free.
+pub const CLAMPED: &str = "clamped";
+
+/// Mesh of the ring, with the clamped nodes as a set of their own.
+///
+/// # Errors
+/// Those of [`ring_mesh`]; a contact ring on a clamped face cannot be, since contact rings lie inside the casing.
+pub fn supported_ring(options: &CasingOptions) -> Result<RingMesh> {
+    let mut ring = ring_mesh(&options.geometry, options.counts, options.rings, options.kind)?;
+    let faces: &[&str] = match options.support {
+        Support::Low => &["low_face"],
+        Support::High => &["high_face"],
+        Support::Both => &["low_face", "high_face"],
+        Support::Free => &[],
+    };
+    let mut clamped = Vec::new();
+    for face in faces {
+        clamped.extend_from_slice(ring.mesh.set(face)?);
+    }
+    clamped.sort_unstable();
+    if !clamped.is_empty() {
+        ring.mesh.sets.insert(CLAMPED.to_owned(), clamped);
+    }
+    Ok(ring)
+}
+
+fn describe(options: &CasingOptions) -> String {
+    let [low, high] = options.geometry.contour.axial();
+    let around = if options.name == CASING37 { " around NASA rotor 37" } else { "" };
+    let support = match options.support {
+        Support::Low => "held at its low end face",
+        Support::High => "held at its high end face",
+        Support::Both => "held at both end faces",
+        Support::Free => "free",
+    };
+    let millimetres = |metres: f64| 1e3 * metres;
+    format!(
+        "Casing ring{around}, inner radius {:.3} to {:.3} mm from z = {:.3} to {:.3} mm, {:.3} mm thick, {support}",
+        millimetres(options.geometry.contour.radius(low)),
+        millimetres(options.geometry.contour.radius(high)),
+        millimetres(low),
+        millimetres(high),
+        millimetres(options.geometry.thickness),
+    )
+}

@@ -1,0 +1,249 @@
+//! Reduction of a casing: Craig-Bampton on a grid of contact nodes, with static responses to the thermal loads.
+//!
+//! Craig-Bampton needs many fixed-interface modes to represent the casing between its contact nodes. The pencil it leaves
+//! is therefore brought to its own modes and [condensed](super::condense): modes above a cut-off give way to the static
+//! response they stand for, so that contact and heat meet the stiffness of the whole finite-element model.
+
+use faer::Mat;
+use nalgebra::{DMatrix, DVector};
+use tiprub_core::Rom;
+use tiprub_core::rom::{Frame, Patch, RomChecks, RomExtras, Thermal};
+
+use super::condense::condense;
+use super::grid::GridNodes;
+use super::modal_form::{ModalForm, modal_form};
+use crate::Result;
+use crate::assembly::{assemble, free_dofs};
+use crate::craig_bampton::{CraigBampton, InnerBasis, craig_bampton_with};
+use crate::material::Material;
+use crate::mesh::Mesh;
+use crate::progress::{Listener, Stage, report};
+use crate::reduce::{
+    ContactPoint, Reduction, Timings, check_nodes, compare, element_names, full_modes, node_modes, timed,
+};
+use crate::sparse::principal_pair;
+use crate::thermal::patch_loads;
+
+/// Rigid-body motions of a free structure.
+const RIGID: usize = 6;
+
+/// What to reduce a casing to, and what to call it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CasingReductionOptions {
+    /// Name of the structure.
+    pub name: String,
+    /// Number of fixed-interface modes to reduce with; one fewer where the last would be half of a double mode.
+    pub fixed_interface_modes: usize,
+    /// Number of modes of the reduced pencil to deliver as they are; one fewer where the last would be half of a double
+    /// mode. Of those above only the response at rest remains, to forces on the contact nodes and to heat.
+    pub modes: usize,
+    /// Number of modes of the full model that are computed and compared with the reduced ones.
+    pub checked_modes: usize,
+    /// Modal damping ratio proposed with the model.
+    pub damping_ratio: f64,
+}
+
+/// Reduce a mesh, made by whatever means, to a grid of contact nodes.
+///
+/// `clamped` lists nodes held in all directions; with none the casing is free and keeps six rigid-body modes. Elements
+/// outside all `patches` stay at the reference temperature; with no patches the ROM has no thermal loads. The ROM's
+/// coordinates are modes: M = I, K = Λ, frame cylindrical.
+///
+/// # Errors
+/// [`Error::Invalid`](crate::Error::Invalid) for contact nodes that are clamped, repeated, on the axis or no grid, and for patches without
+/// elements or with common ones; and whatever assembly, eigenvalue iteration and the ROM's own validation refuse.
+pub fn reduce_casing(
+    mesh: Mesh,
+    material: &Material,
+    clamped: &[usize],
+    grid: &GridNodes,
+    patches: &[Patch],
+    options: &CasingReductionOptions,
+    listener: Listener<'_>,
+) -> Result<Reduction> {
+    // As for blades: the library's own threads would split sums by their number, and with it the bits of the ROM.
+    faer::set_global_parallelism(faer::Par::Seq);
+    let mut timings = Timings::default();
+    let (assembled, loads, free) = timed(&mut timings.assembly, || {
+        grid.validate()?;
+        check_nodes(&mesh, clamped, &contact_points(grid), Frame::Cylindrical)?;
+        let free = free_dofs(mesh.nodes.len(), clamped);
+        let loads = patch_loads(&mesh, material, patches)?;
+        let loads = Mat::from_fn(free.len(), patches.len(), |i, k| loads[(free[i], k)]);
+        Ok((assemble(&mesh, material, listener)?, loads, free))
+    })?;
+    let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
+    let full = timed(&mut timings.full_modes, || {
+        full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)
+    })?;
+    let (reduced, modes, reduced_loads) = timed(&mut timings.reduction, || {
+        let inner = InnerBasis { modes: options.fixed_interface_modes, whole_pairs: true, loads: Some(loads.as_ref()) };
+        let reduced = craig_bampton_with(&stiffness, &mass, &interface_dofs(&free, grid), &inner, listener)?;
+        let order = reduced.mass.nrows();
+        let rigid = if clamped.is_empty() { rigid_motions(&mesh, grid, order) } else { DMatrix::zeros(order, 0) };
+        let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
+        let reduced_loads = reduced_loads(grid, &reduced, &loads);
+        let modes = condense(&modes, options.modes, &reduced_loads);
+        Ok((reduced, modes, reduced_loads))
+    })?;
+    let checks = timed(&mut timings.checks, || {
+        report(listener, Stage::Checks, 0, 1);
+        let checks = compare(&full, &mass, &reduced, &modes.squares, &modes.shapes);
+        report(listener, Stage::Checks, 1, 1);
+        Ok(if clamped.is_empty() { without_rigid_motions(checks) } else { checks })
+    })?;
+    let rom = Rom {
+        name: options.name.clone(),
+        origin: origin(&mesh, material, clamped.len(), grid, &reduced, &modes),
+        sectors: 1,
+        frame: Frame::Cylindrical,
+        mass: DMatrix::identity(modes.squares.len(), modes.squares.len()),
+        stiffness: DMatrix::from_diagonal(&DVector::from_column_slice(&modes.squares)),
+        damping_ratio: options.damping_ratio,
+        contact_map: contact_map(&mesh, grid, &modes),
+        contact_nodes: grid.contact_nodes(&mesh),
+        checks,
+        extras: RomExtras {
+            thermal: thermal(&reduced_loads, patches, &modes),
+            grid: Some(grid.shape()),
+            ..RomExtras::default()
+        },
+    };
+    rom.validate()?;
+    Ok(Reduction {
+        rom,
+        modes: node_modes(&full.modes, &free, mesh.nodes.len()),
+        largest_residual: full.modes.residuals.iter().copied().fold(0.0, f64::max),
+        free_dofs: free.len(),
+        reduced_angular_frequencies: modes.squares.iter().map(|square| square.sqrt()).collect(),
+        fixed_interface_frequencies: reduced.fixed_interface_frequencies,
+        spin_checks: Vec::new(),
+        material: material.clone(),
+        mesh,
+        timings,
+    })
+}
+
+fn contact_points(grid: &GridNodes) -> Vec<ContactPoint> {
+    let names = (0..grid.nodes.len()).map(|index| grid.name(index));
+    let slope = |index: usize| grid.slopes[index / grid.around];
+    grid.nodes
+        .iter()
+        .zip(names)
+        .enumerate()
+        .map(|(index, (&node, name))| ContactPoint { name, node, meridional_slope: slope(index) })
+        .collect()
+}
+
+/// Rows of the contact nodes' dofs among the free ones; none is clamped.
+fn interface_dofs(free: &[usize], grid: &GridNodes) -> Vec<usize> {
+    let dofs = grid.nodes.iter().flat_map(|node| (0..3).map(move |component| 3 * node + component));
+    dofs.map(|dof| free.partition_point(|other| *other < dof)).collect()
+}
+
+/// Rigid-body motions in the coordinates of Craig-Bampton: those of the contact nodes alone, since the interior follows
+/// by the constraint modes. Rotations about the centre of the contact nodes, in units of their distance.
+fn rigid_motions(mesh: &Mesh, grid: &GridNodes, order: usize) -> DMatrix<f64> {
+    let count = grid.nodes.len() as f64;
+    let centre: [f64; 3] =
+        core::array::from_fn(|i| grid.nodes.iter().map(|&node| mesh.nodes[node][i]).sum::<f64>() / count);
+    let mut motions = DMatrix::zeros(order, RIGID);
+    for (index, &node) in grid.nodes.iter().enumerate() {
+        let arm: [f64; 3] = core::array::from_fn(|i| mesh.nodes[node][i] - centre[i]);
+        for axis in 0..3 {
+            let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
+            motions[(3 * index + axis, axis)] = 1.0;
+            // e_axis x arm.
+            motions[(3 * index + next, 3 + axis)] = -arm[last];
+            motions[(3 * index + last, 3 + axis)] = arm[next];
+        }
+    }
+    for mut rotation in motions.columns_mut(3, 3).column_iter_mut() {
+        let size = rotation.amax();
+        // A single contact node has no arm; the reduction has then failed before.
+        if size > 0.0 {
+            rotation /= size;
+        }
+    }
+    motions
+}
+
+/// Radial, tangential and axial displacement of the contact nodes, 3·nodes × modes.
+fn contact_map(mesh: &Mesh, grid: &GridNodes, modes: &ModalForm) -> DMatrix<f64> {
+    let mut map = modes.shapes.rows(0, 3 * grid.nodes.len()).into_owned();
+    for (index, &node) in grid.nodes.iter().enumerate() {
+        let [x, y, _] = mesh.nodes[node];
+        let radius = x.hypot(y);
+        let (cos, sin) = (x / radius, y / radius);
+        for mode in 0..map.ncols() {
+            let (along_x, along_y) = (map[(3 * index, mode)], map[(3 * index + 1, mode)]);
+            map[(3 * index, mode)] = cos * along_x + sin * along_y;
+            map[(3 * index + 1, mode)] = cos * along_y - sin * along_x;
+        }
+    }
+    map
+}
+
+/// Unit forces on the contact nodes, then the thermal loads, in the coordinates of Craig-Bampton.
+fn reduced_loads(grid: &GridNodes, reduced: &CraigBampton, thermal: &Mat<f64>) -> DMatrix<f64> {
+    let boundary = 3 * grid.nodes.len();
+    let thermal = reduced.transformation.transpose() * thermal;
+    DMatrix::from_fn(thermal.nrows(), boundary + thermal.ncols(), |i, k| match k.checked_sub(boundary) {
+        Some(patch) => thermal[(i, patch)],
+        None if i == k => 1.0,
+        None => 0.0,
+    })
+}
+
+/// Thermal loads on the modes; none on rigid-body motions, which strain nothing.
+fn thermal(loads: &DMatrix<f64>, patches: &[Patch], modes: &ModalForm) -> Option<Thermal> {
+    if patches.is_empty() {
+        return None;
+    }
+    let mut loads = modes.shapes.transpose() * loads.columns(loads.ncols() - patches.len(), patches.len());
+    for (mode, _) in modes.squares.iter().enumerate().filter(|(_, square)| **square <= 0.0) {
+        loads.row_mut(mode).fill(0.0);
+    }
+    Some(Thermal { loads, patches: patches.to_vec() })
+}
+
+/// The checks with rigid-body modes at 0 Hz, where round-off of the full model has nothing to deviate from.
+fn without_rigid_motions(mut checks: RomChecks) -> RomChecks {
+    let rigid = RIGID.min(checks.full_frequencies.len());
+    checks.full_frequencies[..rigid].fill(0.0);
+    checks.frequency_deviation[..rigid].fill(0.0);
+    checks
+}
+
+fn origin(
+    mesh: &Mesh,
+    material: &Material,
+    clamped: usize,
+    grid: &GridNodes,
+    reduced: &CraigBampton,
+    modes: &ModalForm,
+) -> String {
+    let cut_off = match modes.condensed_from {
+        Some(kept) => format!(
+            "; {kept} modes up to {:.0} Hz as they are, above it the static response in {} more",
+            modes.squares[..kept].last().map_or(0.0, |square| square.sqrt() / core::f64::consts::TAU),
+            modes.squares.len() - kept
+        ),
+        None => format!("; all of its {} modes", modes.squares.len()),
+    };
+    format!(
+        "{} nodes, {} elements ({}), {clamped} nodes clamped; {}: E = {:e} Pa, nu = {}, rho = {} kg/m3, alpha = {:e} 1/K; \
+         Craig-Bampton with {} x {} contact nodes, {} fixed-interface modes and static responses to the thermal loads{cut_off}",
+        mesh.nodes.len(),
+        mesh.elements.len(),
+        element_names(mesh),
+        material.name,
+        material.young_modulus,
+        material.poisson_ratio,
+        material.density,
+        material.expansion,
+        grid.around,
+        grid.along(),
+        reduced.fixed_interface_frequencies.len(),
+    )
+}

@@ -1,0 +1,104 @@
+//! Thermal loads: what one kelvin of a patch does to the structure at rest.
+//!
+//! A patch is a set of elements with one temperature T above the reference, at which the mesh is free of stress. The
+//! strain α T of its elements acts like the nodal forces f T with f = ∫ Bᵀ D α dV over the patch; loads of several
+//! patches add up. Forces and moments of every f vanish, since a rigid motion strains nothing. The temperature jumps at
+//! the edges of a patch: what is wanted of it is the deformation of the whole, not the stress at those edges.
+
+use core::f64::consts::TAU;
+
+use faer::Mat;
+use tiprub_core::rom::Patch;
+
+use crate::element::thermal_load;
+use crate::material::Material;
+use crate::mesh::{Element, Mesh};
+use crate::{Error, Result};
+
+/// Centroids this close to the edge between two patches (share of a turn, of the mesh's axial extent) belong to the
+/// patch that begins there, whatever their rounding.
+const EDGE: f64 = 1e-9;
+
+/// Equal patches, `around` × `along`, over a whole turn from θ = 0 and the axial positions `axial` (m); those of one
+/// ring follow each other.
+pub fn equal_patches(around: usize, along: usize, axial: [f64; 2]) -> Vec<Patch> {
+    let part = |[from, to]: [f64; 2], index: usize, count: usize| {
+        [index, index + 1].map(|edge| if edge == count { to } else { from + (to - from) * edge as f64 / count as f64 })
+    };
+    let ring = |k| (0..around).map(move |i| Patch { angle: part([0.0, TAU], i, around), axial: part(axial, k, along) });
+    (0..along).flat_map(ring).collect()
+}
+
+/// The patch of every element: the one that its centroid (mean of its corners) lies in.
+///
+/// # Errors
+/// [`Error::Invalid`] for a patch without elements and for patches that overlap.
+pub fn patch_of_elements(mesh: &Mesh, patches: &[Patch]) -> Result<Vec<Option<usize>>> {
+    let (low, high) = mesh
+        .nodes
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), node| (low.min(node[2]), high.max(node[2])));
+    let slack = EDGE * (high - low);
+    let mut filled = vec![false; patches.len()];
+    let mut found = Vec::with_capacity(mesh.elements.len());
+    for (number, element) in mesh.elements.iter().enumerate() {
+        let [x, y, z] = centroid(mesh, element);
+        let angle = y.atan2(x);
+        let mut inside = (0..patches.len()).filter(|&patch| contains(&patches[patch], angle, z, slack));
+        let first = inside.next();
+        if let (Some(first), Some(second)) = (first, inside.next()) {
+            return Err(Error::invalid(
+                format!("thermal patches {} and {}", first + 1, second + 1),
+                format!("both hold element {}", number + 1),
+                "Give patches that do not overlap",
+            ));
+        }
+        if let Some(patch) = first {
+            filled[patch] = true;
+        }
+        found.push(first);
+    }
+    if let Some(empty) = filled.iter().position(|&filled| !filled) {
+        let Patch { angle, axial } = patches[empty];
+        return Err(Error::invalid(
+            format!("thermal patch {}", empty + 1),
+            format!("no element has its centroid at angles {angle:?} rad and axial positions {axial:?} m"),
+            "Give fewer or larger patches, or refine the mesh",
+        ));
+    }
+    Ok(found)
+}
+
+/// Nodal forces per kelvin of each patch, dofs (3·node + component) × patches (N/K).
+///
+/// # Errors
+/// Those of [`patch_of_elements`]; [`Error::NegativeJacobian`].
+pub fn patch_loads(mesh: &Mesh, material: &Material, patches: &[Patch]) -> Result<Mat<f64>> {
+    let mut loads = Mat::zeros(3 * mesh.nodes.len(), patches.len());
+    for (number, (element, patch)) in mesh.elements.iter().zip(patch_of_elements(mesh, patches)?).enumerate() {
+        let Some(patch) = patch else { continue };
+        let forces = thermal_load(element.kind, &mesh.coordinates(element), material, number)?;
+        for (&node, force) in element.nodes.iter().zip(forces.as_chunks::<3>().0) {
+            for component in 0..3 {
+                loads[(3 * node + component, patch)] += force[component];
+            }
+        }
+    }
+    Ok(loads)
+}
+
+fn centroid(mesh: &Mesh, element: &Element) -> [f64; 3] {
+    let corners = &element.nodes[..element.kind.corner_count()];
+    core::array::from_fn(|i| corners.iter().map(|&node| mesh.nodes[node][i]).sum::<f64>() / corners.len() as f64)
+}
+
+/// Whether a point lies in a patch, its lower edges included.
+fn contains(patch: &Patch, angle: f64, axial: f64, slack: f64) -> bool {
+    let beyond = (angle - patch.angle[0]).rem_euclid(TAU);
+    // Just below the edge counts as on it.
+    let beyond = if beyond > TAU * (1.0 - EDGE) { 0.0 } else { beyond };
+    let width = patch.angle[1] - patch.angle[0];
+    // A patch that goes all the way round has no edge.
+    let around = beyond < width - TAU * EDGE || width > TAU * (1.0 - EDGE);
+    around && axial >= patch.axial[0] - slack && axial < patch.axial[1] - slack
+}
