@@ -2,7 +2,7 @@
 
 use std::{env, path::Path};
 
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_model_description::{Description, Experiment, fmi2_xml, fmi3_xml, html};
 
 use crate::{
@@ -50,6 +50,8 @@ impl FmiVersion {
 #[derive(Debug)]
 pub struct Package<'a> {
     scene: &'a Scene,
+    /// ROMs as the FMU holds them.
+    roms: Vec<Rom>,
     simulation: Simulation,
     library: &'a [u8],
     reference_csv: String,
@@ -74,7 +76,15 @@ impl<'a> Package<'a> {
         }
         let reference_csv = native::run(scene, &schedule, &[], &|_| {})?.recording.to_csv();
         let generated = generation_date(env::var("SOURCE_DATE_EPOCH").ok().as_deref())?;
-        Ok(Self { scene, simulation, library, reference_csv, warnings, generated })
+        Ok(Self {
+            scene,
+            roms: tiprub_format::packed_roms(scene),
+            simulation,
+            library,
+            reference_csv,
+            warnings,
+            generated,
+        })
     }
 
     /// Warnings of the initialisation (what an FMU instance would log) and of the experiment proposed.
@@ -137,7 +147,7 @@ impl<'a> Package<'a> {
             },
             table: self.simulation.table(),
             fmi3_arrays: arrays,
-            structures: structures.zip(&self.scene.roms).collect(),
+            structures: structures.zip(&self.roms).collect(),
             features: scene_features::features(self.scene),
             limits: scene_features::limits(self.scene),
             warnings: self.simulation.warnings().to_vec(),

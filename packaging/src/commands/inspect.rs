@@ -52,6 +52,9 @@ pub fn run(arguments: &InspectArguments, console: &Console) -> Result<Outcome> {
 }
 
 fn kind(path: &Path) -> Result<FileKind> {
+    if path.to_str().is_some_and(|name| name.starts_with(scene_source::BUILTIN)) {
+        return Ok(FileKind::Scene);
+    }
     let mut start = Vec::new();
     fs::File::open(path)
         .and_then(|file| file.take(9).read_to_end(&mut start))
