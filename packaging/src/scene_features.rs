@@ -123,7 +123,7 @@ pub fn limits(scene: &Scene) -> Vec<String> {
     }
     if any(|contact| contact.coating.is_some()) {
         limits.push(
-            "Clearances are measured to the unworn coating: they turn negative by up to the wear depth. Worn cells do \
+            "Clearances are measured to the unworn coating: they turn negative where a blade dips into it. Worn cells do \
              not heal, and the coating has no mass.",
         );
     }
