@@ -17,7 +17,7 @@ pub enum Scheme {
     #[default]
     ModalExact,
     /// The highest modes, three per contact node, are quasi-static: contact acts through their residual flexibility
-    /// (Monjaraz-Tec, Gross, Krack, J. Sound Vib. 2022); the other modes take the contact force one step later.
+    /// (Monjaraz-Tec, Gross, Krack, Computers & Structures 260, 2022); the other modes take the contact force one step later.
     MasslessBoundary,
 }
 

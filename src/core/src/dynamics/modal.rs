@@ -217,14 +217,13 @@ fn modal_already(rom: &Rom, stiffness: &DMatrix<f64>) -> Option<(Vec<f64>, DMatr
     let diagonal: Vec<f64> = (0..order).map(|mode| stiffness[(mode, mode)]).collect();
     let ascending =
         diagonal.windows(2).all(|pair| pair[0] <= pair[1]) && diagonal.first().is_some_and(|low| *low >= 0.0);
-    let diagonal_only = |(index, value): (usize, &f64)| index % order == index / order || *value == 0.0;
+    let on_diagonal = |index: usize| index % order == index / order;
     let is_modal = ascending
-        && stiffness.iter().enumerate().all(diagonal_only)
-        && rom
-            .mass
-            .iter()
-            .enumerate()
-            .all(|(index, value)| *value == f64::from(u8::from(index % order == index / order)));
+        && stiffness.iter().enumerate().all(|(index, value)| on_diagonal(index) || *value == 0.0)
+        && rom.mass.iter().enumerate().all(|(index, value)| {
+            let expected: f64 = if on_diagonal(index) { 1.0 } else { 0.0 };
+            value.to_bits() == expected.to_bits()
+        });
     is_modal.then(|| (diagonal, DMatrix::identity(order, order)))
 }
 

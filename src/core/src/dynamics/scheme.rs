@@ -16,7 +16,7 @@
 //! E = ½ m̃ (d/h)² + ½ ω² q q⁻ changes by f (q⁺ − q⁻)/2 − d̃ h ((q⁺ − q⁻)/2h)². Modal-exact is thus central
 //! differences with the modal mass that makes the discrete frequency exact.
 //!
-//! * massless-boundary (A. Monjaraz-Tec, J. Gross, M. Krack, J. Sound Vib. 2022, arXiv 2111.07693): the highest modes are
+//! * massless-boundary (A. Monjaraz-Tec, J. Gross, M. Krack, Computers & Structures 260, 2022, arXiv 2111.07693): the highest modes are
 //!   quasi-static, q = φᵀf/ω² (β = 0, κ = 1, c = 1/ω²), so that contact acts through their residual flexibility alone; the
 //!   other modes are stepped by modal-exact and take the contact force one step later, which makes them explicit. With
 //!   the force f of time n known when q(n+1) is, f (u⁺ − u⁻)/2 changes the same E: of a static mode only ½ ω² q q⁻ is left.
