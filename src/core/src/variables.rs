@@ -155,6 +155,8 @@ pub enum Quantity {
     LoadAmplitude,
     /// Phase of the nodal-diameter load, input.
     LoadPhase,
+    /// Number of nodal diameters of that load, parameter.
+    LoadOrder,
     /// µ, parameter.
     Friction,
     /// Added to every clearance, parameter.

@@ -337,3 +337,38 @@ fn complementarity_holds_over_a_long_rub_of_the_whole_casing() {
         assert!(again <= if name == "rigid" { 1e-10 } else { 1e-3 }, "{name}: {again:e}");
     }
 }
+
+#[test]
+fn the_order_of_the_casing_load_is_a_parameter() {
+    let mut scene = scene_with(("flexible casing", flexible), Scheme::ModalExact, Solver::Lcp);
+    scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 0.0, phase: 0.0 });
+    scene.settings.contacts[0].gap = 2e-2;
+    scene.settings.outputs.slave_displacement = true;
+    let displacement = |order: i32, phase: f64| {
+        let mut simulation = Simulation::new(&scene).unwrap();
+        let reference = simulation.table().find("casing_load_order").unwrap().reference;
+        simulation.set_integer(reference, order).unwrap();
+        set(&mut simulation, "casing_load_amplitude", 0, 1e3);
+        set(&mut simulation, "casing_load_phase", 0, phase);
+        simulation.initialise(0.0).map(|()| {
+            let first = simulation.table().find("casing_displacement").unwrap().reference;
+            (0..36).map(|i| simulation.real(first + i).unwrap()).collect::<Vec<f64>>()
+        })
+    };
+    for order in [2, 3, 4] {
+        for phase in [0.0, 0.7] {
+            let found = displacement(order, phase).unwrap();
+            let angle = |i: usize| f64::from(order) * std::f64::consts::TAU * i as f64 / 36.0 - phase;
+            let amplitude = found.iter().enumerate().map(|(i, u)| u * angle(i).cos()).sum::<f64>() / 18.0;
+            // One pair of modes answers: u = A cos(nθ − φ), outwards where the load is.
+            let off = found.iter().enumerate().map(|(i, u)| (u - amplitude * angle(i).cos()).abs()).fold(0.0, f64::max);
+            assert!(amplitude > 0.0 && off < 1e-12 * amplitude, "order {order}: {amplitude:e}, {off:e}");
+            // 1000 N/m cos² over the circumference, on modes of amplitude 0.5 with ω = 2πf.
+            let omega = std::f64::consts::TAU * [0.0, 0.0, 400.0, 1100.0, 2100.0][usize::try_from(order).unwrap()];
+            let expected = 1e3 * std::f64::consts::PI * 0.25 * 0.5 * 0.5 / (omega * omega);
+            assert!((amplitude / expected - 1.0).abs() < 1e-12, "order {order}: {amplitude:e} for {expected:e}");
+        }
+    }
+    let refusal = displacement(19, 0.0).unwrap_err().to_string();
+    assert!(refusal.contains("casing_load_order") && refusal.contains("0 to 18"), "{refusal}");
+}

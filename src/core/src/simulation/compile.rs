@@ -80,6 +80,8 @@ pub struct Compiled {
     pub reference_speed: f64,
     /// Modes of the structure that carries the surface, seen at its contact grid.
     pub carrier: Option<ModalModel>,
+    /// Nodal diameters of the load on it.
+    pub load_order: u32,
     pub loads: LoadVectors,
     pub patches: Option<Patches>,
     /// Hash of settings and ROMs; saved states carry it.
@@ -113,10 +115,15 @@ impl Compiled {
             model: modes(scene, roles.master, 0.0)?,
             reference_speed: 0.0,
             carrier,
+            load_order: roles
+                .carrier
+                .and_then(|index| scene.settings.structures[index].load)
+                .map_or(0, |load| load.order),
             loads: LoadVectors::default(),
             patches: Patches::new(scene, roles),
             references,
         };
+        compiled.set_load_order(f64::from(compiled.load_order))?;
         compiled.set_reference_speed(scene.settings.structures[roles.master].speed)?;
         Ok(compiled)
     }
@@ -146,19 +153,50 @@ impl Compiled {
     /// # Errors
     /// A speed at which the stiffness is lost, or beyond what the ROM was fitted for.
     pub fn set_reference_speed(&mut self, speed: f64) -> Result<()> {
-        let (structure, rom) = self.master();
-        let (structure, rom) = (structure.clone(), rom.clone());
+        let stiffening = self.master().0.spin.stiffening;
         self.check_speed(speed)?;
-        if structure.spin.stiffening {
+        if stiffening {
             self.model = modes(&self.scene, self.roles.master, speed)?;
         }
         self.reference_speed = speed;
-        self.loads = LoadVectors {
-            centrifugal: LoadVectors::of_master(&structure, &rom, &self.model),
-            ..LoadVectors::default()
-        };
+        self.load();
+        Ok(())
+    }
+
+    /// Load vectors for the modes and the load order in use.
+    fn load(&mut self) {
+        let (structure, rom) = self.master();
+        let centrifugal = LoadVectors::of_master(structure, rom, &self.model);
+        self.loads = LoadVectors { centrifugal, ..LoadVectors::default() };
         if let (Some(index), Some(model)) = (self.roles.carrier, &self.carrier) {
-            self.loads.add_slave(&self.scene.settings.structures[index], &self.scene.roms[index], model);
+            let (structure, rom) = (&self.scene.settings.structures[index], &self.scene.roms[index]);
+            self.loads.add_slave(structure, self.load_order, rom, model);
+        }
+    }
+
+    fn has_load(&self) -> bool {
+        self.roles.carrier.is_some_and(|index| self.scene.settings.structures[index].load.is_some())
+    }
+
+    /// Take another number of nodal diameters for the load on the carrier.
+    ///
+    /// # Errors
+    /// A number that its contact grid does not resolve.
+    pub fn set_load_order(&mut self, order: f64) -> Result<()> {
+        let grid = self.roles.carrier.and_then(|index| self.scene.roms[index].extras.grid);
+        let most = u32::try_from(grid.map_or(0, |grid| grid.around / 2)).unwrap_or(u32::MAX);
+        if self.carrier.is_some() && !(0.0..=f64::from(most)).contains(&order) && self.has_load() {
+            return Err(Error::invalid(
+                "parameter `casing_load_order`",
+                format!("{order} nodal diameters, where the contact grid of the casing resolves 0 to {most}"),
+                "Use fewer nodal diameters, or a casing with more contact nodes around",
+            ));
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 0 and a u32")]
+        let order = order as u32;
+        if order != self.load_order {
+            self.load_order = order;
+            self.load();
         }
         Ok(())
     }

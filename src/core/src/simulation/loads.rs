@@ -3,7 +3,7 @@
 use super::Inputs;
 use crate::Rom;
 use crate::dynamics::modal::ModalModel;
-use crate::settings::{LoadSettings, StructureSettings};
+use crate::settings::StructureSettings;
 
 /// Modal load vectors per unit of what drives them; empty where a scene does not ask for them.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -28,14 +28,14 @@ impl LoadVectors {
         second.into_iter().zip(fourth).map(|(second, fourth)| [second, share * fourth]).collect()
     }
 
-    /// Loads of the slave; `model` sees the contact grid of `rom`.
-    pub fn add_slave(&mut self, structure: &StructureSettings, rom: &Rom, model: &ModalModel) {
+    /// Loads of the slave, the nodal-diameter load with `order` of them; `model` sees the contact grid of `rom`.
+    pub fn add_slave(&mut self, structure: &StructureSettings, order: u32, rom: &Rom, model: &ModalModel) {
         if let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) {
             self.thermal = thermal.loads.column_iter().map(|load| model.modal_load(load.as_slice())).collect();
         }
-        if let Some(load) = structure.load {
+        if structure.load.is_some() {
             let quarter = std::f64::consts::FRAC_PI_2;
-            self.nodal = Some([0.0, quarter].map(|phase| nodal_load(rom, model, load, phase)));
+            self.nodal = Some([0.0, quarter].map(|phase| nodal_load(rom, model, order, phase)));
         }
     }
 
@@ -70,13 +70,13 @@ impl LoadVectors {
 }
 
 /// Modal load of the line load cos(nθ − φ) (N/m of circumference, outwards), shared by the rings of the contact grid.
-fn nodal_load(rom: &Rom, model: &ModalModel, load: LoadSettings, phase: f64) -> Vec<f64> {
+fn nodal_load(rom: &Rom, model: &ModalModel, order: u32, phase: f64) -> Vec<f64> {
     let Some(grid) = rom.extras.grid else { return vec![0.0; model.len()] };
     #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
     let share = std::f64::consts::TAU / (grid.around as f64 * grid.along as f64);
     let force = |node: usize| {
         let position = rom.contact_nodes[node].position;
-        position[0] * share * libm::cos(f64::from(load.order) * position[1] - phase)
+        position[0] * share * libm::cos(f64::from(order) * position[1] - phase)
     };
     let nodes = rom.contact_nodes.len();
     (0..model.len())

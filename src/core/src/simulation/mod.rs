@@ -211,6 +211,7 @@ impl Simulation {
         let parameters = self.parameters();
         self.warnings.clear();
         self.compiled.check_methods(parameters.scheme, parameters.solver)?;
+        self.compiled.set_load_order(self.value_of(Quantity::LoadOrder))?;
         self.follow_reference_speed(self.inputs.speed.value)?;
         self.check_limits(parameters)?;
         let sliding = parameters.solver != Solver::Coulomb;

@@ -5,6 +5,7 @@
 
 use super::{Communication, Inputs, Phase, Simulation};
 use crate::persist::{Persist, Reader, Writer, fingerprint, persist_fields};
+use crate::variables::Quantity;
 use crate::{Error, Result};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
@@ -134,7 +135,11 @@ impl Simulation {
         let parameters = self.parameters();
         let mut speed = 0.0_f64;
         speed.restore(reader);
-        self.follow_reference_speed(speed)?;
+        // Before initialisation nothing has been computed from them, and values out of range are not refused yet.
+        if self.phase != Phase::Created {
+            self.compiled.set_load_order(self.value_of(Quantity::LoadOrder))?;
+            self.follow_reference_speed(speed)?;
+        }
         self.system.set_methods(parameters.scheme, parameters.solver);
         self.system.set_friction(parameters.friction);
         self.rest(parameters);

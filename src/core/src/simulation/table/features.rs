@@ -2,7 +2,7 @@
 
 use super::{ANGLE, Builder, LENGTH, LINE_LOAD, POWER, Parts, TEMPERATURE, VOLUME, has_friction, largest_length};
 use crate::settings::MAX_DAMPING;
-use crate::variables::{Quantity, Span, Start, Variability};
+use crate::variables::{Kind, Quantity, Span, Start, Variability};
 
 /// Temperatures beyond this are not what a linear expansion describes (K).
 const LARGEST_TEMPERATURE: f64 = 3000.0;
@@ -43,10 +43,8 @@ pub fn inputs(table: &mut Builder, scene: &Parts) {
         (row.min, row.max) = (Some(-LARGEST_TEMPERATURE), Some(LARGEST_TEMPERATURE));
     }
     if let Some(load) = carrier.load {
-        let text =
-            format!("Amplitude of the radial line load with {} nodal diameters on the casing, outwards", load.order);
-        let row =
-            table.input(Quantity::LoadAmplitude, "casing_load_amplitude", Some(&LINE_LOAD), load.amplitude, &text);
+        let text = "Amplitude of the radial line load with nodal diameters on the casing, outwards positive";
+        let row = table.input(Quantity::LoadAmplitude, "casing_load_amplitude", Some(&LINE_LOAD), load.amplitude, text);
         row.nominal = Some(1e4);
         let text = "Phase of the nodal-diameter load: amplitude cos(n theta - phase)";
         table.input(Quantity::LoadPhase, "casing_load_phase", Some(&ANGLE), load.phase, text).display = Some(0);
@@ -60,6 +58,12 @@ pub fn parameters(table: &mut Builder, scene: &Parts) {
         let text = "Modal damping ratio of the casing";
         let row = table.parameter(Quantity::SlaveDampingRatio, "casing_damping_ratio", None, ratio, text);
         (row.min, row.max) = (Some(0.0), Some(MAX_DAMPING));
+    }
+    if let Some(load) = scene.carrier.and_then(|(carrier, _)| carrier.load) {
+        let text = "Number of nodal diameters of the radial line load on the casing";
+        let row = table.parameter(Quantity::LoadOrder, "casing_load_order", None, 0.0, text);
+        row.kind = Kind::Integer;
+        row.start = Some(Start::Integer(i32::try_from(load.order).unwrap_or(i32::MAX)));
     }
     if let Some(share) = scene.settings.contacts[0].heat_to_slave.filter(|_| has_friction(scene)) {
         let text = "Share of the friction heat that goes into the casing, the rest into the blades";
