@@ -160,7 +160,8 @@ class Three(Importer):
     def set(self, **values):
         for name, value in values.items():
             kind, reference, _ = self.variables[name]
-            {"Float64": self.fmu.setFloat64, "Enumeration": self.fmu.setInt64}[kind]([reference], [value])
+            setters = {"Float64": self.fmu.setFloat64, "Int32": self.fmu.setInt32, "Enumeration": self.fmu.setInt64}
+            setters[kind]([reference], [value])
 
     def read(self, names):
         """One call per variable that is needed."""

@@ -123,7 +123,7 @@ pub struct SpinSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LoadSettings {
-    /// Nodal diameter.
+    /// Start value of the number of nodal diameters, below half the nodes around of the contact grid.
     pub order: u32,
     /// Start value of the amplitude input (N per metre of circumference, outward positive).
     #[serde(default, skip_serializing_if = "is_positive_zero")]

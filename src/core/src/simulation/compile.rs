@@ -184,7 +184,8 @@ impl Compiled {
     /// A number that its contact grid does not resolve.
     pub fn set_load_order(&mut self, order: f64) -> Result<()> {
         let grid = self.roles.carrier.and_then(|index| self.scene.roms[index].extras.grid);
-        let most = u32::try_from(grid.map_or(0, |grid| grid.around / 2)).unwrap_or(u32::MAX);
+        // Half as many as nodes would have one phase only, and count twice; more are aliases of fewer.
+        let most = u32::try_from(grid.map_or(0, |grid| (grid.around - 1) / 2)).unwrap_or(u32::MAX);
         if self.carrier.is_some() && !(0.0..=f64::from(most)).contains(&order) && self.has_load() {
             return Err(Error::invalid(
                 "parameter `casing_load_order`",
@@ -392,7 +393,6 @@ fn check_rom(structure: &StructureSettings, rom: &Rom) -> Result<()> {
         let problem = format!("it has no contact grid, which `load` of structure `{}` needs", structure.name);
         return Err(Error::invalid(what, problem, "Give a ROM with a contact grid, or leave the load out"));
     }
-    check_order(structure, rom)?;
     let factors = structure.frequency_factors.len();
     if factors != 0 && factors != rom.sectors {
         return Err(Error::invalid(
@@ -402,18 +402,6 @@ fn check_rom(structure: &StructureSettings, rom: &Rom) -> Result<()> {
         ));
     }
     Ok(())
-}
-
-/// A nodal diameter that the contact grid cannot tell from a lower one would load that one instead.
-fn check_order(structure: &StructureSettings, rom: &Rom) -> Result<()> {
-    match (structure.load, rom.extras.grid) {
-        (Some(load), Some(grid)) if 2 * u64::from(load.order) >= grid.around as u64 => Err(Error::invalid(
-            "structure.load.order",
-            format!("{} nodal diameters on the {} nodes around of ROM `{}`", load.order, grid.around, rom.name),
-            "Use fewer than half as many nodal diameters as nodes around, or a ROM with a finer contact grid",
-        )),
-        _ => Ok(()),
-    }
 }
 
 fn fingerprint(scene: &Scene) -> u64 {

@@ -107,7 +107,7 @@ pub const FIELDS: [SceneField; 66] = [
         "whole number",
         None,
         "below half the nodes around of the contact grid",
-        "Nodal diameter of the load; 0 is uniform.",
+        "Start value of the number of nodal diameters; 0 is uniform.",
     ),
     field(
         "structure.load.amplitude",
