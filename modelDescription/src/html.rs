@@ -34,6 +34,7 @@ pub fn html(description: &Description) -> String {
     model(&mut page, description);
     time(&mut page, description);
     variables(&mut page, description);
+    list(&mut page, "What this scene adds", &description.features, "");
     list(&mut page, "Limits", &description.limits, "");
     list(&mut page, "Warnings", &description.warnings, " class=\"warning\"");
     structures(&mut page, description);
@@ -52,7 +53,7 @@ fn model(page: &mut String, description: &Description) {
     }
     page.push_str(
         "<p>This unit marches reduced-order models of flexible structures in time, together with their unilateral \
-         contact against rigid surfaces. The importer sets inputs, calls the unit step by step, and reads clearances, \
+         contact against a surface around them, rigid or flexible. The importer sets inputs, calls the unit step by step, and reads clearances, \
          forces, torques and energies. Inside each communication step the unit takes as many smaller steps of its own \
          as its time step asks for, and lands exactly on the communication point.</p>\n",
     );
@@ -199,7 +200,10 @@ fn structure(page: &mut String, name: &str, rom: &Rom) {
         Frame::Cylindrical => "radial, tangential, axial",
         Frame::Cartesian => "x, y, z",
     };
-    let nodes = rom.contact_nodes.iter().map(|node| node.name.as_str()).collect::<Vec<_>>().join(", ");
+    let nodes = match rom.extras.grid {
+        Some(grid) => format!("a grid of {} around and {} along", grid.around, grid.along),
+        None => rom.contact_nodes.iter().map(|node| node.name.as_str()).collect::<Vec<_>>().join(", "),
+    };
     let _ = writeln!(
         page,
         "<h3>{}</h3>\n<p>{}</p>\n<p>{} sector{} of {} reduced coordinates each; contact nodes of a sector: {} \
@@ -212,7 +216,33 @@ fn structure(page: &mut String, name: &str, rom: &Rom) {
         text(&nodes),
         readable(rom.damping_ratio),
     );
+    extras(page, rom);
     checks(page, rom);
+}
+
+/// Spin and heat, where the model has them.
+fn extras(page: &mut String, rom: &Rom) {
+    if let Some(spin) = &rom.extras.spin {
+        let speed = readable(spin.largest_speed);
+        let _ = writeln!(page, "<p>Effects of spin fitted for speeds up to {speed} rad/s.</p>");
+    }
+    if let Some(thermal) = &rom.extras.thermal {
+        page.push_str(
+            "<table>\n<thead><tr><th class=\"number\">Heated patch</th><th class=\"number\">Angles (deg)</th>\
+             <th class=\"number\">Axial position (m)</th></tr></thead>\n<tbody>\n",
+        );
+        for (index, patch) in thermal.patches.iter().enumerate() {
+            let [from, to] = patch.angle.map(|angle| significant(angle.to_degrees()));
+            let [low, high] = patch.axial.map(significant);
+            let _ = writeln!(
+                page,
+                "<tr><td class=\"number\">{}</td><td class=\"number\">{from} to {to}</td>\
+                 <td class=\"number\">{low} to {high}</td></tr>",
+                index + 1
+            );
+        }
+        page.push_str("</tbody>\n</table>\n");
+    }
 }
 
 fn checks(page: &mut String, rom: &Rom) {

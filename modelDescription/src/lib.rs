@@ -52,6 +52,8 @@ pub struct Description<'a> {
     pub fmi3_arrays: bool,
     /// Structures of the scene with their ROMs, for the page.
     pub structures: Vec<(&'a str, &'a Rom)>,
+    /// What the scene asks for beyond a plain rub, for the page; one phrase each.
+    pub features: Vec<String>,
     /// Limits of validity, for the page; one sentence each.
     pub limits: Vec<String>,
     /// Warnings about this scene, for the page; one sentence each.

@@ -253,7 +253,7 @@ proptest::proptest! {
         let (table, rom) = (common::table(), common::rom());
         let mut description = common::description(&table, &rom, true);
         description.description = &text;
-        description.limits = vec![text.clone()];
+        (description.limits, description.features) = (vec![text.clone()], vec![text.clone()]);
         let control = |c: char| c.is_ascii_control() && !c.is_ascii_whitespace() || c == '\u{b}' || c == '\u{c}';
         let expected: String = text
             .chars()
@@ -269,6 +269,6 @@ proptest::proptest! {
             proptest::prop_assert_eq!(root.get("description").map_or("", String::as_str), &expected);
         }
         let page = html(&description);
-        proptest::prop_assert_eq!(page.matches("<li>").count(), 2);
+        proptest::prop_assert_eq!(page.matches("<li>").count(), 3);
     }
 }

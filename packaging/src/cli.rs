@@ -12,10 +12,13 @@ use crate::casing_arguments::CasingArguments;
     name = "tiprub",
     version,
     about = "Blade-tip/casing contact (rub) as an FMU: reduce, package, run, inspect, demo",
-    long_about = "Marches the contact of a bladed disk (a reduced-order model) with a rigid casing in time, and ships \
-                  that as an FMU for any FMI 2.0 or FMI 3.0 importer.\n\nSI units everywhere (m, kg, s, N, rad).",
+    long_about = "Marches the contact of a bladed disk (a reduced-order model) with its casing in time, rigid or \
+                  flexible, and ships that as an FMU for any FMI 2.0 or FMI 3.0 importer.\n\nSI units everywhere (m, kg, s, N, rad).",
     after_help = "Examples:\n  tiprub demo\n  tiprub run builtin:rotor37 --csv rub.csv\n  \
                   tiprub package scene.toml -o out/\n\n\
+                  Scenes that ship:\n  builtin:rotor37           rotor 37 in a rigid casing with two bumps\n  \
+                  builtin:flexible-casing   in an elastic casing with heat, friction power per patch\n  \
+                  builtin:abradable         wearing the coating of a rigid casing\n\n\
                   Exit codes: 0 done, 1 the work failed, 2 the command line is wrong."
 )]
 pub struct Cli {
@@ -63,7 +66,7 @@ pub enum Command {
     /// What is in an .fmu, a ROM or a scene file, and whether it is sound.
     #[command(
         after_help = "Examples:\n  tiprub inspect rotor37_fmi2.fmu\n  tiprub inspect rotor37.rom.safetensors\n  \
-                            tiprub inspect scene.toml --json"
+                            tiprub inspect scene.toml --json\n  tiprub inspect builtin:flexible-casing"
     )]
     Inspect(InspectArguments),
 }
@@ -120,7 +123,7 @@ pub struct ReduceArguments {
 /// Arguments of `tiprub package`.
 #[derive(Debug, Args)]
 pub struct PackageArguments {
-    /// Scene file (TOML), or `builtin:rotor37`.
+    /// Scene file (TOML), or one that ships, such as `builtin:rotor37`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
     /// FMI version of the FMU.
@@ -140,7 +143,7 @@ pub struct PackageArguments {
 /// Arguments of `tiprub run`.
 #[derive(Debug, Args)]
 pub struct RunArguments {
-    /// Scene file (TOML), or `builtin:rotor37`.
+    /// Scene file (TOML), or one that ships, such as `builtin:rotor37`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
     /// Write all outputs as CSV; `-` is stdout.
@@ -160,7 +163,7 @@ pub struct RunArguments {
 /// Arguments of `tiprub inspect`.
 #[derive(Debug, Args)]
 pub struct InspectArguments {
-    /// An .fmu, a ROM (.safetensors) or a scene (.toml).
+    /// An .fmu, a ROM (.safetensors), a scene (.toml) or one that ships (`builtin:abradable`).
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 }

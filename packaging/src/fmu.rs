@@ -2,13 +2,13 @@
 
 use std::{env, path::Path};
 
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_model_description::{Description, Experiment, fmi2_xml, fmi3_xml, html};
 
 use crate::{
     Failure, Result,
     archive::{self, Entry},
-    native,
+    native, scene_features,
     schedule::Schedule,
 };
 
@@ -26,18 +26,6 @@ const LICENSE: &str = "This FMU and the library in it are licensed under either 
     - the MIT license (LICENSE-MIT.txt), or\n- the Apache License, Version 2.0 (LICENSE-APACHE.txt)\n\
     at your option. third-party.txt lists the libraries it contains and their licenses.\n\
     The scene and the reduced-order models in resources/ belong to whoever made them.\n";
-
-/// Limits of validity that every importer's user should read.
-const LIMITS: [&str; 7] = [
-    "Displacements within each structure are small; the rotation between rotor and casing is not.",
-    "Friction is Coulomb friction in steady sliding along the circumference; sticking is not modelled.",
-    "The casing is a rigid surface of the given shape, parallel to the contour of the blade tips.",
-    "Blades stand on a rigid hub and are not coupled to each other; speed does not stiffen them.",
-    "Forces and torques are means over the communication step, so that the momentum handed over is exact; the force \
-     at an instant of impact grows as 1/h.",
-    "Sliding friction can make the structure itself flutter; a scheme that would add growth of its own is refused.",
-    "The mass of a contact node loses its kinetic energy at impact: an error of first order in mesh size, not in h.",
-];
 
 /// FMI version of a package.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,6 +50,8 @@ impl FmiVersion {
 #[derive(Debug)]
 pub struct Package<'a> {
     scene: &'a Scene,
+    /// ROMs as the FMU holds them.
+    roms: Vec<Rom>,
     simulation: Simulation,
     library: &'a [u8],
     reference_csv: String,
@@ -86,7 +76,15 @@ impl<'a> Package<'a> {
         }
         let reference_csv = native::run(scene, &schedule, &[], &|_| {})?.recording.to_csv();
         let generated = generation_date(env::var("SOURCE_DATE_EPOCH").ok().as_deref())?;
-        Ok(Self { scene, simulation, library, reference_csv, warnings, generated })
+        Ok(Self {
+            scene,
+            roms: tiprub_format::packed_roms(scene),
+            simulation,
+            library,
+            reference_csv,
+            warnings,
+            generated,
+        })
     }
 
     /// Warnings of the initialisation (what an FMU instance would log) and of the experiment proposed.
@@ -149,8 +147,9 @@ impl<'a> Package<'a> {
             },
             table: self.simulation.table(),
             fmi3_arrays: arrays,
-            structures: structures.zip(&self.scene.roms).collect(),
-            limits: LIMITS.map(String::from).to_vec(),
+            structures: structures.zip(&self.roms).collect(),
+            features: scene_features::features(self.scene),
+            limits: scene_features::limits(self.scene),
             warnings: self.simulation.warnings().to_vec(),
         }
     }

@@ -4,6 +4,7 @@
 //! terminal. [`commands`] holds one module per command; the rest are the parts they share.
 //!
 //! - [`scene_source`]: a scene file (or the embedded rotor 37 scene) with its ROMs;
+//! - [`scene_features`]: what a scene asks for beyond a plain rub, and its limits, in words;
 //! - [`schedule`], [`recording`], [`native`]: communication points, the table of results, the run without FMI;
 //! - [`error_study`]: error against run time for every scheme and solver;
 //! - [`archive`], [`fmu`], [`library`]: the reproducible zip, its contents, and the shared library that goes in;
@@ -27,6 +28,7 @@ pub mod recording;
 pub mod reduction;
 pub mod report;
 pub mod rom_facts;
+pub mod scene_features;
 pub mod scene_source;
 pub mod schedule;
 

@@ -130,6 +130,7 @@ impl RomFacts {
             let _ = writeln!(text, "    {:<24}{place}", node.name);
         }
         let _ = writeln!(text, "  damping ratio             {}", rom.damping_ratio);
+        text.push_str(&extras_text(rom));
         let _ = writeln!(text, "  largest frequency         {:.6e} rad/s", self.largest_angular_frequency);
         let _ =
             writeln!(text, "  largest stable step h     central-difference {:.4e} s", self.central_difference_limit);
@@ -166,6 +167,12 @@ impl RomFacts {
                 "name": node.name, "position": node.position, "meridional_slope": node.meridional_slope,
             })).collect::<Vec<_>>(),
             "damping_ratio": rom.damping_ratio,
+            "contact_grid": rom.extras.grid.map(|grid| json!({ "around": grid.around, "along": grid.along })),
+            "spin": rom.extras.spin.as_ref().map(|spin| json!({ "largest_speed": spin.largest_speed })),
+            "thermal_patches": rom.extras.thermal.as_ref().map(|thermal| {
+                thermal.patches.iter().map(|patch| json!({ "angle": patch.angle, "axial": patch.axial }))
+                    .collect::<Vec<_>>()
+            }),
             "frequencies_hz": self.frequencies,
             "largest_angular_frequency": self.largest_angular_frequency,
             "largest_stable_step": {
@@ -182,6 +189,18 @@ impl RomFacts {
             })).collect::<Vec<_>>(),
         })
     }
+}
+
+/// Spin and heat, for people; nothing for a ROM without.
+fn extras_text(rom: &Rom) -> String {
+    let mut text = String::new();
+    if let Some(spin) = &rom.extras.spin {
+        let _ = writeln!(text, "  spin                      fitted up to {} rad/s", spin.largest_speed);
+    }
+    if let Some(thermal) = &rom.extras.thermal {
+        let _ = writeln!(text, "  heated patches            {}", thermal.patches.len());
+    }
+    text
 }
 
 /// Largest µ tried for which the contact problem is solvable for both slip directions.

@@ -1,4 +1,4 @@
-//! A scene file with its ROMs, or the scene that ships with tiprub.
+//! A scene file with its ROMs, or a scene that ships with tiprub.
 
 use std::{cell::RefCell, fs, path::Path};
 
@@ -7,24 +7,35 @@ use tiprub_model::{CasingOptions, Rotor37Options, casing::CASING37, rotor37::DES
 
 use crate::{Failure, Result, console::Console, reduction};
 
-/// The scene that ships with tiprub, as a user would write it.
+/// The scene of the demo, as a user would write it.
 pub const ROTOR37_SCENE: &str = include_str!("../scenes/rotor37.toml");
 
-/// Name by which the embedded scene and the embedded blade are asked for.
-pub const BUILTIN_ROTOR37: &str = "builtin:rotor37";
+/// Scenes that ship with tiprub: what stands behind `builtin:`, and the text.
+pub const BUILTIN_SCENES: [(&str, &str); 3] = [
+    ("rotor37", ROTOR37_SCENE),
+    ("flexible-casing", include_str!("../scenes/flexible-casing.toml")),
+    ("abradable", include_str!("../scenes/abradable.toml")),
+];
 
-/// Load a scene: a path, or [`BUILTIN_ROTOR37`]. Built-in blades are reduced on the way, with progress.
+/// What names of embedded scenes and models begin with.
+pub const BUILTIN: &str = "builtin:";
+
+/// Load a scene: a path, or `builtin:` and the name of one of [`BUILTIN_SCENES`]. Built-in models are reduced on the way,
+/// with progress.
 ///
 /// # Errors
 /// Missing or wrong files, naming file, line, field and remedy.
 pub fn load(argument: &str, console: &Console) -> Result<Scene> {
     let reduce = |name: &str| builtin_rom(name, console);
-    if argument == BUILTIN_ROTOR37 {
-        return rotor37_scene(&reduce);
-    }
-    if let Some(name) = argument.strip_prefix("builtin:") {
-        let problem = format!("there is no built-in scene `{name}`");
-        return Err(Failure::usage("SCENE", problem, format!("Give a scene file, or {BUILTIN_ROTOR37}")));
+    if let Some(name) = argument.strip_prefix(BUILTIN) {
+        return match BUILTIN_SCENES.iter().find(|(known, _)| *known == name) {
+            Some((_, text)) => builtin_scene(argument, text, &reduce),
+            None => {
+                let names: Vec<String> = BUILTIN_SCENES.iter().map(|(known, _)| format!("{BUILTIN}{known}")).collect();
+                let problem = format!("there is no built-in scene `{name}`");
+                Err(Failure::usage("SCENE", problem, format!("Give a scene file, or one of {}", names.join(", "))))
+            }
+        };
     }
     let path = Path::new(argument);
     if path.is_dir() {
@@ -43,21 +54,24 @@ pub fn load(argument: &str, console: &Console) -> Result<Scene> {
     tiprub_format::load_scene(path, &reduce).map_err(Failure::from)
 }
 
-/// The embedded scene with an embedded blade from `reduce`.
-fn rotor37_scene(reduce: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
-    let settings = tiprub_format::parse_scene(ROTOR37_SCENE, BUILTIN_ROTOR37)?;
-    let rom = reduce("rotor37").unwrap_or_else(|| Err("not known".into()));
-    let rom = rom.map_err(|problem| Failure::new(BUILTIN_ROTOR37, problem, ""))?;
-    Ok(Scene { settings, roms: vec![rom] })
+/// An embedded scene with embedded models from `reduce`.
+fn builtin_scene(name: &str, text: &str, reduce: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
+    let settings = tiprub_format::parse_scene(text, name)?;
+    let mut roms = Vec::new();
+    for structure in &settings.structures {
+        let model = structure.rom.strip_prefix(BUILTIN).and_then(reduce).unwrap_or_else(|| Err("not known".into()));
+        roms.push(model.map_err(|problem| Failure::new(&structure.rom, problem, ""))?);
+    }
+    Ok(Scene { settings, roms })
 }
 
-/// The embedded scene around a blade reduced before.
+/// The scene of the demo around a blade reduced before.
 ///
 /// # Errors
 /// Never with the scene that ships.
 pub fn rotor37_scene_with(rom: Rom) -> Result<Scene> {
     let rom = RefCell::new(Some(rom));
-    rotor37_scene(&|_| rom.borrow_mut().take().map(Ok))
+    builtin_scene("builtin:rotor37", ROTOR37_SCENE, &|_| rom.borrow_mut().take().map(Ok))
 }
 
 /// The embedded scene as text, with its ROM read from `rom_file` and the stop time replaced.
@@ -114,11 +128,22 @@ mod tests {
     }
 
     #[test]
+    fn every_embedded_scene_is_valid_named_in_the_help_and_made_of_embedded_models() {
+        let help = <crate::cli::Cli as clap::CommandFactory>::command().render_help().to_string();
+        for (name, text) in BUILTIN_SCENES {
+            let settings = tiprub_format::parse_scene(text, name).unwrap();
+            assert!(settings.structures.iter().all(|structure| structure.rom.starts_with(BUILTIN)), "{name}");
+            assert!(help.contains(&format!("{BUILTIN}{name}")), "{name} is not in:\n{help}");
+        }
+    }
+
+    #[test]
     fn missing_files_and_unknown_builtins_are_named() {
         let console = Console::new(true, false);
         let missing = load("/nowhere/scene.toml", &console).unwrap_err();
         assert!(missing.what.contains("/nowhere/scene.toml"), "{missing}");
-        assert!(load("builtin:rotor38", &console).unwrap_err().problem.contains("rotor38"));
+        let failure = load("builtin:rotor38", &console).unwrap_err();
+        assert!(failure.problem.contains("rotor38") && failure.remedy.contains("builtin:abradable"), "{failure}");
         for (name, kind) in [("rub.fmu", "an FMU"), ("blade.rom.safetensors", "a ROM")] {
             let failure = load(name, &console).unwrap_err();
             assert!(failure.problem.contains(kind) && failure.remedy.contains("inspect"), "{failure}");

@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 use tempfile::TempDir;
 use tiprub_core::{
     Rom,
-    rom::{ContactNode, Frame, RomChecks},
+    rom::{ContactNode, Frame, RomChecks, Spin},
 };
 
 const SCENE: &str = r#"
@@ -202,6 +202,46 @@ fn a_package_is_complete_reproducible_and_inspectable() {
         assert_eq!(inspected["scene"]["settings"]["name"], "small");
     }
     assert_eq!(project.files(), ["a", "b", "library.so", "scene.toml", "small.rom.safetensors"]);
+}
+
+#[test]
+fn what_a_scene_does_not_use_of_a_rom_stays_out_of_the_package() {
+    let project = Project::new();
+    let package = |directory: &str| {
+        project.succeed(&[
+            "package",
+            "scene.toml",
+            "--fmi",
+            "3",
+            "-o",
+            directory,
+            "--library",
+            "library.so",
+            "--quiet",
+        ]);
+        fs::read(project.path(directory).join("small_fmi3.fmu")).unwrap()
+    };
+    let plain = package("plain");
+    let path = project.path("small.rom.safetensors");
+    let mut rom = tiprub_format::read_rom(&fs::read(&path).unwrap(), "small").unwrap();
+    rom.extras.spin = Some(Spin {
+        stiffness_speed2: DMatrix::identity(3, 3) * -0.1,
+        stiffness_speed4: DMatrix::zeros(3, 3),
+        coriolis: DMatrix::zeros(3, 3),
+        centrifugal_load: vec![0.01, 0.0, 0.0],
+        centrifugal_load_speed4: vec![0.0; 3],
+        largest_speed: 200.0,
+    });
+    fs::write(&path, tiprub_format::write_rom(&rom)).unwrap();
+    assert!(package("able") == plain, "the FMU differs");
+    fs::write(project.path("scene.toml"), SCENE.replace("speed = 100.0", "speed = 100.0\nspin = { growth = true }"))
+        .unwrap();
+    let used = package("used");
+    let json = project.succeed(&["inspect", "used/small_fmi3.fmu", "--json"]);
+    let inspected: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(inspected["scene"]["roms"][0]["spin"]["largest_speed"], 200.0);
+    assert_eq!(inspected["scene"]["features"][0], "spin of `rotor`: growth");
+    assert!(used.len() > plain.len());
 }
 
 #[test]

@@ -59,6 +59,16 @@ class Importer:
             self.fmu.freeInstance()
             self.fmu = None
 
+    def put(self, name, values):
+        """Set a scalar or all elements of an array, in one call."""
+        kind, reference, count = (*self.variables.get(name, (None, None)), 1)[:3]
+        if kind is None:
+            first = self.variables[f"{name}[1]"]
+            kind, reference, count = first[0], first[1], 1
+        # Elements have consecutive references; an array of FMI 3.0 has one for all of them.
+        references = [reference] if count > 1 else [reference + index for index in range(len(values))]
+        (self.fmu.setReal if kind == "Real" else self.fmu.setFloat64)(references, values)
+
     def get(self, *names):
         values = self.read(names)
         return values[0] if len(names) == 1 else values
@@ -150,7 +160,8 @@ class Three(Importer):
     def set(self, **values):
         for name, value in values.items():
             kind, reference, _ = self.variables[name]
-            {"Float64": self.fmu.setFloat64, "Enumeration": self.fmu.setInt64}[kind]([reference], [value])
+            setters = {"Float64": self.fmu.setFloat64, "Int32": self.fmu.setInt32, "Enumeration": self.fmu.setInt64}
+            setters[kind]([reference], [value])
 
     def read(self, names):
         """One call per variable that is needed."""

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 use tempfile::TempDir;
-use tiprub_core::rom::{ContactNode, Frame, RomChecks};
+use tiprub_core::rom::{ContactGrid, ContactNode, Frame, Patch, RomChecks, RomExtras, Thermal};
+use tiprub_core::settings::{Motion, StructureSettings};
 use tiprub_core::{Rom, Scene};
 
 /// Radius of the blade tips (m).
@@ -91,6 +92,73 @@ communication_step = 1e-4
 pub fn scene() -> Scene {
     let settings = tiprub_format::parse_scene(SCENE, "toy.toml").expect("the scene of the tests is valid");
     Scene { settings, roms: vec![rom()] }
+}
+
+/// Patches of the ring.
+pub const PATCHES: usize = 4;
+
+/// A ring around the blades that breathes and ovalises, with a contact grid of 12 by 2 nodes and four warm quarters.
+pub fn ring() -> Rom {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let (around, along) = (12, 2);
+    let angle = |node: usize| std::f64::consts::TAU * (node % around) as f64 / around as f64;
+    let shape = |row: usize, mode: usize| {
+        let phase = [0.0, 0.0, quarter][mode];
+        match (row % 3, mode) {
+            (0, 0) => 1.0,
+            (0, _) => (2.0 * angle(row / 3) - phase).cos(),
+            (1, 1 | 2) => -0.5 * (2.0 * angle(row / 3) - phase).sin(),
+            _ => 0.0,
+        }
+    };
+    let stiffness = [3000.0, 400.0, 400.0].map(|frequency: f64| 0.5 * (std::f64::consts::TAU * frequency).powi(2));
+    let node = |node: usize| ContactNode {
+        name: format!("c{}", node + 1),
+        position: [RADIUS, angle(node), -0.01 + 0.06 * (node / around) as f64],
+        meridional_slope: 0.0,
+    };
+    Rom {
+        name: "ring".into(),
+        origin: "breathing and two nodal diameters".into(),
+        sectors: 1,
+        frame: Frame::Cylindrical,
+        mass: DMatrix::from_diagonal_element(3, 3, 0.5),
+        stiffness: DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&stiffness)),
+        damping_ratio: 0.02,
+        contact_map: DMatrix::from_fn(3 * around * along, 3, shape),
+        contact_nodes: (0..around * along).map(node).collect(),
+        checks: RomChecks::default(),
+        extras: RomExtras {
+            spin: None,
+            thermal: Some(Thermal {
+                loads: DMatrix::from_fn(3, PATCHES, |mode, patch| [130.0, 40.0, -30.0][mode] * (1.0 + patch as f64)),
+                patches: (0..PATCHES)
+                    .map(|patch| Patch {
+                        angle: [quarter * patch as f64, quarter * (patch + 1) as f64],
+                        axial: [-0.01, 0.05],
+                    })
+                    .collect(),
+            }),
+            grid: Some(ContactGrid { around, along }),
+        },
+    }
+}
+
+/// The scene with the casing on a ring whose temperatures are inputs.
+#[track_caller]
+pub fn warm_scene() -> Scene {
+    let mut scene = scene();
+    scene.settings.structures.push(StructureSettings {
+        name: "ring".into(),
+        rom: "ring.rom.safetensors".into(),
+        motion: Motion::Still,
+        thermal: true,
+        ..StructureSettings::default()
+    });
+    scene.settings.surfaces[0].structure = Some("ring".into());
+    scene.settings.surfaces[0].ramp_time = 1e-3;
+    scene.roms.push(ring());
+    scene
 }
 
 /// First value reference of a variable of the scene.

@@ -135,6 +135,7 @@ pub fn description<'a>(table: &'a VariableTable, rom: &'a Rom, fmi3_arrays: bool
         table,
         fmi3_arrays,
         structures: vec![("rotor", rom)],
+        features: vec!["`casing` is carried by <ring>".into()],
         limits: vec!["Small displacements within <each> structure.".into()],
         warnings: vec!["ω·h = 2.5 > 2".into()],
     }

@@ -8,7 +8,11 @@ use std::{
 };
 
 use serde_json::{Value, json};
-use tiprub_core::{Scene, Simulation, settings::SceneSettings, variables::Causality};
+use tiprub_core::{
+    Scene, Simulation,
+    settings::{Motion, SceneSettings},
+    variables::Causality,
+};
 
 use crate::{
     Failure, Result,
@@ -16,7 +20,7 @@ use crate::{
     console::{Console, Outcome},
     importer::{UnpackedFmu, open_archive, read_entry},
     rom_facts::RomFacts,
-    scene_source,
+    scene_features, scene_source,
 };
 
 /// Kinds of files, told apart by name and, where that does not help, by their first bytes.
@@ -48,6 +52,9 @@ pub fn run(arguments: &InspectArguments, console: &Console) -> Result<Outcome> {
 }
 
 fn kind(path: &Path) -> Result<FileKind> {
+    if path.to_str().is_some_and(|name| name.starts_with(scene_source::BUILTIN)) {
+        return Ok(FileKind::Scene);
+    }
     let mut start = Vec::new();
     fs::File::open(path)
         .and_then(|file| file.take(9).read_to_end(&mut start))
@@ -150,7 +157,11 @@ fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
     let scalars = |causality| -> usize {
         table.variables().iter().filter(|row| row.causality == causality).map(|row| row.len()).sum()
     };
+    let features = scene_features::features(scene);
     let mut text = scene_text(settings);
+    for feature in &features {
+        let _ = writeln!(text, "  adds          {feature}");
+    }
     let _ = writeln!(
         text,
         "  variables     {} inputs, {} parameters, {} outputs (as scalars)",
@@ -167,6 +178,7 @@ fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
     }
     let json = json!({
         "settings": serde_json::to_value(settings).unwrap_or(Value::Null),
+        "features": features,
         "warnings": simulation.warnings(),
         "variables": {
             "inputs": scalars(Causality::Input),
@@ -181,13 +193,17 @@ fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
 fn scene_text(settings: &SceneSettings) -> String {
     let mut text = format!("scene {}: {}\n", settings.name, settings.description);
     for structure in &settings.structures {
+        let motion = match structure.motion {
+            Motion::Rotating => {
+                format!("speed {} rad/s ({:.1} rpm)", structure.speed, structure.speed * 30.0 / std::f64::consts::PI)
+            }
+            Motion::Still => "stands still".into(),
+        };
         let _ = writeln!(
             text,
-            "  structure     {} from {}, speed {} rad/s ({:.1} rpm), damping ratio {}",
+            "  structure     {} from {}, {motion}, damping ratio {}",
             structure.name,
             structure.rom,
-            structure.speed,
-            structure.speed * 30.0 / std::f64::consts::PI,
             structure.damping_ratio.map_or("of the ROM".into(), |ratio| ratio.to_string())
         );
     }

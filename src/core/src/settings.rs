@@ -123,7 +123,7 @@ pub struct SpinSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LoadSettings {
-    /// Nodal diameter.
+    /// Start value of the number of nodal diameters, below half the nodes around of the contact grid.
     pub order: u32,
     /// Start value of the amplitude input (N per metre of circumference, outward positive).
     #[serde(default, skip_serializing_if = "is_positive_zero")]
@@ -278,7 +278,8 @@ pub struct SurfaceSettings {
     /// structure).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spline: Option<SplineSettings>,
-    /// Friction power of each of these patches as an output; those of the ROM where the structure is thermal.
+    /// Friction power of each of these patches as an output; the heated patches of the ROM where absent and the
+    /// structure is thermal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub patches: Option<PatchSettings>,
 }

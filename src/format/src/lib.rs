@@ -19,7 +19,8 @@ mod suggestion;
 pub use error::Error;
 pub use load::{BUILTIN_PREFIX, load_scene};
 pub use resources::{
-    PACKAGE_FILE, RESOURCES_FORMAT_VERSION, Resources, SCENE_FILE, instantiation_token, load_resources, resource_files,
+    PACKAGE_FILE, RESOURCES_FORMAT_VERSION, Resources, SCENE_FILE, instantiation_token, load_resources, packed_roms,
+    resource_files,
 };
 pub use rom_file::{read_rom, write_rom};
 pub use rom_layout::{ARRAYS, ArrayLayout, METADATA, MetadataLayout, ROM_FORMAT, ROM_FORMAT_VERSION};

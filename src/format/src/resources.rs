@@ -48,16 +48,19 @@ pub fn resource_files(scene: &Scene, fmi3_arrays: bool) -> Vec<(String, Vec<u8>)
         settings.structures[index].rom = rom_file_name(scene, index);
     }
     let mut files = vec![(SCENE_FILE.to_owned(), write_scene(&settings).into_bytes())];
-    for (structure, rom) in settings.structures.iter().zip(&scene.roms) {
-        files.push((
-            structure.rom.clone(),
-            write_rom(&Rom { extras: needed(structure, rom, &settings), ..rom.clone() }),
-        ));
+    for (structure, rom) in settings.structures.iter().zip(packed_roms(scene)) {
+        files.push((structure.rom.clone(), write_rom(&rom)));
     }
     let package = Package { format_version: RESOURCES_FORMAT_VERSION, fmi3_arrays };
     let package = toml::to_string(&package).expect("a number and a flag can be written");
     files.push((PACKAGE_FILE.to_owned(), package.into_bytes()));
     files
+}
+
+/// The ROMs of a scene as an FMU holds them: without what this scene does not use.
+pub fn packed_roms(scene: &Scene) -> Vec<Rom> {
+    let structures = scene.settings.structures.iter().zip(&scene.roms);
+    structures.map(|(structure, rom)| Rom { extras: needed(structure, rom, &scene.settings), ..rom.clone() }).collect()
 }
 
 /// What is off leaves no data in the FMU.

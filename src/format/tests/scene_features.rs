@@ -187,9 +187,17 @@ fn features_that_exclude_each_other_are_refused() {
     scene.time.scheme = Scheme::MasslessBoundary;
     scene.structures[0].spin.coriolis = false;
     parse_scene(&write_scene(&scene), "scene").unwrap();
-    scene.contacts[0].coating = None;
+    (scene.contacts[0].coating, scene.outputs.wear) = (None, false);
     scene.contacts[0].solver = Solver::Coulomb;
     parse_scene(&write_scene(&scene), "scene").unwrap();
+}
+
+#[test]
+fn outputs_of_what_the_scene_does_not_have_are_refused() {
+    let parts = ["outputs.wear: no contact has a coating", "Add a `coating` to the contact"];
+    refused(|scene| scene.contacts[0].coating = None, &parts);
+    let parts = ["outputs.slave_displacement: every surface is rigid", "Give the surface a `structure`"];
+    refused(|scene| scene.surfaces[0].structure = None, &parts);
 }
 
 #[test]

@@ -133,6 +133,44 @@ fn the_example_of_the_chapter_on_scenes_is_a_scene() {
     assert_eq!(scene.structures[0].rom, "builtin:rotor37");
 }
 
+/// Lines of a fragment in the place of those of the scene; tables of a list are told apart by their names.
+fn overlay(scene: &mut toml::Table, fragment: toml::Table) {
+    for (key, value) in fragment {
+        match (scene.get_mut(&key), value) {
+            (Some(toml::Value::Table(known)), toml::Value::Table(more)) => overlay(known, more),
+            (Some(toml::Value::Array(known)), toml::Value::Array(more)) if more.iter().all(toml::Value::is_table) => {
+                for entry in more {
+                    let toml::Value::Table(entry) = entry else { unreachable!("all are tables") };
+                    let same =
+                        |other: &toml::Value| !entry.contains_key("name") || other.get("name") == entry.get("name");
+                    match known.iter_mut().find(|other| same(other)) {
+                        Some(toml::Value::Table(other)) => other.extend(entry),
+                        _ => known.push(entry.into()),
+                    }
+                }
+            }
+            (_, value) => drop(scene.insert(key, value)),
+        }
+    }
+}
+
+#[test]
+fn every_addition_of_the_chapter_on_scenes_makes_a_scene_of_its_example() {
+    let chapter = fs::read_to_string(chapter("scene-file.md")).unwrap();
+    let mut examples = chapter.split("```toml\n").skip(1).map(|text| text.split("```").next().unwrap());
+    let base: toml::Table = toml::from_str(examples.next().unwrap()).unwrap();
+    let mut count = 0;
+    for example in examples {
+        let mut scene = base.clone();
+        overlay(&mut scene, toml::from_str(example).unwrap());
+        let text = toml::to_string(&scene).unwrap();
+        let settings = parse_scene(&text, "example").unwrap_or_else(|error| panic!("{error}\n{example}"));
+        assert_ne!(settings, parse_scene(&toml::to_string(&base).unwrap(), "base").unwrap(), "{example}");
+        count += 1;
+    }
+    assert_eq!(count, 9);
+}
+
 #[test]
 fn the_chapter_on_roms_lists_arrays_and_metadata() {
     let mut text = String::from("| array | shape | unit | needed | meaning |\n|---|---|---|---|---|\n");

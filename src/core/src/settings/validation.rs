@@ -55,19 +55,30 @@ impl SceneSettings {
                 "Give a stop time after the start time",
             ));
         }
-        if self.outputs.watched_sectors.contains(&0) {
+        self.validate_outputs()
+    }
+
+    fn validate_outputs(&self) -> Result<()> {
+        let outputs = &self.outputs;
+        if outputs.watched_sectors.contains(&0) {
             return Err(Error::invalid("outputs.watched_sectors", "sector 0", "Sectors are counted from 1"));
         }
-        let mut seen = self.outputs.watched_sectors.clone();
+        let mut seen = outputs.watched_sectors.clone();
         seen.sort_unstable();
         if seen.windows(2).any(|pair| pair[0] == pair[1]) {
             return Err(Error::invalid("outputs.watched_sectors", "a sector is listed twice", "List each sector once"));
         }
+        if outputs.wear && self.contacts.iter().all(|contact| contact.coating.is_none()) {
+            let remedy = "Add a `coating` to the contact, or remove the line";
+            return Err(Error::invalid("outputs.wear", "no contact has a coating that could wear", remedy));
+        }
+        if outputs.slave_displacement && self.surfaces.iter().all(|surface| surface.structure.is_none()) {
+            let remedy = "Give the surface a `structure`, or remove the line";
+            return Err(Error::invalid("outputs.slave_displacement", "every surface is rigid", remedy));
+        }
         Ok(())
     }
-}
 
-impl SceneSettings {
     fn validate_scheme(&self) -> Result<()> {
         let coriolis = self.structures.iter().position(|structure| structure.spin.coriolis);
         match coriolis {

@@ -184,7 +184,8 @@ impl Compiled {
     /// A number that its contact grid does not resolve.
     pub fn set_load_order(&mut self, order: f64) -> Result<()> {
         let grid = self.roles.carrier.and_then(|index| self.scene.roms[index].extras.grid);
-        let most = u32::try_from(grid.map_or(0, |grid| grid.around / 2)).unwrap_or(u32::MAX);
+        // Half as many as nodes would have one phase only, and count twice; more are aliases of fewer.
+        let most = u32::try_from(grid.map_or(0, |grid| (grid.around - 1) / 2)).unwrap_or(u32::MAX);
         if self.carrier.is_some() && !(0.0..=f64::from(most)).contains(&order) && self.has_load() {
             return Err(Error::invalid(
                 "parameter `casing_load_order`",

@@ -102,7 +102,13 @@ pub const FIELDS: [SceneField; 66] = [
         "structures that stand still only",
         "Radial line load amplitude·cos(order·θ − phase) on the contact grid, with amplitude and phase as inputs.",
     ),
-    field("structure.load.order", "whole number", None, "any", "Nodal diameter of the load; 0 is uniform."),
+    field(
+        "structure.load.order",
+        "whole number",
+        None,
+        "below half the nodes around of the contact grid",
+        "Start value of the number of nodal diameters; 0 is uniform.",
+    ),
     field(
         "structure.load.amplitude",
         "number, N/m",
@@ -220,8 +226,8 @@ pub const FIELDS: [SceneField; 66] = [
         "table",
         Some("none"),
         "at most 10000 in all",
-        "Friction power of each patch of the surface as an output; the patches are those of the ROM where its structure \
-         is thermal.",
+        "Friction power of each patch of the surface as an output. Where it is left out and the structure is thermal, \
+         the patches are those of the ROM.",
     ),
     field(
         "surface.patches.around",

@@ -1,0 +1,169 @@
+//! What a scene asks for beyond sliding contact of a rotor in a rigid casing, and what the model leaves out, in words.
+
+use tiprub_core::{
+    Rom, Scene,
+    settings::{CoatingSettings, ContactSettings, Scheme, Solver, StructureSettings, SurfaceSettings},
+};
+
+/// Everything that is on although it is off unless asked for; one phrase each, empty for a plain scene.
+pub fn features(scene: &Scene) -> Vec<String> {
+    let settings = &scene.settings;
+    let mut found = Vec::new();
+    for (structure, rom) in settings.structures.iter().zip(&scene.roms) {
+        of_structure(structure, rom, &mut found);
+    }
+    for surface in &settings.surfaces {
+        of_surface(surface, scene, &mut found);
+    }
+    for contact in &settings.contacts {
+        of_contact(contact, &mut found);
+    }
+    if settings.time.scheme == Scheme::MasslessBoundary {
+        found.push("highest modes quasi-static: contact nodes have no mass (massless-boundary)".into());
+    }
+    found
+}
+
+fn of_structure(structure: &StructureSettings, rom: &Rom, found: &mut Vec<String>) {
+    let name = &structure.name;
+    let spin = structure.spin;
+    let effects = [("stiffening", spin.stiffening), ("growth", spin.growth), ("coriolis", spin.coriolis)];
+    let effects: Vec<&str> = effects.into_iter().filter(|(_, on)| *on).map(|(effect, _)| effect).collect();
+    if !effects.is_empty() {
+        found.push(format!("spin of `{name}`: {}", effects.join(", ")));
+    }
+    if structure.whirl {
+        found.push(format!("shaft of `{name}` whirls: its displacement in x and y is an input"));
+    }
+    if structure.axial_shift {
+        found.push(format!("`{name}` shifts: its axial displacement is an input"));
+    }
+    let factors = &structure.frequency_factors;
+    if !factors.is_empty() {
+        let low = factors.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = factors.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        found.push(format!("`{name}` is mistuned: frequency factors {low} to {high}"));
+    }
+    if let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) {
+        found.push(format!("`{name}` heats up: temperatures of {} patches are inputs", thermal.patches.len()));
+    }
+    if let Some(load) = structure.load {
+        found.push(format!("nodal-diameter load on `{name}`: {} diameters", load.order));
+    }
+}
+
+fn of_surface(surface: &SurfaceSettings, scene: &Scene, found: &mut Vec<String>) {
+    let named = |name: &String| scene.settings.structures.iter().position(|structure| structure.name == *name);
+    let carrier = surface.structure.as_ref().and_then(|name| Some((name, scene.roms.get(named(name)?)?)));
+    if let Some((name, rom)) = carrier {
+        found.push(format!("surface `{}` is flexible: carried by `{name}` with {} modes", surface.name, rom.order()));
+    } else if let Some(spline) = surface.spline {
+        let (around, along) = (spline.around, spline.along);
+        found.push(format!("surface `{}` is a spline through {around} x {along} points", surface.name));
+    }
+    if let Some(patches) = surface.patches {
+        let (around, along) = (patches.around, patches.along);
+        found.push(format!("friction power into {around} x {along} patches of `{}`", surface.name));
+    }
+}
+
+fn of_contact(contact: &ContactSettings, found: &mut Vec<String>) {
+    if contact.solver == Solver::Coulomb {
+        found.push("friction sticks and slides (coulomb)".into());
+    }
+    if let Some(CoatingSettings { thickness, cells_around, cells_along, .. }) = contact.coating {
+        found.push(format!(
+            "abradable coating on `{}`: {thickness} m, {cells_around} x {cells_along} cells",
+            contact.slave
+        ));
+    }
+    if let Some(share) = contact.heat_to_slave {
+        found.push(format!("friction heat is shared: {share} into `{}`, the rest into the blades", contact.slave));
+    }
+}
+
+/// Limits of validity that every importer's user should read; one sentence each.
+pub fn limits(scene: &Scene) -> Vec<String> {
+    let settings = &scene.settings;
+    let any = |test: fn(&ContactSettings) -> bool| settings.contacts.iter().any(test);
+    let flexible = settings.surfaces.iter().any(|surface| surface.structure.is_some());
+    let stiffens = settings.structures.iter().any(|structure| structure.spin.stiffening);
+    let whirls = settings.structures.iter().any(|structure| structure.whirl || structure.axial_shift);
+    let choose = |first: bool, one: &'static str, other: &'static str| if first { one } else { other };
+    let mut limits = vec![
+        "Displacements within each structure are small; the rotation between rotor and casing is not.",
+        choose(
+            any(|contact| contact.solver == Solver::Coulomb),
+            "Friction is Coulomb friction that sticks and slides, with one coefficient for both.",
+            "Friction is Coulomb friction in steady sliding along the circumference; sticking is not modelled.",
+        ),
+        choose(
+            flexible,
+            "The casing is laid parallel to the contour of the blade tips at the given clearance, whatever radius its mesh \
+             has, and bends with the modes of its reduced model; a blade tip that leaves its rings over an edge has no \
+             contact.",
+            "The casing is a rigid surface of the given shape, parallel to the contour of the blade tips.",
+        ),
+        choose(
+            stiffens,
+            "Blades stand on a rigid hub and are not coupled to each other; speed stiffens them as fitted in their model.",
+            "Blades stand on a rigid hub and are not coupled to each other; speed does not stiffen them.",
+        ),
+        "Forces and torques are means over the communication step, so that the momentum handed over is exact; the force \
+         at an instant of impact grows as 1/h.",
+        "Sliding friction can make the structure itself flutter; a scheme that would add growth of its own is refused.",
+        choose(
+            settings.time.scheme == Scheme::MasslessBoundary,
+            "The highest modes, three per contact node, follow contact at once and have no inertia.",
+            "The mass of a contact node loses its kinetic energy at impact: an error of first order in mesh size, not in h.",
+        ),
+    ];
+    if whirls {
+        limits.push("Whirl and shift of the shaft move the blades as they are: they bring no inertia forces on them.");
+    }
+    if any(|contact| contact.coating.is_some()) {
+        limits.push(
+            "Clearances are measured to the unworn coating: they turn negative where a blade dips into it. Worn cells do \
+             not heal, and the coating has no mass.",
+        );
+    }
+    limits.into_iter().map(String::from).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene_source::ROTOR37_SCENE;
+
+    fn scene(change: impl FnOnce(&mut Scene)) -> Scene {
+        let settings = tiprub_format::parse_scene(ROTOR37_SCENE, "scene").unwrap();
+        let mut scene = Scene { settings, roms: Vec::new() };
+        change(&mut scene);
+        scene
+    }
+
+    #[test]
+    fn a_plain_scene_has_no_features_and_seven_limits() {
+        let plain = scene(|_| {});
+        assert_eq!(features(&plain), Vec::<String>::new());
+        assert_eq!(limits(&plain).len(), 7);
+        let text = limits(&plain).concat();
+        assert!(text.contains("sticking is not modelled") && text.contains("a rigid surface"), "{text}");
+    }
+
+    #[test]
+    fn limits_follow_the_scene() {
+        let text = limits(&scene(|scene| {
+            scene.settings.contacts[0].solver = Solver::Coulomb;
+            scene.settings.surfaces[0].structure = Some("ring".into());
+            scene.settings.structures[0].whirl = true;
+            scene.settings.structures[0].spin.stiffening = true;
+            scene.settings.time.scheme = Scheme::MasslessBoundary;
+        }))
+        .concat();
+        for wrong in ["sticking is not modelled", "a rigid surface", "does not stiffen", "loses its kinetic energy"] {
+            assert!(!text.contains(wrong), "{wrong}: {text}");
+        }
+        assert!(text.contains("sticks and slides") && text.contains("no inertia forces"), "{text}");
+    }
+}

@@ -1,0 +1,86 @@
+//! The scenes that ship, natively and as a user asks for them: each runs in seconds and does what it is there to show.
+
+use std::{fs, process::Command};
+
+use tempfile::TempDir;
+
+#[track_caller]
+fn succeed(directory: &TempDir, arguments: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_tiprub")).current_dir(directory).args(arguments).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn columns(csv: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+    let mut lines = csv.lines();
+    let names = lines.next().unwrap().split(',').map(String::from).collect();
+    (names, lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect())
+}
+
+/// The JSON object of a run of a scene that ships, which must end well and meet blades on the way.
+#[track_caller]
+fn run_builtin(project: &TempDir, name: &str) -> (serde_json::Value, Vec<String>, Vec<Vec<f64>>) {
+    let json = succeed(project, &["run", name, "--csv", "out.csv", "--json", "--quiet"]);
+    let summary: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(summary["warnings"], serde_json::json!([]), "{name}");
+    let (names, rows) = columns(&fs::read_to_string(project.path().join("out.csv")).unwrap());
+    let impulse = names.iter().position(|name| name == "normal_impulse").unwrap();
+    let touching = rows.iter().filter(|row| row[impulse] > 0.0).count();
+    assert!(touching > rows.len() / 2, "{name}: contact at {touching} of {} points", rows.len());
+    let residual = summary["last"]["energy_residual_relative"].as_f64().unwrap();
+    assert!(residual.abs() < 1e-9, "{name}: {residual:e}");
+    (summary["last"].clone(), names, rows)
+}
+
+#[test]
+fn the_flexible_casing_that_ships_runs_and_heats_its_patches() {
+    let project = tempfile::tempdir().unwrap();
+    let (last, names, rows) = run_builtin(&project, "builtin:flexible-casing");
+    let column = |name: &str| names.iter().position(|other| other == name).unwrap_or_else(|| panic!("{name}"));
+    let (total, blades) = (column("friction_power"), column("blade_friction_power"));
+    let patches: Vec<usize> = (1..=12).map(|patch| column(&format!("casing_friction_power[{patch}]"))).collect();
+    for row in &rows {
+        let casing: f64 = patches.iter().map(|patch| row[*patch]).sum();
+        assert!((casing - 0.5 * row[total]).abs() <= 1e-9 * row[total], "{casing} of {}", row[total]);
+        assert!((casing + row[blades] - row[total]).abs() <= 1e-9 * row[total]);
+    }
+    assert!(last["load_work"].as_f64().unwrap() == 0.0, "nothing is warm");
+    // A casing warmed by 20 K all around opens, and less is rubbed off.
+    let warm =
+        succeed(&project, &["run", "builtin:flexible-casing", "--set", "casing_temperature=20", "--json", "--quiet"]);
+    let warm: serde_json::Value = serde_json::from_str(&warm).unwrap();
+    let loss = |last: &serde_json::Value| last["friction_loss"].as_f64().unwrap();
+    assert!(loss(&warm["last"]) < loss(&last), "{} J warm, {} J cold", loss(&warm["last"]), loss(&last));
+}
+
+#[test]
+fn the_abradable_casing_that_ships_wears_and_does_not_heal() {
+    let project = tempfile::tempdir().unwrap();
+    let (last, names, rows) = run_builtin(&project, "builtin:abradable");
+    let cells: Vec<usize> =
+        names.iter().enumerate().filter(|(_, name)| name.starts_with("wear_depth[")).map(|(index, _)| index).collect();
+    assert_eq!(cells.len(), 720 * 5);
+    for pair in rows.windows(2) {
+        assert!(cells.iter().all(|cell| pair[1][*cell] >= pair[0][*cell]));
+    }
+    let deepest = cells.iter().map(|cell| rows.last().unwrap()[*cell]).fold(0.0, f64::max);
+    assert_eq!(last["wear_depth_maximum"].as_f64().unwrap().to_bits(), deepest.to_bits());
+    // The bumps reach 0.2 of the gap beyond the blade tips; vibration of the blades cuts little deeper.
+    assert!((2e-5..1.5e-4).contains(&deepest), "{deepest} m");
+}
+
+#[test]
+fn inspect_tells_what_a_scene_that_ships_adds() {
+    let project = tempfile::tempdir().unwrap();
+    let text = succeed(&project, &["inspect", "builtin:flexible-casing", "--quiet"]);
+    for part in [
+        "ring from builtin:casing37, stands still",
+        "surface `casing` is flexible: carried by `ring` with ",
+        "`ring` heats up: temperatures of 12 patches are inputs",
+        "friction heat is shared: 0.5 into `casing`",
+        "24 around x 3 along",
+        "heated patches            12",
+    ] {
+        assert!(text.contains(part), "{part} is not in:\n{text}");
+    }
+}

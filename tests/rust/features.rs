@@ -1,0 +1,199 @@
+//! Inputs that are arrays, over the C ABI and against callers that break the rules; and features that are off, which
+//! leave nothing behind.
+
+#![allow(clippy::float_cmp, reason = "values are compared for being untouched")]
+
+use tiprub_core::rom::Spin;
+use tiprub_core::{Scene, Simulation};
+use tiprub_tests::scene::{PATCHES, Resources, ring, rom, scene, warm_scene};
+use tiprub_tests::{ERROR, OK, fmi2, fmi3, shipped};
+
+/// First reference of a variable of a scene.
+#[track_caller]
+fn of(scene: &Scene, name: &str) -> u32 {
+    let simulation = Simulation::new(scene).unwrap();
+    simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
+}
+
+#[track_caller]
+fn refused(status: i32, log: &str, reason: &str) {
+    assert!(status == ERROR && log.contains(reason), "status {status}, not \"{reason}\": {log}");
+}
+
+const START: [f64; PATCHES] = [3.0, -2.0, 0.5, 7.0];
+
+#[test]
+fn an_array_input_is_set_whole_or_not_at_all() {
+    let (path, scene) = (shipped(), warm_scene());
+    let (array, speed) = (of(&scene, "casing_temperature"), of(&scene, "speed"));
+    let (api, resources) = (fmi3::load(&path), Resources::of(&scene, true));
+    let slave = fmi3::Slave::new(&api, &resources);
+    assert_eq!(slave.reals(&[array], PATCHES), [0.0; PATCHES], "start values");
+    slave.initialise();
+    slave.expect(slave.set_reals(&[array], &START));
+    let (nan, infinity) = (f64::NAN, f64::INFINITY);
+    for (references, values, reason) in [
+        (vec![array], vec![1.0; 3], "stand for 4 values"),
+        (vec![array], vec![1.0; 5], "stand for 4 values"),
+        (vec![array], vec![], "stand for 4 values"),
+        (vec![array, speed], vec![1.0; 4], "stand for 5 values"),
+        (vec![array, array], vec![1.0; 4], "stand for 8 values"),
+        (vec![array + 1], vec![1.0; 4], "lies inside the array"),
+        (vec![array], vec![1.0, 1.0, nan, 1.0], "casing_temperature[3]"),
+        (vec![array], vec![1.0, infinity, 1.0, 1.0], "not finite"),
+        (vec![array], vec![1.0, 1.0, 1.0, 3000.1], "casing_temperature[4]"),
+        (vec![array], vec![-3000.1, 1.0, 1.0, 1.0], "outside -3000 to 3000"),
+        (vec![speed, array], vec![200.0, 1.0, 1.0, 1.0, nan], "casing_temperature[4]"),
+        (vec![array, speed], vec![1.0, 1.0, 1.0, 1.0, nan], "speed"),
+    ] {
+        refused(slave.set_reals(&references, &values), &slave.log(), reason);
+        assert_eq!(slave.reals(&[array], PATCHES), START, "{references:?} {values:?}");
+        assert_eq!(slave.reals(&[speed], 1), [300.0]);
+    }
+    // What comes back is what was set, and a step goes on.
+    slave.expect(slave.set_reals(&[speed, array], &[310.0, 1.0, 2.0, 3.0, -4.0]));
+    assert_eq!(slave.reals(&[array, speed], 5), [1.0, 2.0, 3.0, -4.0, 310.0]);
+    assert_eq!(slave.step(0.0, 1e-4).status, OK);
+    assert_eq!(slave.reals(&[array], PATCHES), [1.0, 2.0, 3.0, -4.0]);
+    // Saved, changed, restored.
+    let state = slave.save();
+    slave.expect(slave.set_reals(&[array], &START));
+    slave.expect(slave.restore(state));
+    assert_eq!(slave.reals(&[array], PATCHES), [1.0, 2.0, 3.0, -4.0], "inputs are part of a state");
+}
+
+#[test]
+fn elements_are_scalars_in_fmi2_and_where_fmi3_is_packaged_so() {
+    let (path, scene) = (shipped(), warm_scene());
+    let array = of(&scene, "casing_temperature");
+    let references: Vec<u32> = (array..array + 4).collect();
+    let resources = Resources::of(&scene, false);
+    let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
+    let two = fmi2::Slave::initialised(&api2, &resources);
+    let three = fmi3::Slave::new(&api3, &resources);
+    three.initialise();
+    two.expect(two.set_reals(&references, &START));
+    three.expect(three.set_reals(&references, &START));
+    refused(two.set_reals(&references[1..3], &[1.0, f64::NAN]), &two.log(), "casing_temperature[3]");
+    refused(three.set_reals(&references[1..3], &[1.0, f64::NAN]), &three.log(), "casing_temperature[3]");
+    refused(three.set_reals(&[array], &START), &three.log(), "stand for 1 values");
+    assert_eq!(two.reals(&references), START);
+    assert_eq!(three.reals(&references, PATCHES), START);
+    two.expect(two.set_reals(&references[2..3], &[11.0]));
+    assert_eq!(two.reals(&references), [3.0, -2.0, 11.0, 7.0]);
+}
+
+#[test]
+fn each_element_of_an_array_input_has_its_derivative() {
+    let (path, mut scene) = (shipped(), warm_scene());
+    scene.settings.outputs.slave_displacement = true;
+    let (array, moved) = (of(&scene, "casing_temperature"), of(&scene, "casing_displacement"));
+    let (api, resources) = (fmi2::load(&path), Resources::of(&scene, true));
+    let slave = fmi2::Slave::initialised(&api, &resources);
+    for (order, value, reason) in [(2, 1.0, "order"), (0, 1.0, "order"), (1, f64::NAN, "not finite")] {
+        refused(slave.set_derivatives(&[array + 3], order, &[value]), &slave.log(), reason);
+    }
+    refused(slave.set_derivatives(&[array + 4], 1, &[1.0]), &slave.log(), "not a continuous input");
+    refused(slave.set_derivatives(&[moved], 1, &[1.0]), &slave.log(), "not a continuous input");
+    // A good and a wrong one together: neither is taken.
+    refused(slave.set_derivatives(&[array, array + 1], 1, &[1e6, f64::INFINITY]), &slave.log(), "not finite");
+    slave.expect(slave.step(0.0, 1e-4));
+    assert_eq!(slave.reals(&[moved]), [0.0], "nothing warms up");
+    // Only the last patch warms up, and the ring grows.
+    slave.expect(slave.set_derivatives(&[array + 3], 1, &[1e4]));
+    slave.expect(slave.step(1e-4, 1e-4));
+    let grown = slave.reals(&[moved])[0];
+    assert!(grown > 1e-9, "{grown}");
+}
+
+/// Names that only some scenes have.
+const OF_FEATURES: [&str; 19] = [
+    "whirl_x",
+    "whirl_y",
+    "axial_shift",
+    "casing_temperature",
+    "casing_load_amplitude",
+    "casing_load_phase",
+    "casing_friction_power",
+    "casing_displacement",
+    "casing_damping_ratio",
+    "casing_heat_fraction",
+    "blade_friction_power",
+    "wear_depth",
+    "wear_depth_maximum",
+    "worn_volume",
+    "wear_work",
+    "load_work",
+    "casing_radius_change",
+    "casing_shape_factor",
+    "casing_shape_rotation",
+];
+
+#[test]
+fn features_that_are_off_have_no_variables_and_no_data() {
+    let plain = scene();
+    let simulation = Simulation::new(&plain).unwrap();
+    for name in OF_FEATURES {
+        assert!(simulation.table().find(name).is_none(), "{name}");
+    }
+    // One feature more or less does not move the others' names.
+    let warm = Simulation::new(&warm_scene()).unwrap();
+    for variable in simulation.table().variables() {
+        assert!(warm.table().find(&variable.name).is_some(), "{}", variable.name);
+    }
+    // A ROM that could do more gives the same files, bytes and token as one that cannot.
+    let order = rom().order();
+    let mut able = plain.clone();
+    able.roms[0].extras.spin = Some(Spin {
+        stiffness_speed2: nalgebra::DMatrix::identity(order, order),
+        stiffness_speed4: nalgebra::DMatrix::zeros(order, order),
+        coriolis: nalgebra::DMatrix::zeros(order, order),
+        centrifugal_load: vec![1e-3; order],
+        centrifugal_load_speed4: vec![0.0; order],
+        largest_speed: 1000.0,
+    });
+    able.roms[0].extras.thermal = ring().extras.thermal.map(|mut thermal| {
+        thermal.loads = nalgebra::DMatrix::from_element(order, PATCHES, 1.0);
+        thermal
+    });
+    let files = tiprub_format::resource_files(&plain, true);
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["scene.toml", "rotor.rom.safetensors", "package.toml"]);
+    assert_eq!(tiprub_format::resource_files(&able, true), files);
+    // A casing that bears a surface but is not heated keeps its grid and loses its heat.
+    let mut cold = warm_scene();
+    cold.settings.structures[1].thermal = false;
+    let warm_size = |scene: &Scene| tiprub_format::resource_files(scene, true)[2].1.len();
+    let (with, without) = (warm_size(&warm_scene()), warm_size(&cold));
+    // Two arrays of 4 x 4 and 3 x 4 numbers, and what the header says of them.
+    assert!(with - without > (16 + 12) * 8, "{with} bytes with heat, {without} without");
+    let ring_file = String::from_utf8_lossy(&tiprub_format::resource_files(&cold, true)[2].1).into_owned();
+    assert!(ring_file.contains("contact_grid") && !ring_file.contains("thermal"));
+}
+
+#[test]
+fn a_packaged_scene_of_features_runs_as_it_does_without_packaging() {
+    let (path, scene) = (shipped(), warm_scene());
+    let array = of(&scene, "casing_temperature");
+    let (api, resources) = (fmi3::load(&path), Resources::of(&scene, true));
+    let slave = fmi3::Slave::new(&api, &resources);
+    let slightly = START.map(|value| 0.1 * value);
+    slave.expect(slave.set_reals(&[array], &slightly));
+    slave.initialise();
+    let mut simulation = Simulation::new(&scene).unwrap();
+    for (element, value) in (array..).zip(slightly) {
+        simulation.set_real(element, value).unwrap();
+    }
+    simulation.initialise(0.0).unwrap();
+    let (minimum, impulse) = (of(&scene, "sector_clearance_minimum"), of(&scene, "normal_impulse"));
+    let mut touching = 0;
+    for index in 0..100 {
+        let time = f64::from(index) * 1e-4;
+        assert_eq!(slave.step(time, 1e-4).status, OK, "{}", slave.log());
+        simulation.do_step(time, 1e-4).unwrap();
+        let expected: Vec<f64> = (minimum..minimum + 6).map(|r| simulation.real(r).unwrap()).collect();
+        assert_eq!(slave.reals(&[minimum], 6), expected);
+        touching += usize::from(simulation.real(impulse).unwrap() > 0.0);
+    }
+    assert!(touching > 5, "{touching} steps with contact");
+}
