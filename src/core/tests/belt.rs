@@ -80,8 +80,7 @@ fn stick_slip_has_the_amplitude_and_the_times_of_the_closed_form() {
     let first_slip = static_force / stiffness / BELT;
     for scheme in [Scheme::ModalExact, Scheme::CentralDifference] {
         let mut errors = Vec::new();
-        for step in [1e-4, 5e-5, 2.5e-5] {
-            let steps = (1.5 / step) as usize;
+        for (step, steps) in [(1e-4, 15_000), (5e-5, 30_000), (2.5e-5, 60_000)] {
             let record = run(scheme, step, 300.0, 200.0, steps);
             let changes: Vec<usize> = (1..steps).filter(|i| record.stuck[*i] != record.stuck[i - 1]).collect();
             let at = |index: usize| step * (changes[index] + 1) as f64;

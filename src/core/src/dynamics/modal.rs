@@ -224,7 +224,7 @@ fn modal_already(rom: &Rom, stiffness: &DMatrix<f64>) -> Option<(Vec<f64>, DMatr
             .mass
             .iter()
             .enumerate()
-            .all(|(index, value)| *value == f64::from(u8::from(index % order == index / order)));
+            .all(|(index, value)| *value - f64::from(u8::from(index % order == index / order)) == 0.0);
     is_modal.then(|| (diagonal, DMatrix::identity(order, order)))
 }
 
