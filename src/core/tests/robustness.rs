@@ -281,3 +281,19 @@ fn a_restored_state_brings_the_limits_of_its_own_parameters() {
         assert_eq!(found, Err(expected.clone()));
     }
 }
+
+#[test]
+fn a_speed_given_within_a_communication_step_is_checked_as_well() {
+    let mut simulation = started(&common::scene(12)).unwrap();
+    let speed = reference(&simulation, "speed");
+    simulation.begin_step(0.0, 5e-5).unwrap();
+    simulation.advance().unwrap();
+    for (value, slope) in [(1e7, 0.0), (1300.0, 1e12)] {
+        let outcome = simulation.set_real(speed, value).and_then(|()| simulation.set_input_derivative(speed, 1, slope));
+        let message = outcome.unwrap_err().to_string();
+        assert!(message.contains("internal_step_max"), "{message}");
+    }
+    while !simulation.advance().unwrap().finished {}
+    let turned = real(&simulation, "rotor_angle");
+    assert!((turned - 1300.0 * 5e-5).abs() < 1e-12, "{turned}");
+}
