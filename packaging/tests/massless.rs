@@ -53,7 +53,7 @@ fn massless_contact_nodes_agree_and_take_longer_steps() {
         (Scheme::ModalExact, 1e-6),
         (Scheme::MasslessBoundary, 1e-7),
         (Scheme::MasslessBoundary, 1e-6),
-        (Scheme::MasslessBoundary, 0.9 * limit),
+        (Scheme::MasslessBoundary, 0.79 * limit),
     ] {
         let found = run(&scene, scheme, step);
         println!(

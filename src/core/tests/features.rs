@@ -1,6 +1,8 @@
 //! Everything that is off unless a scene asks for it: books that close, states that continue, laws of mechanics.
 
 mod common;
+#[path = "common/counting.rs"]
+mod counting;
 
 use tiprub_core::contact::gap::{Drive, GapLaw};
 use tiprub_core::settings::{
@@ -220,6 +222,93 @@ fn a_saved_state_continues_with_identical_bits_whatever_is_on() {
             assert!(advance(&mut other, 45) == end, "{} {scheme:?}", feature.0);
         }
     }
+}
+
+#[test]
+fn a_step_asks_for_no_memory_whatever_is_on() {
+    for feature in FEATURES {
+        for scheme in [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary] {
+            for solver in [Solver::Film, Solver::Lcp, Solver::Coulomb] {
+                if is_refused(feature.0, scheme, solver) {
+                    continue;
+                }
+                let mut simulation = Simulation::new(&scene_with(feature, scheme, solver)).unwrap();
+                simulation.initialise(0.0).unwrap();
+                let mut state = vec![0; simulation.state_size()];
+                let (mut contacts, mut allocations) = (0, 0);
+                for index in 0..40 {
+                    disturb(&mut simulation, index);
+                    let (time, step) = (simulation.time(), if index % 7 == 0 { 6.3e-5 } else { 5e-5 });
+                    allocations += counting::allocations_of(|| simulation.do_step(time, step).unwrap());
+                    contacts += simulation.system().events().len();
+                }
+                allocations += counting::allocations_of(|| simulation.save_state(&mut state).unwrap());
+                assert!(contacts > 0, "{} {scheme:?} {solver:?} never touched", feature.0);
+                assert_eq!(allocations, 0, "{} {scheme:?} {solver:?}", feature.0);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_state_with_any_bit_changed_is_refused_and_changes_nothing() {
+    let (name, all) = FEATURES[FEATURES.len() - 1];
+    let mut scene = scene_with((name, all), Scheme::ModalExact, Solver::Lcp);
+    coating(&mut scene);
+    scene.settings.contacts[0].coating.as_mut().unwrap().cells_around = 40;
+    let mut simulation = Simulation::new(&scene).unwrap();
+    simulation.initialise(0.0).unwrap();
+    // Saved in the middle of a communication step, after contact.
+    for index in 0..40 {
+        disturb(&mut simulation, index);
+        simulation.do_step(simulation.time(), 5e-5).unwrap();
+    }
+    simulation.begin_step(simulation.time(), 5e-5).unwrap();
+    for _ in 0..20 {
+        assert!(!simulation.advance().unwrap().finished);
+    }
+    let mut state = vec![0; simulation.state_size()];
+    simulation.save_state(&mut state).unwrap();
+    let mut twin = Simulation::new(&scene).unwrap();
+    let mut untouched = vec![0; twin.state_size()];
+    twin.save_state(&mut untouched).unwrap();
+    let mut again = untouched.clone();
+    for byte in (0..state.len()).step_by(1 + state.len() / 997).chain([0, 8, 16, 24, state.len() - 1]) {
+        let mut damaged = state.clone();
+        damaged[byte] ^= 1 << (byte % 8);
+        assert!(twin.restore_state(&damaged).is_err(), "byte {byte}");
+    }
+    for length in [0, 7, 8, state.len() - 1, state.len() + 8] {
+        assert!(twin.restore_state(&vec![0; length]).is_err());
+    }
+    twin.save_state(&mut again).unwrap();
+    assert!(again == untouched);
+    // The twin continues in the middle of the step; neither disturbs the other.
+    twin.restore_state(&state).unwrap();
+    let finish = |simulation: &mut Simulation| {
+        while !simulation.advance().unwrap().finished {}
+        disturb(simulation, 41);
+        simulation.do_step(simulation.time(), 6.1e-5).unwrap();
+        let mut end = vec![0; simulation.state_size()];
+        simulation.save_state(&mut end).unwrap();
+        end
+    };
+    let (first, second) = (finish(&mut twin), finish(&mut simulation));
+    assert!(first == second);
+    // Reset forgets everything, wear included.
+    assert!(real(&simulation, "worn_volume") > 0.0);
+    simulation.reset();
+    simulation.initialise(0.0).unwrap();
+    let mut fresh = Simulation::new(&scene).unwrap();
+    fresh.initialise(0.0).unwrap();
+    let ends = [&mut simulation, &mut fresh].map(|simulation| {
+        simulation.do_step(0.0, 5e-5).unwrap();
+        let mut state = vec![0; simulation.state_size()];
+        simulation.save_state(&mut state).unwrap();
+        state
+    });
+    assert!(ends[0] == ends[1]);
+    assert_eq!(real(&simulation, "worn_volume").to_bits(), 0.0_f64.to_bits());
 }
 
 #[test]

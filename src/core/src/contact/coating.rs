@@ -158,6 +158,11 @@ impl Coating {
         self.plastic.len()
     }
 
+    /// Width of a cell around the circumference (rad).
+    pub fn width(&self) -> f64 {
+        TAU / number(self.around)
+    }
+
     /// Angle (rad, in the fixed frame) and axial position (m) of the centre of a cell.
     pub fn centre(&self, cell: usize) -> (f64, f64) {
         let angle = (number(cell % self.around) + 0.5) * TAU / number(self.around);

@@ -1,5 +1,6 @@
 //! Reading and setting variables: what is legal for which kind, causality and variability.
 
+use super::drive::Input;
 use super::{Phase, Simulation};
 use crate::variables::{Causality, Kind, Quantity, Start, Variability, Variable};
 use crate::{Error, Result};
@@ -96,9 +97,7 @@ impl Simulation {
         if quantity == Quantity::Speed {
             self.rotor.rebase(&self.inputs.speed, offset);
         }
-        if let Some(input) = self.inputs.get_mut(quantity, element) {
-            input.set(value, offset);
-        }
+        self.change_input(quantity, element, |input| input.set(value, offset))?;
         self.values[reference as usize] = value;
         Ok(())
     }
@@ -177,10 +176,29 @@ impl Simulation {
         if quantity == Quantity::Speed {
             self.rotor.rebase(&self.inputs.speed, offset);
         }
-        if let Some(input) = self.inputs.get_mut(quantity, element) {
-            input.set_slope(value, offset);
+        self.change_input(quantity, element, |input| input.set_slope(value, offset))
+    }
+
+    /// Change an input; within a communication step the speed must stay one that the internal step can follow.
+    fn change_input(&mut self, quantity: Quantity, element: usize, change: impl FnOnce(&mut Input)) -> Result<()> {
+        let Some(input) = self.inputs.get_mut(quantity, element) else { return Ok(()) };
+        let before = *input;
+        change(input);
+        let turns = matches!(quantity, Quantity::Speed | Quantity::ShapeRotation);
+        if !turns || self.phase != Phase::Stepping {
+            return Ok(());
         }
-        Ok(())
+        let (step, length) = (self.system.bank().step(), self.communication.length);
+        let ends = [0.0, length].map(|offset| self.inputs.speed.at(offset));
+        let checked = self
+            .check_turning(step, length)
+            .and_then(|()| ends.into_iter().try_for_each(|speed| self.compiled.check_speed(speed)));
+        if checked.is_err()
+            && let Some(input) = self.inputs.get_mut(quantity, element)
+        {
+            *input = before;
+        }
+        checked
     }
 
     /// Whether [`Simulation::set_input_derivative`] would accept the value.

@@ -12,6 +12,7 @@ use crate::settings::{ContactSettings, Scheme, Solver, StructureSettings, Surfac
 use crate::system::{System, SystemParts, SystemSettings};
 use crate::variables::Quantity;
 use crate::{Error, Result, Rom, Scene};
+use nalgebra::DMatrix;
 
 use super::Simulation;
 use super::loads::LoadVectors;
@@ -78,6 +79,8 @@ pub struct Compiled {
     pub model: ModalModel,
     /// Speed whose stiffness `model` has (rad/s).
     pub reference_speed: f64,
+    /// Lowest and highest eigenvalue of the modal stiffness per Ω² and per Ω⁴, where spin stiffens the master.
+    pub stiffness_range: Option<[[f64; 2]; 2]>,
     /// Modes of the structure that carries the surface, seen at its contact grid.
     pub carrier: Option<ModalModel>,
     /// Nodal diameters of the load on it.
@@ -114,6 +117,7 @@ impl Compiled {
             roles,
             model: modes(scene, roles.master, 0.0)?,
             reference_speed: 0.0,
+            stiffness_range: None,
             carrier,
             load_order: roles
                 .carrier
@@ -157,6 +161,13 @@ impl Compiled {
         self.check_speed(speed)?;
         if stiffening {
             self.model = modes(&self.scene, self.roles.master, speed)?;
+            let range = |matrix: &DMatrix<f64>| {
+                let values = matrix.symmetric_eigenvalues();
+                [values.min(), values.max()]
+            };
+            let spin = self.master().1.extras.spin.as_ref();
+            let spin = spin.map(|spin| ModalSpin::new(spin, &self.model, speed));
+            self.stiffness_range = spin.map(|spin| [range(&spin.stiffness_speed2), range(&spin.stiffness_speed4)]);
         }
         self.reference_speed = speed;
         self.load();
@@ -419,7 +430,9 @@ fn fingerprint(scene: &Scene) -> u64 {
                 hash = crate::persist::fingerprint(&value.to_bits().to_le_bytes(), hash);
             }
         }
-        hash = crate::persist::fingerprint(format!("{:?}", rom.contact_nodes).as_bytes(), hash);
+        let patches = rom.extras.thermal.as_ref().map(|thermal| &thermal.patches);
+        let rest = format!("{} {:?} {:?} {:?}", rom.sectors, rom.contact_nodes, rom.extras.grid, patches);
+        hash = crate::persist::fingerprint(rest.as_bytes(), hash);
     }
     hash
 }

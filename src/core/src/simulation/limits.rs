@@ -77,15 +77,25 @@ impl Simulation {
         Ok(())
     }
 
-    /// Refuse a step size (s) whose range was found unstable. Only looks up, so that a step does not allocate.
-    pub(super) fn check_step_size(&self, step: f64) -> Result<()> {
+    /// After a state of other parameters was restored: what holds for these.
+    pub(super) fn renew_limits(&mut self) {
+        let parameters = self.parameters();
+        let known = |known: Parameters| Parameters { sense: parameters.sense, ..known } == parameters;
+        if !self.limits.as_ref().is_some_and(|limits| known(limits.parameters)) {
+            self.limits = Some(self.compiled.limits(parameters, self.system.law()));
+        }
+    }
+
+    /// Refuse a step size (s) whose range was found unstable, or that stiffening at one of the `speeds` (rad/s) forbids. Only looks up, so that a step does not allocate.
+    pub(super) fn check_step_size(&self, step: f64, speeds: [f64; 2]) -> Result<()> {
         let Some(limits) = &self.limits else { return Ok(()) };
         let scheme = limits.parameters.scheme;
-        stability::check_step_allowed(&self.compiled.model, self.compiled.stiffest(), scheme, step)?;
+        let stiffened = speeds.into_iter().fold(1.0, |most: f64, speed| most.max(self.compiled.stiffened(speed)));
+        stability::check_step_allowed(&self.compiled.model, self.compiled.stiffest() * stiffened, scheme, step)?;
         if let Some(carrier) = &self.compiled.carrier {
             stability::check_step_allowed(carrier, 1.0, scheme, step)?;
         }
-        if step >= limits.massless {
+        if step >= massless::USABLE * limits.massless {
             return Err(massless::refusal(step, limits.massless));
         }
         // The range a step belongs to is that of the smallest entry not below it.
@@ -109,22 +119,28 @@ impl Compiled {
         self.master().0.frequency_factors.iter().fold(1.0, |largest: f64, factor| largest.max(*factor))
     }
 
+    /// Bound on the factor by which spin raises the largest frequency from that of the reference speed.
+    fn stiffened(&self, speed: f64) -> f64 {
+        let Some([second, fourth]) = self.stiffness_range else { return 1.0 };
+        let (square, reference) = (speed * speed, self.reference_speed * self.reference_speed);
+        let most = |factor: f64, range: [f64; 2]| factor * if factor > 0.0 { range[1] } else { range[0] };
+        let added = most(square - reference, second) + most(square * square - reference * reference, fourth);
+        let largest = self.model.largest_frequency();
+        (1.0 + added.max(0.0) / (largest * largest)).sqrt()
+    }
+
     fn limits(&self, parameters: Parameters, law: &GapLaw) -> Limits {
         let mut model = self.model.clone();
         model.damping_ratios.fill(parameters.damping_ratio);
+        // Of mistuned blades the stiffest has the tightest limits.
+        let stiffest = self.stiffest();
+        model.frequencies.iter_mut().for_each(|frequency| *frequency *= stiffest);
         let at = Checking { compiled: self, model, parameters };
         let expected = self.expected_step(parameters.step);
-        let (mut outcome, mut limit) = (at.expected(expected), f64::INFINITY);
-        if let Ok(warnings) = &mut outcome {
-            match at.slave(expected, law).and_then(|found| Ok((found, at.massless(expected, law)?))) {
-                Ok((found, (more, step))) => {
-                    warnings.extend(found);
-                    warnings.extend(more);
-                    limit = step;
-                }
-                Err(error) => outcome = Err(error),
-            }
-        }
+        let (outcome, massless) = match at.massless(expected, law) {
+            Ok((more, limit)) => (at.warnings(expected, law, more), limit),
+            Err(error) => (Err(error), f64::INFINITY),
+        };
         let ranges = if parameters.friction == 0.0 {
             Vec::new()
         } else {
@@ -133,12 +149,16 @@ impl Compiled {
             let refusal = |step| senses.iter().find_map(|sense| at.growth(step, *sense, false).err());
             steps.map(|step| (step, refusal(step))).collect()
         };
-        Limits { parameters, outcome, ranges: at.with_expected(ranges, expected), massless: limit }
+        Limits { parameters, outcome, ranges: at.with_expected(ranges, expected), massless }
     }
 }
 
 /// Angles at which the flexible slave is looked at.
 const SLAVE_ANGLES: u32 = 48;
+
+fn slave_angle(place: u32) -> f64 {
+    std::f64::consts::TAU * f64::from(place) / f64::from(SLAVE_ANGLES)
+}
 
 /// The slave's modes along normals and tangents of the contact nodes of a blade at `angle` (rad), nodes × modes.
 fn slave_at(law: &SplineGap, modes: &ModalModel, angle: f64) -> (DMatrix<f64>, DMatrix<f64>) {
@@ -184,12 +204,18 @@ struct Checking<'a> {
 }
 
 impl Checking<'_> {
-    /// Everything at the step to expect; returns warnings.
+    /// All warnings at the step to expect; `more` come last.
+    fn warnings(&self, step: f64, law: &GapLaw, more: Vec<String>) -> Result<Vec<String>> {
+        let mut warnings = self.expected(step)?;
+        warnings.extend(self.slave(step, law)?);
+        warnings.extend(more);
+        Ok(warnings)
+    }
+
+    /// Everything about the rotor at the step to expect; returns warnings.
     fn expected(&self, step: f64) -> Result<Vec<String>> {
         let Parameters { friction, scheme, .. } = self.parameters;
-        let stiffest = self.compiled.stiffest();
-        let mut warnings: Vec<String> =
-            stability::check_step(&self.model, stiffest, scheme, step)?.into_iter().collect();
+        let mut warnings: Vec<String> = stability::check_step(&self.model, 1.0, scheme, step)?.into_iter().collect();
         let directions = [1.0, -1.0].map(|sense| self.directions(sense));
         stability::check_solvable(&self.model, scheme, self.parameters.step, friction, &directions)?;
         if friction > 0.0 {
@@ -218,7 +244,7 @@ impl Checking<'_> {
         let modes = self.compiled.slave_modes(spline);
         let (mut worst, mut at) = (0.0, 0.0);
         for place in 0..SLAVE_ANGLES {
-            let angle = std::f64::consts::TAU * f64::from(place) / f64::from(SLAVE_ANGLES);
+            let angle = slave_angle(place);
             let seen = slave_at(spline, &modes, angle);
             for sense in [1.0, -1.0] {
                 let ratio = lowest_ratio(&seen, &modes, scheme, step, sense * friction);
@@ -246,14 +272,24 @@ impl Checking<'_> {
             (Some(_), GapLaw::Spline(spline)) => Some((self.compiled.slave_modes(spline), spline)),
             _ => None,
         };
-        let slave = modes.as_ref().map(|(modes, spline)| (slave_at(spline, modes, 0.0).0, modes));
         let normals = self.directions(1.0).into_iter().map(|(normal, _)| normal).collect();
-        let check = massless::MasslessCheck { model: &self.model, normals, slave };
-        let limit = check.limit(self.parameters.step.max(step))?;
-        if step >= limit {
+        let mut check = massless::MasslessCheck { model: &self.model, normals, slave: None };
+        if let Some((modes, spline)) = &modes {
+            // A casing need not be alike all around: where it yields most.
+            let mut most = f64::NEG_INFINITY;
+            for place in 0..SLAVE_ANGLES {
+                let seen = slave_at(spline, modes, slave_angle(place)).0;
+                let tried = massless::MasslessCheck { slave: Some((seen, modes)), ..check.clone() };
+                if let Some((_, found)) = tried.eigenvalues(step).filter(|(_, found)| *found > most) {
+                    (most, check) = (found, tried);
+                }
+            }
+        }
+        let limit = check.limit(self.parameters.step.max(step) / massless::QUIET)?;
+        if step >= massless::USABLE * limit {
             return Err(massless::refusal(step, limit));
         }
-        let mut warnings = Vec::new();
+        let mut warnings: Vec<String> = massless::warning(step, limit).into_iter().collect();
         let sectors = f64::from(u32::try_from(self.compiled.master().1.sectors).unwrap_or(u32::MAX));
         if let Some((master, slave)) = check.eigenvalues(step).filter(|(a, b)| a + sectors * b >= 4.0) {
             warnings.push(format!(

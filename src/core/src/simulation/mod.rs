@@ -12,6 +12,7 @@ mod state;
 mod table;
 mod window;
 
+use crate::contact::coating::Coating;
 use crate::contact::gap::Drive;
 use crate::settings::Solver;
 use crate::system::{StepFailure, System};
@@ -360,7 +361,7 @@ impl Simulation {
         #[expect(clippy::cast_precision_loss, reason = "count ≤ 1e9")]
         let step = step_size / count as f64;
         self.check_turning(step, step_size)?;
-        self.check_step_size(step)?;
+        self.check_step_size(step, [self.inputs.speed.at(0.0), self.inputs.speed.at(step_size)])?;
         if (step - self.system.bank().step()).abs() > SAME_STEP * step {
             self.system.set_step(step);
         }
@@ -410,11 +411,25 @@ impl Simulation {
         Ok(())
     }
 
-    /// The rotor must not skip over features of the casing shape. Inputs are linear in time: the ends decide.
+    /// The rotor must not skip over features of the casing shape or cells of the coating. Inputs are linear in time: the ends decide.
     fn check_turning(&self, step: f64, step_size: f64) -> Result<()> {
-        let scale = self.system.law().angular_scale();
+        let (scale, cell) = (self.system.law().angular_scale(), self.system.coating().map(Coating::width));
         let speed = |offset: f64| self.inputs.speed.at(offset) - self.inputs.shape_rotation.slope;
         let turned = step * speed(0.0).abs().max(speed(step_size).abs());
+        // The coating does not turn with the shape.
+        let own = |offset: f64| self.inputs.speed.at(offset).abs();
+        let passed = step * own(0.0).max(own(step_size));
+        if let Some(cell) = cell.filter(|cell| passed > *cell) {
+            return Err(Error::invalid(
+                "contact.coating.cells_around",
+                format!(
+                    "the rotor turns {passed:.3e} rad in one internal step of {step:.3e} s at t = {} s, past cells of the \
+                     coating {cell:.3e} rad wide, which would stay unworn",
+                    self.time
+                ),
+                "Use fewer cells around, a lower speed or a smaller internal_step_max",
+            ));
+        }
         if turned <= scale {
             return Ok(());
         }
@@ -496,6 +511,16 @@ impl Simulation {
                 remedy: "Check gap, casing shape and its inputs; small displacements cannot describe this. Restore a \
                          saved state or reset first"
                     .to_owned(),
+            },
+            StepFailure::CasingImplausible => Error::Unstable {
+                problem: format!(
+                    "at t = {time} s (last good time {} s) the casing is displaced by more than a tenth of the radius",
+                    self.time
+                ),
+                remedy:
+                    "Check its loads and temperatures; small displacements cannot describe this. Restore a saved state \
+                         or reset first"
+                        .to_owned(),
             },
             StepFailure::Unsolved { sector } => Error::Unstable {
                 problem: format!(

@@ -144,6 +144,7 @@ impl Simulation {
         self.system.set_friction(parameters.friction);
         self.rest(parameters);
         self.system.restore(reader);
+        self.renew_limits();
         Ok(())
     }
 }

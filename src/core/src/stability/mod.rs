@@ -221,7 +221,10 @@ pub fn growth(
     friction: f64,
     directions: &ContactDirections,
 ) -> Option<Growth> {
-    if friction == 0.0 || model.len() > GROWTH_UP_TO || scheme == Scheme::MasslessBoundary {
+    if scheme == Scheme::MasslessBoundary {
+        return massless::growth(model, step, friction, directions);
+    }
+    if friction == 0.0 || model.len() > GROWTH_UP_TO {
         return None;
     }
     let modes = model.len();
@@ -251,9 +254,13 @@ pub fn growth(
     let position = &corrected * scaled(&|mode| 1.0 - coefficients[mode].kappa);
     let increment = &corrected * scaled(&|mode| coefficients[mode].beta);
     let map = blocks([&position, &increment, &(&position - &identity), &increment]);
+    Some(Growth { continuous, stepped: libm::log(spectral_radius(map)?) / step, noise: GROWTH_NOISE / step })
+}
+
+/// Largest modulus of the eigenvalues of a general matrix.
+fn spectral_radius(matrix: DMatrix<f64>) -> Option<f64> {
     let size = |value: &nalgebra::Complex<f64>| libm::hypot(value.re, value.im);
-    let radius = eigenvalues(map)?.iter().fold(0.0, |largest: f64, value| largest.max(size(value)));
-    Some(Growth { continuous, stepped: libm::log(radius) / step, noise: GROWTH_NOISE / step })
+    Some(eigenvalues(matrix)?.iter().fold(0.0, |largest: f64, value| largest.max(size(value))))
 }
 
 /// Eigenvalues of a general matrix; `None` where the iteration does not end (entries of extreme size).

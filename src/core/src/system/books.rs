@@ -2,7 +2,7 @@
 
 use super::{ContactEvent, System};
 use crate::contact::gap::{Drive, GapLaw, Geometry, dot};
-use crate::contact::spline_gap::Frame;
+use crate::contact::spline_gap::{BEYOND_EDGE, Frame};
 
 impl System {
     /// Enter the work of all contacts that acted over the step just done.
@@ -35,7 +35,9 @@ impl System {
         let angle = if before { self.state.angle_before } else { self.state.angle };
         let moved = self.relative_motion(event, index, geometry, angle);
         let tangential: [f64; 3] = std::array::from_fn(|i| event.force[i] - event.normal * normal[i]);
-        let approach = -0.5 * (self.state.gap[index] - self.gap_oldest[index]);
+        // A node that comes back from beyond a free edge had no gap to close.
+        let (now, oldest) = (self.state.gap[index], self.gap_oldest[index]);
+        let approach = if now.max(oldest) >= BEYOND_EDGE { 0.0 } else { -0.5 * (now - oldest) };
         let closing = event.normal * approach;
         let pushed = event.normal * dot(normal, moved) + closing;
         let supplied = -dot(tangential, self.law.sliding_velocity(event.node, index, drive)) * self.bank.step();

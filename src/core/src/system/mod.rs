@@ -73,6 +73,8 @@ pub enum StepFailure {
         /// Sector (0-based).
         sector: usize,
     },
+    /// The structure that carries the slave surface is displaced by more than a tenth of the radius.
+    CasingImplausible,
     /// The contact problem of a sector has no solution within the pivoting limit.
     Unsolved {
         /// Sector (0-based).
@@ -346,9 +348,7 @@ impl System {
             let before = self.mechanical_energy();
             self.lasting_force(old, step);
             self.bank.resample(self.settings.scheme, step, &self.displacement_oldest);
-            if let Some(slave) = &mut self.slave {
-                slave.set_step(self.settings.scheme, step);
-            }
+            self.resample_slave(step);
             let ratio = step / old;
             for (before, now) in self.state.gap_before.iter_mut().zip(&self.state.gap) {
                 if now.is_finite() {
@@ -364,6 +364,22 @@ impl System {
                 slave.set_step(self.settings.scheme, step);
             }
         }
+    }
+
+    /// The same forces act on the slave, where the last step found them.
+    fn resample_slave(&mut self, step: f64) {
+        let lanes = self.bank.lanes();
+        let (Some(slave), GapLaw::Spline(law)) = (&mut self.slave, &self.law) else { return };
+        slave.clear_lasting();
+        for index in 0..self.state.gap.len() {
+            let (node, sector) = (index / lanes, index % lanes);
+            let force: [f64; 3] = std::array::from_fn(|i| self.displacement_oldest[(3 * node + i) * lanes + sector]);
+            if force.iter().any(|component| *component != 0.0) {
+                let frame = law.frame(index, self.state.angle);
+                slave.add_lasting(&law.surface, self.state.geometry.places[index], frame, force);
+            }
+        }
+        slave.carry_over(self.settings.scheme, step);
     }
 
     /// Leaves in `displacement_oldest` (scratch between steps) the contact forces without those of impacts.
@@ -541,6 +557,10 @@ impl System {
             return Err(StepFailure::NonFinite);
         }
         let limit = self.law.largest_displacement();
+        let casing = self.slave.as_ref().map_or(&[][..], |slave| slave.bank.displacement());
+        if casing.iter().any(|displacement| displacement.abs() > limit) {
+            return Err(StepFailure::CasingImplausible);
+        }
         let beyond = self.bank.displacement().iter().position(|displacement| displacement.abs() > limit);
         let sector = beyond.map(|index| index % self.bank.lanes());
         sector.map_or(Ok(()), |sector| Err(StepFailure::Implausible { sector }))

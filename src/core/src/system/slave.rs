@@ -24,7 +24,7 @@ pub struct Slave {
     seen: [Vec<f64>; 3],
     /// Scratch: modal forces and modal displacements.
     force: Vec<f64>,
-    /// Displacement of the control points by the forces of a solution (m).
+    /// Displacement of the control points by the forces of a solution (m); between steps scratch.
     pub response: Vec<f64>,
 }
 
@@ -64,9 +64,29 @@ impl Slave {
         self.delayed.fill(0.0);
     }
 
-    /// Carry the state to another step size under the contact forces that last, `share` of those of the last step.
+    /// Use a step size from here, at rest or without regard to the state.
     pub fn set_step(&mut self, scheme: Scheme, step: f64) {
-        if self.bank.step() > 0.0 { self.bank.resample(scheme, step, &[]) } else { self.bank.set_step(scheme, step) }
+        self.bank.set_step(scheme, step);
+    }
+
+    /// Before [`Slave::carry_over`]: no force lasts.
+    pub fn clear_lasting(&mut self) {
+        self.response.fill(0.0);
+    }
+
+    /// Add a lasting contact force on the master (N, in the directions of `frame`) whose reaction acts on a place.
+    pub fn add_lasting(&mut self, surface: &SurfaceSpline, place: Place, frame: Frame, force: [f64; 3]) {
+        let force = frame.fixed(force);
+        for (index, weight) in surface.weights(place).iter() {
+            for (component, value) in force.iter().enumerate() {
+                self.response[3 * index + component] -= weight * value;
+            }
+        }
+    }
+
+    /// Carry the state to another step size under the lasting contact forces added.
+    pub fn carry_over(&mut self, scheme: Scheme, step: f64) {
+        self.bank.resample(scheme, step, &self.response);
     }
 
     /// Half the displacement of a place over the last two steps, in the directions of `frame` (m).

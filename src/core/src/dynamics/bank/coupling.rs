@@ -18,8 +18,6 @@ pub struct Coupling {
     spin: ModalSpin,
     stiffening: bool,
     coriolis: bool,
-    /// Modes with inertia; the others keep the stiffness of the reference speed.
-    dynamic: usize,
     speed: f64,
     /// ΔK, row by row.
     stiffness: Vec<f64>,
@@ -40,7 +38,6 @@ impl Coupling {
             speed: spin.reference_speed,
             stiffening,
             coriolis,
-            dynamic: modes,
             stiffness: square(stiffening),
             gyroscopic: square(coriolis),
             transforms: vec![square(coriolis); sets],
@@ -68,7 +65,9 @@ impl Coupling {
     pub fn refresh(&mut self, speed: f64, step: f64, dynamic: usize, coefficients: &[ModeCoefficients]) {
         let modes = self.result.len();
         self.speed = speed;
-        self.dynamic = dynamic;
+        // Modes without inertia, and those that the step does not resolve, keep the stiffness of the reference speed: ΔK
+        // is explicit, and at ωh ≈ π the least of it would make them grow.
+        let dynamic = dynamic.min(resolved(step, modes, coefficients));
         if self.stiffening {
             let (square, reference) = (speed * speed, self.spin.reference_speed * self.spin.reference_speed);
             let (second, fourth) = (square - reference, square * square - reference * reference);
@@ -167,6 +166,23 @@ impl Coupling {
         }
     }
 
+    /// −ΔKq − 2ΩGq̇ with q̇ = d/h: what constant spin adds to the modal forces of a motion.
+    pub fn force(&self, position: &[f64], increment: &[f64], forces: &mut [f64]) {
+        let modes = self.result.len();
+        forces.fill(0.0);
+        for (row, force) in forces.iter_mut().enumerate() {
+            let product = |matrix: &[f64], vector: &[f64]| -> f64 {
+                matrix[row * modes..][..modes].iter().zip(vector).map(|(entry, value)| entry * value).sum()
+            };
+            if self.is_stiffened() {
+                *force -= product(&self.stiffness, position);
+            }
+            if self.coriolis {
+                *force -= 2.0 * product(&self.gyroscopic, increment);
+            }
+        }
+    }
+
     /// ½ qᵀΔK(q − d): part of the strain energy (J).
     pub fn strain(&self, position: impl Fn(usize) -> f64, before: impl Fn(usize) -> f64) -> f64 {
         if !self.is_stiffened() {
@@ -180,6 +196,13 @@ impl Coupling {
         };
         (0..modes).map(row).sum()
     }
+}
+
+/// Number of modes, from the lowest, with ωh ≤ 2 in every set of coefficients.
+fn resolved(step: f64, modes: usize, coefficients: &[ModeCoefficients]) -> usize {
+    let within = |k: &ModeCoefficients| 2.0 * k.spring * step * step <= 4.0;
+    let count = |set: &[ModeCoefficients]| set.iter().take_while(|k| within(k)).count();
+    coefficients.chunks_exact(modes).map(count).min().unwrap_or(0)
 }
 
 fn multiply(matrix: &[f64], vector: &[f64], result: &mut [f64]) {

@@ -1,0 +1,299 @@
+//! What users may combine without thinking of it: every case once gave wrong numbers in silence.
+
+mod common;
+
+use nalgebra::DMatrix;
+use tiprub_core::settings::{
+    CoatingSettings, Motion, Scheme, Shape, Solver, SplineSettings, StructureSettings, TimeSettings,
+};
+use tiprub_core::{Result, Scene, Simulation};
+
+fn reference(simulation: &Simulation, name: &str) -> u32 {
+    simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
+}
+
+fn real(simulation: &Simulation, name: &str) -> f64 {
+    simulation.real(reference(simulation, name)).unwrap()
+}
+
+fn set(simulation: &mut Simulation, name: &str, value: f64) {
+    simulation.set_real(reference(simulation, name), value).unwrap();
+}
+
+fn energy(simulation: &Simulation) -> f64 {
+    real(simulation, "strain_energy") + real(simulation, "kinetic_energy")
+}
+
+fn started(scene: &Scene) -> Result<Simulation> {
+    let mut simulation = Simulation::new(scene)?;
+    simulation.initialise(0.0)?;
+    Ok(simulation)
+}
+
+/// Twelve blades in a round casing, without friction.
+fn round(scheme: Scheme) -> Scene {
+    let mut scene = common::scene(12);
+    scene.roms[0] = common::rich_rom(12);
+    scene.settings.time.scheme = scheme;
+    scene.settings.contacts[0].friction = 0.0;
+    scene.settings.surfaces[0].shape = Shape::Circular {};
+    scene
+}
+
+fn with_step(mut scene: Scene, step: f64) -> Scene {
+    scene.settings.time = TimeSettings { step, ..scene.settings.time };
+    scene.settings.experiment.communication_step = step;
+    scene
+}
+
+fn on_a_ring(mut scene: Scene) -> Scene {
+    scene.settings.structures.push(StructureSettings {
+        name: "ring".into(),
+        rom: "ring.safetensors".into(),
+        motion: Motion::Still,
+        damping_ratio: Some(0.3),
+        ..StructureSettings::default()
+    });
+    scene.roms.push(common::casing(36, 3));
+    scene.settings.surfaces[0].structure = Some("ring".into());
+    scene
+}
+
+/// The largest usable step that a refusal names (s).
+fn usable_step(scene: Scene) -> f64 {
+    let message = started(&with_step(scene, 1e-3)).unwrap_err().to_string();
+    let number = message.split("Set the internal step below ").nth(1).and_then(|text| text.split(' ').next());
+    number.and_then(|text| text.parse().ok()).unwrap_or_else(|| panic!("{message}"))
+}
+
+/// Stiffens with the speed by 3Ω².
+fn stiffening(scheme: Scheme, step: f64) -> Scene {
+    let mut scene = with_step(common::scene(12), step);
+    let order = scene.roms[0].order();
+    let mut spin = common::spin(order);
+    spin.stiffness_speed2 = DMatrix::identity(order, order) * 3.0;
+    spin.stiffness_speed4.fill(0.0);
+    scene.roms[0].extras.spin = Some(spin);
+    scene.settings.time.scheme = scheme;
+    scene.settings.contacts[0].friction = 0.0;
+    scene.settings.structures[0].spin.stiffening = true;
+    scene.settings.structures[0].speed = 1.0;
+    scene.settings.structures[0].damping_ratio = Some(1e-3);
+    scene
+}
+
+/// Rubs for 1000 steps on the way up to 1300 rad/s, then turns freely.
+fn run_up(simulation: &mut Simulation, step: f64) -> Result<()> {
+    for index in 0..6000 {
+        set(simulation, "speed", 1300.0 * (f64::from(index) / 2000.0).min(1.0));
+        if index == 1000 {
+            set(simulation, "casing_shape_factor", 0.0);
+        }
+        simulation.do_step(simulation.time(), step)?;
+    }
+    Ok(())
+}
+
+#[test]
+fn stiffening_does_not_make_unresolved_modes_grow() {
+    // ωh of the highest mode is an odd multiple of π, where the least explicit stiffness is unstable.
+    let highest = std::f64::consts::TAU * 40_000.0;
+    for turns in [1.0, 1.001, 3.0] {
+        let step = turns * std::f64::consts::PI / highest;
+        let mut simulation = started(&stiffening(Scheme::ModalExact, step)).unwrap();
+        run_up(&mut simulation, step).unwrap();
+        let left = simulation.system().bank().modal_state(7, 0).0.abs();
+        println!("ωh = {turns} π: highest mode left at {left:.1e} m·√kg");
+        assert!(left < 1e-9, "{left:e}");
+    }
+}
+
+#[test]
+fn central_differences_are_refused_when_stiffening_takes_them_over_their_limit() {
+    let step = 1.99995 / (std::f64::consts::TAU * 40_000.0);
+    let mut simulation = started(&stiffening(Scheme::CentralDifference, step)).unwrap();
+    let message = run_up(&mut simulation, step).unwrap_err().to_string();
+    assert!(message.contains("ω_max"), "{message}");
+    // Slower again, it goes on.
+    set(&mut simulation, "speed", 500.0);
+    simulation.do_step(simulation.time(), step).unwrap();
+}
+
+#[test]
+fn massless_boundary_knows_the_stiffest_blade() {
+    let tuned = usable_step(round(Scheme::MasslessBoundary));
+    let mut scene = round(Scheme::MasslessBoundary);
+    scene.settings.structures[0].frequency_factors = vec![1.0; 12];
+    scene.settings.structures[0].frequency_factors[7] = 1.3;
+    let mistuned = usable_step(scene);
+    assert!((mistuned * 1.3 / tuned - 1.0).abs() < 1e-4, "{mistuned:e} of {tuned:e}");
+}
+
+#[test]
+fn pressed_blades_gain_no_energy_at_the_largest_step_of_massless_boundary() {
+    for factor in [1.0, 1.3] {
+        let mut scene = round(Scheme::MasslessBoundary);
+        scene.settings.structures[0].frequency_factors = vec![factor; 12];
+        scene.settings.structures[0].damping_ratio = Some(1e-3);
+        let step = 0.999 * usable_step(scene.clone());
+        let mut simulation = started(&with_step(scene, step)).unwrap();
+        assert!(simulation.warnings().iter().any(|text| text.contains("gain energy")), "{:?}", simulation.warnings());
+        let mut most: f64 = 0.0;
+        for index in 0..10_000 {
+            set(&mut simulation, "casing_radius_change", -4.2e-4 * (f64::from(index) * step / 2e-3).min(1.0));
+            simulation.do_step(simulation.time(), step).unwrap();
+            most = most.max(energy(&simulation));
+        }
+        let (gained, supplied) = (-real(&simulation, "impact_loss"), real(&simulation, "external_work"));
+        println!(
+            "factor {factor}, h = {step:.3e} s: largest energy {most:.3} J, {supplied:.3} J supplied, {gained:.1e} J by impacts"
+        );
+        assert!(gained < 0.01 * supplied && most < 1.01 * supplied);
+    }
+}
+
+#[test]
+fn flutter_is_told_with_massless_boundary_as_with_modal_exact() {
+    let rate = |scheme| {
+        let mut scene = with_step(round(scheme), 2e-7);
+        scene.settings.contacts[0].friction = 0.15;
+        let warnings = started(&scene).unwrap().warnings().to_vec();
+        let number = warnings.iter().find_map(|text| text.split("flutter), growth rate ").nth(1)).map(str::to_owned);
+        let number = number.unwrap_or_else(|| panic!("{scheme:?}: {warnings:?}"));
+        number.trim_end_matches(" 1/s").parse::<f64>().unwrap()
+    };
+    let (massless, exact) = (rate(Scheme::MasslessBoundary), rate(Scheme::ModalExact));
+    println!("growth rates {massless} and {exact} 1/s");
+    assert!((massless / exact - 1.0).abs() < 0.02);
+}
+
+#[test]
+fn a_change_of_step_leaves_the_pressed_casing_at_rest() {
+    for scheme in [Scheme::ModalExact, Scheme::MasslessBoundary] {
+        let mut scene = on_a_ring(round(scheme));
+        scene.settings.structures[0].damping_ratio = Some(0.3);
+        let mut simulation = started(&scene).unwrap();
+        for index in 0..8000 {
+            set(&mut simulation, "casing_radius_change", -5e-4 * (f64::from(index) / 4000.0).min(1.0));
+            simulation.do_step(simulation.time(), 1e-6).unwrap();
+        }
+        let (before, booked) = (energy(&simulation), real(&simulation, "step_change_energy"));
+        for index in 0..400 {
+            simulation.do_step(simulation.time(), if index % 2 == 0 { 2.5e-7 } else { 1e-6 }).unwrap();
+        }
+        let share = (real(&simulation, "step_change_energy") - booked).abs() / before;
+        println!("{scheme:?}: 400 changes of step book {share:.1e} of the energy");
+        assert!(share < 2e-5, "{scheme:?}: {share:e}");
+    }
+}
+
+#[test]
+fn a_node_that_comes_back_over_the_edge_is_no_impact_from_a_metre_away() {
+    for flexible in [false, true] {
+        let mut scene = round(Scheme::ModalExact);
+        if flexible {
+            scene = on_a_ring(scene);
+        } else {
+            scene.settings.surfaces[0].spline = Some(SplineSettings::default());
+        }
+        scene.settings.structures[0].axial_shift = true;
+        let mut simulation = started(&scene).unwrap();
+        for index in 0..6000 {
+            let x = f64::from(index);
+            set(&mut simulation, "casing_radius_change", -4e-4 * (x / 1000.0).min(1.0));
+            set(&mut simulation, "axial_shift", 0.022 * (x / 300.0).sin());
+            simulation.do_step(simulation.time(), 1e-6).unwrap();
+        }
+        let (loss, work) = (real(&simulation, "impact_loss"), real(&simulation, "external_work"));
+        println!("flexible {flexible}: impact loss {loss:.3e} J, external work {work:.3e} J");
+        assert!(real(&simulation, "energy_residual_relative").abs() < 1e-12);
+        // It was millions of joules.
+        assert!(loss.abs() < 2e3 && work.abs() < 2e3, "{loss:e}, {work:e}");
+    }
+}
+
+#[test]
+fn a_casing_that_small_displacements_cannot_describe_is_refused() {
+    let mut scene = on_a_ring(round(Scheme::ModalExact));
+    scene.settings.structures[1].thermal = true;
+    // Radial forces outwards on every node: the casing flees from the blades.
+    let map = &scene.roms[1].contact_map;
+    let load = DMatrix::from_fn(map.ncols(), 4, |mode, _| (0..map.nrows() / 3).map(|node| map[(3 * node, mode)]).sum());
+    for (scale, refused) in [(1e3, false), (4e3, true)] {
+        scene.roms[1].extras.thermal.as_mut().unwrap().loads = &load * scale;
+        let mut simulation = started(&scene).unwrap();
+        let first = reference(&simulation, "casing_temperature");
+        for patch in 0..4 {
+            simulation.set_real(first + patch, 300.0).unwrap();
+        }
+        let outcome = (0..20).try_for_each(|_| simulation.do_step(simulation.time(), 5e-5));
+        assert_eq!(outcome.is_err(), refused, "{outcome:?}");
+        if let Err(error) = outcome {
+            assert!(error.to_string().contains("casing is displaced by more than a tenth"), "{error}");
+        }
+        for bad in [f64::NAN, f64::INFINITY, 3001.0, -1e300] {
+            assert!(simulation.set_real(first, bad).is_err());
+        }
+    }
+}
+
+#[test]
+fn coating_cells_that_the_blades_would_skip_are_refused() {
+    for (cells, refused) in [(4800, false), (5000, true), (100_000, true)] {
+        let mut scene = round(Scheme::ModalExact);
+        scene.settings.contacts[0].coating = Some(CoatingSettings {
+            thickness: 1e-3,
+            modulus: 2e8,
+            yield_stress: 1e6,
+            hardening: 2e7,
+            cells_around: cells,
+            cells_along: 3,
+        });
+        let mut simulation = started(&scene).unwrap();
+        let outcome = simulation.do_step(0.0, 1e-6);
+        assert_eq!(outcome.is_err(), refused, "{cells}: {outcome:?}");
+        if let Err(error) = outcome {
+            assert!(error.to_string().contains("cells_around"), "{error}");
+            set(&mut simulation, "speed", 30.0);
+            simulation.do_step(0.0, 1e-6).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_restored_state_brings_the_limits_of_its_own_parameters() {
+    let mut scene = with_step(round(Scheme::CentralDifference), 1e-3);
+    scene.settings.experiment.communication_step = 1e-6;
+    scene.settings.contacts[0].solver = Solver::Lcp;
+    let mut simulation = started(&scene).unwrap();
+    simulation.do_step(0.0, 1e-6).unwrap();
+    let mut state = vec![0; simulation.state_size()];
+    simulation.save_state(&mut state).unwrap();
+    let expected = simulation.do_step(1e-6, 1e-4).unwrap_err().to_string();
+    assert!(expected.contains("ω_max"), "{expected}");
+    let mut fresh = Simulation::new(&scene).unwrap();
+    let mut other = Simulation::new(&scene).unwrap();
+    other.set_integer(reference(&other, "scheme"), 2).unwrap();
+    other.initialise(0.0).unwrap();
+    for instance in [&mut fresh, &mut other] {
+        instance.restore_state(&state).unwrap();
+        let found = instance.do_step(1e-6, 1e-4).map_err(|error| error.to_string());
+        assert_eq!(found, Err(expected.clone()));
+    }
+}
+
+#[test]
+fn a_speed_given_within_a_communication_step_is_checked_as_well() {
+    let mut simulation = started(&common::scene(12)).unwrap();
+    let speed = reference(&simulation, "speed");
+    simulation.begin_step(0.0, 5e-5).unwrap();
+    simulation.advance().unwrap();
+    for (value, slope) in [(1e7, 0.0), (1300.0, 1e12)] {
+        let outcome = simulation.set_real(speed, value).and_then(|()| simulation.set_input_derivative(speed, 1, slope));
+        let message = outcome.unwrap_err().to_string();
+        assert!(message.contains("internal_step_max"), "{message}");
+    }
+    while !simulation.advance().unwrap().finished {}
+    let turned = real(&simulation, "rotor_angle");
+    assert!((turned - 1300.0 * 5e-5).abs() < 1e-12, "{turned}");
+}
