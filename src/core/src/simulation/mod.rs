@@ -9,13 +9,13 @@ mod outputs;
 mod patches;
 mod slave_surface;
 mod state;
+mod stepping;
 mod table;
 mod window;
 
-use crate::contact::coating::Coating;
 use crate::contact::gap::Drive;
 use crate::settings::Solver;
-use crate::system::{StepFailure, System};
+use crate::system::System;
 use crate::variables::{Quantity, Start, VariableTable};
 use crate::{Error, Result, Scene};
 use compile::Compiled;
@@ -337,226 +337,6 @@ impl Simulation {
         if elapsed >= length { 1.0 } else { 0.5 * (1.0 - libm::cos(std::f64::consts::PI * elapsed / length)) }
     }
 
-    /// Begin a communication step of length H from the current time, landing exactly on `current_time + step_size`.
-    ///
-    /// # Errors
-    /// Step size not positive and finite, or `current_time` further than 1e-3·H from [`Simulation::time`].
-    pub fn begin_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
-        match self.phase {
-            Phase::Ready => {}
-            Phase::Failed => return Err(failed_before()),
-            Phase::Created | Phase::Stepping => {
-                return Err(Error::invalid(
-                    "doStep",
-                    "called outside a communication point",
-                    "Initialise the instance first",
-                ));
-            }
-        }
-        self.check_step(current_time, step_size)?;
-        let limit = self.values[self.compiled.references.step_max];
-        let ratio = step_size / limit;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 ≤ value ≤ 1e9")]
-        let count = (ratio * (1.0 - SAME_STEP)).ceil().max(1.0) as u64;
-        #[expect(clippy::cast_precision_loss, reason = "count ≤ 1e9")]
-        let step = step_size / count as f64;
-        self.check_turning(step, step_size)?;
-        self.check_step_size(step, [self.inputs.speed.at(0.0), self.inputs.speed.at(step_size)])?;
-        if (step - self.system.bank().step()).abs() > SAME_STEP * step {
-            self.system.set_step(step);
-        }
-        if self.compiled.spins() {
-            let (first, last) = (self.inputs.speed.at(0.0), self.inputs.speed.at(step_size));
-            self.compiled.check_speed(if first.abs() > last.abs() { first } else { last })?;
-            self.system.set_speed(0.5 * (first + last));
-        }
-        self.previous.copy_from_slice(&self.values);
-        self.previous_length = self.communication.length;
-        self.communication = Communication { start: current_time, length: step_size, count, done: 0 };
-        self.window.open(self.system.gaps());
-        self.phase = Phase::Stepping;
-        Ok(())
-    }
-
-    fn check_step(&self, current_time: f64, step_size: f64) -> Result<()> {
-        if !(step_size.is_finite() && step_size > 0.0) {
-            return Err(Error::invalid(
-                "communicationStepSize",
-                format!("{step_size} s at t = {} s", self.time),
-                "Give a finite communication step > 0",
-            ));
-        }
-        if !current_time.is_finite() || (current_time - self.time).abs() > TIME_TOLERANCE * step_size {
-            return Err(Error::invalid(
-                "currentCommunicationPoint",
-                format!("{current_time} s, but this instance is at t = {} s", self.time),
-                "Continue from the end of the last step, or restore a saved state",
-            ));
-        }
-        if current_time + step_size <= current_time {
-            return Err(Error::invalid(
-                "communicationStepSize",
-                format!("{step_size} s does not change the time {current_time} s in double precision"),
-                "Use a longer communication step or a start time closer to 0",
-            ));
-        }
-        let ratio = step_size / self.values[self.compiled.references.step_max];
-        if ratio > MOST_STEPS {
-            return Err(Error::invalid(
-                "communicationStepSize",
-                format!("{step_size} s would need {ratio:.3e} internal steps"),
-                "Use a shorter communication step or a larger internal_step_max",
-            ));
-        }
-        Ok(())
-    }
-
-    /// The rotor must not skip over features of the casing shape or cells of the coating. Inputs are linear in time: the ends decide.
-    fn check_turning(&self, step: f64, step_size: f64) -> Result<()> {
-        let (scale, cell) = (self.system.law().angular_scale(), self.system.coating().map(Coating::width));
-        let speed = |offset: f64| self.inputs.speed.at(offset) - self.inputs.shape_rotation.slope;
-        let turned = step * speed(0.0).abs().max(speed(step_size).abs());
-        // The coating does not turn with the shape.
-        let own = |offset: f64| self.inputs.speed.at(offset).abs();
-        let passed = step * own(0.0).max(own(step_size));
-        if let Some(cell) = cell.filter(|cell| passed > *cell) {
-            return Err(Error::invalid(
-                "contact.coating.cells_around",
-                format!(
-                    "the rotor turns {passed:.3e} rad in one internal step of {step:.3e} s at t = {} s, past cells of the \
-                     coating {cell:.3e} rad wide, which would stay unworn",
-                    self.time
-                ),
-                "Use fewer cells around, a lower speed or a smaller internal_step_max",
-            ));
-        }
-        if turned <= scale {
-            return Ok(());
-        }
-        Err(Error::invalid(
-            "variable `speed`",
-            format!(
-                "the rotor turns {turned:.3} rad in one internal step of {step:.3e} s at t = {} s, past features of the casing \
-                 shape {scale:.3} rad wide",
-                self.time
-            ),
-            "Use a lower speed or a smaller internal_step_max",
-        ))
-    }
-
-    /// March one internal step of the communication step begun. Inputs may be set between calls.
-    ///
-    /// # Errors
-    /// Non-finite state; the simulation must then be reset or restored.
-    pub fn advance(&mut self) -> Result<Progress> {
-        if self.phase != Phase::Stepping {
-            return Err(Error::invalid("doStep", "no communication step is under way", "Begin a step first"));
-        }
-        let next = self.communication.done + 1;
-        let (offset, time) = (self.communication.offset(next), self.communication.time(next));
-        let drive = self.drive(offset, time);
-        self.load(drive.speed, offset);
-        if let Err(failure) = self.system.step(&drive) {
-            return Err(self.fail(failure, time));
-        }
-        self.window.add(&self.system, drive.rotor_angle, self.system.bank().step());
-        self.window.add_heat(&self.system, drive.rotor_angle, self.compiled.patches.as_ref());
-        self.communication.done = next;
-        let finished = next == self.communication.count;
-        if finished {
-            self.finish(offset, time)?;
-        }
-        Ok(Progress { time, finished })
-    }
-
-    /// Loads beside contact for the step that ends at `offset`.
-    fn load(&mut self, speed: f64, offset: f64) {
-        let loads = &self.compiled.loads;
-        if !loads.centrifugal.is_empty() {
-            loads.fill_master(speed, self.system.bank_mut().loads_mut());
-        }
-        if let (true, Some(slave)) = (loads.on_slave(), self.system.slave_mut()) {
-            loads.fill_slave(&self.inputs, offset, slave.bank.loads_mut());
-        }
-    }
-
-    fn finish(&mut self, offset: f64, time: f64) -> Result<()> {
-        if let Err(failure) = self.system.check_state() {
-            return Err(self.fail(failure, time));
-        }
-        self.rotor.rebase(&self.inputs.speed, offset);
-        self.update_outputs();
-        self.rotor.shift(offset);
-        self.inputs.shift(offset);
-        self.time = time;
-        self.phase = Phase::Ready;
-        Ok(())
-    }
-
-    fn fail(&mut self, failure: StepFailure, time: f64) -> Error {
-        self.phase = Phase::Failed;
-        match failure {
-            StepFailure::NonFinite => Error::NonFinite {
-                last_good_time: self.time,
-                time,
-                remedy: "Restore a saved state or reset, and use a smaller internal step or smaller loads".to_owned(),
-            },
-            StepFailure::Implausible { sector } => Error::Unstable {
-                problem: format!(
-                    "at t = {time} s (last good time {} s) a contact node of sector {} is displaced by more than a tenth of \
-                     its radius, is as deep inside the casing, or meets a flank of the casing shape steeper than 45°",
-                    self.time,
-                    sector + 1
-                ),
-                remedy: "Check gap, casing shape and its inputs; small displacements cannot describe this. Restore a \
-                         saved state or reset first"
-                    .to_owned(),
-            },
-            StepFailure::CasingImplausible => Error::Unstable {
-                problem: format!(
-                    "at t = {time} s (last good time {} s) the casing is displaced by more than a tenth of the radius",
-                    self.time
-                ),
-                remedy:
-                    "Check its loads and temperatures; small displacements cannot describe this. Restore a saved state \
-                         or reset first"
-                        .to_owned(),
-            },
-            StepFailure::Unsolved { sector } => Error::Unstable {
-                problem: format!(
-                    "the contact problem of sector {} has no solution at t = {time} s (last good time {} s)",
-                    sector + 1,
-                    self.time
-                ),
-                remedy: "Use less friction or another internal step; restore a saved state or reset first".to_owned(),
-            },
-        }
-    }
-
-    /// End the communication step here, before its end (early return): outputs cover the part done.
-    ///
-    /// # Errors
-    /// No step under way, no internal step done yet, or a non-finite state.
-    pub fn end_step_early(&mut self) -> Result<()> {
-        if self.phase != Phase::Stepping || self.communication.done == 0 {
-            return Err(Error::invalid("early return", "no internal step is done", "Return after an internal step"));
-        }
-        let done = self.communication.done;
-        let (offset, time) = (self.communication.offset(done), self.communication.time(done));
-        self.communication = Communication { length: offset, count: done, ..self.communication };
-        self.finish(offset, time)
-    }
-
-    /// `begin_step`, then `advance` to the end.
-    ///
-    /// # Errors
-    /// As those two.
-    pub fn do_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
-        self.begin_step(current_time, step_size)?;
-        while !self.advance()?.finished {}
-        Ok(())
-    }
-
     /// Back to the state after [`Simulation::new`]: start values everywhere.
     pub fn reset(&mut self) {
         self.values.fill(0.0);
@@ -586,8 +366,4 @@ impl Simulation {
         self.warnings.clear();
         self.phase = Phase::Created;
     }
-}
-
-fn failed_before() -> Error {
-    Error::invalid("doStep", "an earlier step of this instance failed", "Restore a saved state or reset the instance")
 }

@@ -1,0 +1,142 @@
+//! What carries a running state on: another step size, saving and restoring, and whether it still makes sense.
+
+use super::{ContactEvent, StepFailure, System};
+use crate::contact::gap::GapLaw;
+use crate::persist::{Persist, Reader, Writer};
+
+/// A contact force is continued over steps at most this many times as long as the one it was found in.
+const FORCE_REACH: f64 = 4.0;
+
+impl System {
+    /// Use step size `step` (s) from here. A running state is carried over by resampling the modal motion under
+    /// the last contact force; the energy this adds is booked in the ledger.
+    ///
+    /// Only a force that lasts is continued: that of a contact closed at both ends of the last step. The multiplier of
+    /// an impact is p/h, an impulse that is over, and means nothing over a step of another length. A much longer
+    /// step reaches back to times of which the last force knows nothing; there it fades out.
+    pub fn set_step(&mut self, step: f64) {
+        let old = self.bank.step();
+        if old > 0.0 && self.state.steps > 0 {
+            let before = self.mechanical_energy();
+            self.lasting_force(old, step);
+            self.bank.resample(self.settings.scheme, step, &self.displacement_oldest);
+            self.resample_slave(step);
+            let ratio = step / old;
+            for (before, now) in self.state.gap_before.iter_mut().zip(&self.state.gap) {
+                if now.is_finite() {
+                    *before = now - ratio * (now - *before);
+                }
+            }
+            let after = self.mechanical_energy();
+            self.state.ledger.step_change.add(after - before);
+            self.state.ledger.turnover.add((after - before).abs());
+        } else {
+            self.bank.set_step(self.settings.scheme, step);
+            if let Some(slave) = &mut self.slave {
+                slave.set_step(self.settings.scheme, step);
+            }
+        }
+    }
+
+    /// The same forces act on the slave, where the last step found them.
+    fn resample_slave(&mut self, step: f64) {
+        let lanes = self.bank.lanes();
+        let (Some(slave), GapLaw::Spline(law)) = (&mut self.slave, &self.law) else { return };
+        slave.clear_lasting();
+        for index in 0..self.state.gap.len() {
+            let (node, sector) = (index / lanes, index % lanes);
+            let force: [f64; 3] = std::array::from_fn(|i| self.displacement_oldest[(3 * node + i) * lanes + sector]);
+            if force.iter().any(|component| *component != 0.0) {
+                let frame = law.frame(index, self.state.angle);
+                slave.add_lasting(&law.surface, self.state.geometry.places[index], frame, force);
+            }
+        }
+        slave.carry_over(self.settings.scheme, step);
+    }
+
+    /// Leaves in `displacement_oldest` (scratch between steps) the contact forces without those of impacts.
+    fn lasting_force(&mut self, old: f64, new: f64) {
+        let lanes = self.bank.lanes();
+        let reach = (FORCE_REACH * old / new).min(1.0);
+        for (lasting, force) in self.displacement_oldest.iter_mut().zip(&self.state.force) {
+            *lasting = reach * reach * force;
+        }
+        for (index, gap) in self.state.gap_before.iter().enumerate() {
+            let lasts = *gap <= 0.0 && self.state.gap[index] <= 0.0;
+            if !lasts {
+                let (node, sector) = (index / lanes, index % lanes);
+                for component in 0..3 {
+                    self.displacement_oldest[(3 * node + component) * lanes + sector] = 0.0;
+                }
+            }
+        }
+    }
+
+    /// Whether the state is still what the model describes.
+    ///
+    /// # Errors
+    /// Coordinates that are not finite; displacements beyond a tenth of the radius.
+    pub fn check_state(&self) -> Result<(), StepFailure> {
+        if !self.bank.is_finite() || self.slave.as_ref().is_some_and(|slave| !slave.bank.is_finite()) {
+            return Err(StepFailure::NonFinite);
+        }
+        let limit = self.law.largest_displacement();
+        let casing = self.slave.as_ref().map_or(&[][..], |slave| slave.bank.displacement());
+        if casing.iter().any(|displacement| displacement.abs() > limit) {
+            return Err(StepFailure::CasingImplausible);
+        }
+        let beyond = self.bank.displacement().iter().position(|displacement| displacement.abs() > limit);
+        let sector = beyond.map(|index| index % self.bank.lanes());
+        sector.map_or(Ok(()), |sector| Err(StepFailure::Implausible { sector }))
+    }
+
+    /// Write everything that determines the future, the step size included.
+    pub fn save(&self, writer: &mut Writer) {
+        self.bank.step().save(writer);
+        self.bank.save(writer);
+        if let Some(slave) = &self.slave {
+            slave.save(writer);
+        }
+        if let Some((coating, _)) = &self.coating {
+            coating.save(writer);
+        }
+        self.state.save(writer);
+    }
+
+    /// Restore a saved state; coefficients are recomputed from the saved step size.
+    pub fn restore(&mut self, reader: &mut Reader) {
+        let mut step = 0.0_f64;
+        step.restore(reader);
+        if step > 0.0 {
+            self.bank.set_step(self.settings.scheme, step);
+            if let Some(slave) = &mut self.slave {
+                slave.bank.set_step(self.settings.scheme, step);
+            }
+        }
+        self.bank.restore(reader);
+        if let Some(slave) = &mut self.slave {
+            slave.restore(reader);
+        }
+        if let Some((coating, _)) = &mut self.coating {
+            coating.restore(reader);
+        }
+        self.state.restore(reader);
+        self.rebuild_events();
+    }
+
+    /// The events of the last step follow from the saved multipliers and forces (heat is not part of the future).
+    fn rebuild_events(&mut self) {
+        let lanes = self.bank.lanes();
+        self.events.clear();
+        for sector in 0..self.bank.sectors() {
+            for node in 0..self.law.nodes() {
+                let normal = self.state.multiplier[node * lanes + sector];
+                if normal != 0.0 {
+                    let force = std::array::from_fn(|i| self.state.force[(3 * node + i) * lanes + sector]);
+                    let coating = self.state.coating_force[node * lanes + sector];
+                    self.events.push(ContactEvent::new(sector, node, normal, force, coating));
+                }
+            }
+        }
+    }
+}
