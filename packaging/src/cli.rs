@@ -46,7 +46,7 @@ pub enum Command {
                             tiprub reduce rotor37 --modes 30 --contact-nodes 5 --mesh 10x2x16 -o fine.rom.safetensors\n  \
                             tiprub reduce casing\n  \
                             tiprub reduce casing --material titanium --thickness 0.003 --high-flange none\n  \
-                            tiprub reduce casing --contour=-0.02:0.256,0.04:0.245 --contact-axial 0.0:0.03\n\n\
+                            tiprub reduce casing --contour=-0.02:0.256,0.04:0.245 --contact-axial 0.0026:0.038\n\n\
                             Meshes of your own are not read; docs/rom-file.md shows how to write a ROM from Python.")]
     Reduce(Box<ReduceArguments>),
     /// From a scene to .fmu files. Compiles nothing: the library is generic, scene and ROM are data.

@@ -52,7 +52,8 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     for (path, bytes) in &files {
         output_file::write(path, bytes)?;
     }
-    let warnings = facts.warnings();
+    let mut warnings = facts.warnings();
+    warnings.extend(spin_warning(&reduction.spin_checks));
     console.warn(&warnings);
     let mut text = facts.to_text();
     text.push_str(&format!(
@@ -113,4 +114,23 @@ fn rotor37_options(arguments: &ReduceArguments) -> Result<Rotor37Options> {
         spin: arguments.spin,
         ..defaults
     })
+}
+
+/// Share (%) by which frequencies or growth at speed may be off without a warning.
+const SPIN_DEVIATION: f64 = 1.0;
+
+/// A fit that does not follow the full model over its range of speed.
+fn spin_warning(checks: &[tiprub_model::spin::SpinCheck]) -> Option<String> {
+    let worst = |check: &tiprub_model::spin::SpinCheck| {
+        let frequencies = check.frequency_deviation().into_iter().fold(0.0, |worst: f64, value| worst.max(value.abs()));
+        frequencies.max(check.growth_deviation().abs())
+    };
+    let check =
+        checks.iter().max_by(|a, b| worst(a).total_cmp(&worst(b))).filter(|check| worst(check) > SPIN_DEVIATION)?;
+    Some(format!(
+        "at {} rad/s frequencies or growth of the reduced model are off by {:.1} %: stiffening and growth over this range are \
+         not to be trusted. Give a lower --spin",
+        check.speed,
+        worst(check)
+    ))
 }

@@ -68,6 +68,9 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
     Ok(Outcome { text, json })
 }
 
+/// Longer arrays are told by their range.
+const MOST_LISTED: usize = 12;
+
 fn summary(json: &Value, names: &[String], last: &[f64]) -> String {
     let number = |name: &str| json[name].as_f64().unwrap_or(f64::NAN);
     let mut text = format!(
@@ -83,8 +86,24 @@ fn summary(json: &Value, names: &[String], last: &[f64]) -> String {
         number("real_time_factor"),
     );
     let width = names.iter().map(String::len).max().unwrap_or(0);
-    for (name, value) in names.iter().zip(last) {
-        text.push_str(&format!("  {name:<width$}  {}\n", shortest(*value)));
+    let array = |name: &str| name.rsplit_once('[').map_or(name, |(array, _)| array).to_owned();
+    let mut rest = names.iter().zip(last).peekable();
+    while let Some((name, value)) = rest.next() {
+        let (start, mut values) = (array(name), vec![*value]);
+        let is_array = start != *name;
+        while is_array && values.len() < names.len() && rest.peek().is_some_and(|(next, _)| array(next) == start) {
+            values.extend(rest.next().map(|(_, value)| *value));
+        }
+        if values.len() > MOST_LISTED {
+            let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(*v), high.max(*v)));
+            let range = format!("{start}[1..{}]", values.len());
+            text.push_str(&format!("  {range:<width$}  {} to {}\n", shortest(low), shortest(high)));
+        } else {
+            for (index, value) in values.iter().enumerate() {
+                let name = if is_array { format!("{start}[{}]", index + 1) } else { name.clone() };
+                text.push_str(&format!("  {name:<width$}  {}\n", shortest(*value)));
+            }
+        }
     }
     if let Some(path) = json["csv"].as_str() {
         text.push_str(&format!("\nwritten: {path}"));

@@ -41,8 +41,10 @@ pub struct Ledger {
     pub friction_loss: Sum,
     /// Energy the contact nodes lose when a gap closes within a step.
     pub impact_loss: Sum,
-    /// Work that the coating absorbs: wear, hardening, and what its rods store and give back when the blade has left.
+    /// Work of the coating's normal force on the approaching blades.
     pub wear_work: Sum,
+    /// Energy that wearing cells takes, ∫(Y + Kε_p) dε_p: not part of the balance, see the coating's limits.
+    pub wear_energy: Sum,
     /// Work of centrifugal, thermal and nodal-diameter loads.
     pub load_work: Sum,
     /// Work done by the shaft and by a moving casing through the contacts.
@@ -59,6 +61,7 @@ persist_fields!(Ledger {
     friction_loss,
     impact_loss,
     wear_work,
+    wear_energy,
     load_work,
     external_work,
     step_change,

@@ -239,8 +239,10 @@ pub enum Quantity {
     FrictionLoss,
     /// Impact loss.
     ImpactLoss,
-    /// Work absorbed by the coating.
+    /// Work of the coating's normal force on the blades.
     WearWork,
+    /// Energy that wearing the coating takes.
+    WearEnergy,
     /// Work of centrifugal, thermal and nodal-diameter loads.
     LoadWork,
     /// External work.

@@ -119,6 +119,13 @@ impl StructureSettings {
                 "Remove the speed, or set motion = \"rotating\"",
             ));
         }
+        if self.motion == Motion::Still && !self.frequency_factors.is_empty() {
+            return Err(Error::invalid(
+                format!("{at}.frequency_factors"),
+                "a structure that stands still has no blades to mistune",
+                "Remove the line, or give it to the rotor",
+            ));
+        }
         for (index, factor) in self.frequency_factors.iter().enumerate() {
             let [low, high] = FREQUENCY_FACTORS;
             within(&format!("{at}.frequency_factors[{}]", index + 1), *factor, low, high)?;

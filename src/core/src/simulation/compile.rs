@@ -247,7 +247,7 @@ impl Compiled {
         let surface = Surface::new(&self.surface().shape, contact.gap)?;
         let smallest = rom.contact_nodes.iter().fold(f64::INFINITY, |low, node| low.min(node.position[0]));
         let largest_gap = clearances.iter().fold(0.0, |largest: f64, gap| largest.max(*gap));
-        for (what, value) in [("surface.shape", surface.largest_change()), ("contact.gap", largest_gap)] {
+        for (what, value) in [("contact.gap", largest_gap), ("surface.shape", surface.largest_change())] {
             if value > SMALL_FRACTION * smallest {
                 return Err(Error::invalid(
                     what,
@@ -459,7 +459,7 @@ impl Simulation {
                 deepest.1,
                 deepest.0 % lanes + 1
             ),
-            "Enlarge the gap, let the casing shape grow in with ramp_time (casing_ramp_time), start at another rotor angle, or start with smaller loads on casing and rotor",
+            "Enlarge the gap, let the casing shape grow in with ramp_time (casing_ramp_time), start at another rotor angle, or give other start values to the inputs that move casing, shaft or load them",
         ))
     }
 }

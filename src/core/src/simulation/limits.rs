@@ -225,8 +225,11 @@ impl Checking<'_> {
             }
             if let [sense] = senses[..] {
                 let reversed = self.growth(step, -sense, true).unwrap_or_else(|refusal| vec![refusal.to_string()]);
-                warnings
-                    .extend(reversed.into_iter().map(|text| format!("should the rotor turn the other way: {text}")));
+                warnings.extend(
+                    reversed
+                        .into_iter()
+                        .map(|text| format!("should the rotor turn the other way (this run does not): {text}")),
+                );
             }
         }
         Ok(warnings)

@@ -219,7 +219,7 @@ impl Simulation {
         if sliding && parameters.friction > 0.0 && self.inputs.speed.value == 0.0 && self.inputs.speed.slope == 0.0 {
             self.warnings.push(
                 "the rotor starts at speed 0 with friction: the sliding law does not model sticking; results are \
-                 meaningful once the tips slide faster than they vibrate"
+                 meaningful once the tips slide faster than they vibrate (the solver coulomb models it)"
                     .to_owned(),
             );
         }

@@ -127,6 +127,7 @@ impl Simulation {
             Quantity::FrictionLoss => ledger.friction_loss.value(),
             Quantity::ImpactLoss => ledger.impact_loss.value(),
             Quantity::WearWork => ledger.wear_work.value(),
+            Quantity::WearEnergy => ledger.wear_energy.value(),
             Quantity::LoadWork => ledger.load_work.value(),
             Quantity::ExternalWork => ledger.external_work.value(),
             Quantity::StepChangeEnergy => ledger.step_change.value(),

@@ -379,7 +379,7 @@ impl System {
             slave.apply(self.settings.ledger);
         }
         if let Some((coating, problem)) = &mut self.coating {
-            coating.commit(problem);
+            self.state.ledger.wear_energy.add(coating.commit(problem));
         }
     }
 

@@ -1,6 +1,8 @@
 //! Rows of what only some scenes ask for.
 
-use super::{ANGLE, Builder, LENGTH, LINE_LOAD, POWER, Parts, TEMPERATURE, VOLUME, has_friction, largest_length};
+use super::{
+    ANGLE, Builder, ENERGY, LENGTH, LINE_LOAD, POWER, Parts, TEMPERATURE, VOLUME, has_friction, largest_length,
+};
 use crate::settings::MAX_DAMPING;
 use crate::variables::{Kind, Quantity, Span, Start, Variability};
 
@@ -96,6 +98,8 @@ pub fn outputs(table: &mut Builder, scene: &Parts) {
         table.output(Quantity::WearDepthMaximum, "wear_depth_maximum", Span::Total, depth, text).display = Some(1);
         let volume = Some((&VOLUME, 1e-9));
         table.output(Quantity::WornVolume, "worn_volume", Span::Total, volume, "Volume worn off the coating");
+        let text = "Energy that wearing the coating takes since the start; no cutting force or torque carries it";
+        table.output(Quantity::WearEnergy, "wear_energy", Span::Total, Some((&ENERGY, 1.0)), text);
         if scene.settings.outputs.wear {
             let text = format!(
                 "Wear depth of each coating cell: {} around from theta = 0, row after row along z ({} rows)",

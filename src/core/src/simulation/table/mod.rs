@@ -466,7 +466,7 @@ fn watched(table: &mut Builder, scene: &Parts) -> Result<()> {
                 "tangential_force",
                 Span::Mean,
                 force,
-                "Friction force, mean over the communication step",
+                "Magnitude of the friction force (axial part included), mean over the communication step",
             ),
         ];
         let now: [(Quantity, &str, Span, _, &str); 2] = [
@@ -561,7 +561,7 @@ fn energies(table: &mut Builder, scene: &Parts) {
             Quantity::WearWork,
             "wear_work",
             Span::Total,
-            "Work absorbed by the coating since the start: wear, hardening and what its rods spring back with",
+            "Work of the coating's normal force against the approach of the blades since the start",
         ),
         (
             Quantity::LoadWork,
