@@ -267,6 +267,7 @@ impl GapLaw {
 
     /// Prescribed velocity of the master relative to the slave (m/s), without deformation; `index` is
     /// `node · lanes + lane`.
+    #[inline(always)]
     pub fn sliding_velocity(&self, node: usize, index: usize, drive: &Drive) -> [f64; 3] {
         match self {
             Self::Fixed(law) => law.sliding[index],

@@ -60,6 +60,7 @@ impl Layout {
     }
 
     /// Velocity of an undeformed node with the rotor (m/s), in the directions of its own frame.
+    #[inline(always)]
     pub fn rigid_velocity(&self, node: usize, index: usize, drive: &Drive) -> [f64; 3] {
         let spin = drive.speed * self.radii[node];
         let [x, y, z] = drive.shaft_velocity;

@@ -53,6 +53,7 @@ impl System {
     }
 
     /// Half the displacement of a node relative to the slave over the last two steps (m), in its own directions.
+    #[inline(always)]
     fn relative_motion(&self, event: &ContactEvent, index: usize, geometry: &Geometry, angle: f64) -> [f64; 3] {
         let lanes = self.bank.lanes();
         let (node, sector) = (event.node, event.sector);

@@ -173,6 +173,7 @@ impl System {
     }
 
     /// Displacement of a node relative to the slave over the step, prediction included (m), without rigid motion.
+    #[inline(always)]
     fn slip_of_deformation(&self, Member { node, sector, index }: Member) -> [f64; 3] {
         let mut moved: [f64; 3] = std::array::from_fn(|component| {
             let row = 3 * node + component;
