@@ -461,3 +461,21 @@ fn the_order_of_the_casing_load_is_a_parameter() {
     let refusal = displacement(18, 0.0).unwrap_err().to_string();
     assert!(refusal.contains("casing_load_order") && refusal.contains("0 to 17"), "{refusal}");
 }
+
+#[test]
+fn wearing_takes_at_least_the_yield_stress_times_the_worn_volume() {
+    let mut simulation = Simulation::new(&scene_with(("coating", coating), Scheme::ModalExact, Solver::Lcp)).unwrap();
+    simulation.initialise(0.0).unwrap();
+    let mut before = 0.0;
+    for _ in 0..60 {
+        let time = simulation.time();
+        simulation.do_step(time, 5e-5).unwrap();
+        let energy = real(&simulation, "wear_energy");
+        assert!(energy >= before);
+        before = energy;
+    }
+    // Y V for no hardening, (Y + K e) V with e the largest plastic strain for full hardening everywhere.
+    let (volume, strain) = (real(&simulation, "worn_volume"), real(&simulation, "wear_depth_maximum") / 1.5e-4);
+    assert!(volume > 0.0);
+    assert!(before >= 1e6 * volume * (1.0 - 1e-12) && before <= (1e6 + 2e7 * strain) * volume, "{before:e} J");
+}

@@ -1,42 +1,14 @@
 //! A rub of a synthetic bladed disk through the whole simulation: books, states, time, steps.
 
 mod common;
+#[path = "common/counting.rs"]
+mod counting;
 
-use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
-use std::cell::Cell;
 use std::collections::BTreeMap;
 
 use tiprub_core::settings::{Scheme, Shape, Solver};
 use tiprub_core::variables::{Causality, Kind};
 use tiprub_core::{Error, Scene, Simulation};
-
-/// Counts allocations of this thread while armed.
-struct Counting;
-
-thread_local! {
-    static ARMED: Cell<bool> = const { Cell::new(false) };
-    static COUNT: Cell<usize> = const { Cell::new(0) };
-}
-
-// SAFETY: forwards to the system allocator; the bookkeeping does not allocate.
-unsafe impl GlobalAlloc for Counting {
-    // SAFETY: the caller's guarantees are those of the system allocator.
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        if ARMED.try_with(Cell::get).unwrap_or(false) {
-            COUNT.with(|count| count.set(count.get() + 1));
-        }
-        // SAFETY: as above.
-        unsafe { SystemAllocator.alloc(layout) }
-    }
-    // SAFETY: as above.
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { SystemAllocator.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 fn reference(simulation: &Simulation, name: &str) -> u32 {
     simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
@@ -380,15 +352,15 @@ fn the_step_does_not_allocate() {
     let mut simulation = started(&common::scene(12));
     run(&mut simulation, 30, 5e-5);
     let mut contacts = 0;
-    ARMED.set(true);
-    for index in 0..200 {
-        let time = simulation.time();
-        simulation.do_step(time, if index % 5 == 0 { 3.1e-5 } else { 5e-5 }).unwrap();
-        contacts += simulation.system().events().len();
-    }
-    ARMED.set(false);
+    let allocations = counting::allocations_of(|| {
+        for index in 0..200 {
+            let time = simulation.time();
+            simulation.do_step(time, if index % 5 == 0 { 3.1e-5 } else { 5e-5 }).unwrap();
+            contacts += simulation.system().events().len();
+        }
+    });
     assert!(contacts > 0);
-    assert_eq!(COUNT.get(), 0, "allocations inside the step");
+    assert_eq!(allocations, 0, "allocations inside the step");
 }
 
 #[test]
