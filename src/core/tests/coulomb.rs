@@ -1,7 +1,7 @@
 //! The Coulomb solver against Siconos, against the law itself, and against the frictionless solver.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+#[path = "common/counting.rs"]
+mod counting;
 
 use nalgebra::DMatrix;
 use tiprub_core::contact::coulomb::CoulombSolver;
@@ -362,43 +362,17 @@ fn solving_does_not_allocate() {
     let (hard, hard_free) = random_problem(&mut Lcg(11), 20, 2);
     let mut hard = solver(&hard, &hard_free, &[1.4; 20]);
     let mut lcp = ContactSolver::new(60);
-    ARMED.with(|armed| armed.set(true));
-    let (first, second) = (coulomb.solve(48), hard.solve(20));
-    lcp.set_size(40);
-    for i in 0..40 {
-        lcp.delassus[(i, i)] = 1.0;
-        lcp.gaps[i] = free[3 * i];
-    }
-    let third = lcp.lcp();
-    ARMED.with(|armed| armed.set(false));
-    assert!(first.solved && first.fallback && second.fallback && third.solved);
-    assert_eq!(COUNT.with(Cell::get), 0);
-}
-
-/// Counts allocations of this thread while armed.
-struct Counting;
-
-thread_local! {
-    static ARMED: Cell<bool> = const { Cell::new(false) };
-    static COUNT: Cell<usize> = const { Cell::new(0) };
-}
-
-// SAFETY: forwards to the system allocator; the bookkeeping does not allocate.
-unsafe impl GlobalAlloc for Counting {
-    // SAFETY: the caller's guarantees are those of the system allocator.
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        if ARMED.try_with(Cell::get).unwrap_or(false) {
-            COUNT.with(|count| count.set(count.get() + 1));
+    let mut outcomes = None;
+    let allocations = counting::allocations_of(|| {
+        let (first, second) = (coulomb.solve(48), hard.solve(20));
+        lcp.set_size(40);
+        for i in 0..40 {
+            lcp.delassus[(i, i)] = 1.0;
+            lcp.gaps[i] = free[3 * i];
         }
-        // SAFETY: as above.
-        unsafe { System.alloc(layout) }
-    }
-    // SAFETY: as above.
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { System.dealloc(pointer, layout) }
-    }
+        outcomes = Some((first, second, lcp.lcp()));
+    });
+    let (first, second, third) = outcomes.unwrap();
+    assert!(first.solved && first.fallback && second.fallback && third.solved);
+    assert_eq!(allocations, 0);
 }
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
