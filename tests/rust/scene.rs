@@ -140,6 +140,7 @@ pub fn ring() -> Rom {
                     .collect(),
             }),
             grid: Some(ContactGrid { around, along }),
+            harmonics: Vec::new(),
         },
     }
 }

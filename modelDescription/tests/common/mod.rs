@@ -114,6 +114,7 @@ pub fn rom() -> Rom {
             reduced_frequencies: vec![812.35, 2345.7],
             frequency_deviation: vec![5.3e-4, 0.0043],
             residual_criterion: vec![0.1],
+            nodal_diameters: Vec::new(),
         },
         extras: tiprub_core::rom::RomExtras::default(),
     }

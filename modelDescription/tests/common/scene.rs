@@ -85,6 +85,7 @@ fn ring() -> Rom {
                 patches: (0..4).map(|patch| Patch { angle: quarter(patch), axial: [-0.02, 0.06] }).collect(),
             }),
             grid: Some(ContactGrid { around, along }),
+            harmonics: Vec::new(),
         },
     }
 }

@@ -2,12 +2,15 @@
 //!
 //! A ROM is what Craig-Bampton (or any other linear reduction) leaves of a finite-element model: small dense
 //! mass and stiffness matrices and the map from reduced coordinates to the displacement of the contact nodes.
-//! `sectors` identical, mutually uncoupled copies of it stand around the axis (blades on a rigid hub);
-//! `sectors = 1` is a single general structure.
+//! `sectors` identical copies of it stand around the axis: uncoupled (blades on a rigid hub), or coupled, with a small pencil
+//! per nodal diameter ([`Harmonic`]). `sectors = 1` is a single general structure.
+
+mod cyclic;
 
 use nalgebra::DMatrix;
 
 use crate::{Error, Result};
+pub use cyclic::Harmonic;
 
 /// Most sectors of a ROM. Bladed disks have tens to a few hundred; a damaged or hostile file must not ask for all memory,
 /// which ends the process of the importer.
@@ -44,6 +47,9 @@ pub struct RomChecks {
     pub frequency_deviation: Vec<f64>,
     /// Residual convergence criterion per mode (%), eq. 12 of the paper.
     pub residual_criterion: Vec<f64>,
+    /// Nodal diameter of each mode of a structure with coupled sectors, else empty. A mode with 0 < 2n < sectors stands
+    /// for two of the whole wheel.
+    pub nodal_diameters: Vec<u32>,
 }
 
 /// What a steady speed Ω about the z axis does to one structure, in its reduced coordinates.
@@ -104,6 +110,9 @@ pub struct RomExtras {
     pub thermal: Option<Thermal>,
     /// The contact nodes are a grid that a surface spline can be laid through.
     pub grid: Option<ContactGrid>,
+    /// Nodal diameters 1 ..= sectors/2 of coupled sectors, whose diameter 0 are the ROM's own matrices; empty for
+    /// uncoupled sectors and single structures.
+    pub harmonics: Vec<Harmonic>,
 }
 
 /// Reduced-order model of one structure.
@@ -113,7 +122,7 @@ pub struct Rom {
     pub name: String,
     /// Where it came from: mesh counts, material, reduction, in one or a few sentences.
     pub origin: String,
-    /// Number of identical uncoupled copies around the axis (1 to [`MAX_SECTORS`]).
+    /// Number of identical copies around the axis (1 to [`MAX_SECTORS`]); uncoupled unless there are harmonics.
     pub sectors: usize,
     /// Directions of the displacement components.
     pub frame: Frame,
@@ -216,7 +225,8 @@ impl Rom {
         self.validate_definiteness(remedy)?;
         self.validate_spin(remedy)?;
         self.validate_thermal(remedy)?;
-        self.validate_grid(remedy)
+        self.validate_grid(remedy)?;
+        self.validate_harmonics(remedy)
     }
 
     fn validate_spin(&self, remedy: &str) -> Result<()> {

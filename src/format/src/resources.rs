@@ -72,6 +72,7 @@ fn needed(structure: &StructureSettings, rom: &Rom, settings: &SceneSettings) ->
         thermal: rom.extras.thermal.clone().filter(|_| structure.thermal),
         // A nodal-diameter load is laid on the grid too.
         grid: rom.extras.grid.filter(|_| carries || structure.load.is_some()),
+        harmonics: rom.extras.harmonics.clone(),
     }
 }
 

@@ -155,6 +155,7 @@ impl Reader<'_> {
                 reduced_frequencies: self.check_values(arrays, "reduced_frequencies")?,
                 frequency_deviation: self.check_values(arrays, "frequency_deviation")?,
                 residual_criterion: self.check_values(arrays, "residual_criterion")?,
+                nodal_diameters: Vec::new(),
             },
             extras: self.extras(arrays, metadata, order)?,
         })

@@ -189,6 +189,7 @@ fn what_a_scene_leaves_off_leaves_no_data_in_the_fmu() {
             patches: vec![Patch { angle: [0.0, 1.0], axial: [0.0, 0.01] }],
         }),
         grid: Some(ContactGrid { around: 4, along: 2 }),
+        harmonics: Vec::new(),
     };
     full.validate().unwrap();
     let still = StructureSettings { name: "ring".into(), motion: Motion::Still, ..StructureSettings::default() };
@@ -203,8 +204,9 @@ fn what_a_scene_leaves_off_leaves_no_data_in_the_fmu() {
     assert_eq!(resource_files(&scene, true)[1].1, write_rom(&bare), "as if the extras had never been there");
 
     let only = |spin: bool, thermal: bool, grid: bool| {
-        let RomExtras { spin: s, thermal: t, grid: g } = full.extras.clone();
-        RomExtras { spin: s.filter(|_| spin), thermal: t.filter(|_| thermal), grid: g.filter(|_| grid) }
+        let RomExtras { spin: s, thermal: t, grid: g, harmonics } = full.extras.clone();
+        let (spin, thermal, grid) = (s.filter(|_| spin), t.filter(|_| thermal), g.filter(|_| grid));
+        RomExtras { spin, thermal, grid, harmonics }
     };
     for spin in [
         SpinSettings { stiffening: true, ..SpinSettings::default() },

@@ -91,9 +91,9 @@ proptest! {
         seed in 0..u64::MAX / 2, order in 1..7usize, patches in 1..5usize, has in prop::array::uniform3(any::<bool>()),
     ) {
         let mut rom = complete(seed, order, patches);
-        let RomExtras { spin, thermal, grid } = rom.extras;
+        let RomExtras { spin, thermal, grid, harmonics } = rom.extras;
         rom.extras = RomExtras {
-            spin: spin.filter(|_| has[0]), thermal: thermal.filter(|_| has[1]), grid: grid.filter(|_| has[2]),
+            spin: spin.filter(|_| has[0]), thermal: thermal.filter(|_| has[1]), grid: grid.filter(|_| has[2]), harmonics,
         };
         let bytes = write_rom(&rom);
         let again = read_rom(&bytes, "rom").unwrap();

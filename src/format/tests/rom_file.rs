@@ -43,6 +43,7 @@ fn random_rom(seed: u64, order: usize, nodes: usize, modes: usize, text: String)
             reduced_frequencies: numbers(seed + 7, modes),
             frequency_deviation: numbers(seed + 8, modes / 2),
             residual_criterion: Vec::new(),
+            nodal_diameters: Vec::new(),
         },
         extras: tiprub_core::rom::RomExtras::default(),
     }

@@ -10,9 +10,11 @@
 pub mod assembly;
 pub mod casing;
 pub mod craig_bampton;
+pub mod cyclic;
 pub mod eigen;
 pub mod element;
 mod error;
+pub mod fe_model;
 pub mod inp;
 pub mod material;
 pub mod mesh;
@@ -21,10 +23,12 @@ pub mod reduce;
 pub mod rotor37;
 pub mod sparse;
 pub mod spin;
+pub mod stage;
 pub mod thermal;
 
 pub use casing::{CasingOptions, reduce_casing, reduce_ring};
 pub use error::{Error, Result};
+pub use fe_model::FeModel;
 pub use material::Material;
 pub use mesh::{Mesh, surface_quads};
 pub use progress::{Progress, Stage};

@@ -276,7 +276,13 @@ pub(crate) fn compare(
     // A rigid-body mode has no frequency to deviate from.
     let deviation = |(f, r): (&f64, &f64)| if *f > 0.0 { (r - f) / f * 100.0 } else { 0.0 };
     let frequency_deviation = full_frequencies.iter().zip(&reduced_frequencies).map(deviation).collect();
-    RomChecks { full_frequencies, reduced_frequencies, frequency_deviation, residual_criterion }
+    RomChecks {
+        full_frequencies,
+        reduced_frequencies,
+        frequency_deviation,
+        residual_criterion,
+        nodal_diameters: Vec::new(),
+    }
 }
 
 pub(crate) fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> Result<T>) -> Result<T> {

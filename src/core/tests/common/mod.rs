@@ -153,6 +153,7 @@ pub fn casing_of(around: usize, along: usize, diameters: u32) -> Rom {
                     .collect(),
             }),
             spin: None,
+            harmonics: Vec::new(),
         },
     }
 }

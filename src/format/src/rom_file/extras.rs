@@ -13,6 +13,7 @@ impl Reader<'_> {
             spin: self.spin(arrays, metadata, order)?,
             thermal: self.thermal(arrays, order)?,
             grid: self.grid(metadata)?,
+            harmonics: Vec::new(),
         })
     }
 

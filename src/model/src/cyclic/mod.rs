@@ -1,0 +1,89 @@
+//! Reduction of a structure of identical coupled sectors, one nodal diameter at a time (cyclic symmetry).
+
+use nalgebra::Complex;
+use tiprub_core::Rom;
+
+use crate::reduce::Timings;
+
+/// The two faces where a sector meets its neighbours.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CyclicBoundary {
+    /// Pairs of node indices (low, high): the high node is the low one turned by +2π/sectors about z.
+    pub pairs: Vec<[usize; 2]>,
+    /// Number of sectors.
+    pub sectors: usize,
+}
+
+/// Which fixed-interface modes are kept.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ModeSelection {
+    /// About this many per nodal diameter: whole families, cut in a gap of frequency that they leave at every nodal
+    /// diameter, so that a family is there for all of them or for none.
+    Families(usize),
+    /// Exactly this many at every nodal diameter.
+    Count(usize),
+    /// Those up to a frequency (Hz).
+    UpTo(f64),
+}
+
+/// What to reduce to, and what to call it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CyclicOptions {
+    /// Name of the structure.
+    pub name: String,
+    /// Fixed-interface modes.
+    pub modes: ModeSelection,
+    /// Modes of the full model per nodal diameter that are computed and compared with the reduced ones.
+    pub checked_modes: usize,
+    /// Modal damping ratio proposed with the model.
+    pub damping_ratio: f64,
+}
+
+/// One nodal diameter, full and reduced.
+#[derive(Debug, Clone)]
+pub struct NodalDiameter {
+    /// Its number n.
+    pub number: usize,
+    /// Frequencies of the full model (Hz), ascending. With 0 < 2n < sectors each stands for two modes of the wheel.
+    pub full_frequencies: Vec<f64>,
+    /// Frequencies of the reduced model (Hz), as many.
+    pub reduced_frequencies: Vec<f64>,
+    /// Frequency deviation (%), eq. 13.
+    pub frequency_deviation: Vec<f64>,
+    /// Residual convergence criterion (%), eq. 12.
+    pub residual_criterion: Vec<f64>,
+    /// Frequencies with the contact nodes held (Hz), those kept.
+    pub fixed_interface_frequencies: Vec<f64>,
+    /// Full modes as displacements (x, y, z) of every node of the first sector, mass-normalised for one sector (1/√kg).
+    pub shapes: Vec<Vec<[Complex<f64>; 3]>>,
+}
+
+/// Quality of one number of fixed-interface modes per nodal diameter, over the lowest modes of the whole wheel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConvergenceRow {
+    /// Fixed-interface modes per nodal diameter η.
+    pub modes: usize,
+    /// Of the whole wheel.
+    pub total_modes: usize,
+    /// Frequency deviation (%) of each of the lowest modes of the wheel, double ones twice, ascending in frequency.
+    pub frequency_deviation: Vec<f64>,
+    /// Residual convergence criterion (%) of the same modes.
+    pub residual_criterion: Vec<f64>,
+}
+
+/// A reduced cyclic structure with what it came from.
+#[derive(Debug, Clone)]
+pub struct CyclicReduction {
+    /// The reduced-order model, checks included.
+    pub rom: Rom,
+    /// One per nodal diameter 0 ..= sectors/2.
+    pub nodal_diameters: Vec<NodalDiameter>,
+    /// Eqs 12 and 13 against the number of modes, from none to all that were computed.
+    pub convergence: Vec<ConvergenceRow>,
+    /// Degrees of freedom of one sector that are neither clamped nor follow from the other face.
+    pub free_dofs: usize,
+    /// Largest natural angular frequency of the reduced model (rad/s).
+    pub largest_angular_frequency: f64,
+    /// Wall times.
+    pub timings: Timings,
+}

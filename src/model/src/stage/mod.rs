@@ -1,0 +1,10 @@
+//! A parametric compressor stage of the paper's size (section 6.1): 56 blades on a disk, and a casing ring with flanges.
+
+/// Blades, and sectors of the disk.
+pub const SECTORS: usize = 56;
+/// Radius of the blade tips (m); the tip contour is a cylinder.
+pub const TIP_RADIUS: f64 = 0.35;
+/// Clearance between tip and casing (m).
+pub const GAP: f64 = 5.0e-4;
+/// Axial extent of the blade tip (m).
+pub const TIP_AXIAL: [f64; 2] = [-0.016, 0.016];
