@@ -19,6 +19,7 @@ pub mod inp;
 pub mod material;
 pub mod mesh;
 pub mod progress;
+pub mod quality;
 pub mod reduce;
 pub mod rotor37;
 pub mod sparse;
