@@ -24,6 +24,9 @@ pub(super) struct Lattice<'a> {
     pub web_column: usize,
 }
 
+/// Diagonals whose lengths differ by less than this share are alike.
+const ALIKE: f64 = 0.05;
+
 impl<'a> Lattice<'a> {
     pub fn new(options: &'a SectorOptions) -> Result<Self> {
         options.validate()?;
@@ -60,11 +63,29 @@ impl<'a> Lattice<'a> {
             let [columns, layers] = self.extent(row);
             for column in columns {
                 for layer in layers.clone() {
-                    prisms.extend(triangles(row, column).map(|corners| self.prism(corners, layer)));
+                    prisms.extend(self.triangles(row, column).map(|corners| self.prism(corners, layer)));
                 }
             }
         }
         prisms
+    }
+
+    /// The two triangles (row, column) of a cell, counter-clockwise in the plane of z and r: cut along the shorter diagonal,
+    /// and in turns where both are alike.
+    fn triangles(&self, row: usize, column: usize) -> [[[usize; 2]; 3]; 2] {
+        let corner = |i: usize, j: usize| [row + i, column + j];
+        let [a, b, c, d] = [corner(0, 0), corner(0, 1), corner(1, 1), corner(1, 0)];
+        let length = |from: [usize; 2], to: [usize; 2]| {
+            let [p, q] = [from, to].map(|[i, j]| self.position([2 * i, 2 * j, self.counts.layers()]));
+            (0..3).map(|d| (p[d] - q[d]).powi(2)).sum::<f64>().sqrt()
+        };
+        let (rising, falling) = (length(a, c), length(b, d));
+        let alike = (rising - falling).abs() < ALIKE * rising;
+        if if alike { (row + column) % 2 == 0 } else { rising < falling } {
+            [[a, b, c], [a, c, d]]
+        } else {
+            [[a, b, d], [b, c, d]]
+        }
     }
 
     /// Places of a prism's nodes in the order of its kind.
@@ -115,11 +136,4 @@ impl<'a> Lattice<'a> {
         sector.mesh.sets.insert("CONTACT".to_owned(), contact);
         Ok(sector)
     }
-}
-
-/// The two triangles (row, column) of a cell, counter-clockwise in the plane of z and r; the diagonals alternate.
-fn triangles(row: usize, column: usize) -> [[[usize; 2]; 3]; 2] {
-    let corner = |i: usize, j: usize| [row + i, column + j];
-    let [a, b, c, d] = [corner(0, 0), corner(0, 1), corner(1, 1), corner(1, 0)];
-    if (row + column) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
 }

@@ -75,11 +75,13 @@ impl SectorOptions {
         Self { counts, ..Self::default() }
     }
 
-    /// 294 nodes, for quick tests and trials: a rim that ends with the blade, a bore no wider than the web.
+    /// 294 nodes, for quick tests and trials: a rim that ends with the blade, a bore no wider than the
+    /// web, no fillet.
     pub fn coarse() -> Self {
         let counts =
             SectorCounts { chord: 2, span: 3, thickness: 1, side: 1, overhang: 0, rim: 1, web: [2, 2], bore: [0, 1] };
         let mut geometry = SectorGeometry::default();
+        geometry.blade.fillet = 0.0;
         geometry.disk.rim_axial = geometry.blade.root_axial;
         geometry.disk.bore_width = geometry.disk.web_thickness[0];
         Self { geometry, counts, kind: ElementKind::Penta15 }
