@@ -15,6 +15,7 @@ pub mod eigen;
 pub mod element;
 mod error;
 pub mod fe_model;
+mod file;
 pub mod inp;
 pub mod material;
 pub mod mesh;
@@ -26,6 +27,7 @@ pub mod sparse;
 pub mod spin;
 pub mod stage;
 pub mod thermal;
+pub mod vtk;
 
 pub use casing::{CasingOptions, reduce_casing, reduce_ring};
 pub use error::{Error, Result};
