@@ -18,6 +18,7 @@ pub mod fe_model;
 pub mod inp;
 pub mod material;
 pub mod mesh;
+pub mod ordering;
 pub mod progress;
 pub mod reduce;
 pub mod rotor37;
