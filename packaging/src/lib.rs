@@ -34,5 +34,6 @@ pub mod rom_facts;
 pub mod scene_features;
 pub mod scene_source;
 pub mod schedule;
+pub mod study;
 
 pub use failure::{Failure, Result};
