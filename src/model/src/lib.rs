@@ -19,6 +19,7 @@ mod file;
 pub mod inp;
 pub mod material;
 pub mod mesh;
+pub mod ordering;
 pub mod progress;
 pub mod quality;
 pub mod reduce;
