@@ -8,7 +8,7 @@ use std::sync::Arc;
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Mat, MatRef, Side};
+use faer::{Mat, MatMut, MatRef, Side};
 use rayon::prelude::*;
 
 use crate::{Error, Result};
@@ -166,5 +166,10 @@ impl Factor {
         let chunks: Vec<_> = right.as_mut().par_col_chunks_mut(SHARE).collect();
         chunks.into_par_iter().for_each(|chunk| self.llt.solve_in_place(chunk));
         right
+    }
+
+    /// As [`Self::solve`] in place, all columns together in the calling thread: for callers that are parallel themselves.
+    pub fn solve_sequential(&self, right: MatMut<'_, f64>) {
+        self.llt.solve_in_place(right);
     }
 }
