@@ -93,7 +93,7 @@ impl<'a> Condensed<'a> {
     /// A_II⁻¹ in place.
     pub fn solve_interior(&self, right: &mut Mat<f64>) {
         if let Some(factor) = &self.interior {
-            factor.solve_sequential(right.as_mut());
+            factor.solve_in_place(right.as_mut());
         }
     }
 

@@ -13,7 +13,6 @@ use super::operator::Operator;
 use super::sector::Sector;
 use super::{CyclicBoundary, CyclicOptions, CyclicReduction, NodalDiameter};
 use super::{families, lanczos, parallel, quality};
-use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report};
 use crate::reduce::{ContactPoint, Timings, check_nodes, timed};
 use crate::{FeModel, Result};
@@ -49,8 +48,7 @@ pub fn reduce_cyclic(
     faer::set_global_parallelism(faer::Par::Seq);
     let mut timings = Timings::default();
     let sector = timed(&mut timings.assembly, || {
-        let nodes_only = Mesh { nodes: model.nodes.clone(), ..Mesh::default() };
-        check_nodes(&nodes_only, clamped, contact, Frame::Cylindrical)?;
+        check_nodes(&model.nodes, clamped, contact, Frame::Cylindrical)?;
         Sector::new(model, clamped, contact, boundary)
     })?;
     let mut condensation = 0.0;
