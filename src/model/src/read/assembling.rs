@@ -85,10 +85,13 @@ fn build(
     let (stiffness, mass) = symmetric_pair(order, stiffness, mass);
     let names: Vec<String> = materials
         .iter()
-        .map(|m| format!("{}: E = {:e} Pa, nu = {}, rho = {} kg/m3", m.name, m.young_modulus, m.poisson_ratio, m.density))
+        .map(|m| {
+            format!("{}: E = {:e} Pa, nu = {}, rho = {} kg/m3", m.name, m.young_modulus, m.poisson_ratio, m.density)
+        })
         .collect();
     let kinds = element_names(mesh);
-    let origin = format!("{origin}, {} elements ({kinds}) of several materials ({})", mesh.elements.len(), names.join("; "));
+    let origin =
+        format!("{origin}, {} elements ({kinds}) of several materials ({})", mesh.elements.len(), names.join("; "));
     Ok(FeModel { nodes: mesh.nodes.clone(), sets: mesh.sets.clone(), stiffness, mass, mesh: None, origin })
 }
 
@@ -131,7 +134,8 @@ fn with_file_number(error: Error, numbers: &[u64], file: &str) -> Error {
                 numbers[element - 1],
                 kind.calculix_name()
             ),
-            remedy: "Mesh that place again; quadratic elements fold where the mesh is too coarse for the curvature".into(),
+            remedy: "Mesh that place again; quadratic elements fold where the mesh is too coarse for the curvature"
+                .into(),
         },
         other => other,
     }

@@ -115,7 +115,8 @@ impl Draft {
         let kept: Vec<usize> = (0..self.numbers.len()).filter(|&index| used[index]).collect();
         let mut position = vec![usize::MAX; self.numbers.len()];
         kept.iter().enumerate().for_each(|(new, &old)| position[old] = new);
-        let place = |number: &u64| self.index.get(number).map(|&index| position[index]).filter(|&new| new != usize::MAX);
+        let place =
+            |number: &u64| self.index.get(number).map(|&index| position[index]).filter(|&new| new != usize::MAX);
         let sets = self.node_sets.iter().map(|(name, numbers)| {
             let mut nodes: Vec<usize> = numbers.iter().filter_map(place).collect();
             nodes.sort_unstable();

@@ -142,9 +142,7 @@ fn mesh_file(path: &Path, bytes: &[u8], temperature: Option<f64>, open: source::
             let inp::Deck { draft, materials, held } = inp::read(path, bytes, temperature, open)?;
             Ok(MeshFile { draft, materials, held })
         }
-        MeshFormat::Gmsh => {
-            Ok(MeshFile { draft: gmsh::read(path, bytes)?, materials: Vec::new(), held: Vec::new() })
-        }
+        MeshFormat::Gmsh => Ok(MeshFile { draft: gmsh::read(path, bytes)?, materials: Vec::new(), held: Vec::new() }),
     }
 }
 
@@ -155,9 +153,7 @@ fn mesh_file(path: &Path, bytes: &[u8], temperature: Option<f64>, open: source::
 /// [`Error::Read`] with file and line.
 pub fn parse_mesh(name: &str, bytes: &[u8]) -> Result<crate::Mesh> {
     let path = Path::new(name);
-    let none = |path: &Path| {
-        Err(Error::File { path: path.to_path_buf(), source: std::io::ErrorKind::NotFound.into() })
-    };
+    let none = |path: &Path| Err(Error::File { path: path.to_path_buf(), source: std::io::ErrorKind::NotFound.into() });
     let (numbered, _, _) = mesh_file(path, bytes, Some(0.0), &none)?.draft.into_mesh(1.0, name)?;
     Ok(numbered.mesh)
 }

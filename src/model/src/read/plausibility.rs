@@ -29,7 +29,12 @@ const DENSITY: Range = Range { what: "density", unit: "kg/m³", usual: [100.0, 2
 /// √(E/ρ): about 5000 m/s for steel, titanium, nickel and aluminium.
 const WAVE: Range = Range { what: "√(E/ρ)", unit: "m/s", usual: [500.0, 20_000.0], possible: [1.0, 1e6] };
 /// Mass over the volume of the box around the model; thin structures fill little of it.
-const FILLING: Range = Range { what: "mass per volume of the box around it", unit: "kg/m³", usual: [0.1, 23_000.0], possible: [1e-6, 1e5] };
+const FILLING: Range = Range {
+    what: "mass per volume of the box around it",
+    unit: "kg/m³",
+    usual: [0.1, 23_000.0],
+    possible: [1e-6, 1e5],
+};
 
 impl Plausibility {
     fn check(&mut self, range: &Range, value: f64, whose: &str) {

@@ -21,7 +21,8 @@ const HEX20: [usize; 20] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17
 /// Gmsh: edges (0,1) (0,2) (0,3) (1,2) (1,4) (2,5) (3,4) (3,5) (4,5).
 const PENTA15: [usize; 15] = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11];
 
-const INCOMPLETE: &str = "Mesh again with Mesh.SecondOrderIncomplete = 1: quadratic elements without nodes on faces and inside";
+const INCOMPLETE: &str =
+    "Mesh again with Mesh.SecondOrderIncomplete = 1: quadratic elements without nodes on faces and inside";
 const LOWER_ORDER: &str = "Mesh again with Mesh.ElementOrder = 2 or 1";
 
 /// Meaning of an element type (Gmsh reference manual, MSH file format).

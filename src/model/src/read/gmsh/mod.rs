@@ -32,7 +32,8 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Draft> {
             "Nodes" => reader.nodes(&mut numbers)?,
             "Elements" => reader.elements(&mut numbers)?,
             "PartitionedEntities" => {
-                return Err(numbers.error("the mesh is partitioned", "Save it with Mesh.PartitionCreateTopology = 0, unpartitioned"));
+                return Err(numbers
+                    .error("the mesh is partitioned", "Save it with Mesh.PartitionCreateTopology = 0, unpartitioned"));
             }
             _ => {}
         }
@@ -65,7 +66,9 @@ impl<'a> Sections<'a> {
             sections.skip_behind("$EndComments")?;
         }
         if sections.take_line() != Some("$MeshFormat") {
-            return Err(sections.error("it does not begin with $MeshFormat", "Give a mesh that Gmsh wrote in format 4.1"));
+            return Err(
+                sections.error("it does not begin with $MeshFormat", "Give a mesh that Gmsh wrote in format 4.1")
+            );
         }
         let format = sections.take_line().unwrap_or_default().to_owned();
         let mut words = format.split_whitespace();
@@ -136,7 +139,11 @@ impl<'a> Sections<'a> {
             self.take_line();
         }
         let Some(line) = self.take_line() else {
-            return if self.rest().is_empty() { Ok(None) } else { Err(self.error("no section begins here", "Write the mesh again")) };
+            return if self.rest().is_empty() {
+                Ok(None)
+            } else {
+                Err(self.error("no section begins here", "Write the mesh again"))
+            };
         };
         let Some(name) = line.strip_prefix('$').filter(|name| !name.is_empty()) else {
             return Err(self.error(format!("`{line}` is no section"), "Write the mesh again"));
@@ -239,7 +246,9 @@ impl Reader {
                 }
                 None => {
                     let problem = format!("element type {kind} is not known");
-                    return Err(numbers.error(problem, "Mesh with tetrahedra, prisms or bricks of first or second order"));
+                    return Err(
+                        numbers.error(problem, "Mesh with tetrahedra, prisms or bricks of first or second order")
+                    );
                 }
             };
             let count = numbers.count(nodes + 1)?;
@@ -264,7 +273,8 @@ impl Reader {
         let name = |tag: &i64| {
             let unnamed = || {
                 let dimension = ["point", "curve", "surface", "volume"];
-                let dimension = usize::try_from(entity.0).ok().and_then(|index| dimension.get(index)).unwrap_or(&"group");
+                let dimension =
+                    usize::try_from(entity.0).ok().and_then(|index| dimension.get(index)).unwrap_or(&"group");
                 format!("{dimension}_{tag}")
             };
             self.names.get(&(entity.0, *tag)).cloned().unwrap_or_else(unnamed)

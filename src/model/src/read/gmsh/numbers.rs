@@ -19,11 +19,9 @@ impl<'a> Numbers<'a> {
     pub fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
         match self {
             Self::Text { file, line, .. } => Place { file: Arc::clone(file), line: *line }.error(problem, remedy),
-            Self::Bytes { file, offset, .. } => Error::Read {
-                place: format!("{file}, byte {offset}"),
-                problem: problem.into(),
-                remedy: remedy.into(),
-            },
+            Self::Bytes { file, offset, .. } => {
+                Error::Read { place: format!("{file}, byte {offset}"), problem: problem.into(), remedy: remedy.into() }
+            }
         }
     }
 

@@ -41,7 +41,9 @@ impl DeckMaterial {
         let kind = card.parameter("TYPE")?.map(str::to_uppercase);
         if kind.as_deref().is_some_and(|kind| !matches!(kind, "ISO" | "ISOTROPIC")) || card.has("DEPENDENCIES") {
             let problem = format!("*{} of material `{}` is not plainly isotropic", card.keyword, self.name);
-            return Err(card.place.error(problem, "Only isotropic materials are computed: give the matrices of the model"));
+            return Err(card
+                .place
+                .error(problem, "Only isotropic materials are computed: give the matrices of the model"));
         }
         match card.keyword.as_str() {
             "ELASTIC" => self.elastic = Some(Table::read(card)?),

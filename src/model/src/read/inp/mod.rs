@@ -104,7 +104,8 @@ impl Reader {
             Unread::Harmless => self.skip(card),
             Unread::Changes => {
                 let problem = format!("*{keyword} changes what is computed and is not supported");
-                let remedy = "Remove it if it is not meant here, or give the matrices of the model: --stiffness and --mass";
+                let remedy =
+                    "Remove it if it is not meant here, or give the matrices of the model: --stiffness and --mass";
                 return Err(card.place.error(problem, remedy));
             }
             Unread::Unknown => {
@@ -145,7 +146,8 @@ impl Reader {
                 *x = match values.next() {
                     None | Some("") => 0.0,
                     Some(text) => number(text).ok_or_else(|| {
-                        line.place.error(format!("coordinate `{text}` of node {node} is not a number"), "Correct the line")
+                        line.place
+                            .error(format!("coordinate `{text}` of node {node} is not a number"), "Correct the line")
                     })?,
                 };
             }
@@ -282,12 +284,15 @@ fn count(counter: &mut usize, card: &Card, what: &str) -> Result<()> {
         return Ok(());
     }
     let problem = format!("a second {what}: only one is read");
-    Err(card.place.error(problem, "Merge the parts into one mesh, or write the input file without parts and assemblies"))
+    Err(card
+        .place
+        .error(problem, "Merge the parts into one mesh, or write the input file without parts and assemblies"))
 }
 
 /// A number of a node or an element.
 fn label(text: &str, line: &DataLine, what: &str) -> Result<u64> {
-    text.parse::<u64>().ok().filter(|&number| number > 0).ok_or_else(|| {
-        line.place.error(format!("`{text}` is not {what} (a whole number from 1)"), "Correct the line")
-    })
+    text.parse::<u64>()
+        .ok()
+        .filter(|&number| number > 0)
+        .ok_or_else(|| line.place.error(format!("`{text}` is not {what} (a whole number from 1)"), "Correct the line"))
 }

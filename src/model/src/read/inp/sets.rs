@@ -86,13 +86,7 @@ impl Family {
         self.resolve(local_name(set), place, &every, &|number| !draft.nodes_of(number).is_empty())
     }
 
-    fn resolve(
-        &self,
-        set: &str,
-        place: &Place,
-        every: &[u64],
-        exists: &dyn Fn(u64) -> bool,
-    ) -> Result<BTreeSet<u64>> {
+    fn resolve(&self, set: &str, place: &Place, every: &[u64], exists: &dyn Fn(u64) -> bool) -> Result<BTreeSet<u64>> {
         let (mut found, mut seen) = (BTreeSet::new(), BTreeSet::new());
         let mut open = vec![(set.to_owned(), place.clone())];
         while let Some((name, place)) = open.pop() {

@@ -31,7 +31,8 @@ const LARGEST_ORDER: usize = 30_000_000;
 pub(super) fn read_matrix(path: &Path, bytes: &[u8]) -> Result<RawMatrix> {
     let text = text_of(bytes);
     let file: Arc<str> = path.display().to_string().into();
-    let lines = text.lines().enumerate().map(|(index, line)| (line.trim(), Place { file: Arc::clone(&file), line: index + 1 }));
+    let lines =
+        text.lines().enumerate().map(|(index, line)| (line.trim(), Place { file: Arc::clone(&file), line: index + 1 }));
     if text.starts_with("%%MatrixMarket") {
         return matrix_market(path, lines);
     }
@@ -42,7 +43,11 @@ pub(super) fn read_matrix(path: &Path, bytes: &[u8]) -> Result<RawMatrix> {
         5 => named(lines),
         _ => {
             let problem = "it is no matrix: lines of ROW, COLUMN, VALUE or of NODE, DOF, NODE, DOF, VALUE are wanted";
-            Err(about(path, problem, "Give Matrix Market, CalculiX .sti/.mas, or Abaqus MATRIX INPUT or COORDINATE text"))
+            Err(about(
+                path,
+                problem,
+                "Give Matrix Market, CalculiX .sti/.mas, or Abaqus MATRIX INPUT or COORDINATE text",
+            ))
         }
     }
 }
@@ -75,7 +80,9 @@ fn matrix_market<'a>(path: &Path, mut lines: impl Iterator<Item = (&'a str, Plac
         return Err(wrong_line(line, &place, "ROWS COLUMNS ENTRIES"));
     };
     if order != columns || order == 0 || order > LARGEST_ORDER {
-        return Err(place.error(format!("{order} × {columns} is no size of a stiffness or mass"), "Give a square matrix"));
+        return Err(
+            place.error(format!("{order} × {columns} is no size of a stiffness or mass"), "Give a square matrix")
+        );
     }
     let mut entries = Entries::default();
     let mut triangles = [false; 2];
@@ -110,7 +117,9 @@ fn entry(line: &str, place: &Place) -> Result<(usize, usize, f64)> {
     let (row, column, value, rest) = (fields.next(), fields.next(), fields.next(), fields.next());
     let index = |text: Option<&str>| text.and_then(|text| text.parse::<usize>().ok()).filter(|&index| index >= 1);
     match (index(row), index(column), value.and_then(number), rest) {
-        (Some(row), Some(column), Some(value), None) if row.max(column) <= LARGEST_ORDER => Ok((row - 1, column - 1, value)),
+        (Some(row), Some(column), Some(value), None) if row.max(column) <= LARGEST_ORDER => {
+            Ok((row - 1, column - 1, value))
+        }
         _ => Err(wrong_line(line, place, "ROW COLUMN VALUE with finite numbers and indices from 1")),
     }
 }
@@ -119,7 +128,11 @@ fn counted<'a>(path: &Path, lines: impl Iterator<Item = (&'a str, Place)>) -> Re
     let items = lines.map(|(line, place)| entry(line, &place)).collect::<Result<Vec<_>>>()?;
     let order = items.iter().map(|entry| entry.0.max(entry.1) + 1).max().unwrap_or(0);
     if order > 3 * items.len() {
-        return Err(about(path, format!("{order} rows with {} entries", items.len()), "Write the matrix again, complete"));
+        return Err(about(
+            path,
+            format!("{order} rows with {} entries", items.len()),
+            "Write the matrix again, complete",
+        ));
     }
     Ok(RawMatrix { entries: Entries { items }, labels: Labels::Counted(order) })
 }
@@ -136,7 +149,9 @@ fn named<'a>(lines: impl Iterator<Item = (&'a str, Place)>) -> Result<RawMatrix>
             let node = node.parse::<i64>().map_err(|_| wrong_line(line, &place, "NODE, DOF, NODE, DOF, VALUE"))?;
             let Some(node) = u64::try_from(node).ok().filter(|&node| node > 0) else {
                 let problem = format!("node {node} is an internal one of the code that wrote the matrix");
-                return Err(place.error(problem, "Write matrices of plain solid elements, without constraints that add nodes"));
+                return Err(
+                    place.error(problem, "Write matrices of plain solid elements, without constraints that add nodes")
+                );
             };
             let component = component.parse().map_err(|_| wrong_line(line, &place, "NODE, DOF, NODE, DOF, VALUE"))?;
             Ok(*index.entry((node, component)).or_insert_with(|| {
@@ -155,7 +170,8 @@ fn named<'a>(lines: impl Iterator<Item = (&'a str, Place)>) -> Result<RawMatrix>
 pub(super) fn read_dofs(path: &Path, bytes: &[u8]) -> Result<Vec<(u64, u64)>> {
     let text = text_of(bytes);
     let file: Arc<str> = path.display().to_string().into();
-    let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim())).filter(|(_, line)| !line.is_empty());
+    let lines =
+        text.lines().enumerate().map(|(index, line)| (index + 1, line.trim())).filter(|(_, line)| !line.is_empty());
     let dof = |(line, text): (usize, &str)| {
         let parts = text.split_once('.').and_then(|(node, dof)| Some((node.parse().ok()?, dof.parse().ok()?)));
         parts.ok_or_else(|| wrong_line(text, &Place { file: Arc::clone(&file), line }, "NODE.DOF"))

@@ -23,9 +23,9 @@ use node_table::{NodeTable, read_nodes};
 use super::entries::{Entries, symmetric_pair};
 use super::source::{about, open_file};
 use super::{Imported, Units};
+use crate::Result;
 use crate::fe_model::FeModel;
 use crate::sparse::SparseMatrix;
-use crate::Result;
 
 /// The files of a model.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -123,10 +123,15 @@ impl<'a> Rows<'a> {
     }
 
     fn dof(&self, path: &Path, node: u64, component: u64) -> Result<usize> {
-        let component = usize::try_from(component).ok().filter(|component| (1..=3).contains(component)).ok_or_else(|| {
-            let problem = format!("node {node} has degree of freedom {component}");
-            about(path, problem, "Solid models with displacements 1, 2, 3 only: no rotations, no pressure or temperature")
-        })?;
+        let component =
+            usize::try_from(component).ok().filter(|component| (1..=3).contains(component)).ok_or_else(|| {
+                let problem = format!("node {node} has degree of freedom {component}");
+                about(
+                    path,
+                    problem,
+                    "Solid models with displacements 1, 2, 3 only: no rotations, no pressure or temperature",
+                )
+            })?;
         let index = self.index.get(&node).ok_or_else(|| {
             let problem = format!("node {node} is not in {}", self.files.nodes.display());
             about(path, problem, "Give a node table of the same model")
@@ -146,9 +151,14 @@ impl<'a> Rows<'a> {
                 "{order} rows, but {} have 3·{all} = {} degrees of freedom{}",
                 self.files.nodes.display(),
                 3 * all,
-                if kept < all { format!(" and 3·{kept} = {} without the clamped nodes", 3 * kept) } else { String::new() }
+                if kept < all {
+                    format!(" and 3·{kept} = {} without the clamped nodes", 3 * kept)
+                } else {
+                    String::new()
+                }
             );
-            let remedy = "Give matrices of all nodes, or of all that --clamp-set does not name, in the order of the node table";
+            let remedy =
+                "Give matrices of all nodes, or of all that --clamp-set does not name, in the order of the node table";
             return Err(about(path, problem, remedy));
         };
         Ok(nodes.iter().flat_map(|node| (0..3).map(move |component| 3 * node + component)).collect())
@@ -184,7 +194,8 @@ const ASYMMETRY: f64 = 1e-8;
 fn mirrored(path: &Path, entries: Entries, order: usize, scale: f64) -> Result<(Entries, Vec<usize>)> {
     let below = entries.items.iter().any(|&(i, j, value)| i > j && value != 0.0);
     let above = entries.items.iter().any(|&(i, j, value)| i < j && value != 0.0);
-    let held = entries.items.iter().filter(|&&(i, j, value)| i == j && value.abs() > HELD).map(|entry| entry.0).collect();
+    let held =
+        entries.items.iter().filter(|&&(i, j, value)| i == j && value.abs() > HELD).map(|entry| entry.0).collect();
     let mut items: Vec<_> = entries.items.iter().map(|&(i, j, value)| (i, j, scale * value)).collect();
     if !(below && above) {
         items.extend(entries.items.iter().filter(|(i, j, _)| i != j).map(|&(i, j, value)| (j, i, scale * value)));
@@ -208,7 +219,11 @@ fn mirrored(path: &Path, entries: Entries, order: usize, scale: f64) -> Result<(
             i + 1,
             j + 1
         );
-        return Err(about(path, problem, "Gyroscopic, follower-load and friction terms must be off when it is written"));
+        return Err(about(
+            path,
+            problem,
+            "Gyroscopic, follower-load and friction terms must be off when it is written",
+        ));
     }
     let halves = |(i, j): (usize, usize), value: f64| [(i, j, 0.5 * value), (j, i, 0.5 * value)];
     let mut items: Vec<_> = sums.into_iter().flat_map(|(place, value)| halves(place, value)).collect();
@@ -251,7 +266,11 @@ fn absent_nodes(files: &MatrixFiles, numbers: &[u64], stiffness: &SparseMatrix) 
         }
         if let Some(component) = (0..3).find(|component| diagonal(stiffness, 3 * node + component) < 0.0) {
             let problem = format!("the diagonal of node {number}, direction {}, is negative", component + 1);
-            return Err(about(&files.stiffness, problem, "A stiffness is positive: are K and M exchanged, or the signs?"));
+            return Err(about(
+                &files.stiffness,
+                problem,
+                "A stiffness is positive: are K and M exchanged, or the signs?",
+            ));
         }
     }
     if absent.len() == numbers.len() {
@@ -268,7 +287,11 @@ fn check_mass(files: &MatrixFiles, numbers: &[u64], mass: &SparseMatrix, absent:
         if let Some(component) = (0..3).find(|component| diagonal(mass, 3 * node + component) <= 0.0) {
             let value = diagonal(mass, 3 * node + component);
             let problem = format!("node {number}, direction {}, has mass {value:e} on the diagonal", component + 1);
-            return Err(about(&files.mass, problem, "Every node that moves needs mass: is it the matrix of the same model?"));
+            return Err(about(
+                &files.mass,
+                problem,
+                "Every node that moves needs mass: is it the matrix of the same model?",
+            ));
         }
     }
     Ok(())
