@@ -232,9 +232,10 @@ impl Reader {
             self.draft.notes.push(format!("{count} elements {name} are no solids: left out, their sets kept"));
         }
         for name in self.near.keys() {
-            let full = name.trim_end_matches(char::is_alphabetic);
+            let full = name.trim_end_matches(|c: char| c.is_ascii_alphabetic());
             self.draft.warnings.push(format!(
-                "{name} is integrated fully, as {full}: frequencies come out slightly higher than with {name}"
+                "{name} is integrated fully here{}: frequencies come out higher than with reduced integration",
+                if name == full { String::new() } else { format!(", as {full}") }
             ));
         }
         if !self.skipped.is_empty() {
