@@ -175,7 +175,7 @@ fn wrong_files_are_refused_with_line_and_remedy() {
         (swap("5, 50", "1, 50"), &["a.inp:16", "element 1", "second time"]),
         (swap("1, 10, 20", "1, 10, 99"), &["a.inp:15", "node 99", "not defined"]),
         (swap("70, 80\n", "70\n"), &["element 1 (C3D8)", "8"]),
-        (swap("120, 130, 140\n", "120, 130\n"), &["a.inp:17", "element 5 (C3D8) has 7 nodes"]),
+        (swap("120, 130, 140\n", "120, 130\n"), &["a.inp:16", "element 5 (C3D8) has 7 nodes"]),
         (swap("1, 10, 20", "1, 20, 10"), &["element 1 (C3D8)", "turned inside out"]),
         (swap("1, 10, 20", "1, 10, 10"), &["a.inp:15", "twice", "collapsed"]),
         (swap("C3D8", "C3D8I"), &["a.inp:14", "C3D8I", "incompatible", "--stiffness"]),
