@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::{casing_arguments::CasingArguments, file_arguments::FileArguments};
+use crate::{casing_arguments::CasingArguments, file_arguments::FileArguments, rom_cache::RomCache};
 
 /// Blade-tip/casing contact (rub) as an FMU.
 #[derive(Debug, Parser)]
@@ -146,6 +146,9 @@ pub struct PackageArguments {
     /// FMU library to package, instead of the one found beside tiprub.
     #[arg(long, value_name = "FILE")]
     pub library: Option<PathBuf>,
+    /// Where built-in models are kept.
+    #[command(flatten)]
+    pub cache: CacheArguments,
 }
 
 /// Arguments of `tiprub run`.
@@ -166,6 +169,9 @@ pub struct RunArguments {
     /// Start value of an input or parameter; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
+    /// Where built-in models are kept.
+    #[command(flatten)]
+    pub cache: CacheArguments,
 }
 
 /// Arguments of `tiprub inspect`.
@@ -174,6 +180,25 @@ pub struct InspectArguments {
     /// An .fmu, a ROM (.safetensors), a scene (.toml) or one that ships (`builtin:abradable`).
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
+    /// Where built-in models are kept.
+    #[command(flatten)]
+    pub cache: CacheArguments,
+}
+
+/// Whether built-in models are kept from one command to the next.
+#[derive(Debug, Clone, Default, Args)]
+pub struct CacheArguments {
+    /// Reduce built-in models anew, and keep them for no other command. Otherwise they are kept in the directory that the
+    /// environment variable TIPRUB_CACHE names, or in `tiprub` in the user's cache directory.
+    #[arg(long)]
+    pub no_cache: bool,
+}
+
+impl CacheArguments {
+    /// The cache to use.
+    pub fn cache(&self) -> RomCache {
+        if self.no_cache { RomCache::off() } else { RomCache::of_user() }
+    }
 }
 
 /// What can be reduced.

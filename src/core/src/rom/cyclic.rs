@@ -104,11 +104,17 @@ impl Rom {
                 return refuse(name, format!("not Hermitian: off by {asymmetry:.3e} at largest entry {largest:.3e}"));
             }
         }
-        if harmonic.mass.clone().cholesky().is_none() {
+        if !is_positive_definite(&harmonic.mass) {
             return refuse("mass", "not positive definite".to_owned());
         }
         Ok(())
     }
+}
+
+/// A complex factorisation does not stop at a negative pivot: its root is imaginary.
+fn is_positive_definite(matrix: &DMatrix<Complex<f64>>) -> bool {
+    let factor = matrix.clone().cholesky();
+    factor.is_some_and(|factor| factor.l_dirty().diagonal().iter().all(|root| root.re > root.im.abs()))
 }
 
 fn largest_entry(matrix: &DMatrix<Complex<f64>>) -> f64 {
