@@ -366,11 +366,10 @@ fn mode_shapes(reduction: &Reduction) -> Figure {
 
 fn surface_of(reduction: &Reduction) -> Surface {
     let corner = |face: &[usize], index: usize| face[index.min(face.len() - 1)];
-    let faces = surface_quads(&reduction.mesh);
-    Surface {
-        points: reduction.mesh.nodes.clone(),
-        faces: faces.iter().map(|face| std::array::from_fn(|index| corner(face, index))).collect(),
-    }
+    // A model without a mesh has no surface to show.
+    let (faces, points) =
+        reduction.mesh.as_ref().map(|mesh| (surface_quads(mesh), mesh.nodes.clone())).unwrap_or_default();
+    Surface { points, faces: faces.iter().map(|face| std::array::from_fn(|index| corner(face, index))).collect() }
 }
 
 fn cartesian([radius, angle, z]: [f64; 3]) -> [f64; 3] {
