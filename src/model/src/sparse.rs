@@ -5,11 +5,17 @@
 
 use std::sync::Arc;
 
-use faer::linalg::solvers::Solve;
-use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::perm::PermRef;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Mat, MatRef, Side};
+use faer::{Conj, Mat, MatMut, MatRef, Par, Side, Spec};
 use rayon::prelude::*;
+
+use crate::ordering::{Ordering, elimination_order};
 
 use crate::{Error, Result};
 
@@ -26,6 +32,10 @@ impl Pattern {
     /// Number of rows and columns.
     pub fn order(&self) -> usize {
         self.starts.len() - 1
+    }
+
+    fn as_faer(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        SymbolicSparseColMatRef::new_checked(self.order(), self.order(), &self.starts, None, &self.rows)
     }
 
     /// Pattern of the rows and columns `keep` (ascending), and for each of its entries the entry it is here.
@@ -126,14 +136,32 @@ impl SparseMatrix {
     /// [`Error::NotPositiveDefinite`].
     pub fn factor(&self, name: &str, remedy: &str) -> Result<Factor> {
         let fail = || Error::NotPositiveDefinite { matrix: name.into(), remedy: remedy.into() };
-        let order = self.order();
-        let symbolic =
-            SymbolicSparseColMatRef::new_checked(order, order, &self.pattern.starts, None, &self.pattern.rows);
-        let matrix = SparseColMatRef::new(symbolic, self.values.as_slice());
-        let llt = SymbolicLlt::try_new(symbolic, Side::Lower)
-            .ok()
-            .and_then(|symbolic| Llt::try_new_with_symbolic(symbolic, matrix, Side::Lower).ok());
-        llt.map(|llt| Factor { llt }).ok_or_else(fail)
+        let symbolic = SymbolicFactor::new(&self.pattern, Ordering::Automatic).ok_or_else(fail)?;
+        self.factor_with(&symbolic).ok_or_else(fail)
+    }
+
+    /// The Cholesky factor, with the structure that was found for this pattern; `None` when it is not positive definite
+    /// or memory does not suffice.
+    pub fn factor_with(&self, symbolic: &SymbolicFactor) -> Option<Factor> {
+        let matrix = SparseColMatRef::new(self.pattern.as_faer(), self.values.as_slice());
+        let mut values = Vec::new();
+        values.try_reserve_exact(symbolic.inner.len_val()).ok()?;
+        values.resize(symbolic.inner.len_val(), 0.0);
+        let scratch = symbolic.inner.factorize_numeric_llt_scratch::<f64>(PAR, Spec::default());
+        let mut memory = MemBuffer::try_new(scratch).ok()?;
+        symbolic
+            .inner
+            .factorize_numeric_llt(
+                &mut values,
+                matrix,
+                Side::Lower,
+                LltRegularization::default(),
+                PAR,
+                MemStack::new(&mut memory),
+                Spec::default(),
+            )
+            .ok()?;
+        Some(Factor { symbolic: symbolic.clone(), values })
     }
 }
 
@@ -149,13 +177,51 @@ pub fn principal_pair(first: &SparseMatrix, second: &SparseMatrix, keep: &[usize
     (pick(first), pick(second))
 }
 
+/// The library's own threads split sums by their number, and a ROM must have the same bits on every number of threads.
+const PAR: Par = Par::Seq;
+
+/// Structure of the Cholesky factor of every matrix of one pattern.
+#[derive(Debug, Clone)]
+pub struct SymbolicFactor {
+    inner: Arc<SymbolicCholesky<usize>>,
+}
+
+impl SymbolicFactor {
+    /// Find an order of elimination and the structure that comes of it; `None` when memory does not suffice.
+    pub fn new(pattern: &Pattern, ordering: Ordering) -> Option<Self> {
+        let order = elimination_order(pattern, ordering);
+        let inverse = order.as_ref().map(|order| {
+            let mut inverse = vec![0; order.len()];
+            for (new, &old) in order.iter().enumerate() {
+                inverse[old] = new;
+            }
+            inverse
+        });
+        let custom = match (&order, &inverse) {
+            (Some(order), Some(inverse)) => {
+                SymmetricOrdering::Custom(PermRef::new_checked(order, inverse, pattern.order()))
+            }
+            _ => SymmetricOrdering::Amd,
+        };
+        let found =
+            factorize_symbolic_cholesky(pattern.as_faer(), Side::Lower, custom, CholeskySymbolicParams::default());
+        Some(Self { inner: Arc::new(found.ok()?) })
+    }
+
+    /// Number of stored entries of the factor, the zeros that blocks include counted.
+    pub fn entries(&self) -> usize {
+        self.inner.len_val()
+    }
+}
+
 /// Columns solved together.
-const SHARE: usize = 3;
+const SHARE: usize = 8;
 
 /// Sparse Cholesky factor.
 #[derive(Debug, Clone)]
 pub struct Factor {
-    llt: Llt<usize, f64>,
+    symbolic: SymbolicFactor,
+    values: Vec<f64>,
 }
 
 impl Factor {
@@ -164,7 +230,19 @@ impl Factor {
         // Columns are independent: shares of them beat threads inside the triangular solves. The width of a share is fixed,
         // because the kernels round differently for different widths, and a ROM must not depend on the number of threads.
         let chunks: Vec<_> = right.as_mut().par_col_chunks_mut(SHARE).collect();
-        chunks.into_par_iter().for_each(|chunk| self.llt.solve_in_place(chunk));
+        chunks.into_par_iter().for_each(|chunk| self.solve_in_place(chunk));
         right
+    }
+
+    fn solve_in_place(&self, right: MatMut<'_, f64>) {
+        let scratch = self.symbolic.inner.solve_in_place_scratch::<f64>(right.ncols(), PAR);
+        let mut memory = MemBuffer::new(scratch);
+        let factor = LltRef::new(&self.symbolic.inner, &self.values);
+        factor.solve_in_place_with_conj(Conj::No, right, PAR, MemStack::new(&mut memory));
+    }
+
+    /// Number of stored entries, the zeros that blocks include counted.
+    pub fn entries(&self) -> usize {
+        self.values.len()
     }
 }
