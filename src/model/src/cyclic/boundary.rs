@@ -164,6 +164,9 @@ fn check_faces(nodes: &[[f64; 3]], low: &[usize], high: &[usize], sectors: usize
             let problem = format!("node {} does not exist; there are {}", node + 1, nodes.len());
             return refuse(problem, "Name nodes of the mesh");
         };
+        if !(x.is_finite() && y.is_finite() && z.is_finite()) {
+            return refuse(format!("coordinates of node {} are not finite", node + 1), "Correct the mesh");
+        }
         let radius = x.hypot(y);
         if radius <= 1e-9 * radius.hypot(z).max(tolerance) {
             let problem = format!("node {} lies on the z axis, where it belongs to every sector", node + 1);

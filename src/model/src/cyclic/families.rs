@@ -10,7 +10,7 @@ use super::ModeSelection;
 use super::component::Wanted;
 
 /// Gaps narrower than this share of their frequency tell no families apart.
-pub const SMALLEST_GAP: f64 = 0.01;
+pub const SMALLEST_GAP: f64 = 0.005;
 
 /// The kept numbers of modes, and what to tell about them.
 #[derive(Debug, Clone, PartialEq)]
