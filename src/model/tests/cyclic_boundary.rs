@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::wheel::{COARSE, boundary, model, sector, tips};
+use common::wheel::{COARSE, Counts, boundary, model, sector, tips};
 use tiprub_model::cyclic::{CyclicBoundary, CyclicOptions, ModeSelection, PairingReport, reduce_cyclic, whole_wheel};
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Mesh;
@@ -104,9 +104,20 @@ fn contact_on_a_face_and_loose_structures_are_refused() {
     let rim = *mesh.set("LOW").unwrap().iter().find(|node| !bore.contains(node)).unwrap();
     assert!(refusal(&bore, &at(rim)).contains("cyclic face"));
     assert!(refusal(&bore, &at(bore[1])).contains("clamped"));
-    // One node clamped per sector on a circle still lets nothing turn freely; a single blade's node in mid-air does not hold it.
-    let none = reduce_cyclic(&model(mesh.clone()), &bore, &[], &faces, &options, &silent).unwrap_err().to_string();
-    assert!(none.contains("contact"), "{none}");
+    assert!(refusal(&bore, &[]).contains("there are none"));
+    let other = CyclicBoundary { pairs: vec![[0, 99_999]], sectors: SECTORS };
+    let error = reduce_cyclic(&model(mesh.clone()), &bore, &tips(&mesh, 2), &other, &options, &silent).unwrap_err();
+    assert!(error.to_string().contains("does not exist"), "{error}");
+    // A brick that hangs on nothing.
+    let mut loose = mesh.clone();
+    let first = loose.nodes.len();
+    loose.nodes.extend(
+        (0..8).map(|i| [0.3 + 0.01 * f64::from(i & 1), 0.01 * f64::from(i >> 1 & 1), 0.01 * f64::from(i >> 2)]),
+    );
+    let corners = [0, 1, 3, 2, 4, 5, 7, 6].map(|i| first + i).to_vec();
+    loose.elements.push(tiprub_model::mesh::Element { kind: ElementKind::Hex8, nodes: corners });
+    let error = reduce_cyclic(&model(loose), &bore, &tips(&mesh, 2), &faces, &options, &silent).unwrap_err();
+    assert!(error.to_string().contains("loose parts"), "{error}");
 }
 
 #[test]
@@ -141,4 +152,19 @@ fn the_wheel_is_closed() {
             assert!((cos * x - sin * y - a).abs() + (sin * x + cos * y - b).abs() + (z - c).abs() < 1e-14);
         }
     }
+}
+
+#[test]
+fn two_sectors_held_at_two_points_can_turn_about_the_line_through_them() {
+    let mesh = sector(ElementKind::Hex8, 2, Counts { around: 5, ..COARSE });
+    let options =
+        CyclicOptions { name: "w".into(), modes: ModeSelection::Count(2), checked_modes: 0, damping_ratio: 0.0 };
+    let faces = boundary(&mesh, 2);
+    let inner =
+        *mesh.set("BORE").unwrap().iter().find(|node| !faces.pairs.iter().flatten().any(|n| n == *node)).unwrap();
+    let reduce =
+        |clamped: &[usize]| reduce_cyclic(&model(mesh.clone()), clamped, &tips(&mesh, 3), &faces, &options, &silent);
+    assert!(reduce(mesh.set("BORE").unwrap()).is_ok());
+    let error = reduce(&[inner]).unwrap_err().to_string();
+    assert!(error.contains("nodal diameter") && error.contains("rigid body"), "{error}");
 }
