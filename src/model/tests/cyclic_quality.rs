@@ -133,6 +133,45 @@ fn matrices_are_hermitian_and_real_where_nothing_travels() {
     }
 }
 
+/// The sector seen in a mirror that turns +θ into -θ.
+fn mirrored(mesh: &Mesh) -> Mesh {
+    let mut mirrored = mesh.clone();
+    mirrored.nodes.iter_mut().for_each(|node| node[1] = -node[1]);
+    for element in &mut mirrored.elements {
+        assert_eq!(element.kind, ElementKind::Hex8);
+        element.nodes = [0, 3, 2, 1, 4, 7, 6, 5].map(|corner| element.nodes[corner]).to_vec();
+    }
+    mirrored
+}
+
+#[test]
+fn in_the_mirror_waves_travel_the_other_way() {
+    let sectors = 7;
+    let mesh = sector(ElementKind::Hex8, sectors, COARSE);
+    let one = reduced(&mesh, sectors, true, &options(ModeSelection::Count(5), 5));
+    let other = reduced(&mirrored(&mesh), sectors, true, &options(ModeSelection::Count(5), 5));
+    // A wave n of the mirrored wheel is a wave -n, that is N - n, of the wheel: conjugate, with tangential components reversed.
+    let sign = |i: usize| if i < 9 && i % 3 == 1 { -1.0 } else { 1.0 };
+    for (n, (a, b)) in pencils(&one.rom).iter().zip(&pencils(&other.rom)).enumerate() {
+        assert_close(
+            "frequency",
+            &one.nodal_diameters[n].full_frequencies,
+            &other.nodal_diameters[n].full_frequencies,
+            1e-10,
+            0.0,
+        );
+        for (matrix, image) in [(&a[0], &b[0]), (&a[1], &b[1])] {
+            let largest = matrix.view((0, 0), (9, 9)).iter().fold(0.0, |most: f64, value| most.max(value.norm()));
+            for i in 0..9 {
+                for j in 0..9 {
+                    let expected = matrix[(i, j)].conj() * (sign(i) * sign(j));
+                    assert!((image[(i, j)] - expected).norm() < 1e-10 * largest, "n = {n}, ({i}, {j})");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
     let mesh = sector(ElementKind::Penta15, 9, COARSE);
