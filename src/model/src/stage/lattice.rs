@@ -81,7 +81,7 @@ impl<'a> Lattice<'a> {
         };
         let (rising, falling) = (length(a, c), length(b, d));
         let alike = (rising - falling).abs() < ALIKE * rising;
-        if if alike { (row + column) % 2 == 0 } else { rising < falling } {
+        if if alike { (row + column).is_multiple_of(2) } else { rising < falling } {
             [[a, b, c], [a, c, d]]
         } else {
             [[a, b, d], [b, c, d]]
