@@ -130,7 +130,9 @@ fn without_coupling(rom: &Rom) -> Rom {
 
 #[test]
 fn without_coupling_a_wheel_is_its_sectors() {
-    println!("| feature | scheme | solver | N | contact steps | displacement | energies |\n|---|---|---|---|---|---|---|");
+    println!(
+        "| feature | scheme | solver | N | contact steps | displacement | energies |\n|---|---|---|---|---|---|---|"
+    );
     let mut worst = 0.0_f64;
     for feature in FEATURES {
         for scheme in SCHEMES {

@@ -4,6 +4,7 @@ use super::{ContactEvent, StepFailure, System};
 use crate::contact::gap::{Drive, GapLaw, dot};
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::cyclic::CyclicBank;
+use crate::dynamics::dispatch::Kernel;
 use crate::dynamics::sectors::Sectors;
 use crate::settings::Solver;
 use nalgebra::DMatrix;
@@ -201,15 +202,19 @@ impl System {
             (None, Some(solver)) if self.settings.solver == Solver::Coulomb => &mut solver.delassus,
             _ => &mut self.problem.delassus,
         };
-        let (rows, columns) = (&self.row_directions[..], &self.column_directions[..]);
+        let (members, rows, columns) = (&self.members[..], &self.row_directions[..], &self.column_directions[..]);
         match (&self.bank, per) {
-            (Sectors::Coupled(wheel), 1) => fill_wheel::<1>(matrix, wheel, &self.members, rows, columns),
-            (Sectors::Coupled(wheel), _) => fill_wheel::<3>(matrix, wheel, &self.members, rows, columns),
+            (Sectors::Coupled(wheel), 1) => {
+                wheel.instruction_set().run(FillWheel::<1> { matrix, wheel, members, rows, columns })
+            }
+            (Sectors::Coupled(wheel), _) => {
+                wheel.instruction_set().run(FillWheel::<3> { matrix, wheel, members, rows, columns })
+            }
             (Sectors::Uncoupled(bank), _) if self.coupled => {
-                fill_sectors(matrix, bank, &self.members, rows, columns, per);
+                fill_sectors(matrix, bank, members, rows, columns, per);
             }
             (Sectors::Uncoupled(bank), _) => {
-                let flexibility = bank.flexibility(self.members[0].sector).as_slice();
+                let flexibility = bank.flexibility(members[0].sector).as_slice();
                 let (rows, columns) = (&rows[..per * nodes], &columns[..per * nodes]);
                 match per {
                     1 => fill_sector::<1>(matrix, flexibility, rows, columns),
@@ -369,8 +374,9 @@ impl System {
         let normals = across.chunks_exact(lanes).zip(around.chunks_exact(lanes)).zip(along.chunks_exact(lanes));
         for ((moved, response), ((across, around), along)) in nodes.zip(normals) {
             for lane in 0..sectors {
-                response[lane] =
-                    across[lane] * moved[lane] + around[lane] * moved[lanes + lane] + along[lane] * moved[2 * lanes + lane];
+                response[lane] = across[lane] * moved[lane]
+                    + around[lane] * moved[lanes + lane]
+                    + along[lane] * moved[2 * lanes + lane];
             }
         }
     }
@@ -468,26 +474,34 @@ fn fill_sectors(
 }
 
 /// W of nodes of a wheel of coupled sectors with `PER` directions each.
-fn fill_wheel<const PER: usize>(
-    matrix: &mut DMatrix<f64>,
-    wheel: &CyclicBank,
-    members: &[Member],
-    rows: &[[f64; 3]],
-    columns: &[[f64; 3]],
-) {
-    let (sectors, leading) = (wheel.sectors(), matrix.nrows());
-    let targets = matrix.as_mut_slice().chunks_exact_mut(PER * leading);
-    let columns = columns.as_chunks::<PER>().0;
-    for ((column, directions), targets) in members.iter().zip(columns).zip(targets) {
-        for ((other, row), across) in members.iter().enumerate().zip(rows.as_chunks::<PER>().0) {
-            let difference = row.sector + if row.sector < column.sector { sectors } else { 0 } - column.sector;
-            let [first, second, third] = wheel.flexibility(difference, column.node, row.node);
-            for (along, direction) in directions.iter().enumerate() {
-                let moved: [f64; 3] = std::array::from_fn(|i| {
-                    first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2]
-                });
-                for (value, row) in targets[along * leading + PER * other..][..PER].iter_mut().zip(across) {
-                    *value = dot(*row, moved);
+struct FillWheel<'a, const PER: usize> {
+    matrix: &'a mut DMatrix<f64>,
+    wheel: &'a CyclicBank,
+    members: &'a [Member],
+    rows: &'a [[f64; 3]],
+    columns: &'a [[f64; 3]],
+}
+
+impl<const PER: usize> Kernel for FillWheel<'_, PER> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { matrix, wheel, members, rows, columns } = self;
+        let (sectors, leading) = (wheel.sectors(), matrix.nrows());
+        let targets = matrix.as_mut_slice().chunks_exact_mut(PER * leading);
+        let columns = columns.as_chunks::<PER>().0;
+        for ((column, directions), targets) in members.iter().zip(columns).zip(targets) {
+            for ((other, row), across) in members.iter().enumerate().zip(rows.as_chunks::<PER>().0) {
+                let difference = row.sector + if row.sector < column.sector { sectors } else { 0 } - column.sector;
+                let [first, second, third] = wheel.flexibility(difference, column.node, row.node);
+                for (along, direction) in directions.iter().enumerate() {
+                    let mut moved = [0.0; 4];
+                    for i in 0..4 {
+                        moved[i] = first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2];
+                    }
+                    let moved = [moved[0], moved[1], moved[2]];
+                    for (value, row) in targets[along * leading + PER * other..][..PER].iter_mut().zip(across) {
+                        *value = dot(*row, moved);
+                    }
                 }
             }
         }

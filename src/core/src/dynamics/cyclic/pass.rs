@@ -223,11 +223,17 @@ pub fn modal_force(touched: &[bool], shapes: &[Complexes], force: &[Complexes]) 
     let (shapes, force) = (shapes.as_chunks::<3>().0, force.as_chunks::<3>().0);
     for ((touched, shapes), force) in touched.iter().zip(shapes).zip(force) {
         if *touched {
+            // Node by node, so that the additions do not wait for each other.
+            let mut node = [[0.0; LANES]; 2];
             for ([real, imaginary], [across, along]) in shapes.iter().zip(force) {
                 for lane in 0..LANES {
-                    sums[0][lane] += real[lane] * across[lane] + imaginary[lane] * along[lane];
-                    sums[1][lane] += real[lane] * along[lane] - imaginary[lane] * across[lane];
+                    node[0][lane] += real[lane] * across[lane] + imaginary[lane] * along[lane];
+                    node[1][lane] += real[lane] * along[lane] - imaginary[lane] * across[lane];
                 }
+            }
+            for lane in 0..LANES {
+                sums[0][lane] += node[0][lane];
+                sums[1][lane] += node[1][lane];
             }
         }
     }
