@@ -1,5 +1,5 @@
-use std::time::Instant;
 use nalgebra::{Complex, DMatrix};
+use std::time::Instant;
 use tiprub_core::dynamics::cyclic::{CyclicBank, CyclicModel, DiameterModes};
 use tiprub_core::settings::Scheme;
 fn main() {
@@ -20,18 +20,30 @@ fn main() {
     let model = CyclicModel { sectors, diameters };
     let mut bank = CyclicBank::new(&model, false);
     bank.set_step(Scheme::ModalExact, 1e-6);
-    for n in 0..29 { for m in 0..34 { bank.set_modal_state(n, m, [1e-5, 0.0], [0.0, 0.0]); } }
+    for n in 0..29 {
+        for m in 0..34 {
+            bank.set_modal_state(n, m, [1e-5, 0.0], [0.0, 0.0]);
+        }
+    }
     bank.recover();
     let mut best = [f64::MAX; 3];
     for _ in 0..400 {
         let t = Instant::now();
-        for _ in 0..200 { bank.predict(true); }
+        for _ in 0..200 {
+            bank.predict(true);
+        }
         best[0] = best[0].min(t.elapsed().as_secs_f64() / 200.0);
         let t = Instant::now();
-        for _ in 0..200 { bank.ask([(3, 0, [1.0, 0.1, 0.2]), (17, 2, [1.0, 0.1, 0.2])].into_iter()); }
+        for _ in 0..200 {
+            bank.ask([(3, 0, [1.0, 0.1, 0.2]), (17, 2, [1.0, 0.1, 0.2])].into_iter());
+        }
         best[1] = best[1].min(t.elapsed().as_secs_f64() / 200.0);
         let t = Instant::now();
-        for _ in 0..200 { bank.predict(true); bank.ask([(3, 0, [1.0, 0.1, 0.2]), (17, 2, [1.0, 0.1, 0.2])].into_iter()); bank.act(); }
+        for _ in 0..200 {
+            bank.predict(true);
+            bank.ask([(3, 0, [1.0, 0.1, 0.2]), (17, 2, [1.0, 0.1, 0.2])].into_iter());
+            bank.act();
+        }
         best[2] = best[2].min(t.elapsed().as_secs_f64() / 200.0);
     }
     println!("predict {:.3} ask {:.3} predict+ask+act {:.3} µs", best[0] * 1e6, best[1] * 1e6, best[2] * 1e6);
