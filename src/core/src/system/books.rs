@@ -55,11 +55,11 @@ impl System {
     /// Half the displacement of a node relative to the slave over the last two steps (m), in its own directions.
     #[inline(always)]
     fn relative_motion(&self, event: &ContactEvent, index: usize, geometry: &Geometry, angle: f64) -> [f64; 3] {
-        let lanes = self.bank.lanes();
+        let (lanes, now) = (self.bank.lanes(), self.bank.displacement());
         let (node, sector) = (event.node, event.sector);
         let mut moved: [f64; 3] = std::array::from_fn(|component| {
             let row = (3 * node + component) * lanes + sector;
-            0.5 * (self.bank.displacement()[row] - self.displacement_oldest[row])
+            0.5 * (now[row] - self.displacement_oldest[row])
         });
         if let (Some(slave), GapLaw::Spline(law)) = (&self.slave, &self.law) {
             let slave = slave.moved(&law.surface, geometry.places[index], self.frame(index, angle));

@@ -179,9 +179,10 @@ impl System {
     /// Displacement of a node relative to the slave over the step, prediction included (m), without rigid motion.
     #[inline(always)]
     fn slip_of_deformation(&self, Member { node, sector, index }: Member) -> [f64; 3] {
+        let (lanes, now, before) = (self.bank.lanes(), self.bank.displacement(), self.bank.displacement_before());
         let mut moved: [f64; 3] = std::array::from_fn(|component| {
-            let row = 3 * node + component;
-            self.bank.row(row, sector) - self.bank.row_before(row, sector)
+            let row = (3 * node + component) * lanes + sector;
+            now[row] - before[row]
         });
         if let (Some(slave), GapLaw::Spline(law)) = (&self.slave, &self.law) {
             let frame = self.frame(index, self.state.angle);
@@ -203,24 +204,18 @@ impl System {
             _ => &mut self.problem.delassus,
         };
         let (members, rows, columns) = (&self.members[..], &self.row_directions[..], &self.column_directions[..]);
-        match (&self.bank, per) {
-            (Sectors::Coupled(wheel), 1) => {
-                wheel.instruction_set().run(FillWheel::<1> { matrix, wheel, members, rows, columns })
-            }
-            (Sectors::Coupled(wheel), _) => {
-                wheel.instruction_set().run(FillWheel::<3> { matrix, wheel, members, rows, columns })
-            }
-            (Sectors::Uncoupled(bank), _) if self.coupled => {
-                fill_sectors(matrix, bank, members, rows, columns, per);
-            }
-            (Sectors::Uncoupled(bank), _) => {
+        match &self.bank {
+            Sectors::Uncoupled(bank) if !self.coupled => {
                 let flexibility = bank.flexibility(members[0].sector).as_slice();
                 let (rows, columns) = (&rows[..per * nodes], &columns[..per * nodes]);
                 match per {
                     1 => fill_sector::<1>(matrix, flexibility, rows, columns),
                     _ => fill_sector::<3>(matrix, flexibility, rows, columns),
                 }
+                return;
             }
+            Sectors::Uncoupled(bank) => fill_sectors(matrix, bank, members, rows, columns, per),
+            Sectors::Coupled(wheel) => fill_wheel(matrix, wheel, members, rows, columns, per),
         }
         if let (Some(slave), GapLaw::Spline(law)) = (&mut self.slave, &self.law) {
             for (member, &Member { index, .. }) in self.members.iter().enumerate() {
@@ -316,6 +311,7 @@ impl System {
     }
 
     /// Force on the master at a member of the group (N), in its own directions.
+    #[inline(always)]
     fn force_on(&self, member: usize) -> [f64; 3] {
         let per = self.directions();
         let mut force = [0.0; 3];
@@ -343,6 +339,7 @@ impl System {
     }
 
     /// Change of the gaps of uncoupled sectors.
+    #[inline(never)]
     fn respond_alone(&mut self) {
         let Sectors::Uncoupled(bank) = &self.bank else { return };
         let (lanes, nodes) = (bank.lanes(), self.law.nodes());
@@ -362,6 +359,7 @@ impl System {
     }
 
     /// Change of the gaps of a wheel: every force moves every sector.
+    #[inline(never)]
     fn respond_together(&mut self) {
         for member in 0..self.members.len() {
             self.member_forces[member] = self.force_on(member);
@@ -388,15 +386,9 @@ impl System {
                 *gap += response;
             }
         }
-        match &mut self.bank {
+        match &self.bank {
             Sectors::Uncoupled(_) => self.apply_alone(),
-            Sectors::Coupled(wheel) => {
-                wheel.act();
-                for member in 0..self.members.len() {
-                    self.state.gap[self.members[member].index] = self.corrected[member];
-                    self.record(member, self.member_forces[member]);
-                }
-            }
+            Sectors::Coupled(_) => self.apply_together(),
         }
         if let Some(slave) = &mut self.slave {
             slave.apply(self.settings.ledger);
@@ -406,7 +398,20 @@ impl System {
         }
     }
 
+    /// Let the solution that was responded to last act on a wheel.
+    #[inline(never)]
+    fn apply_together(&mut self) {
+        if let Sectors::Coupled(wheel) = &mut self.bank {
+            wheel.act();
+        }
+        for member in 0..self.members.len() {
+            self.state.gap[self.members[member].index] = self.corrected[member];
+            self.record(member, self.member_forces[member]);
+        }
+    }
+
     /// Let the solution act on uncoupled sectors.
+    #[inline(always)]
     fn apply_alone(&mut self) {
         let mut next = 0;
         while next < self.members.len() {
@@ -426,6 +431,7 @@ impl System {
         }
     }
 
+    #[inline(always)]
     fn record(&mut self, member: usize, force: [f64; 3]) {
         let lanes = self.bank.lanes();
         let Member { node, sector, index } = self.members[member];
@@ -444,6 +450,7 @@ impl System {
 }
 
 /// W of nodes of uncoupled sectors with `per` directions each.
+#[inline(never)]
 fn fill_sectors(
     matrix: &mut DMatrix<f64>,
     bank: &ModalBank,
@@ -473,7 +480,23 @@ fn fill_sectors(
     }
 }
 
-/// W of nodes of a wheel of coupled sectors with `PER` directions each.
+/// W of nodes of a wheel of coupled sectors with `per` directions each.
+#[inline(never)]
+fn fill_wheel(
+    matrix: &mut DMatrix<f64>,
+    wheel: &CyclicBank,
+    members: &[Member],
+    rows: &[[f64; 3]],
+    columns: &[[f64; 3]],
+    per: usize,
+) {
+    match per {
+        1 => wheel.instruction_set().run(FillWheel::<1> { matrix, wheel, members, rows, columns }),
+        _ => wheel.instruction_set().run(FillWheel::<3> { matrix, wheel, members, rows, columns }),
+    }
+}
+
+/// The same as a kernel.
 struct FillWheel<'a, const PER: usize> {
     matrix: &'a mut DMatrix<f64>,
     wheel: &'a CyclicBank,
