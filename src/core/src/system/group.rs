@@ -51,7 +51,7 @@ impl System {
 
     /// All nodes of the sectors that touch, each sector by itself.
     pub(super) fn solve_sectors(&mut self, drive: &Drive) -> Result<(), StepFailure> {
-        let (lanes, nodes) = (self.bank.lanes(), self.law.nodes());
+        let (lanes, nodes) = (self.lanes, self.law.nodes());
         for sector in 0..self.bank.sectors() {
             // NaN counts as touching, and is found out there.
             if self.lowest[sector] < 0.0 || self.lowest[sector].is_nan() {
@@ -71,7 +71,7 @@ impl System {
             return Ok(());
         }
         let film = self.settings.solver == Solver::Film;
-        let lanes = self.bank.lanes();
+        let lanes = self.lanes;
         self.chosen.fill(false);
         for index in 0..self.chosen.len() {
             let touched = self.state.gap_before[index] <= 0.0 && !film;
@@ -97,7 +97,7 @@ impl System {
 
     /// Take a node into the group; on a coating the whole blade, whose nodes share cells.
     fn choose(&mut self, index: usize) {
-        let lanes = self.bank.lanes();
+        let lanes = self.lanes;
         if self.coating.is_none() {
             self.chosen[index] = true;
             return;
@@ -179,7 +179,7 @@ impl System {
     /// Displacement of a node relative to the slave over the step, prediction included (m), without rigid motion.
     #[inline(always)]
     fn slip_of_deformation(&self, Member { node, sector, index }: Member) -> [f64; 3] {
-        let (lanes, now, before) = (self.bank.lanes(), self.bank.displacement(), self.bank.displacement_before());
+        let (lanes, now, before) = (self.lanes, self.bank.displacement(), self.bank.displacement_before());
         let mut moved: [f64; 3] = std::array::from_fn(|component| {
             let row = (3 * node + component) * lanes + sector;
             now[row] - before[row]
@@ -251,7 +251,7 @@ impl System {
     }
 
     fn solve_coated(&mut self, drive: &Drive) -> bool {
-        let (lanes, nodes) = (self.bank.lanes(), self.law.nodes());
+        let (lanes, nodes) = (self.lanes, self.law.nodes());
         let Some((coating, problem)) = &mut self.coating else { return false };
         for blade in self.members.chunks_exact(nodes) {
             if let Some(layout) = self.law.layout() {
@@ -279,7 +279,7 @@ impl System {
     }
 
     fn solve_coulomb(&mut self, drive: &Drive) -> bool {
-        let (lanes, step) = (self.bank.lanes(), self.bank.step());
+        let (lanes, step) = (self.lanes, self.bank.step());
         for member in 0..self.members.len() {
             let at = self.members[member];
             let Member { node, sector, index } = at;
@@ -324,7 +324,7 @@ impl System {
 
     /// Change of every gap by the solution (m), members and others.
     fn respond(&mut self, drive: &Drive) {
-        let lanes = self.bank.lanes();
+        let lanes = self.lanes;
         match &self.bank {
             Sectors::Uncoupled(_) => self.respond_alone(),
             Sectors::Coupled(_) => self.respond_together(),
@@ -433,7 +433,7 @@ impl System {
 
     #[inline(always)]
     fn record(&mut self, member: usize, force: [f64; 3]) {
-        let lanes = self.bank.lanes();
+        let lanes = self.lanes;
         let Member { node, sector, index } = self.members[member];
         let normal = self.solution.values[self.directions() * member];
         if normal == 0.0 {
