@@ -175,6 +175,7 @@ fn without_coupling_a_wheel_is_its_sectors() {
                     apart / size
                 );
                 assert!(contact > 0, "{} {scheme:?} {solver:?} never touched", feature.0);
+                assert!(apart / size <= 1e-11, "{} {scheme:?} {solver:?}: {:e}", feature.0, apart / size);
                 worst = worst.max(apart / size);
             }
         }
