@@ -135,7 +135,7 @@ fn stepping(scene: &Scene) -> (f64, f64) {
         simulation.do_step(simulation.time(), 1e-4).expect("a step");
     }
     let (mut contacts, mut samples) = (0, 0);
-    let time = fastest(201, 4, || {
+    let time = fastest(1001, 1, || {
         simulation.do_step(simulation.time(), 1e-4).expect("a step");
         contacts += simulation.system().events().len();
         samples += 1;
@@ -180,7 +180,7 @@ fn dense(order: usize) -> f64 {
     let matrices = [0.5, -0.25].map(|value| DMatrix::from_fn(order, order, |i, j| value / (1.0 + (i + j) as f64)));
     let (mut now, mut before) = (DVector::from_element(order, 1e-6), DVector::from_element(order, 1e-6));
     let mut next = now.clone();
-    fastest(31, 4, || {
+    fastest(101, 1, || {
         next.gemv(1.0, &matrices[0], &now, 0.0);
         next.gemv(1.0, &matrices[1], &before, 1.0);
         std::mem::swap(&mut before, &mut now);

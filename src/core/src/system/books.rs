@@ -29,7 +29,7 @@ impl System {
     /// tangential part into the heat, friction force times slip, and what the prescribed sliding supplies. On a
     /// coating the approach is what its rods absorb.
     fn book(&mut self, event: &ContactEvent, drive: &Drive, before: bool) -> f64 {
-        let index = event.node * self.bank.lanes() + event.sector;
+        let index = event.node * self.lanes + event.sector;
         let geometry = if before { &self.geometry_before } else { &self.state.geometry };
         let normal = geometry.normal_at(index);
         let angle = if before { self.state.angle_before } else { self.state.angle };
@@ -55,11 +55,11 @@ impl System {
     /// Half the displacement of a node relative to the slave over the last two steps (m), in its own directions.
     #[inline(always)]
     fn relative_motion(&self, event: &ContactEvent, index: usize, geometry: &Geometry, angle: f64) -> [f64; 3] {
-        let lanes = self.bank.lanes();
+        let (lanes, now) = (self.lanes, self.bank.displacement());
         let (node, sector) = (event.node, event.sector);
         let mut moved: [f64; 3] = std::array::from_fn(|component| {
             let row = (3 * node + component) * lanes + sector;
-            0.5 * (self.bank.displacement()[row] - self.displacement_oldest[row])
+            0.5 * (now[row] - self.displacement_oldest[row])
         });
         if let (Some(slave), GapLaw::Spline(law)) = (&self.slave, &self.law) {
             let slave = slave.moved(&law.surface, geometry.places[index], self.frame(index, angle));

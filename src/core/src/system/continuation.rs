@@ -40,7 +40,7 @@ impl System {
 
     /// The same forces act on the slave, where the last step found them.
     fn resample_slave(&mut self, step: f64) {
-        let lanes = self.bank.lanes();
+        let lanes = self.lanes;
         let (Some(slave), GapLaw::Spline(law)) = (&mut self.slave, &self.law) else { return };
         slave.clear_lasting();
         for index in 0..self.state.gap.len() {
@@ -56,7 +56,7 @@ impl System {
 
     /// Leaves in `displacement_oldest` (scratch between steps) the contact forces without those of impacts.
     fn lasting_force(&mut self, old: f64, new: f64) {
-        let lanes = self.bank.lanes();
+        let lanes = self.lanes;
         let reach = (FORCE_REACH * old / new).min(1.0);
         for (lasting, force) in self.displacement_oldest.iter_mut().zip(&self.state.force) {
             *lasting = reach * reach * force;
@@ -86,7 +86,7 @@ impl System {
             return Err(StepFailure::CasingImplausible);
         }
         let beyond = self.bank.displacement().iter().position(|displacement| displacement.abs() > limit);
-        let sector = beyond.map(|index| index % self.bank.lanes());
+        let sector = beyond.map(|index| index % self.lanes);
         sector.map_or(Ok(()), |sector| Err(StepFailure::Implausible { sector }))
     }
 
@@ -126,7 +126,7 @@ impl System {
 
     /// The events of the last step follow from the saved multipliers and forces (heat is not part of the future).
     fn rebuild_events(&mut self) {
-        let lanes = self.bank.lanes();
+        let lanes = self.lanes;
         self.events.clear();
         for sector in 0..self.bank.sectors() {
             for node in 0..self.law.nodes() {

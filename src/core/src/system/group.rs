@@ -4,6 +4,7 @@ use super::{ContactEvent, StepFailure, System};
 use crate::contact::gap::{Drive, GapLaw, dot};
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::cyclic::CyclicBank;
+use crate::dynamics::dispatch::Kernel;
 use crate::dynamics::sectors::Sectors;
 use crate::settings::Solver;
 use nalgebra::DMatrix;
@@ -50,7 +51,7 @@ impl System {
 
     /// All nodes of the sectors that touch, each sector by itself.
     pub(super) fn solve_sectors(&mut self, drive: &Drive) -> Result<(), StepFailure> {
-        let (lanes, nodes) = (self.bank.lanes(), self.law.nodes());
+        let (lanes, nodes) = (self.lanes, self.law.nodes());
         for sector in 0..self.bank.sectors() {
             // NaN counts as touching, and is found out there.
             if self.lowest[sector] < 0.0 || self.lowest[sector].is_nan() {
@@ -70,7 +71,7 @@ impl System {
             return Ok(());
         }
         let film = self.settings.solver == Solver::Film;
-        let lanes = self.bank.lanes();
+        let lanes = self.lanes;
         self.chosen.fill(false);
         for index in 0..self.chosen.len() {
             let touched = self.state.gap_before[index] <= 0.0 && !film;
@@ -96,7 +97,7 @@ impl System {
 
     /// Take a node into the group; on a coating the whole blade, whose nodes share cells.
     fn choose(&mut self, index: usize) {
-        let lanes = self.bank.lanes();
+        let lanes = self.lanes;
         if self.coating.is_none() {
             self.chosen[index] = true;
             return;
@@ -178,9 +179,10 @@ impl System {
     /// Displacement of a node relative to the slave over the step, prediction included (m), without rigid motion.
     #[inline(always)]
     fn slip_of_deformation(&self, Member { node, sector, index }: Member) -> [f64; 3] {
+        let (lanes, now, before) = (self.lanes, self.bank.displacement(), self.bank.displacement_before());
         let mut moved: [f64; 3] = std::array::from_fn(|component| {
-            let row = 3 * node + component;
-            self.bank.row(row, sector) - self.bank.row_before(row, sector)
+            let row = (3 * node + component) * lanes + sector;
+            now[row] - before[row]
         });
         if let (Some(slave), GapLaw::Spline(law)) = (&self.slave, &self.law) {
             let frame = self.frame(index, self.state.angle);
@@ -201,21 +203,19 @@ impl System {
             (None, Some(solver)) if self.settings.solver == Solver::Coulomb => &mut solver.delassus,
             _ => &mut self.problem.delassus,
         };
-        let (rows, columns) = (&self.row_directions[..], &self.column_directions[..]);
-        match (&self.bank, per) {
-            (Sectors::Coupled(wheel), 1) => fill_wheel::<1>(matrix, wheel, &self.members, rows, columns),
-            (Sectors::Coupled(wheel), _) => fill_wheel::<3>(matrix, wheel, &self.members, rows, columns),
-            (Sectors::Uncoupled(bank), _) if self.coupled => {
-                fill_sectors(matrix, bank, &self.members, rows, columns, per);
-            }
-            (Sectors::Uncoupled(bank), _) => {
-                let flexibility = bank.flexibility(self.members[0].sector).as_slice();
+        let (members, rows, columns) = (&self.members[..], &self.row_directions[..], &self.column_directions[..]);
+        match &self.bank {
+            Sectors::Uncoupled(bank) if !self.coupled => {
+                let flexibility = bank.flexibility(members[0].sector).as_slice();
                 let (rows, columns) = (&rows[..per * nodes], &columns[..per * nodes]);
                 match per {
                     1 => fill_sector::<1>(matrix, flexibility, rows, columns),
                     _ => fill_sector::<3>(matrix, flexibility, rows, columns),
                 }
+                return;
             }
+            Sectors::Uncoupled(bank) => fill_sectors(matrix, bank, members, rows, columns, per),
+            Sectors::Coupled(wheel) => fill_wheel(matrix, wheel, members, rows, columns, per),
         }
         if let (Some(slave), GapLaw::Spline(law)) = (&mut self.slave, &self.law) {
             for (member, &Member { index, .. }) in self.members.iter().enumerate() {
@@ -251,7 +251,7 @@ impl System {
     }
 
     fn solve_coated(&mut self, drive: &Drive) -> bool {
-        let (lanes, nodes) = (self.bank.lanes(), self.law.nodes());
+        let (lanes, nodes) = (self.lanes, self.law.nodes());
         let Some((coating, problem)) = &mut self.coating else { return false };
         for blade in self.members.chunks_exact(nodes) {
             if let Some(layout) = self.law.layout() {
@@ -279,7 +279,7 @@ impl System {
     }
 
     fn solve_coulomb(&mut self, drive: &Drive) -> bool {
-        let (lanes, step) = (self.bank.lanes(), self.bank.step());
+        let (lanes, step) = (self.lanes, self.bank.step());
         for member in 0..self.members.len() {
             let at = self.members[member];
             let Member { node, sector, index } = at;
@@ -311,6 +311,7 @@ impl System {
     }
 
     /// Force on the master at a member of the group (N), in its own directions.
+    #[inline(always)]
     fn force_on(&self, member: usize) -> [f64; 3] {
         let per = self.directions();
         let mut force = [0.0; 3];
@@ -323,7 +324,7 @@ impl System {
 
     /// Change of every gap by the solution (m), members and others.
     fn respond(&mut self, drive: &Drive) {
-        let lanes = self.bank.lanes();
+        let lanes = self.lanes;
         match &self.bank {
             Sectors::Uncoupled(_) => self.respond_alone(),
             Sectors::Coupled(_) => self.respond_together(),
@@ -338,6 +339,7 @@ impl System {
     }
 
     /// Change of the gaps of uncoupled sectors.
+    #[inline(never)]
     fn respond_alone(&mut self) {
         let Sectors::Uncoupled(bank) = &self.bank else { return };
         let (lanes, nodes) = (bank.lanes(), self.law.nodes());
@@ -357,6 +359,7 @@ impl System {
     }
 
     /// Change of the gaps of a wheel: every force moves every sector.
+    #[inline(never)]
     fn respond_together(&mut self) {
         for member in 0..self.members.len() {
             self.member_forces[member] = self.force_on(member);
@@ -369,8 +372,9 @@ impl System {
         let normals = across.chunks_exact(lanes).zip(around.chunks_exact(lanes)).zip(along.chunks_exact(lanes));
         for ((moved, response), ((across, around), along)) in nodes.zip(normals) {
             for lane in 0..sectors {
-                response[lane] =
-                    across[lane] * moved[lane] + around[lane] * moved[lanes + lane] + along[lane] * moved[2 * lanes + lane];
+                response[lane] = across[lane] * moved[lane]
+                    + around[lane] * moved[lanes + lane]
+                    + along[lane] * moved[2 * lanes + lane];
             }
         }
     }
@@ -382,15 +386,9 @@ impl System {
                 *gap += response;
             }
         }
-        match &mut self.bank {
+        match &self.bank {
             Sectors::Uncoupled(_) => self.apply_alone(),
-            Sectors::Coupled(wheel) => {
-                wheel.act();
-                for member in 0..self.members.len() {
-                    self.state.gap[self.members[member].index] = self.corrected[member];
-                    self.record(member, self.member_forces[member]);
-                }
-            }
+            Sectors::Coupled(_) => self.apply_together(),
         }
         if let Some(slave) = &mut self.slave {
             slave.apply(self.settings.ledger);
@@ -400,7 +398,20 @@ impl System {
         }
     }
 
+    /// Let the solution that was responded to last act on a wheel.
+    #[inline(never)]
+    fn apply_together(&mut self) {
+        if let Sectors::Coupled(wheel) = &mut self.bank {
+            wheel.act();
+        }
+        for member in 0..self.members.len() {
+            self.state.gap[self.members[member].index] = self.corrected[member];
+            self.record(member, self.member_forces[member]);
+        }
+    }
+
     /// Let the solution act on uncoupled sectors.
+    #[inline(always)]
     fn apply_alone(&mut self) {
         let mut next = 0;
         while next < self.members.len() {
@@ -420,8 +431,9 @@ impl System {
         }
     }
 
+    #[inline(always)]
     fn record(&mut self, member: usize, force: [f64; 3]) {
-        let lanes = self.bank.lanes();
+        let lanes = self.lanes;
         let Member { node, sector, index } = self.members[member];
         let normal = self.solution.values[self.directions() * member];
         if normal == 0.0 {
@@ -438,6 +450,7 @@ impl System {
 }
 
 /// W of nodes of uncoupled sectors with `per` directions each.
+#[inline(never)]
 fn fill_sectors(
     matrix: &mut DMatrix<f64>,
     bank: &ModalBank,
@@ -467,27 +480,51 @@ fn fill_sectors(
     }
 }
 
-/// W of nodes of a wheel of coupled sectors with `PER` directions each.
-fn fill_wheel<const PER: usize>(
+/// W of nodes of a wheel of coupled sectors with `per` directions each.
+#[inline(never)]
+fn fill_wheel(
     matrix: &mut DMatrix<f64>,
     wheel: &CyclicBank,
     members: &[Member],
     rows: &[[f64; 3]],
     columns: &[[f64; 3]],
+    per: usize,
 ) {
-    let (sectors, leading) = (wheel.sectors(), matrix.nrows());
-    let targets = matrix.as_mut_slice().chunks_exact_mut(PER * leading);
-    let columns = columns.as_chunks::<PER>().0;
-    for ((column, directions), targets) in members.iter().zip(columns).zip(targets) {
-        for ((other, row), across) in members.iter().enumerate().zip(rows.as_chunks::<PER>().0) {
-            let difference = row.sector + if row.sector < column.sector { sectors } else { 0 } - column.sector;
-            let [first, second, third] = wheel.flexibility(difference, column.node, row.node);
-            for (along, direction) in directions.iter().enumerate() {
-                let moved: [f64; 3] = std::array::from_fn(|i| {
-                    first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2]
-                });
-                for (value, row) in targets[along * leading + PER * other..][..PER].iter_mut().zip(across) {
-                    *value = dot(*row, moved);
+    match per {
+        1 => wheel.instruction_set().run(FillWheel::<1> { matrix, wheel, members, rows, columns }),
+        _ => wheel.instruction_set().run(FillWheel::<3> { matrix, wheel, members, rows, columns }),
+    }
+}
+
+/// The same as a kernel.
+struct FillWheel<'a, const PER: usize> {
+    matrix: &'a mut DMatrix<f64>,
+    wheel: &'a CyclicBank,
+    members: &'a [Member],
+    rows: &'a [[f64; 3]],
+    columns: &'a [[f64; 3]],
+}
+
+impl<const PER: usize> Kernel for FillWheel<'_, PER> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { matrix, wheel, members, rows, columns } = self;
+        let (sectors, leading) = (wheel.sectors(), matrix.nrows());
+        let targets = matrix.as_mut_slice().chunks_exact_mut(PER * leading);
+        let columns = columns.as_chunks::<PER>().0;
+        for ((column, directions), targets) in members.iter().zip(columns).zip(targets) {
+            for ((other, row), across) in members.iter().enumerate().zip(rows.as_chunks::<PER>().0) {
+                let difference = row.sector + if row.sector < column.sector { sectors } else { 0 } - column.sector;
+                let [first, second, third] = wheel.flexibility(difference, column.node, row.node);
+                for (along, direction) in directions.iter().enumerate() {
+                    let mut moved = [0.0; 4];
+                    for i in 0..4 {
+                        moved[i] = first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2];
+                    }
+                    let moved = [moved[0], moved[1], moved[2]];
+                    for (value, row) in targets[along * leading + PER * other..][..PER].iter_mut().zip(across) {
+                        *value = dot(*row, moved);
+                    }
                 }
             }
         }

@@ -135,6 +135,8 @@ persist_fields!(SystemState {
 #[derive(Debug, Clone)]
 pub struct System {
     bank: Sectors,
+    /// Lanes of a row of the sectors.
+    lanes: usize,
     /// All sectors form one group: through the slave, the wheel, or both.
     coupled: bool,
     slave: Option<Slave>,
@@ -227,6 +229,7 @@ impl System {
                 ledger: Ledger::default(),
             },
             bank,
+            lanes,
             coupled,
             law,
             settings,
@@ -292,18 +295,18 @@ impl System {
 
     /// Gap of one node of one sector (m).
     pub fn gap(&self, node: usize, sector: usize) -> f64 {
-        self.state.gap[node * self.bank.lanes() + sector]
+        self.state.gap[node * self.lanes + sector]
     }
 
     /// Rate of that gap over the last step (m/s).
     pub fn gap_rate(&self, node: usize, sector: usize) -> f64 {
-        let index = node * self.bank.lanes() + sector;
+        let index = node * self.lanes + sector;
         (self.state.gap[index] - self.state.gap_before[index]) / self.bank.step()
     }
 
     /// λ of one node of one sector in the last step (N).
     pub fn multiplier(&self, node: usize, sector: usize) -> f64 {
-        self.state.multiplier[node * self.bank.lanes() + sector]
+        self.state.multiplier[node * self.lanes + sector]
     }
 
     /// Internal steps done.
@@ -462,7 +465,7 @@ impl System {
         let state = &mut self.state;
         self.law.evaluate(drive, self.bank.displacement(), moved, before, &mut state.geometry, &mut state.gap);
         self.lowest.fill(f64::INFINITY);
-        for row in self.state.gap.chunks(self.bank.lanes()) {
+        for row in self.state.gap.chunks(self.lanes) {
             for (lowest, gap) in self.lowest.iter_mut().zip(row) {
                 // NaN sticks.
                 *lowest = if *lowest <= *gap || lowest.is_nan() { *lowest } else { *gap };
@@ -472,7 +475,7 @@ impl System {
 
     /// The contacts of the last step become those of the step before.
     fn retire_events(&mut self) {
-        let lanes = self.bank.lanes();
+        let lanes = self.lanes;
         if self.settings.solver == Solver::Coulomb {
             self.force_before.copy_from_slice(&self.state.force);
         }

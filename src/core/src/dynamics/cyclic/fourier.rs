@@ -168,7 +168,9 @@ pub fn sine_cosine(index: usize, count: usize) -> (f64, f64) {
         let fraction = part as f64 / count as f64;
         std::f64::consts::FRAC_PI_2 * fraction
     };
-    let (sine, cosine) = if 2 * rest <= count {
+    let (sine, cosine) = if 2 * rest == count {
+        (std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::FRAC_1_SQRT_2)
+    } else if 2 * rest < count {
         libm::sincos(angle(rest))
     } else {
         let (sine, cosine) = libm::sincos(angle(count - rest));
@@ -227,7 +229,10 @@ mod tests {
                         })
                         .sum();
                     let found = values[row * lanes + sector];
-                    assert!((found - sum).abs() < 1e-12, "N = {sectors}, row {row}, sector {sector}: {found} for {sum}");
+                    assert!(
+                        (found - sum).abs() < 1e-12,
+                        "N = {sectors}, row {row}, sector {sector}: {found} for {sum}"
+                    );
                 }
             }
             let mut again = vec![[[0.0; LANES]; 2]; fourier.blocks() * rows];

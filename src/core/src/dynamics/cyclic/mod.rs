@@ -179,6 +179,11 @@ impl CyclicBank {
         self.rows
     }
 
+    /// Instruction set of the hot loops.
+    pub fn instruction_set(&self) -> InstructionSet {
+        self.instruction_set
+    }
+
     /// The modes.
     pub fn model(&self) -> &CyclicModel {
         &self.model
@@ -404,5 +409,95 @@ impl CyclicBank {
     /// Restore a saved state, after [`CyclicBank::set_step`].
     pub fn restore(&mut self, reader: &mut Reader) {
         self.state.restore(reader);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Complex, DMatrix};
+
+    fn model(sectors: usize, nodes: usize) -> CyclicModel {
+        let diameter = |n: usize| {
+            // Fewer modes for some nodal diameters than for others.
+            let modes = 3 * nodes + 4 - n % 3;
+            let real = n == 0 || 2 * n == sectors;
+            let shape = |row: usize, mode: usize| {
+                let x = 1.7 * row as f64 + 0.9 * mode as f64 + 0.4 * n as f64;
+                Complex::new(x.sin(), if real { 0.0 } else { (1.3 * x).cos() })
+            };
+            DiameterModes {
+                nodal_diameter: n,
+                frequencies: (1..=modes).map(|mode| 700.0 * (mode * mode) as f64 + 50.0 * n as f64).collect(),
+                damping_ratios: vec![0.005; modes],
+                contact_modes: DMatrix::from_fn(3 * nodes, modes, shape),
+                shapes: DMatrix::identity(modes, modes),
+                quasi_static: 3 * nodes,
+            }
+        };
+        CyclicModel { sectors, diameters: (0..=sectors / 2).map(diameter).collect() }
+    }
+
+    /// The widest set against the baseline; a processor without wider registers compares the baseline with itself.
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        for (sectors, nodes) in [(13, 1), (20, 2), (36, 5)] {
+            for scheme in [Scheme::ModalExact, Scheme::MasslessBoundary] {
+                let run = |instruction_set| {
+                    let mut bank = CyclicBank::new(&model(sectors, nodes), true);
+                    bank.instruction_set = instruction_set;
+                    bank.set_step(scheme, 1e-6);
+                    for step in 0..300 {
+                        bank.loads_mut()[1] = 1e3;
+                        bank.predict(true);
+                        if step % 3 > 0 {
+                            let force = [f64::from(step).cos(), 0.3, -0.2];
+                            let index = usize::try_from(step).unwrap();
+                            let forces = [(index % sectors, index % nodes, force), (index * 5 % sectors, 0, force)];
+                            bank.ask(forces.into_iter());
+                            bank.act();
+                        }
+                        if step % 50 == 0 {
+                            bank.collect_loss();
+                        }
+                    }
+                    let loss = bank.collect_loss().to_bits();
+                    let state = &bank.state;
+                    let modes = state.position.iter().chain(&state.increment).flatten().flatten();
+                    let bits = modes.chain(&state.displacement).map(|value| value.to_bits());
+                    (bits.collect::<Vec<_>>(), loss)
+                };
+                assert!(
+                    run(InstructionSet::Baseline) == run(InstructionSet::detect()),
+                    "{sectors} x {nodes} {scheme:?}"
+                );
+                #[cfg(target_arch = "x86_64")]
+                if InstructionSet::detect() == InstructionSet::Avx512 {
+                    assert!(
+                        run(InstructionSet::Avx2) == run(InstructionSet::Baseline),
+                        "{sectors} x {nodes} {scheme:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    /// Contact displacements that were corrected at once are those of the modes corrected one by one later.
+    #[test]
+    fn displacements_and_modes_agree_after_contact() {
+        let mut bank = CyclicBank::new(&model(11, 2), false);
+        bank.set_step(Scheme::ModalExact, 1e-4);
+        for step in 0..200_usize {
+            bank.predict(true);
+            bank.ask([(step % 11, step % 2, [1.0, -0.4, 0.1]), (3, 0, [0.2, 0.5, -1.0])].into_iter());
+            bank.act();
+            if step % 20 == 7 {
+                let found = bank.displacement().to_vec();
+                bank.recover();
+                let size = found.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+                let off = found.iter().zip(bank.displacement()).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+                assert!(size > 0.0 && off < 1e-13 * size, "step {step}: {off:e} of {size:e}");
+            }
+        }
     }
 }

@@ -81,6 +81,8 @@ impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bo
     fn block<const ROWS: usize>(&mut self, block: usize) {
         let (modes, rows) = (self.modes, self.rows);
         let force = &self.force[block * rows..][..rows];
+        // Loads turn with the wheel: nodal diameter 0 alone.
+        let loaded = block == 0 && !self.push.is_empty();
         let mut lost = [0.0; LANES];
         let mut sums = [[[0.0; LANES]; 2]; ROWS];
         let states = self.position[block * modes..][..modes]
@@ -117,8 +119,7 @@ impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bo
                             new[lane] += k.delayed[lane] * modal_force[part][lane];
                         }
                     }
-                    if part == 0 && block == 0 {
-                        // Loads turn with the wheel: nodal diameter 0 alone.
+                    if loaded && part == 0 {
                         new[0] += self.push.get(mode).copied().unwrap_or(0.0);
                     }
                     for lane in 0..LANES {
@@ -223,11 +224,17 @@ pub fn modal_force(touched: &[bool], shapes: &[Complexes], force: &[Complexes]) 
     let (shapes, force) = (shapes.as_chunks::<3>().0, force.as_chunks::<3>().0);
     for ((touched, shapes), force) in touched.iter().zip(shapes).zip(force) {
         if *touched {
+            // Node by node, so that the additions do not wait for each other.
+            let mut node = [[0.0; LANES]; 2];
             for ([real, imaginary], [across, along]) in shapes.iter().zip(force) {
                 for lane in 0..LANES {
-                    sums[0][lane] += real[lane] * across[lane] + imaginary[lane] * along[lane];
-                    sums[1][lane] += real[lane] * along[lane] - imaginary[lane] * across[lane];
+                    node[0][lane] += real[lane] * across[lane] + imaginary[lane] * along[lane];
+                    node[1][lane] += real[lane] * along[lane] - imaginary[lane] * across[lane];
                 }
+            }
+            for lane in 0..LANES {
+                sums[0][lane] += node[0][lane];
+                sums[1][lane] += node[1][lane];
             }
         }
     }
