@@ -5,11 +5,12 @@ use serde_json::json;
 use tiprub_model::{
     Mesh,
     cyclic::{CyclicReduction, NodalDiameter},
+    vtk::Field,
 };
 
 use super::{Figure, Picture, Sheet, Statement, Study};
 use crate::{
-    Result,
+    Failure, Result,
     report::{
         picture::{self, Frame, Surface, View},
         plots::{Form, Plot, Series},
@@ -203,16 +204,29 @@ fn resonances(sheet: &Sheet) -> Statement {
     )
 }
 
-/// The study of a reduction of the sector `mesh`, with the engine orders of `speed` (rad/s).
+/// The modes drawn, as a VTK file of the sector for ParaView and others.
+fn vtk(mesh: &Mesh, diameters: &[NodalDiameter]) -> Result<Vec<u8>> {
+    let mut fields = Vec::new();
+    for (number, mode) in SHAPES {
+        if let Some(shape) = diameters.get(number).and_then(|diameter| diameter.shapes.get(mode)) {
+            fields.extend(Field::mode(&format!("n{number}_mode{}", mode + 1), shape));
+        }
+    }
+    tiprub_model::vtk::write(mesh, &fields).map_err(|error| Failure::from_below("VTK file", error))
+}
+
+/// The study of a reduction of the sector `mesh`, with the engine orders of `speed` (rad/s); without one, of the speed at
+/// which an oval casing meets the first mode of nodal diameter 2.
 ///
 /// # Errors
 /// A plot cannot be drawn.
-pub fn study(reduction: &CyclicReduction, mesh: &Mesh, speed: f64, quick: bool) -> Result<Study> {
+pub fn study(reduction: &CyclicReduction, mesh: &Mesh, speed: Option<f64>, quick: bool) -> Result<Study> {
     let diameters = &reduction.nodal_diameters;
     let sectors = reduction.rom.sectors;
-    let diagram = diagram(diameters, sectors, speed)?;
     let oval = diameters.get(2).and_then(|diameter| diameter.full_frequencies.first()).copied();
     let critical = oval.map(|frequency| std::f64::consts::PI * frequency);
+    let speed = speed.or(critical).unwrap_or(1.0);
+    let diagram = diagram(diameters, sectors, speed)?;
     let mut statements = vec![flat_families(diameters), disk_stiffens(diameters), resonances(&diagram.sheet)];
     if let Some(critical) = critical {
         statements.push(Statement::remark(
@@ -247,7 +261,7 @@ pub fn study(reduction: &CyclicReduction, mesh: &Mesh, speed: f64, quick: bool) 
             "frequencies_hz": diameters.iter().map(families).collect::<Vec<_>>(),
         }),
         figures: vec![diagram, shapes(mesh, diameters)],
-        files: Vec::new(),
+        files: vec![("shapes.vtu".into(), "the mode shapes of one sector, for ParaView".into(), vtk(mesh, diameters)?)],
     })
 }
 
