@@ -10,7 +10,8 @@
 //! - [`error_study`]: error against run time for every scheme and solver;
 //! - [`archive`], [`fmu`], [`library`]: the reproducible zip, its contents, and the shared library that goes in;
 //! - [`importer`]: a packaged FMU driven through its C ABI the way any importer would;
-//! - [`casing_arguments`]: what can be asked for of a casing;
+//! - [`casing_arguments`], [`file_arguments`]: what can be asked for of a casing, of a model of one's own;
+//! - [`users_model`]: such a model read, judged, reduced;
 //! - [`report`]: the HTML report with its pictures and plots.
 
 pub mod archive;
@@ -21,6 +22,7 @@ pub mod commands;
 pub mod console;
 pub mod error_study;
 pub mod failure;
+pub mod file_arguments;
 pub mod fmu;
 pub mod importer;
 pub mod library;
@@ -35,5 +37,6 @@ pub mod scene_features;
 pub mod scene_source;
 pub mod schedule;
 pub mod study;
+pub mod users_model;
 
 pub use failure::{Failure, Result};

@@ -12,7 +12,7 @@ pub const CHOSEN: usize = 3;
 
 /// Axial positions closer than this share of the set's extent are one.
 const SAME_PLACE: f64 = 1e-3;
-/// A set that extends along the axis less than this share of its radius is ordered around the axis instead.
+/// A set that extends along the axis less than this share of its radius has no slope, and is ordered around the axis.
 const FLAT: f64 = 1e-6;
 
 /// What is wanted of the contact nodes.
@@ -51,12 +51,14 @@ pub fn choose_contact_nodes(nodes: &[[f64; 3]], set: &[usize], choice: &ContactC
     Ok(chosen.into_iter().enumerate().map(point).collect())
 }
 
-/// The nodes of a set as the meridional plane and the circumference see them.
+/// The nodes of a set in the meridional plane, and on the developed surface in the direction of the chord and across it.
 struct Places {
     axial: Vec<f64>,
     radius: Vec<f64>,
-    /// Arc from the middle of the set (m).
-    arc: Vec<f64>,
+    /// Along the chord, by growing z (m).
+    along: Vec<f64>,
+    /// Across it (m).
+    across: Vec<f64>,
     /// Whether the set lies in one plane across the axis.
     flat: bool,
 }
@@ -65,55 +67,68 @@ fn extent(values: &[f64]) -> [f64; 2] {
     values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| [low.min(value), high.max(value)])
 }
 
+/// Unit vector (z, rθ) of the largest extent of points: main axis of their second moments.
+fn chord_direction(axial: &[f64], arc: &[f64]) -> [f64; 2] {
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let (z, s) = (mean(axial), mean(arc));
+    let moment =
+        |a: &dyn Fn(usize) -> f64, b: &dyn Fn(usize) -> f64| (0..axial.len()).map(|i| a(i) * b(i)).sum::<f64>();
+    let (to_z, to_s) = (|i: usize| axial[i] - z, |i: usize| arc[i] - s);
+    let (zz, ss, zs) = (moment(&to_z, &to_z), moment(&to_s, &to_s), moment(&to_z, &to_s));
+    let angle = 0.5 * (2.0 * zs).atan2(zz - ss);
+    let (sin, cos) = angle.sin_cos();
+    // By growing z; a chord around the axis by growing angle.
+    if cos < -1e-9 || (cos.abs() <= 1e-9 && sin < 0.0) { [-cos, -sin] } else { [cos, sin] }
+}
+
 impl Places {
     fn new(nodes: &[[f64; 3]], set: &[usize]) -> Self {
         let points: Vec<[f64; 3]> = set.iter().map(|&node| nodes[node]).collect();
         let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point[0], y + point[1]));
-        let middle = y.atan2(x);
+        let (sin, cos) = y.atan2(x).sin_cos();
         let radius: Vec<f64> = points.iter().map(|point| point[0].hypot(point[1])).collect();
-        let arc = points.iter().zip(&radius).map(|(point, radius)| {
-            let (sin, cos) = middle.sin_cos();
-            radius * (point[1] * cos - point[0] * sin).atan2(point[0] * cos + point[1] * sin)
-        });
+        let arc = points
+            .iter()
+            .zip(&radius)
+            .map(|(point, radius)| radius * (point[1] * cos - point[0] * sin).atan2(point[0] * cos + point[1] * sin));
         let (arc, axial): (Vec<f64>, Vec<f64>) = (arc.collect(), points.iter().map(|point| point[2]).collect());
         let [low, high] = extent(&axial);
         let flat = high - low <= FLAT * extent(&radius)[1].max(f64::MIN_POSITIVE);
-        Self { axial, radius, arc, flat }
+        let [cz, cs] = chord_direction(&axial, &arc);
+        let along = axial.iter().zip(&arc).map(|(z, s)| cz * z + cs * s).collect();
+        let across = axial.iter().zip(&arc).map(|(z, s)| cz * s - cs * z).collect();
+        Self { axial, radius, along, across, flat }
     }
 
-    /// Places in the set, ordered along the axis (around it, if the set is flat), as evenly as its nodes allow.
+    /// Places in the set by growing z, as evenly along the chord as its nodes allow, in the middle of the thickness.
     fn evenly(&self, count: usize) -> Vec<usize> {
         let all = self.axial.len();
-        let (along, across) = if self.flat { (&self.arc, &self.axial) } else { (&self.axial, &self.arc) };
-        let mut order: Vec<usize> = (0..all).collect();
-        order.sort_by(|&a, &b| along[a].total_cmp(&along[b]).then(self.arc[a].total_cmp(&self.arc[b])));
-        if count == all {
-            return order;
-        }
-        let [low, high] = extent(along);
+        let mut chosen: Vec<usize> = if count == all { (0..all).collect() } else { Vec::with_capacity(count) };
+        let [low, high] = extent(&self.along);
         let mut free = vec![true; all];
-        let mut chosen: Vec<usize> = Vec::with_capacity(count);
-        for index in 0..count {
+        for index in chosen.len()..count {
             let share = if count == 1 { 0.5 } else { index as f64 / (count - 1) as f64 };
             let target = low + share * (high - low);
-            let middle = self.middle_at(target, along, across);
-            let distance = |&place: &usize| (along[place] - target).hypot(across[place] - middle);
+            let middle = self.middle_at(target);
+            let distance = |&place: &usize| (self.along[place] - target).hypot(self.across[place] - middle);
             let nearest = (0..all).filter(|&place| free[place]).min_by(|a, b| distance(a).total_cmp(&distance(b)));
             if let Some(place) = nearest {
                 free[place] = false;
                 chosen.push(place);
             }
         }
-        chosen.sort_by(|&a, &b| along[a].total_cmp(&along[b]).then(self.arc[a].total_cmp(&self.arc[b])));
+        let by_axis = |a: &usize, b: &usize| self.axial[*a].total_cmp(&self.axial[*b]);
+        let by_chord = |a: &usize, b: &usize| self.along[*a].total_cmp(&self.along[*b]);
+        chosen.sort_by(|a, b| if self.flat { by_chord(a, b) } else { by_axis(a, b).then(by_chord(a, b)) });
         chosen
     }
 
-    /// Middle of the thickness at a position: halfway between the outermost of the nearest nodes.
-    fn middle_at(&self, target: f64, along: &[f64], across: &[f64]) -> f64 {
-        let mut nearest: Vec<usize> = (0..along.len()).collect();
-        nearest.sort_by(|&a, &b| (along[a] - target).abs().total_cmp(&(along[b] - target).abs()));
-        nearest.truncate((along.len() / 10).max(2));
-        let [low, high] = extent(&nearest.iter().map(|&place| across[place]).collect::<Vec<_>>());
+    /// Middle of the thickness at a place along the chord: halfway between the outermost of the nearest nodes.
+    fn middle_at(&self, target: f64) -> f64 {
+        let mut nearest: Vec<usize> = (0..self.along.len()).collect();
+        nearest.sort_by(|&a, &b| (self.along[a] - target).abs().total_cmp(&(self.along[b] - target).abs()));
+        nearest.truncate((self.along.len() / 10).max(2));
+        let [low, high] = extent(&nearest.iter().map(|&place| self.across[place]).collect::<Vec<_>>());
         0.5 * (low + high)
     }
 

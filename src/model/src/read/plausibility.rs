@@ -20,8 +20,8 @@ struct Range {
     possible: [f64; 2],
 }
 
-/// From a small turbocharger's blade to a wind turbine's.
-const SIZE: Range = Range { what: "largest dimension", unit: "m", usual: [2e-3, 10.0], possible: [1e-4, 100.0] };
+/// From a small turbocharger's blade to a large water turbine's casing.
+const SIZE: Range = Range { what: "largest dimension", unit: "m", usual: [2e-3, 8.0], possible: [1e-4, 20.0] };
 /// From rubber (1 MPa) to beyond diamond (1.2 TPa); metals and composites within.
 const MODULUS: Range = Range { what: "Young's modulus", unit: "Pa", usual: [1e8, 2e12], possible: [1e6, 1e13] };
 /// From foams to osmium (22600 kg/m³).

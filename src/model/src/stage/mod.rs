@@ -3,9 +3,11 @@
 mod geometry;
 mod lattice;
 mod position;
+mod reduction;
 mod sector;
 
 pub use geometry::{BladeGeometry, DiskGeometry, SectorGeometry};
+pub use reduction::{StageModel, StageOptions, reduce_stage, stage_model};
 pub use sector::{SectorCounts, SectorMesh, SectorOptions, blade_mesh, sector_mesh};
 
 /// Blades, and sectors of the disk.

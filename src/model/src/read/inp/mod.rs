@@ -178,7 +178,11 @@ impl Reader {
         };
         let wanted = kind.map(|kind| kind.node_count() + 1);
         let mut record: Vec<u64> = Vec::new();
+        let mut place = card.place.clone();
         for (index, line) in card.data.iter().enumerate() {
+            if record.is_empty() {
+                place = line.place.clone();
+            }
             for text in line.values() {
                 record.push(label(text, line, "an element or node number")?);
             }
@@ -189,11 +193,11 @@ impl Reader {
             if wanted.is_some_and(|wanted| record.len() != wanted) || record.len() < 2 {
                 let (found, needed) = (record.len().saturating_sub(1), wanted.map_or(1, |wanted| wanted - 1));
                 let problem = format!("element {} ({name}) has {found} nodes where {needed} are needed", record[0]);
-                return Err(line.place.error(problem, "Correct the element or its TYPE"));
+                return Err(place.error(problem, "Correct the element or its TYPE"));
             }
             let (number, nodes) = (record[0], record[1..].to_vec());
             record.clear();
-            self.draft.add_element(DraftElement { number, kind, nodes, material: None, place: line.place.clone() })?;
+            self.draft.add_element(DraftElement { number, kind, nodes, material: None, place: place.clone() })?;
             if let Some(set) = &set {
                 self.sets.elements.add(set, number);
             }
@@ -232,9 +236,10 @@ impl Reader {
             self.draft.notes.push(format!("{count} elements {name} are no solids: left out, their sets kept"));
         }
         for name in self.near.keys() {
-            let full = name.trim_end_matches(char::is_alphabetic);
+            let full = name.trim_end_matches(|c: char| c.is_ascii_alphabetic());
             self.draft.warnings.push(format!(
-                "{name} is integrated fully, as {full}: frequencies come out slightly higher than with {name}"
+                "{name} is integrated fully here{}: frequencies come out higher than with reduced integration",
+                if name == full { String::new() } else { format!(", as {full}") }
             ));
         }
         if !self.skipped.is_empty() {

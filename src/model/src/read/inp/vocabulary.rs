@@ -23,7 +23,8 @@ pub(super) fn element_type(name: &str) -> ElementType {
     match name {
         "C3D4" => Solid(ElementKind::Tet4),
         "C3D10" => Solid(ElementKind::Tet10),
-        "C3D6" => Solid(ElementKind::Penta6),
+        // Two integration points in CalculiX and Abaqus, six here.
+        "C3D6" => Near(ElementKind::Penta6),
         "C3D15" => Solid(ElementKind::Penta15),
         "C3D8" => Solid(ElementKind::Hex8),
         "C3D20" => Solid(ElementKind::Hex20),
