@@ -27,6 +27,8 @@ const DRAWN_DISPLACEMENT: f64 = 0.08;
 const FAMILIES: usize = 8;
 /// Nodal diameters and modes whose shapes are drawn.
 const SHAPES: [(usize, usize); 8] = [(0, 0), (2, 0), (2, 1), (2, 2), (4, 0), (4, 1), (28, 0), (28, 1)];
+/// Relative fall of a frequency from one nodal diameter to the next that still counts as flat.
+const FLAT: f64 = 1e-3;
 /// Relative distance below which an engine order is said to meet a mode.
 const NEAR: f64 = 0.05;
 
@@ -179,12 +181,17 @@ fn flat_families(diameters: &[NodalDiameter]) -> Statement {
 fn disk_stiffens(diameters: &[NodalDiameter]) -> Statement {
     let first: Vec<f64> = diameters.iter().filter_map(|diameter| diameter.full_frequencies.first().copied()).collect();
     let least = first.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1)).map_or(0, |(index, _)| index);
-    let rises = first.windows(2).skip(least).all(|pair| pair[1] >= pair[0] * (1.0 - 1e-9));
+    // A family of blades is flat: mesh and curvature of the diagram leave it falling by a trace.
+    let fall = first.windows(2).skip(least).map(|pair| 1.0 - pair[1] / pair[0]).fold(0.0, f64::max);
     let (low, high) = (first.get(least).copied().unwrap_or(f64::NAN), first.last().copied().unwrap_or(f64::NAN));
     Statement::tested(
         "The lowest frequency rises with the nodal diameter, from the disk's flexibility to the blades'",
-        rises && high > low,
-        format!("{low:.1} Hz at nodal diameter {least}, {high:.1} Hz at {}", first.len().saturating_sub(1)),
+        fall < FLAT && high > low,
+        format!(
+            "{low:.1} Hz at nodal diameter {least}, {high:.1} Hz at {}; largest fall from one to the next {:.1e} %",
+            first.len().saturating_sub(1),
+            100.0 * fall
+        ),
     )
 }
 
