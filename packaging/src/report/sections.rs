@@ -335,7 +335,7 @@ fn energies(results: &Results<'_>) -> Result<Vec<Figure>> {
 
 /// The blade at rest with its contact nodes, and its first mode shapes.
 fn mode_shapes(reduction: &Reduction) -> Figure {
-    let surface = reduction.mesh.as_ref().map(surface_of).unwrap_or_default();
+    let surface = reduction.mesh.as_ref().map_or_else(Surface::default, surface_of);
     let view = View::of_blade(&surface, AZIMUTH, ELEVATION);
     let frame = Frame::around(&surface, &view, 0.1);
     let marks: Vec<[f64; 3]> = reduction.rom.contact_nodes.iter().map(|node| cartesian(node.position)).collect();
