@@ -99,10 +99,10 @@ pub enum ElementChoice {
 pub fn options(arguments: &ReduceArguments) -> Result<CasingOptions> {
     if arguments.contact_nodes.is_some() {
         let remedy = "Give --contact-grid AxL for a casing";
-        return Err(Failure::usage("--contact-nodes", "it belongs to `rotor37`", remedy));
+        return Err(Failure::usage("--contact-nodes", "it belongs to blades", remedy));
     }
     if arguments.spin.is_some() {
-        return Err(Failure::usage("--spin", "it belongs to `rotor37`", "Leave it out: a casing stands still"));
+        return Err(Failure::usage("--spin", "it belongs to blades", "Leave it out: a casing stands still"));
     }
     let defaults = CasingOptions::default();
     let asked = arguments.casing.clone();
@@ -149,7 +149,8 @@ impl SupportChoice {
 }
 
 impl MaterialChoice {
-    fn material(self) -> Material {
+    /// The material of this name.
+    pub fn material(self) -> Material {
         match self {
             Self::Steel => Material::steel(),
             Self::Titanium => Material::titanium(),

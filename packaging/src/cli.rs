@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::casing_arguments::CasingArguments;
+use crate::{casing_arguments::CasingArguments, file_arguments::FileArguments, rom_cache::RomCache};
 
 /// Blade-tip/casing contact (rub) as an FMU.
 #[derive(Debug, Parser)]
@@ -41,13 +41,16 @@ pub enum Command {
                             DIR then holds report.html (opens offline), the two .fmu files, the ROM, the scene and \
                             the results as CSV.")]
     Demo(DemoArguments),
-    /// From a blade or a casing to a reduced-order model (ROM), with its quality checks.
+    /// From a blade, a casing or a finite-element model of your own to a reduced-order model (ROM), with its checks.
     #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  \
                             tiprub reduce rotor37 --modes 30 --contact-nodes 5 --mesh 10x2x16 -o fine.rom.safetensors\n  \
                             tiprub reduce casing\n  \
                             tiprub reduce casing --material titanium --thickness 0.003 --high-flange none\n  \
                             tiprub reduce casing --contour=-0.02:0.256,0.04:0.245 --contact-axial 0.0026:0.038\n\n\
-                            Meshes of your own are not read; docs/rom-file.md shows how to write a ROM from Python.")]
+                            tiprub reduce blade.inp --contact-set TIP --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
+                            tiprub reduce blade.msh --contact-set TIP --clamp-set ROOT --material titanium --contact-nodes 5\n  \
+                            tiprub reduce job.inp --stiffness job.sti --mass job.mas --contact-set TIP --clamp-set ROOT\n\n\
+                            docs/models.md describes models of your own; docs/rom-file.md writes a ROM from Python.")]
     Reduce(Box<ReduceArguments>),
     /// From a scene to .fmu files. Compiles nothing: the library is generic, scene and ROM are data.
     #[command(
@@ -88,14 +91,16 @@ pub struct DemoArguments {
 /// Arguments of `tiprub reduce`.
 #[derive(Debug, Args)]
 pub struct ReduceArguments {
-    /// What to reduce: `rotor37`, the NASA rotor 37 blade that ships with tiprub, or `casing`, a ring around it.
-    #[arg(value_name = "MODEL", value_parser = model)]
-    pub model: Model,
-    /// Number of modes kept: fixed-interface modes of the blade [default: 20], modes of the casing below the cut-off
-    /// [default: 60].
+    /// What to reduce: `rotor37`, the NASA rotor 37 blade that ships with tiprub; `casing`, a ring around it; or a mesh
+    /// file of your own: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh).
+    #[arg(value_name = "MODEL", value_parser = model, required_unless_present = "stiffness")]
+    pub model: Option<Model>,
+    /// Number of modes kept: fixed-interface modes of a blade [default: 20 of rotor37, 25 of a file], modes of the
+    /// casing below the cut-off [default: 60].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
-    /// Number of contact nodes along the tip chord of `rotor37`, leading edge to trailing edge (≥ 2).
+    /// Number of contact nodes: along the tip chord of `rotor37`, leading edge to trailing edge (≥ 2); of a file, chosen
+    /// evenly along the axis out of the contact set.
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
     /// Elements: of the blade along the chord, through the thickness and along the span [default: 16x2x20]; of the
@@ -105,7 +110,7 @@ pub struct ReduceArguments {
     /// Of the blade, also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s).
     #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true)]
     pub spin: Option<f64>,
-    /// ROM file to write [default: rotor37.rom.safetensors; casing37.rom.safetensors, or casing.rom.safetensors where
+    /// ROM file to write [default: NAME.rom.safetensors with the name of the model; casing37 is called casing where
     /// options change it].
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,
@@ -118,6 +123,9 @@ pub struct ReduceArguments {
     /// What describes a casing.
     #[command(flatten)]
     pub casing: CasingArguments,
+    /// What describes a model of one's own.
+    #[command(flatten)]
+    pub file: FileArguments,
 }
 
 /// Arguments of `tiprub package`.
@@ -138,6 +146,9 @@ pub struct PackageArguments {
     /// FMU library to package, instead of the one found beside tiprub.
     #[arg(long, value_name = "FILE")]
     pub library: Option<PathBuf>,
+    /// Where built-in models are kept.
+    #[command(flatten)]
+    pub cache: CacheArguments,
 }
 
 /// Arguments of `tiprub run`.
@@ -158,6 +169,9 @@ pub struct RunArguments {
     /// Start value of an input or parameter; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
+    /// Where built-in models are kept.
+    #[command(flatten)]
+    pub cache: CacheArguments,
 }
 
 /// Arguments of `tiprub inspect`.
@@ -166,15 +180,36 @@ pub struct InspectArguments {
     /// An .fmu, a ROM (.safetensors), a scene (.toml) or one that ships (`builtin:abradable`).
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
+    /// Where built-in models are kept.
+    #[command(flatten)]
+    pub cache: CacheArguments,
 }
 
-/// Models that ship with tiprub.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+/// Whether built-in models are kept from one command to the next.
+#[derive(Debug, Clone, Default, Args)]
+pub struct CacheArguments {
+    /// Reduce built-in models anew, and keep them for no other command. Otherwise they are kept in the directory that the
+    /// environment variable TIPRUB_CACHE names, or in `tiprub` in the user's cache directory.
+    #[arg(long)]
+    pub no_cache: bool,
+}
+
+impl CacheArguments {
+    /// The cache to use.
+    pub fn cache(&self) -> RomCache {
+        if self.no_cache { RomCache::off() } else { RomCache::of_user() }
+    }
+}
+
+/// What can be reduced.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Model {
     /// One blade of NASA rotor 37 (36 blades), hub clamped.
     Rotor37,
     /// A flexible casing ring, by default the one around rotor 37.
     Casing,
+    /// A mesh file.
+    File(PathBuf),
 }
 
 /// Which FMUs to write.
@@ -211,11 +246,13 @@ impl std::str::FromStr for MeshSize {
 }
 
 fn model(text: &str) -> Result<Model, String> {
-    Model::from_str(text, false).map_err(|_| {
-        "only `rotor37` and `casing` ship with tiprub, and meshes are not read; docs/rom-file.md shows how to write a ROM of your own \
-         model from Python"
-            .into()
-    })
+    match text {
+        "rotor37" => Ok(Model::Rotor37),
+        "casing" => Ok(Model::Casing),
+        // Names of files have an extension or a directory; anything else is a slip in the name of a model.
+        _ if text.contains(['.', '/', '\\']) => Ok(Model::File(text.into())),
+        _ => Err("`rotor37` and `casing` ship with tiprub; a model of your own is a file: .inp or .msh".into()),
+    }
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -282,7 +319,9 @@ mod tests {
             ("demo --revolutions -1", "positive"),
             ("package a.toml --fmi 4", "possible values: 2, 3, both"),
             ("reduce rotor38", "rotor37"),
-            ("reduce blade.inp", "docs/rom-file.md"),
+            ("reduce", "MODEL"),
+            ("reduce blade.inp --units inch", "possible values: mm-t-s, m"),
+            ("reduce blade.inp --poisson 0.5", "below 0.5"),
             ("reduce casing --contour 0.1", "z:r"),
             ("reduce casing --contour=0.1:0.2,0.1:0.2", "does not lie beyond"),
             ("reduce casing --thickness 0", "positive length"),

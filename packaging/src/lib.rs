@@ -4,21 +4,25 @@
 //! terminal. [`commands`] holds one module per command; the rest are the parts they share.
 //!
 //! - [`scene_source`]: a scene file (or the embedded rotor 37 scene) with its ROMs;
+//! - [`builtin`], [`rom_cache`]: the models that ship, reduced once and kept in the user's cache directory;
 //! - [`scene_features`]: what a scene asks for beyond a plain rub, and its limits, in words;
 //! - [`schedule`], [`recording`], [`native`]: communication points, the table of results, the run without FMI;
 //! - [`error_study`]: error against run time for every scheme and solver;
 //! - [`archive`], [`fmu`], [`library`]: the reproducible zip, its contents, and the shared library that goes in;
 //! - [`importer`]: a packaged FMU driven through its C ABI the way any importer would;
-//! - [`casing_arguments`]: what can be asked for of a casing;
+//! - [`casing_arguments`], [`file_arguments`]: what can be asked for of a casing, of a model of one's own;
+//! - [`users_model`]: such a model read, judged, reduced;
 //! - [`report`]: the HTML report with its pictures and plots.
 
 pub mod archive;
+pub mod builtin;
 pub mod casing_arguments;
 pub mod cli;
 pub mod commands;
 pub mod console;
 pub mod error_study;
 pub mod failure;
+pub mod file_arguments;
 pub mod fmu;
 pub mod importer;
 pub mod library;
@@ -27,9 +31,12 @@ pub mod output_file;
 pub mod recording;
 pub mod reduction;
 pub mod report;
+pub mod rom_cache;
 pub mod rom_facts;
 pub mod scene_features;
 pub mod scene_source;
 pub mod schedule;
+pub mod study;
+pub mod users_model;
 
 pub use failure::{Failure, Result};

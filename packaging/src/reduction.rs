@@ -34,21 +34,32 @@ pub fn casing(options: &CasingOptions, console: &Console) -> Result<Reduction> {
     with_progress("Reducing the casing", console, &|listener| reduce_ring(options, listener))
 }
 
-fn with_progress(
+/// Work that tells where it stands, shown as a task; `title` says what is done.
+///
+/// # Errors
+/// Those of the work.
+pub fn with_progress<T>(
     title: &str,
     console: &Console,
-    reduce: &dyn Fn(Listener<'_>) -> tiprub_model::Result<Reduction>,
-) -> Result<Reduction> {
+    work: &dyn Fn(Listener<'_>) -> tiprub_model::Result<T>,
+) -> Result<T> {
     let task = console.task(title, Some(100 * STAGES.len() as u64));
     let listener = |progress: Progress| {
         let stage = STAGES.iter().position(|stage| *stage == progress.stage).unwrap_or(0);
         task.now(&format!("{title}: {}", progress.stage));
         task.at(percent(stage as f64 + progress.fraction));
     };
-    reduce(&listener).map_err(|error| match error {
+    work(&listener).map_err(|error| failure(title, error))
+}
+
+/// An error of the model floor, met at the work called `title`.
+pub fn failure(title: &str, error: tiprub_model::Error) -> Failure {
+    match error {
         tiprub_model::Error::Invalid { what, problem, remedy } => Failure::new(what, problem, remedy),
+        tiprub_model::Error::Read { place, problem, remedy } => Failure::new(place, problem, remedy),
+        tiprub_model::Error::File { path, source } => Failure::file(&path, "cannot be read", &source),
         other => Failure::from_below(title, other),
-    })
+    }
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=100 per stage")]

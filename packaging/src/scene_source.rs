@@ -3,9 +3,8 @@
 use std::{cell::RefCell, fs, path::Path};
 
 use tiprub_core::{Rom, Scene};
-use tiprub_model::{CasingOptions, Rotor37Options, casing::CASING37, rotor37::DESIGN_SPEED};
 
-use crate::{Failure, Result, console::Console, reduction};
+use crate::{Failure, Result, builtin, console::Console, rom_cache::RomCache};
 
 /// The scene of the demo, as a user would write it.
 pub const ROTOR37_SCENE: &str = include_str!("../scenes/rotor37.toml");
@@ -20,13 +19,13 @@ pub const BUILTIN_SCENES: [(&str, &str); 3] = [
 /// What names of embedded scenes and models begin with.
 pub const BUILTIN: &str = "builtin:";
 
-/// Load a scene: a path, or `builtin:` and the name of one of [`BUILTIN_SCENES`]. Built-in models are reduced on the way,
-/// with progress.
+/// Load a scene: a path, or `builtin:` and the name of one of [`BUILTIN_SCENES`]. Built-in models come from `cache`, or
+/// are reduced on the way, with progress.
 ///
 /// # Errors
 /// Missing or wrong files, naming file, line, field and remedy.
-pub fn load(argument: &str, console: &Console) -> Result<Scene> {
-    let reduce = |name: &str| builtin_rom(name, console);
+pub fn load(argument: &str, cache: &RomCache, console: &Console) -> Result<Scene> {
+    let reduce = |name: &str| Some(builtin::rom(name, cache, console)?.map_err(|failure| failure.to_string()));
     if let Some(name) = argument.strip_prefix(BUILTIN) {
         return match BUILTIN_SCENES.iter().find(|(known, _)| *known == name) {
             Some((_, text)) => builtin_scene(argument, text, &reduce),
@@ -90,18 +89,6 @@ pub fn rotor37_text(rom_file: &str, stop: f64) -> String {
     text
 }
 
-/// What ships: the blade at rest, the blade with the effects of spin up to its design speed, the casing around it.
-fn builtin_rom(name: &str, console: &Console) -> Option<Result<Rom, String>> {
-    let blade = |spin| reduction::rotor37(&Rotor37Options { spin, ..Rotor37Options::default() }, console);
-    let reduced = match name {
-        "rotor37" => blade(None),
-        "rotor37-spin" => blade(Some(DESIGN_SPEED)),
-        CASING37 => reduction::casing(&CasingOptions::default(), console),
-        _ => return None,
-    };
-    Some(reduced.map(|reduction| reduction.rom).map_err(|failure| failure.to_string()))
-}
-
 /// Read a ROM file.
 ///
 /// # Errors
@@ -140,6 +127,7 @@ mod tests {
     #[test]
     fn missing_files_and_unknown_builtins_are_named() {
         let console = Console::new(true, false);
+        let load = |argument: &str, console: &Console| load(argument, &RomCache::off(), console);
         let missing = load("/nowhere/scene.toml", &console).unwrap_err();
         assert!(missing.what.contains("/nowhere/scene.toml"), "{missing}");
         let failure = load("builtin:rotor38", &console).unwrap_err();
@@ -156,7 +144,8 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("scene.toml");
         fs::write(&path, ROTOR37_SCENE.replace("gap = ", "gapp = ")).unwrap();
-        let text = load(&path.display().to_string(), &Console::new(true, false)).unwrap_err().to_string();
+        let text =
+            load(&path.display().to_string(), &RomCache::off(), &Console::new(true, false)).unwrap_err().to_string();
         assert!(text.contains("scene.toml:") && text.contains("gapp") && text.contains("`gap`"), "{text}");
     }
 }

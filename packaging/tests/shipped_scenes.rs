@@ -6,7 +6,12 @@ use tempfile::TempDir;
 
 #[track_caller]
 fn succeed(directory: &TempDir, arguments: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_tiprub")).current_dir(directory).args(arguments).output().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_tiprub"))
+        .env("TIPRUB_CACHE", env!("CARGO_TARGET_TMPDIR"))
+        .current_dir(directory)
+        .args(arguments)
+        .output()
+        .unwrap();
     assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }

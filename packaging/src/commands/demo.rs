@@ -20,6 +20,7 @@ use crate::{
     native::{self, NativeRun},
     output_file, reduction,
     report::page::{self, ImportedSummary, ReportFile, ReportInput},
+    rom_cache::RomCache,
     rom_facts::RomFacts,
     scene_source::{self, ROTOR37_SCENE, rotor37_text},
     schedule::Schedule,
@@ -123,7 +124,7 @@ fn write_inputs(directory: &Path, reduction: &Reduction, scene_text: &str) -> Re
     output_file::write(&directory.join(ROM_FILE), rom)?;
     let scene = directory.join(SCENE_FILE);
     output_file::write(&scene, scene_text)?;
-    scene_source::load(&scene.display().to_string(), &Console::new(true, false))
+    scene_source::load(&scene.display().to_string(), &RomCache::off(), &Console::new(true, false))
 }
 
 fn fmu_path(directory: &Path, version: FmiVersion) -> PathBuf {

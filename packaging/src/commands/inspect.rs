@@ -44,7 +44,7 @@ pub fn run(arguments: &InspectArguments, console: &Console) -> Result<Outcome> {
             Ok(Outcome { text: facts.to_text(), json: json!({ "kind": "rom", "rom": facts.to_json() }) })
         }
         FileKind::Scene => {
-            let scene = scene_source::load(&path.display().to_string(), console)?;
+            let scene = scene_source::load(&path.display().to_string(), &arguments.cache.cache(), console)?;
             let (text, json) = describe_scene(&scene, console)?;
             Ok(Outcome { text, json: json!({ "kind": "scene", "scene": json }) })
         }
@@ -247,12 +247,13 @@ fn scene_text(settings: &SceneSettings) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::CacheArguments;
 
     fn inspect(name: &str, contents: impl AsRef<[u8]>) -> Result<Outcome> {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join(name);
         fs::write(&path, contents).unwrap();
-        run(&InspectArguments { file: path }, &Console::new(true, false))
+        run(&InspectArguments { file: path, cache: CacheArguments::default() }, &Console::new(true, false))
     }
 
     #[test]
@@ -272,7 +273,11 @@ mod tests {
 
     #[test]
     fn a_missing_file_is_named() {
-        let failure = run(&InspectArguments { file: "/nowhere/x.fmu".into() }, &Console::new(true, false)).unwrap_err();
+        let failure = run(
+            &InspectArguments { file: "/nowhere/x.fmu".into(), cache: CacheArguments::default() },
+            &Console::new(true, false),
+        )
+        .unwrap_err();
         assert!(failure.what.contains("/nowhere/x.fmu"), "{failure}");
     }
 }

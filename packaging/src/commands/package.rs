@@ -19,7 +19,7 @@ use crate::{
 pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
     // What is wrong with the command line is said before any work.
     targets(arguments, "model")?;
-    let scene = scene_source::load(&arguments.scene, console)?;
+    let scene = scene_source::load(&arguments.scene, &arguments.cache.cache(), console)?;
     let targets = targets(arguments, &scene.settings.name)?;
     let library = library::load(arguments.library.as_deref(), console)?;
     let package = Package::new(&scene, &library)?;
@@ -70,9 +70,17 @@ fn targets(arguments: &PackageArguments, name: &str) -> Result<Vec<(FmiVersion, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::CacheArguments;
 
     fn arguments(fmi: FmiChoice, output: &str) -> PackageArguments {
-        PackageArguments { scene: "s".into(), fmi, output: output.into(), scalars: false, library: None }
+        PackageArguments {
+            scene: "s".into(),
+            fmi,
+            output: output.into(),
+            scalars: false,
+            library: None,
+            cache: CacheArguments::default(),
+        }
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! `tiprub reduce`: from a blade or a casing to a ROM file, with its checks.
 
-use serde_json::json;
+use serde_json::{Value, json};
 use tiprub_model::{
-    Rotor37Options,
+    Reduction, Rotor37Options,
     casing::{CLAMPED, Support},
     inp::calculix_input,
     rotor37::MeshCounts,
@@ -13,8 +13,10 @@ use crate::{
     casing_arguments::{self, CasingArguments},
     cli::{Model, ReduceArguments},
     console::{Console, Outcome},
+    file_arguments::FileArguments,
     output_file, reduction,
     rom_facts::RomFacts,
+    users_model::{self, UsersReduction},
 };
 
 /// Frequencies asked for in the exported finite-element model.
@@ -25,22 +27,17 @@ const EXPORTED_FREQUENCIES: usize = 10;
 /// # Errors
 /// Counts that do not fit the mesh, or files that cannot be written.
 pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
-    let (reduction, clamped, default_output) = match arguments.model {
-        Model::Rotor37 => {
-            let reduction = reduction::rotor37(&rotor37_options(arguments)?, console)?;
-            (reduction, Some("hub"), "rotor37.rom.safetensors".to_owned())
-        }
-        Model::Casing => {
-            let options = casing_arguments::options(arguments)?;
-            let clamped = (options.support != Support::Free).then_some(CLAMPED);
-            (reduction::casing(&options, console)?, clamped, format!("{}.rom.safetensors", options.name))
-        }
-    };
+    let Reduced { reduction, clamped, name, text: read, json: read_json, mut warnings } = reduced(arguments, console)?;
+    let default_output = format!("{name}.rom.safetensors");
     let output = &arguments.output.clone().unwrap_or_else(|| default_output.into());
     let facts = RomFacts::of(&reduction.rom)?;
     let mut files = vec![(output, tiprub_format::write_rom(&reduction.rom))];
     if let Some(path) = &arguments.inp {
-        let text = calculix_input(&reduction.mesh, &reduction.material, clamped, EXPORTED_FREQUENCIES)
+        let (Some(mesh), Some(material)) = (&reduction.mesh, &reduction.material) else {
+            let remedy = "Leave --inp out";
+            return Err(Failure::usage("--inp", "the model has no mesh of one material to export", remedy));
+        };
+        let text = calculix_input(mesh, material, clamped, EXPORTED_FREQUENCIES)
             .map_err(|error| Failure::from_below(path.display(), error))?;
         files.push((path, text.into_bytes()));
     }
@@ -52,14 +49,15 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     for (path, bytes) in &files {
         output_file::write(path, bytes)?;
     }
-    let mut warnings = facts.warnings();
+    warnings.extend(facts.warnings());
     warnings.extend(spin_warning(&reduction.spin_checks));
     console.warn(&warnings);
-    let mut text = facts.to_text();
+    let elements = reduction.mesh.as_ref().map(|mesh| mesh.elements.len());
+    let counted = elements.map(|count| format!(" {count} elements,")).unwrap_or_default();
+    let mut text = if read.is_empty() { facts.to_text() } else { format!("{read}\n\n{}", facts.to_text()) };
     text.push_str(&format!(
-        "\n  full model: {} nodes, {} elements, {} free degrees of freedom, reduced in {:.2} s\n  written: {}",
-        reduction.mesh.nodes.len(),
-        reduction.mesh.elements.len(),
+        "\n  full model: {} nodes,{counted} {} free degrees of freedom, reduced in {:.2} s\n  written: {}",
+        reduction.nodes,
         reduction.free_dofs,
         reduction.timings.total(),
         output.display()
@@ -79,9 +77,10 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     }
     let json = json!({
         "rom": facts.to_json(),
+        "model": read_json,
         "full_model": {
-            "nodes": reduction.mesh.nodes.len(),
-            "elements": reduction.mesh.elements.len(),
+            "nodes": reduction.nodes,
+            "elements": elements,
             "free_dofs": reduction.free_dofs,
             "largest_mode_residual": reduction.largest_residual,
         },
@@ -96,6 +95,51 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
         "files": { "rom": output, "inp": arguments.inp },
     });
     Ok(Outcome { text, json })
+}
+
+/// What was reduced, and what is to be told about it.
+struct Reduced {
+    reduction: Reduction,
+    /// Set of clamped nodes, for exported files.
+    clamped: Option<&'static str>,
+    name: String,
+    /// What was read, where it was a file.
+    text: String,
+    json: Value,
+    warnings: Vec<String>,
+}
+
+fn reduced(arguments: &ReduceArguments, console: &Console) -> Result<Reduced> {
+    let shipped = |reduction: Reduction, clamped| {
+        let name = reduction.rom.name.clone();
+        Reduced { reduction, clamped, name, text: String::new(), json: Value::Null, warnings: Vec::new() }
+    };
+    match &arguments.model {
+        Some(Model::Rotor37) => {
+            refuse_file_options(arguments)?;
+            let reduction = reduction::rotor37(&rotor37_options(arguments)?, console)?;
+            Ok(shipped(reduction, Some("hub")))
+        }
+        Some(Model::Casing) => {
+            refuse_file_options(arguments)?;
+            let options = casing_arguments::options(arguments)?;
+            let clamped = (options.support != Support::Free).then_some(CLAMPED);
+            Ok(shipped(reduction::casing(&options, console)?, clamped))
+        }
+        Some(Model::File(_)) | None => {
+            let UsersReduction { reduction, name, clamped, text, json, warnings } =
+                users_model::reduce(arguments, console)?;
+            Ok(Reduced { reduction, clamped, name, text, json, warnings })
+        }
+    }
+}
+
+fn refuse_file_options(arguments: &ReduceArguments) -> Result<()> {
+    if arguments.file == FileArguments::default() {
+        return Ok(());
+    }
+    let remedy = "Leave out what `tiprub reduce --help` lists as options of a model of your own";
+    Err(Failure::usage("MODEL", "an option given describes a model of one's own, and this one ships", remedy))
 }
 
 fn rotor37_options(arguments: &ReduceArguments) -> Result<Rotor37Options> {

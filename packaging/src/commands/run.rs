@@ -23,7 +23,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
     if to_stdout && console.is_json() {
         return Err(Failure::usage("--csv -", "and --json both want stdout", "Give --csv a file"));
     }
-    let scene = scene_source::load(&arguments.scene, console)?;
+    let scene = scene_source::load(&arguments.scene, &arguments.cache.cache(), console)?;
     let schedule = Schedule::new(&scene.settings.experiment, arguments.stop, arguments.step)?;
     let clock = Instant::now();
     let run = {

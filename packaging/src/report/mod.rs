@@ -5,3 +5,4 @@ pub mod page;
 pub mod picture;
 pub mod plots;
 pub mod sections;
+pub mod waterfall;

@@ -14,6 +14,8 @@ use crate::{Failure, Result};
 /// Plots are drawn at twice the size they are shown at: the SVG backend rounds to whole units.
 const SCALE: u32 = 2;
 const WIDTH: u32 = 920 * SCALE;
+/// Height of a legend above the plot, in CSS pixels.
+const LEGEND: u32 = 28;
 const BUCKETS: usize = 700;
 const INK: RGBColor = RGBColor(52, 58, 66);
 const GRID: RGBColor = RGBColor(232, 235, 239);
@@ -32,16 +34,40 @@ type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64
 /// One line of a plot.
 #[derive(Debug, Clone)]
 pub struct Series {
-    /// Legend text.
+    /// Legend text; empty keeps the line out of the legend.
     pub label: String,
     /// Points, x ascending.
     pub points: Vec<(f64, f64)>,
+    /// Index into [`COLORS`], instead of one after the other.
+    pub color: Option<usize>,
+    /// How it is drawn.
+    pub form: Form,
+}
+
+/// How a series is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// A line, peaks kept where there are too many points.
+    Line,
+    /// A thin line through few points.
+    Thin,
+    /// A dot at every point.
+    Dots,
 }
 
 impl Series {
     /// A line.
     pub fn line(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
-        Self { label: label.into(), points }
+        Self { label: label.into(), points, color: None, form: Form::Line }
+    }
+
+    /// The same in another form and colour.
+    pub fn drawn(self, form: Form, color: usize) -> Self {
+        Self { form, color: Some(color), ..self }
+    }
+
+    fn color(&self, index: usize) -> RGBColor {
+        COLORS[self.color.unwrap_or(index) % COLORS.len()]
     }
 }
 
@@ -52,7 +78,7 @@ pub struct Plot {
     pub x_label: String,
     /// Axis label with unit.
     pub y_label: String,
-    /// Lines, at most as many as [`COLORS`].
+    /// Lines; colours repeat beyond [`COLORS`].
     pub series: Vec<Series>,
     /// Height in CSS pixels at a width of 920.
     pub height: u32,
@@ -89,7 +115,7 @@ impl Plot {
         let mut html = String::new();
         if self.series.len() > 1 {
             html.push_str("<div class=\"legend\">");
-            for (series, RGBColor(red, green, blue)) in self.series.iter().zip(COLORS) {
+            for (series, RGBColor(red, green, blue)) in self.legend() {
                 let color = format!("rgb({red},{green},{blue})");
                 let _ = write!(html, "<span><i style=\"background:{color}\"></i>{}</span>", escape(&series.label));
             }
@@ -99,18 +125,55 @@ impl Plot {
         Ok(html)
     }
 
+    /// Series that have a label, with their colours.
+    fn legend(&self) -> impl Iterator<Item = (&Series, RGBColor)> {
+        let colored = self.series.iter().enumerate().map(|(index, series)| (series, series.color(index)));
+        colored.filter(|(series, _)| !series.label.is_empty())
+    }
+
     /// The SVG element.
     ///
     /// # Errors
     /// The plotting library refuses (never seen with finite data).
     pub fn to_svg(&self) -> Result<String> {
+        self.svg(0)
+    }
+
+    /// The SVG element with the legend in it, for a file of its own.
+    ///
+    /// # Errors
+    /// As [`Plot::to_svg`].
+    pub fn to_whole_svg(&self) -> Result<String> {
+        self.svg(if self.series.len() > 1 { LEGEND } else { 0 })
+    }
+
+    /// With so much room for a legend above the plot.
+    fn svg(&self, legend: u32) -> Result<String> {
         let mut svg = String::new();
         {
-            let area = SVGBackend::with_string(&mut svg, (WIDTH, self.height * SCALE)).into_drawing_area();
+            let whole = SVGBackend::with_string(&mut svg, (WIDTH, (self.height + legend) * SCALE)).into_drawing_area();
+            let (top, area) = whole.split_vertically(legend * SCALE);
+            if legend > 0 {
+                self.draw_legend(&top).map_err(|error| Failure::new("report plot", error, ""))?;
+            }
             self.draw(&area).map_err(|error| Failure::new("report plot", error, ""))?;
             area.present().map_err(|error| Failure::new("report plot", error, ""))?;
         }
         Ok(svg)
+    }
+
+    fn draw_legend(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), String> {
+        let font = ("sans-serif", 14 * SCALE).into_font().color(&INK);
+        let (size, mut left) = (i32::try_from(SCALE).unwrap_or(1), 86 * i32::try_from(SCALE).unwrap_or(1));
+        for (series, color) in self.legend() {
+            let line = Rectangle::new([(left, 12 * size), (left + 20 * size, 15 * size)], color.filled());
+            area.draw(&line).map_err(|error| error.to_string())?;
+            let text = Text::new(series.label.clone(), (left + 26 * size, 6 * size), font.clone());
+            area.draw(&text).map_err(|error| error.to_string())?;
+            // Widths of letters are not known here: a little more than a usual one each.
+            left += (44 + 8 * i32::try_from(series.label.chars().count()).unwrap_or(0)) * size;
+        }
+        Ok(())
     }
 
     fn draw(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), String> {
@@ -170,11 +233,14 @@ impl Plot {
     }
 
     fn draw_series(&self, chart: &mut Chart<'_, '_>) -> Result<(), String> {
-        for (series, color) in self.series.iter().zip(COLORS) {
-            let finite: Vec<_> = self.finite_points_of(series).collect();
-            let line = LineSeries::new(decimate(&finite, BUCKETS), color.stroke_width(SCALE + SCALE / 2));
-            chart.draw_series(line).map_err(|error| error.to_string())?;
-            if self.marked {
+        for (index, series) in self.series.iter().enumerate() {
+            let (finite, color): (Vec<_>, _) = (self.finite_points_of(series).collect(), series.color(index));
+            let width = if series.form == Form::Line { SCALE + SCALE / 2 } else { SCALE / 2 };
+            if series.form != Form::Dots {
+                let line = LineSeries::new(decimate(&finite, BUCKETS), color.stroke_width(width));
+                chart.draw_series(line).map_err(|error| error.to_string())?;
+            }
+            if self.marked || series.form == Form::Dots {
                 let circle = |point: &(f64, f64)| Circle::new(*point, 4 * SCALE, color.filled());
                 chart.draw_series(finite.iter().map(circle)).map_err(|error| error.to_string())?;
             }
@@ -256,6 +322,18 @@ mod tests {
             assert!(svg.contains(text), "{text}");
         }
         assert!(svg.len() < 60_000, "{} bytes", svg.len());
+    }
+
+    #[test]
+    fn a_file_of_its_own_holds_the_legend_and_unlabelled_lines_stay_out_of_it() {
+        let line = |label: &str| Series::line(label, vec![(0.0, 1.0), (1.0, 2.0)]);
+        let series = vec![line("first"), line("").drawn(Form::Thin, 4), line("third").drawn(Form::Dots, 7)];
+        let plot = Plot::new("x", "y", series);
+        let svg = plot.to_whole_svg().unwrap();
+        assert!(svg.contains("first") && svg.contains("third"));
+        assert!(!plot.to_svg().unwrap().contains("first"), "a page has it beside the picture");
+        assert_eq!(svg.matches("<circle").count(), 2);
+        assert_eq!(plot.to_html().unwrap().matches("<i style").count(), 2);
     }
 
     #[test]

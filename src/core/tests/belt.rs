@@ -8,6 +8,7 @@ use nalgebra::DMatrix;
 use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw};
 use tiprub_core::dynamics::bank::BankOptions;
 use tiprub_core::dynamics::modal::ModalModel;
+use tiprub_core::dynamics::sectors::SectorModel;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::{System, SystemParts, SystemSettings};
 
@@ -34,7 +35,10 @@ fn block(scheme: Scheme, step: f64) -> System {
     let settings = SystemSettings { scheme, solver: Solver::Coulomb, friction: FRICTION, ledger: true };
     let bank = BankOptions { loads: true, ..BankOptions::default() };
     let mut system =
-        System::with_parts(&model, 1, law, settings, SystemParts { bank, sticking: true, ..SystemParts::default() });
+        {
+        let parts = SystemParts { bank, sticking: true, ..SystemParts::default() };
+        System::with_parts(SectorModel::Uncoupled(&model, 1), law, settings, parts)
+    };
     system.set_step(step);
     system.bank_mut().set_modal_state(1, 0, 0.0, BELT * MASS.sqrt());
     system.start(&Drive::default());

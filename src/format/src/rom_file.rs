@@ -6,11 +6,12 @@ use nalgebra::DMatrix;
 use safetensors::{Dtype, SafeTensorError, SafeTensors};
 use sha2::{Digest, Sha256};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, Frame, RomChecks};
+use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
 
 mod extras;
+mod harmonics;
 
-use crate::rom_layout::{ARRAYS, METADATA, ROM_FORMAT, ROM_FORMAT_VERSION, units_text};
+use crate::rom_layout::{ARRAYS, METADATA, NUMBER, ROM_FORMAT, ROM_FORMAT_VERSION, units_text};
 use crate::{Error, Result, suggestion};
 
 const WRITE_AGAIN: &str = "Write the ROM again; the ROM file chapter of the user guide lists arrays and metadata";
@@ -72,7 +73,8 @@ impl Reader<'_> {
         let known: Vec<&str> = ARRAYS.iter().map(|array| array.name).collect();
         let mut arrays = Arrays::new();
         for (name, view) in views {
-            if !known.contains(&name.as_str()) {
+            let listed = known.contains(&name.as_str()) && !name.contains(NUMBER);
+            if !listed && harmonics::parts(&name).is_none() {
                 let remedy = suggestion::remedy(&name, &known);
                 return Err(self.error(format!("array `{name}`"), "no such array in a ROM file", remedy));
             }
@@ -136,10 +138,12 @@ impl Reader<'_> {
         let map = self.required(arrays, "contact_map", 3)?;
         let reason = "nodes as in `contact_positions`, 3 components, coordinates as in `mass`";
         self.shape("contact_map", map, &[nodes, 3, order], reason)?;
+        let sectors = self.number(metadata, "sectors")?;
+        let harmonics = self.harmonics(arrays, sectors, nodes)?;
         Ok(Rom {
             name: self.entry(metadata, "name")?.to_owned(),
             origin: metadata.get("origin").cloned().unwrap_or_default(),
-            sectors: self.number(metadata, "sectors")?,
+            sectors,
             frame: self.frame(metadata)?,
             mass: DMatrix::from_row_slice(order, order, &mass.values),
             stiffness: DMatrix::from_row_slice(order, order, &stiffness.values),
@@ -155,9 +159,9 @@ impl Reader<'_> {
                 reduced_frequencies: self.check_values(arrays, "reduced_frequencies")?,
                 frequency_deviation: self.check_values(arrays, "frequency_deviation")?,
                 residual_criterion: self.check_values(arrays, "residual_criterion")?,
-                nodal_diameters: Vec::new(),
+                nodal_diameters: self.nodal_diameters(arrays, sectors, harmonics.is_empty())?,
             },
-            extras: self.extras(arrays, metadata, order)?,
+            extras: RomExtras { harmonics, ..self.extras(arrays, metadata, order)? },
         })
     }
 
@@ -334,7 +338,7 @@ fn rom_metadata(rom: &Rom, arrays: &Arrays) -> Metadata {
         ("frame", frame.to_owned()),
         ("damping_ratio", rom.damping_ratio.to_string()),
         ("contact_names", names),
-        ("units", units_text(|name| arrays.contains_key(name))),
+        ("units", units_text(|name| arrays.contains_key(&name.replace(NUMBER, "1")))),
     ]
     .into_iter()
     .chain(extras::metadata(&rom.extras))
@@ -375,7 +379,8 @@ fn rom_arrays(rom: &Rom) -> Arrays {
         }
     }
     arrays.extend(extras::arrays(&rom.extras));
-    arrays.into_iter().map(|(name, array)| (name.to_owned(), array)).collect()
+    let named = arrays.into_iter().map(|(name, array)| (name.to_owned(), array));
+    named.chain(harmonics::arrays(rom)).collect()
 }
 
 /// The safetensors container: header length, JSON header padded to 8 bytes, data. Written here because the library's

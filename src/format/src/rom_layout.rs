@@ -41,12 +41,12 @@ const fn array(
     ArrayLayout { name, shape, unit, required, description }
 }
 
-/// How many of [`ARRAYS`] every structure may have; the others belong to structures that spin, heat up or carry a
-/// surface. Only files that hold one of those mention it.
+/// How many of [`ARRAYS`] every structure may have; the others belong to structures that spin, heat up, or have coupled
+/// sectors. Only files that hold one of those mention it.
 const GENERAL_ARRAYS: usize = 9;
 
 /// Every array.
-pub const ARRAYS: [ArrayLayout; 16] = [
+pub const ARRAYS: [ArrayLayout; 20] = [
     array("mass", "[n, n]", "kg", true, "Reduced mass matrix of one sector: symmetric, positive definite."),
     array("stiffness", "[n, n]", "N/m", true, "Reduced stiffness matrix: symmetric, positive semidefinite."),
     array(
@@ -108,6 +108,37 @@ pub const ARRAYS: [ArrayLayout; 16] = [
         false,
         "Where each patch is: angle from and to, axial position from and to.",
     ),
+    array(
+        "mass_<n>",
+        "[m, m, 2]",
+        "kg",
+        false,
+        "Reduced mass matrix of nodal diameter n = 1, 2, ... up to half of `sectors`: Hermitian, positive definite; the \
+         last index is 0 for the real part and 1 for the imaginary part. `m` may differ from one n to the next. \
+         `mass`, `stiffness` and `contact_map` are then those of n = 0.",
+    ),
+    array(
+        "stiffness_<n>",
+        "[m, m, 2]",
+        "N/m",
+        false,
+        "Reduced stiffness matrix of nodal diameter n: Hermitian, positive semidefinite. The three arrays of a nodal \
+         diameter come together, and for all n or for none.",
+    ),
+    array(
+        "contact_map_<n>",
+        "[nodes, 3, m, 2]",
+        "m per unit coordinate",
+        false,
+        "Displacement components of each contact node caused by each reduced coordinate of nodal diameter n.",
+    ),
+    array(
+        "nodal_diameters",
+        "[modes]",
+        "1",
+        false,
+        "Nodal diameter of each mode in the arrays of frequencies and checks; only with coupled sectors.",
+    ),
 ];
 
 /// The arrays of a structure that spins: all or none.
@@ -129,7 +160,8 @@ pub const METADATA: [MetadataLayout; 12] = [
     entry(
         "sectors",
         None,
-        "Number of identical uncoupled copies around the axis, at least 1 and at most 10000; 1 is a single structure.",
+        "Number of identical sectors around the axis, at least 1 and at most 10000; 1 is a single structure. They are \
+         uncoupled, unless there are arrays for nodal diameters above 0.",
     ),
     entry("frame", None, "`cylindrical` or `cartesian`: directions of positions and displacements."),
     entry("damping_ratio", Some("0"), "Modal damping ratio, from 0 to below 1; a scene may override it."),
@@ -148,6 +180,10 @@ pub const METADATA: [MetadataLayout; 12] = [
     entry("units", Some(""), "Text for the reader of the file: one line per array."),
     entry("checksum", Some(""), "SHA-256 of the content, checked where present; leave it out when writing by hand."),
 ];
+
+/// Arrays of one nodal diameter above 0, and what stands for its number in their names.
+pub(crate) const HARMONIC_ARRAYS: [&str; 3] = ["mass_<n>", "stiffness_<n>", "contact_map_<n>"];
+pub(crate) const NUMBER: &str = "<n>";
 
 /// The text of the metadata entry `units` of a file, given which arrays it holds.
 pub fn units_text(holds: impl Fn(&str) -> bool) -> String {

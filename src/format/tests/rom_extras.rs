@@ -1,7 +1,9 @@
 //! What only some ROM files hold: spin, heat, contact grid.
 
-use std::collections::BTreeMap;
+#[path = "common/loose.rs"]
+mod loose;
 
+use loose::Loose;
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 use sha2::{Digest, Sha256};
@@ -132,47 +134,9 @@ fn units_are_listed_for_the_arrays_in_the_file() {
     assert!(units(&rom).contains("thermal_loads") && !units(&rom).contains("speed"), "{}", units(&rom));
 }
 
-/// The file as arrays and entries that a test may change before it is written again, without checksum.
-struct Loose {
-    arrays: BTreeMap<String, (Vec<usize>, Vec<f64>)>,
-    entries: BTreeMap<String, String>,
-}
-
-impl Loose {
-    fn new() -> Self {
-        let bytes = write_rom(&complete(9, 2, 2));
-        let (_, header) = safetensors::SafeTensors::read_metadata(&bytes).unwrap();
-        let mut entries: BTreeMap<_, _> = header.metadata().clone().unwrap().into_iter().collect();
-        entries.remove("checksum");
-        let container = safetensors::SafeTensors::deserialize(&bytes).unwrap();
-        let values = |data: &[u8]| data.as_chunks::<8>().0.iter().map(|word| f64::from_le_bytes(*word)).collect();
-        let array = |(name, view): (String, safetensors::tensor::TensorView)| {
-            (name, (view.shape().to_vec(), values(view.data())))
-        };
-        Self { arrays: container.tensors().into_iter().map(array).collect(), entries }
-    }
-
-    fn array(&mut self, name: &str) -> &mut (Vec<usize>, Vec<f64>) {
-        self.arrays.get_mut(name).unwrap()
-    }
-
-    fn bytes(&self) -> Vec<u8> {
-        let mut header = serde_json::Map::from_iter([("__metadata__".to_owned(), serde_json::json!(self.entries))]);
-        let mut data: Vec<u8> = Vec::new();
-        for (name, (shape, values)) in &self.arrays {
-            let start = data.len();
-            data.extend(values.iter().flat_map(|value| value.to_le_bytes()));
-            let entry = serde_json::json!({"dtype": "F64", "shape": shape, "data_offsets": [start, data.len()]});
-            header.insert(name.clone(), entry);
-        }
-        let header = serde_json::Value::Object(header).to_string();
-        [u64::try_from(header.len()).unwrap().to_le_bytes().as_slice(), header.as_bytes(), &data].concat()
-    }
-}
-
 #[track_caller]
 fn refused(change: impl FnOnce(&mut Loose), parts: &[&str]) {
-    let mut file = Loose::new();
+    let mut file = Loose::of(&complete(9, 2, 2));
     assert_eq!(read_rom(&file.bytes(), "ring.rom").unwrap(), complete(9, 2, 2));
     change(&mut file);
     let message = read_rom(&file.bytes(), "ring.rom").unwrap_err().to_string();
@@ -244,7 +208,7 @@ fn values_that_cannot_be_are_refused() {
     refused(entry("contact_grid", "4,3"), &["metadata `contact_grid`", "is not at its place of the grid"]);
     refused(entry("sectors", "3"), &["metadata `contact_grid`", "one sector"]);
     let spaces = |file: &mut Loose| drop(file.entries.insert("contact_grid".into(), " 6 , 2 ".into()));
-    let mut file = Loose::new();
+    let mut file = Loose::of(&complete(9, 2, 2));
     spaces(&mut file);
     assert_eq!(read_rom(&file.bytes(), "ring").unwrap().extras.grid, Some(ContactGrid { around: 6, along: 2 }));
 }

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 use tiprub_core::rom::{ContactNode, Frame};
 use tiprub_core::settings::{SceneSettings, Shape};
 use tiprub_format::{ARRAYS, FIELDS, METADATA, SceneField, parse_scene, read_rom, write_scene};
@@ -208,4 +208,24 @@ fn the_file_that_the_python_example_writes_is_a_rom() {
     let node = ContactNode { name: "mid_chord".into(), position: [0.25, 0.0, 0.02], meridional_slope: 0.0 };
     assert_eq!(rom.contact_nodes, [node]);
     assert_eq!(rom.damping_ratio.to_bits(), 0.002f64.to_bits());
+}
+
+/// Written by the second Python example of the chapter (safetensors 0.8.0, NumPy 2.4.6).
+#[test]
+fn the_wheel_that_the_python_example_writes_is_a_rom_of_coupled_sectors() {
+    let rom = read_rom(include_bytes!("data/wheel_by_python.rom.safetensors"), "wheel_by_python").unwrap();
+    assert_eq!((rom.sectors, rom.extras.harmonics.len(), rom.total_order()), (24, 12, 72));
+    let (spring, half) = (2e4, std::f64::consts::PI / 24.0);
+    for (harmonic, n) in rom.extras.harmonics.iter().zip(1..) {
+        // The spring between neighbours: elongation per unit of the radial and tangential coordinate.
+        let (sin, cos) = (2.0 * half * f64::from(n)).sin_cos();
+        let phase = Complex::new(cos, sin);
+        let d = [(phase + 1.0) * half.sin(), (phase - 1.0) * half.cos(), Complex::default()];
+        let blade = [[9e5, 1e5, 0.0], [1e5, 4e4, 0.0], [0.0, 0.0, 2e5]];
+        for (i, j) in (0..9).map(|entry| (entry / 3, entry % 3)) {
+            let expected = d[i].conj() * d[j] * spring + blade[i][j];
+            assert!((harmonic.stiffness[(i, j)] - expected).norm_sqr().sqrt() < 1e-9, "n = {n}, ({i}, {j})");
+        }
+        assert_eq!(harmonic.contact_map, DMatrix::identity(3, 3));
+    }
 }

@@ -23,8 +23,8 @@ fn main() -> tiprub_model::Result<()> {
     println!("{}", reduction.rom.origin);
     println!(
         "{} nodes, {} elements, {} free dofs, {} reduced coordinates",
-        reduction.mesh.nodes.len(),
-        reduction.mesh.elements.len(),
+        reduction.nodes,
+        reduction.mesh.as_ref().map_or(0, |mesh| mesh.elements.len()),
         reduction.free_dofs,
         reduction.rom.order()
     );
@@ -46,8 +46,8 @@ fn main() -> tiprub_model::Result<()> {
     let fixed = &reduction.fixed_interface_frequencies;
     println!("{} fixed-interface modes, {:.1} to {:.1} Hz", fixed.len(), fixed[0], fixed[fixed.len() - 1]);
     println!("{:?}, total {:.2} s", reduction.timings, reduction.timings.total());
-    if let Some(path) = arguments.get(1) {
-        inp::write_calculix_input(Path::new(path), &reduction.mesh, &reduction.material, Some(CLAMPED), 20)?;
+    if let (Some(path), Some(mesh), Some(material)) = (arguments.get(1), &reduction.mesh, &reduction.material) {
+        inp::write_calculix_input(Path::new(path), mesh, material, Some(CLAMPED), 20)?;
     }
     Ok(())
 }

@@ -23,8 +23,8 @@ fn main() -> tiprub_model::Result<()> {
     println!("{}", reduction.rom.origin);
     println!(
         "{} nodes, {} elements, {} free dofs",
-        reduction.mesh.nodes.len(),
-        reduction.mesh.elements.len(),
+        reduction.nodes,
+        reduction.mesh.as_ref().map_or(0, |mesh| mesh.elements.len()),
         reduction.free_dofs
     );
     println!("largest residual of the full modes {:.2e}", reduction.largest_residual);
@@ -48,8 +48,8 @@ fn main() -> tiprub_model::Result<()> {
         println!("{}: r {r:.6} m, theta {theta:.6} rad, z {z:.6} m, dr/dz {:.4}", node.name, node.meridional_slope);
     }
     println!("{:?}, total {:.2} s", reduction.timings, reduction.timings.total());
-    if let Some(path) = arguments.get(1) {
-        inp::write_calculix_input(Path::new(path), &reduction.mesh, &reduction.material, Some("hub"), 10)?;
+    if let (Some(path), Some(mesh), Some(material)) = (arguments.get(1), &reduction.mesh, &reduction.material) {
+        inp::write_calculix_input(Path::new(path), mesh, material, Some("hub"), 10)?;
     }
     Ok(())
 }

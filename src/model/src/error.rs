@@ -61,7 +61,17 @@ pub enum Error {
     /// The reduced model was refused by the stepping floor.
     #[error(transparent)]
     Core(#[from] tiprub_core::Error),
-    /// A file could not be written.
+    /// A file was read and holds something that cannot be used.
+    #[error("{place}: {problem}. {remedy}")]
+    Read {
+        /// File and line (from 1), or byte of a binary file, or record.
+        place: String,
+        /// What is wrong there.
+        problem: String,
+        /// What to do about it.
+        remedy: String,
+    },
+    /// A file could not be read or written.
     #[error("{}: {source}", path.display())]
     File {
         /// Which file.

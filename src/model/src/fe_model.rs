@@ -43,15 +43,24 @@ impl FeModel {
         })
     }
 
-    /// The nodes of a named set.
+    /// The nodes of a named set; upper and lower case may differ where only one set then fits.
     ///
     /// # Errors
     /// [`Error::Invalid`] listing the sets there are.
     pub fn set(&self, name: &str) -> Result<&[usize]> {
-        self.sets.get(name).map(Vec::as_slice).ok_or_else(|| {
-            let names: Vec<_> = self.sets.keys().map(String::as_str).collect();
-            let problem = "the model has no such set";
-            Error::invalid(format!("node set `{name}`"), problem, format!("It has: {}", names.join(", ")))
-        })
+        if let Some(nodes) = self.sets.get(name) {
+            return Ok(nodes);
+        }
+        let mut alike = self.sets.iter().filter(|(known, _)| known.eq_ignore_ascii_case(name));
+        if let (Some((_, nodes)), None) = (alike.next(), alike.next()) {
+            return Ok(nodes);
+        }
+        let problem = "the model has no such set";
+        let remedy = if self.sets.is_empty() {
+            "It has none: name groups of nodes, elements or faces where it is meshed".to_owned()
+        } else {
+            format!("It has: {}", crate::read::set_counts(&self.sets))
+        };
+        Err(Error::invalid(format!("node set `{name}`"), problem, remedy))
     }
 }

@@ -3,7 +3,19 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use crate::file::write_whole;
 use crate::{Error, Result, element::ElementKind, material::Material, mesh::Mesh};
+
+/// A sector of a wheel, for [`calculix_cyclic_input`].
+#[derive(Debug, Clone, Copy)]
+pub struct CyclicSymmetry<'a> {
+    /// Node sets of the two faces, the second one turned by +2π/sectors about z.
+    pub faces: [&'a str; 2],
+    /// Number of sectors of the wheel.
+    pub sectors: usize,
+    /// Nodal diameters, a step for each.
+    pub nodal_diameters: &'a [usize],
+}
 
 /// Text of an input file that computes the lowest `frequencies` natural frequencies.
 ///
@@ -12,6 +24,50 @@ use crate::{Error, Result, element::ElementKind, material::Material, mesh::Mesh}
 /// # Errors
 /// [`Error::Invalid`] when the set does not exist or the mesh is not sound.
 pub fn calculix_input(mesh: &Mesh, material: &Material, clamped: Option<&str>, frequencies: usize) -> Result<String> {
+    let mut text = model(mesh, material, clamped)?;
+    put(&mut text, format_args!("*STEP\n*FREQUENCY\n{frequencies}\n*NODE FILE\nU\n*END STEP\n"));
+    Ok(text)
+}
+
+/// As [`calculix_input`] for a sector of a wheel (`*CYCLIC SYMMETRY MODEL`): a frequency step per nodal diameter.
+///
+/// CalculiX lists every frequency twice, also where the mode is single (no or half as many diameters as sectors); so
+/// twice as many are asked for. Clamped nodes are left out of the faces: CalculiX refuses to tie them.
+///
+/// # Errors
+/// Those of [`calculix_input`]; [`Error::Invalid`] for a nodal diameter above half the number of sectors.
+pub fn calculix_cyclic_input(
+    mesh: &Mesh,
+    material: &Material,
+    clamped: Option<&str>,
+    symmetry: &CyclicSymmetry<'_>,
+    frequencies: usize,
+) -> Result<String> {
+    let CyclicSymmetry { faces, sectors, nodal_diameters } = *symmetry;
+    if let Some(n) = nodal_diameters.iter().find(|&&n| 2 * n > sectors) {
+        let problem = format!("{n} with {sectors} sectors");
+        return Err(Error::invalid("nodal diameter", problem, "Half the number of sectors is the largest one"));
+    }
+    let mut text = model(mesh, material, clamped)?;
+    let clamped = clamped.map_or(Ok(&[][..]), |set| mesh.set(set))?;
+    for (face, name) in faces.iter().zip(["TIED_LOW", "TIED_HIGH"]) {
+        let tied: Vec<usize> = mesh.set(face)?.iter().copied().filter(|node| !clamped.contains(node)).collect();
+        write_set(&mut text, name, &tied);
+        put(&mut text, format_args!("*SURFACE, NAME=S{name}, TYPE=NODE\n{name}\n"));
+    }
+    text.push_str("*TIE, NAME=CYCLIC, CYCLIC SYMMETRY\nSTIED_HIGH, STIED_LOW\n");
+    // The axis is given by two of its points.
+    put(&mut text, format_args!("*CYCLIC SYMMETRY MODEL, N={sectors}, TIE=CYCLIC, ELSET=EALL\n0, 0, 0, 0, 0, 1\n"));
+    for n in nodal_diameters {
+        put(&mut text, format_args!("*STEP\n*FREQUENCY\n{}\n", 2 * frequencies));
+        put(&mut text, format_args!("*SELECT CYCLIC SYMMETRY MODES, NMIN={n}, NMAX={n}\n"));
+        text.push_str("*NODE FILE\nU\n*END STEP\n");
+    }
+    Ok(text)
+}
+
+/// Nodes, elements, sets, material and boundary.
+fn model(mesh: &Mesh, material: &Material, clamped: Option<&str>) -> Result<String> {
     mesh.validate()?;
     material.validate()?;
     let mut text = String::from("*HEADING\nUnits: m, kg, s, N\n*NODE, NSET=NALL\n");
@@ -22,8 +78,7 @@ pub fn calculix_input(mesh: &Mesh, material: &Material, clamped: Option<&str>, f
         write_elements(&mut text, mesh, kind);
     }
     for (name, nodes) in &mesh.sets {
-        put(&mut text, format_args!("*NSET, NSET={}\n", name.to_uppercase()));
-        write_list(&mut text, nodes.iter().map(|node| node + 1));
+        write_set(&mut text, name, nodes);
     }
     let name = material.name.to_uppercase();
     let Material { young_modulus, poisson_ratio, density, .. } = material;
@@ -34,7 +89,6 @@ pub fn calculix_input(mesh: &Mesh, material: &Material, clamped: Option<&str>, f
         mesh.set(set)?;
         put(&mut text, format_args!("*BOUNDARY\n{}, 1, 3\n", set.to_uppercase()));
     }
-    put(&mut text, format_args!("*STEP\n*FREQUENCY\n{frequencies}\n*NODE FILE\nU\n*END STEP\n"));
     Ok(text)
 }
 
@@ -49,15 +103,12 @@ pub fn write_calculix_input(
     clamped: Option<&str>,
     frequencies: usize,
 ) -> Result<()> {
-    let text = calculix_input(mesh, material, clamped, frequencies)?;
-    let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(".part");
-    let temporary = path.with_file_name(name);
-    std::fs::write(&temporary, text).and_then(|()| std::fs::rename(&temporary, path)).map_err(|source| {
-        // Best effort: the error that counts is the one reported.
-        let _ = std::fs::remove_file(&temporary);
-        Error::File { path: path.to_path_buf(), source }
-    })
+    write_whole(path, calculix_input(mesh, material, clamped, frequencies)?.as_bytes())
+}
+
+fn write_set(text: &mut String, name: &str, nodes: &[usize]) {
+    put(text, format_args!("*NSET, NSET={}\n", name.to_uppercase()));
+    write_list(text, nodes.iter().map(|node| node + 1));
 }
 
 fn write_elements(text: &mut String, mesh: &Mesh, kind: ElementKind) {

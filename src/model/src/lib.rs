@@ -3,7 +3,7 @@
 //! Floor 1. A [`Mesh`] of the six solid [elements](element) is [assembled](assembly) into sparse stiffness and mass,
 //! its lowest modes are found by [shift-invert Lanczos](eigen), and [Craig-Bampton](craig_bampton) leaves a small dense
 //! pencil in the displacements of the contact nodes: a [`tiprub_core::Rom`] with the checks that come with it
-//! (eqs 12 and 13 of the paper). [`rotor37`] is the blade that ships, [`casing`] the ring around it. Nothing is printed: a caller passes a
+//! (eqs 12 and 13 of the paper). [`rotor37`] is the blade that ships, [`casing`] the ring around it; models of others are [read](read). Nothing is printed: a caller passes a
 //! [listener](progress) and shows what it likes. SI units everywhere.
 #![forbid(unsafe_code)]
 
@@ -15,17 +15,21 @@ pub mod eigen;
 pub mod element;
 mod error;
 pub mod fe_model;
+mod file;
 pub mod inp;
 pub mod material;
 pub mod mesh;
 pub mod ordering;
 pub mod progress;
+pub mod quality;
+pub mod read;
 pub mod reduce;
 pub mod rotor37;
 pub mod sparse;
 pub mod spin;
 pub mod stage;
 pub mod thermal;
+pub mod vtk;
 
 pub use casing::{CasingOptions, reduce_casing, reduce_ring};
 pub use error::{Error, Result};
@@ -33,5 +37,5 @@ pub use fe_model::FeModel;
 pub use material::Material;
 pub use mesh::{Mesh, surface_quads};
 pub use progress::{Progress, Stage};
-pub use reduce::{Reduction, reduce, reduce_spinning};
+pub use reduce::{Reduction, reduce, reduce_model, reduce_spinning};
 pub use rotor37::{Rotor37Options, reduce_rotor37};

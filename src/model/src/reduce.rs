@@ -7,9 +7,10 @@ use nalgebra::DMatrix;
 use tiprub_core::Rom;
 use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
 
-use crate::assembly::{assemble, free_dofs};
+use crate::assembly::{Assembled, free_dofs};
 use crate::craig_bampton::{CraigBampton, craig_bampton, dense_modes};
 use crate::eigen::{Modes, lowest_modes, positive_factor};
+use crate::fe_model::FeModel;
 use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report, silent};
@@ -81,10 +82,12 @@ impl Timings {
 pub struct Reduction {
     /// The reduced-order model, checks included.
     pub rom: Rom,
-    /// The mesh it was made of.
-    pub mesh: Mesh,
-    /// Material of all elements.
-    pub material: Material,
+    /// The mesh it was made of; none for a model from matrices and for one of several materials.
+    pub mesh: Option<Mesh>,
+    /// Material of all elements of that mesh.
+    pub material: Option<Material>,
+    /// Number of nodes of the full model.
+    pub nodes: usize,
     /// Modes of the full model, ascending.
     pub modes: Vec<Mode>,
     /// Largest relative residual of those modes, see [`Modes::residuals`].
@@ -117,7 +120,7 @@ pub fn reduce(
     options: &ReductionOptions,
     listener: Listener<'_>,
 ) -> Result<Reduction> {
-    reduced(mesh, (material, clamped, contact), options, None, listener)
+    assembled_and_reduced(mesh, material, clamped, contact, (options, None), listener)
 }
 
 /// [`reduce`] with the effects of spin up to `largest_speed` (rad/s), in [`RomExtras::spin`]; see [`crate::spin`].
@@ -136,35 +139,74 @@ pub fn reduce_spinning(
     largest_speed: f64,
     listener: Listener<'_>,
 ) -> Result<Reduction> {
-    if !(largest_speed.is_finite() && largest_speed > 0.0) {
-        let problem = format!("{largest_speed} rad/s is not a finite speed > 0");
-        return Err(Error::invalid("largest speed", problem, "Give the largest speed that is to be computed"));
-    }
-    reduced(mesh, (material, clamped, contact), options, Some(largest_speed), listener)
+    check_speed(largest_speed)?;
+    assembled_and_reduced(mesh, material, clamped, contact, (options, Some(largest_speed)), listener)
 }
 
-fn reduced(
-    mesh: Mesh,
-    (material, clamped, contact): (&Material, &[usize], &[ContactPoint]),
+/// Reduce a model, from a mesh or from the matrices of another code, as [`reduce`] does; `largest_speed` (rad/s) as in
+/// [`reduce_spinning`].
+///
+/// # Errors
+/// Those of [`reduce`] and [`reduce_spinning`]; [`Error::Invalid`] for effects of spin without a mesh.
+pub fn reduce_model(
+    model: FeModel,
+    clamped: &[usize],
+    contact: &[ContactPoint],
     options: &ReductionOptions,
     largest_speed: Option<f64>,
     listener: Listener<'_>,
 ) -> Result<Reduction> {
+    if let Some(speed) = largest_speed {
+        check_speed(speed)?;
+    }
+    check_nodes(&model.nodes, clamped, contact, options.frame)?;
+    reduced(model, clamped, contact, options, largest_speed, Timings::default(), listener)
+}
+
+fn check_speed(speed: f64) -> Result<()> {
+    if speed.is_finite() && speed > 0.0 {
+        return Ok(());
+    }
+    let problem = format!("{speed} rad/s is not a finite speed > 0");
+    Err(Error::invalid("largest speed", problem, "Give the largest speed that is to be computed"))
+}
+
+fn assembled_and_reduced(
+    mesh: Mesh,
+    material: &Material,
+    clamped: &[usize],
+    contact: &[ContactPoint],
+    (options, largest_speed): (&ReductionOptions, Option<f64>),
+    listener: Listener<'_>,
+) -> Result<Reduction> {
+    let mut timings = Timings::default();
+    let model = timed(&mut timings.assembly, || {
+        check_nodes(&mesh.nodes, clamped, contact, options.frame)?;
+        FeModel::assembled(mesh, material, String::new(), listener)
+    })?;
+    reduced(model, clamped, contact, options, largest_speed, timings, listener)
+}
+
+fn reduced(
+    model: FeModel,
+    clamped: &[usize],
+    contact: &[ContactPoint],
+    options: &ReductionOptions,
+    largest_speed: Option<f64>,
+    mut timings: Timings,
+    listener: Listener<'_>,
+) -> Result<Reduction> {
     // The library's own threads split sums by their number, and a ROM must have the same bits on every number of threads.
     faer::set_global_parallelism(faer::Par::Seq);
-    let mut timings = Timings::default();
-    let (assembled, free) = timed(&mut timings.assembly, || {
-        check_nodes(&mesh, clamped, contact, options.frame)?;
-        Ok((assemble(&mesh, material, listener)?, free_dofs(mesh.nodes.len(), clamped)))
-    })?;
-    let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
+    let free = free_dofs(model.nodes.len(), clamped);
+    let (stiffness, mass) = principal_pair(&model.stiffness, &model.mass, &free);
     let full = timed(&mut timings.full_modes, || {
         full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)
     })?;
     let interface = interface_dofs(&free, contact)?;
     let component_modes = |stiffness: &SparseMatrix, modes: usize, listener: Listener<'_>| {
         let cartesian = craig_bampton(stiffness, &mass, &interface, modes, listener)?;
-        Ok(rotated(cartesian, &mesh, contact, options.frame))
+        Ok(rotated(cartesian, &model.nodes, contact, options.frame))
     };
     let craig_bampton =
         timed(&mut timings.reduction, || component_modes(&stiffness, options.fixed_interface_modes, listener))?;
@@ -177,9 +219,8 @@ fn reduced(
     })?;
     let spin = timed(&mut timings.spin, || {
         let Some(speed) = largest_speed else { return Ok(None) };
-        let body = Rotating::new(&mesh, material, &assembled, &free, &stiffness)?;
         let resting = Resting { model: &craig_bampton, mass: &mass, free: &free, interface: &interface };
-        let states = SpinningStates::find(&body, speed, &|done| report(listener, Stage::Spin, done, 6))?;
+        let states = spinning_states(&model, &free, &stiffness, speed, listener)?;
         let modes = (options.fixed_interface_modes + SPARE_MODES).min(free.len() - interface.len());
         let middle = component_modes(&states.middle.stiffness, modes, &silent)?;
         report(listener, Stage::Spin, 4, 6);
@@ -190,21 +231,40 @@ fn reduced(
         Ok(Some(spin))
     })?;
     let (spin, spin_checks) = spin.map_or((None, Vec::new()), |ReducedSpin { spin, checks }| (Some(spin), checks));
-    let mut rom = build_rom(&mesh, material, clamped.len(), contact, options, &craig_bampton, checks)?;
+    let mut rom = build_rom(&model, clamped.len(), contact, options, &craig_bampton, checks)?;
     rom.extras.spin = spin;
     rom.validate()?;
+    let nodes = model.nodes.len();
+    let (mesh, material) = model.mesh.unzip();
     Ok(Reduction {
         rom,
-        modes: node_modes(&full.modes, &free, mesh.nodes.len()),
+        modes: node_modes(&full.modes, &free, nodes),
         largest_residual: full.modes.residuals.iter().copied().fold(0.0, f64::max),
         free_dofs: free.len(),
         reduced_angular_frequencies: squares.iter().map(|square| square.max(0.0).sqrt()).collect(),
         fixed_interface_frequencies: craig_bampton.fixed_interface_frequencies,
         spin_checks,
-        material: material.clone(),
+        material,
         mesh,
+        nodes,
         timings,
     })
+}
+
+fn spinning_states(
+    model: &FeModel,
+    free: &[usize],
+    stiffness: &SparseMatrix,
+    speed: f64,
+    listener: Listener<'_>,
+) -> Result<SpinningStates> {
+    let Some((mesh, material)) = &model.mesh else {
+        let problem = "the model has no mesh of one material, from which they are computed";
+        return Err(Error::invalid("effects of spin", problem, "Leave them out, or give a mesh file of one material"));
+    };
+    let assembled = Assembled { stiffness: model.stiffness.clone(), mass: model.mass.clone() };
+    let body = Rotating::new(mesh, material, &assembled, free, stiffness)?;
+    SpinningStates::find(&body, speed, &|done| report(listener, Stage::Spin, done, 6))
 }
 
 /// Modes of the full model, and the factor and shift they were found with.
@@ -292,10 +352,10 @@ pub(crate) fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> Result<T>) -> R
     result
 }
 
-pub(crate) fn check_nodes(mesh: &Mesh, clamped: &[usize], contact: &[ContactPoint], frame: Frame) -> Result<()> {
+pub(crate) fn check_nodes(nodes: &[[f64; 3]], clamped: &[usize], contact: &[ContactPoint], frame: Frame) -> Result<()> {
     for &node in clamped.iter().chain(contact.iter().map(|point| &point.node)) {
-        if node >= mesh.nodes.len() {
-            let problem = format!("node {} does not exist; there are {}", node + 1, mesh.nodes.len());
+        if node >= nodes.len() {
+            let problem = format!("node {} does not exist; there are {}", node + 1, nodes.len());
             return Err(Error::invalid("clamped or contact nodes", problem, "Name nodes of the mesh"));
         }
     }
@@ -304,7 +364,7 @@ pub(crate) fn check_nodes(mesh: &Mesh, clamped: &[usize], contact: &[ContactPoin
         if clamped.contains(&point.node) {
             return Err(Error::invalid(what(), "it is clamped", "Choose a node that can move"));
         }
-        let [x, y, _] = mesh.nodes[point.node];
+        let [x, y, _] = nodes[point.node];
         if frame == Frame::Cylindrical && x.hypot(y) <= 0.0 {
             let problem = "it lies on the z axis, where the radial direction is undefined";
             return Err(Error::invalid(what(), problem, "Choose another node or the Cartesian frame"));
@@ -336,14 +396,14 @@ fn direction([x, y, _]: [f64; 3]) -> (f64, f64) {
 }
 
 /// The same reduced model with interface displacements in the given frame.
-fn rotated(mut model: CraigBampton, mesh: &Mesh, contact: &[ContactPoint], frame: Frame) -> CraigBampton {
+fn rotated(mut model: CraigBampton, nodes: &[[f64; 3]], contact: &[ContactPoint], frame: Frame) -> CraigBampton {
     if frame == Frame::Cartesian {
         return model;
     }
     let order = model.mass.nrows();
     let mut rotation = DMatrix::<f64>::identity(order, order);
     for (index, point) in contact.iter().enumerate() {
-        let (cos, sin) = direction(mesh.nodes[point.node]);
+        let (cos, sin) = direction(nodes[point.node]);
         let first = 3 * index;
         // Columns: the Cartesian parts of the radial and the tangential unit vector.
         rotation[(first, first)] = cos;
@@ -358,8 +418,8 @@ fn rotated(mut model: CraigBampton, mesh: &Mesh, contact: &[ContactPoint], frame
     model
 }
 
-fn contact_node(mesh: &Mesh, point: &ContactPoint, frame: Frame) -> ContactNode {
-    let [x, y, z] = mesh.nodes[point.node];
+fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: Frame) -> ContactNode {
+    let [x, y, z] = nodes[point.node];
     let position = match frame {
         Frame::Cartesian => [x, y, z],
         Frame::Cylindrical => [x.hypot(y), y.atan2(x), z],
@@ -367,9 +427,20 @@ fn contact_node(mesh: &Mesh, point: &ContactPoint, frame: Frame) -> ContactNode 
     ContactNode { name: point.name.clone(), position, meridional_slope: point.meridional_slope }
 }
 
+/// What the full model is made of.
+fn description(model: &FeModel) -> String {
+    let before = if model.origin.is_empty() { String::new() } else { format!("{}: ", model.origin) };
+    let nodes = model.nodes.len();
+    match &model.mesh {
+        Some((mesh, _)) => {
+            format!("{before}{nodes} nodes, {} elements ({})", mesh.elements.len(), element_names(mesh))
+        }
+        None => format!("{before}{nodes} nodes"),
+    }
+}
+
 fn build_rom(
-    mesh: &Mesh,
-    material: &Material,
+    full: &FeModel,
     clamped: usize,
     contact: &[ContactPoint],
     options: &ReductionOptions,
@@ -377,15 +448,14 @@ fn build_rom(
     checks: RomChecks,
 ) -> Result<Rom> {
     let (boundary, order) = (3 * contact.len(), model.mass.nrows());
+    let material = full.mesh.as_ref().map_or(String::new(), |(_, material)| {
+        let Material { young_modulus, poisson_ratio, density, .. } = material;
+        format!("; E = {young_modulus:e} Pa, nu = {poisson_ratio}, rho = {density} kg/m3")
+    });
     let origin = format!(
-        "{} nodes, {} elements ({}), {clamped} nodes clamped; E = {:e} Pa, nu = {}, rho = {} kg/m3; Craig-Bampton with \
-         {boundary} interface degrees of freedom and {} fixed-interface modes",
-        mesh.nodes.len(),
-        mesh.elements.len(),
-        element_names(mesh),
-        material.young_modulus,
-        material.poisson_ratio,
-        material.density,
+        "{}, {clamped} nodes clamped{material}; Craig-Bampton with {boundary} interface degrees of freedom and {} \
+         fixed-interface modes",
+        description(full),
         order - boundary,
     );
     let rom = Rom {
@@ -397,7 +467,7 @@ fn build_rom(
         stiffness: model.stiffness.clone(),
         damping_ratio: options.damping_ratio,
         contact_map: DMatrix::identity(boundary, order),
-        contact_nodes: contact.iter().map(|point| contact_node(mesh, point, options.frame)).collect(),
+        contact_nodes: contact.iter().map(|point| contact_node(&full.nodes, point, options.frame)).collect(),
         checks,
         extras: RomExtras::default(),
     };

@@ -295,7 +295,8 @@ impl Factor {
         right
     }
 
-    fn solve_in_place(&self, right: MatMut<'_, f64>) {
+    /// As [`Self::solve`], all columns together in the calling thread: for callers that are parallel themselves.
+    pub fn solve_in_place(&self, right: MatMut<'_, f64>) {
         let scratch = self.symbolic.inner.solve_in_place_scratch::<f64>(right.ncols(), PAR);
         let mut memory = MemBuffer::new(scratch);
         let factor = LltRef::new(&self.symbolic.inner, &self.values);

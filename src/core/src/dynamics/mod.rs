@@ -1,6 +1,8 @@
 //! Modal equations of motion and their time stepping.
 
 pub mod bank;
+pub mod cyclic;
 pub mod dispatch;
 pub mod modal;
 pub mod scheme;
+pub mod sectors;

@@ -9,7 +9,7 @@ use crate::settings::Scheme;
 use crate::{Error, Result, Rom};
 
 /// Eigenvalues below this fraction of the largest are not resolved by the eigenproblem; the Rayleigh quotient decides.
-const RIGID_FRACTION: f64 = 1e-13;
+pub(super) const RIGID_FRACTION: f64 = 1e-13;
 
 /// Modes of the reduced pencil (K, M), mass-normalised.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,10 +87,7 @@ impl ModalModel {
                 "Give the modal damping ratio as a fraction of critical, for example 0.005",
             ));
         }
-        let (eigenvalues, shapes) = match modal_already(rom, stiffness) {
-            Some(modes) => modes,
-            None => generalised_modes(rom, stiffness)?,
-        };
+        let (eigenvalues, shapes) = real_modes(&rom.mass, stiffness, "")?;
         let contact_modes = &rom.contact_map * &shapes;
         Ok(Self {
             damping_ratios: vec![damping_ratio; eigenvalues.len()],
@@ -114,13 +111,7 @@ impl ModalModel {
     /// Coefficients of one mode at the step size `step` (s), its frequency times `factor` (mistuning; 1 = tuned).
     pub fn coefficient(&self, mode: usize, factor: f64, scheme: Scheme, step: f64) -> ModeCoefficients {
         let (frequency, ratio) = (self.frequencies[mode] * factor, self.damping_ratios[mode]);
-        if scheme != Scheme::MasslessBoundary {
-            ModeCoefficients::new(scheme, frequency, ratio, step)
-        } else if mode < self.dynamic_modes(scheme) {
-            ModeCoefficients::new(scheme, frequency, ratio, step).delay()
-        } else {
-            ModeCoefficients::quasi_static(frequency)
-        }
+        ModeCoefficients::of_mode(scheme, mode < self.dynamic_modes(scheme), frequency, ratio, step)
     }
 
     /// Coefficients of all modes at the step size `step` (s).
@@ -211,26 +202,40 @@ pub struct NodePair {
     pub slave: Option<(usize, usize)>,
 }
 
+/// Eigenvalues ω² (ascending, rigid ones exactly 0) and mass-normalised modes of K φ = ω² M φ; errors name the arrays
+/// `mass` and `stiffness` with `suffix`.
+pub(super) fn real_modes(
+    mass: &DMatrix<f64>,
+    stiffness: &DMatrix<f64>,
+    suffix: &str,
+) -> Result<(Vec<f64>, DMatrix<f64>)> {
+    modal_already(mass, stiffness).map_or_else(|| generalised_modes(mass, stiffness, suffix), Ok)
+}
+
 /// A ROM delivered in modal coordinates (M = I, K diagonal and ascending) needs no eigenproblem.
-fn modal_already(rom: &Rom, stiffness: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
-    let order = rom.order();
+fn modal_already(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+    let order = mass.nrows();
     let diagonal: Vec<f64> = (0..order).map(|mode| stiffness[(mode, mode)]).collect();
     let ascending =
         diagonal.windows(2).all(|pair| pair[0] <= pair[1]) && diagonal.first().is_some_and(|low| *low >= 0.0);
     let on_diagonal = |index: usize| index % order == index / order;
     let is_modal = ascending
         && stiffness.iter().enumerate().all(|(index, value)| on_diagonal(index) || *value == 0.0)
-        && rom.mass.iter().enumerate().all(|(index, value)| {
+        && mass.iter().enumerate().all(|(index, value)| {
             let expected: f64 = if on_diagonal(index) { 1.0 } else { 0.0 };
             value.to_bits() == expected.to_bits()
         });
     is_modal.then(|| (diagonal, DMatrix::identity(order, order)))
 }
 
-/// Eigenvalues ω² (ascending, rigid ones exactly 0) and mass-normalised modes of K φ = ω² M φ.
-fn generalised_modes(rom: &Rom, stiffness: &DMatrix<f64>) -> Result<(Vec<f64>, DMatrix<f64>)> {
-    let Some(cholesky) = rom.mass.clone().cholesky() else {
-        return Err(Error::invalid("ROM array `mass`", "not positive definite", "Write the ROM again"));
+fn generalised_modes(
+    mass: &DMatrix<f64>,
+    stiffness: &DMatrix<f64>,
+    suffix: &str,
+) -> Result<(Vec<f64>, DMatrix<f64>)> {
+    let Some(cholesky) = mass.clone().cholesky() else {
+        let what = format!("ROM array `mass{suffix}`");
+        return Err(Error::invalid(what, "not positive definite", "Write the ROM again"));
     };
     let lower = cholesky.l();
     let half = lower.solve_lower_triangular(stiffness).unwrap_or_else(|| stiffness.clone());
@@ -239,14 +244,7 @@ fn generalised_modes(rom: &Rom, stiffness: &DMatrix<f64>) -> Result<(Vec<f64>, D
     let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
     let largest = eigen.eigenvalues.amax();
-    let smallest = eigen.eigenvalues[order[0]];
-    if smallest < -1e-9 * largest {
-        return Err(Error::invalid(
-            "ROM array `stiffness`",
-            format!("not positive semidefinite: eigenvalue {smallest:.3e} rad²/s² at largest {largest:.3e}"),
-            "Write the ROM again",
-        ));
-    }
+    check_semidefinite(eigen.eigenvalues[order[0]], largest, suffix)?;
     let vectors =
         DMatrix::from_columns(&order.iter().map(|index| eigen.eigenvectors.column(*index)).collect::<Vec<_>>());
     let mut shapes = lower.transpose().solve_upper_triangular(&vectors).unwrap_or(vectors);
@@ -257,6 +255,18 @@ fn generalised_modes(rom: &Rom, stiffness: &DMatrix<f64>) -> Result<(Vec<f64>, D
     });
     let values = values.collect();
     Ok((values, shapes))
+}
+
+/// Refuse a lowest eigenvalue of K φ = ω² M φ below zero by more than rounding.
+pub(super) fn check_semidefinite(smallest: f64, largest: f64, suffix: &str) -> Result<()> {
+    if smallest >= -1e-9 * largest {
+        return Ok(());
+    }
+    Err(Error::invalid(
+        format!("ROM array `stiffness{suffix}`"),
+        format!("not positive semidefinite: eigenvalue {smallest:.3e} rad²/s² at largest {largest:.3e}"),
+        "Write the ROM again",
+    ))
 }
 
 /// φᵀKφ of a mode far below the largest: its error is of second order in that of the mode shape, so that it tells a

@@ -65,6 +65,17 @@ impl ModeCoefficients {
         }
     }
 
+    /// Coefficients of a mode that has inertia under the scheme (`dynamic`), or is quasi-static.
+    pub fn of_mode(scheme: Scheme, dynamic: bool, frequency: f64, damping_ratio: f64, step: f64) -> Self {
+        if scheme != Scheme::MasslessBoundary {
+            Self::new(scheme, frequency, damping_ratio, step)
+        } else if dynamic {
+            Self::new(scheme, frequency, damping_ratio, step).delay()
+        } else {
+            Self::quasi_static(frequency)
+        }
+    }
+
     /// A mode without inertia: q = f/ω² at once.
     pub fn quasi_static(frequency: f64) -> Self {
         let square = frequency * frequency;

@@ -104,11 +104,22 @@ impl Rom {
                 return refuse(name, format!("not Hermitian: off by {asymmetry:.3e} at largest entry {largest:.3e}"));
             }
         }
-        if harmonic.mass.clone().cholesky().is_none() {
+        if cholesky(&harmonic.mass).is_none() {
             return refuse("mass", "not positive definite".to_owned());
         }
         Ok(())
     }
+}
+
+/// L of a Hermitian matrix L Lᴴ; `None` unless it is positive definite. (Of a complex number there is always a square root,
+/// so that the factorisation of a complex matrix alone does not tell.)
+pub(crate) fn cholesky(matrix: &DMatrix<Complex<f64>>) -> Option<DMatrix<Complex<f64>>> {
+    let lower = matrix.clone().cholesky()?.l();
+    let real = |index: usize| {
+        let pivot: Complex<f64> = lower[(index, index)];
+        pivot.re > 0.0 && pivot.im.abs() <= 1e-8 * pivot.re
+    };
+    (0..lower.nrows()).all(real).then_some(lower)
 }
 
 fn largest_entry(matrix: &DMatrix<Complex<f64>>) -> f64 {

@@ -6,7 +6,9 @@ use crate::contact::layout::Layout;
 use crate::contact::spline_gap::SplineGap;
 use crate::contact::surface::Surface;
 use crate::dynamics::bank::BankOptions;
+use crate::dynamics::cyclic::CyclicModel;
 use crate::dynamics::modal::{ModalModel, ModalSpin};
+use crate::dynamics::sectors::SectorModel;
 use crate::rom::Frame;
 use crate::settings::{ContactSettings, Scheme, Solver, StructureSettings, SurfaceSettings};
 use crate::system::{System, SystemParts, SystemSettings};
@@ -21,7 +23,7 @@ use super::slave_surface::{Carrier, control_modes, spline_law};
 
 /// Gaps, casing shapes and displacements beyond this share of the radius are not what the model describes.
 pub const SMALL_FRACTION: f64 = 0.1;
-/// Most contact nodes of all sectors together that a flexible slave couples: their Delassus matrix is dense.
+/// Most contact nodes of all sectors together that a flexible slave or the wheel couples: their Delassus matrix is dense.
 const MOST_COUPLED: usize = 2000;
 
 /// Places of values that the step reads.
@@ -75,8 +77,10 @@ impl Roles {
 pub struct Compiled {
     pub scene: Scene,
     pub roles: Roles,
-    /// Modes of the master, at the reference speed where spin stiffens it.
+    /// Modes of the master, at the reference speed where spin stiffens it; of coupled sectors those of nodal diameter 0.
     pub model: ModalModel,
+    /// Modes of the master where its sectors are coupled.
+    pub wheel: Option<CyclicModel>,
     /// Speed whose stiffness `model` has (rad/s).
     pub reference_speed: f64,
     /// Lowest and highest eigenvalue of the modal stiffness per Ω² and per Ω⁴, where spin stiffens the master.
@@ -103,6 +107,7 @@ impl Compiled {
         for (structure, rom) in scene.settings.structures.iter().zip(&scene.roms) {
             check_rom(structure, rom)?;
         }
+        check_coupling(scene, roles)?;
         let carrier = roles.carrier.map(|index| modes(scene, index, 0.0)).transpose()?;
         let table = super::table::build(scene)?;
         let place = |quantity| table.with_quantity(quantity).map(|variable| variable.reference as usize);
@@ -116,6 +121,7 @@ impl Compiled {
             scene: scene.clone(),
             roles,
             model: modes(scene, roles.master, 0.0)?,
+            wheel: wheel(scene, roles.master)?,
             reference_speed: 0.0,
             stiffness_range: None,
             carrier,
@@ -144,6 +150,11 @@ impl Compiled {
 
     fn surface(&self) -> &SurfaceSettings {
         &self.scene.settings.surfaces[self.roles.surface]
+    }
+
+    /// Largest angular frequency of the master (rad/s), of all nodal diameters where its sectors are coupled.
+    pub fn largest_frequency(&self) -> f64 {
+        self.wheel.as_ref().map_or_else(|| self.model.largest_frequency(), CyclicModel::largest_frequency)
     }
 
     /// Whether modes or loads of the master depend on the speed.
@@ -257,6 +268,14 @@ impl Compiled {
             }
         }
         let lanes = crate::dynamics::bank::lanes(rom.sectors);
+        let contacts = rom.sectors * rom.contact_nodes.len();
+        if (self.wheel.is_some() || self.roles.carrier.is_some()) && contacts > MOST_COUPLED {
+            return Err(Error::invalid(
+                if self.wheel.is_some() { "ROM metadata `sectors`" } else { "surface.structure" },
+                format!("{contacts} contact nodes of all sectors together, coupled, more than {MOST_COUPLED}"),
+                "Use fewer contact nodes or sectors, or uncoupled sectors on a rigid surface",
+            ));
+        }
         let (law, slave) = self.law(surface, &clearances, lanes)?;
         let system_settings = SystemSettings {
             scheme: settings.time.scheme,
@@ -270,7 +289,9 @@ impl Compiled {
             coating: self.coating(rom)?,
             sticking: self.may_stick(),
         };
-        Ok(System::with_parts(&self.model, rom.sectors, law, system_settings, parts))
+        let uncoupled = SectorModel::Uncoupled(&self.model, rom.sectors);
+        let model = self.wheel.as_ref().map_or(uncoupled, SectorModel::Coupled);
+        Ok(System::with_parts(model, law, system_settings, parts))
     }
 
     fn law(&self, surface: Surface, clearances: &[f64], lanes: usize) -> Result<(GapLaw, Option<ModalModel>)> {
@@ -285,14 +306,6 @@ impl Compiled {
         let carrier = self.roles.carrier.zip(self.carrier.as_ref());
         let carrier = carrier.map(|(index, model)| Carrier { rom: &self.scene.roms[index], model });
         let law = spline_law(rom, layout, contact, settings, carrier)?;
-        let contacts = rom.sectors * rom.contact_nodes.len();
-        if carrier.is_some() && contacts > MOST_COUPLED {
-            return Err(Error::invalid(
-                "surface.structure",
-                format!("{contacts} contact nodes of all sectors together, more than {MOST_COUPLED}"),
-                "Use fewer contact nodes or sectors, or a rigid surface",
-            ));
-        }
         let slave = match (&law, carrier) {
             (GapLaw::Spline(law), Some(carrier)) => Some(control_modes(carrier, law)),
             _ => None,
@@ -344,8 +357,8 @@ impl Compiled {
     /// Whether `coulomb` can be chosen: a coupled problem of all sectors has room for it only if the scene says so.
     pub fn may_stick(&self) -> bool {
         let contact = self.contact();
-        let uncoupled = self.roles.carrier.is_none() && contact.friction > 0.0 && contact.coating.is_none();
-        contact.solver == Solver::Coulomb || uncoupled
+        let small = self.roles.carrier.is_none() && self.wheel.is_none();
+        contact.solver == Solver::Coulomb || (small && contact.friction > 0.0 && contact.coating.is_none())
     }
 
     /// Combinations of scheme and solver that this scene cannot be stepped with.
@@ -366,7 +379,12 @@ impl Compiled {
             let remedy = "Use modal-exact, or leave coriolis out";
             return refuse("parameter `scheme`", "`massless-boundary` does not take the Coriolis force", remedy);
         }
-        if scheme == Scheme::MasslessBoundary && self.model.dynamic_modes(scheme) == 0 {
+        let left = |modes: usize| modes == 0;
+        let none_left = self.wheel.as_ref().map_or_else(
+            || left(self.model.dynamic_modes(scheme)),
+            |wheel| wheel.diameters.iter().any(|diameter| left(diameter.dynamic_modes(scheme))),
+        );
+        if scheme == Scheme::MasslessBoundary && none_left {
             let problem =
                 "`massless-boundary` makes the highest modes quasi-static, three per contact node: none is left";
             return refuse("parameter `scheme`", problem, "Use more modes or fewer contact nodes, or modal-exact");
@@ -379,6 +397,39 @@ fn modes(scene: &Scene, index: usize, speed: f64) -> Result<ModalModel> {
     let (structure, rom) = (&scene.settings.structures[index], &scene.roms[index]);
     let ratio = structure.damping_ratio.unwrap_or(rom.damping_ratio);
     if structure.spin.stiffening { ModalModel::at_speed(rom, ratio, speed) } else { ModalModel::from_rom(rom, ratio) }
+}
+
+/// Modes of coupled sectors.
+fn wheel(scene: &Scene, index: usize) -> Result<Option<CyclicModel>> {
+    let (structure, rom) = (&scene.settings.structures[index], &scene.roms[index]);
+    let ratio = structure.damping_ratio.unwrap_or(rom.damping_ratio);
+    rom.is_cyclic().then(|| CyclicModel::from_rom(rom, ratio)).transpose()
+}
+
+/// What coupled sectors do not take, and where they cannot be.
+fn check_coupling(scene: &Scene, roles: Roles) -> Result<()> {
+    let refuse = |what: &str, problem: String, remedy: &str| Err(Error::invalid(what, problem, remedy));
+    if let Some(index) = roles.carrier.filter(|index| scene.roms[*index].is_cyclic()) {
+        let problem = format!("the sectors of ROM `{}` are coupled by harmonics", scene.roms[index].name);
+        let remedy = "Give a structure of its own, reduced as a whole (sectors = 1), to carry the surface";
+        return refuse("surface.structure", problem, remedy);
+    }
+    let (structure, rom) = (&scene.settings.structures[roles.master], &scene.roms[roles.master]);
+    if !rom.is_cyclic() {
+        return Ok(());
+    }
+    let of = |feature: &str| format!("{feature} with the coupled sectors of ROM `{}`", rom.name);
+    let uncoupled = "Leave it out, or use a ROM of uncoupled sectors (without harmonics)";
+    if !structure.frequency_factors.is_empty() {
+        return refuse("structure.frequency_factors", of("mistuning of single sectors"), uncoupled);
+    }
+    if structure.spin.stiffening {
+        return refuse("structure.spin.stiffening", of("stiffening"), uncoupled);
+    }
+    if structure.spin.coriolis {
+        return refuse("structure.spin.coriolis", of("Coriolis force"), uncoupled);
+    }
+    Ok(())
 }
 
 /// What a structure asks of its ROM.
@@ -428,6 +479,13 @@ fn fingerprint(scene: &Scene) -> u64 {
         for matrix in matrices {
             for value in matrix.iter() {
                 hash = crate::persist::fingerprint(&value.to_bits().to_le_bytes(), hash);
+            }
+        }
+        for harmonic in &rom.extras.harmonics {
+            for matrix in [&harmonic.mass, &harmonic.stiffness, &harmonic.contact_map] {
+                for value in matrix.iter().flat_map(|value| [value.re, value.im]) {
+                    hash = crate::persist::fingerprint(&value.to_bits().to_le_bytes(), hash);
+                }
             }
         }
         let patches = rom.extras.thermal.as_ref().map(|thermal| &thermal.patches);

@@ -91,9 +91,10 @@ impl Simulation {
         let Some(limits) = &self.limits else { return Ok(()) };
         let scheme = limits.parameters.scheme;
         let stiffened = speeds.into_iter().fold(1.0, |most: f64, speed| most.max(self.compiled.stiffened(speed)));
-        stability::check_step_allowed(&self.compiled.model, self.compiled.stiffest() * stiffened, scheme, step)?;
+        let frequency = self.compiled.largest_frequency() * self.compiled.stiffest() * stiffened;
+        stability::check_step_allowed(frequency, scheme, step)?;
         if let Some(carrier) = &self.compiled.carrier {
-            stability::check_step_allowed(carrier, 1.0, scheme, step)?;
+            stability::check_step_allowed(carrier.largest_frequency(), scheme, step)?;
         }
         if step >= massless::USABLE * limits.massless {
             return Err(massless::refusal(step, limits.massless));
@@ -130,12 +131,17 @@ impl Compiled {
     }
 
     fn limits(&self, parameters: Parameters, law: &GapLaw) -> Limits {
-        let mut model = self.model.clone();
-        model.damping_ratios.fill(parameters.damping_ratio);
+        let mut models = match &self.wheel {
+            Some(wheel) => (0..wheel.diameters.len()).map(|diameter| wheel.paired(diameter)).collect(),
+            None => vec![self.model.clone()],
+        };
         // Of mistuned blades the stiffest has the tightest limits.
         let stiffest = self.stiffest();
-        model.frequencies.iter_mut().for_each(|frequency| *frequency *= stiffest);
-        let at = Checking { compiled: self, model, parameters };
+        for model in &mut models {
+            model.damping_ratios.fill(parameters.damping_ratio);
+            model.frequencies.iter_mut().for_each(|frequency| *frequency *= stiffest);
+        }
+        let mut at = Checking { compiled: self, models, parameters, watched: [Vec::new(), Vec::new()] };
         let expected = self.expected_step(parameters.step);
         let (outcome, massless) = match at.massless(expected, law) {
             Ok((more, limit)) => (at.warnings(expected, law, more), limit),
@@ -145,9 +151,10 @@ impl Compiled {
             Vec::new()
         } else {
             let senses = at.senses();
-            let steps = stability::growth_steps(&at.model, parameters.step);
-            let refusal = |step| senses.iter().find_map(|sense| at.growth(step, *sense, false).err());
-            steps.map(|step| (step, refusal(step))).collect()
+            let steps = stability::growth_steps(at.largest_frequency(), parameters.step);
+            steps
+                .map(|step| (step, senses.iter().find_map(|sense| at.growth(step, *sense, false).err())))
+                .collect()
         };
         Limits { parameters, outcome, ranges: at.with_expected(ranges, expected), massless }
     }
@@ -196,16 +203,38 @@ fn lowest_ratio(
     if eigenvalues.max() > 0.0 { eigenvalues.min() / eigenvalues.max() } else { 0.0 }
 }
 
+/// A casing need not be alike all around: the check at the place where it yields most.
+fn yielding_most<'a>(
+    check: massless::MasslessCheck<'a>,
+    places: impl Iterator<Item = DMatrix<f64>>,
+    modes: &'a ModalModel,
+    step: f64,
+) -> massless::MasslessCheck<'a> {
+    let (mut most, mut chosen) = (f64::NEG_INFINITY, check.clone());
+    for seen in places {
+        let tried = massless::MasslessCheck { slave: Some((seen, modes)), ..check.clone() };
+        if let Some((_, found)) = tried.eigenvalues(step).filter(|(_, found)| *found > most) {
+            (most, chosen) = (found, tried);
+        }
+    }
+    chosen
+}
+
 /// A scene with some parameters, about to be checked.
 struct Checking<'a> {
     compiled: &'a Compiled,
-    model: crate::dynamics::modal::ModalModel,
+    /// What the contact problem with all sectors closed decouples into: one uncoupled sector, or the nodal diameters as
+    /// real structures.
+    models: Vec<ModalModel>,
     parameters: Parameters,
+    /// Per sense of slip (+, −) and combination of nodes the model that grows most at the step to expect. At other steps
+    /// only this one is looked at: with all nodal diameters of a wheel at all steps the check would take a minute.
+    watched: [Vec<usize>; 2],
 }
 
 impl Checking<'_> {
     /// All warnings at the step to expect; `more` come last.
-    fn warnings(&self, step: f64, law: &GapLaw, more: Vec<String>) -> Result<Vec<String>> {
+    fn warnings(&mut self, step: f64, law: &GapLaw, more: Vec<String>) -> Result<Vec<String>> {
         let mut warnings = self.expected(step)?;
         warnings.extend(self.slave(step, law)?);
         warnings.extend(more);
@@ -213,18 +242,25 @@ impl Checking<'_> {
     }
 
     /// Everything about the rotor at the step to expect; returns warnings.
-    fn expected(&self, step: f64) -> Result<Vec<String>> {
+    fn expected(&mut self, step: f64) -> Result<Vec<String>> {
         let Parameters { friction, scheme, .. } = self.parameters;
-        let mut warnings: Vec<String> = stability::check_step(&self.model, 1.0, scheme, step)?.into_iter().collect();
-        let directions = [1.0, -1.0].map(|sense| self.directions(sense));
-        stability::check_solvable(&self.model, scheme, self.parameters.step, friction, &directions)?;
+        let mut warnings: Vec<String> = stability::check_step(self.largest_frequency(), scheme, step)?.into_iter().collect();
+        let senses: Vec<Vec<ContactDirections>> =
+            self.models.iter().map(|model| [1.0, -1.0].map(|sense| self.directions(model, sense)).into()).collect();
+        let largest = self.parameters.step;
+        if self.compiled.wheel.is_some() {
+            stability::check_solvable_together(&self.models, scheme, largest, friction, &senses)?;
+        } else {
+            stability::check_solvable(&self.models[0], scheme, largest, friction, &senses[0])?;
+        }
         if friction > 0.0 {
             let senses = self.senses();
             for sense in &senses {
                 warnings.extend(self.growth(step, *sense, true)?);
             }
-            if let [sense] = senses[..] {
-                let reversed = self.growth(step, -sense, true).unwrap_or_else(|refusal| vec![refusal.to_string()]);
+            // Of a wheel the other sense takes as long again.
+            if let ([sense], None) = (&senses[..], &self.compiled.wheel) {
+                let reversed = self.growth(step, -*sense, true).unwrap_or_else(|refusal| vec![refusal.to_string()]);
                 warnings.extend(
                     reversed
                         .into_iter()
@@ -240,7 +276,7 @@ impl Checking<'_> {
     fn slave(&self, step: f64, law: &GapLaw) -> Result<Vec<String>> {
         let (Some(model), GapLaw::Spline(spline)) = (&self.compiled.carrier, law) else { return Ok(Vec::new()) };
         let Parameters { friction, scheme, .. } = self.parameters;
-        let mut warnings: Vec<String> = stability::check_step(model, 1.0, scheme, step)?.into_iter().collect();
+        let mut warnings: Vec<String> = stability::check_step(model.largest_frequency(), scheme, step)?.into_iter().collect();
         for warning in &mut warnings {
             *warning = format!("casing: {warning}");
         }
@@ -275,26 +311,27 @@ impl Checking<'_> {
             (Some(_), GapLaw::Spline(spline)) => Some((self.compiled.slave_modes(spline), spline)),
             _ => None,
         };
-        let normals = self.directions(1.0).into_iter().map(|(normal, _)| normal).collect();
-        let mut check = massless::MasslessCheck { model: &self.model, normals, slave: None };
-        if let Some((modes, spline)) = &modes {
-            // A casing need not be alike all around: where it yields most.
-            let mut most = f64::NEG_INFINITY;
-            for place in 0..SLAVE_ANGLES {
-                let seen = slave_at(spline, modes, slave_angle(place)).0;
-                let tried = massless::MasslessCheck { slave: Some((seen, modes)), ..check.clone() };
-                if let Some((_, found)) = tried.eigenvalues(step).filter(|(_, found)| *found > most) {
-                    (most, check) = (found, tried);
-                }
+        let largest = self.parameters.step.max(step) / massless::QUIET;
+        let (mut limit, mut worst) = (f64::INFINITY, (0.0, 0.0));
+        for (diameter, model) in self.models.iter().enumerate() {
+            let normals = self.directions(model, 1.0).into_iter().map(|(normal, _)| normal).collect();
+            let mut check = massless::MasslessCheck { model, normals, slave: None };
+            if let Some((modes, spline)) = &modes {
+                let place = |place| self.seen_by(diameter, slave_at(spline, modes, slave_angle(place)).0);
+                check = yielding_most(check, (0..SLAVE_ANGLES).map(place), modes, step);
             }
+            // Of several only the tightest counts.
+            limit = check.limit(largest.min(limit))?.min(limit);
+            let found = check.eigenvalues(step).unwrap_or(worst);
+            worst = (found.0.max(worst.0), found.1.max(worst.1));
         }
-        let limit = check.limit(self.parameters.step.max(step) / massless::QUIET)?;
         if step >= massless::USABLE * limit {
             return Err(massless::refusal(step, limit));
         }
         let mut warnings: Vec<String> = massless::warning(step, limit).into_iter().collect();
         let sectors = f64::from(u32::try_from(self.compiled.master().1.sectors).unwrap_or(u32::MAX));
-        if let Some((master, slave)) = check.eigenvalues(step).filter(|(a, b)| a + sectors * b >= 4.0) {
+        let (master, slave) = worst;
+        if master + sectors * slave >= 4.0 {
             warnings.push(format!(
                 "massless-boundary is shown stable for up to {:.0} blades in contact with the casing at once, not for all \
                  {sectors}",
@@ -302,6 +339,15 @@ impl Checking<'_> {
             ));
         }
         Ok((warnings, limit))
+    }
+
+    /// The slave's modes as the real part of a nodal diameter sees them. One blade in contact has an equal share of all
+    /// nodal diameters, so that the softest of them bounds what the slave adds.
+    fn seen_by(&self, diameter: usize, seen: DMatrix<f64>) -> DMatrix<f64> {
+        let Some(wheel) = &self.compiled.wheel else { return seen };
+        let rows = self.models[diameter].contact_modes.nrows() / 3;
+        let weight = wheel.weight(diameter);
+        DMatrix::from_fn(rows, seen.ncols(), |i, j| if i < seen.nrows() { weight * seen[(i, j)] } else { 0.0 })
     }
 
     /// Senses of slip to expect.
@@ -317,11 +363,18 @@ impl Checking<'_> {
         ranges
     }
 
-    /// Normals and slip directions of the contact nodes on a round casing.
-    fn directions(&self, sense: f64) -> ContactDirections {
+    fn largest_frequency(&self) -> f64 {
+        self.models.iter().fold(0.0, |largest, model| f64::max(largest, model.largest_frequency()))
+    }
+
+    /// Normals and slip directions of the contact nodes of one of the models on a round casing; both parts of a nodal
+    /// diameter have the same.
+    fn directions(&self, model: &ModalModel, sense: f64) -> ContactDirections {
         let meridian = self.compiled.contact().meridian;
         let nodes = self.compiled.master().1.contact_nodes.iter();
         nodes
+            .cycle()
+            .take(model.contact_modes.nrows() / 3)
             .map(|node| {
                 let slope = if meridian == Meridian::Contour { node.meridional_slope } else { 0.0 };
                 let length = (1.0 + slope * slope).sqrt();
@@ -330,9 +383,13 @@ impl Checking<'_> {
             .collect()
     }
 
-    /// Sets of closed contact nodes: all combinations of a few; of many every one alone, neighbours, and all.
+    /// Sets of closed contact nodes: all combinations of a few; of many every one alone, neighbours, and all; of a wheel,
+    /// on all sectors, every one alone and all.
     fn combinations(&self) -> Vec<Vec<usize>> {
         let nodes = self.compiled.master().1.contact_nodes.len();
+        if self.compiled.wheel.is_some() {
+            return (0..nodes).map(|node| vec![node]).chain([(0..nodes).collect()]).collect();
+        }
         if nodes <= ALL_COMBINATIONS_UP_TO {
             let members = |set: usize| (0..nodes).filter(|node| set >> node & 1 == 1).collect();
             return (1..1 << nodes).map(members).collect();
@@ -343,26 +400,47 @@ impl Checking<'_> {
     }
 
     /// Growth of closed sliding contact at one step size and sense of slip; returns warnings of flutter.
-    fn growth(&self, step: f64, sense: f64, warn: bool) -> Result<Vec<String>> {
-        let Parameters { friction, scheme, .. } = self.parameters;
-        let all = self.directions(sense);
+    fn growth(&mut self, step: f64, sense: f64, warn: bool) -> Result<Vec<String>> {
         let mut warnings = Vec::new();
-        for nodes in self.combinations() {
-            let directions = nodes.iter().map(|node| all[*node]).collect();
-            let model = self.model.with_nodes(&nodes);
-            let Some(found) = stability::growth(&model, scheme, step, friction, &directions) else { continue };
-            if found.is_added() {
-                return Err(self.refusal(&nodes, sense, step, found));
+        for (combination, nodes) in self.combinations().iter().enumerate() {
+            let watched = self.watched[usize::from(sense < 0.0)].get(combination).copied();
+            let models = watched.map_or(0..self.models.len(), |model| model..model + 1);
+            let (mut flutter, mut most) = (0.0_f64, (0, f64::NEG_INFINITY));
+            for model in models {
+                let Some(found) = self.growth_of(model, nodes, step, sense) else { continue };
+                if found.is_added() {
+                    return Err(self.refusal(nodes, sense, step, found));
+                }
+                if found.is_flutter() {
+                    flutter = flutter.max(found.continuous);
+                }
+                if found.stepped > most.1 {
+                    most = (model, found.stepped);
+                }
             }
-            if warn && found.is_flutter() {
+            if watched.is_none() {
+                self.watched[usize::from(sense < 0.0)].push(most.0);
+            }
+            if warn && flutter > 0.0 {
                 warnings.push(format!(
-                    "{} is physically unstable (flutter), growth rate {:.3e} 1/s",
-                    self.contact(&nodes, sense),
-                    found.continuous
+                    "{} is physically unstable (flutter), growth rate {flutter:.3e} 1/s",
+                    self.contact(nodes, sense)
                 ));
             }
         }
         Ok(warnings)
+    }
+
+    /// Growth of one of the models with contact closed at some nodes (of both parts of a nodal diameter).
+    fn growth_of(&self, model: usize, nodes: &[usize], step: f64, sense: f64) -> Option<Growth> {
+        let Parameters { friction, scheme, .. } = self.parameters;
+        let model = &self.models[model];
+        let all = self.directions(model, sense);
+        let own = self.compiled.master().1.contact_nodes.len();
+        let places = (0..all.len() / own).flat_map(|part| nodes.iter().map(move |node| part * own + node));
+        let places: Vec<usize> = places.collect();
+        let directions = places.iter().map(|place| all[*place]).collect();
+        stability::growth(&model.with_nodes(&places), scheme, step, friction, &directions)
     }
 
     /// Which contact is meant.
@@ -370,8 +448,9 @@ impl Checking<'_> {
         let names: Vec<&str> =
             nodes.iter().map(|node| self.compiled.master().1.contact_nodes[*node].name.as_str()).collect();
         let direction = if sense > 0.0 { "+θ" } else { "−θ" };
+        let where_closed = if self.compiled.wheel.is_some() { " of all sectors" } else { "" };
         format!(
-            "with µ = {}, contact closed at {} and sliding in {direction}",
+            "with µ = {}, contact closed at {}{where_closed} and sliding in {direction}",
             self.parameters.friction,
             names.join(", ")
         )

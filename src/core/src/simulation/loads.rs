@@ -17,7 +17,7 @@ pub struct LoadVectors {
 }
 
 impl LoadVectors {
-    /// Loads of the master.
+    /// Loads of the master; of coupled sectors on nodal diameter 0.
     pub fn of_master(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<[f64; 2]> {
         let Some(spin) = rom.extras.spin.as_ref().filter(|_| structure.spin.growth) else { return Vec::new() };
         let second = model.modal_load(&spin.centrifugal_load);
@@ -25,7 +25,10 @@ impl LoadVectors {
         // stiffness Ω²c alone is linear theory.
         let fourth = model.modal_load(&spin.centrifugal_load_speed4);
         let share = if structure.spin.stiffening { 1.0 } else { 0.0 };
-        second.into_iter().zip(fourth).map(|(second, fourth)| [second, share * fourth]).collect()
+        // The load is that of one sector, the same on all N; an amplitude of nodal diameter 0 moves each by 1/√N.
+        #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
+        let all = if rom.is_cyclic() { libm::sqrt(rom.sectors as f64) } else { 1.0 };
+        second.into_iter().zip(fourth).map(|(second, fourth)| [all * second, all * share * fourth]).collect()
     }
 
     /// Loads of the slave, the nodal-diameter load with `order` of them; `model` sees the contact grid of `rom`.

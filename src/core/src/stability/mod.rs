@@ -69,21 +69,20 @@ fn directional_modes(
     (normals, forces)
 }
 
-/// Refuse step sizes beyond the linear limit, with all frequencies times `factor` (mistuning). Allocates only to refuse.
+/// Refuse step sizes beyond the linear limit of the largest angular `frequency` (rad/s). Allocates only to refuse.
 ///
 /// # Errors
 /// [`Error::Unstable`] for central differences at or beyond ω_max h = 2.
-pub fn check_step_allowed(model: &ModalModel, factor: f64, scheme: Scheme, step: f64) -> Result<()> {
-    let product = factor * model.largest_frequency() * step;
+pub fn check_step_allowed(frequency: f64, scheme: Scheme, step: f64) -> Result<()> {
+    let product = frequency * step;
     match scheme {
         Scheme::CentralDifference if product >= 2.0 * (1.0 - CENTRAL_MARGIN) => Err(Error::Unstable {
             problem: format!(
-                "central-difference with internal step {step:.6e} s has ω_max·h = {product:.4} ≥ 2 (ω_max = {:.6e} rad/s)",
-                factor * model.largest_frequency()
+                "central-difference with internal step {step:.6e} s has ω_max·h = {product:.4} ≥ 2 (ω_max = {frequency:.6e} rad/s)"
             ),
             remedy: format!(
                 "Set the internal step below {:.6e} s, or use the scheme modal-exact",
-                central_difference_limit(model) / factor
+                2.0 / frequency
             ),
         }),
         _ => Ok(()),
@@ -94,9 +93,9 @@ pub fn check_step_allowed(model: &ModalModel, factor: f64, scheme: Scheme, step:
 ///
 /// # Errors
 /// As there.
-pub fn check_step(model: &ModalModel, factor: f64, scheme: Scheme, step: f64) -> Result<Option<String>> {
-    check_step_allowed(model, factor, scheme, step)?;
-    let product = factor * model.largest_frequency() * step;
+pub fn check_step(frequency: f64, scheme: Scheme, step: f64) -> Result<Option<String>> {
+    check_step_allowed(frequency, scheme, step)?;
+    let product = frequency * step;
     match scheme {
         Scheme::ModalExact if product > 2.0 => Ok(Some(format!(
             "ω_max·h = {product:.2} > 2: modes above {:.4e} rad/s are not resolved by the internal step {step:.3e} s; \
@@ -109,8 +108,8 @@ pub fn check_step(model: &ModalModel, factor: f64, scheme: Scheme, step: f64) ->
 
 /// Steps from the largest down at which solvability is looked at: a communication step may be shorter than the
 /// internal step, and W keeps its shape only once ω_max h ≪ 1.
-fn steps_to_check(model: &ModalModel, largest: f64) -> impl Iterator<Item = f64> {
-    let resolved = 0.1 / model.largest_frequency();
+fn steps_to_check(frequency: f64, largest: f64) -> impl Iterator<Item = f64> {
+    let resolved = 0.1 / frequency;
     std::iter::successors(Some(largest), |step| Some(0.5 * step)).take(24).scan(true, move |unresolved, step| {
         let take = *unresolved;
         *unresolved = step > resolved;
@@ -130,11 +129,45 @@ pub fn check_solvable(
     senses: &[ContactDirections],
 ) -> Result<()> {
     let solvable = |friction: f64| {
-        steps_to_check(model, step).all(|step| {
+        steps_to_check(model.largest_frequency(), step).all(|step| {
             let at = |directions| is_solvable(&delassus(model, scheme, step, friction, directions));
             senses.iter().all(at)
         })
     };
+    let by_minors = senses.iter().all(|directions| directions.len() <= MINORS_UP_TO);
+    refuse_unsolvable(solvable, by_minors, step, friction)
+}
+
+/// The same for coupled sectors: `diameters` are all nodal diameters as real structures (see
+/// [`CyclicModel::paired`](crate::dynamics::cyclic::CyclicModel::paired)), with the `senses` of slip of each.
+///
+/// On a round casing W of all nodes of all sectors is block-circulant, and its Fourier blocks are the Delassus matrices of
+/// the nodal diameters: when their symmetric parts are positive definite so is that of W, and hence of every subset of the
+/// contacts.
+///
+/// # Errors
+/// [`Error::Unstable`] naming µ and h.
+pub fn check_solvable_together(
+    diameters: &[ModalModel],
+    scheme: Scheme,
+    step: f64,
+    friction: f64,
+    senses: &[Vec<ContactDirections>],
+) -> Result<()> {
+    let frequency = diameters.iter().fold(0.0, |most: f64, model| most.max(model.largest_frequency()));
+    let solvable = |friction: f64| {
+        steps_to_check(frequency, step).all(|step| {
+            diameters.iter().zip(senses).all(|(model, senses)| {
+                let at = |directions| scaled(&delassus(model, scheme, step, friction, directions));
+                senses.iter().all(|directions| at(directions).is_some_and(|scaled| is_definite(&scaled)))
+            })
+        })
+    };
+    refuse_unsolvable(solvable, false, step, friction)
+}
+
+/// Refusal naming the least friction at which solvability is lost; `exact` tells whether it is really lost there.
+fn refuse_unsolvable(solvable: impl Fn(f64) -> bool, exact: bool, step: f64, friction: f64) -> Result<()> {
     if friction == 0.0 || solvable(friction) {
         return Ok(());
     }
@@ -146,13 +179,13 @@ pub fn check_solvable(
         let middle = 0.5 * (low + high);
         *(if solvable(middle) { &mut low } else { &mut high }) = middle;
     }
-    let (what, why) = if senses.iter().any(|directions| directions.len() > MINORS_UP_TO) {
+    let (what, why) = if exact {
+        ("has no unique solution", "a principal minor of the Delassus matrix is not positive")
+    } else {
         (
             "cannot be shown to have a unique solution",
             "the symmetric part of the Delassus matrix is not positive definite",
         )
-    } else {
-        ("has no unique solution", "a principal minor of the Delassus matrix is not positive")
     };
     Err(Error::Unstable {
         problem: format!(
@@ -171,20 +204,28 @@ pub fn check_solvable(
 /// Redundant contacts (zero minors up to rounding) are accepted.
 fn is_solvable(delassus: &DMatrix<f64>) -> bool {
     let nodes = delassus.nrows();
-    let diagonal: Vec<f64> = (0..nodes).map(|node| delassus[(node, node)]).collect();
-    if diagonal.iter().any(|value| *value <= 0.0) {
-        return false;
-    }
-    let scaled = DMatrix::from_fn(nodes, nodes, |i, j| delassus[(i, j)] / (diagonal[i] * diagonal[j]).sqrt());
+    let Some(scaled) = scaled(delassus) else { return false };
     if nodes > MINORS_UP_TO {
-        let symmetric = (&scaled + scaled.transpose()) * 0.5;
-        return symmetric.symmetric_eigenvalues().min() > -1e-10;
+        return is_definite(&scaled);
     }
     (1..1_usize << nodes).all(|set| {
         let members: Vec<usize> = (0..nodes).filter(|node| set >> node & 1 == 1).collect();
         let minor = DMatrix::from_fn(members.len(), members.len(), |i, j| scaled[(members[i], members[j])]);
         minor.determinant() > -1e-10
     })
+}
+
+/// W with unit diagonal; `None` where a diagonal entry is not positive.
+fn scaled(delassus: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let diagonal = delassus.diagonal();
+    let entry = |i: usize, j: usize| delassus[(i, j)] / (diagonal[i] * diagonal[j]).sqrt();
+    diagonal.iter().all(|value| *value > 0.0).then(|| DMatrix::from_fn(delassus.nrows(), delassus.ncols(), entry))
+}
+
+/// Whether the symmetric part is positive definite, redundant contacts apart.
+fn is_definite(scaled: &DMatrix<f64>) -> bool {
+    let symmetric = (scaled + scaled.transpose()) * 0.5;
+    symmetric.symmetric_eigenvalues().min() > -1e-10
 }
 
 /// Growth rates of closed sliding contact.
@@ -291,8 +332,8 @@ fn blocks([a, b, c, d]: [&DMatrix<f64>; 4]) -> DMatrix<f64> {
 }
 
 /// Steps at which growth is looked at, from `largest` down to where every mode is resolved well (at most 12 octaves).
-pub fn growth_steps(model: &ModalModel, largest: f64) -> impl Iterator<Item = f64> {
-    let resolved = 0.1 / model.largest_frequency();
+pub fn growth_steps(frequency: f64, largest: f64) -> impl Iterator<Item = f64> {
+    let resolved = 0.1 / frequency;
     std::iter::successors(Some(largest), |step| Some(step * std::f64::consts::FRAC_1_SQRT_2))
         .take_while(move |step| *step > resolved)
         .take(24)
@@ -323,10 +364,10 @@ mod tests {
         let model = model(&[100.0, 4000.0], &[[1.0, 0.0, 0.0], [0.5, 0.0, 0.0]], 0.01);
         for (factor, stable) in [(0.9, true), (0.999, true), (1.001, false), (10.0, false)] {
             let step = factor * central_difference_limit(&model);
-            assert_eq!(check_step(&model, 1.0, Scheme::CentralDifference, step).is_ok(), stable, "factor {factor}");
-            assert!(check_step(&model, 1.0, Scheme::ModalExact, step).is_ok());
+            assert_eq!(check_step(model.largest_frequency(), Scheme::CentralDifference, step).is_ok(), stable, "factor {factor}");
+            assert!(check_step(model.largest_frequency(), Scheme::ModalExact, step).is_ok());
         }
-        assert!(check_step(&model, 1.0, Scheme::ModalExact, 1e-3).unwrap().is_some());
+        assert!(check_step(model.largest_frequency(), Scheme::ModalExact, 1e-3).unwrap().is_some());
     }
 
     #[test]
@@ -348,7 +389,7 @@ mod tests {
         let refusal = check_solvable(&model, Scheme::ModalExact, 1e-3, 1.1, &[radial()]).unwrap_err().to_string();
         // Free masses: 1 + 0.9² − µ·0.9·2 > 0.
         assert!(refusal.contains("µ below 1.00"), "{refusal}");
-        assert_eq!(steps_to_check(&model, 1e-7).count(), 1);
+        assert_eq!(steps_to_check(model.largest_frequency(), 1e-7).count(), 1);
     }
 
     #[test]

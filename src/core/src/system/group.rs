@@ -2,6 +2,9 @@
 
 use super::{ContactEvent, StepFailure, System};
 use crate::contact::gap::{Drive, GapLaw, dot};
+use crate::dynamics::bank::ModalBank;
+use crate::dynamics::cyclic::CyclicBank;
+use crate::dynamics::sectors::Sectors;
 use crate::settings::Solver;
 use nalgebra::DMatrix;
 
@@ -60,7 +63,7 @@ impl System {
         Ok(())
     }
 
-    /// Sectors coupled through the slave: the nodes that penetrate or touched last, then those that their solution
+    /// Sectors coupled through the slave or as a wheel: the nodes that penetrate or touched last, then those that their solution
     /// makes penetrate, until there are none.
     pub(super) fn solve_coupled(&mut self, drive: &Drive) -> Result<(), StepFailure> {
         if self.lowest.iter().all(|gap| *gap >= 0.0) {
@@ -198,31 +201,19 @@ impl System {
             (None, Some(solver)) if self.settings.solver == Solver::Coulomb => &mut solver.delassus,
             _ => &mut self.problem.delassus,
         };
-        if self.slave.is_none() {
-            let flexibility = self.bank.flexibility(self.members[0].sector).as_slice();
-            let (rows, columns) = (&self.row_directions[..per * nodes], &self.column_directions[..per * nodes]);
-            match per {
-                1 => fill_sector::<1>(matrix, flexibility, rows, columns),
-                _ => fill_sector::<3>(matrix, flexibility, rows, columns),
+        let (rows, columns) = (&self.row_directions[..], &self.column_directions[..]);
+        match (&self.bank, per) {
+            (Sectors::Coupled(wheel), 1) => fill_wheel::<1>(matrix, wheel, &self.members, rows, columns),
+            (Sectors::Coupled(wheel), _) => fill_wheel::<3>(matrix, wheel, &self.members, rows, columns),
+            (Sectors::Uncoupled(bank), _) if self.coupled => {
+                fill_sectors(matrix, bank, &self.members, rows, columns, per);
             }
-            return;
-        }
-        for (member, &Member { node: column_node, sector, .. }) in self.members.iter().enumerate() {
-            let flexibility = self.bank.flexibility(sector).as_slice();
-            let [first, second, third] =
-                std::array::from_fn(|j| &flexibility[(3 * column_node + j) * 3 * nodes..][..3 * nodes]);
-            for along in per * member..per * (member + 1) {
-                let direction = self.column_directions[along];
-                for (other, row) in self.members.iter().enumerate() {
-                    let at = 3 * row.node;
-                    let same = row.sector == sector;
-                    let moved: [f64; 3] = std::array::from_fn(|i| {
-                        let i = at + i;
-                        first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2]
-                    });
-                    for across in per * other..per * (other + 1) {
-                        matrix[(across, along)] = if same { dot(self.row_directions[across], moved) } else { 0.0 };
-                    }
+            (Sectors::Uncoupled(bank), _) => {
+                let flexibility = bank.flexibility(self.members[0].sector).as_slice();
+                let (rows, columns) = (&rows[..per * nodes], &columns[..per * nodes]);
+                match per {
+                    1 => fill_sector::<1>(matrix, flexibility, rows, columns),
+                    _ => fill_sector::<3>(matrix, flexibility, rows, columns),
                 }
             }
         }
@@ -332,19 +323,10 @@ impl System {
 
     /// Change of every gap by the solution (m), members and others.
     fn respond(&mut self, drive: &Drive) {
-        let (lanes, nodes) = (self.bank.lanes(), self.law.nodes());
-        self.response.fill(0.0);
-        for member in 0..self.members.len() {
-            let Member { node: column, sector, .. } = self.members[member];
-            let force = self.force_on(member);
-            let flexibility = self.bank.flexibility(sector);
-            for node in 0..nodes {
-                let index = node * lanes + sector;
-                let moved: [f64; 3] = std::array::from_fn(|i| {
-                    (0..3).map(|j| flexibility[(3 * node + i, 3 * column + j)] * force[j]).sum()
-                });
-                self.response[index] += dot(self.state.geometry.normal_at(index), moved);
-            }
+        let lanes = self.bank.lanes();
+        match &self.bank {
+            Sectors::Uncoupled(_) => self.respond_alone(),
+            Sectors::Coupled(_) => self.respond_together(),
         }
         let (Some(slave), GapLaw::Spline(law)) = (&mut self.slave, &self.law) else { return };
         slave.respond(&self.solution);
@@ -355,13 +337,71 @@ impl System {
         }
     }
 
+    /// Change of the gaps of uncoupled sectors.
+    fn respond_alone(&mut self) {
+        let Sectors::Uncoupled(bank) = &self.bank else { return };
+        let (lanes, nodes) = (bank.lanes(), self.law.nodes());
+        self.response.fill(0.0);
+        for member in 0..self.members.len() {
+            let Member { node: column, sector, .. } = self.members[member];
+            let force = self.force_on(member);
+            let flexibility = bank.flexibility(sector);
+            for node in 0..nodes {
+                let index = node * lanes + sector;
+                let moved: [f64; 3] = std::array::from_fn(|i| {
+                    (0..3).map(|j| flexibility[(3 * node + i, 3 * column + j)] * force[j]).sum()
+                });
+                self.response[index] += dot(self.state.geometry.normal_at(index), moved);
+            }
+        }
+    }
+
+    /// Change of the gaps of a wheel: every force moves every sector.
+    fn respond_together(&mut self) {
+        for member in 0..self.members.len() {
+            self.member_forces[member] = self.force_on(member);
+        }
+        let Sectors::Coupled(wheel) = &mut self.bank else { return };
+        let forces = self.members.iter().zip(&self.member_forces);
+        wheel.ask(forces.map(|(member, force)| (member.sector, member.node, *force)));
+        let (sectors, lanes, [across, around, along]) = (wheel.sectors(), wheel.lanes(), &self.state.geometry.normal);
+        let nodes = wheel.moved().chunks_exact(3 * lanes).zip(self.response.chunks_exact_mut(lanes));
+        let normals = across.chunks_exact(lanes).zip(around.chunks_exact(lanes)).zip(along.chunks_exact(lanes));
+        for ((moved, response), ((across, around), along)) in nodes.zip(normals) {
+            for lane in 0..sectors {
+                response[lane] =
+                    across[lane] * moved[lane] + around[lane] * moved[lanes + lane] + along[lane] * moved[2 * lanes + lane];
+            }
+        }
+    }
+
     /// Let the solution act on both structures, and record it.
     fn apply(&mut self) {
-        if self.slave.is_some() {
+        if self.coupled {
             for (gap, response) in self.state.gap.iter_mut().zip(&self.response) {
                 *gap += response;
             }
         }
+        match &mut self.bank {
+            Sectors::Uncoupled(_) => self.apply_alone(),
+            Sectors::Coupled(wheel) => {
+                wheel.act();
+                for member in 0..self.members.len() {
+                    self.state.gap[self.members[member].index] = self.corrected[member];
+                    self.record(member, self.member_forces[member]);
+                }
+            }
+        }
+        if let Some(slave) = &mut self.slave {
+            slave.apply(self.settings.ledger);
+        }
+        if let Some((coating, problem)) = &mut self.coating {
+            self.state.ledger.wear_energy.add(coating.commit(problem));
+        }
+    }
+
+    /// Let the solution act on uncoupled sectors.
+    fn apply_alone(&mut self) {
         let mut next = 0;
         while next < self.members.len() {
             let sector = self.members[next].sector;
@@ -374,13 +414,9 @@ impl System {
                 self.record(next, force);
                 next += 1;
             }
-            self.bank.correct(sector, &self.force, self.settings.ledger);
-        }
-        if let Some(slave) = &mut self.slave {
-            slave.apply(self.settings.ledger);
-        }
-        if let Some((coating, problem)) = &mut self.coating {
-            self.state.ledger.wear_energy.add(coating.commit(problem));
+            if let Sectors::Uncoupled(bank) = &mut self.bank {
+                bank.correct(sector, &self.force, self.settings.ledger);
+            }
         }
     }
 
@@ -398,6 +434,63 @@ impl System {
         }
         let event = ContactEvent::new(sector, node, normal, force, self.coating_share[member]);
         self.events.push(event);
+    }
+}
+
+/// W of nodes of uncoupled sectors with `per` directions each.
+fn fill_sectors(
+    matrix: &mut DMatrix<f64>,
+    bank: &ModalBank,
+    members: &[Member],
+    rows: &[[f64; 3]],
+    columns: &[[f64; 3]],
+    per: usize,
+) {
+    let height = bank.rows();
+    for (member, &Member { node: column_node, sector, .. }) in members.iter().enumerate() {
+        let flexibility = bank.flexibility(sector).as_slice();
+        let [first, second, third] = std::array::from_fn(|j| &flexibility[(3 * column_node + j) * height..][..height]);
+        for along in per * member..per * (member + 1) {
+            let direction = columns[along];
+            for (other, row) in members.iter().enumerate() {
+                let at = 3 * row.node;
+                let same = row.sector == sector;
+                let moved: [f64; 3] = std::array::from_fn(|i| {
+                    let i = at + i;
+                    first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2]
+                });
+                for across in per * other..per * (other + 1) {
+                    matrix[(across, along)] = if same { dot(rows[across], moved) } else { 0.0 };
+                }
+            }
+        }
+    }
+}
+
+/// W of nodes of a wheel of coupled sectors with `PER` directions each.
+fn fill_wheel<const PER: usize>(
+    matrix: &mut DMatrix<f64>,
+    wheel: &CyclicBank,
+    members: &[Member],
+    rows: &[[f64; 3]],
+    columns: &[[f64; 3]],
+) {
+    let (sectors, leading) = (wheel.sectors(), matrix.nrows());
+    let targets = matrix.as_mut_slice().chunks_exact_mut(PER * leading);
+    let columns = columns.as_chunks::<PER>().0;
+    for ((column, directions), targets) in members.iter().zip(columns).zip(targets) {
+        for ((other, row), across) in members.iter().enumerate().zip(rows.as_chunks::<PER>().0) {
+            let difference = row.sector + if row.sector < column.sector { sectors } else { 0 } - column.sector;
+            let [first, second, third] = wheel.flexibility(difference, column.node, row.node);
+            for (along, direction) in directions.iter().enumerate() {
+                let moved: [f64; 3] = std::array::from_fn(|i| {
+                    first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2]
+                });
+                for (value, row) in targets[along * leading + PER * other..][..PER].iter_mut().zip(across) {
+                    *value = dot(*row, moved);
+                }
+            }
+        }
     }
 }
 

@@ -9,8 +9,9 @@ use crate::contact::coating::{CoatedProblem, Coating};
 use crate::contact::coulomb::CoulombSolver;
 use crate::contact::gap::{Drive, GapLaw, Geometry, dot};
 use crate::contact::solver::ContactSolver;
-use crate::dynamics::bank::{BankOptions, ModalBank};
+use crate::dynamics::bank::BankOptions;
 use crate::dynamics::modal::ModalModel;
+use crate::dynamics::sectors::{SectorModel, Sectors};
 use crate::ledger::Ledger;
 use crate::persist::persist_fields;
 use crate::settings::{Scheme, Solver};
@@ -133,7 +134,9 @@ persist_fields!(SystemState {
 /// Modes, gap function and contact solver put together.
 #[derive(Debug, Clone)]
 pub struct System {
-    bank: ModalBank,
+    bank: Sectors,
+    /// All sectors form one group: through the slave, the wheel, or both.
+    coupled: bool,
     slave: Option<Slave>,
     law: GapLaw,
     settings: SystemSettings,
@@ -153,6 +156,8 @@ pub struct System {
     coating_share: Vec<f64>,
     /// Change of all gaps by the solution of a coupled group.
     response: Vec<f64>,
+    /// Forces on the members of a group of a wheel.
+    member_forces: Vec<[f64; 3]>,
     /// Contact force on the rows of one sector.
     force: Vec<f64>,
     /// Contact force of the step before on all rows; only where it is needed.
@@ -169,21 +174,16 @@ impl System {
     /// All sectors at rest against something rigid. [`System::set_step`] and [`System::start`] come before the first step.
     pub fn new(model: &ModalModel, sectors: usize, law: GapLaw, settings: SystemSettings) -> Self {
         let sticking = settings.solver == Solver::Coulomb;
-        Self::with_parts(model, sectors, law, settings, SystemParts { sticking, ..SystemParts::default() })
+        let parts = SystemParts { sticking, ..SystemParts::default() };
+        Self::with_parts(SectorModel::Uncoupled(model, sectors), law, settings, parts)
     }
 
-    /// The same with parts that only some scenes need.
-    pub fn with_parts(
-        model: &ModalModel,
-        sectors: usize,
-        law: GapLaw,
-        settings: SystemSettings,
-        parts: SystemParts,
-    ) -> Self {
-        let bank = ModalBank::with_options(model, sectors, parts.bank);
-        let (lanes, nodes) = (bank.lanes(), law.nodes());
+    /// The same with coupled sectors, or with parts that only some scenes need.
+    pub fn with_parts(model: SectorModel, law: GapLaw, settings: SystemSettings, parts: SystemParts) -> Self {
+        let bank = Sectors::new(model, parts.bank);
+        let (sectors, lanes, nodes) = (bank.sectors(), bank.lanes(), law.nodes());
         let contacts = nodes * lanes;
-        let coupled = parts.slave.is_some();
+        let coupled = parts.slave.is_some() || bank.coupled().is_some();
         let group = if coupled { nodes * sectors } else { nodes };
         let directions = if parts.sticking { 3 } else { 1 };
         let coating = parts.coating.map(|coating| {
@@ -205,6 +205,7 @@ impl System {
             corrected: vec![0.0; group],
             coating_share: vec![0.0; group],
             response: vec![0.0; if coupled { contacts } else { 0 }],
+            member_forces: vec![[0.0; 3]; if bank.coupled().is_some() { group } else { 0 }],
             force: vec![0.0; 3 * nodes],
             force_before: vec![0.0; 3 * contacts],
             angles: vec![0.0; nodes],
@@ -226,6 +227,7 @@ impl System {
                 ledger: Ledger::default(),
             },
             bank,
+            coupled,
             law,
             settings,
             coating,
@@ -264,12 +266,12 @@ impl System {
     }
 
     /// The modes.
-    pub fn bank(&self) -> &ModalBank {
+    pub fn bank(&self) -> &Sectors {
         &self.bank
     }
 
     /// The modes, to set initial conditions before [`System::start`].
-    pub fn bank_mut(&mut self) -> &mut ModalBank {
+    pub fn bank_mut(&mut self) -> &mut Sectors {
         &mut self.bank
     }
 
@@ -410,7 +412,7 @@ impl System {
         self.law.turn(self.state.angle - self.state.angle_before);
         self.evaluate_gaps(drive, true);
         self.retire_events();
-        if self.slave.is_some() {
+        if self.coupled {
             self.solve_coupled(drive)?;
         } else {
             self.solve_sectors(drive)?;
@@ -429,13 +431,15 @@ impl System {
 
     /// Contact forces of the last step act on the modes with inertia.
     fn act_delayed(&mut self) {
-        let lanes = self.bank.lanes();
-        for sector in 0..self.bank.sectors() {
+        // A wheel of coupled sectors keeps its forces until it predicts.
+        let Sectors::Uncoupled(bank) = &mut self.bank else { return };
+        let lanes = bank.lanes();
+        for sector in 0..bank.sectors() {
             for (row, force) in self.force.iter_mut().enumerate() {
                 *force = self.state.force[row * lanes + sector];
             }
             if self.force.iter().any(|force| *force != 0.0) {
-                self.bank.act_delayed(sector, &self.force, self.settings.ledger);
+                bank.act_delayed(sector, &self.force, self.settings.ledger);
             }
         }
     }

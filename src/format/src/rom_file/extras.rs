@@ -1,4 +1,5 @@
-//! What only some structures have: spin, heat, contact grid. Files without it are those of the first release.
+//! What only some structures have: spin, heat, contact grid (coupled sectors: [`super::harmonics`]). Files without it
+//! are those of the first release.
 
 use nalgebra::DMatrix;
 use tiprub_core::rom::{ContactGrid, Patch, RomExtras, Spin, Thermal};

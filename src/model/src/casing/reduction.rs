@@ -66,7 +66,7 @@ pub fn reduce_casing(
     let mut timings = Timings::default();
     let (assembled, loads, free) = timed(&mut timings.assembly, || {
         grid.validate()?;
-        check_nodes(&mesh, clamped, &contact_points(grid), Frame::Cylindrical)?;
+        check_nodes(&mesh.nodes, clamped, &contact_points(grid), Frame::Cylindrical)?;
         let free = free_dofs(mesh.nodes.len(), clamped);
         let loads = patch_loads(&mesh, material, patches)?;
         let loads = Mat::from_fn(free.len(), patches.len(), |i, k| loads[(free[i], k)]);
@@ -118,8 +118,9 @@ pub fn reduce_casing(
         reduced_angular_frequencies: modes.squares.iter().map(|square| square.sqrt()).collect(),
         fixed_interface_frequencies: reduced.fixed_interface_frequencies,
         spin_checks: Vec::new(),
-        material: material.clone(),
-        mesh,
+        material: Some(material.clone()),
+        nodes: mesh.nodes.len(),
+        mesh: Some(mesh),
         timings,
     })
 }

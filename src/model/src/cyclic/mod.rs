@@ -1,7 +1,25 @@
 //! Reduction of a structure of identical coupled sectors, one nodal diameter at a time (cyclic symmetry).
 
+mod boundary;
+mod component;
+mod condense;
+mod families;
+mod lanczos;
+mod operator;
+mod parallel;
+mod quality;
+mod reduction;
+mod sector;
+mod wheel;
+
 use nalgebra::Complex;
 use tiprub_core::Rom;
+
+pub use boundary::PairingReport;
+pub use families::SMALLEST_GAP;
+pub use quality::WHEEL_MODES;
+pub use reduction::reduce_cyclic;
+pub use wheel::{WholeWheel, whole_wheel};
 
 use crate::reduce::Timings;
 
@@ -84,6 +102,8 @@ pub struct CyclicReduction {
     pub free_dofs: usize,
     /// Largest natural angular frequency of the reduced model (rad/s).
     pub largest_angular_frequency: f64,
+    /// What is worth telling about the choice of modes.
+    pub notes: Vec<String>,
     /// Wall times.
     pub timings: Timings,
 }

@@ -84,27 +84,32 @@ impl BladeMesh {
     /// # Errors
     /// [`Error::Invalid`] for fewer than two or more than the line has.
     pub fn contact_points(&self, count: usize) -> Result<Vec<ContactPoint>> {
-        let available = self.tip_line.len();
-        if count < 2 || count > available {
-            return Err(Error::invalid(
-                "number of contact nodes",
-                format!("{count} is outside 2..={available}, the nodes on the tip's mid-thickness line of this mesh"),
-                "Ask for another number or for more elements along the chord",
-            ));
-        }
-        let point = |index: usize| {
-            // Rounded to the nearest node of the line.
-            let place = (2 * index * (available - 1) + count - 1) / (2 * (count - 1));
-            let name = match index {
-                0 => "leading_edge".to_owned(),
-                _ if index + 1 == count => "trailing_edge".to_owned(),
-                _ if 2 * index + 1 == count => "mid_chord".to_owned(),
-                _ => format!("tip_{}", index + 1),
-            };
-            ContactPoint { name, node: self.tip_line[place], meridional_slope: self.tip_slopes[place] }
-        };
-        Ok((0..count).map(point).collect())
+        spread_contact(&self.tip_line, &self.tip_slopes, count)
     }
+}
+
+/// `count` contact nodes spread along a line of nodes from leading to trailing edge, with the slopes dr/dz there.
+pub(crate) fn spread_contact(line: &[usize], slopes: &[f64], count: usize) -> Result<Vec<ContactPoint>> {
+    let available = line.len();
+    if count < 2 || count > available {
+        return Err(Error::invalid(
+            "number of contact nodes",
+            format!("{count} is outside 2..={available}, the nodes on the tip's mid-thickness line of this mesh"),
+            "Ask for another number or for more elements along the chord",
+        ));
+    }
+    let point = |index: usize| {
+        // Rounded to the nearest node of the line.
+        let place = (2 * index * (available - 1) + count - 1) / (2 * (count - 1));
+        let name = match index {
+            0 => "leading_edge".to_owned(),
+            _ if index + 1 == count => "trailing_edge".to_owned(),
+            _ if 2 * index + 1 == count => "mid_chord".to_owned(),
+            _ => format!("tip_{}", index + 1),
+        };
+        ContactPoint { name, node: line[place], meridional_slope: slopes[place] }
+    };
+    Ok((0..count).map(point).collect())
 }
 
 fn ratio(index: usize, count: usize) -> f64 {

@@ -1,5 +1,15 @@
 //! A parametric compressor stage of the paper's size (section 6.1): 56 blades on a disk, and a casing ring with flanges.
 
+mod geometry;
+mod lattice;
+mod position;
+mod reduction;
+mod sector;
+
+pub use geometry::{BladeGeometry, DiskGeometry, SectorGeometry};
+pub use reduction::{StageModel, StageOptions, reduce_stage, stage_model};
+pub use sector::{SectorCounts, SectorMesh, SectorOptions, blade_mesh, sector_mesh};
+
 /// Blades, and sectors of the disk.
 pub const SECTORS: usize = 56;
 /// Radius of the blade tips (m); the tip contour is a cylinder.

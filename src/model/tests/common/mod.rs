@@ -2,12 +2,13 @@
 #![allow(dead_code)] // Every test binary uses its own part of these helpers.
 
 pub mod casing;
+pub mod wheel;
 
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::{Element, Mesh};
 
 /// How a brick of eight corners is divided into elements of a linear kind.
-fn division(kind: ElementKind) -> Vec<Vec<usize>> {
+pub fn division(kind: ElementKind) -> Vec<Vec<usize>> {
     match kind {
         ElementKind::Hex8 | ElementKind::Hex20 => vec![(0..8).collect()],
         ElementKind::Penta6 | ElementKind::Penta15 => vec![vec![0, 1, 2, 4, 5, 6], vec![0, 2, 3, 4, 6, 7]],
@@ -19,7 +20,7 @@ fn division(kind: ElementKind) -> Vec<Vec<usize>> {
     }
 }
 
-fn linear(kind: ElementKind) -> ElementKind {
+pub fn linear(kind: ElementKind) -> ElementKind {
     match kind {
         ElementKind::Hex8 | ElementKind::Hex20 => ElementKind::Hex8,
         ElementKind::Penta6 | ElementKind::Penta15 => ElementKind::Penta6,

@@ -24,7 +24,7 @@ use predict::Predict;
 pub const LANES: usize = 8;
 
 /// Amplitudes below this are flushed to zero now and then: idle damped modes would decay into denormals.
-const FLUSH_BELOW: f64 = 1e-150;
+pub(super) const FLUSH_BELOW: f64 = 1e-150;
 
 /// Lanes of a displacement row for this many sectors: rounded up to whole chunks, except for a single structure.
 pub fn lanes(sectors: usize) -> usize {

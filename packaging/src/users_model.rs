@@ -1,0 +1,295 @@
+//! A finite-element model of one's own: read, judged, reduced, told about.
+
+use std::{cell::RefCell, fmt::Write as _, path::Path};
+
+use serde_json::{Value, json};
+use tiprub_core::rom::Frame;
+use tiprub_model::{
+    Reduction, casing,
+    read::{
+        ContactChoice, Imported, MatrixFiles, MeshOptions, bounding_box, choose_contact_nodes, plausibility,
+        read_matrices, read_mesh, set_counts, total_mass,
+    },
+    reduce::{ContactPoint, ReductionOptions},
+    reduce_model,
+};
+
+use crate::{
+    Failure, Result,
+    casing_arguments::CasingArguments,
+    cli::{Model, ReduceArguments},
+    console::Console,
+    file_arguments::UnitChoice,
+    reduction::{self, with_progress},
+};
+
+/// Fixed-interface modes, modes compared with the full model, and damping ratio where none are given.
+const MODES: usize = 25;
+const CHECKED_MODES: usize = 10;
+const DAMPING: f64 = 0.005;
+
+/// Name of the set of all clamped nodes in exported files.
+const CLAMPED: &str = casing::CLAMPED;
+
+/// First natural frequencies (Hz) of things that are built lie in here.
+const USUAL_FREQUENCIES: [f64; 2] = [1.0, 1e6];
+
+/// A reduced model with what is to be told about it.
+pub struct UsersReduction {
+    /// The reduction.
+    pub reduction: Reduction,
+    /// Its name.
+    pub name: String,
+    /// Set of clamped nodes, for exported files.
+    pub clamped: Option<&'static str>,
+    /// What was read, for people.
+    pub text: String,
+    /// The same for programs.
+    pub json: Value,
+    /// Warnings.
+    pub warnings: Vec<String>,
+}
+
+/// Read, choose, reduce.
+///
+/// # Errors
+/// Files and sets, naming file, line and remedy; options that do not go together; and whatever the reduction refuses.
+pub fn reduce(arguments: &ReduceArguments, console: &Console) -> Result<UsersReduction> {
+    refuse_other_options(arguments)?;
+    let imported = import(arguments, console)?;
+    let asked = &arguments.file;
+    let mut warnings = imported.warnings.clone();
+    warnings.extend(judge(&imported, asked.units)?);
+    let contact_set = named_set(&imported, asked.contact_set.as_deref(), "--contact-set")?;
+    let clamped = clamped_nodes(&imported, &asked.clamp_set)?;
+    let free: Vec<usize> =
+        set(&imported, contact_set)?.iter().copied().filter(|node| clamped.binary_search(node).is_err()).collect();
+    if free.is_empty() {
+        let what = format!("--contact-set {contact_set}");
+        return Err(Failure::new(what, "all of its nodes are clamped", "Choose a set whose nodes can move"));
+    }
+    let choice = ContactChoice { count: arguments.contact_nodes, names: asked.contact_names.clone() };
+    let contact = choose_contact_nodes(&imported.model.nodes, &free, &choice).map_err(failure)?;
+    let name = asked.name.clone().unwrap_or_else(|| default_name(arguments));
+    let options = ReductionOptions {
+        name: name.clone(),
+        fixed_interface_modes: arguments.modes.unwrap_or(MODES),
+        checked_modes: CHECKED_MODES,
+        sectors: asked.sectors.unwrap_or(1) as usize,
+        frame: Frame::Cylindrical,
+        damping_ratio: asked.damping.unwrap_or(DAMPING),
+    };
+    let (text, json) = describe(&imported, (contact_set, free.len()), &contact, &clamped);
+    let mut model = imported.model;
+    if let Some((mesh, _)) = model.mesh.as_mut().filter(|_| !clamped.is_empty()) {
+        mesh.sets.insert(CLAMPED.to_owned(), clamped.clone());
+    }
+    let model = RefCell::new(Some(model));
+    let title = format!("Reducing {name}");
+    let reduction = with_progress(&title, console, &|listener| {
+        // The matrices are handed over, not copied.
+        let model = model.take().ok_or_else(|| tiprub_model::Error::invalid("model", "it is reduced already", ""))?;
+        reduce_model(model, &clamped, &contact, &options, arguments.spin, listener)
+    })?;
+    warnings.extend(frequency_warning(&reduction, clamped.is_empty()));
+    let clamped = (!clamped.is_empty()).then_some(CLAMPED);
+    Ok(UsersReduction { reduction, name, clamped, text, json, warnings })
+}
+
+fn refuse_other_options(arguments: &ReduceArguments) -> Result<()> {
+    let casing = &arguments.casing;
+    let shared =
+        CasingArguments { material: casing.material, expansion: casing.expansion, ..CasingArguments::default() };
+    if *casing != shared || arguments.mesh.is_some() {
+        let remedy = "Leave out --mesh and what `tiprub reduce --help` lists as options of `casing`";
+        return Err(Failure::usage("MODEL", "an option given describes a casing or a blade that ships", remedy));
+    }
+    let file = &arguments.file;
+    if file.cyclic_low.is_some() {
+        let remedy = "Leave out --cyclic-low and --cyclic-high: blades that know nothing of each other";
+        return Err(Failure::usage("--cyclic-low", "coupled sectors are not reduced yet", remedy));
+    }
+    if arguments.spin.is_some() && file.stiffness.is_some() {
+        let remedy = "Leave it out, or give a mesh file of one material instead of matrices";
+        return Err(Failure::usage("--spin", "the effects of spin are computed from a mesh", remedy));
+    }
+    Ok(())
+}
+
+fn import(arguments: &ReduceArguments, console: &Console) -> Result<Imported> {
+    let asked = &arguments.file;
+    let material = asked.material(arguments.casing.material, arguments.casing.expansion)?;
+    let mesh = match &arguments.model {
+        Some(Model::File(path)) => Some(path),
+        _ => None,
+    };
+    let (Some(stiffness), Some(mass)) = (&asked.stiffness, &asked.mass) else {
+        let Some(path) = mesh else {
+            return Err(Failure::usage("MODEL", "there is no file", "Give a mesh file, or --stiffness and --mass"));
+        };
+        let options = MeshOptions { units: asked.units(), material, temperature: asked.temperature };
+        let title = format!("Reading {}", path.display());
+        return with_progress(&title, console, &|listener| read_mesh(path, &options, listener));
+    };
+    if material.is_some() {
+        let remedy = "Leave --material, --young, --poisson and --density out";
+        return Err(Failure::usage("--stiffness", "matrices hold their material", remedy));
+    }
+    let nodes = match (&asked.nodes, mesh) {
+        (Some(_), Some(_)) => {
+            let remedy = "Give one of them: a mesh file whose nodes and sets are taken, or a table with --nodes";
+            return Err(Failure::usage("--nodes", "the nodes are given twice", remedy));
+        }
+        (Some(nodes), None) | (None, Some(nodes)) => nodes.clone(),
+        (None, None) => {
+            let remedy = "Give --nodes FILE (lines NODE,X,Y,Z,SETS) or the mesh file of the model";
+            return Err(Failure::usage("--stiffness", "the positions of the nodes are missing", remedy));
+        }
+    };
+    let files = MatrixFiles {
+        stiffness: stiffness.clone(),
+        mass: mass.clone(),
+        nodes,
+        dofs: asked.dofs.clone(),
+        units: asked.units(),
+        left_out: asked.clamp_set.clone(),
+    };
+    console.say(format_args!("Reading {} and {}", stiffness.display(), mass.display()));
+    read_matrices(&files).map_err(failure)
+}
+
+fn failure(error: tiprub_model::Error) -> Failure {
+    reduction::failure("model", error)
+}
+
+/// What cannot be meant is refused, unless the units are said to be SI; what is unusual is asked about.
+fn judge(imported: &Imported, units: Option<UnitChoice>) -> Result<Vec<String>> {
+    let found = plausibility(&imported.model, &imported.materials);
+    let question = |list: &[String]| format!("{}: is that meant?", list.join("; "));
+    let mut warnings = Vec::new();
+    if !found.impossible.is_empty() {
+        if units != Some(UnitChoice::Metre) {
+            let remedy = match units {
+                None => {
+                    "If lengths are in mm, masses in t and stresses in MPa, say --units mm-t-s; if it is meant, --units m"
+                }
+                Some(_) => "Are the file's units m, kg and s after all? Then leave --units out",
+            };
+            let problem = format!("{} cannot be meant", found.impossible.join("; "));
+            return Err(Failure::new("units of the model", problem, remedy));
+        }
+        warnings.push(question(&found.impossible));
+    }
+    if !found.doubtful.is_empty() {
+        warnings.push(format!("{} (--units mm-t-s is for files in mm, t and s)", question(&found.doubtful)));
+    }
+    Ok(warnings)
+}
+
+fn frequency_warning(reduction: &Reduction, free: bool) -> Option<String> {
+    let first = reduction.modes.iter().map(|mode| mode.frequency).nth(if free { 6 } else { 0 })?;
+    let [low, high] = USUAL_FREQUENCIES;
+    (!(low..=high).contains(&first)).then(|| {
+        format!(
+            "the first natural frequency is {first:.3e} Hz: are units, material and clamped nodes those that are meant?"
+        )
+    })
+}
+
+fn sets_of(imported: &Imported) -> String {
+    if imported.model.sets.is_empty() {
+        return "the model has no sets: name groups of nodes, elements or faces where it is meshed".into();
+    }
+    format!("sets of the model, with their numbers of nodes: {}", set_counts(&imported.model.sets))
+}
+
+fn named_set<'a>(imported: &Imported, name: Option<&'a str>, option: &str) -> Result<&'a str> {
+    name.ok_or_else(|| Failure::usage(option, "it is missing", format!("Give one; {}", sets_of(imported))))
+}
+
+fn set<'a>(imported: &'a Imported, name: &str) -> Result<&'a [usize]> {
+    imported.model.set(name).map_err(failure)
+}
+
+/// All nodes that are held, ascending.
+fn clamped_nodes(imported: &Imported, names: &[String]) -> Result<Vec<usize>> {
+    let mut clamped = imported.absent.clone();
+    let free = matches!(names, [only] if only.eq_ignore_ascii_case("none"));
+    if names.is_empty() && clamped.is_empty() {
+        let held = match imported.held.as_slice() {
+            [] => String::new(),
+            held => format!(
+                "; *BOUNDARY of the file holds {}",
+                held.iter().take(10).cloned().collect::<Vec<_>>().join(", ")
+            ),
+        };
+        let remedy = format!("Give the set that is held, or `none`; {}{held}", sets_of(imported));
+        return Err(Failure::usage("--clamp-set", "it is missing", remedy));
+    }
+    for name in names.iter().filter(|_| !free) {
+        clamped.extend(set(imported, name)?);
+    }
+    clamped.sort_unstable();
+    clamped.dedup();
+    Ok(clamped)
+}
+
+fn default_name(arguments: &ReduceArguments) -> String {
+    let path = match &arguments.model {
+        Some(Model::File(path)) => path,
+        _ => arguments.file.stiffness.as_deref().unwrap_or(Path::new("model")),
+    };
+    path.file_stem().map_or_else(|| "model".to_owned(), |stem| stem.to_string_lossy().into_owned())
+}
+
+fn describe(
+    imported: &Imported,
+    (contact_set, contact_count): (&str, usize),
+    contact: &[ContactPoint],
+    clamped: &[usize],
+) -> (String, Value) {
+    let model = &imported.model;
+    let [low, high] = bounding_box(&model.nodes);
+    let mass = total_mass(model);
+    let mut text = format!("{}: {} nodes", model.origin, model.nodes.len());
+    if let Some((mesh, _)) = &model.mesh {
+        let _ = write!(text, ", {} elements", mesh.elements.len());
+    }
+    for material in &imported.materials {
+        let _ = write!(
+            text,
+            "\n  material                  {}: E = {:.4e} Pa, ν = {}, ρ = {:.1} kg/m³",
+            material.name, material.young_modulus, material.poisson_ratio, material.density
+        );
+    }
+    for (axis, name) in ["x", "y", "z"].iter().enumerate() {
+        let _ = write!(text, "\n  {name}                         {:.6} m to {:.6} m", low[axis], high[axis]);
+    }
+    let _ = write!(
+        text,
+        "\n  mass                      {mass:.6} kg\n  sets                      {}",
+        set_counts(&model.sets)
+    );
+    let _ = write!(text, "\n  clamped                   {} nodes", clamped.len());
+    let _ = write!(text, "\n  contact nodes             {} of {contact_count} in {contact_set}", contact.len());
+    for point in contact {
+        let number = imported.node_numbers[point.node];
+        let _ = write!(text, "\n    {:<24}node {number} of the file", point.name);
+    }
+    for note in &imported.notes {
+        let _ = write!(text, "\n  note: {note}");
+    }
+    let json = json!({
+        "origin": model.origin,
+        "nodes": model.nodes.len(),
+        "box": { "low": low, "high": high },
+        "mass": mass,
+        "sets": model.sets.iter().map(|(name, nodes)| (name.clone(), json!(nodes.len()))).collect::<serde_json::Map<_, _>>(),
+        "clamped_nodes": clamped.len(),
+        "contact_nodes": contact.iter().map(|point| json!({
+            "name": point.name, "node": imported.node_numbers[point.node], "slope": point.meridional_slope,
+        })).collect::<Vec<_>>(),
+        "notes": imported.notes,
+    });
+    (text, json)
+}

@@ -1,0 +1,319 @@
+//! Modes of a wheel of coupled sectors, nodal diameter by nodal diameter.
+//!
+//! Every nodal diameter n has its Hermitian pencil K_n φ = ω² M_n φ (see [`Harmonic`]). With the mass-normalised modes,
+//! z_n = Φ_n q_n, the equations are q̈ + 2ξω q̇ + ω² q = p for each complex amplitude q, and the displacement of sector s is
+//! u_s = Σ_n Re(Ψ_n q_n e^(2πi n s/N)) with the weighted contact modes Ψ_n = w_n C_n Φ_n. Virtual work gives the modal
+//! force p_n = Ψ_nᴴ Σ_s f_s e^(−2πi n s/N) of forces f_s on the sectors; its imaginary part is left out for n = 0 and
+//! 2n = N, whose modes are real.
+
+use nalgebra::{Complex, DMatrix, SymmetricEigen};
+
+use crate::dynamics::modal::{ModalModel, RIGID_FRACTION, check_semidefinite, real_modes};
+use crate::dynamics::scheme::ModeCoefficients;
+use crate::rom::{Harmonic, cholesky};
+use crate::settings::Scheme;
+use crate::{Error, Result, Rom};
+
+/// Entries of a mode shape this close to the largest count as equally large when the phase is chosen.
+const SAME_SIZE: f64 = 1e-6;
+
+/// Modes of one nodal diameter, mass-normalised, in the order of their frequencies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DiameterModes {
+    /// Nodal diameter n.
+    pub nodal_diameter: usize,
+    /// Undamped angular frequencies ω (rad/s), ascending; exactly 0 for rigid modes.
+    pub frequencies: Vec<f64>,
+    /// Damping ratios ξ (-), one per mode.
+    pub damping_ratios: Vec<f64>,
+    /// Ψ_n = w_n C_n Φ_n, rows × modes: displacement of the contact rows of sector 0 per unit amplitude.
+    pub contact_modes: DMatrix<Complex<f64>>,
+    /// Φ_n, reduced coordinates × modes. The largest entry of every column (the first of equals) is real and positive.
+    pub shapes: DMatrix<Complex<f64>>,
+    /// Number of the highest modes that massless-boundary treats as quasi-static.
+    pub quasi_static: usize,
+}
+
+impl DiameterModes {
+    /// Number of modes.
+    pub fn len(&self) -> usize {
+        self.frequencies.len()
+    }
+
+    /// True when there is no mode at all.
+    pub fn is_empty(&self) -> bool {
+        self.frequencies.is_empty()
+    }
+
+    /// Number of modes with inertia under a scheme; the others are the highest.
+    pub fn dynamic_modes(&self, scheme: Scheme) -> usize {
+        if scheme == Scheme::MasslessBoundary { self.len().saturating_sub(self.quasi_static) } else { self.len() }
+    }
+
+    /// Coefficients of one mode at the step size `step` (s).
+    pub fn coefficient(&self, mode: usize, scheme: Scheme, step: f64) -> ModeCoefficients {
+        let dynamic = mode < self.dynamic_modes(scheme);
+        ModeCoefficients::of_mode(scheme, dynamic, self.frequencies[mode], self.damping_ratios[mode], step)
+    }
+
+    fn new(
+        nodal_diameter: usize,
+        damping_ratio: f64,
+        weight: f64,
+        contact_map: &DMatrix<Complex<f64>>,
+        (eigenvalues, shapes): (Vec<f64>, DMatrix<Complex<f64>>),
+    ) -> Self {
+        Self {
+            nodal_diameter,
+            damping_ratios: vec![damping_ratio; eigenvalues.len()],
+            frequencies: eigenvalues.iter().map(|value| value.sqrt()).collect(),
+            contact_modes: contact_map * &shapes * Complex::new(weight, 0.0),
+            quasi_static: contact_map.nrows(),
+            shapes,
+        }
+    }
+}
+
+/// Modes of all nodal diameters 0 ..= ⌊N/2⌋ of N coupled sectors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CyclicModel {
+    /// Number of sectors N.
+    pub sectors: usize,
+    /// Nodal diameters in ascending order, from 0.
+    pub diameters: Vec<DiameterModes>,
+}
+
+impl CyclicModel {
+    /// Solve the eigenproblem of every nodal diameter and attach one damping ratio to all modes.
+    ///
+    /// # Errors
+    /// Invalid ROM, or a stiffness that is not positive semidefinite; the message names the array.
+    pub fn from_rom(rom: &Rom, damping_ratio: f64) -> Result<Self> {
+        let zero = ModalModel::from_rom(rom, damping_ratio)?;
+        let (sectors, complex) = (rom.sectors, |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0)));
+        let squares = zero.frequencies.iter().map(|frequency| frequency * frequency).collect();
+        let map = complex(&rom.contact_map);
+        let mut first = DiameterModes::new(0, damping_ratio, weight(0, sectors), &map, (squares, complex(&zero.shapes)));
+        // Not by way of the squares, which would cost a rounding.
+        first.frequencies = zero.frequencies;
+        let mut diameters = vec![first];
+        for (index, harmonic) in rom.extras.harmonics.iter().enumerate() {
+            let nodal_diameter = index + 1;
+            let suffix = format!("_{nodal_diameter}");
+            let (modes, map) = if 2 * nodal_diameter == sectors {
+                let real = |matrix: &DMatrix<Complex<f64>>| matrix.map(|value| value.re);
+                let (squares, shapes) = real_modes(&real(&harmonic.mass), &real(&harmonic.stiffness), &suffix)?;
+                ((squares, complex(&shapes)), complex(&real(&harmonic.contact_map)))
+            } else {
+                (hermitian_modes(harmonic, &suffix)?, harmonic.contact_map.clone())
+            };
+            let weight = weight(nodal_diameter, sectors);
+            diameters.push(DiameterModes::new(nodal_diameter, damping_ratio, weight, &map, modes));
+        }
+        Ok(Self { sectors, diameters })
+    }
+
+    /// Contact rows per sector (3 per contact node).
+    pub fn rows(&self) -> usize {
+        self.diameters[0].contact_modes.nrows()
+    }
+
+    /// Largest number of modes of a nodal diameter.
+    pub fn most_modes(&self) -> usize {
+        self.diameters.iter().map(DiameterModes::len).max().unwrap_or(0)
+    }
+
+    /// Whether the modes of a nodal diameter are real: nothing can travel.
+    pub fn is_real(&self, nodal_diameter: usize) -> bool {
+        nodal_diameter == 0 || 2 * nodal_diameter == self.sectors
+    }
+
+    /// Give all modes one damping ratio.
+    pub fn set_damping_ratio(&mut self, damping_ratio: f64) {
+        self.diameters.iter_mut().for_each(|diameter| diameter.damping_ratios.fill(damping_ratio));
+    }
+
+    /// Largest undamped angular frequency (rad/s).
+    pub fn largest_frequency(&self) -> f64 {
+        let all = self.diameters.iter().flat_map(|diameter| &diameter.frequencies);
+        all.fold(0.0, |largest, value| f64::max(largest, *value))
+    }
+
+    /// w_n: displacement of a sector per unit amplitude of a nodal diameter that moves every reduced coordinate by one.
+    pub fn weight(&self, nodal_diameter: usize) -> f64 {
+        weight(nodal_diameter, self.sectors)
+    }
+
+    /// One nodal diameter as a real structure: real and imaginary parts of the amplitudes are modes, those of the
+    /// displacement pattern are contact nodes (first all real, then all imaginary ones). Contact that is closed on all
+    /// sectors decouples into these. A nodal diameter with real modes has the real parts only.
+    pub fn paired(&self, nodal_diameter: usize) -> ModalModel {
+        let diameter = &self.diameters[nodal_diameter];
+        let (rows, modes) = diameter.contact_modes.shape();
+        let copies = if self.is_real(nodal_diameter) { 1 } else { 2 };
+        let double = |values: &[f64]| values.iter().flat_map(|value| vec![*value; copies]).collect();
+        let contact_modes = DMatrix::from_fn(copies * rows, copies * modes, |row, mode| {
+            let value = diameter.contact_modes[(row % rows, mode / copies)];
+            match (row / rows, mode % copies) {
+                (0, 0) | (1, 1) => value.re,
+                (0, _) => -value.im,
+                _ => value.im,
+            }
+        });
+        ModalModel {
+            frequencies: double(&diameter.frequencies),
+            damping_ratios: double(&diameter.damping_ratios),
+            contact_modes,
+            shapes: DMatrix::identity(copies * modes, copies * modes),
+            quasi_static: copies * diameter.quasi_static,
+        }
+    }
+}
+
+/// w_n: 1/√N for real amplitudes, √(2/N) for complex ones.
+fn weight(nodal_diameter: usize, sectors: usize) -> f64 {
+    let share = if nodal_diameter == 0 || 2 * nodal_diameter == sectors { 1.0 } else { 2.0 };
+    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
+    let count = sectors as f64;
+    libm::sqrt(share / count)
+}
+
+/// Eigenvalues ω² (ascending, rigid ones exactly 0) and mass-normalised modes of a Hermitian pencil.
+fn hermitian_modes(harmonic: &Harmonic, suffix: &str) -> Result<(Vec<f64>, DMatrix<Complex<f64>>)> {
+    let Harmonic { mass, stiffness, .. } = harmonic;
+    if let Some(modes) = modal_already(mass, stiffness) {
+        return Ok(modes);
+    }
+    let Some(lower) = cholesky(mass) else {
+        let what = format!("ROM array `mass{suffix}`");
+        return Err(Error::invalid(what, "not positive definite", "Write the ROM again"));
+    };
+    let half = lower.solve_lower_triangular(stiffness).unwrap_or_else(|| stiffness.clone());
+    let full = lower.solve_lower_triangular(&half.adjoint()).unwrap_or(half);
+    let eigen = SymmetricEigen::new((&full + full.adjoint()) * Complex::new(0.5, 0.0));
+    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+    order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+    let largest = eigen.eigenvalues.amax();
+    check_semidefinite(eigen.eigenvalues[order[0]], largest, suffix)?;
+    let vectors = eigen.eigenvectors.select_columns(&order);
+    let mut shapes = lower.adjoint().solve_upper_triangular(&vectors).unwrap_or(vectors);
+    fix_phases(&mut shapes);
+    let values = order.iter().enumerate().map(|(mode, index)| {
+        let value = eigen.eigenvalues[*index];
+        if value < RIGID_FRACTION * largest { unresolved_eigenvalue(stiffness, &shapes, mode) } else { value }
+    });
+    let values = values.collect();
+    Ok((values, shapes))
+}
+
+/// Matrices given in modal coordinates (M = I, K diagonal and ascending) need no eigenproblem.
+fn modal_already(
+    mass: &DMatrix<Complex<f64>>,
+    stiffness: &DMatrix<Complex<f64>>,
+) -> Option<(Vec<f64>, DMatrix<Complex<f64>>)> {
+    let order = mass.nrows();
+    let diagonal: Vec<f64> = (0..order).map(|mode| stiffness[(mode, mode)].re).collect();
+    let ascending = diagonal.windows(2).all(|pair| pair[0] <= pair[1]) && diagonal.iter().all(|value| *value >= 0.0);
+    let nothing = Complex::new(0.0, 0.0);
+    let diagonal_only = |matrix: &DMatrix<Complex<f64>>| {
+        let mut entries = matrix.iter().enumerate();
+        entries.all(|(index, value)| {
+            if index % order == index / order { value.im.to_bits() == 0 } else { *value == nothing }
+        })
+    };
+    let unit = (0..order).all(|mode| mass[(mode, mode)].re.to_bits() == 1.0_f64.to_bits());
+    (ascending && unit && diagonal_only(mass) && diagonal_only(stiffness))
+        .then(|| (diagonal, DMatrix::identity(order, order)))
+}
+
+/// φᴴKφ, exactly 0 for a rigid mode, as for real modes.
+fn unresolved_eigenvalue(stiffness: &DMatrix<Complex<f64>>, shapes: &DMatrix<Complex<f64>>, mode: usize) -> f64 {
+    let (mut quotient, mut magnitude) = (0.0, 0.0);
+    for column in 0..stiffness.ncols() {
+        for row in 0..stiffness.nrows() {
+            let term = shapes[(row, mode)].conj() * stiffness[(row, column)] * shapes[(column, mode)];
+            quotient += term.re;
+            magnitude += libm::hypot(term.re, term.im);
+        }
+    }
+    #[expect(clippy::cast_precision_loss, reason = "orders are far below 2^52")]
+    let rounding = 32.0 * f64::EPSILON * stiffness.nrows() as f64 * magnitude;
+    if quotient > rounding { quotient } else { 0.0 }
+}
+
+/// An eigenvector's phase is arbitrary; make its largest entry real and positive so that numbers are comparable.
+fn fix_phases(shapes: &mut DMatrix<Complex<f64>>) {
+    let size = |value: &Complex<f64>| libm::hypot(value.re, value.im);
+    for mut column in shapes.column_iter_mut() {
+        let largest = column.iter().fold(0.0, |most: f64, value| most.max(size(value)));
+        let Some(chosen) = column.iter().position(|value| size(value) >= (1.0 - SAME_SIZE) * largest) else { continue };
+        let turn = column[chosen].conj() / size(&column[chosen]);
+        column.iter_mut().for_each(|value| *value *= turn);
+        column[chosen].im = 0.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn number(seed: &mut u64) -> f64 {
+        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        f64::from(u32::try_from(*seed >> 33).unwrap()) / f64::from(1_u32 << 30) - 1.0
+    }
+
+    fn pencil(order: usize, seed: u64) -> Harmonic {
+        let mut seed = seed;
+        let mut random = |rows, columns| {
+            DMatrix::from_fn(rows, columns, |_, _| Complex::new(number(&mut seed), number(&mut seed)))
+        };
+        let (a, b, contact_map) = (random(order, order), random(order, order), random(3, order));
+        let hermitian = |matrix: DMatrix<Complex<f64>>| (&matrix + matrix.adjoint()) * Complex::new(0.5, 0.0);
+        Harmonic {
+            mass: hermitian(&a * a.adjoint() * Complex::new(0.1, 0.0) + DMatrix::identity(order, order)),
+            stiffness: hermitian(&b * b.adjoint() * Complex::new(1e6, 0.0)),
+            contact_map,
+        }
+    }
+
+    #[test]
+    fn modes_are_orthonormal_and_diagonalise_the_pencil_to_rounding() {
+        for (order, seed) in [(1, 1), (3, 2), (14, 3), (34, 4), (60, 5)] {
+            let harmonic = pencil(order, seed);
+            let (squares, shapes) = hermitian_modes(&harmonic, "_1").unwrap();
+            let size = |matrix: DMatrix<Complex<f64>>| matrix.iter().fold(0.0, |most: f64, z| most.max(z.re.hypot(z.im)));
+            let error = size(shapes.adjoint() * &harmonic.mass * &shapes - DMatrix::identity(order, order));
+            let diagonal = DMatrix::from_fn(order, order, |i, j| Complex::new(if i == j { squares[i] } else { 0.0 }, 0.0));
+            let off = size(shapes.adjoint() * &harmonic.stiffness * &shapes - diagonal) / squares[order - 1];
+            println!("n = {order}: orthonormality {error:.1e}, diagonality {off:.1e}");
+            assert!(error < 1e-13 && off < 1e-13, "n = {order}: {error:e}, {off:e}");
+            assert!(squares.windows(2).all(|pair| pair[0] <= pair[1]));
+        }
+    }
+
+    #[test]
+    fn phases_do_not_depend_on_how_the_eigenvectors_came_out() {
+        let mut seed = 9;
+        let mut shapes = DMatrix::from_fn(7, 5, |_, _| Complex::new(number(&mut seed), number(&mut seed)));
+        let mut turned = shapes.clone();
+        for (column, angle) in [0.3, 1.9, -2.5, 3.1, 0.0_f64].into_iter().enumerate() {
+            turned.column_mut(column).iter_mut().for_each(|value| *value *= Complex::new(angle.cos(), angle.sin()));
+        }
+        fix_phases(&mut shapes);
+        fix_phases(&mut turned);
+        let off = shapes.iter().zip(turned.iter()).fold(0.0_f64, |most, (a, b)| most.max((a - b).norm_sqr().sqrt()));
+        assert!(off < 1e-15, "{off:e}");
+    }
+
+    #[test]
+    fn a_rigid_rotation_of_a_free_pair_is_exactly_rigid() {
+        // Two masses tied by a spring of complex direction: rank one, so one mode is rigid.
+        let direction = [Complex::new(1.0, 0.0), Complex::new(-0.6, 0.8)];
+        let stiffness = DMatrix::from_fn(2, 2, |i, j| direction[i] * direction[j].conj() * Complex::new(3e7, 0.0));
+        let mass = DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[2.0, 0.7])).map(|m| Complex::new(m, 0.0));
+        let harmonic = Harmonic { mass, stiffness, contact_map: DMatrix::zeros(3, 2) };
+        let (squares, _) = hermitian_modes(&harmonic, "_1").unwrap();
+        assert!(squares[0] == 0.0, "{squares:?}");
+        assert!((squares[1] / (3e7 * (1.0 / 2.0 + 1.0 / 0.7)) - 1.0).abs() < 1e-13, "{squares:?}");
+    }
+}

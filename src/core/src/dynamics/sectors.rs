@@ -1,0 +1,158 @@
+//! The two kinds of sectors a step can be made of: uncoupled ones, and a wheel of coupled ones.
+
+use super::bank::{BankOptions, ModalBank};
+use super::cyclic::{CyclicBank, CyclicModel};
+use super::modal::ModalModel;
+use crate::persist::{Reader, Writer};
+use crate::settings::Scheme;
+
+/// Modes of the sectors.
+#[derive(Debug, Clone, Copy)]
+pub enum SectorModel<'a> {
+    /// Those of one uncoupled sector, and the number of sectors.
+    Uncoupled(&'a ModalModel, usize),
+    /// Those of the whole wheel.
+    Coupled(&'a CyclicModel),
+}
+
+/// State of all modes of all sectors.
+#[derive(Debug, Clone)]
+#[expect(clippy::large_enum_variant, reason = "a system has one of them for good; a box would cost every access")]
+pub enum Sectors {
+    /// Sectors that do not know of each other.
+    Uncoupled(ModalBank),
+    /// Sectors of one elastic wheel.
+    Coupled(CyclicBank),
+}
+
+/// The same call on either kind.
+macro_rules! delegate {
+    ($($(#[$doc:meta])* $name:ident[$($kind:tt)?]($($argument:ident: $type:ty),*) $(-> $result:ty)?;)+) => {
+        $($(#[$doc])* #[inline(always)]
+        pub fn $name(& $($kind)? self, $($argument: $type),*) $(-> $result)? {
+            match self {
+                Self::Uncoupled(bank) => bank.$name($($argument),*),
+                Self::Coupled(bank) => bank.$name($($argument),*),
+            }
+        })+
+    };
+}
+
+impl Sectors {
+    /// All sectors at rest; [`Sectors::set_step`] must be called before stepping.
+    ///
+    /// # Panics
+    /// When options are given that coupled sectors do not have: mistuning, and spin that couples modes.
+    pub fn new(model: SectorModel, options: BankOptions) -> Self {
+        match model {
+            SectorModel::Uncoupled(model, sectors) => {
+                Self::Uncoupled(ModalBank::with_options(model, sectors, options))
+            }
+            SectorModel::Coupled(model) => {
+                assert!(options.frequency_factors.is_empty() && options.coupling.is_none(), "refused beforehand");
+                Self::Coupled(CyclicBank::new(model, options.loads))
+            }
+        }
+    }
+
+    delegate! {
+        /// Number of sectors.
+        sectors[]() -> usize;
+        /// Lanes of a displacement row: sectors rounded up to whole registers.
+        lanes[]() -> usize;
+        /// Number of contact rows of a sector (3 per contact node).
+        rows[]() -> usize;
+        /// Step size of the coefficients in use (s).
+        step[]() -> f64;
+        /// Displacements of the contact rows at the current step (m), `[row][lane]`.
+        displacement[]() -> &[f64];
+        /// The same one step earlier (m).
+        displacement_before[]() -> &[f64];
+        /// New step size: coefficients and flexibility; the state is not touched.
+        set_step[mut](scheme: Scheme, step: f64);
+        /// Modal damping ratio of all modes (takes effect with the next [`Sectors::set_step`]).
+        set_damping_ratio[mut](damping_ratio: f64);
+        /// Carry the state to another step size under the last contact forces (`forces[row · lanes + sector]`, N) and the
+        /// modal loads.
+        resample[mut](scheme: Scheme, new_step: f64, forces: &[f64]);
+        /// Static equilibrium under modal loads: of every sector, or of nodal diameter 0.
+        settle[mut](push: &[f64]);
+        /// Recompute the contact displacements from the modal state (after setting it).
+        recover[mut]();
+        /// Everything at rest and undeformed.
+        rest[mut]();
+        /// Modal loads of the next step, of every sector or of nodal diameter 0; to be set before [`Sectors::predict`].
+        loads_mut[mut]() -> &mut [f64];
+        /// Predict one step without contact (eq. 9 of the paper) and recover the contact displacements.
+        predict[mut](with_loss: bool);
+        /// Kinetic and strain energy of all sectors (J), in the quantity the scheme conserves.
+        energies[]() -> (f64, f64);
+        /// Damping loss since the last call (J).
+        collect_loss[mut]() -> f64;
+        /// Work of the modal loads over the step just done (J), once contact has corrected it.
+        finish_loads[mut]() -> f64;
+        /// Set amplitudes that have decayed to nothing to exactly zero.
+        flush[mut]();
+        /// True when every modal coordinate is finite.
+        is_finite[]() -> bool;
+        /// Save the state (not the step size).
+        save[](writer: &mut Writer);
+        /// Restore a saved state, after [`Sectors::set_step`].
+        restore[mut](reader: &mut Reader);
+    }
+
+    /// The uncoupled sectors.
+    pub fn uncoupled(&self) -> Option<&ModalBank> {
+        if let Self::Uncoupled(bank) = self { Some(bank) } else { None }
+    }
+
+    /// The wheel of coupled sectors.
+    pub fn coupled(&self) -> Option<&CyclicBank> {
+        if let Self::Coupled(bank) = self { Some(bank) } else { None }
+    }
+
+    /// The wheel of coupled sectors, to set initial conditions.
+    pub fn coupled_mut(&mut self) -> Option<&mut CyclicBank> {
+        if let Self::Coupled(bank) = self { Some(bank) } else { None }
+    }
+
+    /// Displacement of one contact row of one sector (m).
+    #[inline(always)]
+    pub fn row(&self, row: usize, sector: usize) -> f64 {
+        self.displacement()[row * self.lanes() + sector]
+    }
+
+    /// The same one step earlier (m).
+    #[inline(always)]
+    pub fn row_before(&self, row: usize, sector: usize) -> f64 {
+        self.displacement_before()[row * self.lanes() + sector]
+    }
+
+    /// Modal position and increment of one mode of an uncoupled sector. Of coupled sectors it is the real part of nodal
+    /// diameter `sector`.
+    pub fn modal_state(&self, mode: usize, sector: usize) -> (f64, f64) {
+        match self {
+            Self::Uncoupled(bank) => bank.modal_state(mode, sector),
+            Self::Coupled(bank) => {
+                let (position, increment) = bank.modal_state(sector, mode);
+                (position[0], increment[0])
+            }
+        }
+    }
+
+    /// Set position and velocity of one mode of an uncoupled sector, or of the real part of nodal diameter `sector`.
+    pub fn set_modal_state(&mut self, mode: usize, sector: usize, position: f64, velocity: f64) {
+        match self {
+            Self::Uncoupled(bank) => bank.set_modal_state(mode, sector, position, velocity),
+            Self::Coupled(bank) => bank.set_modal_state(sector, mode, [position, 0.0], [velocity, 0.0]),
+        }
+    }
+
+    /// Follow the speed of the rotor (rad/s) where modes are coupled by it; returns the change of strain energy (J).
+    pub fn set_speed(&mut self, speed: f64) -> f64 {
+        match self {
+            Self::Uncoupled(bank) => bank.set_speed(speed),
+            Self::Coupled(_) => 0.0,
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! A ROM file as arrays and entries that a test may change before it is written again, without checksum.
+
+use std::collections::BTreeMap;
+
+use tiprub_core::Rom;
+use tiprub_format::write_rom;
+
+/// Arrays (shape, values in row-major order) and metadata.
+pub struct Loose {
+    pub arrays: BTreeMap<String, (Vec<usize>, Vec<f64>)>,
+    pub entries: BTreeMap<String, String>,
+}
+
+impl Loose {
+    /// The file of this ROM.
+    pub fn of(rom: &Rom) -> Self {
+        let bytes = write_rom(rom);
+        let (_, header) = safetensors::SafeTensors::read_metadata(&bytes).unwrap();
+        let mut entries: BTreeMap<_, _> = header.metadata().clone().unwrap().into_iter().collect();
+        entries.remove("checksum");
+        let container = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+        let values = |data: &[u8]| data.as_chunks::<8>().0.iter().map(|word| f64::from_le_bytes(*word)).collect();
+        let array = |(name, view): (String, safetensors::tensor::TensorView)| {
+            (name, (view.shape().to_vec(), values(view.data())))
+        };
+        Self { arrays: container.tensors().into_iter().map(array).collect(), entries }
+    }
+
+    /// One of the arrays.
+    pub fn array(&mut self, name: &str) -> &mut (Vec<usize>, Vec<f64>) {
+        self.arrays.get_mut(name).unwrap()
+    }
+
+    /// The file.
+    pub fn bytes(&self) -> Vec<u8> {
+        let mut header = serde_json::Map::from_iter([("__metadata__".to_owned(), serde_json::json!(self.entries))]);
+        let mut data: Vec<u8> = Vec::new();
+        for (name, (shape, values)) in &self.arrays {
+            let start = data.len();
+            data.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+            let entry = serde_json::json!({"dtype": "F64", "shape": shape, "data_offsets": [start, data.len()]});
+            header.insert(name.clone(), entry);
+        }
+        let header = serde_json::Value::Object(header).to_string();
+        [u64::try_from(header.len()).unwrap().to_le_bytes().as_slice(), header.as_bytes(), &data].concat()
+    }
+}

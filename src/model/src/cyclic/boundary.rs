@@ -1,0 +1,195 @@
+//! Pairing of the two faces of a sector by a turn of one pitch.
+
+use core::f64::consts::TAU;
+
+use super::CyclicBoundary;
+use crate::{Error, Result};
+
+/// How well the two faces fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairingReport {
+    /// Largest distance of a high node from its turned low node (m).
+    pub largest_mismatch: f64,
+    /// Median of those distances (m).
+    pub typical_mismatch: f64,
+    /// Index of the low node with the largest distance.
+    pub worst_node: usize,
+    /// The sets were named the other way round: what was given as low is the face at the greater angle.
+    pub swapped: bool,
+}
+
+impl CyclicBoundary {
+    /// Pair the nodes of two faces: every high node is a low one turned by +2π/`sectors` about z, to within `tolerance`
+    /// (m). Faces that were named the other way round are exchanged, and the report says so.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for fewer than two sectors, empty or unequal faces, nodes that are in both, on the axis or
+    /// without a partner.
+    pub fn pair(
+        nodes: &[[f64; 3]],
+        low: &[usize],
+        high: &[usize],
+        sectors: usize,
+        tolerance: f64,
+    ) -> Result<(Self, PairingReport)> {
+        check_faces(nodes, low, high, sectors, tolerance)?;
+        let forward = Match::of(nodes, low, high, sectors);
+        // With two sectors a turn forward is a turn backward, and nothing tells the faces apart.
+        let (chosen, swapped) = if forward.worst.distance <= tolerance || sectors == 2 {
+            (forward, false)
+        } else {
+            let backward = Match::of(nodes, high, low, sectors);
+            if backward.worst.distance < forward.worst.distance { (backward, true) } else { (forward, false) }
+        };
+        let worst = chosen.worst;
+        if worst.distance > tolerance {
+            let problem = format!(
+                "node {} turned by 2π/{sectors} lies {:.3e} m from the nearest node of the other face (node {}), the tolerance \
+                 is {tolerance:.3e} m",
+                worst.low + 1,
+                worst.distance,
+                worst.high + 1
+            );
+            let remedy = "Mesh both faces alike (copy one onto the other), check the number of sectors and that the axis is z, \
+                          or raise the tolerance to the accuracy of the coordinates";
+            return Err(Error::invalid("cyclic faces", problem, remedy));
+        }
+        check_one_to_one(&chosen.pairs)?;
+        let mut distances = chosen.distances;
+        distances.sort_by(f64::total_cmp);
+        let report = PairingReport {
+            largest_mismatch: worst.distance,
+            typical_mismatch: distances[distances.len() / 2],
+            worst_node: worst.low,
+            swapped,
+        };
+        Ok((Self { pairs: chosen.pairs, sectors }, report))
+    }
+
+    /// Angle from one sector to the next (rad).
+    #[expect(clippy::cast_precision_loss, reason = "sectors are far fewer than 2^52")]
+    pub fn pitch(&self) -> f64 {
+        TAU / self.sectors as f64
+    }
+
+    /// Largest nodal diameter ⌊N/2⌋.
+    pub fn largest_nodal_diameter(&self) -> usize {
+        self.sectors / 2
+    }
+}
+
+/// A point turned by `angle` about z.
+pub(super) fn turned([x, y, z]: [f64; 3], angle: f64) -> [f64; 3] {
+    let (sin, cos) = angle.sin_cos();
+    [cos * x - sin * y, sin * x + cos * y, z]
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Worst {
+    low: usize,
+    high: usize,
+    distance: f64,
+}
+
+struct Match {
+    pairs: Vec<[usize; 2]>,
+    distances: Vec<f64>,
+    worst: Worst,
+}
+
+impl Match {
+    /// Nearest high node of every low node turned by one pitch.
+    fn of(nodes: &[[f64; 3]], low: &[usize], high: &[usize], sectors: usize) -> Self {
+        let pitch = CyclicBoundary { pairs: Vec::new(), sectors }.pitch();
+        let mut by_height: Vec<usize> = high.to_vec();
+        by_height.sort_by(|&a, &b| nodes[a][2].total_cmp(&nodes[b][2]));
+        let mut result = Self {
+            pairs: Vec::with_capacity(low.len()),
+            distances: Vec::with_capacity(low.len()),
+            worst: Worst { low: low[0], high: high[0], distance: -1.0 },
+        };
+        for &node in low {
+            let (partner, distance) = nearest(nodes, &by_height, turned(nodes[node], pitch));
+            result.pairs.push([node, partner]);
+            result.distances.push(distance);
+            if distance > result.worst.distance {
+                result.worst = Worst { low: node, high: partner, distance };
+            }
+        }
+        result
+    }
+}
+
+/// The nearest of the nodes `by_height` (ascending in z) and its distance: outward from the point's own height, until the
+/// difference in height alone is larger than the best distance.
+fn nearest(nodes: &[[f64; 3]], by_height: &[usize], point: [f64; 3]) -> (usize, f64) {
+    let middle = by_height.partition_point(|&node| nodes[node][2] < point[2]);
+    let mut best = (by_height[middle.min(by_height.len() - 1)], f64::INFINITY);
+    let mut look = |node: usize| {
+        let apart: [f64; 3] = core::array::from_fn(|i| nodes[node][i] - point[i]);
+        let distance = (apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2]).sqrt();
+        if distance < best.1 {
+            best = (node, distance);
+        }
+        apart[2].abs() <= best.1
+    };
+    for &node in &by_height[middle..] {
+        if !look(node) {
+            break;
+        }
+    }
+    for &node in by_height[..middle].iter().rev() {
+        if !look(node) {
+            break;
+        }
+    }
+    best
+}
+
+fn check_faces(nodes: &[[f64; 3]], low: &[usize], high: &[usize], sectors: usize, tolerance: f64) -> Result<()> {
+    let refuse = |problem: String, remedy: &str| Err(Error::invalid("cyclic faces", problem, remedy));
+    if !(2..=tiprub_core::rom::MAX_SECTORS).contains(&sectors) {
+        let problem = format!("{sectors} sectors, 2 to {} are possible", tiprub_core::rom::MAX_SECTORS);
+        return refuse(problem, "Give the number of sectors of the whole wheel");
+    }
+    if !(tolerance.is_finite() && tolerance >= 0.0) {
+        return refuse(format!("tolerance {tolerance} m"), "Give a finite distance, for example 1e-6 of the radius");
+    }
+    if low.is_empty() || low.len() != high.len() {
+        let problem = format!("{} nodes on one face and {} on the other", low.len(), high.len());
+        return refuse(problem, "Mesh both faces alike and give all nodes of each, edges included");
+    }
+    for &node in low.iter().chain(high) {
+        let Some(&[x, y, z]) = nodes.get(node) else {
+            let problem = format!("node {} does not exist; there are {}", node + 1, nodes.len());
+            return refuse(problem, "Name nodes of the mesh");
+        };
+        let radius = x.hypot(y);
+        if radius <= 1e-9 * radius.hypot(z).max(tolerance) {
+            let problem = format!("node {} lies on the z axis, where it belongs to every sector", node + 1);
+            return refuse(problem, "Give the structure a bore, however small");
+        }
+    }
+    let mut seen = vec![false; nodes.len()];
+    for &node in low.iter().chain(high) {
+        if core::mem::replace(&mut seen[node], true) {
+            let problem = format!("node {} appears twice", node + 1);
+            return refuse(problem, "A node belongs to one of the two faces, once");
+        }
+    }
+    Ok(())
+}
+
+fn check_one_to_one(pairs: &[[usize; 2]]) -> Result<()> {
+    let mut by_high: Vec<[usize; 2]> = pairs.iter().map(|&[low, high]| [high, low]).collect();
+    by_high.sort_unstable();
+    for two in by_high.windows(2) {
+        if two[0][0] == two[1][0] {
+            let problem =
+                format!("nodes {} and {} both turn onto node {}", two[0][1] + 1, two[1][1] + 1, two[0][0] + 1);
+            let remedy = "Lower the tolerance below the distance of neighbouring nodes, or merge coincident nodes";
+            return Err(Error::invalid("cyclic faces", problem, remedy));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,84 @@
+//! Which fixed-interface modes are kept: whole families, as far as they can be told apart by frequency.
+//!
+//! The frequencies with the contact held are computed beyond the number asked for. Of all of them, from all
+//! nodal diameters together, those below the lowest of the highest computed ones are complete. Cuts between neighbours in
+//! this list are tried, as many modes from the bottom as there are nodal diameters times η, give or take a fifth; the widest relative gap is
+//! taken when it is at least [`SMALLEST_GAP`]. Above and below of a gap stand whole families at every nodal diameter: a
+//! family that veers with another crosses it at none.
+
+use super::ModeSelection;
+use super::component::Wanted;
+
+/// Gaps narrower than this share of their frequency tell no families apart.
+pub const SMALLEST_GAP: f64 = 0.01;
+
+/// The kept numbers of modes, and what to tell about them.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Choice {
+    /// For every nodal diameter.
+    pub counts: Vec<usize>,
+    pub note: Option<String>,
+}
+
+/// What has to be computed for a selection, of `available` modes.
+pub(super) fn wanted(selection: ModeSelection, available: usize) -> Wanted {
+    match selection {
+        ModeSelection::Families(modes) => Wanted::Count((modes + (modes / 4).max(4)).min(available)),
+        ModeSelection::Count(modes) => Wanted::Count(modes),
+        ModeSelection::UpTo(frequency) => {
+            let angular = core::f64::consts::TAU * frequency;
+            Wanted::UpTo(angular * angular)
+        }
+    }
+}
+
+/// Choose from the computed ω² of every nodal diameter, ascending.
+pub(super) fn choose(selection: ModeSelection, squares: &[&[f64]]) -> Choice {
+    match selection {
+        ModeSelection::Count(modes) => Choice { counts: vec![modes; squares.len()], note: None },
+        ModeSelection::UpTo(frequency) => {
+            let angular = core::f64::consts::TAU * frequency;
+            Choice { counts: below(squares, angular * angular), note: None }
+        }
+        ModeSelection::Families(modes) => whole_families(modes, squares),
+    }
+}
+
+fn below(squares: &[&[f64]], limit: f64) -> Vec<usize> {
+    squares.iter().map(|list| list.partition_point(|&square| square <= limit)).collect()
+}
+
+fn whole_families(modes: usize, squares: &[&[f64]]) -> Choice {
+    let even = |note| Choice { counts: squares.iter().map(|list| modes.min(list.len())).collect(), note };
+    if modes == 0 {
+        return even(None);
+    }
+    let ceiling = squares.iter().filter_map(|list| list.last()).copied().fold(f64::INFINITY, f64::min);
+    let mut all: Vec<f64> = squares.iter().flat_map(|list| list.iter()).copied().filter(|&s| s <= ceiling).collect();
+    all.sort_by(f64::total_cmp);
+    let spread = (modes / 5).max(1);
+    let (least, most) = ((modes - spread).max(1) * squares.len(), (modes + spread) * squares.len());
+    let width = |cut: usize| -> f64 { 0.5 * (all[cut] / all[cut - 1]).ln() };
+    let off = |cut: usize| cut.abs_diff(modes * squares.len());
+    let widest = (least.max(1)..=most.min(all.len().saturating_sub(1)))
+        .max_by(|&a, &b| width(a).total_cmp(&width(b)).then(off(b).cmp(&off(a))));
+    match widest {
+        Some(cut) if width(cut) >= SMALLEST_GAP => {
+            let limit = (all[cut] * all[cut - 1]).sqrt();
+            let hertz = |square: f64| square.sqrt() / core::f64::consts::TAU;
+            let note = format!(
+                "fixed-interface modes cut in the gap from {:.1} Hz to {:.1} Hz that all nodal diameters leave",
+                hertz(all[cut - 1]),
+                hertz(all[cut])
+            );
+            Choice { counts: below(squares, limit), note: Some(note) }
+        }
+        _ => {
+            let narrow = widest.map_or(0.0, width) * 100.0;
+            even(Some(format!(
+                "no gap of frequency common to all nodal diameters near {modes} modes (the widest is {narrow:.2} %): the same \
+                 number is kept at every nodal diameter, so a family may be cut at some"
+            )))
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Eqs 12 and 13 over all nodal diameters: the checks of the ROM, and their convergence with the number of modes.
+
+use tiprub_core::rom::RomChecks;
+
+use super::component::Component;
+use super::reduction::sorted_checks;
+use super::{ConvergenceRow, NodalDiameter};
+use crate::Result;
+
+/// Modes of the whole wheel whose convergence is followed (figs 9 and 10 of the paper).
+pub const WHEEL_MODES: usize = 56;
+
+/// Eq. 13 (%). A rigid-body mode has no frequency to deviate from.
+pub(super) fn deviation(full: f64, reduced: f64) -> f64 {
+    if full > 0.0 { (reduced - full) / full * 100.0 } else { 0.0 }
+}
+
+/// The checks of all nodal diameters, ascending in frequency.
+pub(super) fn merged(diameters: &[NodalDiameter]) -> RomChecks {
+    let list = diameters.iter().flat_map(|one| {
+        let number = u32::try_from(one.number).expect("sectors are limited to far fewer");
+        (0..one.full_frequencies.len()).map(move |k| {
+            let values = [
+                one.full_frequencies[k],
+                one.reduced_frequencies[k],
+                one.frequency_deviation[k],
+                one.residual_criterion[k],
+            ];
+            (number, values)
+        })
+    });
+    sorted_checks(list.collect())
+}
+
+/// One of the lowest modes of the wheel: its nodal diameter and its place there.
+#[derive(Debug, Clone, Copy)]
+struct WheelMode {
+    square: f64,
+    nodal_diameter: usize,
+    place: usize,
+}
+
+/// The lowest modes of the wheel, double ones twice. Beyond the lowest of the last computed ones of the nodal diameters
+/// the list would have holes, and ends.
+fn wheel_modes(full: &[&[f64]], sectors: usize) -> Vec<WheelMode> {
+    let ceiling =
+        full.iter().map(|list| list.last().copied().unwrap_or(f64::NEG_INFINITY)).fold(f64::INFINITY, f64::min);
+    let mut modes: Vec<WheelMode> = Vec::new();
+    for (nodal_diameter, list) in full.iter().enumerate() {
+        let copies = if nodal_diameter == 0 || 2 * nodal_diameter == sectors { 1 } else { 2 };
+        for (place, &square) in list.iter().enumerate().filter(|&(_, &square)| square <= ceiling) {
+            modes.extend(core::iter::repeat_n(WheelMode { square, nodal_diameter, place }, copies));
+        }
+    }
+    modes.sort_by(|a, b| a.square.total_cmp(&b.square).then(a.nodal_diameter.cmp(&b.nodal_diameter)));
+    modes.truncate(WHEEL_MODES);
+    modes
+}
+
+/// Eqs 12 and 13 of the lowest modes of the wheel for 0, 1, 2 ... fixed-interface modes per nodal diameter.
+pub(super) fn convergence(components: &[&Component], full: &[&[f64]], sectors: usize) -> Result<Vec<ConvergenceRow>> {
+    let modes = wheel_modes(full, sectors);
+    let most = components.iter().map(|component| component.squares.len()).min().unwrap_or(0);
+    let hertz = |square: f64| square.max(0.0).sqrt() / core::f64::consts::TAU;
+    let row = |count: usize| {
+        let needed = |n: usize| modes.iter().filter(|mode| mode.nodal_diameter == n).map(|mode| mode.place + 1).max();
+        let qualities: Result<Vec<_>> = components
+            .iter()
+            .enumerate()
+            .map(|(n, component)| component.quality(count, needed(n).unwrap_or(0)))
+            .collect();
+        let qualities = qualities?;
+        let (mut frequency_deviation, mut residual_criterion) = (Vec::new(), Vec::new());
+        for mode in &modes {
+            let quality = &qualities[mode.nodal_diameter];
+            // A mode that the reduced model has no room for is infinitely far off.
+            let square = quality.squares.get(mode.place).copied().unwrap_or(f64::INFINITY);
+            frequency_deviation.push(deviation(hertz(mode.square), hertz(square)));
+            residual_criterion.push(quality.residual_criterion.get(mode.place).copied().unwrap_or(f64::INFINITY));
+        }
+        Ok(ConvergenceRow { modes: count, total_modes: count * sectors, frequency_deviation, residual_criterion })
+    };
+    (0..=most).map(row).collect()
+}

@@ -1,0 +1,245 @@
+//! From the model of one sector to a checked reduced-order model of the wheel.
+
+use std::time::Instant;
+
+use faer::{Mat, c64};
+use nalgebra::{Complex, DMatrix};
+use tiprub_core::Rom;
+use tiprub_core::rom::{ContactNode, Frame, Harmonic, RomChecks, RomExtras};
+
+use super::component::Component;
+use super::condense::Condensed;
+use super::operator::Operator;
+use super::sector::Sector;
+use super::{CyclicBoundary, CyclicOptions, CyclicReduction, NodalDiameter};
+use super::{families, lanczos, parallel, quality};
+use crate::progress::{Listener, Stage, report};
+use crate::reduce::{ContactPoint, Timings, check_nodes, timed};
+use crate::{FeModel, Result};
+
+/// What is found of one nodal diameter in parallel.
+struct Found {
+    component: Component,
+    full_squares: Vec<f64>,
+    shapes: Vec<Vec<[Complex<f64>; 3]>>,
+    /// Seconds spent on the full modes and on the reduction.
+    seconds: [f64; 2],
+}
+
+/// Reduce one sector of a wheel to its contact nodes and fixed-interface modes, for every nodal diameter.
+///
+/// The reduced coordinates of nodal diameter n are the radial, tangential and axial displacements of the contact nodes, node by node, then the
+/// fixed-interface modes, so `contact_map` is \[I 0\]; see [`tiprub_core::rom::Harmonic`] for how they make the
+/// displacements of sector s. A wheel without clamped nodes keeps its rigid-body modes, in nodal diameters 0 and 1. The bits of the
+/// result do not depend on the number of threads.
+///
+/// # Errors
+/// [`crate::Error::Invalid`] for contact nodes that are clamped, repeated, on the axis or on a face;
+/// [`crate::Error::NotPositiveDefinite`] for parts that hang loose; and whatever the eigenvalue iteration and the ROM's validation refuse.
+pub fn reduce_cyclic(
+    model: &FeModel,
+    clamped: &[usize],
+    contact: &[ContactPoint],
+    boundary: &CyclicBoundary,
+    options: &CyclicOptions,
+    listener: Listener<'_>,
+) -> Result<CyclicReduction> {
+    // As in `reduce`: the bits must not depend on the number of threads.
+    faer::set_global_parallelism(faer::Par::Seq);
+    let mut timings = Timings::default();
+    let sector = timed(&mut timings.assembly, || {
+        check_nodes(&model.nodes, clamped, contact, Frame::Cylindrical)?;
+        Sector::new(model, clamped, contact, boundary)
+    })?;
+    let mut condensation = 0.0;
+    let (at_rest, shifted) = timed(&mut condensation, || {
+        let at_rest = Condensed::new(&sector, 0.0, listener)?;
+        // As in `reduce`: a millionth of the order of the highest ω² lies among the lowest elastic ones.
+        let shift = -1e-6 * sector.stiffness.trace() / sector.mass.trace();
+        let shifted = if clamped.is_empty() { Some(Condensed::new(&sector, shift, listener)?) } else { None };
+        Ok((at_rest, shifted))
+    })?;
+    let diameters = boundary.largest_nodal_diameter() + 1;
+    let mut parallel = 0.0;
+    let found = timed(&mut parallel, || {
+        let report_to = (Stage::FixedInterfaceModes, listener);
+        parallel::for_each(diameters, 2, report_to, |number, step| {
+            find(&at_rest, shifted.as_ref(), (number, boundary.sectors, model.nodes.len()), options, step)
+        })
+    })?;
+    let shares: [f64; 2] = core::array::from_fn(|i| found.iter().map(|one| one.seconds[i]).sum());
+    timings.full_modes = parallel * shares[0] / (shares[0] + shares[1]);
+    timings.reduction = condensation + parallel - timings.full_modes;
+    report(listener, Stage::FullModes, 1, 1);
+    let mut result = timed(&mut timings.checks, || {
+        report(listener, Stage::Checks, 0, 1);
+        let result = assembled((model, clamped.len(), contact, boundary), &sector, found, options)?;
+        report(listener, Stage::Checks, 1, 1);
+        Ok(result)
+    })?;
+    result.timings = timings;
+    Ok(result)
+}
+
+/// Everything about one nodal diameter that needs the full model.
+fn find(
+    at_rest: &Condensed<'_>,
+    shifted: Option<&Condensed<'_>>,
+    (number, sectors, nodes): (usize, usize, usize),
+    options: &CyclicOptions,
+    step: &dyn Fn(),
+) -> Result<Found> {
+    let start = Instant::now();
+    let parts = at_rest.parts();
+    let held = Operator::new(at_rest, number, sectors, shifted.is_some())?;
+    let moving = shifted.map(|condensed| Operator::new(condensed, number, sectors, false)).transpose()?;
+    let full = moving.as_ref().unwrap_or(&held);
+    let modes = lanczos::lowest_modes(full, parts.order(), options.checked_modes.min(parts.order()))?;
+    let shapes = node_shapes(full, &modes.shapes, nodes);
+    step();
+    let between = Instant::now();
+    let wanted = families::wanted(options.modes, parts.order() - parts.contact);
+    let component = Component::new(&held, full, wanted)?;
+    step();
+    let seconds = [between.duration_since(start).as_secs_f64(), between.elapsed().as_secs_f64()];
+    Ok(Found { component, full_squares: modes.eigenvalues, shapes, seconds })
+}
+
+/// Displacements (x, y, z) of every node of the model; zero where clamped.
+fn node_shapes(operator: &Operator<'_>, shapes: &Mat<c64>, nodes: usize) -> Vec<Vec<[Complex<f64>; 3]>> {
+    let sector = operator.condensed.sector;
+    let displacements = operator.expand(shapes.as_ref());
+    let width = shapes.ncols();
+    let shape = |k: usize| {
+        let mut shape = vec![[Complex::new(0.0, 0.0); 3]; nodes];
+        for (place, (&node, directions)) in sector.nodes.iter().zip(&sector.directions).enumerate() {
+            for i in 0..3 {
+                for j in 0..3 {
+                    let row = 3 * place + j;
+                    let imaginary = if operator.real { 0.0 } else { displacements[(row, width + k)] };
+                    shape[node][i] += Complex::new(displacements[(row, k)], imaginary) * directions[(i, j)];
+                }
+            }
+        }
+        shape
+    };
+    (0..width).map(shape).collect()
+}
+
+fn assembled(
+    (model, clamped, contact, boundary): (&FeModel, usize, &[ContactPoint], &CyclicBoundary),
+    sector: &Sector,
+    found: Vec<Found>,
+    options: &CyclicOptions,
+) -> Result<CyclicReduction> {
+    let squares: Vec<&[f64]> = found.iter().map(|one| one.component.squares.as_slice()).collect();
+    let choice = families::choose(options.modes, &squares);
+    let full: Vec<&[f64]> = found.iter().map(|one| one.full_squares.as_slice()).collect();
+    let components: Vec<&Component> = found.iter().map(|one| &one.component).collect();
+    let convergence = quality::convergence(&components, &full, boundary.sectors)?;
+    let mut harmonics = Vec::with_capacity(found.len());
+    let mut nodal_diameters = Vec::with_capacity(found.len());
+    let mut largest = 0.0_f64;
+    for (number, (one, &count)) in found.iter().zip(&choice.counts).enumerate() {
+        let order = one.component.contact + count;
+        let quality = one.component.quality(count, order)?;
+        largest = quality.squares.iter().copied().fold(largest, f64::max);
+        nodal_diameters.push(nodal_diameter(number, one, count, &quality));
+        harmonics.push(harmonic(&one.component, order));
+    }
+    for (diameter, one) in nodal_diameters.iter_mut().zip(found) {
+        diameter.shapes = one.shapes;
+    }
+    let counts = match (choice.counts.iter().min(), choice.counts.iter().max()) {
+        (Some(least), Some(most)) if least < most => format!("{least} to {most}"),
+        (Some(least), _) => least.to_string(),
+        _ => "no".to_owned(),
+    };
+    let origin = format!(
+        "{}; one of {} sectors: {} nodes, {clamped} clamped, {} on each face; cyclic Craig-Bampton with {} interface degrees of \
+         freedom and {counts} fixed-interface modes per nodal diameter",
+        model.origin,
+        boundary.sectors,
+        model.nodes.len(),
+        boundary.pairs.len(),
+        sector.parts.contact,
+    );
+    let checks = quality::merged(&nodal_diameters);
+    let mut rest = harmonics.into_iter();
+    let first = rest.next().expect("nodal diameter 0 is always there");
+    let rom = Rom {
+        name: options.name.clone(),
+        origin,
+        sectors: boundary.sectors,
+        frame: Frame::Cylindrical,
+        mass: first.mass.map(|value| value.re),
+        stiffness: first.stiffness.map(|value| value.re),
+        damping_ratio: options.damping_ratio,
+        contact_map: first.contact_map.map(|value| value.re),
+        contact_nodes: contact.iter().map(|point| contact_node(model, point)).collect(),
+        checks,
+        extras: RomExtras { harmonics: rest.collect(), ..RomExtras::default() },
+    };
+    rom.validate()?;
+    Ok(CyclicReduction {
+        rom,
+        nodal_diameters,
+        convergence,
+        free_dofs: sector.parts.order(),
+        largest_angular_frequency: largest.max(0.0).sqrt(),
+        notes: choice.note.into_iter().collect(),
+        timings: Timings::default(),
+    })
+}
+
+fn contact_node(model: &FeModel, point: &ContactPoint) -> ContactNode {
+    let [x, y, z] = model.nodes[point.node];
+    let position = [x.hypot(y), y.atan2(x), z];
+    ContactNode { name: point.name.clone(), position, meridional_slope: point.meridional_slope }
+}
+
+fn harmonic(component: &Component, order: usize) -> Harmonic {
+    // Of a real nodal diameter every imaginary part is a zero of either sign.
+    let entry = |value: c64| Complex::new(value.re, if component.real { 0.0 } else { value.im });
+    let copied = |matrix: &Mat<c64>| DMatrix::from_fn(order, order, |i, j| entry(matrix[(i, j)]));
+    Harmonic {
+        mass: copied(&component.mass),
+        stiffness: copied(&component.stiffness),
+        contact_map: DMatrix::identity(component.contact, order),
+    }
+}
+
+fn hertz(square: f64) -> f64 {
+    square.max(0.0).sqrt() / core::f64::consts::TAU
+}
+
+fn nodal_diameter(number: usize, found: &Found, kept: usize, quality: &super::component::Quality) -> NodalDiameter {
+    let count = found.full_squares.len().min(quality.squares.len());
+    let full_frequencies: Vec<f64> = found.full_squares[..count].iter().map(|&square| hertz(square)).collect();
+    let reduced_frequencies: Vec<f64> = quality.squares[..count].iter().map(|&square| hertz(square)).collect();
+    let frequency_deviation =
+        full_frequencies.iter().zip(&reduced_frequencies).map(|(&full, &reduced)| quality::deviation(full, reduced));
+    NodalDiameter {
+        number,
+        frequency_deviation: frequency_deviation.collect(),
+        full_frequencies,
+        reduced_frequencies,
+        residual_criterion: quality.residual_criterion[..count].to_vec(),
+        fixed_interface_frequencies: found.component.squares[..kept].iter().map(|&square| hertz(square)).collect(),
+        shapes: Vec::new(),
+    }
+}
+
+/// The checks of all nodal diameters in one list, ascending in frequency.
+pub(super) fn sorted_checks(list: Vec<(u32, [f64; 4])>) -> RomChecks {
+    let mut list = list;
+    list.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]).then(a.0.cmp(&b.0)));
+    let column = |i: usize| list.iter().map(|entry| entry.1[i]).collect();
+    RomChecks {
+        full_frequencies: column(0),
+        reduced_frequencies: column(1),
+        frequency_deviation: column(2),
+        residual_criterion: column(3),
+        nodal_diameters: list.iter().map(|entry| entry.0).collect(),
+    }
+}

@@ -1,0 +1,74 @@
+//! Shape quality of elements.
+
+use crate::element::ElementKind;
+use crate::mesh::Mesh;
+
+/// How well an element, or the worst of a mesh, is shaped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quality {
+    /// Scaled Jacobian: over the corners, the least triple product of the unit tangents of the three edges that meet there,
+    /// over its value for the regular element (1 for cubes, √3/2 for prisms, √2/2 for tetrahedra). 1 is ideal, 0 flat.
+    /// P. M. Knupp, Int. J. Numer. Meth. Engng 48, 2000.
+    pub scaled_jacobian: f64,
+    /// Smallest over largest Jacobian determinant among nodes and integration points; ≤ 0 for an element that folds over.
+    pub jacobian_ratio: f64,
+}
+
+/// Quality of one element from the coordinates of its nodes (m).
+pub fn quality(kind: ElementKind, coordinates: &[[f64; 3]]) -> Quality {
+    let nodes = kind.natural_nodes();
+    let corners = &nodes[..kind.corner_count()];
+    let scaled = corners.iter().enumerate().map(|(corner, point)| {
+        let jacobian = jacobian(kind, coordinates, *point);
+        let mut tangents = kind.quadratic().edges().iter().filter_map(|&[a, b]| {
+            let other = if a == corner { b } else { a };
+            (a == corner || b == corner).then(|| {
+                let direction: [f64; 3] = core::array::from_fn(|d| nodes[other][d] - point[d]);
+                unit(core::array::from_fn(|i| (0..3).map(|d| jacobian[d][i] * direction[d]).sum()))
+            })
+        });
+        let mut tangent = || tangents.next().expect("three edges meet at a corner of a solid element");
+        // Edges come in any order: the sign is that of the determinant.
+        determinant([tangent(), tangent(), tangent()]).abs().copysign(determinant(jacobian)) / regular(kind)
+    });
+    let scaled_jacobian = scaled.fold(f64::INFINITY, f64::min);
+    let rules = [kind.stiffness_rule(), kind.mass_rule()].concat();
+    let points = nodes.iter().copied().chain(rules.iter().map(|point| point.point));
+    let determinants = points.map(|point| determinant(jacobian(kind, coordinates, point)));
+    let [least, most] = determinants.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
+    Quality { scaled_jacobian, jacobian_ratio: least / most.abs() }
+}
+
+/// The worst of both figures over all elements.
+pub fn worst_quality(mesh: &Mesh) -> Quality {
+    let all = mesh.elements.iter().map(|element| quality(element.kind, &mesh.coordinates(element)));
+    all.fold(Quality { scaled_jacobian: 1.0, jacobian_ratio: 1.0 }, |worst, one| Quality {
+        scaled_jacobian: worst.scaled_jacobian.min(one.scaled_jacobian),
+        jacobian_ratio: worst.jacobian_ratio.min(one.jacobian_ratio),
+    })
+}
+
+/// Triple product of unit edges at the corner of the regular element.
+fn regular(kind: ElementKind) -> f64 {
+    match kind {
+        ElementKind::Hex8 | ElementKind::Hex20 => 1.0,
+        ElementKind::Penta6 | ElementKind::Penta15 => 0.75_f64.sqrt(),
+        ElementKind::Tet4 | ElementKind::Tet10 => 0.5_f64.sqrt(),
+    }
+}
+
+/// ∂x/∂(natural coordinate), one row per natural coordinate.
+fn jacobian(kind: ElementKind, coordinates: &[[f64; 3]], point: [f64; 3]) -> [[f64; 3]; 3] {
+    let gradients = kind.shape(point).gradients;
+    let part = |d: usize, i: usize| coordinates.iter().zip(&gradients).map(|(x, gradient)| gradient[d] * x[i]).sum();
+    core::array::from_fn(|d| core::array::from_fn(|i| part(d, i)))
+}
+
+fn determinant([a, b, c]: [[f64; 3]; 3]) -> f64 {
+    a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+}
+
+fn unit(vector: [f64; 3]) -> [f64; 3] {
+    let length = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
+    vector.map(|x| x / length)
+}

@@ -1,0 +1,228 @@
+//! Contact nodes out of a set: evenly along the axis, in the middle of the tip's thickness, with the contour's slope.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::reduce::ContactPoint;
+use crate::{Error, Result};
+
+/// A set of at most this many nodes is taken whole.
+pub const TAKEN_WHOLE: usize = 12;
+/// Of a larger set, this many: both edges and the middle.
+pub const CHOSEN: usize = 3;
+
+/// Axial positions closer than this share of the set's extent are one.
+const SAME_PLACE: f64 = 1e-3;
+/// A set that extends along the axis less than this share of its radius has no slope, and is ordered around the axis.
+const FLAT: f64 = 1e-6;
+
+/// What is wanted of the contact nodes.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct ContactChoice {
+    /// How many; all of a set of at most [`TAKEN_WHOLE`], [`CHOSEN`] of a larger one where absent.
+    pub count: Option<usize>,
+    /// Their names by growing z; `tip_1`, `tip_2`, ... where empty.
+    pub names: Vec<String>,
+}
+
+/// Contact nodes of a set by growing z (of equal z: by angle), with slopes dr/dz of the set's contour.
+///
+/// # Errors
+/// [`Error::Invalid`] for an empty set, more nodes than it has, or names that are not as many.
+pub fn choose_contact_nodes(nodes: &[[f64; 3]], set: &[usize], choice: &ContactChoice) -> Result<Vec<ContactPoint>> {
+    let default = if set.len() <= TAKEN_WHOLE { set.len() } else { CHOSEN };
+    let named = if choice.names.is_empty() { default } else { choice.names.len() };
+    let count = choice.count.unwrap_or(named);
+    if count == 0 || count > set.len() {
+        let problem = format!("{count} of a set of {} nodes", set.len());
+        return Err(Error::invalid("number of contact nodes", problem, "Give a number from 1 to that of the set"));
+    }
+    if !choice.names.is_empty() && choice.names.len() != count {
+        let problem = format!("{} names for {count} contact nodes", choice.names.len());
+        return Err(Error::invalid("names of contact nodes", problem, "Give one name for each, by growing z"));
+    }
+    let places = Places::new(nodes, set);
+    let chosen = places.evenly(count);
+    let name = |index: usize| choice.names.get(index).cloned().unwrap_or_else(|| format!("tip_{}", index + 1));
+    let point = |(index, place): (usize, usize)| ContactPoint {
+        name: name(index),
+        node: set[place],
+        meridional_slope: places.slope(place),
+    };
+    Ok(chosen.into_iter().enumerate().map(point).collect())
+}
+
+/// The nodes of a set in the meridional plane, and on the developed surface in the direction of the chord and across it.
+struct Places {
+    axial: Vec<f64>,
+    radius: Vec<f64>,
+    /// Along the chord, by growing z (m).
+    along: Vec<f64>,
+    /// Across it (m).
+    across: Vec<f64>,
+    /// Whether the set lies in one plane across the axis.
+    flat: bool,
+}
+
+fn extent(values: &[f64]) -> [f64; 2] {
+    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| [low.min(value), high.max(value)])
+}
+
+/// Unit vector (z, rθ) of the largest extent of points: main axis of their second moments.
+fn chord_direction(axial: &[f64], arc: &[f64]) -> [f64; 2] {
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let (z, s) = (mean(axial), mean(arc));
+    let moment =
+        |a: &dyn Fn(usize) -> f64, b: &dyn Fn(usize) -> f64| (0..axial.len()).map(|i| a(i) * b(i)).sum::<f64>();
+    let (to_z, to_s) = (|i: usize| axial[i] - z, |i: usize| arc[i] - s);
+    let (zz, ss, zs) = (moment(&to_z, &to_z), moment(&to_s, &to_s), moment(&to_z, &to_s));
+    let angle = 0.5 * (2.0 * zs).atan2(zz - ss);
+    let (sin, cos) = angle.sin_cos();
+    // By growing z; a chord around the axis by growing angle.
+    if cos < -1e-9 || (cos.abs() <= 1e-9 && sin < 0.0) { [-cos, -sin] } else { [cos, sin] }
+}
+
+impl Places {
+    fn new(nodes: &[[f64; 3]], set: &[usize]) -> Self {
+        let points: Vec<[f64; 3]> = set.iter().map(|&node| nodes[node]).collect();
+        let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point[0], y + point[1]));
+        let (sin, cos) = y.atan2(x).sin_cos();
+        let radius: Vec<f64> = points.iter().map(|point| point[0].hypot(point[1])).collect();
+        let arc = points
+            .iter()
+            .zip(&radius)
+            .map(|(point, radius)| radius * (point[1] * cos - point[0] * sin).atan2(point[0] * cos + point[1] * sin));
+        let (arc, axial): (Vec<f64>, Vec<f64>) = (arc.collect(), points.iter().map(|point| point[2]).collect());
+        let [low, high] = extent(&axial);
+        let flat = high - low <= FLAT * extent(&radius)[1].max(f64::MIN_POSITIVE);
+        let [cz, cs] = chord_direction(&axial, &arc);
+        let along = axial.iter().zip(&arc).map(|(z, s)| cz * z + cs * s).collect();
+        let across = axial.iter().zip(&arc).map(|(z, s)| cz * s - cs * z).collect();
+        Self { axial, radius, along, across, flat }
+    }
+
+    /// Places in the set by growing z, as evenly along the chord as its nodes allow, in the middle of the thickness.
+    fn evenly(&self, count: usize) -> Vec<usize> {
+        let all = self.axial.len();
+        let mut chosen: Vec<usize> = if count == all { (0..all).collect() } else { Vec::with_capacity(count) };
+        let [low, high] = extent(&self.along);
+        let mut free = vec![true; all];
+        for index in chosen.len()..count {
+            let share = if count == 1 { 0.5 } else { index as f64 / (count - 1) as f64 };
+            let target = low + share * (high - low);
+            let middle = self.middle_at(target);
+            let distance = |&place: &usize| (self.along[place] - target).hypot(self.across[place] - middle);
+            let nearest = (0..all).filter(|&place| free[place]).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            if let Some(place) = nearest {
+                free[place] = false;
+                chosen.push(place);
+            }
+        }
+        let by_axis = |a: &usize, b: &usize| self.axial[*a].total_cmp(&self.axial[*b]);
+        let by_chord = |a: &usize, b: &usize| self.along[*a].total_cmp(&self.along[*b]);
+        chosen.sort_by(|a, b| if self.flat { by_chord(a, b) } else { by_axis(a, b).then(by_chord(a, b)) });
+        chosen
+    }
+
+    /// Middle of the thickness at a place along the chord: halfway between the outermost of the nearest nodes.
+    fn middle_at(&self, target: f64) -> f64 {
+        let mut nearest: Vec<usize> = (0..self.along.len()).collect();
+        nearest.sort_by(|&a, &b| (self.along[a] - target).abs().total_cmp(&(self.along[b] - target).abs()));
+        nearest.truncate((self.along.len() / 10).max(2));
+        let [low, high] = extent(&nearest.iter().map(|&place| self.across[place]).collect::<Vec<_>>());
+        0.5 * (low + high)
+    }
+
+    /// dr/dz at a node: parabola through the nearest third of the axial positions (at least three), by least squares.
+    fn slope(&self, place: usize) -> f64 {
+        let mut levels = self.levels();
+        let here = self.axial[place];
+        levels.sort_by(|a, b| (a.0 - here).abs().total_cmp(&(b.0 - here).abs()));
+        levels.truncate((levels.len() / 3).max(3));
+        let terms = levels.len().min(3);
+        if terms < 2 {
+            return 0.0;
+        }
+        let reach = levels.iter().map(|level| (level.0 - here).abs()).fold(0.0, f64::max);
+        let powers = DMatrix::from_fn(levels.len(), terms, |i, j| {
+            let local = (levels[i].0 - here) / reach;
+            [1.0, local, local * local][j]
+        });
+        let radii = DVector::from_iterator(levels.len(), levels.iter().map(|level| level.1));
+        powers.svd(true, true).solve(&radii, 1e-12).map_or(0.0, |coefficients| coefficients[1] / reach)
+    }
+
+    /// Axial positions that differ, with the mean radius there.
+    fn levels(&self) -> Vec<(f64, f64)> {
+        let [low, high] = extent(&self.axial);
+        let mut order: Vec<usize> = (0..self.axial.len()).collect();
+        order.sort_by(|&a, &b| self.axial[a].total_cmp(&self.axial[b]));
+        let mut levels: Vec<(f64, f64, f64)> = Vec::new();
+        for place in order {
+            let (axial, radius) = (self.axial[place], self.radius[place]);
+            match levels.last_mut() {
+                Some((first, sum, count)) if self.flat || axial - *first <= SAME_PLACE * (high - low) => {
+                    *sum += radius;
+                    *count += 1.0;
+                }
+                _ => levels.push((axial, radius, 1.0)),
+            }
+        }
+        levels.into_iter().map(|(axial, sum, count)| (axial, sum / count)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tip of a staggered blade, `through` nodes thick, on the contour r = 0.3 + 0.1 z - z².
+    fn tip(along: usize, through: usize) -> Vec<[f64; 3]> {
+        let mut nodes = Vec::new();
+        for i in 0..along {
+            for j in 0..through {
+                let z = 0.04 * i as f64 / (along - 1) as f64;
+                let radius = 0.3 + 0.1 * z - z * z;
+                let across = if through > 1 { j as f64 / (through - 1) as f64 - 0.5 } else { 0.0 };
+                // About ±π, where angles jump.
+                let angle = core::f64::consts::PI + (0.8 * z + 0.003 * across) / radius;
+                nodes.push([radius * angle.cos(), radius * angle.sin(), z]);
+            }
+        }
+        nodes
+    }
+
+    #[test]
+    fn a_face_gives_nodes_in_the_middle_of_its_thickness_with_the_slope_of_the_contour() {
+        let nodes = tip(21, 3);
+        let set: Vec<usize> = (0..nodes.len()).collect();
+        let points = choose_contact_nodes(&nodes, &set, &ContactChoice::default()).unwrap();
+        assert_eq!(points.iter().map(|point| point.node).collect::<Vec<_>>(), [1, 31, 61]);
+        for point in &points {
+            let expected = 0.1 - 2.0 * nodes[point.node][2];
+            assert!((point.meridional_slope - expected).abs() < 1e-9, "{point:?}: {expected}");
+        }
+        assert_eq!(points[2].name, "tip_3");
+    }
+
+    #[test]
+    fn a_small_set_is_taken_whole_by_growing_z() {
+        let nodes: Vec<[f64; 3]> = tip(3, 1).into_iter().rev().collect();
+        let choice = ContactChoice { count: None, names: ["le", "mid", "te"].map(String::from).to_vec() };
+        let points = choose_contact_nodes(&nodes, &[0, 1, 2], &choice).unwrap();
+        assert_eq!(points.iter().map(|point| point.node).collect::<Vec<_>>(), [2, 1, 0]);
+        assert!((points[1].meridional_slope - 0.06).abs() < 1e-9, "{points:?}");
+        assert_eq!(points[0].name, "le");
+    }
+
+    #[test]
+    fn counts_and_names_that_do_not_fit_are_refused() {
+        let nodes = tip(3, 1);
+        let refused = |count, names: &[&str]| {
+            let names = names.iter().map(ToString::to_string).collect();
+            choose_contact_nodes(&nodes, &[0, 1, 2], &ContactChoice { count, names }).unwrap_err().to_string()
+        };
+        assert!(refused(Some(4), &[]).contains("4 of a set of 3"));
+        assert!(refused(Some(0), &[]).contains("0 of a set of 3"));
+        assert!(refused(Some(2), &["a"]).contains("1 names for 2"));
+    }
+}

@@ -1,0 +1,160 @@
+//! What every mesh format is read into first: nodes and elements by their numbers in the file, sets by name.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use super::source::Place;
+use crate::element::ElementKind;
+use crate::mesh::{Element, Mesh};
+use crate::{Error, Result};
+
+/// An element as read.
+#[derive(Debug, Clone)]
+pub(super) struct DraftElement {
+    /// Number in the file.
+    pub number: u64,
+    /// `None` for points, lines and faces, whose nodes can still make a set.
+    pub kind: Option<ElementKind>,
+    /// Node numbers in the file, already in the order of [`ElementKind`].
+    pub nodes: Vec<u64>,
+    /// Index of the material, where one is known.
+    pub material: Option<usize>,
+    /// Where it stands.
+    pub place: Place,
+}
+
+/// A mesh as read.
+#[derive(Debug, Default)]
+pub(super) struct Draft {
+    /// Node numbers in the order of the file.
+    pub numbers: Vec<u64>,
+    /// Their coordinates, in the file's unit.
+    pub positions: Vec<[f64; 3]>,
+    /// Index of a node number.
+    index: HashMap<u64, usize>,
+    /// Elements in the order of the file.
+    pub elements: Vec<DraftElement>,
+    /// Index of an element number.
+    element_index: HashMap<u64, usize>,
+    /// Node sets: numbers of nodes.
+    pub node_sets: BTreeMap<String, BTreeSet<u64>>,
+    /// Things a user should know but need not act on.
+    pub notes: Vec<String>,
+    /// Things that make the result differ from what the file's own code would compute.
+    pub warnings: Vec<String>,
+}
+
+/// A mesh with the numbers that its nodes and elements had in the file.
+#[derive(Debug)]
+pub(super) struct Numbered {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// Number of each node in the file.
+    pub nodes: Vec<u64>,
+    /// Number of each element in the file.
+    pub elements: Vec<u64>,
+    /// Material index of each element.
+    pub materials: Vec<Option<usize>>,
+}
+
+impl Draft {
+    /// Add a node. The same number may come again with the same coordinates.
+    pub fn add_node(&mut self, number: u64, position: [f64; 3], place: &dyn Fn() -> Place) -> Result<()> {
+        if let Some(&index) = self.index.get(&number) {
+            if self.positions[index].map(f64::to_bits) == position.map(f64::to_bits) {
+                return Ok(());
+            }
+            let problem = format!("node {number} is defined a second time with other coordinates");
+            return Err(place().error(problem, "Number the nodes uniquely"));
+        }
+        self.index.insert(number, self.numbers.len());
+        self.numbers.push(number);
+        self.positions.push(position);
+        Ok(())
+    }
+
+    /// Add an element.
+    pub fn add_element(&mut self, element: DraftElement) -> Result<()> {
+        if self.element_index.insert(element.number, self.elements.len()).is_some() {
+            let problem = format!("element {} is defined a second time", element.number);
+            return Err(element.place.error(problem, "Number the elements uniquely"));
+        }
+        self.elements.push(element);
+        Ok(())
+    }
+
+    /// Whether there is a node of this number.
+    pub fn has_node(&self, number: u64) -> bool {
+        self.index.contains_key(&number)
+    }
+
+    /// The element of this number.
+    pub fn element(&mut self, number: u64) -> Option<&mut DraftElement> {
+        self.element_index.get(&number).map(|&index| &mut self.elements[index])
+    }
+
+    /// Nodes of an element.
+    pub fn nodes_of(&self, number: u64) -> &[u64] {
+        self.element_index.get(&number).map_or(&[], |&index| &self.elements[index].nodes)
+    }
+
+    /// The mesh of the solid elements, coordinates times `scale`; nodes of no solid element are left out.
+    pub fn into_mesh(mut self, scale: f64, what: &str) -> Result<(Numbered, Vec<String>, Vec<String>)> {
+        let mut used = vec![false; self.numbers.len()];
+        for element in &self.elements {
+            self.check_nodes(element)?;
+            if element.kind.is_some() {
+                element.nodes.iter().for_each(|node| used[self.index[node]] = true);
+            }
+        }
+        let solids = || self.elements.iter().filter(|element| element.kind.is_some());
+        if solids().next().is_none() {
+            let problem = "the file has no solid element (tetrahedra, prisms, bricks)";
+            let remedy = "Mesh the volume and export its elements: shells and faces are not computed";
+            return Err(Error::Read { place: what.into(), problem: problem.into(), remedy: remedy.into() });
+        }
+        let kept: Vec<usize> = (0..self.numbers.len()).filter(|&index| used[index]).collect();
+        let mut position = vec![usize::MAX; self.numbers.len()];
+        kept.iter().enumerate().for_each(|(new, &old)| position[old] = new);
+        let place =
+            |number: &u64| self.index.get(number).map(|&index| position[index]).filter(|&new| new != usize::MAX);
+        let sets = self.node_sets.iter().map(|(name, numbers)| {
+            let mut nodes: Vec<usize> = numbers.iter().filter_map(place).collect();
+            nodes.sort_unstable();
+            (name.clone(), nodes)
+        });
+        let sets: BTreeMap<String, Vec<usize>> = sets.filter(|(_, nodes)| !nodes.is_empty()).collect();
+        let element = |element: &DraftElement| {
+            let nodes = element.nodes.iter().filter_map(place).collect();
+            element.kind.map(|kind| Element { kind, nodes })
+        };
+        let numbered = Numbered {
+            nodes: kept.iter().map(|&index| self.numbers[index]).collect(),
+            elements: solids().map(|element| element.number).collect(),
+            materials: solids().map(|element| element.material).collect(),
+            mesh: Mesh {
+                nodes: kept.iter().map(|&index| self.positions[index].map(|x| scale * x)).collect(),
+                elements: self.elements.iter().filter_map(element).collect(),
+                sets,
+            },
+        };
+        if kept.len() < self.numbers.len() {
+            let left_out = self.numbers.len() - kept.len();
+            self.notes.push(format!("{left_out} nodes that belong to no solid element are left out"));
+        }
+        Ok((numbered, self.notes, self.warnings))
+    }
+
+    fn check_nodes(&self, element: &DraftElement) -> Result<()> {
+        if let Some(node) = element.nodes.iter().find(|node| !self.index.contains_key(node)) {
+            let problem = format!("element {} names node {node}, which is not defined", element.number);
+            return Err(element.place.error(problem, "Add the node, or export the mesh again, complete"));
+        }
+        let distinct: BTreeSet<&u64> = element.nodes.iter().collect();
+        if element.kind.is_some() && distinct.len() < element.nodes.len() {
+            let problem = format!("element {} names a node twice: it is collapsed", element.number);
+            let remedy = "Use prisms and tetrahedra instead of collapsed bricks";
+            return Err(element.place.error(problem, remedy));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,106 @@
+//! Numbers of a section of a Gmsh file, one by one, from text or from bytes.
+
+use std::sync::Arc;
+
+use super::super::source::Place;
+use crate::{Error, Result};
+
+/// Where the numbers of one section come from.
+#[derive(Debug)]
+pub(super) enum Numbers<'a> {
+    /// Words, with the line of each.
+    Text { file: Arc<str>, rest: &'a str, line: usize },
+    /// Bytes, with the offset in the file of the next one.
+    Bytes { file: Arc<str>, rest: &'a [u8], offset: usize, big_endian: bool },
+}
+
+impl<'a> Numbers<'a> {
+    /// What is wrong with the number just read or to be read.
+    pub fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
+        match self {
+            Self::Text { file, line, .. } => Place { file: Arc::clone(file), line: *line }.error(problem, remedy),
+            Self::Bytes { file, offset, .. } => {
+                Error::Read { place: format!("{file}, byte {offset}"), problem: problem.into(), remedy: remedy.into() }
+            }
+        }
+    }
+
+    /// Where we are, as a place for later messages.
+    pub fn place(&self) -> Place {
+        match self {
+            Self::Text { file, line, .. } => Place { file: Arc::clone(file), line: *line },
+            Self::Bytes { file, offset, .. } => Place { file: format!("{file}, byte").into(), line: *offset },
+        }
+    }
+
+    /// At most this many more numbers can come; what a file says of its own length is not trusted beyond that.
+    pub fn at_most(&self) -> usize {
+        match self {
+            Self::Text { rest, .. } => rest.len() / 2 + 1,
+            Self::Bytes { rest, .. } => rest.len() / 4,
+        }
+    }
+
+    fn word(&mut self) -> Option<&'a str> {
+        let Self::Text { rest, line, .. } = self else { return None };
+        let text: &'a str = rest;
+        let start = text.find(|c: char| !c.is_ascii_whitespace())?;
+        *line += text[..start].matches('\n').count();
+        let text = &text[start..];
+        let end = text.find(|c: char| c.is_ascii_whitespace()).unwrap_or(text.len());
+        *rest = &text[end..];
+        Some(&text[..end])
+    }
+
+    fn bytes<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let Self::Bytes { rest, offset, big_endian, .. } = self else { return None };
+        let (taken, remaining) = rest.split_first_chunk::<N>()?;
+        *rest = remaining;
+        *offset += N;
+        let mut taken = *taken;
+        if *big_endian {
+            taken.reverse();
+        }
+        Some(taken)
+    }
+
+    fn ended(&self) -> Error {
+        self.error("the section ends too early, or something that is no number stands in it", "Write the mesh again")
+    }
+
+    /// An `int` of the format.
+    pub fn int(&mut self) -> Result<i64> {
+        let value = match self {
+            Self::Text { .. } => self.word().and_then(|word| word.parse::<i32>().ok()),
+            Self::Bytes { .. } => self.bytes().map(i32::from_le_bytes),
+        };
+        value.map(i64::from).ok_or_else(|| self.ended())
+    }
+
+    /// A `size_t` of the format.
+    pub fn size(&mut self) -> Result<u64> {
+        let value = match self {
+            Self::Text { .. } => self.word().and_then(|word| word.parse().ok()),
+            Self::Bytes { .. } => self.bytes().map(u64::from_le_bytes),
+        };
+        value.ok_or_else(|| self.ended())
+    }
+
+    /// A `size_t` that counts things of at least `each` numbers, all of which must still come.
+    pub fn count(&mut self, each: usize) -> Result<usize> {
+        let value = self.size()?;
+        let most = self.at_most() / each.max(1) + 1;
+        usize::try_from(value).ok().filter(|&count| count <= most).ok_or_else(|| {
+            self.error(format!("the file announces {value} entries, more than it can hold"), "Write the mesh again")
+        })
+    }
+
+    /// A finite `double`.
+    pub fn real(&mut self) -> Result<f64> {
+        let value = match self {
+            Self::Text { .. } => self.word().and_then(|word| word.parse().ok()),
+            Self::Bytes { .. } => self.bytes().map(f64::from_le_bytes),
+        };
+        value.filter(|value: &f64| value.is_finite()).ok_or_else(|| self.ended())
+    }
+}

@@ -1,0 +1,173 @@
+//! Lines of an input file: includes expanded, keywords with their parameters and data grouped.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::super::source::{Open, Place, beside, text_of};
+use crate::Result;
+
+/// Files included within each other at most this deep, and this many in all.
+const LARGEST_DEPTH: usize = 16;
+const LARGEST_COUNT: usize = 1000;
+
+/// A keyword line with what follows it.
+#[derive(Debug)]
+pub(super) struct Card {
+    /// Upper case, one blank between words, without the star: `SOLID SECTION`.
+    pub keyword: String,
+    /// Name in upper case without blanks, and value as written, if any.
+    pub parameters: Vec<(String, Option<String>)>,
+    /// Where the keyword stands.
+    pub place: Place,
+    /// Data lines without comments and empty ones.
+    pub data: Vec<DataLine>,
+}
+
+/// A line of data.
+#[derive(Debug, Clone)]
+pub(super) struct DataLine {
+    /// The line without blanks around it.
+    pub text: String,
+    /// Where it stands.
+    pub place: Place,
+}
+
+impl DataLine {
+    /// Values between commas; an empty last one (a comma at the end) is left out.
+    pub fn values(&self) -> impl Iterator<Item = &str> {
+        self.text.trim_end_matches([',', ' ', '\t']).split(',').map(str::trim)
+    }
+
+    /// Whether the record goes on in the next line.
+    pub fn goes_on(&self) -> bool {
+        self.text.ends_with(',')
+    }
+}
+
+impl Card {
+    /// Value of a parameter; an error for one that is there without a value.
+    pub fn parameter(&self, name: &str) -> Result<Option<&str>> {
+        match self.parameters.iter().find(|(key, _)| key == name) {
+            None => Ok(None),
+            Some((_, Some(value))) if !value.is_empty() => Ok(Some(value)),
+            Some(_) => {
+                let problem = format!("parameter {name} of *{} has no value", self.keyword);
+                Err(self.place.error(problem, format!("Write {name}=...")))
+            }
+        }
+    }
+
+    /// Value of a parameter that must be there.
+    pub fn required(&self, name: &str) -> Result<&str> {
+        self.parameter(name)?.ok_or_else(|| {
+            let problem = format!("*{} has no parameter {name}", self.keyword);
+            self.place.error(problem, format!("Write *{}, {name}=...", self.keyword))
+        })
+    }
+
+    /// Whether a parameter is there, with a value or without.
+    pub fn has(&self, name: &str) -> bool {
+        self.parameters.iter().any(|(key, _)| key == name)
+    }
+}
+
+/// All cards of a file and of the files it includes.
+pub(super) fn cards(path: &Path, bytes: &[u8], open: Open<'_>) -> Result<Vec<Card>> {
+    let mut reader = Reader { open, cards: Vec::new(), active: Vec::new(), count: 0, before_first_keyword: None };
+    reader.file(path.to_path_buf(), bytes)?;
+    if let Some(place) = reader.before_first_keyword {
+        let problem = "data stands before the first keyword";
+        return Err(place.error(problem, "Is this a CalculiX or Abaqus input file? Its keywords begin with `*`"));
+    }
+    Ok(reader.cards)
+}
+
+struct Reader<'a> {
+    open: Open<'a>,
+    cards: Vec<Card>,
+    active: Vec<PathBuf>,
+    count: usize,
+    before_first_keyword: Option<Place>,
+}
+
+impl Reader<'_> {
+    fn file(&mut self, path: PathBuf, bytes: &[u8]) -> Result<()> {
+        let (text, name) = (text_of(bytes), Arc::from(path.display().to_string()));
+        self.active.push(path);
+        // A keyword line that ends with a comma goes on in the next line.
+        let mut keyword: Option<(String, Place)> = None;
+        for (index, line) in text.lines().enumerate() {
+            let line = line.trim();
+            let place = Place { file: Arc::clone(&name), line: index + 1 };
+            if line.starts_with("**") || line.is_empty() {
+                continue;
+            }
+            if let Some((begun, _)) = &mut keyword {
+                begun.push_str(line);
+            } else if let Some(begun) = line.strip_prefix('*') {
+                keyword = Some((begun.to_owned(), place));
+            } else {
+                self.data(line, place);
+            }
+            if keyword.as_ref().is_some_and(|(text, _)| !text.ends_with(',')) {
+                self.keyword(keyword.take())?;
+            }
+        }
+        self.keyword(keyword)?;
+        self.active.pop();
+        Ok(())
+    }
+
+    fn data(&mut self, line: &str, place: Place) {
+        match self.cards.last_mut() {
+            Some(card) => card.data.push(DataLine { text: line.to_owned(), place }),
+            None => _ = self.before_first_keyword.get_or_insert(place),
+        }
+    }
+
+    fn keyword(&mut self, line: Option<(String, Place)>) -> Result<()> {
+        let Some((text, place)) = line else { return Ok(()) };
+        let mut parts = text.split(',');
+        let words: Vec<String> = parts.next().unwrap_or("").split_whitespace().map(str::to_uppercase).collect();
+        let parameters = parts.filter(|part| !part.trim().is_empty()).map(parameter).collect();
+        let card = Card { keyword: words.join(" "), parameters, place, data: Vec::new() };
+        if card.keyword == "INCLUDE" {
+            return self.include(&card);
+        }
+        // *NODE, INPUT=file and *ELEMENT, INPUT=file: data lines from a file of their own.
+        let elsewhere = match card.keyword.as_str() {
+            "NODE" | "ELEMENT" | "NSET" | "ELSET" => card.parameter("INPUT")?.map(str::to_owned),
+            _ => None,
+        };
+        let place = card.place.clone();
+        self.cards.push(card);
+        elsewhere.map_or(Ok(()), |written| self.open_beside(&written, &place))
+    }
+
+    fn include(&mut self, card: &Card) -> Result<()> {
+        let written = card.required("INPUT")?.to_owned();
+        self.open_beside(&written, &card.place)
+    }
+
+    fn open_beside(&mut self, written: &str, place: &Place) -> Result<()> {
+        let current = self.active.last().cloned().unwrap_or_default();
+        let path = beside(&current, written);
+        self.count += 1;
+        if self.active.contains(&path) || self.active.len() >= LARGEST_DEPTH || self.count > LARGEST_COUNT {
+            let problem = format!("{} is included within itself, or too deep, or too often", path.display());
+            return Err(place.error(problem, "Include every file once"));
+        }
+        let bytes = (self.open)(&path).map_err(|error| {
+            place.error(format!("the included file cannot be read: {error}"), "Keep included files beside this one")
+        })?;
+        self.file(path, &bytes)
+    }
+}
+
+fn parameter(part: &str) -> (String, Option<String>) {
+    let (name, value) = match part.split_once('=') {
+        Some((name, value)) => (name, Some(value.trim().trim_matches('"').trim().to_owned())),
+        None => (part, None),
+    };
+    (name.split_whitespace().collect::<String>().to_uppercase(), value)
+}

@@ -1,0 +1,303 @@
+//! CalculiX and Abaqus input files: nodes, solid elements, sets, one isotropic material per element.
+//!
+//! Read are `*NODE`, `*ELEMENT`, `*NSET`, `*ELSET`, `*MATERIAL` with `*ELASTIC`, `*DENSITY` and `*EXPANSION`, `*SOLID SECTION`,
+//! `*INCLUDE`, and `*BOUNDARY` as a hint. Keywords that change neither stiffness nor mass are skipped and listed; those that do
+//! are refused, and so is everything unknown before the first `*STEP`. Loads and results inside steps are not read.
+
+mod lines;
+mod materials;
+mod sets;
+mod vocabulary;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use lines::{Card, DataLine, cards};
+use materials::DeckMaterial;
+use sets::Sets;
+use vocabulary::{ElementType, Unread, element_type, unread};
+
+use super::draft::{Draft, DraftElement};
+use super::source::{Open, Place, number};
+use crate::Result;
+use crate::material::Material;
+
+/// What an input file holds.
+#[derive(Debug, Default)]
+pub(super) struct Deck {
+    /// Nodes, elements, sets.
+    pub draft: Draft,
+    /// Materials in the order of the file, in its units.
+    pub materials: Vec<Material>,
+    /// What `*BOUNDARY` holds, for a hint: set names or node numbers, as written.
+    pub held: Vec<String>,
+}
+
+/// Read an input file; a table of properties over temperature is read at `temperature`.
+pub(super) fn read(path: &Path, bytes: &[u8], temperature: Option<f64>, open: Open<'_>) -> Result<Deck> {
+    let mut reader = Reader::default();
+    for card in cards(path, bytes, open)? {
+        reader.card(&card)?;
+    }
+    reader.finish(temperature)
+}
+
+#[derive(Debug)]
+struct Section {
+    set: String,
+    material: String,
+    place: Place,
+}
+
+#[derive(Debug, Default)]
+struct Reader {
+    draft: Draft,
+    sets: Sets,
+    materials: Vec<DeckMaterial>,
+    sections: Vec<Section>,
+    held: Vec<String>,
+    skipped: BTreeMap<String, (usize, usize)>,
+    near: BTreeMap<String, usize>,
+    left_out: BTreeMap<String, usize>,
+    parts: usize,
+    instances: usize,
+    in_step: bool,
+    in_assembly: bool,
+}
+
+impl Reader {
+    fn card(&mut self, card: &Card) -> Result<()> {
+        match card.keyword.as_str() {
+            "BOUNDARY" => {
+                let held = card.data.iter().filter_map(|line| line.values().next());
+                self.held.extend(held.map(|name| sets::local_name(name).to_uppercase()));
+            }
+            "STEP" => {
+                self.skip(card);
+                self.in_step = true;
+            }
+            "END STEP" => self.in_step = false,
+            // Loads and results; what changes the structure within a step, contact for one, does not at rest.
+            _ if self.in_step => {}
+            "PART" => return count(&mut self.parts, card, "part"),
+            "INSTANCE" => return self.instance(card),
+            "ASSEMBLY" => self.in_assembly = true,
+            "NODE" => return self.nodes(card),
+            "ELEMENT" => return self.elements(card),
+            "NSET" => return self.sets.nodes.read(card, card.required("NSET")?),
+            "ELSET" => return self.sets.elements.read(card, card.required("ELSET")?),
+            "MATERIAL" => self.materials.push(DeckMaterial::new(card)?),
+            "ELASTIC" | "DENSITY" | "EXPANSION" => return self.property(card),
+            "SOLID SECTION" => return self.section(card),
+            "TIE" if card.has("CYCLICSYMMETRY") => self.skip(card),
+            keyword => return self.unread(keyword, card),
+        }
+        Ok(())
+    }
+
+    fn skip(&mut self, card: &Card) {
+        self.skipped.entry(card.keyword.clone()).or_insert((0, card.place.line)).0 += 1;
+    }
+
+    fn unread(&mut self, keyword: &str, card: &Card) -> Result<()> {
+        match unread(keyword) {
+            Unread::Harmless => self.skip(card),
+            Unread::Changes => {
+                let problem = format!("*{keyword} changes what is computed and is not supported");
+                let remedy =
+                    "Remove it if it is not meant here, or give the matrices of the model: --stiffness and --mass";
+                return Err(card.place.error(problem, remedy));
+            }
+            Unread::Unknown => {
+                let problem = format!("keyword *{keyword} is not known");
+                return Err(card.place.error(problem, "Remove it if it changes neither stiffness nor mass"));
+            }
+        }
+        Ok(())
+    }
+
+    fn instance(&mut self, card: &Card) -> Result<()> {
+        count(&mut self.instances, card, "instance")?;
+        match card.data.first() {
+            None => Ok(()),
+            Some(line) => {
+                let problem = "the instance is moved or turned against its part";
+                Err(line.place.error(problem, "Write the input file without parts and assemblies"))
+            }
+        }
+    }
+
+    fn nodes(&mut self, card: &Card) -> Result<()> {
+        if self.in_assembly && self.instances > 0 && self.parts > 0 {
+            let problem = "nodes of the assembly (reference points) stand beside those of the part";
+            return Err(card.place.error(problem, "Remove the reference points, or write the file without parts"));
+        }
+        if let Some(system) = card.parameter("SYSTEM")?.filter(|system| !system.eq_ignore_ascii_case("R")) {
+            let problem = format!("coordinates in SYSTEM={system} are not read");
+            return Err(card.place.error(problem, "Write Cartesian coordinates"));
+        }
+        let set = card.parameter("NSET")?.map(str::to_owned);
+        for line in &card.data {
+            let mut values = line.values();
+            let node = label(values.next().unwrap_or(""), line, "a node number")?;
+            let mut position = [0.0; 3];
+            for x in &mut position {
+                // An empty field is zero, as in the codes that read this format.
+                *x = match values.next() {
+                    None | Some("") => 0.0,
+                    Some(text) => number(text).ok_or_else(|| {
+                        line.place
+                            .error(format!("coordinate `{text}` of node {node} is not a number"), "Correct the line")
+                    })?,
+                };
+            }
+            self.draft.add_node(node, position, &|| line.place.clone())?;
+            if let Some(set) = &set {
+                self.sets.nodes.add(set, node);
+            }
+        }
+        Ok(())
+    }
+
+    fn elements(&mut self, card: &Card) -> Result<()> {
+        let name = card.required("TYPE")?.to_uppercase();
+        let set = card.parameter("ELSET")?.map(str::to_owned);
+        let kind = match element_type(&name) {
+            ElementType::Solid(kind) => Some(kind),
+            ElementType::Near(kind) => {
+                *self.near.entry(name.clone()).or_default() += card.data.len();
+                Some(kind)
+            }
+            ElementType::LowerDimension => {
+                *self.left_out.entry(name.clone()).or_default() += card.data.len();
+                None
+            }
+            ElementType::Refused(reason, remedy) => {
+                return Err(card.place.error(format!("element type {name} {reason}"), remedy));
+            }
+        };
+        let wanted = kind.map(|kind| kind.node_count() + 1);
+        let mut record: Vec<u64> = Vec::new();
+        let mut place = card.place.clone();
+        for (index, line) in card.data.iter().enumerate() {
+            if record.is_empty() {
+                place = line.place.clone();
+            }
+            for text in line.values() {
+                record.push(label(text, line, "an element or node number")?);
+            }
+            let complete = wanted.map_or(!line.goes_on(), |wanted| record.len() >= wanted);
+            if !complete && index + 1 < card.data.len() {
+                continue;
+            }
+            if wanted.is_some_and(|wanted| record.len() != wanted) || record.len() < 2 {
+                let (found, needed) = (record.len().saturating_sub(1), wanted.map_or(1, |wanted| wanted - 1));
+                let problem = format!("element {} ({name}) has {found} nodes where {needed} are needed", record[0]);
+                return Err(place.error(problem, "Correct the element or its TYPE"));
+            }
+            let (number, nodes) = (record[0], record[1..].to_vec());
+            record.clear();
+            self.draft.add_element(DraftElement { number, kind, nodes, material: None, place: place.clone() })?;
+            if let Some(set) = &set {
+                self.sets.elements.add(set, number);
+            }
+        }
+        Ok(())
+    }
+
+    fn property(&mut self, card: &Card) -> Result<()> {
+        match self.materials.last_mut() {
+            Some(material) => material.read(card),
+            None => {
+                let problem = format!("*{} stands before any *MATERIAL", card.keyword);
+                Err(card.place.error(problem, "Write *MATERIAL, NAME=... above it"))
+            }
+        }
+    }
+
+    fn section(&mut self, card: &Card) -> Result<()> {
+        if card.has("COMPOSITE") {
+            return Err(card.place.error("composite sections are not computed", "Give the matrices of the model"));
+        }
+        let (set, material) = (card.required("ELSET")?.to_uppercase(), card.required("MATERIAL")?.to_uppercase());
+        self.sections.push(Section { set, material, place: card.place.clone() });
+        Ok(())
+    }
+
+    fn finish(mut self, temperature: Option<f64>) -> Result<Deck> {
+        self.assign_materials()?;
+        let materials: Vec<Material> = if self.materials.len() == 1 || !self.sections.is_empty() {
+            self.materials.iter().map(|material| material.at(temperature)).collect::<Result<_>>()?
+        } else {
+            Vec::new()
+        };
+        self.sets.into_node_sets(&mut self.draft)?;
+        for (name, count) in core::mem::take(&mut self.left_out) {
+            self.draft.notes.push(format!("{count} elements {name} are no solids: left out, their sets kept"));
+        }
+        for name in self.near.keys() {
+            let full = name.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+            self.draft.warnings.push(format!(
+                "{name} is integrated fully here{}: frequencies come out higher than with reduced integration",
+                if name == full { String::new() } else { format!(", as {full}") }
+            ));
+        }
+        if !self.skipped.is_empty() {
+            let skipped = self.skipped.iter().map(|(keyword, (_, line))| format!("*{keyword} (line {line})"));
+            let skipped: Vec<String> = skipped.collect();
+            self.draft.notes.push(format!("skipped, without effect on stiffness and mass: {}", skipped.join(", ")));
+        }
+        self.held.sort();
+        self.held.dedup();
+        Ok(Deck { draft: self.draft, materials, held: self.held })
+    }
+
+    /// Give every element the material of its section.
+    fn assign_materials(&mut self) -> Result<()> {
+        for section in core::mem::take(&mut self.sections) {
+            let Section { set, material, place } = &section;
+            let Some(index) = self.materials.iter().position(|known| known.is_named(material)) else {
+                let names: Vec<&str> = self.materials.iter().map(|known| known.name()).collect();
+                let problem = format!("the section names material `{material}`, which is not defined");
+                return Err(place.error(problem, format!("Materials of the file: {}", names.join(", "))));
+            };
+            for number in self.sets.elements.members(set, place, &self.draft)? {
+                let Some(element) = self.draft.element(number) else { continue };
+                if element.material.is_some_and(|other| other != index) {
+                    let problem = format!("element {number} has a second section, with another material");
+                    return Err(place.error(problem, "Give every element one section"));
+                }
+                element.material = Some(index);
+            }
+            self.sections.push(section);
+        }
+        if self.sections.is_empty() && self.materials.len() == 1 {
+            self.draft.notes.push(format!(
+                "there is no *SOLID SECTION: material `{}` is taken for all elements",
+                self.materials[0].name()
+            ));
+            self.draft.elements.iter_mut().for_each(|element| element.material = Some(0));
+        }
+        Ok(())
+    }
+}
+
+/// Count something of which one is read, and refuse the second.
+fn count(counter: &mut usize, card: &Card, what: &str) -> Result<()> {
+    *counter += 1;
+    if *counter == 1 {
+        return Ok(());
+    }
+    let problem = format!("a second {what}: only one is read");
+    Err(card
+        .place
+        .error(problem, "Merge the parts into one mesh, or write the input file without parts and assemblies"))
+}
+
+/// A number of a node or an element.
+fn label(text: &str, line: &DataLine, what: &str) -> Result<u64> {
+    text.parse::<u64>()
+        .ok()
+        .filter(|&number| number > 0)
+        .ok_or_else(|| line.place.error(format!("`{text}` is not {what} (a whole number from 1)"), "Correct the line"))
+}

@@ -1,0 +1,145 @@
+//! Node and element sets: numbers, ranges and other sets, resolved when everything is known.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::super::draft::Draft;
+use super::super::source::Place;
+use super::lines::Card;
+use crate::Result;
+
+/// Name without the instance in front of it: `PART-1-1.TIP` is `TIP`.
+pub(super) fn local_name(name: &str) -> &str {
+    name.rsplit_once('.').map_or(name, |(_, local)| local).trim_matches('"')
+}
+
+#[derive(Debug)]
+enum Member {
+    Number(u64),
+    /// A number written in a set of its own, which must exist.
+    Written(u64, Place),
+    /// First, last, increment; what does not exist in between is not missed.
+    Range(u64, u64, u64),
+    Set(String, Place),
+}
+
+/// Sets of one kind by name, in upper case.
+#[derive(Debug, Default)]
+pub(super) struct Family {
+    sets: BTreeMap<String, Vec<Member>>,
+}
+
+/// Node sets and element sets.
+#[derive(Debug, Default)]
+pub(super) struct Sets {
+    pub nodes: Family,
+    pub elements: Family,
+}
+
+impl Family {
+    /// A member that is defined on the spot.
+    pub fn add(&mut self, set: &str, number: u64) {
+        self.entry(set).push(Member::Number(number));
+    }
+
+    fn entry(&mut self, set: &str) -> &mut Vec<Member> {
+        let name = local_name(set).to_uppercase();
+        self.sets.entry(name).or_default()
+    }
+
+    /// Data of `*NSET` or `*ELSET`.
+    pub fn read(&mut self, card: &Card, set: &str) -> Result<()> {
+        let mut members = Vec::new();
+        if let Some(elements) = card.parameter("ELSET")?.filter(|_| card.keyword == "NSET") {
+            let problem = format!("node set `{set}` is made of the elements of `{elements}`");
+            let remedy = "Leave it out: every element set is also a set of its nodes";
+            return Err(card.place.error(problem, remedy));
+        }
+        for line in &card.data {
+            if card.has("GENERATE") {
+                let values: Option<Vec<u64>> = line.values().map(|text| text.parse().ok()).collect();
+                let (first, last, step) = match values.as_deref() {
+                    Some(&[first, last]) => (first, last, 1),
+                    Some(&[first, last, step]) => (first, last, step),
+                    _ => (0, 0, 0),
+                };
+                if first == 0 || last < first || step == 0 {
+                    let problem = format!("`{}` is not FIRST, LAST, INCREMENT", line.text);
+                    return Err(line.place.error(problem, "Give whole numbers with LAST ≥ FIRST ≥ 1, INCREMENT ≥ 1"));
+                }
+                members.push(Member::Range(first, last, step));
+                continue;
+            }
+            for text in line.values().filter(|text| !text.is_empty()) {
+                members.push(match text.parse() {
+                    Ok(number) => Member::Written(number, line.place.clone()),
+                    Err(_) => Member::Set(local_name(text).to_uppercase(), line.place.clone()),
+                });
+            }
+        }
+        self.entry(set).extend(members);
+        Ok(())
+    }
+
+    /// Numbers of the members of a set that exist.
+    pub fn members(&self, set: &str, place: &Place, draft: &Draft) -> Result<BTreeSet<u64>> {
+        let every: Vec<u64> = draft.elements.iter().map(|element| element.number).collect();
+        self.resolve(local_name(set), place, &every, &|number| !draft.nodes_of(number).is_empty())
+    }
+
+    fn resolve(&self, set: &str, place: &Place, every: &[u64], exists: &dyn Fn(u64) -> bool) -> Result<BTreeSet<u64>> {
+        let (mut found, mut seen) = (BTreeSet::new(), BTreeSet::new());
+        let mut open = vec![(set.to_owned(), place.clone())];
+        while let Some((name, place)) = open.pop() {
+            if !seen.insert(name.clone()) {
+                continue;
+            }
+            let Some(members) = self.sets.get(&name) else {
+                let names: Vec<&str> = self.sets.keys().take(20).map(String::as_str).collect();
+                let problem = format!("set `{name}` is not defined");
+                return Err(place.error(problem, format!("Sets of its kind in the file: {}", names.join(", "))));
+            };
+            for member in members {
+                match member {
+                    Member::Number(number) => _ = found.insert(*number),
+                    Member::Written(number, place) => {
+                        if !exists(*number) {
+                            let problem = format!("set `{name}` names {number}, which is not defined");
+                            return Err(place.error(problem, "Correct the set, or export the mesh again, complete"));
+                        }
+                        found.insert(*number);
+                    }
+                    Member::Range(first, last, step) => {
+                        let inside = |number: &&u64| {
+                            (*first..=*last).contains(number) && (*number - first).is_multiple_of(*step)
+                        };
+                        found.extend(every.iter().filter(inside));
+                    }
+                    Member::Set(other, place) => open.push((other.clone(), place.clone())),
+                }
+            }
+        }
+        Ok(found)
+    }
+}
+
+impl Sets {
+    /// Every node set, and every element set as the set of its nodes.
+    pub fn into_node_sets(self, draft: &mut Draft) -> Result<()> {
+        let nowhere = Place { file: "".into(), line: 0 };
+        let mut node_sets = BTreeMap::new();
+        for name in self.elements.sets.keys() {
+            let members = self.elements.members(name, &nowhere, draft)?;
+            let nodes: BTreeSet<u64> = members.iter().flat_map(|&number| draft.nodes_of(number)).copied().collect();
+            node_sets.insert(name.clone(), nodes);
+        }
+        for name in self.nodes.sets.keys() {
+            let members = self.nodes.resolve(name, &nowhere, &draft.numbers, &|number| draft.has_node(number))?;
+            if node_sets.get(name).is_some_and(|others| *others != members) {
+                draft.notes.push(format!("`{name}` is a node set and an element set: the node set is taken"));
+            }
+            node_sets.insert(name.clone(), members);
+        }
+        draft.node_sets = node_sets;
+        Ok(())
+    }
+}

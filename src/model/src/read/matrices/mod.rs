@@ -1,0 +1,338 @@
+//! Models from the matrices of another code: K, M and a table of nodes.
+//!
+//! | format | told by | dofs of a row |
+//! |---|---|---|
+//! | Matrix Market `coordinate`, `real`, `symmetric` or `general` | `%%MatrixMarket` | 3·node + component, nodes in the order of the table |
+//! | CalculiX `*FREQUENCY, SOLVER=MATRIXSTORAGE` (`.sti`, `.mas`) | `.dof` beside it | `node.component` per line of the `.dof` file |
+//! | Abaqus `*MATRIX OUTPUT, FORMAT=MATRIX INPUT` | five values a line | node and component stand in the line |
+//! | Abaqus `FORMAT=COORDINATE` | three values a line | as Matrix Market |
+//!
+//! One triangle or both may be given. Dofs of clamped nodes may be missing.
+
+mod formats;
+mod node_table;
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use faer::Mat;
+
+use formats::{Labels, RawMatrix, read_matrix};
+use node_table::{NodeTable, read_nodes};
+
+use super::entries::{Entries, symmetric_pair};
+use super::source::{about, open_file};
+use super::{Imported, Units};
+use crate::Result;
+use crate::fe_model::FeModel;
+use crate::sparse::SparseMatrix;
+
+/// The files of a model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MatrixFiles {
+    /// K.
+    pub stiffness: PathBuf,
+    /// M.
+    pub mass: PathBuf,
+    /// Nodes: a table `node,x,y,z[,sets]`, or a mesh file whose nodes and sets are taken.
+    pub nodes: PathBuf,
+    /// CalculiX's list of dofs, where it does not lie beside K with the extension `.dof`.
+    pub dofs: Option<PathBuf>,
+    /// Units of matrices and coordinates.
+    pub units: Units,
+    /// Sets of nodes whose dofs the matrices leave out, for formats whose rows name no nodes.
+    pub left_out: Vec<String>,
+}
+
+/// Read a model from matrices.
+///
+/// # Errors
+/// [`Error::File`](crate::Error::File); [`Error::Read`](crate::Error::Read) with file and line, and for matrices that do not fit each other or the
+/// nodes, are not symmetric, or hold a mass that is not positive.
+pub fn read_matrices(files: &MatrixFiles) -> Result<Imported> {
+    let table = read_nodes(&files.nodes, files.units)?;
+    let dofs = dof_file(files)?;
+    let rows = Rows::new(files, &table)?;
+    let stiffness = located(&files.stiffness, dofs.as_deref(), &rows)?;
+    let mass = located(&files.mass, dofs.as_deref(), &rows)?;
+    let mut notes = table.notes;
+    let order = 3 * table.positions.len();
+    let (stiffness, mut held) = mirrored(&files.stiffness, stiffness, order, files.units.matrix())?;
+    let (mass, _) = mirrored(&files.mass, mass, order, files.units.matrix())?;
+    let (mut stiffness, mass) = symmetric_pair(order, stiffness, mass);
+    release(&mut stiffness, &mut held);
+    let absent = absent_nodes(files, &table.numbers, &stiffness)?;
+    check_mass(files, &table.numbers, &mass, &absent)?;
+    if !absent.is_empty() {
+        notes.push(format!("{} nodes have no dofs in the matrices: they are clamped", absent.len()));
+    }
+    let mut warnings = Vec::new();
+    if absent.is_empty() {
+        warnings.extend(rigid_motion_warning(&table.positions, &stiffness));
+    }
+    let names = [&files.stiffness, &files.mass].map(|path| path.file_name().unwrap_or_default().to_string_lossy());
+    Ok(Imported {
+        model: FeModel {
+            nodes: table.positions,
+            sets: table.sets,
+            stiffness,
+            mass,
+            mesh: None,
+            origin: format!("Matrices {} and {}", names[0], names[1]),
+        },
+        node_numbers: table.numbers,
+        materials: Vec::new(),
+        absent,
+        held: Vec::new(),
+        notes,
+        warnings,
+    })
+}
+
+/// CalculiX's `node.component` of each row.
+fn dof_file(files: &MatrixFiles) -> Result<Option<Vec<(u64, u64)>>> {
+    let beside = files.stiffness.with_extension("dof");
+    let path = match &files.dofs {
+        Some(path) => path.clone(),
+        None if files.stiffness.extension().is_some_and(|extension| extension == "sti") => beside,
+        None => return Ok(None),
+    };
+    formats::read_dofs(&path, &open_file(&path)?).map(Some)
+}
+
+/// What row a dof has.
+struct Rows<'a> {
+    table: &'a NodeTable,
+    index: HashMap<u64, usize>,
+    /// Nodes without those left out, in the order of the table.
+    kept: Vec<usize>,
+    files: &'a MatrixFiles,
+}
+
+impl<'a> Rows<'a> {
+    fn new(files: &'a MatrixFiles, table: &'a NodeTable) -> Result<Self> {
+        let index = table.numbers.iter().enumerate().map(|(index, &number)| (number, index)).collect();
+        let mut left_out = vec![false; table.numbers.len()];
+        for name in &files.left_out {
+            // A set that does not exist is reported where it is to be clamped.
+            let nodes = table.sets.get(name).map_or(&[][..], Vec::as_slice);
+            nodes.iter().for_each(|&node| left_out[node] = true);
+        }
+        let kept = (0..table.numbers.len()).filter(|&node| !left_out[node]).collect();
+        Ok(Self { table, index, kept, files })
+    }
+
+    fn dof(&self, path: &Path, node: u64, component: u64) -> Result<usize> {
+        let component =
+            usize::try_from(component).ok().filter(|component| (1..=3).contains(component)).ok_or_else(|| {
+                let problem = format!("node {node} has degree of freedom {component}");
+                about(
+                    path,
+                    problem,
+                    "Solid models with displacements 1, 2, 3 only: no rotations, no pressure or temperature",
+                )
+            })?;
+        let index = self.index.get(&node).ok_or_else(|| {
+            let problem = format!("node {node} is not in {}", self.files.nodes.display());
+            about(path, problem, "Give a node table of the same model")
+        })?;
+        Ok(3 * index + component - 1)
+    }
+
+    /// Dofs of the rows of a matrix whose rows are only counted.
+    fn counted(&self, path: &Path, order: usize) -> Result<Vec<usize>> {
+        let (all, kept) = (self.table.numbers.len(), self.kept.len());
+        let nodes: Vec<usize> = if order == 3 * all {
+            (0..all).collect()
+        } else if order == 3 * kept {
+            self.kept.clone()
+        } else {
+            let problem = format!(
+                "{order} rows, but {} have 3·{all} = {} degrees of freedom{}",
+                self.files.nodes.display(),
+                3 * all,
+                if kept < all {
+                    format!(" and 3·{kept} = {} without the clamped nodes", 3 * kept)
+                } else {
+                    String::new()
+                }
+            );
+            let remedy =
+                "Give matrices of all nodes, or of all that --clamp-set does not name, in the order of the node table";
+            return Err(about(path, problem, remedy));
+        };
+        Ok(nodes.iter().flat_map(|node| (0..3).map(move |component| 3 * node + component)).collect())
+    }
+}
+
+/// Entries of a matrix file by dofs of all nodes.
+fn located(path: &Path, dofs: Option<&[(u64, u64)]>, rows: &Rows<'_>) -> Result<Entries> {
+    let RawMatrix { entries, labels } = read_matrix(path, &open_file(path)?)?;
+    let dof_of = match (labels, dofs) {
+        (Labels::Named(labels), _) => {
+            labels.iter().map(|&(node, component)| rows.dof(path, node, component)).collect::<Result<Vec<_>>>()?
+        }
+        (Labels::Counted(order), Some(dofs)) => {
+            if order > dofs.len() {
+                let problem = format!("{order} rows, but the list of dofs has {}", dofs.len());
+                return Err(about(path, problem, "Give the .dof file of the same run: --dofs"));
+            }
+            dofs.iter().map(|&(node, component)| rows.dof(path, node, component)).collect::<Result<Vec<_>>>()?
+        }
+        (Labels::Counted(order), None) => rows.counted(path, order)?,
+    };
+    let items = entries.items.into_iter().map(|(i, j, value)| (dof_of[i], dof_of[j], value)).collect();
+    Ok(Entries { items })
+}
+
+/// A diagonal as large as this stands for a dof that Abaqus holds.
+const HELD: f64 = 1e35;
+/// Largest difference of entries beside the diagonal from their mirror images, as a share of the larger diagonal.
+const ASYMMETRY: f64 = 1e-8;
+
+/// Both triangles from one or from both, scaled; and the dofs that are held by a huge diagonal.
+fn mirrored(path: &Path, entries: Entries, order: usize, scale: f64) -> Result<(Entries, Vec<usize>)> {
+    let below = entries.items.iter().any(|&(i, j, value)| i > j && value != 0.0);
+    let above = entries.items.iter().any(|&(i, j, value)| i < j && value != 0.0);
+    let held =
+        entries.items.iter().filter(|&&(i, j, value)| i == j && value.abs() > HELD).map(|entry| entry.0).collect();
+    let mut items: Vec<_> = entries.items.iter().map(|&(i, j, value)| (i, j, scale * value)).collect();
+    if !(below && above) {
+        items.extend(entries.items.iter().filter(|(i, j, _)| i != j).map(|&(i, j, value)| (j, i, scale * value)));
+        return Ok((Entries { items }, held));
+    }
+    // Sorted, an entry and its mirror image are found in turn.
+    let mut sums: HashMap<(usize, usize), f64> = HashMap::with_capacity(items.len());
+    items.iter().for_each(|&(i, j, value)| *sums.entry((i, j)).or_default() += value);
+    let diagonal = |i: usize| sums.get(&(i, i)).copied().unwrap_or(0.0).abs();
+    let mut worst: Option<(f64, usize, usize)> = None;
+    for (&(i, j), value) in &sums {
+        let difference = (value - sums.get(&(j, i)).copied().unwrap_or(0.0)).abs();
+        let share = difference / diagonal(i).max(diagonal(j)).max(f64::MIN_POSITIVE);
+        if share > ASYMMETRY && worst.is_none_or(|(most, ..)| share > most) {
+            worst = Some((share, i, j));
+        }
+    }
+    if let Some((share, i, j)) = worst {
+        let problem = format!(
+            "it is not symmetric: entries ({}, {}) and its mirror image differ by {share:.1e} of the diagonal ({order} rows)",
+            i + 1,
+            j + 1
+        );
+        return Err(about(
+            path,
+            problem,
+            "Gyroscopic, follower-load and friction terms must be off when it is written",
+        ));
+    }
+    let halves = |(i, j): (usize, usize), value: f64| [(i, j, 0.5 * value), (j, i, 0.5 * value)];
+    let mut items: Vec<_> = sums.into_iter().flat_map(|(place, value)| halves(place, value)).collect();
+    // The order of a hash table must not show in the sums.
+    items.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)));
+    Ok((Entries { items }, held))
+}
+
+/// Take held dofs out of the stiffness: they are absent.
+fn release(stiffness: &mut SparseMatrix, held: &mut Vec<usize>) {
+    held.sort_unstable();
+    held.dedup();
+    let is_held = |dof: usize, held: &[usize]| held.binary_search(&dof).is_ok();
+    for column in 0..stiffness.order() {
+        for entry in stiffness.pattern.starts[column]..stiffness.pattern.starts[column + 1] {
+            if is_held(column, held) || is_held(stiffness.pattern.rows[entry], held) {
+                stiffness.values[entry] = 0.0;
+            }
+        }
+    }
+}
+
+fn diagonal(matrix: &SparseMatrix, dof: usize) -> f64 {
+    let range = matrix.pattern.starts[dof]..matrix.pattern.starts[dof + 1];
+    let found = matrix.pattern.rows[range.clone()].binary_search(&dof);
+    found.map_or(0.0, |offset| matrix.values[range.start + offset])
+}
+
+/// Nodes without any stiffness. A node that lacks one or two directions is refused.
+fn absent_nodes(files: &MatrixFiles, numbers: &[u64], stiffness: &SparseMatrix) -> Result<Vec<usize>> {
+    let mut absent = Vec::new();
+    for (node, number) in numbers.iter().enumerate() {
+        let present = [0, 1, 2].map(|component| diagonal(stiffness, 3 * node + component) != 0.0);
+        if !present.contains(&true) {
+            absent.push(node);
+        } else if present.contains(&false) {
+            let problem = format!("node {number} has stiffness in some directions only (x, y, z: {present:?})");
+            let remedy = "Write the matrices without boundary conditions, and clamp whole nodes with --clamp-set";
+            return Err(about(&files.stiffness, problem, remedy));
+        }
+        if let Some(component) = (0..3).find(|component| diagonal(stiffness, 3 * node + component) < 0.0) {
+            let problem = format!("the diagonal of node {number}, direction {}, is negative", component + 1);
+            return Err(about(
+                &files.stiffness,
+                problem,
+                "A stiffness is positive: are K and M exchanged, or the signs?",
+            ));
+        }
+    }
+    if absent.len() == numbers.len() {
+        return Err(about(&files.stiffness, "it has no entry", "Write the matrix again"));
+    }
+    Ok(absent)
+}
+
+fn check_mass(files: &MatrixFiles, numbers: &[u64], mass: &SparseMatrix, absent: &[usize]) -> Result<()> {
+    for (node, number) in numbers.iter().enumerate() {
+        if absent.binary_search(&node).is_ok() {
+            continue;
+        }
+        if let Some(component) = (0..3).find(|component| diagonal(mass, 3 * node + component) <= 0.0) {
+            let value = diagonal(mass, 3 * node + component);
+            let problem = format!("node {number}, direction {}, has mass {value:e} on the diagonal", component + 1);
+            return Err(about(
+                &files.mass,
+                problem,
+                "Every node that moves needs mass: is it the matrix of the same model?",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// A rigid motion that strains the model this much, as a share of Σ|K||u|, is more than round-off of printed numbers.
+const STRAINED: f64 = 1e-5;
+
+/// Rigid motions must not strain a model without boundary: translations if it is tied to the ground, rotations also if the
+/// nodes do not belong to the rows.
+fn rigid_motion_warning(nodes: &[[f64; 3]], stiffness: &SparseMatrix) -> Option<String> {
+    let motion = |kind: usize, [x, y, z]: [f64; 3]| match kind {
+        0 => [1.0, 0.0, 0.0],
+        1 => [0.0, 1.0, 0.0],
+        2 => [0.0, 0.0, 1.0],
+        3 => [0.0, -z, y],
+        4 => [z, 0.0, -x],
+        _ => [-y, x, 0.0],
+    };
+    let centre: [f64; 3] = core::array::from_fn(|i| nodes.iter().map(|node| node[i]).sum::<f64>() / nodes.len() as f64);
+    let about_centre = |node: [f64; 3]| core::array::from_fn(|i| node[i] - centre[i]);
+    let motions = Mat::from_fn(3 * nodes.len(), 6, |dof, kind| motion(kind, about_centre(nodes[dof / 3]))[dof % 3]);
+    let forces = stiffness.times(motions.as_ref());
+    let absolute = SparseMatrix {
+        pattern: std::sync::Arc::clone(&stiffness.pattern),
+        values: stiffness.values.iter().map(|value| value.abs()).collect(),
+    };
+    let sizes = absolute.times(Mat::from_fn(motions.nrows(), 6, |i, k| motions[(i, k)].abs()).as_ref());
+    let share = |kind: usize| forces.col(kind).norm_max() / sizes.col(kind).norm_max().max(f64::MIN_POSITIVE);
+    let most = |kinds: [usize; 3]| kinds.map(share).into_iter().fold(0.0, f64::max);
+    let (translations, rotations) = (most([0, 1, 2]), most([3, 4, 5]));
+    if translations > STRAINED {
+        return Some(format!(
+            "moving the whole model strains it (by {translations:.1e}): springs to the ground, or dofs left out? The matrices \
+             are used as they are"
+        ));
+    }
+    (rotations > STRAINED).then(|| {
+        format!(
+            "turning the whole model strains it (by {rotations:.1e}), moving it does not: are the nodes in the order of the \
+             rows, and with the right coordinates?"
+        )
+    })
+}

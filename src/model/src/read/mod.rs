@@ -1,0 +1,165 @@
+//! Users' own models: meshes (CalculiX/Abaqus `.inp`, Gmsh `.msh` 4.1) and matrices with a node table.
+//!
+//! Everything becomes a [`FeModel`] in SI units. Nothing is dropped in silence: what changes stiffness or mass and is not
+//! computed is refused with file, line and remedy; what is harmless is skipped and listed in [`Imported::notes`].
+
+mod assembling;
+mod contact_nodes;
+mod draft;
+mod entries;
+mod gmsh;
+mod inp;
+mod matrices;
+mod plausibility;
+mod source;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::fe_model::FeModel;
+use crate::material::Material;
+use crate::progress::Listener;
+use crate::{Error, Result};
+
+pub use contact_nodes::{CHOSEN, ContactChoice, TAKEN_WHOLE, choose_contact_nodes};
+pub use matrices::{MatrixFiles, read_matrices};
+pub use plausibility::{Plausibility, bounding_box, plausibility, total_mass};
+
+use draft::Draft;
+
+/// Units of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Units {
+    /// m, kg, s, N, Pa.
+    #[default]
+    Si,
+    /// mm, t, s, N, MPa.
+    MillimetreTonneSecond,
+}
+
+impl Units {
+    /// Metres per unit of length.
+    pub fn length(self) -> f64 {
+        match self {
+            Self::Si => 1.0,
+            Self::MillimetreTonneSecond => 1e-3,
+        }
+    }
+
+    /// Factor to N/m of a stiffness, and to kg of a mass: both are 1000 for N/mm and t.
+    fn matrix(self) -> f64 {
+        match self {
+            Self::Si => 1.0,
+            Self::MillimetreTonneSecond => 1e3,
+        }
+    }
+
+    fn si(self, material: &Material) -> Material {
+        let (stress, density) = match self {
+            Self::Si => (1.0, 1.0),
+            Self::MillimetreTonneSecond => (1e6, 1e12),
+        };
+        Material {
+            young_modulus: stress * material.young_modulus,
+            density: density * material.density,
+            ..material.clone()
+        }
+    }
+}
+
+/// How a mesh file is to be understood.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct MeshOptions {
+    /// Units of coordinates and material in the file.
+    pub units: Units,
+    /// Material of all elements (SI), instead of those in the file.
+    pub material: Option<Material>,
+    /// Temperature at which tables of properties are read, in the file's unit.
+    pub temperature: Option<f64>,
+}
+
+/// A model as read, with what a user should know of it.
+#[derive(Debug, Clone)]
+pub struct Imported {
+    /// The model, SI units.
+    pub model: FeModel,
+    /// Number of each node in the file.
+    pub node_numbers: Vec<u64>,
+    /// Materials of the elements, SI; empty for matrices.
+    pub materials: Vec<Material>,
+    /// Nodes that the matrices leave out: they are clamped. Ascending indices.
+    pub absent: Vec<usize>,
+    /// What the file itself holds fixed (`*BOUNDARY`), as written: a hint, not applied.
+    pub held: Vec<String>,
+    /// Harmless: what was skipped, left out or taken for granted.
+    pub notes: Vec<String>,
+    /// What makes results differ from those of the file's own code.
+    pub warnings: Vec<String>,
+}
+
+/// Formats of meshes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum MeshFormat {
+    Input,
+    Gmsh,
+}
+
+fn mesh_format(path: &Path, bytes: &[u8]) -> Result<MeshFormat> {
+    let extension = path.extension().map(|extension| extension.to_ascii_lowercase()).unwrap_or_default();
+    match extension.to_str() {
+        Some("inp" | "dat") => Ok(MeshFormat::Input),
+        Some("msh") => Ok(MeshFormat::Gmsh),
+        _ if bytes.starts_with(b"$MeshFormat") => Ok(MeshFormat::Gmsh),
+        _ if bytes.starts_with(b"*") => Ok(MeshFormat::Input),
+        _ => {
+            let remedy = "Give a CalculiX or Abaqus input file (.inp) or a Gmsh mesh (.msh, version 4.1)";
+            Err(source::about(path, "it is neither an input file nor a Gmsh mesh", remedy))
+        }
+    }
+}
+
+/// Read a mesh and assemble its matrices.
+///
+/// # Errors
+/// [`Error::File`] for a file that cannot be read, [`Error::Read`] with file and line for anything in it that is not
+/// understood or not supported, [`Error::Invalid`] for a missing material, and those of assembly with the file's numbers.
+pub fn read_mesh(path: &Path, options: &MeshOptions, listener: Listener<'_>) -> Result<Imported> {
+    let bytes = source::open_file(path)?;
+    let read = mesh_file(path, &bytes, options.temperature, &source::open_file)?;
+    assembling::assembled(path, read, options, listener)
+}
+
+/// A mesh of either format before assembly.
+struct MeshFile {
+    draft: Draft,
+    materials: Vec<Material>,
+    held: Vec<String>,
+}
+
+fn mesh_file(path: &Path, bytes: &[u8], temperature: Option<f64>, open: source::Open<'_>) -> Result<MeshFile> {
+    match mesh_format(path, bytes)? {
+        MeshFormat::Input => {
+            let inp::Deck { draft, materials, held } = inp::read(path, bytes, temperature, open)?;
+            Ok(MeshFile { draft, materials, held })
+        }
+        MeshFormat::Gmsh => Ok(MeshFile { draft: gmsh::read(path, bytes)?, materials: Vec::new(), held: Vec::new() }),
+    }
+}
+
+/// Read a mesh that is in memory, without assembling it: nodes, elements and sets, in the file's unit of length. Other
+/// files that it includes are not opened.
+///
+/// # Errors
+/// [`Error::Read`] with file and line.
+pub fn parse_mesh(name: &str, bytes: &[u8]) -> Result<crate::Mesh> {
+    let path = Path::new(name);
+    let none = |path: &Path| Err(Error::File { path: path.to_path_buf(), source: std::io::ErrorKind::NotFound.into() });
+    let (numbered, _, _) = mesh_file(path, bytes, Some(0.0), &none)?.draft.into_mesh(1.0, name)?;
+    Ok(numbered.mesh)
+}
+
+/// Sets with as many nodes as they have, for messages.
+pub fn set_counts(sets: &BTreeMap<String, Vec<usize>>) -> String {
+    let counts: Vec<String> = sets.iter().map(|(name, nodes)| format!("{name} ({})", nodes.len())).collect();
+    counts.join(", ")
+}

@@ -1,0 +1,64 @@
+//! Files as lines that know where they came from.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::{Error, Result};
+
+/// A line of a file, for messages.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Place {
+    /// Name of the file, as it was asked for.
+    pub file: Arc<str>,
+    /// Line, from 1.
+    pub line: usize,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}:{}", self.file, self.line)
+    }
+}
+
+impl Place {
+    /// What is wrong here, and what to do about it.
+    pub fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
+        Error::Read { place: self.to_string(), problem: problem.into(), remedy: remedy.into() }
+    }
+}
+
+/// How files are opened; tests keep theirs in memory.
+pub(super) type Open<'a> = &'a dyn Fn(&Path) -> Result<Vec<u8>>;
+
+/// Read a whole file from disk.
+pub(super) fn open_file(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).map_err(|source| Error::File { path: path.to_path_buf(), source })
+}
+
+/// An error about a whole file.
+pub(super) fn about(path: &Path, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
+    Error::Read { place: path.display().to_string(), problem: problem.into(), remedy: remedy.into() }
+}
+
+/// Text of a file. Comments and headings come in many encodings, so that bytes which are no UTF-8 are replaced; where they
+/// matter (names of sets) the replacement character shows in every message.
+pub(super) fn text_of(bytes: &[u8]) -> String {
+    let without_mark = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    String::from_utf8_lossy(without_mark).into_owned()
+}
+
+/// A path written in a file: relative to the directory of that file.
+pub(super) fn beside(file: &Path, written: &str) -> PathBuf {
+    // Files written on Windows keep their separators.
+    let written = written.trim().trim_matches(['"', '\'']).replace('\\', "/");
+    file.parent().unwrap_or(Path::new("")).join(written)
+}
+
+/// A finite number, Fortran's exponent letter D included.
+pub(super) fn number(text: &str) -> Option<f64> {
+    let text = text.trim();
+    let value = text.parse::<f64>().ok().or_else(|| text.replace(['d', 'D'], "e").parse().ok())?;
+    // `inf` and `nan` are words that the standard library reads.
+    value.is_finite().then_some(value)
+}

@@ -1,0 +1,101 @@
+//! The reduced-order model of the stage's bladed disk.
+
+use super::sector::{SectorMesh, SectorOptions, sector_mesh};
+use crate::cyclic::{CyclicBoundary, CyclicOptions, CyclicReduction, ModeSelection, PairingReport, reduce_cyclic};
+use crate::material::Material;
+use crate::progress::{Listener, Stage, report};
+use crate::reduce::ContactPoint;
+use crate::{FeModel, Result};
+
+/// What to build.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StageOptions {
+    /// Shape and mesh of a sector.
+    pub sector: SectorOptions,
+    /// Material.
+    pub material: Material,
+    /// Contact nodes in the middle of the tip's thickness, edges included (at least 2).
+    pub contact_nodes: usize,
+    /// Fixed-interface modes.
+    pub modes: ModeSelection,
+    /// Modes per nodal diameter that are compared with the full model.
+    pub checked_modes: usize,
+    /// Modal damping ratio proposed with the model.
+    pub damping_ratio: f64,
+}
+
+impl Default for StageOptions {
+    fn default() -> Self {
+        Self {
+            sector: SectorOptions::default(),
+            material: Material::titanium(),
+            contact_nodes: 3,
+            modes: ModeSelection::Families(25),
+            checked_modes: 10,
+            damping_ratio: 0.005,
+        }
+    }
+}
+
+impl StageOptions {
+    /// A coarse sector and few modes, for trials.
+    pub fn coarse() -> Self {
+        Self { sector: SectorOptions::coarse(), modes: ModeSelection::Families(8), checked_modes: 5, ..Self::default() }
+    }
+}
+
+/// One sector's model with everything its reduction needs.
+#[derive(Debug, Clone)]
+pub struct StageModel {
+    /// Assembled, mesh included.
+    pub model: FeModel,
+    /// Nodes of the bore.
+    pub clamped: Vec<usize>,
+    /// Contact nodes, leading to trailing edge.
+    pub contact: Vec<ContactPoint>,
+    /// Pairs of nodes of the faces.
+    pub boundary: CyclicBoundary,
+    /// How well they fit.
+    pub pairing: PairingReport,
+}
+
+/// Faces of a generated sector fit to round-off; this (m) only tells nodes apart.
+const TOLERANCE: f64 = 1e-9;
+
+/// Mesh and assemble a sector of the stage.
+///
+/// # Errors
+/// Those of [`sector_mesh`] and of the assembly; more contact nodes than the tip has.
+pub fn stage_model(options: &StageOptions, listener: Listener<'_>) -> Result<StageModel> {
+    report(listener, Stage::Mesh, 0, 1);
+    let sector: SectorMesh = sector_mesh(&options.sector)?;
+    let contact = sector.contact_points(options.contact_nodes)?;
+    report(listener, Stage::Mesh, 1, 1);
+    let origin = format!("Parametric stage of {} sectors, bore clamped", options.sector.geometry.sectors);
+    let model = FeModel::assembled(sector.mesh, &options.material, origin, listener)?;
+    let [low, high] = ["CYCLIC_LOW", "CYCLIC_HIGH"].map(|face| model.set(face));
+    let (boundary, pairing) =
+        CyclicBoundary::pair(&model.nodes, low?, high?, options.sector.geometry.sectors, TOLERANCE)?;
+    let clamped = model.set("CLAMPED")?.to_vec();
+    Ok(StageModel { model, clamped, contact, boundary, pairing })
+}
+
+/// Build, reduce and check the bladed disk of the stage.
+///
+/// # Errors
+/// Those of [`stage_model`] and [`reduce_cyclic`].
+pub fn reduce_stage(options: &StageOptions, listener: Listener<'_>) -> Result<CyclicReduction> {
+    let start = std::time::Instant::now();
+    let stage = stage_model(options, listener)?;
+    let assembly = start.elapsed().as_secs_f64();
+    let cyclic = CyclicOptions {
+        name: "stage".into(),
+        modes: options.modes,
+        checked_modes: options.checked_modes,
+        damping_ratio: options.damping_ratio,
+    };
+    let StageModel { model, clamped, contact, boundary, .. } = &stage;
+    let mut reduction = reduce_cyclic(model, clamped, contact, boundary, &cyclic, listener)?;
+    reduction.timings.assembly += assembly;
+    Ok(reduction)
+}

@@ -1,0 +1,198 @@
+//! Mesh of one sector: triangles in the meridional plane, swept along the circumference into prisms.
+//!
+//! A lattice of columns (along the axis), rows (along the radius) and layers (around) has cells where the sector has
+//! material; each is cut into two prisms by a diagonal of its meridional face. The blade takes the middle layers, so that it
+//! grows out of the disk node for node, and the lowest and highest layer end in faces that differ by one pitch exactly. The
+//! cut between sectors follows the camber line at the rim and is flat at the bore.
+
+use super::geometry::SectorGeometry;
+use super::lattice::Lattice;
+use crate::element::ElementKind;
+use crate::mesh::Mesh;
+use crate::reduce::ContactPoint;
+use crate::rotor37::spread_contact;
+use crate::{Error, Result};
+
+/// Numbers of elements' edges in the parts of a sector.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SectorCounts {
+    /// Columns of the blade, leading to trailing edge; even, so that there is a middle.
+    pub chord: usize,
+    /// Rows of the blade, root to tip; the first one is the fillet, where there is one.
+    pub span: usize,
+    /// Layers through the blade.
+    pub thickness: usize,
+    /// Layers on either side of the blade, in the disk.
+    pub side: usize,
+    /// Columns of the rim before and behind the blade.
+    pub overhang: usize,
+    /// Rows of the rim.
+    pub rim: usize,
+    /// Columns and rows of the web; as many columns as those of the rim, less an even number.
+    pub web: [usize; 2],
+    /// Columns of the bore's ring on either side of the web, and rows.
+    pub bore: [usize; 2],
+}
+
+impl Default for SectorCounts {
+    /// 6,734 nodes with quadratic prisms.
+    fn default() -> Self {
+        Self { chord: 12, span: 18, thickness: 1, side: 2, overhang: 2, rim: 3, web: [6, 12], bore: [2, 2] }
+    }
+}
+
+/// What to build. Lengths and numbers of elements are independent of each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SectorOptions {
+    /// Shape.
+    pub geometry: SectorGeometry,
+    /// Numbers of elements.
+    pub counts: SectorCounts,
+    /// Penta15 or penta6.
+    pub kind: ElementKind,
+}
+
+impl Default for SectorOptions {
+    /// Quadratic prisms with the paper's number of nodes.
+    fn default() -> Self {
+        Self { geometry: SectorGeometry::default(), counts: SectorCounts::default(), kind: ElementKind::Penta15 }
+    }
+}
+
+impl SectorOptions {
+    /// The paper's number of elements, 3,764 quadratic prisms, with the 13,205 nodes they have.
+    pub fn with_3764_elements() -> Self {
+        let counts = SectorCounts {
+            chord: 14,
+            span: 28,
+            thickness: 1,
+            side: 2,
+            overhang: 2,
+            rim: 5,
+            web: [8, 19],
+            bore: [3, 4],
+        };
+        Self { counts, ..Self::default() }
+    }
+
+    /// 294 nodes, for quick tests and trials: a rim that ends with the blade, a bore no wider than the
+    /// web, no fillet.
+    pub fn coarse() -> Self {
+        let counts =
+            SectorCounts { chord: 2, span: 3, thickness: 1, side: 1, overhang: 0, rim: 1, web: [2, 2], bore: [0, 1] };
+        let mut geometry = SectorGeometry::default();
+        geometry.blade.fillet = 0.0;
+        geometry.disk.rim_axial = geometry.blade.root_axial;
+        geometry.disk.bore_width = geometry.disk.web_thickness[0];
+        Self { geometry, counts, kind: ElementKind::Penta15 }
+    }
+}
+
+impl SectorOptions {
+    /// Check that numbers fit each other and the shape.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the number or length.
+    pub fn validate(&self) -> Result<()> {
+        self.geometry.validate()?;
+        let (counts, geometry) = (&self.counts, &self.geometry);
+        let SectorCounts { chord, span, thickness, side, overhang, rim, web, bore } = *counts;
+        let named = [("chord", chord), ("span", span), ("thickness", thickness), ("side", side), ("rim", rim)];
+        let named = named.into_iter().chain([("web columns", web[0]), ("web rows", web[1]), ("bore rows", bore[1])]);
+        for (name, count) in named {
+            if count == 0 {
+                return refuse(name, "it is zero".to_owned(), "Give at least one element");
+            }
+        }
+        if chord % 2 != 0 {
+            return refuse("chord", format!("{chord} is odd"), "Give an even number: contact is sought at mid-chord");
+        }
+        let columns = counts.columns();
+        if web[0] % 2 != 0 || web[0] + 2 * bore[0] > columns {
+            let problem = format!("web {} and bore 2 x {} beside {columns} columns of the rim", web[0], bore[0]);
+            return refuse("web and bore", problem, "Give an even number for the web, in all no more than for the rim");
+        }
+        let kind_fits = match self.kind {
+            ElementKind::Penta15 => true,
+            // The middle of the thickness must be between two layers, since edges have no nodes in their middle.
+            ElementKind::Penta6 => thickness % 2 == 0,
+            _ => false,
+        };
+        if !kind_fits {
+            let problem = format!("{} with {thickness} layers through the blade", self.kind.calculix_name());
+            return refuse("element kind", problem, "Choose penta15, or penta6 with an even number of layers");
+        }
+        let (disk, blade) = (&geometry.disk, &geometry.blade);
+        let longer = [disk.rim_axial[0] < blade.root_axial[0], disk.rim_axial[1] > blade.root_axial[1]];
+        if longer != [overhang > 0; 2] {
+            let problem = format!(
+                "{overhang} columns for a rim over {:?} m and a root over {:?} m",
+                disk.rim_axial, blade.root_axial
+            );
+            return refuse(
+                "overhang",
+                problem,
+                "Give columns if the rim is longer than the root at both ends, else none",
+            );
+        }
+        if (disk.bore_width > disk.web_thickness[0]) != (bore[0] > 0) {
+            let problem = format!("{} columns for {} m beside {} m", bore[0], disk.bore_width, disk.web_thickness[0]);
+            return refuse("bore", problem, "Give columns if the bore is wider than the web, else none");
+        }
+        Ok(())
+    }
+}
+
+fn refuse(count: &str, problem: String, remedy: &str) -> Result<()> {
+    Err(Error::invalid(format!("stage, number of elements `{count}`"), problem, remedy))
+}
+
+impl SectorCounts {
+    /// Columns of the rim.
+    pub(super) fn columns(&self) -> usize {
+        self.chord + 2 * self.overhang
+    }
+
+    /// Layers of the disk.
+    pub(super) fn layers(&self) -> usize {
+        self.thickness + 2 * self.side
+    }
+}
+
+/// A mesh of prisms and the line along which its tip may touch.
+#[derive(Debug, Clone)]
+pub struct SectorMesh {
+    /// Node sets `CLAMPED` (the bore; the root, where there is no disk), `TIP`, `CONTACT` (leading edge, mid-chord and
+    /// trailing edge at the middle of the tip's thickness), `BLADE`, `ROOT` (of the blade), and for a sector `CYCLIC_LOW` and
+    /// `CYCLIC_HIGH`, the latter turned by +2π/sectors.
+    pub mesh: Mesh,
+    /// Nodes in the middle of the tip's thickness, leading to trailing edge.
+    pub tip_line: Vec<usize>,
+}
+
+impl SectorMesh {
+    /// `count` contact nodes spread along [`tip_line`](Self::tip_line), named as those of [rotor 37](crate::rotor37::BladeMesh::contact_points).
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for fewer than two or more than the line has.
+    pub fn contact_points(&self, count: usize) -> Result<Vec<ContactPoint>> {
+        spread_contact(&self.tip_line, &vec![0.0; self.tip_line.len()], count)
+    }
+}
+
+/// Mesh of one sector of the bladed disk.
+///
+/// # Errors
+/// [`Error::Invalid`] for lengths that make no bladed disk, and numbers of elements that do not fit each other or the shape.
+pub fn sector_mesh(options: &SectorOptions) -> Result<SectorMesh> {
+    Lattice::new(options)?.mesh(0)
+}
+
+/// Mesh of the blade alone, clamped at its root.
+///
+/// # Errors
+/// Those of [`sector_mesh`].
+pub fn blade_mesh(options: &SectorOptions) -> Result<SectorMesh> {
+    let lattice = Lattice::new(options)?;
+    lattice.mesh(lattice.hub)
+}

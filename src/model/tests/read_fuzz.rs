@@ -1,0 +1,114 @@
+//! Damaged files: every beginning and many changed bytes of small ones end in a model or in an error, never in a panic.
+
+use std::path::Path;
+
+use tiprub_model::progress::silent;
+use tiprub_model::read::{MatrixFiles, Units, parse_mesh, read_matrices};
+use tiprub_model::{Error, FeModel, Material};
+
+fn data(name: &str) -> Vec<u8> {
+    std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/models").join(name)).unwrap()
+}
+
+/// A generator of numbers that need not be good, only many and always the same (Marsaglia's xorshift).
+struct Draws(u64);
+
+impl Draws {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        usize::try_from(self.0 % limit as u64).unwrap()
+    }
+}
+
+const MESHES: [&str; 3] = ["bar.inp", "bar.msh", "bar_binary.msh"];
+
+/// Read, and assemble what could be read; whether it could.
+fn tried(name: &str, bytes: &[u8]) -> bool {
+    match parse_mesh(name, bytes) {
+        Ok(mesh) => {
+            let _ = FeModel::assembled(mesh, &Material::steel(), String::new(), &silent);
+            true
+        }
+        Err(Error::Read { place, problem, remedy }) => {
+            assert!(place.contains(name) && !problem.is_empty() && !remedy.is_empty(), "{place}: {problem}. {remedy}");
+            false
+        }
+        Err(other) => panic!("{name}: {other}"),
+    }
+}
+
+#[test]
+fn beginnings_of_mesh_files() {
+    for name in MESHES {
+        let whole = data(name);
+        assert!(tried(name, &whole));
+        let read = (0..whole.len()).filter(|&length| tried(name, &whole[..length])).count();
+        // Only what stands behind the elements can be missed.
+        assert!(read < whole.len() / 2, "{name}: {read} of {} beginnings are read", whole.len());
+    }
+}
+
+#[test]
+fn changed_bytes_of_mesh_files() {
+    let mut draws = Draws(0x9e37_79b9_7f4a_7c15);
+    for name in MESHES {
+        let whole = data(name);
+        let mut refused = 0;
+        for _ in 0..4000 {
+            let mut bytes = whole.clone();
+            for _ in 0..=draws.below(3) {
+                let place = draws.below(bytes.len());
+                bytes[place] = match draws.below(4) {
+                    0 => b"0123456789,.*-e\n $"[draws.below(18)],
+                    1 => bytes[place] ^ (1 << draws.below(8)),
+                    2 => 0xff,
+                    _ => u8::try_from(draws.below(256)).unwrap(),
+                };
+            }
+            refused += usize::from(!tried(name, &bytes));
+        }
+        assert!(refused > 500, "{name}: only {refused} of 4000 damaged files are refused");
+    }
+}
+
+#[test]
+fn damaged_matrices_and_node_tables() {
+    let root = tempfile::tempdir().unwrap();
+    let written = |name: &str, bytes: &[u8]| std::fs::write(root.path().join(name), bytes).unwrap();
+    let table = "node,x,y,z,sets\n1,0.1,0,0,A\n2,0.2,0,0,A B\n";
+    let entries = "1 1 5\n2 2 5\n3 3 5\n4 4 5\n5 5 5\n6 6 5\n4 1 -1\n";
+    let market = format!("%%MatrixMarket matrix coordinate real symmetric\n6 6 7\n{entries}");
+    let named = "1,1,1,1,5\n1,2,1,2,5\n1,3,1,3,5\n2,1,2,1,5\n2,2,2,2,5\n2,3,2,3,5\n1,1,2,1,-1\n";
+    let files = MatrixFiles {
+        stiffness: root.path().join("k"),
+        mass: root.path().join("m"),
+        nodes: root.path().join("nodes.csv"),
+        dofs: None,
+        units: Units::Si,
+        left_out: vec!["B".into()],
+    };
+    let mut draws = Draws(0x1234_5678_9abc_def1);
+    let mut refused = 0;
+    for (stiffness, mass) in [(market.as_str(), entries), (named, market.as_str())] {
+        let all = [("k", stiffness), ("m", mass), ("nodes.csv", table)];
+        all.iter().for_each(|(name, text)| written(name, text.as_bytes()));
+        read_matrices(&files).unwrap();
+        for (name, text) in all {
+            for round in 0..text.len() + 300 {
+                let mut bytes = text.as_bytes().to_vec();
+                if round < text.len() {
+                    bytes.truncate(round);
+                } else {
+                    let place = draws.below(bytes.len());
+                    bytes[place] = b"0123456789,.-e\n %x"[draws.below(18)];
+                }
+                written(name, &bytes);
+                refused += usize::from(read_matrices(&files).is_err());
+            }
+            written(name, text.as_bytes());
+        }
+    }
+    assert!(refused > 500, "{refused}");
+}
