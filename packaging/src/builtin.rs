@@ -2,13 +2,16 @@
 
 use tiprub_core::Rom;
 use tiprub_model::{
-    CasingOptions, FeModel, Material, Mesh, Reduction, Rotor37Options,
-    casing::{CASING37, ContactRings, Contour, Flange, RingCounts, RingGeometry, Support},
-    cyclic::{CyclicBoundary, CyclicOptions, CyclicReduction, ModeSelection, reduce_cyclic},
+    CasingOptions, Mesh, Rotor37Options,
+    casing::CASING37,
+    cyclic::{CyclicOptions, CyclicReduction, ModeSelection, reduce_cyclic},
     progress::{Listener, Progress, Stage},
-    reduce_ring,
     rotor37::DESIGN_SPEED,
-    stage::{GAP, SECTORS, SectorOptions, TIP_AXIAL, TIP_RADIUS, sector_mesh},
+    stage::{
+        StageOptions,
+        casing::{StageCasingOptions, reduce_stage_casing},
+        stage_model,
+    },
 };
 
 use crate::{Failure, Result, console::Console, reduction, rom_cache::RomCache};
@@ -25,12 +28,6 @@ pub const STAGE_CASING_COARSE: &str = "stage-casing-coarse";
 /// Every name that [`rom`] knows.
 pub const NAMES: [&str; 7] =
     ["rotor37", "rotor37-spin", CASING37, STAGE, STAGE_CASING, STAGE_COARSE, STAGE_CASING_COARSE];
-
-/// The paper's damping of disk and casing.
-const DISK_DAMPING: f64 = 0.005;
-const CASING_DAMPING: f64 = 0.03;
-/// How far faces of neighbouring sectors may be apart, relative to the radius of the tips.
-const PAIRING: f64 = 1e-6;
 
 /// The model of this name; `None` where there is no such model.
 pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom>> {
@@ -52,33 +49,31 @@ pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom
         STAGE => disk(false),
         STAGE_COARSE => disk(true),
         STAGE_CASING | STAGE_CASING_COARSE => {
-            let options = ring_around_the_stage(name == STAGE_CASING_COARSE);
-            cache.get(name, &options, console, &|| Ok(casing(&options, console)?.rom))
+            let options = stage_casing(name == STAGE_CASING_COARSE);
+            let title = "Reducing the casing of the stage";
+            let reduce = || with_progress(title, console, &|listener| reduce_stage_casing(&options, listener));
+            cache.get(name, &options, console, &|| Ok(reduce()?.rom))
         }
         _ => return None,
     })
 }
 
-/// What the bladed disk of the stage is made of.
+/// The bladed disk of the stage, of the paper's size or coarse.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiskModel {
-    sector: SectorOptions,
-    material: Material,
-    contact_nodes: usize,
-    options: CyclicOptions,
+    name: &'static str,
+    options: StageOptions,
 }
 
 impl DiskModel {
-    /// Of the paper's size, or coarse.
+    /// What is reduced; nothing is done yet.
     pub fn new(coarse: bool) -> Self {
-        let options = CyclicOptions {
-            name: if coarse { STAGE_COARSE } else { STAGE }.to_owned(),
-            modes: ModeSelection::Families(if coarse { 12 } else { 25 }),
-            checked_modes: if coarse { 6 } else { 10 },
-            damping_ratio: DISK_DAMPING,
-        };
-        let sector = if coarse { SectorOptions::coarse() } else { SectorOptions::default() };
-        Self { sector, material: Material::titanium(), contact_nodes: 3, options }
+        if coarse {
+            let options = StageOptions { modes: ModeSelection::Families(12), ..StageOptions::coarse() };
+            Self { name: STAGE_COARSE, options }
+        } else {
+            Self { name: STAGE, options: StageOptions::default() }
+        }
     }
 
     /// The reduction, and the mesh of one sector.
@@ -87,50 +82,29 @@ impl DiskModel {
     /// Never with the options that ship.
     pub fn reduce(&self, console: &Console) -> Result<(CyclicReduction, Mesh)> {
         with_progress("Reducing the bladed disk", console, &|listener| {
-            let sector = sector_mesh(&self.sector)?;
-            let contact = sector.contact_points(self.contact_nodes)?;
-            let [low, high] = [sector.mesh.set("CYCLIC_LOW")?, sector.mesh.set("CYCLIC_HIGH")?];
-            let (boundary, _) = CyclicBoundary::pair(&sector.mesh.nodes, low, high, SECTORS, PAIRING * TIP_RADIUS)?;
-            let clamped = sector.mesh.set("CLAMPED")?.to_vec();
-            let (nodes, elements) = (sector.mesh.nodes.len(), sector.mesh.elements.len());
-            let origin = format!(
-                "Parametric stage of {SECTORS} sectors, each {nodes} nodes and {elements} quadratic prisms, {}, held at the bore",
-                self.material.name
-            );
-            let mesh = sector.mesh.clone();
-            let model = FeModel::assembled(sector.mesh, &self.material, origin, listener)?;
-            Ok((reduce_cyclic(&model, &clamped, &contact, &boundary, &self.options, listener)?, mesh))
+            let stage = stage_model(&self.options, listener)?;
+            let options = CyclicOptions {
+                name: self.name.to_owned(),
+                modes: self.options.modes,
+                checked_modes: self.options.checked_modes,
+                damping_ratio: self.options.damping_ratio,
+            };
+            let (contact, boundary) = (&stage.contact, &stage.boundary);
+            let reduction = reduce_cyclic(&stage.model, &stage.clamped, contact, boundary, &options, listener)?;
+            let mesh = stage.model.mesh.map(|(mesh, _)| mesh).unwrap_or_default();
+            Ok((reduction, mesh))
         })
     }
 }
 
-/// A flanged ring with the casing's clearance around the stage.
-fn ring_around_the_stage(coarse: bool) -> CasingOptions {
-    let margin = 0.03;
-    let [low, high] = [TIP_AXIAL[0] - margin, TIP_AXIAL[1] + margin];
-    let radius = TIP_RADIUS + GAP;
-    let contour = Contour::new(&[[low, radius], [high, radius]]).expect("two points by growing z");
-    let flanges = [Flange { thickness: 6e-3, height: 15e-3 }, Flange { thickness: 5e-3, height: 10e-3 }].map(Some);
-    let counts = if coarse {
-        RingCounts { around: 56, through: 1, along: 4, flange: 1 }
+/// The casing of the stage, of the paper's size or with an eighth of the elements around.
+fn stage_casing(coarse: bool) -> StageCasingOptions {
+    let defaults = StageCasingOptions::default();
+    if coarse {
+        StageCasingOptions { name: STAGE_CASING_COARSE.into(), around: defaults.around / 8, ..defaults }
     } else {
-        RingCounts { around: 112, through: 1, along: 12, flange: 2 }
-    };
-    CasingOptions {
-        name: if coarse { STAGE_CASING_COARSE } else { STAGE_CASING }.to_owned(),
-        geometry: RingGeometry { contour, thickness: 4e-3, flanges },
-        counts,
-        material: Material::steel(),
-        support: Support::Low,
-        rings: ContactRings { around: 28, along: 3, axial: [TIP_AXIAL[0] - 4e-3, TIP_AXIAL[1] + 4e-3] },
-        patches: [0, 0],
-        damping_ratio: CASING_DAMPING,
-        ..CasingOptions::default()
+        StageCasingOptions { name: STAGE_CASING.into(), ..defaults }
     }
-}
-
-fn casing(options: &CasingOptions, console: &Console) -> Result<Reduction> {
-    with_progress("Reducing the casing of the stage", console, &|listener| reduce_ring(options, listener))
 }
 
 const STAGES: [Stage; 6] =
