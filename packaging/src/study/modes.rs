@@ -44,7 +44,7 @@ pub fn folded(order: usize, sectors: usize) -> (usize, bool) {
 /// The engine order that meets a mode of a nodal diameter at the nearest frequency, among those up to `most`.
 fn nearest_order(number: usize, frequency: f64, turns: f64, sectors: usize) -> Option<usize> {
     let most = (1.5 * frequency / turns).ceil().max(2.0 * sectors as f64);
-    let orders = (1..).take_while(|order| f64::from(*order) <= most).map(|order| order as usize);
+    let orders = (1_u32..).take_while(|order| f64::from(*order) <= most).map(|order| order as usize);
     let distance = |order: &usize| (frequency - *order as f64 * turns).abs();
     orders.filter(|order| folded(*order, sectors).0 == number).min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
