@@ -2,6 +2,8 @@
 
 use core::f64::consts::TAU;
 
+use tiprub_core::rom::MAX_SECTORS;
+
 use super::CyclicBoundary;
 use crate::{Error, Result};
 
@@ -64,6 +66,15 @@ impl CyclicBoundary {
             swapped,
         };
         Ok((Self { pairs: chosen.pairs, sectors }, report))
+    }
+
+    /// Check that it fits a model of `count` nodes; [`Self::pair`] gives one that does.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for fewer than two sectors, for nodes that do not exist or appear twice.
+    pub fn validate(&self, count: usize) -> Result<()> {
+        check_sectors(self.sectors)?;
+        check_indices(count, self.pairs.iter().flatten())
     }
 
     /// Angle from one sector to the next (rad).
@@ -146,12 +157,33 @@ fn nearest(nodes: &[[f64; 3]], by_height: &[usize], point: [f64; 3]) -> (usize, 
     best
 }
 
-fn check_faces(nodes: &[[f64; 3]], low: &[usize], high: &[usize], sectors: usize, tolerance: f64) -> Result<()> {
-    let refuse = |problem: String, remedy: &str| Err(Error::invalid("cyclic faces", problem, remedy));
-    if !(2..=tiprub_core::rom::MAX_SECTORS).contains(&sectors) {
-        let problem = format!("{sectors} sectors, 2 to {} are possible", tiprub_core::rom::MAX_SECTORS);
-        return refuse(problem, "Give the number of sectors of the whole wheel");
+fn refuse(problem: String, remedy: &str) -> Result<()> {
+    Err(Error::invalid("cyclic faces", problem, remedy))
+}
+
+fn check_sectors(sectors: usize) -> Result<()> {
+    if (2..=MAX_SECTORS).contains(&sectors) {
+        return Ok(());
     }
+    let problem = format!("{sectors} sectors, 2 to {MAX_SECTORS} are possible");
+    refuse(problem, "Give the number of sectors of the whole wheel")
+}
+
+fn check_indices<'a>(count: usize, face_nodes: impl Iterator<Item = &'a usize>) -> Result<()> {
+    let mut seen = vec![false; count];
+    for &node in face_nodes {
+        let Some(flag) = seen.get_mut(node) else {
+            return refuse(format!("node {} does not exist; there are {count}", node + 1), "Name nodes of the mesh");
+        };
+        if core::mem::replace(flag, true) {
+            return refuse(format!("node {} appears twice", node + 1), "A node belongs to one of the two faces, once");
+        }
+    }
+    Ok(())
+}
+
+fn check_faces(nodes: &[[f64; 3]], low: &[usize], high: &[usize], sectors: usize, tolerance: f64) -> Result<()> {
+    check_sectors(sectors)?;
     if !(tolerance.is_finite() && tolerance >= 0.0) {
         return refuse(format!("tolerance {tolerance} m"), "Give a finite distance, for example 1e-6 of the radius");
     }
@@ -159,22 +191,16 @@ fn check_faces(nodes: &[[f64; 3]], low: &[usize], high: &[usize], sectors: usize
         let problem = format!("{} nodes on one face and {} on the other", low.len(), high.len());
         return refuse(problem, "Mesh both faces alike and give all nodes of each, edges included");
     }
+    check_indices(nodes.len(), low.iter().chain(high))?;
     for &node in low.iter().chain(high) {
-        let Some(&[x, y, z]) = nodes.get(node) else {
-            let problem = format!("node {} does not exist; there are {}", node + 1, nodes.len());
-            return refuse(problem, "Name nodes of the mesh");
-        };
+        let [x, y, z] = nodes[node];
+        if !(x.is_finite() && y.is_finite() && z.is_finite()) {
+            return refuse(format!("coordinates of node {} are not finite", node + 1), "Correct the mesh");
+        }
         let radius = x.hypot(y);
         if radius <= 1e-9 * radius.hypot(z).max(tolerance) {
             let problem = format!("node {} lies on the z axis, where it belongs to every sector", node + 1);
             return refuse(problem, "Give the structure a bore, however small");
-        }
-    }
-    let mut seen = vec![false; nodes.len()];
-    for &node in low.iter().chain(high) {
-        if core::mem::replace(&mut seen[node], true) {
-            let problem = format!("node {} appears twice", node + 1);
-            return refuse(problem, "A node belongs to one of the two faces, once");
         }
     }
     Ok(())

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::sector::{Parts, Sector};
 use crate::Result;
+use crate::eigen::positive_factor;
 use crate::progress::{Listener, Stage, report};
 use crate::sparse::{Factor, SparseMatrix, principal_pair};
 
@@ -43,8 +44,10 @@ impl<'a> Condensed<'a> {
             None
         } else {
             let keep: Vec<usize> = (0..sector.parts.interior).collect();
-            let inner = principal_pair(&shifted, &shifted, &keep).0;
-            Some(inner.factor(
+            let (inner, mass) = principal_pair(&shifted, &sector.mass, &keep);
+            Some(positive_factor(
+                &inner,
+                &mass,
                 "K_II (stiffness of the sector with faces and contact nodes held)",
                 "A part of the sector hangs on neither face nor clamp: check the mesh for loose parts",
             )?)

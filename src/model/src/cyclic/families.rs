@@ -1,16 +1,21 @@
 //! Which fixed-interface modes are kept: whole families, as far as they can be told apart by frequency.
 //!
-//! The frequencies with the contact held are computed beyond the number asked for. Of all of them, from all
-//! nodal diameters together, those below the lowest of the highest computed ones are complete. Cuts between neighbours in
-//! this list are tried, as many modes from the bottom as there are nodal diameters times η, give or take a fifth; the widest relative gap is
-//! taken when it is at least [`SMALLEST_GAP`]. Above and below of a gap stand whole families at every nodal diameter: a
-//! family that veers with another crosses it at none.
+//! A family of the blades (first bending, first torsion, ...) has nearly the same frequency at every nodal diameter. When
+//! it is kept at some and left out at others, the wave of one blade moving alone cannot be put together any more, and the
+//! reduced blades are coupled where the real ones are not. So the modes are cut at one frequency for all nodal diameters,
+//! in a gap between families. A family of the disk rises steeply with the nodal diameter and is kept as far as
+//! it lies below; the number of modes then differs between nodal diameters.
+//!
+//! The frequencies with the contact held are computed beyond the number η asked for. The list of all of them, from all
+//! nodal diameters together, is complete up to the lowest of the highest computed ones. Cuts between neighbours in this
+//! list are compared that keep η modes per nodal diameter on average, give or take a fifth. The widest relative gap is taken
+//! when it is at least [`SMALLEST_GAP`].
 
 use super::ModeSelection;
 use super::component::Wanted;
 
 /// Gaps narrower than this share of their frequency tell no families apart.
-pub const SMALLEST_GAP: f64 = 0.01;
+pub const SMALLEST_GAP: f64 = 0.005;
 
 /// The kept numbers of modes, and what to tell about them.
 #[derive(Debug, Clone, PartialEq)]

@@ -35,8 +35,10 @@ pub struct CyclicBoundary {
 /// Which fixed-interface modes are kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ModeSelection {
-    /// About this many per nodal diameter: whole families, cut in a gap of frequency that they leave at every nodal
-    /// diameter, so that a family is there for all of them or for none.
+    /// About this many per nodal diameter: those below a gap of frequency that all nodal diameters leave, so that a
+    /// family of the blades, whose frequency hardly changes with the nodal diameter, is there for all of them or for none.
+    /// A family of the disk, whose frequency rises steeply, is there as far as it lies below. The same number at every
+    /// nodal diameter, and a note in [`CyclicReduction::notes`], where there is no such gap.
     Families(usize),
     /// Exactly this many at every nodal diameter.
     Count(usize),

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use faer::{Mat, c64};
+use faer::{Mat, MatRef, c64};
 use nalgebra::{Complex, DMatrix};
 use tiprub_core::Rom;
 use tiprub_core::rom::{ContactNode, Frame, Harmonic, RomChecks, RomExtras};
@@ -11,11 +11,11 @@ use super::component::Component;
 use super::condense::Condensed;
 use super::operator::Operator;
 use super::sector::Sector;
-use super::{CyclicBoundary, CyclicOptions, CyclicReduction, NodalDiameter};
+use super::{CyclicBoundary, CyclicOptions, CyclicReduction, ModeSelection, NodalDiameter};
 use super::{families, lanczos, parallel, quality};
 use crate::progress::{Listener, Stage, report};
 use crate::reduce::{ContactPoint, Timings, check_nodes, timed};
-use crate::{FeModel, Result};
+use crate::{Error, FeModel, Result};
 
 /// What is found of one nodal diameter in parallel.
 struct Found {
@@ -48,6 +48,8 @@ pub fn reduce_cyclic(
     faer::set_global_parallelism(faer::Par::Seq);
     let mut timings = Timings::default();
     let sector = timed(&mut timings.assembly, || {
+        check_options(contact, options)?;
+        boundary.validate(model.nodes.len())?;
         check_nodes(&model.nodes, clamped, contact, Frame::Cylindrical)?;
         Sector::new(model, clamped, contact, boundary)
     })?;
@@ -81,6 +83,23 @@ pub fn reduce_cyclic(
     Ok(result)
 }
 
+fn check_options(contact: &[ContactPoint], options: &CyclicOptions) -> Result<()> {
+    if contact.is_empty() {
+        return Err(Error::invalid(
+            "contact nodes",
+            "there are none",
+            "Name at least one, for example at the blade's tip",
+        ));
+    }
+    match options.modes {
+        ModeSelection::UpTo(limit) if !(limit.is_finite() && limit > 0.0) => {
+            let problem = format!("modes up to {limit} Hz");
+            Err(Error::invalid("fixed-interface modes", problem, "Give a finite frequency above 0"))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Everything about one nodal diameter that needs the full model.
 fn find(
     at_rest: &Condensed<'_>,
@@ -94,8 +113,11 @@ fn find(
     let held = Operator::new(at_rest, number, sectors, shifted.is_some())?;
     let moving = shifted.map(|condensed| Operator::new(condensed, number, sectors, false)).transpose()?;
     let full = moving.as_ref().unwrap_or(&held);
-    let modes = lanczos::lowest_modes(full, parts.order(), options.checked_modes.min(parts.order()))?;
-    let shapes = node_shapes(full, &modes.shapes, nodes);
+    let checked = options.checked_modes.min(parts.order());
+    // The first mode in any case: it tells a mechanism from a structure.
+    let mut modes = lanczos::lowest_modes(full, parts.order(), checked.max(1))?;
+    modes.eigenvalues.truncate(checked);
+    let shapes = node_shapes(full, modes.shapes.get(.., ..checked), nodes);
     step();
     let between = Instant::now();
     let wanted = families::wanted(options.modes, parts.order() - parts.contact);
@@ -106,9 +128,9 @@ fn find(
 }
 
 /// Displacements (x, y, z) of every node of the model; zero where clamped.
-fn node_shapes(operator: &Operator<'_>, shapes: &Mat<c64>, nodes: usize) -> Vec<Vec<[Complex<f64>; 3]>> {
+fn node_shapes(operator: &Operator<'_>, shapes: MatRef<'_, c64>, nodes: usize) -> Vec<Vec<[Complex<f64>; 3]>> {
     let sector = operator.condensed.sector;
-    let displacements = operator.expand(shapes.as_ref());
+    let displacements = operator.expand(shapes);
     let width = shapes.ncols();
     let shape = |k: usize| {
         let mut shape = vec![[Complex::new(0.0, 0.0); 3]; nodes];

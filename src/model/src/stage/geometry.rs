@@ -182,7 +182,10 @@ impl SectorGeometry {
             return Err(Error::invalid("stage, number of sectors", format!("{}", self.sectors), remedy));
         }
         let rim_inside = disk.hub_radius - disk.rim_thickness;
-        rising("radii", &[0.0, disk.bore_radius, disk.bore_radius + disk.bore_height, rim_inside, disk.hub_radius])?;
+        rising(
+            "radii (0, bore, end of its ring, inside of the rim, hub)",
+            &[0.0, disk.bore_radius, disk.bore_radius + disk.bore_height, rim_inside, disk.hub_radius],
+        )?;
         rising("hub radius, end of the fillet, tip radius", &[disk.hub_radius, blade.tip_radius - blade.fillet])?;
         rising("axial positions of the tip's edges", &blade.tip_axial)?;
         rising("axial positions of the root's edges", &blade.root_axial)?;
@@ -202,7 +205,9 @@ impl SectorGeometry {
             "rim's high end",
             disk.rim_axial[1],
         )?;
-        not_above("0", 0.0, "fillet radius", blade.fillet)?;
+        if blade.fillet.is_nan() || blade.fillet < 0.0 {
+            return Err(Error::invalid("stage, fillet radius", format!("{} m is below 0", blade.fillet), REMEDY));
+        }
         for end in 0..2 {
             rising(
                 "thicknesses of the edges and of the blade",
