@@ -206,13 +206,11 @@ fn structure(page: &mut String, name: &str, rom: &Rom) {
     };
     let _ = writeln!(
         page,
-        "<h3>{}</h3>\n<p>{}</p>\n<p>{} sector{} of {} reduced coordinates each; contact nodes of a sector: {} \
+        "<h3>{}</h3>\n<p>{}</p>\n<p>{}; contact nodes of a sector: {} \
          (components {frame}); modal damping ratio proposed by the model: {}.</p>",
         text(name),
         text(&rom.origin),
-        rom.sectors,
-        if rom.sectors == 1 { "" } else { "s" },
-        rom.order(),
+        size(rom),
         text(&nodes),
         readable(rom.damping_ratio),
     );
@@ -245,6 +243,19 @@ fn extras(page: &mut String, rom: &Rom) {
     }
 }
 
+/// Sectors and reduced coordinates in words.
+fn size(rom: &Rom) -> String {
+    if rom.is_cyclic() {
+        let (sectors, largest, order) = (rom.sectors, rom.largest_nodal_diameter(), rom.total_order());
+        return format!("{sectors} coupled sectors, nodal diameters 0 to {largest}, {order} reduced coordinates in all");
+    }
+    let plural = if rom.sectors == 1 { "" } else { "s" };
+    format!("{} sector{plural} of {} reduced coordinates each", rom.sectors, rom.order())
+}
+
+/// Modes listed: coupled sectors may come with hundreds.
+const CHECKS_SHOWN: usize = 40;
+
 fn checks(page: &mut String, rom: &Rom) {
     let columns: Vec<(&str, &[f64])> = [
         ("Full model (Hz)", rom.checks.full_frequencies.as_slice()),
@@ -256,17 +267,24 @@ fn checks(page: &mut String, rom: &Rom) {
     .filter(|(_, values)| !values.is_empty())
     .collect();
     let modes = columns.iter().map(|(_, values)| values.len()).max().unwrap_or(0);
+    let numbers = &rom.checks.nodal_diameters;
     if modes == 0 {
         page.push_str("<p>The ROM came without checks of the reduction.</p>\n");
         return;
     }
     page.push_str("<table>\n<thead><tr><th class=\"number\">Mode</th>");
+    if !numbers.is_empty() {
+        page.push_str("<th class=\"number\">Nodal diameter</th>");
+    }
     for (heading, _) in &columns {
         let _ = write!(page, "<th class=\"number\">{heading}</th>");
     }
     page.push_str("</tr></thead>\n<tbody>\n");
-    for mode in 0..modes {
+    for mode in 0..modes.min(CHECKS_SHOWN) {
         let _ = write!(page, "<tr><td class=\"number\">{}</td>", mode + 1);
+        if let Some(number) = numbers.get(mode) {
+            let _ = write!(page, "<td class=\"number\">{number}</td>");
+        }
         for (_, values) in &columns {
             let value = values.get(mode).map_or_else(|| "-".into(), |value| significant(*value));
             let _ = write!(page, "<td class=\"number\">{value}</td>");
@@ -274,6 +292,9 @@ fn checks(page: &mut String, rom: &Rom) {
         page.push_str("</tr>\n");
     }
     page.push_str("</tbody>\n</table>\n");
+    if modes > CHECKS_SHOWN {
+        let _ = writeln!(page, "<p>{} more modes were checked; the ROM file lists them.</p>", modes - CHECKS_SHOWN);
+    }
 }
 
 /// Six significant digits, for reading.

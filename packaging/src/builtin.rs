@@ -1,15 +1,43 @@
 //! Models that ship with tiprub, by the name after `builtin:` in a scene; reduced when first asked for.
 
 use tiprub_core::Rom;
-use tiprub_model::{CasingOptions, Rotor37Options, casing::CASING37, rotor37::DESIGN_SPEED};
+use tiprub_model::{
+    CasingOptions, Mesh, Rotor37Options,
+    casing::CASING37,
+    cyclic::{CyclicOptions, CyclicReduction, ModeSelection, reduce_cyclic},
+    progress::{Listener, Progress, Stage},
+    rotor37::DESIGN_SPEED,
+    stage::{
+        StageOptions,
+        casing::{StageCasingOptions, reduce_stage_casing},
+        stage_model,
+    },
+};
 
-use crate::{Result, console::Console, reduction, rom_cache::RomCache};
+use crate::{Failure, Result, console::Console, reduction, rom_cache::RomCache};
+
+/// The bladed disk of the stage.
+pub const STAGE: &str = "stage";
+/// The casing of the stage.
+pub const STAGE_CASING: &str = "stage-casing";
+/// The same two on coarse meshes, for tests and first looks: shapes alike, frequencies some percent off.
+pub const STAGE_COARSE: &str = "stage-coarse";
+/// See [`STAGE_COARSE`].
+pub const STAGE_CASING_COARSE: &str = "stage-casing-coarse";
+
+/// Every name that [`rom`] knows.
+pub const NAMES: [&str; 7] =
+    ["rotor37", "rotor37-spin", CASING37, STAGE, STAGE_CASING, STAGE_COARSE, STAGE_CASING_COARSE];
 
 /// The model of this name; `None` where there is no such model.
 pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom>> {
     let blade = |spin| {
         let options = Rotor37Options { spin, ..Rotor37Options::default() };
         cache.get(name, &options, console, &|| Ok(reduction::rotor37(&options, console)?.rom))
+    };
+    let disk = |coarse| {
+        let model = DiskModel::new(coarse);
+        cache.get(name, &model, console, &|| Ok(model.reduce(console)?.0.rom))
     };
     Some(match name {
         "rotor37" => blade(None),
@@ -18,6 +46,88 @@ pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom
             let options = CasingOptions::default();
             cache.get(name, &options, console, &|| Ok(reduction::casing(&options, console)?.rom))
         }
+        STAGE => disk(false),
+        STAGE_COARSE => disk(true),
+        STAGE_CASING | STAGE_CASING_COARSE => {
+            let options = stage_casing(name == STAGE_CASING_COARSE);
+            let title = "Reducing the casing of the stage";
+            let reduce = || with_progress(title, console, &|listener| reduce_stage_casing(&options, listener));
+            cache.get(name, &options, console, &|| Ok(reduce()?.rom))
+        }
         _ => return None,
     })
+}
+
+/// The bladed disk of the stage, of the paper's size or coarse.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DiskModel {
+    name: &'static str,
+    options: StageOptions,
+}
+
+impl DiskModel {
+    /// What is reduced; nothing is done yet.
+    pub fn new(coarse: bool) -> Self {
+        if coarse {
+            let options = StageOptions { modes: ModeSelection::Families(12), ..StageOptions::coarse() };
+            Self { name: STAGE_COARSE, options }
+        } else {
+            Self { name: STAGE, options: StageOptions::default() }
+        }
+    }
+
+    /// The reduction, and the mesh of one sector.
+    ///
+    /// # Errors
+    /// Never with the options that ship.
+    pub fn reduce(&self, console: &Console) -> Result<(CyclicReduction, Mesh)> {
+        with_progress("Reducing the bladed disk", console, &|listener| {
+            let stage = stage_model(&self.options, listener)?;
+            let options = CyclicOptions {
+                name: self.name.to_owned(),
+                modes: self.options.modes,
+                checked_modes: self.options.checked_modes,
+                damping_ratio: self.options.damping_ratio,
+            };
+            let (contact, boundary) = (&stage.contact, &stage.boundary);
+            let reduction = reduce_cyclic(&stage.model, &stage.clamped, contact, boundary, &options, listener)?;
+            let mesh = stage.model.mesh.map(|(mesh, _)| mesh).unwrap_or_default();
+            Ok((reduction, mesh))
+        })
+    }
+}
+
+/// The casing of the stage, of the paper's size or with an eighth of the elements around.
+fn stage_casing(coarse: bool) -> StageCasingOptions {
+    let defaults = StageCasingOptions::default();
+    if coarse {
+        StageCasingOptions { name: STAGE_CASING_COARSE.into(), around: defaults.around / 8, ..defaults }
+    } else {
+        StageCasingOptions { name: STAGE_CASING.into(), ..defaults }
+    }
+}
+
+const STAGES: [Stage; 6] =
+    [Stage::Mesh, Stage::Assembly, Stage::FixedInterfaceModes, Stage::FullModes, Stage::ConstraintModes, Stage::Checks];
+
+fn with_progress<T>(
+    title: &str,
+    console: &Console,
+    reduce: &dyn Fn(Listener<'_>) -> tiprub_model::Result<T>,
+) -> Result<T> {
+    let task = console.task(title, Some(100 * STAGES.len() as u64));
+    let listener = |progress: Progress| {
+        let stage = STAGES.iter().position(|stage| *stage == progress.stage).unwrap_or(0);
+        task.now(&format!("{title}: {}", progress.stage));
+        task.at(percent(stage as f64 + progress.fraction));
+    };
+    reduce(&listener).map_err(|error| match error {
+        tiprub_model::Error::Invalid { what, problem, remedy } => Failure::new(what, problem, remedy),
+        other => Failure::from_below(title, other),
+    })
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=100 per stage")]
+fn percent(stages: f64) -> u64 {
+    (100.0 * stages.clamp(0.0, STAGES.len() as f64)) as u64
 }

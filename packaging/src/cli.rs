@@ -11,14 +11,15 @@ use crate::{casing_arguments::CasingArguments, file_arguments::FileArguments, ro
 #[command(
     name = "tiprub",
     version,
-    about = "Blade-tip/casing contact (rub) as an FMU: reduce, package, run, inspect, demo",
+    about = "Blade-tip/casing contact (rub) as an FMU: reduce, package, run, inspect, study, demo",
     long_about = "Marches the contact of a bladed disk (a reduced-order model) with its casing in time, rigid or \
                   flexible, and ships that as an FMU for any FMI 2.0 or FMI 3.0 importer.\n\nSI units everywhere (m, kg, s, N, rad).",
     after_help = "Examples:\n  tiprub demo\n  tiprub run builtin:rotor37 --csv rub.csv\n  \
                   tiprub package scene.toml -o out/\n\n\
                   Scenes that ship:\n  builtin:rotor37           rotor 37 in a rigid casing with two bumps\n  \
                   builtin:flexible-casing   in an elastic casing with heat, friction power per patch\n  \
-                  builtin:abradable         wearing the coating of a rigid casing\n\n\
+                  builtin:abradable         wearing the coating of a rigid casing\n  \
+                  builtin:stage             56 coupled blades in an oval elastic casing\n\n\
                   Exit codes: 0 done, 1 the work failed, 2 the command line is wrong."
 )]
 pub struct Cli {
@@ -72,6 +73,11 @@ pub enum Command {
                             tiprub inspect scene.toml --json\n  tiprub inspect builtin:flexible-casing"
     )]
     Inspect(InspectArguments),
+    /// Studies of the compressor stage that ships: pictures, numbers, and whether they show what they should.
+    #[command(after_help = "Examples:\n  tiprub study stage --quick\n  tiprub study convergence --out convergence\n  \
+                            tiprub study modes --speed 1500\n  tiprub study stage --speeds 400:1600:25 --out stage\n\n\
+                            DIR then holds index.html (opens offline), an SVG and a CSV per figure, and results.json.")]
+    Study(StudyArguments),
 }
 
 /// Arguments of `tiprub demo`.
@@ -185,6 +191,64 @@ pub struct InspectArguments {
     pub cache: CacheArguments,
 }
 
+/// Arguments of `tiprub study`.
+#[derive(Debug, Args)]
+pub struct StudyArguments {
+    /// What to study.
+    #[arg(value_name = "STUDY", value_enum)]
+    pub study: StudyChoice,
+    /// Directory for everything the study writes; made if missing [default: study-STUDY].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Coarse meshes and few runs: seconds instead of minutes, for a first look.
+    #[arg(long)]
+    pub quick: bool,
+    /// Of `modes`: speed of the engine orders (rad/s) [default: where an oval casing meets the first mode of nodal diameter
+    /// 2].
+    #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true)]
+    pub speed: Option<f64>,
+    /// Of `stage`: angular velocities (rad/s), from, to and how many [default: 0.5 to 1.5 times the one where an oval
+    /// casing meets the first mode of nodal diameter 2].
+    #[arg(long, value_name = "FROM:TO:COUNT", value_parser = speeds)]
+    pub speeds: Option<Speeds>,
+    /// Of `stage`: runs at the same time [default: one per processor].
+    #[arg(long, value_name = "N")]
+    pub threads: Option<std::num::NonZero<usize>>,
+    /// Where built-in models are kept.
+    #[command(flatten)]
+    pub cache: CacheArguments,
+}
+
+/// Studies by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum StudyChoice {
+    /// Frequency deviation and residual criterion of the reduced disk against the number of component modes.
+    Convergence,
+    /// Natural frequencies against nodal diameter with engine orders, and mode shapes.
+    Modes,
+    /// Blades against an oval flexible casing over a range of speeds.
+    Stage,
+}
+
+/// A range of angular velocities (rad/s).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Speeds {
+    /// First.
+    pub from: f64,
+    /// Last.
+    pub to: f64,
+    /// How many, ends included.
+    pub count: usize,
+}
+
+impl Speeds {
+    /// All of them, ascending.
+    pub fn values(&self) -> Vec<f64> {
+        let last = self.count.saturating_sub(1).max(1) as f64;
+        (0..self.count).map(|index| self.from + (self.to - self.from) * index as f64 / last).collect()
+    }
+}
+
 /// Whether built-in models are kept from one command to the next.
 #[derive(Debug, Clone, Default, Args)]
 pub struct CacheArguments {
@@ -262,6 +326,20 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+fn speeds(text: &str) -> Result<Speeds, String> {
+    let parts: Vec<&str> = text.split(':').collect();
+    let read = || match parts.as_slice() {
+        [from, to, count] => {
+            Some(Speeds { from: from.parse().ok()?, to: to.parse().ok()?, count: count.parse().ok()? })
+        }
+        _ => None,
+    };
+    let sound = |speeds: &Speeds| speeds.from > 0.0 && speeds.from < speeds.to && speeds.to.is_finite();
+    read().filter(|speeds| sound(speeds) && (2..=1000).contains(&speeds.count)).ok_or_else(|| {
+        "give growing positive angular velocities in rad/s and a count from 2 to 1000 as FROM:TO:COUNT, for example 400:1600:25".into()
+    })
+}
+
 fn assignment(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
@@ -328,6 +406,9 @@ mod tests {
             ("reduce casing --low-flange 5", "TxH"),
             ("reduce casing --contact-grid 24", "AROUNDxALONG"),
             ("reduce casing --contact-axial 0.1:0.1", "FROM:TO"),
+            ("study stage --speeds 100:50:4", "FROM:TO:COUNT"),
+            ("study stage --speeds 100:500", "FROM:TO:COUNT"),
+            ("study tip", "possible values: convergence, modes, stage"),
             ("reduce casing --support left", "possible values: low, high, both, free"),
         ] {
             let error = parse(line).unwrap_err();

@@ -9,11 +9,15 @@ use crate::{Failure, Result, builtin, console::Console, rom_cache::RomCache};
 /// The scene of the demo, as a user would write it.
 pub const ROTOR37_SCENE: &str = include_str!("../scenes/rotor37.toml");
 
+/// Coupled blades in an oval flexible casing.
+pub const STAGE_SCENE: &str = include_str!("../scenes/stage.toml");
+
 /// Scenes that ship with tiprub: what stands behind `builtin:`, and the text.
-pub const BUILTIN_SCENES: [(&str, &str); 3] = [
+pub const BUILTIN_SCENES: [(&str, &str); 4] = [
     ("rotor37", ROTOR37_SCENE),
     ("flexible-casing", include_str!("../scenes/flexible-casing.toml")),
     ("abradable", include_str!("../scenes/abradable.toml")),
+    ("stage", STAGE_SCENE),
 ];
 
 /// What names of embedded scenes and models begin with.
@@ -73,6 +77,19 @@ pub fn rotor37_scene_with(rom: Rom) -> Result<Scene> {
     builtin_scene("builtin:rotor37", ROTOR37_SCENE, &|_| rom.borrow_mut().take().map(Ok))
 }
 
+/// The scene of the stage, or the same with coarse models.
+///
+/// # Errors
+/// Never with what ships.
+pub fn stage_scene(coarse: bool, cache: &RomCache, console: &Console) -> Result<Scene> {
+    let suffix = if coarse { "-coarse" } else { "" };
+    let reduce = |name: &str| {
+        let model = builtin::rom(&format!("{name}{suffix}"), cache, console)?;
+        Some(model.map_err(|failure| failure.to_string()))
+    };
+    builtin_scene("builtin:stage", STAGE_SCENE, &reduce)
+}
+
 /// The embedded scene as text, with its ROM read from `rom_file` and the stop time replaced.
 pub fn rotor37_text(rom_file: &str, stop: f64) -> String {
     let mut text = String::new();
@@ -120,6 +137,8 @@ mod tests {
         for (name, text) in BUILTIN_SCENES {
             let settings = tiprub_format::parse_scene(text, name).unwrap();
             assert!(settings.structures.iter().all(|structure| structure.rom.starts_with(BUILTIN)), "{name}");
+            let models = settings.structures.iter().map(|structure| &structure.rom[BUILTIN.len()..]);
+            assert!(models.clone().all(|model| builtin::NAMES.contains(&model)), "{name}");
             assert!(help.contains(&format!("{BUILTIN}{name}")), "{name} is not in:\n{help}");
         }
     }

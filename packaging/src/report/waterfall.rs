@@ -24,6 +24,8 @@ pub struct Axis {
     pub label: String,
     /// Range shown.
     pub range: [f64; 2],
+    /// Whether it runs from the largest value to the smallest.
+    pub reversed: bool,
 }
 
 impl Axis {
@@ -36,12 +38,18 @@ impl Axis {
             (true, true) => [low, high],
             (true, false) => [low - 0.5 * low.abs().max(1.0), low + 0.5 * low.abs().max(1.0)],
         };
-        Self { label: label.into(), range }
+        Self { label: label.into(), range, reversed: false }
     }
 
     /// Where a value lies, 0 to 1.
     fn share(&self, value: f64) -> f64 {
-        ((value - self.range[0]) / (self.range[1] - self.range[0])).clamp(0.0, 1.0)
+        let share = ((value - self.range[0]) / (self.range[1] - self.range[0])).clamp(0.0, 1.0);
+        if self.reversed { 1.0 - share } else { share }
+    }
+
+    /// The same axis the other way round.
+    pub fn reversed(self) -> Self {
+        Self { reversed: !self.reversed, ..self }
     }
 
     /// Round numbers within the range, about `count` of them.
@@ -148,8 +156,7 @@ impl Waterfall {
             text(svg, [ORIGIN[0] - 8.0, ORIGIN[1] - UP * self.value.share(value) + 5.0], "end", &number(value));
         }
         text(svg, [ORIGIN[0] + 0.5 * ACROSS, ORIGIN[1] + 44.0], "middle", &self.x.label);
-        let beside = [ORIGIN[0] + ACROSS + 0.5 * DEPTH[0] + 62.0, ORIGIN[1] - 0.5 * DEPTH[1] + 30.0];
-        text(svg, beside, "start", &self.depth.label);
+        text(svg, [WIDTH - 12.0, ORIGIN[1] + 44.0], "end", &self.depth.label);
         let (x, y) = (24.0, ORIGIN[1] - 0.5 * UP);
         let label = escape(&self.value.label);
         let _ = write!(svg, r#"<text transform="translate({x} {y}) rotate(-90)" text-anchor="middle">{label}</text>"#);
@@ -178,7 +185,7 @@ mod tests {
         Waterfall {
             x: Axis::over("mode (-)", [1.0, 60.0].into_iter()),
             depth: Axis::over("modes kept (-)", [0.0, 25.0].into_iter()),
-            value: Axis { label: "deviation (%)".into(), range: [0.0, 3.0] },
+            value: Axis::over("deviation (%)", [0.0, 3.0].into_iter()),
             curves: vec![curve(0.0), curve(10.0), (25.0, Vec::new()), (20.0, vec![(1.0, f64::NAN)])],
         }
     }
@@ -203,11 +210,14 @@ mod tests {
 
     #[test]
     fn ticks_are_round_numbers_within_the_axis() {
-        let axis = |low, high| Axis { label: String::new(), range: [low, high] };
+        let axis = |low, high| Axis { label: String::new(), range: [low, high], reversed: false };
         assert_eq!(axis(0.0, 3.0).ticks(4.0), [0.0, 1.0, 2.0, 3.0]);
         assert_eq!(axis(0.0, 1456.0).ticks(5.0), [0.0, 500.0, 1000.0]);
         assert_eq!(axis(-1e-6, 4e-6).ticks(5.0).len(), 6);
-        assert_eq!(Axis::over("", [7.0].into_iter()).range, [3.5, 10.5]);
-        assert_eq!(Axis::over("", std::iter::empty()).range, [0.0, 1.0]);
+        let range = |axis: Axis| axis.range.map(f64::to_bits);
+        assert_eq!(range(Axis::over("", [7.0].into_iter())), [3.5_f64, 10.5].map(f64::to_bits));
+        assert_eq!(range(Axis::over("", std::iter::empty())), [0.0_f64, 1.0].map(f64::to_bits));
+        let places = [axis(0.0, 4.0), axis(0.0, 4.0).reversed()].map(|axis| axis.share(1.0).to_bits());
+        assert_eq!(places, [0.25_f64, 0.75].map(f64::to_bits));
     }
 }

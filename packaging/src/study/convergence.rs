@@ -70,8 +70,8 @@ impl Criterion {
         };
         Waterfall {
             x: Axis::over("mode of the wheel (-)", [1.0, MODES as f64].into_iter()),
-            depth: Axis::over("component modes (-)", rows.iter().map(|row| row.total_modes as f64)),
-            value: Axis { label: self.label.into(), range: [0.0, self.shown] },
+            depth: Axis::over("component modes (-)", rows.iter().map(|row| row.total_modes as f64)).reversed(),
+            value: Axis::over(self.label, [0.0, self.shown].into_iter()),
             curves: rows.iter().map(curve).collect(),
         }
     }

@@ -7,6 +7,7 @@
 pub mod convergence;
 pub mod modes;
 pub mod output;
+pub mod stage;
 pub mod sweep;
 
 use serde_json::{Value, json};

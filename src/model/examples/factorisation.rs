@@ -1,43 +1,57 @@
-//! Time and size of sparse Cholesky factors with either ordering, on stiffness matrices of bricks.
+//! Time and size of sparse Cholesky factors with either ordering.
 //!
-//!     cargo run --release -p tiprub-model --example factorisation -- around through along hex8|hex20 [matrix.mtx]
+//!     cargo run --release -p tiprub-model --example factorisation -- casing|sector [nd|amd|both] [matrix.mtx]
 //!
-//! A casing ring with so many elements is assembled; with a file name its stiffness is also written as Matrix Market
-//! text, for other solvers (`tools/factorisation.py`).
+//! `casing` is the stiffness of the stage's casing, held at its flange; `sector` that of one sector of the stage, held at
+//! nothing and made definite by a thousandth of its mass. With a file name the matrix is also written as Matrix Market text,
+//! for other solvers (`tools/factorisation.py`). One ordering at a time lets its peak of memory be read from outside.
 
 use std::io::{BufWriter, Write as _};
 use std::time::Instant;
 
-use tiprub_model::assembly::{assemble, free_dofs};
-use tiprub_model::casing::{CLAMPED, RingCounts, supported_ring};
-use tiprub_model::element::ElementKind;
+use tiprub_model::assembly::{assemble, assemble_with, free_dofs};
+use tiprub_model::casing::CLAMPED;
 use tiprub_model::ordering::Ordering;
 use tiprub_model::sparse::{SparseMatrix, SymbolicFactor, principal_pair};
-use tiprub_model::{CasingOptions, Error, progress::silent};
+use tiprub_model::stage::casing::{StageCasingOptions, stage_casing_mesh};
+use tiprub_model::stage::{SectorOptions, sector_mesh};
+use tiprub_model::{Error, progress::silent};
 
 fn main() -> tiprub_model::Result<()> {
     let arguments: Vec<String> = std::env::args().collect();
-    let count = |index: usize| {
-        let text = arguments.get(index).map_or("", String::as_str);
-        text.parse::<usize>().map_err(|_| Error::invalid("element count", text, "Give whole numbers"))
+    let matrix = match arguments.get(1).map(String::as_str) {
+        Some("casing") => casing()?,
+        Some("sector") => sector()?,
+        other => return Err(Error::invalid("structure", format!("{other:?}"), "Give `casing` or `sector`")),
     };
-    let [around, through, along] = [count(1)?, count(2)?, count(3)?];
-    let kind = if arguments.get(4).is_some_and(|kind| kind == "hex8") { ElementKind::Hex8 } else { ElementKind::Hex20 };
-    let mut options = CasingOptions { kind, ..CasingOptions::default() };
-    options.counts = RingCounts { around, through, along, flange: through };
-    options.rings.around = around;
-    let ring = supported_ring(&options)?;
-    let assembled = assemble(&ring.mesh, &options.material, &silent)?;
-    let free = free_dofs(ring.mesh.nodes.len(), ring.mesh.set(CLAMPED)?);
-    let (stiffness, _) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
-    println!("{} dofs, {} entries", stiffness.order(), stiffness.values.len());
-    for ordering in [Ordering::NestedDissection, Ordering::MinimumDegree] {
-        measure(&stiffness, ordering);
+    println!("{} dofs, {} entries", matrix.order(), matrix.values.len());
+    let orderings: &[Ordering] = match arguments.get(2).map(String::as_str) {
+        Some("nd") => &[Ordering::NestedDissection],
+        Some("amd") => &[Ordering::MinimumDegree],
+        _ => &[Ordering::NestedDissection, Ordering::MinimumDegree],
+    };
+    for ordering in orderings {
+        measure(&matrix, *ordering);
     }
-    if let Some(path) = arguments.get(5) {
-        write_matrix_market(&stiffness, path).map_err(|error| Error::invalid(path, error.to_string(), "Check it"))?;
+    if let Some(path) = arguments.get(3) {
+        write_matrix_market(&matrix, path).map_err(|error| Error::invalid(path, error.to_string(), "Check it"))?;
     }
     Ok(())
+}
+
+fn casing() -> tiprub_model::Result<SparseMatrix> {
+    let options = StageCasingOptions::default();
+    let ring = stage_casing_mesh(&options)?;
+    let assembled = assemble_with(&ring.mesh, &options.material, options.formulation, &silent)?;
+    let free = free_dofs(ring.mesh.nodes.len(), ring.mesh.set(CLAMPED)?);
+    Ok(principal_pair(&assembled.stiffness, &assembled.mass, &free).0)
+}
+
+fn sector() -> tiprub_model::Result<SparseMatrix> {
+    let sector = sector_mesh(&SectorOptions::default())?;
+    let assembled = assemble(&sector.mesh, &tiprub_model::Material::titanium(), &silent)?;
+    let share = 1e-3 * assembled.stiffness.trace() / assembled.mass.trace();
+    Ok(assembled.stiffness.plus_scaled(share, &assembled.mass))
 }
 
 fn measure(matrix: &SparseMatrix, ordering: Ordering) {

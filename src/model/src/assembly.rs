@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use crate::element::{consistent_mass, lumped_mass, stiffness};
+use crate::element::{ElementKind, Formulation, consistent_mass, incompatible_stiffness, lumped_mass, stiffness};
 use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report};
@@ -70,6 +70,19 @@ pub(crate) fn for_each_block(pattern: &Pattern, nodes: &[usize], mut visit: impl
 /// # Errors
 /// [`Error::Invalid`] for an unsound mesh or material, [`Error::NegativeJacobian`] naming the element.
 pub fn assemble(mesh: &Mesh, material: &Material, listener: Listener<'_>) -> Result<Assembled> {
+    assemble_with(mesh, material, Formulation::default(), listener)
+}
+
+/// As [`assemble`], with hex8 elements in the given formulation.
+///
+/// # Errors
+/// Those of [`assemble`].
+pub fn assemble_with(
+    mesh: &Mesh,
+    material: &Material,
+    formulation: Formulation,
+    listener: Listener<'_>,
+) -> Result<Assembled> {
     mesh.validate()?;
     material.validate()?;
     if mesh.elements.is_empty() {
@@ -86,7 +99,12 @@ pub fn assemble(mesh: &Mesh, material: &Material, listener: Listener<'_>) -> Res
             .enumerate()
             .map(|(offset, element)| {
                 let (number, coordinates) = (chunk_index * CHUNK + offset, mesh.coordinates(element));
-                let stiffness = stiffness(element.kind, &coordinates, material, number)?;
+                let stiffness = match (element.kind, formulation) {
+                    (ElementKind::Hex8, Formulation::IncompatibleModes) => {
+                        incompatible_stiffness(&coordinates, material, number)?
+                    }
+                    _ => stiffness(element.kind, &coordinates, material, number)?,
+                };
                 Ok((stiffness, consistent_mass(element.kind, &coordinates, material.density, number)?))
             })
             .collect();

@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 
 use crate::eigen::{Modes, lowest_modes, positive_factor};
 use crate::progress::{Listener, Stage, report};
-use crate::sparse::{SparseMatrix, principal_pair};
+use crate::sparse::{Factor, SparseMatrix, add_tall, principal_pair, tall_product};
 use crate::{Error, Result};
 
 /// A reduced pencil and the way back to the full one.
@@ -94,20 +94,68 @@ pub fn craig_bampton_with(
         }
         _ => fixed,
     };
-    report(listener, Stage::ConstraintModes, 0, 1);
-    let coupling = stiffness.block(&interior, interface);
-    let mut constraint = factor.solve(coupling.clone());
-    constraint *= faer::Scale(-1.0);
-    let static_stiffness = stiffness.block(interface, interface) + coupling.transpose() * &constraint;
-    let transformation = transformation(stiffness.order(), &interior, interface, &constraint, &inner);
-    let reduced_mass = transformation.transpose() * mass.times(transformation.as_ref());
+    let mut transformation = Mat::zeros(stiffness.order(), interface.len() + inner.eigenvalues.len());
+    for (k, mut column) in transformation.as_mut().col_iter_mut().skip(interface.len()).enumerate() {
+        interior.iter().zip(inner.shapes.col(k).iter()).for_each(|(&dof, shape)| column[dof] = *shape);
+    }
+    let eigenvalues = inner.eigenvalues;
+    // The shapes stand in the transformation now.
+    drop(inner.shapes);
+    let static_stiffness = constraint_modes(stiffness, &factor, &interior, interface, &mut transformation, listener);
+    drop(factor);
+    let reduced_mass = projected(mass, &transformation);
     report(listener, Stage::ConstraintModes, 1, 1);
     Ok(CraigBampton {
         mass: symmetrised(reduced_mass.nrows(), |i, j| reduced_mass[(i, j)]),
-        stiffness: reduced_stiffness(&static_stiffness, &inner.eigenvalues),
+        stiffness: reduced_stiffness(&static_stiffness, &eigenvalues),
         transformation,
         fixed_interface_frequencies,
     })
+}
+
+/// Columns that are worked on at once where there are many, which bounds the memory beside the transformation's own.
+const COLUMNS: usize = 64;
+
+/// Write the constraint modes, and the interface's own unit displacements, into the first columns of the
+/// transformation; returns K_bb + K_bi Ψ.
+fn constraint_modes(
+    stiffness: &SparseMatrix,
+    factor: &Factor,
+    interior: &[usize],
+    interface: &[usize],
+    transformation: &mut Mat<f64>,
+    listener: Listener<'_>,
+) -> Mat<f64> {
+    let mut static_stiffness = Mat::zeros(interface.len(), interface.len());
+    for (chunk, part) in interface.chunks(COLUMNS).enumerate() {
+        let first = chunk * COLUMNS;
+        report(listener, Stage::ConstraintModes, first, interface.len());
+        let constraint = factor.solve(stiffness.block(interior, part));
+        let mut columns = transformation.get_mut(.., first..first + part.len());
+        for (j, &dof) in part.iter().enumerate() {
+            columns[(dof, j)] = 1.0;
+            interior.iter().zip(constraint.col(j).iter()).for_each(|(&dof, value)| columns[(dof, j)] = -value);
+        }
+        let forces = stiffness.times(columns.as_ref());
+        for j in 0..part.len() {
+            for (i, &dof) in interface.iter().enumerate() {
+                static_stiffness[(i, first + j)] = forces[(dof, j)];
+            }
+        }
+    }
+    static_stiffness
+}
+
+/// TᵀAT.
+fn projected(matrix: &SparseMatrix, transformation: &Mat<f64>) -> Mat<f64> {
+    let size = transformation.ncols();
+    let mut product = Mat::zeros(size, size);
+    for first in (0..size).step_by(COLUMNS) {
+        let columns = first..(first + COLUMNS).min(size);
+        let part = matrix.times(transformation.get(.., columns.clone()));
+        product.get_mut(.., columns).copy_from(tall_product(transformation.as_ref(), part.as_ref()));
+    }
+    product
 }
 
 /// ω² of a double mode agree to this share.
@@ -149,7 +197,7 @@ fn with_static_responses(
         return Ok(fixed);
     }
     // The basis is M-orthonormal, so that its own modes come from the projected stiffness alone.
-    let projected = basis.transpose() * stiffness.times(basis.as_ref());
+    let projected = projected(stiffness, &basis);
     let size = projected.nrows();
     let scale = projected.norm_max();
     let symmetric = Mat::from_fn(size, size, |i, j| 0.5 * (projected[(i, j)] + projected[(j, i)]) / scale);
@@ -157,7 +205,9 @@ fn with_static_responses(
         Error::invalid("static responses", "their eigenvalue problem did not converge", "Check loads and material")
     })?;
     let eigenvalues = (0..size).map(|k| scale * eigen.S()[k]).collect();
-    Ok(Modes { eigenvalues, shapes: basis * eigen.U(), residuals: fixed.residuals })
+    let mut shapes = Mat::zeros(basis.nrows(), size);
+    add_tall(shapes.as_mut(), 1.0, basis.as_ref(), eigen.U());
+    Ok(Modes { eigenvalues, shapes, residuals: fixed.residuals })
 }
 
 /// `column` without its part in the M-orthonormal `basis`, scaled to unit mass; `None` where nothing is left.
@@ -169,7 +219,8 @@ fn independent_part(basis: &Mat<f64>, mass: &SparseMatrix, mut column: Mat<f64>)
     let mut before = first;
     // Until a pass takes nothing away any more, as in the Lanczos iteration.
     for _pass in 0..6 {
-        column -= basis * (basis.transpose() * &mass_column);
+        let part = tall_product(basis.as_ref(), mass_column.as_ref());
+        add_tall(column.as_mut(), -1.0, basis.as_ref(), part.as_ref());
         mass_column = mass.times(column.as_ref());
         let after = norm(&column, &mass_column);
         // Not more than, so that a load of zeros is left out, too.
@@ -196,29 +247,6 @@ fn interior_dofs(order: usize, interface: &[usize]) -> Result<Vec<usize>> {
         return Err(Error::invalid("interface", "it is empty", "Name at least one contact node"));
     }
     Ok((0..order).filter(|&dof| !held[dof]).collect())
-}
-
-fn transformation(
-    order: usize,
-    interior: &[usize],
-    interface: &[usize],
-    constraint: &Mat<f64>,
-    fixed: &Modes,
-) -> Mat<f64> {
-    let boundary = interface.len();
-    let mut matrix = Mat::zeros(order, boundary + fixed.eigenvalues.len());
-    for (j, &dof) in interface.iter().enumerate() {
-        matrix[(dof, j)] = 1.0;
-    }
-    for (i, &dof) in interior.iter().enumerate() {
-        for j in 0..boundary {
-            matrix[(dof, j)] = constraint[(i, j)];
-        }
-        for k in 0..fixed.eigenvalues.len() {
-            matrix[(dof, boundary + k)] = fixed.shapes[(i, k)];
-        }
-    }
-    matrix
 }
 
 fn reduced_stiffness(boundary: &Mat<f64>, squares: &[f64]) -> DMatrix<f64> {

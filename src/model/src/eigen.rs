@@ -8,7 +8,7 @@
 use faer::{Mat, MatRef, Side};
 
 use crate::progress::{Listener, Stage, report};
-use crate::sparse::{Factor, SparseMatrix};
+use crate::sparse::{Factor, SparseMatrix, add_tall, tall_product};
 use crate::{Error, Result};
 
 /// Relative accuracy of the returned pairs: ‖Aφ - θφ‖_M ≤ `TOLERANCE` θ, which bounds the relative error of ω² - σ.
@@ -17,7 +17,9 @@ pub const TOLERANCE: f64 = 1e-10;
 const CHECKED_TOLERANCE: f64 = 1e-8;
 /// Vectors that this share of the block's largest is left of depend on the basis.
 const DEPENDENT: f64 = 1e-13;
-const BLOCK: usize = 6;
+/// A column that loses more than this share inside its block is projected against the whole basis again.
+const CANCELLED: f64 = 1e-2;
+const BLOCK: usize = 8;
 /// An ω² below this share of tr K / tr M is round-off of a rigid-body motion.
 const MECHANISM: f64 = 1e-14;
 
@@ -79,14 +81,15 @@ impl Basis {
     fn project_out(&self, block: &mut Mat<f64>) -> Mat<f64> {
         let mut coefficients = Mat::zeros(self.size, block.ncols());
         for _pass in 0..2 {
-            let part = self.used_mass().transpose() * &*block;
-            *block -= self.used() * &part;
+            let part = tall_product(self.used_mass(), block.as_ref());
+            add_tall(block.as_mut(), -1.0, self.used(), part.as_ref());
             coefficients += part;
         }
         coefficients
     }
 
-    /// Orthonormalise the columns of `block` and append them; returns R of block = Q_new R (rows: new vectors).
+    /// Orthonormalise the columns of `block`, from which the basis has been removed, and append them; returns R of
+    /// block = Q_new R (rows: new vectors).
     ///
     /// Columns that depend on the others are left out. M Q is formed anew from each finished vector: carried along
     /// through the subtractions it would lose what they cancel.
@@ -105,14 +108,18 @@ impl Basis {
             let mut mass_column = Mat::zeros(0, 0);
             // Repeat until a pass takes nothing away any more (Kahan: once more is enough, unless it is round-off).
             for _pass in 0..6 {
-                let part = self.used_mass().transpose() * &column;
-                column -= self.used() * &part;
+                // What cancels inside the block brings the older vectors back in proportion.
+                let from = if before < CANCELLED * norms[j] { 0 } else { first };
+                let used = from..self.size;
+                let part = tall_product(self.mass_vectors.get(.., used.clone()), column.as_ref());
+                add_tall(column.as_mut(), -1.0, self.vectors.get(.., used), part.as_ref());
                 for i in first..self.size {
-                    upper[(i - first, j)] += part[(i, 0)];
+                    upper[(i - first, j)] += part[(i - from, 0)];
                 }
                 mass_column = mass.times(column.as_ref());
                 norm = column_norms(&column, &mass_column)[0];
-                if norm > 0.5 * before || norm <= DEPENDENT * scale {
+                let again = norm < CANCELLED * norms[j] && from == first;
+                if (norm > 0.5 * before && !again) || norm <= DEPENDENT * scale {
                     break;
                 }
                 before = norm;
@@ -206,7 +213,8 @@ pub fn lowest_modes(
             let converged = ritz.bounds.iter().filter(|&&bound| bound <= TOLERANCE).count();
             report(listener, stage, converged, count);
             if converged == count {
-                let shapes = basis.vectors.get(.., ..end) * &ritz.vectors;
+                let mut shapes = Mat::zeros(order, count);
+                add_tall(shapes.as_mut(), 1.0, basis.vectors.get(.., ..end), ritz.vectors.as_ref());
                 return checked(mass, factor, shift, &ritz.values, shapes);
             }
             if exhausted {

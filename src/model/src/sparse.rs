@@ -7,17 +7,57 @@ use std::sync::Arc;
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::linalg::matmul::matmul;
 use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, Mat, MatMut, MatRef, Par, Side, Spec};
+use faer::{Accum, Conj, Mat, MatMut, MatRef, Par, Side, Spec};
 use rayon::prelude::*;
 
 use crate::ordering::{Ordering, elimination_order};
 
 use crate::{Error, Result};
+
+/// Columns of a dense matrix that a sparse one is multiplied with at once.
+const WIDTH: usize = 8;
+/// Rows of a tall matrix that are worked on as one piece. Sums go over the pieces in order, whoever worked on them, so
+/// that bits do not depend on the number of threads.
+const ROWS: usize = 4096;
+
+/// AᵀB of two tall matrices, in parallel.
+pub fn tall_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+    assert_eq!(a.nrows(), b.nrows(), "the product's inner dimensions must agree");
+    let pieces = a.nrows().div_ceil(ROWS);
+    // A few pieces at a time, so that their products need not be kept all at once.
+    let mut product = Mat::zeros(a.ncols(), b.ncols());
+    for group in (0..pieces).collect::<Vec<_>>().chunks(16) {
+        let parts: Vec<Mat<f64>> = group
+            .par_iter()
+            .map(|&piece| {
+                let rows = piece * ROWS..((piece + 1) * ROWS).min(a.nrows());
+                let mut part = Mat::zeros(a.ncols(), b.ncols());
+                let (left, right) = (a.get(rows.clone(), ..).transpose(), b.get(rows, ..));
+                matmul(part.as_mut(), Accum::Replace, left, right, 1.0, PAR);
+                part
+            })
+            .collect();
+        for part in parts {
+            product += part;
+        }
+    }
+    product
+}
+
+/// target + factor · A C for a tall A and a small C, in parallel.
+pub fn add_tall(target: MatMut<'_, f64>, factor: f64, a: MatRef<'_, f64>, c: MatRef<'_, f64>) {
+    let chunks: Vec<_> = target.par_row_chunks_mut(ROWS).collect();
+    chunks.into_par_iter().enumerate().for_each(|(piece, rows)| {
+        let part = a.get(piece * ROWS..piece * ROWS + rows.nrows(), ..);
+        matmul(rows, Accum::Add, part, c, factor, PAR);
+    });
+}
 
 /// Where the entries of a symmetric matrix are: compressed columns, rows ascending, both triangles.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -79,19 +119,35 @@ impl SparseMatrix {
     /// Product with a dense matrix, n × m.
     pub fn times(&self, dense: MatRef<'_, f64>) -> Mat<f64> {
         assert_eq!(dense.nrows(), self.order(), "the product's inner dimensions must agree");
-        let columns: Vec<Vec<f64>> = (0..dense.ncols())
-            .into_par_iter()
-            .map(|column| {
-                let x: Vec<f64> = dense.col(column).iter().copied().collect();
-                (0..self.order()).map(|row| self.row_times(row, &x)).collect()
-            })
-            .collect();
-        Mat::from_fn(self.order(), dense.ncols(), |i, j| columns[j][i])
+        let mut product = Mat::zeros(self.order(), dense.ncols());
+        for first in (0..dense.ncols()).step_by(WIDTH) {
+            let width = WIDTH.min(dense.ncols() - first);
+            // Some columns side by side, so that an entry of the matrix is read once for all of them.
+            let mut packed = vec![[0.0; WIDTH]; self.order()];
+            for j in 0..width {
+                packed.iter_mut().zip(dense.col(first + j).iter()).for_each(|(row, value)| row[j] = *value);
+            }
+            let columns = product.get_mut(.., first..first + width);
+            let chunks: Vec<_> = columns.par_row_chunks_mut(ROWS).collect();
+            chunks.into_par_iter().enumerate().for_each(|(chunk, mut rows)| {
+                for i in 0..rows.nrows() {
+                    let sums = self.row_times(chunk * ROWS + i, &packed);
+                    (0..width).for_each(|j| rows[(i, j)] = sums[j]);
+                }
+            });
+        }
+        product
     }
 
-    fn row_times(&self, row: usize, x: &[f64]) -> f64 {
+    fn row_times(&self, row: usize, packed: &[[f64; WIDTH]]) -> [f64; WIDTH] {
         let range = self.pattern.starts[row]..self.pattern.starts[row + 1];
-        self.pattern.rows[range.clone()].iter().zip(&self.values[range]).map(|(&i, value)| value * x[i]).sum()
+        let mut sums = [0.0; WIDTH];
+        for (&i, value) in self.pattern.rows[range.clone()].iter().zip(&self.values[range]) {
+            for (sum, x) in sums.iter_mut().zip(&packed[i]) {
+                *sum += value * x;
+            }
+        }
+        sums
     }
 
     /// self + factor · other, for matrices of one pattern.
@@ -214,8 +270,12 @@ impl SymbolicFactor {
     }
 }
 
-/// Columns solved together.
-const SHARE: usize = 8;
+/// Columns solved together where there are few, such as a block of the Lanczos iteration,
+const SHARE: usize = 4;
+/// and where there are many.
+const WIDE_SHARE: usize = 16;
+/// Number of columns that are many.
+const MANY: usize = 32;
 
 /// Sparse Cholesky factor.
 #[derive(Debug, Clone)]
@@ -229,7 +289,8 @@ impl Factor {
     pub fn solve(&self, mut right: Mat<f64>) -> Mat<f64> {
         // Columns are independent: shares of them beat threads inside the triangular solves. The width of a share is fixed,
         // because the kernels round differently for different widths, and a ROM must not depend on the number of threads.
-        let chunks: Vec<_> = right.as_mut().par_col_chunks_mut(SHARE).collect();
+        let share = if right.ncols() < MANY { SHARE } else { WIDE_SHARE };
+        let chunks: Vec<_> = right.as_mut().par_col_chunks_mut(share).collect();
         chunks.into_par_iter().for_each(|chunk| self.solve_in_place(chunk));
         right
     }

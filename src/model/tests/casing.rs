@@ -12,7 +12,7 @@ use tiprub_model::casing::{
     CLAMPED, CasingReductionOptions, GridNodes, ModalForm, Support, condense, modal_form, supported_ring,
 };
 use tiprub_model::craig_bampton::{InnerBasis, craig_bampton, craig_bampton_with};
-use tiprub_model::element::{ElementKind, stiffness, thermal_load};
+use tiprub_model::element::{ElementKind, Formulation, stiffness, thermal_load};
 use tiprub_model::progress::silent;
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::thermal::{equal_patches, patch_loads};
@@ -292,6 +292,7 @@ fn a_mesh_of_ones_own_is_reduced_alike() {
         assert!((parabola - contour).abs() < 0.03, "{:?} {:?}", grid.slopes, ring.grid.slopes);
     }
     let settings = CasingReductionOptions {
+        formulation: Formulation::Displacement,
         name: "own".into(),
         fixed_interface_modes: options.fixed_interface_modes,
         modes: options.modes,

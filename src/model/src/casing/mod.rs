@@ -20,7 +20,7 @@ pub use reduction::{CasingReductionOptions, reduce_casing};
 pub use ring_mesh::{ContactRings, Flange, RingCounts, RingGeometry, RingMesh, ring_mesh};
 
 use crate::Result;
-use crate::element::ElementKind;
+use crate::element::{ElementKind, Formulation};
 use crate::material::Material;
 use crate::progress::{Listener, Stage, report};
 use crate::reduce::Reduction;
@@ -83,6 +83,7 @@ pub fn reduce_ring(options: &CasingOptions, listener: Listener<'_>) -> Result<Re
     let meshing = start.elapsed().as_secs_f64();
     let reduction_options = CasingReductionOptions {
         name: options.name.clone(),
+        formulation: Formulation::Displacement,
         fixed_interface_modes: options.fixed_interface_modes,
         modes: options.modes,
         checked_modes: options.checked_modes,

@@ -13,15 +13,16 @@ use super::condense::condense;
 use super::grid::GridNodes;
 use super::modal_form::{ModalForm, modal_form};
 use crate::Result;
-use crate::assembly::{assemble, free_dofs};
+use crate::assembly::{assemble_with, free_dofs};
 use crate::craig_bampton::{CraigBampton, InnerBasis, craig_bampton_with};
+use crate::element::Formulation;
 use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report};
 use crate::reduce::{
     ContactPoint, Reduction, Timings, check_nodes, compare, element_names, full_modes, node_modes, timed,
 };
-use crate::sparse::principal_pair;
+use crate::sparse::{principal_pair, tall_product};
 use crate::thermal::patch_loads;
 
 /// Rigid-body motions of a free structure.
@@ -32,6 +33,8 @@ const RIGID: usize = 6;
 pub struct CasingReductionOptions {
     /// Name of the structure.
     pub name: String,
+    /// Formulation of hex8 elements.
+    pub formulation: Formulation,
     /// Number of fixed-interface modes to reduce with; one fewer where the last would be half of a double mode.
     pub fixed_interface_modes: usize,
     /// Number of modes of the reduced pencil to deliver as they are; one fewer where the last would be half of a double
@@ -64,15 +67,16 @@ pub fn reduce_casing(
     // As for blades: the library's own threads would split sums by their number, and with it the bits of the ROM.
     faer::set_global_parallelism(faer::Par::Seq);
     let mut timings = Timings::default();
-    let (assembled, loads, free) = timed(&mut timings.assembly, || {
+    let (stiffness, mass, loads, free) = timed(&mut timings.assembly, || {
         grid.validate()?;
         check_nodes(&mesh.nodes, clamped, &contact_points(grid), Frame::Cylindrical)?;
         let free = free_dofs(mesh.nodes.len(), clamped);
         let loads = patch_loads(&mesh, material, patches)?;
         let loads = Mat::from_fn(free.len(), patches.len(), |i, k| loads[(free[i], k)]);
-        Ok((assemble(&mesh, material, listener)?, loads, free))
+        let assembled = assemble_with(&mesh, material, options.formulation, listener)?;
+        let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
+        Ok((stiffness, mass, loads, free))
     })?;
-    let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
     let full = timed(&mut timings.full_modes, || {
         full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)
     })?;
@@ -94,7 +98,7 @@ pub fn reduce_casing(
     })?;
     let rom = Rom {
         name: options.name.clone(),
-        origin: origin(&mesh, material, clamped.len(), grid, &reduced, &modes),
+        origin: origin(&mesh, (material, options.formulation), clamped.len(), grid, &reduced, &modes),
         sectors: 1,
         frame: Frame::Cylindrical,
         mass: DMatrix::identity(modes.squares.len(), modes.squares.len()),
@@ -188,7 +192,7 @@ fn contact_map(mesh: &Mesh, grid: &GridNodes, modes: &ModalForm) -> DMatrix<f64>
 /// Unit forces on the contact nodes, then the thermal loads, in the coordinates of Craig-Bampton.
 fn reduced_loads(grid: &GridNodes, reduced: &CraigBampton, thermal: &Mat<f64>) -> DMatrix<f64> {
     let boundary = 3 * grid.nodes.len();
-    let thermal = reduced.transformation.transpose() * thermal;
+    let thermal = tall_product(reduced.transformation.as_ref(), thermal.as_ref());
     DMatrix::from_fn(thermal.nrows(), boundary + thermal.ncols(), |i, k| match k.checked_sub(boundary) {
         Some(patch) => thermal[(i, patch)],
         None if i == k => 1.0,
@@ -218,7 +222,7 @@ fn without_rigid_motions(mut checks: RomChecks) -> RomChecks {
 
 fn origin(
     mesh: &Mesh,
-    material: &Material,
+    (material, formulation): (&Material, Formulation),
     clamped: usize,
     grid: &GridNodes,
     reduced: &CraigBampton,
@@ -232,8 +236,12 @@ fn origin(
         ),
         None => format!("; all of its {} modes", modes.squares.len()),
     };
+    let incompatible = match formulation {
+        Formulation::IncompatibleModes => ", hex8 with incompatible modes",
+        Formulation::Displacement => "",
+    };
     format!(
-        "{} nodes, {} elements ({}), {clamped} nodes clamped; {}: E = {:e} Pa, nu = {}, rho = {} kg/m3, alpha = {:e} 1/K; \
+        "{} nodes, {} elements ({}{incompatible}), {clamped} nodes clamped; {}: E = {:e} Pa, nu = {}, rho = {} kg/m3, alpha = {:e} 1/K; \
          Craig-Bampton with {} x {} contact nodes, {} fixed-interface modes and static responses to the thermal loads{cut_off}",
         mesh.nodes.len(),
         mesh.elements.len(),

@@ -13,7 +13,7 @@ pub(super) struct Mapped {
 }
 
 /// Jacobian matrix ∂x_i/∂ξ_j.
-fn jacobian(shape: &Shape, coordinates: &[[f64; 3]]) -> Matrix3<f64> {
+pub(super) fn jacobian(shape: &Shape, coordinates: &[[f64; 3]]) -> Matrix3<f64> {
     let mut matrix = Matrix3::zeros();
     for (x, gradient) in coordinates.iter().zip(&shape.gradients) {
         for i in 0..3 {
@@ -60,27 +60,33 @@ pub fn stiffness(
     element: usize,
 ) -> Result<DMatrix<f64>> {
     let nodes = kind.node_count();
-    let (lambda, shear) = material.lame();
     let mut matrix = DMatrix::zeros(3 * nodes, 3 * nodes);
     for (index, quadrature) in kind.stiffness_rule().iter().enumerate() {
         let mapped = map_point(kind, coordinates, quadrature, (element, index))?;
-        let gradients = &mapped.shape.gradients;
-        for b in 0..nodes {
-            for a in 0..=b {
-                let (ga, gb) = (gradients[a], gradients[b]);
-                let dot = shear * mapped.volume * (ga[0] * gb[0] + ga[1] * gb[1] + ga[2] * gb[2]);
-                for j in 0..3 {
-                    for i in 0..3 {
-                        matrix[(3 * a + i, 3 * b + j)] +=
-                            mapped.volume * (lambda * ga[i] * gb[j] + shear * ga[j] * gb[i]);
-                    }
-                    matrix[(3 * a + j, 3 * b + j)] += dot;
-                }
-            }
-        }
+        add_stiffness(&mut matrix, &mapped.shape.gradients[..nodes], mapped.volume, material.lame());
     }
     matrix.fill_lower_triangle_with_upper_triangle();
     Ok(matrix)
+}
+
+/// Add one integration point's share to the upper triangle of a stiffness matrix.
+pub(super) fn add_stiffness(
+    matrix: &mut DMatrix<f64>,
+    gradients: &[[f64; 3]],
+    volume: f64,
+    (lambda, shear): (f64, f64),
+) {
+    for (b, gb) in gradients.iter().enumerate() {
+        for (a, ga) in gradients[..=b].iter().enumerate() {
+            let dot = shear * volume * (ga[0] * gb[0] + ga[1] * gb[1] + ga[2] * gb[2]);
+            for j in 0..3 {
+                for i in 0..3 {
+                    matrix[(3 * a + i, 3 * b + j)] += volume * (lambda * ga[i] * gb[j] + shear * ga[j] * gb[i]);
+                }
+                matrix[(3 * a + j, 3 * b + j)] += dot;
+            }
+        }
+    }
 }
 
 /// Consistent mass matrix per node pair, n × n in kg; each entry holds for all three displacement components.

@@ -9,13 +9,16 @@
 //! | [`Tet4`](ElementKind::Tet4) | C3D4 | r, s, t ≥ 0, r + s + t ≤ 1 | 1 | 4 |
 //! | [`Tet10`](ElementKind::Tet10) | C3D10 | as above | 4 | 14 |
 //!
-//! All displacement interpolation is isoparametric; no reduced integration, incompatible modes or selective rules.
+//! All displacement interpolation is isoparametric, without reduced integration or selective rules. Hex8 has incompatible
+//! modes as an option, see [`Formulation`].
 
+mod incompatible;
 mod matrices;
 mod nonlinear;
 mod quadrature;
 mod shape;
 
+pub use incompatible::{Formulation, incompatible_stiffness};
 pub use matrices::thermal_load;
 pub use matrices::{consistent_mass, lumped_mass, stiffness, strain, stress};
 pub use nonlinear::{Tangent, geometric_stiffness, second_stresses, tangent};

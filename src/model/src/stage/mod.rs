@@ -1,5 +1,6 @@
 //! A parametric compressor stage of the paper's size (section 6.1): 56 blades on a disk, and a casing ring with flanges.
 
+pub mod casing;
 mod geometry;
 mod lattice;
 mod position;

@@ -1,0 +1,114 @@
+//! `tiprub study` in its quick forms, and the cache of built-in models behind it.
+
+use std::{fs, path::Path, process::Command};
+
+use serde_json::Value;
+
+fn tiprub(directory: &Path, cache: &str, arguments: &[&str]) -> (String, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+    let output = command.current_dir(directory).env("TIPRUB_CACHE", cache).args(arguments).output().unwrap();
+    let [stdout, stderr] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {stderr}");
+    (stdout, stderr)
+}
+
+/// The results of a quick study, with all files there and each figure's numbers whole.
+#[track_caller]
+fn study(root: &Path, name: &str, more: &[&str]) -> Value {
+    let arguments = [&["study", name, "--quick", "--json", "--quiet", "--out", "out"], more].concat();
+    let (stdout, _) = tiprub(root, env!("CARGO_TARGET_TMPDIR"), &arguments);
+    let json: Value = serde_json::from_str(&stdout).unwrap();
+    let out = root.join("out");
+    let page = fs::read_to_string(out.join("index.html")).unwrap();
+    assert!(!page.contains("http://") || page.matches("http://").count() == page.matches("http://www.w3.org").count());
+    for figure in json["figures"].as_array().unwrap() {
+        let svg = fs::read_to_string(out.join(figure["svg"].as_str().unwrap())).unwrap();
+        assert!(svg.starts_with("<svg") && svg.ends_with("</svg>") || svg.trim_end().ends_with("</svg>"), "{figure}");
+        let csv = fs::read_to_string(out.join(figure["csv"].as_str().unwrap())).unwrap();
+        assert!(csv.lines().count() > 3, "{figure}");
+    }
+    // Fig. 12 is about a range of angular velocities, of which a test asks for a few.
+    let whole = |statement: &&Value| more.is_empty() || !statement["expected"].as_str().unwrap().contains("fig. 12");
+    for statement in json["statements"].as_array().unwrap().iter().filter(whole) {
+        assert_ne!(statement["holds"], Value::Bool(false), "{statement:#}");
+    }
+    let written: Value = serde_json::from_str(&fs::read_to_string(out.join("results.json")).unwrap()).unwrap();
+    assert_eq!(written["results"], json["results"]);
+    json
+}
+
+fn columns(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
+    let text = fs::read_to_string(path).unwrap();
+    let mut lines = text.lines();
+    let names = lines.next().unwrap().split(',').map(String::from).collect();
+    (names, lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect())
+}
+
+#[test]
+fn the_quick_study_of_convergence_reaches_the_limits() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "convergence", &[]);
+    let enough = json["results"]["enough"]["deviation"]["per_nodal_diameter"].as_u64().unwrap();
+    let (_, rows) = columns(&root.path().join("out/deviation.csv"));
+    for row in &rows {
+        assert!(row[0] < enough as f64 || row[3].abs() < 0.3, "{row:?}");
+    }
+    assert!(rows.iter().any(|row| row[0] == enough as f64 - 1.0 && row[3].abs() >= 0.3), "one fewer is not enough");
+}
+
+#[test]
+fn the_quick_study_of_modes_draws_folded_engine_orders() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "modes", &["--speed", "1000"]);
+    assert_eq!(json["results"]["frequencies_hz"].as_array().unwrap().len(), 29);
+    let (_, rows) = columns(&root.path().join("out/interference.csv"));
+    for row in rows {
+        let [number, frequency, order] = [row[0], row[2], row[4]];
+        let rest = order % 56.0;
+        assert_eq!(rest.min(56.0 - rest).to_bits(), number.to_bits(), "{row:?}");
+        assert!((row[6] * order / std::f64::consts::TAU / frequency - 1.0).abs() < 1e-12);
+    }
+    assert!(root.path().join("out/shapes.vtu").is_file());
+}
+
+/// Threads and cache have no influence on the numbers.
+#[test]
+fn the_quick_study_of_the_stage_shows_contact_and_does_not_depend_on_threads() {
+    let root = tempfile::tempdir().unwrap();
+    let speeds = ["--speeds", "900:1300:2"];
+    study(root.path(), "stage", &[&speeds[..], &["--threads", "1"]].concat());
+    let out = root.path().join("out");
+    let before = fs::read(out.join("amplitudes.csv")).unwrap();
+    let (names, rows) = columns(&out.join("clearances.csv"));
+    assert_eq!(&names[2..], ["leading_edge (m)", "mid_chord (m)", "trailing_edge (m)", "nodes in contact"]);
+    assert!(rows.iter().any(|row| row[2..5].contains(&0.0)), "no contact of blade 1");
+    assert!(rows.iter().all(|row| row[2..5].iter().all(|clearance| *clearance >= -1e-12)));
+    study(root.path(), "stage", &[&speeds[..], &["--threads", "2"]].concat());
+    assert_eq!(fs::read(out.join("amplitudes.csv")).unwrap(), before);
+}
+
+#[test]
+fn built_in_models_are_reduced_once_unless_asked_otherwise() {
+    let root = tempfile::tempdir().unwrap();
+    let kept = root.path().join("kept");
+    let kept = kept.to_str().unwrap();
+    let run = |cache: &str, more: &[&str]| {
+        tiprub(root.path(), cache, &[&["run", "builtin:rotor37", "--stop", "1e-4", "--csv", "out.csv"], more].concat())
+            .1
+    };
+    assert!(run(kept, &[]).contains("Reducing"));
+    let first = fs::read(root.path().join("out.csv")).unwrap();
+    let again = run(kept, &[]);
+    assert!(again.contains("as made before") && !again.contains("Reducing"), "{again}");
+    assert_eq!(fs::read(root.path().join("out.csv")).unwrap(), first, "a kept model gives the same bits");
+    assert!(run(kept, &["--no-cache"]).contains("Reducing"));
+    assert!(run("", &[]).contains("Reducing"), "an empty TIPRUB_CACHE keeps nothing");
+    let file = fs::read_dir(kept).unwrap().next().unwrap().unwrap().path();
+    let mut bytes = fs::read(&file).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    fs::write(&file, bytes).unwrap();
+    let repaired = run(kept, &[]);
+    assert!(repaired.contains("is not what was kept; making it anew") && repaired.contains("Reducing"), "{repaired}");
+    assert_eq!(fs::read(root.path().join("out.csv")).unwrap(), first);
+}
