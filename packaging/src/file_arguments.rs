@@ -29,6 +29,10 @@ pub struct FileArguments {
     /// Face of a sector towards its upper neighbour.
     #[arg(long, value_name = "SET", requires = "cyclic_low", requires = "sectors")]
     pub cyclic_high: Option<String>,
+    /// Largest distance (m) of a node of the upper face from the turned one of the lower face [default: 1e-5 of the
+    /// largest radius].
+    #[arg(long, value_name = "M", value_parser = positive, requires = "cyclic_low")]
+    pub cyclic_tolerance: Option<f64>,
     /// Units of the file; everything on the command line is in SI units, whatever the file's are [default: m].
     #[arg(long, value_enum)]
     pub units: Option<UnitChoice>,

@@ -34,8 +34,7 @@ fn block(scheme: Scheme, step: f64) -> System {
     });
     let settings = SystemSettings { scheme, solver: Solver::Coulomb, friction: FRICTION, ledger: true };
     let bank = BankOptions { loads: true, ..BankOptions::default() };
-    let mut system =
-        {
+    let mut system = {
         let parts = SystemParts { bank, sticking: true, ..SystemParts::default() };
         System::with_parts(SectorModel::Uncoupled(&model, 1), law, settings, parts)
     };

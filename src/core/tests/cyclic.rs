@@ -116,7 +116,11 @@ fn every_pair(mut check: impl FnMut(&Wheel, [Simulation; 2], String)) {
                 for friction in [0.0, 0.15] {
                     let wheel = Wheel::random(sectors, nodes, order, 0.2, 3 + sectors as u64);
                     let both = pair(&wheel, scheme, solver, friction);
-                    check(&wheel, both, format!("{sectors} x {nodes} x {order} | {scheme:?} | {solver:?} | {friction}"));
+                    check(
+                        &wheel,
+                        both,
+                        format!("{sectors} x {nodes} x {order} | {scheme:?} | {solver:?} | {friction}"),
+                    );
                 }
             }
         }
@@ -140,7 +144,9 @@ fn a_thousand_contact_steps_equal_those_of_the_whole_wheel_as_one_structure() {
 /// stepped by the same code with the casing 1e-19 m away is the measure.
 #[test]
 fn a_wheel_that_bounces_all_around_differs_no_more_than_from_itself_nudged_by_rounding() {
-    println!("| sectors x nodes x coordinates | scheme | solver | µ | most contacts | displacement | energies | nudged |");
+    println!(
+        "| sectors x nodes x coordinates | scheme | solver | µ | most contacts | displacement | energies | nudged |"
+    );
     println!("|---|---|---|---|---|---|---|---|");
     every_pair(|wheel, mut both, name| {
         let mut twins = [both[0].clone(), both[0].clone()];

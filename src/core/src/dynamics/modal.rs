@@ -228,11 +228,7 @@ fn modal_already(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(Vec<f
     is_modal.then(|| (diagonal, DMatrix::identity(order, order)))
 }
 
-fn generalised_modes(
-    mass: &DMatrix<f64>,
-    stiffness: &DMatrix<f64>,
-    suffix: &str,
-) -> Result<(Vec<f64>, DMatrix<f64>)> {
+fn generalised_modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>, suffix: &str) -> Result<(Vec<f64>, DMatrix<f64>)> {
     let Some(cholesky) = mass.clone().cholesky() else {
         let what = format!("ROM array `mass{suffix}`");
         return Err(Error::invalid(what, "not positive definite", "Write the ROM again"));

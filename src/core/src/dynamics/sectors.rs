@@ -45,9 +45,7 @@ impl Sectors {
     /// When options are given that coupled sectors do not have: mistuning, and spin that couples modes.
     pub fn new(model: SectorModel, options: BankOptions) -> Self {
         match model {
-            SectorModel::Uncoupled(model, sectors) => {
-                Self::Uncoupled(ModalBank::with_options(model, sectors, options))
-            }
+            SectorModel::Uncoupled(model, sectors) => Self::Uncoupled(ModalBank::with_options(model, sectors, options)),
             SectorModel::Coupled(model) => {
                 assert!(options.frequency_factors.is_empty() && options.coupling.is_none(), "refused beforehand");
                 Self::Coupled(CyclicBank::new(model, options.loads))

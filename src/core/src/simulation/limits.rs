@@ -240,7 +240,8 @@ impl Checking<'_> {
     /// Everything about the rotor at the step to expect; returns warnings.
     fn expected(&self, step: f64) -> Result<Vec<String>> {
         let Parameters { friction, scheme, .. } = self.parameters;
-        let mut warnings: Vec<String> = stability::check_step(self.largest_frequency(), scheme, step)?.into_iter().collect();
+        let mut warnings: Vec<String> =
+            stability::check_step(self.largest_frequency(), scheme, step)?.into_iter().collect();
         let senses: Vec<Vec<ContactDirections>> =
             self.models.iter().map(|model| [1.0, -1.0].map(|sense| self.directions(model, sense)).into()).collect();
         let largest = self.parameters.step;
@@ -271,7 +272,8 @@ impl Checking<'_> {
     fn slave(&self, step: f64, law: &GapLaw) -> Result<Vec<String>> {
         let (Some(model), GapLaw::Spline(spline)) = (&self.compiled.carrier, law) else { return Ok(Vec::new()) };
         let Parameters { friction, scheme, .. } = self.parameters;
-        let mut warnings: Vec<String> = stability::check_step(model.largest_frequency(), scheme, step)?.into_iter().collect();
+        let mut warnings: Vec<String> =
+            stability::check_step(model.largest_frequency(), scheme, step)?.into_iter().collect();
         for warning in &mut warnings {
             *warning = format!("casing: {warning}");
         }

@@ -80,10 +80,7 @@ pub fn check_step_allowed(frequency: f64, scheme: Scheme, step: f64) -> Result<(
             problem: format!(
                 "central-difference with internal step {step:.6e} s has ω_max·h = {product:.4} ≥ 2 (ω_max = {frequency:.6e} rad/s)"
             ),
-            remedy: format!(
-                "Set the internal step below {:.6e} s, or use the scheme modal-exact",
-                2.0 / frequency
-            ),
+            remedy: format!("Set the internal step below {:.6e} s, or use the scheme modal-exact", 2.0 / frequency),
         }),
         _ => Ok(()),
     }
@@ -364,7 +361,11 @@ mod tests {
         let model = model(&[100.0, 4000.0], &[[1.0, 0.0, 0.0], [0.5, 0.0, 0.0]], 0.01);
         for (factor, stable) in [(0.9, true), (0.999, true), (1.001, false), (10.0, false)] {
             let step = factor * central_difference_limit(&model);
-            assert_eq!(check_step(model.largest_frequency(), Scheme::CentralDifference, step).is_ok(), stable, "factor {factor}");
+            assert_eq!(
+                check_step(model.largest_frequency(), Scheme::CentralDifference, step).is_ok(),
+                stable,
+                "factor {factor}"
+            );
             assert!(check_step(model.largest_frequency(), Scheme::ModalExact, step).is_ok());
         }
         assert!(check_step(model.largest_frequency(), Scheme::ModalExact, 1e-3).unwrap().is_some());

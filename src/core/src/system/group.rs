@@ -369,8 +369,9 @@ impl System {
         let normals = across.chunks_exact(lanes).zip(around.chunks_exact(lanes)).zip(along.chunks_exact(lanes));
         for ((moved, response), ((across, around), along)) in nodes.zip(normals) {
             for lane in 0..sectors {
-                response[lane] =
-                    across[lane] * moved[lane] + around[lane] * moved[lanes + lane] + along[lane] * moved[2 * lanes + lane];
+                response[lane] = across[lane] * moved[lane]
+                    + around[lane] * moved[lanes + lane]
+                    + along[lane] * moved[2 * lanes + lane];
             }
         }
     }

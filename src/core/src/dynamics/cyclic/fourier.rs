@@ -227,7 +227,10 @@ mod tests {
                         })
                         .sum();
                     let found = values[row * lanes + sector];
-                    assert!((found - sum).abs() < 1e-12, "N = {sectors}, row {row}, sector {sector}: {found} for {sum}");
+                    assert!(
+                        (found - sum).abs() < 1e-12,
+                        "N = {sectors}, row {row}, sector {sector}: {found} for {sum}"
+                    );
                 }
             }
             let mut again = vec![[[0.0; LANES]; 2]; fourier.blocks() * rows];

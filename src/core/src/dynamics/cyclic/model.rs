@@ -93,7 +93,8 @@ impl CyclicModel {
         let (sectors, complex) = (rom.sectors, |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0)));
         let squares = zero.frequencies.iter().map(|frequency| frequency * frequency).collect();
         let map = complex(&rom.contact_map);
-        let mut first = DiameterModes::new(0, damping_ratio, weight(0, sectors), &map, (squares, complex(&zero.shapes)));
+        let mut first =
+            DiameterModes::new(0, damping_ratio, weight(0, sectors), &map, (squares, complex(&zero.shapes)));
         // Not by way of the squares, which would cost a rounding.
         first.frequencies = zero.frequencies;
         let mut diameters = vec![first];
@@ -218,9 +219,11 @@ fn modal_already(
     let nothing = Complex::new(0.0, 0.0);
     let diagonal_only = |matrix: &DMatrix<Complex<f64>>| {
         let mut entries = matrix.iter().enumerate();
-        entries.all(|(index, value)| {
-            if index % order == index / order { value.im.to_bits() == 0 } else { *value == nothing }
-        })
+        entries.all(
+            |(index, value)| {
+                if index % order == index / order { value.im.to_bits() == 0 } else { *value == nothing }
+            },
+        )
     };
     let unit = (0..order).all(|mode| mass[(mode, mode)].re.to_bits() == 1.0_f64.to_bits());
     (ascending && unit && diagonal_only(mass) && diagonal_only(stiffness))
@@ -265,9 +268,8 @@ mod tests {
 
     fn pencil(order: usize, seed: u64) -> Harmonic {
         let mut seed = seed;
-        let mut random = |rows, columns| {
-            DMatrix::from_fn(rows, columns, |_, _| Complex::new(number(&mut seed), number(&mut seed)))
-        };
+        let mut random =
+            |rows, columns| DMatrix::from_fn(rows, columns, |_, _| Complex::new(number(&mut seed), number(&mut seed)));
         let (a, b, contact_map) = (random(order, order), random(order, order), random(3, order));
         let hermitian = |matrix: DMatrix<Complex<f64>>| (&matrix + matrix.adjoint()) * Complex::new(0.5, 0.0);
         Harmonic {
@@ -282,9 +284,11 @@ mod tests {
         for (order, seed) in [(1, 1), (3, 2), (14, 3), (34, 4), (60, 5)] {
             let harmonic = pencil(order, seed);
             let (squares, shapes) = hermitian_modes(&harmonic, "_1").unwrap();
-            let size = |matrix: DMatrix<Complex<f64>>| matrix.iter().fold(0.0, |most: f64, z| most.max(z.re.hypot(z.im)));
+            let size =
+                |matrix: DMatrix<Complex<f64>>| matrix.iter().fold(0.0, |most: f64, z| most.max(z.re.hypot(z.im)));
             let error = size(shapes.adjoint() * &harmonic.mass * &shapes - DMatrix::identity(order, order));
-            let diagonal = DMatrix::from_fn(order, order, |i, j| Complex::new(if i == j { squares[i] } else { 0.0 }, 0.0));
+            let diagonal =
+                DMatrix::from_fn(order, order, |i, j| Complex::new(if i == j { squares[i] } else { 0.0 }, 0.0));
             let off = size(shapes.adjoint() * &harmonic.stiffness * &shapes - diagonal) / squares[order - 1];
             println!("n = {order}: orthonormality {error:.1e}, diagonality {off:.1e}");
             assert!(error < 1e-13 && off < 1e-13, "n = {order}: {error:e}, {off:e}");
@@ -311,7 +315,8 @@ mod tests {
         // Two masses tied by a spring of complex direction: rank one, so one mode is rigid.
         let direction = [Complex::new(1.0, 0.0), Complex::new(-0.6, 0.8)];
         let stiffness = DMatrix::from_fn(2, 2, |i, j| direction[i] * direction[j].conj() * Complex::new(3e7, 0.0));
-        let mass = DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[2.0, 0.7])).map(|m| Complex::new(m, 0.0));
+        let mass =
+            DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[2.0, 0.7])).map(|m| Complex::new(m, 0.0));
         let harmonic = Harmonic { mass, stiffness, contact_map: DMatrix::zeros(3, 2) };
         let (squares, _) = hermitian_modes(&harmonic, "_1").unwrap();
         assert!(squares[0] == 0.0, "{squares:?}");
