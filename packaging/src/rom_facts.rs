@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 use tiprub_core::{
     Rom,
-    dynamics::modal::ModalModel,
+    dynamics::{cyclic::CyclicModel, modal::ModalModel},
     rom::Frame,
     settings::Scheme,
     stability::{self, ContactDirections},
@@ -17,8 +17,13 @@ use crate::{Failure, Result};
 const FRICTION_STEPS: u32 = 40;
 const FRICTION_STEP: f64 = 0.05;
 
-/// Modes that a warning of the checks is about: those that blade-tip contact excites most.
+/// Modes that a warning of the checks is about: those that blade-tip contact excites most. Of coupled sectors the first
+/// family: as many modes of the wheel as there are sectors.
 const FIRST_MODES: usize = 6;
+/// Rows of a table of checks for people; coupled sectors may come with hundreds.
+pub(crate) const ROWS_SHOWN: usize = 40;
+/// Frequencies listed of each nodal diameter.
+const FREQUENCIES_SHOWN: usize = 6;
 /// Largest frequency deviation (eq. 13) and residual convergence criterion (eq. 12) without a warning, in %.
 const DEVIATION_LIMIT: f64 = 0.3;
 const RESIDUAL_LIMIT: f64 = 1.0;
@@ -28,8 +33,10 @@ const RESIDUAL_LIMIT: f64 = 1.0;
 pub struct RomFacts {
     /// The ROM.
     pub rom: Rom,
-    /// Natural frequencies of the reduced model (Hz), ascending, all of them.
+    /// Natural frequencies of the reduced model (Hz), ascending, all of them; of coupled sectors double ones once.
     pub frequencies: Vec<f64>,
+    /// The same for every nodal diameter of coupled sectors, from 0; else empty.
+    pub by_nodal_diameter: Vec<Vec<f64>>,
     /// Largest angular frequency ω_max (rad/s).
     pub largest_angular_frequency: f64,
     /// Largest stable internal step of central differences, 2/ω_max (s).
@@ -50,6 +57,8 @@ pub struct CheckRow {
     pub deviation: f64,
     /// Residual convergence criterion, eq. 12 (%).
     pub residual: f64,
+    /// Nodal diameter, of coupled sectors.
+    pub nodal_diameter: Option<u32>,
 }
 
 impl RomFacts {
@@ -58,23 +67,34 @@ impl RomFacts {
     /// # Errors
     /// A ROM whose eigenproblem cannot be solved.
     pub fn of(rom: &Rom) -> Result<Self> {
-        let model = ModalModel::from_rom(rom, rom.damping_ratio)
-            .map_err(|error| Failure::from_core(format!("ROM `{}`", rom.name), error))?;
-        let mut frequencies: Vec<f64> = model.frequencies.iter().map(|omega| omega / std::f64::consts::TAU).collect();
+        let in_rom = |error| Failure::from_core(format!("ROM `{}`", rom.name), error);
+        let hertz = |frequencies: &[f64]| frequencies.iter().map(|omega| omega / std::f64::consts::TAU).collect();
+        let mut by_nodal_diameter: Vec<Vec<f64>> = Vec::new();
+        let models = if rom.is_cyclic() {
+            let wheel = CyclicModel::from_rom(rom, rom.damping_ratio).map_err(in_rom)?;
+            by_nodal_diameter.extend(wheel.diameters.iter().map(|diameter| hertz(&diameter.frequencies)));
+            (0..wheel.diameters.len()).map(|number| wheel.paired(number)).collect()
+        } else {
+            vec![ModalModel::from_rom(rom, rom.damping_ratio).map_err(in_rom)?]
+        };
+        let mut frequencies: Vec<f64> =
+            if rom.is_cyclic() { by_nodal_diameter.concat() } else { hertz(&models[0].frequencies) };
         frequencies.sort_by(f64::total_cmp);
+        let limits = models.iter().map(stability::central_difference_limit);
         Ok(Self {
             rom: rom.clone(),
             frequencies,
-            largest_angular_frequency: model.largest_frequency(),
-            central_difference_limit: stability::central_difference_limit(&model),
-            solvable_friction: solvable_friction(rom, &model),
+            by_nodal_diameter,
+            largest_angular_frequency: models.iter().map(ModalModel::largest_frequency).fold(0.0, f64::max),
+            central_difference_limit: limits.fold(f64::INFINITY, f64::min),
+            solvable_friction: solvable_friction(rom, &models),
         })
     }
 
     /// What its checks say against a ROM: one line per mode beyond the limits, first modes only.
     pub fn warnings(&self) -> Vec<String> {
         let poor = |row: &CheckRow| row.deviation.abs() > DEVIATION_LIMIT || row.residual > RESIDUAL_LIMIT;
-        let rows = (1..).zip(self.checks()).take(FIRST_MODES).filter(|(_, row)| poor(row));
+        let rows = (1..).zip(self.checks()).take(self.first_modes()).filter(|(_, row)| poor(row));
         rows.map(|(mode, row)| {
             format!(
                 "ROM `{}`: mode {mode} ({:.1} Hz) deviates by {:.3} % from the full model (eq. 13) with a residual of \
@@ -85,17 +105,33 @@ impl RomFacts {
         .collect()
     }
 
+    /// How many of the checked modes are to be good.
+    fn first_modes(&self) -> usize {
+        let (sectors, numbers) = (self.rom.sectors, &self.rom.checks.nodal_diameters);
+        if numbers.is_empty() {
+            return FIRST_MODES;
+        }
+        let of_wheel = |number: &u32| if *number == 0 || 2 * *number as usize == sectors { 1 } else { 2 };
+        let before = numbers.iter().scan(0, |sum, number| {
+            *sum += of_wheel(number);
+            Some(*sum)
+        });
+        before.take_while(|sum| *sum <= sectors).count()
+    }
+
     /// The checks that came with the ROM, mode by mode; empty where it came without.
     pub fn checks(&self) -> Vec<CheckRow> {
         let checks = &self.rom.checks;
         let columns = checks.full_frequencies.iter().zip(&checks.reduced_frequencies);
         columns
             .zip(checks.frequency_deviation.iter().zip(&checks.residual_criterion))
-            .map(|((full, reduced), (deviation, residual))| CheckRow {
+            .enumerate()
+            .map(|(mode, ((full, reduced), (deviation, residual)))| CheckRow {
                 full: *full,
                 reduced: *reduced,
                 deviation: *deviation,
                 residual: *residual,
+                nodal_diameter: checks.nodal_diameters.get(mode).copied(),
             })
             .collect()
     }
@@ -106,8 +142,8 @@ impl RomFacts {
         let mut text = String::new();
         let nodes: Vec<&str> = rom.contact_nodes.iter().map(|node| node.name.as_str()).collect();
         let _ = writeln!(text, "ROM {}: {}", rom.name, rom.origin);
-        let _ = writeln!(text, "  sectors                   {}", rom.sectors);
-        let _ = writeln!(text, "  reduced coordinates       {} per sector", rom.order());
+        let _ = writeln!(text, "  sectors                   {}", sectors_text(rom));
+        let _ = writeln!(text, "  reduced coordinates       {}", order_text(rom));
         // Of a grid, the first node of every ring stands for the others.
         let shown = match rom.extras.grid {
             Some(grid) => {
@@ -141,18 +177,53 @@ impl RomFacts {
         );
         let friction = self.solvable_friction.map_or("none".into(), |value| format!("{value}"));
         let _ = writeln!(text, "  contact solvable up to µ  {friction} (all nodes closed, tried up to 2)");
+        self.write_frequencies(&mut text);
+        self.write_checks(&mut text);
+        text
+    }
+
+    /// First frequencies, of coupled sectors by nodal diameter; not repeated where checks list them.
+    fn write_frequencies(&self, text: &mut String) {
+        let list = |frequencies: &[f64], separator: &str| {
+            let first = frequencies.iter().take(FREQUENCIES_SHOWN).map(|value| format!("{value:.2}"));
+            first.collect::<Vec<_>>().join(separator)
+        };
+        if !self.by_nodal_diameter.is_empty() {
+            let _ = writeln!(text, "  first frequencies (Hz) by nodal diameter");
+            for (number, frequencies) in self.by_nodal_diameter.iter().enumerate() {
+                let columns: Vec<String> =
+                    frequencies.iter().take(FREQUENCIES_SHOWN).map(|value| format!("{value:>11.2}")).collect();
+                let _ = writeln!(text, "    {number:>3} {}   ({} coordinates)", columns.concat(), frequencies.len());
+            }
+        } else if self.checks().is_empty() {
+            let _ = writeln!(text, "  first frequencies (Hz)    {}", list(&self.frequencies, "  "));
+        }
+    }
+
+    fn write_checks(&self, text: &mut String) {
         let checks = self.checks();
         if checks.is_empty() {
-            let first: Vec<String> = self.frequencies.iter().take(6).map(|value| format!("{value:.2}")).collect();
-            let _ = writeln!(text, "  first frequencies (Hz)    {}", first.join("  "));
-            return text;
+            return;
         }
-        let _ = writeln!(text, "\n  mode    full (Hz)   reduced (Hz)   deviation eq. 13 (%)   residual eq. 12 (%)");
-        for (row, mode) in checks.iter().zip(1..) {
-            let CheckRow { full, reduced, deviation, residual } = row;
-            let _ = writeln!(text, "  {mode:>4} {full:>12.3} {reduced:>14.3} {deviation:>22.5} {residual:>21.5}");
+        let of = |number: Option<u32>| number.map_or(String::new(), |number| format!("{number:>5}"));
+        let heading = if checks[0].nodal_diameter.is_some() { "    n" } else { "" };
+        let _ = writeln!(
+            text,
+            "\n  mode{heading}    full (Hz)   reduced (Hz)   deviation eq. 13 (%)   residual eq. 12 (%)"
+        );
+        for (row, mode) in checks.iter().zip(1..).take(ROWS_SHOWN) {
+            let CheckRow { full, reduced, deviation, residual, nodal_diameter } = row;
+            let number = of(*nodal_diameter);
+            let _ =
+                writeln!(text, "  {mode:>4}{number} {full:>12.3} {reduced:>14.3} {deviation:>22.5} {residual:>21.5}");
         }
-        text
+        if let Some(rest) = Worst::of(&checks, ROWS_SHOWN) {
+            let _ = writeln!(
+                text,
+                "  {} more, up to {:.1} Hz: deviation at most {:.5} %, residual at most {:.5} %",
+                rest.count, rest.frequency, rest.deviation, rest.residual
+            );
+        }
     }
 
     /// For programs.
@@ -163,6 +234,11 @@ impl RomFacts {
             "origin": rom.origin,
             "sectors": rom.sectors,
             "order": rom.order(),
+            "nodal_diameters": rom.is_cyclic().then(|| json!({
+                "orders": self.by_nodal_diameter.iter().map(Vec::len).collect::<Vec<_>>(),
+                "total_order": rom.total_order(),
+                "frequencies_hz": self.by_nodal_diameter,
+            })),
             "contact_nodes": rom.contact_nodes.iter().map(|node| json!({
                 "name": node.name, "position": node.position, "meridional_slope": node.meridional_slope,
             })).collect::<Vec<_>>(),
@@ -186,9 +262,52 @@ impl RomFacts {
                 "reduced_hz": row.reduced,
                 "frequency_deviation_percent": row.deviation,
                 "residual_criterion_percent": row.residual,
+                "nodal_diameter": row.nodal_diameter,
             })).collect::<Vec<_>>(),
         })
     }
+}
+
+/// What the rows of a long table of checks that are not shown amount to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Worst {
+    pub count: usize,
+    pub frequency: f64,
+    pub deviation: f64,
+    pub residual: f64,
+}
+
+impl Worst {
+    /// The rows from `shown` on; `None` where there are none.
+    pub fn of(checks: &[CheckRow], shown: usize) -> Option<Self> {
+        let rest = checks.get(shown..).filter(|rest| !rest.is_empty())?;
+        let most = |value: &dyn Fn(&CheckRow) -> f64| rest.iter().map(value).fold(0.0, f64::max);
+        Some(Self {
+            count: rest.len(),
+            frequency: most(&|row| row.full),
+            deviation: most(&|row| row.deviation.abs()),
+            residual: most(&|row| row.residual),
+        })
+    }
+}
+
+/// Number of sectors, and how they are coupled.
+pub(crate) fn sectors_text(rom: &Rom) -> String {
+    match (rom.is_cyclic(), rom.sectors) {
+        (true, sectors) => format!("{sectors}, coupled: nodal diameters 0 to {}", rom.largest_nodal_diameter()),
+        (false, sectors) => sectors.to_string(),
+    }
+}
+
+/// Number of reduced coordinates: they may differ from one nodal diameter to the next.
+pub(crate) fn order_text(rom: &Rom) -> String {
+    if !rom.is_cyclic() {
+        return format!("{} per sector", rom.order());
+    }
+    let orders = rom.extras.harmonics.iter().map(|harmonic| harmonic.mass.nrows()).chain([rom.order()]);
+    let (low, high) = orders.fold((usize::MAX, 0), |(low, high), order| (low.min(order), high.max(order)));
+    let each = if low == high { format!("{low}") } else { format!("{low} to {high}") };
+    format!("{each} per nodal diameter, {} of the whole wheel", rom.total_order())
 }
 
 /// Spin and heat, for people; nothing for a ROM without.
@@ -203,12 +322,23 @@ fn extras_text(rom: &Rom) -> String {
     text
 }
 
-/// Largest µ tried for which the contact problem is solvable for both slip directions.
-fn solvable_friction(rom: &Rom, model: &ModalModel) -> Option<f64> {
-    let step = 1.0 / model.largest_frequency();
+/// Largest µ tried for which the contact problem is solvable for both slip directions; `models` is the one sector, or all
+/// nodal diameters of coupled sectors.
+fn solvable_friction(rom: &Rom, models: &[ModalModel]) -> Option<f64> {
+    let largest = models.iter().map(ModalModel::largest_frequency).fold(0.0, f64::max);
+    let step = 1.0 / largest;
     let senses = [1.0, -1.0].map(|sign| closed_contacts(rom, sign));
-    let solvable =
-        |friction: f64| stability::check_solvable(model, Scheme::ModalExact, step, friction, &senses).is_ok();
+    // Real and imaginary parts of a nodal diameter are contacts of their own.
+    let copies = |model: &ModalModel| model.contact_modes.nrows() / (3 * rom.contact_nodes.len());
+    let together: Vec<Vec<ContactDirections>> =
+        models.iter().map(|model| senses.iter().map(|sense| sense.repeat(copies(model))).collect()).collect();
+    let solvable = |friction: f64| {
+        if rom.is_cyclic() {
+            stability::check_solvable_together(models, Scheme::ModalExact, step, friction, &together).is_ok()
+        } else {
+            stability::check_solvable(&models[0], Scheme::ModalExact, step, friction, &senses).is_ok()
+        }
+    };
     (0..=FRICTION_STEPS).map(|step| f64::from(step) * FRICTION_STEP).take_while(|friction| solvable(*friction)).last()
 }
 

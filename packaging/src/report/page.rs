@@ -11,7 +11,7 @@ use crate::{
     error_study::ErrorStudy,
     native::NativeRun,
     recording::Agreement,
-    rom_facts::{CheckRow, RomFacts},
+    rom_facts::{CheckRow, ROWS_SHOWN, RomFacts, Worst, order_text, sectors_text},
     schedule::Schedule,
 };
 
@@ -150,8 +150,8 @@ fn rom_section(facts: &[RomFacts]) -> String {
         let nodes: Vec<&str> = rom.contact_nodes.iter().map(|node| node.name.as_str()).collect();
         let friction = fact.solvable_friction.map_or("-".into(), |value| format!("{value}"));
         html.push_str(&table(&[
-            ("sectors", rom.sectors.to_string()),
-            ("reduced coordinates per sector", rom.order().to_string()),
+            ("sectors", sectors_text(rom)),
+            ("reduced coordinates", order_text(rom)),
             ("contact nodes", escape(&nodes.join(", "))),
             (
                 "largest angular frequency ω<sub>max</sub>",
@@ -177,18 +177,28 @@ fn checks_table(checks: &[CheckRow]) -> String {
     if checks.is_empty() {
         return "<p>This ROM came without checks.</p>".into();
     }
-    let mut html = String::from(
-        "<table class=\"numbers\"><thead><tr><th>mode</th><th>full model (Hz)</th><th>reduced (Hz)</th>\
+    let coupled = checks[0].nodal_diameter.is_some();
+    let mut html = format!(
+        "<table class=\"numbers\"><thead><tr><th>mode</th>{}<th>full model (Hz)</th><th>reduced (Hz)</th>\
          <th>frequency deviation, eq. 13 (%)</th><th>residual criterion, eq. 12 (%)</th></tr></thead><tbody>",
+        if coupled { "<th>nodal diameter</th>" } else { "" }
     );
-    for (row, mode) in checks.iter().zip(1..) {
+    for (row, mode) in checks.iter().zip(1..).take(ROWS_SHOWN) {
+        let number = row.nodal_diameter.map_or(String::new(), |number| format!("<td>{number}</td>"));
         let _ = write!(
             html,
-            "<tr><td>{mode}</td><td>{:.3}</td><td>{:.3}</td><td>{:.5}</td><td>{:.5}</td></tr>",
+            "<tr><td>{mode}</td>{number}<td>{:.3}</td><td>{:.3}</td><td>{:.5}</td><td>{:.5}</td></tr>",
             row.full, row.reduced, row.deviation, row.residual
         );
     }
     html.push_str("</tbody></table>");
+    if let Some(rest) = Worst::of(checks, ROWS_SHOWN) {
+        let _ = write!(
+            html,
+            "<p>{} more modes up to {:.1} Hz: deviation at most {:.5} %, residual at most {:.5} %.</p>",
+            rest.count, rest.frequency, rest.deviation, rest.residual
+        );
+    }
     html
 }
 

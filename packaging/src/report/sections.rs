@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use tiprub_core::{VariableTable, settings::Shape, variables::Quantity};
-use tiprub_model::{Reduction, surface_quads};
+use tiprub_model::{Mesh, Reduction, surface_quads};
 
 use super::{
     page::{ReportInput, escape},
@@ -335,7 +335,7 @@ fn energies(results: &Results<'_>) -> Result<Vec<Figure>> {
 
 /// The blade at rest with its contact nodes, and its first mode shapes.
 fn mode_shapes(reduction: &Reduction) -> Figure {
-    let surface = surface_of(reduction);
+    let surface = reduction.mesh.as_ref().map_or_else(Surface::default, surface_of);
     let view = View::of_blade(&surface, AZIMUTH, ELEVATION);
     let frame = Frame::around(&surface, &view, 0.1);
     let marks: Vec<[f64; 3]> = reduction.rom.contact_nodes.iter().map(|node| cartesian(node.position)).collect();
@@ -364,12 +364,14 @@ fn mode_shapes(reduction: &Reduction) -> Figure {
     Figure { body, caption }
 }
 
-fn surface_of(reduction: &Reduction) -> Surface {
+/// The outer surface of a mesh.
+pub fn surface_of(mesh: &Mesh) -> Surface {
     let corner = |face: &[usize], index: usize| face[index.min(face.len() - 1)];
-    // A model without a mesh has no surface to show.
-    let (faces, points) =
-        reduction.mesh.as_ref().map(|mesh| (surface_quads(mesh), mesh.nodes.clone())).unwrap_or_default();
-    Surface { points, faces: faces.iter().map(|face| std::array::from_fn(|index| corner(face, index))).collect() }
+    let faces = surface_quads(mesh);
+    Surface {
+        points: mesh.nodes.clone(),
+        faces: faces.iter().map(|face| std::array::from_fn(|index| corner(face, index))).collect(),
+    }
 }
 
 fn cartesian([radius, angle, z]: [f64; 3]) -> [f64; 3] {

@@ -4,6 +4,8 @@
 //! was found. [`output`] writes it, always in the same way: one HTML page that opens offline, an SVG and a CSV per
 //! figure, and `results.json`. Runs that do not depend on each other go through [`sweep`].
 
+pub mod convergence;
+pub mod modes;
 pub mod output;
 pub mod sweep;
 

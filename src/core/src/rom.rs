@@ -11,6 +11,7 @@ use nalgebra::DMatrix;
 
 use crate::{Error, Result};
 pub use cyclic::Harmonic;
+pub(crate) use cyclic::cholesky;
 
 /// Most sectors of a ROM. Bladed disks have tens to a few hundred; a damaged or hostile file must not ask for all memory,
 /// which ends the process of the importer.

@@ -71,12 +71,13 @@ fn compressed(pattern: &Pattern) -> (Graph, Vec<core::ops::Range<usize>>) {
         for &row in column(rows.start) {
             // Rows ascend, and so do their groups.
             if group[row] != last && group[row] != vertex {
-                graph.push_neighbour(group[row], rows.len());
+                graph.push_neighbour(group[row], 1);
             }
             last = group[row];
         }
         graph.finish_vertex(rows.len());
     }
+    graph.weigh_edges();
     (graph, members)
 }
 

@@ -121,7 +121,7 @@ fn array(text: &str, name: &str) -> Vec<u8> {
     let block = text[start..].lines().nth(1).unwrap();
     let bytes = STANDARD.decode(block).unwrap();
     let (length, data) = bytes.split_at(8);
-    assert_eq!(u64::from_le_bytes(length.try_into().unwrap()) as usize, data.len());
+    assert_eq!(usize::try_from(u64::from_le_bytes(length.try_into().unwrap())).unwrap(), data.len());
     data.to_vec()
 }
 
@@ -140,7 +140,10 @@ fn a_vtk_file_holds_mesh_sets_and_fields() {
     assert!(text.contains("NumberOfPoints=\"294\" NumberOfCells=\"60\""));
     assert_eq!(reals(&text, "Points"), mesh.nodes.concat());
     let whole = |name: &str| -> Vec<usize> {
-        array(&text, name).chunks(8).map(|bytes| u64::from_le_bytes(bytes.try_into().unwrap()) as usize).collect()
+        array(&text, name)
+            .chunks(8)
+            .map(|bytes| usize::try_from(u64::from_le_bytes(bytes.try_into().unwrap())).unwrap())
+            .collect()
     };
     assert_eq!(
         whole("connectivity"),

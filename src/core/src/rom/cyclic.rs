@@ -104,17 +104,22 @@ impl Rom {
                 return refuse(name, format!("not Hermitian: off by {asymmetry:.3e} at largest entry {largest:.3e}"));
             }
         }
-        if !is_positive_definite(&harmonic.mass) {
+        if cholesky(&harmonic.mass).is_none() {
             return refuse("mass", "not positive definite".to_owned());
         }
         Ok(())
     }
 }
 
-/// A complex factorisation does not stop at a negative pivot: its root is imaginary.
-fn is_positive_definite(matrix: &DMatrix<Complex<f64>>) -> bool {
-    let factor = matrix.clone().cholesky();
-    factor.is_some_and(|factor| factor.l_dirty().diagonal().iter().all(|root| root.re > root.im.abs()))
+/// L of a Hermitian matrix L Lᴴ; `None` unless it is positive definite. (Of a complex number there is always a square root,
+/// so that the factorisation of a complex matrix alone does not tell.)
+pub(crate) fn cholesky(matrix: &DMatrix<Complex<f64>>) -> Option<DMatrix<Complex<f64>>> {
+    let lower = matrix.clone().cholesky()?.l();
+    let real = |index: usize| {
+        let pivot: Complex<f64> = lower[(index, index)];
+        pivot.re > 0.0 && pivot.im.abs() <= 1e-8 * pivot.re
+    };
+    (0..lower.nrows()).all(real).then_some(lower)
 }
 
 fn largest_entry(matrix: &DMatrix<Complex<f64>>) -> f64 {

@@ -141,7 +141,7 @@ impl Compiled {
             model.damping_ratios.fill(parameters.damping_ratio);
             model.frequencies.iter_mut().for_each(|frequency| *frequency *= stiffest);
         }
-        let at = Checking { compiled: self, models, parameters };
+        let mut at = Checking { compiled: self, models, parameters, watched: [Vec::new(), Vec::new()] };
         let expected = self.expected_step(parameters.step);
         let (outcome, massless) = match at.massless(expected, law) {
             Ok((more, limit)) => (at.warnings(expected, law, more), limit),
@@ -152,8 +152,9 @@ impl Compiled {
         } else {
             let senses = at.senses();
             let steps = stability::growth_steps(at.largest_frequency(), parameters.step);
-            let refusal = |step| senses.iter().find_map(|sense| at.growth(step, *sense, false).err());
-            steps.map(|step| (step, refusal(step))).collect()
+            steps
+                .map(|step| (step, senses.iter().find_map(|sense| at.growth(step, *sense, false).err())))
+                .collect()
         };
         Limits { parameters, outcome, ranges: at.with_expected(ranges, expected), massless }
     }
@@ -226,11 +227,14 @@ struct Checking<'a> {
     /// real structures.
     models: Vec<ModalModel>,
     parameters: Parameters,
+    /// Per sense of slip (+, −) and combination of nodes the model that grows most at the step to expect. At other steps
+    /// only this one is looked at: with all nodal diameters of a wheel at all steps the check would take a minute.
+    watched: [Vec<usize>; 2],
 }
 
 impl Checking<'_> {
     /// All warnings at the step to expect; `more` come last.
-    fn warnings(&self, step: f64, law: &GapLaw, more: Vec<String>) -> Result<Vec<String>> {
+    fn warnings(&mut self, step: f64, law: &GapLaw, more: Vec<String>) -> Result<Vec<String>> {
         let mut warnings = self.expected(step)?;
         warnings.extend(self.slave(step, law)?);
         warnings.extend(more);
@@ -238,7 +242,7 @@ impl Checking<'_> {
     }
 
     /// Everything about the rotor at the step to expect; returns warnings.
-    fn expected(&self, step: f64) -> Result<Vec<String>> {
+    fn expected(&mut self, step: f64) -> Result<Vec<String>> {
         let Parameters { friction, scheme, .. } = self.parameters;
         let mut warnings: Vec<String> =
             stability::check_step(self.largest_frequency(), scheme, step)?.into_iter().collect();
@@ -255,8 +259,9 @@ impl Checking<'_> {
             for sense in &senses {
                 warnings.extend(self.growth(step, *sense, true)?);
             }
-            if let [sense] = senses[..] {
-                let reversed = self.growth(step, -sense, true).unwrap_or_else(|refusal| vec![refusal.to_string()]);
+            // Of a wheel the other sense takes as long again.
+            if let ([sense], None) = (&senses[..], &self.compiled.wheel) {
+                let reversed = self.growth(step, -*sense, true).unwrap_or_else(|refusal| vec![refusal.to_string()]);
                 warnings.extend(
                     reversed
                         .into_iter()
@@ -380,9 +385,13 @@ impl Checking<'_> {
             .collect()
     }
 
-    /// Sets of closed contact nodes: all combinations of a few; of many every one alone, neighbours, and all.
+    /// Sets of closed contact nodes: all combinations of a few; of many every one alone, neighbours, and all; of a wheel,
+    /// on all sectors, every one alone and all.
     fn combinations(&self) -> Vec<Vec<usize>> {
         let nodes = self.compiled.master().1.contact_nodes.len();
+        if self.compiled.wheel.is_some() {
+            return (0..nodes).map(|node| vec![node]).chain([(0..nodes).collect()]).collect();
+        }
         if nodes <= ALL_COMBINATIONS_UP_TO {
             let members = |set: usize| (0..nodes).filter(|node| set >> node & 1 == 1).collect();
             return (1..1 << nodes).map(members).collect();
@@ -393,35 +402,47 @@ impl Checking<'_> {
     }
 
     /// Growth of closed sliding contact at one step size and sense of slip; returns warnings of flutter.
-    fn growth(&self, step: f64, sense: f64, warn: bool) -> Result<Vec<String>> {
-        let Parameters { friction, scheme, .. } = self.parameters;
+    fn growth(&mut self, step: f64, sense: f64, warn: bool) -> Result<Vec<String>> {
         let mut warnings = Vec::new();
-        for nodes in self.combinations() {
-            let mut worst: f64 = 0.0;
-            for model in &self.models {
-                let all = self.directions(model, sense);
-                // Both parts of a nodal diameter.
-                let own = self.compiled.master().1.contact_nodes.len();
-                let places = (0..all.len() / own).flat_map(|part| nodes.iter().map(move |node| part * own + node));
-                let places: Vec<usize> = places.collect();
-                let directions = places.iter().map(|place| all[*place]).collect();
-                let model = model.with_nodes(&places);
-                let Some(found) = stability::growth(&model, scheme, step, friction, &directions) else { continue };
+        for (combination, nodes) in self.combinations().iter().enumerate() {
+            let watched = self.watched[usize::from(sense < 0.0)].get(combination).copied();
+            let models = watched.map_or(0..self.models.len(), |model| model..model + 1);
+            let (mut flutter, mut most) = (0.0_f64, (0, f64::NEG_INFINITY));
+            for model in models {
+                let Some(found) = self.growth_of(model, nodes, step, sense) else { continue };
                 if found.is_added() {
-                    return Err(self.refusal(&nodes, sense, step, found));
+                    return Err(self.refusal(nodes, sense, step, found));
                 }
                 if found.is_flutter() {
-                    worst = worst.max(found.continuous);
+                    flutter = flutter.max(found.continuous);
+                }
+                if found.stepped > most.1 {
+                    most = (model, found.stepped);
                 }
             }
-            if warn && worst > 0.0 {
+            if watched.is_none() {
+                self.watched[usize::from(sense < 0.0)].push(most.0);
+            }
+            if warn && flutter > 0.0 {
                 warnings.push(format!(
-                    "{} is physically unstable (flutter), growth rate {worst:.3e} 1/s",
-                    self.contact(&nodes, sense)
+                    "{} is physically unstable (flutter), growth rate {flutter:.3e} 1/s",
+                    self.contact(nodes, sense)
                 ));
             }
         }
         Ok(warnings)
+    }
+
+    /// Growth of one of the models with contact closed at some nodes (of both parts of a nodal diameter).
+    fn growth_of(&self, model: usize, nodes: &[usize], step: f64, sense: f64) -> Option<Growth> {
+        let Parameters { friction, scheme, .. } = self.parameters;
+        let model = &self.models[model];
+        let all = self.directions(model, sense);
+        let own = self.compiled.master().1.contact_nodes.len();
+        let places = (0..all.len() / own).flat_map(|part| nodes.iter().map(move |node| part * own + node));
+        let places: Vec<usize> = places.collect();
+        let directions = places.iter().map(|place| all[*place]).collect();
+        stability::growth(&model.with_nodes(&places), scheme, step, friction, &directions)
     }
 
     /// Which contact is meant.

@@ -1,5 +1,7 @@
 //! Weighted graphs, their parts, and their coarser images.
 
+use rayon::prelude::*;
+
 /// An undirected graph: neighbours of each vertex without itself, weights of vertices and edges.
 #[derive(Debug, Clone)]
 pub(super) struct Graph {
@@ -52,6 +54,16 @@ impl Graph {
         self.weights.iter().sum()
     }
 
+    /// Weigh every edge by what its ends have in common, so that matching pairs those that lie close.
+    pub(super) fn weigh_edges(&mut self) {
+        let graph = &*self;
+        let weights = (0..graph.order()).into_par_iter().flat_map_iter(|vertex| {
+            let own = graph.neighbours_of(vertex);
+            own.iter().map(move |&neighbour| 1 + common(own, graph.neighbours_of(neighbour)))
+        });
+        self.edge_weights = weights.collect();
+    }
+
     /// The subgraph of some vertices, numbered as they are given.
     pub(super) fn induced(&self, vertices: &[usize]) -> Self {
         let mut position = vec![usize::MAX; self.order()];
@@ -74,8 +86,8 @@ impl Graph {
     /// The graph with pairs of vertices that a heavy edge joins made one, and the vertex each one goes into.
     ///
     /// No vertex becomes heavier than `heaviest`.
-    pub(super) fn coarser(&self, heaviest: usize) -> (Self, Vec<usize>) {
-        let pairs = self.heavy_edge_matching(heaviest);
+    pub(super) fn coarser(&self, heaviest: usize, salt: usize) -> (Self, Vec<usize>) {
+        let pairs = self.heavy_edge_matching(heaviest, salt);
         let mut coarse_of = vec![usize::MAX; self.order()];
         let mut leaders = Vec::with_capacity(self.order() / 2);
         for vertex in 0..self.order() {
@@ -112,23 +124,37 @@ impl Graph {
     }
 
     /// Partner of every vertex, itself where it has none.
-    fn heavy_edge_matching(&self, heaviest: usize) -> Vec<usize> {
+    fn heavy_edge_matching(&self, heaviest: usize, salt: usize) -> Vec<usize> {
         let mut pairs = vec![usize::MAX; self.order()];
-        for vertex in scrambled(self.order()) {
+        for vertex in scrambled(self.order(), salt) {
             if pairs[vertex] != usize::MAX {
                 continue;
             }
             let room = heaviest.saturating_sub(self.weights[vertex]);
-            let best =
-                self.edges_of(vertex).filter(|&(u, _)| pairs[u] == usize::MAX && self.weights[u] <= room).max_by_key(
-                    |&(u, weight)| (weight, core::cmp::Reverse(self.weights[u]), core::cmp::Reverse(scramble(u))),
-                );
+            let best = self
+                .edges_of(vertex)
+                .filter(|&(u, _)| pairs[u] == usize::MAX && self.weights[u] <= room)
+                .max_by_key(|&(u, weight)| {
+                    (weight, core::cmp::Reverse(self.weights[u]), core::cmp::Reverse(scramble(salt + u)))
+                });
             let partner = best.map_or(vertex, |(u, _)| u);
             pairs[vertex] = partner;
             pairs[partner] = vertex;
         }
         pairs
     }
+}
+
+/// Number of entries that two ascending lists share.
+fn common(first: &[usize], second: &[usize]) -> usize {
+    let (mut i, mut k, mut count) = (0, 0, 0);
+    while i < first.len() && k < second.len() {
+        let (a, b) = (first[i], second[k]);
+        count += usize::from(a == b);
+        i += usize::from(a <= b);
+        k += usize::from(b <= a);
+    }
+    count
 }
 
 /// A fixed sequence without pattern (splitmix64).
@@ -140,8 +166,8 @@ pub(super) fn scramble(number: usize) -> u64 {
 }
 
 /// The numbers below `count` in an order without pattern.
-fn scrambled(count: usize) -> Vec<usize> {
+fn scrambled(count: usize, salt: usize) -> Vec<usize> {
     let mut numbers: Vec<usize> = (0..count).collect();
-    numbers.sort_unstable_by_key(|&number| (scramble(number), number));
+    numbers.sort_unstable_by_key(|&number| (scramble(salt + number), number));
     numbers
 }

@@ -13,9 +13,13 @@ use super::graph::{Graph, scramble};
 pub(super) const SEPARATOR: usize = 2;
 
 /// Coarsening ends here,
-const COARSEST: usize = 100;
+const COARSEST: usize = 40;
 /// or when a step leaves more than this share of the vertices.
 const STALLED: f64 = 0.95;
+/// Attempts at the coarser half of the levels,
+const ATTEMPTS: usize = 3;
+/// which is where this many vertices of the graph have become one.
+const SHRINKAGE: usize = 30;
 /// Seeds tried on the coarsest graph.
 const SEEDS: usize = 12;
 /// Refinement passes per level.
@@ -26,22 +30,38 @@ const PATIENCE: usize = 200;
 /// Side (0, 1 or [`SEPARATOR`]) of every vertex.
 pub(super) fn separator(graph: &Graph) -> Vec<usize> {
     let heaviest = (3 * graph.total_weight()).div_ceil(2 * COARSEST);
+    // What the first coarse graphs look like matters little, so that attempts may begin at a smaller one.
+    let levels = coarsened(graph, graph.order().div_ceil(SHRINKAGE).max(COARSEST), heaviest, 0);
+    let middle = levels.last().map_or(graph, |(coarse, _)| coarse);
+    let attempts = (0..ATTEMPTS).map(|attempt| {
+        let levels = coarsened(middle, COARSEST, heaviest, attempt);
+        let coarsest = levels.last().map_or(middle, |(coarse, _)| coarse);
+        refined(middle, &levels, initial(coarsest, attempt))
+    });
+    let best = attempts.min_by_key(|sides| Partition::new(middle, sides.clone()).cost()).unwrap_or_default();
+    refined(graph, &levels, best)
+}
+
+/// Coarser and coarser graphs down to about `target` vertices, each with the vertices that those of the finer one go into.
+fn coarsened(graph: &Graph, target: usize, heaviest: usize, salt: usize) -> Vec<(Graph, Vec<usize>)> {
     let mut levels: Vec<(Graph, Vec<usize>)> = Vec::new();
     loop {
         let finest = levels.last().map_or(graph, |(coarse, _)| coarse);
-        if finest.order() <= COARSEST {
-            break;
+        if finest.order() <= target {
+            return levels;
         }
-        let (coarse, map) = finest.coarser(heaviest);
+        let (coarse, map) = finest.coarser(heaviest, salt);
         if coarse.order() as f64 > STALLED * finest.order() as f64 {
-            break;
+            return levels;
         }
         levels.push((coarse, map));
     }
-    let coarsest = levels.last().map_or(graph, |(coarse, _)| coarse);
-    let mut sides = initial(coarsest);
-    while let Some((_, map)) = levels.pop() {
-        let finer = levels.last().map_or(graph, |(coarse, _)| coarse);
+}
+
+/// The sides of the coarsest graph brought to the finest, better at every level.
+fn refined(graph: &Graph, levels: &[(Graph, Vec<usize>)], mut sides: Vec<usize>) -> Vec<usize> {
+    for (level, (_, map)) in levels.iter().enumerate().rev() {
+        let finer = if level == 0 { graph } else { &levels[level - 1].0 };
         let projected = map.iter().map(|&coarse| sides[coarse]).collect();
         let mut partition = Partition::new(finer, projected);
         partition.refine();
@@ -51,10 +71,10 @@ pub(super) fn separator(graph: &Graph) -> Vec<usize> {
 }
 
 /// Best of several regions grown to half of the weight.
-fn initial(graph: &Graph) -> Vec<usize> {
+fn initial(graph: &Graph, salt: usize) -> Vec<usize> {
     let attempts = (0..SEEDS).map(|attempt| {
         #[expect(clippy::cast_possible_truncation, reason = "a remainder below the number of vertices")]
-        let random = (scramble(attempt) % graph.order() as u64) as usize;
+        let random = (scramble(salt * SEEDS + attempt) % graph.order() as u64) as usize;
         // Every other one from as far out as two searches get.
         let seed = if attempt % 2 == 0 { farthest(graph, farthest(graph, random)) } else { random };
         let mut partition = Partition::new(graph, grown(graph, seed));
@@ -119,10 +139,9 @@ struct Partition<'a> {
     heaviest: usize,
 }
 
-/// One move: the vertex, the side it went to, and how many neighbours it drew into the separator.
+/// One move: the vertex, and how many neighbours it drew into the separator.
 struct Move {
     vertex: usize,
-    side: usize,
     drawn: usize,
 }
 
@@ -147,58 +166,54 @@ impl<'a> Partition<'a> {
         (overweight, 256 * middle * (first + second).pow(2) / (first * second).max(1))
     }
 
+    /// Passes to either side in turn. One that could go both ways would hold a separator where it is: only as a whole
+    /// does a plane of vertices move over a plateau.
     fn refine(&mut self) {
         for _ in 0..PASSES {
             let before = self.cost();
-            self.pass();
+            self.pass(0);
+            self.pass(1);
             if self.cost() >= before {
                 break;
             }
         }
     }
 
-    /// Move separator vertices, best gain first, each at most once, and go back to the best state met.
-    fn pass(&mut self) {
+    /// Move separator vertices to one side, best gain first, each at most once, and go back to the best state met.
+    fn pass(&mut self, side: usize) {
         let mut locked = vec![false; self.sides.len()];
-        // By how much the separator shrinks when a vertex of it goes to either side.
-        let mut gains = vec![[0_isize; 2]; self.sides.len()];
-        let mut queues = [Queue::new(), Queue::new()];
+        // By how much the separator shrinks when a vertex of it goes to that side.
+        let mut gains = vec![0; self.sides.len()];
+        let mut queue = Queue::new();
         for vertex in 0..self.sides.len() {
             if self.sides[vertex] == SEPARATOR {
-                self.enter(vertex, &mut gains, &mut queues);
+                self.enter(vertex, side, &mut gains, &mut queue);
             }
         }
         let (mut moves, mut drawn) = (Vec::<Move>::new(), Vec::new());
         let (mut best, mut best_length) = (self.cost(), 0);
-        while let Some((vertex, side)) = self.next(&mut queues, &gains, &locked) {
+        while let Some(vertex) = self.next(&mut queue, side, &gains, &locked) {
             locked[vertex] = true;
             let first = drawn.len();
             self.shift(vertex, side);
             for &neighbour in self.graph.neighbours_of(vertex) {
-                match self.sides[neighbour] {
-                    SEPARATOR => {
-                        gains[neighbour][1 - side] -= signed(self.graph.weights[vertex]);
-                        queues[1 - side].push((gains[neighbour][1 - side], Reverse(neighbour)));
-                    }
-                    other if other != side => {
-                        self.shift(neighbour, SEPARATOR);
-                        drawn.push(neighbour);
-                    }
-                    _ => {}
+                if self.sides[neighbour] == 1 - side {
+                    self.shift(neighbour, SEPARATOR);
+                    drawn.push(neighbour);
                 }
             }
             for &entered in &drawn[first..] {
                 for &near in self.graph.neighbours_of(entered) {
                     if self.sides[near] == SEPARATOR {
-                        gains[near][side] += signed(self.graph.weights[entered]);
-                        queues[side].push((gains[near][side], Reverse(near)));
+                        gains[near] += signed(self.graph.weights[entered]);
+                        queue.push((gains[near], Reverse(near)));
                     }
                 }
             }
             for &entered in &drawn[first..] {
-                self.enter(entered, &mut gains, &mut queues);
+                self.enter(entered, side, &mut gains, &mut queue);
             }
-            moves.push(Move { vertex, side, drawn: drawn.len() - first });
+            moves.push(Move { vertex, drawn: drawn.len() - first });
             let cost = self.cost();
             if cost < best {
                 (best, best_length) = (cost, moves.len());
@@ -209,47 +224,31 @@ impl<'a> Partition<'a> {
         for undone in moves.drain(best_length..).rev() {
             let kept = drawn.len() - undone.drawn;
             for neighbour in drawn.drain(kept..) {
-                self.shift(neighbour, 1 - undone.side);
+                self.shift(neighbour, 1 - side);
             }
             self.shift(undone.vertex, SEPARATOR);
         }
     }
 
-    /// The gains of a vertex of the separator, and its places in the queues.
-    fn enter(&self, vertex: usize, gains: &mut [[isize; 2]], queues: &mut [Queue; 2]) {
-        let mut near = [0; 3];
-        for &neighbour in self.graph.neighbours_of(vertex) {
-            near[self.sides[neighbour]] += self.graph.weights[neighbour];
-        }
-        let own = self.graph.weights[vertex];
-        gains[vertex] = [signed(own) - signed(near[1]), signed(own) - signed(near[0])];
-        for side in 0..2 {
-            queues[side].push((gains[vertex][side], Reverse(vertex)));
-        }
+    /// The gain of a vertex of the separator, and its place in the queue.
+    fn enter(&self, vertex: usize, side: usize, gains: &mut [isize], queue: &mut Queue) {
+        let far = self.graph.neighbours_of(vertex).iter().filter(|&&near| self.sides[near] == 1 - side);
+        let drawn: usize = far.map(|&near| self.graph.weights[near]).sum();
+        gains[vertex] = signed(self.graph.weights[vertex]) - signed(drawn);
+        queue.push((gains[vertex], Reverse(vertex)));
     }
 
-    /// The best move that keeps the balance, or betters it; what stands in the queues out of date is dropped.
-    fn next(&self, queues: &mut [Queue; 2], gains: &[[isize; 2]], locked: &[bool]) -> Option<(usize, usize)> {
-        let mut best: Option<(isize, usize, usize)> = None;
-        for side in 0..2 {
-            while let Some(&(gain, Reverse(vertex))) = queues[side].peek() {
-                if !locked[vertex] && self.sides[vertex] == SEPARATOR && gains[vertex][side] == gain {
-                    break;
-                }
-                queues[side].pop();
-            }
-            let Some(&(gain, Reverse(vertex))) = queues[side].peek() else { continue };
+    /// The best move that keeps the balance, or betters it; what stands in the queue out of date is dropped.
+    fn next(&self, queue: &mut Queue, side: usize, gains: &[isize], locked: &[bool]) -> Option<usize> {
+        while let Some((gain, Reverse(vertex))) = queue.pop() {
             let after = self.weights[side] + self.graph.weights[vertex];
-            if after > self.heaviest && after > self.weights[1 - side] {
-                continue;
-            }
-            let better = best
-                .is_none_or(|(other, _, at)| gain > other || (gain == other && self.weights[side] < self.weights[at]));
-            if better {
-                best = Some((gain, vertex, side));
+            let balanced = after <= self.heaviest || after <= self.weights[1 - side];
+            let current = !locked[vertex] && self.sides[vertex] == SEPARATOR && gains[vertex] == gain;
+            if current && balanced {
+                return Some(vertex);
             }
         }
-        best.map(|(_, vertex, side)| (vertex, side))
+        None
     }
 
     fn shift(&mut self, vertex: usize, side: usize) {

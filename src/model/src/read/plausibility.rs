@@ -53,7 +53,7 @@ impl Plausibility {
 pub fn total_mass(model: &FeModel) -> f64 {
     let pattern = &model.mass.pattern;
     let entries = (0..model.nodes.len()).map(|node| 3 * node).flat_map(|column| {
-        (pattern.starts[column]..pattern.starts[column + 1]).filter(|&entry| pattern.rows[entry] % 3 == 0)
+        (pattern.starts[column]..pattern.starts[column + 1]).filter(|&entry| pattern.rows[entry].is_multiple_of(3))
     });
     entries.map(|entry| model.mass.values[entry]).sum()
 }

@@ -10,7 +10,7 @@ use nalgebra::{Complex, DMatrix, SymmetricEigen};
 
 use crate::dynamics::modal::{ModalModel, RIGID_FRACTION, check_semidefinite, real_modes};
 use crate::dynamics::scheme::ModeCoefficients;
-use crate::rom::Harmonic;
+use crate::rom::{Harmonic, cholesky};
 use crate::settings::Scheme;
 use crate::{Error, Result, Rom};
 
@@ -185,11 +185,10 @@ fn hermitian_modes(harmonic: &Harmonic, suffix: &str) -> Result<(Vec<f64>, DMatr
     if let Some(modes) = modal_already(mass, stiffness) {
         return Ok(modes);
     }
-    let Some(cholesky) = mass.clone().cholesky() else {
+    let Some(lower) = cholesky(mass) else {
         let what = format!("ROM array `mass{suffix}`");
         return Err(Error::invalid(what, "not positive definite", "Write the ROM again"));
     };
-    let lower = cholesky.l();
     let half = lower.solve_lower_triangular(stiffness).unwrap_or_else(|| stiffness.clone());
     let full = lower.solve_lower_triangular(&half.adjoint()).unwrap_or(half);
     let eigen = SymmetricEigen::new((&full + full.adjoint()) * Complex::new(0.5, 0.0));

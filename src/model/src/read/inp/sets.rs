@@ -109,7 +109,9 @@ impl Family {
                         found.insert(*number);
                     }
                     Member::Range(first, last, step) => {
-                        let inside = |number: &&u64| (*first..=*last).contains(number) && (*number - first) % step == 0;
+                        let inside = |number: &&u64| {
+                            (*first..=*last).contains(number) && (*number - first).is_multiple_of(*step)
+                        };
                         found.extend(every.iter().filter(inside));
                     }
                     Member::Set(other, place) => open.push((other.clone(), place.clone())),
