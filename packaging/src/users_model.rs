@@ -203,7 +203,8 @@ fn import(arguments: &ReduceArguments, console: &Console) -> Result<Imported> {
         let Some(path) = mesh else {
             return Err(Failure::usage("MODEL", "there is no file", "Give a mesh file, or --stiffness and --mass"));
         };
-        let options = MeshOptions { units: asked.units(), material, temperature: asked.temperature };
+        let options =
+            MeshOptions { units: asked.units(), axis: asked.axis(), material, temperature: asked.temperature };
         let title = format!("Reading {}", path.display());
         return with_progress(&title, console, &|listener| read_mesh(path, &options, listener));
     };
@@ -228,6 +229,7 @@ fn import(arguments: &ReduceArguments, console: &Console) -> Result<Imported> {
         nodes,
         dofs: asked.dofs.clone(),
         units: asked.units(),
+        axis: asked.axis(),
         left_out: asked.clamp_set.clone(),
     };
     console.say(format_args!("Reading {} and {}", stiffness.display(), mass.display()));

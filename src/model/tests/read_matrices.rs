@@ -8,7 +8,7 @@ use tiprub_core::Rom;
 use tiprub_core::rom::Frame;
 use tiprub_model::progress::silent;
 use tiprub_model::read::{
-    ContactChoice, Imported, MatrixFiles, MeshOptions, Units, choose_contact_nodes, read_matrices, read_mesh,
+    Axis, ContactChoice, Imported, MatrixFiles, MeshOptions, Units, choose_contact_nodes, read_matrices, read_mesh,
 };
 use tiprub_model::reduce::ReductionOptions;
 use tiprub_model::{Material, reduce_model};
@@ -57,6 +57,7 @@ fn files(directory: &Path, stiffness: &str, mass: &str, nodes: &str) -> MatrixFi
         nodes: directory.join(nodes),
         dofs: None,
         units: Units::Si,
+        axis: Axis::Z,
         left_out: Vec::new(),
     }
 }
@@ -296,4 +297,37 @@ fn nodes_in_another_order_than_the_rows_are_noticed() {
         Written::new(&market(&bar, false, Triangle::Lower), &market(&bar, true, Triangle::Lower), &lines.join("\n"));
     let imported = read_matrices(&written.files()).unwrap();
     assert!(imported.warnings.iter().any(|warning| warning.contains("in the order of the rows")), "{imported:?}");
+}
+
+#[test]
+fn another_engine_axis_turns_the_model_and_its_matrices_alike() {
+    let bar = bar();
+    let expected = rom(&bar);
+    // What stands along z here stands along x there, and so on: (x, y, z) there is (z, x, y) of the bar.
+    let mut table = String::new();
+    for (index, [x, y, z]) in bar.model.nodes.iter().enumerate() {
+        let sets = bar.model.sets.iter().filter(|(_, nodes)| nodes.contains(&index));
+        let sets: Vec<&str> = sets.map(|(name, _)| name.as_str()).collect();
+        let _ = writeln!(table, "{},{z:e},{x:e},{y:e},{}", bar.node_numbers[index], sets.join(" "));
+    }
+    let there = |dof: usize| (bar.node_numbers[(dof - 1) / 3], [2, 3, 1][(dof - 1) % 3]);
+    let text = |mass: bool| {
+        let entries = entries(&bar, mass, Triangle::Lower, &|_| true);
+        let line = |(row, column, value): &(usize, usize, f64)| {
+            let ((a, i), (b, j)) = (there(*row), there(*column));
+            format!("{a},{i},{b},{j},{value:.16e}\n")
+        };
+        entries.iter().map(line).collect::<String>()
+    };
+    let written = Written::new(&text(false), &text(true), &table);
+    let turned = read_matrices(&MatrixFiles { axis: Axis::X, ..written.files() }).unwrap();
+    assert!(turned.warnings.is_empty(), "{:?}", turned.warnings);
+    assert_eq!(turned.model.nodes, bar.model.nodes);
+    let off = difference(&expected, &rom(&turned));
+    assert!(off < 1e-12, "{off:.2e}");
+    let straight = read_matrices(&written.files()).unwrap();
+    assert_eq!(straight.model.nodes[5], {
+        let [x, y, z] = bar.model.nodes[5];
+        [z, x, y]
+    });
 }

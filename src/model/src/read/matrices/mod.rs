@@ -22,7 +22,7 @@ use node_table::{NodeTable, read_nodes};
 
 use super::entries::{Entries, symmetric_pair};
 use super::source::{about, open_file};
-use super::{Imported, Units};
+use super::{Axis, Imported, Units};
 use crate::Result;
 use crate::fe_model::FeModel;
 use crate::sparse::SparseMatrix;
@@ -40,6 +40,8 @@ pub struct MatrixFiles {
     pub dofs: Option<PathBuf>,
     /// Units of matrices and coordinates.
     pub units: Units,
+    /// The engine axis in the files.
+    pub axis: Axis,
     /// Sets of nodes whose dofs the matrices leave out, for formats whose rows name no nodes.
     pub left_out: Vec<String>,
 }
@@ -50,7 +52,7 @@ pub struct MatrixFiles {
 /// [`Error::File`](crate::Error::File); [`Error::Read`](crate::Error::Read) with file and line, and for matrices that do not fit each other or the
 /// nodes, are not symmetric, or hold a mass that is not positive.
 pub fn read_matrices(files: &MatrixFiles) -> Result<Imported> {
-    let table = read_nodes(&files.nodes, files.units)?;
+    let table = read_nodes(&files.nodes, files.units, files.axis)?;
     let dofs = dof_file(files)?;
     let rows = Rows::new(files, &table)?;
     let stiffness = located(&files.stiffness, dofs.as_deref(), &rows)?;
@@ -136,7 +138,7 @@ impl<'a> Rows<'a> {
             let problem = format!("node {node} is not in {}", self.files.nodes.display());
             about(path, problem, "Give a node table of the same model")
         })?;
-        Ok(3 * index + component - 1)
+        Ok(3 * index + self.files.axis.place(component - 1))
     }
 
     /// Dofs of the rows of a matrix whose rows are only counted.
@@ -161,7 +163,8 @@ impl<'a> Rows<'a> {
                 "Give matrices of all nodes, or of all that --clamp-set does not name, in the order of the node table";
             return Err(about(path, problem, remedy));
         };
-        Ok(nodes.iter().flat_map(|node| (0..3).map(move |component| 3 * node + component)).collect())
+        let axis = self.files.axis;
+        Ok(nodes.iter().flat_map(|node| (0..3).map(move |component| 3 * node + axis.place(component))).collect())
     }
 }
 
