@@ -56,7 +56,7 @@ pub fn reduce(arguments: &ReduceArguments, console: &Console) -> Result<Reduced>
     let imported = import(arguments, console)?;
     let asked = &arguments.file;
     let mut warnings = imported.warnings.clone();
-    warnings.extend(judge(&imported, asked.units)?);
+    warnings.extend(judge(&imported, asked)?);
     let chosen = choose(&imported, arguments)?;
     let read = describe(&imported, asked, &chosen);
     let name = asked.name.clone().unwrap_or_else(|| default_name(arguments));
@@ -241,13 +241,16 @@ fn failure(error: tiprub_model::Error) -> Failure {
 }
 
 /// What cannot be meant is refused, unless the units are said to be SI; what is unusual is asked about.
-fn judge(imported: &Imported, units: Option<UnitChoice>) -> Result<Vec<String>> {
+fn judge(imported: &Imported, asked: &FileArguments) -> Result<Vec<String>> {
     let found = plausibility(&imported.model, &imported.materials);
     let question = |list: &[String]| format!("{}: is that meant?", list.join("; "));
     let mut warnings = Vec::new();
     if !found.impossible.is_empty() {
-        if units != Some(UnitChoice::Metre) {
-            let remedy = match units {
+        if asked.units != Some(UnitChoice::Metre) {
+            let remedy = match asked.units {
+                _ if asked.young.is_some() && found.impossible.iter().all(|text| text.starts_with("material")) => {
+                    "--young and --density are in SI units, Pa and kg/m³, whatever the file's units are"
+                }
                 None => {
                     "If lengths are in mm, masses in t and stresses in MPa, say --units mm-t-s; if it is meant, --units m"
                 }

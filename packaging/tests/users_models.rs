@@ -46,7 +46,8 @@ impl Project {
         let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(code), "{line}: {stderr}");
         assert!(!stderr.contains("panicked"), "{stderr}");
-        stderr.lines().find(|line| line.starts_with("error: ")).unwrap_or_else(|| panic!("{line}: {stderr}")).to_owned()
+        assert!(stderr.contains("error: "), "{line}: {stderr}");
+        stderr
     }
 
     fn write(&self, name: &str, contents: impl AsRef<[u8]>) {
@@ -172,10 +173,7 @@ fn a_sector_of_gmsh_becomes_a_wheel_with_the_frequencies_of_calculix() {
             .unwrap()
             .contains("*CYCLIC SYMMETRY MODEL, N=12")
     );
-    assert!(
-        fs::read_to_string(project.root.path().join("sector.vtu")).unwrap_or_default().len() > 1000
-            || fs::metadata(project.root.path().join("sector.vtu")).unwrap().len() > 1000
-    );
+    assert!(fs::metadata(project.root.path().join("sector.vtu")).unwrap().len() > 1000);
     // The other way round is noticed and put right.
     let swapped = line.replace("--cyclic-low LOW --cyclic-high HIGH", "--cyclic-low HIGH --cyclic-high LOW --force");
     assert_eq!(project.succeed(&swapped)["model"]["faces"]["swapped"], true);
@@ -219,7 +217,7 @@ fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
         (1, format!("reduce old.msh {bar}"), &["old.msh:2", "Mesh.MshFileVersion"]),
         (1, format!("reduce bar.inp {bar}"), &["bar.inp", "no material", "--material"]),
         (1, "reduce blade_hex8.inp --contact-set TIP --clamp-set ROOT --material steel".into(), &["6.0", "--units mm-t-s", "--units m"]),
-        (1, format!("reduce bar.inp {bar} --young 210e3 --poisson 0.3 --density 7.85e-9"), &["Young's modulus", "density"]),
+        (1, format!("reduce bar.inp {bar} --young 210e3 --poisson 0.3 --density 7.85e-9"), &["Young's modulus", "SI units"]),
         (2, "reduce bar.inp --material steel --units mm-t-s".into(), &["--contact-set", "TIP (16)", "ROOT (8)"]),
         (2, "reduce bar.inp --material steel --units mm-t-s --contact-set TIP".into(), &["--clamp-set", "ROOT (8)", "none"]),
         (1, "reduce bar.inp --material steel --units mm-t-s --contact-set TIPS --clamp-set ROOT".into(), &["`TIPS`", "TIP (16)"]),
@@ -235,14 +233,14 @@ fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
         (2, format!("reduce --stiffness bar.sti --mass bar.mas {bar}"), &["--nodes", "mesh file"]),
         (2, format!("reduce bar.inp {bar} --stiffness bar.sti --mass bar.mas --material steel"), &["matrices hold their material"]),
         (1, format!("reduce bar.inp {bar} --stiffness k.mtx --mass bar.mas"), &["k.mtx", "3 rows", "96"]),
-        (1, format!("reduce bar.inp {bar} --stiffness bar.mas --mass bar.sti --dofs bar.dof"), &["units of the model"]),
+        (1, format!("reduce bar.inp {bar} --stiffness bar.mas --mass bar.sti --dofs bar.dof"), &["exchanged"]),
         (2, format!("reduce sector.msh --contact-set TIP --clamp-set BORE --cyclic-low LOW --material steel --units mm-t-s"), &["--cyclic-high"]),
         (1, "reduce sector.msh --contact-set TIP --clamp-set BORE --cyclic-low LOW --cyclic-high HIGH --sectors 13 --material steel --units mm-t-s".into(), &["cyclic faces", "number of sectors"]),
         (1, "reduce sector.msh --contact-set LOW --clamp-set BORE --cyclic-low LOW --cyclic-high HIGH --sectors 12 --material steel --units mm-t-s".into(), &["LOW", "faces"]),
     ];
     for (code, line, wanted) in cases {
         let message = project.fail(&line, code);
-        println!("{message}");
+        println!("{}", message.trim_end());
         for part in wanted {
             assert!(message.contains(part), "`{part}` is not in: {message}\n{line}");
         }

@@ -257,7 +257,8 @@ fn wrong_matrices_are_refused_with_the_remedy() {
         ("both triangles", first(&both, "general", "symmetric"), m.clone(), table.clone(), &["both sides", "general"]),
         ("one triangle", first(&k, "symmetric", "general"), m.clone(), table.clone(), &["one side", "symmetric"]),
         ("no matrix", "hello\n".into(), m.clone(), table.clone(), &["no matrix", "Matrix Market"]),
-        ("exchanged", k.replace(" 1 ", " 1 -"), m.clone(), table.clone(), &["k.mtx"]),
+        ("negative", k.replacen("\n1 1 ", "\n1 1 -", 1), m.clone(), table.clone(), &["k.mtx", "negative"]),
+        ("exchanged", m.clone(), k.clone(), table.clone(), &["m.mtx", "exchanged"]),
         ("mass cut", k.clone(), first(&m, "\n1 1 ", "\n1 1 -"), table.clone(), &["m.mtx", "mass"]),
         (
             "short table",
@@ -286,6 +287,18 @@ fn wrong_matrices_are_refused_with_the_remedy() {
             assert!(text.contains(part), "{name}: `{part}` is not in: {text}");
         }
     }
+}
+
+#[test]
+fn exchanged_matrices_without_the_clamped_nodes_are_noticed() {
+    let names = ["bar_held.mas", "bar_held.sti"];
+    let files = MatrixFiles {
+        dofs: Some(data("bar_held.dof")),
+        units: Units::MillimetreTonneSecond,
+        ..files(&data(""), names[0], names[1], "bar.inp")
+    };
+    let warnings = read_matrices(&files).unwrap().warnings;
+    assert!(warnings.iter().any(|warning| warning.contains("mass along x, y and z differs")), "{warnings:?}");
 }
 
 #[test]

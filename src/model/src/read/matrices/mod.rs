@@ -68,7 +68,7 @@ pub fn read_matrices(files: &MatrixFiles) -> Result<Imported> {
     if !absent.is_empty() {
         notes.push(format!("{} nodes have no dofs in the matrices: they are clamped", absent.len()));
     }
-    let mut warnings = Vec::new();
+    let mut warnings = Vec::from_iter(check_inertia(&files.mass, &mass)?);
     if absent.is_empty() {
         warnings.extend(rigid_motion_warning(&table.positions, &stiffness));
     }
@@ -298,6 +298,33 @@ fn check_mass(files: &MatrixFiles, numbers: &[u64], mass: &SparseMatrix, absent:
         }
     }
     Ok(())
+}
+
+/// Inertia of a motion along one axis, as a share of Σ|M|, below which there is none; a stiffness leaves round-off.
+const NO_INERTIA: f64 = 1e-6;
+/// Inertia along the three axes agrees to this share.
+const UNEQUAL: f64 = 0.01;
+
+/// A mass resists motion along each axis alike. A stiffness in its place resists none, or (with clamped nodes left out)
+/// each differently.
+fn check_inertia(path: &Path, mass: &SparseMatrix) -> Result<Option<String>> {
+    let (mut inertia, mut size) = ([0.0_f64; 3], 0.0_f64);
+    for column in 0..mass.order() {
+        for entry in mass.pattern.starts[column]..mass.pattern.starts[column + 1] {
+            if mass.pattern.rows[entry] % 3 == column % 3 {
+                inertia[column % 3] += mass.values[entry];
+                size += mass.values[entry].abs() / 3.0;
+            }
+        }
+    }
+    let [low, high] = inertia.iter().fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], &x| [low.min(x), high.max(x)]);
+    if low <= NO_INERTIA * size {
+        let problem = format!("moving the whole model along x, y, z meets inertia {inertia:.3e}, which is no mass");
+        return Err(about(path, problem, "Are stiffness and mass exchanged?"));
+    }
+    Ok((high > (1.0 + UNEQUAL) * low).then(|| {
+        format!("the mass along x, y and z differs ({inertia:.4e} kg): is it the mass matrix, and of solids only?")
+    }))
 }
 
 /// A rigid motion that strains the model this much, as a share of Σ|K||u|, is more than round-off of printed numbers.
