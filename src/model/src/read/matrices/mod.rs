@@ -225,7 +225,8 @@ fn pairs(entries: &Entries, scale: f64) -> Vec<Pair> {
 ///
 /// A file of one triangle, in the order of its own rows, names each pair of dofs once, whatever their order here.
 fn mirrored(path: &Path, entries: Entries, order: usize, scale: f64) -> Result<(Entries, Vec<usize>)> {
-    let held = entries.items.iter().filter(|&&(i, j, value)| i == j && value.abs() > HELD).map(|entry| entry.0).collect();
+    let held =
+        entries.items.iter().filter(|&&(i, j, value)| i == j && value.abs() > HELD).map(|entry| entry.0).collect();
     let pairs = pairs(&entries, scale);
     drop(entries);
     let mut diagonal = vec![0.0_f64; order];
@@ -335,12 +336,13 @@ fn check_inertia(path: &Path, mass: &SparseMatrix) -> Result<Option<String>> {
         }
     }
     let [low, high] = inertia.iter().fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], &x| [low.min(x), high.max(x)]);
+    let [x, y, z] = inertia;
     if low <= NO_INERTIA * size {
-        let problem = format!("moving the whole model along x, y, z meets inertia {inertia:.3e}, which is no mass");
+        let problem = format!("moving the whole model along x, y, z meets inertias {x:.3e}, {y:.3e}, {z:.3e}: no mass");
         return Err(about(path, problem, "Are stiffness and mass exchanged?"));
     }
     Ok((high > (1.0 + UNEQUAL) * low).then(|| {
-        format!("the mass along x, y and z differs ({inertia:.4e} kg): is it the mass matrix, and of solids only?")
+        format!("the mass along x, y and z differs ({x:.4e}, {y:.4e}, {z:.4e} kg): is it the mass matrix, and of solids only?")
     }))
 }
 
