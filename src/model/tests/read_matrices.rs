@@ -152,7 +152,7 @@ impl Written {
 
     #[track_caller]
     fn refused(&self) -> String {
-        read_matrices(&self.files()).unwrap_err().to_string()
+        read_matrices(&self.files()).err().expect("the files are wrong").to_string()
     }
 }
 
@@ -274,7 +274,7 @@ fn wrong_matrices_are_refused_with_the_remedy() {
             format!("{table}{}", table.lines().nth(2).unwrap()),
             &["nodes.csv:35", "twice"],
         ),
-        ("table line", k.clone(), m.clone(), first(&table, ",", ",x"), &["nodes.csv", "NODE,X,Y,Z"]),
+        ("table line", k.clone(), m.clone(), first(&table, "\n1,", "\n1,x"), &["nodes.csv", "NODE,X,Y,Z"]),
         ("empty table", k.clone(), m.clone(), "node,x,y,z\n".into(), &["no node"]),
         ("rotation", format!("{named}1,4,1,4,1.0\n"), m.clone(), table.clone(), &["degree of freedom 4", "rotations"]),
         ("unknown node", format!("{named}77,1,77,1,1.0\n"), m.clone(), table.clone(), &["node 77", "nodes.csv"]),
