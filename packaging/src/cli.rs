@@ -50,7 +50,9 @@ pub enum Command {
                             tiprub reduce casing --contour=-0.02:0.256,0.04:0.245 --contact-axial 0.0026:0.038\n\n\
                             tiprub reduce blade.inp --contact-set TIP --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
                             tiprub reduce blade.msh --contact-set TIP --clamp-set ROOT --material titanium --contact-nodes 5\n  \
-                            tiprub reduce job.inp --stiffness job.sti --mass job.mas --contact-set TIP --clamp-set ROOT\n\n\
+                            tiprub reduce job.inp --stiffness job.sti --mass job.mas --contact-set TIP --clamp-set ROOT\n  \
+                            tiprub reduce sector.inp --contact-set TIP --clamp-set BORE --sectors 56 --cyclic-low LOW --cyclic-high HIGH\n  \
+                            tiprub reduce stage --coarse --inp sector.inp --vtk sector.vtu\n\n\
                             docs/models.md describes models of your own; docs/rom-file.md writes a ROM from Python.")]
     Reduce(Box<ReduceArguments>),
     /// From a scene to .fmu files. Compiles nothing: the library is generic, scene and ROM are data.
@@ -97,11 +99,11 @@ pub struct DemoArguments {
 /// Arguments of `tiprub reduce`.
 #[derive(Debug, Args)]
 pub struct ReduceArguments {
-    /// What to reduce: `rotor37`, the NASA rotor 37 blade that ships with tiprub; `casing`, a ring around it; or a mesh
-    /// file of your own: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh).
+    /// What to reduce: `rotor37`, the NASA rotor 37 blade that ships with tiprub; `casing`, a ring around it; `stage`, a
+    /// disk with 56 blades; or a mesh file of your own: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh).
     #[arg(value_name = "MODEL", value_parser = model, required_unless_present = "stiffness")]
     pub model: Option<Model>,
-    /// Number of modes kept: fixed-interface modes of a blade [default: 20 of rotor37, 25 of a file], modes of the
+    /// Number of modes kept: fixed-interface modes of a blade [default: 20 of rotor37, 25 of a file and of the stage, there per nodal diameter], modes of the
     /// casing below the cut-off [default: 60].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
@@ -123,9 +125,15 @@ pub struct ReduceArguments {
     /// Replace files that are there already and hold something else.
     #[arg(long)]
     pub force: bool,
-    /// Also write the mesh as a CalculiX/Abaqus input file.
+    /// Also write the mesh as a CalculiX/Abaqus input file that computes its frequencies.
     #[arg(long, value_name = "FILE")]
     pub inp: Option<PathBuf>,
+    /// Also write mesh, sets and mode shapes for ParaView (.vtu).
+    #[arg(long, value_name = "FILE")]
+    pub vtk: Option<PathBuf>,
+    /// Of the `stage`, a coarse mesh and few modes, for trials.
+    #[arg(long)]
+    pub coarse: bool,
     /// What describes a casing.
     #[command(flatten)]
     pub casing: CasingArguments,
@@ -272,6 +280,8 @@ pub enum Model {
     Rotor37,
     /// A flexible casing ring, by default the one around rotor 37.
     Casing,
+    /// The bladed disk of the 56-sector stage.
+    Stage,
     /// A mesh file.
     File(PathBuf),
 }
@@ -313,9 +323,12 @@ fn model(text: &str) -> Result<Model, String> {
     match text {
         "rotor37" => Ok(Model::Rotor37),
         "casing" => Ok(Model::Casing),
+        "stage" => Ok(Model::Stage),
         // Names of files have an extension or a directory; anything else is a slip in the name of a model.
         _ if text.contains(['.', '/', '\\']) => Ok(Model::File(text.into())),
-        _ => Err("`rotor37` and `casing` ship with tiprub; a model of your own is a file: .inp or .msh".into()),
+        _ => {
+            Err("`rotor37`, `casing` and `stage` ship with tiprub; a model of your own is a file: .inp or .msh".into())
+        }
     }
 }
 

@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use tiprub_model::{Material, read::Units};
+use tiprub_model::{
+    Material,
+    read::{Axis, Units},
+};
 
 use crate::{Failure, Result, casing_arguments::MaterialChoice};
 
@@ -29,9 +32,16 @@ pub struct FileArguments {
     /// Face of a sector towards its upper neighbour.
     #[arg(long, value_name = "SET", requires = "cyclic_low", requires = "sectors")]
     pub cyclic_high: Option<String>,
+    /// Largest distance (m) of a node of the upper face from the turned one of the lower face [default: 1e-5 of the
+    /// largest radius].
+    #[arg(long, value_name = "M", value_parser = positive, requires = "cyclic_low")]
+    pub cyclic_tolerance: Option<f64>,
     /// Units of the file; everything on the command line is in SI units, whatever the file's are [default: m].
     #[arg(long, value_enum)]
     pub units: Option<UnitChoice>,
+    /// Engine axis in the file; the others follow in turn [default: z].
+    #[arg(long, value_enum)]
+    pub axis: Option<AxisChoice>,
     /// Young's modulus (Pa) of all elements, instead of the file's material.
     #[arg(long, value_name = "E", value_parser = positive, requires = "poisson", requires = "density")]
     pub young: Option<f64>,
@@ -75,7 +85,27 @@ pub enum UnitChoice {
     Metre,
 }
 
+/// Axes by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum AxisChoice {
+    /// x: the file's y, z, x become x, y, z.
+    X,
+    /// y: the file's z, x, y become x, y, z.
+    Y,
+    /// z: nothing is turned.
+    Z,
+}
+
 impl FileArguments {
+    /// Engine axis in the file.
+    pub fn axis(&self) -> Axis {
+        match self.axis {
+            Some(AxisChoice::X) => Axis::X,
+            Some(AxisChoice::Y) => Axis::Y,
+            Some(AxisChoice::Z) | None => Axis::Z,
+        }
+    }
+
     /// Units of the file.
     pub fn units(&self) -> Units {
         match self.units {

@@ -11,7 +11,7 @@
 //! - [`archive`], [`fmu`], [`library`]: the reproducible zip, its contents, and the shared library that goes in;
 //! - [`importer`]: a packaged FMU driven through its C ABI the way any importer would;
 //! - [`casing_arguments`], [`file_arguments`]: what can be asked for of a casing, of a model of one's own;
-//! - [`users_model`]: such a model read, judged, reduced;
+//! - [`users_model`], [`mod@reduced`]: such a model read, judged, reduced; what is written and told of any reduced model;
 //! - [`report`]: the HTML report with its pictures and plots.
 
 pub mod archive;
@@ -29,6 +29,7 @@ pub mod library;
 pub mod native;
 pub mod output_file;
 pub mod recording;
+pub mod reduced;
 pub mod reduction;
 pub mod report;
 pub mod rom_cache;

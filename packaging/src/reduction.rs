@@ -2,8 +2,10 @@
 
 use tiprub_model::{
     CasingOptions, Reduction, Rotor37Options,
+    cyclic::CyclicReduction,
     progress::{Listener, Progress, Stage},
     reduce_ring, reduce_rotor37,
+    stage::{StageOptions, reduce_stage},
 };
 
 use crate::{Failure, Result, console::Console};
@@ -32,6 +34,14 @@ pub fn rotor37(options: &Rotor37Options, console: &Console) -> Result<Reduction>
 /// Lengths, counts and contact rings that do not fit each other, and whatever the reduction refuses.
 pub fn casing(options: &CasingOptions, console: &Console) -> Result<Reduction> {
     with_progress("Reducing the casing", console, &|listener| reduce_ring(options, listener))
+}
+
+/// Reduce the bladed disk of the stage, showing stage and share done.
+///
+/// # Errors
+/// Counts that do not fit each other, and whatever the reduction refuses.
+pub fn stage(options: &StageOptions, console: &Console) -> Result<CyclicReduction> {
+    with_progress("Reducing the stage", console, &|listener| reduce_stage(options, listener))
 }
 
 /// Work that tells where it stands, shown as a task; `title` says what is done.

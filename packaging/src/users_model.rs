@@ -3,9 +3,10 @@
 use std::{cell::RefCell, fmt::Write as _, path::Path};
 
 use serde_json::{Value, json};
-use tiprub_core::rom::Frame;
+use tiprub_core::{Rom, rom::Frame};
 use tiprub_model::{
-    Reduction, casing,
+    FeModel, Reduction, casing,
+    cyclic::{CyclicBoundary, CyclicOptions, ModeSelection, PairingReport, reduce_cyclic},
     read::{
         ContactChoice, Imported, MatrixFiles, MeshOptions, bounding_box, choose_contact_nodes, plausibility,
         read_matrices, read_mesh, set_counts, total_mass,
@@ -19,7 +20,8 @@ use crate::{
     casing_arguments::CasingArguments,
     cli::{Model, ReduceArguments},
     console::Console,
-    file_arguments::UnitChoice,
+    file_arguments::{FileArguments, UnitChoice},
+    reduced::Reduced,
     reduction::{self, with_progress},
 };
 
@@ -28,72 +30,143 @@ const MODES: usize = 25;
 const CHECKED_MODES: usize = 10;
 const DAMPING: f64 = 0.005;
 
-/// Name of the set of all clamped nodes in exported files.
+/// Names of the sets of all clamped nodes and of the two faces in exported files.
 const CLAMPED: &str = casing::CLAMPED;
+const FACES: [&str; 2] = ["CYCLIC_LOW", "CYCLIC_HIGH"];
 
 /// First natural frequencies (Hz) of things that are built lie in here.
 const USUAL_FREQUENCIES: [f64; 2] = [1.0, 1e6];
 
-/// A reduced model with what is to be told about it.
-pub struct UsersReduction {
-    /// The reduction.
-    pub reduction: Reduction,
-    /// Its name.
-    pub name: String,
-    /// Set of clamped nodes, for exported files.
-    pub clamped: Option<&'static str>,
-    /// What was read, for people.
-    pub text: String,
-    /// The same for programs.
-    pub json: Value,
-    /// Warnings.
-    pub warnings: Vec<String>,
+/// Share of the largest radius by which nodes of the two faces of a sector may miss each other.
+const FACE_TOLERANCE: f64 = 1e-5;
+
+/// What is reduced, chosen from what was read.
+struct Chosen {
+    clamped: Vec<usize>,
+    contact: Vec<ContactPoint>,
+    faces: Option<(CyclicBoundary, PairingReport)>,
 }
 
 /// Read, choose, reduce.
 ///
 /// # Errors
 /// Files and sets, naming file, line and remedy; options that do not go together; and whatever the reduction refuses.
-pub fn reduce(arguments: &ReduceArguments, console: &Console) -> Result<UsersReduction> {
+pub fn reduce(arguments: &ReduceArguments, console: &Console) -> Result<Reduced> {
     refuse_other_options(arguments)?;
     let imported = import(arguments, console)?;
     let asked = &arguments.file;
     let mut warnings = imported.warnings.clone();
-    warnings.extend(judge(&imported, asked.units)?);
-    let contact_set = named_set(&imported, asked.contact_set.as_deref(), "--contact-set")?;
-    let clamped = clamped_nodes(&imported, &asked.clamp_set)?;
-    let free: Vec<usize> =
-        set(&imported, contact_set)?.iter().copied().filter(|node| clamped.binary_search(node).is_err()).collect();
-    if free.is_empty() {
-        let what = format!("--contact-set {contact_set}");
-        return Err(Failure::new(what, "all of its nodes are clamped", "Choose a set whose nodes can move"));
-    }
-    let choice = ContactChoice { count: arguments.contact_nodes, names: asked.contact_names.clone() };
-    let contact = choose_contact_nodes(&imported.model.nodes, &free, &choice).map_err(failure)?;
+    warnings.extend(judge(&imported, asked)?);
+    let chosen = choose(&imported, arguments)?;
+    let read = describe(&imported, asked, &chosen);
     let name = asked.name.clone().unwrap_or_else(|| default_name(arguments));
+    let mut model = imported.model;
+    let clamped = (!chosen.clamped.is_empty()).then_some(CLAMPED);
+    if let Some((mesh, _)) = model.mesh.as_mut().filter(|_| clamped.is_some()) {
+        mesh.sets.insert(CLAMPED.to_owned(), chosen.clamped.clone());
+    }
+    let mut reduced = match &chosen.faces {
+        None => Reduced::general(general(arguments, model, &chosen, name, console)?, clamped),
+        Some((boundary, _)) => cyclic(arguments, model, &chosen, boundary, name, console)?,
+    };
+    let notes = core::mem::take(&mut reduced.read.0);
+    reduced.read = read;
+    for note in notes.lines() {
+        let _ = write!(reduced.read.0, "\n  note: {note}");
+    }
+    warnings.extend(frequency_warning(&reduced.rom, clamped.is_none()));
+    reduced.warnings = warnings;
+    Ok(reduced)
+}
+
+fn general(
+    arguments: &ReduceArguments,
+    model: FeModel,
+    chosen: &Chosen,
+    name: String,
+    console: &Console,
+) -> Result<Reduction> {
+    let asked = &arguments.file;
+    let title = format!("Reducing {name}");
     let options = ReductionOptions {
-        name: name.clone(),
+        name,
         fixed_interface_modes: arguments.modes.unwrap_or(MODES),
         checked_modes: CHECKED_MODES,
         sectors: asked.sectors.unwrap_or(1) as usize,
         frame: Frame::Cylindrical,
         damping_ratio: asked.damping.unwrap_or(DAMPING),
     };
-    let (text, json) = describe(&imported, (contact_set, free.len()), &contact, &clamped);
-    let mut model = imported.model;
-    if let Some((mesh, _)) = model.mesh.as_mut().filter(|_| !clamped.is_empty()) {
-        mesh.sets.insert(CLAMPED.to_owned(), clamped.clone());
-    }
     let model = RefCell::new(Some(model));
-    let title = format!("Reducing {name}");
-    let reduction = with_progress(&title, console, &|listener| {
+    with_progress(&title, console, &|listener| {
         // The matrices are handed over, not copied.
         let model = model.take().ok_or_else(|| tiprub_model::Error::invalid("model", "it is reduced already", ""))?;
-        reduce_model(model, &clamped, &contact, &options, arguments.spin, listener)
+        reduce_model(model, &chosen.clamped, &chosen.contact, &options, arguments.spin, listener)
+    })
+}
+
+fn cyclic(
+    arguments: &ReduceArguments,
+    model: FeModel,
+    chosen: &Chosen,
+    boundary: &CyclicBoundary,
+    name: String,
+    console: &Console,
+) -> Result<Reduced> {
+    let asked = &arguments.file;
+    let title = format!("Reducing {name}");
+    let options = CyclicOptions {
+        name,
+        modes: ModeSelection::Families(arguments.modes.unwrap_or(MODES)),
+        checked_modes: CHECKED_MODES,
+        damping_ratio: asked.damping.unwrap_or(DAMPING),
+    };
+    let Chosen { clamped, contact, .. } = chosen;
+    let reduction = with_progress(&title, console, &|listener| {
+        reduce_cyclic(&model, clamped, contact, boundary, &options, listener)
     })?;
-    warnings.extend(frequency_warning(&reduction, clamped.is_empty()));
-    let clamped = (!clamped.is_empty()).then_some(CLAMPED);
-    Ok(UsersReduction { reduction, name, clamped, text, json, warnings })
+    let (nodes, held) = (model.nodes.len(), (!clamped.is_empty()).then_some(CLAMPED));
+    let mut mesh = model.mesh;
+    if let Some((mesh, _)) = &mut mesh {
+        for (face, side) in FACES.iter().zip([0, 1]) {
+            let mut face_nodes: Vec<usize> = boundary.pairs.iter().map(|pair| pair[side]).collect();
+            face_nodes.sort_unstable();
+            mesh.sets.insert((*face).to_owned(), face_nodes);
+        }
+    }
+    Ok(Reduced::cyclic(reduction, mesh, nodes, held, FACES))
+}
+
+fn choose(imported: &Imported, arguments: &ReduceArguments) -> Result<Chosen> {
+    let asked = &arguments.file;
+    let contact_set = named_set(imported, asked.contact_set.as_deref(), "--contact-set")?;
+    let clamped = clamped_nodes(imported, &asked.clamp_set)?;
+    let faces = pair_faces(imported, asked)?;
+    let mut fixed = clamped.clone();
+    if let Some((boundary, _)) = &faces {
+        fixed.extend(boundary.pairs.iter().flatten());
+        fixed.sort_unstable();
+    }
+    let free: Vec<usize> =
+        set(imported, contact_set)?.iter().copied().filter(|node| fixed.binary_search(node).is_err()).collect();
+    if free.is_empty() {
+        let problem = "all of its nodes are clamped or lie on the faces to the neighbours";
+        return Err(Failure::new(format!("--contact-set {contact_set}"), problem, "Choose a set whose nodes can move"));
+    }
+    let choice = ContactChoice { count: arguments.contact_nodes, names: asked.contact_names.clone() };
+    let contact = choose_contact_nodes(&imported.model.nodes, &free, &choice).map_err(failure)?;
+    Ok(Chosen { clamped, contact, faces })
+}
+
+fn pair_faces(imported: &Imported, asked: &FileArguments) -> Result<Option<(CyclicBoundary, PairingReport)>> {
+    let (Some(low), Some(high), Some(sectors)) = (&asked.cyclic_low, &asked.cyclic_high, asked.sectors) else {
+        return Ok(None);
+    };
+    let nodes = &imported.model.nodes;
+    let radius = nodes.iter().map(|[x, y, _]| x.hypot(*y)).fold(0.0, f64::max);
+    let tolerance = asked.cyclic_tolerance.unwrap_or(FACE_TOLERANCE * radius);
+    CyclicBoundary::pair(nodes, set(imported, low)?, set(imported, high)?, sectors as usize, tolerance)
+        .map(Some)
+        .map_err(failure)
 }
 
 fn refuse_other_options(arguments: &ReduceArguments) -> Result<()> {
@@ -105,9 +178,12 @@ fn refuse_other_options(arguments: &ReduceArguments) -> Result<()> {
         return Err(Failure::usage("MODEL", "an option given describes a casing or a blade that ships", remedy));
     }
     let file = &arguments.file;
-    if file.cyclic_low.is_some() {
-        let remedy = "Leave out --cyclic-low and --cyclic-high: blades that know nothing of each other";
-        return Err(Failure::usage("--cyclic-low", "coupled sectors are not reduced yet", remedy));
+    if arguments.coarse {
+        return Err(Failure::usage("--coarse", "it belongs to `stage`", "Leave it out"));
+    }
+    if file.cyclic_low.is_some() && arguments.spin.is_some() {
+        let remedy = "Leave --spin out, or --cyclic-low and --cyclic-high: blades that know nothing of each other";
+        return Err(Failure::usage("--spin", "the effects of spin are not computed for coupled sectors", remedy));
     }
     if arguments.spin.is_some() && file.stiffness.is_some() {
         let remedy = "Leave it out, or give a mesh file of one material instead of matrices";
@@ -127,7 +203,8 @@ fn import(arguments: &ReduceArguments, console: &Console) -> Result<Imported> {
         let Some(path) = mesh else {
             return Err(Failure::usage("MODEL", "there is no file", "Give a mesh file, or --stiffness and --mass"));
         };
-        let options = MeshOptions { units: asked.units(), material, temperature: asked.temperature };
+        let options =
+            MeshOptions { units: asked.units(), axis: asked.axis(), material, temperature: asked.temperature };
         let title = format!("Reading {}", path.display());
         return with_progress(&title, console, &|listener| read_mesh(path, &options, listener));
     };
@@ -152,6 +229,7 @@ fn import(arguments: &ReduceArguments, console: &Console) -> Result<Imported> {
         nodes,
         dofs: asked.dofs.clone(),
         units: asked.units(),
+        axis: asked.axis(),
         left_out: asked.clamp_set.clone(),
     };
     console.say(format_args!("Reading {} and {}", stiffness.display(), mass.display()));
@@ -163,13 +241,16 @@ fn failure(error: tiprub_model::Error) -> Failure {
 }
 
 /// What cannot be meant is refused, unless the units are said to be SI; what is unusual is asked about.
-fn judge(imported: &Imported, units: Option<UnitChoice>) -> Result<Vec<String>> {
+fn judge(imported: &Imported, asked: &FileArguments) -> Result<Vec<String>> {
     let found = plausibility(&imported.model, &imported.materials);
     let question = |list: &[String]| format!("{}: is that meant?", list.join("; "));
     let mut warnings = Vec::new();
     if !found.impossible.is_empty() {
-        if units != Some(UnitChoice::Metre) {
-            let remedy = match units {
+        if asked.units != Some(UnitChoice::Metre) {
+            let remedy = match asked.units {
+                _ if asked.young.is_some() && found.impossible.iter().all(|text| text.starts_with("material")) => {
+                    "--young and --density are in SI units, Pa and kg/m³, whatever the file's units are"
+                }
                 None => {
                     "If lengths are in mm, masses in t and stresses in MPa, say --units mm-t-s; if it is meant, --units m"
                 }
@@ -186,8 +267,8 @@ fn judge(imported: &Imported, units: Option<UnitChoice>) -> Result<Vec<String>> 
     Ok(warnings)
 }
 
-fn frequency_warning(reduction: &Reduction, free: bool) -> Option<String> {
-    let first = reduction.modes.iter().map(|mode| mode.frequency).nth(if free { 6 } else { 0 })?;
+fn frequency_warning(rom: &Rom, free: bool) -> Option<String> {
+    let first = *rom.checks.full_frequencies.get(if free { 6 } else { 0 })?;
     let [low, high] = USUAL_FREQUENCIES;
     (!(low..=high).contains(&first)).then(|| {
         format!(
@@ -242,12 +323,8 @@ fn default_name(arguments: &ReduceArguments) -> String {
     path.file_stem().map_or_else(|| "model".to_owned(), |stem| stem.to_string_lossy().into_owned())
 }
 
-fn describe(
-    imported: &Imported,
-    (contact_set, contact_count): (&str, usize),
-    contact: &[ContactPoint],
-    clamped: &[usize],
-) -> (String, Value) {
+/// What was read and chosen, for people and for programs.
+fn describe(imported: &Imported, asked: &FileArguments, chosen: &Chosen) -> (String, Value) {
     let model = &imported.model;
     let [low, high] = bounding_box(&model.nodes);
     let mass = total_mass(model);
@@ -270,11 +347,24 @@ fn describe(
         "\n  mass                      {mass:.6} kg\n  sets                      {}",
         set_counts(&model.sets)
     );
-    let _ = write!(text, "\n  clamped                   {} nodes", clamped.len());
-    let _ = write!(text, "\n  contact nodes             {} of {contact_count} in {contact_set}", contact.len());
-    for point in contact {
+    let _ = write!(text, "\n  clamped                   {} nodes", chosen.clamped.len());
+    let contact_set = asked.contact_set.as_deref().unwrap_or_default();
+    let _ = write!(text, "\n  contact nodes             {} from {contact_set}", chosen.contact.len());
+    for point in &chosen.contact {
         let number = imported.node_numbers[point.node];
         let _ = write!(text, "\n    {:<24}node {number} of the file", point.name);
+    }
+    if let Some((boundary, report)) = &chosen.faces {
+        let PairingReport { largest_mismatch, typical_mismatch, .. } = report;
+        let (pairs, pitch) = (boundary.pairs.len(), boundary.pitch().to_degrees());
+        let _ = write!(
+            text,
+            "\n  faces                     {pairs} pairs of nodes, {pitch:.4}° apart; off by {largest_mismatch:.2e} m at most, \
+             typically {typical_mismatch:.2e} m"
+        );
+        if report.swapped {
+            text.push_str("\n  note: the faces are named the other way round: low is the one at the smaller angle");
+        }
     }
     for note in &imported.notes {
         let _ = write!(text, "\n  note: {note}");
@@ -285,8 +375,14 @@ fn describe(
         "box": { "low": low, "high": high },
         "mass": mass,
         "sets": model.sets.iter().map(|(name, nodes)| (name.clone(), json!(nodes.len()))).collect::<serde_json::Map<_, _>>(),
-        "clamped_nodes": clamped.len(),
-        "contact_nodes": contact.iter().map(|point| json!({
+        "clamped_nodes": chosen.clamped.len(),
+        "faces": chosen.faces.as_ref().map(|(boundary, report)| json!({
+            "pairs": boundary.pairs.len(),
+            "largest_mismatch": report.largest_mismatch,
+            "typical_mismatch": report.typical_mismatch,
+            "swapped": report.swapped,
+        })),
+        "contact_nodes": chosen.contact.iter().map(|point| json!({
             "name": point.name, "node": imported.node_numbers[point.node], "slope": point.meridional_slope,
         })).collect::<Vec<_>>(),
         "notes": imported.notes,

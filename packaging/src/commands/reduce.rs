@@ -1,11 +1,14 @@
 //! `tiprub reduce`: from a blade or a casing to a ROM file, with its checks.
 
+use std::{fmt::Write as _, path::Path};
+
 use serde_json::{Value, json};
 use tiprub_model::{
-    Reduction, Rotor37Options,
+    Rotor37Options,
     casing::{CLAMPED, Support},
-    inp::calculix_input,
+    cyclic::ModeSelection,
     rotor37::MeshCounts,
+    stage::{StageOptions, sector_mesh},
 };
 
 use crate::{
@@ -14,32 +17,28 @@ use crate::{
     cli::{Model, ReduceArguments},
     console::{Console, Outcome},
     file_arguments::FileArguments,
-    output_file, reduction,
+    output_file,
+    reduced::Reduced,
+    reduction,
     rom_facts::RomFacts,
-    users_model::{self, UsersReduction},
+    users_model,
 };
-
-/// Frequencies asked for in the exported finite-element model.
-const EXPORTED_FREQUENCIES: usize = 10;
 
 /// Reduce, check, write.
 ///
 /// # Errors
-/// Counts that do not fit the mesh, or files that cannot be written.
+/// Counts that do not fit the mesh, wrong files, or files that cannot be written.
 pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
-    let Reduced { reduction, clamped, name, text: read, json: read_json, mut warnings } = reduced(arguments, console)?;
-    let default_output = format!("{name}.rom.safetensors");
+    let reduced = reduced(arguments, console)?;
+    let default_output = format!("{}.rom.safetensors", reduced.rom.name);
     let output = &arguments.output.clone().unwrap_or_else(|| default_output.into());
-    let facts = RomFacts::of(&reduction.rom)?;
-    let mut files = vec![(output, tiprub_format::write_rom(&reduction.rom))];
+    let facts = RomFacts::of(&reduced.rom)?;
+    let mut files = vec![(output, tiprub_format::write_rom(&reduced.rom))];
     if let Some(path) = &arguments.inp {
-        let (Some(mesh), Some(material)) = (&reduction.mesh, &reduction.material) else {
-            let remedy = "Leave --inp out";
-            return Err(Failure::usage("--inp", "the model has no mesh of one material to export", remedy));
-        };
-        let text = calculix_input(mesh, material, clamped, EXPORTED_FREQUENCIES)
-            .map_err(|error| Failure::from_below(path.display(), error))?;
-        files.push((path, text.into_bytes()));
+        files.push((path, reduced.calculix()?));
+    }
+    if let Some(path) = &arguments.vtk {
+        files.push((path, reduced.vtk()?));
     }
     if !arguments.force {
         for (path, bytes) in &files {
@@ -49,92 +48,107 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     for (path, bytes) in &files {
         output_file::write(path, bytes)?;
     }
+    let mut warnings = reduced.warnings.clone();
     warnings.extend(facts.warnings());
-    warnings.extend(spin_warning(&reduction.spin_checks));
+    warnings.extend(spin_warning(&reduced.spin_checks));
     console.warn(&warnings);
-    let elements = reduction.mesh.as_ref().map(|mesh| mesh.elements.len());
-    let counted = elements.map(|count| format!(" {count} elements,")).unwrap_or_default();
+    let paths: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
+    Ok(Outcome { text: text(&reduced, &facts, &paths), json: json(&reduced, &facts, arguments, output, &warnings) })
+}
+
+/// For people.
+fn text(reduced: &Reduced, facts: &RomFacts, paths: &[&Path]) -> String {
+    let elements = reduced.mesh.as_ref().map(|(mesh, _)| format!(" {} elements,", mesh.elements.len()));
+    let read = &reduced.read.0;
     let mut text = if read.is_empty() { facts.to_text() } else { format!("{read}\n\n{}", facts.to_text()) };
-    text.push_str(&format!(
-        "\n  full model: {} nodes,{counted} {} free degrees of freedom, reduced in {:.2} s\n  written: {}",
-        reduction.nodes,
-        reduction.free_dofs,
-        reduction.timings.total(),
-        output.display()
-    ));
-    if let Some(path) = &arguments.inp {
-        text.push_str(&format!("\n  written: {}", path.display()));
+    let _ = write!(
+        text,
+        "\n  full model: {} nodes,{} {} free degrees of freedom, reduced in {:.2} s",
+        reduced.nodes,
+        elements.unwrap_or_default(),
+        reduced.free_dofs,
+        reduced.seconds
+    );
+    for path in paths {
+        let _ = write!(text, "\n  written: {}", path.display());
     }
-    for check in &reduction.spin_checks {
+    for check in &reduced.spin_checks {
         let worst =
             check.frequency_deviation().into_iter().fold(0.0, |worst: f64, deviation| worst.max(deviation.abs()));
-        text.push_str(&format!(
+        let _ = write!(
+            text,
             "\n  at {} rad/s: {:.2} Hz first; frequencies off by up to {worst:.3} %, growth by {:.3} %",
             check.speed,
             check.reduced_frequencies.first().copied().unwrap_or(0.0),
             check.growth_deviation()
-        ));
+        );
     }
-    let json = json!({
+    text
+}
+
+/// For programs.
+fn json(reduced: &Reduced, facts: &RomFacts, arguments: &ReduceArguments, output: &Path, warnings: &[String]) -> Value {
+    json!({
         "rom": facts.to_json(),
-        "model": read_json,
+        "model": reduced.read.1,
         "full_model": {
-            "nodes": reduction.nodes,
-            "elements": elements,
-            "free_dofs": reduction.free_dofs,
-            "largest_mode_residual": reduction.largest_residual,
+            "nodes": reduced.nodes,
+            "elements": reduced.mesh.as_ref().map(|(mesh, _)| mesh.elements.len()),
+            "free_dofs": reduced.free_dofs,
+            "largest_mode_residual": reduced.largest_residual,
         },
-        "spin": reduction.spin_checks.iter().map(|check| json!({
+        "spin": reduced.spin_checks.iter().map(|check| json!({
             "speed": check.speed,
             "full_frequencies": check.full_frequencies,
             "reduced_frequencies": check.reduced_frequencies,
             "growth_deviation": check.growth_deviation(),
         })).collect::<Vec<_>>(),
-        "seconds": reduction.timings.total(),
+        "seconds": reduced.seconds,
         "warnings": warnings,
-        "files": { "rom": output, "inp": arguments.inp },
-    });
-    Ok(Outcome { text, json })
-}
-
-/// What was reduced, and what is to be told about it.
-struct Reduced {
-    reduction: Reduction,
-    /// Set of clamped nodes, for exported files.
-    clamped: Option<&'static str>,
-    name: String,
-    /// What was read, where it was a file.
-    text: String,
-    json: Value,
-    warnings: Vec<String>,
+        "files": { "rom": output, "inp": arguments.inp, "vtk": arguments.vtk },
+    })
 }
 
 fn reduced(arguments: &ReduceArguments, console: &Console) -> Result<Reduced> {
-    let shipped = |reduction: Reduction, clamped| {
-        let name = reduction.rom.name.clone();
-        Reduced { reduction, clamped, name, text: String::new(), json: Value::Null, warnings: Vec::new() }
-    };
     match &arguments.model {
         Some(Model::Rotor37) => {
             refuse_file_options(arguments)?;
             let reduction = reduction::rotor37(&rotor37_options(arguments)?, console)?;
-            Ok(shipped(reduction, Some("hub")))
+            Ok(Reduced::general(reduction, Some("hub")))
         }
         Some(Model::Casing) => {
             refuse_file_options(arguments)?;
             let options = casing_arguments::options(arguments)?;
             let clamped = (options.support != Support::Free).then_some(CLAMPED);
-            Ok(shipped(reduction::casing(&options, console)?, clamped))
+            Ok(Reduced::general(reduction::casing(&options, console)?, clamped))
         }
-        Some(Model::File(_)) | None => {
-            let UsersReduction { reduction, name, clamped, text, json, warnings } =
-                users_model::reduce(arguments, console)?;
-            Ok(Reduced { reduction, clamped, name, text, json, warnings })
+        Some(Model::Stage) => {
+            refuse_file_options(arguments)?;
+            stage(arguments, console)
         }
+        Some(Model::File(_)) | None => users_model::reduce(arguments, console),
     }
 }
 
+/// The bladed disk that ships.
+fn stage(arguments: &ReduceArguments, console: &Console) -> Result<Reduced> {
+    if arguments.casing != CasingArguments::default() || arguments.mesh.is_some() || arguments.spin.is_some() {
+        let remedy = "Leave out --mesh, --spin and what `tiprub reduce --help` lists as options of `casing`";
+        return Err(Failure::usage("stage", "an option given describes another model", remedy));
+    }
+    let mut options = if arguments.coarse { StageOptions::coarse() } else { StageOptions::default() };
+    options.contact_nodes = arguments.contact_nodes.unwrap_or(options.contact_nodes);
+    options.modes = arguments.modes.map_or(options.modes, ModeSelection::Families);
+    let sector = sector_mesh(&options.sector).map_err(|error| reduction::failure("stage", error))?;
+    let reduced = reduction::stage(&options, console)?;
+    let (nodes, mesh) = (sector.mesh.nodes.len(), Some((sector.mesh, options.material)));
+    Ok(Reduced::cyclic(reduced, mesh, nodes, Some("CLAMPED"), ["CYCLIC_LOW", "CYCLIC_HIGH"]))
+}
+
 fn refuse_file_options(arguments: &ReduceArguments) -> Result<()> {
+    if arguments.coarse && arguments.model != Some(Model::Stage) {
+        return Err(Failure::usage("--coarse", "it belongs to `stage`", "Leave it out"));
+    }
     if arguments.file == FileArguments::default() {
         return Ok(());
     }

@@ -1,11 +1,13 @@
 //! From a mesh to a checked reduced-order model.
 
+mod outcome;
+
 use std::time::Instant;
 
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
+use tiprub_core::rom::{Frame, RomChecks};
 
 use crate::assembly::{Assembled, free_dofs};
 use crate::craig_bampton::{CraigBampton, craig_bampton, dense_modes};
@@ -17,6 +19,9 @@ use crate::progress::{Listener, Stage, report, silent};
 use crate::sparse::{Factor, SparseMatrix, principal_pair};
 use crate::spin::{ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, SpinningStates, reduced_spin};
 use crate::{Error, Result};
+
+use outcome::{build_rom, rotated};
+pub(crate) use outcome::{element_names, node_modes};
 
 /// A contact node before the reduction.
 #[derive(Debug, Clone, PartialEq)]
@@ -123,7 +128,7 @@ pub fn reduce(
     assembled_and_reduced(mesh, material, clamped, contact, (options, None), listener)
 }
 
-/// [`reduce`] with the effects of spin up to `largest_speed` (rad/s), in [`RomExtras::spin`]; see [`crate::spin`].
+/// [`reduce`] with the effects of spin up to `largest_speed` (rad/s), in [`tiprub_core::rom::RomExtras::spin`]; see [`crate::spin`].
 ///
 /// The rest of the ROM is that of [`reduce`], bit for bit.
 ///
@@ -387,108 +392,4 @@ fn interface_dofs(free: &[usize], contact: &[ContactPoint]) -> Result<Vec<usize>
             })
         })
         .collect()
-}
-
-/// (cos θ, sin θ) of a point about the z axis.
-fn direction([x, y, _]: [f64; 3]) -> (f64, f64) {
-    let radius = x.hypot(y);
-    (x / radius, y / radius)
-}
-
-/// The same reduced model with interface displacements in the given frame.
-fn rotated(mut model: CraigBampton, nodes: &[[f64; 3]], contact: &[ContactPoint], frame: Frame) -> CraigBampton {
-    if frame == Frame::Cartesian {
-        return model;
-    }
-    let order = model.mass.nrows();
-    let mut rotation = DMatrix::<f64>::identity(order, order);
-    for (index, point) in contact.iter().enumerate() {
-        let (cos, sin) = direction(nodes[point.node]);
-        let first = 3 * index;
-        // Columns: the Cartesian parts of the radial and the tangential unit vector.
-        rotation[(first, first)] = cos;
-        rotation[(first + 1, first)] = sin;
-        rotation[(first, first + 1)] = -sin;
-        rotation[(first + 1, first + 1)] = cos;
-    }
-    let symmetric = |matrix: DMatrix<f64>| 0.5 * (&matrix + matrix.transpose());
-    model.mass = symmetric(rotation.transpose() * &model.mass * &rotation);
-    model.stiffness = symmetric(rotation.transpose() * &model.stiffness * &rotation);
-    model.transformation = &model.transformation * Mat::from_fn(order, order, |i, j| rotation[(i, j)]);
-    model
-}
-
-fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: Frame) -> ContactNode {
-    let [x, y, z] = nodes[point.node];
-    let position = match frame {
-        Frame::Cartesian => [x, y, z],
-        Frame::Cylindrical => [x.hypot(y), y.atan2(x), z],
-    };
-    ContactNode { name: point.name.clone(), position, meridional_slope: point.meridional_slope }
-}
-
-/// What the full model is made of.
-fn description(model: &FeModel) -> String {
-    let before = if model.origin.is_empty() { String::new() } else { format!("{}: ", model.origin) };
-    let nodes = model.nodes.len();
-    match &model.mesh {
-        Some((mesh, _)) => {
-            format!("{before}{nodes} nodes, {} elements ({})", mesh.elements.len(), element_names(mesh))
-        }
-        None => format!("{before}{nodes} nodes"),
-    }
-}
-
-fn build_rom(
-    full: &FeModel,
-    clamped: usize,
-    contact: &[ContactPoint],
-    options: &ReductionOptions,
-    model: &CraigBampton,
-    checks: RomChecks,
-) -> Result<Rom> {
-    let (boundary, order) = (3 * contact.len(), model.mass.nrows());
-    let material = full.mesh.as_ref().map_or(String::new(), |(_, material)| {
-        let Material { young_modulus, poisson_ratio, density, .. } = material;
-        format!("; E = {young_modulus:e} Pa, nu = {poisson_ratio}, rho = {density} kg/m3")
-    });
-    let origin = format!(
-        "{}, {clamped} nodes clamped{material}; Craig-Bampton with {boundary} interface degrees of freedom and {} \
-         fixed-interface modes",
-        description(full),
-        order - boundary,
-    );
-    let rom = Rom {
-        name: options.name.clone(),
-        origin,
-        sectors: options.sectors,
-        frame: options.frame,
-        mass: model.mass.clone(),
-        stiffness: model.stiffness.clone(),
-        damping_ratio: options.damping_ratio,
-        contact_map: DMatrix::identity(boundary, order),
-        contact_nodes: contact.iter().map(|point| contact_node(&full.nodes, point, options.frame)).collect(),
-        checks,
-        extras: RomExtras::default(),
-    };
-    rom.validate()?;
-    Ok(rom)
-}
-
-pub(crate) fn element_names(mesh: &Mesh) -> String {
-    let mut names: Vec<_> = mesh.elements.iter().map(|element| element.kind.calculix_name()).collect();
-    names.sort_unstable();
-    names.dedup();
-    names.join(", ")
-}
-
-pub(crate) fn node_modes(modes: &Modes, free: &[usize], nodes: usize) -> Vec<Mode> {
-    let mode = |(k, frequency)| {
-        let mut shape = vec![[0.0; 3]; nodes];
-        for (row, dof) in free.iter().enumerate() {
-            shape[dof / 3][dof % 3] = modes.shapes[(row, k)];
-        }
-        Mode { frequency, shape }
-    };
-    modes.frequencies().into_iter().enumerate().map(mode).collect()
 }

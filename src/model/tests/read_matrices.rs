@@ -8,7 +8,7 @@ use tiprub_core::Rom;
 use tiprub_core::rom::Frame;
 use tiprub_model::progress::silent;
 use tiprub_model::read::{
-    ContactChoice, Imported, MatrixFiles, MeshOptions, Units, choose_contact_nodes, read_matrices, read_mesh,
+    Axis, ContactChoice, Imported, MatrixFiles, MeshOptions, Units, choose_contact_nodes, read_matrices, read_mesh,
 };
 use tiprub_model::reduce::ReductionOptions;
 use tiprub_model::{Material, reduce_model};
@@ -57,6 +57,7 @@ fn files(directory: &Path, stiffness: &str, mass: &str, nodes: &str) -> MatrixFi
         nodes: directory.join(nodes),
         dofs: None,
         units: Units::Si,
+        axis: Axis::Z,
         left_out: Vec::new(),
     }
 }
@@ -151,7 +152,7 @@ impl Written {
 
     #[track_caller]
     fn refused(&self) -> String {
-        read_matrices(&self.files()).unwrap_err().to_string()
+        read_matrices(&self.files()).err().expect("the files are wrong").to_string()
     }
 }
 
@@ -256,7 +257,8 @@ fn wrong_matrices_are_refused_with_the_remedy() {
         ("both triangles", first(&both, "general", "symmetric"), m.clone(), table.clone(), &["both sides", "general"]),
         ("one triangle", first(&k, "symmetric", "general"), m.clone(), table.clone(), &["one side", "symmetric"]),
         ("no matrix", "hello\n".into(), m.clone(), table.clone(), &["no matrix", "Matrix Market"]),
-        ("exchanged", k.replace(" 1 ", " 1 -"), m.clone(), table.clone(), &["k.mtx"]),
+        ("negative", k.replacen("\n1 1 ", "\n1 1 -", 1), m.clone(), table.clone(), &["k.mtx", "negative"]),
+        ("exchanged", m.clone(), k.clone(), table.clone(), &["m.mtx", "exchanged"]),
         ("mass cut", k.clone(), first(&m, "\n1 1 ", "\n1 1 -"), table.clone(), &["m.mtx", "mass"]),
         (
             "short table",
@@ -272,7 +274,7 @@ fn wrong_matrices_are_refused_with_the_remedy() {
             format!("{table}{}", table.lines().nth(2).unwrap()),
             &["nodes.csv:35", "twice"],
         ),
-        ("table line", k.clone(), m.clone(), first(&table, ",", ",x"), &["nodes.csv", "NODE,X,Y,Z"]),
+        ("table line", k.clone(), m.clone(), first(&table, "\n1,", "\n1,x"), &["nodes.csv", "NODE,X,Y,Z"]),
         ("empty table", k.clone(), m.clone(), "node,x,y,z\n".into(), &["no node"]),
         ("rotation", format!("{named}1,4,1,4,1.0\n"), m.clone(), table.clone(), &["degree of freedom 4", "rotations"]),
         ("unknown node", format!("{named}77,1,77,1,1.0\n"), m.clone(), table.clone(), &["node 77", "nodes.csv"]),
@@ -288,6 +290,18 @@ fn wrong_matrices_are_refused_with_the_remedy() {
 }
 
 #[test]
+fn exchanged_matrices_without_the_clamped_nodes_are_noticed() {
+    let names = ["bar_held.mas", "bar_held.sti"];
+    let files = MatrixFiles {
+        dofs: Some(data("bar_held.dof")),
+        units: Units::MillimetreTonneSecond,
+        ..files(&data(""), names[0], names[1], "bar.inp")
+    };
+    let warnings = read_matrices(&files).unwrap().warnings;
+    assert!(warnings.iter().any(|warning| warning.contains("mass along x, y and z differs")), "{warnings:?}");
+}
+
+#[test]
 fn nodes_in_another_order_than_the_rows_are_noticed() {
     let bar = bar();
     let mut lines: Vec<String> = node_table(&bar).lines().map(str::to_owned).collect();
@@ -296,4 +310,35 @@ fn nodes_in_another_order_than_the_rows_are_noticed() {
         Written::new(&market(&bar, false, Triangle::Lower), &market(&bar, true, Triangle::Lower), &lines.join("\n"));
     let imported = read_matrices(&written.files()).unwrap();
     assert!(imported.warnings.iter().any(|warning| warning.contains("in the order of the rows")), "{imported:?}");
+}
+
+#[test]
+fn another_engine_axis_turns_the_model_and_its_matrices_alike() {
+    let bar = bar();
+    let expected = rom(&bar);
+    // What stands along z here stands along x there, and so on: (x, y, z) there is (z, x, y) of the bar.
+    let mut table = String::new();
+    for (index, [x, y, z]) in bar.model.nodes.iter().enumerate() {
+        let sets = bar.model.sets.iter().filter(|(_, nodes)| nodes.contains(&index));
+        let sets: Vec<&str> = sets.map(|(name, _)| name.as_str()).collect();
+        let _ = writeln!(table, "{},{z:e},{x:e},{y:e},{}", bar.node_numbers[index], sets.join(" "));
+    }
+    let there = |dof: usize| (bar.node_numbers[(dof - 1) / 3], [2, 3, 1][(dof - 1) % 3]);
+    let text = |mass: bool| {
+        let entries = entries(&bar, mass, Triangle::Lower, &|_| true);
+        let line = |(row, column, value): &(usize, usize, f64)| {
+            let ((a, i), (b, j)) = (there(*row), there(*column));
+            format!("{a},{i},{b},{j},{value:.16e}\n")
+        };
+        entries.iter().map(line).collect::<String>()
+    };
+    let written = Written::new(&text(false), &text(true), &table);
+    let turned = read_matrices(&MatrixFiles { axis: Axis::X, ..written.files() }).unwrap();
+    assert!(turned.warnings.is_empty(), "{:?}", turned.warnings);
+    assert_eq!(turned.model.nodes, bar.model.nodes);
+    let off = difference(&expected, &rom(&turned));
+    assert!(off < 1e-12, "{off:.2e}");
+    let straight = read_matrices(&written.files()).unwrap();
+    let [x, y, z] = bar.model.nodes[5];
+    assert_eq!(straight.model.nodes[5].map(f64::to_bits), [z, x, y].map(f64::to_bits));
 }

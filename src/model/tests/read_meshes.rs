@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use tiprub_model::assembly::free_dofs;
 use tiprub_model::element::{ElementKind, QuadraturePoint};
 use tiprub_model::progress::silent;
-use tiprub_model::read::{Imported, MeshOptions, Units, read_mesh, total_mass};
+use tiprub_model::read::{Axis, Imported, MeshOptions, Units, read_mesh, total_mass};
 use tiprub_model::reduce::full_modes;
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::{Error, FeModel, Material};
@@ -203,6 +203,20 @@ fn units_are_converted() {
     let model = imported("blade_hex20.inp").model;
     assert!((total_mass(&model) - 0.0771).abs() < 1e-4, "{}", total_mass(&model));
     assert!(model.nodes.iter().all(|[x, y, _]| (0.199..0.261).contains(&x.hypot(*y))));
+}
+
+#[test]
+fn another_engine_axis_turns_the_mesh_without_mirroring_it() {
+    let z = imported("blade_hex8.inp").model;
+    for (axis, from) in [(Axis::X, [1, 2, 0]), (Axis::Y, [2, 0, 1])] {
+        let units = Units::MillimetreTonneSecond;
+        let options = MeshOptions { units, axis, material: Some(steel()), ..MeshOptions::default() };
+        // A mirrored mesh would be turned inside out, and refused.
+        let turned = read_mesh(&data("blade_hex8.inp"), &options, &silent).unwrap().model;
+        for (turned, node) in turned.nodes.iter().zip(&z.nodes) {
+            assert_eq!(turned.map(f64::to_bits), from.map(|component| node[component].to_bits()), "{axis:?}");
+        }
+    }
 }
 
 #[test]

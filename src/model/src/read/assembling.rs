@@ -21,7 +21,7 @@ pub(super) fn assembled(
     let name = path.display().to_string();
     let file_name = path.file_name().map_or(name.clone(), |file| file.to_string_lossy().into_owned());
     let MeshFile { draft, materials, held } = file;
-    let (numbered, mut notes, mut warnings) = draft.into_mesh(options.units.length(), &name)?;
+    let (numbered, mut notes, mut warnings) = draft.into_mesh(options.units.length(), options.axis, &name)?;
     let (materials, of_element) = match &options.material {
         Some(material) => {
             if !materials.is_empty() {

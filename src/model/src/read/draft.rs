@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
+use super::Axis;
 use super::source::Place;
 use crate::element::ElementKind;
 use crate::mesh::{Element, Mesh};
@@ -97,8 +98,9 @@ impl Draft {
         self.element_index.get(&number).map_or(&[], |&index| &self.elements[index].nodes)
     }
 
-    /// The mesh of the solid elements, coordinates times `scale`; nodes of no solid element are left out.
-    pub fn into_mesh(mut self, scale: f64, what: &str) -> Result<(Numbered, Vec<String>, Vec<String>)> {
+    /// The mesh of the solid elements, coordinates times `scale`, turned so that `axis` is z; nodes of no solid element are
+    /// left out.
+    pub fn into_mesh(mut self, scale: f64, axis: Axis, what: &str) -> Result<(Numbered, Vec<String>, Vec<String>)> {
         let mut used = vec![false; self.numbers.len()];
         for element in &self.elements {
             self.check_nodes(element)?;
@@ -122,7 +124,8 @@ impl Draft {
             nodes.sort_unstable();
             (name.clone(), nodes)
         });
-        let sets: BTreeMap<String, Vec<usize>> = sets.filter(|(_, nodes)| !nodes.is_empty()).collect();
+        let (sets, empty): (BTreeMap<String, Vec<usize>>, BTreeMap<_, _>) =
+            sets.partition(|(_, nodes)| !nodes.is_empty());
         let element = |element: &DraftElement| {
             let nodes = element.nodes.iter().filter_map(place).collect();
             element.kind.map(|kind| Element { kind, nodes })
@@ -132,7 +135,7 @@ impl Draft {
             elements: solids().map(|element| element.number).collect(),
             materials: solids().map(|element| element.material).collect(),
             mesh: Mesh {
-                nodes: kept.iter().map(|&index| self.positions[index].map(|x| scale * x)).collect(),
+                nodes: kept.iter().map(|&index| axis.turned(self.positions[index].map(|x| scale * x))).collect(),
                 elements: self.elements.iter().filter_map(element).collect(),
                 sets,
             },
@@ -140,6 +143,10 @@ impl Draft {
         if kept.len() < self.numbers.len() {
             let left_out = self.numbers.len() - kept.len();
             self.notes.push(format!("{left_out} nodes that belong to no solid element are left out"));
+        }
+        if !empty.is_empty() {
+            let names: Vec<&str> = empty.keys().map(String::as_str).collect();
+            self.notes.push(format!("sets without a node of a solid element are left out: {}", names.join(", ")));
         }
         Ok((numbered, self.notes, self.warnings))
     }

@@ -67,11 +67,44 @@ impl Units {
     }
 }
 
+/// Which axis of a file is the engine axis, which is z here. The others follow in turn: x, y, z becomes y, z, x with x as
+/// the engine axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Axis {
+    /// x.
+    X,
+    /// y.
+    Y,
+    /// z: nothing is turned.
+    #[default]
+    Z,
+}
+
+impl Axis {
+    /// Where a component of the file stands here: 0, 1, 2 for x, y, z.
+    fn place(self, component: usize) -> usize {
+        match self {
+            Self::X => (component + 2) % 3,
+            Self::Y => (component + 1) % 3,
+            Self::Z => component,
+        }
+    }
+
+    /// Coordinates here of a point of the file.
+    fn turned(self, point: [f64; 3]) -> [f64; 3] {
+        let mut turned = [0.0; 3];
+        point.iter().enumerate().for_each(|(component, &value)| turned[self.place(component)] = value);
+        turned
+    }
+}
+
 /// How a mesh file is to be understood.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MeshOptions {
     /// Units of coordinates and material in the file.
     pub units: Units,
+    /// The engine axis in the file.
+    pub axis: Axis,
     /// Material of all elements (SI), instead of those in the file.
     pub material: Option<Material>,
     /// Temperature at which tables of properties are read, in the file's unit.
@@ -154,7 +187,7 @@ fn mesh_file(path: &Path, bytes: &[u8], temperature: Option<f64>, open: source::
 pub fn parse_mesh(name: &str, bytes: &[u8]) -> Result<crate::Mesh> {
     let path = Path::new(name);
     let none = |path: &Path| Err(Error::File { path: path.to_path_buf(), source: std::io::ErrorKind::NotFound.into() });
-    let (numbered, _, _) = mesh_file(path, bytes, Some(0.0), &none)?.draft.into_mesh(1.0, name)?;
+    let (numbered, _, _) = mesh_file(path, bytes, Some(0.0), &none)?.draft.into_mesh(1.0, Axis::Z, name)?;
     Ok(numbered.mesh)
 }
 

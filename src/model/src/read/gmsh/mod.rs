@@ -99,7 +99,8 @@ impl<'a> Sections<'a> {
     }
 
     fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> crate::Error {
-        Place { file: Arc::clone(&self.file), line: self.line }.error(problem, remedy)
+        // The line just taken.
+        Place { file: Arc::clone(&self.file), line: (self.line - 1).max(1) }.error(problem, remedy)
     }
 
     fn rest(&self) -> &'a [u8] {

@@ -22,7 +22,7 @@ use node_table::{NodeTable, read_nodes};
 
 use super::entries::{Entries, symmetric_pair};
 use super::source::{about, open_file};
-use super::{Imported, Units};
+use super::{Axis, Imported, Units};
 use crate::Result;
 use crate::fe_model::FeModel;
 use crate::sparse::SparseMatrix;
@@ -40,6 +40,8 @@ pub struct MatrixFiles {
     pub dofs: Option<PathBuf>,
     /// Units of matrices and coordinates.
     pub units: Units,
+    /// The engine axis in the files.
+    pub axis: Axis,
     /// Sets of nodes whose dofs the matrices leave out, for formats whose rows name no nodes.
     pub left_out: Vec<String>,
 }
@@ -50,7 +52,7 @@ pub struct MatrixFiles {
 /// [`Error::File`](crate::Error::File); [`Error::Read`](crate::Error::Read) with file and line, and for matrices that do not fit each other or the
 /// nodes, are not symmetric, or hold a mass that is not positive.
 pub fn read_matrices(files: &MatrixFiles) -> Result<Imported> {
-    let table = read_nodes(&files.nodes, files.units)?;
+    let table = read_nodes(&files.nodes, files.units, files.axis)?;
     let dofs = dof_file(files)?;
     let rows = Rows::new(files, &table)?;
     let stiffness = located(&files.stiffness, dofs.as_deref(), &rows)?;
@@ -66,7 +68,7 @@ pub fn read_matrices(files: &MatrixFiles) -> Result<Imported> {
     if !absent.is_empty() {
         notes.push(format!("{} nodes have no dofs in the matrices: they are clamped", absent.len()));
     }
-    let mut warnings = Vec::new();
+    let mut warnings = Vec::from_iter(check_inertia(&files.mass, &mass)?);
     if absent.is_empty() {
         warnings.extend(rigid_motion_warning(&table.positions, &stiffness));
     }
@@ -136,7 +138,7 @@ impl<'a> Rows<'a> {
             let problem = format!("node {node} is not in {}", self.files.nodes.display());
             about(path, problem, "Give a node table of the same model")
         })?;
-        Ok(3 * index + component - 1)
+        Ok(3 * index + self.files.axis.place(component - 1))
     }
 
     /// Dofs of the rows of a matrix whose rows are only counted.
@@ -161,7 +163,8 @@ impl<'a> Rows<'a> {
                 "Give matrices of all nodes, or of all that --clamp-set does not name, in the order of the node table";
             return Err(about(path, problem, remedy));
         };
-        Ok(nodes.iter().flat_map(|node| (0..3).map(move |component| 3 * node + component)).collect())
+        let axis = self.files.axis;
+        Ok(nodes.iter().flat_map(|node| (0..3).map(move |component| 3 * node + axis.place(component))).collect())
     }
 }
 
@@ -190,45 +193,63 @@ const HELD: f64 = 1e35;
 /// Largest difference of entries beside the diagonal from their mirror images, as a share of the larger diagonal.
 const ASYMMETRY: f64 = 1e-8;
 
-/// Both triangles from one or from both, scaled; and the dofs that are held by a huge diagonal.
-fn mirrored(path: &Path, entries: Entries, order: usize, scale: f64) -> Result<(Entries, Vec<usize>)> {
-    let below = entries.items.iter().any(|&(i, j, value)| i > j && value != 0.0);
-    let above = entries.items.iter().any(|&(i, j, value)| i < j && value != 0.0);
-    let held =
-        entries.items.iter().filter(|&&(i, j, value)| i == j && value.abs() > HELD).map(|entry| entry.0).collect();
-    let mut items: Vec<_> = entries.items.iter().map(|&(i, j, value)| (i, j, scale * value)).collect();
-    if !(below && above) {
-        items.extend(entries.items.iter().filter(|(i, j, _)| i != j).map(|&(i, j, value)| (j, i, scale * value)));
-        return Ok((Entries { items }, held));
-    }
-    // Sorted, an entry and its mirror image are found in turn.
-    let mut sums: HashMap<(usize, usize), f64> = HashMap::with_capacity(items.len());
-    items.iter().for_each(|&(i, j, value)| *sums.entry((i, j)).or_default() += value);
-    let diagonal = |i: usize| sums.get(&(i, i)).copied().unwrap_or(0.0).abs();
-    let mut worst: Option<(f64, usize, usize)> = None;
-    for (&(i, j), value) in &sums {
-        let difference = (value - sums.get(&(j, i)).copied().unwrap_or(0.0)).abs();
-        let share = difference / diagonal(i).max(diagonal(j)).max(f64::MIN_POSITIVE);
-        if share > ASYMMETRY && worst.is_none_or(|(most, ..)| share > most) {
-            worst = Some((share, i, j));
+/// A place above the diagonal (or on it) and its mirror image.
+struct Pair {
+    low: usize,
+    high: usize,
+    /// Sums of the entries above and below the diagonal.
+    sums: [f64; 2],
+    /// Whether there are any.
+    given: [bool; 2],
+}
+
+/// Entries by pairs of places, in the order of rows and columns.
+fn pairs(entries: &Entries, scale: f64) -> Vec<Pair> {
+    let place = |&(i, j, value): &(usize, usize, f64)| (i.min(j), i.max(j), usize::from(i > j), scale * value);
+    let mut items: Vec<(usize, usize, usize, f64)> = entries.items.iter().map(place).collect();
+    items.sort_by_key(|&(low, high, side, _)| (low, high, side));
+    let mut pairs: Vec<Pair> = Vec::new();
+    for (low, high, side, value) in items {
+        if pairs.last().is_none_or(|pair| (pair.low, pair.high) != (low, high)) {
+            pairs.push(Pair { low, high, sums: [0.0; 2], given: [false; 2] });
+        }
+        if let Some(pair) = pairs.last_mut() {
+            pair.sums[side] += value;
+            pair.given[side] = true;
         }
     }
-    if let Some((share, i, j)) = worst {
-        let problem = format!(
-            "it is not symmetric: entries ({}, {}) and its mirror image differ by {share:.1e} of the diagonal ({order} rows)",
-            i + 1,
-            j + 1
-        );
-        return Err(about(
-            path,
-            problem,
-            "Gyroscopic, follower-load and friction terms must be off when it is written",
-        ));
+    pairs
+}
+
+/// Both triangles from one or from both, scaled; and the dofs that are held by a huge diagonal.
+///
+/// A file of one triangle, in the order of its own rows, names each pair of dofs once, whatever their order here.
+fn mirrored(path: &Path, entries: Entries, order: usize, scale: f64) -> Result<(Entries, Vec<usize>)> {
+    let held =
+        entries.items.iter().filter(|&&(i, j, value)| i == j && value.abs() > HELD).map(|entry| entry.0).collect();
+    let pairs = pairs(&entries, scale);
+    drop(entries);
+    let mut diagonal = vec![0.0_f64; order];
+    pairs.iter().filter(|pair| pair.low == pair.high).for_each(|pair| diagonal[pair.low] = pair.sums[0].abs());
+    let square = pairs.iter().any(|pair| pair.given == [true; 2]);
+    let mut items = Vec::with_capacity(2 * pairs.len());
+    for Pair { low, high, sums: [above, below], .. } in pairs {
+        let share = (above - below).abs() / diagonal[low].max(diagonal[high]).max(f64::MIN_POSITIVE);
+        if square && low != high && share > ASYMMETRY {
+            let (row, column) = (low + 1, high + 1);
+            let problem = format!(
+                "it is not symmetric: entry ({row}, {column}) and its mirror image differ by {share:.1e} of the diagonal, counted \
+                 over all {order} degrees of freedom"
+            );
+            let remedy = "Gyroscopic, follower-load and friction terms must be off when it is written";
+            return Err(about(path, problem, remedy));
+        }
+        let value = if square && low != high { 0.5 * (above + below) } else { above + below };
+        items.push((low, high, value));
+        if low != high {
+            items.push((high, low, value));
+        }
     }
-    let halves = |(i, j): (usize, usize), value: f64| [(i, j, 0.5 * value), (j, i, 0.5 * value)];
-    let mut items: Vec<_> = sums.into_iter().flat_map(|(place, value)| halves(place, value)).collect();
-    // The order of a hash table must not show in the sums.
-    items.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)));
     Ok((Entries { items }, held))
 }
 
@@ -295,6 +316,34 @@ fn check_mass(files: &MatrixFiles, numbers: &[u64], mass: &SparseMatrix, absent:
         }
     }
     Ok(())
+}
+
+/// Inertia of a motion along one axis, as a share of Σ|M|, below which there is none; a stiffness leaves round-off.
+const NO_INERTIA: f64 = 1e-6;
+/// Inertia along the three axes agrees to this share.
+const UNEQUAL: f64 = 0.01;
+
+/// A mass resists motion along each axis alike. A stiffness in its place resists none, or (with clamped nodes left out)
+/// each differently.
+fn check_inertia(path: &Path, mass: &SparseMatrix) -> Result<Option<String>> {
+    let (mut inertia, mut size) = ([0.0_f64; 3], 0.0_f64);
+    for column in 0..mass.order() {
+        for entry in mass.pattern.starts[column]..mass.pattern.starts[column + 1] {
+            if mass.pattern.rows[entry] % 3 == column % 3 {
+                inertia[column % 3] += mass.values[entry];
+                size += mass.values[entry].abs() / 3.0;
+            }
+        }
+    }
+    let [low, high] = inertia.iter().fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], &x| [low.min(x), high.max(x)]);
+    let [x, y, z] = inertia;
+    if low <= NO_INERTIA * size {
+        let problem = format!("moving the whole model along x, y, z meets inertias {x:.3e}, {y:.3e}, {z:.3e}: no mass");
+        return Err(about(path, problem, "Are stiffness and mass exchanged?"));
+    }
+    Ok((high > (1.0 + UNEQUAL) * low).then(|| {
+        format!("the mass along x, y and z differs ({x:.4e}, {y:.4e}, {z:.4e} kg): is it the mass matrix, and of solids only?")
+    }))
 }
 
 /// A rigid motion that strains the model this much, as a share of Σ|K||u|, is more than round-off of printed numbers.

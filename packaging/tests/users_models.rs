@@ -1,0 +1,248 @@
+//! Models of a user's own, as the user meets them: reduce, package, run, and what is said of wrong ones.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/models").join(name)
+}
+
+/// A directory with the models of the tests.
+struct Project {
+    root: TempDir,
+}
+
+impl Project {
+    fn new(files: &[&str]) -> Self {
+        let root = tempfile::tempdir().unwrap();
+        for name in files {
+            fs::copy(data(name), root.path().join(name)).unwrap();
+        }
+        Self { root }
+    }
+
+    fn run(&self, line: &str) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+        command.current_dir(self.root.path()).args(line.split_whitespace()).output().unwrap()
+    }
+
+    #[track_caller]
+    fn succeed(&self, line: &str) -> Value {
+        let output = self.run(&format!("--json --quiet {line}"));
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{line}: {stderr}");
+        serde_json::from_slice(&output.stdout).unwrap()
+    }
+
+    #[track_caller]
+    fn fail(&self, line: &str, code: i32) -> String {
+        let output = self.run(line);
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{line}: {stderr}");
+        assert!(!stderr.contains("panicked"), "{stderr}");
+        assert!(stderr.contains("error: "), "{line}: {stderr}");
+        stderr
+    }
+
+    fn write(&self, name: &str, contents: impl AsRef<[u8]>) {
+        fs::write(self.root.path().join(name), contents).unwrap();
+    }
+
+    fn rom(&self, name: &str) -> tiprub_core::Rom {
+        tiprub_format::read_rom(&fs::read(self.root.path().join(name)).unwrap(), name).unwrap()
+    }
+}
+
+fn numbers(value: &Value, key: &str) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|row| row[key].as_f64().unwrap()).collect()
+}
+
+fn guide() -> String {
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/models.md")).unwrap()
+}
+
+/// The scene of the guide.
+fn scene() -> String {
+    let guide = guide();
+    let text = guide.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    assert!(text.lines().count() <= 20, "a scene of one's own needs no more than 20 lines");
+    text.to_owned()
+}
+
+/// The command of the guide that reduces the blade, without `tiprub`.
+fn command() -> String {
+    let guide = guide();
+    let lines = guide.split("\n    tiprub reduce blade.inp --contact-set TIP").nth(2).expect("the second one");
+    let text: String = lines.split("\n    tiprub package").next().unwrap().replace("\\\n", " ");
+    format!("reduce blade_hex20.inp --contact-set TIP{text}")
+}
+
+#[test]
+fn a_mesh_of_gmsh_becomes_a_running_scene_as_the_guide_tells() {
+    let project = Project::new(&["blade_hex20.inp"]);
+    let told = project.succeed(&command());
+    assert_eq!(told["rom"]["sectors"], 36);
+    assert_eq!(told["model"]["sets"]["TIP"], 53);
+    assert!((told["model"]["mass"].as_f64().unwrap() - 0.0771).abs() < 1e-4);
+    let names: Vec<&str> =
+        told["rom"]["contact_nodes"].as_array().unwrap().iter().map(|node| node["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["leading_edge", "mid_chord", "trailing_edge"]);
+    // The chord of the tip is 32 mm at 40 degrees to the axis: the edges' middles lie 12.26 mm before and behind.
+    let rom = project.rom("blade.rom.safetensors");
+    for (node, z) in rom.contact_nodes.iter().zip([-12.256e-3, 0.0, 12.256e-3]) {
+        let [radius, _, axial] = node.position;
+        assert!((axial - z).abs() < 5e-6 && (radius - 0.26).abs() < 3e-4, "{node:?}");
+    }
+    project.write("blade.toml", scene());
+    let run = project.succeed("run blade.toml --csv rub.csv");
+    assert_eq!(run["communication_steps"], 500);
+    let csv = fs::read_to_string(project.root.path().join("rub.csv")).unwrap();
+    let names: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
+    let column = names.iter().position(|name| *name == "clearance_minimum").unwrap();
+    let smallest = csv.lines().skip(1).map(|line| line.split(',').nth(column).unwrap().parse::<f64>().unwrap());
+    let smallest = smallest.fold(f64::INFINITY, f64::min);
+    assert!(smallest.abs() < 2e-6, "the lobes close the gap and the blades give way: {smallest}");
+}
+
+#[test]
+fn matrices_of_calculix_give_the_rom_of_the_mesh() {
+    let project =
+        Project::new(&["bar.inp", "bar.sti", "bar.mas", "bar.dof", "bar_held.sti", "bar_held.mas", "bar_held.dof"]);
+    let common = "--contact-set TIP --contact-nodes 3 --modes 8 --units mm-t-s";
+    let mesh = format!(
+        "reduce bar.inp --clamp-set ROOT --young 210e9 --poisson 0.3 --density 7850 {common} -o mesh.rom.safetensors"
+    );
+    let matrices = format!(
+        "reduce bar.inp --clamp-set ROOT --stiffness bar.sti --mass bar.mas {common} -o matrices.rom.safetensors"
+    );
+    let held = format!("reduce bar.inp --stiffness bar_held.sti --mass bar_held.mas {common} -o held.rom.safetensors");
+    for line in [&mesh, &matrices, &held] {
+        project.succeed(line);
+    }
+    let expected = project.rom("mesh.rom.safetensors");
+    for name in ["matrices.rom.safetensors", "held.rom.safetensors"] {
+        let found = project.rom(name);
+        assert_eq!(found.contact_nodes, expected.contact_nodes);
+        // Shapes have no sign of their own.
+        let off = (found.mass.abs() - expected.mass.abs()).amax() / expected.mass.amax();
+        let stiffness = (found.stiffness.abs() - expected.stiffness.abs()).amax() / expected.stiffness.amax();
+        println!("{name}: mass off by {off:.2e}, stiffness by {stiffness:.2e}");
+        assert!(off < 1e-10 && stiffness < 1e-10, "{name}: {off:.2e} {stiffness:.2e}");
+        assert!(found.origin.contains(".sti"), "{}", found.origin);
+    }
+}
+
+#[test]
+fn a_sector_of_gmsh_becomes_a_wheel_with_the_frequencies_of_calculix() {
+    let project = Project::new(&["sector.msh"]);
+    let line = "reduce sector.msh --contact-set TIP --clamp-set BORE --sectors 12 --cyclic-low LOW --cyclic-high HIGH \
+                --units mm-t-s --young 210e9 --poisson 0.3 --density 7850 --contact-nodes 3 --modes 12 \
+                --inp sector_out.inp --vtk sector.vtu";
+    let told = project.succeed(line);
+    let faces = &told["model"]["faces"];
+    assert!(faces["largest_mismatch"].as_f64().unwrap() < 1e-12 && faces["swapped"] == false, "{faces}");
+    let rom = project.rom("sector.rom.safetensors");
+    assert_eq!((rom.sectors, rom.extras.harmonics.len()), (12, 6));
+    let checks = &rom.checks;
+    let reference = fs::read_to_string(data("sector_calculix.csv")).unwrap();
+    let rows = reference.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit()));
+    let mut compared = 0;
+    for row in rows {
+        let values: Vec<f64> = row.split(',').map(|value| value.parse().unwrap()).collect();
+        let own: Vec<f64> = checks
+            .full_frequencies
+            .iter()
+            .zip(&checks.nodal_diameters)
+            .filter(|(_, n)| **n as f64 == values[0])
+            .map(|(frequency, _)| *frequency)
+            .collect();
+        for (found, expected) in own.iter().zip(&values[1..]) {
+            assert!((found / expected - 1.0).abs() < 1e-4, "n = {}: {found} {expected}", values[0]);
+            compared += 1;
+        }
+    }
+    assert!(compared >= 14, "{compared} frequencies");
+    assert!(
+        fs::read_to_string(project.root.path().join("sector_out.inp"))
+            .unwrap()
+            .contains("*CYCLIC SYMMETRY MODEL, N=12")
+    );
+    assert!(fs::metadata(project.root.path().join("sector.vtu")).unwrap().len() > 1000);
+    // The other way round is noticed and put right.
+    let swapped = line.replace("--cyclic-low LOW --cyclic-high HIGH", "--cyclic-low HIGH --cyclic-high LOW --force");
+    assert_eq!(project.succeed(&swapped)["model"]["faces"]["swapped"], true);
+    assert!(project.rom("sector.rom.safetensors") == rom);
+}
+
+#[test]
+fn an_exported_mesh_is_read_back_to_the_same_frequencies() {
+    let project = Project::new(&[]);
+    let first = project.succeed("reduce rotor37 --mesh 6x1x6 --inp blade.inp");
+    let again = project.succeed("reduce blade.inp --contact-set TIP --clamp-set HUB --contact-nodes 3 --modes 20");
+    let (a, b) = (numbers(&first["rom"]["checks"], "full_hz"), numbers(&again["rom"]["checks"], "full_hz"));
+    assert!(a.iter().zip(&b).all(|(a, b)| (a / b - 1.0).abs() < 1e-9), "{a:?} {b:?}");
+}
+
+#[test]
+fn effects_of_spin_are_computed_for_a_mesh_of_ones_own() {
+    let project = Project::new(&["blade_tet10.msh"]);
+    let line =
+        "reduce blade_tet10.msh --contact-set TIP --clamp-set ROOT --units mm-t-s --material titanium --spin 1500";
+    let told = project.succeed(line);
+    assert_eq!(told["rom"]["spin"]["largest_speed"], 1500.0);
+    let check = &told["spin"][1];
+    let (rest, spinning) = (told["rom"]["checks"][0]["full_hz"].as_f64().unwrap(), &check["full_frequencies"][0]);
+    assert!(spinning.as_f64().unwrap() > 1.005 * rest, "{spinning} {rest}");
+}
+
+#[test]
+fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
+    let project = Project::new(&["bar.inp", "bar.sti", "bar.mas", "bar.dof", "sector.msh", "blade_hex8.inp"]);
+    project.write("empty.inp", "");
+    project.write("picture.png", b"\x89PNG");
+    project.write("old.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n");
+    project.write("k.mtx", "%%MatrixMarket matrix coordinate real symmetric\n3 3 1\n1 1 1.0\n");
+    let bar = "--contact-set TIP --clamp-set ROOT --units mm-t-s";
+    let cases: Vec<(i32, String, &[&str])> = vec![
+        (2, "reduce blade".into(), &["rotor37", ".inp"]),
+        (1, format!("reduce missing.inp {bar}"), &["missing.inp", "Check the path"]),
+        (1, format!("reduce empty.inp {bar}"), &["empty.inp", "no solid element"]),
+        (1, format!("reduce picture.png {bar}"), &["picture.png", ".inp", ".msh"]),
+        (1, format!("reduce old.msh {bar}"), &["old.msh:2", "Mesh.MshFileVersion"]),
+        (1, format!("reduce bar.inp {bar}"), &["bar.inp", "no material", "--material"]),
+        (1, "reduce blade_hex8.inp --contact-set TIP --clamp-set ROOT --material steel".into(), &["6.0", "--units mm-t-s", "--units m"]),
+        (1, format!("reduce bar.inp {bar} --young 210e3 --poisson 0.3 --density 7.85e-9"), &["Young's modulus", "SI units"]),
+        (2, "reduce bar.inp --material steel --units mm-t-s".into(), &["--contact-set", "TIP (8)", "ROOT (8)"]),
+        (2, "reduce bar.inp --material steel --units mm-t-s --contact-set TIP".into(), &["--clamp-set", "ROOT (8)", "none"]),
+        (1, "reduce bar.inp --material steel --units mm-t-s --contact-set TIPS --clamp-set ROOT".into(), &["`TIPS`", "TIP (8)"]),
+        (1, "reduce bar.inp --material steel --units mm-t-s --contact-set ROOT --clamp-set ROOT".into(), &["ROOT", "clamped"]),
+        (1, format!("reduce bar.inp {bar} --material steel --contact-nodes 40"), &["40 of a set of", "Give a number"]),
+        (1, format!("reduce bar.inp {bar} --material steel --contact-nodes 2 --contact-names a,b,c"), &["3 names for 2"]),
+        (1, format!("reduce bar.inp {bar} --material steel --modes 5000"), &["5000", "fewer modes"]),
+        (2, format!("reduce bar.inp {bar} --material steel --young 1e11 --poisson 0.3 --density 1e3"), &["given twice"]),
+        (2, format!("reduce bar.inp {bar} --young 1e11"), &["--poisson"]),
+        (2, format!("reduce bar.inp {bar} --material steel --contour 0:1,1:1"), &["casing"]),
+        (2, format!("reduce rotor37 --contact-set TIP"), &["one's own"]),
+        (2, format!("reduce bar.inp {bar} --stiffness bar.sti"), &["--mass"]),
+        (2, format!("reduce --stiffness bar.sti --mass bar.mas {bar}"), &["--nodes", "mesh file"]),
+        (2, format!("reduce bar.inp {bar} --stiffness bar.sti --mass bar.mas --material steel"), &["matrices hold their material"]),
+        (1, format!("reduce bar.inp {bar} --stiffness k.mtx --mass bar.mas"), &["k.mtx", "3 rows", "96"]),
+        (1, format!("reduce bar.inp {bar} --stiffness bar.mas --mass bar.sti --dofs bar.dof"), &["exchanged"]),
+        (2, format!("reduce sector.msh --contact-set TIP --clamp-set BORE --cyclic-low LOW --material steel --units mm-t-s"), &["--cyclic-high"]),
+        (1, "reduce sector.msh --contact-set TIP --clamp-set BORE --cyclic-low LOW --cyclic-high HIGH --sectors 13 --material steel --units mm-t-s".into(), &["cyclic faces", "number of sectors"]),
+        (1, "reduce sector.msh --contact-set LOW --clamp-set BORE --cyclic-low LOW --cyclic-high HIGH --sectors 12 --material steel --units mm-t-s".into(), &["LOW", "faces"]),
+    ];
+    for (code, line, wanted) in cases {
+        let message = project.fail(&line, code);
+        println!("{}", message.trim_end());
+        for part in wanted {
+            assert!(message.contains(part), "`{part}` is not in: {message}\n{line}");
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! What a reduction leaves: coordinates in the frame of the contact nodes, the ROM with its origin, shapes for pictures.
+
+use faer::Mat;
+use nalgebra::DMatrix;
+use tiprub_core::Rom;
+use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
+
+use super::{ContactPoint, Mode, ReductionOptions};
+use crate::Result;
+use crate::craig_bampton::CraigBampton;
+use crate::eigen::Modes;
+use crate::fe_model::FeModel;
+use crate::material::Material;
+use crate::mesh::Mesh;
+
+/// (cos θ, sin θ) of a point about the z axis.
+fn direction([x, y, _]: [f64; 3]) -> (f64, f64) {
+    let radius = x.hypot(y);
+    (x / radius, y / radius)
+}
+
+/// The same reduced model with interface displacements in the given frame.
+pub(super) fn rotated(
+    mut model: CraigBampton,
+    nodes: &[[f64; 3]],
+    contact: &[ContactPoint],
+    frame: Frame,
+) -> CraigBampton {
+    if frame == Frame::Cartesian {
+        return model;
+    }
+    let order = model.mass.nrows();
+    let mut rotation = DMatrix::<f64>::identity(order, order);
+    for (index, point) in contact.iter().enumerate() {
+        let (cos, sin) = direction(nodes[point.node]);
+        let first = 3 * index;
+        // Columns: the Cartesian parts of the radial and the tangential unit vector.
+        rotation[(first, first)] = cos;
+        rotation[(first + 1, first)] = sin;
+        rotation[(first, first + 1)] = -sin;
+        rotation[(first + 1, first + 1)] = cos;
+    }
+    let symmetric = |matrix: DMatrix<f64>| 0.5 * (&matrix + matrix.transpose());
+    model.mass = symmetric(rotation.transpose() * &model.mass * &rotation);
+    model.stiffness = symmetric(rotation.transpose() * &model.stiffness * &rotation);
+    model.transformation = &model.transformation * Mat::from_fn(order, order, |i, j| rotation[(i, j)]);
+    model
+}
+
+fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: Frame) -> ContactNode {
+    let [x, y, z] = nodes[point.node];
+    let position = match frame {
+        Frame::Cartesian => [x, y, z],
+        Frame::Cylindrical => [x.hypot(y), y.atan2(x), z],
+    };
+    ContactNode { name: point.name.clone(), position, meridional_slope: point.meridional_slope }
+}
+
+/// What the full model is made of.
+fn description(model: &FeModel) -> String {
+    let before = if model.origin.is_empty() { String::new() } else { format!("{}: ", model.origin) };
+    let nodes = model.nodes.len();
+    match &model.mesh {
+        Some((mesh, _)) => {
+            format!("{before}{nodes} nodes, {} elements ({})", mesh.elements.len(), element_names(mesh))
+        }
+        None => format!("{before}{nodes} nodes"),
+    }
+}
+
+pub(super) fn build_rom(
+    full: &FeModel,
+    clamped: usize,
+    contact: &[ContactPoint],
+    options: &ReductionOptions,
+    model: &CraigBampton,
+    checks: RomChecks,
+) -> Result<Rom> {
+    let (boundary, order) = (3 * contact.len(), model.mass.nrows());
+    let material = full.mesh.as_ref().map_or(String::new(), |(_, material)| {
+        let Material { young_modulus, poisson_ratio, density, .. } = material;
+        format!("; E = {young_modulus:e} Pa, nu = {poisson_ratio}, rho = {density} kg/m3")
+    });
+    let origin = format!(
+        "{}, {clamped} nodes clamped{material}; Craig-Bampton with {boundary} interface degrees of freedom and {} \
+         fixed-interface modes",
+        description(full),
+        order - boundary,
+    );
+    let rom = Rom {
+        name: options.name.clone(),
+        origin,
+        sectors: options.sectors,
+        frame: options.frame,
+        mass: model.mass.clone(),
+        stiffness: model.stiffness.clone(),
+        damping_ratio: options.damping_ratio,
+        contact_map: DMatrix::identity(boundary, order),
+        contact_nodes: contact.iter().map(|point| contact_node(&full.nodes, point, options.frame)).collect(),
+        checks,
+        extras: RomExtras::default(),
+    };
+    rom.validate()?;
+    Ok(rom)
+}
+
+pub(crate) fn element_names(mesh: &Mesh) -> String {
+    let mut names: Vec<_> = mesh.elements.iter().map(|element| element.kind.calculix_name()).collect();
+    names.sort_unstable();
+    names.dedup();
+    names.join(", ")
+}
+
+pub(crate) fn node_modes(modes: &Modes, free: &[usize], nodes: usize) -> Vec<Mode> {
+    let mode = |(k, frequency)| {
+        let mut shape = vec![[0.0; 3]; nodes];
+        for (row, dof) in free.iter().enumerate() {
+            shape[dof / 3][dof % 3] = modes.shapes[(row, k)];
+        }
+        Mode { frequency, shape }
+    };
+    modes.frequencies().into_iter().enumerate().map(mode).collect()
+}
