@@ -20,6 +20,12 @@ const DEPENDENT: f64 = 1e-13;
 /// A column that loses more than this share inside its block is projected against the whole basis again.
 const CANCELLED: f64 = 1e-2;
 const BLOCK: usize = 8;
+/// Vectors of the basis that are stored together.
+const PART: usize = 64;
+/// Convergence is looked for again when the basis has grown by this share: that takes a dense eigenvalue problem.
+const LOOK: usize = 12;
+/// Modes whose residuals are formed together.
+const CHECKED_TOGETHER: usize = 64;
 /// An ω² below this share of tr K / tr M is round-off of a rigid-body motion.
 const MECHANISM: f64 = 1e-14;
 
@@ -41,61 +47,87 @@ impl Modes {
     }
 }
 
-/// A growing M-orthonormal basis Q with M Q beside it.
-struct Basis {
-    vectors: Mat<f64>,
-    mass_vectors: Mat<f64>,
+/// A growing M-orthonormal basis Q.
+///
+/// It is kept in parts, so that it grows without being copied. M Q is not kept: M times a block costs less than the memory.
+struct Basis<'a> {
+    mass: &'a SparseMatrix,
+    parts: Vec<Mat<f64>>,
     size: usize,
     /// The basis grows to this size at most.
     capacity: usize,
 }
 
-impl Basis {
-    fn new(order: usize, capacity: usize) -> Self {
-        Self { vectors: Mat::zeros(order, 0), mass_vectors: Mat::zeros(order, 0), size: 0, capacity }
+impl<'a> Basis<'a> {
+    fn new(mass: &'a SparseMatrix, capacity: usize) -> Self {
+        Self { mass, parts: Vec::new(), size: 0, capacity }
     }
 
-    fn push(&mut self, column: &Mat<f64>, mass_column: &Mat<f64>, norm: f64) {
-        let order = column.nrows();
-        if self.size == self.vectors.ncols() {
-            let room = (2 * self.size).clamp(8 * BLOCK, self.capacity.max(8 * BLOCK));
-            self.vectors.resize_with(order, room, |_, _| 0.0);
-            self.mass_vectors.resize_with(order, room, |_, _| 0.0);
+    fn push(&mut self, column: &Mat<f64>, norm: f64) {
+        let place = self.size % PART;
+        if place == 0 {
+            self.parts.push(Mat::zeros(column.nrows(), PART.min(self.capacity - self.size)));
         }
-        for i in 0..order {
-            self.vectors[(i, self.size)] = column[(i, 0)] / norm;
-            self.mass_vectors[(i, self.size)] = mass_column[(i, 0)] / norm;
-        }
+        let target = self.parts[self.size / PART].col_mut(place);
+        target.iter_mut().zip(column.col(0).iter()).for_each(|(target, value)| *target = value / norm);
         self.size += 1;
     }
 
-    fn used(&self) -> MatRef<'_, f64> {
-        self.vectors.get(.., ..self.size)
+    /// The vectors from `first` on, part by part, each with its number.
+    fn from(&self, first: usize) -> impl Iterator<Item = (usize, MatRef<'_, f64>)> {
+        self.parts.iter().enumerate().filter_map(move |(index, part)| {
+            let start = first.max(index * PART);
+            let end = self.size.min((index + 1) * PART);
+            (start < end).then(|| (start, part.get(.., start - index * PART..end - index * PART)))
+        })
     }
 
-    fn used_mass(&self) -> MatRef<'_, f64> {
-        self.mass_vectors.get(.., ..self.size)
+    /// The vectors from `first` on.
+    fn block(&self, first: usize) -> Mat<f64> {
+        Mat::from_fn(self.mass.order(), self.size - first, |i, j| {
+            self.parts[(first + j) / PART][(i, (first + j) % PART)]
+        })
     }
 
-    /// Remove the basis from `block`; returns the coefficients QᵀM·block.
-    fn project_out(&self, block: &mut Mat<f64>) -> Mat<f64> {
-        let mut coefficients = Mat::zeros(self.size, block.ncols());
-        for _pass in 0..2 {
-            let part = tall_product(self.used_mass(), block.as_ref());
-            add_tall(block.as_mut(), -1.0, self.used(), part.as_ref());
-            coefficients += part;
+    /// Q C of the first vectors.
+    fn combined(&self, coefficients: MatRef<'_, f64>) -> Mat<f64> {
+        let mut sum = Mat::zeros(self.mass.order(), coefficients.ncols());
+        for (start, part) in self.from(0) {
+            let end = coefficients.nrows().min(start + part.ncols());
+            if start < end {
+                let rows = coefficients.get(start..end, ..);
+                add_tall(sum.as_mut(), 1.0, part.get(.., ..end - start), rows);
+            }
+        }
+        sum
+    }
+
+    /// Remove the vectors from `first` on from `block`, once; returns the coefficients QᵀM·block.
+    fn project_once(&self, first: usize, block: &mut Mat<f64>) -> Mat<f64> {
+        let mut coefficients = Mat::zeros(self.size - first, block.ncols());
+        let mass_block = self.mass.times(block.as_ref());
+        for (start, part) in self.from(first) {
+            let rows = start - first..start - first + part.ncols();
+            coefficients.get_mut(rows, ..).copy_from(tall_product(part, mass_block.as_ref()));
+        }
+        for (start, part) in self.from(first) {
+            let rows = start - first..start - first + part.ncols();
+            add_tall(block.as_mut(), -1.0, part, coefficients.get(rows, ..));
         }
         coefficients
     }
 
+    /// Remove the basis from `block`; returns the coefficients QᵀM·block.
+    fn project_out(&self, block: &mut Mat<f64>) -> Mat<f64> {
+        let first = self.project_once(0, block);
+        first + self.project_once(0, block)
+    }
+
     /// Orthonormalise the columns of `block`, from which the basis has been removed, and append them; returns R of
-    /// block = Q_new R (rows: new vectors).
-    ///
-    /// Columns that depend on the others are left out. M Q is formed anew from each finished vector: carried along
-    /// through the subtractions it would lose what they cancel.
-    fn append(&mut self, block: &Mat<f64>, mass: &SparseMatrix) -> Mat<f64> {
+    /// block = Q_new R (rows: new vectors). Columns that depend on the others are left out.
+    fn append(&mut self, block: &Mat<f64>) -> Mat<f64> {
         let (first, width) = (self.size, block.ncols());
-        let norms = column_norms(block, &mass.times(block.as_ref()));
+        let norms = column_norms(block, &self.mass.times(block.as_ref()));
         let scale = norms.iter().copied().fold(0.0, f64::max);
         let mut upper = Mat::zeros(width, width);
         for j in 0..width {
@@ -105,20 +137,16 @@ impl Basis {
             let mut column = block.get(.., j..j + 1).to_owned();
             let mut before = norms[j];
             let mut norm = 0.0;
-            let mut mass_column = Mat::zeros(0, 0);
             // Repeat until a pass takes nothing away any more (Kahan: once more is enough, unless it is round-off).
             for _pass in 0..6 {
                 // What cancels inside the block brings the older vectors back in proportion.
                 let from = if before < CANCELLED * norms[j] { 0 } else { first };
-                let used = from..self.size;
-                let part = tall_product(self.mass_vectors.get(.., used.clone()), column.as_ref());
-                add_tall(column.as_mut(), -1.0, self.vectors.get(.., used), part.as_ref());
+                let part = self.project_once(from, &mut column);
                 for i in first..self.size {
                     upper[(i - first, j)] += part[(i - from, 0)];
                 }
-                mass_column = mass.times(column.as_ref());
-                norm = column_norms(&column, &mass_column)[0];
-                let again = norm < CANCELLED * norms[j] && from == first;
+                norm = column_norms(&column, &self.mass.times(column.as_ref()))[0];
+                let again = norm < CANCELLED * norms[j] && from == first && first > 0;
                 if (norm > 0.5 * before && !again) || norm <= DEPENDENT * scale {
                     break;
                 }
@@ -128,7 +156,7 @@ impl Basis {
                 continue;
             }
             upper[(self.size - first, j)] = norm;
-            self.push(&column, &mass_column, norm);
+            self.push(&column, norm);
         }
         upper.get(..self.size - first, ..).to_owned()
     }
@@ -186,35 +214,35 @@ pub fn lowest_modes(
         return Ok(Modes { eigenvalues: Vec::new(), shapes: Mat::zeros(order, 0), residuals: Vec::new() });
     }
     let capacity = (6 * count + 20 * BLOCK).min(order);
-    let mut basis = Basis::new(order, capacity);
+    let mut basis = Basis::new(mass, capacity);
     let mut projected = Mat::<f64>::zeros(0, 0);
     let mut seed = 0;
     // A first application of the operator makes the random start rich in low modes.
     let block = factor.solve(mass.times(random_block(order, BLOCK.min(order), &mut seed).as_ref()));
-    let mut start = 0;
-    basis.append(&block, mass);
+    let (mut start, mut look) = (0, count + BLOCK);
+    basis.append(&block);
     loop {
         let end = basis.size;
-        let mut next = factor.solve(basis.mass_vectors.get(.., start..end).to_owned());
+        let mut next = factor.solve(mass.times(basis.block(start).as_ref()));
         let coefficients = basis.project_out(&mut next);
         projected.resize_with(end, end, |_, _| 0.0);
         projected.get_mut(..end, start..end).copy_from(&coefficients);
-        let mut coupling = basis.append(&next, mass);
+        let mut coupling = basis.append(&next);
         if basis.size == end && end < capacity {
             // An invariant subspace: continue with directions it does not contain.
             let mut fresh = random_block(order, BLOCK, &mut seed);
             basis.project_out(&mut fresh);
-            basis.append(&fresh, mass);
+            basis.append(&fresh);
             coupling = Mat::zeros(0, end - start);
         }
         let exhausted = basis.size == end;
-        if end >= count && (exhausted || end >= count + BLOCK) {
+        if end >= count && (exhausted || end >= look) {
+            look = end + (end / LOOK).max(BLOCK);
             let ritz = ritz_pairs(projected.as_ref(), coupling.as_ref(), count, order == end)?;
             let converged = ritz.bounds.iter().filter(|&&bound| bound <= TOLERANCE).count();
             report(listener, stage, converged, count);
             if converged == count {
-                let mut shapes = Mat::zeros(order, count);
-                add_tall(shapes.as_mut(), 1.0, basis.vectors.get(.., ..end), ritz.vectors.as_ref());
+                let shapes = basis.combined(ritz.vectors.as_ref());
                 return checked(mass, factor, shift, &ritz.values, shapes);
             }
             if exhausted {
@@ -253,15 +281,18 @@ fn ritz_pairs(projected: MatRef<'_, f64>, coupling: MatRef<'_, f64>, count: usiz
 
 /// Form the residual of every pair explicitly and refuse what does not hold.
 fn checked(mass: &SparseMatrix, factor: &Factor, shift: f64, thetas: &[f64], shapes: Mat<f64>) -> Result<Modes> {
-    let mut residual = factor.solve(mass.times(shapes.as_ref()));
-    for (k, theta) in thetas.iter().enumerate() {
-        for i in 0..shapes.nrows() {
-            residual[(i, k)] -= theta * shapes[(i, k)];
+    let mut residuals = Vec::with_capacity(thetas.len());
+    for (part, some) in thetas.chunks(CHECKED_TOGETHER).enumerate() {
+        let some_shapes = shapes.get(.., part * CHECKED_TOGETHER..part * CHECKED_TOGETHER + some.len());
+        let mut residual = factor.solve(mass.times(some_shapes));
+        for (k, theta) in some.iter().enumerate() {
+            for i in 0..shapes.nrows() {
+                residual[(i, k)] -= theta * some_shapes[(i, k)];
+            }
         }
+        let norms = column_norms(&residual, &mass.times(residual.as_ref()));
+        residuals.extend(norms.iter().zip(some).map(|(norm, theta)| norm / theta.abs()));
     }
-    let mass_residual = mass.times(residual.as_ref());
-    let norms = column_norms(&residual, &mass_residual);
-    let residuals: Vec<f64> = norms.iter().zip(thetas).map(|(norm, theta)| norm / theta.abs()).collect();
     // NaN must count as failure, hence the comparison's direction.
     let converged = residuals.iter().filter(|&&residual| residual <= CHECKED_TOLERANCE).count();
     if converged < thetas.len() {

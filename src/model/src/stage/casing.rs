@@ -82,7 +82,7 @@ impl Default for StageCasingOptions {
             material: Material::titanium(),
             contact: [28, 3],
             patches: [0, 0],
-            fixed_interface_modes: 100,
+            fixed_interface_modes: 160,
             modes: 60,
             checked_modes: 20,
             damping_ratio: 0.03,
