@@ -2,6 +2,8 @@
 //! uses the product's stepping or contact code; meshes, element matrices and sparse factors are those of `tiprub-model`.
 
 pub mod carpenter;
+pub mod closed;
+pub mod compare;
 pub mod cube;
 pub mod methods;
 pub mod paper;

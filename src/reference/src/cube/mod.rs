@@ -5,6 +5,7 @@
 //! y = +20 mm, 0.01 ms before the first touch at 100 m/s.
 
 pub mod calculix;
+pub mod files;
 pub mod history;
 pub mod mesh;
 pub mod scene;

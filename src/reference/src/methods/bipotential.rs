@@ -50,6 +50,7 @@ pub fn run(scene: &Scene, run: &Run) -> Result<History> {
         let found = problem.solve(&surface_of(scene, &now), &surface_of(scene, &free), step)?;
         recorder.iterations(found.sweeps);
         recorder.note_penetration(found.penetration);
+        recorder.note_forces(&found.contacts, &found.forces);
         let mut next = free;
         if found.forces.iter().any(|force| *force != [0.0; 3]) {
             add_to_loads(scene, &surface_forces(scene, &found.contacts, &found.forces), square, &mut loads);
@@ -70,11 +71,8 @@ pub fn run(scene: &Scene, run: &Run) -> Result<History> {
                 time: step as f64 * h,
                 displacements: &now,
                 cube_velocity: &velocity[0],
-                contacts: &found.contacts,
-                forces: &found.forces,
                 kinetic: operator.kinetic(&velocity),
                 strain: (0..3).map(strain).sum(),
-                penetration: found.penetration,
             });
         }
         (now, elastic) = (next, elastic_next);

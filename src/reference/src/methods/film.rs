@@ -34,6 +34,7 @@ pub fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
     let mut recorder = Recorder::new(scene, run, "film");
     let operator = Operator::new(scene, 0.0)?;
     let rest = surface_at_rest(scene);
+    operator.check_step(scene, run.step)?;
     recorder.prepared();
     let (h, square) = (run.step, run.step * run.step);
     // u₋₁ = u₀ − h v₀: nothing is strained or touched at the start.
@@ -62,24 +63,18 @@ pub fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
         }
         let next: Vectors =
             core::array::from_fn(|index| now[index].iter().zip(&change[index]).map(|(u, d)| u + d).collect());
+        recorder.note_forces(&contacts, &forces);
         if recorder.wants(step) {
             let velocity: Vectors = core::array::from_fn(|index| change[index].iter().map(|d| d / h).collect());
             let left = find(scene, &rest, &surface_of(scene, &next), 0.0);
-            let energy = operator.kinetic(&velocity);
-            if !energy.is_finite() {
-                let problem = format!("the motion is no longer finite at {:.3e} s", step as f64 * h);
-                return Err(Error::invalid("step of film", problem, "Take a smaller step"));
-            }
+            recorder.note_penetration(left.iter().fold(0.0, |largest, contact| largest.max(-contact.gap)));
             recorder.record(&Entry {
                 time: step as f64 * h,
                 displacements: &now,
                 cube_velocity: &velocity[0],
-                contacts: &contacts,
-                forces: &forces,
-                kinetic: energy,
+                kinetic: operator.kinetic(&velocity),
                 // With u_{n+1} on one side this is what central differences conserve, together with the kinetic energy.
                 strain: (0..3).map(|index| 0.5 * inner(&next[index], &elastic[index])).sum(),
-                penetration: left.iter().fold(0.0, |largest, contact| largest.max(-contact.gap)),
             });
         }
         now = next;

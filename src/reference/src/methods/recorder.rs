@@ -12,12 +12,8 @@ pub(super) struct Entry<'a> {
     pub(super) displacements: &'a Vectors,
     /// Velocity of the cube (any consistent choice of the scheme), all dofs.
     pub(super) cube_velocity: &'a [f64],
-    pub(super) contacts: &'a [Contact],
-    /// In the frames of the contacts (N).
-    pub(super) forces: &'a [[f64; 3]],
     pub(super) kinetic: f64,
     pub(super) strain: f64,
-    pub(super) penetration: f64,
 }
 
 pub(super) struct Recorder<'a> {
@@ -30,6 +26,9 @@ pub(super) struct Recorder<'a> {
     started: f64,
     prepared: f64,
     penetration: f64,
+    /// Sums since the last record: normal forces of all masters, and how many steps.
+    forces: Vec<f64>,
+    summed: usize,
 }
 
 impl<'a> Recorder<'a> {
@@ -49,6 +48,8 @@ impl<'a> Recorder<'a> {
             started: processor_time(),
             prepared: f64::NAN,
             penetration: 0.0,
+            forces: vec![0.0; 2 * scene.masters],
+            summed: 0,
         }
     }
 
@@ -71,14 +72,19 @@ impl<'a> Recorder<'a> {
         self.penetration = self.penetration.max(penetration);
     }
 
-    pub(super) fn record(&mut self, entry: &Entry<'_>) {
-        let masters = self.scene.masters;
-        let mut normal = vec![0.0; 2 * masters];
-        let mut sums = [0.0; 2];
-        for (contact, force) in entry.contacts.iter().zip(entry.forces) {
-            normal[contact.side * masters + contact.master] += force[0];
-            sums[contact.side] += force[0];
+    /// Contact forces of a step (in the frames, N); records hold their means.
+    pub(super) fn note_forces(&mut self, contacts: &[Contact], forces: &[[f64; 3]]) {
+        for (contact, force) in contacts.iter().zip(forces) {
+            self.forces[contact.side * self.scene.masters + contact.master] += force[0];
         }
+        self.summed += 1;
+    }
+
+    pub(super) fn record(&mut self, entry: &Entry<'_>) {
+        let steps = self.summed.max(1) as f64;
+        let normal: Vec<f64> = self.forces.iter().map(|sum| sum / steps).collect();
+        let (left, right) = normal.split_at(self.scene.masters);
+        let sums = [left.iter().sum(), right.iter().sum()];
         let cube = &entry.displacements[0];
         let at = |node: usize| -> [f64; 3] { core::array::from_fn(|i| cube[3 * node + i]) };
         let history = &mut self.history;
@@ -88,8 +94,9 @@ impl<'a> Recorder<'a> {
         history.forces.push(sums);
         history.kinetic.push(entry.kinetic);
         history.strain.push(entry.strain);
-        history.penetration.push(self.penetration.max(entry.penetration));
-        self.penetration = 0.0;
+        history.penetration.push(std::mem::take(&mut self.penetration));
+        self.forces.fill(0.0);
+        self.summed = 0;
         let mass: f64 = self.masses.iter().step_by(3).sum();
         history.velocity.push(core::array::from_fn(|i| {
             let dofs = (i..cube.len()).step_by(3);
