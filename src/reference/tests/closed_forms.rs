@@ -31,8 +31,8 @@ fn the_bouncing_bar_solves_the_wave_equation_in_every_phase() {
 #[test]
 fn the_bouncing_bar_keeps_its_energy_and_its_phases_join() {
     for time in [0.5, 1.2, 1.5, 2.0, 3.0, 3.9, 4.2, 5.0] {
-        let (dt, dx, mut energy) = (1e-4, 0.01, 0.0);
-        for i in 0..1000 {
+        let (dt, dx, mut energy) = (1e-4, 0.025, 0.0);
+        for i in 0..400 {
             let x = (f64::from(i) + 0.5) * dx;
             let velocity = (displacement(x, time + dt) - displacement(x, time - dt)) / (2.0 * dt);
             let strain = (displacement(x + 0.5 * dx, time) - displacement(x - 0.5 * dx, time)) / dx;
@@ -169,7 +169,7 @@ fn roots_of_the_cantilever_and_its_frequency_by_finite_elements() {
     let (elements, length) = (60, 1.0_f64);
     let size = length / elements as f64;
     let order = 2 * elements + 2;
-    let (mut k, mut m) = (DMatrix::zeros(order, order), DMatrix::zeros(order, order));
+    let (mut k, mut m) = (DMatrix::<f64>::zeros(order, order), DMatrix::<f64>::zeros(order, order));
     let stiff = [[12.0, 6.0, -12.0, 6.0], [6.0, 4.0, -6.0, 2.0], [-12.0, -6.0, 12.0, -6.0], [6.0, 2.0, -6.0, 4.0]];
     let heavy = [[156.0, 22.0, 54.0, -13.0], [22.0, 4.0, 13.0, -3.0], [54.0, 13.0, 156.0, -22.0], [-13.0, -3.0, -22.0, 4.0]];
     for e in 0..elements {
@@ -195,7 +195,7 @@ fn roots_of_the_cantilever_and_its_frequency_by_finite_elements() {
 fn frequencies_of_the_cyclic_chain_are_eigenvalues() {
     let (sectors, mass, spring, coupling) = (9_u32, 0.4, 3e4, 1.1e4);
     let count = sectors as usize;
-    let mut matrix = DMatrix::identity(count, count) * spring;
+    let mut matrix = DMatrix::<f64>::identity(count, count) * spring;
     for i in 0..count {
         let next = (i + 1) % count;
         matrix[(i, i)] += coupling;
@@ -215,7 +215,7 @@ fn frequencies_of_the_cyclic_chain_are_eigenvalues() {
 /// A thin free ring of quadratic bricks; the closed form leaves out shear and rotary inertia, about (t/R)² of the frequency.
 #[test]
 fn the_free_ring_has_its_two_wave_frequency() {
-    let (radius, thickness, width, arc) = (1.0, 0.02, 0.02, 48);
+    let (radius, thickness, width, arc) = (1.0, 0.02, 0.02, 96);
     let mut mesh = Mesh::default();
     for i in 0..arc {
         let angle = std::f64::consts::TAU * f64::from(i) / f64::from(arc);

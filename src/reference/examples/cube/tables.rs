@@ -92,28 +92,29 @@ pub fn energies(named: &[(&str, &History)], friction: f64) {
 /// Errors over h, against the finest run of a, on the same mesh and spline.
 pub fn convergence(mass: Mass) {
     let setting = Setting { mass, ..Setting::default() };
-    let end = 1e-3;
+    // Node 1 has left the rings by then.
+    let end = 5e-4;
     let explicit: &[(f64, usize)] = match mass {
-        Mass::Lumped => &[(8e-7, 1), (4e-7, 5), (2e-7, 10), (1e-7, 20), (5e-8, 40), (2.5e-8, 80)],
+        Mass::Lumped => &[(8e-7, 1), (4e-7, 5), (2e-7, 10), (1e-7, 20), (5e-8, 40)],
         Mass::Consistent => &[(4e-7, 5), (2e-7, 10)],
     };
     let film = Method::Film(Default::default());
     let film: Vec<History> = explicit.iter().map(|(h, stride)| run(film, setting, *h, end, *stride)).collect();
-    let implicit: Vec<History> = [(2e-6, 1), (1e-6, 2), (5e-7, 4), (2.5e-7, 8)]
+    let implicit: Vec<History> = [(2e-6, 1), (1e-6, 2), (5e-7, 4)]
         .map(|(h, stride)| run(Method::Bipotential, setting, h, end, stride))
         .into();
     let stiff = penalty::Options { stiffness: 5e9, ..penalty::Options::default() };
-    let mut others: Vec<History> = [(2e-6, 1), (1e-6, 2), (5e-7, 4)]
+    let mut others: Vec<History> = [(2e-6, 1), (1e-6, 2)]
         .map(|(h, stride)| run(Method::Augmented(Default::default()), setting, h, end, stride))
         .into();
     if mass == Mass::Lumped {
-        others.push(run(Method::Penalty(Default::default()), setting, 4e-7, end, 5));
         others.push(run(Method::Penalty(Default::default()), setting, 1e-7, end, 20));
         others.push(run(Method::Penalty(stiff), setting, 1e-7, end, 20));
     }
     let (finest, other) = (&film[film.len() - 1], &implicit[implicit.len() - 1]);
-    let (touching, contact) = (released(finest), finest.last_contact().unwrap_or(0.0));
-    println!("| method | h (µs) | u1x | slowing of u1y | u1z | u1x, whole contact | λ1 in windows | impulse | exit speed | total energy at 1 ms (J) | processor time (s) |");
+    let touching = released(finest);
+    let contact = end;
+    println!("| method | h (µs) | u1x | slowing of u1y | u1z | u1x to 0.5 ms | λ1 in windows | impulse | speed at 0.5 ms | total energy at 0.5 ms (J) | processor time (s) |");
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
     for history in film.iter().chain(&implicit).chain(&others) {
         let found = agreement(history, finest, setting.speed, touching, contact);
