@@ -171,7 +171,8 @@ fn roots_of_the_cantilever_and_its_frequency_by_finite_elements() {
     let order = 2 * elements + 2;
     let (mut k, mut m) = (DMatrix::<f64>::zeros(order, order), DMatrix::<f64>::zeros(order, order));
     let stiff = [[12.0, 6.0, -12.0, 6.0], [6.0, 4.0, -6.0, 2.0], [-12.0, -6.0, 12.0, -6.0], [6.0, 2.0, -6.0, 4.0]];
-    let heavy = [[156.0, 22.0, 54.0, -13.0], [22.0, 4.0, 13.0, -3.0], [54.0, 13.0, 156.0, -22.0], [-13.0, -3.0, -22.0, 4.0]];
+    let heavy =
+        [[156.0, 22.0, 54.0, -13.0], [22.0, 4.0, 13.0, -3.0], [54.0, 13.0, 156.0, -22.0], [-13.0, -3.0, -22.0, 4.0]];
     for e in 0..elements {
         for i in 0..4 {
             for j in 0..4 {
@@ -181,9 +182,11 @@ fn roots_of_the_cantilever_and_its_frequency_by_finite_elements() {
             }
         }
     }
-    let (k, m) = (k.view((2, 2), (order - 2, order - 2)).into_owned(), m.view((2, 2), (order - 2, order - 2)).into_owned());
+    let (k, m) =
+        (k.view((2, 2), (order - 2, order - 2)).into_owned(), m.view((2, 2), (order - 2, order - 2)).into_owned());
     let inverse = m.cholesky().expect("positive definite").l().try_inverse().expect("regular");
-    let mut found: Vec<f64> = SymmetricEigen::new(&inverse * k * inverse.transpose()).eigenvalues.iter().copied().collect();
+    let mut found: Vec<f64> =
+        SymmetricEigen::new(&inverse * k * inverse.transpose()).eigenvalues.iter().copied().collect();
     found.sort_by(f64::total_cmp);
     for n in 1..=3_u32 {
         let (omega, closed) = (found[n as usize - 1].sqrt(), cantilever(n, 1.0, 1.0, length));

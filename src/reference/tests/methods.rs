@@ -70,7 +70,11 @@ fn gaps_stay_closed_and_friction_takes_its_share_of_the_energy() {
             let lost = total[0] - total[total.len() - 1];
             // µ times the normal forces over the distance slid, and what impacts of lumped nodes cost.
             let slid: f64 = history.forces.iter().map(|sides| sides[0] + sides[1]).sum::<f64>() * step * setting.speed;
-            println!("{} {surface:?} µ = {friction}: lost {lost:.3} J, friction {:.3} J", history.method, friction * slid);
+            println!(
+                "{} {surface:?} µ = {friction}: lost {lost:.3} J, friction {:.3} J",
+                history.method,
+                friction * slid
+            );
             assert!((lost - friction * slid).abs() < 0.006 * total[0], "{}: {lost} J", history.method);
             assert!(friction == 0.0 || lost > 0.5 * friction * slid);
         }

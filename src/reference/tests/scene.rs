@@ -49,7 +49,16 @@ fn masses_are_those_of_the_solids_and_rigid_motion_costs_no_energy() {
             let volume = if index == 0 { SIDE.powi(3) } else { ring };
             let total: f64 = body.mass.values.iter().sum::<f64>() / 3.0;
             assert!((total / (7800.0 * volume) - 1.0).abs() < 1e-12, "{mass:?}, body {index}: {total} kg");
-            let column: f64 = (0..3).map(|i| body.stiffness.block(&[i], &(0..body.dofs()).step_by(3).collect::<Vec<_>>()).row(0).iter().sum::<f64>().abs()).sum();
+            let column: f64 = (0..3)
+                .map(|i| {
+                    body.stiffness
+                        .block(&[i], &(0..body.dofs()).step_by(3).collect::<Vec<_>>())
+                        .row(0)
+                        .iter()
+                        .sum::<f64>()
+                        .abs()
+                })
+                .sum();
             assert!(column < 1e-6 * body.stiffness.trace() / body.dofs() as f64, "body {index}: {column}");
         }
     }
@@ -118,7 +127,9 @@ fn spread_forces_do_the_work_of_the_carriers() {
         (0..surface.len()).map(|i| core::array::from_fn(|k| (seed * (i as f64 + 0.3) + k as f64).sin())).collect()
     };
     let (nodal, forces) = (irregular(12.9), irregular(7.7));
-    let work = |a: &[[f64; 3]], b: &[[f64; 3]]| -> f64 { a.iter().flatten().zip(b.iter().flatten()).map(|(x, y)| x * y).sum() };
+    let work = |a: &[[f64; 3]], b: &[[f64; 3]]| -> f64 {
+        a.iter().flatten().zip(b.iter().flatten()).map(|(x, y)| x * y).sum()
+    };
     let (on_carriers, on_nodes) = (work(&surface.carriers(&nodal), &forces), work(&nodal, &surface.spread(&forces)));
     assert!((on_carriers - on_nodes).abs() < 1e-12 * on_nodes.abs(), "{on_carriers} {on_nodes}");
 }
@@ -136,7 +147,8 @@ fn matrices_come_back_from_their_file() {
         let model = read_json::<BodyFile>(&path).unwrap().fe_model("file").unwrap();
         assert_eq!(model.sets, body.mesh.sets);
         assert_eq!(model.stiffness.pattern, body.stiffness.pattern);
-        let off = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs() / b.abs().max(1e-9)).fold(0.0, f64::max);
+        let off =
+            |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs() / b.abs().max(1e-9)).fold(0.0, f64::max);
         assert!(off(&model.stiffness.values, &body.stiffness.values) < 1e-15);
         assert!(off(&model.mass.values, &body.mass.values) < 1e-15);
         let mut broken = BodyFile::from(body);

@@ -33,7 +33,11 @@ pub fn compare(path: &str) {
     let end = times.last().copied().expect("at least one increment");
     let friction = if path.contains("frictionless") { 0.0 } else { 0.15 };
     println!("CalculiX: {} increments to {:.4} ms, µ = {friction}", times.len(), end * 1e3);
-    let settings = [(SurfaceKind::Facets, Mass::Consistent), (SurfaceKind::Facets, Mass::Lumped), (SurfaceKind::Spline, Mass::Consistent)];
+    let settings = [
+        (SurfaceKind::Facets, Mass::Consistent),
+        (SurfaceKind::Facets, Mass::Lumped),
+        (SurfaceKind::Spline, Mass::Consistent),
+    ];
     for (surface, mass) in settings {
         let setting = Setting { surface, mass, friction, ..Setting::default() };
         for method in [Method::Bipotential, Method::Augmented(Default::default())] {
@@ -43,7 +47,8 @@ pub fn compare(path: &str) {
                 let apart = [0, 1, 2].map(|i| {
                     let lag = if i == 1 { setting.speed } else { 0.0 };
                     let theirs: Vec<f64> = moved.iter().zip(&times).map(|(u, t)| u[i] + lag * t).collect();
-                    let ours: Vec<f64> = history.first(i).iter().zip(&history.times).map(|(u, t)| u + lag * t).collect();
+                    let ours: Vec<f64> =
+                        history.first(i).iter().zip(&history.times).map(|(u, t)| u + lag * t).collect();
                     100.0 * relative_l2((&history.times, &ours), (&times, &theirs), &at)
                 });
                 println!(

@@ -5,7 +5,8 @@ use std::path::Path;
 use plotters::prelude::*;
 use tiprub_reference::cube::history::History;
 
-const COLOURS: [RGBColor; 4] = [RGBColor(20, 60, 160), RGBColor(200, 60, 30), RGBColor(30, 130, 60), RGBColor(120, 60, 140)];
+const COLOURS: [RGBColor; 4] =
+    [RGBColor(20, 60, 160), RGBColor(200, 60, 30), RGBColor(30, 130, 60), RGBColor(120, 60, 140)];
 
 struct Curve<'a> {
     name: &'a str,
@@ -81,10 +82,16 @@ fn component(history: &History, component: usize, factor: f64) -> Vec<f64> {
 
 /// Figure 4: u1x, u1y, u1z, λ1.
 pub fn comparison(directory: &Path, runs: &[&(&str, History)]) {
-    for (index, (name, unit, factor)) in [("u1x", "mm", 1e3), ("u1y", "m", 1.0), ("u1z", "mm", 1e3)].into_iter().enumerate() {
+    for (index, (name, unit, factor)) in
+        [("u1x", "mm", 1e3), ("u1y", "m", 1.0), ("u1z", "mm", 1e3)].into_iter().enumerate()
+    {
         let curves: Vec<Curve<'_>> = runs
             .iter()
-            .map(|(label, history)| Curve { name: label, times: &history.times, values: component(history, index, factor) })
+            .map(|(label, history)| Curve {
+                name: label,
+                times: &history.times,
+                values: component(history, index, factor),
+            })
             .collect();
         let file = format!("fig4{}.svg", ["a", "b", "c"][index]);
         lines(&directory.join(file), name, &format!("displacement ({unit})"), 3e-3, &curves);
@@ -95,7 +102,11 @@ pub fn comparison(directory: &Path, runs: &[&(&str, History)]) {
 fn forces(path: &Path, end: f64, runs: &[&(&str, History)]) {
     let curves: Vec<Curve<'_>> = runs
         .iter()
-        .map(|(label, history)| Curve { name: label, times: &history.times, values: smoothed(&history.first_force(), 5) })
+        .map(|(label, history)| Curve {
+            name: label,
+            times: &history.times,
+            values: smoothed(&history.first_force(), 5),
+        })
         .collect();
     lines(path, "contact force on node 1, mean over 11 µs", "force (N)", end, &curves);
 }
@@ -105,7 +116,11 @@ pub fn superposition(directory: &Path, runs: &[&(&str, History)]) {
     for (index, name) in [(0, "u1x"), (2, "u1z")] {
         let curves: Vec<Curve<'_>> = runs
             .iter()
-            .map(|(label, history)| Curve { name: label, times: &history.times, values: component(history, index, 1e3) })
+            .map(|(label, history)| Curve {
+                name: label,
+                times: &history.times,
+                values: component(history, index, 1e3),
+            })
             .collect();
         lines(&directory.join(format!("fig5-{name}.svg")), name, "displacement (mm)", 5e-4, &curves);
     }
@@ -115,7 +130,10 @@ pub fn superposition(directory: &Path, runs: &[&(&str, History)]) {
 /// Figure 6: energies.
 pub fn energies(directory: &Path, name: &str, history: &History) {
     let curve = |name: &'static str, values: Vec<f64>| Curve { name, times: &history.times, values };
-    let curves =
-        [curve("total", history.total()), curve("kinetic", history.kinetic.clone()), curve("strain", history.strain.clone())];
+    let curves = [
+        curve("total", history.total()),
+        curve("kinetic", history.kinetic.clone()),
+        curve("strain", history.strain.clone()),
+    ];
     lines(&directory.join(format!("fig6-{name}.svg")), "energy at 50 m/s", "energy (J)", 3e-3, &curves);
 }

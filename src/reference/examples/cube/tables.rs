@@ -18,7 +18,9 @@ pub fn pairs(named: &[(&str, History)], speed: f64) {
     let touching = released(&named[0].1);
     let contact = named[0].1.last_contact().unwrap_or(0.0);
     println!("node 1 touches until {:.4} ms, the cube until {:.4} ms (of a)\n", touching * 1e3, contact * 1e3);
-    println!("| pair | u1x | slowing of u1y | u1z | u1x, whole contact | slowing | u1z | u1y itself | λ1 in windows | peak | impulse | left face | exit speed |");
+    println!(
+        "| pair | u1x | slowing of u1y | u1z | u1x, whole contact | slowing | u1z | u1y itself | λ1 in windows | peak | impulse | left face | exit speed |"
+    );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for (i, (first, b)) in named.iter().enumerate() {
         for (second, a) in &named[i + 1..] {
@@ -40,7 +42,9 @@ pub fn pairs(named: &[(&str, History)], speed: f64) {
 
 /// What one reads off the figures, run by run.
 pub fn readings(named: &[(&str, History)]) {
-    println!("\n| run | u1x least, largest (mm) | u1z least, largest (mm) | peak λ1, means over 2 µs and 20 µs (N) | node 1 until (ms) | cube until (ms) | exit (m/s) | asymmetry ux, λ | deepest (µm) | steps (s), preparation (s) |");
+    println!(
+        "\n| run | u1x least, largest (mm) | u1z least, largest (mm) | peak λ1, means over 2 µs and 20 µs (N) | node 1 until (ms) | cube until (ms) | exit (m/s) | asymmetry ux, λ | deepest (µm) | steps (s), preparation (s) |"
+    );
     println!("|---|---|---|---|---|---|---|---|---|---|");
     for (name, history) in named {
         let span = |component: usize| {
@@ -100,9 +104,8 @@ pub fn convergence(mass: Mass) {
     };
     let film = Method::Film(Default::default());
     let film: Vec<History> = explicit.iter().map(|(h, stride)| run(film, setting, *h, end, *stride)).collect();
-    let implicit: Vec<History> = [(2e-6, 1), (1e-6, 2), (5e-7, 4)]
-        .map(|(h, stride)| run(Method::Bipotential, setting, h, end, stride))
-        .into();
+    let implicit: Vec<History> =
+        [(2e-6, 1), (1e-6, 2), (5e-7, 4)].map(|(h, stride)| run(Method::Bipotential, setting, h, end, stride)).into();
     let stiff = penalty::Options { stiffness: 5e9, ..penalty::Options::default() };
     let mut others: Vec<History> = [(2e-6, 1), (1e-6, 2)]
         .map(|(h, stride)| run(Method::Augmented(Default::default()), setting, h, end, stride))
@@ -114,7 +117,9 @@ pub fn convergence(mass: Mass) {
     let (finest, other) = (&film[film.len() - 1], &implicit[implicit.len() - 1]);
     let touching = released(finest);
     let contact = end;
-    println!("| method | h (µs) | u1x | slowing of u1y | u1z | u1x to 0.5 ms | λ1 in windows | impulse | speed at 0.5 ms | total energy at 0.5 ms (J) | processor time (s) |");
+    println!(
+        "| method | h (µs) | u1x | slowing of u1y | u1z | u1x to 0.5 ms | λ1 in windows | impulse | speed at 0.5 ms | total energy at 0.5 ms (J) | processor time (s) |"
+    );
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
     for history in film.iter().chain(&implicit).chain(&others) {
         let found = agreement(history, finest, setting.speed, touching, contact);

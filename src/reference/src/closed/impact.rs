@@ -18,7 +18,12 @@ pub struct Bounce {
 /// Half a swing: π√(m/k), v√(km), v√(m/k), 2mv for a mass (kg), spring (N/m) and speed (m/s).
 pub fn rigid_bounce(mass: f64, stiffness: f64, speed: f64) -> Bounce {
     let omega = (stiffness / mass).sqrt();
-    Bounce { duration: PI / omega, force: speed * (stiffness * mass).sqrt(), depth: speed / omega, impulse: 2.0 * mass * speed }
+    Bounce {
+        duration: PI / omega,
+        force: speed * (stiffness * mass).sqrt(),
+        depth: speed / omega,
+        impulse: 2.0 * mass * speed,
+    }
 }
 
 /// Two elastic spheres, or a sphere and a half-space.

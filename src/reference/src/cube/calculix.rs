@@ -59,11 +59,17 @@ pub fn input(run: &Run) -> String {
         put(&mut text, format_args!("*FRICTION\n{}, {:e}\n", run.friction, run.stick_stiffness));
     }
     for side in ["LEFT", "RIGHT"] {
-        put(&mut text, format_args!("*CONTACT PAIR, INTERACTION=TOUCH, TYPE=NODE TO SURFACE\nS_MASTER_{side}, F_{side}\n"));
+        put(
+            &mut text,
+            format_args!("*CONTACT PAIR, INTERACTION=TOUCH, TYPE=NODE TO SURFACE\nS_MASTER_{side}, F_{side}\n"),
+        );
     }
     put(&mut text, format_args!("*INITIAL CONDITIONS, TYPE=VELOCITY\n"));
     (1..=cube_nodes).for_each(|node| put(&mut text, format_args!("{node}, 2, {}\n", -run.speed)));
-    put(&mut text, format_args!("*STEP, NLGEOM, INC=1000000\n*DYNAMIC, DIRECT, ALPHA=0.\n{:e}, {:e}\n", run.increment, run.end));
+    put(
+        &mut text,
+        format_args!("*STEP, NLGEOM, INC=1000000\n*DYNAMIC, DIRECT, ALPHA=0.\n{:e}, {:e}\n", run.increment, run.end),
+    );
     put(&mut text, format_args!("*NODE PRINT, NSET=N_CUBE\nU\n"));
     put(&mut text, format_args!("*CONTACT PRINT\nCSTR\n"));
     put(&mut text, format_args!("*EL PRINT, ELSET=E_CUBE, TOTALS=ONLY\nELSE, ELKE\n*END STEP\n"));
@@ -87,7 +93,10 @@ fn write_body(text: &mut String, name: &str, mesh: &Mesh, material: &Material, f
         nodes.iter().for_each(|node| put(text, format_args!("{},\n", first[0] + node)));
     }
     let Material { young_modulus, poisson_ratio, density, .. } = material;
-    put(text, format_args!("*MATERIAL, NAME=M_{name}\n*ELASTIC\n{young_modulus:e}, {poisson_ratio}\n*DENSITY\n{density}\n"));
+    put(
+        text,
+        format_args!("*MATERIAL, NAME=M_{name}\n*ELASTIC\n{young_modulus:e}, {poisson_ratio}\n*DENSITY\n{density}\n"),
+    );
     put(text, format_args!("*SOLID SECTION, ELSET=E_{name}, MATERIAL=M_{name}\n"));
 }
 

@@ -41,7 +41,9 @@ pub fn cube_of(n: usize) -> Mesh {
     for layer in 0..n {
         for a in 0..n {
             for b in 0..n {
-                let face = |z: usize| [(a, layer), (a + 1, layer), (a + 1, layer + 1), (a, layer + 1)].map(|(a, y)| node(a, y, z));
+                let face = |z: usize| {
+                    [(a, layer), (a + 1, layer), (a + 1, layer + 1), (a, layer + 1)].map(|(a, y)| node(a, y, z))
+                };
                 elements.push(Element { kind: ElementKind::Hex8, nodes: [face(b), face(b + 1)].concat() });
             }
         }

@@ -64,7 +64,8 @@ impl Body {
     /// Those of assembly; a missing set.
     pub fn new(mesh: Mesh, material: Material, mass: Mass, contact: Vec<usize>) -> Result<Self> {
         let matrices = assemble(&mesh, &material, &silent)?;
-        let mut body = Self { stiffness: matrices.stiffness, mass: matrices.mass, free: Vec::new(), contact, mesh, material };
+        let mut body =
+            Self { stiffness: matrices.stiffness, mass: matrices.mass, free: Vec::new(), contact, mesh, material };
         if mass == Mass::Lumped {
             let masses = lumped_masses(&body.mesh, body.material.density)?;
             body.mass.values.fill(0.0);
@@ -129,7 +130,9 @@ impl Body {
             unit[(place, column)] = 1.0;
         }
         let solution = factor.solve(unit);
-        DMatrix::from_fn(places.len(), places.len(), |i, j| if places[i] == usize::MAX { 0.0 } else { solution[(places[i], j)] })
+        DMatrix::from_fn(places.len(), places.len(), |i, j| {
+            if places[i] == usize::MAX { 0.0 } else { solution[(places[i], j)] }
+        })
     }
 }
 
@@ -167,9 +170,7 @@ impl Scene {
             let slaves = mesh.set("SLAVE")?.to_vec();
             Body::new(mesh, ring_material(), setting.mass, slaves)
         };
-        let surface = |side: Side| {
-            Surface::new(setting.surface, divisions[0] + 1, divisions[1] + 1, -side.sign())
-        };
+        let surface = |side: Side| Surface::new(setting.surface, divisions[0] + 1, divisions[1] + 1, -side.sign());
         Ok(Self {
             setting,
             masters: masters.len() / 2,

@@ -48,7 +48,14 @@ pub fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
     let h = run.step;
     let quarter = 0.25 * h * h;
     let operator = Operator::new(scene, quarter)?;
-    let mut problem = Problem { scene, operator: &operator, rest: surface_at_rest(scene), quarter, options, friction_memory: Memory::new() };
+    let mut problem = Problem {
+        scene,
+        operator: &operator,
+        rest: surface_at_rest(scene),
+        quarter,
+        options,
+        friction_memory: Memory::new(),
+    };
     recorder.prepared();
     let (mut now, mut velocity, mut acceleration) = (scene.rest(), scene.launch(), scene.rest());
     for step in 1..=run.steps() {
@@ -114,7 +121,11 @@ fn recall(memory: &Memory, contact: &Contact) -> Vector3<f64> {
 }
 
 fn memory(contacts: &[Contact], forces: &[Vector3<f64>]) -> Memory {
-    contacts.iter().zip(forces).map(|(contact, force)| (contact.side, contact.master, contact.global((*force).into()))).collect()
+    contacts
+        .iter()
+        .zip(forces)
+        .map(|(contact, force)| (contact.side, contact.master, contact.global((*force).into())))
+        .collect()
 }
 
 impl Problem<'_> {
@@ -127,7 +138,8 @@ impl Problem<'_> {
             let offsets: Vec<Vector3<f64>> = contacts
                 .iter()
                 .map(|contact| {
-                    let at = |surface: &SurfaceVectors| Vector3::from(contact.local(contact.relative(masters, surface)));
+                    let at =
+                        |surface: &SurfaceVectors| Vector3::from(contact.local(contact.relative(masters, surface)));
                     let ahead = at(free);
                     let mut offset = ahead - at(start);
                     offset[0] = contact.gap + ahead[0] - at(&moved)[0];
@@ -165,10 +177,15 @@ impl Problem<'_> {
                 self.friction_memory = memory(&contacts, &forces);
                 return Ok(Found { contacts, forces: local, iterations, penetration });
             }
-            multipliers = memory(&contacts, &forces.iter().map(|force| Vector3::new(force[0], 0.0, 0.0)).collect::<Vec<_>>());
+            multipliers =
+                memory(&contacts, &forces.iter().map(|force| Vector3::new(force[0], 0.0, 0.0)).collect::<Vec<_>>());
         }
         let problem = format!("step {step} is not settled after {UPDATES} updates; surfaces move by {last:.1e} m");
-        Err(Error::invalid("contact problem of the augmented Lagrangian", problem, "Take a smaller step or a larger penalty"))
+        Err(Error::invalid(
+            "contact problem of the augmented Lagrangian",
+            problem,
+            "Take a smaller step or a larger penalty",
+        ))
     }
 
     /// Forces r = P(λ − ε δ(r)) by Newton's method on the piecewise smooth law.
@@ -198,7 +215,11 @@ impl Problem<'_> {
             }
             let change = jacobian.lu().solve(&residual);
             forces -= change.ok_or_else(|| {
-                Error::invalid("contact problem of the augmented Lagrangian", "its matrix is singular", "Check the scene")
+                Error::invalid(
+                    "contact problem of the augmented Lagrangian",
+                    "its matrix is singular",
+                    "Check the scene",
+                )
             })?;
         }
         let problem = format!("Newton's method has not converged in {ITERATIONS} iterations in step {step}");

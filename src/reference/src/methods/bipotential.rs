@@ -38,7 +38,8 @@ pub fn run(scene: &Scene, run: &Run) -> Result<History> {
     let mut recorder = Recorder::new(scene, run, "bipotential");
     let (h, square) = (run.step, run.step * run.step);
     let operator = Operator::new(scene, 0.25 * square)?;
-    let mut problem = Problem { scene, operator: &operator, rest: surface_at_rest(scene), square, previous: Vec::new() };
+    let mut problem =
+        Problem { scene, operator: &operator, rest: surface_at_rest(scene), square, previous: Vec::new() };
     recorder.prepared();
     let mut now = scene.rest();
     let mut change: Vectors = scene.launch().map(|v| v.iter().map(|v| h * v).collect());
@@ -113,7 +114,8 @@ impl Problem<'_> {
                 .iter()
                 .map(|contact| {
                     // Gap linearised about where it was evaluated; slip over the step.
-                    let at = |surface: &SurfaceVectors| Vector3::from(contact.local(contact.relative(masters, surface)));
+                    let at =
+                        |surface: &SurfaceVectors| Vector3::from(contact.local(contact.relative(masters, surface)));
                     let (base, ahead) = (at(start), at(free));
                     let mut offset = ahead - base;
                     offset[0] = contact.gap + ahead[0] - at(&moved)[0];
@@ -123,7 +125,8 @@ impl Problem<'_> {
             let mut forces: Vec<[f64; 3]> = contacts.iter().map(|contact| self.remembered(contact)).collect();
             let delassus = self.operator.delassus(&contacts, masters) * self.square;
             sweeps += uzawa(&delassus, &offsets, self.scene.setting.friction, &mut forces, step)?;
-            self.previous = contacts.iter().zip(&forces).map(|(contact, force)| (contact.side, contact.master, *force)).collect();
+            self.previous =
+                contacts.iter().zip(&forces).map(|(contact, force)| (contact.side, contact.master, *force)).collect();
             let response = self.operator.surface_response(&surface_forces(self.scene, &contacts, &forces));
             last = 0.0;
             for index in 0..3 {

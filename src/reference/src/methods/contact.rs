@@ -65,7 +65,8 @@ pub(super) fn surface_at_rest(scene: &Scene) -> SurfaceVectors {
 pub(super) fn find(scene: &Scene, rest: &SurfaceVectors, moved: &SurfaceVectors, margin: f64) -> Vec<Contact> {
     let mut contacts = Vec::new();
     for side in 0..2 {
-        let sum = |index: usize, i: usize| -> [f64; 3] { core::array::from_fn(|k| rest[index][i][k] + moved[index][i][k]) };
+        let sum =
+            |index: usize, i: usize| -> [f64; 3] { core::array::from_fn(|k| rest[index][i][k] + moved[index][i][k]) };
         let carriers: Vec<[f64; 3]> = (0..rest[1 + side].len()).map(|i| sum(1 + side, i)).collect();
         for master in 0..scene.masters {
             let place = sum(0, side * scene.masters + master);
@@ -83,8 +84,11 @@ pub(super) fn find(scene: &Scene, rest: &SurfaceVectors, moved: &SurfaceVectors,
 
 /// Forces (local frames, on the masters) as forces on masters and carriers; action and reaction.
 pub(super) fn surface_forces(scene: &Scene, contacts: &[Contact], forces: &[[f64; 3]]) -> SurfaceVectors {
-    let mut all: SurfaceVectors =
-        [vec![[0.0; 3]; 2 * scene.masters], vec![[0.0; 3]; scene.surfaces[0].len()], vec![[0.0; 3]; scene.surfaces[1].len()]];
+    let mut all: SurfaceVectors = [
+        vec![[0.0; 3]; 2 * scene.masters],
+        vec![[0.0; 3]; scene.surfaces[0].len()],
+        vec![[0.0; 3]; scene.surfaces[1].len()],
+    ];
     for (contact, force) in contacts.iter().zip(forces) {
         let force = contact.global(*force);
         add_scaled(&mut all[0][contact.side * scene.masters + contact.master], force, 1.0);

@@ -109,7 +109,10 @@ fn multipliers(
         let kept: Vec<usize> =
             (0..active.len()).filter(|i| !options.release_tension || solution[*i] > 0.0).map(|i| active[i]).collect();
         if kept.len() == active.len() {
-            active.iter().enumerate().for_each(|(i, &contact)| forces[contact] = directions[contact].map(|d| d * solution[i]));
+            active
+                .iter()
+                .enumerate()
+                .for_each(|(i, &contact)| forces[contact] = directions[contact].map(|d| d * solution[i]));
             return Ok(forces);
         }
         active = kept;

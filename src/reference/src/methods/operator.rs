@@ -1,8 +1,8 @@
 //! The three bodies as linear systems (M + c K) x = b, and what these look like from the contact surfaces.
 
 use nalgebra::{DMatrix, Matrix3};
-use tiprub_model::{Error, Result};
 use tiprub_model::sparse::Factor;
+use tiprub_model::{Error, Result};
 
 use super::blocks::BlockMatrix;
 use super::contact::Contact;
@@ -57,7 +57,8 @@ impl Operator {
                 let mut position = 0;
                 for &dof in &body.free {
                     // Three equal masses per node: one look-up each.
-                    inverse[dof] = if dof % 3 > 0 && position + 1 == dof { inverse[position] } else { 1.0 / diagonal(dof) };
+                    inverse[dof] =
+                        if dof % 3 > 0 && position + 1 == dof { inverse[position] } else { 1.0 / diagonal(dof) };
                     position = dof;
                 }
                 let contact = DMatrix::from_fn(body.contact.len(), body.contact.len(), |a, b| {
@@ -142,7 +143,8 @@ impl Operator {
     /// Relative displacement (local frames) of each contact per force on each, 3n × 3n.
     pub(super) fn delassus(&self, contacts: &[Contact], masters: usize) -> DMatrix<f64> {
         let mut matrix = DMatrix::zeros(3 * contacts.len(), 3 * contacts.len());
-        let frames: Vec<Matrix3<f64>> = contacts.iter().map(|contact| Matrix3::from_fn(|i, j| contact.frame[j][i])).collect();
+        let frames: Vec<Matrix3<f64>> =
+            contacts.iter().map(|contact| Matrix3::from_fn(|i, j| contact.frame[j][i])).collect();
         for (b, second) in contacts.iter().enumerate() {
             for (a, first) in contacts.iter().enumerate() {
                 let place = |contact: &Contact| contact.side * masters + contact.master;

@@ -44,7 +44,9 @@ pub fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
         let slip = surface_of(scene, &velocity);
         let forces: Vec<[f64; 3]> = contacts
             .iter()
-            .map(|contact| spring(contact, contact.local(contact.relative(scene.masters, &slip)), scene.setting.friction, options))
+            .map(|contact| {
+                spring(contact, contact.local(contact.relative(scene.masters, &slip)), scene.setting.friction, options)
+            })
             .collect();
         let mut loads: Vectors = core::array::from_fn(|i| elastic[i].iter().map(|f| -f).collect());
         add_to_loads(scene, &surface_forces(scene, &contacts, &forces), 1.0, &mut loads);

@@ -33,7 +33,8 @@ fn on_facet(surface: &Surface, point: [f64; 3], carriers: &[[f64; 3]], [row, col
         let (f, g) = (dot(away, s), dot(away, t));
         let (a, b, c) = (dot(s, s), dot(s, t) - dot(away, twist), dot(t, t));
         let determinant = a * c - b * b;
-        let next = [at[0] + (c * f - b * g) / determinant, at[1] + (a * g - b * f) / determinant].map(|x| x.clamp(0.0, 1.0));
+        let next =
+            [at[0] + (c * f - b * g) / determinant, at[1] + (a * g - b * f) / determinant].map(|x| x.clamp(0.0, 1.0));
         let moved = (next[0] - at[0]).abs().max((next[1] - at[1]).abs());
         at = next;
         if moved < 1e-13 {

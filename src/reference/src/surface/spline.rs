@@ -6,7 +6,8 @@ use super::{Foot, Surface, add_scaled, cross, dot, minus, scaled, unit};
 fn basis(x: f64) -> [[f64; 4]; 3] {
     let y = 1.0 - x;
     [
-        [y * y * y, 3.0 * x * x * x - 6.0 * x * x + 4.0, 3.0 * y * y * y - 6.0 * y * y + 4.0, x * x * x].map(|b| b / 6.0),
+        [y * y * y, 3.0 * x * x * x - 6.0 * x * x + 4.0, 3.0 * y * y * y - 6.0 * y * y + 4.0, x * x * x]
+            .map(|b| b / 6.0),
         [-0.5 * y * y, 1.5 * x * x - 2.0 * x, -1.5 * y * y + 2.0 * y, 0.5 * x * x],
         [y, 3.0 * x - 2.0, 3.0 * y - 2.0, x],
     ]
