@@ -112,7 +112,9 @@ pub fn convergence(mass: Mass) {
         .into();
     if mass == Mass::Lumped {
         others.push(run(Method::Penalty(Default::default()), setting, 1e-7, end, 20));
-        others.push(run(Method::Penalty(stiff), setting, 1e-7, end, 20));
+        let mut stiffer = run(Method::Penalty(stiff), setting, 1e-7, end, 20);
+        stiffer.method.push_str(", ten times stiffer");
+        others.push(stiffer);
     }
     let (finest, other) = (&film[film.len() - 1], &implicit[implicit.len() - 1]);
     let touching = released(finest);
@@ -124,7 +126,7 @@ pub fn convergence(mass: Mass) {
     for history in film.iter().chain(&implicit).chain(&others) {
         let found = agreement(history, finest, setting.speed, touching, contact);
         println!(
-            "| {} | {} | {:.3} % | {:.3} % | {:.3} % | {:.3} % | {:.2} % | {:+.3} % | {:+.4} % | {:.2} | {:.1} |",
+            "| {} | {:.3} | {:.3} % | {:.3} % | {:.3} % | {:.3} % | {:.2} % | {:+.3} % | {:+.4} % | {:.2} | {:.1} |",
             history.method,
             history.step * 1e6,
             100.0 * found.touching[0],

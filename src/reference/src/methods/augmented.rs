@@ -13,6 +13,7 @@ use super::operator::{Operator, SurfaceVectors, Vectors, inner};
 use super::recorder::{Entry, Recorder};
 use crate::cube::history::History;
 use crate::cube::scene::Scene;
+use crate::surface::is_zero;
 
 /// Choices of this method.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,7 +74,7 @@ pub fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
         recorder.iterations(found.iterations);
         recorder.note_penetration(found.penetration);
         recorder.note_forces(&found.contacts, &found.forces);
-        if found.forces.iter().any(|force| *force != [0.0; 3]) {
+        if !found.forces.iter().all(is_zero) {
             add_to_loads(scene, &surface_forces(scene, &found.contacts, &found.forces), 1.0, &mut loads);
             next = operator.solve(scene, &loads);
         }

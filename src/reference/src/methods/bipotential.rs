@@ -18,6 +18,7 @@ use super::operator::{Operator, SurfaceVectors, Vectors, inner};
 use super::recorder::{Entry, Recorder};
 use crate::cube::history::History;
 use crate::cube::scene::Scene;
+use crate::surface::is_zero;
 
 /// Masters closer than this to a surface take part (m).
 const MARGIN: f64 = 1e-4;
@@ -53,7 +54,7 @@ pub fn run(scene: &Scene, run: &Run) -> Result<History> {
         recorder.note_penetration(found.penetration);
         recorder.note_forces(&found.contacts, &found.forces);
         let mut next = free;
-        if found.forces.iter().any(|force| *force != [0.0; 3]) {
+        if !found.forces.iter().all(is_zero) {
             add_to_loads(scene, &surface_forces(scene, &found.contacts, &found.forces), square, &mut loads);
             second = operator.solve(scene, &loads);
             next = advanced(&now, &change, &second);
@@ -168,7 +169,7 @@ fn uzawa(
         for a in 0..count {
             let own: Matrix3<f64> = delassus.fixed_view::<3, 3>(3 * a, 3 * a).into_owned();
             let mut others = offsets[a];
-            for b in (0..count).filter(|b| *b != a && forces[*b] != [0.0; 3]) {
+            for b in (0..count).filter(|b| *b != a && !is_zero(&forces[*b])) {
                 others += delassus.fixed_view::<3, 3>(3 * a, 3 * b) * Vector3::from(forces[b]);
             }
             let before = Vector3::from(forces[a]);

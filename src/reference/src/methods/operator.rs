@@ -7,7 +7,7 @@ use tiprub_model::{Error, Result};
 use super::blocks::BlockMatrix;
 use super::contact::Contact;
 use crate::cube::scene::{Mass, Scene};
-use crate::surface::Surface;
+use crate::surface::{Surface, is_zero};
 
 /// Displacements, forces or velocities of all dofs of cube, left ring, right ring.
 pub(super) type Vectors = [Vec<f64>; 3];
@@ -168,7 +168,7 @@ impl Operator {
     pub(super) fn surface_response(&self, forces: &SurfaceVectors) -> SurfaceVectors {
         core::array::from_fn(|index| {
             let mut moved = vec![[0.0; 3]; forces[index].len()];
-            for (b, force) in forces[index].iter().enumerate().filter(|(_, force)| **force != [0.0; 3]) {
+            for (b, force) in forces[index].iter().enumerate().filter(|(_, force)| !is_zero(force)) {
                 for (a, u) in moved.iter_mut().enumerate() {
                     match &self.compliances[index] {
                         Compliance::Isotropic(matrix) => (0..3).for_each(|i| u[i] += matrix[(a, b)] * force[i]),

@@ -64,7 +64,7 @@ impl<'a> Recorder<'a> {
 
     /// Whether the step is to be recorded.
     pub(super) fn wants(&self, step: usize) -> bool {
-        step % self.run.stride == 0
+        step.is_multiple_of(self.run.stride)
     }
 
     /// Keep the largest penetration of steps between records.

@@ -100,6 +100,10 @@ pub(crate) fn unit(a: [f64; 3]) -> [f64; 3] {
     scaled(a, 1.0 / dot(a, a).sqrt())
 }
 
+pub(crate) fn is_zero(a: &[f64; 3]) -> bool {
+    a.iter().all(|x| *x == 0.0)
+}
+
 pub(crate) fn add_scaled(sum: &mut [f64; 3], a: [f64; 3], factor: f64) {
     (0..3).for_each(|i| sum[i] += factor * a[i]);
 }
