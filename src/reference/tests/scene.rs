@@ -107,6 +107,28 @@ fn the_spline_goes_through_the_nodes_and_nears_the_cylinder_at_fourth_order() {
     }
 }
 
+/// An uneven surface, so that nodes on its ends and edges are met only with the right end conditions.
+#[test]
+fn the_spline_meets_the_nodes_of_ends_and_edges() {
+    let (rows, columns) = (7, 6);
+    let place = |i: usize, j: usize| [i as f64, j as f64, 0.3 * (2.0 * i as f64 + 3.1 * j as f64).sin()];
+    let nodes: Vec<[f64; 3]> = (0..rows).flat_map(|i| (0..columns).map(move |j| place(i, j))).collect();
+    let surface = Surface::new(SurfaceKind::Spline, rows, columns, 1.0);
+    let carriers = surface.carriers(&nodes);
+    for i in 0..rows {
+        for j in 0..columns {
+            let foot = surface.foot(place(i, j), &carriers, [i as f64, j as f64]).expect("a node lies on the surface");
+            assert!(foot.gap.abs() < 1e-14, "gap {} at node ({i}, {j})", foot.gap);
+            let mut met = [0.0; 3];
+            foot.weights
+                .iter()
+                .for_each(|(carrier, weight)| (0..3).for_each(|k| met[k] += weight * carriers[*carrier][k]));
+            let node = place(i, j);
+            assert!((0..3).all(|k| (met[k] - node[k]).abs() < 1e-13), "{met:?} instead of {node:?}");
+        }
+    }
+}
+
 #[test]
 fn facets_are_the_chords_of_the_cylinder() {
     let nodes = grid(&ring_mesh(Side::Left));

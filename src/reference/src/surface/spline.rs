@@ -81,8 +81,8 @@ pub(super) fn foot(surface: &Surface, point: [f64; 3], carriers: &[[f64; 3]], gu
             break;
         }
     }
-    // Free edges are straight: a foot beyond them is none.
-    (0..2).all(|i| at[i] >= 0.0 && at[i] <= ends[i]).then(|| {
+    // A foot beyond a free edge is none, but for rounding.
+    (0..2).all(|i| at[i] >= -1e-9 && at[i] <= ends[i] + 1e-9).then(|| {
         let found = evaluate(surface, carriers, at);
         let normal = scaled(unit(cross(found.jets[1], found.jets[2])), surface.orientation);
         let mut weights = Vec::with_capacity(16);
