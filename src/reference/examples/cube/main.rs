@@ -1,0 +1,107 @@
+//! The cube between two rings by four independent methods: tables, CSV, and the paper's figures 3 to 6 as SVG.
+//!
+//! `cargo run --release -p tiprub-reference --example cube -- WHAT DIRECTORY [lumped|consistent]` with WHAT one of
+//! `figures` (methods a, b, c at 100 m/s), `energy` (50 m/s), `convergence` (in h), `outside` (a CalculiX `.dat` file, given
+//! as third argument, beside our methods) and `files` (matrices and node tables).
+
+mod outside;
+mod plot;
+mod tables;
+
+use std::path::{Path, PathBuf};
+
+use tiprub_reference::cube::files::{BodyFile, write_json};
+use tiprub_reference::cube::history::History;
+use tiprub_reference::cube::scene::{Mass, Scene, Setting};
+use tiprub_reference::methods::{Method, Run};
+use tiprub_reference::surface::SurfaceKind;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [what, directory, rest @ ..] = arguments.as_slice() else {
+        eprintln!("cube figures|energy|convergence|outside|files DIRECTORY [lumped|consistent, or a .dat file]");
+        std::process::exit(2);
+    };
+    let directory = PathBuf::from(directory);
+    std::fs::create_dir_all(&directory).expect("the directory can be made");
+    let mass = if rest.first().is_some_and(|word| word == "consistent") { Mass::Consistent } else { Mass::Lumped };
+    match what.as_str() {
+        "figures" => figures(&directory, mass),
+        "energy" => energy(&directory),
+        "convergence" => tables::convergence(mass),
+        "outside" => outside::compare(rest.first().expect("the CalculiX .dat file")),
+        "files" => files(&directory),
+        other => panic!("`{other}` is none of figures, energy, convergence, outside, files"),
+    }
+}
+
+/// Run a method on a scene and say how it went.
+fn run(method: Method, setting: Setting, step: f64, end: f64, stride: usize) -> History {
+    let scene = Scene::new(setting).expect("the scene can be built");
+    let run = Run { step, end, stride, snapshots: vec![1e-4, 2e-4, 3e-4, 5e-4, 8e-4] };
+    let history = method.run(&scene, &run).expect("the run ends well");
+    eprintln!(
+        "{} ({:?}, {:?} mass, µ = {}, {} m/s, h = {step:e} s): {:.2} s of processor time and {:.2} s to prepare",
+        history.method,
+        setting.surface,
+        setting.mass,
+        setting.friction,
+        setting.speed,
+        history.processor_time,
+        history.preparation_time
+    );
+    history
+}
+
+fn save(directory: &Path, name: &str, history: &History) {
+    std::fs::write(directory.join(format!("{name}.csv")), history.csv()).expect("a CSV file can be written");
+    write_json(&directory.join(format!("{name}.json")), history).expect("a JSON file can be written");
+}
+
+/// Figures 3, 4 and 5: a, b, c over 3 ms.
+fn figures(directory: &Path, mass: Mass) {
+    let spline = Setting { mass, ..Setting::default() };
+    let facets = Setting { surface: SurfaceKind::Facets, ..spline };
+    // A consistent mass lowers the limit of central differences and has to be solved for: only the contact is followed.
+    let (explicit, stride, end) = if mass == Mass::Lumped { (5e-7, 2, 3e-3) } else { (4e-7, 5, 1e-3) };
+    let named = [
+        ("a, film", run(Method::Film(Default::default()), spline, explicit, end, stride)),
+        ("b, bi-potential, facets", run(Method::Bipotential, facets, 1e-6, end, 1)),
+        ("b, bi-potential, spline", run(Method::Bipotential, spline, 1e-6, end, 1)),
+        ("c, augmented Lagrangian, facets", run(Method::Augmented(Default::default()), facets, 1e-6, end, 1)),
+        ("c, augmented Lagrangian, spline", run(Method::Augmented(Default::default()), spline, 1e-6, end, 1)),
+    ];
+    for ((_, history), name) in named.iter().zip(["a-film", "b-facets", "b-spline", "c-facets", "c-spline"]) {
+        save(directory, name, history);
+    }
+    tables::pairs(&named, spline.speed);
+    tables::readings(&named);
+    plot::symmetry(directory, &named[0].1);
+    plot::comparison(directory, &[&named[0], &named[1]]);
+    plot::superposition(directory, &[&named[0], &named[1], &named[4]]);
+}
+
+/// Figure 6: energies at 50 m/s.
+fn energy(directory: &Path) {
+    for friction in [0.0, 0.15] {
+        let setting = Setting { speed: 50.0, friction, ..Setting::default() };
+        let film = run(Method::Film(Default::default()), setting, 5e-7, 3e-3, 4);
+        let implicit = run(Method::Bipotential, setting, 1e-6, 3e-3, 2);
+        let name = format!("energy-mu-{friction}");
+        tables::energies(&[("a, film", &film), ("b, bi-potential", &implicit)], friction);
+        save(directory, &name, &film);
+        save(directory, &format!("{name}-b"), &implicit);
+        plot::energies(directory, &name, &film);
+    }
+}
+
+/// Node tables, elements, sets and matrices of the three bodies, both masses.
+fn files(directory: &Path) {
+    for mass in [Mass::Lumped, Mass::Consistent] {
+        let scene = Scene::new(Setting { mass, ..Setting::default() }).expect("the scene can be built");
+        for (body, name) in scene.bodies.iter().zip(["cube", "left", "right"]) {
+            let path = directory.join(format!("{name}-{mass:?}.json").to_lowercase());
+            write_json(&path, &BodyFile::from(body)).expect("a JSON file can be written");
+        }
+    }
+}

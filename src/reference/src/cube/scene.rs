@@ -1,0 +1,201 @@
+//! The three bodies with their matrices, and the contact surfaces between them.
+
+use faer::Mat;
+use nalgebra::DMatrix;
+use tiprub_model::assembly::{assemble, free_dofs, lumped_masses};
+use tiprub_model::progress::silent;
+use tiprub_model::sparse::{Factor, SparseMatrix, principal_pair};
+use tiprub_model::{FeModel, Material, Mesh, Result};
+
+use super::mesh::{cube_mesh, ring_mesh};
+use super::{CENTRE, FRICTION, HALF_ARC, RING_ELEMENTS, Side, WIDTH, cube_material, ring_material};
+use crate::surface::{Surface, SurfaceKind};
+
+/// Mass matrix of the finite elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mass {
+    /// Diagonal.
+    Lumped,
+    /// ∫ ρ NᵀN dV.
+    Consistent,
+}
+
+/// What can be chosen about the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setting {
+    /// Speed of the cube along −y (m/s).
+    pub speed: f64,
+    /// Coefficient of friction.
+    pub friction: f64,
+    /// Surface of the rings.
+    pub surface: SurfaceKind,
+    /// Mass matrix of all bodies.
+    pub mass: Mass,
+}
+
+impl Default for Setting {
+    /// The paper's case with the spline: 100 m/s, µ = 0.15; lumped mass.
+    fn default() -> Self {
+        Self { speed: 100.0, friction: FRICTION, surface: SurfaceKind::Spline, mass: Mass::Lumped }
+    }
+}
+
+/// A body with the matrices of all its nodes; dof 3·node + component.
+#[derive(Debug, Clone)]
+pub struct Body {
+    /// Mesh and node sets.
+    pub mesh: Mesh,
+    /// Material.
+    pub material: Material,
+    /// K (N/m).
+    pub stiffness: SparseMatrix,
+    /// M (kg), with the pattern of K.
+    pub mass: SparseMatrix,
+    /// Dofs that are not clamped, ascending.
+    pub free: Vec<usize>,
+    /// Nodes of the contact surface: masters of the cube (left face, then right), slaves of a ring (grid order).
+    pub contact: Vec<usize>,
+}
+
+impl Body {
+    /// Assemble a mesh.
+    ///
+    /// # Errors
+    /// Those of assembly; a missing set.
+    pub fn new(mesh: Mesh, material: Material, mass: Mass, contact: Vec<usize>) -> Result<Self> {
+        let matrices = assemble(&mesh, &material, &silent)?;
+        let mut body =
+            Self { stiffness: matrices.stiffness, mass: matrices.mass, free: Vec::new(), contact, mesh, material };
+        if mass == Mass::Lumped {
+            let masses = lumped_masses(&body.mesh, body.material.density)?;
+            body.mass.values.fill(0.0);
+            for dof in 0..body.mass.order() {
+                let start = body.mass.pattern.starts[dof];
+                let rows = &body.mass.pattern.rows[start..body.mass.pattern.starts[dof + 1]];
+                let place = rows.binary_search(&dof).expect("the pattern holds the diagonal");
+                body.mass.values[start + place] = masses[dof / 3];
+            }
+        }
+        let clamped = body.mesh.sets.get("CLAMPED").map_or(&[][..], Vec::as_slice);
+        body.free = free_dofs(body.mesh.nodes.len(), clamped);
+        Ok(body)
+    }
+
+    /// The same body for a reduction by the product, without friction surfaces or clamps applied.
+    pub fn fe_model(&self, origin: &str) -> FeModel {
+        FeModel {
+            nodes: self.mesh.nodes.clone(),
+            sets: self.mesh.sets.clone(),
+            stiffness: self.stiffness.clone(),
+            mass: self.mass.clone(),
+            mesh: Some((self.mesh.clone(), self.material.clone())),
+            origin: origin.into(),
+        }
+    }
+
+    /// Number of dofs.
+    pub fn dofs(&self) -> usize {
+        self.mass.order()
+    }
+
+    /// Positions of the contact nodes under displacements of all dofs (m).
+    pub fn contact_positions(&self, displacements: &[f64]) -> Vec<[f64; 3]> {
+        let place = |&node: &usize| core::array::from_fn(|i| self.mesh.nodes[node][i] + displacements[3 * node + i]);
+        self.contact.iter().map(place).collect()
+    }
+
+    /// Factor of M + c K without the clamped dofs.
+    pub(crate) fn factor(&self, c: f64) -> Result<Factor> {
+        let (mass, stiffness) = principal_pair(&self.mass, &self.stiffness, &self.free);
+        mass.plus_scaled(c, &stiffness).factor("M + cK", "Check the mesh of the scene")
+    }
+
+    /// Solution with a factor for a load on all dofs; zero where clamped.
+    pub(crate) fn solve(&self, factor: &Factor, load: &[f64]) -> Vec<f64> {
+        let right = Mat::from_fn(self.free.len(), 1, |i, _| load[self.free[i]]);
+        let solution = factor.solve(right);
+        let mut all = vec![0.0; self.dofs()];
+        self.free.iter().enumerate().for_each(|(i, &dof)| all[dof] = solution[(i, 0)]);
+        all
+    }
+
+    /// Rows and columns of the contact dofs of the inverse behind a factor.
+    pub(crate) fn contact_inverse(&self, factor: &Factor) -> DMatrix<f64> {
+        let mut position = vec![usize::MAX; self.dofs()];
+        self.free.iter().enumerate().for_each(|(i, &dof)| position[dof] = i);
+        let places: Vec<usize> =
+            self.contact.iter().flat_map(|&node| (0..3).map(move |i| 3 * node + i)).map(|dof| position[dof]).collect();
+        let mut unit = Mat::zeros(self.free.len(), places.len());
+        for (column, &place) in places.iter().enumerate().filter(|(_, place)| **place != usize::MAX) {
+            unit[(place, column)] = 1.0;
+        }
+        let solution = factor.solve(unit);
+        DMatrix::from_fn(places.len(), places.len(), |i, j| {
+            if places[i] == usize::MAX { 0.0 } else { solution[(places[i], j)] }
+        })
+    }
+}
+
+/// Cube, left ring, right ring.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// What was chosen.
+    pub setting: Setting,
+    /// Cube, left ring, right ring.
+    pub bodies: [Body; 3],
+    /// Surfaces of the left and the right ring.
+    pub surfaces: [Surface; 2],
+    /// Masters per side.
+    pub masters: usize,
+    /// Divisions of a ring's surface along arc and width.
+    divisions: [usize; 2],
+}
+
+impl Scene {
+    /// The paper's meshes.
+    ///
+    /// # Errors
+    /// Those of assembly.
+    pub fn new(setting: Setting) -> Result<Self> {
+        Self::of(setting, cube_mesh(), Side::BOTH.map(ring_mesh), [RING_ELEMENTS[2], RING_ELEMENTS[1]])
+    }
+
+    /// Meshes of another refinement; `divisions` are those of a ring's surface along arc and width.
+    ///
+    /// # Errors
+    /// Those of assembly; a set that a mesh lacks.
+    pub fn of(setting: Setting, cube: Mesh, [left, right]: [Mesh; 2], divisions: [usize; 2]) -> Result<Self> {
+        let masters = [cube.set("MASTER_LEFT")?, cube.set("MASTER_RIGHT")?].concat();
+        let ring = |mesh: Mesh| {
+            let slaves = mesh.set("SLAVE")?.to_vec();
+            Body::new(mesh, ring_material(), setting.mass, slaves)
+        };
+        let surface = |side: Side| Surface::new(setting.surface, divisions[0] + 1, divisions[1] + 1, -side.sign());
+        Ok(Self {
+            setting,
+            masters: masters.len() / 2,
+            bodies: [Body::new(cube, cube_material(), setting.mass, masters)?, ring(left)?, ring(right)?],
+            surfaces: Side::BOTH.map(surface),
+            divisions,
+        })
+    }
+
+    /// Displacements of the three bodies at the start: none.
+    pub fn rest(&self) -> [Vec<f64>; 3] {
+        core::array::from_fn(|body| vec![0.0; self.bodies[body].dofs()])
+    }
+
+    /// Velocities at the start: the cube flies along −y.
+    pub fn launch(&self) -> [Vec<f64>; 3] {
+        let mut velocities = self.rest();
+        velocities[0].iter_mut().skip(1).step_by(3).for_each(|v| *v = -self.setting.speed);
+        velocities
+    }
+
+    /// Surface parameters of the point of the undeformed ring nearest to a place.
+    pub(crate) fn guess(&self, side: usize, place: [f64; 3]) -> [f64; 2] {
+        let angle = place[1].atan2(CENTRE - Side::BOTH[side].sign() * place[0]);
+        let [arc, wide] = self.divisions;
+        [(angle + HALF_ARC) / (2.0 * HALF_ARC) * arc as f64, (place[2] / WIDTH + 0.5) * wide as f64]
+    }
+}

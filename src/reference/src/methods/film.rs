@@ -1,0 +1,134 @@
+//! Central differences with forward-increment Lagrange multipliers: the paper's algorithm (eqs 9 to 11).
+//!
+//! Only sliding: the direction of friction is that of the predicted displacement of the step, in which the displacement of
+//! the rings along z is left out. As in Carpenter's paper contacts whose multiplier turns out negative are let go.
+
+use nalgebra::{DMatrix, DVector};
+use tiprub_model::{Error, Result};
+
+use super::Run;
+use super::contact::{Contact, add_to_loads, find, surface_at_rest, surface_forces, surface_of};
+use super::operator::{Operator, SurfaceVectors, Vectors, inner};
+use super::recorder::{Entry, Recorder};
+use crate::cube::history::History;
+use crate::cube::scene::Scene;
+
+/// Choices of this method.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// Let contacts with a negative multiplier go and solve again for the others.
+    pub release_tension: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { release_tension: true }
+    }
+}
+
+/// Run the scene.
+///
+/// # Errors
+/// As [`super::Method::run`].
+pub fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
+    let mut recorder = Recorder::new(scene, run, "film");
+    let operator = Operator::new(scene, 0.0)?;
+    let rest = surface_at_rest(scene);
+    operator.check_step(scene, run.step)?;
+    recorder.prepared();
+    let (h, square) = (run.step, run.step * run.step);
+    // u₋₁ = u₀ − h v₀: nothing is strained or touched at the start.
+    let mut now = scene.rest();
+    let mut change: Vectors = scene.launch().map(|v| v.iter().map(|v| h * v).collect());
+    for step in 0..=run.steps() {
+        let elastic = operator.elastic(&now);
+        let acceleration = operator.solve(scene, &elastic);
+        for index in 0..3 {
+            change[index].iter_mut().zip(&acceleration[index]).for_each(|(d, a)| *d -= square * a);
+        }
+        let predicted: Vectors =
+            core::array::from_fn(|index| now[index].iter().zip(&change[index]).map(|(u, d)| u + d).collect());
+        let moved = surface_of(scene, &predicted);
+        let contacts = find(scene, &rest, &moved, 0.0);
+        let mut forces = Vec::new();
+        if !contacts.is_empty() {
+            let slip = surface_of(scene, &change);
+            forces = multipliers(scene, &operator, &contacts, &slip, square, options, &mut recorder)?;
+            let mut loads = scene.rest();
+            add_to_loads(scene, &surface_forces(scene, &contacts, &forces), square, &mut loads);
+            let correction = operator.solve(scene, &loads);
+            for index in 0..3 {
+                change[index].iter_mut().zip(&correction[index]).for_each(|(d, c)| *d += c);
+            }
+        }
+        let next: Vectors =
+            core::array::from_fn(|index| now[index].iter().zip(&change[index]).map(|(u, d)| u + d).collect());
+        recorder.note_forces(&contacts, &forces);
+        if recorder.wants(step) {
+            let velocity: Vectors = core::array::from_fn(|index| change[index].iter().map(|d| d / h).collect());
+            let left = find(scene, &rest, &surface_of(scene, &next), 0.0);
+            recorder.note_penetration(left.iter().fold(0.0, |largest, contact| largest.max(-contact.gap)));
+            recorder.record(&Entry {
+                time: step as f64 * h,
+                displacements: &now,
+                cube_velocity: &velocity[0],
+                kinetic: operator.kinetic(&velocity),
+                // With u_{n+1} on one side this is what central differences conserve, together with the kinetic energy.
+                strain: (0..3).map(|index| 0.5 * inner(&next[index], &elastic[index])).sum(),
+            });
+        }
+        now = next;
+    }
+    Ok(recorder.finish())
+}
+
+/// Eq. 11: λ from C_Nᵀ M⁻¹ C_NT h² λ = −g; forces (normal, tangential) in the frames.
+fn multipliers(
+    scene: &Scene,
+    operator: &Operator,
+    contacts: &[Contact],
+    slip: &SurfaceVectors,
+    square: f64,
+    options: Options,
+    recorder: &mut Recorder<'_>,
+) -> Result<Vec<[f64; 3]>> {
+    let directions: Vec<[f64; 3]> = contacts.iter().map(|contact| direction(scene, contact, slip)).collect();
+    let delassus = operator.delassus(contacts, scene.masters);
+    let entry = |a: usize, b: usize| -> f64 {
+        square * (0..3).map(|j| delassus[(3 * a, 3 * b + j)] * directions[b][j]).sum::<f64>()
+    };
+    let mut active: Vec<usize> = (0..contacts.len()).collect();
+    let mut forces = vec![[0.0; 3]; contacts.len()];
+    loop {
+        recorder.iterations(1);
+        let matrix = DMatrix::from_fn(active.len(), active.len(), |i, j| entry(active[i], active[j]));
+        let right = DVector::from_fn(active.len(), |i, _| -contacts[active[i]].gap);
+        let solution = matrix.lu().solve(&right).ok_or_else(|| {
+            Error::invalid("contact matrix of film", "it is singular", "Check the surfaces of the scene")
+        })?;
+        let kept: Vec<usize> =
+            (0..active.len()).filter(|i| !options.release_tension || solution[*i] > 0.0).map(|i| active[i]).collect();
+        if kept.len() == active.len() {
+            active
+                .iter()
+                .enumerate()
+                .for_each(|(i, &contact)| forces[contact] = directions[contact].map(|d| d * solution[i]));
+            return Ok(forces);
+        }
+        active = kept;
+    }
+}
+
+/// Force per multiplier in the frame: the normal, and µ against the predicted sliding.
+fn direction(scene: &Scene, contact: &Contact, slip: &SurfaceVectors) -> [f64; 3] {
+    let friction = scene.setting.friction;
+    let master = slip[0][contact.side * scene.masters + contact.master];
+    let mut relative = contact.relative(scene.masters, slip);
+    relative[2] = master[2];
+    let [_, along, across] = contact.local(relative);
+    let length = along.hypot(across);
+    if length == 0.0 || friction == 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    [1.0, -friction * along / length, -friction * across / length]
+}

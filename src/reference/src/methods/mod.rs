@@ -1,0 +1,78 @@
+//! Four methods for the cube between two rings, each with time stepping and contact of its own:
+//! [`film`], [`bipotential`], [`augmented`] and [`penalty`]. They share the finite-element matrices, the surfaces and
+//! where a master meets a surface ([`contact`]), nothing else.
+
+pub mod augmented;
+pub mod bipotential;
+mod blocks;
+pub mod contact;
+pub mod film;
+mod operator;
+pub mod penalty;
+mod recorder;
+
+use crate::cube::history::History;
+use crate::cube::scene::Scene;
+
+/// How long and how finely to run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Step h (s).
+    pub step: f64,
+    /// End (s).
+    pub end: f64,
+    /// Record every so many steps.
+    pub stride: usize,
+    /// Take the displacements of all masters at the first recorded step at or after each of these times (s), ascending.
+    pub snapshots: Vec<f64>,
+}
+
+impl Run {
+    /// Number of steps to the end.
+    pub fn steps(&self) -> usize {
+        let mut steps = 0;
+        while (steps as f64 + 0.5) * self.step < self.end {
+            steps += 1;
+        }
+        steps
+    }
+}
+
+/// One of the methods, with a name for reports.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Method {
+    /// [`film`].
+    Film(film::Options),
+    /// [`bipotential`].
+    Bipotential,
+    /// [`augmented`].
+    Augmented(augmented::Options),
+    /// [`penalty`].
+    Penalty(penalty::Options),
+}
+
+impl Method {
+    /// Name for tables and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Film(_) => "film",
+            Self::Bipotential => "bipotential",
+            Self::Augmented(_) => "augmented",
+            Self::Penalty(_) => "penalty",
+        }
+    }
+
+    /// Run the scene.
+    ///
+    /// # Errors
+    /// A mass or iteration matrix that is not positive definite; a solver that does not converge; an explicit step that
+    /// is not stable.
+    pub fn run(self, scene: &Scene, run: &Run) -> tiprub_model::Result<History> {
+        match self {
+            Self::Film(options) => film::run(scene, run, options),
+            Self::Bipotential => bipotential::run(scene, run),
+            Self::Augmented(options) => augmented::run(scene, run, options),
+            Self::Penalty(options) => penalty::run(scene, run, options),
+        }
+    }
+}
