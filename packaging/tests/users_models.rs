@@ -155,7 +155,7 @@ fn a_sector_of_gmsh_becomes_a_wheel_with_the_frequencies_of_calculix() {
     let mut compared = 0;
     for row in rows {
         let values: Vec<f64> = row.split(',').map(|value| value.parse().unwrap()).collect();
-        let diameter: usize = row.split(',').next().unwrap().parse().unwrap();
+        let diameter: u32 = row.split(',').next().unwrap().parse().unwrap();
         let own: Vec<f64> = checks
             .full_frequencies
             .iter()
