@@ -98,7 +98,7 @@ impl DiskModel {
 }
 
 /// The casing of the stage, of the paper's size or with an eighth of the elements around.
-fn stage_casing(coarse: bool) -> StageCasingOptions {
+pub fn stage_casing(coarse: bool) -> StageCasingOptions {
     let defaults = StageCasingOptions::default();
     if coarse {
         StageCasingOptions { name: STAGE_CASING_COARSE.into(), around: defaults.around / 8, ..defaults }

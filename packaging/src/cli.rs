@@ -131,7 +131,7 @@ pub struct ReduceArguments {
     /// Also write mesh, sets and mode shapes for ParaView (.vtu).
     #[arg(long, value_name = "FILE")]
     pub vtk: Option<PathBuf>,
-    /// Of the `stage`, a coarse mesh and few modes, for trials.
+    /// Of `stage` and `stage-casing`, a coarse mesh (and few modes of the disk), for trials.
     #[arg(long)]
     pub coarse: bool,
     /// What describes a casing.
@@ -282,6 +282,8 @@ pub enum Model {
     Casing,
     /// The bladed disk of the 56-sector stage.
     Stage,
+    /// The casing of the 56-sector stage.
+    StageCasing,
     /// A mesh file.
     File(PathBuf),
 }
@@ -324,10 +326,12 @@ fn model(text: &str) -> Result<Model, String> {
         "rotor37" => Ok(Model::Rotor37),
         "casing" => Ok(Model::Casing),
         "stage" => Ok(Model::Stage),
+        "stage-casing" => Ok(Model::StageCasing),
         // Names of files have an extension or a directory; anything else is a slip in the name of a model.
         _ if text.contains(['.', '/', '\\']) => Ok(Model::File(text.into())),
         _ => {
-            Err("`rotor37`, `casing` and `stage` ship with tiprub; a model of your own is a file: .inp or .msh".into())
+            Err("`rotor37`, `casing`, `stage` and `stage-casing` ship with tiprub; a model of your own is a file: .inp or .msh"
+                .into())
         }
     }
 }

@@ -5,7 +5,11 @@ use tiprub_model::{
     cyclic::CyclicReduction,
     progress::{Listener, Progress, Stage},
     reduce_ring, reduce_rotor37,
-    stage::{StageOptions, reduce_stage},
+    stage::{
+        StageOptions,
+        casing::{StageCasingOptions, reduce_stage_casing},
+        reduce_stage,
+    },
 };
 
 use crate::{Failure, Result, console::Console};
@@ -42,6 +46,14 @@ pub fn casing(options: &CasingOptions, console: &Console) -> Result<Reduction> {
 /// Counts that do not fit each other, and whatever the reduction refuses.
 pub fn stage(options: &StageOptions, console: &Console) -> Result<CyclicReduction> {
     with_progress("Reducing the stage", console, &|listener| reduce_stage(options, listener))
+}
+
+/// Reduce the casing of the stage, showing stage and share done.
+///
+/// # Errors
+/// Counts that do not fit each other, and whatever the reduction refuses.
+pub fn stage_casing(options: &StageCasingOptions, console: &Console) -> Result<Reduction> {
+    with_progress("Reducing the casing of the stage", console, &|listener| reduce_stage_casing(options, listener))
 }
 
 /// Work that tells where it stands, shown as a task; `title` says what is done.

@@ -12,8 +12,8 @@ use tiprub_model::{
 };
 
 use crate::{
-    Failure, Result,
-    casing_arguments::{self, CasingArguments},
+    Failure, Result, builtin,
+    casing_arguments::{self, CasingArguments, MaterialChoice},
     cli::{Model, ReduceArguments},
     console::{Console, Outcome},
     file_arguments::FileArguments,
@@ -126,6 +126,10 @@ fn reduced(arguments: &ReduceArguments, console: &Console) -> Result<Reduced> {
             refuse_file_options(arguments)?;
             stage(arguments, console)
         }
+        Some(Model::StageCasing) => {
+            refuse_file_options(arguments)?;
+            stage_casing(arguments, console)
+        }
         Some(Model::File(_)) | None => users_model::reduce(arguments, console),
     }
 }
@@ -145,9 +149,29 @@ fn stage(arguments: &ReduceArguments, console: &Console) -> Result<Reduced> {
     Ok(Reduced::cyclic(reduced, mesh, nodes, Some("CLAMPED"), ["CYCLIC_LOW", "CYCLIC_HIGH"]))
 }
 
+/// The casing around it.
+fn stage_casing(arguments: &ReduceArguments, console: &Console) -> Result<Reduced> {
+    let other = arguments.mesh.is_some() || arguments.spin.is_some() || arguments.contact_nodes.is_some();
+    let mut described = arguments.casing.clone();
+    let (grid, patches) = (described.contact_grid.take(), described.patches.take());
+    let (fixed_interface_modes, material) = (described.fixed_interface_modes.take(), described.material.take());
+    if other || described != CasingArguments::default() {
+        let problem = "an option given describes another model";
+        let remedy = "Give only --coarse, --modes, --fixed-interface-modes, --contact-grid, --patches and --material";
+        return Err(Failure::usage("stage-casing", problem, remedy));
+    }
+    let mut options = builtin::stage_casing(arguments.coarse);
+    options.contact = grid.unwrap_or(options.contact);
+    options.patches = patches.unwrap_or(options.patches);
+    options.fixed_interface_modes = fixed_interface_modes.unwrap_or(options.fixed_interface_modes);
+    options.modes = arguments.modes.unwrap_or(options.modes);
+    options.material = material.map_or(options.material.clone(), MaterialChoice::material);
+    Ok(Reduced::general(reduction::stage_casing(&options, console)?, Some(CLAMPED)))
+}
+
 fn refuse_file_options(arguments: &ReduceArguments) -> Result<()> {
-    if arguments.coarse && arguments.model != Some(Model::Stage) {
-        return Err(Failure::usage("--coarse", "it belongs to `stage`", "Leave it out"));
+    if arguments.coarse && !matches!(arguments.model, Some(Model::Stage | Model::StageCasing)) {
+        return Err(Failure::usage("--coarse", "it belongs to `stage` and `stage-casing`", "Leave it out"));
     }
     if arguments.file == FileArguments::default() {
         return Ok(());

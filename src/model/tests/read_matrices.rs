@@ -152,7 +152,7 @@ impl Written {
 
     #[track_caller]
     fn refused(&self) -> String {
-        read_matrices(&self.files()).err().expect("the files are wrong").to_string()
+        read_matrices(&self.files()).expect_err("the files are wrong").to_string()
     }
 }
 
