@@ -247,7 +247,9 @@ fn extras(page: &mut String, rom: &Rom) {
 fn size(rom: &Rom) -> String {
     if rom.is_cyclic() {
         let (sectors, largest, order) = (rom.sectors, rom.largest_nodal_diameter(), rom.total_order());
-        return format!("{sectors} coupled sectors, nodal diameters 0 to {largest}, {order} reduced coordinates in all");
+        return format!(
+            "{sectors} coupled sectors, nodal diameters 0 to {largest}, {order} reduced coordinates in all"
+        );
     }
     let plural = if rom.sectors == 1 { "" } else { "s" };
     format!("{} sector{plural} of {} reduced coordinates each", rom.sectors, rom.order())

@@ -53,7 +53,10 @@ fn the_quick_study_of_convergence_reaches_the_limits() {
     for row in &rows {
         assert!(row[0] < enough as f64 || row[3].abs() < 0.3, "{row:?}");
     }
-    assert!(rows.iter().any(|row| (row[0] - enough as f64 + 1.0).abs() < 0.5 && row[3].abs() >= 0.3), "one fewer is not enough");
+    assert!(
+        rows.iter().any(|row| (row[0] - enough as f64 + 1.0).abs() < 0.5 && row[3].abs() >= 0.3),
+        "one fewer is not enough"
+    );
 }
 
 #[test]
