@@ -25,7 +25,7 @@ fn study(root: &Path, name: &str, more: &[&str]) -> Value {
         let svg = fs::read_to_string(out.join(figure["svg"].as_str().unwrap())).unwrap();
         assert!(svg.starts_with("<svg") && svg.ends_with("</svg>") || svg.trim_end().ends_with("</svg>"), "{figure}");
         let csv = fs::read_to_string(out.join(figure["csv"].as_str().unwrap())).unwrap();
-        assert!(csv.lines().count() > 3, "{figure}");
+        assert!(csv.lines().count() >= 3, "{figure}");
     }
     // Fig. 12 is about a range of angular velocities, of which a test asks for a few.
     let whole = |statement: &&Value| more.is_empty() || !statement["expected"].as_str().unwrap().contains("fig. 12");
@@ -53,7 +53,10 @@ fn the_quick_study_of_convergence_reaches_the_limits() {
     for row in &rows {
         assert!(row[0] < enough as f64 || row[3].abs() < 0.3, "{row:?}");
     }
-    assert!(rows.iter().any(|row| row[0] == enough as f64 - 1.0 && row[3].abs() >= 0.3), "one fewer is not enough");
+    assert!(
+        rows.iter().any(|row| (row[0] - enough as f64 + 1.0).abs() < 0.5 && row[3].abs() >= 0.3),
+        "one fewer is not enough"
+    );
 }
 
 #[test]
