@@ -118,8 +118,14 @@ fn content(rom: &Rom, key: &str) -> Vec<u8> {
 
 /// The ROM in the file; `Err(None)` where there is no file, else what is wrong with it.
 fn read(path: &Path, key: &str) -> Result<Rom, Option<String>> {
-    let bytes = fs::read(path)
-        .map_err(|error| (error.kind() != std::io::ErrorKind::NotFound).then(|| format!("cannot be read ({error})")))?;
+    let unreadable = |error: std::io::Error| {
+        (error.kind() != std::io::ErrorKind::NotFound).then(|| format!("cannot be read ({error})"))
+    };
+    // A pipe would be waited for without end.
+    if !fs::metadata(path).map_err(unreadable)?.is_file() {
+        return Err(Some("is no file".to_owned()));
+    }
+    let bytes = fs::read(path).map_err(unreadable)?;
     let damaged = || Some("is not what was kept".to_owned());
     let end = bytes.iter().position(|byte| *byte == b'\n').ok_or_else(damaged)?;
     let (first, rom) = (&bytes[..end], &bytes[end + 1..]);
@@ -251,6 +257,18 @@ mod tests {
         fs::write(&file, "").unwrap();
         let made = RomCache::at(file.join("below")).get("a", &1, &console, &|| Ok(rom(1.0)));
         assert_eq!(made, Ok(rom(1.0)));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_in_place_of_a_kept_model_is_not_waited_for() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join(format!("a-{}.rom", &key("a", &1)[..32]));
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        let (done, answer) = std::sync::mpsc::channel();
+        std::thread::spawn(move || done.send(read(&path, &key("a", &1)).unwrap_err()));
+        let answer = answer.recv_timeout(std::time::Duration::from_secs(20)).expect("an answer");
+        assert_eq!(answer.as_deref(), Some("is no file"));
     }
 
     #[test]

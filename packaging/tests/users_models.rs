@@ -247,3 +247,14 @@ fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
         }
     }
 }
+
+#[test]
+fn rigid_body_modes_of_a_free_wheel_are_no_reason_to_warn() {
+    let project = Project::new(&["sector.msh"]);
+    let line = "reduce sector.msh --contact-set TIP --clamp-set none --sectors 12 --cyclic-low LOW --cyclic-high HIGH \
+                --units mm-t-s --material steel --contact-nodes 2 --modes 25";
+    let output = project.run(line);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    assert!(!stderr.contains("(0.0 Hz)") && !stderr.contains("(-0.0 Hz)"), "{stderr}");
+}

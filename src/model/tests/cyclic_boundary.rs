@@ -92,6 +92,18 @@ fn what_is_no_pair_of_faces_is_refused() {
 }
 
 #[test]
+fn no_tolerance_pairs_the_faces_of_another_number_of_sectors() {
+    let mesh = coarse();
+    let (low, high) = (mesh.set("LOW").unwrap(), mesh.set("HIGH").unwrap());
+    for sectors in [2, 6, 8, 14] {
+        let message = CyclicBoundary::pair(&mesh.nodes, low, high, sectors, 10.0).unwrap_err().to_string();
+        assert!(message.contains("no tolerance") || message.contains("both turn onto"), "{sectors}: {message}");
+    }
+    // One pair alone has no neighbours to be told from; a tolerance that is merely wide does no harm.
+    assert!(CyclicBoundary::pair(&mesh.nodes, low, high, SECTORS, 10.0).is_ok());
+}
+
+#[test]
 fn contact_on_a_face_and_loose_structures_are_refused() {
     let mesh = coarse();
     let (faces, bore) = (boundary(&mesh, SECTORS), mesh.set("BORE").unwrap().to_vec());

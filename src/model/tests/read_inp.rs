@@ -232,3 +232,13 @@ fn gmsh_files_of_other_versions_and_kinds_are_refused() {
         assert!(message.contains(wanted) && message.starts_with("bar.msh:"), "{message}");
     }
 }
+
+#[test]
+fn two_elements_on_the_same_nodes_are_refused() {
+    // The second is numbered from another corner.
+    let text = deck().replace(ELEMENTS, &format!("{ELEMENTS}7, 20, 30, 40, 10, 60, 70, 80, 50\n"));
+    let error = read(&[("a.inp", &text)], &MeshOptions::default()).unwrap_err().to_string();
+    for part in ["a.inp:", "element 7", "element 1", "counted twice"] {
+        assert!(error.contains(part), "`{part}` is not in: {error}");
+    }
+}

@@ -278,6 +278,7 @@ fn wrong_matrices_are_refused_with_the_remedy() {
         ("empty table", k.clone(), m.clone(), "node,x,y,z\n".into(), &["no node"]),
         ("rotation", format!("{named}1,4,1,4,1.0\n"), m.clone(), table.clone(), &["degree of freedom 4", "rotations"]),
         ("unknown node", format!("{named}77,1,77,1,1.0\n"), m.clone(), table.clone(), &["node 77", "nodes.csv"]),
+        ("twice", format!("{named}1,1,1,1,1.0\n"), m.clone(), table.clone(), &["(1.1, 1.1)", "twice"]),
         ("internal", format!("{named}-1,1,1,1,1.0\n"), m.clone(), table.clone(), &["internal", "constraints"]),
     ];
     for (name, stiffness, mass, nodes, wanted) in cases {
@@ -341,4 +342,23 @@ fn another_engine_axis_turns_the_model_and_its_matrices_alike() {
     let straight = read_matrices(&written.files()).unwrap();
     let [x, y, z] = bar.model.nodes[5];
     assert_eq!(straight.model.nodes[5].map(f64::to_bits), [z, x, y].map(f64::to_bits));
+}
+
+#[test]
+fn a_matrix_of_calculix_cut_off_between_two_lines_is_noticed() {
+    let whole = std::fs::read_to_string(data("bar.sti")).unwrap();
+    let lines: Vec<&str> = whole.lines().collect();
+    let directory = tempfile::tempdir().unwrap();
+    for (count, wanted) in [(lines.len() / 2, "the list of dofs has 96"), (2 * lines.len(), "twice")] {
+        let text: String = lines.iter().cycle().take(count).flat_map(|line| [line, "\n"]).collect();
+        std::fs::write(directory.path().join("k.sti"), text).unwrap();
+        let files = MatrixFiles {
+            stiffness: directory.path().join("k.sti"),
+            dofs: Some(data("bar.dof")),
+            units: Units::MillimetreTonneSecond,
+            ..files(&data(""), "bar.sti", "bar.mas", "bar.inp")
+        };
+        let message = read_matrices(&files).unwrap_err().to_string();
+        assert!(message.contains(wanted), "{message}");
+    }
 }

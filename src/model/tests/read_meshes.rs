@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 use tiprub_model::assembly::free_dofs;
 use tiprub_model::element::{ElementKind, QuadraturePoint};
 use tiprub_model::progress::silent;
-use tiprub_model::read::{Axis, Imported, MeshOptions, Units, read_mesh, total_mass};
+use tiprub_model::read::{
+    Axis, ContactChoice, Imported, MeshOptions, Units, choose_contact_nodes, read_mesh, total_mass,
+};
 use tiprub_model::reduce::full_modes;
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::{Error, FeModel, Material};
@@ -223,4 +225,17 @@ fn another_engine_axis_turns_the_mesh_without_mirroring_it() {
 fn a_mesh_without_material_asks_for_one() {
     let error = read_mesh(&data("blade_hex8.inp"), &MeshOptions::default(), &silent).unwrap_err();
     assert!(matches!(&error, Error::Read { remedy, .. } if remedy.contains("--material")), "{error}");
+}
+
+#[test]
+fn contact_nodes_of_a_tip_one_element_thick_stand_in_its_middle() {
+    let model = imported("sector.inp").model;
+    for count in [1, 2, 3] {
+        let choice = ContactChoice { count: Some(count), ..ContactChoice::default() };
+        let chosen = choose_contact_nodes(&model.nodes, model.set("TIP").unwrap(), &choice).unwrap();
+        for point in chosen {
+            let [x, y, z] = model.nodes[point.node];
+            assert!(y.abs() < 1e-9, "{count}: {} at {x} {y} {z}", point.name);
+        }
+    }
 }

@@ -57,6 +57,7 @@ impl CyclicBoundary {
             return Err(Error::invalid("cyclic faces", problem, remedy));
         }
         check_one_to_one(&chosen.pairs)?;
+        check_spacing(nodes, if swapped { high } else { low }, worst)?;
         let mut distances = chosen.distances;
         distances.sort_by(f64::total_cmp);
         let report = PairingReport {
@@ -204,6 +205,32 @@ fn check_faces(nodes: &[[f64; 3]], low: &[usize], high: &[usize], sectors: usize
         }
     }
     Ok(())
+}
+
+/// Share of the distance of neighbouring nodes of a face beyond which a mismatch is no inaccuracy of coordinates any more.
+const MISPLACED: f64 = 0.25;
+
+/// A tolerance of one's own may be wide, but not so wide that other nodes are paired than those that fit.
+fn check_spacing(nodes: &[[f64; 3]], low: &[usize], worst: Worst) -> Result<()> {
+    let apart = |node: usize| {
+        let [x, y, z]: [f64; 3] = core::array::from_fn(|i| nodes[node][i] - nodes[worst.low][i]);
+        x.hypot(y).hypot(z)
+    };
+    let others = low.iter().copied().filter(|&node| node != worst.low);
+    let spacing = others.map(apart).fold(f64::INFINITY, f64::min);
+    if worst.distance <= MISPLACED * spacing {
+        return Ok(());
+    }
+    let problem = format!(
+        "node {} turned by one pitch misses node {} by {:.3e} m, at a distance of {spacing:.3e} m between neighbouring nodes",
+        worst.low + 1,
+        worst.high + 1,
+        worst.distance
+    );
+    refuse(
+        problem,
+        "Check the number of sectors and the axis, and mesh both faces alike: no tolerance makes up for that",
+    )
 }
 
 fn check_one_to_one(pairs: &[[usize; 2]]) -> Result<()> {

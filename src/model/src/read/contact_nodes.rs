@@ -127,7 +127,12 @@ impl Places {
     fn middle_at(&self, target: f64) -> f64 {
         let mut nearest: Vec<usize> = (0..self.along.len()).collect();
         nearest.sort_by(|&a, &b| (self.along[a] - target).abs().total_cmp(&(self.along[b] - target).abs()));
-        nearest.truncate((self.along.len() / 10).max(2));
+        // All that stand beside each other, or the middle of three would be that of two.
+        let [first, last] = extent(&self.along);
+        let away = |place: usize| (self.along[place] - target).abs();
+        let least = nearest[(self.along.len() / 10).max(2).min(nearest.len()) - 1];
+        let reach = away(least) + SAME_PLACE * (last - first);
+        nearest.retain(|&place| away(place) <= reach);
         let [low, high] = extent(&nearest.iter().map(|&place| self.across[place]).collect::<Vec<_>>());
         0.5 * (low + high)
     }

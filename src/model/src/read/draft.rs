@@ -114,6 +114,7 @@ impl Draft {
             let remedy = "Mesh the volume and export its elements: shells and faces are not computed";
             return Err(Error::Read { place: what.into(), problem: problem.into(), remedy: remedy.into() });
         }
+        self.check_overlaid()?;
         let kept: Vec<usize> = (0..self.numbers.len()).filter(|&index| used[index]).collect();
         let mut position = vec![usize::MAX; self.numbers.len()];
         kept.iter().enumerate().for_each(|(new, &old)| position[old] = new);
@@ -149,6 +150,21 @@ impl Draft {
             self.notes.push(format!("sets without a node of a solid element are left out: {}", names.join(", ")));
         }
         Ok((numbered, self.notes, self.warnings))
+    }
+
+    /// Two solids on the same nodes would count stiffness and mass of that place twice.
+    fn check_overlaid(&self) -> Result<()> {
+        let mut first: HashMap<Vec<u64>, u64> = HashMap::with_capacity(self.elements.len());
+        for element in self.elements.iter().filter(|element| element.kind.is_some()) {
+            let mut nodes = element.nodes.clone();
+            nodes.sort_unstable();
+            if let Some(other) = first.insert(nodes, element.number) {
+                let problem = format!("element {} has the nodes of element {other}", element.number);
+                let remedy = "Remove one of them: that place would be counted twice, in stiffness and in mass";
+                return Err(element.place.error(problem, remedy));
+            }
+        }
+        Ok(())
     }
 
     fn check_nodes(&self, element: &DraftElement) -> Result<()> {

@@ -40,7 +40,7 @@ pub(super) fn read_matrix(path: &Path, bytes: &[u8]) -> Result<RawMatrix> {
     let fields = lines.peek().map_or(0, |(line, _)| values(line).count());
     match fields {
         3 => counted(path, lines),
-        5 => named(lines),
+        5 => named(path, lines),
         _ => {
             let problem = "it is no matrix: lines of ROW, COLUMN, VALUE or of NODE, DOF, NODE, DOF, VALUE are wanted";
             Err(about(
@@ -134,11 +134,26 @@ fn counted<'a>(path: &Path, lines: impl Iterator<Item = (&'a str, Place)>) -> Re
             "Write the matrix again, complete",
         ));
     }
+    check_repeated(path, &items, |index| (index + 1).to_string())?;
     Ok(RawMatrix { entries: Entries { items }, labels: Labels::Counted(order) })
 }
 
+/// CalculiX and Abaqus write every entry once: one that comes again is a file that was appended to. (In Matrix Market files,
+/// entries of one place add up, as its readers have it.)
+fn check_repeated(path: &Path, items: &[(usize, usize, f64)], name: impl Fn(usize) -> String) -> Result<()> {
+    let mut places: Vec<(usize, usize)> = items.iter().map(|&(row, column, _)| (row, column)).collect();
+    places.sort_unstable();
+    match places.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(pair) => {
+            let problem = format!("entry ({}, {}) stands in it twice", name(pair[0].0), name(pair[0].1));
+            Err(about(path, problem, "Write the matrix again, into a new file"))
+        }
+        None => Ok(()),
+    }
+}
+
 /// NODE, DOF, NODE, DOF, VALUE.
-fn named<'a>(lines: impl Iterator<Item = (&'a str, Place)>) -> Result<RawMatrix> {
+fn named<'a>(path: &Path, lines: impl Iterator<Item = (&'a str, Place)>) -> Result<RawMatrix> {
     let (mut labels, mut index, mut entries) = (Vec::new(), HashMap::new(), Entries::default());
     for (line, place) in lines {
         let fields: Vec<&str> = values(line).collect();
@@ -163,6 +178,7 @@ fn named<'a>(lines: impl Iterator<Item = (&'a str, Place)>) -> Result<RawMatrix>
         let value = number(value).ok_or_else(|| wrong_line(line, &place, "NODE, DOF, NODE, DOF, VALUE"))?;
         entries.items.push((row, column, value));
     }
+    check_repeated(path, &entries.items, |index| format!("{}.{}", labels[index].0, labels[index].1))?;
     Ok(RawMatrix { entries, labels: Labels::Named(labels) })
 }
 

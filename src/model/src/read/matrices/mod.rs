@@ -176,9 +176,10 @@ fn located(path: &Path, dofs: Option<&[(u64, u64)]>, rows: &Rows<'_>) -> Result<
             labels.iter().map(|&(node, component)| rows.dof(path, node, component)).collect::<Result<Vec<_>>>()?
         }
         (Labels::Counted(order), Some(dofs)) => {
-            if order > dofs.len() {
+            if order != dofs.len() {
                 let problem = format!("{order} rows, but the list of dofs has {}", dofs.len());
-                return Err(about(path, problem, "Give the .dof file of the same run: --dofs"));
+                let remedy = "Give the .dof file of the same run (--dofs), and the matrix whole";
+                return Err(about(path, problem, remedy));
             }
             dofs.iter().map(|&(node, component)| rows.dof(path, node, component)).collect::<Result<Vec<_>>>()?
         }
