@@ -339,7 +339,10 @@ fn solvable_friction(rom: &Rom, models: &[ModalModel]) -> Option<f64> {
             stability::check_solvable(&models[0], Scheme::ModalExact, step, friction, &senses).is_ok()
         }
     };
-    (0..=FRICTION_STEPS).map(|step| f64::from(step) / FRICTION_STEPS_PER_UNIT).take_while(|friction| solvable(*friction)).last()
+    (0..=FRICTION_STEPS)
+        .map(|step| f64::from(step) / FRICTION_STEPS_PER_UNIT)
+        .take_while(|friction| solvable(*friction))
+        .last()
 }
 
 /// Normal and slip direction of every contact node against a round casing: inwards along the contour's normal, and
