@@ -65,6 +65,8 @@ struct Run {
     largest_force: f64,
     stepping: std::time::Duration,
     internal_steps: u64,
+    /// What the simulation warned of, such as flutter of closed contact.
+    warnings: Vec<String>,
 }
 
 impl Setup {
@@ -127,6 +129,7 @@ impl Setup {
             largest_force: 0.0,
             stepping: std::time::Duration::ZERO,
             internal_steps: 0,
+            warnings: Vec::new(),
         };
         let stride = self.schedule.count.div_ceil(MOST_POINTS).max(1);
         for index in 0..=self.schedule.count {
@@ -166,6 +169,7 @@ impl Setup {
             }
             run.stepping += clock.elapsed();
         }
+        run.warnings = simulation.warnings().to_vec();
         Ok(run)
     }
 }
@@ -329,6 +333,7 @@ fn statements(setup: &Setup, runs: &[Run], shown: &Run) -> Vec<Statement> {
     };
     let (largest, fast) = (over(0.0), over(setup.critical_speed()));
     let energy = runs.iter().map(|run| run.energy_residual).fold(0.0, f64::max);
+    let warned = warnings(runs);
     vec![
         Statement::tested(
             "The oval casing closes the clearance: blade 1 comes into contact (fig. 11)",
@@ -373,6 +378,7 @@ fn statements(setup: &Setup, runs: &[Run], shown: &Run) -> Vec<Statement> {
             energy < 1e-9,
             format!("largest residual {energy:.1e} of the energy exchanged"),
         ),
+        Statement::remark("Warnings of the runs", if warned.is_empty() { "none".into() } else { warned.join("; ") }),
     ]
 }
 
@@ -401,7 +407,17 @@ pub fn study(arguments: &StudyArguments, console: &Console) -> Result<Study> {
             },
         )?
     };
-    report(&setup, &runs, quick)
+    let study = report(&setup, &runs, quick)?;
+    console.warn(&warnings(&runs));
+    Ok(study)
+}
+
+/// Every warning once, whichever run it came from.
+fn warnings(runs: &[Run]) -> Vec<String> {
+    let mut all: Vec<String> = runs.iter().flat_map(|run| run.warnings.iter().cloned()).collect();
+    all.sort();
+    all.dedup();
+    all
 }
 
 fn report(setup: &Setup, runs: &[Run], quick: bool) -> Result<Study> {
@@ -461,6 +477,7 @@ fn report(setup: &Setup, runs: &[Run], quick: bool) -> Result<Study> {
             "critical_speed": critical,
             "first_frequency_of_nodal_diameter_2": setup.frequency,
             "load_amplitude": setup.amplitude,
+            "warnings": warnings(runs),
             "speeds": runs.iter().map(|run| run.speed).collect::<Vec<_>>(),
             "internal_steps": steps,
             "stepping_seconds": stepping,
