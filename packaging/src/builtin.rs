@@ -58,6 +58,15 @@ pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom
     })
 }
 
+/// Name and options of the bladed disk of the stage, of the paper's size or coarse.
+pub fn stage(coarse: bool) -> (&'static str, StageOptions) {
+    if coarse {
+        (STAGE_COARSE, StageOptions { modes: ModeSelection::Families(12), ..StageOptions::coarse() })
+    } else {
+        (STAGE, StageOptions::default())
+    }
+}
+
 /// The bladed disk of the stage, of the paper's size or coarse.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiskModel {
@@ -68,12 +77,8 @@ pub struct DiskModel {
 impl DiskModel {
     /// What is reduced; nothing is done yet.
     pub fn new(coarse: bool) -> Self {
-        if coarse {
-            let options = StageOptions { modes: ModeSelection::Families(12), ..StageOptions::coarse() };
-            Self { name: STAGE_COARSE, options }
-        } else {
-            Self { name: STAGE, options: StageOptions::default() }
-        }
+        let (name, options) = stage(coarse);
+        Self { name, options }
     }
 
     /// The reduction, and the mesh of one sector.

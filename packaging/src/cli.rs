@@ -100,7 +100,7 @@ pub struct DemoArguments {
 #[derive(Debug, Args)]
 pub struct ReduceArguments {
     /// What to reduce: `rotor37`, the NASA rotor 37 blade that ships with tiprub; `casing`, a ring around it; `stage`, a
-    /// disk with 56 blades; or a mesh file of your own: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh).
+    /// disk with 56 blades; `stage-casing`, the casing around that; or a mesh file of your own: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh).
     #[arg(value_name = "MODEL", value_parser = model, required_unless_present = "stiffness")]
     pub model: Option<Model>,
     /// Number of modes kept: fixed-interface modes of a blade [default: 20 of rotor37, 25 of a file and of the stage, there per nodal diameter], modes of the
@@ -108,7 +108,7 @@ pub struct ReduceArguments {
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
     /// Number of contact nodes: along the tip chord of `rotor37`, leading edge to trailing edge (≥ 2); of a file, chosen
-    /// evenly along the axis out of the contact set.
+    /// evenly along the chord out of the contact set.
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
     /// Elements: of the blade along the chord, through the thickness and along the span [default: 16x2x20]; of the

@@ -15,7 +15,7 @@ use crate::{Failure, Result};
 
 /// Friction coefficients for which solvability is tried, ascending.
 const FRICTION_STEPS: u32 = 40;
-const FRICTION_STEP: f64 = 0.05;
+const FRICTION_STEPS_PER_UNIT: f64 = 20.0;
 
 /// Modes that a warning of the checks is about: those that blade-tip contact excites most. Of coupled sectors the first
 /// family: as many modes of the wheel as there are sectors.
@@ -345,7 +345,10 @@ fn solvable_friction(rom: &Rom, models: &[ModalModel]) -> Option<f64> {
             stability::check_solvable(&models[0], Scheme::ModalExact, step, friction, &senses).is_ok()
         }
     };
-    (0..=FRICTION_STEPS).map(|step| f64::from(step) * FRICTION_STEP).take_while(|friction| solvable(*friction)).last()
+    (0..=FRICTION_STEPS)
+        .map(|step| f64::from(step) / FRICTION_STEPS_PER_UNIT)
+        .take_while(|friction| solvable(*friction))
+        .last()
 }
 
 /// Normal and slip direction of every contact node against a round casing: inwards along the contour's normal, and

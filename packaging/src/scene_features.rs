@@ -44,6 +44,10 @@ fn of_structure(structure: &StructureSettings, rom: &Rom, found: &mut Vec<String
         let high = factors.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         found.push(format!("`{name}` is mistuned: frequency factors {low} to {high}"));
     }
+    if rom.is_cyclic() {
+        let (sectors, largest) = (rom.sectors, rom.largest_nodal_diameter());
+        found.push(format!("the {sectors} sectors of `{name}` are coupled: nodal diameters 0 to {largest}"));
+    }
     if let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) {
         found.push(format!("`{name}` heats up: temperatures of {} patches are inputs", thermal.patches.len()));
     }
@@ -88,6 +92,7 @@ pub fn limits(scene: &Scene) -> Vec<String> {
     let any = |test: fn(&ContactSettings) -> bool| settings.contacts.iter().any(test);
     let flexible = settings.surfaces.iter().any(|surface| surface.structure.is_some());
     let stiffens = settings.structures.iter().any(|structure| structure.spin.stiffening);
+    let coupled = scene.roms.iter().any(Rom::is_cyclic);
     let whirls = settings.structures.iter().any(|structure| structure.whirl || structure.axial_shift);
     let choose = |first: bool, one: &'static str, other: &'static str| if first { one } else { other };
     let mut limits = vec![
@@ -104,11 +109,7 @@ pub fn limits(scene: &Scene) -> Vec<String> {
              contact.",
             "The casing is a rigid surface of the given shape, parallel to the contour of the blade tips.",
         ),
-        choose(
-            stiffens,
-            "Blades stand on a rigid hub and are not coupled to each other; speed stiffens them as fitted in their model.",
-            "Blades stand on a rigid hub and are not coupled to each other; speed does not stiffen them.",
-        ),
+        blades(coupled, stiffens),
         "Forces and torques are means over the communication step, so that the momentum handed over is exact; the force \
          at an instant of impact grows as 1/h.",
         "Sliding friction can make the structure itself flutter; a scheme that would add growth of its own is refused.",
@@ -130,8 +131,25 @@ pub fn limits(scene: &Scene) -> Vec<String> {
     limits.into_iter().map(String::from).collect()
 }
 
+/// What holds the blades together, and what speed does to them. Coupled blades are refused with stiffening.
+fn blades(coupled: bool, stiffens: bool) -> &'static str {
+    match (coupled, stiffens) {
+        (true, _) => {
+            "Blades are coupled by their disk; all sectors are equal, and speed neither stiffens them nor brings Coriolis \
+             forces."
+        }
+        (false, true) => {
+            "Blades stand on a rigid hub and are not coupled to each other; speed stiffens them as fitted in their model."
+        }
+        (false, false) => "Blades stand on a rigid hub and are not coupled to each other; speed does not stiffen them.",
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use nalgebra::DMatrix;
+    use tiprub_core::rom::{Frame, Harmonic, RomChecks, RomExtras};
+
     use super::*;
     use crate::scene_source::ROTOR37_SCENE;
 
@@ -165,5 +183,36 @@ mod tests {
             assert!(!text.contains(wrong), "{wrong}: {text}");
         }
         assert!(text.contains("sticks and slides") && text.contains("no inertia forces"), "{text}");
+    }
+
+    fn two_sectors(coupled: bool) -> Rom {
+        let pencil = Harmonic {
+            mass: DMatrix::identity(1, 1),
+            stiffness: DMatrix::identity(1, 1),
+            contact_map: DMatrix::zeros(0, 1),
+        };
+        Rom {
+            name: "pair".into(),
+            origin: String::new(),
+            sectors: 2,
+            frame: Frame::Cylindrical,
+            mass: DMatrix::identity(1, 1),
+            stiffness: DMatrix::identity(1, 1),
+            contact_map: DMatrix::zeros(0, 1),
+            contact_nodes: Vec::new(),
+            damping_ratio: 0.0,
+            checks: RomChecks::default(),
+            extras: RomExtras { harmonics: if coupled { vec![pencil] } else { Vec::new() }, ..RomExtras::default() },
+        }
+    }
+
+    #[test]
+    fn coupled_blades_are_not_said_to_stand_alone() {
+        for coupled in [false, true] {
+            let scene = scene(|scene| scene.roms = vec![two_sectors(coupled)]);
+            assert_eq!(limits(&scene).concat().contains("not coupled"), !coupled);
+            assert_eq!(limits(&scene).len(), 7);
+            assert_eq!(features(&scene).concat().contains("are coupled: nodal diameters 0 to 1"), coupled);
+        }
     }
 }

@@ -191,7 +191,8 @@ fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
 }
 
 fn scene_text(settings: &SceneSettings) -> String {
-    let mut text = format!("scene {}: {}\n", settings.name, settings.description);
+    let colon = if settings.description.is_empty() { "" } else { ": " };
+    let mut text = format!("scene {}{colon}{}\n", settings.name, settings.description);
     for structure in &settings.structures {
         let motion = match structure.motion {
             Motion::Rotating => {

@@ -8,7 +8,7 @@ use tiprub_model::{
     casing::{CLAMPED, Support},
     cyclic::ModeSelection,
     rotor37::MeshCounts,
-    stage::{StageOptions, sector_mesh},
+    stage::sector_mesh,
 };
 
 use crate::{
@@ -140,11 +140,12 @@ fn stage(arguments: &ReduceArguments, console: &Console) -> Result<Reduced> {
         let remedy = "Leave out --mesh, --spin and what `tiprub reduce --help` lists as options of `casing`";
         return Err(Failure::usage("stage", "an option given describes another model", remedy));
     }
-    let mut options = if arguments.coarse { StageOptions::coarse() } else { StageOptions::default() };
+    let (name, mut options) = builtin::stage(arguments.coarse);
     options.contact_nodes = arguments.contact_nodes.unwrap_or(options.contact_nodes);
     options.modes = arguments.modes.map_or(options.modes, ModeSelection::Families);
     let sector = sector_mesh(&options.sector).map_err(|error| reduction::failure("stage", error))?;
-    let reduced = reduction::stage(&options, console)?;
+    let mut reduced = reduction::stage(&options, console)?;
+    name.clone_into(&mut reduced.rom.name);
     let (nodes, mesh) = (sector.mesh.nodes.len(), Some((sector.mesh, options.material)));
     Ok(Reduced::cyclic(reduced, mesh, nodes, Some("CLAMPED"), ["CYCLIC_LOW", "CYCLIC_HIGH"]))
 }

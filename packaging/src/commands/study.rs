@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::{
-    Result,
+    Failure, Result,
     builtin::DiskModel,
     cli::{StudyArguments, StudyChoice},
     console::{Console, Outcome},
@@ -15,6 +15,7 @@ use crate::{
 /// # Errors
 /// A run that fails, or files that cannot be written.
 pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
+    refuse_other_options(arguments)?;
     let quick = arguments.quick;
     let (name, study) = match arguments.study {
         StudyChoice::Convergence => {
@@ -29,4 +30,46 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
     };
     let directory = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("study-{name}")));
     study::output::write(&study, &directory)
+}
+
+/// Options of another study would be passed over in silence.
+fn refuse_other_options(arguments: &StudyArguments) -> Result<()> {
+    let asked = arguments.study;
+    let given = [
+        ("--speed", arguments.speed.is_some(), StudyChoice::Modes, "modes"),
+        ("--speeds", arguments.speeds.is_some(), StudyChoice::Stage, "stage"),
+        ("--threads", arguments.threads.is_some(), StudyChoice::Stage, "stage"),
+    ];
+    match given.into_iter().find(|(_, given, study, _)| *given && *study != asked) {
+        Some((option, _, _, name)) => {
+            Err(Failure::usage(option, format!("it belongs to `study {name}`"), "Leave it out"))
+        }
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::cli::{Cli, Command};
+
+    #[test]
+    fn options_of_another_study_are_refused() {
+        for (line, wrong) in [
+            ("modes --speed 900", None),
+            ("stage --speeds 400:900:3 --threads 1", None),
+            ("modes --speeds 400:900:3", Some("--speeds")),
+            ("stage --speed 900", Some("--speed")),
+            ("convergence --threads 2", Some("--threads")),
+        ] {
+            let words = ["tiprub", "study"].into_iter().chain(line.split(' '));
+            let Ok(Cli { command: Command::Study(arguments), .. }) = Cli::try_parse_from(words) else {
+                panic!("{line}")
+            };
+            let refused = refuse_other_options(&arguments).err().map(|failure| failure.what);
+            assert_eq!(refused.as_deref(), wrong, "{line}");
+        }
+    }
 }

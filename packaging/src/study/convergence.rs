@@ -104,10 +104,10 @@ impl Criterion {
         let last = rows.last().map_or(f64::NAN, |row| self.worst(row));
         let found = match self.enough(rows) {
             Some(row) => format!(
-                "{} from {} component modes per nodal diameter on ({} of the wheel); {last:.2e} % with all of them",
-                self.title, row.modes, row.total_modes
+                "below from {} per nodal diameter on ({} component modes of the wheel); at most {last:.2e} % with all of them",
+                row.modes, row.total_modes
             ),
-            None => format!("{} still {last:.3} % with the most component modes", self.title),
+            None => format!("still {last:.3} % with the most component modes"),
         };
         let expected = format!("each of the {MODES} lowest modes below {} %", self.limit);
         Statement::tested(format!("{}: {expected}", self.title), self.enough(rows).is_some(), found)

@@ -54,8 +54,9 @@ fn diagram(diameters: &[NodalDiameter], sectors: usize, speed: f64) -> Result<Fi
     let turns = speed / std::f64::consts::TAU;
     let kept = |diameter: &NodalDiameter| diameter.full_frequencies.iter().take(FAMILIES).copied().collect::<Vec<_>>();
     let top = diameters.iter().flat_map(kept).fold(0.0, f64::max) * 1.05;
+    let drawn = diameters.iter().map(|diameter| kept(diameter).len()).max().unwrap_or(0);
     let mut series = Vec::new();
-    for family in 0..FAMILIES {
+    for family in 0..drawn {
         let points = diameters
             .iter()
             .filter_map(|diameter| Some((diameter.number as f64, *diameter.full_frequencies.get(family)?)));
@@ -98,7 +99,7 @@ fn diagram(diameters: &[NodalDiameter], sectors: usize, speed: f64) -> Result<Fi
     Ok(Figure {
         name: "interference",
         caption: format!(
-            "Natural frequencies at rest against nodal diameter, first {FAMILIES} at each, and the engine orders at {speed:.1} \
+            "Natural frequencies at rest against nodal diameter, first {drawn} at each, and the engine orders at {speed:.1} \
              rad/s. What stands still and has k waves around shakes the blades at k times the speed, in the nodal diameter k; \
              beyond half the number of sectors the line is folded back. A mode on the line is resonant. The frequencies are \
              those of the disk turning without centrifugal and gyroscopic effects, in its own frame."

@@ -31,7 +31,9 @@ const QUICK_COUNT: usize = 5;
 const SHOWN: [usize; 2] = [2, 4];
 /// Points of one curve that are kept.
 const MOST_POINTS: usize = 1000;
-/// Deepest penetration, as a share of the clearance, that still counts as none.
+/// Nodal diameters below this share of the largest amplitude are not drawn.
+const SILENT: f64 = 1e-4;
+/// Largest clearance, as a share of the clearance at rest, that counts as contact.
 const PENETRATION: f64 = 1e-6;
 
 /// What is asked of one stage.
@@ -63,6 +65,8 @@ struct Run {
     largest_force: f64,
     stepping: std::time::Duration,
     internal_steps: u64,
+    /// What the simulation warned of, such as flutter of closed contact.
+    warnings: Vec<String>,
 }
 
 impl Setup {
@@ -125,6 +129,7 @@ impl Setup {
             largest_force: 0.0,
             stepping: std::time::Duration::ZERO,
             internal_steps: 0,
+            warnings: Vec::new(),
         };
         let stride = self.schedule.count.div_ceil(MOST_POINTS).max(1);
         for index in 0..=self.schedule.count {
@@ -164,6 +169,7 @@ impl Setup {
             }
             run.stepping += clock.elapsed();
         }
+        run.warnings = simulation.warnings().to_vec();
         Ok(run)
     }
 }
@@ -275,8 +281,11 @@ fn waterfall_figure(setup: &Setup, runs: &[Run], nodal_diameter: usize) -> Figur
 fn amplitude_figure(setup: &Setup, runs: &[Run]) -> Result<Figure> {
     let diameters = runs.first().map_or(0, |run| run.amplitudes.len());
     let value = |run: &Run, number: usize| run.effective(number, setup.schedule.start + setup.ramp);
-    let shown = [0, 1, 2, 3, 4].into_iter().filter(|number| *number < diameters);
-    let series = shown.map(|number| {
+    let most = |number: usize| runs.iter().map(|run| value(run, number)).fold(0.0, f64::max);
+    let largest = (0..diameters).map(most).fold(0.0, f64::max);
+    let (shown, silent): (Vec<usize>, Vec<usize>) =
+        (0..diameters.min(5)).partition(|number| most(*number) > SILENT * largest);
+    let series = shown.into_iter().map(|number| {
         let points = runs.iter().map(|run| (run.speed, 1e6 * value(run, number))).collect();
         Series::line(format!("nodal diameter {number}"), points)
     });
@@ -295,12 +304,15 @@ fn amplitude_figure(setup: &Setup, runs: &[Run]) -> Result<Figure> {
         row.extend([run.touching(), run.largest_force, run.least_clearance]);
         sheet.rows.push(row);
     }
-    Ok(Figure {
-        name: "amplitudes",
-        caption: "Effective amplitude (root mean square once the load is there) of the nodal diameters against angular velocity.".into(),
-        picture: Picture::plot(&plot)?,
-        sheet,
-    })
+    let mut caption =
+        "Effective amplitude (root mean square once the load is there) of the nodal diameters against angular velocity.".to_owned();
+    if !silent.is_empty() {
+        let silent = silent.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+        caption.push_str(&format!(
+            " Not drawn, below {SILENT:e} of the largest: nodal diameters {silent}; the numbers are whole."
+        ));
+    }
+    Ok(Figure { name: "amplitudes", caption, picture: Picture::plot(&plot)?, sheet })
 }
 
 fn statements(setup: &Setup, runs: &[Run], shown: &Run) -> Vec<Statement> {
@@ -321,6 +333,7 @@ fn statements(setup: &Setup, runs: &[Run], shown: &Run) -> Vec<Statement> {
     };
     let (largest, fast) = (over(0.0), over(setup.critical_speed()));
     let energy = runs.iter().map(|run| run.energy_residual).fold(0.0, f64::max);
+    let warned = warnings(runs);
     vec![
         Statement::tested(
             "The oval casing closes the clearance: blade 1 comes into contact (fig. 11)",
@@ -328,7 +341,7 @@ fn statements(setup: &Setup, runs: &[Run], shown: &Run) -> Vec<Statement> {
             format!(
                 "smallest clearances of its nodes at {:.1} rad/s: {} of the clearance at rest",
                 shown.speed,
-                least.iter().map(|value| format!("{:.2e}", value / gap)).collect::<Vec<_>>().join(", ")
+                least.iter().map(|value| format!("{:.3}", value / gap)).collect::<Vec<_>>().join(", ")
             ),
         ),
         Statement::tested(
@@ -336,12 +349,12 @@ fn statements(setup: &Setup, runs: &[Run], shown: &Run) -> Vec<Statement> {
             touched == runs.len(),
             format!("at {touched} of {} angular velocities", runs.len()),
         ),
-        Statement::tested(
-            "Residual penetrations are insignificant (fig. 11)",
-            deepest <= PENETRATION * gap,
+        Statement::remark(
+            "Residual penetrations (fig. 11)",
             format!(
-                "deepest at any communication point of any run: {deepest:.2e} m, {:.1e} of the clearance",
-                deepest / gap
+                "deepest reported at any communication point of any run: {deepest} m. The solver lcp closes every gap of a step \
+                 exactly, so this is no measurement; what the turning of a flexible casing's normal within a step leaves is in \
+                 the chapter Validation"
             ),
         ),
         Statement::tested(
@@ -365,6 +378,7 @@ fn statements(setup: &Setup, runs: &[Run], shown: &Run) -> Vec<Statement> {
             energy < 1e-9,
             format!("largest residual {energy:.1e} of the energy exchanged"),
         ),
+        Statement::remark("Warnings of the runs", if warned.is_empty() { "none".into() } else { warned.join("; ") }),
     ]
 }
 
@@ -393,7 +407,17 @@ pub fn study(arguments: &StudyArguments, console: &Console) -> Result<Study> {
             },
         )?
     };
-    report(&setup, &runs, quick)
+    let study = report(&setup, &runs, quick)?;
+    console.warn(&warnings(&runs));
+    Ok(study)
+}
+
+/// Every warning once, whichever run it came from.
+fn warnings(runs: &[Run]) -> Vec<String> {
+    let mut all: Vec<String> = runs.iter().flat_map(|run| run.warnings.iter().cloned()).collect();
+    all.sort();
+    all.dedup();
+    all
 }
 
 fn report(setup: &Setup, runs: &[Run], quick: bool) -> Result<Study> {
@@ -453,6 +477,7 @@ fn report(setup: &Setup, runs: &[Run], quick: bool) -> Result<Study> {
             "critical_speed": critical,
             "first_frequency_of_nodal_diameter_2": setup.frequency,
             "load_amplitude": setup.amplitude,
+            "warnings": warnings(runs),
             "speeds": runs.iter().map(|run| run.speed).collect::<Vec<_>>(),
             "internal_steps": steps,
             "stepping_seconds": stepping,
