@@ -38,7 +38,7 @@ fn nested_dissection_beats_minimum_degree_on_a_block() {
         [Ordering::NestedDissection, Ordering::MinimumDegree].map(|ordering| entries(&matrix.pattern, ordering));
     println!("entries of the factor: {dissected} dissected, {minimum} by minimum degree");
     assert!((dissected as f64) < 0.75 * minimum as f64, "{dissected} against {minimum}");
-    // George's order of a 20 x 20 x 20 grid of nodes; nobody's cut may be far from the planes that he takes.
+    // A matrix of this size is dissected unasked.
     assert_eq!(entries(&matrix.pattern, Ordering::Automatic), dissected);
 }
 
@@ -100,7 +100,7 @@ fn the_order_is_a_permutation_whatever_the_graph() {
         order.sort_unstable();
         assert!(order.iter().copied().eq(0..pattern.order()), "{name}");
     }
-    // A chain of n needs 2n - 1 entries and hardly more; postordering keeps a star without fill.
+    // A star has no fill when its centre comes last.
     let fill = entries(&star, Ordering::NestedDissection);
     assert!(fill < 2 * 500, "{fill}");
 }

@@ -3,8 +3,12 @@
 
 pub mod carpenter;
 pub mod closed;
+#[cfg(feature = "cube")]
 pub mod compare;
+#[cfg(feature = "cube")]
 pub mod cube;
+#[cfg(feature = "cube")]
 pub mod methods;
 pub mod paper;
+#[cfg(feature = "cube")]
 pub mod surface;

@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p tiprub-reference --example cube -- WHAT DIRECTORY [lumped|consistent]` with WHAT one of
 //! `figures` (methods a, b, c at 100 m/s), `energy` (50 m/s), `convergence` (in h), `outside` (a CalculiX `.dat` file, given
-//! as third argument, beside our methods) and `files` (matrices and node tables).
+//! as third argument, beside our methods; a fourth one is its contact stiffness in Pa/m, to allow for its penetration) and `files` (matrices and node tables).
 
 mod outside;
 mod plot;
@@ -29,7 +29,10 @@ fn main() {
         "figures" => figures(&directory, mass),
         "energy" => energy(&directory),
         "convergence" => tables::convergence(mass),
-        "outside" => outside::compare(rest.first().expect("the CalculiX .dat file")),
+        "outside" => {
+            let stiffness = rest.get(1).map_or(f64::INFINITY, |text| text.parse().expect("a stiffness in Pa/m"));
+            outside::compare(&directory, rest.first().expect("the CalculiX .dat file"), stiffness);
+        }
         "files" => files(&directory),
         other => panic!("`{other}` is none of figures, energy, convergence, outside, files"),
     }

@@ -99,13 +99,14 @@ pub fn convergence(mass: Mass) {
     // Node 1 has left the rings by then.
     let end = 5e-4;
     let explicit: &[(f64, usize)] = match mass {
-        Mass::Lumped => &[(8e-7, 1), (4e-7, 5), (2e-7, 10), (1e-7, 20), (5e-8, 40)],
+        Mass::Lumped => &[(8e-7, 1), (4e-7, 5), (2e-7, 10), (1e-7, 20), (5e-8, 40), (2.5e-8, 80)],
         Mass::Consistent => &[(4e-7, 5), (2e-7, 10)],
     };
     let film = Method::Film(Default::default());
     let film: Vec<History> = explicit.iter().map(|(h, stride)| run(film, setting, *h, end, *stride)).collect();
-    let implicit: Vec<History> =
-        [(2e-6, 1), (1e-6, 2), (5e-7, 4)].map(|(h, stride)| run(Method::Bipotential, setting, h, end, stride)).into();
+    let implicit: Vec<History> = [(2e-6, 1), (1e-6, 2), (5e-7, 4), (2.5e-7, 8)]
+        .map(|(h, stride)| run(Method::Bipotential, setting, h, end, stride))
+        .into();
     let stiff = penalty::Options { stiffness: 5e9, ..penalty::Options::default() };
     let mut others: Vec<History> = [(2e-6, 1), (1e-6, 2)]
         .map(|(h, stride)| run(Method::Augmented(Default::default()), setting, h, end, stride))
