@@ -21,7 +21,7 @@ pub struct FileArguments {
     #[arg(long, value_name = "SET")]
     pub clamp_set: Vec<String>,
     /// Names of the contact nodes, by growing z [default: tip_1,tip_2,...].
-    #[arg(long, value_name = "NAME,NAME,...", value_delimiter = ',')]
+    #[arg(long, value_name = "NAME,NAME,...", value_delimiter = ',', value_parser = identifier)]
     pub contact_names: Vec<String>,
     /// Number of equal sectors around the axis. Without cyclic faces: blades that know nothing of each other [default: 1].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
@@ -70,7 +70,7 @@ pub struct FileArguments {
     #[arg(long, value_name = "RATIO", value_parser = share)]
     pub damping: Option<f64>,
     /// Name of the structure [default: that of the file].
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = model_name)]
     pub name: Option<String>,
 }
 
@@ -148,6 +148,23 @@ fn poisson(text: &str) -> Result<f64, String> {
         Ok(value) if value > -1.0 && value < 0.5 => Ok(value),
         _ => Err("give a number above -1 and below 0.5".into()),
     }
+}
+
+/// Part of variable names.
+fn identifier(text: &str) -> Result<String, String> {
+    let starts_well = text.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
+    if starts_well && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
+        return Ok(text.to_owned());
+    }
+    Err("use letters, digits and underscores, not starting with a digit: it becomes part of variable names".into())
+}
+
+/// Part of a file name.
+fn model_name(text: &str) -> Result<String, String> {
+    if text.is_empty() || text.contains(['/', '\\']) || text.starts_with('.') {
+        return Err("give a plain name; where the ROM file goes is what -o says".into());
+    }
+    Ok(text.to_owned())
 }
 
 fn share(text: &str) -> Result<f64, String> {

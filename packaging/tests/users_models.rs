@@ -230,6 +230,8 @@ fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
         (2, format!("reduce bar.inp {bar} --young 1e11"), &["--poisson"]),
         (2, format!("reduce bar.inp {bar} --material steel --contour 0:1,1:1"), &["casing"]),
         (2, "reduce rotor37 --contact-set TIP".into(), &["one's own"]),
+        (2, format!("reduce bar.inp {bar} --material steel --name ../up"), &["plain name"]),
+        (2, format!("reduce bar.inp {bar} --material steel --contact-names a-b"), &["variable names"]),
         (2, format!("reduce bar.inp {bar} --stiffness bar.sti"), &["--mass"]),
         (2, format!("reduce --stiffness bar.sti --mass bar.mas {bar}"), &["--nodes", "mesh file"]),
         (2, format!("reduce bar.inp {bar} --stiffness bar.sti --mass bar.mas --material steel"), &["matrices hold their material"]),
