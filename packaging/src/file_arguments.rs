@@ -60,7 +60,7 @@ pub struct FileArguments {
     /// Mass matrix, in the same format.
     #[arg(long, value_name = "FILE", requires = "stiffness")]
     pub mass: Option<PathBuf>,
-    /// Table of nodes of the matrices: NODE,X,Y,Z[,SETS], instead of a mesh file.
+    /// Table of nodes of the matrices: `NODE,X,Y,Z[,SETS]`, instead of a mesh file.
     #[arg(long, value_name = "FILE", requires = "stiffness")]
     pub nodes: Option<PathBuf>,
     /// CalculiX's list of degrees of freedom [default: the stiffness file with the extension .dof].

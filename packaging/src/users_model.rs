@@ -5,14 +5,17 @@ use std::{cell::RefCell, fmt::Write as _, path::Path};
 use serde_json::{Value, json};
 use tiprub_core::{Rom, rom::Frame};
 use tiprub_model::{
-    FeModel, Reduction, casing,
+    CasingOptions, FeModel, Material, Reduction,
+    casing::{self, CasingReductionOptions, GridNodes},
     cyclic::{CyclicBoundary, CyclicOptions, ModeSelection, PairingReport, reduce_cyclic},
+    element::Formulation,
     read::{
         ContactChoice, Imported, MatrixFiles, MeshOptions, bounding_box, choose_contact_nodes, plausibility,
         read_matrices, read_mesh, set_counts, total_mass,
     },
     reduce::{ContactPoint, ReductionOptions},
-    reduce_model,
+    reduce_casing, reduce_model,
+    thermal::equal_patches,
 };
 
 use crate::{
@@ -45,6 +48,8 @@ struct Chosen {
     clamped: Vec<usize>,
     contact: Vec<ContactPoint>,
     faces: Option<(CyclicBoundary, PairingReport)>,
+    /// Contact nodes of a casing.
+    grid: Option<GridNodes>,
 }
 
 /// Read, choose, reduce.
@@ -65,9 +70,13 @@ pub fn reduce(arguments: &ReduceArguments, console: &Console) -> Result<Reduced>
     if let Some((mesh, _)) = model.mesh.as_mut().filter(|_| clamped.is_some()) {
         mesh.sets.insert(CLAMPED.to_owned(), chosen.clamped.clone());
     }
-    let mut reduced = match &chosen.faces {
-        None => Reduced::general(general(arguments, model, &chosen, name, console)?, clamped),
-        Some((boundary, _)) => cyclic(arguments, model, &chosen, boundary, name, console)?,
+    let mut reduced = match (&chosen.faces, &chosen.grid) {
+        (_, Some(grid)) => {
+            let reduction = ring(arguments, model, &imported.materials, &chosen.clamped, grid, name, console)?;
+            Reduced::general(reduction, clamped)
+        }
+        (None, None) => Reduced::general(general(arguments, model, &chosen, name, console)?, clamped),
+        (Some((boundary, _)), None) => cyclic(arguments, model, &chosen, boundary, name, console)?,
     };
     let notes = core::mem::take(&mut reduced.read.0);
     reduced.read = read;
@@ -101,6 +110,41 @@ fn general(
         // The matrices are handed over, not copied.
         let model = model.take().ok_or_else(|| tiprub_model::Error::invalid("model", "it is reduced already", ""))?;
         reduce_model(model, &chosen.clamped, &chosen.contact, &options, arguments.spin, listener)
+    })
+}
+
+/// A casing whose contact nodes form a grid.
+fn ring(
+    arguments: &ReduceArguments,
+    model: FeModel,
+    materials: &[Material],
+    clamped: &[usize],
+    grid: &GridNodes,
+    name: String,
+    console: &Console,
+) -> Result<Reduction> {
+    let asked = &arguments.casing;
+    let (Some((mesh, material)), [_]) = (model.mesh, materials) else {
+        let problem = "a casing is reduced from a mesh of one material";
+        return Err(Failure::usage("--contact-grid", problem, "Give a mesh file whose elements share one material"));
+    };
+    let [low, high] = bounding_box(&mesh.nodes);
+    let [around, along] = asked.patches.unwrap_or([0, 0]);
+    let patches = equal_patches(around, along, [low[2], high[2]]);
+    let title = format!("Reducing {name}");
+    let defaults = CasingOptions::default();
+    let options = CasingReductionOptions {
+        name,
+        formulation: Formulation::Displacement,
+        fixed_interface_modes: asked.fixed_interface_modes.unwrap_or(defaults.fixed_interface_modes),
+        modes: arguments.modes.unwrap_or(defaults.modes),
+        checked_modes: CHECKED_MODES,
+        damping_ratio: arguments.file.damping.unwrap_or(DAMPING),
+    };
+    let mesh = RefCell::new(Some(mesh));
+    with_progress(&title, console, &|listener| {
+        let mesh = mesh.take().ok_or_else(|| tiprub_model::Error::invalid("model", "it is reduced already", ""))?;
+        reduce_casing(mesh, &material, clamped, grid, &patches, &options, listener)
     })
 }
 
@@ -152,9 +196,18 @@ fn choose(imported: &Imported, arguments: &ReduceArguments) -> Result<Chosen> {
         let problem = "all of its nodes are clamped or lie on the faces to the neighbours";
         return Err(Failure::new(format!("--contact-set {contact_set}"), problem, "Choose a set whose nodes can move"));
     }
+    if let Some([around, along]) = arguments.casing.contact_grid {
+        let Some((mesh, _)) = &imported.model.mesh else {
+            let remedy = "Give a mesh file instead of matrices";
+            return Err(Failure::usage("--contact-grid", "a casing is reduced from a mesh", remedy));
+        };
+        let axial = arguments.casing.contact_axial;
+        let grid = GridNodes::chosen(mesh, &free, around, along, axial).map_err(failure)?;
+        return Ok(Chosen { clamped, contact: grid.contact_points(), faces, grid: Some(grid) });
+    }
     let choice = ContactChoice { count: arguments.contact_nodes, names: asked.contact_names.clone() };
     let contact = choose_contact_nodes(&imported.model.nodes, &free, &choice).map_err(failure)?;
-    Ok(Chosen { clamped, contact, faces })
+    Ok(Chosen { clamped, contact, faces, grid: None })
 }
 
 fn pair_faces(imported: &Imported, asked: &FileArguments) -> Result<Option<(CyclicBoundary, PairingReport)>> {
@@ -173,11 +226,29 @@ fn refuse_other_options(arguments: &ReduceArguments) -> Result<()> {
     let casing = &arguments.casing;
     let shared =
         CasingArguments { material: casing.material, expansion: casing.expansion, ..CasingArguments::default() };
-    if *casing != shared || arguments.mesh.is_some() {
+    // With a contact grid the model is a casing.
+    let of_grid = CasingArguments {
+        contact_grid: casing.contact_grid,
+        contact_axial: casing.contact_axial,
+        patches: casing.patches,
+        fixed_interface_modes: casing.fixed_interface_modes,
+        ..shared.clone()
+    };
+    let expected = if casing.contact_grid.is_some() { of_grid } else { shared };
+    if *casing != expected || arguments.mesh.is_some() {
         let remedy = "Leave out --mesh and what `tiprub reduce --help` lists as options of `casing`";
         return Err(Failure::usage("MODEL", "an option given describes a casing or a blade that ships", remedy));
     }
     let file = &arguments.file;
+    let of_blades = file.sectors.is_some()
+        || !file.contact_names.is_empty()
+        || arguments.contact_nodes.is_some()
+        || arguments.spin.is_some();
+    if casing.contact_grid.is_some() && of_blades {
+        let problem = "it makes the model a casing, and an option given describes blades";
+        let remedy = "Leave out --sectors, the cyclic faces, --contact-names, --contact-nodes and --spin";
+        return Err(Failure::usage("--contact-grid", problem, remedy));
+    }
     if arguments.coarse {
         return Err(Failure::usage("--coarse", "it belongs to `stage`", "Leave it out"));
     }
@@ -350,7 +421,10 @@ fn describe(imported: &Imported, asked: &FileArguments, chosen: &Chosen) -> (Str
     let _ = write!(text, "\n  clamped                   {} nodes", chosen.clamped.len());
     let contact_set = asked.contact_set.as_deref().unwrap_or_default();
     let _ = write!(text, "\n  contact nodes             {} from {contact_set}", chosen.contact.len());
-    for point in &chosen.contact {
+    if let Some(grid) = &chosen.grid {
+        let _ = write!(text, ": {} around x {} along", grid.around, grid.along());
+    }
+    for point in chosen.contact.iter().filter(|_| chosen.grid.is_none()) {
         let number = imported.node_numbers[point.node];
         let _ = write!(text, "\n    {:<24}node {number} of the file", point.name);
     }

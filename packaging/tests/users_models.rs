@@ -260,3 +260,35 @@ fn rigid_body_modes_of_a_free_wheel_are_no_reason_to_warn() {
     assert_eq!(output.status.code(), Some(0), "{stderr}");
     assert!(!stderr.contains("(0.0 Hz)") && !stderr.contains("(-0.0 Hz)"), "{stderr}");
 }
+
+#[test]
+fn a_casing_of_ones_own_is_the_casing_that_ships() {
+    let project = Project::new(&[]);
+    let common = "--contact-grid 12x2 --modes 20 --fixed-interface-modes 40";
+    project.succeed(&format!(
+        "reduce casing --mesh 24x1x6 --patches 0x0 {common} -o ships.rom.safetensors --inp ring.inp"
+    ));
+    let file = format!("reduce ring.inp --contact-set INNER --clamp-set CLAMPED --contact-axial 0.0026:0.038 {common}");
+    let told = project.succeed(&format!("{file} -o own.rom.safetensors"));
+    assert_eq!(told["model"]["contact_nodes"].as_array().unwrap().len(), 24);
+    let (ships, own) = (project.rom("ships.rom.safetensors"), project.rom("own.rom.safetensors"));
+    assert_eq!(own.extras.grid, ships.extras.grid);
+    for (own, ships) in own.contact_nodes.iter().zip(&ships.contact_nodes) {
+        assert_eq!(own.name, ships.name);
+        assert!(own.position.iter().zip(ships.position).all(|(a, b)| (a - b).abs() < 1e-12), "{own:?} {ships:?}");
+    }
+    // Two rings tell a straight line; the ring that ships knows its contour.
+    let [[low, _, front], [high, _, back]] = [own.contact_nodes[0].position, own.contact_nodes[12].position];
+    assert!((own.contact_nodes[0].meridional_slope - (high - low) / (back - front)).abs() < 1e-9);
+    let off = (own.stiffness.diagonal() - ships.stiffness.diagonal()).component_div(&ships.stiffness.diagonal()).amax();
+    println!("eigenvalues differ by {off:.1e}");
+    assert!(own.order() == ships.order() && off < 1e-9, "{off:.1e}");
+    for (line, code, words) in [
+        (file.replace("12x2", "13x2"), 1, ["no node at", "divides"]),
+        (file.replace("12x2", "12x14"), 1, ["fewer than 14 rings", "fewer rings"]),
+        (format!("{file} --sectors 12"), 2, ["describes blades", "--sectors"]),
+    ] {
+        let text = project.fail(&line, code);
+        assert!(words.iter().all(|word| text.contains(word)), "{line}: {text}");
+    }
+}

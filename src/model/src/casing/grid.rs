@@ -5,6 +5,7 @@ use core::f64::consts::TAU;
 use tiprub_core::rom::{ContactGrid, ContactNode};
 
 use crate::mesh::Mesh;
+use crate::reduce::ContactPoint;
 use crate::{Error, Result};
 
 /// Nodes of a mesh that form rings: node `along · around + i` is the i-th of ring `along`, rings by growing z, nodes of a
@@ -55,6 +56,67 @@ impl GridNodes {
         Ok(grid)
     }
 
+    /// Choose a grid among the `nodes` of a surface: `along` rings, evenly from the axial position `axial[0]` to `axial[1]` (m; the
+    /// first and the last of the nodes where absent), each at the node nearest to its place; `around` nodes at equal angles
+    /// from the smallest angle on.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] when a place of the grid has no node, saying how far the nearest one is.
+    pub fn chosen(mesh: &Mesh, nodes: &[usize], around: usize, along: usize, axial: Option<[f64; 2]>) -> Result<Self> {
+        let what = "contact grid of the casing";
+        if around < 4 || along < 2 || nodes.len() < around * along {
+            let problem = format!("{} nodes cannot be {along} rings of {around}", nodes.len());
+            return Err(Error::invalid(what, problem, "Ask for at least 4 x 2, and for no more than the set has"));
+        }
+        if let Some(node) = nodes.iter().find(|node| **node >= mesh.nodes.len()) {
+            let problem = format!("node {} does not exist; there are {}", node + 1, mesh.nodes.len());
+            return Err(Error::invalid(what, problem, "Name nodes of the mesh"));
+        }
+        let angle = |node: usize| mesh.nodes[node][1].atan2(mesh.nodes[node][0]);
+        let height = |node: usize| mesh.nodes[node][2];
+        let heights = nodes.iter().map(|node| height(*node));
+        let ends = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(z), high.max(z)]);
+        let [from, to] = axial.unwrap_or(ends);
+        let step = TAU / around as f64;
+        let first =
+            nodes.iter().map(|node| (angle(*node) + 1e-3 * step).rem_euclid(TAU)).fold(TAU, f64::min) - 1e-3 * step;
+        let mut chosen = Vec::with_capacity(around * along);
+        for ring in 0..along {
+            let wanted = from + (to - from) * ring as f64 / (along - 1) as f64;
+            let off = |node: &usize| (height(*node) - wanted).abs();
+            let nearest = nodes.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+            let level = nearest.map_or(wanted, |node| height(*node));
+            for place in 0..around {
+                let target = first + step * place as f64;
+                let miss = |node: &usize| {
+                    let turned = (angle(*node) - target + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
+                    let [x, y, z] = mesh.nodes[*node];
+                    (turned * x.hypot(y)).hypot(z - level)
+                };
+                let Some(node) = nodes.iter().copied().min_by(|a, b| miss(a).total_cmp(&miss(b))) else { continue };
+                let radius = mesh.nodes[node][0].hypot(mesh.nodes[node][1]);
+                if miss(&node) > 1e-3 * step * radius {
+                    let (degrees, distance) = (target.to_degrees(), miss(&node));
+                    let problem =
+                        format!("no node at {degrees:.3}° and z = {level:.6} m: the nearest is {distance:.2e} m away");
+                    let remedy = "Ask for a number of nodes around that divides the mesh's, and for rings that it has";
+                    return Err(Error::invalid(what, problem, remedy));
+                }
+                chosen.push(node);
+            }
+        }
+        let mut distinct = chosen.clone();
+        distinct.sort_unstable();
+        distinct.dedup();
+        if distinct.len() < chosen.len() {
+            let problem = format!("the mesh has fewer than {along} rings from z = {from:.6} m to {to:.6} m");
+            return Err(Error::invalid(what, problem, "Ask for fewer rings, or other axial positions"));
+        }
+        let mut grid = Self { around, nodes: chosen, slopes: Vec::new() };
+        grid.slopes = grid.parabolic_slopes(mesh);
+        Ok(grid)
+    }
+
     /// Check that nodes and slopes fill whole rings.
     ///
     /// # Errors
@@ -87,6 +149,16 @@ impl GridNodes {
             ContactNode { name: self.name(index), position: [x.hypot(y), y.atan2(x), z], meridional_slope }
         };
         self.nodes.iter().enumerate().map(node).collect()
+    }
+
+    /// The contact nodes before the reduction.
+    pub fn contact_points(&self) -> Vec<ContactPoint> {
+        let point = |(index, node): (usize, &usize)| ContactPoint {
+            name: self.name(index),
+            node: *node,
+            meridional_slope: self.slopes[index / self.around],
+        };
+        self.nodes.iter().enumerate().map(point).collect()
     }
 
     /// Name of the contact node with the given index: `ring_1_node_1`, ...

@@ -19,9 +19,7 @@ use crate::element::Formulation;
 use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{
-    ContactPoint, Reduction, Timings, check_nodes, compare, element_names, full_modes, node_modes, timed,
-};
+use crate::reduce::{Reduction, Timings, check_nodes, compare, element_names, full_modes, node_modes, timed};
 use crate::sparse::{principal_pair, tall_product};
 use crate::thermal::patch_loads;
 
@@ -69,7 +67,7 @@ pub fn reduce_casing(
     let mut timings = Timings::default();
     let (stiffness, mass, loads, free) = timed(&mut timings.assembly, || {
         grid.validate()?;
-        check_nodes(&mesh.nodes, clamped, &contact_points(grid), Frame::Cylindrical)?;
+        check_nodes(&mesh.nodes, clamped, &grid.contact_points(), Frame::Cylindrical)?;
         let free = free_dofs(mesh.nodes.len(), clamped);
         let loads = patch_loads(&mesh, material, patches)?;
         let loads = Mat::from_fn(free.len(), patches.len(), |i, k| loads[(free[i], k)]);
@@ -127,17 +125,6 @@ pub fn reduce_casing(
         mesh: Some(mesh),
         timings,
     })
-}
-
-fn contact_points(grid: &GridNodes) -> Vec<ContactPoint> {
-    let names = (0..grid.nodes.len()).map(|index| grid.name(index));
-    let slope = |index: usize| grid.slopes[index / grid.around];
-    grid.nodes
-        .iter()
-        .zip(names)
-        .enumerate()
-        .map(|(index, (&node, name))| ContactPoint { name, node, meridional_slope: slope(index) })
-        .collect()
 }
 
 /// Rows of the contact nodes' dofs among the free ones; none is clamped.
