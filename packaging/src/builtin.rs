@@ -5,7 +5,6 @@ use tiprub_model::{
     CasingOptions, Mesh, Rotor37Options,
     casing::CASING37,
     cyclic::{CyclicOptions, CyclicReduction, ModeSelection, reduce_cyclic},
-    progress::{Listener, Progress, Stage},
     rotor37::DESIGN_SPEED,
     stage::{
         StageOptions,
@@ -14,7 +13,12 @@ use tiprub_model::{
     },
 };
 
-use crate::{Failure, Result, console::Console, reduction, rom_cache::RomCache};
+use crate::{
+    Result,
+    console::Console,
+    reduction::{self, with_progress},
+    rom_cache::RomCache,
+};
 
 /// The bladed disk of the stage.
 pub const STAGE: &str = "stage";
@@ -110,29 +114,4 @@ pub fn stage_casing(coarse: bool) -> StageCasingOptions {
     } else {
         StageCasingOptions { name: STAGE_CASING.into(), ..defaults }
     }
-}
-
-const STAGES: [Stage; 6] =
-    [Stage::Mesh, Stage::Assembly, Stage::FixedInterfaceModes, Stage::FullModes, Stage::ConstraintModes, Stage::Checks];
-
-fn with_progress<T>(
-    title: &str,
-    console: &Console,
-    reduce: &dyn Fn(Listener<'_>) -> tiprub_model::Result<T>,
-) -> Result<T> {
-    let task = console.task(title, Some(100 * STAGES.len() as u64));
-    let listener = |progress: Progress| {
-        let stage = STAGES.iter().position(|stage| *stage == progress.stage).unwrap_or(0);
-        task.now(&format!("{title}: {}", progress.stage));
-        task.at(percent(stage as f64 + progress.fraction));
-    };
-    reduce(&listener).map_err(|error| match error {
-        tiprub_model::Error::Invalid { what, problem, remedy } => Failure::new(what, problem, remedy),
-        other => Failure::from_below(title, other),
-    })
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=100 per stage")]
-fn percent(stages: f64) -> u64 {
-    (100.0 * stages.clamp(0.0, STAGES.len() as f64)) as u64
 }

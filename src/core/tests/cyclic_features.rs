@@ -1,17 +1,18 @@
 //! Everything a wheel of coupled sectors can be combined with: against uncoupled sectors in the limit, books, states, refusals.
 
 mod common;
+#[path = "common/features.rs"]
+mod common_features;
 #[path = "common/counting.rs"]
 mod counting;
 #[path = "common/wheel.rs"]
 mod wheel;
 
+use common_features::{coating, flexible};
 use nalgebra::Complex;
 use proptest::prelude::*;
 use tiprub_core::rom::{Harmonic, Rom};
-use tiprub_core::settings::{
-    CoatingSettings, LoadSettings, Motion, PatchSettings, Scheme, Shape, Solver, SplineSettings, StructureSettings,
-};
+use tiprub_core::settings::{LoadSettings, PatchSettings, Scheme, Shape, Solver, SplineSettings};
 use tiprub_core::{Scene, Simulation};
 use wheel::{Wheel, rub};
 
@@ -30,29 +31,6 @@ fn started(scene: &Scene) -> Simulation {
 }
 
 type Feature = (&'static str, fn(&mut Scene));
-
-fn flexible(scene: &mut Scene) {
-    scene.settings.structures.push(StructureSettings {
-        name: "ring".into(),
-        rom: "ring.safetensors".into(),
-        motion: Motion::Still,
-        damping_ratio: Some(0.01),
-        ..StructureSettings::default()
-    });
-    scene.roms.push(common::casing(36, 3));
-    scene.settings.surfaces[0].structure = Some("ring".into());
-}
-
-fn coating(scene: &mut Scene) {
-    scene.settings.contacts[0].coating = Some(CoatingSettings {
-        thickness: 1.5e-4,
-        modulus: 2e8,
-        yield_stress: 1e6,
-        hardening: 2e7,
-        cells_around: 500,
-        cells_along: 7,
-    });
-}
 
 fn growing(scene: &mut Scene) {
     let order = scene.roms[0].order();

@@ -1,13 +1,14 @@
 //! Everything that is off unless a scene asks for it: books that close, states that continue, laws of mechanics.
 
 mod common;
+#[path = "common/features.rs"]
+mod common_features;
 #[path = "common/counting.rs"]
 mod counting;
 
+use common_features::{coating, flexible};
 use tiprub_core::contact::gap::{Drive, GapLaw};
-use tiprub_core::settings::{
-    CoatingSettings, LoadSettings, PatchSettings, Scheme, Shape, Solver, SplineSettings, StructureSettings,
-};
+use tiprub_core::settings::{LoadSettings, PatchSettings, Scheme, Shape, Solver, SplineSettings};
 use tiprub_core::{Scene, Simulation};
 
 fn real(simulation: &Simulation, name: &str) -> f64 {
@@ -22,29 +23,6 @@ fn set(simulation: &mut Simulation, name: &str, element: u32, value: f64) {
 
 /// Twelve blades that rub the two-lobe casing, with one thing added.
 type Feature = (&'static str, fn(&mut Scene));
-
-fn flexible(scene: &mut Scene) {
-    scene.settings.structures.push(StructureSettings {
-        name: "ring".into(),
-        rom: "ring.safetensors".into(),
-        motion: tiprub_core::settings::Motion::Still,
-        damping_ratio: Some(0.01),
-        ..StructureSettings::default()
-    });
-    scene.roms.push(common::casing(36, 3));
-    scene.settings.surfaces[0].structure = Some("ring".into());
-}
-
-fn coating(scene: &mut Scene) {
-    scene.settings.contacts[0].coating = Some(CoatingSettings {
-        thickness: 1.5e-4,
-        modulus: 2e8,
-        yield_stress: 1e6,
-        hardening: 2e7,
-        cells_around: 500,
-        cells_along: 7,
-    });
-}
 
 fn spinning(scene: &mut Scene) {
     let order = scene.roms[0].order();
