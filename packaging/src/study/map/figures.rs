@@ -1,7 +1,7 @@
 //! Figures of the interaction map with their numbers.
 
 use super::{
-    Map, MODES, Response,
+    MODES, Map, Response,
     findings::order_curve,
     picture::{Column, HeatMap, Line, LineKind},
 };
@@ -39,7 +39,12 @@ fn lines(map: &Map) -> Vec<Line> {
             kind: if excited { LineKind::Excited } else { LineKind::Silent },
         });
     }
-    let shown = map.prediction.lines(range[0]).into_iter().enumerate().filter(|(_, mode)| *mode > 0.0 && *mode <= map.setup.top);
+    let shown = map
+        .prediction
+        .lines(range[0])
+        .into_iter()
+        .enumerate()
+        .filter(|(_, mode)| *mode > 0.0 && *mode <= map.setup.top);
     for (index, _) in shown.take(MODES * 40) {
         let points = (0..=POINTS).map(|point| (speed(point), map.prediction.lines(speed(point))[index])).collect();
         lines.push(Line { points, label: String::new(), kind: LineKind::Mode });
@@ -106,9 +111,12 @@ fn map_sheet(map: &Map) -> Sheet {
 
 /// The excited orders of largest amplitude.
 fn strongest_orders(map: &Map) -> Vec<usize> {
-    let most = |order: usize| order_curve(&map.runs, order, map.setup.revolutions).iter().map(|point| point.1).fold(0.0, f64::max);
+    let most = |order: usize| {
+        order_curve(&map.runs, order, map.setup.revolutions).iter().map(|point| point.1).fold(0.0, f64::max)
+    };
     let bins = map.answered().map(|(_, response)| response.first_blade[0].len()).min().unwrap_or(0);
-    let orders = (1..).take_while(|order| order * map.setup.revolutions < bins).filter(|order| map.prediction.excites(*order));
+    let orders =
+        (1..).take_while(|order| order * map.setup.revolutions < bins).filter(|order| map.prediction.excites(*order));
     let mut orders: Vec<(usize, f64)> = orders.map(|order| (order, most(order))).collect();
     orders.sort_by(|a, b| b.1.total_cmp(&a.1));
     orders.into_iter().take(CURVES).map(|order| order.0).collect()
@@ -116,22 +124,29 @@ fn strongest_orders(map: &Map) -> Vec<usize> {
 
 fn amplitudes(map: &Map) -> Result<Figure> {
     let orders = strongest_orders(map);
-    let deflection = |node: usize| map.answered().map(|(speed, response)| (speed, 1e6 * response.deflection[node])).collect();
+    let deflection =
+        |node: usize| map.answered().map(|(speed, response)| (speed, 1e6 * response.deflection[node])).collect();
     let mut series = vec![Series::line("leading edge", deflection(0)), Series::line("trailing edge", deflection(1))];
     for order in &orders {
         let curve = order_curve(&map.runs, *order, map.setup.revolutions).into_iter();
-        series.push(Series::line(format!("{order}Ω, leading edge"), curve.map(|(speed, value)| (speed, 1e6 * value)).collect()));
+        series.push(Series::line(
+            format!("{order}Ω, leading edge"),
+            curve.map(|(speed, value)| (speed, 1e6 * value)).collect(),
+        ));
     }
-    let plot = Plot {
-        logarithmic: true,
-        height: 340,
-        ..Plot::new("angular velocity (rad/s)", "amplitude (µm)", series)
-    };
+    let plot =
+        Plot { logarithmic: true, height: 340, ..Plot::new("angular velocity (rad/s)", "amplitude (µm)", series) };
     let mut sheet = Sheet::new(["speed (rad/s)", "leading edge (m)", "trailing edge (m)"]);
     sheet.columns.extend(orders.iter().map(|order| format!("engine order {order}; leading edge (m)")));
     sheet.columns.extend(
-        ["share of time in contact", "mean normal force (N)", "largest normal force (N)", "largest penetration (m)", "drift"]
-            .map(String::from),
+        [
+            "share of time in contact",
+            "mean normal force (N)",
+            "largest normal force (N)",
+            "largest penetration (m)",
+            "drift",
+        ]
+        .map(String::from),
     );
     for run in &map.runs {
         let Ok(response) = &run.outcome else {
@@ -158,7 +173,8 @@ fn amplitudes(map: &Map) -> Result<Figure> {
 fn contact(map: &Map) -> Result<Figure> {
     let share = map.answered().map(|(speed, response)| (speed, 100.0 * response.contact_share)).collect();
     let force = map.answered().map(|(speed, response)| (speed, response.normal_force)).collect();
-    let series = vec![Series::line("share of time in contact (%)", share), Series::line("mean normal force (N)", force)];
+    let series =
+        vec![Series::line("share of time in contact (%)", share), Series::line("mean normal force (N)", force)];
     let plot = Plot { height: 300, ..Plot::new("angular velocity (rad/s)", "see the legend", series) };
     let mut sheet = Sheet::new(["speed (rad/s)", "share of time in contact", "mean normal force (N)"]);
     let row = |(speed, response): (f64, &Response)| vec![speed, response.contact_share, response.normal_force];

@@ -54,6 +54,8 @@ struct Map {
     coincidences: Vec<Coincidence>,
     /// How far the casing reaches beyond the tips at rest (m).
     intrusion: f64,
+    /// Difference between the casing's largest and smallest radius (m).
+    depth: f64,
     /// Displacement of the leading edge when it is pushed back slowly by that much (m).
     static_displacement: Option<f64>,
     damping_ratio: f64,
@@ -116,7 +118,11 @@ pub fn of_scene(
     if let (true, Some(Err(refusal))) =
         (map.answered().next().is_none(), map.runs.first().map(|run| run.outcome.as_ref().map(|_| ())))
     {
-        return Err(Failure::new("study map", format!("every angular velocity is refused, the first one: {refusal}"), ""));
+        return Err(Failure::new(
+            "study map",
+            format!("every angular velocity is refused, the first one: {refusal}"),
+            "",
+        ));
     }
     map.peaks = findings::peaks(&map.runs);
     map.coincidences = findings::coincidences(&map.runs, &map.crossings, map.setup.revolutions);
@@ -137,9 +143,14 @@ impl Map {
         let prediction = Prediction::new(&setup.scene, fastest)?;
         let speeds = speeds(&prediction, request)?;
         let range = [speeds[0], speeds[speeds.len() - 1]];
-        let probe = setup.simulation(range[0])?;
+        // At its own speed: those of the study may be refused.
+        let probe = setup.simulation(setup.scene.settings.structures[master].speed)?;
         let value = |quantity| {
-            probe.table().with_quantity(quantity).and_then(|variable| probe.real(variable.reference).ok()).unwrap_or(0.0)
+            probe
+                .table()
+                .with_quantity(quantity)
+                .and_then(|variable| probe.real(variable.reference).ok())
+                .unwrap_or(0.0)
         };
         let (damping_ratio, friction) = (value(Quantity::DampingRatio), value(Quantity::Friction));
         let elastic: Vec<f64> =
@@ -154,9 +165,11 @@ impl Map {
         setup.transient = request.transient.unwrap_or(patience.clamp(LEAST_TRANSIENT, most));
         let crossings = prediction.crossings(range, setup.top);
         let gap = setup.scene.settings.contacts[0].gap + value(Quantity::GapOffset);
-        let lowest = prediction::shape(&setup.scene)?.into_iter().fold(f64::INFINITY, f64::min);
+        let shape = prediction::shape(&setup.scene)?;
+        let lowest = shape.iter().copied().fold(f64::INFINITY, f64::min);
+        let highest = shape.into_iter().fold(f64::NEG_INFINITY, f64::max);
         let intrusion = -(gap + lowest);
-        let static_displacement = findings::static_displacement(&setup.scene, intrusion)?;
+        let static_displacement = findings::static_displacement(&setup.scene, highest - lowest)?;
         let map = Self {
             setup,
             prediction,
@@ -165,6 +178,7 @@ impl Map {
             peaks: Vec::new(),
             coincidences: Vec::new(),
             intrusion,
+            depth: highest - lowest,
             static_displacement,
             damping_ratio,
             friction,
@@ -188,7 +202,8 @@ impl Map {
     fn report(&self, quick: bool) -> Result<Study> {
         let steps: u64 = self.answered().map(|(_, response)| response.internal_steps).sum();
         let stepping: f64 = self.answered().map(|(_, response)| response.stepping.as_secs_f64()).sum();
-        let refusals: Vec<_> = self.runs.iter().filter_map(|run| Some((run.speed, run.outcome.as_ref().err()?))).collect();
+        let refusals: Vec<_> =
+            self.runs.iter().filter_map(|run| Some((run.speed, run.outcome.as_ref().err()?))).collect();
         Ok(Study {
             name: "map",
             title: "Interaction map".into(),
@@ -209,6 +224,7 @@ impl Map {
                 "peaks": self.peaks.iter().map(MapPeak::to_json).collect::<Vec<_>>(),
                 "coincidences": self.coincidences.iter().map(Coincidence::to_json).collect::<Vec<_>>(),
                 "intrusion": self.intrusion,
+                "depth": self.depth,
                 "static_displacement": self.static_displacement,
                 "internal_steps": steps,
                 "stepping_seconds": stepping,
@@ -246,7 +262,10 @@ impl Map {
             ("start values changed".into(), if changed.is_empty() { "none".into() } else { changed.join(", ") }),
             ("rotor".into(), format!("{} blades; {}", rom.sectors, rom.origin)),
             (
-                format!("natural frequencies{}", if self.prediction.stiffening { format!(" at {middle:.1} rad/s") } else { " at rest".into() }),
+                format!(
+                    "natural frequencies{}",
+                    if self.prediction.stiffening { format!(" at {middle:.1} rad/s") } else { " at rest".into() }
+                ),
                 format!("{} Hz", shown.join(", ")),
             ),
             ("clearance at rest".into(), format!("{} m", contact.gap)),
@@ -255,7 +274,12 @@ impl Map {
             ("damping ratio".into(), self.damping_ratio.to_string()),
             (
                 "angular velocities".into(),
-                format!("{} from {:.3} to {:.3} rad/s", self.runs.len(), self.runs[0].speed, self.runs[self.runs.len() - 1].speed),
+                format!(
+                    "{} from {:.3} to {:.3} rad/s",
+                    self.runs.len(),
+                    self.runs[0].speed,
+                    self.runs[self.runs.len() - 1].speed
+                ),
             ),
             (
                 "one run".into(),
@@ -282,7 +306,10 @@ impl Map {
             ),
             (
                 "stepping".into(),
-                format!("{:.2} µs per internal step, {stepping:.1} s in all on one processor", 1e6 * stepping / steps.max(1) as f64),
+                format!(
+                    "{:.2} µs per internal step, {stepping:.1} s in all on one processor",
+                    1e6 * stepping / steps.max(1) as f64
+                ),
             ),
         ])
     }

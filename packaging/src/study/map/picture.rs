@@ -179,7 +179,13 @@ impl HeatMap<'_> {
         for line in &self.lines {
             let mut path = String::new();
             for (speed, frequency) in &line.points {
-                let _ = write!(path, "{}{} {}", if path.is_empty() { 'M' } else { 'L' }, self.x(*speed), self.y(*frequency));
+                let _ = write!(
+                    path,
+                    "{}{} {}",
+                    if path.is_empty() { 'M' } else { 'L' },
+                    self.x(*speed),
+                    self.y(*frequency)
+                );
             }
             let style = match line.kind {
                 LineKind::Excited => r#"stroke-opacity="0.75""#,
@@ -232,7 +238,11 @@ impl HeatMap<'_> {
         for level in 0..LEVELS {
             let y = bottom - height * (level + 1) as f64;
             let color = color((level as f64 + 0.5) / LEVELS as f64);
-            let _ = write!(svg, r#"<rect x="{left}" y="{y:.1}" width="{width}" height="{:.1}" fill="{color}"/>"#, height + 0.3);
+            let _ = write!(
+                svg,
+                r#"<rect x="{left}" y="{y:.1}" width="{width}" height="{:.1}" fill="{color}"/>"#,
+                height + 0.3
+            );
         }
         let [low, high] = self.range.map(f64::log10);
         for power in (-12..12).map(f64::from).filter(|power| (low - 1e-9..=high + 1e-9).contains(power)) {
@@ -247,12 +257,8 @@ impl HeatMap<'_> {
                 y + 5.0
             );
         }
-        let _ = write!(
-            svg,
-            r#"<text x="{}" y="{}" text-anchor="end">amplitude (µm)</text>"#,
-            WIDTH - 6.0,
-            bottom + 24.0
-        );
+        let _ =
+            write!(svg, r#"<text x="{}" y="{}" text-anchor="end">amplitude (µm)</text>"#, WIDTH - 6.0, bottom + 24.0);
     }
 }
 
@@ -306,7 +312,10 @@ mod tests {
         assert_eq!(cells.matches('M').count(), 2, "{cells}");
         let numbers: Vec<f64> = cells.split(['M', 'V', 'H', 'z', ' ']).filter_map(|text| text.parse().ok()).collect();
         let middle = FRAME[1].midpoint(FRAME[3]);
-        assert!((numbers[0] - FRAME[0]).abs() < 0.11 && (numbers[3] - FRAME[0].midpoint(FRAME[2])).abs() < 0.11, "{cells}");
+        assert!(
+            (numbers[0] - FRAME[0]).abs() < 0.11 && (numbers[3] - FRAME[0].midpoint(FRAME[2])).abs() < 0.11,
+            "{cells}"
+        );
         assert!(numbers[1] >= middle - 2.0 && numbers[2] <= middle + 2.0 && numbers[1] > numbers[2], "{cells}");
         assert!(svg.contains(&color(1.0 - 0.5 / LEVELS as f64)) && svg.matches("<circle").count() == 1);
     }

@@ -131,7 +131,8 @@ pub fn master(scene: &Scene) -> Result<usize> {
     let settings = &scene.settings;
     let name = settings.contacts.first().map(|contact| &contact.master);
     let found = settings.structures.iter().position(|structure| Some(&structure.name) == name);
-    found.ok_or_else(|| Failure::new(format!("scene `{}`", settings.name), "it has no contact with a master", "Add one"))
+    found
+        .ok_or_else(|| Failure::new(format!("scene `{}`", settings.name), "it has no contact with a master", "Add one"))
 }
 
 /// The casing's rigid shape at [`ANGLES`] angles (m).
@@ -179,14 +180,18 @@ pub(super) mod tests {
     /// One mode of `frequency` Hz and one ten times as high, radial, one tangential component.
     pub fn blade(frequency: f64, sectors: usize) -> Rom {
         let square = |hertz: f64| (std::f64::consts::TAU * hertz).powi(2);
-        let node = |name: &str, z: f64| ContactNode { name: name.into(), position: [0.25, 0.0, z], meridional_slope: 0.0 };
+        let node =
+            |name: &str, z: f64| ContactNode { name: name.into(), position: [0.25, 0.0, z], meridional_slope: 0.0 };
         Rom {
             name: "beam".into(),
             origin: "test".into(),
             sectors,
             frame: Frame::Cylindrical,
             mass: DMatrix::identity(2, 2) * 0.1,
-            stiffness: DMatrix::from_diagonal(&nalgebra::dvector![square(frequency), square(10.0 * frequency)]) * 0.1,
+            stiffness: DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![
+                square(frequency),
+                square(10.0 * frequency),
+            ])) * 0.1,
             damping_ratio: 2e-3,
             contact_map: DMatrix::from_row_slice(6, 2, &[0.4, 0.5, 1.0, -0.2, 0.1, 0.0, 0.3, 0.6, 0.9, 0.2, 0.1, 0.1]),
             contact_nodes: vec![node("leading_edge", 0.0), node("trailing_edge", 0.03)],

@@ -141,7 +141,9 @@ impl Setup {
                 return Err(Failure::new(
                     format!("scene `{}` at {speed} rad/s", self.scene.settings.name),
                     format!("its internal step is longer than a quarter of the {step:.3e} s from sample to sample"),
-                    format!("Use an internal step of at most {coarsest:.3e} s (--set internal_step_max={coarsest:.1e})"),
+                    format!(
+                        "Use an internal step of at most {coarsest:.3e} s (--set internal_step_max={coarsest:.1e})"
+                    ),
                 ));
             }
         }
@@ -255,7 +257,10 @@ impl March<'_> {
             for node in 0..2 {
                 let channels = [0, 1, 2].map(|component| 6 * index + 3 * node + component);
                 let amplitudes = vector_spectrum(&analyser, &decimator, channels, count)?;
-                largest_blade[node].iter_mut().zip(&amplitudes).for_each(|(most, value)| *most = f64::max(*most, *value));
+                largest_blade[node]
+                    .iter_mut()
+                    .zip(&amplitudes)
+                    .for_each(|(most, value)| *most = f64::max(*most, *value));
                 let distances = distances(&decimator, channels, count);
                 deflection[node] = distances.iter().copied().fold(deflection[node], f64::max);
                 if node == 0 {
