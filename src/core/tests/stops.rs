@@ -67,7 +67,7 @@ fn what_touches_a_rigid_stop_stays_and_the_spring_takes_it_back() {
                     // Known to a step; v h is what it may be off by.
                     assert!((0.0..1.0001).contains(&touch), "{touch} steps late");
                     assert!(position < 4.0 * OMEGA * step && position < last, "{position:e}");
-                    assert!((loss - case.loss()).abs() < 4.0 * OMEGA * step, "{loss} of {}", case.loss());
+                    assert!((loss - case.loss()).abs() < 5.0 * (OMEGA * step).powi(2), "{loss} of {}", case.loss());
                     assert!(ledger.abs() < 1e-12);
                     last = 0.3 * position;
                 }
@@ -87,9 +87,9 @@ fn after_one_impact_an_oscillator_only_grazes() {
                 "{scheme:?}, A = (1 + {excess:e})d: position {position:.1e}, touch {touch:.2} steps late, loss {loss:.3e} of {:.3e}",
                 case.loss()
             );
-            // Both graze to second order in ωh: (ωh)²/2 of the amplitude lies between two samples.
-            assert!(position < 60.0 * OMEGA * 1e-5 * (excess.sqrt() + OMEGA * 1e-5), "{position:e}");
-            assert!((loss - case.loss()).abs() < 20.0 * (OMEGA * 1e-5 * excess.sqrt() + (OMEGA * 1e-5).powi(2)));
+            // The impact is known to a step, which the phase keeps; what a graze takes is of second order.
+            assert!(position < 2.5 * OMEGA * 1e-5, "{position:e}");
+            assert!((loss - case.loss()).abs() < 5.0 * (OMEGA * 1e-5).powi(2), "loss off by {:e}", loss - case.loss());
             assert!(ledger.abs() < 1e-12);
         }
     }
@@ -170,7 +170,7 @@ fn a_ball_bounces_on_a_spring_for_ever() {
         }
         let order = 0.5 * (errors[0] / errors[2]).log2();
         println!("{solver:?}: order {order:.2}");
-        assert!(order > 1.5 && errors[2] < 1e-2, "{errors:?}");
+        assert!(order > 1.3 && errors[2] < 1e-3, "{errors:?}");
     }
 }
 
@@ -193,7 +193,11 @@ fn bilinear(case: Bilinear, solver: Solver, step: f64, turns: u32) -> [f64; 3] {
     });
     let (kinetic, strain) = system.energies();
     let period = (crossings[turns as usize] - crossings[0]) / f64::from(turns);
-    [period / case.period() - 1.0, force / (case.omega * case.omega * case.force_per_stiffness()) - 1.0, (kinetic + strain) / before - 1.0]
+    [
+        period / case.period() - 1.0,
+        force / (case.omega * case.omega * case.force_per_stiffness()) - 1.0,
+        (kinetic + strain) / before - 1.0,
+    ]
 }
 
 #[test]
@@ -215,8 +219,8 @@ fn the_period_of_an_impact_oscillator_from_grazing_to_hard_impacts() {
                 found[2][1],
                 found[2][2]
             );
-            assert!(errors[2] < 3e-4, "{errors:?}");
-            assert!(found.iter().all(|found| found[2].abs() < 0.05), "{found:?}");
+            assert!(errors[0] < 5e-4 && errors[2] < 1e-5, "{errors:?}");
+            assert!(found.iter().all(|found| found[2].abs() < 1e-3), "{found:?}");
         }
     }
 }
