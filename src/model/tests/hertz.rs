@@ -23,8 +23,8 @@ const RADIUS: f64 = 0.05;
 const APPROACH: f64 = CONTACT * CONTACT / RADIUS;
 /// Surface nodes out to here may touch, as a multiple of the contact radius.
 const REACH: f64 = 1.3;
-/// Elements grow by this factor outside.
-const GROWTH: f64 = 1.6;
+/// The block is this many radii of the contact wide and deep; its held faces make it stiffer by about 0.95/L of the force.
+const EXTENT: f64 = 400.0;
 
 fn material() -> Material {
     Material { name: "steel".into(), young_modulus: 210e9, poisson_ratio: 0.3, density: 7800.0, expansion: 0.0 }
@@ -35,13 +35,13 @@ fn hertz() -> Hertz {
     Hertz { radius: RADIUS, modulus: young_modulus / (1.0 - poisson_ratio * poisson_ratio) }
 }
 
-/// Equal elements of `size` up to `fine`, then growing ones up to `length` exactly.
-fn graded(size: f64, fine: f64, length: f64) -> Vec<f64> {
+/// Equal elements of `size` up to `fine`, then growing by a `factor` up to `length` exactly.
+fn graded(size: f64, fine: f64, factor: f64, length: f64) -> Vec<f64> {
     let mut places: Vec<f64> = (0..=(fine / size).round() as usize).map(|i| size * i as f64).collect();
     let (start, mut next, mut rest) = (places.len(), size, Vec::new());
     let mut reached = places[start - 1];
     while reached < length {
-        next *= GROWTH;
+        next *= factor;
         reached += next;
         rest.push(reached);
     }
@@ -60,11 +60,11 @@ struct Block {
 }
 
 /// Quarter of a block x, y ≤ L, −L ≤ z ≤ 0 with symmetry at x = 0 and y = 0 and held outside; `per_radius` elements per radius of
-/// the contact, L = `extent` radii.
-fn block(per_radius: usize, extent: f64) -> Block {
-    let size = CONTACT / per_radius as f64;
-    let side = graded(size, REACH * CONTACT, extent * CONTACT);
-    let depth = graded(size, CONTACT, extent * CONTACT);
+/// the contact. Refined everywhere alike: twice as many elements grow by the root of the factor.
+fn block(per_radius: usize) -> Block {
+    let (size, factor) = (CONTACT / per_radius as f64, (1.17 / per_radius as f64).exp());
+    let side = graded(size, REACH * CONTACT, factor, EXTENT * CONTACT);
+    let depth = graded(size, CONTACT, factor, EXTENT * CONTACT);
     let (nx, nz) = (side.len(), depth.len());
     let number = |i: usize, j: usize, k: usize| i + nx * (j + nx * k);
     let mut mesh = Mesh::default();
@@ -92,8 +92,7 @@ fn block(per_radius: usize, extent: f64) -> Block {
     let free: Vec<usize> = (0..3 * mesh.nodes.len()).filter(|dof| !held(*dof)).collect();
     let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
     let places = || (0..nx).flat_map(|j| (0..nx).map(move |i| [i, j]));
-    let touching: Vec<[usize; 2]> =
-        places().filter(|[i, j]| side[*i].hypot(side[*j]) < REACH * CONTACT).collect();
+    let touching: Vec<[usize; 2]> = places().filter(|[i, j]| side[*i].hypot(side[*j]) < REACH * CONTACT).collect();
     let interface: Vec<usize> =
         touching.iter().map(|[i, j]| free.partition_point(|dof| *dof < 3 * number(*i, *j, nz - 1) + 2)).collect();
     let reduced = craig_bampton(&stiffness, &mass, &interface, 4, &silent).unwrap();
@@ -118,9 +117,13 @@ fn rom(name: &str, mass: DMatrix<f64>, stiffness: DMatrix<f64>, nodes: usize) ->
         mass,
         stiffness,
         damping_ratio: 0.0,
-        contact_map: DMatrix::from_fn(3 * nodes, order, |row, column| {
-            if row % 3 == 2 && row / 3 == column { 1.0 } else { 0.0 }
-        }),
+        contact_map: DMatrix::from_fn(
+            3 * nodes,
+            order,
+            |row, column| {
+                if row % 3 == 2 && row / 3 == column { 1.0 } else { 0.0 }
+            },
+        ),
         contact_nodes: (0..nodes).map(node).collect(),
         checks: RomChecks::default(),
         extras: RomExtras::default(),
@@ -178,33 +181,126 @@ fn at_rest(block: &Block, model: &ModalModel, solver: Solver, approach: f64) -> 
     }
 }
 
+/// Errors of the force, of the contact radius and of the pressure profile, root mean square over approaches that put the
+/// edge of the contact at every place within an element.
+fn refine(per_radius: usize) -> [f64; 3] {
+    let (theory, block) = (hertz(), block(per_radius));
+    let model = ModalModel::from_rom(&block.rom, 0.8).unwrap();
+    let (count, mut squares) = (12, [0.0; 3]);
+    for index in 0..count {
+        let radius = CONTACT * (0.75 + 0.25 * f64::from(index + 1) / f64::from(count));
+        let approach = radius * radius / RADIUS;
+        let found = at_rest(&block, &model, Solver::Lcp, approach);
+        assert!(found.violation.iter().all(|size| *size <= 0.0), "{:?}", found.violation);
+        // The farthest node that touches is within one diagonal of an element.
+        let edge = (found.radius[1] - radius).abs() * per_radius as f64 / CONTACT;
+        assert!(edge < 1.5, "edge {edge} elements off");
+        let errors = [found.force / theory.force(approach) - 1.0, found.radius[0] / radius - 1.0, found.pressure[1]];
+        squares = [0, 1, 2].map(|i| squares[i] + errors[i] * errors[i] / f64::from(count));
+        if index + 1 == count {
+            for solver in [Solver::Coulomb, Solver::Film] {
+                let other = at_rest(&block, &model, solver, approach);
+                let off = other.force / theory.force(approach) - 1.0;
+                let [deep, negative] = other.violation;
+                println!(
+                    "| {per_radius}, δ = 20 µm | {} | {solver:?} | {off:+.2e} | {:+.2e} | {:.2e} | {:.4} | penetration {deep:.0e} δ, adhesion {negative:.0e} F |",
+                    block.elements,
+                    other.radius[0] / radius - 1.0,
+                    other.pressure[1],
+                    other.pressure[0]
+                );
+                assert!(solver == Solver::Film || (other.force / found.force - 1.0).abs() < 1e-9, "{solver:?}");
+            }
+            println!(
+                "| {per_radius}, δ = 20 µm | {} | Lcp | {:+.2e} | {:+.2e} | {:.2e} | {:.4} | |",
+                block.elements, errors[0], errors[1], errors[2], found.pressure[0]
+            );
+        }
+    }
+    squares.map(f64::sqrt)
+}
+
+fn table(meshes: &[usize]) -> Vec<[f64; 3]> {
+    println!("| elements per radius | elements | solver | force | contact radius | pressure, L2 | p(0)/p0 | |");
+    println!("|---|---|---|---|---|---|---|---|");
+    let errors: Vec<[f64; 3]> = meshes.iter().map(|per_radius| refine(*per_radius)).collect();
+    for (per_radius, [force, radius, pressure]) in meshes.iter().zip(&errors) {
+        println!(
+            "{per_radius} elements per radius, mean over 12 approaches: F {force:.2e}, a {radius:.2e}, p {pressure:.2e}"
+        );
+    }
+    errors
+}
+
 #[test]
 fn a_sphere_pressed_on_a_block_meets_hertz() {
-    let theory = hertz();
-    println!("| elements per radius, extent | elements | solver | δ (µm) | F off by | a off by | farthest (elements off) | p0 | profile L2 |");
-    println!("|---|---|---|---|---|---|---|---|---|");
-    let mut errors = Vec::new();
-    for (per_radius, extent) in [(3, 100.0), (6, 100.0), (6, 25.0)] {
-        let block = block(per_radius, extent);
-        let model = ModalModel::from_rom(&block.rom, 0.8).unwrap();
-        for (solver, share) in [(Solver::Lcp, 0.25), (Solver::Lcp, 1.0), (Solver::Coulomb, 1.0), (Solver::Film, 1.0)] {
-            let approach = share * APPROACH;
-            let found = at_rest(&block, &model, solver, approach);
-            let radius = (RADIUS * approach).sqrt();
-            let off = [found.force / theory.force(approach) - 1.0, found.radius[0] / radius - 1.0];
-            let farthest = (found.radius[1] - radius) * per_radius as f64 / CONTACT;
-            println!(
-                "| {per_radius}, {extent} | {} | {solver:?} | {:.0} | {:+.2e} | {:+.2e} | {farthest:+.2} | {:.4} | {:.2e} | penetration {:.0e}, adhesion {:.0e}",
-                block.elements,
-                approach * 1e6,
-                off[0],
-                off[1],
-                found.pressure[0],
-                found.pressure[1],
-                found.violation[0],
-                found.violation[1]
-            );
-            errors.push(off);
+    let errors = table(&[2, 3, 4]);
+    let [force, radius, pressure] = [0, 1, 2].map(|i| errors[0][i] / errors[2][i]);
+    // At least of first order in the size of elements.
+    assert!(force > 1.8 && radius > 1.8 && pressure > 1.8, "{errors:?}");
+    assert!(errors[2][0] < 0.015 && errors[2][1] < 0.02 && errors[2][2] < 0.04, "{errors:?}");
+}
+
+#[test]
+#[ignore = "minutes"]
+fn a_sphere_pressed_on_a_finer_block_meets_hertz() {
+    let errors = table(&[4, 6]);
+    assert!(errors[1][0] < 0.008, "{errors:?}");
+}
+
+/// A heavy sphere that hits the block slowly: the block follows at rest, which is what Hertz's impact supposes.
+#[test]
+fn a_sphere_that_hits_a_block_meets_hertz() {
+    println!("| scheme | h (µs) | duration | largest force | deepest | impulse | energy left in the sphere | ledger |");
+    println!("|---|---|---|---|---|---|---|---|");
+    let (theory, block) = (hertz(), block(3));
+    // Waves cross the block in 0.07 ms; the impact takes 20 ms.
+    let duration = 20e-3;
+    let speed = 2.943_275 * APPROACH / duration;
+    let mass = 16.0 / 15.0 * theory.modulus * RADIUS.sqrt() * APPROACH.powf(2.5) / (speed * speed);
+    let exact = theory.impact(mass, speed);
+    assert!((exact.duration / duration - 1.0).abs() < 1e-9);
+    // A quarter of the sphere belongs to a quarter of the block.
+    let sphere = rom("sphere", DMatrix::from_element(1, 1, 0.25 * mass), DMatrix::zeros(1, 1), 1);
+    let parts = [&block.rom, &sphere].map(|rom| ModalModel::from_rom(rom, 0.0).unwrap());
+    let nodes = block.distance.len();
+    let pairs: Vec<NodePair> = (0..nodes).map(|node| NodePair { master: (0, node), slave: Some((1, 0)) }).collect();
+    let model = ModalModel::combined(&parts, &pairs).unwrap();
+    let last = model.len() - 1;
+    for scheme in [Scheme::ModalExact] {
+        let step = duration / 4000.0;
+        let settings = SystemSettings { scheme, solver: Solver::Lcp, friction: 0.0, ledger: true };
+        let mut system = System::new(&model, 1, law(&block, 0.0), settings);
+        system.set_step(step);
+        // The sphere comes from above with its lowest point on the surface at time 0.
+        system.bank_mut().set_modal_state(last, 0, 0.0, -speed * (0.25 * mass).sqrt());
+        system.start(&Drive::default());
+        let (mut release, mut force, mut deepest, mut impulse) = (0.0, 0.0_f64, 0.0_f64, 0.0);
+        while (system.steps() as f64) * step < 1.2 * duration {
+            system.step(&Drive::default()).unwrap();
+            let now: f64 = 4.0 * (0..nodes).map(|node| system.multiplier(node, 0)).sum::<f64>();
+            if now > 0.0 {
+                release = system.steps() as f64 * step;
+            }
+            force = force.max(now);
+            impulse += now * step;
+            deepest = deepest.max(-system.bank().modal_state(last, 0).0 / (0.25 * mass).sqrt());
         }
+        system.close_books();
+        let (kinetic, strain) = system.energies();
+        let ledger = system.ledger().residual(kinetic + strain) / system.ledger().initial;
+        let left = (system.bank().modal_state(last, 0).1 / step).powi(2) / (0.25 * mass * speed * speed);
+        let off = [release / exact.duration, force / exact.force, deepest / exact.depth, impulse / exact.impulse, left]
+            .map(|value| value - 1.0);
+        println!(
+            "| {scheme:?} | {:.0} | {:+.2e} | {:+.2e} | {:+.2e} | {:+.2e} | {:+.2e} | {ledger:.0e} |",
+            step * 1e6,
+            off[0],
+            off[1],
+            off[2],
+            off[3],
+            off[4]
+        );
+        assert!(off.iter().all(|off| off.abs() < 0.02) && ledger.abs() < 1e-12, "{off:?}");
     }
 }
