@@ -73,7 +73,7 @@ fn bounce(elements: usize, scheme: Scheme, solver: Solver, fraction: f64) -> Out
         let (time, force) = (system.steps() as f64 * step, system.multiplier(0, 0));
         // The series is long: as many samples for every mesh.
         if system.steps().is_multiple_of((elements / 25) as u64) {
-            let (period, exact) = (((time / PERIOD) as usize).min(PERIODS - 1), displacement(0.0, time));
+            let (period, exact) = (periods(time).min(PERIODS - 1), displacement(0.0, time));
             squares[period].add(system.gap(0, 0), exact);
             if period == 0 {
                 outcome.bottom[0] = outcome.bottom[0].max((system.gap(0, 0) - exact).abs());
@@ -85,7 +85,7 @@ fn bounce(elements: usize, scheme: Scheme, solver: Solver, fraction: f64) -> Out
             impulses[1] += pressure(acting) * step;
         }
         note_contact(&mut outcome.contacts, acting, force);
-        if (time / PERIOD) as usize > outcome.losses.len() {
+        if periods(time) > outcome.losses.len() {
             let (kinetic, strain) = system.energies();
             let (position, increment) = system.bank().modal_state(0, 0);
             // Potential energy as the scheme has it: mean of now and before. Heights are from the release.
@@ -100,6 +100,11 @@ fn bounce(elements: usize, scheme: Scheme, solver: Solver, fraction: f64) -> Out
     outcome.bottom[2] = squares[PERIODS - 1].relative();
     outcome.force = [impulses[0] / impulses[1] - 1.0, squares_force.relative()];
     outcome
+}
+
+/// Whole periods in a time (s).
+fn periods(time: f64) -> usize {
+    (1..=PERIODS).take_while(|count| time >= *count as f64 * PERIOD).count()
 }
 
 fn note_contact(contacts: &mut Vec<[f64; 2]>, time: f64, force: f64) {

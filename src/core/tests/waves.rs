@@ -204,9 +204,11 @@ fn whirl_error(simulation: &mut Simulation, whirl: f64, rotor: f64, step: f64) -
         [grown * (whirl * time).cos(), grown * (whirl * time).sin()]
     };
     let mut worst = 0.0_f64;
-    let steps = ((0.02 + 2.0 * TAU / omega.abs()) / step) as u32;
-    for index in 0..steps {
+    for index in 0.. {
         let (time, next) = (step * f64::from(index), step * f64::from(index + 1));
+        if time > 0.02 + 2.0 * TAU / omega.abs() {
+            break;
+        }
         let (now, then) = (shaft(time), shaft(next));
         for (name, axis) in [("whirl_x", 0), ("whirl_y", 1)] {
             set(simulation, name, now[axis], (then[axis] - now[axis]) / step);

@@ -37,7 +37,10 @@ fn hertz() -> Hertz {
 
 /// Equal elements of `size` up to `fine`, then growing by a `factor` up to `length` exactly.
 fn graded(size: f64, fine: f64, factor: f64, length: f64) -> Vec<f64> {
-    let mut places: Vec<f64> = (0..=(fine / size).round() as usize).map(|i| size * i as f64).collect();
+    let mut places = vec![0.0];
+    while places[places.len() - 1] < fine - 0.5 * size {
+        places.push(size * places.len() as f64);
+    }
     let (start, mut next, mut rest) = (places.len(), size, Vec::new());
     let mut reached = places[start - 1];
     while reached < length {
@@ -238,14 +241,7 @@ fn a_sphere_pressed_on_a_block_meets_hertz() {
     let [force, radius, pressure] = [0, 1, 2].map(|i| errors[0][i] / errors[2][i]);
     // At least of first order in the size of elements.
     assert!(force > 1.8 && radius > 1.8 && pressure > 1.8, "{errors:?}");
-    assert!(errors[2][0] < 0.015 && errors[2][1] < 0.02 && errors[2][2] < 0.04, "{errors:?}");
-}
-
-#[test]
-#[ignore = "minutes"]
-fn a_sphere_pressed_on_a_finer_block_meets_hertz() {
-    let errors = table(&[4, 6]);
-    assert!(errors[1][0] < 0.008, "{errors:?}");
+    assert!(errors[2][0] < 0.005 && errors[2][1] < 0.02 && errors[2][2] < 0.04, "{errors:?}");
 }
 
 /// A heavy sphere that hits the block slowly: the block follows at rest, which is what Hertz's impact supposes.
@@ -301,6 +297,7 @@ fn a_sphere_that_hits_a_block_meets_hertz() {
             off[3],
             off[4]
         );
-        assert!(off.iter().all(|off| off.abs() < 0.02) && ledger.abs() < 1e-12, "{off:?}");
+        let bounds = [3e-3, 1.2e-2, 5e-3, 1e-4, 1e-3];
+        assert!(off.iter().zip(bounds).all(|(off, bound)| off.abs() < bound) && ledger.abs() < 1e-12, "{off:?}");
     }
 }
