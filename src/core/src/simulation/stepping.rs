@@ -124,7 +124,7 @@ impl Simulation {
         let next = self.communication.done + 1;
         let (offset, time) = (self.communication.offset(next), self.communication.time(next));
         let drive = self.drive(offset, time);
-        self.load(drive.speed, offset);
+        self.load(self.communication.offset(self.communication.done));
         if let Err(failure) = self.system.step(&drive) {
             return Err(self.fail(failure, time));
         }
@@ -138,9 +138,9 @@ impl Simulation {
         Ok(Progress { time, finished })
     }
 
-    /// Loads beside contact for the step that ends at `offset`.
-    fn load(&mut self, speed: f64, offset: f64) {
-        let loads = &self.compiled.loads;
+    /// Loads beside contact for the step that begins at `offset`: q⁺ = a q + b q⁻ + c f takes the force at the time of q.
+    fn load(&mut self, offset: f64) {
+        let (loads, speed) = (&self.compiled.loads, self.inputs.speed.at(offset));
         if !loads.centrifugal.is_empty() {
             loads.fill_master(speed, self.system.bank_mut().loads_mut());
         }
