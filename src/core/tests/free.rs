@@ -42,7 +42,7 @@ fn a_body_that_touches_nothing_flies_straight_with_exact_energies() {
             }
         }
         let found = vector(&simulation, "block.velocity");
-        assert!((0..3).all(|axis| (found[axis] / velocity[axis] - 1.0).abs() < 1e-15), "{found:?}");
+        assert!((0..3).all(|axis| (found[axis] - velocity[axis]).abs() < 2e-15 * size(velocity)), "{found:?}");
         let energies = ["kinetic_energy", "strain_energy", "energy_residual"].map(|name| real(&simulation, name));
         println!(
             "{scheme:?}: kinetic {:.17} J of {kinetic:.17} J, strain {:.1e} J, residual {:.1e} J",
@@ -52,7 +52,7 @@ fn a_body_that_touches_nothing_flies_straight_with_exact_energies() {
             (energies[0] / kinetic - 1.0).abs() < 1e-14 && energies[1] == 0.0 && energies[2] == 0.0,
             "{energies:?}"
         );
-        assert_eq!(real(&simulation, "normal_impulse"), 0.0);
+        assert!(real(&simulation, "normal_impulse") == 0.0);
     }
 }
 
@@ -194,6 +194,53 @@ fn a_symmetric_scene_stays_symmetric_to_rounding() {
 }
 
 #[test]
+fn film_with_central_differences_is_the_papers_form() {
+    use nalgebra::{DMatrix, DVector};
+    let (h, friction, velocity) = (1e-6, 0.2, [-12.0, 6.0, 1.0]);
+    let distances = [0.0203, 0.0205];
+    let plates = [(Side::Left, distances[0]), (Side::Right, distances[1])];
+    let mut scene =
+        with(scene(block([0.0; 3], 3e6), &plates, false, velocity), friction, Solver::Film, Scheme::CentralDifference);
+    scene.settings.surfaces.iter_mut().for_each(|surface| surface.rigid = true);
+    let (mut simulation, rom) = (started(&scene), &scene.roms[0]);
+    let order = rom.order();
+    let start = DVector::from_fn(order, |row, _| -h * velocity[row % 3]);
+    let none = DMatrix::zeros(order, order);
+    let (mass, stiffness) = (rom.mass.clone(), rom.stiffness.clone());
+    let mut dense = tiprub_reference::paper::DenseFilm::new(mass, none, stiffness, h, DVector::zeros(order), start);
+    let contacts: Vec<(usize, f64)> = (0..27)
+        .filter_map(|node| [(0, 1.0), (2, -1.0)].into_iter().find(|side| side.0 == node / 9).map(|side| (node, side.1)))
+        .collect();
+    let gaps = DVector::from_iterator(18, contacts.iter().map(|(_, x)| distances[usize::from(*x < 0.0)] - 0.5 * SIDE));
+    let (mut off, mut force_off, mut touched) = (0.0_f64, 0.0_f64, 0);
+    for _ in 0..500 {
+        // Prediction (9), whose slip gives the direction of friction.
+        let force = &rom.stiffness * &dense.now;
+        let moved = DVector::from_fn(order, |row, _| {
+            dense.now[row] - dense.before[row] - h * h * force[row] / rom.mass[(row, row)]
+        });
+        let (mut normal, mut sliding) = (DMatrix::zeros(order, 18), DMatrix::zeros(order, 18));
+        for (column, (node, x)) in contacts.iter().enumerate() {
+            let [y, z] = [1, 2].map(|i| moved[3 * node + i]);
+            normal[(3 * node, column)] = *x;
+            sliding[(3 * node, column)] = *x;
+            sliding[(3 * node + 1, column)] = -friction * y / y.hypot(z);
+            sliding[(3 * node + 2, column)] = -friction * z / y.hypot(z);
+        }
+        let multipliers = dense.step(&normal, &sliding, &gaps);
+        advance(&mut simulation, h);
+        touched += multipliers.iter().filter(|value| **value != 0.0).count();
+        let displacement = simulation.system().bank().displacement();
+        off = (0..order).fold(off, |off, row| off.max((displacement[row] - dense.now[row]).abs()));
+        for (column, (node, _)) in contacts.iter().enumerate() {
+            force_off = force_off.max((simulation.system().multiplier(*node, 0) - multipliers[column]).abs());
+        }
+    }
+    println!("{touched} contacts, displacements {off:.1e} m, forces {force_off:.1e} N");
+    assert!(touched > 200 && off < 1e-14 && force_off < 1e-4, "{touched}, {off:e}, {force_off:e}");
+}
+
+#[test]
 fn a_pair_far_away_changes_nothing() {
     let (body, velocity) = (|| block([0.0; 3], 3e6), [-12.0, 6.0, 1.0]);
     let one = scene(body(), &[(Side::Left, 0.0203)], true, velocity);
@@ -328,7 +375,8 @@ fn refusal(change: impl FnOnce(&mut Scene)) -> String {
 
 #[test]
 fn scenes_that_make_no_sense_are_refused_with_the_reason() {
-    let cases: [(&str, fn(&mut Scene)); 24] = [
+    type Case = (&'static str, fn(&mut Scene));
+    let cases: [Case; 24] = [
         ("held", |scene| scene.roms[0].stiffness[(4, 4)] += 1e3),
         ("no contact node", |scene| scene.settings.contacts[0].nodes = Some("top".into())),
         ("claims the node `left_000`", |scene| scene.settings.contacts[1].nodes = Some("le".into())),

@@ -1,5 +1,7 @@
 //! Open surfaces: interpolation, free edges on all sides, closest points, against an independent implementation.
 
+#![allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+
 #[path = "common/casings.rs"]
 mod casings;
 
