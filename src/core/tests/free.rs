@@ -456,6 +456,19 @@ fn friction_that_may_leave_the_flight_without_one_solution_is_warned_of() {
 }
 
 #[test]
+fn the_chapter_on_variables_lists_every_variable() {
+    let chapter = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/variables.md")).unwrap();
+    let (_, free) = chapter.split_once("## Scenes of a free structure").unwrap();
+    let mut scene = with(squeezed(), 0.15, Solver::Lcp, Scheme::ModalExact);
+    scene.settings.outputs.instantaneous_forces = true;
+    for variable in Simulation::new(&scene).unwrap().table().variables() {
+        let name = variable.name.replace("right", "left");
+        let name = name.strip_suffix("_y").or(name.strip_suffix("_z")).map_or(name.clone(), |axis| format!("{axis}_x"));
+        assert!(name == "time" || free.contains(&format!("`{name}`")), "{name}");
+    }
+}
+
+#[test]
 fn gaps_at_the_start_are_distances_to_the_surfaces() {
     let flat = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.0203), (Side::Right, 0.021)], false, [0.0; 3]);
     let simulation = started(&flat);
