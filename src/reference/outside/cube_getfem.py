@@ -35,6 +35,8 @@ POISSON, DENSITY = 0.3, 7800.0
 # Corners of a brick in the order of GetFEM's QK elements.
 ORDER = [0, 1, 3, 2, 4, 5, 7, 6]
 SURFACE, ALL = 1, -1
+# Newton's method ends when positions (m) and, for finite strains, forces (N) balance to this.
+SETTLED, BALANCED = 1e-12, 1e-6
 
 
 class Body:
@@ -128,7 +130,10 @@ class Contact:
         if options.stiffness:
             touching = self.weights > 1e-12
             per_area[touching] = options.stiffness / self.weights[touching]
+            corners = np.concatenate([cube.sets["CORNERS_LEFT"], cube.sets["CORNERS_RIGHT"]])
+            per_area[corners] *= options.corners
         self.model.add_initialized_fem_data("k", point, per_area)
+        self.per_area = per_area
         self.model.add_fem_data("held", cube.mf)
         for body in bodies:
             self.model.add_fem_data("old_" + body.name, body.mf)
@@ -178,6 +183,9 @@ class Contact:
         parts = [csc(gf.asm_generic(self.mim, 2, e, region, self.model)) for region, e in self.expressions]
         return parts[0] + parts[1]
 
+    def soften(self, scale):
+        self.model.set_variable("k", scale * self.per_area)
+
     def settled(self, displacements, forces):
         """The end of a step: friction and displacements are remembered."""
         for body, values in zip(self.bodies, displacements):
@@ -214,11 +222,13 @@ def arguments():
     parser.add_argument("--speed", type=float, default=100.0)
     parser.add_argument("--friction", type=float, default=0.0)
     parser.add_argument("--stiffness", type=float)
+    parser.add_argument("--corners", type=float, default=1.0, help="stiffness of corner nodes over that of the others")
     parser.add_argument("--per-area", type=float)
     parser.add_argument("--points", choices=["nodes", "gauss"], default="nodes")
     parser.add_argument("--gauss", type=int, default=5, help="order of the Gauss rule")
     parser.add_argument("--scheme", choices=["newmark", "held"], default="newmark")
     parser.add_argument("--law", choices=["linear", "stvk"], default="linear")
+    parser.add_argument("--stride", type=int, default=1, help="steps per row; forces are means over them")
     parser.add_argument("--lumped", action="store_true")
     options = parser.parse_args()
     if (options.stiffness is None) == (options.per_area is None):
@@ -262,6 +272,7 @@ class Stepper:
         self.a = [np.zeros(3 * body.count) for body in bodies]
         self.change = [self.h * v for v in self.v]
         self.iterations = 0
+        self.before = np.zeros(len(self.places))
 
     def solve(self, index, load):
         result = np.zeros_like(load)
@@ -282,12 +293,28 @@ class Stepper:
     def newton(self, free):
         """Contact forces of linear bodies whose positions without contact are `free`."""
         start = self.at_contact(free)
-        x = start.copy()
-        forces = self.evaluate(free, x)
-        for _ in range(60):
-            residual = x - start - self.compliance @ forces[self.places]
-            if np.abs(residual).max() < 1e-14:
+        # The forces of the step before are a good guess; where Newton's method runs in circles with it, softer contact first.
+        guess = start + self.compliance @ self.before
+        for scales in ([1.0], [1e-3, 1e-2, 1e-1, 1.0]):
+            x = guess if len(scales) == 1 else start
+            for scale in scales:
+                self.contact.soften(scale)
+                x, forces, left = self.iterate(free, start, x)
+                if left >= SETTLED:
+                    break
+            else:
+                self.before = forces[self.places]
                 return forces
+        raise SystemExit(f"Newton's method has not converged: residual {left:.1e} m")
+
+    def iterate(self, free, start, x):
+        """Newton's method from contact dofs x: where it ends, the forces there, the residual (m)."""
+        for _ in range(25):
+            forces = self.evaluate(free, x)
+            residual = x - start - self.compliance @ forces[self.places]
+            left = np.abs(residual).max()
+            if left < SETTLED:
+                break
             tangent = self.contact.tangent()[self.places][:, self.places].tocsc()
             active = np.flatnonzero(np.diff(tangent.indptr))
             change = -residual
@@ -296,9 +323,8 @@ class Stepper:
                 moved = np.linalg.solve(np.eye(len(active)) + slope[active], -residual[active])
                 change = change - slope @ moved
             x = x + change
-            forces = self.evaluate(free, x)
             self.iterations += 1
-        raise SystemExit(f"Newton's method has not converged: residual {np.abs(residual).max():.1e} m")
+        return x, forces, left
 
     def newton_large(self, known, free):
         """As `newton` for a cube of finite strains; also the cube's displacement."""
@@ -309,7 +335,7 @@ class Stepper:
         first = len(self.places) - len(ring_places)
         compliance = self.compliance[first:, first:]
         start = np.concatenate(free)[ring_places]
-        x, rings = known[0] + (self.u[0] - self.u[0]) + 0.0, start.copy()
+        x, rings = known[0].copy(), start.copy()
         for _ in range(60):
             values = np.concatenate([x] + list(free[1:]))
             values[ring_places] = rings
@@ -318,7 +344,7 @@ class Stepper:
             inner, slope = self.large.at(x)
             load = inertia @ (x - known[0]) + inner - forces[:size]
             gap = rings - start - compliance @ forces[ring_places]
-            if np.abs(load).max() < 1e-7 and np.abs(gap).max() < 1e-14:
+            if np.abs(load).max() < BALANCED and np.abs(gap).max() < SETTLED:
                 return forces, x
             tangent = tangent.tocsr()
             mixed = tangent[ring_places].tocsc()
@@ -376,35 +402,44 @@ class Stepper:
         return forces
 
 
-def normal_part(stepper, node):
-    """Size of the normal force from the components of a frictional one: |F|/√(1 + µ²) while it slides."""
-    return np.linalg.norm(node) / np.sqrt(1.0 + stepper.options.friction**2)
+def normal_part(options, force):
+    """Normal force out of the whole one while the node slides, |F|/√(1 + µ²); a little too large where it sticks."""
+    return np.linalg.norm(force) / np.sqrt(1.0 + options.friction**2)
 
 
 def main():
     options = arguments()
+    gf.util_trace_level(0)
     started = time.process_time()
     tables = [json.loads((pathlib.Path(options.files) / f"{name}-consistent.json").read_text()) for name in YOUNG]
     bodies = [Body(name, table, options.lumped) for name, table in zip(YOUNG, tables)]
     stepper = Stepper(bodies, options)
     print(f"prepared in {time.process_time() - started:.1f} s of processor time", file=sys.stderr)
     cube = bodies[0]
-    first = 3 * cube.sets["CORNERS_LEFT"].min() if False else cube.dofs[0]
-    left = (3 * cube.sets["MASTER_LEFT"][:, None] + np.arange(3))
+    first = cube.dofs[0]
+    left = 3 * cube.sets["MASTER_LEFT"][:, None] + np.arange(3)
     mass = np.asarray(cube.mass.sum(axis=1)).ravel()
     with open(options.out, "w") as out:
-        out.write(f"# {' '.join(sys.argv[1:])}\nt,u1x,u1y,u1z,lambda1,left,vy\n")
-        for index in range(1, int(round(options.end / options.step)) + 1):
+        out.write(f"# {' '.join(sys.argv[2:])}\nt,u1x,u1y,u1z,lambda1,left,vy\n")
+        sums = np.zeros(2)
+        for index in range(1, round(options.end / options.step) + 1):
+            before, speed = stepper.u[0][first : first + 3], stepper.v[0][1::3]
             forces = stepper.step()
-            u = stepper.u[0][first : first + 3]
-            # A scheme that holds gaps open has the force of t_n for the positions of t_{n+1}.
-            node = normal_part(stepper, forces[first : first + 3])
-            total = sum(normal_part(stepper, forces[dofs]) for dofs in left)
-            speed = (mass[1::3] @ stepper.v[0][1::3]) / mass[1::3].sum()
-            out.write(",".join(f"{x:.9e}" for x in [index * options.step, *u, node, total, speed]) + "\n")
-            if index % 20 == 0:
+            sums += normal_part(options, forces[first : first + 3]), sum(normal_part(options, forces[d]) for d in left)
+            # The force that holds positions at the end of a step acts at its beginning.
+            held = options.scheme == "held"
+            at = index - 1 if held else index
+            if at % options.stride or at == 0:
+                continue
+            u = before if held else stepper.u[0][first : first + 3]
+            speed = (mass[1::3] @ (speed if held else stepper.v[0][1::3])) / mass[1::3].sum()
+            row = [at * options.step, *u, *(sums / options.stride), speed]
+            out.write(",".join(f"{x:.7e}" for x in row) + "\n")
+            sums[:] = 0.0
+            if index % 100 == 0:
                 out.flush()
-                print(f"{index} steps, {stepper.iterations} iterations, {time.process_time() - started:.0f} s", file=sys.stderr)
+                spent = time.process_time() - started
+                print(f"{index} steps, {stepper.iterations} iterations, {spent:.0f} s", file=sys.stderr)
 
 
 if __name__ == "__main__":
