@@ -33,7 +33,7 @@ pub fn level(directory: &Path, n: usize, case: &str, courant: f64, end: f64) {
     let rings = Side::BOTH.map(|side| ring_of(side, [n, wide, arc]));
     let scene = Scene::of(setting, cube_of(n), rings, [arc, wide]).expect("the scene can be built");
     let step = courant * 5.0 / n as f64;
-    let stride = (1..).find(|k| f64::from(*k) * step > 3.999e-6).expect("a number of steps") as usize;
+    let stride = (1_usize..).find(|k| *k as f64 * step > 3.999e-6).expect("a number of steps");
     let history = run_scene(&scene, Method::Film(Default::default()), step, end, stride);
     write_json(&file(directory, n, case), &history).expect("the history can be written");
 }
