@@ -423,7 +423,7 @@ def main():
         out.write(f"# {' '.join(sys.argv[2:])}\nt,u1x,u1y,u1z,lambda1,left,vy\n")
         sums = np.zeros(2)
         for index in range(1, round(options.end / options.step) + 1):
-            before, speed = stepper.u[0][first : first + 3], stepper.v[0][1::3]
+            before = stepper.u[0][first : first + 3]
             forces = stepper.step()
             sums += normal_part(options, forces[first : first + 3]), sum(normal_part(options, forces[d]) for d in left)
             # The force that holds positions at the end of a step acts at its beginning.
@@ -432,7 +432,7 @@ def main():
             if at % options.stride or at == 0:
                 continue
             u = before if held else stepper.u[0][first : first + 3]
-            speed = (mass[1::3] @ (speed if held else stepper.v[0][1::3])) / mass[1::3].sum()
+            speed = (mass[1::3] @ stepper.v[0][1::3]) / mass[1::3].sum()
             row = [at * options.step, *u, *(sums / options.stride), speed]
             out.write(",".join(f"{x:.7e}" for x in row) + "\n")
             sums[:] = 0.0
