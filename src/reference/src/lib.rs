@@ -10,5 +10,6 @@ pub mod cube;
 #[cfg(feature = "cube")]
 pub mod methods;
 pub mod paper;
+pub mod reduced;
 #[cfg(feature = "cube")]
 pub mod surface;
