@@ -222,9 +222,32 @@ pub struct StudyArguments {
     /// Of `stage`: runs at the same time [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
+    /// Of `error`: only this scene; may be given several times.
+    #[arg(long, value_name = "SCENE", value_enum)]
+    pub scene: Vec<ErrorScene>,
     /// Where built-in models are kept.
     #[command(flatten)]
     pub cache: CacheArguments,
+}
+
+/// Scenes of the study of errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ErrorScene {
+    /// Carpenter's two bars.
+    Carpenter,
+    /// The bouncing bar.
+    BouncingBar,
+    /// Rotor 37 touching lightly.
+    #[value(name = "rotor37-light")]
+    Rotor37Light,
+    /// Rotor 37 rubbing by the whole gap.
+    #[value(name = "rotor37-heavy")]
+    Rotor37Heavy,
+}
+
+impl ErrorScene {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Carpenter, Self::BouncingBar, Self::Rotor37Light, Self::Rotor37Heavy];
 }
 
 /// Studies by name.
@@ -236,6 +259,8 @@ pub enum StudyChoice {
     Modes,
     /// Blades against an oval flexible casing over a range of speeds.
     Stage,
+    /// Error against run time of every scheme and solver, beside independent methods.
+    Error,
 }
 
 /// A range of angular velocities (rad/s).

@@ -7,7 +7,7 @@ use crate::{
     builtin::DiskModel,
     cli::{StudyArguments, StudyChoice},
     console::{Console, Outcome},
-    study::{self, convergence, modes, stage},
+    study::{self, convergence, error, modes, stage},
 };
 
 /// Study, write, sum up.
@@ -27,6 +27,7 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
             ("modes", modes::study(&reduction, &mesh, arguments.speed, quick)?)
         }
         StudyChoice::Stage => ("stage", stage::study(arguments, console)?),
+        StudyChoice::Error => ("error", error::study(arguments, console)?),
     };
     let directory = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("study-{name}")));
     study::output::write(&study, &directory)
@@ -38,6 +39,7 @@ fn refuse_other_options(arguments: &StudyArguments) -> Result<()> {
     let given = [
         ("--speed", arguments.speed.is_some(), StudyChoice::Modes, "modes"),
         ("--speeds", arguments.speeds.is_some(), StudyChoice::Stage, "stage"),
+        ("--scene", !arguments.scene.is_empty(), StudyChoice::Error, "error"),
         ("--threads", arguments.threads.is_some(), StudyChoice::Stage, "stage"),
     ];
     match given.into_iter().find(|(_, given, study, _)| *given && *study != asked) {
@@ -62,6 +64,8 @@ mod tests {
             ("stage --speeds 400:900:3 --threads 1", None),
             ("modes --speeds 400:900:3", Some("--speeds")),
             ("stage --speed 900", Some("--speed")),
+            ("error --scene carpenter --scene rotor37-light", None),
+            ("modes --scene carpenter", Some("--scene")),
             ("convergence --threads 2", Some("--threads")),
         ] {
             let words = ["tiprub", "study"].into_iter().chain(line.split(' '));

@@ -10,6 +10,9 @@ pub trait Case {
     /// For file names and `--scene`.
     fn name(&self) -> &'static str;
 
+    /// Names of its two figures: error of the steps, total error.
+    fn figures(&self) -> [&'static str; 2];
+
     /// For headings.
     fn title(&self) -> &'static str;
 
@@ -70,7 +73,17 @@ pub trait Case {
         Vec::new()
     }
 
-    /// Whether the equations of a family are those of the truth; otherwise its runs are also held against their own limit.
+    /// What errors of the energy are relative to (J); the largest energy there is, where the scene does not say.
+    fn energy_scale(&self) -> Option<f64> {
+        None
+    }
+
+    /// Whether contact nodes act on each other, so that solvers differ.
+    fn several_nodes(&self) -> bool {
+        true
+    }
+
+    /// Whether anyone of a family takes part.
     fn has_family(&self, family: Family) -> bool {
         let all = (0..self.sizes().len()).flat_map(|size| self.competitors(size));
         all.into_iter().any(|competitor| competitor.family() == family)

@@ -167,6 +167,7 @@ fn judge(
     let window = case.impulse_window();
     let energies = truth.energies.iter().chain(&own.first.energies).chain([&truth.initial_energy]);
     let largest = energies.fold(f64::MIN_POSITIVE, |largest, energy| largest.max(energy.abs()));
+    let largest = case.energy_scale().unwrap_or(largest);
     let last = |trace: &Trace| trace.energies.last().copied().unwrap_or(0.0);
     Ok(Figures {
         seconds: run::time(&start, case.samples())?,

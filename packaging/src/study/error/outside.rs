@@ -15,7 +15,7 @@ use super::{
 /// How soft contact may be: what augmented Lagrangian and penalty need to know of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Softness {
-    /// Contact stiffness (N/m).
+    /// Contact stiffness of the softer penalty (N/m); the augmented Lagrangian has ten times as much.
     pub stiffness: f64,
     /// Penetration that the augmented Lagrangian lets pass (m).
     pub tolerance: f64,
@@ -50,7 +50,7 @@ impl<'a, S: Scene> OutsideRun<'a, S> {
         let method: Box<dyn Method + 'a> = match competitor {
             Competitor::Moreau => Box::new(Moreau::new(scene, step)),
             Competitor::Augmented => {
-                Box::new(Augmented::new(scene, step, Options { penalty: stiffness, tolerance, margin }))
+                Box::new(Augmented::new(scene, step, Options { penalty: 10.0 * stiffness, tolerance, margin }))
             }
             Competitor::Penalty(times) => Box::new(Penalty::new(scene, step, f64::from(times) * stiffness)?),
             Competitor::Core(..) => return Err("this is no method of the reference crate".into()),

@@ -116,7 +116,7 @@ pub fn shaken(elements: usize, end_mass: f64, touching: bool) -> Rod {
         mass,
         stiffness,
         closing: -unit(elements, 0),
-        gap: if touching { 0.0 } else { 1.0 },
+        gap: if touching { 0.0 } else { 10.0 },
         load,
         displacement,
         velocity: DVector::from_fn(elements, |node, _| 0.2 * swing(node)),
