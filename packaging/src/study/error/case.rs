@@ -78,6 +78,12 @@ pub trait Case {
         None
     }
 
+    /// How two runs from almost the same start part ([`super::window::parting`]), beyond the window; empty where the exact
+    /// solution is known.
+    fn parting(&self) -> &[f64] {
+        &[]
+    }
+
     /// Whether contact nodes act on each other, so that solvers differ.
     fn several_nodes(&self) -> bool {
         true

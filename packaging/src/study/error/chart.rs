@@ -167,7 +167,12 @@ impl Chart {
         let (x, mut y) = (RIGHT + 18.0, TOP + 10.0);
         for each in &self.all {
             mark(svg, each.competitor.marker(), COLORS[each.competitor.color() % COLORS.len()], x, y - 4.0);
-            let _ = write!(svg, r#"<text x="{}" y="{y}" font-size="12">{}</text>"#, x + 12.0, escape(&each.competitor.name()));
+            let _ = write!(
+                svg,
+                r#"<text x="{}" y="{y}" font-size="12">{}</text>"#,
+                x + 12.0,
+                escape(&each.competitor.name())
+            );
             y += 20.0;
         }
         let _ = write!(
@@ -193,8 +198,14 @@ fn mark(svg: &mut String, marker: usize, color: &str, x: f64, y: f64) {
         0 => write!(svg, r#"<path d="M{}h8v8h-8z" fill="{color}"/>"#, at(-4.0, -4.0)),
         1 => write!(svg, r#"<circle cx="{x}" cy="{y}" r="4.4" fill="{color}"/>"#),
         2 => write!(svg, r#"<path d="M{}l5 9h-10z" fill="none" stroke="{color}" stroke-width="1.6"/>"#, at(0.0, -5.0)),
-        3 => write!(svg, r#"<path d="M{}l8 8m0 -8l-8 8" stroke="{color}" stroke-width="2.2" fill="none"/>"#, at(-4.0, -4.0)),
-        _ => write!(svg, r#"<path d="M{}h10m-5 -5v10" stroke="{color}" stroke-width="2.2" fill="none"/>"#, at(-5.0, 0.0)),
+        3 => write!(
+            svg,
+            r#"<path d="M{}l8 8m0 -8l-8 8" stroke="{color}" stroke-width="2.2" fill="none"/>"#,
+            at(-4.0, -4.0)
+        ),
+        _ => {
+            write!(svg, r#"<path d="M{}h10m-5 -5v10" stroke="{color}" stroke-width="2.2" fill="none"/>"#, at(-5.0, 0.0))
+        }
     };
 }
 

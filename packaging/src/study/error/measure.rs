@@ -95,11 +95,11 @@ pub fn count(case: &dyn Case) -> u64 {
     (0..case.sizes().len()).map(each).sum::<usize>() as u64
 }
 
-/// Run everything. One run at a time: times are measured.
+/// Run everything, configurations so many times each for their time. One run at a time.
 ///
 /// # Errors
 /// A reference fails.
-pub fn measure(case: &dyn Case, task: &Task) -> Result<Measured> {
+pub fn measure(case: &dyn Case, repetitions: usize, task: &Task) -> Result<Measured> {
     let mut done = 0;
     let mut tick = || {
         done += 1;
@@ -117,7 +117,7 @@ pub fn measure(case: &dyn Case, task: &Task) -> Result<Measured> {
     for (size, own) in references.iter().enumerate() {
         for competitor in case.competitors(size) {
             for division in case.divisions(size) {
-                let outcome = judge(case, size, (competitor, division), own, truth);
+                let outcome = judge(case, size, (competitor, division), own, truth, repetitions);
                 rows.push(Row { size, competitor, step: case.interval() / f64::from(division), outcome });
                 tick();
             }
@@ -133,7 +133,11 @@ fn refer(case: &dyn Case, size: usize) -> Result<References> {
     let trace = |competitor: Competitor, division: u32| {
         let run = case.start(size, competitor, division, 0.0);
         run.and_then(|mut run| run::trace(run.as_mut(), case.samples())).map_err(|problem| {
-            Failure::new(format!("{}, {}", case.name(), competitor.name()), format!("the reference failed: {problem}"), "")
+            Failure::new(
+                format!("{}, {}", case.name(), competitor.name()),
+                format!("the reference failed: {problem}"),
+                "",
+            )
         })
     };
     let (first, second) = (trace(DEFAULT, division)?, trace(case.second(), outside)?);
@@ -157,6 +161,7 @@ fn judge(
     (competitor, division): (Competitor, u32),
     own: &References,
     truth: &Trace,
+    repetitions: usize,
 ) -> Result<Figures, String> {
     let start = || case.start(size, competitor, division, 0.0);
     let found = run::trace(start()?.as_mut(), case.samples())?;
@@ -170,7 +175,7 @@ fn judge(
     let largest = case.energy_scale().unwrap_or(largest);
     let last = |trace: &Trace| trace.energies.last().copied().unwrap_or(0.0);
     Ok(Figures {
-        seconds: run::time(&start, case.samples())?,
+        seconds: run::time(&start, case.samples(), repetitions)?,
         total: apart(&found.displacements, &truth.displacements),
         of_time: apart(&found.displacements, &own.first.displacements),
         of_own: apart(&found.displacements, &limit.displacements),

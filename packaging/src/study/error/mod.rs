@@ -63,12 +63,14 @@ pub fn study(arguments: &StudyArguments, console: &Console) -> Result<Study> {
         results: Value::Null,
         files: Vec::new(),
     };
-    study.facts.push(("time".into(), format!("{}, median of {} runs or more, one run at a time", clock::MEANING, run::REPETITIONS)));
+    let repetitions = if quick { 1 } else { run::REPETITIONS };
+    let time = format!("{}, median of {repetitions} runs or more, one run at a time", clock::MEANING);
+    study.facts.push(("time".into(), time));
     let mut measured = Vec::new();
     for scene in scenes {
         let case = case_of(scene, quick, &arguments.cache.cache(), console)?;
         let task = console.task(case.title(), Some(measure::count(case.as_ref())));
-        let found = measure::measure(case.as_ref(), &task)?;
+        let found = measure::measure(case.as_ref(), repetitions, &task)?;
         measured.push((case, found));
     }
     let orders = orders(&measured, console)?;
@@ -106,8 +108,9 @@ fn orders(measured: &[(Box<dyn Case>, Measured)], console: &Console) -> Result<T
     let never = |problem: String| Failure::new("error study", problem, "Report this to the developers");
     let shaken = [Bars::shaken(false).map_err(never)?, Bars::shaken(true).map_err(never)?];
     let task = console.task("Orders of convergence", None);
-    let smooth = shaken.iter().map(|case| measure::measure(case, &task)).collect::<Result<Vec<_>>>()?;
-    let mut all: Vec<(&dyn Case, &Measured)> = zip(&shaken, &smooth).map(|(case, found)| (case as &dyn Case, found)).collect();
+    let smooth = shaken.iter().map(|case| measure::measure(case, 1, &task)).collect::<Result<Vec<_>>>()?;
+    let mut all: Vec<(&dyn Case, &Measured)> =
+        zip(&shaken, &smooth).map(|(case, found)| (case as &dyn Case, found)).collect();
     all.extend(measured.iter().map(|(case, found)| (case.as_ref(), found)));
     Ok(ranking::orders(&all))
 }
@@ -124,6 +127,10 @@ fn add(study: &mut Study, case: &dyn Case, found: &Measured) -> Vec<Table> {
         html.push_str(&costs.to_html(false));
         if kind == Kind::Total {
             html.push_str(&about.to_html(false));
+            if let Some(statistics) = window::statistics(case) {
+                html.push_str(&statistics.to_html(false));
+                all.push(statistics);
+            }
             html.push_str(&sheets::rows(case, found).to_html(true));
         }
         let picture = Picture { svg: chart.to_svg(), html };
@@ -155,7 +162,9 @@ fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> Stri
             case.interval() / f64::from(case.reference_divisions(standard).1),
             own.apart[0]
         ),
-        Kind::Total => format!("{}: total error of the displacements, all numbers of {}.", case.title(), case.size_name()),
+        Kind::Total => {
+            format!("{}: total error of the displacements, all numbers of {}.", case.title(), case.size_name())
+        }
     };
     let massless = own.massless.as_ref().map_or_else(String::new, |_| {
         format!(" massless-boundary tends to a limit of its own, {:.1e} away.", own.massless_apart)
@@ -203,5 +212,6 @@ fn statements(case: &dyn Case, found: &Measured) -> Vec<Statement> {
         ),
     ];
     all.extend(ranking::floor(case, found));
+    all.extend(window::statement(case));
     all
 }

@@ -84,7 +84,8 @@ pub fn winners(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
     for target in TARGETS {
         let paper = cheapest(&rows, kind, Some(PAPER), target);
         let text = |(row, figures): (&Row, &Figures)| {
-            let size = if kind == Kind::Total { format!("{} {}, ", sizes[row.size], case.size_name()) } else { String::new() };
+            let size =
+                if kind == Kind::Total { format!("{} {}, ", sizes[row.size], case.size_name()) } else { String::new() };
             format!("{} ({size}h = {:.3} µs)", seconds(figures.seconds), 1e6 * row.step)
         };
         let paper_text = paper.map_or_else(|| "does not reach it".into(), text);
@@ -110,7 +111,8 @@ pub fn costs(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
     let rows = kind.rows(case, measured);
     let of = if kind == Kind::OfTime { "the steps alone" } else { "all, modes included" };
     let caption = format!("{}: time that every competitor needs for an error of {of}", case.title());
-    let mut table = Table::new(caption, ["competitor", "1e-2", "1e-3", "1e-4", "least error", "largest h that ran (µs)"]);
+    let mut table =
+        Table::new(caption, ["competitor", "1e-2", "1e-3", "1e-4", "least error", "largest h that ran (µs)"]);
     for competitor in Competitor::all() {
         let own: Vec<&Row> = rows.iter().copied().filter(|row| row.competitor == competitor).collect();
         let done = || own.iter().filter_map(|row| row.outcome.as_ref().ok().map(|figures| (row, figures)));

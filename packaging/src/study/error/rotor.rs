@@ -10,12 +10,13 @@ use super::{
     outside::{OutsideRun, Softness},
     run::Run,
     scene::SceneRun,
+    window,
 };
 use crate::{Failure, Result, console::Console, reduction, rom_cache::RomCache, scene_source};
 
 /// Component modes kept beside the contact nodes' own.
 const MODES: [usize; 4] = [5, 10, 20, 40];
-const QUICK_MODES: [usize; 3] = [3, 6, 12];
+const QUICK_MODES: [usize; 2] = [4, 12];
 /// Depth of the bumps: they intrude by 2·depth − 1 of the gap.
 const LIGHT: f64 = 0.6;
 const HEAVY: f64 = 1.0;
@@ -24,12 +25,15 @@ const INTERVAL: f64 = 1e-5;
 /// Samples of the window: a revolution.
 const SAMPLES: usize = 349;
 const QUICK_SAMPLES: usize = 150;
+/// Runs are followed for so many windows to see whether they part, with so many internal steps per sample.
+const LONG: usize = 3;
+const PARTING_DIVISION: u32 = 20;
 /// Internal steps per sample; the limit of central differences is at 5.8.
 const DIVISIONS: [u32; 8] = [1, 2, 5, 6, 10, 20, 40, 80];
-const QUICK_DIVISIONS: [u32; 6] = [2, 5, 10, 20, 40, 80];
+const QUICK_DIVISIONS: [u32; 5] = [2, 5, 10, 20, 40];
 /// The same of the references, the product's and Moreau-Jean's.
 const REFERENCES: (u32, u32) = (1280, 1280);
-const QUICK_REFERENCES: (u32, u32) = (640, 320);
+const QUICK_REFERENCES: (u32, u32) = (320, 160);
 /// Contact stiffness of soft methods (N/m) per node, the penetration they may leave and how near a node takes part (m).
 const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 1e-7, margin: 2e-5 };
 
@@ -40,6 +44,7 @@ pub struct Rotor {
     divisions: Vec<u32>,
     references: (u32, u32),
     samples: usize,
+    parting: Vec<f64>,
 }
 
 impl Rotor {
@@ -60,7 +65,11 @@ impl Rotor {
         }
         let divisions = if quick { QUICK_DIVISIONS.to_vec() } else { DIVISIONS.to_vec() };
         let (references, samples) = if quick { (QUICK_REFERENCES, QUICK_SAMPLES) } else { (REFERENCES, SAMPLES) };
-        Ok(Self { heavy, sizes, divisions, references, samples })
+        let mut rotor = Self { heavy, sizes, divisions, references, samples, parting: Vec::new() };
+        rotor.parting = window::parting(&rotor, PARTING_DIVISION, LONG * samples)
+            .map_err(|problem| Failure::new("rotor 37", problem, "Report this to the developers"))?;
+        rotor.samples = window::samples(&rotor.parting, samples);
+        Ok(rotor)
     }
 }
 
@@ -129,7 +138,7 @@ impl Case for Rotor {
     }
 
     fn standard(&self) -> usize {
-        self.sizes.len() - 2
+        self.sizes.len().saturating_sub(2)
     }
 
     fn interval(&self) -> f64 {
@@ -148,8 +157,14 @@ impl Case for Rotor {
         self.divisions.clone()
     }
 
-    fn reference_divisions(&self, _: usize) -> (u32, u32) {
-        self.references
+    fn reference_divisions(&self, size: usize) -> (u32, u32) {
+        let (own, outside) = self.references;
+        // Only where steps are compared must the outside reference be as fine.
+        (own, if size == self.standard() { outside } else { outside / 4 })
+    }
+
+    fn parting(&self) -> &[f64] {
+        &self.parting
     }
 
     /// Outside methods at the standard size only: they take long, and truncation is the same for all.

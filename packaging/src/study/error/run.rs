@@ -118,13 +118,17 @@ pub fn trace(run: &mut dyn Run, samples: usize) -> Result<Trace, String> {
     Ok(found)
 }
 
-/// Median of the processor time of stepping over `samples` samples (s), of at least [`REPETITIONS`] runs.
+/// Median of the processor time of stepping over `samples` samples (s), of at least `repetitions` runs.
 ///
 /// # Errors
 /// Why a run ends early.
-pub fn time<'a>(start: &dyn Fn() -> Result<Box<dyn Run + 'a>, String>, samples: usize) -> Result<f64, String> {
+pub fn time<'a>(
+    start: &dyn Fn() -> Result<Box<dyn Run + 'a>, String>,
+    samples: usize,
+    repetitions: usize,
+) -> Result<f64, String> {
     let (mut times, mut total) = (Vec::new(), 0.0);
-    while times.len() < REPETITIONS || (total < LEAST_TIME && times.len() < MOST_REPETITIONS) {
+    while times.len() < repetitions || (repetitions > 1 && total < LEAST_TIME && times.len() < MOST_REPETITIONS) {
         let mut run = start()?;
         let before = clock::now();
         for _ in 0..samples {

@@ -26,8 +26,10 @@ pub fn chart(case: &dyn Case, found: &Measured, kind: Kind) -> (Chart, Sheet) {
         joined: kind == Kind::OfTime,
         readable: (kind == Kind::OfTime).then(|| found.references[case.standard()].apart[0]),
     };
-    let competitors: Vec<Competitor> =
-        Competitor::all().into_iter().filter(|competitor| rows.iter().any(|row| row.competitor == *competitor)).collect();
+    let competitors: Vec<Competitor> = Competitor::all()
+        .into_iter()
+        .filter(|competitor| rows.iter().any(|row| row.competitor == *competitor))
+        .collect();
     let mut sheet = Sheet::default();
     sheet.columns.extend(["time (s)".to_owned(), case.size_name().to_owned(), "h (s)".to_owned()]);
     sheet.columns.extend(competitors.iter().map(|competitor| competitor.name()));
@@ -108,8 +110,7 @@ pub fn rows(case: &dyn Case, found: &Measured) -> Table {
 }
 
 fn cells(case: &dyn Case, row: &Row) -> Vec<String> {
-    let mut cells =
-        vec![row.competitor.name(), case.sizes()[row.size].to_string(), format!("{:.4}", 1e6 * row.step)];
+    let mut cells = vec![row.competitor.name(), case.sizes()[row.size].to_string(), format!("{:.4}", 1e6 * row.step)];
     match &row.outcome {
         Ok(figures) => {
             let [time, rest @ ..] = values(figures);
@@ -160,8 +161,16 @@ pub fn to_json(case: &dyn Case, found: &Measured) -> Value {
         match &row.outcome {
             Ok(figures) => {
                 let keys = [
-                    "seconds", "error_of_steps", "error_of_own_limit", "total_error", "impulse_error_of_steps",
-                    "total_impulse_error", "energy_error", "ledger_residual", "penetration", "least_force",
+                    "seconds",
+                    "error_of_steps",
+                    "error_of_own_limit",
+                    "total_error",
+                    "impulse_error_of_steps",
+                    "total_impulse_error",
+                    "energy_error",
+                    "ledger_residual",
+                    "penetration",
+                    "least_force",
                     "release_error",
                 ];
                 for (key, value) in keys.into_iter().zip(values(figures)) {

@@ -63,7 +63,8 @@ mod tests {
         };
         for count in [1, 3, 8, 20] {
             for _ in 0..50 {
-                let (a, b) = (DMatrix::from_fn(count, count, |_, _| random()), DVector::from_fn(count, |_, _| random()));
+                let (a, b) =
+                    (DMatrix::from_fn(count, count, |_, _| random()), DVector::from_fn(count, |_, _| random()));
                 let matrix = &a * a.transpose() + DMatrix::identity(count, count) * 0.3 + (&a - a.transpose()) * 0.1;
                 for found in [solve(&matrix, &b).unwrap(), relax(&matrix, &b).unwrap()] {
                     let slack = &b + &matrix * &found;

@@ -27,9 +27,8 @@ pub struct Row(pub Vec<(usize, Vec<f64>)>);
 impl Row {
     /// Σ row·values.
     pub fn dot(&self, values: &[f64]) -> f64 {
-        let piece = |(start, row): &(usize, Vec<f64>)| -> f64 {
-            row.iter().zip(&values[*start..]).map(|(a, b)| a * b).sum()
-        };
+        let piece =
+            |(start, row): &(usize, Vec<f64>)| -> f64 { row.iter().zip(&values[*start..]).map(|(a, b)| a * b).sum() };
         self.0.iter().map(piece).sum()
     }
 

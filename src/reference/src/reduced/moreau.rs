@@ -50,7 +50,8 @@ impl<'a, S: Scene> Moreau<'a, S> {
         let mut impulses = Vec::with_capacity(contacts.len());
         for group in contacts.chunk_by(|a, b| a.group == b.group) {
             let count = group.len();
-            let matrix = DMatrix::from_fn(count, count, |i, j| group[i].normal.weighted(&self.inertia, &group[j].force));
+            let matrix =
+                DMatrix::from_fn(count, count, |i, j| group[i].normal.weighted(&self.inertia, &group[j].force));
             let right = DVector::from_fn(count, |i, _| group[i].normal.dot(free) + group[i].rate);
             let found = complementarity::solve(&matrix, &right)
                 .ok_or_else(|| format!("the contact problem of step {} is not solved", self.steps))?;
