@@ -75,9 +75,9 @@ pub enum Command {
                             tiprub inspect scene.toml --json\n  tiprub inspect builtin:flexible-casing"
     )]
     Inspect(InspectArguments),
-    /// Studies of the compressor stage that ships: pictures, numbers, and whether they show what they should.
+    /// Studies of the scenes that ship: pictures, numbers, and whether they show what they should.
     #[command(after_help = "Examples:\n  tiprub study stage --quick\n  tiprub study convergence --out convergence\n  \
-                            tiprub study modes --speed 1500\n  tiprub study stage --speeds 400:1600:25 --out stage\n\n\
+                            tiprub study modes --speed 1500\n  tiprub study stage --speeds 400:1600:25 --out stage\n  tiprub study error --scene carpenter\n\n\
                             DIR then holds index.html (opens offline), an SVG and a CSV per figure, and results.json.")]
     Study(StudyArguments),
 }
@@ -243,11 +243,14 @@ pub enum ErrorScene {
     /// Rotor 37 rubbing by the whole gap.
     #[value(name = "rotor37-heavy")]
     Rotor37Heavy,
+    /// The stage of 56 coupled sectors in its elastic casing.
+    Stage,
 }
 
 impl ErrorScene {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Carpenter, Self::BouncingBar, Self::Rotor37Light, Self::Rotor37Heavy];
+    pub const ALL: [Self; 5] =
+        [Self::Carpenter, Self::BouncingBar, Self::Rotor37Light, Self::Rotor37Heavy, Self::Stage];
 }
 
 /// Studies by name.

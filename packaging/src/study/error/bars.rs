@@ -239,7 +239,7 @@ impl Case for Bars {
         let (size, interval) = (&self.sizes[size], self.interval);
         Ok(match competitor {
             Competitor::Core(scheme, solver) => {
-                let massless = competitor.family() == Family::Massless;
+                let massless = competitor.family().massless;
                 let rod = if massless { &size.massless } else { &size.core };
                 Box::new(rod.run((scheme, solver), interval, division, perturbation)?)
             }
@@ -281,6 +281,11 @@ impl Case for Bars {
             penetration: 0.0,
             adhesion: 0.0,
         })
+    }
+
+    /// Without friction nothing sticks.
+    fn families(&self, _: usize) -> Vec<Family> {
+        vec![Family::MASSLESS]
     }
 
     fn several_nodes(&self) -> bool {

@@ -89,9 +89,6 @@ pub trait Case {
         true
     }
 
-    /// Whether anyone of a family takes part.
-    fn has_family(&self, family: Family) -> bool {
-        let all = (0..self.sizes().len()).flat_map(|size| self.competitors(size));
-        all.into_iter().any(|competitor| competitor.family() == family)
-    }
+    /// Equations other than those of the first reference whose limits are computed at a size.
+    fn families(&self, size: usize) -> Vec<Family>;
 }

@@ -24,16 +24,30 @@ pub const SOLVERS: [Solver; 3] = [Solver::Film, Solver::Lcp, Solver::Coulomb];
 pub const PAPER: Competitor = Competitor::Core(Scheme::CentralDifference, Solver::Film);
 /// The first reference and default of the product.
 pub const DEFAULT: Competitor = Competitor::Core(Scheme::ModalExact, Solver::Lcp);
-/// The same without inertia of the contact nodes: other equations, with a limit of their own.
-pub const MASSLESS: Competitor = Competitor::Core(Scheme::MasslessBoundary, Solver::Lcp);
-
 /// Which equations a competitor solves: runs of one family have one limit for h → 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Family {
-    /// Every mode has its inertia.
-    Inertia,
-    /// The contact nodes have none.
-    Massless,
+pub struct Family {
+    /// The contact nodes have no inertia.
+    pub massless: bool,
+    /// Contacts may stick, and slide in any direction; otherwise they slide along the circumference.
+    pub sticking: bool,
+}
+
+impl Family {
+    /// Inertia everywhere and sliding, as the first reference.
+    pub const PLAIN: Self = Self { massless: false, sticking: false };
+    /// No inertia of the contact nodes.
+    pub const MASSLESS: Self = Self { massless: true, sticking: false };
+    /// Sticking.
+    pub const STICKING: Self = Self { massless: false, sticking: true };
+    /// Both.
+    pub const BOTH: Self = Self { massless: true, sticking: true };
+
+    /// Whose fine run stands for the limit.
+    pub fn reference(self) -> Competitor {
+        let scheme = if self.massless { Scheme::MasslessBoundary } else { Scheme::ModalExact };
+        Competitor::Core(scheme, if self.sticking { Solver::Coulomb } else { Solver::Lcp })
+    }
 }
 
 impl Competitor {
@@ -50,10 +64,8 @@ impl Competitor {
 
     /// The equations it solves.
     pub fn family(self) -> Family {
-        match self {
-            Self::Core(Scheme::MasslessBoundary, _) => Family::Massless,
-            _ => Family::Inertia,
-        }
+        let Self::Core(scheme, solver) = self else { return Family::PLAIN };
+        Family { massless: scheme == Scheme::MasslessBoundary, sticking: solver == Solver::Coulomb }
     }
 
     /// As in scene files, or in words.

@@ -4,7 +4,7 @@ use std::iter::zip;
 
 use super::{
     case::Case,
-    competitor::{Competitor, DEFAULT, Family, MASSLESS},
+    competitor::{Competitor, DEFAULT, Family},
     run::{self, Trace},
 };
 use crate::{Failure, Result, console::Task};
@@ -18,7 +18,7 @@ pub struct Figures {
     pub total: f64,
     /// Displacements against the reference of the same size: what the steps alone do.
     pub of_time: f64,
-    /// Displacements against the limit of the same equations, which differ for massless contact nodes.
+    /// Displacements against the limit of the same equations, which differ for massless contact nodes and for sticking.
     pub of_own: f64,
     /// Normal impulse in windows against the reference of the same size.
     pub impulse: f64,
@@ -55,12 +55,24 @@ pub struct References {
     pub first: Trace,
     /// The outside one.
     pub second: Trace,
-    /// The product's without inertia of the contact nodes.
-    pub massless: Option<Trace>,
+    /// The product's for other equations.
+    pub limits: Vec<(Family, Trace)>,
     /// Displacements and windowed impulses of the first two, relative.
     pub apart: [f64; 2],
-    /// Displacements of the massless one from the first.
-    pub massless_apart: f64,
+}
+
+impl References {
+    /// Limit of the equations of a family; where nothing can stick, those of sliding.
+    pub fn limit(&self, family: Family) -> &Trace {
+        let of = |family: Family| self.limits.iter().find(|limit| limit.0 == family).map(|limit| &limit.1);
+        of(family).or_else(|| of(Family { sticking: false, ..family })).unwrap_or(&self.first)
+    }
+
+    /// How far the limit of a family is from the first reference; `None` where it was not computed.
+    pub fn away(&self, family: Family) -> Option<f64> {
+        let own = self.limits.iter().find(|limit| limit.0 == family)?;
+        Some(apart(&own.1.displacements, &self.first.displacements))
+    }
 }
 
 /// Everything measured of a scene.
@@ -141,16 +153,15 @@ fn refer(case: &dyn Case, size: usize) -> Result<References> {
         })
     };
     let (first, second) = (trace(DEFAULT, division)?, trace(case.second(), outside)?);
-    let massless = case.has_family(Family::Massless).then(|| trace(MASSLESS, division)).transpose()?;
+    let limits = case.families(size).into_iter().map(|family| Ok((family, trace(family.reference(), division)?)));
     Ok(References {
         apart: [
             apart(&second.displacements, &first.displacements),
             windows_apart(&second.impulses, &first.impulses, case.impulse_window()),
         ],
-        massless_apart: massless.as_ref().map_or(0.0, |own| apart(&own.displacements, &first.displacements)),
+        limits: limits.collect::<Result<_>>()?,
         first,
         second,
-        massless,
     })
 }
 
@@ -165,10 +176,7 @@ fn judge(
 ) -> Result<Figures, String> {
     let start = || case.start(size, competitor, division, 0.0);
     let found = run::trace(start()?.as_mut(), case.samples())?;
-    let limit = match competitor.family() {
-        Family::Massless => own.massless.as_ref().unwrap_or(&own.first),
-        Family::Inertia => &own.first,
-    };
+    let limit = own.limit(competitor.family());
     let window = case.impulse_window();
     let energies = truth.energies.iter().chain(&own.first.energies).chain([&truth.initial_energy]);
     let largest = energies.fold(f64::MIN_POSITIVE, |largest, energy| largest.max(energy.abs()));

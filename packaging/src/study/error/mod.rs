@@ -17,6 +17,7 @@ pub mod rotor;
 pub mod run;
 pub mod scene;
 pub mod sheets;
+pub mod stage;
 pub mod table;
 pub mod window;
 
@@ -34,10 +35,11 @@ use crate::{
 use bars::Bars;
 use case::Case;
 use chart::Chart;
-use competitor::{Competitor, SCHEMES};
+use competitor::{Competitor, Family, SCHEMES};
 use measure::{Measured, Row};
 use ranking::Kind;
 use rotor::Rotor;
+use stage::Wheel;
 use table::Table;
 use tiprub_core::settings::{Scheme, Solver};
 
@@ -100,6 +102,7 @@ fn case_of(scene: ErrorScene, quick: bool, cache: &RomCache, console: &Console) 
         ErrorScene::BouncingBar => Box::new(Bars::bouncing(quick).map_err(never)?),
         ErrorScene::Rotor37Light => Box::new(Rotor::new(false, quick, cache, console)?),
         ErrorScene::Rotor37Heavy => Box::new(Rotor::new(true, quick, cache, console)?),
+        ErrorScene::Stage => Box::new(Wheel::new(quick, cache, console)?),
     })
 }
 
@@ -166,14 +169,16 @@ fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> Stri
             format!("{}: total error of the displacements, all numbers of {}.", case.title(), case.size_name())
         }
     };
-    let massless = own.massless.as_ref().map_or_else(String::new, |_| {
-        format!(" massless-boundary tends to a limit of its own, {:.1e} away.", own.massless_apart)
-    });
+    let away = |family: Family, what: &str| {
+        own.away(family)
+            .map_or_else(String::new, |away| format!(" {what} tends to a limit of its own, {away:.1e} away."))
+    };
+    let limits = away(Family::MASSLESS, "massless-boundary") + &away(Family::STICKING, "coulomb");
     let refused = found.rows.iter().filter(|row| row.outcome.is_err()).count();
     let shown: usize = chart.all.iter().map(|each| each.points.len()).sum();
     format!(
         "{what}{} {} {shown} configurations; {refused} of this scene were refused or failed and stand in the table of all runs.",
-        if kind == Kind::OfTime { massless.as_str() } else { "" },
+        if kind == Kind::OfTime { limits.as_str() } else { "" },
         if kind == Kind::OfTime { case.description() } else { String::new() }
     )
 }
@@ -181,7 +186,7 @@ fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> Stri
 /// What every scene should show.
 fn statements(case: &dyn Case, found: &Measured) -> Vec<Statement> {
     let title = case.title();
-    let worst = found.references.iter().map(|own| own.apart[0]).fold(0.0, f64::max);
+    let apart = found.references[case.standard()].apart[0];
     let own = |competitor: Competitor| found.rows.iter().filter(move |row| row.competitor == competitor);
     let refused = SCHEMES.into_iter().flat_map(|scheme| own(Competitor::Core(scheme, Solver::Lcp)));
     let refused: Vec<&Row> = refused.filter(|row| row.outcome.is_err()).collect();
@@ -197,8 +202,8 @@ fn statements(case: &dyn Case, found: &Measured) -> Vec<Statement> {
     let mut all = vec![
         Statement::tested(
             format!("{title}: the two references, which share no code, meet"),
-            worst < MEET,
-            format!("displacements at most {worst:.1e} apart, at any number of {}", case.size_name()),
+            apart < MEET,
+            format!("displacements {apart:.1e} apart at {} {}", case.sizes()[case.standard()], case.size_name()),
         ),
         Statement::tested(
             format!("{title}: steps beyond the limit of central differences are refused, and not with modal-exact"),

@@ -4,7 +4,7 @@ use tiprub_core::settings::{Scheme, Solver};
 
 use super::{
     case::Case,
-    competitor::{Competitor, Family, PAPER},
+    competitor::{Competitor, PAPER},
     measure::{Figures, Measured, Row},
     table::Table,
 };
@@ -210,7 +210,7 @@ pub fn orders(scenes: &[(&dyn Case, &Measured)]) -> Table {
     for competitor in Competitor::all() {
         let mut cells = vec![competitor.name()];
         cells.extend(scenes.iter().map(|(case, measured)| order(*case, measured, competitor).text()));
-        if competitor.family() == Family::Massless || cells[1..].iter().any(|cell| cell != "-") {
+        if cells[1..].iter().any(|cell| cell != "-") {
             table.rows.push(cells);
         }
     }

@@ -6,7 +6,7 @@ use tiprub_reference::reduced::rub::{BladeScene, Blades, Tip};
 
 use super::{
     case::Case,
-    competitor::Competitor,
+    competitor::{Competitor, Family},
     outside::{OutsideRun, Softness},
     run::Run,
     scene::SceneRun,
@@ -15,7 +15,7 @@ use super::{
 use crate::{Failure, Result, console::Console, reduction, rom_cache::RomCache, scene_source};
 
 /// Component modes kept beside the contact nodes' own.
-const MODES: [usize; 4] = [5, 10, 20, 40];
+const MODES: [usize; 3] = [8, 20, 40];
 const QUICK_MODES: [usize; 2] = [4, 12];
 /// Depth of the bumps: they intrude by 2·depth − 1 of the gap.
 const LIGHT: f64 = 0.6;
@@ -32,10 +32,10 @@ const PARTING_DIVISION: u32 = 20;
 const DIVISIONS: [u32; 8] = [1, 2, 5, 6, 10, 20, 40, 80];
 const QUICK_DIVISIONS: [u32; 5] = [2, 5, 10, 20, 40];
 /// The same of the references, the product's and Moreau-Jean's.
-const REFERENCES: (u32, u32) = (1280, 1280);
+const REFERENCES: (u32, u32) = (640, 640);
 const QUICK_REFERENCES: (u32, u32) = (320, 160);
 /// Contact stiffness of soft methods (N/m) per node, the penetration they may leave and how near a node takes part (m).
-const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 1e-7, margin: 2e-5 };
+const SOFTNESS: Softness = Softness { stiffness: 1e9, tolerance: 1e-6, margin: 2e-5 };
 
 /// A rub of rotor 37.
 pub struct Rotor {
@@ -153,14 +153,21 @@ impl Case for Rotor {
         10
     }
 
-    fn divisions(&self, _: usize) -> Vec<u32> {
-        self.divisions.clone()
+    /// Steps are compared at the standard size; the others leave the finest out.
+    fn divisions(&self, size: usize) -> Vec<u32> {
+        let count = self.divisions.len();
+        self.divisions[..if size == self.standard() { count } else { count - 1 }].to_vec()
     }
 
     fn reference_divisions(&self, size: usize) -> (u32, u32) {
         let (own, outside) = self.references;
         // Only where steps are compared must the outside reference be as fine.
         (own, if size == self.standard() { outside } else { outside / 4 })
+    }
+
+    fn families(&self, size: usize) -> Vec<Family> {
+        let all = vec![Family::MASSLESS, Family::STICKING, Family::BOTH];
+        if size == self.standard() { all } else { vec![Family::MASSLESS] }
     }
 
     fn parting(&self) -> &[f64] {

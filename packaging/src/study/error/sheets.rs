@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::{
     case::Case,
     chart::{Chart, Points},
-    competitor::Competitor,
+    competitor::{Competitor, Family},
     measure::{Figures, Measured, Row},
     ranking::{Kind, seconds},
     table::Table,
@@ -140,14 +140,22 @@ pub fn references(case: &dyn Case, found: &Measured) -> Table {
         "displacements apart",
         "impulses apart",
         "massless-boundary away",
+        "coulomb away",
         "reference from the truth",
     ];
     let mut table = Table::new(caption, columns);
     for ((size, own), truncation) in case.sizes().iter().zip(&found.references).zip(&found.truncation) {
-        let massless = own.massless.as_ref().map_or_else(|| "-".into(), |_| format!("{:.1e}", own.massless_apart));
+        let away = |family| own.away(family).map_or_else(|| "-".into(), |away: f64| format!("{away:.1e}"));
         let truncation = if *truncation == 0.0 { "is the truth".into() } else { format!("{truncation:.1e}") };
         let [displacements, impulses] = own.apart.map(|apart| format!("{apart:.1e}"));
-        table.rows.push(vec![size.to_string(), displacements, impulses, massless, truncation]);
+        table.rows.push(vec![
+            size.to_string(),
+            displacements,
+            impulses,
+            away(Family::MASSLESS),
+            away(Family::STICKING),
+            truncation,
+        ]);
     }
     table
 }
@@ -187,7 +195,8 @@ pub fn to_json(case: &dyn Case, found: &Measured) -> Value {
         "standard_size": case.sizes()[case.standard()],
         "window": case.interval() * case.samples() as f64,
         "references_apart": found.references.iter().map(|own| own.apart).collect::<Vec<_>>(),
-        "massless_boundary_away": found.references.iter().map(|own| own.massless_apart).collect::<Vec<_>>(),
+        "massless_boundary_away": found.references.iter().map(|own| own.away(Family::MASSLESS)).collect::<Vec<_>>(),
+        "coulomb_away": found.references.iter().map(|own| own.away(Family::STICKING)).collect::<Vec<_>>(),
         "reference_from_truth": found.truncation,
         "rows": rows.collect::<Vec<_>>(),
     })

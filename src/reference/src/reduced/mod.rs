@@ -16,7 +16,9 @@ pub mod complementarity;
 pub mod modes;
 pub mod moreau;
 pub mod penalty;
+pub mod ring;
 pub mod rub;
+pub mod wheel;
 
 use modes::Modes;
 
