@@ -9,7 +9,7 @@ fn study(root: &Path, scenes: &[&str]) -> Value {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
     command.current_dir(root).env("TIPRUB_CACHE", env!("CARGO_TARGET_TMPDIR")).env("SOURCE_DATE_EPOCH", "951782400");
     command.args(["study", "error", "--quick", "--json", "--quiet", "--out", "out"]);
-    scenes.iter().for_each(|scene| drop(command.args(["--scene", scene])));
+    command.args(scenes.iter().flat_map(|scene| ["--scene", scene]));
     let output = command.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();

@@ -48,7 +48,7 @@ pub struct Seen {
 
 impl Seen {
     /// Nothing yet.
-    pub fn new() -> Self {
+    pub fn nothing() -> Self {
         Self { impulse: 0.0, last_force: f64::NAN, penetration: 0.0, adhesion: 0.0 }
     }
 
@@ -104,7 +104,7 @@ pub fn trace(run: &mut dyn Run, samples: usize) -> Result<Trace, String> {
         penetration: 0.0,
         adhesion: 0.0,
     };
-    let mut seen = Seen::new();
+    let mut seen = Seen::nothing();
     for _ in 0..samples {
         seen.impulse = 0.0;
         run.watch(&mut seen)?;

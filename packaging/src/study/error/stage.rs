@@ -23,14 +23,14 @@ const QUICK_MODES: [usize; 2] = [2, 4];
 const INTERVAL: f64 = 2e-5;
 /// The casing touches from about 2 ms on.
 const SAMPLES: usize = 175;
-const QUICK_SAMPLES: usize = 125;
+const QUICK_SAMPLES: usize = 110;
 /// Runs are followed for so many windows to see whether they part.
 const LONG: usize = 2;
 const PARTING_DIVISION: u32 = 16;
 const DIVISIONS: [u32; 6] = [2, 4, 8, 16, 32, 64];
 const QUICK_DIVISIONS: [u32; 3] = [2, 8, 16];
 const REFERENCES: (u32, u32) = (256, 128);
-const QUICK_REFERENCES: (u32, u32) = (64, 32);
+const QUICK_REFERENCES: (u32, u32) = (64, 16);
 /// Contact stiffness of soft methods (N/m) per node, the penetration they may leave and how near a node takes part (m).
 const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 1e-6, margin: 2e-5 };
 
