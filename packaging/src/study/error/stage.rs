@@ -21,13 +21,15 @@ const MODES: [usize; 3] = [4, 8, 16];
 const QUICK_MODES: [usize; 2] = [2, 4];
 /// Time between samples (s).
 const INTERVAL: f64 = 2e-5;
-/// The casing touches from about 2 ms on.
-const SAMPLES: usize = 175;
-const QUICK_SAMPLES: usize = 110;
+/// Time over which the lobes grow (s), sooner than in the scene that ships; the casing touches from about half of it on.
+const RAMP: f64 = 1.5e-3;
+/// Samples of the window.
+const SAMPLES: usize = 125;
+const QUICK_SAMPLES: usize = 75;
 /// Runs are followed for so many windows to see whether they part.
 const LONG: usize = 2;
 const PARTING_DIVISION: u32 = 16;
-const DIVISIONS: [u32; 6] = [2, 4, 8, 16, 32, 64];
+const DIVISIONS: [u32; 6] = [4, 8, 12, 16, 32, 64];
 const QUICK_DIVISIONS: [u32; 3] = [2, 8, 16];
 const REFERENCES: (u32, u32) = (256, 128);
 const QUICK_REFERENCES: (u32, u32) = (64, 16);
@@ -54,6 +56,7 @@ impl Wheel {
         for &modes in if quick { &QUICK_MODES[..] } else { &MODES[..] } {
             let mut scene = coarse.clone();
             scene.roms[0] = disk(modes, cache, console)?;
+            scene.settings.surfaces[0].ramp_time = RAMP;
             let outside = outside(&scene).ok_or_else(|| Failure::new("stage", "the disk has no mass", ""))?;
             sizes.push((modes, scene, outside));
         }
