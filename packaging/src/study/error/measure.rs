@@ -85,6 +85,9 @@ pub struct Measured {
     pub truncation: Vec<f64>,
 }
 
+/// A run whose displacements are further away than so many times their size has failed.
+const DIVERGED: f64 = 10.0;
+
 /// |a − b| / |b| over all samples.
 pub fn apart(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     let (mut difference, mut size) = (0.0, 0.0);
@@ -178,6 +181,10 @@ fn judge(
 ) -> Result<Figures, String> {
     let start = || case.start(size, competitor, division, 0.0);
     let found = run::trace(start()?.as_mut(), case.samples())?;
+    let error = apart(&found.displacements, &own.first.displacements);
+    if error.is_nan() || error > DIVERGED {
+        return Err(format!("diverged: displacements are {error:.0e} times their size away"));
+    }
     let limit = own.limit(competitor.family());
     let window = case.impulse_window();
     let energies = truth.energies.iter().chain(&own.first.energies).chain([&truth.initial_energy]);
@@ -187,7 +194,7 @@ fn judge(
     Ok(Figures {
         seconds: run::time(&start, case.samples(), repetitions)?,
         total: apart(&found.displacements, &truth.displacements),
-        of_time: apart(&found.displacements, &own.first.displacements),
+        of_time: error,
         of_own: apart(&found.displacements, &limit.displacements),
         impulse: windows_apart(&found.impulses, &own.first.impulses, window),
         impulse_total: windows_apart(&found.impulses, &truth.impulses, window),

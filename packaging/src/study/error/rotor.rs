@@ -32,10 +32,10 @@ const PARTING_DIVISION: u32 = 20;
 const DIVISIONS: [u32; 8] = [1, 2, 5, 6, 10, 20, 40, 80];
 const QUICK_DIVISIONS: [u32; 5] = [2, 5, 10, 20, 40];
 /// The same of the references, the product's and Moreau-Jean's.
-const REFERENCES: (u32, u32) = (640, 640);
+const REFERENCES: (u32, u32) = (1280, 640);
 const QUICK_REFERENCES: (u32, u32) = (320, 160);
 /// Contact stiffness of soft methods (N/m) per node, the penetration they may leave and how near a node takes part (m).
-const SOFTNESS: Softness = Softness { stiffness: 1e9, tolerance: 1e-6, margin: 2e-5 };
+const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 5e-6, margin: 2e-5 };
 
 /// A rub of rotor 37.
 pub struct Rotor {

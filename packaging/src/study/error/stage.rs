@@ -34,7 +34,7 @@ const QUICK_DIVISIONS: [u32; 3] = [2, 8, 16];
 const REFERENCES: (u32, u32) = (256, 128);
 const QUICK_REFERENCES: (u32, u32) = (64, 16);
 /// Contact stiffness of soft methods (N/m) per node, the penetration they may leave and how near a node takes part (m).
-const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 1e-6, margin: 2e-5 };
+const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 5e-6, margin: 2e-5 };
 
 /// The stage with several numbers of component modes.
 pub struct Wheel {
