@@ -85,6 +85,11 @@ impl DiskModel {
         Self { name, options }
     }
 
+    /// The disk with options of one's own.
+    pub fn with_options(name: &'static str, options: StageOptions) -> Self {
+        Self { name, options }
+    }
+
     /// The reduction, and the mesh of one sector.
     ///
     /// # Errors

@@ -78,7 +78,7 @@ pub enum Command {
     /// Studies of the models that ship, or of a scene: pictures, numbers, and whether they show what they should.
     #[command(after_help = "Examples:\n  tiprub study stage --quick\n  tiprub study convergence --out convergence\n  \
                             tiprub study modes --speed 1500\n  tiprub study stage --speeds 400:1600:25 --out stage\n  \
-                            tiprub study map scene.toml --speeds 1200:1500:61\n\n\
+                            tiprub study map scene.toml --speeds 1200:1500:61\n  tiprub study error --scene carpenter\n\n\
                             DIR then holds index.html (opens offline), an SVG and a CSV per figure, and results.json.")]
     Study(StudyArguments),
 }
@@ -237,9 +237,35 @@ pub struct StudyArguments {
     /// Of `map`: start value of an input or parameter, such as friction_coefficient=0 or gap_offset=1e-5; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
+    /// Of `error`: only this scene; may be given several times.
+    #[arg(long = "scene", value_name = "SCENE", value_enum)]
+    pub scenes: Vec<ErrorScene>,
     /// Where built-in models are kept.
     #[command(flatten)]
     pub cache: CacheArguments,
+}
+
+/// Scenes of the study of errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ErrorScene {
+    /// Carpenter's two bars.
+    Carpenter,
+    /// The bouncing bar.
+    BouncingBar,
+    /// Rotor 37 touching lightly.
+    #[value(name = "rotor37-light")]
+    Rotor37Light,
+    /// Rotor 37 rubbing by the whole gap.
+    #[value(name = "rotor37-heavy")]
+    Rotor37Heavy,
+    /// The stage of 56 coupled sectors in its elastic casing.
+    Stage,
+}
+
+impl ErrorScene {
+    /// All of them.
+    pub const ALL: [Self; 5] =
+        [Self::Carpenter, Self::BouncingBar, Self::Rotor37Light, Self::Rotor37Heavy, Self::Stage];
 }
 
 /// Studies by name.
@@ -253,6 +279,8 @@ pub enum StudyChoice {
     Stage,
     /// Amplitudes of rubbing blades over angular velocity and frequency, with engine orders and natural frequencies.
     Map,
+    /// Error against run time of every scheme and solver, beside independent methods.
+    Error,
 }
 
 /// A range of angular velocities (rad/s).

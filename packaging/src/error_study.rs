@@ -5,22 +5,27 @@
 //! read. The massless boundary solves other equations and has a reference of its own. Errors are taken over a window that ends before rounding
 //! differences of chaotic contact could dominate.
 
-use std::time::{Duration, Instant};
-
 use serde_json::{Value, json};
 use tiprub_core::{
-    Scene, Simulation,
+    Scene,
     settings::{Scheme, Solver},
 };
 
-use crate::{Failure, Result, console::Task};
+use crate::{
+    Failure, Result,
+    console::Task,
+    study::error::{
+        competitor::Competitor,
+        measure::apart,
+        run::{self, Run, Trace},
+        scene::SceneRun,
+    },
+};
 
 /// Internal steps per communication step that are compared.
 const DIVISIONS: [u32; 6] = [2, 5, 10, 20, 40, 80];
 /// Internal steps per communication step of the references.
 const REFERENCE_DIVISION: u32 = 640;
-/// Repetitions of a run for the median time; the references run once.
-const REPETITIONS: usize = 3;
 
 /// Scheme and solver.
 pub type Method = (Scheme, Solver);
@@ -41,9 +46,9 @@ pub struct Errors {
     pub displacement: f64,
     /// Normal impulse over the window, relative.
     pub impulse: f64,
-    /// Largest penetration at a communication point (m).
+    /// Largest penetration in any step (m).
     pub penetration: f64,
-    /// Most negative multiplier at a communication point (N), 0 if none.
+    /// Most negative multiplier in any step (N), 0 if none.
     pub adhesion: f64,
 }
 
@@ -54,7 +59,7 @@ pub struct Row {
     pub method: Method,
     /// Internal step h (s).
     pub step: f64,
-    /// Median stepping time (s) and errors, or why the run was refused or failed.
+    /// Median processor time of stepping (s) and errors, or why the run was refused or failed.
     pub outcome: Result<(f64, Errors), String>,
 }
 
@@ -71,15 +76,6 @@ pub struct ErrorStudy {
     pub massless_apart: f64,
     /// All runs.
     pub rows: Vec<Row>,
-}
-
-/// What a run leaves behind.
-struct Trace {
-    displacements: Vec<f64>,
-    impulse: f64,
-    penetration: f64,
-    adhesion: f64,
-    stepping: Duration,
 }
 
 /// Number of runs a study makes, for progress.
@@ -116,8 +112,8 @@ pub fn study(scene: &Scene, window: f64, task: &Task) -> Result<ErrorStudy> {
     Ok(ErrorStudy {
         window,
         reference_step: length / f64::from(REFERENCE_DIVISION),
-        references_apart: apart(&exact.displacements, &other.displacements),
-        massless_apart: apart(&exact.displacements, &massless.displacements),
+        references_apart: apart(&other.displacements, &exact.displacements),
+        massless_apart: apart(&massless.displacements, &exact.displacements),
         rows,
     })
 }
@@ -128,73 +124,30 @@ fn count(steps: f64) -> usize {
 }
 
 fn measure(scene: &Scene, method: Method, division: u32, steps: usize, exact: &Trace) -> Result<(f64, Errors), String> {
-    let mut times = Vec::new();
-    let mut last = trace(scene, method, division, steps)?;
-    for _ in 1..REPETITIONS {
-        times.push(last.stepping.as_secs_f64());
-        last = trace(scene, method, division, steps)?;
-    }
-    times.push(last.stepping.as_secs_f64());
-    times.sort_by(f64::total_cmp);
+    let last = trace(scene, method, division, steps)?;
+    let seconds = run::time(&|| start(scene, method, division), steps, run::REPETITIONS)?;
+    let impulse = |trace: &Trace| trace.impulses.iter().sum::<f64>();
     let errors = Errors {
-        displacement: apart(&exact.displacements, &last.displacements),
-        impulse: (last.impulse / exact.impulse - 1.0).abs(),
+        displacement: apart(&last.displacements, &exact.displacements),
+        impulse: (impulse(&last) / impulse(exact) - 1.0).abs(),
         penetration: last.penetration,
         adhesion: last.adhesion,
     };
-    Ok((times[times.len() / 2], errors))
+    Ok((seconds, errors))
 }
 
-fn trace(scene: &Scene, (scheme, solver): Method, division: u32, steps: usize) -> Result<Trace, String> {
-    let mut scene = scene.clone();
+fn start(scene: &Scene, method: Method, division: u32) -> Result<Box<dyn Run>, String> {
     let length = scene.settings.experiment.communication_step;
-    scene.settings.time.scheme = scheme;
-    scene.settings.time.step = length / f64::from(division);
-    scene.settings.contacts.iter_mut().for_each(|contact| contact.solver = solver);
-    let start = scene.settings.experiment.start;
-    let mut simulation = Simulation::new(&scene).map_err(|error| error.to_string())?;
-    simulation.initialise(start).map_err(|error| error.to_string())?;
-    let mut found =
-        Trace { displacements: Vec::new(), impulse: 0.0, penetration: 0.0, adhesion: 0.0, stepping: Duration::ZERO };
-    let impulse = simulation.table().find("normal_impulse").map(|variable| variable.reference);
-    for index in 0..steps {
-        let time = start + index as f64 * length;
-        let clock = Instant::now();
-        simulation.do_step(time, length).map_err(|error| error.to_string())?;
-        found.stepping += clock.elapsed();
-        let system = simulation.system();
-        for row in 0..system.bank().rows() {
-            found.displacements.extend((0..system.bank().sectors()).map(|sector| system.bank().row(row, sector)));
-        }
-        found.penetration = system.gaps().iter().fold(found.penetration, |deepest, gap| deepest.max(-gap));
-        found.adhesion = system.events().iter().fold(found.adhesion, |least, event| least.min(event.normal));
-        if let Some(reference) = impulse {
-            found.impulse += simulation.real(reference).map_err(|error| error.to_string())?;
-        }
-    }
-    Ok(found)
+    Ok(Box::new(SceneRun::new(scene, method, length, division, 0.0)?))
 }
 
-/// |a − b| / |a|.
-fn apart(a: &[f64], b: &[f64]) -> f64 {
-    let square = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
-    let difference = square(&mut a.iter().zip(b).map(|(a, b)| a - b));
-    (difference / square(&mut a.iter().copied()).max(f64::MIN_POSITIVE)).sqrt()
+fn trace(scene: &Scene, method: Method, division: u32, steps: usize) -> Result<Trace, String> {
+    run::trace(start(scene, method, division)?.as_mut(), steps)
 }
 
 /// Name of a method as in scene files.
 pub fn name((scheme, solver): Method) -> String {
-    let scheme = match scheme {
-        Scheme::ModalExact => "modal-exact",
-        Scheme::CentralDifference => "central-difference",
-        Scheme::MasslessBoundary => "massless-boundary",
-    };
-    let solver = match solver {
-        Solver::Lcp => "lcp",
-        Solver::Film => "film",
-        Solver::Coulomb => "coulomb",
-    };
-    format!("{scheme} + {solver}")
+    Competitor::Core(scheme, solver).name()
 }
 
 impl ErrorStudy {

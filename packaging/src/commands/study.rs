@@ -7,7 +7,7 @@ use crate::{
     builtin::DiskModel,
     cli::{StudyArguments, StudyChoice},
     console::{Console, Outcome},
-    study::{self, convergence, map, modes, stage},
+    study::{self, convergence, error, map, modes, stage},
 };
 
 /// Study, write, sum up.
@@ -28,6 +28,7 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
         }
         StudyChoice::Stage => ("stage", stage::study(arguments, console)?),
         StudyChoice::Map => ("map", map::study(arguments, console)?),
+        StudyChoice::Error => ("error", error::study(arguments, console)?),
     };
     let directory = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("study-{name}")));
     study::output::write(&study, &directory)
@@ -35,12 +36,13 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
 
 /// Options of another study would be passed over in silence.
 fn refuse_other_options(arguments: &StudyArguments) -> Result<()> {
-    use StudyChoice::{Map, Modes, Stage};
-    let given: [(&str, bool, &[StudyChoice], &str); 7] = [
+    use StudyChoice::{Error, Map, Modes, Stage};
+    let given: [(&str, bool, &[StudyChoice], &str); 8] = [
         ("--speed", arguments.speed.is_some(), &[Modes], "modes"),
         ("--speeds", arguments.speeds.is_some(), &[Stage, Map], "stage` and `study map"),
         ("--threads", arguments.threads.is_some(), &[Stage, Map], "stage` and `study map"),
         ("SCENE", arguments.scene.is_some(), &[Map], "map"),
+        ("--scene", !arguments.scenes.is_empty(), &[Error], "error"),
         ("--revolutions", arguments.revolutions.is_some(), &[Map], "map"),
         ("--transient", arguments.transient.is_some(), &[Map], "map"),
         ("--set", !arguments.set.is_empty(), &[Map], "map"),
@@ -67,6 +69,8 @@ mod tests {
             ("stage --speeds 400:900:3 --threads 1", None),
             ("modes --speeds 400:900:3", Some("--speeds")),
             ("stage --speed 900", Some("--speed")),
+            ("error --scene carpenter --scene rotor37-light", None),
+            ("modes --scene carpenter", Some("--scene")),
             ("convergence --threads 2", Some("--threads")),
             ("map scene.toml --speeds 400:900:3 --threads 1 --revolutions 8 --transient 0 --set a=1", None),
             ("stage scene.toml", Some("SCENE")),

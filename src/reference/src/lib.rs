@@ -1,5 +1,5 @@
-//! Independent methods and closed forms that the product is compared with. Nothing here ships, and nothing here
-//! uses the product's stepping or contact code; meshes, element matrices and sparse factors are those of `tiprub-model`.
+//! Independent methods and closed forms that the product is compared with, by tests and by `tiprub study error`. Nothing here
+//! goes into the FMU, and nothing here uses the product's stepping or contact code; meshes, element matrices and sparse factors are those of `tiprub-model`.
 
 pub mod carpenter;
 pub mod closed;
@@ -10,4 +10,5 @@ pub mod cube;
 #[cfg(feature = "cube")]
 pub mod methods;
 pub mod paper;
+pub mod reduced;
 pub mod surface;

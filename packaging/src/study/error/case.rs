@@ -1,0 +1,94 @@
+//! What every scene of the study offers: its sizes, its steps, and a run of any competitor.
+
+use super::{
+    competitor::{Competitor, Family},
+    run::{Run, Trace},
+};
+
+/// A scene in several sizes: numbers of elements, or of component modes.
+pub trait Case {
+    /// For file names and `--scene`.
+    fn name(&self) -> &'static str;
+
+    /// Names of its two figures: error of the steps, total error.
+    fn figures(&self) -> [&'static str; 2];
+
+    /// For headings.
+    fn title(&self) -> &'static str;
+
+    /// What the scene is, in a sentence or two, with what bounds the reading of its figures.
+    fn description(&self) -> String;
+
+    /// What a size counts: `elements per bar`.
+    fn size_name(&self) -> &'static str;
+
+    /// The sizes, ascending.
+    fn sizes(&self) -> Vec<usize>;
+
+    /// Index of the size at which all competitors are compared for their steps.
+    fn standard(&self) -> usize;
+
+    /// Time between samples (s), common to all runs.
+    fn interval(&self) -> f64;
+
+    /// Samples until the window ends.
+    fn samples(&self) -> usize;
+
+    /// Samples per window of impulses.
+    fn impulse_window(&self) -> usize;
+
+    /// Internal steps per sample to be tried, ascending; the first are beyond the limit of central differences.
+    fn divisions(&self, size: usize) -> Vec<u32>;
+
+    /// Internal steps per sample of the references: the product's, and the outside one's where the scene has one.
+    fn reference_divisions(&self, size: usize) -> (u32, u32);
+
+    /// The second reference, and the competitors at a size.
+    fn second(&self) -> Competitor {
+        Competitor::Moreau
+    }
+
+    /// Who takes part at a size.
+    fn competitors(&self, size: usize) -> Vec<Competitor>;
+
+    /// Start a run at a size, with a relative perturbation of the initial gap.
+    ///
+    /// # Errors
+    /// The competitor refuses.
+    fn start<'a>(
+        &'a self,
+        size: usize,
+        competitor: Competitor,
+        division: u32,
+        perturbation: f64,
+    ) -> Result<Box<dyn Run + 'a>, String>;
+
+    /// The exact solution, where there is one.
+    fn exact(&self) -> Option<Trace> {
+        None
+    }
+
+    /// Releases that are looked for: a time before which contact has ended (s), and a time after which it began.
+    fn releases(&self) -> Vec<[f64; 2]> {
+        Vec::new()
+    }
+
+    /// What errors of the energy are relative to (J); the largest energy there is, where the scene does not say.
+    fn energy_scale(&self) -> Option<f64> {
+        None
+    }
+
+    /// How two runs from almost the same start part ([`super::window::parting`]), beyond the window; empty where the exact
+    /// solution is known.
+    fn parting(&self) -> &[f64] {
+        &[]
+    }
+
+    /// Whether contact nodes act on each other, so that solvers differ.
+    fn several_nodes(&self) -> bool {
+        true
+    }
+
+    /// Equations other than those of the first reference whose limits are computed at a size.
+    fn families(&self, size: usize) -> Vec<Family>;
+}

@@ -1,0 +1,122 @@
+//! Who takes part: every scheme with every solver of the product, and methods that share nothing with it.
+
+use tiprub_core::settings::{Scheme, Solver};
+
+/// One way to step a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Competitor {
+    /// The product.
+    Core(Scheme, Solver),
+    /// Moreau and Jean, θ = ½: implicit, exact complementarity.
+    Moreau,
+    /// Newmark with an augmented Lagrangian.
+    Augmented,
+    /// Central differences with contact springs of so many times the scene's own stiffness.
+    Penalty(u32),
+}
+
+/// Schemes of the product.
+pub const SCHEMES: [Scheme; 3] = [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary];
+/// Solvers of the product.
+pub const SOLVERS: [Solver; 3] = [Solver::Film, Solver::Lcp, Solver::Coulomb];
+
+/// The method of the paper.
+pub const PAPER: Competitor = Competitor::Core(Scheme::CentralDifference, Solver::Film);
+/// The first reference and default of the product.
+pub const DEFAULT: Competitor = Competitor::Core(Scheme::ModalExact, Solver::Lcp);
+/// Which equations a competitor solves: runs of one family have one limit for h → 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Family {
+    /// The contact nodes have no inertia.
+    pub massless: bool,
+    /// Contacts may stick, and slide in any direction; otherwise they slide along the circumference.
+    pub sticking: bool,
+}
+
+impl Family {
+    /// Inertia everywhere and sliding, as the first reference.
+    pub const PLAIN: Self = Self { massless: false, sticking: false };
+    /// No inertia of the contact nodes.
+    pub const MASSLESS: Self = Self { massless: true, sticking: false };
+    /// Sticking.
+    pub const STICKING: Self = Self { massless: false, sticking: true };
+    /// Both.
+    pub const BOTH: Self = Self { massless: true, sticking: true };
+
+    /// Whose fine run stands for the limit.
+    pub fn reference(self) -> Competitor {
+        let scheme = if self.massless { Scheme::MasslessBoundary } else { Scheme::ModalExact };
+        Competitor::Core(scheme, if self.sticking { Solver::Coulomb } else { Solver::Lcp })
+    }
+}
+
+impl Competitor {
+    /// Everyone, the product's own first.
+    pub fn all() -> Vec<Self> {
+        let own = SCHEMES.into_iter().flat_map(|scheme| SOLVERS.map(|solver| Self::Core(scheme, solver)));
+        own.chain([Self::Moreau, Self::Augmented, Self::Penalty(1), Self::Penalty(10)]).collect()
+    }
+
+    /// The product's own.
+    pub fn is_core(self) -> bool {
+        matches!(self, Self::Core(..))
+    }
+
+    /// The equations it solves.
+    pub fn family(self) -> Family {
+        let Self::Core(scheme, solver) = self else { return Family::PLAIN };
+        Family { massless: scheme == Scheme::MasslessBoundary, sticking: solver == Solver::Coulomb }
+    }
+
+    /// As in scene files, or in words.
+    pub fn name(self) -> String {
+        match self {
+            Self::Core(scheme, solver) => format!("{} + {}", scheme_name(scheme), solver_name(solver)),
+            Self::Moreau => "Moreau-Jean, implicit".into(),
+            Self::Augmented => "Newmark, augmented Lagrangian".into(),
+            Self::Penalty(1) => "central differences, penalty".into(),
+            Self::Penalty(times) => format!("central differences, penalty × {times}"),
+        }
+    }
+
+    /// Index of the colour: one per scheme or outside method.
+    pub fn color(self) -> usize {
+        match self {
+            Self::Core(Scheme::CentralDifference, _) => 0,
+            Self::Core(Scheme::ModalExact, _) => 1,
+            Self::Core(Scheme::MasslessBoundary, _) => 2,
+            Self::Moreau => 3,
+            Self::Augmented => 4,
+            Self::Penalty(_) => 5,
+        }
+    }
+
+    /// Index of the marker: one per solver; outside methods have a cross, the stiffer penalty another.
+    pub fn marker(self) -> usize {
+        match self {
+            Self::Core(_, Solver::Film) => 0,
+            Self::Core(_, Solver::Lcp) => 1,
+            Self::Core(_, Solver::Coulomb) => 2,
+            Self::Penalty(times) if times > 1 => 4,
+            _ => 3,
+        }
+    }
+}
+
+/// Name of a scheme in scene files.
+pub fn scheme_name(scheme: Scheme) -> &'static str {
+    match scheme {
+        Scheme::ModalExact => "modal-exact",
+        Scheme::CentralDifference => "central-difference",
+        Scheme::MasslessBoundary => "massless-boundary",
+    }
+}
+
+/// Name of a solver in scene files.
+pub fn solver_name(solver: Solver) -> &'static str {
+    match solver {
+        Solver::Lcp => "lcp",
+        Solver::Film => "film",
+        Solver::Coulomb => "coulomb",
+    }
+}

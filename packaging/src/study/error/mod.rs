@@ -1,0 +1,224 @@
+//! Error against run time: every scheme, solver, step and number of modes of the product, and methods that share nothing with it.
+//!
+//! A [`case::Case`] is a scene in several sizes; [`competitor::Competitor`] is who steps it; [`measure`] holds every configuration
+//! against two references that share no code, and [`ranking`] says who is cheapest. Refusals and failures are rows like all others.
+
+pub mod bars;
+pub mod case;
+pub mod chart;
+pub mod clock;
+pub mod competitor;
+pub mod machine;
+pub mod measure;
+pub mod outside;
+pub mod ranking;
+pub mod rods;
+pub mod rotor;
+pub mod run;
+pub mod scene;
+pub mod sheets;
+pub mod stage;
+pub mod table;
+pub mod window;
+
+use std::iter::zip;
+
+use serde_json::{Value, json};
+
+use super::{Figure, Picture, Statement, Study};
+use crate::{
+    Failure, Result,
+    cli::{ErrorScene, StudyArguments},
+    console::Console,
+    rom_cache::RomCache,
+};
+use bars::Bars;
+use case::Case;
+use chart::Chart;
+use competitor::{Competitor, Family, SCHEMES};
+use measure::{Measured, Row};
+use ranking::Kind;
+use rotor::Rotor;
+use stage::Wheel;
+use table::Table;
+use tiprub_core::settings::{Scheme, Solver};
+
+/// How far apart the two references of a scene may be.
+const MEET: f64 = 2e-3;
+
+/// The study.
+///
+/// # Errors
+/// A reference fails; never with the scenes that ship.
+pub fn study(arguments: &StudyArguments, console: &Console) -> Result<Study> {
+    let scenes = if arguments.scenes.is_empty() { ErrorScene::ALL.to_vec() } else { arguments.scenes.clone() };
+    let quick = arguments.quick;
+    let mut study = Study {
+        name: "error",
+        title: "Error against run time".into(),
+        summary: "Every time scheme and contact solver, at steps on both sides of the stability limit and with several numbers of modes, beside \
+                  methods that share no code with them."
+            .into(),
+        facts: machine::facts(),
+        statements: Vec::new(),
+        figures: Vec::new(),
+        results: Value::Null,
+        files: Vec::new(),
+    };
+    let repetitions = if quick { 1 } else { run::REPETITIONS };
+    let time = format!("{}, median of {repetitions} runs or more, one run at a time", clock::MEANING);
+    study.facts.push(("time".into(), time));
+    let mut measured = Vec::new();
+    for scene in scenes {
+        let case = case_of(scene, quick, &arguments.cache.cache(), console)?;
+        let task = console.task(case.title(), Some(measure::count(case.as_ref())));
+        let found = measure::measure(case.as_ref(), repetitions, &task)?;
+        measured.push((case, found));
+    }
+    let orders = orders(&measured, console)?;
+    let mut tables = Vec::new();
+    let mut results = Vec::new();
+    for (case, found) in &measured {
+        tables.extend(add(&mut study, case.as_ref(), found));
+        results.push(sheets::to_json(case.as_ref(), found));
+    }
+    if let Some(last) = study.figures.last_mut() {
+        last.picture.html.push_str(&orders.to_html(false));
+    }
+    tables.push(orders);
+    let facts: String = study.facts.iter().map(|(name, value)| format!("* {name}: {value}\n")).collect();
+    let text: Vec<String> = tables.iter().map(Table::to_markdown).collect();
+    let markdown = format!("{facts}\n{}", text.join("\n"));
+    study.files.push(("tables.md".into(), "the tables as text".into(), markdown.into_bytes()));
+    study.results = json!({ "scenes": results, "quick": quick });
+    Ok(study)
+}
+
+/// The scene of this name, reduced where it has to be.
+fn case_of(scene: ErrorScene, quick: bool, cache: &RomCache, console: &Console) -> Result<Box<dyn Case>> {
+    let never = |problem: String| Failure::new("error study", problem, "Report this to the developers");
+    Ok(match scene {
+        ErrorScene::Carpenter => Box::new(Bars::carpenter(quick).map_err(never)?),
+        ErrorScene::BouncingBar => Box::new(Bars::bouncing(quick).map_err(never)?),
+        ErrorScene::Rotor37Light => Box::new(Rotor::new(false, quick, cache, console)?),
+        ErrorScene::Rotor37Heavy => Box::new(Rotor::new(true, quick, cache, console)?),
+        ErrorScene::Stage => Box::new(Wheel::new(quick, cache, console)?),
+    })
+}
+
+/// Orders while nothing changes its contact, and in the scenes that were measured.
+fn orders(measured: &[(Box<dyn Case>, Measured)], console: &Console) -> Result<Table> {
+    let never = |problem: String| Failure::new("error study", problem, "Report this to the developers");
+    let shaken = [Bars::shaken(false).map_err(never)?, Bars::shaken(true).map_err(never)?];
+    let task = console.task("Orders of convergence", None);
+    let smooth = shaken.iter().map(|case| measure::measure(case, 1, &task)).collect::<Result<Vec<_>>>()?;
+    let mut all: Vec<(&dyn Case, &Measured)> =
+        zip(&shaken, &smooth).map(|(case, found)| (case as &dyn Case, found)).collect();
+    all.extend(measured.iter().map(|(case, found)| (case.as_ref(), found)));
+    Ok(ranking::orders(&all))
+}
+
+/// Figures, statements and files of one scene; its tables are returned.
+fn add(study: &mut Study, case: &dyn Case, found: &Measured) -> Vec<Table> {
+    let about = sheets::references(case, found);
+    let mut all = vec![about.clone()];
+    for (kind, name) in zip([Kind::OfTime, Kind::Total], case.figures()) {
+        let (chart, sheet) = sheets::chart(case, found, kind);
+        let (winners, costs) = (ranking::winners(case, found, kind), ranking::costs(case, found, kind));
+        let mut html = chart.to_svg();
+        html.push_str(&winners.to_html(false));
+        html.push_str(&costs.to_html(false));
+        if kind == Kind::Total {
+            html.push_str(&about.to_html(false));
+            if let Some(statistics) = window::statistics(case) {
+                html.push_str(&statistics.to_html(false));
+                all.push(statistics);
+            }
+            html.push_str(&sheets::rows(case, found).to_html(true));
+        }
+        let picture = Picture { svg: chart.to_svg(), html };
+        study.figures.push(Figure { name, caption: caption(case, found, kind, &chart), picture, sheet });
+        all.extend([winners, costs]);
+    }
+    study.statements.extend(statements(case, found));
+    study.files.push((
+        format!("{}.csv", case.name()),
+        format!("every configuration of {}", case.title()),
+        sheets::csv(case, found).into_bytes(),
+    ));
+    all
+}
+
+fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> String {
+    let standard = case.standard();
+    let own = &found.references[standard];
+    let size = case.sizes()[standard];
+    let what = match kind {
+        Kind::OfTime => format!(
+            "{}: error of the steps alone at {size} {}: relative L2 of the displacements against {} at h = {:.2e} s. {} at h = {:.2e} s, which \
+             shares no code with it, is {:.1e} away.",
+            case.title(),
+            case.size_name(),
+            competitor::DEFAULT.name(),
+            case.interval() / f64::from(case.reference_divisions(standard).0),
+            case.second().name(),
+            case.interval() / f64::from(case.reference_divisions(standard).1),
+            own.apart[0]
+        ),
+        Kind::Total => {
+            format!("{}: total error of the displacements, all numbers of {}.", case.title(), case.size_name())
+        }
+    };
+    let away = |family: Family, what: &str| {
+        own.away(family)
+            .map_or_else(String::new, |away| format!(" {what} tends to a limit of its own, {away:.1e} away."))
+    };
+    let limits = away(Family::MASSLESS, "massless-boundary") + &away(Family::STICKING, "coulomb");
+    let refused = found.rows.iter().filter(|row| row.outcome.is_err()).count();
+    let shown: usize = chart.all.iter().map(|each| each.points.len()).sum();
+    format!(
+        "{what}{} {} {shown} configurations; {refused} of this scene were refused or failed and stand in the table of all runs.",
+        if kind == Kind::OfTime { limits.as_str() } else { "" },
+        if kind == Kind::OfTime { case.description() } else { String::new() }
+    )
+}
+
+/// What every scene should show.
+fn statements(case: &dyn Case, found: &Measured) -> Vec<Statement> {
+    let title = case.title();
+    let apart = found.references[case.standard()].apart[0];
+    let own = |competitor: Competitor| found.rows.iter().filter(move |row| row.competitor == competitor);
+    let refused = SCHEMES.into_iter().flat_map(|scheme| own(Competitor::Core(scheme, Solver::Lcp)));
+    let refused: Vec<&Row> = refused.filter(|row| row.outcome.is_err()).collect();
+    let of = |scheme: Scheme, refused: &[&Row]| {
+        refused.iter().filter(|row| matches!(row.competitor, Competitor::Core(own, _) if own == scheme)).count()
+    };
+    let (central, exact) = (of(Scheme::CentralDifference, &refused), of(Scheme::ModalExact, &refused));
+    let lcp = SCHEMES.into_iter().flat_map(|scheme| own(Competitor::Core(scheme, Solver::Lcp)));
+    let (mut deepest, mut least) = (0.0_f64, 0.0_f64);
+    for figures in lcp.filter_map(|row| row.outcome.as_ref().ok()) {
+        (deepest, least) = (deepest.max(figures.penetration), least.min(figures.adhesion));
+    }
+    let mut all = vec![
+        Statement::tested(
+            format!("{title}: the two references, which share no code, meet"),
+            apart < MEET,
+            format!("displacements {apart:.1e} apart at {} {}", case.sizes()[case.standard()], case.size_name()),
+        ),
+        Statement::tested(
+            format!(
+                "{title}: steps beyond the limit of central differences are refused; modal-exact takes longer ones"
+            ),
+            central > exact,
+            format!("{central} and {exact} refusals with lcp"),
+        ),
+        Statement::tested(
+            format!("{title}: lcp neither penetrates nor pulls"),
+            deepest <= 0.0 && least >= 0.0,
+            format!("deepest {deepest:.1e} m, least force {least:.1e} N"),
+        ),
+    ];
+    all.extend(ranking::floor(case, found));
+    all.extend(window::statement(case));
+    all
+}

@@ -1,0 +1,167 @@
+//! Rods through the core: one structure against a fixed obstacle, stepped by [`System`] without a scene around it.
+
+use nalgebra::{DMatrix, DVector};
+use tiprub_core::{
+    Rom,
+    contact::gap::{Drive, FixedGap, GapLaw},
+    dynamics::{bank::BankOptions, modal::ModalModel, sectors::SectorModel},
+    rom::{ContactNode, Frame, RomChecks, RomExtras},
+    settings::{Scheme, Solver},
+    stability::{self, massless},
+    system::{System, SystemParts, SystemSettings},
+};
+use tiprub_reference::reduced::bars::Rod;
+
+use super::run::{Run, Seen};
+
+/// Normal of the one contact: the structure's first direction closes the gap.
+const NORMAL: [f64; 3] = [-1.0, 0.0, 0.0];
+
+/// A rod prepared for the core.
+#[derive(Debug, Clone)]
+pub struct CoreRod {
+    model: ModalModel,
+    load: Vec<f64>,
+    start: [Vec<f64>; 2],
+    gap: f64,
+    whole: bool,
+    /// Largest step that closed contact allows massless-boundary (s).
+    massless_limit: f64,
+}
+
+impl CoreRod {
+    /// `ends`: contact nodes without mass under massless-boundary. `whole`: compare all nodes, not the contact alone.
+    ///
+    /// # Errors
+    /// Never with rods.
+    pub fn new(rod: &Rod, ends: usize, whole: bool) -> Result<Self, String> {
+        let count = rod.closing.len();
+        let mut contact_map = DMatrix::zeros(3, count);
+        contact_map.row_mut(0).copy_from(&rod.closing.transpose());
+        let rom = Rom {
+            name: "rod".into(),
+            origin: "linear rod elements, lumped mass".into(),
+            sectors: 1,
+            frame: Frame::Cartesian,
+            mass: rod.mass.clone(),
+            stiffness: rod.stiffness.clone(),
+            damping_ratio: 0.0,
+            contact_map,
+            contact_nodes: vec![ContactNode { name: "end".into(), position: [0.0; 3], meridional_slope: 0.0 }],
+            checks: RomChecks::default(),
+            extras: RomExtras::default(),
+        };
+        let model = ModalModel::from_rom(&rom, 0.0).map_err(|error| error.to_string())?;
+        let model = ModalModel { quasi_static: ends, ..model };
+        let amplitudes = |values: &DVector<f64>| model.modal_load((&rod.mass * values).as_slice());
+        let check = massless::MasslessCheck { model: &model, normals: vec![NORMAL], slave: None };
+        Ok(Self {
+            load: model.modal_load(rod.load.as_slice()),
+            start: [amplitudes(&rod.displacement), amplitudes(&rod.velocity)],
+            gap: rod.gap,
+            massless_limit: check.limit(1.0).unwrap_or(f64::INFINITY),
+            model,
+            whole,
+        })
+    }
+
+    /// Start a run, refused as a scene would be.
+    ///
+    /// # Errors
+    /// Steps beyond the limit of the scheme, with numbers.
+    pub fn run(
+        &self,
+        (scheme, solver): (Scheme, Solver),
+        interval: f64,
+        division: u32,
+        perturbation: f64,
+    ) -> Result<RodRun<'_>, String> {
+        let step = interval / f64::from(division);
+        stability::check_step(self.model.largest_frequency(), scheme, step).map_err(|error| error.to_string())?;
+        if scheme == Scheme::MasslessBoundary && step >= massless::USABLE * self.massless_limit {
+            return Err(massless::refusal(step, self.massless_limit).to_string());
+        }
+        let gap = self.gap * (1.0 + perturbation);
+        let law = GapLaw::Fixed(FixedGap { normals: vec![NORMAL], gaps: vec![gap], sliding: vec![[0.0; 3]] });
+        let settings = SystemSettings { scheme, solver, friction: 0.0, ledger: true };
+        let bank = BankOptions { loads: true, ..BankOptions::default() };
+        let parts = SystemParts { bank, sticking: solver == Solver::Coulomb, ..SystemParts::default() };
+        let mut system = System::with_parts(SectorModel::Uncoupled(&self.model, 1), law, settings, parts);
+        system.set_step(step);
+        for mode in 0..self.model.len() {
+            let dynamic = mode < self.model.dynamic_modes(scheme);
+            let velocity = self.start[1][mode] - if dynamic { self.half_kick(mode, step) } else { 0.0 };
+            system.bank_mut().set_modal_state(mode, 0, self.start[0][mode], velocity);
+        }
+        system.start(&Drive::default());
+        Ok(RodRun { rod: self, system, division, step })
+    }
+
+    /// The core takes a start without loads: the velocity that gives its first increment what the load adds to it.
+    fn half_kick(&self, mode: usize, step: f64) -> f64 {
+        let (frequency, load) = (self.model.frequencies[mode], self.load[mode]);
+        if load == 0.0 {
+            0.0
+        } else if frequency == 0.0 {
+            0.5 * load * step
+        } else {
+            load / frequency * (0.5 * frequency * step).tan()
+        }
+    }
+}
+
+/// A run of a rod.
+pub struct RodRun<'a> {
+    rod: &'a CoreRod,
+    system: System,
+    division: u32,
+    step: f64,
+}
+
+impl RodRun<'_> {
+    fn one(&mut self) -> Result<(), String> {
+        self.system.bank_mut().loads_mut().copy_from_slice(&self.rod.load);
+        let stepped = self.system.step(&Drive::default());
+        stepped.map_err(|failure| format!("step {} failed: {failure:?}", self.system.steps()))
+    }
+
+    fn position(&self) -> DVector<f64> {
+        DVector::from_fn(self.rod.model.len(), |mode, _| self.system.bank().modal_state(mode, 0).0)
+    }
+}
+
+impl Run for RodRun<'_> {
+    fn advance(&mut self) -> Result<(), String> {
+        (0..self.division).try_for_each(|_| self.one())
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "step counts are below 2^52")]
+    fn watch(&mut self, seen: &mut Seen) -> Result<(), String> {
+        for _ in 0..self.division {
+            self.one()?;
+            let forces = self.system.events().iter().map(|event| event.normal);
+            seen.add(self.system.steps() as f64 * self.step, self.step, forces, self.system.gap(0, 0));
+        }
+        self.system.close_books();
+        Ok(())
+    }
+
+    fn displacements(&self) -> Vec<f64> {
+        if self.rod.whole {
+            return (&self.rod.model.shapes * self.position()).iter().copied().collect();
+        }
+        vec![self.system.bank().row(0, 0)]
+    }
+
+    fn energy(&self) -> f64 {
+        let (kinetic, strain) = self.system.energies();
+        let potential: f64 = self.rod.load.iter().zip(self.position().iter()).map(|(f, q)| f * q).sum();
+        kinetic + strain - potential
+    }
+
+    fn residual(&self) -> Option<f64> {
+        let (kinetic, strain) = self.system.energies();
+        let scale = self.system.ledger().scale();
+        (scale > 0.0).then(|| self.system.ledger().residual(kinetic + strain) / scale)
+    }
+}

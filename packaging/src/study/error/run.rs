@@ -1,0 +1,143 @@
+//! One run of one competitor: what is recorded at the sample times, and the time that stepping takes.
+
+use super::clock;
+
+/// Timed runs of a configuration.
+pub const REPETITIONS: usize = 3;
+/// Short runs are repeated until they add up to this much (s).
+const LEAST_TIME: f64 = 5e-3;
+/// Most timed runs of a configuration.
+const MOST_REPETITIONS: usize = 40;
+
+/// A competitor that marches a scene from one sample time to the next.
+pub trait Run {
+    /// March to the next sample time.
+    ///
+    /// # Errors
+    /// Why the run ends here.
+    fn advance(&mut self) -> Result<(), String>;
+
+    /// The same, looking at every internal step.
+    ///
+    /// # Errors
+    /// As there.
+    fn watch(&mut self, seen: &mut Seen) -> Result<(), String>;
+
+    /// The displacements that are compared (m).
+    fn displacements(&self) -> Vec<f64>;
+
+    /// Kinetic, strain and potential energy (J).
+    fn energy(&self) -> f64;
+
+    /// Residual of the energy ledger relative to what was exchanged; `None` where there is no ledger.
+    fn residual(&self) -> Option<f64>;
+}
+
+/// What is gathered over internal steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seen {
+    /// ∫ of all normal forces since the last sample (N·s).
+    pub impulse: f64,
+    /// Time of the last force (s); NaN before there was one.
+    pub last_force: f64,
+    /// Deepest penetration so far (m).
+    pub penetration: f64,
+    /// Most negative normal force so far (N), 0 if there is none.
+    pub adhesion: f64,
+}
+
+impl Seen {
+    /// Nothing yet.
+    pub fn nothing() -> Self {
+        Self { impulse: 0.0, last_force: f64::NAN, penetration: 0.0, adhesion: 0.0 }
+    }
+
+    /// A step of length `step` (s) that ends at `time` (s).
+    pub fn add(&mut self, time: f64, step: f64, forces: impl Iterator<Item = f64>, least_gap: f64) {
+        let mut total = 0.0;
+        for force in forces {
+            total += force;
+            self.adhesion = self.adhesion.min(force);
+        }
+        if total != 0.0 {
+            self.impulse += total * step;
+            // The force that closes the gap at the end of the step acts at its beginning.
+            self.last_force = time - step;
+        }
+        self.penetration = self.penetration.max(-least_gap);
+    }
+}
+
+/// What a run leaves behind.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trace {
+    /// Displacements, sample by sample (m).
+    pub displacements: Vec<Vec<f64>>,
+    /// Normal impulse between samples (N·s).
+    pub impulses: Vec<f64>,
+    /// Time of the last force up to every sample (s).
+    pub last_forces: Vec<f64>,
+    /// Energy at every sample (J).
+    pub energies: Vec<f64>,
+    /// Energy at the start (J).
+    pub initial_energy: f64,
+    /// See [`Run::residual`].
+    pub residual: Option<f64>,
+    /// Deepest penetration (m).
+    pub penetration: f64,
+    /// Most negative normal force (N).
+    pub adhesion: f64,
+}
+
+/// Record `samples` samples.
+///
+/// # Errors
+/// Why the run ends early.
+pub fn trace(run: &mut dyn Run, samples: usize) -> Result<Trace, String> {
+    let mut found = Trace {
+        displacements: Vec::with_capacity(samples),
+        impulses: Vec::with_capacity(samples),
+        last_forces: Vec::with_capacity(samples),
+        energies: Vec::with_capacity(samples),
+        initial_energy: run.energy(),
+        residual: None,
+        penetration: 0.0,
+        adhesion: 0.0,
+    };
+    let mut seen = Seen::nothing();
+    for _ in 0..samples {
+        seen.impulse = 0.0;
+        run.watch(&mut seen)?;
+        found.displacements.push(run.displacements());
+        found.impulses.push(seen.impulse);
+        found.last_forces.push(seen.last_force);
+        found.energies.push(run.energy());
+    }
+    found.residual = run.residual();
+    (found.penetration, found.adhesion) = (seen.penetration, seen.adhesion);
+    Ok(found)
+}
+
+/// Median of the processor time of stepping over `samples` samples (s), of at least `repetitions` runs.
+///
+/// # Errors
+/// Why a run ends early.
+pub fn time<'a>(
+    start: &dyn Fn() -> Result<Box<dyn Run + 'a>, String>,
+    samples: usize,
+    repetitions: usize,
+) -> Result<f64, String> {
+    let (mut times, mut total) = (Vec::new(), 0.0);
+    while times.len() < repetitions || (repetitions > 1 && total < LEAST_TIME && times.len() < MOST_REPETITIONS) {
+        let mut run = start()?;
+        let before = clock::now();
+        for _ in 0..samples {
+            run.advance()?;
+        }
+        let taken = (clock::now() - before).as_secs_f64();
+        total += taken;
+        times.push(taken);
+    }
+    times.sort_by(f64::total_cmp);
+    Ok(times[times.len() / 2])
+}

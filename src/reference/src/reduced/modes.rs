@@ -1,0 +1,68 @@
+//! Modes of a symmetric pencil.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// Mass-normalised modes with modal damping.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Modes {
+    /// Angular frequencies ω (rad/s).
+    pub frequencies: Vec<f64>,
+    /// Damping ratio ξ of all modes.
+    pub damping: Vec<f64>,
+    /// Shapes, coordinates × modes.
+    pub shapes: DMatrix<f64>,
+}
+
+/// Squares of frequencies below this part of the largest are those of rigid modes.
+const RIGID: f64 = 1e-12;
+
+impl Modes {
+    /// Solve K φ = ω² M φ by Cholesky's factor of the mass; `None` where the mass is not positive definite.
+    pub fn new(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>, damping: f64) -> Option<Self> {
+        let lower = mass.clone().cholesky()?.l();
+        let half = lower.solve_lower_triangular(stiffness)?;
+        let whole = lower.solve_lower_triangular(&half.transpose())?;
+        let eigen = SymmetricEigen::new((&whole + whole.transpose()) * 0.5);
+        let largest = eigen.eigenvalues.amax();
+        let root = |square: f64| if square < RIGID * largest { 0.0 } else { square.sqrt() };
+        let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+        let shapes = lower.transpose().solve_upper_triangular(&eigen.eigenvectors)?;
+        Some(Self {
+            frequencies: order.iter().map(|mode| root(eigen.eigenvalues[*mode])).collect(),
+            damping: vec![damping; order.len()],
+            shapes: shapes.select_columns(&order),
+        })
+    }
+
+    /// `count` copies side by side, without coupling; the shapes are those of one.
+    #[must_use]
+    pub fn repeated(self, count: usize) -> Self {
+        Self { frequencies: self.frequencies.repeat(count), damping: self.damping.repeat(count), shapes: self.shapes }
+    }
+
+    /// Number of modes.
+    pub fn len(&self) -> usize {
+        self.frequencies.len()
+    }
+
+    /// True when there is none.
+    pub fn is_empty(&self) -> bool {
+        self.frequencies.is_empty()
+    }
+
+    /// Largest angular frequency (rad/s).
+    pub fn largest_frequency(&self) -> f64 {
+        self.frequencies.iter().fold(0.0, |largest, value| f64::max(largest, *value))
+    }
+
+    /// φᵀ f of forces on the coordinates.
+    pub fn force(&self, force: &DVector<f64>) -> Vec<f64> {
+        (self.shapes.transpose() * force).iter().copied().collect()
+    }
+
+    /// Modal amplitudes φᵀ M u of displacements or velocities of the coordinates.
+    pub fn amplitudes(&self, mass: &DMatrix<f64>, values: &DVector<f64>) -> Vec<f64> {
+        self.force(&(mass * values))
+    }
+}

@@ -1,0 +1,153 @@
+//! Blades without coupling rubbing against a rigid casing with two bumps, written from the geometry alone.
+//!
+//! A blade node at radius r, angle θ and axial place z stands at the distance c + s(θ) − u_r + m u_z inside the casing, whose
+//! meridian runs at the slope m of the tip; s is the shape of the casing at the angle where the node is now. Divided by the length of
+//! its gradient this is the gap, and the gradient over its length the normal. Sliding follows the rotation.
+
+use nalgebra::DMatrix;
+
+use super::modes::Modes;
+use super::{Contact, Row, Scene};
+
+/// A contact node: radius (m), angle (rad), meridional slope.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tip {
+    /// Radius (m).
+    pub radius: f64,
+    /// Angle in the sector (rad).
+    pub angle: f64,
+    /// dr/dz of the tip contour.
+    pub slope: f64,
+}
+
+/// One blade's matrices and its surroundings.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Blades {
+    /// Mass.
+    pub mass: DMatrix<f64>,
+    /// Stiffness.
+    pub stiffness: DMatrix<f64>,
+    /// Radial, tangential and axial displacement of every tip node per coordinate.
+    pub contact_map: DMatrix<f64>,
+    /// Tip nodes.
+    pub tips: Vec<Tip>,
+    /// Number of blades.
+    pub sectors: usize,
+    /// Modal damping ratio.
+    pub damping: f64,
+    /// Radial clearance (m).
+    pub clearance: f64,
+    /// Angular velocity (rad/s).
+    pub speed: f64,
+    /// Coulomb coefficient.
+    pub friction: f64,
+    /// Height of the bumps (m), their width (of half a turn) and the time over which they grow (s).
+    pub bumps: [f64; 3],
+}
+
+/// Blades in their modes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BladeScene {
+    blades: Blades,
+    modes: Modes,
+    /// Contact rows of one blade over its modes.
+    rows: Vec<Vec<f64>>,
+    load: Vec<f64>,
+}
+
+impl BladeScene {
+    /// `None` for a mass that is not positive definite.
+    pub fn new(blades: Blades) -> Option<Self> {
+        let modes = Modes::new(&blades.mass, &blades.stiffness, blades.damping)?;
+        let seen = &blades.contact_map * &modes.shapes;
+        let rows = seen.row_iter().map(|row| row.iter().copied().collect()).collect();
+        let modes = modes.repeated(blades.sectors);
+        Some(Self { load: vec![0.0; modes.len()], rows, modes, blades })
+    }
+
+    fn each(&self) -> usize {
+        self.rows[0].len()
+    }
+
+    fn moved(&self, row: usize, sector: usize, position: &[f64]) -> f64 {
+        let each = self.each();
+        self.rows[row].iter().zip(&position[sector * each..]).map(|(a, b)| a * b).sum()
+    }
+
+    /// Change of the casing's radius at a fixed angle, its slope and its rate of growth, with the ramp in it.
+    fn shape(&self, angle: f64, time: f64) -> [f64; 3] {
+        use std::f64::consts::PI;
+        let [height, width, ramp] = self.blades.bumps;
+        let away = (angle.rem_euclid(PI) / PI - 0.5) / width;
+        let bump = -height * (-away * away).exp();
+        let slope = -2.0 * away / (PI * width) * bump;
+        if time >= ramp {
+            return [bump, slope, 0.0];
+        }
+        let phase = PI * time / ramp;
+        let (grown, growing) = (0.5 * (1.0 - phase.cos()), 0.5 * PI / ramp * phase.sin());
+        [grown * bump, grown * slope, growing * bump]
+    }
+
+    fn contact(&self, node: usize, sector: usize, time: f64, position: &[f64], within: f64) -> Option<Contact> {
+        let (tip, blades) = (self.blades.tips[node], &self.blades);
+        let [radial, tangential, axial]: [f64; 3] =
+            std::array::from_fn(|component| self.moved(3 * node + component, sector, position));
+        let pitch = std::f64::consts::TAU * sector as f64 / blades.sectors as f64;
+        let [shape, slope, growth] =
+            self.shape(tip.angle + pitch + blades.speed * time + tangential / tip.radius, time);
+        let gradient = [-1.0, slope / tip.radius, tip.slope];
+        let length = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
+        let gap = (blades.clearance + shape - radial + tip.slope * axial) / length;
+        if gap > within {
+            return None;
+        }
+        let normal = gradient.map(|g| g / length);
+        // Along the circumference, within the tangent plane.
+        let along = [-normal[1] * normal[0], 1.0 - normal[1] * normal[1], -normal[1] * normal[2]];
+        let size = along.iter().map(|t| t * t).sum::<f64>().sqrt();
+        let force: [f64; 3] = std::array::from_fn(|i| normal[i] - blades.friction * along[i] / size);
+        let row = |direction: [f64; 3]| {
+            let entry = |mode: usize| (0..3).map(|i| direction[i] * self.rows[3 * node + i][mode]).sum();
+            Row(vec![(sector * self.each(), (0..self.each()).map(entry).collect())])
+        };
+        Some(Contact {
+            node: node * blades.sectors + sector,
+            group: sector,
+            gap,
+            rate: (slope * blades.speed + growth) / length,
+            normal: row(normal),
+            force: row(force),
+        })
+    }
+}
+
+impl Scene for BladeScene {
+    fn modes(&self) -> &Modes {
+        &self.modes
+    }
+
+    fn contacts(&self, time: f64, position: &[f64], within: f64) -> Vec<Contact> {
+        let mut found = Vec::new();
+        for sector in 0..self.blades.sectors {
+            for node in 0..self.blades.tips.len() {
+                found.extend(self.contact(node, sector, time, position, within));
+            }
+        }
+        found
+    }
+
+    fn load(&self) -> &[f64] {
+        &self.load
+    }
+
+    fn start(&self) -> (Vec<f64>, Vec<f64>) {
+        (vec![0.0; self.modes.len()], vec![0.0; self.modes.len()])
+    }
+
+    /// Row by row, every sector.
+    fn observed(&self, position: &[f64]) -> Vec<f64> {
+        let rows = 0..self.rows.len();
+        rows.flat_map(|row| (0..self.blades.sectors).map(move |sector| self.moved(row, sector, position))).collect()
+    }
+}
