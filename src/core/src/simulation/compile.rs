@@ -60,12 +60,16 @@ impl Roles {
         let roles = Self { master: structure(&contact.master).unwrap_or(0), surface, carrier };
         let counts = [settings.structures.len(), settings.surfaces.len(), settings.contacts.len()];
         let expected = [1 + usize::from(carrier.is_some()), 1, 1];
-        if counts != expected || scene.roms.len() != counts[0] || carrier == Some(roles.master) {
+        if settings.free_master().is_some()
+            || counts != expected
+            || scene.roms.len() != counts[0]
+            || carrier == Some(roles.master)
+        {
             return Err(Error::invalid(
                 "scene",
                 format!("{} structures, {} surfaces, {} contacts", counts[0], counts[1], counts[2]),
-                "This version takes one rotor against one surface, which one other structure may carry \
-                 (surface.structure): remove what takes no part",
+                "A rotor takes one surface, which one other structure may carry (surface.structure): remove what takes no \
+                 part. Several pairs need a master with motion = \"free\"",
             ));
         }
         Ok(roles)
