@@ -363,11 +363,11 @@ fn model(text: &str) -> Result<Model, String> {
         "ring-right" => Ok(Model::Ring(Side::Right)),
         // Names of files have an extension or a directory; anything else is a slip in the name of a model.
         _ if text.contains(['.', '/', '\\']) => Ok(Model::File(text.into())),
-        _ => {
-            Err("`rotor37`, `casing`, `stage`, `stage-casing`, `cube`, `ring-left` and `ring-right` ship with tiprub; a \
+        _ => Err(
+            "`rotor37`, `casing`, `stage`, `stage-casing`, `cube`, `ring-left` and `ring-right` ship with tiprub; a \
                  model of your own is a file: .inp or .msh"
-                .into())
-        }
+                .into(),
+        ),
     }
 }
 

@@ -67,6 +67,7 @@ fn the_list_of_keys_is_that_of_the_settings() {
         found.extend(keys(&scene));
     }
     found.extend(keys(&features::scene_with_every_feature()));
+    found.extend(keys(&features::scene_with_a_free_master()));
     // Tables are not keys with values of their own, except those inside others.
     for table in ["structure", "surface", "contact", "time", "outputs", "experiment"] {
         assert!(found.remove(table), "{table}");

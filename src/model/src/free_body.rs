@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use tiprub_core::Rom;
 use tiprub_core::rom::{ContactNode, Frame, RomExtras};
 
+use crate::Result;
 use crate::assembly::free_dofs;
 use crate::casing::{modal_form, rigid_motions, without_rigid_motions};
 use crate::craig_bampton::craig_bampton;
@@ -15,7 +16,6 @@ use crate::progress::{Listener, Stage, report};
 use crate::reduce::{
     ContactPoint, Reduction, Timings, check_nodes, compare, description, full_modes, interface_dofs, node_modes, timed,
 };
-use crate::Result;
 
 /// What to reduce a body to, and what to call it.
 #[derive(Debug, Clone, PartialEq)]

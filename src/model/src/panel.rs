@@ -220,9 +220,8 @@ fn principal_forces(
             dofs.iter().enumerate().for_each(|(i, &dof)| lacking[(i, chunk * COLUMNS + j)] = response[(dof, j)]);
         }
     }
-    let scaled = Mat::from_fn(dofs.len(), kept.eigenvalues.len(), |i, k| {
-        kept.shapes[(dofs[i], k)] / kept.eigenvalues[k].sqrt()
-    });
+    let scaled =
+        Mat::from_fn(dofs.len(), kept.eigenvalues.len(), |i, k| kept.shapes[(dofs[i], k)] / kept.eigenvalues[k].sqrt());
     lacking -= &scaled * scaled.transpose();
     let symmetric = Mat::from_fn(dofs.len(), dofs.len(), |i, j| 0.5 * (lacking[(i, j)] + lacking[(j, i)]));
     let scale = symmetric.norm_max();

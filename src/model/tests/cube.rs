@@ -84,7 +84,10 @@ fn with_all_modes_nothing_is_lost() {
         equal(&flexibility(&rom, shift), &full.select_rows(&rows).select_columns(&rows), 1e-9);
         // And some of it is lost with fewer, so that the test can fail.
         let truncated = cube(3, mass, Some(10)).rom;
-        assert!((flexibility(&truncated, shift) - full.select_rows(&rows).select_columns(&rows)).amax() > 1e-4 * full.amax());
+        assert!(
+            (flexibility(&truncated, shift) - full.select_rows(&rows).select_columns(&rows)).amax()
+                > 1e-4 * full.amax()
+        );
     }
     for side in Side::BOTH {
         let [stiffness, inertia] = dense(ring_of(side, COARSE), &ring_material(), MassMatrix::Lumped);

@@ -123,13 +123,7 @@ pub fn reduce_cube_ring(options: &RingOptions, listener: Listener<'_>) -> Result
     Ok(reduction)
 }
 
-fn model(
-    mesh: Mesh,
-    material: &Material,
-    mass: MassMatrix,
-    origin: &str,
-    listener: Listener<'_>,
-) -> Result<FeModel> {
+fn model(mesh: Mesh, material: &Material, mass: MassMatrix, origin: &str, listener: Listener<'_>) -> Result<FeModel> {
     report(listener, Stage::Mesh, 1, 1);
     let kind = if mass == MassMatrix::Lumped { "lumped" } else { "consistent" };
     let model = FeModel::assembled(mesh, material, format!("{origin}, {kind} mass"), listener)?;

@@ -60,9 +60,10 @@ fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: Frame) -> Conta
 pub(crate) fn description(model: &FeModel, clamped: usize) -> String {
     let before = if model.origin.is_empty() { String::new() } else { format!("{}: ", model.origin) };
     let nodes = model.nodes.len();
-    let elements = model.mesh.as_ref().map_or(String::new(), |(mesh, _)| {
-        format!(", {} elements ({})", mesh.elements.len(), element_names(mesh))
-    });
+    let elements = model
+        .mesh
+        .as_ref()
+        .map_or(String::new(), |(mesh, _)| format!(", {} elements ({})", mesh.elements.len(), element_names(mesh)));
     let material = model.mesh.as_ref().map_or(String::new(), |(_, material)| {
         let Material { young_modulus, poisson_ratio, density, .. } = material;
         format!("; E = {young_modulus:e} Pa, nu = {poisson_ratio}, rho = {density} kg/m3")
