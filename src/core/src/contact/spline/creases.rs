@@ -4,7 +4,7 @@
 
 use super::foot::{Foot, Held, noise};
 use super::projection::ROUNDING;
-use super::{Place, SurfaceSpline};
+use super::{Ends, Place, SurfaceSpline};
 use crate::contact::gap::dot;
 use crate::settings::Interpolation;
 
@@ -45,6 +45,10 @@ impl SurfaceSpline {
             side == 0 || distance * distance * length <= 8.0 * foot.half_square || distance <= 0.0
         };
         if !(near(sides[0], s, room[0], length_s) && near(sides[1], t, room[1], length_t)) {
+            return None;
+        }
+        let last = p + 1 == self.columns();
+        if self.ends == Ends::Open && ((sides[0] < 0 && p == 0) || (sides[0] > 0 && last)) {
             return None;
         }
         let (column, s) = match (sides[0], self.interpolation) {
