@@ -107,7 +107,7 @@ pub struct ReduceArguments {
     #[arg(value_name = "MODEL", value_parser = model, required_unless_present = "stiffness")]
     pub model: Option<Model>,
     /// Number of modes kept: fixed-interface modes of a blade [default: 20 of rotor37, 25 of a file and of the stage, there per nodal diameter] and of the
-    /// cube [default: all], modes of the casing below the cut-off and of the cube's rings [default: 60].
+    /// cube [default: all], modes of the casing below the cut-off [default: 60], of the cube's rings [default: 100].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
     /// Number of contact nodes: along the tip chord of `rotor37`, leading edge to trailing edge (≥ 2); of a file, chosen
@@ -134,7 +134,7 @@ pub struct ReduceArguments {
     /// Also write mesh, sets and mode shapes for ParaView (.vtu).
     #[arg(long, value_name = "FILE")]
     pub vtk: Option<PathBuf>,
-    /// Of the rings of `cube`: static responses to contact forces kept beside the modes [default: 60].
+    /// Of the rings of `cube`: static responses to contact forces kept beside the modes [default: 0].
     #[arg(long, value_name = "N")]
     pub static_responses: Option<usize>,
     /// Of `cube` and its rings: mass matrix of the finite elements [default: lumped].
@@ -245,6 +245,8 @@ pub enum StudyChoice {
     Modes,
     /// Blades against an oval flexible casing over a range of speeds.
     Stage,
+    /// The cube between two rings: the product against independent methods on the full model.
+    Cube,
 }
 
 /// A range of angular velocities (rad/s).
@@ -460,7 +462,7 @@ mod tests {
             ("reduce casing --contact-axial 0.1:0.1", "FROM:TO"),
             ("study stage --speeds 100:50:4", "FROM:TO:COUNT"),
             ("study stage --speeds 100:500", "FROM:TO:COUNT"),
-            ("study tip", "possible values: convergence, modes, stage"),
+            ("study tip", "possible values: convergence, modes, stage, cube"),
             ("reduce casing --support left", "possible values: low, high, both, free"),
         ] {
             let error = parse(line).unwrap_err();

@@ -20,6 +20,8 @@ const FRICTION_STEPS_PER_UNIT: f64 = 20.0;
 /// Modes that a warning of the checks is about: those that blade-tip contact excites most. Of coupled sectors the first
 /// family: as many modes of the wheel as there are sectors.
 const FIRST_MODES: usize = 6;
+/// Contact nodes that are listed.
+const LISTED_NODES: usize = 24;
 /// Rows of a table of checks for people; coupled sectors may come with hundreds.
 pub(crate) const ROWS_SHOWN: usize = 40;
 /// Frequencies listed of each nodal diameter.
@@ -150,13 +152,18 @@ impl RomFacts {
         let _ = writeln!(text, "ROM {}: {}", rom.name, rom.origin);
         let _ = writeln!(text, "  sectors                   {}", sectors_text(rom));
         let _ = writeln!(text, "  reduced coordinates       {}", order_text(rom));
-        // Of a grid, the first node of every ring stands for the others.
+        // Of a grid, the first node of every ring stands for the others; of many nodes, some.
         let shown = match rom.extras.grid {
             Some(grid) => {
                 let edges = if grid.closed { "" } else { ", four free edges" };
                 let _ =
                     writeln!(text, "  contact nodes             {} around x {} along{edges}", grid.around, grid.along);
                 grid.around
+            }
+            None if nodes.len() > LISTED_NODES => {
+                let (first, last) = (nodes[0], nodes[nodes.len() - 1]);
+                let _ = writeln!(text, "  contact nodes             {} ({first} ... {last})", nodes.len());
+                nodes.len().div_ceil(LISTED_NODES)
             }
             None => {
                 let _ = writeln!(text, "  contact nodes             {} ({})", nodes.len(), nodes.join(", "));

@@ -7,7 +7,7 @@ use crate::{
     builtin::DiskModel,
     cli::{StudyArguments, StudyChoice},
     console::{Console, Outcome},
-    study::{self, convergence, modes, stage},
+    study::{self, convergence, cube, modes, stage},
 };
 
 /// Study, write, sum up.
@@ -26,6 +26,7 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
             let (reduction, mesh) = DiskModel::new(quick).reduce(console)?;
             ("modes", modes::study(&reduction, &mesh, arguments.speed, quick)?)
         }
+        StudyChoice::Cube => ("cube", cube::study(arguments, console)?),
         StudyChoice::Stage => ("stage", stage::study(arguments, console)?),
     };
     let directory = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("study-{name}")));

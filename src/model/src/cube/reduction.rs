@@ -71,8 +71,8 @@ impl RingOptions {
             side,
             elements: RING_ELEMENTS,
             mass: MassMatrix::default(),
-            modes: 60,
-            static_responses: 60,
+            modes: 100,
+            static_responses: 0,
             checked_modes: 10,
         }
     }
