@@ -10,5 +10,4 @@ pub mod cube;
 #[cfg(feature = "cube")]
 pub mod methods;
 pub mod paper;
-#[cfg(feature = "cube")]
 pub mod surface;

@@ -216,12 +216,19 @@ impl Slave {
     /// What the forces of a solution would do to the control points.
     pub fn respond(&mut self, solution: &Solution, per: usize) {
         self.gather(solution, per);
+        if self.members.is_empty() {
+            self.response.fill(0.0);
+            return;
+        }
         self.bank.response_to_modal(&self.force, &mut self.response);
     }
 
     /// Let the forces of the solution act that [`Slave::respond`] was asked about last.
     pub fn apply(&mut self, with_loss: bool) {
         self.delayed.copy_from_slice(&self.force);
+        if self.members.is_empty() {
+            return;
+        }
         self.bank.correct_modal(&self.force, &self.response, with_loss);
     }
 

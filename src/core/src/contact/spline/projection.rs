@@ -40,8 +40,8 @@ pub enum Projection {
 const EDGE_TOLERANCE: f64 = 1e-9;
 /// Newton steps below this (in patches) end the iteration.
 const STEP_TOLERANCE: f64 = 1e-11;
-/// Rounding of the coordinates of x − S, relative to |x|.
-pub(super) const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// Rounding of the coordinates of x − S, relative to |x| (and |x − S|).
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// Corrections near a good start; one or two are the rule.
 const MAX_CORRECTIONS: usize = 6;
 /// Far beyond what starts on the opposite side of the casing need (about 30).
@@ -174,11 +174,23 @@ impl SurfaceSpline {
         Place { patch, s, t: t - (ring - q) }
     }
 
+    /// Rounding of the coordinates of x − S (m), and of the place of S. A node inside a casing is near the surface and as
+    /// far from the axis. One that faces an open surface may be anywhere, and so may that: rounding of the tangents, which
+    /// is that of the coordinates over a patch, moves the closest point in proportion to the distance.
+    pub(super) fn rounding(&self, x: [f64; 3], foot: &Foot) -> f64 {
+        let size = dot(x, x).sqrt();
+        if self.ends != Ends::Open {
+            return ROUNDING * size;
+        }
+        let (distance, metric) = ((2.0 * foot.half_square).sqrt(), foot.metric());
+        ROUNDING * (size + distance) * (1.0 + distance / metric[0].min(metric[2]).sqrt())
+    }
+
     /// Minimum of f on the sheet of `start`.
     pub(super) fn descend(&self, x: [f64; 3], start: Place) -> Option<Foot> {
-        let rounding = ROUNDING * dot(x, x).sqrt();
         let longest = (0.125 * super::real(self.around)).max(1.0);
         let mut foot = Foot::at(self, x, start);
+        let rounding = self.rounding(x, &foot);
         for _ in 0..MAX_ITERATIONS {
             let room = self.room(foot.place);
             let metric = foot.metric();
