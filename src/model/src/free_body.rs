@@ -50,7 +50,7 @@ pub fn reduce_free_body(
         full_modes(&model.stiffness, &model.mass, true, options.checked_modes, listener)
     })?;
     let interface = interface_dofs(&free, contact)?;
-    let inner = free.len().checked_sub(interface.len()).unwrap_or_default();
+    let inner = free.len().saturating_sub(interface.len());
     let count = options.fixed_interface_modes.unwrap_or(inner);
     let points: Vec<[f64; 3]> = contact.iter().map(|point| model.nodes[point.node]).collect();
     let (reduced, modes) = timed(&mut timings.reduction, || {

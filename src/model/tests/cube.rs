@@ -151,7 +151,7 @@ fn normals_point_to_the_cube() {
         assert!((normal.x + side.sign()).abs() < 1e-12, "{side:?}: {normal}");
         let crest = place(i, j).x;
         assert!((crest - side.sign() * 0.024).abs() < 1e-12, "2 mm closer together than the cube is wide: {crest}");
-        assert_eq!(rom.contact_map.row(0).amax(), 0.0, "the ends are clamped");
+        assert!(rom.contact_map.row(0).amax() < 1e-300, "the ends are clamped");
     }
     let diagonal = |rom: &Rom| rom.stiffness.diagonal();
     let off = (diagonal(&roms[0]) - diagonal(&roms[1])).component_div(&diagonal(&roms[0])).amax();
