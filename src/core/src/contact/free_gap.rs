@@ -134,6 +134,7 @@ fn extent(points: &[[f64; 3]]) -> f64 {
 }
 
 /// Unit tangent along a velocity (m/s); zero when nothing slides.
+#[inline(always)]
 pub fn tangent(velocity: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
     let along = dot(velocity, normal);
     let tangent: [f64; 3] = std::array::from_fn(|i| velocity[i] - along * normal[i]);

@@ -184,7 +184,6 @@ impl GapLaw {
     }
 
     /// The surface spline that a contact node meets, and which of the carriers may deform it.
-    #[inline(always)]
     pub fn spline_of(&self, node: usize) -> Option<(&SurfaceSpline, usize)> {
         match self {
             Self::Fixed(_) | Self::Revolution(_) => None,

@@ -39,9 +39,12 @@ pub(super) fn carrier_of<'a>(
     law: &'a GapLaw,
     node: usize,
 ) -> Option<(&'a Slave, &'a SurfaceSpline)> {
-    if slaves.is_empty() {
-        return None;
-    }
+    if slaves.is_empty() { None } else { find_carrier(slaves, law, node) }
+}
+
+/// Out of line: in a rigid casing contacts never get here.
+#[inline(never)]
+fn find_carrier<'a>(slaves: &'a [Slave], law: &'a GapLaw, node: usize) -> Option<(&'a Slave, &'a SurfaceSpline)> {
     let (surface, carrier) = law.spline_of(node)?;
     Some((&slaves[carrier], surface))
 }
