@@ -4,6 +4,7 @@ use tiprub_core::Rom;
 use tiprub_model::{
     CasingOptions, Mesh, Rotor37Options,
     casing::CASING37,
+    cube::{CubeOptions, RingOptions, Side},
     cyclic::{CyclicOptions, CyclicReduction, ModeSelection, reduce_cyclic},
     rotor37::DESIGN_SPEED,
     stage::{
@@ -29,9 +30,24 @@ pub const STAGE_COARSE: &str = "stage-coarse";
 /// See [`STAGE_COARSE`].
 pub const STAGE_CASING_COARSE: &str = "stage-casing-coarse";
 
+/// The cube of the cube between two rings.
+pub const CUBE: &str = "cube";
+/// Its rings.
+pub const RINGS: [(&str, Side); 2] = [("ring-left", Side::Left), ("ring-right", Side::Right)];
+
 /// Every name that [`rom`] knows.
-pub const NAMES: [&str; 7] =
-    ["rotor37", "rotor37-spin", CASING37, STAGE, STAGE_CASING, STAGE_COARSE, STAGE_CASING_COARSE];
+pub const NAMES: [&str; 10] = [
+    "rotor37",
+    "rotor37-spin",
+    CASING37,
+    STAGE,
+    STAGE_CASING,
+    STAGE_COARSE,
+    STAGE_CASING_COARSE,
+    CUBE,
+    RINGS[0].0,
+    RINGS[1].0,
+];
 
 /// The model of this name; `None` where there is no such model.
 pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom>> {
@@ -58,7 +74,15 @@ pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom
             let reduce = || with_progress(title, console, &|listener| reduce_stage_casing(&options, listener));
             cache.get(name, &options, console, &|| Ok(reduce()?.rom))
         }
-        _ => return None,
+        CUBE => {
+            let options = CubeOptions::default();
+            cache.get(name, &options, console, &|| Ok(reduction::cube(&options, console)?.rom))
+        }
+        _ => {
+            let (_, side) = RINGS.iter().find(|(ring, _)| *ring == name)?;
+            let options = RingOptions::new(*side);
+            cache.get(name, &options, console, &|| Ok(reduction::cube_ring(&options, console)?.rom))
+        }
     })
 }
 

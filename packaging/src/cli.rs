@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use tiprub_model::cube::{MassMatrix, Side};
 
 use crate::{casing_arguments::CasingArguments, file_arguments::FileArguments, rom_cache::RomCache};
 
@@ -19,7 +20,8 @@ use crate::{casing_arguments::CasingArguments, file_arguments::FileArguments, ro
                   Scenes that ship:\n  builtin:rotor37           rotor 37 in a rigid casing with two bumps\n  \
                   builtin:flexible-casing   in an elastic casing with heat, friction power per patch\n  \
                   builtin:abradable         wearing the coating of a rigid casing\n  \
-                  builtin:stage             56 coupled blades in an oval elastic casing\n\n\
+                  builtin:stage             56 coupled blades in an oval elastic casing\n  \
+                  builtin:cube-between-rings  a cube that flies through two clamped rings\n\n\
                   Exit codes: 0 done, 1 the work failed, 2 the command line is wrong."
 )]
 pub struct Cli {
@@ -101,11 +103,12 @@ pub struct DemoArguments {
 #[derive(Debug, Args)]
 pub struct ReduceArguments {
     /// What to reduce: `rotor37`, the NASA rotor 37 blade that ships with tiprub; `casing`, a ring around it; `stage`, a
-    /// disk with 56 blades; `stage-casing`, the casing around that; or a mesh file of your own: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh).
+    /// disk with 56 blades; `stage-casing`, the casing around that; `cube`, `ring-left`, `ring-right`, the bodies of the cube between two rings; or a
+    /// mesh file of your own: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh).
     #[arg(value_name = "MODEL", value_parser = model, required_unless_present = "stiffness")]
     pub model: Option<Model>,
-    /// Number of modes kept: fixed-interface modes of a blade [default: 20 of rotor37, 25 of a file and of the stage, there per nodal diameter], modes of the
-    /// casing below the cut-off [default: 60].
+    /// Number of modes kept: fixed-interface modes of a blade [default: 20 of rotor37, 25 of a file and of the stage, there per nodal diameter] and of the
+    /// cube [default: all], modes of the casing below the cut-off [default: 60], of the cube's rings [default: 100].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
     /// Number of contact nodes: along the tip chord of `rotor37`, leading edge to trailing edge (≥ 2); of a file, chosen
@@ -132,6 +135,12 @@ pub struct ReduceArguments {
     /// Also write mesh, sets and mode shapes for ParaView (.vtu).
     #[arg(long, value_name = "FILE")]
     pub vtk: Option<PathBuf>,
+    /// Of the rings of `cube`: static responses to contact forces kept beside the modes [default: 0].
+    #[arg(long, value_name = "N")]
+    pub static_responses: Option<usize>,
+    /// Of `cube` and its rings: mass matrix of the finite elements [default: lumped].
+    #[arg(long, value_enum)]
+    pub mass_matrix: Option<MassChoice>,
     /// Of `stage` and `stage-casing`, a coarse mesh (and few modes of the disk), for trials.
     #[arg(long)]
     pub coarse: bool,
@@ -277,6 +286,8 @@ pub enum StudyChoice {
     Modes,
     /// Blades against an oval flexible casing over a range of speeds.
     Stage,
+    /// The cube between two rings: the product against independent methods on the full model.
+    Cube,
     /// Amplitudes of rubbing blades over angular velocity and frequency, with engine orders and natural frequencies.
     Map,
     /// Error against run time of every scheme and solver, beside independent methods.
@@ -329,6 +340,10 @@ pub enum Model {
     Stage,
     /// The casing of the 56-sector stage.
     StageCasing,
+    /// The cube that flies between two rings.
+    Cube,
+    /// One of these rings.
+    Ring(Side),
     /// A mesh file.
     File(PathBuf),
 }
@@ -344,6 +359,24 @@ pub enum FmiChoice {
     Three,
     /// Both, as two files.
     Both,
+}
+
+/// Mass matrix of finite elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MassChoice {
+    /// On the nodes.
+    Lumped,
+    /// As the elements' shape functions share it out.
+    Consistent,
+}
+
+impl From<MassChoice> for MassMatrix {
+    fn from(choice: MassChoice) -> Self {
+        match choice {
+            MassChoice::Lumped => Self::Lumped,
+            MassChoice::Consistent => Self::Consistent,
+        }
+    }
 }
 
 /// Three element counts: chord, thickness and span of a blade; around, through and along of a casing.
@@ -372,12 +405,16 @@ fn model(text: &str) -> Result<Model, String> {
         "casing" => Ok(Model::Casing),
         "stage" => Ok(Model::Stage),
         "stage-casing" => Ok(Model::StageCasing),
+        "cube" => Ok(Model::Cube),
+        "ring-left" => Ok(Model::Ring(Side::Left)),
+        "ring-right" => Ok(Model::Ring(Side::Right)),
         // Names of files have an extension or a directory; anything else is a slip in the name of a model.
         _ if text.contains(['.', '/', '\\']) => Ok(Model::File(text.into())),
-        _ => {
-            Err("`rotor37`, `casing`, `stage` and `stage-casing` ship with tiprub; a model of your own is a file: .inp or .msh"
-                .into())
-        }
+        _ => Err(
+            "`rotor37`, `casing`, `stage`, `stage-casing`, `cube`, `ring-left` and `ring-right` ship with tiprub; a \
+                 model of your own is a file: .inp or .msh"
+                .into(),
+        ),
     }
 }
 
@@ -470,7 +507,7 @@ mod tests {
             ("reduce casing --contact-axial 0.1:0.1", "FROM:TO"),
             ("study stage --speeds 100:50:4", "FROM:TO:COUNT"),
             ("study stage --speeds 100:500", "FROM:TO:COUNT"),
-            ("study tip", "possible values: convergence, modes, stage, map"),
+            ("study tip", "possible values: convergence, modes, stage, cube"),
             ("reduce casing --support left", "possible values: low, high, both, free"),
         ] {
             let error = parse(line).unwrap_err();

@@ -20,6 +20,7 @@ pub mod casing_arguments;
 pub mod cli;
 pub mod commands;
 pub mod console;
+pub mod cube_models;
 pub mod error_study;
 pub mod failure;
 pub mod file_arguments;

@@ -2,6 +2,7 @@
 
 use tiprub_model::{
     CasingOptions, Reduction, Rotor37Options,
+    cube::{CubeOptions, RingOptions, reduce_cube, reduce_cube_ring},
     cyclic::CyclicReduction,
     progress::{Listener, Progress, Stage},
     reduce_ring, reduce_rotor37,
@@ -54,6 +55,23 @@ pub fn stage(options: &StageOptions, console: &Console) -> Result<CyclicReductio
 /// Counts that do not fit each other, and whatever the reduction refuses.
 pub fn stage_casing(options: &StageCasingOptions, console: &Console) -> Result<Reduction> {
     with_progress("Reducing the casing of the stage", console, &|listener| reduce_stage_casing(options, listener))
+}
+
+/// Reduce the cube that flies between two rings, showing stage and share done.
+///
+/// # Errors
+/// More modes than degrees of freedom.
+pub fn cube(options: &CubeOptions, console: &Console) -> Result<Reduction> {
+    with_progress("Reducing the cube", console, &|listener| reduce_cube(options, listener))
+}
+
+/// Reduce one of these rings, showing stage and share done.
+///
+/// # Errors
+/// More modes than degrees of freedom, or more static responses than contact forces.
+pub fn cube_ring(options: &RingOptions, console: &Console) -> Result<Reduction> {
+    let title = format!("Reducing {}", options.name.replace('_', "-"));
+    with_progress(&title, console, &|listener| reduce_cube_ring(options, listener))
 }
 
 /// Work that tells where it stands, shown as a task; `title` says what is done.

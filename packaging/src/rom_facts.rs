@@ -20,6 +20,8 @@ const FRICTION_STEPS_PER_UNIT: f64 = 20.0;
 /// Modes that a warning of the checks is about: those that blade-tip contact excites most. Of coupled sectors the first
 /// family: as many modes of the wheel as there are sectors.
 const FIRST_MODES: usize = 6;
+/// Contact nodes that are listed.
+const LISTED_NODES: usize = 24;
 /// Rows of a table of checks for people; coupled sectors may come with hundreds.
 pub(crate) const ROWS_SHOWN: usize = 40;
 /// Frequencies listed of each nodal diameter.
@@ -150,11 +152,18 @@ impl RomFacts {
         let _ = writeln!(text, "ROM {}: {}", rom.name, rom.origin);
         let _ = writeln!(text, "  sectors                   {}", sectors_text(rom));
         let _ = writeln!(text, "  reduced coordinates       {}", order_text(rom));
-        // Of a grid, the first node of every ring stands for the others.
+        // Of a grid, the first node of every ring stands for the others; of many nodes, some.
         let shown = match rom.extras.grid {
             Some(grid) => {
-                let _ = writeln!(text, "  contact nodes             {} around x {} along", grid.around, grid.along);
+                let edges = if grid.closed { "" } else { ", four free edges" };
+                let _ =
+                    writeln!(text, "  contact nodes             {} around x {} along{edges}", grid.around, grid.along);
                 grid.around
+            }
+            None if nodes.len() > LISTED_NODES => {
+                let (first, last) = (nodes[0], nodes[nodes.len() - 1]);
+                let _ = writeln!(text, "  contact nodes             {} ({first} ... {last})", nodes.len());
+                nodes.len().div_ceil(LISTED_NODES)
             }
             None => {
                 let _ = writeln!(text, "  contact nodes             {} ({})", nodes.len(), nodes.join(", "));
@@ -181,8 +190,10 @@ impl RomFacts {
             "                            modal-exact: none; resolves all modes up to {:.4e} s",
             self.central_difference_limit
         );
-        let friction = self.solvable_friction.map_or("none".into(), |value| format!("{value}"));
-        let _ = writeln!(text, "  contact solvable up to µ  {friction} (all nodes closed, tried up to 2)");
+        if rom.frame == Frame::Cylindrical {
+            let friction = self.solvable_friction.map_or("none".into(), |value| format!("{value}"));
+            let _ = writeln!(text, "  contact solvable up to µ  {friction} (all nodes closed, tried up to 2)");
+        }
         self.write_frequencies(&mut text);
         self.write_checks(&mut text);
         text
@@ -249,7 +260,9 @@ impl RomFacts {
                 "name": node.name, "position": node.position, "meridional_slope": node.meridional_slope,
             })).collect::<Vec<_>>(),
             "damping_ratio": rom.damping_ratio,
-            "contact_grid": rom.extras.grid.map(|grid| json!({ "around": grid.around, "along": grid.along })),
+            "contact_grid": rom.extras.grid.map(|grid| json!({
+                "around": grid.around, "along": grid.along, "closed": grid.closed,
+            })),
             "spin": rom.extras.spin.as_ref().map(|spin| json!({ "largest_speed": spin.largest_speed })),
             "thermal_patches": rom.extras.thermal.as_ref().map(|thermal| {
                 thermal.patches.iter().map(|patch| json!({ "angle": patch.angle, "axial": patch.axial }))
@@ -330,7 +343,12 @@ fn extras_text(rom: &Rom) -> String {
 
 /// Largest µ tried for which the contact problem is solvable for both slip directions; `models` is the one sector, or all
 /// nodal diameters of coupled sectors.
+///
+/// A Cartesian ROM does not say where the other body is: what can be solved is checked with the scene.
 fn solvable_friction(rom: &Rom, models: &[ModalModel]) -> Option<f64> {
+    if rom.frame == Frame::Cartesian {
+        return None;
+    }
     let largest = models.iter().map(ModalModel::largest_frequency).fold(0.0, f64::max);
     let step = 1.0 / largest;
     let senses = [1.0, -1.0].map(|sign| closed_contacts(rom, sign));

@@ -2,7 +2,9 @@
 
 use tiprub_core::{
     Rom, Scene,
-    settings::{CoatingSettings, ContactSettings, Scheme, Solver, StructureSettings, SurfaceSettings},
+    settings::{
+        CoatingSettings, ContactSettings, Motion, SceneSettings, Scheme, Solver, StructureSettings, SurfaceSettings,
+    },
 };
 
 /// Everything that is on although it is off unless asked for; one phrase each, empty for a plain scene.
@@ -26,6 +28,10 @@ pub fn features(scene: &Scene) -> Vec<String> {
 
 fn of_structure(structure: &StructureSettings, rom: &Rom, found: &mut Vec<String>) {
     let name = &structure.name;
+    if structure.motion == Motion::Free {
+        let [x, y, z] = structure.velocity;
+        found.push(format!("`{name}` flies freely, at the start with {x}, {y}, {z} m/s along x, y, z"));
+    }
     let spin = structure.spin;
     let effects = [("stiffening", spin.stiffening), ("growth", spin.growth), ("coriolis", spin.coriolis)];
     let effects: Vec<&str> = effects.into_iter().filter(|(_, on)| *on).map(|(effect, _)| effect).collect();
@@ -59,7 +65,9 @@ fn of_structure(structure: &StructureSettings, rom: &Rom, found: &mut Vec<String
 fn of_surface(surface: &SurfaceSettings, scene: &Scene, found: &mut Vec<String>) {
     let named = |name: &String| scene.settings.structures.iter().position(|structure| structure.name == *name);
     let carrier = surface.structure.as_ref().and_then(|name| Some((name, scene.roms.get(named(name)?)?)));
-    if let Some((name, rom)) = carrier {
+    if let Some((name, _)) = carrier.filter(|_| surface.rigid) {
+        found.push(format!("surface `{}` is rigid: `{name}` says where it is", surface.name));
+    } else if let Some((name, rom)) = carrier {
         found.push(format!("surface `{}` is flexible: carried by `{name}` with {} modes", surface.name, rom.order()));
     } else if let Some(spline) = surface.spline {
         let (around, along) = (spline.around, spline.along);
@@ -89,6 +97,9 @@ fn of_contact(contact: &ContactSettings, found: &mut Vec<String>) {
 /// Limits of validity that every importer's user should read; one sentence each.
 pub fn limits(scene: &Scene) -> Vec<String> {
     let settings = &scene.settings;
+    if settings.free_master().is_some() {
+        return limits_of_flight(settings).into_iter().map(String::from).collect();
+    }
     let any = |test: fn(&ContactSettings) -> bool| settings.contacts.iter().any(test);
     let flexible = settings.surfaces.iter().any(|surface| surface.structure.is_some());
     let stiffens = settings.structures.iter().any(|structure| structure.spin.stiffening);
@@ -131,6 +142,25 @@ pub fn limits(scene: &Scene) -> Vec<String> {
     limits.into_iter().map(String::from).collect()
 }
 
+/// Limits of a scene whose master flies freely.
+fn limits_of_flight(settings: &SceneSettings) -> [&'static str; 5] {
+    let sticks = settings.contacts.iter().any(|contact| contact.solver == Solver::Coulomb);
+    [
+        "Displacements within each structure are small; the free structure may travel any way, but not turn by more than small \
+         angles.",
+        if sticks {
+            "Friction is Coulomb friction that sticks and slides, with one coefficient for both."
+        } else {
+            "Friction is Coulomb friction in sliding; sticking is not modelled."
+        },
+        "Surfaces are laid through the contact grids of their structures; a contact node that leaves a grid over an edge has no \
+         contact with it.",
+        "Forces are means over the communication step, so that the momentum handed over is exact; the force at an instant of \
+         impact grows as 1/h.",
+        "The mass of a contact node loses its kinetic energy at impact: an error of first order in mesh size, not in h.",
+    ]
+}
+
 /// What holds the blades together, and what speed does to them. Coupled blades are refused with stiffening.
 fn blades(coupled: bool, stiffens: bool) -> &'static str {
     match (coupled, stiffens) {
@@ -167,6 +197,25 @@ mod tests {
         assert_eq!(limits(&plain).len(), 7);
         let text = limits(&plain).concat();
         assert!(text.contains("sticking is not modelled") && text.contains("a rigid surface"), "{text}");
+    }
+
+    #[test]
+    fn a_free_master_is_told_with_limits_of_its_own() {
+        let settings = tiprub_format::parse_scene(crate::scene_source::CUBE_SCENE, "scene").unwrap();
+        let mut scene = Scene { settings, roms: vec![two_sectors(false); 3] };
+        scene.settings.surfaces[1].rigid = true;
+        let text = features(&scene).join("\n");
+        for part in ["`cube` flies freely, at the start with 0, -100, 0 m/s", "`left` is flexible", "`right` is rigid"]
+        {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        let text = limits(&scene).join("\n");
+        for wrong in ["blade", "casing", "rotor"] {
+            assert!(!text.contains(wrong), "{wrong}: {text}");
+        }
+        assert!(text.contains("sticking is not modelled"));
+        scene.settings.contacts.iter_mut().for_each(|contact| contact.solver = Solver::Coulomb);
+        assert!(limits(&scene).concat().contains("sticks and slides"));
     }
 
     #[test]

@@ -12,12 +12,16 @@ pub const ROTOR37_SCENE: &str = include_str!("../scenes/rotor37.toml");
 /// Coupled blades in an oval flexible casing.
 pub const STAGE_SCENE: &str = include_str!("../scenes/stage.toml");
 
+/// A cube that flies between two rings.
+pub const CUBE_SCENE: &str = include_str!("../scenes/cube-between-rings.toml");
+
 /// Scenes that ship with tiprub: what stands behind `builtin:`, and the text.
-pub const BUILTIN_SCENES: [(&str, &str); 4] = [
+pub const BUILTIN_SCENES: [(&str, &str); 5] = [
     ("rotor37", ROTOR37_SCENE),
     ("flexible-casing", include_str!("../scenes/flexible-casing.toml")),
     ("abradable", include_str!("../scenes/abradable.toml")),
     ("stage", STAGE_SCENE),
+    ("cube-between-rings", CUBE_SCENE),
 ];
 
 /// What names of embedded scenes and models begin with.

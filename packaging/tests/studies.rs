@@ -90,6 +90,35 @@ fn the_quick_study_of_the_stage_shows_contact_and_does_not_depend_on_threads() {
     assert_eq!(fs::read(out.join("amplitudes.csv")).unwrap(), before);
 }
 
+/// The first 0.2 ms: two rows of nodes touch. Statements hold, and the numbers are those of methods that are near and not equal.
+#[test]
+fn the_quick_study_of_the_cube_meets_independent_methods() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "cube", &[]);
+    let flights = json["results"]["flights"].as_array().unwrap();
+    assert_eq!(flights.len(), 1);
+    let runs = flights[0]["runs"].as_array().unwrap();
+    assert_eq!(runs.len(), 4);
+    for run in runs {
+        assert!(run["failed"].is_null(), "{run}");
+        let exit = run["exit_speed"].as_f64().unwrap();
+        assert!((93.0..99.5).contains(&exit), "friction slows the cube: {run}");
+    }
+    let pairs = flights[0]["pairs"].as_array().unwrap();
+    assert_eq!(pairs.len(), 6);
+    for pair in pairs {
+        let shares: Vec<f64> = pair["shares"].as_array().unwrap().iter().map(|share| share.as_f64().unwrap()).collect();
+        assert!(shares[0] > 1e-6 && shares[0] < 0.005 && shares[1] < 0.02 && shares[2] < 0.01, "{pair}");
+    }
+    let (names, rows) = columns(&root.path().join("out/fig4a-u1x.csv"));
+    assert_eq!((names.len(), names[0].as_str()), (5, "time (ms)"));
+    // 1 mm of interference is shared by the cube and the rings.
+    let crest = rows.iter().map(|row| row[4]).fold(0.0, f64::max);
+    assert!((0.5..1.0).contains(&crest), "{crest} mm");
+    let tables = fs::read_to_string(root.path().join("out/tables.md")).unwrap();
+    assert!(tables.contains("| product, lcp, modal-exact / a, film |"), "{tables}");
+}
+
 #[test]
 fn built_in_models_are_reduced_once_unless_asked_otherwise() {
     let root = tempfile::tempdir().unwrap();

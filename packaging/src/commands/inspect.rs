@@ -212,7 +212,13 @@ fn scene_text(settings: &SceneSettings) -> String {
             structure.damping_ratio.map_or("of the ROM".into(), |ratio| ratio.to_string())
         );
     }
+    let free = settings.free_master().is_some();
     for surface in &settings.surfaces {
+        if let Some(structure) = surface.structure.as_ref().filter(|_| free) {
+            let how = if surface.rigid { "rigid, at the place of" } else { "carried by" };
+            let _ = writeln!(text, "  surface       {} {how} {structure}", surface.name);
+            continue;
+        }
         let shape = serde_json::to_string(&surface.shape).unwrap_or_default();
         let _ = writeln!(
             text,
@@ -223,12 +229,13 @@ fn scene_text(settings: &SceneSettings) -> String {
         );
     }
     for contact in &settings.contacts {
+        let nodes = || contact.nodes.as_ref().map_or("all nodes".to_owned(), |start| format!("nodes {start}..."));
         let _ = writeln!(
             text,
-            "  contact       {} against {}: gap {} m, friction {}, solver {}",
+            "  contact       {} against {}: {}, friction {}, solver {}",
             contact.master,
             contact.slave,
-            contact.gap,
+            if free { nodes() } else { format!("gap {} m", contact.gap) },
             contact.friction,
             serde_json::to_value(contact.solver)
                 .ok()

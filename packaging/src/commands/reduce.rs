@@ -16,6 +16,7 @@ use crate::{
     casing_arguments::{self, CasingArguments, MaterialChoice},
     cli::{Model, ReduceArguments},
     console::{Console, Outcome},
+    cube_models,
     file_arguments::FileArguments,
     output_file,
     reduced::Reduced,
@@ -110,6 +111,7 @@ fn json(reduced: &Reduced, facts: &RomFacts, arguments: &ReduceArguments, output
 }
 
 fn reduced(arguments: &ReduceArguments, console: &Console) -> Result<Reduced> {
+    cube_models::refuse_elsewhere(arguments)?;
     match &arguments.model {
         Some(Model::Rotor37) => {
             refuse_file_options(arguments)?;
@@ -130,6 +132,8 @@ fn reduced(arguments: &ReduceArguments, console: &Console) -> Result<Reduced> {
             refuse_file_options(arguments)?;
             stage_casing(arguments, console)
         }
+        Some(Model::Cube) => cube_models::cube(arguments, console),
+        Some(Model::Ring(side)) => cube_models::ring(arguments, *side, console),
         Some(Model::File(_)) | None => users_model::reduce(arguments, console),
     }
 }

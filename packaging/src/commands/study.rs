@@ -7,7 +7,7 @@ use crate::{
     builtin::DiskModel,
     cli::{StudyArguments, StudyChoice},
     console::{Console, Outcome},
-    study::{self, convergence, error, map, modes, stage},
+    study::{self, convergence, cube, error, map, modes, stage},
 };
 
 /// Study, write, sum up.
@@ -26,6 +26,7 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
             let (reduction, mesh) = DiskModel::new(quick).reduce(console)?;
             ("modes", modes::study(&reduction, &mesh, arguments.speed, quick)?)
         }
+        StudyChoice::Cube => ("cube", cube::study(arguments, console)?),
         StudyChoice::Stage => ("stage", stage::study(arguments, console)?),
         StudyChoice::Map => ("map", map::study(arguments, console)?),
         StudyChoice::Error => ("error", error::study(arguments, console)?),

@@ -5,6 +5,7 @@
 //! figure, and `results.json`. Runs that do not depend on each other go through [`sweep`].
 
 pub mod convergence;
+pub mod cube;
 pub mod error;
 pub mod map;
 pub mod modes;

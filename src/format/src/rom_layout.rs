@@ -175,7 +175,9 @@ pub const METADATA: [MetadataLayout; 12] = [
         "contact_grid",
         Some(""),
         "`around,along`, for example `72,5`: the contact nodes form a grid on a closed ring that can carry a surface. \
-         Node along·around + i is the i-th of its ring, rings in order of growing z, angles growing by 2π/around.",
+         Node along·around + i is the i-th of its ring, rings in order of growing z, angles growing by 2π/around. \
+         `around,along,open`: they form a grid with four free edges, frame `cartesian`; node along·around + i is the i-th \
+         of its row.",
     ),
     entry("units", Some(""), "Text for the reader of the file: one line per array."),
     entry("checksum", Some(""), "SHA-256 of the content, checked where present; leave it out when writing by hand."),

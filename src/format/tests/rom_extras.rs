@@ -104,6 +104,40 @@ proptest! {
     }
 }
 
+/// A rectangle of 4 x 3 nodes with free edges, in a Cartesian frame.
+fn panel(order: usize, value: &mut dyn FnMut() -> f64) -> Rom {
+    let mut rom = ring(order, value);
+    rom.frame = Frame::Cartesian;
+    for (index, node) in rom.contact_nodes.iter_mut().enumerate() {
+        node.position = [(index % 4) as f64 * 0.01, (index / 4) as f64 * 0.02, 0.001 * value()];
+    }
+    rom.extras.grid = Some(ContactGrid { around: 4, along: 3, closed: false });
+    rom
+}
+
+#[test]
+fn an_open_grid_says_so_in_a_third_word() {
+    let mut value = numbers(11);
+    let rom = panel(5, &mut value);
+    let mut file = Loose::of(&rom);
+    assert_eq!(file.entries["contact_grid"], "4,3,open");
+    assert_eq!(read_rom(&file.bytes(), "panel").unwrap(), rom);
+    file.entries.insert("contact_grid".into(), " 4 , 3 , open ".into());
+    assert_eq!(read_rom(&file.bytes(), "panel").unwrap(), rom);
+    for (text, part) in [
+        ("4,3", "a closed contact grid needs a cylindrical frame"),
+        ("4,3,shut", "is not two whole numbers with a comma between them, or these and `,open`"),
+        ("4,3,open,open", "or these and `,open`"),
+        ("5,3,open", "5 around x 3 along"),
+        ("12,1,open", "at least 2 x 2"),
+    ] {
+        file.entries.insert("contact_grid".into(), text.into());
+        let message = read_rom(&file.bytes(), "panel.rom").unwrap_err().to_string();
+        assert!(message.starts_with("panel.rom: ") && message.contains(part), "{text}: {message}");
+    }
+    refused(|file| drop(file.entries.insert("contact_grid".into(), "6,2,open".into())), &["needs a Cartesian frame"]);
+}
+
 /// Written by the release before there were extras.
 #[test]
 fn a_file_without_extras_is_what_it_always_was() {
@@ -200,7 +234,7 @@ fn values_that_cannot_be_are_refused() {
         move |file: &mut Loose| drop(file.entries.insert(name.into(), text.into()))
     };
     refused(entry("largest_speed", "fast"), &["metadata `largest_speed`: \"fast\" is not such a number"]);
-    for text in ["", "6", "6,2,1", "6x2", "-6,2", "6.0,2", "99999999999999999999,2"] {
+    for text in ["", "6", "6,2,1", "6,2,open,", "open", "6x2", "-6,2", "6.0,2", "99999999999999999999,2"] {
         refused(entry("contact_grid", text), &["metadata `contact_grid`", "is not two whole numbers with a comma"]);
     }
     refused(entry("contact_grid", "2,6"), &["metadata `contact_grid`: 2 around x 6 along"]);

@@ -18,9 +18,46 @@ fn a_scene_with_every_feature_survives_writing_and_reading() {
 }
 
 #[test]
+fn a_scene_with_a_free_master_survives_writing_and_reading() {
+    let scene = features::scene_with_a_free_master();
+    let text = write_scene(&scene);
+    assert_eq!(parse_scene(&text, "written").unwrap(), scene);
+    assert!(text.contains("motion = \"free\"") && text.contains("velocity = [0.0, -100.0, 0.5]"), "{text}");
+    assert!(text.contains("nodes = \"left_\"") && !text.contains("gap ="), "{text}");
+    assert_eq!(text.matches("rigid = true").count(), 1, "{text}");
+    assert_eq!(text.matches("velocity").count(), 1, "{text}");
+}
+
+/// Line and column of what is wrong, and what to do.
+#[test]
+fn slips_of_free_masters_are_located() {
+    let text = write_scene(&features::scene_with_a_free_master());
+    let told = |from: &str, to: &str, parts: &[&str]| {
+        assert!(text.contains(from), "{from:?} in:\n{text}");
+        let changed = text.replacen(from, to, 1);
+        let message = parse_scene(&changed, "free.toml").unwrap_err().to_string();
+        assert!(message.starts_with("free.toml:"), "{message}");
+        for part in parts {
+            assert!(message.contains(part), "{part:?} is not in {message:?}");
+        }
+    };
+    told("motion = \"free\"", "motion = \"fre\"", &["structure[1].motion", "Did you mean `free`?"]);
+    told("[0.0, -100.0, 0.5]", "-100.0", &["structure[1].velocity: ", "list of 3 numbers, m/s"]);
+    told("[0.0, -100.0, 0.5]", "[0.0, -100.0]", &["structure[1].velocity: ", "list of 3 numbers, m/s"]);
+    told("[0.0, -100.0, 0.5]", "[0.0, nan, 0.5]", &["structure[1].velocity"]);
+    told("motion = \"free\"", "motion = \"rotating\"", &["structure[1].velocity: only a free structure has it"]);
+    told("nodes = \"left_\"", "nodes = 3", &["contact[1].nodes: integer `3` found"]);
+    told("nodes = \"left_\"\n", "", &["contact[2].nodes: of several pairs one claims all", "Give every pair `nodes`"]);
+    told("nodes = \"left_\"", "nodes = \"left_\"\ngap = 1e-3", &["contact[1].gap: a free master does not have it"]);
+    told("rigid = true", "rigid = 1", &["surface[2].rigid: integer `1` found, true or false expected"]);
+    told("rigid = true", "rigit = true", &["surface[2].rigit: unknown key", "Did you mean `rigid`?"]);
+    told("friction = 0.15", "friction = 0.2", &["Give all pairs the same friction and solver"]);
+}
+
+#[test]
 fn features_that_are_off_are_not_written() {
     let text = write_scene(&common::complete_scene());
-    let off = "spin whirl axial_shift frequency_factors thermal load structure spline patches coating heat_to_slave wear \
+    let off = "velocity rigid nodes spin whirl axial_shift frequency_factors thermal load structure spline patches coating heat_to_slave wear \
                slave_displacement";
     for key in off.split(' ') {
         assert!(!text.lines().any(|line| line.starts_with(&format!("{key} ="))), "{key} in:\n{text}");

@@ -180,7 +180,7 @@ fn lowest_of(modes: Modes, count: usize) -> Modes {
 const DEPENDENT: f64 = 1e-10;
 
 /// The space of modes and static responses, described by its own modes.
-fn with_static_responses(
+pub(crate) fn with_static_responses(
     fixed: Modes,
     stiffness: &SparseMatrix,
     mass: &SparseMatrix,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::assembly::assemble;
+use crate::assembly::{assemble, lumped_masses};
 use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::Listener;
@@ -41,6 +41,20 @@ impl FeModel {
             mesh: Some((mesh, material.clone())),
             origin,
         })
+    }
+
+    /// The same model with its mass on the nodes, see [`lumped_masses`].
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a model without a mesh of one material; those of [`lumped_masses`].
+    pub fn lumped(mut self) -> Result<Self> {
+        let Some((mesh, material)) = &self.mesh else {
+            let problem = "the model has no mesh of one material, from which masses are shared out";
+            return Err(Error::invalid("lumped mass", problem, "Keep the mass matrix that comes with the model"));
+        };
+        let masses = lumped_masses(mesh, material.density)?;
+        self.mass.set_diagonal(|dof| masses[dof / 3]);
+        Ok(self)
     }
 
     /// The nodes of a named set; upper and lower case may differ where only one set then fits.

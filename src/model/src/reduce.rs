@@ -21,7 +21,7 @@ use crate::spin::{ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, Spinni
 use crate::{Error, Result};
 
 use outcome::{build_rom, rotated};
-pub(crate) use outcome::{element_names, node_modes};
+pub(crate) use outcome::{description, element_names, node_modes};
 
 /// A contact node before the reduction.
 #[derive(Debug, Clone, PartialEq)]
@@ -285,6 +285,13 @@ pub struct FullModes {
     shift: f64,
 }
 
+impl FullModes {
+    /// Displacements of the structure at rest under these loads, (K - σM)⁻¹ f, free dofs × loads.
+    pub(crate) fn responses(&self, loads: Mat<f64>) -> Mat<f64> {
+        self.factor.solve(loads)
+    }
+}
+
 /// Lowest modes of a structure; `free` when it can move as a rigid body, which needs a negative shift.
 ///
 /// # Errors
@@ -382,7 +389,7 @@ pub(crate) fn check_nodes(nodes: &[[f64; 3]], clamped: &[usize], contact: &[Cont
 }
 
 /// Rows of the contact nodes' dofs among the free ones, node by node.
-fn interface_dofs(free: &[usize], contact: &[ContactPoint]) -> Result<Vec<usize>> {
+pub(crate) fn interface_dofs(free: &[usize], contact: &[ContactPoint]) -> Result<Vec<usize>> {
     contact
         .iter()
         .flat_map(|point| (0..3).map(move |component| (point, 3 * point.node + component)))

@@ -176,6 +176,19 @@ impl SparseMatrix {
         dense
     }
 
+    /// Become diagonal, in the same pattern.
+    ///
+    /// # Panics
+    /// If the pattern lacks an entry of the diagonal: no assembled matrix does.
+    pub fn set_diagonal(&mut self, entry: impl Fn(usize) -> f64) {
+        self.values.fill(0.0);
+        for dof in 0..self.order() {
+            let start = self.pattern.starts[dof];
+            let rows = &self.pattern.rows[start..self.pattern.starts[dof + 1]];
+            self.values[start + rows.binary_search(&dof).expect("the pattern holds the diagonal")] = entry(dof);
+        }
+    }
+
     /// Sum of the diagonal.
     pub fn trace(&self) -> f64 {
         let diagonal = |column: usize| {

@@ -2,9 +2,9 @@
 
 use tiprub_model::Mesh;
 use tiprub_reference::cube::files::{BodyFile, read_json, write_json};
-use tiprub_reference::cube::mesh::{cube_mesh, cube_of, ring_mesh, ring_of};
 use tiprub_reference::cube::scene::{Mass, Scene, Setting};
 use tiprub_reference::cube::{CENTRE, OUTER_RADIUS, SIDE, Side, THICKNESS, WIDTH};
+use tiprub_reference::cube::{cube_mesh, cube_of, ring_mesh, ring_of};
 use tiprub_reference::surface::{Surface, SurfaceKind};
 
 #[test]

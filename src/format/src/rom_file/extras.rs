@@ -8,6 +8,9 @@ use super::{Array, Arrays, Metadata, Reader, WRITE_AGAIN, list, matrix};
 use crate::Result;
 use crate::rom_layout::{SPIN_ARRAYS, THERMAL_ARRAYS};
 
+/// Third word of a contact grid with free edges all around.
+const OPEN: &str = "open";
+
 impl Reader<'_> {
     pub(super) fn extras(&self, arrays: &Arrays, metadata: &Metadata, order: usize) -> Result<RomExtras> {
         Ok(RomExtras {
@@ -78,12 +81,19 @@ impl Reader<'_> {
 
     fn grid(&self, metadata: &Metadata) -> Result<Option<ContactGrid>> {
         let Some(text) = metadata.get("contact_grid") else { return Ok(None) };
-        let numbers = text.split_once(',').map(|(around, along)| (around.trim().parse(), along.trim().parse()));
-        let Some((Ok(around), Ok(along))) = numbers else {
-            let problem = format!("{text:?} is not two whole numbers with a comma between them");
+        let words: Vec<&str> = text.split(',').map(str::trim).collect();
+        let counts = words.get(..2).map(|counts| (counts[0].parse(), counts[1].parse()));
+        let closed = match &words[..] {
+            [_, _] => Some(true),
+            [_, _, OPEN] => Some(false),
+            _ => None,
+        };
+        let (Some((Ok(around), Ok(along))), Some(closed)) = (counts, closed) else {
+            let problem =
+                format!("{text:?} is not two whole numbers with a comma between them, or these and `,{OPEN}`");
             return Err(self.error("metadata `contact_grid`", problem, WRITE_AGAIN));
         };
-        Ok(Some(ContactGrid { around, along, closed: true }))
+        Ok(Some(ContactGrid { around, along, closed }))
     }
 }
 
@@ -113,6 +123,9 @@ pub(super) fn arrays(extras: &RomExtras) -> Vec<(&'static str, Array)> {
 
 pub(super) fn metadata(extras: &RomExtras) -> Vec<(&'static str, String)> {
     let speed = extras.spin.as_ref().map(|spin| ("largest_speed", spin.largest_speed.to_string()));
-    let grid = extras.grid.map(|grid| ("contact_grid", format!("{},{}", grid.around, grid.along)));
+    let grid = extras.grid.map(|ContactGrid { around, along, closed }| {
+        let edges = if closed { String::new() } else { format!(",{OPEN}") };
+        ("contact_grid", format!("{around},{along}{edges}"))
+    });
     speed.into_iter().chain(grid).collect()
 }

@@ -13,7 +13,7 @@ const fn field(
 }
 
 /// Every key, in file order.
-pub const FIELDS: [SceneField; 66] = [
+pub const FIELDS: [SceneField; 69] = [
     field("name", "text", None, "letters, digits, underscore; starts with a letter", "Name of the model."),
     field("description", "text", Some("empty"), "any", "One or a few sentences for the importer's catalogue."),
     field("structure.name", "text", None, "as `name` of the scene", "Name by which contacts refer to it."),
@@ -28,15 +28,22 @@ pub const FIELDS: [SceneField; 66] = [
         "structure.motion",
         "text",
         Some("`rotating`"),
-        "`rotating`, `still`",
-        "Rigid motion: turning about the z axis with the input `speed`, or standing still.",
+        "`rotating`, `still`, `free`",
+        "Rigid motion: turning about the z axis with the input `speed`, standing still, or flying freely from `velocity` on.",
     ),
     field(
         "structure.speed",
         "number, rad/s",
         Some("0"),
-        "finite; 0 for `still`",
+        "finite; 0 for `still` and `free`",
         "Start value of the speed input, about +z.",
+    ),
+    field(
+        "structure.velocity",
+        "list of 3 numbers, m/s",
+        Some("[0, 0, 0]"),
+        "finite; `free` structures only",
+        "Velocity of the whole body at the start along x, y, z.",
     ),
     field(
         "structure.damping_ratio",
@@ -182,7 +189,15 @@ pub const FIELDS: [SceneField; 66] = [
         "text",
         Some("none: rigid"),
         "name of a structure that stands still",
-        "Structure that carries the surface and deforms it; its ROM needs a contact grid.",
+        "Structure that carries the surface and deforms it; its ROM needs a contact grid, closed around a rotor, open for a \
+         free master.",
+    ),
+    field(
+        "surface.rigid",
+        "true or false",
+        Some("false"),
+        "with a free master only",
+        "The structure only says where the surface is, and does not deform it.",
     ),
     field(
         "surface.spline",
@@ -240,11 +255,18 @@ pub const FIELDS: [SceneField; 66] = [
     field("contact.master", "text", None, "name of a structure", "Structure whose contact nodes are the masters."),
     field("contact.slave", "text", None, "name of a surface", "Surface they meet."),
     field(
+        "contact.nodes",
+        "text",
+        Some("all nodes"),
+        "free masters only; needed where there are several pairs",
+        "What the names of the contact nodes of this pair start with. No node may belong to two pairs.",
+    ),
+    field(
         "contact.gap",
         "number, m",
         None,
-        "> 0, up to a tenth of the radius",
-        "Radial tip clearance of the undeformed structure.",
+        "> 0, up to a tenth of the radius; left out with a free master",
+        "Radial tip clearance of the undeformed structure. Gaps of a free master follow from the positions in the ROMs.",
     ),
     field(
         "contact.sector_gaps",

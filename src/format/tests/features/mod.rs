@@ -40,3 +40,34 @@ fn coating() -> CoatingSettings {
         cells_along: 20,
     }
 }
+
+/// What only a master that flies freely has: two pairs against open surfaces.
+pub fn scene_with_a_free_master() -> SceneSettings {
+    let still = |name: &str| StructureSettings {
+        name: name.into(),
+        rom: format!("{name}.rom.safetensors"),
+        motion: Motion::Still,
+        ..StructureSettings::default()
+    };
+    let surface = |name: &str, structure: &str, rigid| SurfaceSettings {
+        name: name.into(),
+        structure: Some(structure.into()),
+        rigid,
+        ..SurfaceSettings::default()
+    };
+    let contact = |slave: &str, nodes: &str| ContactSettings {
+        master: "cube".into(),
+        slave: slave.into(),
+        nodes: Some(nodes.into()),
+        friction: 0.15,
+        ..ContactSettings::default()
+    };
+    let cube = StructureSettings { motion: Motion::Free, velocity: [0.0, -100.0, 0.5], ..still("cube") };
+    SceneSettings {
+        structures: vec![cube, still("left"), still("right")],
+        surfaces: vec![surface("left_side", "left", false), surface("right_side", "right", true)],
+        contacts: vec![contact("left_side", "left_"), contact("right_side", "right_")],
+        outputs: OutputSettings::default(),
+        ..complete_scene()
+    }
+}

@@ -17,6 +17,7 @@ pub use contour::Contour;
 pub use grid::GridNodes;
 pub use modal_form::{ModalForm, modal_form};
 pub use reduction::{CasingReductionOptions, reduce_casing};
+pub(crate) use reduction::{rigid_motions, without_rigid_motions};
 pub use ring_mesh::{ContactRings, Flange, RingCounts, RingGeometry, RingMesh, ring_mesh};
 
 use crate::Result;

@@ -82,7 +82,8 @@ pub fn reduce_casing(
         let inner = InnerBasis { modes: options.fixed_interface_modes, whole_pairs: true, loads: Some(loads.as_ref()) };
         let reduced = craig_bampton_with(&stiffness, &mass, &interface_dofs(&free, grid), &inner, listener)?;
         let order = reduced.mass.nrows();
-        let rigid = if clamped.is_empty() { rigid_motions(&mesh, grid, order) } else { DMatrix::zeros(order, 0) };
+        let points: Vec<[f64; 3]> = grid.nodes.iter().map(|&node| mesh.nodes[node]).collect();
+        let rigid = if clamped.is_empty() { rigid_motions(&points, order) } else { DMatrix::zeros(order, 0) };
         let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
         let reduced_loads = reduced_loads(grid, &reduced, &loads);
         let modes = condense(&modes, options.modes, &reduced_loads);
@@ -135,13 +136,12 @@ fn interface_dofs(free: &[usize], grid: &GridNodes) -> Vec<usize> {
 
 /// Rigid-body motions in the coordinates of Craig-Bampton: those of the contact nodes alone, since the interior follows
 /// by the constraint modes. Rotations about the centre of the contact nodes, in units of their distance.
-fn rigid_motions(mesh: &Mesh, grid: &GridNodes, order: usize) -> DMatrix<f64> {
-    let count = grid.nodes.len() as f64;
-    let centre: [f64; 3] =
-        core::array::from_fn(|i| grid.nodes.iter().map(|&node| mesh.nodes[node][i]).sum::<f64>() / count);
+pub(crate) fn rigid_motions(points: &[[f64; 3]], order: usize) -> DMatrix<f64> {
+    let count = points.len() as f64;
+    let centre: [f64; 3] = core::array::from_fn(|i| points.iter().map(|point| point[i]).sum::<f64>() / count);
     let mut motions = DMatrix::zeros(order, RIGID);
-    for (index, &node) in grid.nodes.iter().enumerate() {
-        let arm: [f64; 3] = core::array::from_fn(|i| mesh.nodes[node][i] - centre[i]);
+    for (index, point) in points.iter().enumerate() {
+        let arm: [f64; 3] = core::array::from_fn(|i| point[i] - centre[i]);
         for axis in 0..3 {
             let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
             motions[(3 * index + axis, axis)] = 1.0;
@@ -200,7 +200,7 @@ fn thermal(loads: &DMatrix<f64>, patches: &[Patch], modes: &ModalForm) -> Option
 }
 
 /// The checks with rigid-body modes at 0 Hz, where round-off of the full model has nothing to deviate from.
-fn without_rigid_motions(mut checks: RomChecks) -> RomChecks {
+pub(crate) fn without_rigid_motions(mut checks: RomChecks) -> RomChecks {
     let rigid = RIGID.min(checks.full_frequencies.len());
     checks.full_frequencies[..rigid].fill(0.0);
     checks.frequency_deviation[..rigid].fill(0.0);

@@ -56,16 +56,19 @@ fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: Frame) -> Conta
     ContactNode { name: point.name.clone(), position, meridional_slope: point.meridional_slope }
 }
 
-/// What the full model is made of.
-fn description(model: &FeModel) -> String {
+/// What the full model is made of, and how many of its nodes are clamped.
+pub(crate) fn description(model: &FeModel, clamped: usize) -> String {
     let before = if model.origin.is_empty() { String::new() } else { format!("{}: ", model.origin) };
     let nodes = model.nodes.len();
-    match &model.mesh {
-        Some((mesh, _)) => {
-            format!("{before}{nodes} nodes, {} elements ({})", mesh.elements.len(), element_names(mesh))
-        }
-        None => format!("{before}{nodes} nodes"),
-    }
+    let elements = model
+        .mesh
+        .as_ref()
+        .map_or(String::new(), |(mesh, _)| format!(", {} elements ({})", mesh.elements.len(), element_names(mesh)));
+    let material = model.mesh.as_ref().map_or(String::new(), |(_, material)| {
+        let Material { young_modulus, poisson_ratio, density, .. } = material;
+        format!("; E = {young_modulus:e} Pa, nu = {poisson_ratio}, rho = {density} kg/m3")
+    });
+    format!("{before}{nodes} nodes{elements}, {clamped} nodes clamped{material}")
 }
 
 pub(super) fn build_rom(
@@ -77,14 +80,9 @@ pub(super) fn build_rom(
     checks: RomChecks,
 ) -> Result<Rom> {
     let (boundary, order) = (3 * contact.len(), model.mass.nrows());
-    let material = full.mesh.as_ref().map_or(String::new(), |(_, material)| {
-        let Material { young_modulus, poisson_ratio, density, .. } = material;
-        format!("; E = {young_modulus:e} Pa, nu = {poisson_ratio}, rho = {density} kg/m3")
-    });
     let origin = format!(
-        "{}, {clamped} nodes clamped{material}; Craig-Bampton with {boundary} interface degrees of freedom and {} \
-         fixed-interface modes",
-        description(full),
+        "{}; Craig-Bampton with {boundary} interface degrees of freedom and {} fixed-interface modes",
+        description(full, clamped),
         order - boundary,
     );
     let rom = Rom {

@@ -2,7 +2,8 @@
 //!
 //! `cargo run --release -p tiprub-reference --example cube -- WHAT DIRECTORY [lumped|consistent]` with WHAT one of
 //! `figures` (methods a, b, c at 100 m/s), `energy` (50 m/s), `convergence` (in h), `outside` (a CalculiX `.dat` file, given
-//! as third argument, beside our methods; a fourth one is its contact stiffness in Pa/m, to allow for its penetration) and `files` (matrices and node tables).
+//! as third argument, beside our methods; a fourth one is its contact stiffness in Pa/m, to allow for its penetration), `files` (matrices and node tables)
+//! and `table` (the flight by method b as the small table that the FMU is tested against, `tests/python/cube_reference.csv`).
 
 mod outside;
 mod plot;
@@ -19,7 +20,7 @@ use tiprub_reference::surface::SurfaceKind;
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [what, directory, rest @ ..] = arguments.as_slice() else {
-        eprintln!("cube figures|energy|convergence|outside|files DIRECTORY [lumped|consistent, or a .dat file]");
+        eprintln!("cube figures|energy|convergence|outside|files|table DIRECTORY [lumped|consistent, or a .dat file]");
         std::process::exit(2);
     };
     let directory = PathBuf::from(directory);
@@ -34,7 +35,8 @@ fn main() {
             outside::compare(&directory, rest.first().expect("the CalculiX .dat file"), stiffness);
         }
         "files" => files(&directory),
-        other => panic!("`{other}` is none of figures, energy, convergence, outside, files"),
+        "table" => table(&directory),
+        other => panic!("`{other}` is none of figures, energy, convergence, outside, files, table"),
     }
 }
 
@@ -96,6 +98,23 @@ fn energy(directory: &Path) {
         save(directory, &format!("{name}-b"), &implicit);
         plot::energies(directory, &name, &film);
     }
+}
+
+/// Method b at 100 m/s until the cube has left, a record every 4 µs.
+fn table(directory: &Path) {
+    let history = run(Method::Bipotential, Setting::default(), 5e-7, 1e-3, 8);
+    let mut text = String::from(
+        "# Cube between two rings, 100 m/s, friction 0.15, lumped mass, B-spline: method b (bi-potential, trapezoidal rule), h = 0.5 us,\n\
+         # full finite-element model. Displacements of node 1 and velocity of the centre at t, mean normal force on node 1 since the\n\
+         # line before; m, m/s, N, s. Made by: cargo run --release -p tiprub-reference --example cube -- table DIRECTORY\n\
+         t,u1x,u1y,u1z,lambda1,vy\n",
+    );
+    for (i, t) in history.times.iter().enumerate() {
+        let [x, y, z] = history.corners[i][0];
+        let (force, velocity) = (history.corner_forces[i][0], history.velocity[i][1]);
+        text.push_str(&format!("{t:.6e},{x:.9e},{y:.9e},{z:.9e},{force:.6e},{velocity:.9e}\n"));
+    }
+    std::fs::write(directory.join("cube_reference.csv"), text).expect("a CSV file can be written");
 }
 
 /// Node tables, elements, sets and matrices of the three bodies, both masses.

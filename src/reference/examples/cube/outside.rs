@@ -4,8 +4,8 @@ use std::path::Path;
 
 use tiprub_reference::compare::relative_l2;
 use tiprub_reference::cube::calculix;
+use tiprub_reference::cube::cube_mesh;
 use tiprub_reference::cube::history::History;
-use tiprub_reference::cube::mesh::cube_mesh;
 use tiprub_reference::cube::outside::COLUMNS;
 use tiprub_reference::cube::scene::{Mass, Setting};
 use tiprub_reference::methods::Method;

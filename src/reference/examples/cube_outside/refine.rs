@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use tiprub_reference::compare::{agreement, exit_speed, windowed};
 use tiprub_reference::cube::files::{read_json, write_json};
 use tiprub_reference::cube::history::History;
-use tiprub_reference::cube::mesh::{cube_of, ring_of};
 use tiprub_reference::cube::scene::{Scene, Setting};
 use tiprub_reference::cube::{OUTER_RADIUS, SIDE, Side};
+use tiprub_reference::cube::{cube_of, ring_of};
 use tiprub_reference::methods::Method;
 
 use super::run_scene;

@@ -8,8 +8,7 @@ use std::fmt::Write as _;
 use tiprub_model::element::ElementKind;
 use tiprub_model::{Material, Mesh};
 
-use super::mesh::{cube_mesh, ring_mesh};
-use super::{CUBE_ELEMENTS, SIDE, Side, cube_material, ring_material};
+use super::{CUBE_ELEMENTS, SIDE, Side, cube_material, cube_mesh, ring_material, ring_mesh};
 
 /// Choices of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]

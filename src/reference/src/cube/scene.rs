@@ -7,8 +7,9 @@ use tiprub_model::progress::silent;
 use tiprub_model::sparse::{Factor, SparseMatrix, principal_pair};
 use tiprub_model::{FeModel, Material, Mesh, Result};
 
-use super::mesh::{cube_mesh, ring_mesh};
-use super::{CENTRE, FRICTION, HALF_ARC, RING_ELEMENTS, Side, WIDTH, cube_material, ring_material};
+use super::{
+    CENTRE, FRICTION, HALF_ARC, RING_ELEMENTS, Side, WIDTH, cube_material, cube_mesh, ring_material, ring_mesh,
+};
 use crate::surface::{Surface, SurfaceKind};
 
 /// Mass matrix of the finite elements.
@@ -68,13 +69,7 @@ impl Body {
             Self { stiffness: matrices.stiffness, mass: matrices.mass, free: Vec::new(), contact, mesh, material };
         if mass == Mass::Lumped {
             let masses = lumped_masses(&body.mesh, body.material.density)?;
-            body.mass.values.fill(0.0);
-            for dof in 0..body.mass.order() {
-                let start = body.mass.pattern.starts[dof];
-                let rows = &body.mass.pattern.rows[start..body.mass.pattern.starts[dof + 1]];
-                let place = rows.binary_search(&dof).expect("the pattern holds the diagonal");
-                body.mass.values[start + place] = masses[dof / 3];
-            }
+            body.mass.set_diagonal(|dof| masses[dof / 3]);
         }
         let clamped = body.mesh.sets.get("CLAMPED").map_or(&[][..], Vec::as_slice);
         body.free = free_dofs(body.mesh.nodes.len(), clamped);

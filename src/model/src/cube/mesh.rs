@@ -2,11 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use tiprub_model::Mesh;
-use tiprub_model::element::ElementKind;
-use tiprub_model::mesh::Element;
-
 use super::{CENTRE, CUBE_ELEMENTS, HALF_ARC, INNER_RADIUS, RING_ELEMENTS, SIDE, START, Side, THICKNESS, WIDTH};
+use crate::Mesh;
+use crate::element::ElementKind;
+use crate::mesh::Element;
 
 /// The paper's cube, 5 × 5 × 5 bricks; see [`cube_of`].
 pub fn cube_mesh() -> Mesh {

@@ -1,0 +1,155 @@
+//! The three bodies as reduced-order models.
+
+use super::{CUBE_ELEMENTS, RING_ELEMENTS, Side, cube_material, cube_of, ring_material, ring_of};
+use crate::fe_model::FeModel;
+use crate::free_body::{FreeBodyOptions, reduce_free_body};
+use crate::mesh::Mesh;
+use crate::panel::{PanelGrid, PanelOptions, reduce_panel};
+use crate::progress::{Listener, Stage, report};
+use crate::reduce::{ContactPoint, Reduction};
+use crate::{Material, Result};
+
+/// Mass matrix of the finite elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MassMatrix {
+    /// On the nodes: diagonal.
+    #[default]
+    Lumped,
+    /// ∫ ρ NᵀN dV.
+    Consistent,
+}
+
+/// What to reduce the cube to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CubeOptions {
+    /// Name of the structure.
+    pub name: String,
+    /// Elements along a side.
+    pub elements: usize,
+    /// Mass matrix.
+    pub mass: MassMatrix,
+    /// Number of fixed-interface modes; all where absent, and the reduction is then exact.
+    pub modes: Option<usize>,
+    /// Number of modes compared with the full model.
+    pub checked_modes: usize,
+}
+
+impl Default for CubeOptions {
+    fn default() -> Self {
+        let name = "cube".to_owned();
+        Self { name, elements: CUBE_ELEMENTS, mass: MassMatrix::default(), modes: None, checked_modes: 16 }
+    }
+}
+
+/// What to reduce a ring to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RingOptions {
+    /// Name of the structure.
+    pub name: String,
+    /// Which ring.
+    pub side: Side,
+    /// Elements along radius, width and arc.
+    pub elements: [usize; 3],
+    /// Mass matrix.
+    pub mass: MassMatrix,
+    /// Number of modes.
+    pub modes: usize,
+    /// Number of static responses to contact forces.
+    pub static_responses: usize,
+    /// Number of modes compared with the full model.
+    pub checked_modes: usize,
+}
+
+impl RingOptions {
+    /// The ring of one side, as it ships.
+    pub fn new(side: Side) -> Self {
+        Self {
+            name: match side {
+                Side::Left => "ring_left".into(),
+                Side::Right => "ring_right".into(),
+            },
+            side,
+            elements: RING_ELEMENTS,
+            mass: MassMatrix::default(),
+            modes: 100,
+            static_responses: 0,
+            checked_modes: 10,
+        }
+    }
+}
+
+/// Mesh, reduce and check the cube: 72 contact nodes `left_1` ... and `right_1` ..., line by line along z from the leading
+/// face on.
+///
+/// # Errors
+/// Those of [`reduce_free_body`].
+pub fn reduce_cube(options: &CubeOptions, listener: Listener<'_>) -> Result<Reduction> {
+    let mesh = cube_of(options.elements);
+    let contact = master_points(&mesh)?;
+    let start = std::time::Instant::now();
+    let model = model(mesh, &cube_material(), options.mass, "Cube of the benchmark between two rings", listener)?;
+    let assembly = start.elapsed().as_secs_f64();
+    let reduction_options = FreeBodyOptions {
+        name: options.name.clone(),
+        fixed_interface_modes: options.modes,
+        checked_modes: options.checked_modes,
+        damping_ratio: 0.0,
+    };
+    let mut reduction = reduce_free_body(model, &contact, &reduction_options, listener)?;
+    reduction.timings.assembly += assembly;
+    Ok(reduction)
+}
+
+/// Mesh, reduce and check a ring, both ends clamped.
+///
+/// # Errors
+/// Those of [`reduce_panel`].
+pub fn reduce_cube_ring(options: &RingOptions, listener: Listener<'_>) -> Result<Reduction> {
+    let mesh = ring_of(options.side, options.elements);
+    let (clamped, grid) = (mesh.set("CLAMPED")?.to_vec(), ring_grid(options.side, options.elements));
+    let start = std::time::Instant::now();
+    let origin = "Ring of the benchmark of a cube between two rings";
+    let model = model(mesh, &ring_material(), options.mass, origin, listener)?;
+    let assembly = start.elapsed().as_secs_f64();
+    let reduction_options = PanelOptions {
+        name: options.name.clone(),
+        modes: options.modes,
+        static_responses: options.static_responses,
+        checked_modes: options.checked_modes,
+        damping_ratio: 0.0,
+    };
+    let mut reduction = reduce_panel(model, &clamped, &grid, &reduction_options, listener)?;
+    reduction.timings.assembly += assembly;
+    Ok(reduction)
+}
+
+fn model(mesh: Mesh, material: &Material, mass: MassMatrix, origin: &str, listener: Listener<'_>) -> Result<FeModel> {
+    report(listener, Stage::Mesh, 1, 1);
+    let kind = if mass == MassMatrix::Lumped { "lumped" } else { "consistent" };
+    let model = FeModel::assembled(mesh, material, format!("{origin}, {kind} mass"), listener)?;
+    if mass == MassMatrix::Lumped { model.lumped() } else { Ok(model) }
+}
+
+/// The masters of a cube's mesh: left face, then right.
+///
+/// # Errors
+/// A mesh without the sets of [`cube_of`].
+pub fn master_points(mesh: &Mesh) -> Result<Vec<ContactPoint>> {
+    let mut points = Vec::new();
+    for (set, name) in [("MASTER_LEFT", "left"), ("MASTER_RIGHT", "right")] {
+        points.extend(mesh.set(set)?.iter().zip(1..).map(|(&node, number)| ContactPoint {
+            name: format!("{name}_{number}"),
+            node,
+            meridional_slope: 0.0,
+        }));
+    }
+    Ok(points)
+}
+
+/// Outer nodes of a ring's mesh as a grid, rows along the arc, in growing z; the arc runs so that the normal points to the
+/// cube.
+pub fn ring_grid(side: Side, [radial, wide, arc]: [usize; 3]) -> PanelGrid {
+    let place = |i: usize| if side == Side::Left { arc - i } else { i };
+    let node = |i: usize, j: usize| (place(i) * (wide + 1) + j) * (radial + 1) + radial;
+    PanelGrid { around: arc + 1, nodes: (0..=wide).flat_map(|j| (0..=arc).map(move |i| node(i, j))).collect() }
+}

@@ -1,0 +1,105 @@
+//! Reduction of a body that flies freely: Craig-Bampton on its contact nodes, delivered in its own modes.
+//!
+//! The rigid-body motions are known beforehand and stay exactly at rest in the stiffness: translations of the contact
+//! nodes are combinations of them, which is what a scene with a free structure needs.
+
+use nalgebra::{DMatrix, DVector};
+use tiprub_core::Rom;
+use tiprub_core::rom::{ContactNode, Frame, RomExtras};
+
+use crate::Result;
+use crate::assembly::free_dofs;
+use crate::casing::{modal_form, rigid_motions, without_rigid_motions};
+use crate::craig_bampton::craig_bampton;
+use crate::fe_model::FeModel;
+use crate::progress::{Listener, Stage, report};
+use crate::reduce::{
+    ContactPoint, Reduction, Timings, check_nodes, compare, description, full_modes, interface_dofs, node_modes, timed,
+};
+
+/// What to reduce a body to, and what to call it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeBodyOptions {
+    /// Name of the structure.
+    pub name: String,
+    /// Number of fixed-interface modes; all where absent, and the reduction is then exact.
+    pub fixed_interface_modes: Option<usize>,
+    /// Number of modes compared with the full model, the six rigid-body motions among them.
+    pub checked_modes: usize,
+    /// Modal damping ratio proposed with the model.
+    pub damping_ratio: f64,
+}
+
+/// Reduce an unsupported body to its contact nodes; frame Cartesian, M = I, K = Λ with six zeros first.
+///
+/// # Errors
+/// [`Error::Invalid`] for contact nodes that are repeated or do not exist;
+/// [`Error::NotPositiveDefinite`] for contact nodes on one line, and where the body
+/// is not one connected part.
+pub fn reduce_free_body(
+    model: FeModel,
+    contact: &[ContactPoint],
+    options: &FreeBodyOptions,
+    listener: Listener<'_>,
+) -> Result<Reduction> {
+    faer::set_global_parallelism(faer::Par::Seq);
+    check_nodes(&model.nodes, &[], contact, Frame::Cartesian)?;
+    let mut timings = Timings::default();
+    let free = free_dofs(model.nodes.len(), &[]);
+    let full = timed(&mut timings.full_modes, || {
+        full_modes(&model.stiffness, &model.mass, true, options.checked_modes, listener)
+    })?;
+    let interface = interface_dofs(&free, contact)?;
+    let inner = free.len().saturating_sub(interface.len());
+    let count = options.fixed_interface_modes.unwrap_or(inner);
+    let points: Vec<[f64; 3]> = contact.iter().map(|point| model.nodes[point.node]).collect();
+    let (reduced, modes) = timed(&mut timings.reduction, || {
+        let reduced = craig_bampton(&model.stiffness, &model.mass, &interface, count, listener)?;
+        let rigid = rigid_motions(&points, reduced.mass.nrows());
+        let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
+        Ok((reduced, modes))
+    })?;
+    let checks = timed(&mut timings.checks, || {
+        report(listener, Stage::Checks, 0, 1);
+        let checks = compare(&full, &model.mass, &reduced, &modes.squares, &modes.shapes);
+        report(listener, Stage::Checks, 1, 1);
+        Ok(without_rigid_motions(checks))
+    })?;
+    let order = modes.squares.len();
+    let exact = if count == inner { ", all of them" } else { "" };
+    let rom = Rom {
+        name: options.name.clone(),
+        origin: format!(
+            "{}, free to fly; Craig-Bampton with {} interface degrees of freedom and {count} fixed-interface modes{exact}",
+            description(&model, 0),
+            interface.len()
+        ),
+        sectors: 1,
+        frame: Frame::Cartesian,
+        mass: DMatrix::identity(order, order),
+        stiffness: DMatrix::from_diagonal(&DVector::from_column_slice(&modes.squares)),
+        damping_ratio: options.damping_ratio,
+        contact_map: modes.shapes.rows(0, interface.len()).into_owned(),
+        contact_nodes: contact.iter().zip(&points).map(|(point, place)| contact_node(point, *place)).collect(),
+        checks,
+        extras: RomExtras::default(),
+    };
+    rom.validate()?;
+    Ok(Reduction {
+        rom,
+        modes: node_modes(&full.modes, &free, model.nodes.len()),
+        largest_residual: full.modes.residuals.iter().copied().fold(0.0, f64::max),
+        free_dofs: free.len(),
+        reduced_angular_frequencies: modes.squares.iter().map(|square| square.sqrt()).collect(),
+        fixed_interface_frequencies: reduced.fixed_interface_frequencies,
+        spin_checks: Vec::new(),
+        nodes: model.nodes.len(),
+        material: model.mesh.as_ref().map(|(_, material)| material.clone()),
+        mesh: model.mesh.map(|(mesh, _)| mesh),
+        timings,
+    })
+}
+
+fn contact_node(point: &ContactPoint, position: [f64; 3]) -> ContactNode {
+    ContactNode { name: point.name.clone(), position, meridional_slope: 0.0 }
+}

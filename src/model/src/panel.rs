@@ -1,0 +1,247 @@
+//! Reduction of a supported structure that carries an open contact surface: a grid of nodes with four free edges.
+//!
+//! Coordinates are the lowest modes of the supported structure, and static responses to forces on the grid that these modes
+//! leave out (residual attachment modes: MacNeal, Computers & Structures 1, 1971; Rubin, AIAA Journal 13(8), 1975). A grid has
+//! hundreds of nodes, and a response for each of them would be a large model again. So forces are taken by the
+//! principal directions of the flexibility that the modes lack, C (K⁻¹ − ΦΛ⁻¹Φᵀ) Cᵀ v = κ v: those with the largest κ
+//! first, which leave the least flexibility out for their number.
+
+use faer::{Mat, Side};
+use nalgebra::{DMatrix, DVector};
+use tiprub_core::Rom;
+use tiprub_core::rom::{ContactGrid, ContactNode, Frame, RomExtras};
+
+use crate::assembly::free_dofs;
+use crate::craig_bampton::{CraigBampton, with_static_responses};
+use crate::eigen::Modes;
+use crate::fe_model::FeModel;
+use crate::progress::{Listener, Stage, report};
+use crate::reduce::{FullModes, Reduction, Timings, compare, description, full_modes, node_modes, timed};
+use crate::sparse::{SparseMatrix, principal_pair};
+use crate::{Error, Result};
+
+/// Right-hand sides that are solved at once.
+const COLUMNS: usize = 64;
+
+/// Contact nodes of an open surface: node `along · around + i` is the i-th of row `along`. With S_s along a row and S_t from
+/// row to row, S_t × S_s points to the other body.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PanelGrid {
+    /// Nodes of a row.
+    pub around: usize,
+    /// Node indices of the mesh (from 0), row by row; clamped ones may be among them.
+    pub nodes: Vec<usize>,
+}
+
+impl PanelGrid {
+    /// Number of rows.
+    pub fn along(&self) -> usize {
+        self.nodes.len() / self.around.max(1)
+    }
+
+    fn check(&self, model: &FeModel) -> Result<()> {
+        let refuse = |problem: String| {
+            let remedy = "Name each node of at least four rows of four once, row by row";
+            Err(Error::invalid("contact grid", problem, remedy))
+        };
+        if self.around < 2 || self.along() < 2 || self.around * self.along() != self.nodes.len() {
+            return refuse(format!("{} nodes are no rows of {}", self.nodes.len(), self.around));
+        }
+        if let Some(node) = self.nodes.iter().find(|node| **node >= model.nodes.len()) {
+            return refuse(format!("node {} does not exist; there are {}", node + 1, model.nodes.len()));
+        }
+        let mut sorted = self.nodes.clone();
+        sorted.sort_unstable();
+        match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+            Some(pair) => refuse(format!("node {} appears twice", pair[0] + 1)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What to reduce to, and what to call it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PanelOptions {
+    /// Name of the structure.
+    pub name: String,
+    /// Number of modes.
+    pub modes: usize,
+    /// Number of static responses to forces on the grid, at most three per node that can move: then the response at rest to
+    /// any contact force is that of the full model.
+    pub static_responses: usize,
+    /// Number of modes compared with the full model.
+    pub checked_modes: usize,
+    /// Modal damping ratio proposed with the model.
+    pub damping_ratio: f64,
+}
+
+/// Reduce a supported structure to its modes and static responses; frame Cartesian, M = I, K = Λ.
+///
+/// # Errors
+/// [`Error::Invalid`] for a grid of nodes that do not exist or are repeated, more modes than degrees of freedom or
+/// more static responses than forces; [`Error::NotPositiveDefinite`] for a structure that is not held.
+pub fn reduce_panel(
+    model: FeModel,
+    clamped: &[usize],
+    grid: &PanelGrid,
+    options: &PanelOptions,
+    listener: Listener<'_>,
+) -> Result<Reduction> {
+    faer::set_global_parallelism(faer::Par::Seq);
+    grid.check(&model)?;
+    let mut timings = Timings::default();
+    let free = free_dofs(model.nodes.len(), clamped);
+    let (stiffness, mass) = principal_pair(&model.stiffness, &model.mass, &free);
+    let full = timed(&mut timings.full_modes, || {
+        full_modes(&stiffness, &mass, false, options.modes.max(options.checked_modes), listener)
+    })?;
+    let basis = timed(&mut timings.reduction, || {
+        let kept = lowest(&full.modes, options.modes);
+        with_grid_responses(kept, &full, (&stiffness, &mass), &grid_dofs(&free, grid), options, listener)
+    })?;
+    let order = basis.eigenvalues.len();
+    let reduced = CraigBampton {
+        mass: DMatrix::identity(order, order),
+        stiffness: DMatrix::from_diagonal(&DVector::from_column_slice(&basis.eigenvalues)),
+        transformation: basis.shapes,
+        fixed_interface_frequencies: Vec::new(),
+    };
+    let checks = timed(&mut timings.checks, || {
+        report(listener, Stage::Checks, 0, 1);
+        let mut judged = full.clone();
+        judged.modes = lowest(&full.modes, options.checked_modes);
+        let checks = compare(&judged, &mass, &reduced, &basis.eigenvalues, &DMatrix::identity(order, order));
+        report(listener, Stage::Checks, 1, 1);
+        Ok(checks)
+    })?;
+    let rom = Rom {
+        name: options.name.clone(),
+        origin: format!(
+            "{}; {} modes up to {:.0} Hz and {} static responses to forces on {} x {} contact nodes",
+            description(&model, clamped.len()),
+            options.modes,
+            full.modes.frequencies()[..options.modes].last().copied().unwrap_or(0.0),
+            order - options.modes,
+            grid.around,
+            grid.along(),
+        ),
+        sectors: 1,
+        frame: Frame::Cartesian,
+        contact_map: contact_map(&free, grid, &reduced.transformation),
+        mass: reduced.mass,
+        stiffness: reduced.stiffness,
+        damping_ratio: options.damping_ratio,
+        contact_nodes: contact_nodes(&model, grid),
+        checks,
+        extras: RomExtras {
+            grid: Some(ContactGrid { around: grid.around, along: grid.along(), closed: false }),
+            ..RomExtras::default()
+        },
+    };
+    rom.validate()?;
+    Ok(Reduction {
+        rom,
+        modes: node_modes(&lowest(&full.modes, options.checked_modes), &free, model.nodes.len()),
+        largest_residual: full.modes.residuals.iter().copied().fold(0.0, f64::max),
+        free_dofs: free.len(),
+        reduced_angular_frequencies: basis.eigenvalues.iter().map(|square| square.sqrt()).collect(),
+        fixed_interface_frequencies: Vec::new(),
+        spin_checks: Vec::new(),
+        nodes: model.nodes.len(),
+        material: model.mesh.as_ref().map(|(_, material)| material.clone()),
+        mesh: model.mesh.map(|(mesh, _)| mesh),
+        timings,
+    })
+}
+
+fn lowest(modes: &Modes, count: usize) -> Modes {
+    let count = count.min(modes.eigenvalues.len());
+    Modes {
+        eigenvalues: modes.eigenvalues[..count].to_vec(),
+        shapes: modes.shapes.get(.., ..count).to_owned(),
+        residuals: modes.residuals[..count].to_vec(),
+    }
+}
+
+/// Rows among the free dofs of the components of grid nodes; `None` where clamped.
+fn grid_dofs(free: &[usize], grid: &PanelGrid) -> Vec<Option<usize>> {
+    let dofs = grid.nodes.iter().flat_map(|node| (0..3).map(move |component| 3 * node + component));
+    dofs.map(|dof| free.binary_search(&dof).ok()).collect()
+}
+
+fn with_grid_responses(
+    kept: Modes,
+    full: &FullModes,
+    (stiffness, mass): (&SparseMatrix, &SparseMatrix),
+    dofs: &[Option<usize>],
+    options: &PanelOptions,
+    listener: Listener<'_>,
+) -> Result<Modes> {
+    let dofs: Vec<usize> = dofs.iter().copied().flatten().collect();
+    let count = options.static_responses;
+    if count > dofs.len() {
+        let problem = format!("{count} asked, but only {} components of grid nodes can move", dofs.len());
+        return Err(Error::invalid("number of static responses", problem, "Ask for fewer"));
+    }
+    if count == 0 {
+        return Ok(kept);
+    }
+    let patterns = principal_forces(&kept, full, &dofs, count, listener)?;
+    let mut loads = Mat::zeros(stiffness.order(), count);
+    for k in 0..count {
+        dofs.iter().enumerate().for_each(|(i, &dof)| loads[(dof, k)] = patterns[(i, k)]);
+    }
+    let responses = full.responses(loads);
+    let squares = kept.eigenvalues.clone();
+    let mut basis = with_static_responses(kept, stiffness, mass, &responses)?;
+    // The projected problem finds the modes again; of those, what was iterated for is the better.
+    basis.eigenvalues[..squares.len()].copy_from_slice(&squares);
+    basis.eigenvalues.iter().is_sorted().then_some(basis).ok_or_else(|| {
+        let remedy = "Ask for some modes more or fewer";
+        Error::invalid("static responses", "they mix with the modes", remedy)
+    })
+}
+
+/// Force patterns on the grid, dofs × `count`, along which the modes lack most flexibility.
+fn principal_forces(
+    kept: &Modes,
+    full: &FullModes,
+    dofs: &[usize],
+    count: usize,
+    listener: Listener<'_>,
+) -> Result<Mat<f64>> {
+    let mut lacking = Mat::zeros(dofs.len(), dofs.len());
+    for (chunk, part) in dofs.chunks(COLUMNS).enumerate() {
+        report(listener, Stage::ConstraintModes, chunk * COLUMNS, dofs.len());
+        let mut unit = Mat::zeros(kept.shapes.nrows(), part.len());
+        part.iter().enumerate().for_each(|(j, &dof)| unit[(dof, j)] = 1.0);
+        let response = full.responses(unit);
+        for j in 0..part.len() {
+            dofs.iter().enumerate().for_each(|(i, &dof)| lacking[(i, chunk * COLUMNS + j)] = response[(dof, j)]);
+        }
+    }
+    let scaled =
+        Mat::from_fn(dofs.len(), kept.eigenvalues.len(), |i, k| kept.shapes[(dofs[i], k)] / kept.eigenvalues[k].sqrt());
+    lacking -= &scaled * scaled.transpose();
+    let symmetric = Mat::from_fn(dofs.len(), dofs.len(), |i, j| 0.5 * (lacking[(i, j)] + lacking[(j, i)]));
+    let scale = symmetric.norm_max();
+    let eigen = (symmetric * faer::Scale(1.0 / scale)).self_adjoint_eigen(Side::Lower).map_err(|_| {
+        Error::invalid("flexibility of the contact grid", "its eigenvalue problem did not converge", "Check the mesh")
+    })?;
+    Ok(Mat::from_fn(dofs.len(), count, |i, k| eigen.U()[(i, dofs.len() - 1 - k)]))
+}
+
+/// Displacements of the grid nodes, zero where clamped.
+fn contact_map(free: &[usize], grid: &PanelGrid, shapes: &Mat<f64>) -> DMatrix<f64> {
+    let dofs = grid_dofs(free, grid);
+    DMatrix::from_fn(dofs.len(), shapes.ncols(), |row, mode| dofs[row].map_or(0.0, |dof| shapes[(dof, mode)]))
+}
+
+fn contact_nodes(model: &FeModel, grid: &PanelGrid) -> Vec<ContactNode> {
+    let named = |(index, &node): (usize, &usize)| ContactNode {
+        name: format!("row_{}_{}", index / grid.around + 1, index % grid.around + 1),
+        position: model.nodes[node],
+        meridional_slope: 0.0,
+    };
+    grid.nodes.iter().enumerate().map(named).collect()
+}
