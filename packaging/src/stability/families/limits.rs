@@ -1,0 +1,119 @@
+//! Step sizes across the limits of the schemes, and stiffness that spans many orders of magnitude.
+
+use tiprub_core::{
+    Scene, Simulation,
+    settings::{Scheme, Solver},
+};
+
+use super::super::{
+    Case, Expected, Happened,
+    models::{SCHEMES, SOLVERS, Tower, blade, round, with_methods, with_step},
+    press::Press,
+};
+
+const FACTORS: [f64; 5] = [0.9, 0.999, 1.001, 1.5, 10.0];
+
+/// All of them.
+pub fn cases() -> Vec<Case> {
+    step_limit().into_iter().chain(ratios()).collect()
+}
+
+/// Largest usable step of massless-boundary (s), as its refusal of a long one names it.
+pub fn massless_step(scene: &Scene) -> Option<f64> {
+    let scene = with_step(with_methods(scene.clone(), Scheme::MasslessBoundary, Solver::Lcp), 1e-2);
+    let refusal = Simulation::new(&scene).and_then(|mut simulation| simulation.initialise(0.0)).err()?.to_string();
+    refusal.split("Set the internal step below ").nth(1)?.split(' ').next()?.parse().ok()
+}
+
+fn step_limit() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (scheme, scheme_name) in SCHEMES {
+        for (solver, solver_name) in SOLVERS {
+            for (friction, model) in [(0.0, "tower"), (0.15, "tower"), (0.0, "blade"), (0.15, "blade")] {
+                // Three nodes that push each other apart: film, which looks once, need not come to the static solution.
+                if model == "blade" && solver == Solver::Film {
+                    continue;
+                }
+                for factor in FACTORS {
+                    let name = format!("step-limit/{scheme_name}/{solver_name}/{model}/µ={friction}/h={factor}");
+                    let against = "static contact, signs of the ledger";
+                    let expected = match scheme {
+                        Scheme::CentralDifference if factor > 1.0 => Expected::refused(["central-difference", "ω_max"]),
+                        Scheme::MasslessBoundary if factor > 1.0 => Expected::refused(["massless-boundary", "internal step"]),
+                        _ if friction > 0.0 && model == "blade" => Expected::either(against, ["grows"]),
+                        _ => Expected::right(against),
+                    };
+                    let quick = model == "tower" && friction > 0.0 && solver != Solver::Film;
+                    cases.push(Case::new(name, expected, move |_| at(scheme, solver, friction, model, factor)).quick(quick));
+                }
+            }
+        }
+    }
+    cases
+}
+
+fn at(scheme: Scheme, solver: Solver, friction: f64, model: &str, factor: f64) -> Happened {
+    let tower = Tower::default();
+    let rom = if model == "tower" { tower.rom() } else { blade(12) };
+    let fastest = if model == "tower" {
+        tower.largest_frequency()
+    } else {
+        rom.stiffness.diagonal().max().sqrt()
+    };
+    let mut scene = with_methods(round(rom), scheme, solver);
+    scene.settings.contacts[0].friction = friction;
+    // Free of friction, so that what is refused is the step.
+    let limit = match scheme {
+        Scheme::MasslessBoundary => {
+            let mut pressed = scene.clone();
+            pressed.settings.structures[0].damping_ratio = Some(0.3);
+            massless_step(&pressed)
+        }
+        _ => Some(2.0 / fastest),
+    };
+    let Some(limit) = limit else { return Happened::refused("no limit was named") };
+    Happened::of(Press::new(with_step(scene, factor * limit)).run())
+}
+
+fn ratios() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for exponent in 2..=8 {
+        for (scheme, scheme_name) in SCHEMES {
+            for (solver, solver_name) in SOLVERS {
+                for kind in ["stiff node", "light node"] {
+                    let name = format!("stiffness/{}/1e{exponent}/{scheme_name}/{solver_name}", kind.replace(' ', "-"));
+                    let expected = Expected::right("static contact, signs of the ledger");
+                    let quick = solver == Solver::Lcp && exponent % 3 == 2 && scheme != Scheme::CentralDifference;
+                    let work = move |_: &_| ratio(kind, 10_f64.powi(exponent), scheme, solver);
+                    cases.push(Case::new(name, expected, work).quick(quick).within(300.0));
+                }
+            }
+        }
+    }
+    cases
+}
+
+/// Ratio of the squares of the highest to the lowest frequency: by stiffness, or by mass.
+fn ratio(kind: &str, ratio: f64, scheme: Scheme, solver: Solver) -> Happened {
+    let soft = 4e6 / 0.1;
+    let mut tower = Tower { sectors: 2, ..Tower::default() };
+    if kind == "stiff node" {
+        tower.tip = ratio * soft * tower.mass[1];
+    } else {
+        tower.mass[1] = tower.tip / (ratio * soft);
+    }
+    let mut scene = with_methods(round(tower.rom()), scheme, solver);
+    scene.settings.contacts[0].friction = 0.15;
+    let step = match scheme {
+        Scheme::CentralDifference => 0.9 * 2.0 / tower.largest_frequency(),
+        Scheme::ModalExact => 5e-6,
+        Scheme::MasslessBoundary => {
+            scene.settings.structures[0].damping_ratio = Some(0.3);
+            match massless_step(&scene) {
+                Some(step) => (0.9 * step).min(5e-6),
+                None => 5e-6,
+            }
+        }
+    };
+    Happened::of(Press::new(with_step(scene, step)).run())
+}
