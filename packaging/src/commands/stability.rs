@@ -4,8 +4,9 @@ use crate::{
     Failure, Result,
     cli::StabilityArguments,
     console::{Console, Outcome},
-    output_file,
-    stability::{self, Case, Context, child, table::Table},
+    fmu::{FmiVersion, Package},
+    library, output_file,
+    stability::{self, Case, Context, child, families::values, table::Table},
     study::sweep,
 };
 
@@ -19,7 +20,9 @@ pub fn run(arguments: &StabilityArguments, console: &Console) -> Result<Outcome>
         return Ok(Outcome { text: json.to_string(), json });
     }
     let cases = chosen(arguments)?;
-    let context = Context::default();
+    // Lives as long as the cases run.
+    let fmus = if cases.iter().any(|case| case.imports) { Some(package(arguments, console)?) } else { None };
+    let context = Context { fmus: fmus.as_ref().map(|directory| directory.path().to_owned()) };
     let task = console.task("Stability", Some(cases.len() as u64));
     let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
     let rows = sweep::sweep(
@@ -41,6 +44,23 @@ pub fn run(arguments: &StabilityArguments, console: &Console) -> Result<Outcome>
         write_chapter(path, &table)?;
     }
     Ok(outcome)
+}
+
+/// The scenes whose variables are walked, as FMUs of both versions in a temporary directory.
+fn package(arguments: &StabilityArguments, console: &Console) -> Result<tempfile::TempDir> {
+    let library = library::load(arguments.library.as_deref(), console)?;
+    let directory = tempfile::tempdir().map_err(|error| {
+        Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error)
+    })?;
+    for name in values::SCENES {
+        let scene = values::scene(name);
+        let package = Package::new(&scene, &library)?;
+        for version in [FmiVersion::Two, FmiVersion::Three] {
+            let path = directory.path().join(format!("{name}-{}.fmu", version.digit()));
+            package.write(&path, version, false)?;
+        }
+    }
+    Ok(directory)
 }
 
 fn chosen(arguments: &StabilityArguments) -> Result<Vec<Case>> {

@@ -4,6 +4,7 @@
 mod description;
 mod fmi2;
 mod fmi3;
+mod session;
 mod slave;
 
 use std::{
@@ -16,6 +17,7 @@ use std::{
 use tempfile::TempDir;
 use zip::ZipArchive;
 
+pub use session::Session;
 pub use description::{ImportedDescription, ImportedVariable, VariableType, parse};
 
 use crate::{Failure, Result, recording::Recording, schedule::Schedule};

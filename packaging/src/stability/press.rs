@@ -58,19 +58,17 @@ impl Press {
     /// # Errors
     /// The scene is refused.
     pub fn run(&self) -> Result<Vec<Check>> {
-        let (mut checks, simulation) = self.march()?;
-        let (watch, mut simulation) = (simulation.1, simulation.0);
-        checks.extend(watch.books());
+        let (simulation, watch) = self.march()?;
+        let mut checks = Vec::new();
+        checks.extend(watch.books_of(self.scene.settings.time.scheme));
         if self.scene.settings.contacts[0].solver != Solver::Film {
             checks.extend(watch.complementarity());
         }
-        checks.extend(self.compare(&mut simulation));
+        checks.extend(self.compare(&simulation));
         Ok(checks)
     }
 
-    /// March to the end; no checks yet.
-    #[expect(clippy::type_complexity, reason = "one caller and tests")]
-    fn march(&self) -> Result<(Vec<Check>, (Simulation, Watch))> {
+    fn march(&self) -> Result<(Simulation, Watch)> {
         let mut scene = self.scene.clone();
         scene.settings.structures[0].damping_ratio.get_or_insert(DAMPING);
         let step = scene.settings.time.step;
@@ -78,15 +76,16 @@ impl Press {
         let mut simulation = Simulation::new(&scene)?;
         simulation.initialise(0.0)?;
         let mut watch = Watch::new(&scene);
+        watch.scale = watch.scale.max(self.depth);
         let count = ((self.rise + self.hold) / step).ceil() as u64;
         for index in 0..count.max(400) {
             set(&mut simulation, "casing_radius_change", self.change(index as f64 * step))?;
             watch.step(&mut simulation, step)?;
         }
-        Ok((Vec::new(), (simulation, watch)))
+        Ok((simulation, watch))
     }
 
-    fn compare(&self, simulation: &mut Simulation) -> Vec<Check> {
+    fn compare(&self, simulation: &Simulation) -> Vec<Check> {
         let (rom, contact) = (&self.scene.roms[0], &self.scene.settings.contacts[0]);
         let sense = self.scene.settings.structures[0].speed.signum();
         let exact = pressed(rom, contact.friction * sense, self.depth);

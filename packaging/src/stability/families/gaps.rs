@@ -202,6 +202,8 @@ fn closed_long(scheme: Scheme, solver: Solver, friction: f64, flexible: bool) ->
     scene.settings.structures[0].damping_ratio = Some(0.3);
     if flexible {
         on_ring(&mut scene, 0.3);
+        // A spline through 36 points of a circle ripples by 0.1 µm, which fast blades feel.
+        scene.settings.structures[0].speed = 10.0;
     }
     let step = 2e-6;
     let scene = with_step(scene, step);
@@ -223,14 +225,13 @@ fn closed_long(scheme: Scheme, solver: Solver, friction: f64, flexible: bool) ->
     let system = simulation.system();
     let forces: Vec<f64> = (0..12).map(|sector| system.multiplier(0, sector)).collect();
     let off = forces.iter().fold(0.0, |most: f64, force| most.max((force / exact - 1.0).abs()));
-    let mut checks = watch.books();
+    let mut checks = watch.books_of(scheme);
     if solver != Solver::Film {
         checks.extend(watch.complementarity());
     }
-    // A spline through 36 points of a circle is off by 1e-6 of its radius at most; friction tilts nothing that is round.
-    checks.push(Check::at_most("λ from the static solution", off, if flexible { 2e-2 } else { 1e-6 }));
+    checks.push(Check::at_most("λ from the static solution", off, if flexible { 5e-3 } else { 1e-6 }));
     let turning = forces.iter().fold(0.0, |most: f64, force| most.max((force / forces[0] - 1.0).abs()));
-    checks.push(Check::at_most("blades differ", turning, if flexible { 2e-2 } else { 0.0 }));
+    checks.push(Check::at_most("blades differ", turning, if flexible { 5e-3 } else { 0.0 }));
     checks.push(Check::so("all 12 nodes in contact", system.events().len() == 12));
     Ok(checks)
 }
@@ -263,14 +264,14 @@ fn scaled(exponent: i32, solver: Solver, friction: f64) -> Result<Vec<Check>> {
         let back = b / power_of_two(exponent / 2) / (scale / power_of_two(exponent / 2));
         most.max((back - a).abs() / largest)
     });
-    // Below 1e-150 m modes are flushed to rest, so that what moves by itself there is lost: absolutely, nothing.
-    let bound = if exponent > -440 { 1e-12 } else { f64::INFINITY };
+    // Below 1e-150 modes are flushed to rest every 512 steps: what is left are forces of the size of the scaled ones.
+    let (bound, most) = if exponent > -440 { (1e-12, 1.0 + 1e-12) } else { (f64::INFINITY, 10.0) };
     let negative = small.iter().fold(0.0, |most: f64, force| most.max(-force));
     Ok(vec![
         Check::so("they touch", largest > 0.0),
         Check::at_most("scaled λ differ by", off, bound),
         Check::so("no adhesion, all finite", negative == 0.0 && small.iter().all(|force| force.is_finite())),
-        Check::at_most("largest λ beyond the scaled one", small.iter().fold(0.0, |a: f64, b| a.max(*b)) / largest / scale.max(1e-290), 1.5),
+        Check::at_most("largest λ beyond the scaled one", small.iter().fold(0.0, |a: f64, b| a.max(*b)) / largest / scale.max(1e-290), most),
         Check::at_most("time per step against normal numbers", time / calm, 8.0),
     ])
 }
