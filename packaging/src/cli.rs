@@ -81,10 +81,12 @@ pub enum Command {
                             DIR then holds index.html (opens offline), an SVG and a CSV per figure, and results.json.")]
     Study(StudyArguments),
     /// Stiff and extreme cases: each must end in a right answer or in a refusal that says why.
-    #[command(after_help = "Examples:\n  tiprub stability --quick\n  tiprub stability --case friction/ --out friction\n  \
+    #[command(
+        after_help = "Examples:\n  tiprub stability --quick\n  tiprub stability --case friction/ --out friction\n  \
                             tiprub stability --out stability --chapter docs/stability.md\n\n\
                             Every case runs in a process of its own with a time limit. DIR then holds index.html, \
-                            stability.csv, stability.md and results.json.")]
+                            stability.csv, stability.md and results.json."
+    )]
     Stability(StabilityArguments),
 }
 

@@ -49,9 +49,8 @@ pub fn run(arguments: &StabilityArguments, console: &Console) -> Result<Outcome>
 /// The scenes whose variables are walked, as FMUs of both versions in a temporary directory.
 fn package(arguments: &StabilityArguments, console: &Console) -> Result<tempfile::TempDir> {
     let library = library::load(arguments.library.as_deref(), console)?;
-    let directory = tempfile::tempdir().map_err(|error| {
-        Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error)
-    })?;
+    let directory = tempfile::tempdir()
+        .map_err(|error| Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error))?;
     for name in values::SCENES {
         let scene = values::scene(name);
         let package = Package::new(&scene, &library)?;

@@ -17,8 +17,8 @@ use std::{
 use tempfile::TempDir;
 use zip::ZipArchive;
 
-pub use session::Session;
 pub use description::{ImportedDescription, ImportedVariable, VariableType, parse};
+pub use session::Session;
 
 use crate::{Failure, Result, recording::Recording, schedule::Schedule};
 

@@ -31,7 +31,9 @@ impl<'a> Session<'a> {
         let slave: Box<dyn Slave> = match fmu.description.fmi_version.as_str() {
             "2.0" => Box::new(fmi2::Fmi2Slave::new(fmu, library)?),
             "3.0" => Box::new(fmi3::Fmi3Slave::new(fmu, library)?),
-            other => return Err(Failure::new("FMU", format!("FMI version {other}"), "Only 2.0 and 3.0 can be imported")),
+            other => {
+                return Err(Failure::new("FMU", format!("FMI version {other}"), "Only 2.0 and 3.0 can be imported"));
+            }
         };
         Ok(Self { fmu, slave, groups: slave::group_outputs(&fmu.description) })
     }
@@ -42,7 +44,8 @@ impl<'a> Session<'a> {
     /// No variable of this name, or the FMU refuses.
     pub fn set_real(&mut self, name: &str, value: f64) -> Result<()> {
         let first = format!("{name}[1]");
-        let found = self.fmu.description.variables.iter().find(|variable| variable.name == name || variable.name == first);
+        let found =
+            self.fmu.description.variables.iter().find(|variable| variable.name == name || variable.name == first);
         let missing = || Failure::new("FMU", format!("has no variable {name}"), "");
         self.slave.set_real(found.ok_or_else(missing)?.reference, value)
     }

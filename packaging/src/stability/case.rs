@@ -132,9 +132,10 @@ impl Happened {
     /// For the parent process.
     pub fn to_json(&self) -> Value {
         // Numbers as bits: JSON knows neither NaN nor infinity.
-        let checks = self.checks.iter().map(|check| {
-            json!({ "what": check.what, "found": check.found.to_bits(), "bound": check.bound.to_bits() })
-        });
+        let checks = self
+            .checks
+            .iter()
+            .map(|check| json!({ "what": check.what, "found": check.found.to_bits(), "bound": check.bound.to_bits() }));
         json!({ "refusal": self.refusal, "checks": checks.collect::<Vec<_>>(), "remarks": self.remarks })
     }
 
@@ -196,8 +197,7 @@ pub fn judge(expected: &Expected, happened: &Happened) -> (Verdict, String) {
     match (&happened.refusal, words) {
         (Some(message), None) => (Verdict::Wrong, format!("refused: {message}")),
         (Some(message), Some(words)) => {
-            let missing: Vec<&str> =
-                words.iter().map(String::as_str).filter(|word| !message.contains(*word)).collect();
+            let missing: Vec<&str> = words.iter().map(String::as_str).filter(|word| !message.contains(*word)).collect();
             if !missing.is_empty() {
                 return (Verdict::Wrong, format!("refused without naming {}: {message}", missing.join(", ")));
             }
@@ -207,9 +207,7 @@ pub fn judge(expected: &Expected, happened: &Happened) -> (Verdict, String) {
             (Verdict::Refused, format!("{message}{remarks}"))
         }
         (None, _) if !failed.is_empty() => (Verdict::Wrong, format!("{}{remarks}", failed.join("; "))),
-        (None, _) if matches!(expected, Expected::Refused(_)) => {
-            (Verdict::Wrong, "was not refused".to_owned())
-        }
+        (None, _) if matches!(expected, Expected::Refused(_)) => (Verdict::Wrong, "was not refused".to_owned()),
         (None, _) if happened.checks.is_empty() => (Verdict::Wrong, "nothing was compared".to_owned()),
         (None, _) => (Verdict::Right, format!("{}{remarks}", tightest(&happened.checks))),
     }

@@ -17,11 +17,8 @@ pub const RADIUS: f64 = 0.25;
 /// Clearance (m).
 pub const GAP: f64 = 3.56e-4;
 /// All schemes with their names.
-pub const SCHEMES: [(Scheme, &str); 3] = [
-    (Scheme::CentralDifference, "central"),
-    (Scheme::ModalExact, "exact"),
-    (Scheme::MasslessBoundary, "massless"),
-];
+pub const SCHEMES: [(Scheme, &str); 3] =
+    [(Scheme::CentralDifference, "central"), (Scheme::ModalExact, "exact"), (Scheme::MasslessBoundary, "massless")];
 /// All contact solvers with their names.
 pub const SOLVERS: [(Solver, &str); 3] = [(Solver::Film, "film"), (Solver::Lcp, "lcp"), (Solver::Coulomb, "coulomb")];
 
@@ -158,7 +155,11 @@ pub fn blade(sectors: usize) -> Rom {
         stiffness: DMatrix::from_fn(order, order, |i, j| if i == j { (TAU * frequency(i)).powi(2) } else { 0.0 }),
         damping_ratio: 0.005,
         contact_map: DMatrix::from_fn(9, order, shape),
-        contact_nodes: ["leading_edge", "mid_chord", "trailing_edge"].iter().enumerate().map(|(i, n)| node(i, n)).collect(),
+        contact_nodes: ["leading_edge", "mid_chord", "trailing_edge"]
+            .iter()
+            .enumerate()
+            .map(|(i, n)| node(i, n))
+            .collect(),
         checks: RomChecks::default(),
         extras: RomExtras::default(),
     }
@@ -192,10 +193,8 @@ pub fn ring() -> Rom {
         }
     };
     let quarter = 0.5 * PI;
-    let patch = |index: usize| Patch {
-        angle: [quarter * index as f64, quarter * (index + 1) as f64],
-        axial: [-0.02, 0.05],
-    };
+    let patch =
+        |index: usize| Patch { angle: [quarter * index as f64, quarter * (index + 1) as f64], axial: [-0.02, 0.05] };
     Rom {
         name: "ring".into(),
         origin: "analytic modes".into(),

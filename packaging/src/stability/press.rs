@@ -152,7 +152,8 @@ fn flexibility(rom: &Rom) -> DMatrix<f64> {
     let scale = DVector::from_fn(order, |i, _| 1.0 / rom.stiffness[(i, i)].sqrt());
     let scaled = DMatrix::from_fn(order, order, |i, j| scale[i] * rom.stiffness[(i, j)] * scale[j]);
     let map = DMatrix::from_fn(rom.contact_map.nrows(), order, |i, j| rom.contact_map[(i, j)] * scale[j]);
-    let solved = scaled.lu().solve(&map.transpose()).unwrap_or_else(|| DMatrix::from_element(order, map.nrows(), f64::NAN));
+    let solved =
+        scaled.lu().solve(&map.transpose()).unwrap_or_else(|| DMatrix::from_element(order, map.nrows(), f64::NAN));
     map * solved
 }
 
@@ -161,7 +162,10 @@ pub fn pressed(rom: &Rom, friction: f64, depth: f64) -> Static {
     let (along, flexible) = (directions(rom, friction), flexibility(rom));
     let count = along.len();
     let entry = |i: usize, j: usize| -> f64 {
-        (0..3).flat_map(|a| (0..3).map(move |b| (a, b))).map(|(a, b)| along[i].0[a] * flexible[(3 * i + a, 3 * j + b)] * along[j].1[b]).sum()
+        (0..3)
+            .flat_map(|a| (0..3).map(move |b| (a, b)))
+            .map(|(a, b)| along[i].0[a] * flexible[(3 * i + a, 3 * j + b)] * along[j].1[b])
+            .sum()
     };
     let gap = |i: usize| depth * along[i].0[0];
     let multipliers = if coincident(rom) {

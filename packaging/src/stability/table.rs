@@ -56,7 +56,14 @@ impl Table {
             let _ = writeln!(text, "  {family:<16}{}", counts.concat());
         }
         for row in self.unsound() {
-            let _ = write!(text, "\n{} {}\n  expected: {}\n  happened: {}\n", row.verdict.name(), row.name, row.expected, row.happened);
+            let _ = write!(
+                text,
+                "\n{} {}\n  expected: {}\n  happened: {}\n",
+                row.verdict.name(),
+                row.name,
+                row.expected,
+                row.happened
+            );
         }
         text
     }
@@ -99,10 +106,17 @@ impl Table {
         }
         for family in self.families() {
             let _ = write!(text, "\n### {family}\n\n| case | expected | happened | verdict |\n|---|---|---|---|\n");
-            for row in self.rows.iter().filter(|row| self::family(row) == family) {
-                let name = row.name.split_once('/').map_or(row.name.as_str(), |(_, rest)| rest);
-                let cells = [name, &row.expected, &row.happened].map(|cell| cell.replace('|', "\\|"));
-                let _ = writeln!(text, "| {} | {} |", cells.join(" | "), row.verdict.name());
+            let rows: Vec<&Row> = self.rows.iter().filter(|row| self::family(row) == family).collect();
+            for (name, group) in groups(&rows) {
+                let counts = Verdict::ALL.map(|verdict| group.iter().filter(|row| row.verdict == verdict).count());
+                let verdicts = Verdict::ALL.iter().zip(counts).filter(|(_, count)| *count > 0);
+                let verdicts: Vec<String> = match group.len() {
+                    1 => verdicts.map(|(verdict, _)| verdict.name().to_owned()).collect(),
+                    _ => verdicts.map(|(verdict, count)| format!("{count} {}", verdict.name())).collect(),
+                };
+                let cells =
+                    [&name, &group[0].expected, &shortened(&group[0].happened)].map(|cell| cell.replace('|', "\\|"));
+                let _ = writeln!(text, "| {} | {} |", cells.join(" | "), verdicts.join(", "));
             }
         }
         text
@@ -143,4 +157,36 @@ impl Table {
 
 fn family(row: &Row) -> &str {
     row.name.split('/').next().unwrap_or(&row.name)
+}
+
+/// Families of more cases than this have one line per group in the guide.
+const LISTED: usize = 60;
+/// Characters of what happened that the guide shows.
+const SHOWN: usize = 160;
+
+/// Rows of a family with the names they go by: each by itself, or those that differ in the last part of the name together,
+/// the first of them as an example.
+fn groups<'a>(rows: &[&'a Row]) -> Vec<(String, Vec<&'a Row>)> {
+    let own = |row: &Row| row.name.split_once('/').map_or(row.name.clone(), |(_, rest)| rest.to_owned());
+    if rows.len() <= LISTED {
+        return rows.iter().map(|row| (own(row), vec![*row])).collect();
+    }
+    let mut groups: Vec<(String, Vec<&Row>)> = Vec::new();
+    for row in rows {
+        let name = own(row);
+        let name = name.rsplit_once('/').map_or(name.clone(), |(before, _)| format!("{before}/…"));
+        match groups.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, group)) => group.push(row),
+            None => groups.push((name, vec![row])),
+        }
+    }
+    groups
+}
+
+fn shortened(text: &str) -> String {
+    if text.chars().count() <= SHOWN {
+        return text.to_owned();
+    }
+    let short: String = text.chars().take(SHOWN).collect();
+    format!("{short}…")
 }

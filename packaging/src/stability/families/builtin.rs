@@ -56,7 +56,8 @@ fn rotor37() -> Vec<Case> {
     for (solver, solver_name) in SOLVERS {
         for friction in [0.0, 0.15, 0.5, 1.0, 1.5, 2.0] {
             for sense in [1.0, -1.0] {
-                let name = format!("rotor37/friction/µ={friction}/{solver_name}/{}Ω", if sense > 0.0 { '+' } else { '−' });
+                let name =
+                    format!("rotor37/friction/µ={friction}/{solver_name}/{}Ω", if sense > 0.0 { '+' } else { '−' });
                 let expected = Expected::either("the same with a fourth of the step, complementarity", ["µ"]);
                 let work = move |_: &_| Happened::of(rubbed(solver, friction, sense));
                 cases.push(Case::new(name, expected, work).within(300.0));
@@ -68,7 +69,8 @@ fn rotor37() -> Vec<Case> {
 
 fn at_limit(scheme: Scheme, solver: Solver, factor: f64) -> Happened {
     let Some(rom) = model("rotor37") else { return Happened::refused("there is no rotor 37") };
-    let fastest = tiprub_core::dynamics::modal::ModalModel::from_rom(&rom, 0.0).map_or(f64::NAN, |model| model.largest_frequency());
+    let fastest = tiprub_core::dynamics::modal::ModalModel::from_rom(&rom, 0.0)
+        .map_or(f64::NAN, |model| model.largest_frequency());
     let mut scene = with_methods(round(rom), scheme, solver);
     scene.settings.structures[0].damping_ratio = Some(0.3);
     let limit = match scheme {
@@ -86,8 +88,12 @@ fn share_of_limit(share: f64, damping: f64) -> Happened {
     let mut scene = with_methods(round(rom), Scheme::MasslessBoundary, Solver::Lcp);
     scene.settings.structures[0].damping_ratio = Some(damping);
     let long = with_step(scene.clone(), 1e-2);
-    let refusal = Simulation::new(&long).and_then(|mut simulation| simulation.initialise(0.0)).err().map(|error| error.to_string());
-    let limit = refusal.as_deref().and_then(|text| text.split("stable below ").nth(1)?.split(' ').next()?.parse::<f64>().ok());
+    let refusal = Simulation::new(&long)
+        .and_then(|mut simulation| simulation.initialise(0.0))
+        .err()
+        .map(|error| error.to_string());
+    let limit =
+        refusal.as_deref().and_then(|text| text.split("stable below ").nth(1)?.split(' ').next()?.parse::<f64>().ok());
     let Some(limit) = limit else { return Happened::refused("no limit was named") };
     let press = Press {
         depth: 2e-5,
@@ -164,7 +170,8 @@ fn on_stage(solver: Solver, friction: f64, load: f64) -> Result<Vec<Check>> {
     scene.settings.contacts[0].solver = solver;
     scene.settings.surfaces[0].ramp_time = 1e-3;
     if load > 1e6 {
-        scene.settings.structures[1].load = scene.settings.structures[1].load.map(|old| tiprub_core::settings::LoadSettings { amplitude: load, ..old });
+        scene.settings.structures[1].load =
+            scene.settings.structures[1].load.map(|old| tiprub_core::settings::LoadSettings { amplitude: load, ..old });
     }
     // Much friction makes contact that grows by itself: small steps, before they part.
     let (step, count) = if friction > 0.5 { (2.5e-7, 60) } else { (2e-6, 120) };
@@ -174,7 +181,11 @@ fn on_stage(solver: Solver, friction: f64, load: f64) -> Result<Vec<Check>> {
 fn exchanged() -> Vec<Case> {
     let mut cases = Vec::new();
     for (name, swap) in [("exchanged", true), ("as-they-are", false)] {
-        let expected = if swap { Expected::refused(["harmonics", "nodal diameter"]) } else { Expected::right("it starts, and steps") };
+        let expected = if swap {
+            Expected::refused(["harmonics", "nodal diameter"])
+        } else {
+            Expected::right("it starts, and steps")
+        };
         let work = move |_: &_| Happened::of(harmonics(swap));
         cases.push(Case::new(format!("rom/harmonics-{name}"), expected, work).quick(true));
     }

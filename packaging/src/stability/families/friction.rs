@@ -91,7 +91,9 @@ fn speeds() -> Vec<Case> {
                 let expected = if speed > 1e5 {
                     Expected::either("static contact, friction −µλ", ["speed"])
                 } else {
-                    Expected::right("static normal forces, friction at most µλ, against the slip where tips slide; else a warning")
+                    Expected::right(
+                        "static normal forces, friction at most µλ, against the slip where tips slide; else a warning",
+                    )
                 };
                 let case = format!("speed/steady/{name}/{:e}", sense * speed);
                 cases.push(
@@ -100,9 +102,13 @@ fn speeds() -> Vec<Case> {
                 );
             }
         }
-        let zero = Expected::right("static normal forces, friction at most µλ; with film and lcp a warning of sticking");
-        cases.push(Case::new(format!("speed/steady/{name}/0"), zero, move |_| Happened::of(steady(solver, 0.0))).quick(true));
-        for (course, text) in [("reversal", "torque of either sense, −µΣλr"), ("jump", "torque unchanged, −µΣλr")] {
+        let zero =
+            Expected::right("static normal forces, friction at most µλ; with film and lcp a warning of sticking");
+        cases.push(
+            Case::new(format!("speed/steady/{name}/0"), zero, move |_| Happened::of(steady(solver, 0.0))).quick(true),
+        );
+        for (course, text) in [("reversal", "torque of either sense, −µΣλr"), ("jump", "torque unchanged, −µΣλr")]
+        {
             let work = move |_: &_| Happened::of(changing(solver, course));
             cases.push(Case::new(format!("speed/{course}/{name}"), Expected::right(text), work).quick(true));
         }
@@ -208,7 +214,13 @@ fn on_bumps(solver: Solver, course: &'static str) -> Result<Vec<Check>> {
                 "reversal" => 1300.0 * (1.0 - 2.0 * ((time - 5e-4) / 1e-3).clamp(0.0, 1.0)),
                 // Film and lcp know sliding only: they are compared while the tips slide.
                 "stop" if solver != Solver::Coulomb => (1300.0 * (1.0 - time / 1.5e-3)).max(130.0),
-                "jump" => if time < 1e-3 { 1300.0 } else { 13_000.0 },
+                "jump" => {
+                    if time < 1e-3 {
+                        1300.0
+                    } else {
+                        13_000.0
+                    }
+                }
                 "ramp" => 200.0 + 1e6 * time,
                 _ => 1300.0 * (1.0 - (time / 1.5e-3).min(1.0)),
             };

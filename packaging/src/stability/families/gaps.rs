@@ -43,7 +43,9 @@ fn clearances() -> Vec<Case> {
             let work = move |_: &_| pressed_from(solver, gap);
             cases.push(Case::new(format!("gap/{name}/{what}"), Expected::refused([words]), work).quick(true));
         }
-        for (what, offset) in [("all-just-closed", -GAP), ("all-inside", -1.0001 * GAP), ("all-deep-inside", -10.0 * GAP)] {
+        for (what, offset) in
+            [("all-just-closed", -GAP), ("all-inside", -1.0001 * GAP), ("all-deep-inside", -10.0 * GAP)]
+        {
             let expected = if what == "all-just-closed" {
                 Expected::right("no force, no motion")
             } else {
@@ -135,7 +137,9 @@ fn sectors() -> Vec<Case> {
                 let kind = if neighbour > 0.0 { "coupled" } else { "uncoupled" };
                 let expected = Expected::right("static contact, all sectors alike, no resultant");
                 let quick = count < 5 || (count == 200 && neighbour == 0.0 && solver == Solver::Lcp);
-                cases.push(Case::new(format!("sectors/{count}/{kind}/{name}"), expected, work).quick(quick).within(600.0));
+                cases.push(
+                    Case::new(format!("sectors/{count}/{kind}/{name}"), expected, work).quick(quick).within(600.0),
+                );
             }
         }
     }
@@ -170,7 +174,10 @@ fn missing(solver: Solver) -> Result<Vec<Check>> {
     let others = whole.iter().zip(&gone).enumerate().filter(|(index, _)| index % 12 != 5);
     Ok(vec![
         Check::so("no force on the missing blade", gone.iter().skip(5).step_by(12).all(|force| *force == 0.0)),
-        Check::so("the other blades as without, bit by bit", others.clone().all(|(_, (a, b))| a.to_bits() == b.to_bits())),
+        Check::so(
+            "the other blades as without, bit by bit",
+            others.clone().all(|(_, (a, b))| a.to_bits() == b.to_bits()),
+        ),
         Check::so("they touch", others.into_iter().any(|(_, (a, _))| *a > 0.0)),
     ])
 }
@@ -274,7 +281,11 @@ fn scaled(exponent: i32, solver: Solver, friction: f64) -> Result<Vec<Check>> {
         Check::so("they touch", largest > 0.0),
         Check::at_most("scaled λ differ by", off, bound),
         Check::so("no adhesion, all finite", negative == 0.0 && small.iter().all(|force| force.is_finite())),
-        Check::at_most("largest λ beyond the scaled one", small.iter().fold(0.0, |a: f64, b| a.max(*b)) / largest / scale.max(1e-290), most),
+        Check::at_most(
+            "largest λ beyond the scaled one",
+            small.iter().fold(0.0, |a: f64, b| a.max(*b)) / largest / scale.max(1e-290),
+            most,
+        ),
         Check::at_most("time per step against normal numbers", time / calm.max(LEAST_TIME), 8.0),
     ])
 }
@@ -314,5 +325,8 @@ fn small_rub(exponent: i32, solver: Solver, friction: f64) -> Result<(Vec<f64>, 
 /// Processor time of this process's only working thread (s), as the system counts it; 0 where it does not tell.
 pub fn processor_time() -> f64 {
     let told = std::fs::read_to_string("/proc/self/schedstat").unwrap_or_default();
-    told.split_whitespace().next().and_then(|text| text.parse::<f64>().ok()).map_or(0.0, |nanoseconds| 1e-9 * nanoseconds)
+    told.split_whitespace()
+        .next()
+        .and_then(|text| text.parse::<f64>().ok())
+        .map_or(0.0, |nanoseconds| 1e-9 * nanoseconds)
 }

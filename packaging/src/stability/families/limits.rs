@@ -39,12 +39,16 @@ fn step_limit() -> Vec<Case> {
                     let against = "static contact, signs of the ledger";
                     let expected = match scheme {
                         Scheme::CentralDifference if factor > 1.0 => Expected::refused(["central-difference", "ω_max"]),
-                        Scheme::MasslessBoundary if factor > 1.0 => Expected::refused(["massless-boundary", "internal step"]),
+                        Scheme::MasslessBoundary if factor > 1.0 => {
+                            Expected::refused(["massless-boundary", "internal step"])
+                        }
                         _ if friction > 0.0 && model == "blade" => Expected::either(against, ["grows"]),
                         _ => Expected::right(against),
                     };
                     let quick = model == "tower" && friction > 0.0 && solver != Solver::Film;
-                    cases.push(Case::new(name, expected, move |_| at(scheme, solver, friction, model, factor)).quick(quick));
+                    cases.push(
+                        Case::new(name, expected, move |_| at(scheme, solver, friction, model, factor)).quick(quick),
+                    );
                 }
             }
         }
@@ -55,11 +59,7 @@ fn step_limit() -> Vec<Case> {
 fn at(scheme: Scheme, solver: Solver, friction: f64, model: &str, factor: f64) -> Happened {
     let tower = Tower::default();
     let rom = if model == "tower" { tower.rom() } else { blade(12) };
-    let fastest = if model == "tower" {
-        tower.largest_frequency()
-    } else {
-        rom.stiffness.diagonal().max().sqrt()
-    };
+    let fastest = if model == "tower" { tower.largest_frequency() } else { rom.stiffness.diagonal().max().sqrt() };
     let mut scene = with_methods(round(rom), scheme, solver);
     scene.settings.contacts[0].friction = friction;
     // Free of friction, so that what is refused is the step.

@@ -44,7 +44,9 @@ fn loads() -> Vec<Case> {
                 };
                 let work = move |_: &_| Happened::of(nodal(order, sign * amplitude));
                 let quick = order == 2 && sign > 0.0;
-                cases.push(Case::new(format!("loads/nodal/{order}/{:e}", sign * amplitude), expected, work).quick(quick));
+                cases.push(
+                    Case::new(format!("loads/nodal/{order}/{:e}", sign * amplitude), expected, work).quick(quick),
+                );
             }
         }
     }
@@ -73,7 +75,9 @@ fn loads() -> Vec<Case> {
 
 /// Radial amplitude of the ring's first ring of nodes.
 fn amplitude(simulation: &Simulation, order: u32) -> (f64, f64) {
-    let Some(row) = simulation.table().find("casing_displacement").map(|row| row.reference) else { return (f64::NAN, f64::NAN) };
+    let Some(row) = simulation.table().find("casing_displacement").map(|row| row.reference) else {
+        return (f64::NAN, f64::NAN);
+    };
     let values: Vec<f64> = (0..36).map(|i| simulation.real(row + i).unwrap_or(f64::NAN)).collect();
     let angle = |i: usize| f64::from(order) * TAU * i as f64 / 36.0;
     let size = values.iter().enumerate().map(|(i, u)| u * angle(i).cos()).sum::<f64>() / 18.0;
@@ -111,10 +115,14 @@ fn heated(temperature: f64) -> Result<Vec<Check>> {
     }
     let ring = ring();
     let Some(loads) = ring.extras.thermal.as_ref().map(|thermal| &thermal.loads) else { return Ok(Vec::new()) };
-    let Some(row) = simulation.table().find("casing_displacement").map(|row| row.reference) else { return Ok(Vec::new()) };
+    let Some(row) = simulation.table().find("casing_displacement").map(|row| row.reference) else {
+        return Ok(Vec::new());
+    };
     let exact = |node: usize| -> f64 {
         (0..ring.order())
-            .map(|mode| ring.contact_map[(3 * node, mode)] * loads[(mode, 0)] * temperature / ring.stiffness[(mode, mode)])
+            .map(|mode| {
+                ring.contact_map[(3 * node, mode)] * loads[(mode, 0)] * temperature / ring.stiffness[(mode, mode)]
+            })
             .sum()
     };
     let (mut off, mut size) = (0.0_f64, 0.0_f64);
@@ -148,7 +156,12 @@ fn sudden(mut scene: Scene, what: &str) -> Result<Vec<Check>> {
     checks.push(Check::relative("energy is the work of the load", energy, real(&simulation, "load_work"), 1e-9));
     checks.push(Check::so("the load did work", work > 0.0));
     if what == "load" {
-        checks.push(Check::relative("twice the static amplitude", most, 0.5 * 1e5 * PI * RADIUS / (omega * omega), 1e-3));
+        checks.push(Check::relative(
+            "twice the static amplitude",
+            most,
+            0.5 * 1e5 * PI * RADIUS / (omega * omega),
+            1e-3,
+        ));
     }
     Ok(checks)
 }
@@ -266,7 +279,9 @@ fn shapes() -> Vec<Case> {
                 let shape = Shape::TwoLobe { depth, width, phase: 0.0 };
                 let work = move |_: &_| Happened::of(shaped(solver, shape.clone()));
                 let quick = solver == Solver::Lcp && (depth - 0.6).abs() < 0.2;
-                cases.push(Case::new(format!("shapes/two-lobe/w={width}/d={depth}/{name}"), expected, work).quick(quick));
+                cases.push(
+                    Case::new(format!("shapes/two-lobe/w={width}/d={depth}/{name}"), expected, work).quick(quick),
+                );
             }
         }
         for order in [1, 2, 7, 36, 72, 300, 10_000] {
@@ -289,7 +304,8 @@ fn shapes() -> Vec<Case> {
 /// A rub on a shape against itself with finer steps, over the first contacts.
 fn shaped(solver: Solver, shape: Shape) -> Result<Vec<Check>> {
     let run = |step: f64| -> Result<(Vec<f64>, Watch)> {
-        let mut scene = with_step(with_methods(bumps(blade(6)), tiprub_core::settings::Scheme::ModalExact, solver), step);
+        let mut scene =
+            with_step(with_methods(bumps(blade(6)), tiprub_core::settings::Scheme::ModalExact, solver), step);
         scene.settings.surfaces[0].shape = shape.clone();
         scene.settings.surfaces[0].ramp_time = 5e-4;
         scene.settings.structures[0].damping_ratio = Some(0.05);
@@ -314,7 +330,11 @@ fn shaped(solver: Solver, shape: Shape) -> Result<Vec<Check>> {
     let (fine, finer) = run(0.25 * step)?;
     let mut checks = vec![
         Check::at_most("displacements from a fourth of the step", apart(&coarse, &fine), 0.1),
-        Check::at_most("impulse from a fourth of the step", (watch.impulse - finer.impulse).abs() / finer.impulse.max(1e-12), 0.1),
+        Check::at_most(
+            "impulse from a fourth of the step",
+            (watch.impulse - finer.impulse).abs() / finer.impulse.max(1e-12),
+            0.1,
+        ),
         watch.ledger(),
         finer.ledger(),
     ];

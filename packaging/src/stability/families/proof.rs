@@ -18,8 +18,10 @@ pub fn cases() -> Vec<Case> {
         Case::new("judge/abort", right(), |_| std::process::abort()),
         Case::new("judge/overflow", right(), |_| Happened::answer(vec![Check::at_most("depth", descend(1), 0.0)])),
         Case::new("judge/exit", right(), |_| std::process::exit(0)),
-        Case::new("judge/hang", right(), |_| loop {
-            std::thread::sleep(Duration::from_secs(1));
+        Case::new("judge/hang", right(), |_| {
+            loop {
+                std::thread::sleep(Duration::from_secs(1));
+            }
         })
         .within(1.0),
     ]

@@ -19,7 +19,9 @@ pub fn cases() -> Vec<Case> {
     let case = |index: u64| {
         let against = "signs of the ledger, complementarity, the same with a fourth of the step";
         let expected = Expected::either(against, ["refused"]);
-        Case::new(format!("random/{index:03}"), expected, move |_| happened(index)).quick(index < COUNT[0]).within(300.0)
+        Case::new(format!("random/{index:03}"), expected, move |_| happened(index))
+            .quick(index < COUNT[0])
+            .within(300.0)
     };
     (0..COUNT[1]).map(case).collect()
 }
@@ -60,7 +62,8 @@ fn scene(index: u64) -> (Scene, f64, f64) {
         on_ring(&mut scene, random.scale(1e-3, 0.3));
     }
     let step = random.scale(2e-7, 2e-6);
-    let swing = scene.settings.contacts[0].gap * random.within(1.05, 1.6).min(1.0 + 1e-4 / scene.settings.contacts[0].gap);
+    let swing =
+        scene.settings.contacts[0].gap * random.within(1.05, 1.6).min(1.0 + 1e-4 / scene.settings.contacts[0].gap);
     (with_step(scene, step), swing, random.scale(2000.0, 20_000.0))
 }
 
@@ -89,7 +92,11 @@ fn checked(index: u64) -> Result<Vec<Check>> {
     let mut checks = vec![
         Check::so("the blades touched", watch.contacts > 0 && finer.contacts > 0),
         // Coarse steps may be coarse; they must come nearer as they get finer.
-        Check::at_most("displacements with h/4 from those with h/16, and against h", better.min(better / error.max(1e-9) * 0.1), if massless { 0.1 } else { 0.05 }),
+        Check::at_most(
+            "displacements with h/4 from those with h/16, and against h",
+            better.min(better / error.max(1e-9) * 0.1),
+            if massless { 0.1 } else { 0.05 },
+        ),
         watch.ledger(),
         finer.ledger(),
         Check::so("all outputs finite", watch.finite),

@@ -44,7 +44,12 @@ fn communication() -> Vec<Case> {
         let expected = Expected::right("energy of free blades without damping, and their phase against ω t");
         cases.push(Case::new(format!("communication/H=1e6h/{scheme_name}"), expected, huge).quick(false));
         let refused = Expected::refused(["communicationStepSize", "internal steps"]);
-        cases.push(Case::new(format!("communication/H=1e10h/{scheme_name}"), refused, move |_| Happened::of(beyond(scheme, 1e4))).quick(true));
+        cases.push(
+            Case::new(format!("communication/H=1e10h/{scheme_name}"), refused, move |_| {
+                Happened::of(beyond(scheme, 1e4))
+            })
+            .quick(true),
+        );
         for (what, length, word) in [
             ("0", 0.0, "communicationStepSize"),
             ("-1e-6", -1e-6, "communicationStepSize"),
@@ -54,7 +59,9 @@ fn communication() -> Vec<Case> {
             ("1e308", 1e308, "communicationStepSize"),
         ] {
             let case = move |_: &_| Happened::of(beyond(scheme, length));
-            cases.push(Case::new(format!("communication/H={what}/{scheme_name}"), Expected::refused([word]), case).quick(true));
+            cases.push(
+                Case::new(format!("communication/H={what}/{scheme_name}"), Expected::refused([word]), case).quick(true),
+            );
         }
     }
     cases
@@ -147,7 +154,11 @@ fn short(scheme: Scheme, solver: Solver, length: f64) -> Result<Vec<Check>> {
         second.step(&mut other, 10.0 * length)?;
     }
     Ok(vec![
-        Check::at_most("displacements from ten times as long steps", apart(&displacements(&simulation), &displacements(&other)), 1e-3),
+        Check::at_most(
+            "displacements from ten times as long steps",
+            apart(&displacements(&simulation), &displacements(&other)),
+            1e-3,
+        ),
         Check::so("the blades touched", watch.contacts > 0),
         watch.ledger(),
     ])
@@ -206,7 +217,11 @@ fn huge(scheme: Scheme) -> Result<Vec<Check>> {
     Ok(vec![
         Check::so("there is energy", before > 0.0),
         Check::at_most("energy drift over 1e6 steps", (energy(&simulation) / before - 1.0).abs(), 1e-11),
-        Check::at_most("displacements from 1000 steps as long in all", apart(&displacements(&simulation), &displacements(&twin)), 1e-5),
+        Check::at_most(
+            "displacements from 1000 steps as long in all",
+            apart(&displacements(&simulation), &displacements(&twin)),
+            1e-5,
+        ),
     ])
 }
 
@@ -267,7 +282,11 @@ fn chatter(scheme: Scheme) -> Result<Vec<Check>> {
                 energy(&simulation) / supplied - 1.0,
                 if scheme == Scheme::MasslessBoundary { MASSLESS_RETURN } else { 1e-9 },
             ),
-            Check::at_most("impact loss falls by", watch.impact_drop(), if scheme == Scheme::MasslessBoundary { MASSLESS_RETURN } else { 1e-9 }),
+            Check::at_most(
+                "impact loss falls by",
+                watch.impact_drop(),
+                if scheme == Scheme::MasslessBoundary { MASSLESS_RETURN } else { 1e-9 },
+            ),
         ],
     ]
     .concat())
@@ -281,7 +300,9 @@ fn jumps() -> Vec<Case> {
                 let expected = Expected::right("impulse = W⁻¹ jump, energy of the casing = impact loss + energy left");
                 let work = move |_: &_| Happened::of(jumped(scheme, solver, jump));
                 let quick = solver == Solver::Lcp;
-                cases.push(Case::new(format!("jump/gap-offset/{jump:e}/{scheme_name}/{name}"), expected, work).quick(quick));
+                cases.push(
+                    Case::new(format!("jump/gap-offset/{jump:e}/{scheme_name}/{name}"), expected, work).quick(quick),
+                );
             }
         }
     }
@@ -316,7 +337,11 @@ fn jumped(scheme: Scheme, solver: Solver, jump: f64) -> Result<Vec<Check>> {
     let supplied = real(&simulation, "external_work");
     checks.extend(watch.books_of(scheme));
     if jump > 0.0 {
-        checks.push(Check::at_most("energy beyond the work of the casing", energy(&simulation) / supplied - 1.0, if scheme == Scheme::MasslessBoundary { MASSLESS_RETURN } else { 1e-9 }));
+        checks.push(Check::at_most(
+            "energy beyond the work of the casing",
+            energy(&simulation) / supplied - 1.0,
+            if scheme == Scheme::MasslessBoundary { MASSLESS_RETURN } else { 1e-9 },
+        ));
     } else {
         checks.push(Check::so("nothing moves", energy(&simulation) == 0.0 && supplied == 0.0));
     }

@@ -68,7 +68,8 @@ pub fn cases() -> Vec<Case> {
     for name in SCENES {
         // The table of a scene is cheap to make, and the only list of what can be set.
         let Ok(simulation) = Simulation::new(&scene(name)) else { continue };
-        for variable in simulation.table().variables().iter().filter(|row| row.is_settable() && row.kind == Kind::Real) {
+        for variable in simulation.table().variables().iter().filter(|row| row.is_settable() && row.kind == Kind::Real)
+        {
             for (text, value) in VALUES {
                 cases.extend(of_variable(name, variable, text, value));
             }
@@ -87,9 +88,14 @@ fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64)
         _ => "casing",
     };
     let expected = || {
-        let finite = value.is_finite() && variable.min.is_none_or(|min| value >= min) && variable.max.is_none_or(|max| value <= max);
+        let finite = value.is_finite()
+            && variable.min.is_none_or(|min| value >= min)
+            && variable.max.is_none_or(|max| value <= max);
         if !finite {
             Expected::Refused(vec![variable.name.clone()])
+        } else if variable.name == "casing_ramp_time" && value.abs() <= 1.0 {
+            // Without a ramp some blades start inside the bumps.
+            Expected::either(against, ["initial clearance"])
         } else if value.abs() > 1.0 {
             Expected::either(against, [word])
         } else {
@@ -98,7 +104,10 @@ fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64)
     };
     let mut cases = Vec::new();
     for (when, during) in [("start", false), ("run", true)] {
-        if during && variable.causality == Causality::Parameter && variable.variability == tiprub_core::variables::Variability::Fixed {
+        if during
+            && variable.causality == Causality::Parameter
+            && variable.variability == tiprub_core::variables::Variability::Fixed
+        {
             continue;
         }
         let owned = name.clone();
@@ -170,7 +179,11 @@ fn by_setter(name: &str, variable: &str, value: f64, during: bool) -> Happened {
                 twin.initialise(0.0)?;
             }
             go_on(&mut twin)?;
-            checks.push(Check::at_most(format!("outputs differ from those with {plain:.6}"), differ(&simulation, &twin), 1e-6));
+            checks.push(Check::at_most(
+                format!("outputs differ from those with {plain:.6}"),
+                differ(&simulation, &twin),
+                1e-6,
+            ));
         }
         Ok(Happened::answer(checks))
     })();
@@ -221,7 +234,14 @@ fn differ(first: &Simulation, second: &Simulation) -> f64 {
 }
 
 /// After a refusal the instance must go on as if nothing had been asked; where a step had begun, after a reset.
-fn refused(error: &Error, mut simulation: Simulation, mut twin: Simulation, row: u32, before: f64, during: bool) -> Happened {
+fn refused(
+    error: &Error,
+    mut simulation: Simulation,
+    mut twin: Simulation,
+    row: u32,
+    before: f64,
+    during: bool,
+) -> Happened {
     let mut checks = Vec::new();
     let outcome = (|| -> Result<bool> {
         if during && simulation.set_real(row, before).is_ok() && go_on(&mut simulation).is_ok() {
@@ -271,17 +291,22 @@ fn by_import(context: &Context, scene: &str, version: u8, variable: &str, value:
             (0..5).try_for_each(|index| session.do_step(f64::from(index) * LENGTH, LENGTH))
         });
         if let Err(refusal) = stepped {
-            return Ok(Happened { checks: vec![Check::so("told through a status", true)], ..Happened::refused(refusal) });
+            return Ok(Happened {
+                checks: vec![Check::so("told through a status", true)],
+                ..Happened::refused(refusal)
+            });
         }
         let values = session.outputs()?;
         let mut checks = vec![Check::so("all outputs finite", values.iter().all(|value| value.is_finite()))];
         // The same without FMI, bit by bit.
-        let mut native = Simulation::new(&self::scene(scene)).map_err(|error| crate::Failure::from_core("scene", error))?;
+        let mut native =
+            Simulation::new(&self::scene(scene)).map_err(|error| crate::Failure::from_core("scene", error))?;
         let run = native.table().find(variable).map_or(0, |row| row.reference);
         let ran = native.set_real(run, value).and_then(|()| native.initialise(0.0)).and_then(|()| go_on(&mut native));
         checks.push(Check::so("runs without FMI as well", ran.is_ok()));
         let expected = crate::native::numeric_outputs(&native);
-        let same = expected.len() == values.len() && expected.iter().zip(&values).all(|(a, b)| a.to_bits() == b.to_bits());
+        let same =
+            expected.len() == values.len() && expected.iter().zip(&values).all(|(a, b)| a.to_bits() == b.to_bits());
         checks.push(Check::so("the bits of the run without FMI", same));
         Ok(Happened::answer(checks))
     })();
@@ -302,7 +327,9 @@ fn settings() -> Vec<Case> {
         ("friction", "friction", |scene, value| scene.settings.contacts[0].friction = value),
         ("ramp_time", "ramp_time", |scene, value| scene.settings.surfaces[0].ramp_time = value),
         ("time.step", "time.step", |scene, value| scene.settings.time.step = value),
-        ("communication_step", "communication_step", |scene, value| scene.settings.experiment.communication_step = value),
+        ("communication_step", "communication_step", |scene, value| {
+            scene.settings.experiment.communication_step = value
+        }),
         ("shape.depth", "shape", |scene, value| {
             scene.settings.surfaces[0].shape =
                 tiprub_core::settings::Shape::TwoLobe { depth: value, width: 0.15, phase: 0.0 };

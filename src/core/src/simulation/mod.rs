@@ -243,7 +243,11 @@ impl Simulation {
     fn warn_of_sticking(&mut self, parameters: limits::Parameters) {
         let speed = &self.inputs.speed;
         let slow = self.compiled.slow_sliding();
-        if parameters.solver == Solver::Coulomb || parameters.friction == 0.0 || speed.slope != 0.0 || speed.value.abs() >= slow {
+        if parameters.solver == Solver::Coulomb
+            || parameters.friction == 0.0
+            || speed.slope != 0.0
+            || speed.value.abs() >= slow
+        {
             return;
         }
         self.warnings.push(format!(
