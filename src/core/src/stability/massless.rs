@@ -22,12 +22,13 @@ const MARGIN: f64 = 1e-6;
 /// casing for 0.1 s with 1e-3 of damping gain no energy at 0.8 of the limit, hundreds of times their energy at 0.85.
 const USABLE: f64 = 0.8;
 /// The same where closed contact is much stiffer than the modes with inertia, whose damping then has too little hold on what
-/// bounces: nodes a thousand times as stiff as their base gain thousands of times their energy at 0.8 of the limit and 3 % at
-/// 0.3, and still settle there with a damping ratio of 0.02.
+/// bounces: nodes a hundred times as stiff as their base settle there with a damping ratio of 0.02, and not from 0.5 on.
 const USABLE_STIFF: f64 = 0.25;
 /// Ratio of the squares of the highest frequency with closed contact and without from which contact counts as stiff: at 10
-/// a damping ratio of 0.02 brings the same nodes to rest up to 0.8 of the limit, at 100 it does not from 0.5 on.
+/// a damping ratio of 0.02 brings the same nodes to rest up to 0.8 of the limit.
 const STIFF: f64 = 10.0;
+/// From here on nothing helps: at 1000 the same nodes keep bouncing at 0.2 of the limit, with forces that mean nothing.
+const TOO_STIFF: f64 = 300.0;
 /// Share of the limit up to which the same blades gain none without damping either: at 0.5 it is a fifth of theirs.
 pub const QUIET: f64 = 0.4;
 
@@ -105,7 +106,18 @@ impl MasslessCheck<'_> {
         if closed.is_infinite() {
             return Ok(MasslessLimit::NONE);
         }
-        let share = if self.stiffening(1e-3 * closed) > STIFF { USABLE_STIFF } else { USABLE };
+        let stiffening = self.stiffening(1e-3 * closed);
+        if stiffening > TOO_STIFF {
+            return Err(Error::invalid(
+                "scheme massless-boundary",
+                format!(
+                    "closed contact raises the square of the highest frequency of the modes with inertia by a factor of \
+                     {stiffening:.3e}, so that nodes that bounce gain energy at any internal step near its limit {closed:.3e} s"
+                ),
+                "Use modal-exact, or a ROM with more modes or softer contact nodes",
+            ));
+        }
+        let share = if stiffening > STIFF { USABLE_STIFF } else { USABLE };
         Ok(MasslessLimit { closed, usable: share * closed })
     }
 
