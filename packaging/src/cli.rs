@@ -83,6 +83,14 @@ pub enum Command {
                             tiprub study map scene.toml --speeds 1200:1500:61\n  tiprub study error --scene carpenter\n\n\
                             DIR then holds index.html (opens offline), an SVG and a CSV per figure, and results.json.")]
     Study(StudyArguments),
+    /// Stiff and extreme cases: each must end in a right answer or in a refusal that says why.
+    #[command(
+        after_help = "Examples:\n  tiprub stability --quick\n  tiprub stability --case friction/ --out friction\n  \
+                            tiprub stability --out stability --chapter docs/stability.md\n\n\
+                            Every case runs in a process of its own with a time limit. DIR then holds index.html, \
+                            stability.csv, stability.md and results.json."
+    )]
+    Stability(StabilityArguments),
 }
 
 /// Arguments of `tiprub demo`.
@@ -275,6 +283,32 @@ impl ErrorScene {
     /// All of them.
     pub const ALL: [Self; 5] =
         [Self::Carpenter, Self::BouncingBar, Self::Rotor37Light, Self::Rotor37Heavy, Self::Stage];
+}
+
+/// Arguments of `tiprub stability`.
+#[derive(Debug, Args)]
+pub struct StabilityArguments {
+    /// Directory for the table; made if missing.
+    #[arg(long, value_name = "DIR", default_value = "stability")]
+    pub out: PathBuf,
+    /// Fewer and shorter cases: a minute.
+    #[arg(long)]
+    pub quick: bool,
+    /// Only cases whose name begins so.
+    #[arg(long, value_name = "NAME")]
+    pub case: Option<String>,
+    /// Cases at the same time [default: one per processor].
+    #[arg(long, value_name = "N")]
+    pub threads: Option<std::num::NonZero<usize>>,
+    /// Also write the table into this chapter of the guide, below what stands there.
+    #[arg(long, value_name = "FILE")]
+    pub chapter: Option<PathBuf>,
+    /// FMU library for the cases that import FMUs, instead of the one found or built.
+    #[arg(long, value_name = "FILE")]
+    pub library: Option<PathBuf>,
+    /// Run one case in this process and print what happened.
+    #[arg(long, value_name = "NAME", hide = true)]
+    pub child: Option<String>,
 }
 
 /// Studies by name.

@@ -12,6 +12,7 @@
 //! - [`importer`]: a packaged FMU driven through its C ABI the way any importer would;
 //! - [`casing_arguments`], [`file_arguments`]: what can be asked for of a casing, of a model of one's own;
 //! - [`users_model`], [`mod@reduced`]: such a model read, judged, reduced; what is written and told of any reduced model;
+//! - [`stability`]: stiff and extreme cases, each in a child process, judged;
 //! - [`report`]: the HTML report with its pictures and plots.
 
 pub mod archive;
@@ -38,6 +39,7 @@ pub mod rom_facts;
 pub mod scene_features;
 pub mod scene_source;
 pub mod schedule;
+pub mod stability;
 pub mod study;
 pub mod users_model;
 

@@ -63,6 +63,14 @@ pub fn run(
     Ok(NativeRun { recording, stepping, internal_steps, warnings })
 }
 
+/// All numeric outputs as they are now, in the order of the table.
+pub fn numeric_outputs(simulation: &Simulation) -> Vec<f64> {
+    let mut values = Vec::new();
+    // Every reference comes from the table that it is read from.
+    let _ = Outputs::of(simulation.table()).read(simulation, &mut values);
+    values
+}
+
 /// The numeric outputs of a table, element by element.
 struct Outputs {
     names: Vec<String>,

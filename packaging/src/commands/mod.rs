@@ -5,6 +5,7 @@ pub mod inspect;
 pub mod package;
 pub mod reduce;
 pub mod run;
+pub mod stability;
 pub mod study;
 
 use crate::{
@@ -24,6 +25,7 @@ pub fn run(command: &Command, console: &Console) -> Result<Outcome> {
         Command::Package(arguments) => package::run(arguments, console),
         Command::Run(arguments) => run::run(arguments, console),
         Command::Inspect(arguments) => inspect::run(arguments, console),
+        Command::Stability(arguments) => stability::run(arguments, console),
         Command::Study(arguments) => study::run(arguments, console),
     }
 }

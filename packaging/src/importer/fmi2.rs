@@ -35,6 +35,7 @@ type SetupExperiment = unsafe extern "C" fn(Component, i32, f64, f64, i32, f64) 
 type PhaseChange = unsafe extern "C" fn(Component) -> Status;
 type DoStep = unsafe extern "C" fn(Component, f64, f64, i32) -> Status;
 type GetReal = unsafe extern "C" fn(Component, *const Reference, usize, *mut f64) -> Status;
+type SetReal = unsafe extern "C" fn(Component, *const Reference, usize, *const f64) -> Status;
 type GetInteger = unsafe extern "C" fn(Component, *const Reference, usize, *mut i32) -> Status;
 type FreeInstance = unsafe extern "C" fn(Component);
 
@@ -97,6 +98,7 @@ struct Functions {
     exit_initialization: PhaseChange,
     do_step: DoStep,
     get_real: GetReal,
+    set_real: SetReal,
     get_integer: GetInteger,
     get_boolean: GetInteger,
     terminate: PhaseChange,
@@ -114,6 +116,7 @@ impl Functions {
                 exit_initialization: symbol(library, "fmi2ExitInitializationMode")?,
                 do_step: symbol(library, "fmi2DoStep")?,
                 get_real: symbol(library, "fmi2GetReal")?,
+                set_real: symbol(library, "fmi2SetReal")?,
                 get_integer: symbol(library, "fmi2GetInteger")?,
                 get_boolean: symbol(library, "fmi2GetBoolean")?,
                 terminate: symbol(library, "fmi2Terminate")?,
@@ -210,6 +213,12 @@ impl Slave for Fmi2Slave {
                 Ok(())
             }
         }
+    }
+
+    fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
+        // SAFETY: one reference and one value behind the pointers.
+        let status = unsafe { (self.functions.set_real)(self.component, &raw const reference, 1, &raw const value) };
+        check("fmi2SetReal", None, status, &self.messages)
     }
 
     fn terminate(&mut self) -> Result<()> {

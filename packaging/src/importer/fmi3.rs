@@ -35,6 +35,7 @@ type EnterInitialization = unsafe extern "C" fn(Instance, bool, f64, f64, bool, 
 type PhaseChange = unsafe extern "C" fn(Instance) -> Status;
 type DoStep = unsafe extern "C" fn(Instance, f64, f64, bool, *mut bool, *mut bool, *mut bool, *mut f64) -> Status;
 type Get<T> = unsafe extern "C" fn(Instance, *const Reference, usize, *mut T, usize) -> Status;
+type SetFloat64 = unsafe extern "C" fn(Instance, *const Reference, usize, *const f64, usize) -> Status;
 type FreeInstance = unsafe extern "C" fn(Instance);
 
 /// The logger: the environment is the message list of the slave.
@@ -58,6 +59,7 @@ struct Functions {
     exit_initialization: PhaseChange,
     do_step: DoStep,
     get_float64: Get<f64>,
+    set_float64: SetFloat64,
     get_int32: Get<i32>,
     get_int64: Get<i64>,
     get_boolean: Get<u8>,
@@ -75,6 +77,7 @@ impl Functions {
                 exit_initialization: symbol(library, "fmi3ExitInitializationMode")?,
                 do_step: symbol(library, "fmi3DoStep")?,
                 get_float64: symbol(library, "fmi3GetFloat64")?,
+                set_float64: symbol(library, "fmi3SetFloat64")?,
                 get_int32: symbol(library, "fmi3GetInt32")?,
                 get_int64: symbol(library, "fmi3GetInt64")?,
                 get_boolean: symbol(library, "fmi3GetBoolean")?,
@@ -204,6 +207,13 @@ impl Slave for Fmi3Slave {
             VariableType::Text => {}
         }
         Ok(())
+    }
+
+    fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
+        // SAFETY: one reference and one value behind the pointers.
+        let status =
+            unsafe { (self.functions.set_float64)(self.instance, &raw const reference, 1, &raw const value, 1) };
+        check("fmi3SetFloat64", None, status, &self.messages)
     }
 
     fn terminate(&mut self) -> Result<()> {

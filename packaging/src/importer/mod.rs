@@ -4,6 +4,7 @@
 mod description;
 mod fmi2;
 mod fmi3;
+mod session;
 mod slave;
 
 use std::{
@@ -17,6 +18,7 @@ use tempfile::TempDir;
 use zip::ZipArchive;
 
 pub use description::{ImportedDescription, ImportedVariable, VariableType, parse};
+pub use session::Session;
 
 use crate::{Failure, Result, recording::Recording, schedule::Schedule};
 

@@ -30,6 +30,8 @@ pub(super) trait Slave {
     fn do_step(&mut self, time: f64, step: f64) -> Result<()>;
     /// Append the values of a group.
     fn read(&mut self, group: &OutputGroup, values: &mut Vec<f64>) -> Result<()>;
+    /// Set one real value.
+    fn set_real(&mut self, reference: u32, value: f64) -> Result<()>;
     /// End of the run.
     fn terminate(&mut self) -> Result<()>;
     /// Everything the FMU logged.
@@ -65,7 +67,7 @@ pub(super) fn drive(
     Ok(ImportedRun { recording, stepping, messages: slave.messages() })
 }
 
-fn group_outputs(description: &ImportedDescription) -> Vec<OutputGroup> {
+pub(super) fn group_outputs(description: &ImportedDescription) -> Vec<OutputGroup> {
     let mut groups: Vec<OutputGroup> = Vec::new();
     for output in description.numeric_outputs() {
         if groups.last().is_none_or(|group| group.kind != output.kind) {

@@ -303,7 +303,7 @@ pub struct SurfaceSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CoatingSettings {
-    /// Thickness h₀ (m), > 0.
+    /// Thickness h₀ (m), 1e-9 to 0.1.
     pub thickness: f64,
     /// Modulus E (Pa), > 0.
     pub modulus: f64,

@@ -26,7 +26,7 @@ pub struct CoreRod {
     gap: f64,
     whole: bool,
     /// Largest step that closed contact allows massless-boundary (s).
-    massless_limit: f64,
+    massless_limit: massless::MasslessLimit,
 }
 
 impl CoreRod {
@@ -59,7 +59,7 @@ impl CoreRod {
             load: model.modal_load(rod.load.as_slice()),
             start: [amplitudes(&rod.displacement), amplitudes(&rod.velocity)],
             gap: rod.gap,
-            massless_limit: check.limit(1.0).unwrap_or(f64::INFINITY),
+            massless_limit: check.limit(1.0).unwrap_or(massless::MasslessLimit::NONE),
             model,
             whole,
         })
@@ -78,7 +78,7 @@ impl CoreRod {
     ) -> Result<RodRun<'_>, String> {
         let step = interval / f64::from(division);
         stability::check_step(self.model.largest_frequency(), scheme, step).map_err(|error| error.to_string())?;
-        if scheme == Scheme::MasslessBoundary && step >= massless::USABLE * self.massless_limit {
+        if scheme == Scheme::MasslessBoundary && step >= self.massless_limit.usable {
             return Err(massless::refusal(step, self.massless_limit).to_string());
         }
         let gap = self.gap * (1.0 + perturbation);

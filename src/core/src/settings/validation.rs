@@ -300,7 +300,7 @@ impl ContactSettings {
 impl CoatingSettings {
     fn validate(&self, at: &str) -> Result<()> {
         positive(&format!("{at}.thickness"), self.thickness, "m")?;
-        within(&format!("{at}.thickness"), self.thickness, 0.0, MAX_THICKNESS)?;
+        within(&format!("{at}.thickness"), self.thickness, MIN_THICKNESS, MAX_THICKNESS)?;
         positive(&format!("{at}.modulus"), self.modulus, "Pa")?;
         within(&format!("{at}.modulus"), self.modulus, 0.0, MAX_STRESS)?;
         within(&format!("{at}.yield_stress"), self.yield_stress, 0.0, MAX_STRESS)?;
@@ -327,6 +327,8 @@ const SPLINE_AROUND: [usize; 2] = [4, 2000];
 const SPLINE_ALONG: [usize; 2] = [2, 200];
 /// Each patch is an output.
 const MAX_PATCHES: usize = 10_000;
+/// Thinnest coating (m): a few atoms. What it does to blades that move by micrometres is lost in rounding.
+const MIN_THICKNESS: f64 = 1e-9;
 /// Thickest coating (m); real ones have millimetres.
 const MAX_THICKNESS: f64 = 0.1;
 /// Largest modulus, yield stress and hardening of a coating (Pa), beyond any solid.

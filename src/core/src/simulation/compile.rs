@@ -189,6 +189,17 @@ impl Compiled {
         self.wheel.as_ref().map_or_else(|| self.model.largest_frequency(), CyclicModel::largest_frequency)
     }
 
+    /// Speed (rad/s) below which tips that vibrate by their clearance in the lowest mode move faster than they slide.
+    pub fn slow_sliding(&self) -> f64 {
+        let frequencies = match &self.wheel {
+            Some(wheel) => wheel.diameters.iter().flat_map(|diameter| &diameter.frequencies).collect(),
+            None => self.model.frequencies.iter().collect::<Vec<_>>(),
+        };
+        let lowest = frequencies.into_iter().copied().filter(|value| *value > 0.0).fold(f64::INFINITY, f64::min);
+        let radius = self.master().1.contact_nodes.iter().fold(0.0, |most: f64, node| most.max(node.position[0]));
+        if lowest.is_finite() { self.contact().gap * lowest / radius } else { 0.0 }
+    }
+
     /// Whether modes or loads of the master depend on the speed.
     pub fn spins(&self) -> bool {
         let spin = self.master().0.spin;

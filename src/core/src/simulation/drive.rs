@@ -58,10 +58,13 @@ impl RotorAngle {
         rotor
     }
 
+    /// The remainder of a division is exact, however many turns.
     fn wrap(&mut self) {
-        let turns = (self.angle / std::f64::consts::TAU).floor();
-        self.angle -= turns * std::f64::consts::TAU;
-        self.turns += turns;
+        let turn = std::f64::consts::TAU;
+        let rest = self.angle % turn;
+        let rest = if rest < 0.0 { rest + turn } else { rest };
+        self.turns += ((self.angle - rest) / turn).round();
+        self.angle = rest;
     }
 
     /// Angle at `offset`, less whole turns at the last rebase (rad): the phase for trigonometry.
@@ -106,6 +109,20 @@ mod tests {
         let exact = 7.0 + start + 0.5 * slope;
         assert!((rotor.total(&speed, 0.0) - exact).abs() < 1e-9, "{} vs {exact}", rotor.total(&speed, 0.0));
         assert!((0.0..std::f64::consts::TAU).contains(&rotor.phase(&speed, 0.0)));
+    }
+
+    #[test]
+    fn an_angle_of_many_turns_keeps_its_phase() {
+        let speed = Input { value: 10.0, slope: 0.0, since: 0.0 };
+        for angle in [1e9, -1e9, 1e20, -1e154, 1e308] {
+            let rotor = RotorAngle::new(angle);
+            let (phase, rest) = (rotor.phase(&speed, 0.0), angle % std::f64::consts::TAU);
+            assert!((0.0..=std::f64::consts::TAU).contains(&phase), "{angle:e}: {phase:e}");
+            let expected = if rest < 0.0 { rest + std::f64::consts::TAU } else { rest };
+            assert_eq!(phase.to_bits(), expected.to_bits(), "{angle:e}");
+            // It turns on from there.
+            assert!((rotor.phase(&speed, 0.1) - phase - 1.0).abs() < 1e-14, "{angle:e}");
+        }
     }
 
     #[test]

@@ -7,6 +7,7 @@ use crate::contact::gap::{GapLaw, dot};
 use crate::contact::spline_gap::{Frame, SplineGap};
 use crate::dynamics::modal::ModalModel;
 use crate::settings::{Meridian, Scheme, Solver};
+use crate::stability::massless::MasslessLimit;
 use crate::stability::{self, ContactDirections, Growth, massless};
 use crate::variables::Quantity;
 use crate::{Error, Result};
@@ -40,8 +41,8 @@ pub struct Limits {
     outcome: Result<Vec<String>>,
     /// Largest step of each range of step sizes, descending, and why it is refused, if it is.
     ranges: Vec<(f64, Option<Error>)>,
-    /// Step (s) from which on massless-boundary is unstable in closed contact; infinite for other schemes.
-    massless: f64,
+    /// Steps of massless-boundary; infinite for other schemes.
+    massless: MasslessLimit,
 }
 
 impl Simulation {
@@ -106,7 +107,7 @@ impl Simulation {
         for carrier in self.compiled.carriers() {
             stability::check_step_allowed(carrier.largest_frequency(), scheme, step)?;
         }
-        if step >= massless::USABLE * limits.massless {
+        if step >= limits.massless.usable {
             return Err(massless::refusal(step, limits.massless));
         }
         // The range a step belongs to is that of the smallest entry not below it.
@@ -165,7 +166,7 @@ impl Compiled {
         let expected = self.expected_step(parameters.step);
         let (outcome, massless) = match at.massless(expected, law) {
             Ok((more, limit)) => (at.warnings(expected, law, more), limit),
-            Err(error) => (Err(error), f64::INFINITY),
+            Err(error) => (Err(error), MasslessLimit::NONE),
         };
         let ranges = if parameters.friction == 0.0 {
             Vec::new()
@@ -323,16 +324,16 @@ impl Checking<'_> {
     }
 
     /// Largest step of massless-boundary, and a warning where many blades in contact at once may lower it.
-    fn massless(&self, step: f64, law: &GapLaw) -> Result<(Vec<String>, f64)> {
+    fn massless(&self, step: f64, law: &GapLaw) -> Result<(Vec<String>, MasslessLimit)> {
         if self.parameters.scheme != Scheme::MasslessBoundary {
-            return Ok((Vec::new(), f64::INFINITY));
+            return Ok((Vec::new(), MasslessLimit::NONE));
         }
         let modes = match (&self.compiled.carrier, law) {
             (Some(_), GapLaw::Spline(spline)) => Some((self.compiled.slave_modes(spline), spline)),
             _ => None,
         };
         let largest = self.parameters.step.max(step) / massless::QUIET;
-        let (mut limit, mut worst) = (f64::INFINITY, (0.0, 0.0));
+        let (mut limit, mut worst) = (MasslessLimit::NONE, (0.0, 0.0));
         for (diameter, model) in self.models.iter().enumerate() {
             let normals = self.directions(model, 1.0).into_iter().map(|(normal, _)| normal).collect();
             let mut check = massless::MasslessCheck { model, normals, slave: None };
@@ -341,11 +342,12 @@ impl Checking<'_> {
                 check = yielding_most(check, (0..SLAVE_ANGLES).map(place), modes, step);
             }
             // Of several only the tightest counts.
-            limit = check.limit(largest.min(limit))?.min(limit);
+            let own = check.limit(largest.min(limit.closed))?;
+            limit = MasslessLimit { closed: limit.closed.min(own.closed), usable: limit.usable.min(own.usable) };
             let found = check.eigenvalues(step).unwrap_or(worst);
             worst = (found.0.max(worst.0), found.1.max(worst.1));
         }
-        if step >= massless::USABLE * limit {
+        if step >= limit.usable {
             return Err(massless::refusal(step, limit));
         }
         let mut warnings: Vec<String> = massless::warning(step, limit).into_iter().collect();

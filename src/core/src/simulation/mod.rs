@@ -218,14 +218,7 @@ impl Simulation {
         self.compiled.set_load_order(self.value_of(Quantity::LoadOrder))?;
         self.follow_reference_speed(self.inputs.speed.value)?;
         self.check_limits(&parameters)?;
-        let sliding = parameters.solver != Solver::Coulomb && self.compiled.free.is_none();
-        if sliding && parameters.friction > 0.0 && self.inputs.speed.value == 0.0 && self.inputs.speed.slope == 0.0 {
-            self.warnings.push(
-                "the rotor starts at speed 0 with friction: the sliding law does not model sticking; results are \
-                 meaningful once the tips slide faster than they vibrate (the solver coulomb models it)"
-                    .to_owned(),
-            );
-        }
+        self.warn_of_sticking(&parameters);
         self.system.set_methods(parameters.scheme, parameters.solver);
         self.system.set_friction(parameters.friction);
         self.rest(&parameters);
@@ -248,6 +241,26 @@ impl Simulation {
         self.update_outputs();
         self.previous.copy_from_slice(&self.values);
         Ok(())
+    }
+
+    /// Tips that slide more slowly than they vibrate stick at times, which the sliding law does not know.
+    fn warn_of_sticking(&mut self, parameters: &limits::Parameters) {
+        let speed = &self.inputs.speed;
+        let slow = self.compiled.slow_sliding();
+        if self.compiled.free.is_some()
+            || parameters.solver == Solver::Coulomb
+            || parameters.friction == 0.0
+            || speed.slope != 0.0
+            || speed.value.abs() >= slow
+        {
+            return;
+        }
+        self.warnings.push(format!(
+            "the rotor starts at speed {} rad/s with friction: the sliding law does not model sticking; results are \
+             meaningful once the tips slide faster than they vibrate, which they do not below some {slow:.1e} rad/s (the \
+             solver coulomb models it)",
+            speed.value
+        ));
     }
 
     /// With stiffening, the modes are those at the speed of the start.
@@ -325,7 +338,8 @@ impl Simulation {
             speed: speed.at(offset),
             gap_offset: self.values_gap_offset(),
             shape_factor: self.inputs.shape_factor.at(offset) * self.ramp(time),
-            shape_rotation: self.inputs.shape_rotation.at(offset),
+            // Exact, so that a rotation by many turns does not swallow the rotor's own.
+            shape_rotation: self.inputs.shape_rotation.at(offset) % std::f64::consts::TAU,
             radius_change: self.inputs.radius_change.at(offset),
             shaft: self.inputs.shaft.map(|input| input.at(offset)),
             shaft_velocity: self.inputs.shaft.map(|input| input.slope),

@@ -176,9 +176,10 @@ impl Simulation {
             StepFailure::Implausible { sector } => Error::Unstable {
                 problem: format!(
                     "at t = {time} s (last good time {} s) a contact node of sector {} is displaced by more than a tenth of \
-                     its radius, is as deep inside the casing, or meets a flank of the casing shape steeper than 45°",
+                     its radius, is as deep inside the casing, or meets a flank of the casing shape steeper than 45°{}",
                     self.time,
-                    sector + 1
+                    sector + 1,
+                    self.instability()
                 ),
                 remedy: "Check gap, casing shape and its inputs; small displacements cannot describe this. Restore a \
                          saved state or reset first"
@@ -227,6 +228,12 @@ impl Simulation {
             problem: format!("at t = {time} s (last good time {} s) {problem}", self.time),
             remedy: format!("{remedy}. Restore a saved state or reset first"),
         })
+    }
+
+    /// Growth that the initialisation warned of, as the likely cause of a failure.
+    fn instability(&self) -> String {
+        let grows = |text: &&String| text.contains("physically unstable") && !text.contains("this run does not");
+        self.warnings.iter().find(grows).map_or_else(String::new, |text| format!(". {text}"))
     }
 
     /// End the communication step here, before its end (early return): outputs cover the part done.

@@ -1,8 +1,8 @@
 //! The step limit of massless-boundary: explicit, but without the inertia of the contact nodes.
 //!
 //! Closed contact makes the residual flexibility G of the quasi-static modes a spring on the modes with inertia:
-//! K_c = Φ_nᵀ G_nn⁻¹ Φ_n. Their step q⁺ − 2q + q⁻ = −C(Λ + K_c)q, C = diag(c), is stable while the largest eigenvalue of
-//! C(Λ + K_c) is below 4. A flexible slave adds the largest eigenvalue of G_nn⁻¹ Ψ_n C_s Ψ_nᵀ per blade in contact.
+//! K_c = Φ_nᵀ G_nn⁻¹ Φ_n. Their step q⁺ − (1 + β)q + βq⁻ = −C(Λ + K_c)q, C = diag(c), is that of the masses ½(1 + β) with
+//! dashpots, and stable while the largest eigenvalue of 2(1 + β)⁻¹C(Λ + K_c) is below 4. A flexible slave adds the largest eigenvalue of G_nn⁻¹ Ψ_n C_s Ψ_nᵀ per blade in contact.
 
 use nalgebra::DMatrix;
 
@@ -11,6 +11,7 @@ use super::{
 };
 use crate::contact::gap::dot;
 use crate::dynamics::modal::ModalModel;
+use crate::dynamics::scheme::ModeCoefficients;
 use crate::settings::Scheme;
 use crate::{Error, Result};
 
@@ -19,9 +20,31 @@ const MARGIN: f64 = 1e-6;
 /// Share of the limit up to which steps are accepted. Closed contact is stable up to the limit, but a node that opens and
 /// closes switches between two springs, which pumps energy in bands of step sizes. Twelve blades pressed on a round
 /// casing for 0.1 s with 1e-3 of damping gain no energy at 0.8 of the limit, hundreds of times their energy at 0.85.
-pub const USABLE: f64 = 0.8;
+const USABLE: f64 = 0.8;
+/// The same where closed contact is much stiffer than the modes with inertia, whose damping then has too little hold on what
+/// bounces: nodes a hundred times as stiff as their base settle there with a damping ratio of 0.02, and not from 0.5 on.
+const USABLE_STIFF: f64 = 0.25;
+/// Ratio of the squares of the highest frequency with closed contact and without from which contact counts as stiff: at 10
+/// a damping ratio of 0.02 brings the same nodes to rest up to 0.8 of the limit.
+const STIFF: f64 = 10.0;
+/// From here on nothing helps: at 1000 the same nodes keep bouncing at 0.2 of the limit, with forces that mean nothing.
+const TOO_STIFF: f64 = 300.0;
 /// Share of the limit up to which the same blades gain none without damping either: at 0.5 it is a fifth of theirs.
 pub const QUIET: f64 = 0.4;
+
+/// Steps (s) at which the scheme meets its limits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MasslessLimit {
+    /// Closed contact is stable below.
+    pub closed: f64,
+    /// Contact that opens and closes gains no energy to speak of below.
+    pub usable: f64,
+}
+
+impl MasslessLimit {
+    /// No limit.
+    pub const NONE: Self = Self { closed: f64::INFINITY, usable: f64::INFINITY };
+}
 
 /// What the limit depends on.
 #[derive(Debug, Clone)]
@@ -53,30 +76,60 @@ impl MasslessCheck<'_> {
         let scaled = |count: usize, entry: &dyn Fn(usize, usize) -> f64| {
             lower.solve_lower_triangular(&DMatrix::from_fn(nodes, count, entry))
         };
-        // C½(Λ + K_c)C½ with K_c = (L⁻¹Φ)ᵀ(L⁻¹Φ).
-        let root = |mode: usize| coefficients[mode].delayed.sqrt();
+        // C½(Λ + K_c)C½ with K_c = (L⁻¹Φ)ᵀ(L⁻¹Φ), C per mass ½(1 + β) of the recurrence.
+        let root = |mode: usize| per_mass(&coefficients[mode], coefficients[mode].delayed).sqrt();
         let half = scaled(dynamic, &|node, mode| seen[(node, mode)] * root(mode))?;
         let mut matrix = half.transpose() * &half;
         for mode in 0..dynamic {
-            matrix[(mode, mode)] += coefficients[mode].kappa;
+            matrix[(mode, mode)] += per_mass(&coefficients[mode], coefficients[mode].kappa);
         }
         let master = if dynamic == 0 { 0.0 } else { matrix.symmetric_eigenvalues().max() };
         let slave = match &self.slave {
             None => 0.0,
             Some((seen, model)) => {
                 let coefficients = model.coefficients(Scheme::MasslessBoundary, step);
-                let half = scaled(model.len(), &|node, mode| seen[(node, mode)] * coefficients[mode].delayed.sqrt())?;
+                let root = |mode: usize| per_mass(&coefficients[mode], coefficients[mode].delayed).sqrt();
+                let half = scaled(model.len(), &|node, mode| seen[(node, mode)] * root(mode))?;
                 (&half * half.transpose()).symmetric_eigenvalues().max()
             }
         };
         Some((master, slave))
     }
 
-    /// Smallest step (s) at which closed contact is unstable, sought up to `largest`; infinite if none is found.
+    /// Steps (s) at which closed contact is unstable and up to which the scheme is used, sought up to `largest`; infinite
+    /// if closed contact is stable up to there.
     ///
     /// # Errors
     /// A residual flexibility that is singular along the normals.
-    pub fn limit(&self, largest: f64) -> Result<f64> {
+    pub fn limit(&self, largest: f64) -> Result<MasslessLimit> {
+        let closed = self.closed(largest)?;
+        if closed.is_infinite() {
+            return Ok(MasslessLimit::NONE);
+        }
+        let stiffening = self.stiffening(1e-3 * closed);
+        if stiffening > TOO_STIFF {
+            return Err(Error::invalid(
+                "scheme massless-boundary",
+                format!(
+                    "closed contact raises the square of the highest frequency of the modes with inertia by a factor of \
+                     {stiffening:.3e}, so that nodes that bounce gain energy at any internal step near its limit {closed:.3e} s"
+                ),
+                "Use modal-exact, or a ROM with more modes or softer contact nodes",
+            ));
+        }
+        let share = if stiffening > STIFF { USABLE_STIFF } else { USABLE };
+        Ok(MasslessLimit { closed, usable: share * closed })
+    }
+
+    /// By how much closed contact raises the square of the highest frequency of the modes with inertia, at a small step (s).
+    fn stiffening(&self, step: f64) -> f64 {
+        let coefficients = self.model.coefficients(Scheme::MasslessBoundary, step);
+        let dynamic = self.model.dynamic_modes(Scheme::MasslessBoundary);
+        let open = coefficients[..dynamic].iter().fold(0.0, |most: f64, mode| most.max(per_mass(mode, mode.kappa)));
+        self.eigenvalues(step).map_or(1.0, |(master, slave)| (master + slave) / open)
+    }
+
+    fn closed(&self, largest: f64) -> Result<f64> {
         let unstable = |step: f64| {
             let found = self.eigenvalues(step).map(|(master, slave)| master + slave >= 4.0 * (1.0 - MARGIN));
             found.ok_or_else(|| {
@@ -102,6 +155,11 @@ impl MasslessCheck<'_> {
         }
         Ok(high)
     }
+}
+
+/// A coefficient of the recurrence over its mass ½(1 + β), which damping makes smaller than 1.
+fn per_mass(mode: &ModeCoefficients, coefficient: f64) -> f64 {
+    2.0 * coefficient / (1.0 + mode.beta)
 }
 
 /// Growth with all contacts of `directions` closed and sliding: as [`stability::growth`](super::growth), with the contact
@@ -144,25 +202,25 @@ pub fn growth(model: &ModalModel, step: f64, friction: f64, directions: &Contact
     Some(Growth { continuous, stepped: libm::log(spectral_radius(map)?) / step, noise: GROWTH_NOISE / step })
 }
 
-/// Refusal of a step (s) at or beyond [`USABLE`] of the limit (s) of closed contact.
-pub fn refusal(step: f64, limit: f64) -> Error {
-    let usable = USABLE * limit;
+/// Refusal of a step (s) at or beyond the usable one.
+pub fn refusal(step: f64, limit: MasslessLimit) -> Error {
+    let MasslessLimit { closed, usable } = limit;
     Error::Unstable {
         problem: format!(
             "massless-boundary with internal step {step:.6e} s: closed contact on the residual flexibility of the contact nodes \
-             is stable below {limit:.6e} s only, and contact that opens and closes gains energy above {usable:.6e} s"
+             is stable below {closed:.6e} s only, and contact that opens and closes gains energy above {usable:.6e} s"
         ),
         remedy: format!("Set the internal step below {usable:.6e} s, or use the scheme modal-exact"),
     }
 }
 
 /// Warning for a step (s) at which contact that opens and closes gains energy unless damping takes it.
-pub fn warning(step: f64, limit: f64) -> Option<String> {
-    (step >= QUIET * limit).then(|| {
+pub fn warning(step: f64, limit: MasslessLimit) -> Option<String> {
+    (step >= QUIET * limit.closed).then(|| {
         format!(
             "massless-boundary with internal step {step:.3e} s: above {:.3e} s contact that opens and closes may gain \
              energy, which a damping ratio of 1e-3 outweighs; a falling impact_loss tells",
-            QUIET * limit
+            QUIET * limit.closed
         )
     })
 }

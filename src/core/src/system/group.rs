@@ -13,6 +13,10 @@ use nalgebra::DMatrix;
 /// Nodes outside a group count as penetrating beyond this fraction of the largest gap of the group.
 const VIOLATED_FRACTION: f64 = 1e-13;
 
+/// Penetrations below this are none (m): squares of what they lead to leave the range of double precision, and modes as small
+/// are flushed to rest.
+const LEAST_PENETRATION: f64 = 1e-150;
+
 /// A contact node of one sector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Member {
@@ -55,7 +59,7 @@ impl System {
         let (lanes, nodes) = (self.lanes, self.law.nodes());
         for sector in 0..self.bank.sectors() {
             // NaN counts as touching, and is found out there.
-            if self.lowest[sector] < 0.0 || self.lowest[sector].is_nan() {
+            if self.lowest[sector] < -LEAST_PENETRATION || self.lowest[sector].is_nan() {
                 self.members.clear();
                 self.members.extend((0..nodes).map(|node| Member { node, sector, index: node * lanes + sector }));
                 self.solve_group(drive)?;
@@ -68,7 +72,7 @@ impl System {
     /// Sectors coupled through the slave or as a wheel: the nodes that penetrate or touched last, then those that their solution
     /// makes penetrate, until there are none.
     pub(super) fn solve_coupled(&mut self, drive: &Drive) -> Result<(), StepFailure> {
-        if self.lowest.iter().all(|gap| *gap >= 0.0) {
+        if self.lowest.iter().all(|gap| *gap >= -LEAST_PENETRATION) {
             return Ok(());
         }
         let film = self.settings.solver == Solver::Film;

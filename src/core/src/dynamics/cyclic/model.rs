@@ -17,6 +17,11 @@ use crate::{Error, Result, Rom};
 /// Entries of a mode shape this close to the largest count as equally large when the phase is chosen.
 const SAME_SIZE: f64 = 1e-6;
 
+/// Frequencies of one mode, once computed by the reduction and once from its matrices, agree to this fraction.
+const SAME_FREQUENCY: f64 = 1e-3;
+/// Rigid modes agree to this fraction of the highest frequency.
+const RIGID_FREQUENCY: f64 = 1e-5;
+
 /// Modes of one nodal diameter, mass-normalised, in the order of their frequencies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiameterModes {
@@ -111,7 +116,37 @@ impl CyclicModel {
             let weight = weight(nodal_diameter, sectors);
             diameters.push(DiameterModes::new(nodal_diameter, damping_ratio, weight, &map, modes));
         }
-        Ok(Self { sectors, diameters })
+        let model = Self { sectors, diameters };
+        model.check_frequencies(rom)?;
+        Ok(model)
+    }
+
+    /// The harmonics must have the frequencies that the ROM says they have: exchanged ones do not. (A harmonic in place of
+    /// its complex conjugate has the same; its waves travel the other way.)
+    fn check_frequencies(&self, rom: &Rom) -> Result<()> {
+        let checks = &rom.checks;
+        if checks.nodal_diameters.len() != checks.reduced_frequencies.len() {
+            return Ok(());
+        }
+        for diameter in &self.diameters {
+            let told = checks.nodal_diameters.iter().zip(&checks.reduced_frequencies);
+            let told = told.filter(|(number, _)| usize::try_from(**number) == Ok(diameter.nodal_diameter));
+            let largest = diameter.frequencies.last().map_or(0.0, |most| most / std::f64::consts::TAU);
+            for ((_, told), found) in told.zip(&diameter.frequencies) {
+                let found = found / std::f64::consts::TAU;
+                if (found - told).abs() > SAME_FREQUENCY * told + RIGID_FREQUENCY * largest {
+                    return Err(Error::invalid(
+                        "ROM harmonics",
+                        format!(
+                            "nodal diameter {} has a mode of {found} Hz where the checks of the ROM tell {told} Hz",
+                            diameter.nodal_diameter
+                        ),
+                        "Write the harmonics in the order of the nodal diameters, or the ROM again with `tiprub reduce`",
+                    ));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Contact rows per sector (3 per contact node).

@@ -16,6 +16,7 @@ use crate::dynamics::modal::ModalModel;
 use crate::settings::Solver;
 use crate::simulation::compile::Compiled;
 use crate::simulation::free::FreeParts;
+use crate::stability::massless::MasslessLimit;
 use crate::stability::{self, ContactDirections};
 use crate::{Error, Result};
 
@@ -38,7 +39,7 @@ impl Compiled {
     pub(super) fn free_limits(&self, parameters: &Parameters, free: &FreeParts, law: &FreeGap) -> Limits {
         let step = self.expected_step(parameters.step);
         let outcome = self.free_warnings(parameters, free, law, step);
-        Limits { parameters: parameters.clone(), outcome, ranges: Vec::new(), massless: f64::INFINITY }
+        Limits { parameters: parameters.clone(), outcome, ranges: Vec::new(), massless: MasslessLimit::NONE }
     }
 
     fn free_warnings(

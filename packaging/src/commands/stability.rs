@@ -1,0 +1,86 @@
+//! `tiprub stability`: stiff and extreme cases, each in a process of its own, judged.
+
+use crate::{
+    Failure, Result,
+    cli::StabilityArguments,
+    console::{Console, Outcome},
+    fmu::{FmiVersion, Package},
+    library, output_file,
+    stability::{self, Case, Context, child, families::values, table::Table},
+    study::sweep,
+};
+
+/// Run the cases asked for and write the table.
+///
+/// # Errors
+/// No case of that name, files that cannot be written, or a case that is neither right nor refused as it should be.
+pub fn run(arguments: &StabilityArguments, console: &Console) -> Result<Outcome> {
+    if let Some(name) = &arguments.child {
+        let json = child::answer(name)?;
+        return Ok(Outcome { text: json.to_string(), json });
+    }
+    let cases = chosen(arguments)?;
+    // Lives as long as the cases run.
+    let fmus = if cases.iter().any(|case| case.imports) { Some(package(arguments, console)?) } else { None };
+    let context = Context { fmus: fmus.as_ref().map(|directory| directory.path().to_owned()) };
+    let task = console.task("Stability", Some(cases.len() as u64));
+    let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
+    let rows = sweep::sweep(
+        &cases,
+        threads,
+        |case| {
+            let row = child::run(case, &context)?;
+            if !matches!(row.verdict, stability::Verdict::Right | stability::Verdict::Refused) {
+                task.line(&format!("{} {}: {}", row.verdict.name(), row.name, row.happened));
+            }
+            Ok(row)
+        },
+        |done| task.at(done as u64),
+    )?;
+    drop(task);
+    let table = Table { rows };
+    let outcome = table.write(&arguments.out)?;
+    if let Some(path) = &arguments.chapter {
+        write_chapter(path, &table)?;
+    }
+    Ok(outcome)
+}
+
+/// The scenes whose variables are walked, as FMUs of both versions in a temporary directory.
+fn package(arguments: &StabilityArguments, console: &Console) -> Result<tempfile::TempDir> {
+    let library = library::load(arguments.library.as_deref(), console)?;
+    let directory = tempfile::tempdir()
+        .map_err(|error| Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error))?;
+    for name in values::SCENES {
+        let scene = values::scene(name);
+        let package = Package::new(&scene, &library)?;
+        for version in [FmiVersion::Two, FmiVersion::Three] {
+            let path = directory.path().join(format!("{name}-{}.fmu", version.digit()));
+            package.write(&path, version, false)?;
+        }
+    }
+    Ok(directory)
+}
+
+fn chosen(arguments: &StabilityArguments) -> Result<Vec<Case>> {
+    let Some(prefix) = &arguments.case else { return Ok(stability::cases(arguments.quick)) };
+    let cases = stability::named(prefix, arguments.quick);
+    if cases.is_empty() {
+        let families: Vec<String> = stability::cases(false).iter().map(|case| case.family().to_owned()).collect();
+        let mut families = families;
+        families.dedup();
+        let problem = format!("no case begins with `{prefix}`");
+        return Err(Failure::usage("--case", problem, format!("Begin with one of {}", families.join(", "))));
+    }
+    Ok(cases)
+}
+
+/// What stands above the table of the guide is kept.
+fn write_chapter(path: &std::path::Path, table: &Table) -> Result<()> {
+    let present = std::fs::read_to_string(path).unwrap_or_default();
+    let above = present.split_once(MARK).map_or(present.as_str(), |(above, _)| above);
+    output_file::write(path, format!("{above}{MARK}\n\n{}", table.to_markdown()))
+}
+
+/// The table begins below this line.
+const MARK: &str = "<!-- the table below is written by `tiprub stability --chapter` -->";

@@ -1,0 +1,343 @@
+//! What a case is, what can happen to it, and what that is worth.
+
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+
+/// Wall-clock limit of most cases (s): far beyond what any of them takes on a loaded machine.
+const TIME_LIMIT: f64 = 120.0;
+
+/// What is expected of a case.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Expected {
+    /// A right answer, and what it is held against.
+    Right(String),
+    /// A refusal that contains all of these words.
+    Refused(Vec<String>),
+    /// Either; a refusal contains all of the words.
+    Either(String, Vec<String>),
+}
+
+impl Expected {
+    /// A right answer, and what it is held against.
+    pub fn right(against: impl Into<String>) -> Self {
+        Self::Right(against.into())
+    }
+
+    /// A refusal that contains all of these words.
+    pub fn refused<const N: usize>(words: [&str; N]) -> Self {
+        Self::Refused(words.map(String::from).to_vec())
+    }
+
+    /// A right answer or such a refusal.
+    pub fn either<const N: usize>(against: impl Into<String>, words: [&str; N]) -> Self {
+        Self::Either(against.into(), words.map(String::from).to_vec())
+    }
+
+    /// For tables.
+    pub fn to_text(&self) -> String {
+        let named = |words: &[String]| format!("refusal naming {}", words.join(", "));
+        match self {
+            Self::Right(against) => against.clone(),
+            Self::Refused(words) => named(words),
+            Self::Either(against, words) => format!("{against}; or {}", named(words)),
+        }
+    }
+}
+
+/// One comparison: holds while `found` is a number and at most `bound`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Check {
+    /// What is compared.
+    pub what: String,
+    /// Size of the difference found.
+    pub found: f64,
+    /// Largest that is right.
+    pub bound: f64,
+}
+
+impl Check {
+    /// Something that may be at most `bound`.
+    pub fn at_most(what: impl Into<String>, found: f64, bound: f64) -> Self {
+        Self { what: what.into(), found, bound }
+    }
+
+    /// Something that must be so.
+    pub fn so(what: impl Into<String>, holds: bool) -> Self {
+        Self::at_most(what, if holds { 0.0 } else { 1.0 }, 0.0)
+    }
+
+    /// Relative difference of two numbers.
+    pub fn relative(what: impl Into<String>, found: f64, exact: f64, bound: f64) -> Self {
+        Self::at_most(what, if exact == 0.0 { found.abs() } else { (found / exact - 1.0).abs() }, bound)
+    }
+
+    /// Whether it holds; not-a-number does not.
+    pub fn holds(&self) -> bool {
+        self.found <= self.bound
+    }
+
+    fn to_text(&self) -> String {
+        if self.bound == 0.0 {
+            return if self.holds() { self.what.clone() } else { format!("not so: {}", self.what) };
+        }
+        format!("{} {:.1e} (at most {:.0e})", self.what, self.found, self.bound)
+    }
+
+    /// How much of its bound it takes up.
+    fn share(&self) -> f64 {
+        if self.found.is_nan() {
+            f64::INFINITY
+        } else if self.found == 0.0 {
+            0.0
+        } else {
+            self.found / self.bound
+        }
+    }
+}
+
+/// What a case came to, when it came to an end of its own.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Happened {
+    /// The refusal, if there was one.
+    pub refusal: Option<String>,
+    /// What was compared.
+    pub checks: Vec<Check>,
+    /// Figures worth telling beside the checks.
+    pub remarks: Vec<String>,
+}
+
+impl Happened {
+    /// An answer with its checks.
+    pub fn answer(checks: Vec<Check>) -> Self {
+        Self { checks, ..Self::default() }
+    }
+
+    /// A refusal.
+    pub fn refused(message: impl ToString) -> Self {
+        Self { refusal: Some(message.to_string()), ..Self::default() }
+    }
+
+    /// The outcome of work that may be refused by the core.
+    pub fn of(outcome: tiprub_core::Result<Vec<Check>>) -> Self {
+        outcome.map_or_else(Self::refused, Self::answer)
+    }
+
+    /// With a figure worth telling.
+    pub fn remark(mut self, text: impl Into<String>) -> Self {
+        self.remarks.push(text.into());
+        self
+    }
+
+    /// For the parent process.
+    pub fn to_json(&self) -> Value {
+        // Numbers as bits: JSON knows neither NaN nor infinity.
+        let checks = self
+            .checks
+            .iter()
+            .map(|check| json!({ "what": check.what, "found": check.found.to_bits(), "bound": check.bound.to_bits() }));
+        json!({ "refusal": self.refusal, "checks": checks.collect::<Vec<_>>(), "remarks": self.remarks })
+    }
+
+    /// What a child process wrote.
+    pub fn from_json(value: &Value) -> Option<Self> {
+        let number = |value: &Value| value.as_u64().map(f64::from_bits);
+        let check = |check: &Value| {
+            let what = check["what"].as_str()?.to_owned();
+            Some(Check { what, found: number(&check["found"])?, bound: number(&check["bound"])? })
+        };
+        let text = |value: &Value| value.as_str().map(String::from);
+        Some(Self {
+            refusal: text(&value["refusal"]),
+            checks: value["checks"].as_array()?.iter().map(check).collect::<Option<_>>()?,
+            remarks: value["remarks"].as_array()?.iter().map(text).collect::<Option<_>>()?,
+        })
+    }
+}
+
+/// What a case is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// A right answer.
+    Right,
+    /// Refused as it should be.
+    Refused,
+    /// A wrong answer, a wrong refusal, or an answer where there is none.
+    Wrong,
+    /// The process ended by itself: panic, abort, signal.
+    Crashed,
+    /// The process did not end in time.
+    Hung,
+}
+
+impl Verdict {
+    /// All of them, in the order of a table.
+    pub const ALL: [Self; 5] = [Self::Right, Self::Refused, Self::Wrong, Self::Crashed, Self::Hung];
+
+    /// In a word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Refused => "refused",
+            Self::Wrong => "WRONG",
+            Self::Crashed => "CRASHED",
+            Self::Hung => "HUNG",
+        }
+    }
+}
+
+/// Verdict on what happened, and what to say about it.
+pub fn judge(expected: &Expected, happened: &Happened) -> (Verdict, String) {
+    let failed: Vec<String> = happened.checks.iter().filter(|check| !check.holds()).map(Check::to_text).collect();
+    let remarks = happened.remarks.iter().map(|remark| format!("; {remark}")).collect::<String>();
+    let words = match expected {
+        Expected::Right(_) => None,
+        Expected::Refused(words) | Expected::Either(_, words) => Some(words),
+    };
+    match (&happened.refusal, words) {
+        (Some(message), None) => (Verdict::Wrong, format!("refused: {message}")),
+        (Some(message), Some(words)) => {
+            let missing: Vec<&str> = words.iter().map(String::as_str).filter(|word| !message.contains(*word)).collect();
+            if !missing.is_empty() {
+                return (Verdict::Wrong, format!("refused without naming {}: {message}", missing.join(", ")));
+            }
+            if !failed.is_empty() {
+                return (Verdict::Wrong, format!("{}; refused: {message}", failed.join("; ")));
+            }
+            (Verdict::Refused, format!("{message}{remarks}"))
+        }
+        (None, _) if !failed.is_empty() => (Verdict::Wrong, format!("{}{remarks}", failed.join("; "))),
+        (None, _) if matches!(expected, Expected::Refused(_)) => (Verdict::Wrong, "was not refused".to_owned()),
+        (None, _) if happened.checks.is_empty() => (Verdict::Wrong, "nothing was compared".to_owned()),
+        (None, _) => (Verdict::Right, format!("{}{remarks}", tightest(&happened.checks))),
+    }
+}
+
+/// The check that took up most of its bound stands for all.
+fn tightest(checks: &[Check]) -> String {
+    let most = checks.iter().max_by(|a, b| a.share().total_cmp(&b.share()));
+    let others = match checks.len() {
+        0 | 1 => String::new(),
+        count => format!("; {} more", count - 1),
+    };
+    most.map_or_else(String::new, |check| format!("{}{others}", check.to_text()))
+}
+
+/// What a case may use beside its own models.
+#[derive(Debug, Clone, Default)]
+pub struct Context {
+    /// Directory with packaged FMUs, where the parent made some.
+    pub fmus: Option<PathBuf>,
+}
+
+/// The work of a case.
+type Work = Box<dyn Fn(&Context) -> Happened + Send + Sync>;
+
+/// One row of the table.
+pub struct Case {
+    /// Family, slash, what sets it apart: `step-limit/central-difference/lcp/h=0.9`.
+    pub name: String,
+    /// What is expected.
+    pub expected: Expected,
+    /// In the quick table as well.
+    pub quick: bool,
+    /// Needs packaged FMUs.
+    pub imports: bool,
+    /// Wall-clock limit (s).
+    pub limit: f64,
+    work: Work,
+}
+
+impl std::fmt::Debug for Case {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(out, "{}", self.name)
+    }
+}
+
+impl Case {
+    /// A case of the full table.
+    pub fn new(
+        name: impl Into<String>,
+        expected: Expected,
+        work: impl Fn(&Context) -> Happened + Send + Sync + 'static,
+    ) -> Self {
+        let (name, work) = (name.into(), Box::new(work));
+        Self { name, expected, quick: false, imports: false, limit: TIME_LIMIT, work }
+    }
+
+    /// Also in the quick table, if `so`.
+    pub fn quick(self, so: bool) -> Self {
+        Self { quick: so, ..self }
+    }
+
+    /// With another time limit (s).
+    pub fn within(self, limit: f64) -> Self {
+        Self { limit, ..self }
+    }
+
+    /// Needs packaged FMUs.
+    pub fn importing(self) -> Self {
+        Self { imports: true, ..self }
+    }
+
+    /// What comes before the first slash.
+    pub fn family(&self) -> &str {
+        self.name.split('/').next().unwrap_or(&self.name)
+    }
+
+    /// Do it, in this process.
+    pub fn run(&self, context: &Context) -> Happened {
+        (self.work)(context)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn verdict(expected: Expected, happened: Happened) -> Verdict {
+        judge(&expected, &happened).0
+    }
+
+    #[test]
+    fn an_answer_is_right_only_if_something_was_compared_and_all_of_it_holds() {
+        let right = || Expected::right("x");
+        let within = Check::at_most("a", 1e-12, 1e-9);
+        assert_eq!(verdict(right(), Happened::answer(vec![within.clone()])), Verdict::Right);
+        assert_eq!(verdict(right(), Happened::answer(vec![])), Verdict::Wrong);
+        for found in [2e-9, f64::NAN, f64::INFINITY] {
+            let beyond = Check::at_most("b", found, 1e-9);
+            assert_eq!(verdict(right(), Happened::answer(vec![within.clone(), beyond])), Verdict::Wrong);
+        }
+        assert_eq!(verdict(right(), Happened::answer(vec![Check::so("c", false)])), Verdict::Wrong);
+        assert_eq!(verdict(right(), Happened::refused("h is too long")), Verdict::Wrong);
+    }
+
+    #[test]
+    fn a_refusal_counts_only_where_it_is_expected_and_names_what_it_should() {
+        let refused = || Expected::refused(["µ", "h ="]);
+        assert_eq!(verdict(refused(), Happened::refused("µ = 2 with h = 1 s")), Verdict::Refused);
+        assert_eq!(verdict(refused(), Happened::refused("µ = 2")), Verdict::Wrong);
+        let answer = Happened::answer(vec![Check::so("a", true)]);
+        assert_eq!(verdict(refused(), answer.clone()), Verdict::Wrong);
+        let either = || Expected::either("x", ["µ"]);
+        assert_eq!(verdict(either(), answer), Verdict::Right);
+        assert_eq!(verdict(either(), Happened::refused("µ")), Verdict::Refused);
+        let spoiled = Happened { checks: vec![Check::so("a", false)], ..Happened::refused("µ") };
+        assert_eq!(verdict(either(), spoiled), Verdict::Wrong);
+    }
+
+    #[test]
+    fn what_happened_crosses_the_process_boundary_bit_by_bit() {
+        let happened = Happened {
+            refusal: Some("no".into()),
+            checks: vec![Check::at_most("a", f64::NAN, 0.1), Check::at_most("b", 1.0 / 3.0, f64::INFINITY)],
+            remarks: vec!["c".into()],
+        };
+        let text = happened.to_json().to_string();
+        let back = Happened::from_json(&serde_json::from_str(&text).unwrap()).unwrap();
+        assert_eq!(back.to_json(), happened.to_json());
+        assert!(back.checks[0].found.is_nan() && back.checks[1].bound.is_infinite());
+        assert_eq!(Happened::from_json(&json!({})), None);
+    }
+}

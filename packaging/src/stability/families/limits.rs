@@ -1,0 +1,166 @@
+//! Step sizes across the limits of the schemes, and stiffness that spans many orders of magnitude.
+
+use tiprub_core::{
+    Scene, Simulation,
+    settings::{Scheme, Solver},
+};
+
+use super::super::{
+    Case, Expected, Happened,
+    models::{SCHEMES, SOLVERS, Tower, blade, round, with_methods, with_step},
+    press::Press,
+};
+
+const FACTORS: [f64; 5] = [0.9, 0.999, 1.001, 1.5, 10.0];
+
+/// All of them.
+pub fn cases() -> Vec<Case> {
+    [step_limit(), ratios(), massless()].into_iter().flatten().collect()
+}
+
+/// Largest usable step of massless-boundary (s), as its refusal of a long one names it.
+pub fn massless_step(scene: &Scene) -> Option<f64> {
+    let scene = with_step(with_methods(scene.clone(), Scheme::MasslessBoundary, Solver::Lcp), 1e-2);
+    let refusal = Simulation::new(&scene).and_then(|mut simulation| simulation.initialise(0.0)).err()?.to_string();
+    refusal.split("Set the internal step below ").nth(1)?.split(' ').next()?.parse().ok()
+}
+
+fn step_limit() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (scheme, scheme_name) in SCHEMES {
+        for (solver, solver_name) in SOLVERS {
+            for (friction, model) in [(0.0, "tower"), (0.15, "tower"), (0.0, "blade"), (0.15, "blade")] {
+                // Three nodes that push each other apart: film, which looks once, need not come to the static solution.
+                if model == "blade" && solver == Solver::Film {
+                    continue;
+                }
+                for factor in FACTORS {
+                    let name = format!("step-limit/{scheme_name}/{solver_name}/{model}/µ={friction}/h={factor}");
+                    let against = "static contact, signs of the ledger";
+                    let expected = match scheme {
+                        Scheme::CentralDifference if factor > 1.0 => Expected::refused(["central-difference", "ω_max"]),
+                        Scheme::MasslessBoundary if factor > 1.0 => {
+                            Expected::refused(["massless-boundary", "internal step"])
+                        }
+                        _ if friction > 0.0 && model == "blade" => Expected::either(against, ["grows"]),
+                        _ => Expected::right(against),
+                    };
+                    let quick = model == "tower" && friction > 0.0 && solver != Solver::Film;
+                    cases.push(
+                        Case::new(name, expected, move |_| at(scheme, solver, friction, model, factor)).quick(quick),
+                    );
+                }
+            }
+        }
+    }
+    cases
+}
+
+fn at(scheme: Scheme, solver: Solver, friction: f64, model: &str, factor: f64) -> Happened {
+    let tower = Tower::default();
+    let rom = if model == "tower" { tower.rom() } else { blade(12) };
+    let fastest = if model == "tower" { tower.largest_frequency() } else { rom.stiffness.diagonal().max().sqrt() };
+    let mut scene = with_methods(round(rom), scheme, solver);
+    scene.settings.contacts[0].friction = friction;
+    // Free of friction, so that what is refused is the step.
+    let limit = match scheme {
+        Scheme::MasslessBoundary => {
+            let mut pressed = scene.clone();
+            pressed.settings.structures[0].damping_ratio = Some(0.3);
+            massless_step(&pressed)
+        }
+        _ => Some(2.0 / fastest),
+    };
+    let Some(limit) = limit else { return Happened::refused("no limit was named") };
+    Happened::of(Press::new(with_step(scene, factor * limit)).run())
+}
+
+fn ratios() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for exponent in 2..=8 {
+        for (scheme, scheme_name) in SCHEMES {
+            for (solver, solver_name) in SOLVERS {
+                for kind in ["stiff node", "light node"] {
+                    let name = format!("stiffness/{}/1e{exponent}/{scheme_name}/{solver_name}", kind.replace(' ', "-"));
+                    let against = "static contact, signs of the ledger";
+                    let expected = if scheme == Scheme::MasslessBoundary && kind == "stiff node" && exponent > 4 {
+                        Expected::either(against, ["massless-boundary", "modes with inertia"])
+                    } else {
+                        Expected::right(against)
+                    };
+                    let quick = solver == Solver::Lcp && exponent % 3 == 2 && scheme != Scheme::CentralDifference;
+                    let work = move |_: &_| ratio(kind, 10_f64.powi(exponent), scheme, solver);
+                    cases.push(Case::new(name, expected, work).quick(quick).within(300.0));
+                }
+            }
+        }
+    }
+    cases
+}
+
+/// Ratio of the squares of the highest to the lowest frequency: by stiffness, or by mass.
+fn ratio(kind: &str, ratio: f64, scheme: Scheme, solver: Solver) -> Happened {
+    let soft = 4e6 / 0.1;
+    let mut tower = Tower { sectors: 2, ..Tower::default() };
+    if kind == "stiff node" {
+        tower.tip = ratio * soft * tower.mass[1];
+    } else {
+        tower.mass[1] = tower.tip / (ratio * soft);
+    }
+    let mut scene = with_methods(round(tower.rom()), scheme, solver);
+    scene.settings.contacts[0].friction = 0.15;
+    let step = match scheme {
+        Scheme::CentralDifference => 0.9 * 2.0 / tower.largest_frequency(),
+        Scheme::ModalExact => 5e-6,
+        Scheme::MasslessBoundary => {
+            scene.settings.structures[0].damping_ratio = Some(0.3);
+            match massless_step(&scene) {
+                // The family `massless` looks at more of the range.
+                Some(step) => (0.9 * step).min(5e-6),
+                None => 5e-6,
+            }
+        }
+    };
+    Happened::of(Press::new(with_step(scene, step)).run())
+}
+
+/// Up to which share of the limit of closed contact, with how stiff a contact node and how much damping, does
+/// massless-boundary come to rest?
+fn massless() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for share in [0.2, 0.24, 0.26, 0.5, 0.7, 0.79] {
+        for exponent in 2..=7 {
+            for damping in [0.02, 0.3] {
+                let name = format!("massless/{share}-of-limit/tip-1e{exponent}/ξ={damping}");
+                let expected = Expected::either("static contact", ["massless-boundary", "internal step"]);
+                let work = move |_: &_| at_share(share, 10_f64.powi(exponent), damping);
+                cases.push(Case::new(name, expected, work).quick(exponent == 6 && damping > 0.1).within(300.0));
+            }
+        }
+    }
+    cases
+}
+
+fn at_share(share: f64, ratio: f64, damping: f64) -> Happened {
+    let mut tower = Tower { sectors: 2, ..Tower::default() };
+    tower.tip = ratio * 4e7 * tower.mass[1];
+    let mut scene = with_methods(round(tower.rom()), Scheme::MasslessBoundary, Solver::Lcp);
+    scene.settings.structures[0].damping_ratio = Some(damping);
+    // Closed, the base is held by both springs; modal-exact with the force a step late is stable while κ + cK < 4.
+    let open = tower.base[0] / tower.mass[0];
+    let closed = tower.tip / tower.mass[0];
+    let unstable = |step: f64| {
+        let sine = (0.5 * open.sqrt() * step).sin();
+        let kappa = 4.0 * sine * sine;
+        kappa + kappa / open * closed >= 4.0
+    };
+    let (mut low, mut high) = (0.0, 2.0 / closed.sqrt() * 1.5);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        *(if unstable(middle) { &mut high } else { &mut low }) = middle;
+    }
+    let mut press = Press::new(with_step(scene, share * low));
+    press.hold = 12e-3 * 0.3 / damping;
+    press.tolerance = 1e-4;
+    Happened::of(press.run())
+}

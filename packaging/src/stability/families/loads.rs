@@ -1,0 +1,345 @@
+//! Heat, nodal-diameter loads, coatings and casing shapes of any size.
+
+use std::f64::consts::{PI, TAU};
+
+use tiprub_core::{
+    Result, Scene, Simulation,
+    settings::{CoatingSettings, LoadSettings, Shape, Solver},
+};
+
+use super::super::{
+    Case, Check, Expected, Happened,
+    models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, blade, bumps, on_ring, ring, round, with_methods, with_step},
+    observe::{Watch, apart, displacements, real, set},
+};
+
+/// All of them.
+pub fn cases() -> Vec<Case> {
+    [loads(), coatings(), shapes()].into_iter().flatten().collect()
+}
+
+fn ringed() -> Scene {
+    let mut scene = round(Tower { slope: 0.0, ..Tower::default() }.rom());
+    on_ring(&mut scene, 0.03);
+    scene.settings.structures[1].thermal = true;
+    scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 0.0, phase: 0.0 });
+    scene.settings.outputs.slave_displacement = true;
+    // Far enough away for what the ring may do.
+    scene.settings.contacts[0].gap = 0.02;
+    with_step(scene, 2e-6)
+}
+
+fn loads() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for order in [1, 2, 3, 4] {
+        for amplitude in [5e-324, 1e-300, 1e-6, 1.0, 1e3, 1e5, 1e7, 1e9, 1e12, 1e100, 1e200, 1e308] {
+            for sign in [1.0, -1.0] {
+                let against = "static amplitude F π R/2 · (½)²·2/ω² of one pair of modes, linear in the load";
+                let expected = if amplitude > 1e9 {
+                    Expected::refused([""])
+                } else if amplitude > 1e5 {
+                    Expected::either(against, [""])
+                } else {
+                    Expected::right(against)
+                };
+                let work = move |_: &_| Happened::of(nodal(order, sign * amplitude));
+                let quick = order == 2 && sign > 0.0;
+                cases.push(
+                    Case::new(format!("loads/nodal/{order}/{:e}", sign * amplitude), expected, work).quick(quick),
+                );
+            }
+        }
+    }
+    for temperature in [1e-300, 1e-6, 1.0, -1.0, 300.0, 3000.0, -3000.0] {
+        let expected = Expected::right("static displacement under the modal loads, linear in the temperature");
+        let work = move |_: &_| Happened::of(heated(temperature));
+        cases.push(Case::new(format!("loads/heat/{temperature:e}"), expected, work).quick(true));
+    }
+    for temperature in [3001.0, 1e9, -1e308, f64::INFINITY] {
+        let work = move |_: &_| Happened::of(heated(temperature));
+        let expected = Expected::refused(["casing_temperature"]);
+        cases.push(Case::new(format!("loads/heat/{temperature:e}"), expected, work).quick(true));
+    }
+    for (scheme, name) in SCHEMES {
+        for step in ["load", "heat"] {
+            let expected = Expected::right("twice the static displacement after a sudden load, undamped; ledger");
+            let work = move |_: &_| {
+                let scene = with_methods(ringed(), scheme, Solver::Lcp);
+                Happened::of(sudden(scene, step))
+            };
+            cases.push(Case::new(format!("loads/sudden-{step}/{name}"), expected, work).quick(true));
+        }
+    }
+    cases
+}
+
+/// Radial amplitude of the ring's first ring of nodes.
+fn amplitude(simulation: &Simulation, order: u32) -> (f64, f64) {
+    let Some(row) = simulation.table().find("casing_displacement").map(|row| row.reference) else {
+        return (f64::NAN, f64::NAN);
+    };
+    let values: Vec<f64> = (0..36).map(|i| simulation.real(row + i).unwrap_or(f64::NAN)).collect();
+    let angle = |i: usize| f64::from(order) * TAU * i as f64 / 36.0;
+    let size = values.iter().enumerate().map(|(i, u)| u * angle(i).cos()).sum::<f64>() / 18.0;
+    let off = values.iter().enumerate().map(|(i, u)| (u - size * angle(i).cos()).abs()).fold(0.0, f64::max);
+    (size, off)
+}
+
+fn nodal(order: u32, size: f64) -> Result<Vec<Check>> {
+    let mut scene = ringed();
+    scene.settings.structures[1].load = Some(LoadSettings { order, amplitude: size, phase: 0.0 });
+    let mut simulation = Simulation::new(&scene)?;
+    simulation.initialise(0.0)?;
+    for _ in 0..20 {
+        simulation.do_step(simulation.time(), 2e-6)?;
+    }
+    let (found, off) = amplitude(&simulation, order);
+    // F cos² around R, on modes of amplitude ½: modal force ½ F π R, displacement ½ of it over ω².
+    let omega = TAU * [9000.0, 900.0, 400.0, 1100.0, 2100.0][order as usize];
+    let exact = 0.25 * size * PI * RADIUS / (omega * omega);
+    let energy = real(&simulation, "kinetic_energy");
+    Ok(vec![
+        Check::at_most("amplitude from the static one", (found - exact).abs() / exact.abs().max(1e-290), 1e-9),
+        Check::at_most("other shapes", off / exact.abs().max(1e-290), 1e-9),
+        Check::at_most("kinetic energy at rest", energy / real(&simulation, "strain_energy").max(1e-290), 1e-18),
+    ])
+}
+
+fn heated(temperature: f64) -> Result<Vec<Check>> {
+    let scene = ringed();
+    let mut simulation = Simulation::new(&scene)?;
+    set(&mut simulation, "casing_temperature", temperature)?;
+    simulation.initialise(0.0)?;
+    for _ in 0..20 {
+        simulation.do_step(simulation.time(), 2e-6)?;
+    }
+    let ring = ring();
+    let Some(loads) = ring.extras.thermal.as_ref().map(|thermal| &thermal.loads) else { return Ok(Vec::new()) };
+    let Some(row) = simulation.table().find("casing_displacement").map(|row| row.reference) else {
+        return Ok(Vec::new());
+    };
+    let exact = |node: usize| -> f64 {
+        (0..ring.order())
+            .map(|mode| {
+                ring.contact_map[(3 * node, mode)] * loads[(mode, 0)] * temperature / ring.stiffness[(mode, mode)]
+            })
+            .sum()
+    };
+    let (mut off, mut size) = (0.0_f64, 0.0_f64);
+    for (node, reference) in (0..108).zip(row..) {
+        size = size.max(exact(node).abs());
+        off = off.max((simulation.real(reference)? - exact(node)).abs());
+    }
+    Ok(vec![Check::at_most("displacement from the static one", off / size.max(1e-300), 1e-9)])
+}
+
+/// A load put on at once: without damping the ring swings to twice its static place and back.
+fn sudden(mut scene: Scene, what: &str) -> Result<Vec<Check>> {
+    scene.settings.structures[1].damping_ratio = Some(0.0);
+    let mut simulation = Simulation::new(&scene)?;
+    simulation.initialise(0.0)?;
+    let mut watch = Watch::new(&scene);
+    let omega = TAU * 400.0;
+    if what == "load" {
+        set(&mut simulation, "casing_load_amplitude", 1e5)?;
+    } else {
+        set(&mut simulation, "casing_temperature", 100.0)?;
+    }
+    let (mut most, mut work) = (0.0_f64, 0.0_f64);
+    for _ in 0..1300 {
+        watch.step(&mut simulation, 2e-6)?;
+        most = most.max(amplitude(&simulation, 2).0);
+        work = work.max(real(&simulation, "load_work"));
+    }
+    let mut checks = watch.books();
+    let energy = real(&simulation, "kinetic_energy") + real(&simulation, "strain_energy");
+    checks.push(Check::relative("energy is the work of the load", energy, real(&simulation, "load_work"), 1e-9));
+    checks.push(Check::so("the load did work", work > 0.0));
+    if what == "load" {
+        checks.push(Check::relative(
+            "twice the static amplitude",
+            most,
+            0.5 * 1e5 * PI * RADIUS / (omega * omega),
+            1e-3,
+        ));
+    }
+    Ok(checks)
+}
+
+fn coatings() -> Vec<Case> {
+    let mut cases = Vec::new();
+    let plain = CoatingSettings {
+        thickness: 1.5e-4,
+        modulus: 2e8,
+        yield_stress: 1e6,
+        hardening: 2e7,
+        cells_around: 500,
+        cells_along: 7,
+    };
+    type Change = fn(CoatingSettings) -> CoatingSettings;
+    let accepted: [(&str, Change); 13] = [
+        ("plain", |c| c),
+        ("zero-yield", |c| CoatingSettings { yield_stress: 0.0, ..c }),
+        ("no-hardening", |c| CoatingSettings { hardening: 0.0, ..c }),
+        ("zero-yield-no-hardening", |c| CoatingSettings { yield_stress: 0.0, hardening: 0.0, ..c }),
+        ("stiff", |c| CoatingSettings { modulus: 1e13, ..c }),
+        ("soft", |c| CoatingSettings { modulus: 1e-3, ..c }),
+        ("thin-1e-9", |c| CoatingSettings { thickness: 1e-9, ..c }),
+        ("thick", |c| CoatingSettings { thickness: 0.01, ..c }),
+        ("hard", |c| CoatingSettings { yield_stress: 1e13, hardening: 1e13, ..c }),
+        ("24-cells", |c| CoatingSettings { cells_around: 24, cells_along: 1, ..c }),
+        ("10000-cells", |c| CoatingSettings { cells_around: 1000, cells_along: 10, ..c }),
+        ("1e6-cells", |c| CoatingSettings { cells_around: 1000, cells_along: 1000, ..c }),
+        ("denormal", |c| CoatingSettings { modulus: 1e-310, yield_stress: 1e-310, hardening: 1e-310, ..c }),
+    ];
+    let refused: [(&str, &'static str, Change); 10] = [
+        ("thin-1e-300", "thickness", |c| CoatingSettings { thickness: 1e-300, ..c }),
+        ("1-cell", "cells", |c| CoatingSettings { cells_around: 1, cells_along: 1, ..c }),
+        ("23-cells", "cells", |c| CoatingSettings { cells_around: 23, ..c }),
+        ("no-rows", "cells_along", |c| CoatingSettings { cells_along: 0, ..c }),
+        ("1e18-cells", "cells", |c| CoatingSettings { cells_around: 1 << 30, cells_along: 1 << 30, ..c }),
+        ("no-thickness", "thickness", |c| CoatingSettings { thickness: 0.0, ..c }),
+        ("NaN-modulus", "modulus", |c| CoatingSettings { modulus: f64::NAN, ..c }),
+        ("negative-yield", "yield_stress", |c| CoatingSettings { yield_stress: -1.0, ..c }),
+        ("infinite-hardening", "hardening", |c| CoatingSettings { hardening: f64::INFINITY, ..c }),
+        ("1e308-modulus", "modulus", |c| CoatingSettings { modulus: 1e308, ..c }),
+    ];
+    for (scheme, scheme_name) in SCHEMES {
+        for (name, change) in accepted {
+            let coating = change(plain);
+            let work = move |_: &_| {
+                let mut scene = with_methods(round(blade(12)), scheme, Solver::Lcp);
+                scene.settings.contacts[0].coating = Some(coating);
+                Happened::of(worn(with_step(scene, 1e-6), coating))
+            };
+            let expected = Expected::right("wear only grows, ∫σdε ≥ Y V, signs of the ledger, hard casing not passed");
+            let quick = scheme_name == "exact";
+            cases.push(Case::new(format!("coating/{name}/{scheme_name}"), expected, work).quick(quick));
+        }
+    }
+    for (name, word, change) in refused {
+        let coating = change(plain);
+        let work = move |_: &_| {
+            let mut scene = with_methods(round(blade(12)), tiprub_core::settings::Scheme::ModalExact, Solver::Lcp);
+            scene.settings.contacts[0].coating = Some(coating);
+            Happened::of(worn(with_step(scene, 1e-6), coating))
+        };
+        cases.push(Case::new(format!("coating/{name}"), Expected::refused([word]), work).quick(true));
+    }
+    cases
+}
+
+fn worn(mut scene: Scene, coating: CoatingSettings) -> Result<Vec<Check>> {
+    scene.settings.contacts[0].friction = 0.15;
+    scene.settings.structures[0].damping_ratio = Some(0.05);
+    let mut simulation = Simulation::new(&scene)?;
+    simulation.initialise(0.0)?;
+    let mut watch = Watch::new(&scene);
+    let (mut before, mut fallen, mut deepest) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for index in 0..3000 {
+        // Down to three tenths of a coating of 0.15 mm, and back.
+        let swing = 0.5 - 0.5 * (TAU * f64::from(index) / 2000.0).cos();
+        set(&mut simulation, "casing_radius_change", -(GAP + 4.5e-5) * swing)?;
+        watch.step(&mut simulation, 1e-6)?;
+        let volume = real(&simulation, "worn_volume");
+        fallen = fallen.max(before - volume);
+        before = volume;
+        let system = simulation.system();
+        deepest = system.gaps().iter().fold(deepest, |most: f64, gap| most.max(-gap));
+    }
+    let energy = real(&simulation, "wear_energy");
+    let (yields, depth) = (coating.yield_stress, real(&simulation, "wear_depth_maximum"));
+    let most = (yields + coating.hardening * depth / coating.thickness) * before;
+    let massless = scene.settings.time.scheme == tiprub_core::settings::Scheme::MasslessBoundary;
+    let mut checks = watch.books_of(scene.settings.time.scheme);
+    if massless {
+        checks.retain(|check| !check.what.contains("impact"));
+    }
+    checks.extend([
+        Check::so("wear only grows", fallen <= 0.0),
+        Check::at_most("wear energy below Y V", (yields * before - energy) / most.max(1e-300), 1e-9),
+        Check::at_most("wear energy beyond (Y + K ε) V", (energy - most) / most.max(1e-300), 1e-9),
+        Check::at_most("deeper than the coating", (deepest - coating.thickness) / (GAP + coating.thickness), 1e-9),
+        if yields + coating.hardening > 0.0 {
+            Check::so("blades touched", watch.contacts > 0)
+        } else {
+            Check::so("worn without force", watch.contacts == 0 && before > 0.0 && energy == 0.0)
+        },
+    ]);
+    Ok(checks)
+}
+
+fn shapes() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (solver, name) in SOLVERS {
+        for width in [1e-3, 0.01, 0.05, 0.15, 0.25] {
+            for depth in [-1.0, 0.1, 0.51, 0.6, 1.0, 3.0, 30.0] {
+                let against = "the same with a fourth of the step";
+                let expected = Expected::either(against, [""]);
+                let shape = Shape::TwoLobe { depth, width, phase: 0.0 };
+                let work = move |_: &_| Happened::of(shaped(solver, shape.clone()));
+                let quick = solver == Solver::Lcp && (depth - 0.6).abs() < 0.2;
+                cases.push(
+                    Case::new(format!("shapes/two-lobe/w={width}/d={depth}/{name}"), expected, work).quick(quick),
+                );
+            }
+        }
+        for order in [1, 2, 7, 36, 72, 300, 10_000] {
+            let expected = Expected::either("the same with a fourth of the step", [""]);
+            let shape = Shape::Lobes { amplitude: 4e-4, order, phase: 0.3 };
+            let work = move |_: &_| Happened::of(shaped(solver, shape.clone()));
+            cases.push(Case::new(format!("shapes/lobes/{order}/{name}"), expected, work).quick(solver == Solver::Lcp));
+        }
+        for (what, height) in [("small", 3.8e-4), ("high", 4e-3), ("huge", 1.0)] {
+            let expected = Expected::either("the same with a fourth of the step", [""]);
+            let jump = move |index: usize| if index < 18 { -height } else { 0.0 };
+            let shape = Shape::Table { radius_change: (0..36).map(jump).collect() };
+            let work = move |_: &_| Happened::of(shaped(solver, shape.clone()));
+            cases.push(Case::new(format!("shapes/jump-{what}/{name}"), expected, work).quick(solver == Solver::Lcp));
+        }
+    }
+    cases
+}
+
+/// A rub on a shape against itself with finer steps, over the first contacts.
+fn shaped(solver: Solver, shape: Shape) -> Result<Vec<Check>> {
+    let run = |step: f64| -> Result<(Vec<f64>, Watch)> {
+        let mut scene =
+            with_step(with_methods(bumps(blade(6)), tiprub_core::settings::Scheme::ModalExact, solver), step);
+        scene.settings.surfaces[0].shape = shape.clone();
+        scene.settings.surfaces[0].ramp_time = 5e-4;
+        scene.settings.structures[0].damping_ratio = Some(0.05);
+        let mut simulation = Simulation::new(&scene)?;
+        simulation.initialise(0.0)?;
+        let mut watch = Watch::new(&scene);
+        let mut history = Vec::new();
+        for _ in 0..70 {
+            watch.step(&mut simulation, 1e-5)?;
+            history.extend(displacements(&simulation));
+        }
+        Ok((history, watch))
+    };
+    // A bump or a lobe takes at least two hundred steps to pass.
+    let feature = match shape {
+        Shape::TwoLobe { width, .. } => 2.0 * PI * width,
+        Shape::Lobes { order, .. } => TAU / f64::from(order.min(300)),
+        _ => TAU / 36.0,
+    };
+    let step = (feature / 1300.0 / 200.0).min(5e-7);
+    let (coarse, watch) = run(step)?;
+    let (fine, finer) = run(0.25 * step)?;
+    let mut checks = vec![
+        Check::at_most("displacements from a fourth of the step", apart(&coarse, &fine), 0.1),
+        Check::at_most(
+            "impulse from a fourth of the step",
+            (watch.impulse - finer.impulse).abs() / finer.impulse.max(1e-12),
+            0.1,
+        ),
+        watch.ledger(),
+        finer.ledger(),
+    ];
+    if solver != Solver::Film {
+        checks.extend(watch.complementarity());
+    }
+    Ok(checks)
+}

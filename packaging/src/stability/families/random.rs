@@ -1,0 +1,139 @@
+//! A hundred scenes of random parameters within their documented ranges, each held against mechanics and a finer step.
+
+use tiprub_core::{
+    Result, Scene, Simulation,
+    settings::{Scheme, Shape, Solver},
+};
+
+use super::super::{
+    Case, Check, Expected, Happened,
+    models::{GAP, Random, SCHEMES, SOLVERS, Tower, blade, on_ring, round, with_methods, with_step},
+    observe::{MASSLESS_RETURN, Watch, apart, displacements, set},
+};
+
+/// Scenes in the quick table and in the full one.
+const COUNT: [u64; 2] = [12, 100];
+
+/// All of them.
+pub fn cases() -> Vec<Case> {
+    let case = |index: u64| {
+        let against = "signs of the ledger, complementarity, the same with a fourth of the step";
+        let expected = Expected::either(against, ["refused"]);
+        Case::new(format!("random/{index:03}"), expected, move |_| happened(index))
+            .quick(index < COUNT[0])
+            .within(300.0)
+    };
+    (0..COUNT[1]).map(case).collect()
+}
+
+/// Scene, and by how much and how fast the casing swings (m, rad/s).
+fn scene(index: u64) -> (Scene, f64, f64) {
+    let mut random = Random(0x9e37_79b9_7f4a_7c15 ^ (index + 1).wrapping_mul(0xd134_2543_de82_ef95));
+    for _ in 0..8 {
+        random.unit();
+    }
+    let sectors = random.of(&[1_usize, 2, 3, 4, 6]);
+    let rom = match random.of(&[0, 1, 2]) {
+        0 => blade(sectors),
+        kind => Tower {
+            sectors,
+            mass: [random.scale(0.01, 1.0), random.scale(1e-4, 5e-3)],
+            base: [random.scale(1e6, 1e8), random.scale(1e6, 1e8), random.scale(1e6, 1e8)],
+            tip: random.scale(1e7, 1e9),
+            turned: random.within(-0.5, 0.5),
+            slope: random.within(-0.5, 0.5),
+            neighbour: if kind == 2 && sectors > 1 { random.scale(1e4, 1e7) } else { 0.0 },
+            ..Tower::default()
+        }
+        .rom(),
+    };
+    let (scheme, solver) = (random.of(&SCHEMES).0, random.of(&SOLVERS).0);
+    let mut scene = with_methods(round(rom), scheme, solver);
+    scene.settings.contacts[0].gap = random.scale(1e-5, 1e-3);
+    scene.settings.contacts[0].friction = random.of(&[0.0, 0.05, 0.15, 0.3, 0.6]);
+    scene.settings.structures[0].speed = random.of(&[1.0, -1.0]) * random.scale(100.0, 3000.0);
+    scene.settings.structures[0].damping_ratio = Some(random.scale(1e-3, 0.5));
+    if random.unit() < 0.3 {
+        let gap = scene.settings.contacts[0].gap;
+        let order = random.of(&[1_u32, 2, 3, 5]);
+        scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 0.5 * gap, order, phase: random.within(0.0, 6.0) };
+    }
+    if random.unit() < 0.2 {
+        on_ring(&mut scene, random.scale(1e-3, 0.3));
+    }
+    let step = random.scale(2e-7, 2e-6);
+    let swing =
+        scene.settings.contacts[0].gap * random.within(1.05, 1.6).min(1.0 + 1e-4 / scene.settings.contacts[0].gap);
+    (with_step(scene, step), swing, random.scale(2000.0, 20_000.0))
+}
+
+fn happened(index: u64) -> Happened {
+    let (scene, ..) = scene(index);
+    let contact = &scene.settings.contacts[0];
+    let remark = format!(
+        "{:?}, {:?}, {} sectors of {}, µ = {}, h = {:.1e} s",
+        scene.settings.time.scheme,
+        contact.solver,
+        scene.roms[0].sectors,
+        scene.roms[0].name,
+        contact.friction,
+        scene.settings.time.step
+    );
+    Happened::of(checked(index)).remark(remark)
+}
+
+fn checked(index: u64) -> Result<Vec<Check>> {
+    let (scene, ..) = scene(index);
+    let massless = scene.settings.time.scheme == Scheme::MasslessBoundary;
+    let (coarse, watch) = run(index, 1.0)?;
+    let (fine, finer) = run(index, 0.25)?;
+    let (finest, _) = run(index, 0.0625)?;
+    let (error, better) = (apart(&coarse, &finest), apart(&fine, &finest));
+    let mut checks = vec![
+        Check::so("the blades touched", watch.contacts > 0 && finer.contacts > 0),
+        // Coarse steps may be coarse; they must come nearer as they get finer.
+        Check::at_most(
+            "displacements with h/4 from those with h/16, and against h",
+            better.min(better / error.max(1e-9) * 0.1),
+            if massless { 0.1 } else { 0.05 },
+        ),
+        watch.ledger(),
+        finer.ledger(),
+        Check::so("all outputs finite", watch.finite),
+    ];
+    if scene.settings.contacts[0].solver != Solver::Film {
+        checks.extend(watch.complementarity());
+        let most = if massless { MASSLESS_RETURN } else { 1e-9 };
+        checks.push(Check::at_most("impact loss falls by", watch.impact_drop(), most));
+    }
+    // Film and lcp turn the friction of a node that sticks for a moment with its vibration.
+    let sticks = scene.settings.contacts[0].solver == Solver::Coulomb && !massless;
+    checks.push(Check::at_most("friction heat falls by", watch.heat_drop(), if sticks { 1e-9 } else { 1e-2 }));
+    Ok(checks)
+}
+
+/// 1.5 ms with the step times `factor`; displacements every 50 µs.
+fn run(index: u64, factor: f64) -> Result<(Vec<f64>, Watch)> {
+    let (mut scene, swing, rate) = scene(index);
+    scene.settings.time.step *= factor;
+    scene.settings.experiment.communication_step = 1e-5;
+    let mut simulation = Simulation::new(&scene)?;
+    simulation.initialise(0.0)?;
+    let mut watch = Watch::new(&scene);
+    watch.scale = watch.scale.max(GAP);
+    let mut history = Vec::new();
+    for index in 0..150 {
+        let time = 1e-5 * f64::from(index);
+        let place = |time: f64| -swing * 0.5 * (1.0 - (rate * time).cos());
+        // Linear within the communication step, so that all step sizes see the same casing.
+        set(&mut simulation, "casing_radius_change", place(time))?;
+        if let Some(row) = simulation.table().find("casing_radius_change").map(|row| row.reference) {
+            simulation.set_input_derivative(row, 1, (place(time + 1e-5) - place(time)) / 1e-5)?;
+        }
+        watch.step_moving(&mut simulation, 1e-5)?;
+        if index % 5 == 4 {
+            history.extend(displacements(&simulation));
+        }
+    }
+    Ok((history, watch))
+}

@@ -1,0 +1,260 @@
+//! What is watched while a simulation runs, each time from the state and not from what the solver said.
+
+use tiprub_core::{
+    Result, Simulation,
+    contact::gap::GapLaw,
+    settings::{Scheme, Shape},
+};
+
+use super::Check;
+
+/// Largest share of the energy exchanged that massless-boundary may give back in one step: its warning names it.
+pub const MASSLESS_RETURN: f64 = 2e-2;
+
+/// Value of a real variable that the scene has.
+pub fn real(simulation: &Simulation, name: &str) -> f64 {
+    let row = simulation.table().find(name);
+    row.and_then(|row| simulation.real(row.reference).ok()).unwrap_or(f64::NAN)
+}
+
+/// Set the first element of a real variable; a variable that is not there is left alone.
+///
+/// # Errors
+/// The value is refused.
+pub fn set(simulation: &mut Simulation, name: &str, value: f64) -> Result<()> {
+    let Some(reference) = simulation.table().find(name).map(|row| row.reference) else { return Ok(()) };
+    simulation.set_real(reference, value)
+}
+
+/// All numeric outputs, to compare two runs bit by bit.
+pub fn outputs(simulation: &Simulation) -> Vec<f64> {
+    let mut values = Vec::new();
+    for variable in simulation.table().variables() {
+        for reference in (variable.reference..).take(variable.len()) {
+            if let Ok(value) = simulation.real(reference) {
+                values.push(value);
+            }
+        }
+    }
+    values
+}
+
+/// The same as bits.
+pub fn bits(simulation: &Simulation) -> Vec<u64> {
+    outputs(simulation).into_iter().map(f64::to_bits).collect()
+}
+
+/// Largest of everything that should be small, over a run.
+#[derive(Debug, Clone)]
+pub struct Watch {
+    sectors: usize,
+    slopes: Vec<f64>,
+    clearances: Vec<f64>,
+    /// Gaps follow from displacements and radius alone: rigid, round, on springs of any kind.
+    round: bool,
+    /// Lengths are compared with this (m).
+    pub scale: f64,
+    largest: f64,
+    adhesion: f64,
+    penetration: f64,
+    product: f64,
+    again: f64,
+    residual: f64,
+    impact_drop: f64,
+    heat_drop: f64,
+    before: [f64; 2],
+    /// Energy exchanged so far (J).
+    exchanged: f64,
+    /// Contacts of all internal steps.
+    pub contacts: u64,
+    /// ∫Σλ dt (N·s).
+    pub impulse: f64,
+    /// All outputs were finite.
+    pub finite: bool,
+}
+
+impl Watch {
+    /// Before the first step of an initialised simulation of `scene`.
+    pub fn new(scene: &tiprub_core::Scene) -> Self {
+        let (contact, rom) = (&scene.settings.contacts[0], &scene.roms[0]);
+        let clearances =
+            if contact.sector_gaps.is_empty() { vec![contact.gap; rom.sectors] } else { contact.sector_gaps.clone() };
+        let surface = &scene.settings.surfaces[0];
+        let rotor = &scene.settings.structures[0];
+        Self {
+            sectors: rom.sectors,
+            slopes: rom.contact_nodes.iter().map(|node| node.meridional_slope).collect(),
+            scale: clearances.iter().fold(0.0, |most: f64, gap| most.max(*gap)),
+            clearances,
+            round: surface.shape == (Shape::Circular {})
+                && surface.structure.is_none()
+                && surface.spline.is_none()
+                && !rotor.whirl
+                && !rotor.axial_shift,
+            largest: 0.0,
+            adhesion: 0.0,
+            penetration: 0.0,
+            product: 0.0,
+            again: 0.0,
+            residual: 0.0,
+            impact_drop: 0.0,
+            heat_drop: 0.0,
+            before: [0.0; 2],
+            exchanged: 0.0,
+            contacts: 0,
+            impulse: 0.0,
+            finite: true,
+        }
+    }
+
+    /// One communication step, watched after every internal one.
+    ///
+    /// # Errors
+    /// The step is refused.
+    pub fn step(&mut self, simulation: &mut Simulation, length: f64) -> Result<()> {
+        simulation.begin_step(simulation.time(), length)?;
+        loop {
+            let progress = simulation.advance()?;
+            self.look(simulation);
+            if progress.finished {
+                break;
+            }
+        }
+        self.look_at_books(simulation);
+        self.finite &= outputs(simulation).iter().all(|value| value.is_finite());
+        Ok(())
+    }
+
+    /// The same while inputs change within the step: gaps are not evaluated again.
+    ///
+    /// # Errors
+    /// The step is refused.
+    pub fn step_moving(&mut self, simulation: &mut Simulation, length: f64) -> Result<()> {
+        self.round = false;
+        self.step(simulation, length)
+    }
+
+    fn look(&mut self, simulation: &Simulation) {
+        let system = simulation.system();
+        self.contacts += system.events().len() as u64;
+        let sum: f64 = system.events().iter().map(|event| event.normal).sum();
+        self.impulse += sum * system.bank().step();
+        self.largest = system.events().iter().fold(self.largest, |most, event| most.max(event.normal));
+        let opening = if self.round { open(simulation) } else { f64::NAN };
+        for node in 0..self.slopes.len() {
+            for sector in 0..self.sectors {
+                let (gap, multiplier) = (system.gap(node, sector), system.multiplier(node, sector));
+                self.penetration = worse(self.penetration, -gap / self.scale);
+                if self.largest > f64::MIN_POSITIVE {
+                    self.adhesion = worse(self.adhesion, -multiplier / self.largest);
+                    self.product = worse(self.product, (multiplier / self.largest * (gap / self.scale)).abs());
+                }
+                if self.round {
+                    let moved = |i: usize| system.bank().row(3 * node + i, sector);
+                    let slope = self.slopes[node];
+                    let radial = self.clearances[sector] + opening - moved(0) + slope * moved(2);
+                    let found = radial / (1.0 + slope * slope).sqrt();
+                    self.again = worse(self.again, (found - gap).abs() / self.scale);
+                }
+            }
+        }
+    }
+
+    fn look_at_books(&mut self, simulation: &Simulation) {
+        let ledger = simulation.system().ledger();
+        let (kinetic, strain) = simulation.system().energies();
+        let scale = ledger.scale();
+        if scale > 0.0 {
+            self.residual = worse(self.residual, ledger.residual(kinetic + strain).abs() / scale);
+            let now = [ledger.impact_loss.value(), ledger.friction_loss.value()];
+            self.impact_drop = worse(self.impact_drop, self.before[0] - now[0]);
+            self.heat_drop = worse(self.heat_drop, self.before[1] - now[1]);
+            self.before = now;
+            self.exchanged = scale;
+        }
+    }
+
+    /// Books that close, and entries that have their physical signs: contact takes energy, friction heats.
+    pub fn books(&self) -> Vec<Check> {
+        vec![
+            Check::so("all outputs finite", self.finite),
+            Check::at_most("ledger residual", self.residual, 1e-9),
+            Check::at_most("impact loss falls by", self.impact_drop(), 1e-9),
+            Check::at_most("friction heat falls by", self.heat_drop(), 1e-9),
+        ]
+    }
+
+    /// The same for a scheme: massless-boundary takes contact forces a step late, and gives back a little of what it took.
+    pub fn books_of(&self, scheme: Scheme) -> Vec<Check> {
+        let mut checks = self.books();
+        if scheme == Scheme::MasslessBoundary {
+            checks[2].bound = MASSLESS_RETURN;
+        }
+        checks
+    }
+
+    /// The ledger alone.
+    pub fn ledger(&self) -> Check {
+        Check::at_most("ledger residual", self.residual, 1e-9)
+    }
+
+    /// How far the impact loss fell in a communication step, relative to the energy exchanged in all.
+    pub fn impact_drop(&self) -> f64 {
+        self.share(self.impact_drop)
+    }
+
+    /// The same of the friction heat.
+    pub fn heat_drop(&self) -> f64 {
+        self.share(self.heat_drop)
+    }
+
+    fn share(&self, energy: f64) -> f64 {
+        if energy > 0.0 { energy / self.exchanged } else { energy }
+    }
+
+    /// λ ≥ 0, g ≥ 0, λg = 0 at every internal step, and g again from the displacements.
+    pub fn complementarity(&self) -> Vec<Check> {
+        let mut checks = vec![
+            Check::at_most("adhesion", self.adhesion, 1e-10),
+            Check::at_most("penetration", self.penetration, 1e-10),
+            Check::at_most("λg", self.product, 1e-10),
+        ];
+        if self.round {
+            checks.push(Check::at_most("gap again from displacements", self.again, 1e-9));
+        }
+        checks
+    }
+}
+
+/// The larger one; not-a-number sticks.
+fn worse(before: f64, now: f64) -> f64 {
+    if before >= now || before.is_nan() { before } else { now }
+}
+
+/// What the round casing stands further away than in the scene (m).
+fn open(simulation: &Simulation) -> f64 {
+    let change = real(simulation, "casing_radius_change");
+    real(simulation, "gap_offset") + if change.is_nan() { 0.0 } else { change }
+}
+
+/// Largest difference of two histories of displacements relative to the largest of the second.
+pub fn apart(first: &[f64], second: &[f64]) -> f64 {
+    let largest = second.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    let square = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
+    if largest == 0.0 || first.len() != second.len() {
+        return if first == second { 0.0 } else { f64::INFINITY };
+    }
+    let off = square(&mut first.iter().zip(second).map(|(a, b)| (a - b) / largest));
+    (off / square(&mut second.iter().map(|value| value / largest))).sqrt()
+}
+
+/// Displacements of all contact nodes of the sectors (m).
+pub fn displacements(simulation: &Simulation) -> Vec<f64> {
+    let system = simulation.system();
+    let rows = 3 * nodes(system.law());
+    (0..system.bank().sectors()).flat_map(|sector| (0..rows).map(move |row| system.bank().row(row, sector))).collect()
+}
+
+fn nodes(law: &GapLaw) -> usize {
+    law.nodes()
+}

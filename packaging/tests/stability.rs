@@ -1,0 +1,58 @@
+//! `tiprub stability --quick`: every case right or refused as it should be; and the proof that the judge sees what is not.
+
+use std::{path::Path, process::Command};
+
+use serde_json::Value;
+
+fn stability(root: &Path, arguments: &[&str]) -> Value {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+    command.current_dir(root).args(["--json", "--quiet", "stability", "--out", "out"]).args(arguments);
+    // A library built elsewhere is tested where one is named; else the program builds one.
+    if let Some(library) = std::env::var_os("TIPRUB_LIBRARY") {
+        command.arg("--library").arg(library);
+    }
+    let output = command.env("TIPRUB_CACHE", env!("CARGO_TARGET_TMPDIR")).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn every_quick_case_is_right_or_refused() {
+    let root = tempfile::tempdir().unwrap();
+    let json = stability(root.path(), &["--quick"]);
+    for row in json["rows"].as_array().unwrap() {
+        assert!(["right", "refused"].contains(&row["verdict"].as_str().unwrap()), "{row:#}");
+    }
+    let count = |verdict: &str| json["counts"][verdict].as_u64().unwrap();
+    let total = json["cases"].as_u64().unwrap();
+    assert_eq!((count("wrong"), count("crashed"), count("hung")), (0, 0, 0));
+    assert_eq!(count("right") + count("refused"), total);
+    assert!(total > 600 && count("right") > 250 && count("refused") > 250, "{}", json["counts"]);
+    for name in ["index.html", "stability.csv", "stability.md", "results.json"] {
+        assert!(root.path().join("out").join(name).metadata().unwrap().len() > 10_000, "{name}");
+    }
+}
+
+#[test]
+fn the_judge_sees_every_way_to_fail() {
+    let root = tempfile::tempdir().unwrap();
+    let json = stability(root.path(), &["--case", "judge/"]);
+    let verdict = |name: &str| {
+        let rows = json["rows"].as_array().unwrap();
+        let row = rows.iter().find(|row| row["case"] == format!("judge/{name}")).unwrap();
+        row["verdict"].as_str().unwrap().to_owned()
+    };
+    for (name, expected) in [
+        ("wrong", "WRONG"),
+        ("refused", "WRONG"),
+        ("not-refused", "WRONG"),
+        ("unnamed", "WRONG"),
+        ("panic", "CRASHED"),
+        ("abort", "CRASHED"),
+        ("overflow", "CRASHED"),
+        ("exit", "CRASHED"),
+        ("hang", "HUNG"),
+    ] {
+        assert_eq!(verdict(name), expected, "{name}");
+    }
+}
