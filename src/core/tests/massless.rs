@@ -132,16 +132,37 @@ fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
     (most, (last[1] - last[0]) / most)
 }
 
-/// Above the limit that is computed closed contact grows without bound; with damping, which lowers the limit, it does not come
-/// to rest any more (where it opens, damping keeps it bounded).
+/// Above the limit that is computed closed contact grows without bound, below it stays.
 #[test]
 fn closed_contact_is_stable_up_to_the_limit_and_not_beyond() {
     let (stable, unstable) = (pressed(0.0, 0.8).0, pressed(0.0, 1.1).0);
     println!("largest energy {stable:.1e} J below, {unstable:.1e} J above");
-    assert!(unstable > 1e3 * stable);
-    for damping_ratio in [0.05, 0.3] {
-        let (rest, restless) = (pressed(damping_ratio, 0.7).1, pressed(damping_ratio, 1.05).1);
-        println!("ξ = {damping_ratio}: energy changes by {rest:.1e} below, {restless:.1e} above");
-        assert!(rest < 1e-9 && restless > 1e-3, "ξ = {damping_ratio}");
+    assert!(unstable > 1e3 * stable && pressed(0.05, 0.7).1 < 1e-9 && pressed(0.05, 1.05).1 > 1e-3);
+}
+
+/// One mode with inertia on the residual flexibility of a node: q⁺ = (1 + β − S)q − βq⁻ with S = κ + c K. Damping lowers β, and
+/// with it the S up to which both roots stay within the unit circle.
+#[test]
+fn damping_is_part_of_the_limit() {
+    let (frequency, fixed) = (2e4, 5e4);
+    for damping_ratio in [0.0, 0.1, 0.3, 0.6] {
+        let model = ModalModel {
+            frequencies: vec![frequency, fixed, fixed, fixed],
+            damping_ratios: vec![damping_ratio; 4],
+            contact_modes: DMatrix::from_row_slice(3, 4, &[1., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.]),
+            shapes: DMatrix::identity(4, 4),
+            quasi_static: 3,
+        };
+        let check = MasslessCheck { model: &model, normals: vec![[-1.0, 0.0, 0.0]], slave: None };
+        let limit = check.limit(1.0).unwrap().closed;
+        let radius = |step: f64| {
+            let mode = model.coefficient(0, 1.0, Scheme::MasslessBoundary, step);
+            let sum = 1.0 + mode.beta - mode.kappa - mode.delayed * fixed * fixed;
+            let root = sum * sum - 4.0 * mode.beta;
+            if root < 0.0 { mode.beta.sqrt() } else { 0.5 * (sum.abs() + root.sqrt()) }
+        };
+        let (below, above) = (radius(0.99 * limit), radius(1.01 * limit));
+        println!("ξ = {damping_ratio}: limit {limit:.3e} s, largest root {below:.4} below, {above:.4} above");
+        assert!(below < 1.0 + 1e-12 && above > 1.0, "ξ = {damping_ratio}");
     }
 }
