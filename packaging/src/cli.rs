@@ -75,9 +75,10 @@ pub enum Command {
                             tiprub inspect scene.toml --json\n  tiprub inspect builtin:flexible-casing"
     )]
     Inspect(InspectArguments),
-    /// Studies of the scenes that ship: pictures, numbers, and whether they show what they should.
+    /// Studies of the models that ship, or of a scene: pictures, numbers, and whether they show what they should.
     #[command(after_help = "Examples:\n  tiprub study stage --quick\n  tiprub study convergence --out convergence\n  \
-                            tiprub study modes --speed 1500\n  tiprub study stage --speeds 400:1600:25 --out stage\n  tiprub study error --scene carpenter\n\n\
+                            tiprub study modes --speed 1500\n  tiprub study stage --speeds 400:1600:25 --out stage\n  \
+                            tiprub study map scene.toml --speeds 1200:1500:61\n  tiprub study error --scene carpenter\n\n\
                             DIR then holds index.html (opens offline), an SVG and a CSV per figure, and results.json.")]
     Study(StudyArguments),
 }
@@ -205,6 +206,9 @@ pub struct StudyArguments {
     /// What to study.
     #[arg(value_name = "STUDY", value_enum)]
     pub study: StudyChoice,
+    /// Of `map`: scene file (TOML), or one that ships [default: builtin:rotor37].
+    #[arg(value_name = "SCENE")]
+    pub scene: Option<String>,
     /// Directory for everything the study writes; made if missing [default: study-STUDY].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -215,16 +219,27 @@ pub struct StudyArguments {
     /// 2].
     #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true)]
     pub speed: Option<f64>,
-    /// Of `stage`: angular velocities (rad/s), from, to and how many [default: 0.5 to 1.5 times the one where an oval
-    /// casing meets the first mode of nodal diameter 2].
+    /// Of `stage` and `map`: angular velocities (rad/s), from, to and how many [default: of `stage` 0.5 to 1.5 times the one
+    /// where an oval casing meets the first mode of nodal diameter 2; of `map` 81 from 0.8 to 1.2 times the one where twice the
+    /// casing's lowest engine order meets the first mode].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = speeds)]
     pub speeds: Option<Speeds>,
-    /// Of `stage`: runs at the same time [default: one per processor].
+    /// Of `stage` and `map`: runs at the same time [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
     /// Of `error`: only this scene; may be given several times.
-    #[arg(long, value_name = "SCENE", value_enum)]
-    pub scene: Vec<ErrorScene>,
+    #[arg(long = "scene", value_name = "NAME", value_enum)]
+    pub error_scenes: Vec<ErrorScene>,
+    /// Of `map`: revolutions whose motion is transformed; the bins of the spectra are the N-th part of the rotational
+    /// frequency apart [default: 64].
+    #[arg(long, value_name = "N")]
+    pub revolutions: Option<std::num::NonZero<usize>>,
+    /// Of `map`: revolutions that pass before [default: the casing's ramp and five decay times of the first mode, 20 to 400].
+    #[arg(long, value_name = "N")]
+    pub transient: Option<usize>,
+    /// Of `map`: start value of an input or parameter, such as friction_coefficient=0 or gap_offset=1e-5; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
+    pub set: Vec<(String, String)>,
     /// Where built-in models are kept.
     #[command(flatten)]
     pub cache: CacheArguments,
@@ -264,6 +279,8 @@ pub enum StudyChoice {
     Stage,
     /// Error against run time of every scheme and solver, beside independent methods.
     Error,
+    /// Amplitudes of rubbing blades over angular velocity and frequency, with engine orders and natural frequencies.
+    Map,
 }
 
 /// A range of angular velocities (rad/s).
@@ -453,7 +470,7 @@ mod tests {
             ("reduce casing --contact-axial 0.1:0.1", "FROM:TO"),
             ("study stage --speeds 100:50:4", "FROM:TO:COUNT"),
             ("study stage --speeds 100:500", "FROM:TO:COUNT"),
-            ("study tip", "possible values: convergence, modes, stage"),
+            ("study tip", "possible values: convergence, modes, stage, map"),
             ("reduce casing --support left", "possible values: low, high, both, free"),
         ] {
             let error = parse(line).unwrap_err();

@@ -96,7 +96,7 @@ impl Outputs {
 }
 
 /// Set a start value by name: a scalar, one element `name[i]`, or all elements of an array at once.
-fn set(simulation: &mut Simulation, name: &str, text: &str) -> Result<()> {
+pub(crate) fn set(simulation: &mut Simulation, name: &str, text: &str) -> Result<()> {
     let (kind, references) = locate(simulation.table(), name)?;
     let option = format!("--set {name}={text}");
     for reference in references {

@@ -139,7 +139,7 @@ pub fn ring() -> Rom {
                     })
                     .collect(),
             }),
-            grid: Some(ContactGrid { around, along }),
+            grid: Some(ContactGrid { around, along, closed: true }),
             harmonics: Vec::new(),
         },
     }

@@ -84,7 +84,7 @@ fn ring() -> Rom {
                 loads: DMatrix::from_fn(5, 4, |mode, patch| if mode == 0 { 200.0 } else { (mode + patch) as f64 }),
                 patches: (0..4).map(|patch| Patch { angle: quarter(patch), axial: [-0.02, 0.06] }).collect(),
             }),
-            grid: Some(ContactGrid { around, along }),
+            grid: Some(ContactGrid { around, along, closed: true }),
             harmonics: Vec::new(),
         },
     }

@@ -199,6 +199,10 @@ fn scene_text(settings: &SceneSettings) -> String {
                 format!("speed {} rad/s ({:.1} rpm)", structure.speed, structure.speed * 30.0 / std::f64::consts::PI)
             }
             Motion::Still => "stands still".into(),
+            Motion::Free => {
+                let [x, y, z] = structure.velocity;
+                format!("flies freely, starts at {x}, {y}, {z} m/s")
+            }
         };
         let _ = writeln!(
             text,

@@ -1,4 +1,4 @@
-//! `tiprub study`: a question about the stage that ships, answered with pictures and numbers.
+//! `tiprub study`: a question about a model that ships, or about a scene, answered with pictures and numbers.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use crate::{
     builtin::DiskModel,
     cli::{StudyArguments, StudyChoice},
     console::{Console, Outcome},
-    study::{self, convergence, error, modes, stage},
+    study::{self, convergence, error, map, modes, stage},
 };
 
 /// Study, write, sum up.
@@ -28,6 +28,7 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
         }
         StudyChoice::Stage => ("stage", stage::study(arguments, console)?),
         StudyChoice::Error => ("error", error::study(arguments, console)?),
+        StudyChoice::Map => ("map", map::study(arguments, console)?),
     };
     let directory = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("study-{name}")));
     study::output::write(&study, &directory)
@@ -35,14 +36,18 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
 
 /// Options of another study would be passed over in silence.
 fn refuse_other_options(arguments: &StudyArguments) -> Result<()> {
-    let asked = arguments.study;
-    let given = [
-        ("--speed", arguments.speed.is_some(), StudyChoice::Modes, "modes"),
-        ("--speeds", arguments.speeds.is_some(), StudyChoice::Stage, "stage"),
-        ("--scene", !arguments.scene.is_empty(), StudyChoice::Error, "error"),
-        ("--threads", arguments.threads.is_some(), StudyChoice::Stage, "stage"),
+    use StudyChoice::{Error, Map, Modes, Stage};
+    let given: [(&str, bool, &[StudyChoice], &str); 8] = [
+        ("--speed", arguments.speed.is_some(), &[Modes], "modes"),
+        ("--speeds", arguments.speeds.is_some(), &[Stage, Map], "stage` and `study map"),
+        ("--threads", arguments.threads.is_some(), &[Stage, Map], "stage` and `study map"),
+        ("--scene", !arguments.error_scenes.is_empty(), &[Error], "error"),
+        ("SCENE", arguments.scene.is_some(), &[Map], "map"),
+        ("--revolutions", arguments.revolutions.is_some(), &[Map], "map"),
+        ("--transient", arguments.transient.is_some(), &[Map], "map"),
+        ("--set", !arguments.set.is_empty(), &[Map], "map"),
     ];
-    match given.into_iter().find(|(_, given, study, _)| *given && *study != asked) {
+    match given.into_iter().find(|(_, given, studies, _)| *given && !studies.contains(&arguments.study)) {
         Some((option, _, _, name)) => {
             Err(Failure::usage(option, format!("it belongs to `study {name}`"), "Leave it out"))
         }
@@ -67,6 +72,11 @@ mod tests {
             ("error --scene carpenter --scene rotor37-light", None),
             ("modes --scene carpenter", Some("--scene")),
             ("convergence --threads 2", Some("--threads")),
+            ("map scene.toml --speeds 400:900:3 --threads 1 --revolutions 8 --transient 0 --set a=1", None),
+            ("stage scene.toml", Some("SCENE")),
+            ("stage --revolutions 8", Some("--revolutions")),
+            ("modes --transient 8", Some("--transient")),
+            ("convergence --set a=1", Some("--set")),
         ] {
             let words = ["tiprub", "study"].into_iter().chain(line.split(' '));
             let Ok(Cli { command: Command::Study(arguments), .. }) = Cli::try_parse_from(words) else {

@@ -6,6 +6,7 @@
 
 pub mod convergence;
 pub mod error;
+pub mod map;
 pub mod modes;
 pub mod output;
 pub mod stage;

@@ -6,6 +6,7 @@
 //! per nodal diameter ([`Harmonic`]). `sectors = 1` is a single general structure.
 
 mod cyclic;
+mod grid;
 
 use nalgebra::DMatrix;
 
@@ -92,14 +93,20 @@ pub struct Thermal {
     pub patches: Vec<Patch>,
 }
 
-/// Contact nodes that form a grid on a closed ring: node `along · around + i` is the i-th of ring `along`, rings in
-/// order of growing z, nodes of a ring at growing angles 2π/around apart.
+/// Contact nodes that form a grid: node `along · around + i` is the i-th of row `along`.
+///
+/// A closed grid is a ring around the z axis in a cylindrical frame: rows (rings) in order of growing z, nodes of a ring at
+/// growing angles 2π/around apart, at least 4 × 2. An open one is a quadrilateral grid of any shape in a Cartesian frame with
+/// four free edges, at least 2 × 2; with s growing along a row and t from row to row, the surface S(s, t) through its nodes
+/// is met from the side that S_t × S_s points to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ContactGrid {
-    /// Nodes around the circumference.
+    /// Nodes of a row: around the circumference where the grid is closed.
     pub around: usize,
-    /// Rings along the axis.
+    /// Rows: rings along the axis where the grid is closed.
     pub along: usize,
+    /// The last node of a row is followed by its first.
+    pub closed: bool,
 }
 
 /// What only some structures have and only some scenes need.
@@ -226,7 +233,7 @@ impl Rom {
         self.validate_definiteness(remedy)?;
         self.validate_spin(remedy)?;
         self.validate_thermal(remedy)?;
-        self.validate_grid(remedy)?;
+        self.validate_grid()?;
         self.validate_harmonics(remedy)
     }
 
@@ -284,35 +291,6 @@ impl Rom {
                     format!("angles {:?} rad and axial positions {:?} m are no patch", patch.angle, patch.axial),
                     remedy,
                 ));
-            }
-        }
-        Ok(())
-    }
-
-    fn validate_grid(&self, remedy: &str) -> Result<()> {
-        let Some(grid) = self.extras.grid else { return Ok(()) };
-        let refuse = |problem: String| Err(Error::invalid("ROM metadata `contact_grid`", problem, remedy));
-        if self.frame != Frame::Cylindrical || self.sectors != 1 {
-            return refuse("a contact grid needs a cylindrical frame and one sector".to_owned());
-        }
-        if grid.around.checked_mul(grid.along) != Some(self.contact_nodes.len()) || grid.around < 4 || grid.along < 2 {
-            let nodes = self.contact_nodes.len();
-            return refuse(format!("{} around x {} along, at least 4 x 2 of {nodes} nodes", grid.around, grid.along));
-        }
-        #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
-        let step = std::f64::consts::TAU / grid.around as f64;
-        for (along, ring) in self.contact_nodes.chunks(grid.around).enumerate() {
-            let (first, axial) = (self.contact_nodes[0].position[1], ring[0].position[2]);
-            for (i, node) in ring.iter().enumerate() {
-                #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
-                let turns = (node.position[1] - first - step * i as f64) / std::f64::consts::TAU;
-                let off = (turns - turns.round()).abs() * std::f64::consts::TAU;
-                if off > 1e-3 * step || (node.position[2] - axial).abs() > 1e-3 * step * node.position[0] {
-                    return refuse(format!("node {} of ring {} is not at its place of the grid", i + 1, along + 1));
-                }
-            }
-            if along > 0 && axial <= self.contact_nodes[(along - 1) * grid.around].position[2] {
-                return refuse(format!("ring {} does not lie beyond ring {along} in z", along + 1));
             }
         }
         Ok(())

@@ -79,6 +79,10 @@ fn is_positive_zero(value: &f64) -> bool {
     value.to_bits() == 0
 }
 
+fn is_at_rest(velocity: &[f64; 3]) -> bool {
+    velocity.iter().all(is_positive_zero)
+}
+
 fn one() -> f64 {
     1.0
 }
@@ -96,6 +100,9 @@ pub enum Motion {
     Rotating,
     /// Stands still; `speed` does not exist.
     Still,
+    /// Flies freely, held by nothing but its contacts: a Cartesian ROM whose stiffness leaves the three rigid translations
+    /// free. `velocity` is its velocity at the start.
+    Free,
 }
 
 impl Default for Shape {
@@ -147,6 +154,9 @@ pub struct StructureSettings {
     /// Start value of the speed input (rad/s).
     #[serde(default)]
     pub speed: f64,
+    /// Start value of the velocity of the whole body along x, y, z (m/s); of a free structure only.
+    #[serde(default, skip_serializing_if = "is_at_rest")]
+    pub velocity: [f64; 3],
     /// Modal damping ratio ξ (-), 0 ≤ ξ < 1; the ROM's own when absent.
     #[serde(default)]
     pub damping_ratio: Option<f64>,
@@ -256,7 +266,8 @@ fn is_one_part(parts: &usize) -> bool {
     *parts == one_part()
 }
 
-/// One surface around the z axis, parallel to the tip contour of the structure it faces.
+/// One surface: around the z axis and parallel to the tip contour of the rotor it faces, or laid through the open contact
+/// grid of a structure where it faces a free one.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceSettings {
@@ -274,6 +285,9 @@ pub struct SurfaceSettings {
     /// Structure that carries the surface and deforms it; its ROM needs a contact grid. Rigid where absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub structure: Option<String>,
+    /// The structure gives the place of the surface only: it does not deform. Against free structures only.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub rigid: bool,
     /// Surface spline through data points; the analytical surface of revolution where absent (always a spline on a
     /// structure).
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -322,7 +336,13 @@ pub struct ContactSettings {
     pub master: String,
     /// Surface they meet.
     pub slave: String,
-    /// Radial tip clearance of the undeformed structure (m), > 0.
+    /// The contact nodes whose names start with this text take part in this pair; all of them when absent. Free masters
+    /// only; of several pairs no two may claim the same node.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nodes: Option<String>,
+    /// Radial tip clearance of the undeformed structure (m), > 0; absent (0) for a free master, whose gaps follow from
+    /// the positions in both ROMs.
+    #[serde(default, skip_serializing_if = "is_positive_zero")]
     pub gap: f64,
     /// Clearance of each sector (m) where they differ; replaces `gap`, one value per sector.
     #[serde(default)]
@@ -416,7 +436,7 @@ pub struct SceneSettings {
     /// Flexible structures.
     #[serde(rename = "structure")]
     pub structures: Vec<StructureSettings>,
-    /// Rigid surfaces.
+    /// Surfaces, rigid or carried by a structure.
     #[serde(rename = "surface")]
     pub surfaces: Vec<SurfaceSettings>,
     /// Contact pairs.

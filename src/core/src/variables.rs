@@ -163,8 +163,10 @@ pub enum Quantity {
     GapOffset,
     /// ξ, parameter.
     DampingRatio,
-    /// ξ of the structure that carries the slave surface, parameter.
-    SlaveDampingRatio,
+    /// ξ of a structure that carries a slave surface (0-based), parameter.
+    SlaveDampingRatio(usize),
+    /// Velocity of a free master at the start along x, y, z (component 0, 1, 2), parameter.
+    InitialVelocity(usize),
     /// Share of the friction heat that goes into the slave, parameter.
     HeatToSlave,
     /// Largest internal step, parameter.
@@ -199,6 +201,14 @@ pub enum Quantity {
     TangentialForceNow(usize),
     /// Mean contact force on the rotor along fixed x, y, z (component 0, 1, 2).
     Force(usize),
+    /// Mean contact force on a free master from the surface of one pair (0-based) along x, y, z.
+    PairForce(usize, usize),
+    /// Velocity of the centre of mass of a free master along x, y, z.
+    CentreVelocity(usize),
+    /// Its displacement.
+    CentreDisplacement(usize),
+    /// Displacements of all contact nodes of a free master along x, y, z.
+    NodeDisplacement(usize),
     /// Mean contact torque on the rotor about z.
     Torque,
     /// Largest λ of any node within the step.

@@ -11,6 +11,7 @@ use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::dynamics::sectors::SectorModel;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::{System, SystemParts, SystemSettings};
+use tiprub_reference::closed::belt::Belt;
 
 const MASS: f64 = 2.0;
 const OMEGA: f64 = 50.0;
@@ -76,10 +77,8 @@ fn run(scheme: Scheme, step: f64, sticking: f64, sliding: f64, steps: usize) -> 
 fn stick_slip_has_the_amplitude_and_the_times_of_the_closed_form() {
     let (static_force, kinetic_force) = (FRICTION * 300.0, FRICTION * 200.0);
     let stiffness = MASS * OMEGA * OMEGA;
-    let a = (static_force - kinetic_force) / stiffness;
-    let amplitude = (a * a + (BELT / OMEGA).powi(2)).sqrt();
-    let slide_time = (std::f64::consts::TAU - 2.0 * (a * OMEGA / BELT).atan()) / OMEGA;
-    let stick_time = 2.0 * a / BELT;
+    let closed = Belt { mass: MASS, stiffness, speed: BELT, sticking: static_force, sliding: kinetic_force };
+    let (amplitude, slide_time, stick_time) = (closed.amplitude(), closed.slide_time(), closed.stick_time());
     let first_slip = static_force / stiffness / BELT;
     for scheme in [Scheme::ModalExact, Scheme::CentralDifference] {
         let mut errors = Vec::new();

@@ -46,7 +46,13 @@ impl<'a> Document<'a> {
         }
         let only = candidates.first().filter(|first| candidates.iter().all(|place| place.path == first.path));
         let what = only.map_or(path, |place| &place.path);
-        self.error(only.map(|place| place.span.clone()), what, problem, remedy)
+        // A key that is not there is missed in its table.
+        let table = || {
+            let (table, _) = bare.rsplit_once('.')?;
+            self.places().into_iter().rfind(|place| place.path == table)
+        };
+        let span = only.map(|place| place.span.clone()).or_else(|| Some(table()?.span));
+        self.error(span, what, problem, remedy)
     }
 
     fn error(&self, span: Option<Range<usize>>, what: &str, problem: String, remedy: String) -> Error {

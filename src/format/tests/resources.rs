@@ -188,7 +188,7 @@ fn what_a_scene_leaves_off_leaves_no_data_in_the_fmu() {
             loads: DMatrix::from_element(2, 1, 3.0),
             patches: vec![Patch { angle: [0.0, 1.0], axial: [0.0, 0.01] }],
         }),
-        grid: Some(ContactGrid { around: 4, along: 2 }),
+        grid: Some(ContactGrid { around: 4, along: 2, closed: true }),
         harmonics: Vec::new(),
     };
     full.validate().unwrap();

@@ -83,7 +83,7 @@ fn complete(seed: u64, order: usize, patches: usize) -> Rom {
     let mut rom = ring(order, &mut value);
     rom.extras.spin = Some(spin(order, &mut value));
     rom.extras.thermal = Some(thermal(order, patches, &mut value));
-    rom.extras.grid = Some(ContactGrid { around: AROUND, along: ALONG });
+    rom.extras.grid = Some(ContactGrid { around: AROUND, along: ALONG, closed: true });
     rom
 }
 
@@ -210,5 +210,8 @@ fn values_that_cannot_be_are_refused() {
     let spaces = |file: &mut Loose| drop(file.entries.insert("contact_grid".into(), " 6 , 2 ".into()));
     let mut file = Loose::of(&complete(9, 2, 2));
     spaces(&mut file);
-    assert_eq!(read_rom(&file.bytes(), "ring").unwrap().extras.grid, Some(ContactGrid { around: 6, along: 2 }));
+    assert_eq!(
+        read_rom(&file.bytes(), "ring").unwrap().extras.grid,
+        Some(ContactGrid { around: 6, along: 2, closed: true })
+    );
 }

@@ -1,4 +1,5 @@
-//! Write the CalculiX input file of the cube between two rings: `cube_calculix FILE.inp [increment in s] [end in s]`.
+//! Write the CalculiX input file of the cube between two rings:
+//! `cube_calculix FILE.inp [increment in s] [end in s] [µ] [Pa/m of contact] [Pa/m of sticking] [small] [surfaces]`.
 
 use tiprub_reference::cube::{FRICTION, calculix};
 
@@ -7,6 +8,7 @@ fn main() {
     let number = |index: usize, default: f64| {
         arguments.get(index).map_or(default, |text| text.parse().expect("a number in seconds"))
     };
+    let says = |word: &str| arguments.iter().any(|argument| argument == word);
     let file = arguments.get(1).expect("the name of the file to write");
     let run = calculix::Run {
         speed: 100.0,
@@ -15,6 +17,8 @@ fn main() {
         end: number(3, 5e-4),
         contact_stiffness: number(5, 1e13),
         stick_stiffness: number(6, 1e12),
+        large: !says("small"),
+        surfaces: says("surfaces"),
     };
     std::fs::write(file, calculix::input(&run)).expect("the input file could be written");
 }

@@ -11,5 +11,4 @@ pub mod cube;
 pub mod methods;
 pub mod paper;
 pub mod reduced;
-#[cfg(feature = "cube")]
 pub mod surface;

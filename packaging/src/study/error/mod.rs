@@ -51,7 +51,8 @@ const MEET: f64 = 2e-3;
 /// # Errors
 /// A reference fails; never with the scenes that ship.
 pub fn study(arguments: &StudyArguments, console: &Console) -> Result<Study> {
-    let scenes = if arguments.scene.is_empty() { ErrorScene::ALL.to_vec() } else { arguments.scene.clone() };
+    let scenes =
+        if arguments.error_scenes.is_empty() { ErrorScene::ALL.to_vec() } else { arguments.error_scenes.clone() };
     let quick = arguments.quick;
     let mut study = Study {
         name: "error",

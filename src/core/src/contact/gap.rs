@@ -6,9 +6,10 @@
 //! displacement; dividing by its length N gives the unit normal from the casing to the blade and the gap F/N. The
 //! slope is what lets a frictionless lobe draw power from the shaft: r n_θ λ is the torque conjugate to θ_r.
 
+use super::free_gap::{FreeGap, tangent};
 use super::layout::Layout;
 pub use super::layout::sector_angle;
-use super::spline::Place;
+use super::spline::{Place, SurfaceSpline};
 use super::spline_gap::{SplineGap, faces_inwards};
 use super::surface::Surface;
 use crate::dynamics::dispatch::{InstructionSet, Kernel};
@@ -68,6 +69,8 @@ pub enum GapLaw {
     Revolution(RevolutionGap),
     /// Sectors around an axis inside a surface through data points, rigid or carried by a structure.
     Spline(Box<SplineGap>),
+    /// Nodes of a free structure against open surfaces.
+    Free(Box<FreeGap>),
 }
 
 /// Constant normals, gaps and sliding velocities of one group of contacts.
@@ -176,13 +179,26 @@ impl GapLaw {
             Self::Fixed(law) => law.gaps.len(),
             Self::Revolution(law) => law.layout.nodes(),
             Self::Spline(law) => law.layout.nodes(),
+            Self::Free(law) => law.nodes(),
+        }
+    }
+
+    /// The surface spline that a contact node meets, and which of the carriers may deform it.
+    pub fn spline_of(&self, node: usize) -> Option<(&SurfaceSpline, usize)> {
+        match self {
+            Self::Fixed(_) | Self::Revolution(_) => None,
+            Self::Spline(law) => Some((&law.surface, 0)),
+            Self::Free(law) => {
+                let surface = &law.surfaces[law.surface_of(node)?];
+                Some((&surface.surface, surface.carrier?))
+            }
         }
     }
 
     /// Where the nodes stand around the axis, if there is one.
     pub fn layout(&self) -> Option<&Layout> {
         match self {
-            Self::Fixed(_) => None,
+            Self::Fixed(_) | Self::Free(_) => None,
             Self::Revolution(law) => Some(&law.layout),
             Self::Spline(law) => Some(&law.layout),
         }
@@ -191,7 +207,7 @@ impl GapLaw {
     /// Angle over which the casing shape changes noticeably (rad).
     pub fn angular_scale(&self) -> f64 {
         match self {
-            Self::Fixed(_) => f64::INFINITY,
+            Self::Fixed(_) | Self::Free(_) => f64::INFINITY,
             Self::Revolution(law) => law.surface.angular_scale(),
             Self::Spline(law) => law.angular_scale,
         }
@@ -200,7 +216,8 @@ impl GapLaw {
     /// Arrays of the right size, filled once for laws that never change.
     pub fn geometry(&self, lanes: usize) -> Geometry {
         let len = self.nodes() * lanes;
-        let mut geometry = Geometry::new(len, if matches!(self, Self::Spline(_)) { len } else { 0 });
+        let has_places = matches!(self, Self::Spline(_) | Self::Free(_));
+        let mut geometry = Geometry::new(len, if has_places { len } else { 0 });
         if let Self::Fixed(law) = self {
             for (node, normal) in law.normals.iter().enumerate() {
                 for component in 0..3 {
@@ -212,7 +229,8 @@ impl GapLaw {
     }
 
     /// Gaps (m) and normals at an instant, for the displacements `[row · lanes + lane]` of the contact rows (m) and
-    /// `moved` of the control points of a surface that is carried by a structure. `before` is the geometry of the step
+    /// `moved` of the control points of a surface around an axis that is carried by a structure (open surfaces have been
+    /// displaced by [`super::free_gap::OpenSurface::follow`]). `before` is the geometry of the step
     /// before, from which closest points are sought. Gaps of padding lanes are infinite.
     pub fn evaluate(
         &mut self,
@@ -239,6 +257,7 @@ impl GapLaw {
                 let guess = before.map(|before| &before.places[..]);
                 law.evaluate(drive, displacement, moved, guess, geometry, gap);
             }
+            Self::Free(law) => law.evaluate(displacement, before.map(|before| &before.places[..]), geometry, gap),
         }
     }
 
@@ -249,19 +268,24 @@ impl GapLaw {
         }
     }
 
-    /// Largest displacement (m) that counts as small: a tenth of the smallest radius; no limit for fixed obstacles.
+    /// Largest displacement (m) that counts as small: a tenth of the smallest radius, or of the extent of open surfaces and
+    /// what they meet; no limit for fixed obstacles.
     pub fn largest_displacement(&self) -> f64 {
+        if let Self::Free(law) = self {
+            return law.largest();
+        }
         let radii = self.layout().map(|layout| layout.radii.iter());
         radii.map_or(f64::INFINITY, |radii| 0.1 * radii.fold(f64::INFINITY, |low: f64, radius| low.min(*radius)))
     }
 
     /// Whether a contact is within what small displacements and a casing seen from inside can describe: less deep than
-    /// a tenth of the radius, on a flank below 45°.
+    /// a tenth of the radius, on a flank below 45°. On open surfaces the depth alone counts.
     pub fn is_plausible(&self, node: usize, gap: f64, normal: [f64; 3]) -> bool {
         match self {
             Self::Fixed(_) => true,
             Self::Revolution(law) => gap > -0.1 * law.layout.radii[node] && normal[1].abs() <= -normal[0],
             Self::Spline(law) => gap > -0.1 * law.layout.radii[node] && faces_inwards(normal),
+            Self::Free(law) => gap > -law.largest(),
         }
     }
 
@@ -273,6 +297,8 @@ impl GapLaw {
             Self::Fixed(law) => law.sliding[index],
             Self::Revolution(RevolutionGap { layout, .. }) => layout.rigid_velocity(node, index, drive),
             Self::Spline(law) => law.layout.rigid_velocity(node, index, drive),
+            // Free flight is part of the displacements.
+            Self::Free(_) => [0.0; 3],
         }
     }
 
@@ -280,13 +306,10 @@ impl GapLaw {
     /// when nothing slides. On surfaces of revolution axial slip is neglected, as in section 4.3 of the paper.
     pub fn slip_direction(&self, velocity: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
         let candidate = match self {
-            Self::Fixed(_) => velocity,
+            Self::Fixed(_) | Self::Free(_) => velocity,
             Self::Revolution(_) | Self::Spline(_) => [0.0, velocity[1], 0.0],
         };
-        let along = dot(candidate, normal);
-        let tangent: [f64; 3] = std::array::from_fn(|i| candidate[i] - along * normal[i]);
-        let length = dot(tangent, tangent).sqrt();
-        if length > 0.0 { tangent.map(|value| value / length) } else { [0.0; 3] }
+        tangent(candidate, normal)
     }
 }
 

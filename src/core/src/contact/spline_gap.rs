@@ -147,6 +147,9 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// That of a structure described in fixed directions.
+    pub const FIXED: Self = Self { sine: 0.0, cosine: 1.0 };
+
     /// At `angle` (rad).
     pub fn new(angle: f64) -> Self {
         let (sine, cosine) = libm::sincos(angle);

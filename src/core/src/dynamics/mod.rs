@@ -4,5 +4,6 @@ pub mod bank;
 pub mod cyclic;
 pub mod dispatch;
 pub mod modal;
+pub mod rigid;
 pub mod scheme;
 pub mod sectors;

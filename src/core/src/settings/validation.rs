@@ -1,5 +1,7 @@
 //! The documented range of every setting, and how settings go together.
 
+mod free;
+
 use super::{
     CoatingSettings, ContactSettings, Motion, SceneSettings, Scheme, Shape, Solver, SplineSettings, StructureSettings,
     SurfaceSettings,
@@ -44,6 +46,7 @@ impl SceneSettings {
         for (index, contact) in self.contacts.iter().enumerate() {
             contact.validate(self, &format!("contact[{}]", index + 1))?;
         }
+        self.validate_pairs()?;
         self.validate_scheme()?;
         within("time.step", self.time.step, SHORTEST_STEP, LONGEST_STEP)?;
         finite("experiment.start", self.experiment.start)?;
@@ -112,17 +115,22 @@ impl StructureSettings {
         if let Some(ratio) = self.damping_ratio {
             within(&format!("{at}.damping_ratio"), ratio, 0.0, MAX_DAMPING)?;
         }
-        if self.motion == Motion::Still && self.speed != 0.0 {
+        let other = match self.motion {
+            Motion::Rotating => None,
+            Motion::Still => Some("stands still"),
+            Motion::Free => Some("flies freely"),
+        };
+        if let Some(other) = other.filter(|_| self.speed != 0.0) {
             return Err(Error::invalid(
                 format!("{at}.speed"),
-                format!("{} rad/s for a structure that stands still", self.speed),
+                format!("{} rad/s for a structure that {other}", self.speed),
                 "Remove the speed, or set motion = \"rotating\"",
             ));
         }
-        if self.motion == Motion::Still && !self.frequency_factors.is_empty() {
+        if let Some(other) = other.filter(|_| !self.frequency_factors.is_empty()) {
             return Err(Error::invalid(
                 format!("{at}.frequency_factors"),
-                "a structure that stands still has no blades to mistune",
+                format!("a structure that {other} has no blades to mistune"),
                 "Remove the line, or give it to the rotor",
             ));
         }
@@ -137,31 +145,35 @@ impl StructureSettings {
         self.validate_motion(at)
     }
 
-    /// What only rotating structures have, and what only those have that stand still.
+    /// What only rotating structures have, only those that stand still, and only free ones.
     fn validate_motion(&self, at: &str) -> Result<()> {
-        let still = self.motion == Motion::Still;
-        let refused = [
-            ("spin.stiffening", self.spin.stiffening, still),
-            ("spin.growth", self.spin.growth, still),
-            ("spin.coriolis", self.spin.coriolis, still),
-            ("whirl", self.whirl, still),
-            ("axial_shift", self.axial_shift, still),
-            ("thermal", self.thermal, !still),
-            ("load", self.load.is_some(), !still),
+        let (rotating, still, free) = (Motion::Rotating, Motion::Still, Motion::Free);
+        let moves = self.velocity.iter().any(|component| *component != 0.0);
+        let asked = [
+            ("spin.stiffening", self.spin.stiffening, rotating),
+            ("spin.growth", self.spin.growth, rotating),
+            ("spin.coriolis", self.spin.coriolis, rotating),
+            ("whirl", self.whirl, rotating),
+            ("axial_shift", self.axial_shift, rotating),
+            ("thermal", self.thermal, still),
+            ("load", self.load.is_some(), still),
+            ("velocity", moves, free),
         ];
-        match refused.into_iter().find(|(_, asked, wrong)| *asked && *wrong) {
-            None => Ok(()),
-            Some((field, ..)) if still => Err(Error::invalid(
-                format!("{at}.{field}"),
-                "only a rotating structure has it, and this one stands still",
-                format!("Remove `{field}`, or set motion = \"rotating\""),
-            )),
-            Some((field, ..)) => Err(Error::invalid(
-                format!("{at}.{field}"),
-                "only a structure that stands still has it, and this one rotates",
-                format!("Remove `{field}`, or set motion = \"still\""),
-            )),
-        }
+        let Some((field, _, owner)) = asked.into_iter().find(|(_, asked, owner)| *asked && *owner != self.motion)
+        else {
+            return self.velocity.iter().try_for_each(|component| finite(&format!("{at}.velocity"), *component));
+        };
+        let who = |motion: Motion| match motion {
+            Motion::Rotating => ("a rotating structure", "this one rotates", "rotating"),
+            Motion::Still => ("a structure that stands still", "this one stands still", "still"),
+            Motion::Free => ("a free structure", "this one flies freely", "free"),
+        };
+        let ((owner, _, word), (_, this, _)) = (who(owner), who(self.motion));
+        Err(Error::invalid(
+            format!("{at}.{field}"),
+            format!("only {owner} has it, and {this}"),
+            format!("Remove `{field}`, or set motion = \"{word}\""),
+        ))
     }
 }
 
@@ -189,8 +201,11 @@ impl SurfaceSettings {
         let candidates: Vec<&str> = scene.structures.iter().filter(still).map(|s| s.name.as_str()).collect();
         let problem = match scene.structures.iter().find(|structure| structure.name == *name) {
             None => format!("`{name}` is not defined"),
-            Some(structure) if structure.motion != Motion::Still => {
+            Some(structure) if structure.motion == Motion::Rotating => {
                 format!("`{name}` rotates, and a surface stands still")
+            }
+            Some(structure) if structure.motion == Motion::Free => {
+                format!("`{name}` flies freely, and a surface stands still")
             }
             Some(_) => return Ok(()),
         };
@@ -247,6 +262,21 @@ impl ContactSettings {
                 format!("`{}` is the surface of `{}`, which is the master of this contact", self.slave, self.master),
                 "Give the surface of another structure, or a rigid one",
             ));
+        }
+        if scene.free_master().is_some() {
+            return self.validate_free(scene, at);
+        }
+        if self.nodes.is_some() {
+            let remedy = "Remove the line: all contact nodes of a rotor meet its surface";
+            return Err(Error::invalid(format!("{at}.nodes"), "only a free master chooses among its nodes", remedy));
+        }
+        if slave.is_some_and(|surface| surface.rigid) {
+            let remedy = "Remove the line; without `structure` the surface around a rotor is rigid";
+            return Err(Error::invalid(format!("{at}.slave"), format!("surface `{}` is `rigid`", self.slave), remedy));
+        }
+        if self.gap == 0.0 {
+            let remedy = "Add the radial tip clearance to [[contact]]: number, m (> 0, up to a tenth of the radius); only a free master has none";
+            return Err(Error::invalid(format!("{at}.gap"), "missing or 0", remedy));
         }
         positive(&format!("{at}.gap"), self.gap, "m")?;
         self.sector_gaps.iter().try_for_each(|gap| positive(&format!("{at}.sector_gaps"), *gap, "m"))?;

@@ -90,7 +90,7 @@ impl Simulation {
         if quantity == Quantity::Friction && self.phase != Phase::Created {
             let mut parameters = self.parameters();
             parameters.friction = value;
-            self.check_limits(parameters)?;
+            self.check_limits(&parameters)?;
             self.system.set_friction(value);
         }
         let offset = self.offset_now();

@@ -8,15 +8,17 @@ use crate::contact::surface::Surface;
 use crate::dynamics::bank::BankOptions;
 use crate::dynamics::cyclic::CyclicModel;
 use crate::dynamics::modal::{ModalModel, ModalSpin};
+use crate::dynamics::rigid::free_modes;
 use crate::dynamics::sectors::SectorModel;
 use crate::rom::Frame;
-use crate::settings::{ContactSettings, Scheme, Solver, StructureSettings, SurfaceSettings};
+use crate::settings::{ContactSettings, Motion, Scheme, Solver, StructureSettings, SurfaceSettings};
 use crate::system::{System, SystemParts, SystemSettings};
 use crate::variables::Quantity;
 use crate::{Error, Result, Rom, Scene};
 use nalgebra::DMatrix;
 
 use super::Simulation;
+use super::free::FreeParts;
 use super::loads::LoadVectors;
 use super::patches::Patches;
 use super::slave_surface::{Carrier, control_modes, spline_law};
@@ -24,17 +26,17 @@ use super::slave_surface::{Carrier, control_modes, spline_law};
 /// Gaps, casing shapes and displacements beyond this share of the radius are not what the model describes.
 pub const SMALL_FRACTION: f64 = 0.1;
 /// Most contact nodes of all sectors together that a flexible slave or the wheel couples: their Delassus matrix is dense.
-const MOST_COUPLED: usize = 2000;
+pub const MOST_COUPLED: usize = 2000;
 
 /// Places of values that the step reads.
 #[derive(Debug, Clone, Copy)]
 pub struct References {
     pub step_max: usize,
-    pub gap_offset: usize,
+    pub gap_offset: Option<usize>,
     pub ramp_time: Option<usize>,
 }
 
-/// Which parts of a scene meet.
+/// Which parts of a scene meet; of a free master (see [`super::free`]) the first pair, without its carrier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Roles {
     /// Structure whose contact nodes are the masters.
@@ -49,10 +51,13 @@ impl Roles {
     /// Find them in a validated scene.
     ///
     /// # Errors
-    /// More than one contact, or a structure or surface that takes no part.
+    /// More than one contact of a rotor, or a structure or surface that takes no part.
     pub fn new(scene: &Scene) -> Result<Self> {
         let settings = &scene.settings;
         let contact = &settings.contacts[0];
+        if settings.free_master().is_some() {
+            return Self::of_free_master(scene);
+        }
         let structure = |name: &str| settings.structures.iter().position(|structure| structure.name == name);
         let surface = settings.surfaces.iter().position(|surface| surface.name == contact.slave).unwrap_or(0);
         let carrier =
@@ -64,11 +69,23 @@ impl Roles {
             return Err(Error::invalid(
                 "scene",
                 format!("{} structures, {} surfaces, {} contacts", counts[0], counts[1], counts[2]),
-                "This version takes one rotor against one surface, which one other structure may carry \
-                 (surface.structure): remove what takes no part",
+                "A rotor takes one surface, which one other structure may carry (surface.structure): remove what takes no \
+                 part. Several pairs need a master with motion = \"free\"",
             ));
         }
         Ok(roles)
+    }
+
+    fn of_free_master(scene: &Scene) -> Result<Self> {
+        let structures = &scene.settings.structures;
+        if scene.roms.len() != structures.len() {
+            let problem = format!("{} structures with {} ROMs", structures.len(), scene.roms.len());
+            return Err(Error::invalid("scene", problem, "Give one ROM per structure"));
+        }
+        let master = structures.iter().position(|structure| structure.motion == Motion::Free).unwrap_or(0);
+        let slave = &scene.settings.contacts[0].slave;
+        let surface = scene.settings.surfaces.iter().position(|surface| surface.name == *slave).unwrap_or(0);
+        Ok(Self { master, surface, carrier: None })
     }
 }
 
@@ -91,6 +108,8 @@ pub struct Compiled {
     pub load_order: u32,
     pub loads: LoadVectors,
     pub patches: Option<Patches>,
+    /// Pairs and carriers of a free master.
+    pub free: Option<FreeParts>,
     /// Hash of settings and ROMs; saved states carry it.
     pub fingerprint: u64,
     pub references: References,
@@ -104,23 +123,36 @@ impl Compiled {
     pub fn new(scene: &Scene) -> Result<Self> {
         scene.settings.validate()?;
         let roles = Roles::new(scene)?;
-        for (structure, rom) in scene.settings.structures.iter().zip(&scene.roms) {
-            check_rom(structure, rom)?;
+        let is_free = scene.settings.free_master().is_some();
+        if is_free {
+            super::free::pairs(scene)?;
+        } else {
+            for (structure, rom) in scene.settings.structures.iter().zip(&scene.roms) {
+                check_rom(structure, rom)?;
+            }
+            check_coupling(scene, roles)?;
         }
-        check_coupling(scene, roles)?;
+        let (model, free) = if is_free {
+            let (structure, rom) = (&scene.settings.structures[roles.master], &scene.roms[roles.master]);
+            let (model, translations) = free_modes(rom, structure.damping_ratio.unwrap_or(rom.damping_ratio))?;
+            (model, Some(FreeParts::new(scene, translations)?))
+        } else {
+            (modes(scene, roles.master, 0.0)?, None)
+        };
         let carrier = roles.carrier.map(|index| modes(scene, index, 0.0)).transpose()?;
         let table = super::table::build(scene)?;
         let place = |quantity| table.with_quantity(quantity).map(|variable| variable.reference as usize);
         let references = References {
             step_max: place(Quantity::StepMax).unwrap_or(0),
-            gap_offset: place(Quantity::GapOffset).unwrap_or(0),
+            gap_offset: place(Quantity::GapOffset),
             ramp_time: place(Quantity::RampTime),
         };
         let mut compiled = Self {
             fingerprint: fingerprint(scene),
             scene: scene.clone(),
             roles,
-            model: modes(scene, roles.master, 0.0)?,
+            model,
+            free,
             wheel: wheel(scene, roles.master)?,
             reference_speed: 0.0,
             stiffness_range: None,
@@ -251,6 +283,9 @@ impl Compiled {
     /// # Errors
     /// Wrong number of sector gaps or frequency factors, bad shape table, surfaces that do not fit the nodes.
     pub fn system(&self) -> Result<System> {
+        if let Some(free) = &self.free {
+            return self.free_system(free);
+        }
         let (settings, contact) = (&self.scene.settings, self.contact());
         let (structure, rom) = self.master();
         let clearances =
@@ -285,7 +320,7 @@ impl Compiled {
         };
         let parts = SystemParts {
             bank: self.bank_options(structure, rom),
-            slave: slave.map(|model| (model, self.loads.on_slave())),
+            slaves: slave.map(|model| (model, self.loads.on_slave())).into_iter().collect(),
             coating: self.coating(rom)?,
             sticking: self.may_stick(),
         };
@@ -357,7 +392,7 @@ impl Compiled {
     /// Whether `coulomb` can be chosen: a coupled problem of all sectors has room for it only if the scene says so.
     pub fn may_stick(&self) -> bool {
         let contact = self.contact();
-        let small = self.roles.carrier.is_none() && self.wheel.is_none();
+        let small = self.roles.carrier.is_none() && self.wheel.is_none() && self.free.is_none();
         contact.solver == Solver::Coulomb || (small && contact.friction > 0.0 && contact.coating.is_none())
     }
 
@@ -367,6 +402,9 @@ impl Compiled {
     /// Naming parameter and remedy.
     pub fn check_methods(&self, scheme: Scheme, solver: Solver) -> Result<()> {
         let refuse = |what: &str, problem: &str, remedy: &str| Err(Error::invalid(what, problem, remedy));
+        if self.free.is_some() {
+            return self.check_free_methods(scheme, solver);
+        }
         let (structure, _) = self.master();
         if solver == Solver::Coulomb && !self.may_stick() {
             let remedy = "Package the scene with friction and contact.solver = \"coulomb\", without coating";
@@ -510,6 +548,14 @@ impl Simulation {
         }
         let touching = self.system.gaps().iter().filter(|gap| **gap < 0.0).count();
         let node = &self.compiled.master().1.contact_nodes[deepest.0 / lanes].name;
+        if self.compiled.free.is_some() {
+            return Err(Error::invalid(
+                "initial clearance",
+                format!("{touching} contact nodes start inside the surfaces, deepest {:.3e} m at {node}", deepest.1),
+                "Move one of the structures: gaps follow from the contact positions in the ROMs; check that S_t x S_s of \
+                 each contact grid points to the master",
+            ));
+        }
         Err(Error::invalid(
             "initial clearance",
             format!(

@@ -1,5 +1,7 @@
 //! Stability and solvability of a scene at the step sizes it can be stepped with.
 
+mod free;
+
 use super::{Compiled, Simulation};
 use crate::contact::gap::{GapLaw, dot};
 use crate::contact::spline_gap::{Frame, SplineGap};
@@ -14,18 +16,20 @@ use nalgebra::DMatrix;
 const ALL_COMBINATIONS_UP_TO: usize = 3;
 
 /// Parameters that decide stability.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
     pub friction: f64,
     pub damping_ratio: f64,
-    /// Of the structure that carries the surface.
-    pub slave_damping_ratio: Option<f64>,
+    /// Of the structures that carry surfaces.
+    pub slave_damping_ratios: Vec<f64>,
     /// Largest internal step (s).
     pub step: f64,
     pub scheme: Scheme,
     pub solver: Solver,
     /// Sign of the speed at the start; 0 for a rotor that starts at rest.
     pub sense: f64,
+    /// Velocity of a free master at the start (m/s).
+    pub velocity: [f64; 3],
 }
 
 /// What is known about the limits with some parameters.
@@ -57,17 +61,23 @@ impl Simulation {
         Parameters {
             friction: self.value_of(Quantity::Friction),
             damping_ratio: self.value_of(Quantity::DampingRatio),
-            slave_damping_ratio: self.compiled.roles.carrier.map(|_| self.value_of(Quantity::SlaveDampingRatio)),
+            slave_damping_ratios: self.slave_damping_ratios(),
             step: self.value_of(Quantity::StepMax),
             scheme,
             solver,
             sense: if speed == 0.0 { 0.0 } else { speed.signum() },
+            velocity: [0, 1, 2].map(|axis| self.value_of(Quantity::InitialVelocity(axis))),
         }
     }
 
+    fn slave_damping_ratios(&self) -> Vec<f64> {
+        let slaves = 0..self.system.slaves().len();
+        slaves.map(|slave| self.value_of(Quantity::SlaveDampingRatio(slave))).collect()
+    }
+
     /// Check limits unless the same parameters were checked last.
-    pub(super) fn check_limits(&mut self, parameters: Parameters) -> Result<()> {
-        if self.limits.as_ref().is_none_or(|limits| limits.parameters != parameters) {
+    pub(super) fn check_limits(&mut self, parameters: &Parameters) -> Result<()> {
+        if self.limits.as_ref().is_none_or(|limits| limits.parameters != *parameters) {
             self.limits = Some(self.compiled.limits(parameters, self.system.law()));
         }
         self.warnings = match &self.limits {
@@ -80,9 +90,9 @@ impl Simulation {
     /// After a state of other parameters was restored: what holds for these.
     pub(super) fn renew_limits(&mut self) {
         let parameters = self.parameters();
-        let known = |known: Parameters| Parameters { sense: parameters.sense, ..known } == parameters;
-        if !self.limits.as_ref().is_some_and(|limits| known(limits.parameters)) {
-            self.limits = Some(self.compiled.limits(parameters, self.system.law()));
+        let known = |known: &Parameters| Parameters { sense: parameters.sense, ..known.clone() } == parameters;
+        if !self.limits.as_ref().is_some_and(|limits| known(&limits.parameters)) {
+            self.limits = Some(self.compiled.limits(&parameters, self.system.law()));
         }
     }
 
@@ -93,7 +103,7 @@ impl Simulation {
         let stiffened = speeds.into_iter().fold(1.0, |most: f64, speed| most.max(self.compiled.stiffened(speed)));
         let frequency = self.compiled.largest_frequency() * self.compiled.stiffest() * stiffened;
         stability::check_step_allowed(frequency, scheme, step)?;
-        if let Some(carrier) = &self.compiled.carrier {
+        for carrier in self.compiled.carriers() {
             stability::check_step_allowed(carrier.largest_frequency(), scheme, step)?;
         }
         if step >= massless::USABLE * limits.massless {
@@ -130,7 +140,16 @@ impl Compiled {
         (1.0 + added.max(0.0) / (largest * largest)).sqrt()
     }
 
-    fn limits(&self, parameters: Parameters, law: &GapLaw) -> Limits {
+    /// Modes of the structures that carry surfaces.
+    fn carriers(&self) -> impl Iterator<Item = &ModalModel> {
+        self.carrier.iter().chain(self.free.iter().flat_map(|free| &free.carriers))
+    }
+
+    fn limits(&self, parameters: &Parameters, law: &GapLaw) -> Limits {
+        if let (Some(free), GapLaw::Free(law)) = (&self.free, law) {
+            return self.free_limits(parameters, free, law);
+        }
+        let parameters = parameters.clone();
         let mut models = match &self.wheel {
             Some(wheel) => (0..wheel.diameters.len()).map(|diameter| wheel.paired(diameter)).collect(),
             None => vec![self.model.clone()],
@@ -141,7 +160,8 @@ impl Compiled {
             model.damping_ratios.fill(parameters.damping_ratio);
             model.frequencies.iter_mut().for_each(|frequency| *frequency *= stiffest);
         }
-        let mut at = Checking { compiled: self, models, parameters, watched: [Vec::new(), Vec::new()] };
+        let mut at =
+            Checking { compiled: self, models, parameters: parameters.clone(), watched: [Vec::new(), Vec::new()] };
         let expected = self.expected_step(parameters.step);
         let (outcome, massless) = match at.massless(expected, law) {
             Ok((more, limit)) => (at.warnings(expected, law, more), limit),

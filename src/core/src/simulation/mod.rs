@@ -3,6 +3,7 @@
 mod access;
 mod compile;
 mod drive;
+mod free;
 mod limits;
 mod loads;
 mod outputs;
@@ -168,7 +169,9 @@ impl Simulation {
         let compiled = Compiled::new(scene)?;
         let table = table::build(scene)?;
         let system = compiled.system()?;
-        let window = Window::new(system.gaps().len(), compiled.patches.as_ref().map_or(0, patches::Patches::len));
+        let patches = compiled.patches.as_ref().map_or(0, patches::Patches::len);
+        let pairs = compiled.free.as_ref().map_or(0, |free| free.pairs.len());
+        let window = Window::new(system.gaps().len(), patches, pairs);
         let temperatures = vec![Input::default(); compiled.loads.thermal.len()];
         let mut simulation = Self {
             values: vec![0.0; table.references()],
@@ -214,8 +217,8 @@ impl Simulation {
         self.compiled.check_methods(parameters.scheme, parameters.solver)?;
         self.compiled.set_load_order(self.value_of(Quantity::LoadOrder))?;
         self.follow_reference_speed(self.inputs.speed.value)?;
-        self.check_limits(parameters)?;
-        let sliding = parameters.solver != Solver::Coulomb;
+        self.check_limits(&parameters)?;
+        let sliding = parameters.solver != Solver::Coulomb && self.compiled.free.is_none();
         if sliding && parameters.friction > 0.0 && self.inputs.speed.value == 0.0 && self.inputs.speed.slope == 0.0 {
             self.warnings.push(
                 "the rotor starts at speed 0 with friction: the sliding law does not model sticking; results are \
@@ -225,7 +228,7 @@ impl Simulation {
         }
         self.system.set_methods(parameters.scheme, parameters.solver);
         self.system.set_friction(parameters.friction);
-        self.rest(parameters);
+        self.rest(&parameters);
         self.time = start_time;
         self.initial_time = start_time;
         self.communication = Communication { start: start_time, length: 0.0, count: 1, done: 1 };
@@ -233,10 +236,11 @@ impl Simulation {
         self.rotor = RotorAngle::new(self.value_of(Quantity::InitialAngle));
         let drive = self.drive(0.0, start_time);
         self.system.bank_mut().set_step(parameters.scheme, parameters.step);
-        if let Some(slave) = self.system.slave_mut() {
+        for slave in self.system.slaves_mut() {
             slave.bank.set_step(parameters.scheme, parameters.step);
         }
         self.settle(drive.speed);
+        self.launch();
         self.system.start(&drive);
         self.check_initial_gaps()?;
         self.window.open(self.system.gaps());
@@ -258,14 +262,22 @@ impl Simulation {
     }
 
     /// Undeformed and at rest, with the damping of the parameters.
-    fn rest(&mut self, parameters: limits::Parameters) {
+    fn rest(&mut self, parameters: &limits::Parameters) {
         self.system.bank_mut().rest();
         self.system.bank_mut().set_damping_ratio(parameters.damping_ratio);
-        if let Some(slave) = self.system.slave_mut() {
+        for (slave, ratio) in self.system.slaves_mut().iter_mut().zip(&parameters.slave_damping_ratios) {
             slave.bank.rest();
-            if let Some(ratio) = parameters.slave_damping_ratio {
-                slave.bank.set_damping_ratio(ratio);
-            }
+            slave.bank.set_damping_ratio(*ratio);
+        }
+    }
+
+    /// A free master flies with its initial velocity as a whole.
+    fn launch(&mut self) {
+        let Some(free) = &self.compiled.free else { return };
+        let velocity = [0, 1, 2].map(|axis| self.value_of(Quantity::InitialVelocity(axis)));
+        let crate::dynamics::sectors::Sectors::Uncoupled(bank) = self.system.bank_mut() else { return };
+        for (mode, velocity) in free.translations.modal(velocity).into_iter().enumerate() {
+            bank.set_modal_state(mode, 0, 0.0, velocity);
         }
     }
 
@@ -277,7 +289,7 @@ impl Simulation {
             loads.fill_master(speed, &mut push);
             self.system.bank_mut().settle(&push);
         }
-        if let (true, Some(slave)) = (loads.on_slave(), self.system.slave_mut()) {
+        if let (true, [slave, ..]) = (loads.on_slave(), self.system.slaves_mut()) {
             let mut push = vec![0.0; slave.bank.modes()];
             loads.fill_slave(&self.inputs, 0.0, &mut push);
             slave.bank.settle(&push);
@@ -327,7 +339,7 @@ impl Simulation {
     }
 
     fn values_gap_offset(&self) -> f64 {
-        self.values[self.compiled.references.gap_offset]
+        self.compiled.references.gap_offset.map_or(0.0, |reference| self.values[reference])
     }
 
     /// Share of the casing shape that has grown in: ½(1 − cos(πt/T)) until T.

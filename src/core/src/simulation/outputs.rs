@@ -3,6 +3,7 @@
 use super::{Phase, Simulation};
 use crate::contact::coating::Coating;
 use crate::contact::gap::sector_angle;
+use crate::dynamics::sectors::Sectors;
 use crate::variables::{Causality, Quantity, Span, Variable};
 
 /// What all outputs of one instant share.
@@ -75,6 +76,11 @@ impl Simulation {
                 }
             }
             Quantity::SlaveDisplacement => self.fill_slave_displacement(out),
+            Quantity::NodeDisplacement(axis) => {
+                for (node, value) in out.iter_mut().enumerate() {
+                    *value = system.bank().displacement()[3 * node + axis];
+                }
+            }
             Quantity::Clearance(_)
             | Quantity::WatchedClearanceMinimum(_)
             | Quantity::NormalForce(_)
@@ -112,6 +118,9 @@ impl Simulation {
         match quantity {
             Quantity::RotorAngle => self.rotor.total(&self.inputs.speed, elapsed),
             Quantity::Force(component) => mean * window.force_impulse[component],
+            Quantity::PairForce(pair, axis) => mean * window.pair_impulse[pair][axis],
+            Quantity::CentreVelocity(axis) => self.centre(axis, |(_, increment)| increment / system.bank().step()),
+            Quantity::CentreDisplacement(axis) => self.centre(axis, |(position, _)| position),
             Quantity::Torque => mean * window.torque_impulse,
             Quantity::NormalForcePeak => window.normal_peak,
             Quantity::NormalImpulse => window.normal_impulse.iter().sum(),
@@ -140,6 +149,12 @@ impl Simulation {
             Quantity::InternalSteps => system.steps() as f64,
             _ => 0.0,
         }
+    }
+
+    /// Value of the centre of mass of a free master along an axis, from the modal (position, increment) of its translations.
+    fn centre(&self, axis: usize, value: impl Fn((f64, f64)) -> f64) -> f64 {
+        let (Some(free), Sectors::Uncoupled(bank)) = (&self.compiled.free, self.system.bank()) else { return 0.0 };
+        free.translations.centre(axis, [0, 1, 2].map(|mode| value(bank.modal_state(mode, 0))))
     }
 
     /// Radial displacement of the contact grid of the carrier.

@@ -9,7 +9,7 @@ use crate::variables::Quantity;
 use crate::{Error, Result};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 2;
+const VERSION: u64 = 3;
 const CHECKSUM_BYTES: usize = 8;
 
 persist_fields!(Communication { start, length, count, done });
@@ -142,7 +142,7 @@ impl Simulation {
         }
         self.system.set_methods(parameters.scheme, parameters.solver);
         self.system.set_friction(parameters.friction);
-        self.rest(parameters);
+        self.rest(&parameters);
         self.system.restore(reader);
         self.renew_limits();
         Ok(())

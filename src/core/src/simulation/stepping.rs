@@ -124,7 +124,7 @@ impl Simulation {
         let next = self.communication.done + 1;
         let (offset, time) = (self.communication.offset(next), self.communication.time(next));
         let drive = self.drive(offset, time);
-        self.load(drive.speed, offset);
+        self.load(self.communication.offset(self.communication.done));
         if let Err(failure) = self.system.step(&drive) {
             return Err(self.fail(failure, time));
         }
@@ -138,13 +138,13 @@ impl Simulation {
         Ok(Progress { time, finished })
     }
 
-    /// Loads beside contact for the step that ends at `offset`.
-    fn load(&mut self, speed: f64, offset: f64) {
-        let loads = &self.compiled.loads;
+    /// Loads beside contact for the step that begins at `offset`: q⁺ = a q + b q⁻ + c f takes the force at the time of q.
+    fn load(&mut self, offset: f64) {
+        let (loads, speed) = (&self.compiled.loads, self.inputs.speed.at(offset));
         if !loads.centrifugal.is_empty() {
             loads.fill_master(speed, self.system.bank_mut().loads_mut());
         }
-        if let (true, Some(slave)) = (loads.on_slave(), self.system.slave_mut()) {
+        if let (true, [slave, ..]) = (loads.on_slave(), self.system.slaves_mut()) {
             loads.fill_slave(&self.inputs, offset, slave.bank.loads_mut());
         }
     }
@@ -164,6 +164,9 @@ impl Simulation {
 
     fn fail(&mut self, failure: StepFailure, time: f64) -> Error {
         self.phase = Phase::Failed;
+        if let Some(error) = self.free_failure(failure, time) {
+            return error;
+        }
         match failure {
             StepFailure::NonFinite => Error::NonFinite {
                 last_good_time: self.time,
@@ -200,6 +203,30 @@ impl Simulation {
                 remedy: "Use less friction or another internal step; restore a saved state or reset first".to_owned(),
             },
         }
+    }
+
+    /// What only means something else for a free master.
+    fn free_failure(&self, failure: StepFailure, time: f64) -> Option<Error> {
+        self.compiled.free.as_ref()?;
+        let problem = match failure {
+            StepFailure::NonFinite => return None,
+            StepFailure::Implausible { .. } => {
+                "contact nodes of the free structure have moved against each other, or into a surface, by more than a tenth of \
+                 the extent of the contact nodes"
+            }
+            StepFailure::CasingImplausible => {
+                "a structure that carries a surface is displaced by more than a tenth of the extent of the contact nodes"
+            }
+            StepFailure::Unsolved { .. } => "the contact problem has no solution",
+        };
+        let remedy = match failure {
+            StepFailure::Unsolved { .. } => "Use less friction, another internal step or the solver coulomb",
+            _ => "Check positions and velocity; small displacements beside rigid flight cannot describe this",
+        };
+        Some(Error::Unstable {
+            problem: format!("at t = {time} s (last good time {} s) {problem}", self.time),
+            remedy: format!("{remedy}. Restore a saved state or reset first"),
+        })
     }
 
     /// End the communication step here, before its end (early return): outputs cover the part done.

@@ -1,6 +1,7 @@
 //! What is gathered over one communication step: impulses, extremes, friction heat.
 
 use super::patches::Patches;
+use crate::contact::gap::GapLaw;
 use crate::persist::persist_fields;
 use crate::system::System;
 
@@ -23,6 +24,8 @@ pub struct Window {
     pub normal_peak: f64,
     /// Friction heat per patch (J); empty where the scene has none.
     pub patch_heat: Vec<f64>,
+    /// ∫F dt on a free master along x, y, z (N·s) per pair; empty for rotors.
+    pub pair_impulse: Vec<[f64; 3]>,
 }
 
 persist_fields!(Window {
@@ -33,12 +36,13 @@ persist_fields!(Window {
     torque_impulse,
     friction_heat,
     normal_peak,
-    patch_heat
+    patch_heat,
+    pair_impulse
 });
 
 impl Window {
-    /// Room for `len` nodes of all lanes and a number of patches.
-    pub fn new(len: usize, patches: usize) -> Self {
+    /// Room for `len` nodes of all lanes and numbers of patches and of pairs of a free master.
+    pub fn new(len: usize, patches: usize, pairs: usize) -> Self {
         Self {
             lowest: vec![f64::INFINITY; len],
             normal_impulse: vec![0.0; len],
@@ -48,6 +52,7 @@ impl Window {
             friction_heat: 0.0,
             normal_peak: 0.0,
             patch_heat: vec![0.0; patches],
+            pair_impulse: vec![[0.0; 3]; pairs],
         }
     }
 
@@ -61,6 +66,7 @@ impl Window {
         self.friction_heat = 0.0;
         self.normal_peak = 0.0;
         self.patch_heat.fill(0.0);
+        self.pair_impulse.fill([0.0; 3]);
     }
 
     /// Add the internal step just done, of length `step` (s), at the rotor phase `phase` (rad).
@@ -85,6 +91,12 @@ impl Window {
                 self.force_impulse[1] += step * second;
             }
             self.force_impulse[2] += step * third;
+            if let GapLaw::Free(law) = system.law()
+                && let Some(pair) = law.surface_of(event.node)
+            {
+                let sum = &mut self.pair_impulse[pair];
+                *sum = std::array::from_fn(|i| sum[i] + step * event.force[i]);
+            }
         }
     }
 

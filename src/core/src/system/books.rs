@@ -1,7 +1,8 @@
 //! The energy ledger's entries of contact.
 
-use super::{ContactEvent, System};
-use crate::contact::gap::{Drive, GapLaw, Geometry, dot};
+use super::slave::carrier_of;
+use super::{ContactEvent, System, frame_of};
+use crate::contact::gap::{Drive, Geometry, dot};
 use crate::contact::spline_gap::{BEYOND_EDGE, Frame};
 
 impl System {
@@ -61,8 +62,8 @@ impl System {
             let row = (3 * node + component) * lanes + sector;
             0.5 * (now[row] - self.displacement_oldest[row])
         });
-        if let (Some(slave), GapLaw::Spline(law)) = (&self.slave, &self.law) {
-            let slave = slave.moved(&law.surface, geometry.places[index], self.frame(index, angle));
+        if let Some((slave, surface)) = carrier_of(&self.slaves, &self.law, node) {
+            let slave = slave.moved(surface, geometry.places[index], self.frame(index, angle));
             moved = std::array::from_fn(|i| moved[i] - slave[i]);
         }
         moved
@@ -70,6 +71,6 @@ impl System {
 
     /// Directions of a node's own frame at a rotor angle (rad).
     pub(super) fn frame(&self, index: usize, rotor_angle: f64) -> Frame {
-        self.law.layout().map_or(Frame::new(0.0), |layout| Frame::new(layout.angles[index] + rotor_angle))
+        frame_of(&self.law, index, rotor_angle)
     }
 }

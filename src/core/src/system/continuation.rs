@@ -1,6 +1,6 @@
 //! What carries a running state on: another step size, saving and restoring, and whether it still makes sense.
 
-use super::{ContactEvent, StepFailure, System};
+use super::{ContactEvent, Slave, StepFailure, System, frame_of};
 use crate::contact::gap::GapLaw;
 use crate::persist::{Persist, Reader, Writer};
 
@@ -20,7 +20,7 @@ impl System {
             let before = self.mechanical_energy();
             self.lasting_force(old, step);
             self.bank.resample(self.settings.scheme, step, &self.displacement_oldest);
-            self.resample_slave(step);
+            self.resample_slaves(step);
             let ratio = step / old;
             for (before, now) in self.state.gap_before.iter_mut().zip(&self.state.gap) {
                 if now.is_finite() {
@@ -32,26 +32,28 @@ impl System {
             self.state.ledger.turnover.add((after - before).abs());
         } else {
             self.bank.set_step(self.settings.scheme, step);
-            if let Some(slave) = &mut self.slave {
-                slave.set_step(self.settings.scheme, step);
-            }
+            self.slaves.iter_mut().for_each(|slave| slave.set_step(self.settings.scheme, step));
         }
     }
 
-    /// The same forces act on the slave, where the last step found them.
-    fn resample_slave(&mut self, step: f64) {
+    /// The same forces act on the slaves, where the last step found them.
+    fn resample_slaves(&mut self, step: f64) {
+        if self.slaves.is_empty() {
+            return;
+        }
         let lanes = self.lanes;
-        let (Some(slave), GapLaw::Spline(law)) = (&mut self.slave, &self.law) else { return };
-        slave.clear_lasting();
+        self.slaves.iter_mut().for_each(Slave::clear_lasting);
         for index in 0..self.state.gap.len() {
             let (node, sector) = (index / lanes, index % lanes);
             let force: [f64; 3] = std::array::from_fn(|i| self.displacement_oldest[(3 * node + i) * lanes + sector]);
-            if force.iter().any(|component| *component != 0.0) {
-                let frame = law.frame(index, self.state.angle);
-                slave.add_lasting(&law.surface, self.state.geometry.places[index], frame, force);
+            if let (true, Some((surface, carrier))) =
+                (force.iter().any(|value| *value != 0.0), self.law.spline_of(node))
+            {
+                let frame = frame_of(&self.law, index, self.state.angle);
+                self.slaves[carrier].add_lasting(surface, self.state.geometry.places[index], frame, force);
             }
         }
-        slave.carry_over(self.settings.scheme, step);
+        self.slaves.iter_mut().for_each(|slave| slave.carry_over(self.settings.scheme, step));
     }
 
     /// Leaves in `displacement_oldest` (scratch between steps) the contact forces without those of impacts.
@@ -75,15 +77,20 @@ impl System {
     /// Whether the state is still what the model describes.
     ///
     /// # Errors
-    /// Coordinates that are not finite; displacements beyond a tenth of the radius.
+    /// Coordinates that are not finite; displacements beyond a tenth of the radius, or those of the nodes of a free master
+    /// against each other beyond a tenth of their extent.
     pub fn check_state(&self) -> Result<(), StepFailure> {
-        if !self.bank.is_finite() || self.slave.as_ref().is_some_and(|slave| !slave.bank.is_finite()) {
+        if !self.bank.is_finite() || self.slaves.iter().any(|slave| !slave.bank.is_finite()) {
             return Err(StepFailure::NonFinite);
         }
         let limit = self.law.largest_displacement();
-        let casing = self.slave.as_ref().map_or(&[][..], |slave| slave.bank.displacement());
-        if casing.iter().any(|displacement| displacement.abs() > limit) {
+        let mut moved = self.slaves.iter().flat_map(|slave| slave.bank.displacement());
+        if moved.any(|displacement| displacement.abs() > limit) {
             return Err(StepFailure::CasingImplausible);
+        }
+        if let GapLaw::Free(law) = &self.law {
+            let distorted = law.is_distorted(self.bank.displacement());
+            return if distorted { Err(StepFailure::Implausible { sector: 0 }) } else { Ok(()) };
         }
         let beyond = self.bank.displacement().iter().position(|displacement| displacement.abs() > limit);
         let sector = beyond.map(|index| index % self.lanes);
@@ -94,9 +101,7 @@ impl System {
     pub fn save(&self, writer: &mut Writer) {
         self.bank.step().save(writer);
         self.bank.save(writer);
-        if let Some(slave) = &self.slave {
-            slave.save(writer);
-        }
+        self.slaves.iter().for_each(|slave| slave.save(writer));
         if let Some((coating, _)) = &self.coating {
             coating.save(writer);
         }
@@ -109,14 +114,10 @@ impl System {
         step.restore(reader);
         if step > 0.0 {
             self.bank.set_step(self.settings.scheme, step);
-            if let Some(slave) = &mut self.slave {
-                slave.bank.set_step(self.settings.scheme, step);
-            }
+            self.slaves.iter_mut().for_each(|slave| slave.set_step(self.settings.scheme, step));
         }
         self.bank.restore(reader);
-        if let Some(slave) = &mut self.slave {
-            slave.restore(reader);
-        }
+        self.slaves.iter_mut().for_each(|slave| slave.restore(reader));
         if let Some((coating, _)) = &mut self.coating {
             coating.restore(reader);
         }

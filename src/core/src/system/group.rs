@@ -1,7 +1,8 @@
 //! The contact problem of one group of coupled nodes: Delassus matrix, solution, and what it does to the structures.
 
-use super::{ContactEvent, StepFailure, System};
-use crate::contact::gap::{Drive, GapLaw, dot};
+use super::slave::carrier_of;
+use super::{ContactEvent, StepFailure, System, frame_of};
+use crate::contact::gap::{Drive, dot};
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::cyclic::CyclicBank;
 use crate::dynamics::dispatch::Kernel;
@@ -184,9 +185,9 @@ impl System {
             let row = (3 * node + component) * lanes + sector;
             now[row] - before[row]
         });
-        if let (Some(slave), GapLaw::Spline(law)) = (&self.slave, &self.law) {
+        if let Some((slave, surface)) = carrier_of(&self.slaves, &self.law, node) {
             let frame = self.frame(index, self.state.angle);
-            let slave = slave.moved_last(&law.surface, self.state.geometry.places[index], frame);
+            let slave = slave.moved_last(surface, self.state.geometry.places[index], frame);
             moved = std::array::from_fn(|i| moved[i] - slave[i]);
         }
         moved
@@ -217,19 +218,18 @@ impl System {
             Sectors::Uncoupled(bank) => fill_sectors(matrix, bank, members, rows, columns, per),
             Sectors::Coupled(wheel) => fill_wheel(matrix, wheel, members, rows, columns, per),
         }
-        if let (Some(slave), GapLaw::Spline(law)) = (&mut self.slave, &self.law) {
-            for (member, &Member { index, .. }) in self.members.iter().enumerate() {
-                let frame = law.frame(index, self.state.angle);
-                let span = per * member..per * (member + 1);
-                let (rows, columns) = (&self.row_directions[span.clone()], &self.column_directions[span]);
-                slave.see(member, &law.surface, self.state.geometry.places[index], frame, rows, columns);
-            }
-            for column in 0..per * self.members.len() {
-                slave.prepare_column(column);
-                for row in 0..per * self.members.len() {
-                    matrix[(row, column)] += slave.delassus(row);
+        for (carrier, slave) in self.slaves.iter_mut().enumerate() {
+            slave.clear_members();
+            for (member, &Member { node, index, .. }) in self.members.iter().enumerate() {
+                let Some((surface, own)) = self.law.spline_of(node) else { continue };
+                if own == carrier {
+                    let frame = frame_of(&self.law, index, self.state.angle);
+                    let span = per * member..per * (member + 1);
+                    let (rows, columns) = (&self.row_directions[span.clone()], &self.column_directions[span]);
+                    slave.see(member, surface, self.state.geometry.places[index], frame, rows, columns);
                 }
             }
+            slave.add_delassus(matrix, per);
         }
     }
 
@@ -329,11 +329,15 @@ impl System {
             Sectors::Uncoupled(_) => self.respond_alone(),
             Sectors::Coupled(_) => self.respond_together(),
         }
-        let (Some(slave), GapLaw::Spline(law)) = (&mut self.slave, &self.law) else { return };
-        slave.respond(&self.solution);
+        if self.slaves.is_empty() {
+            return;
+        }
+        let per = self.directions();
+        self.slaves.iter_mut().for_each(|slave| slave.respond(&self.solution, per));
         for index in (0..self.response.len()).filter(|index| index % lanes < self.bank.sectors()) {
-            let place = self.state.geometry.places[index];
-            let moved = slave.responded(&law.surface, place, law.frame(index, drive.rotor_angle));
+            let Some((slave, surface)) = carrier_of(&self.slaves, &self.law, index / lanes) else { continue };
+            let moved =
+                slave.responded(surface, self.state.geometry.places[index], self.frame(index, drive.rotor_angle));
             self.response[index] -= dot(self.state.geometry.normal_at(index), moved);
         }
     }
@@ -390,9 +394,7 @@ impl System {
             Sectors::Uncoupled(_) => self.apply_alone(),
             Sectors::Coupled(_) => self.apply_together(),
         }
-        if let Some(slave) = &mut self.slave {
-            slave.apply(self.settings.ledger);
-        }
+        self.slaves.iter_mut().for_each(|slave| slave.apply(self.settings.ledger));
         if let Some((coating, problem)) = &mut self.coating {
             self.state.ledger.wear_energy.add(coating.commit(problem));
         }

@@ -9,6 +9,7 @@ use crate::contact::coating::{CoatedProblem, Coating};
 use crate::contact::coulomb::CoulombSolver;
 use crate::contact::gap::{Drive, GapLaw, Geometry, dot};
 use crate::contact::solver::ContactSolver;
+use crate::contact::spline_gap::Frame;
 use crate::dynamics::bank::BankOptions;
 use crate::dynamics::modal::ModalModel;
 use crate::dynamics::sectors::{SectorModel, Sectors};
@@ -54,9 +55,10 @@ impl ContactEvent {
 pub struct SystemParts {
     /// Options of the master's modes.
     pub bank: BankOptions,
-    /// Modes of the structure that carries the slave surface, one contact row per component of every control point,
-    /// and whether it is loaded beside contact. The gap function must be [`GapLaw::Spline`].
-    pub slave: Option<(ModalModel, bool)>,
+    /// Modes of each structure that carries a slave surface, one contact row per component of every control point, and
+    /// whether it is loaded beside contact: at most one with [`GapLaw::Spline`], those that the surfaces of
+    /// [`GapLaw::Free`] name, none with other gap functions.
+    pub slaves: Vec<(ModalModel, bool)>,
     /// Abradable coating.
     pub coating: Option<Coating>,
     /// The solver may be [`Solver::Coulomb`].
@@ -68,12 +70,13 @@ pub struct SystemParts {
 pub enum StepFailure {
     /// A displacement or gap became infinite or NaN.
     NonFinite,
-    /// A node is displaced or penetrates by more than a tenth of its radius, or meets a flank of the casing steeper than 45°.
+    /// A node is displaced or penetrates by more than a tenth of its radius, or meets a flank of the casing steeper than
+    /// 45°; of a free master, by more than a tenth of the extent of the contact nodes.
     Implausible {
         /// Sector (0-based).
         sector: usize,
     },
-    /// The structure that carries the slave surface is displaced by more than a tenth of the radius.
+    /// A structure that carries a slave surface is displaced by more than a tenth of the radius, or of the extent.
     CasingImplausible,
     /// The contact problem of a sector has no solution within the pivoting limit.
     Unsolved {
@@ -137,9 +140,9 @@ pub struct System {
     bank: Sectors,
     /// Lanes of a row of the sectors.
     lanes: usize,
-    /// All sectors form one group: through the slave, the wheel, or both.
+    /// All contacts form one group: through slaves, the wheel, or as those of one free structure.
     coupled: bool,
-    slave: Option<Slave>,
+    slaves: Vec<Slave>,
     law: GapLaw,
     settings: SystemSettings,
     problem: ContactSolver,
@@ -172,6 +175,12 @@ pub struct System {
     state: SystemState,
 }
 
+/// Directions of a node's own frame at a rotor angle (rad); the fixed ones where nothing turns.
+#[inline(always)]
+fn frame_of(law: &GapLaw, index: usize, rotor_angle: f64) -> Frame {
+    law.layout().map_or(Frame::FIXED, |layout| Frame::new(layout.angles[index] + rotor_angle))
+}
+
 impl System {
     /// All sectors at rest against something rigid. [`System::set_step`] and [`System::start`] come before the first step.
     pub fn new(model: &ModalModel, sectors: usize, law: GapLaw, settings: SystemSettings) -> Self {
@@ -185,7 +194,7 @@ impl System {
         let bank = Sectors::new(model, parts.bank);
         let (sectors, lanes, nodes) = (bank.sectors(), bank.lanes(), law.nodes());
         let contacts = nodes * lanes;
-        let coupled = parts.slave.is_some() || bank.coupled().is_some();
+        let coupled = !parts.slaves.is_empty() || bank.coupled().is_some() || matches!(law, GapLaw::Free(_));
         let group = if coupled { nodes * sectors } else { nodes };
         let directions = if parts.sticking { 3 } else { 1 };
         let coating = parts.coating.map(|coating| {
@@ -193,7 +202,7 @@ impl System {
             (coating, problem)
         });
         Self {
-            slave: parts.slave.map(|(model, loads)| Slave::new(&model, loads, group, directions)),
+            slaves: parts.slaves.iter().map(|(model, loads)| Slave::new(model, *loads, group, directions)).collect(),
             problem: ContactSolver::new(group),
             coulomb: parts.sticking.then(|| CoulombSolver::new(group)),
             events: Vec::with_capacity(contacts),
@@ -242,14 +251,19 @@ impl System {
         &self.state.geometry
     }
 
-    /// The structure that carries the slave surface.
+    /// The structure that carries the slave surface; of several the first.
     pub fn slave(&self) -> Option<&Slave> {
-        self.slave.as_ref()
+        self.slaves.first()
+    }
+
+    /// The structures that carry slave surfaces.
+    pub fn slaves(&self) -> &[Slave] {
+        &self.slaves
     }
 
     /// The same, to set loads and initial conditions.
-    pub fn slave_mut(&mut self) -> Option<&mut Slave> {
-        self.slave.as_mut()
+    pub fn slaves_mut(&mut self) -> &mut [Slave] {
+        &mut self.slaves
     }
 
     /// The coating.
@@ -344,9 +358,7 @@ impl System {
     pub fn start(&mut self, drive: &Drive) {
         self.bank.recover();
         self.bank.collect_loss();
-        if let Some(slave) = &mut self.slave {
-            slave.start();
-        }
+        self.slaves.iter_mut().for_each(Slave::start);
         if let Some((coating, _)) = &mut self.coating {
             coating.reset();
         }
@@ -368,11 +380,10 @@ impl System {
         kinetic + strain
     }
 
-    /// Kinetic and strain energy of both structures (J).
+    /// Kinetic and strain energy of all structures (J).
     pub fn energies(&self) -> (f64, f64) {
-        let (kinetic, strain) = self.bank.energies();
-        let slave = self.slave.as_ref().map_or((0.0, 0.0), |slave| slave.bank.energies());
-        (kinetic + slave.0, strain + slave.1)
+        let slaves = self.slaves.iter().map(|slave| slave.bank.energies());
+        slaves.fold(self.bank.energies(), |sum, slave| (sum.0 + slave.0, sum.1 + slave.1))
     }
 
     /// Follow the speed of the rotor (rad/s) where its modes depend on it; the strain energy this adds is work of the
@@ -387,9 +398,8 @@ impl System {
     pub fn close_books(&mut self) {
         let loss = self.bank.collect_loss();
         self.state.ledger.damping_loss.add(loss);
-        if let Some(slave) = &mut self.slave {
-            let loss = slave.bank.collect_loss();
-            self.state.ledger.damping_loss.add(loss);
+        for slave in &mut self.slaves {
+            self.state.ledger.damping_loss.add(slave.bank.collect_loss());
         }
     }
 
@@ -401,9 +411,7 @@ impl System {
         let (delayed, ledger) = (self.is_delayed(), self.settings.ledger);
         self.displacement_oldest.copy_from_slice(self.bank.displacement_before());
         self.bank.predict(ledger);
-        if let Some(slave) = &mut self.slave {
-            slave.predict(delayed, ledger);
-        }
+        self.slaves.iter_mut().for_each(|slave| slave.predict(delayed, ledger));
         if delayed {
             self.act_delayed();
         }
@@ -425,9 +433,7 @@ impl System {
         self.state.steps += 1;
         if self.state.steps.is_multiple_of(FLUSH_EVERY) {
             self.bank.flush();
-            if let Some(slave) = &mut self.slave {
-                slave.bank.flush();
-            }
+            self.slaves.iter_mut().for_each(|slave| slave.bank.flush());
         }
         Ok(())
     }
@@ -449,7 +455,7 @@ impl System {
 
     fn finish_loads(&mut self) {
         let mut work = self.bank.finish_loads();
-        if let Some(slave) = &mut self.slave {
+        for slave in &mut self.slaves {
             work += slave.bank.finish_loads();
         }
         if work != 0.0 {
@@ -460,7 +466,14 @@ impl System {
 
     /// Gap of every node, and the smallest of each lane.
     fn evaluate_gaps(&mut self, drive: &Drive, warm: bool) {
-        let moved = self.slave.as_ref().map_or(&[][..], |slave| slave.bank.displacement());
+        let moved = self.slaves.first().map_or(&[][..], |slave| slave.bank.displacement());
+        if let GapLaw::Free(law) = &mut self.law {
+            for surface in &mut law.surfaces {
+                if let Some(carrier) = surface.carrier {
+                    surface.follow(self.slaves[carrier].bank.displacement());
+                }
+            }
+        }
         let before = warm.then_some(&self.geometry_before);
         let state = &mut self.state;
         self.law.evaluate(drive, self.bank.displacement(), moved, before, &mut state.geometry, &mut state.gap);

@@ -1,12 +1,14 @@
-//! The structure that carries the slave surface: its modes, and the control points they move.
+//! A structure that carries a slave surface: its modes, and the control points they move.
 
 use super::Solution;
+use crate::contact::gap::GapLaw;
 use crate::contact::spline::{Place, SurfaceSpline};
 use crate::contact::spline_gap::Frame;
 use crate::dynamics::bank::{BankOptions, ModalBank};
 use crate::dynamics::modal::ModalModel;
 use crate::persist::{Persist, Reader, Writer};
 use crate::settings::Scheme;
+use nalgebra::DMatrix;
 
 /// A flexible slave in the fixed frame.
 #[derive(Debug, Clone)]
@@ -17,6 +19,8 @@ pub struct Slave {
     delayed: Vec<f64>,
     /// Scratch: displacements of the control points two steps before the one that is under way.
     oldest: Vec<f64>,
+    /// Contacts of the group that act on this structure.
+    members: Vec<usize>,
     /// Modes seen at the contacts of a group, along the rows and columns of the Delassus matrix.
     rows: Vec<f64>,
     columns: Vec<f64>,
@@ -26,6 +30,23 @@ pub struct Slave {
     force: Vec<f64>,
     /// Displacement of the control points by the forces of a solution (m); between steps scratch.
     pub response: Vec<f64>,
+}
+
+/// The structure that carries the surface which a contact node meets, and this surface.
+#[inline(always)]
+pub(super) fn carrier_of<'a>(
+    slaves: &'a [Slave],
+    law: &'a GapLaw,
+    node: usize,
+) -> Option<(&'a Slave, &'a SurfaceSpline)> {
+    if slaves.is_empty() { None } else { find_carrier(slaves, law, node) }
+}
+
+/// Out of line: in a rigid casing contacts never get here.
+#[inline(never)]
+fn find_carrier<'a>(slaves: &'a [Slave], law: &'a GapLaw, node: usize) -> Option<(&'a Slave, &'a SurfaceSpline)> {
+    let (surface, carrier) = law.spline_of(node)?;
+    Some((&slaves[carrier], surface))
 }
 
 impl Slave {
@@ -38,6 +59,7 @@ impl Slave {
         Self {
             delayed: vec![0.0; modes],
             oldest: vec![0.0; bank.rows()],
+            members: Vec::with_capacity(contacts),
             rows: vec![0.0; contacts * directions * modes],
             columns: vec![0.0; contacts * directions * modes],
             seen: std::array::from_fn(|_| vec![0.0; modes]),
@@ -116,7 +138,12 @@ impl Slave {
         sum
     }
 
-    /// Project the modes on the directions (in `frame`) of contact `member` of the group.
+    /// Forget the group.
+    pub fn clear_members(&mut self) {
+        self.members.clear();
+    }
+
+    /// Project the modes on the directions (in `frame`) of contact `member` of the group, which acts on this structure.
     pub fn see(
         &mut self,
         member: usize,
@@ -126,6 +153,7 @@ impl Slave {
         rows: &[[f64; 3]],
         columns: &[[f64; 3]],
     ) {
+        self.members.push(member);
         let modes = self.bank.modes();
         for (component, seen) in self.seen.iter_mut().enumerate() {
             seen.fill(0.0);
@@ -146,14 +174,28 @@ impl Slave {
         }
     }
 
+    /// Add this structure's part to the Delassus matrix (m/N) of a group with `per` directions per contact.
+    pub fn add_delassus(&mut self, matrix: &mut DMatrix<f64>, per: usize) {
+        for at in 0..self.members.len() {
+            for column in per * self.members[at]..per * (self.members[at] + 1) {
+                self.prepare_column(column);
+                for member in &self.members {
+                    for row in per * member..per * (member + 1) {
+                        matrix[(row, column)] += self.delassus(row);
+                    }
+                }
+            }
+        }
+    }
+
     /// Entry (row, column) of the slave's part of the Delassus matrix (m/N); [`Slave::prepare_column`] comes before.
-    pub fn delassus(&self, row: usize) -> f64 {
+    fn delassus(&self, row: usize) -> f64 {
         let modes = self.bank.modes();
         self.rows[row * modes..][..modes].iter().zip(&self.force).map(|(shape, moved)| shape * moved).sum()
     }
 
     /// Modal displacement per unit force along a column of the Delassus matrix.
-    pub fn prepare_column(&mut self, column: usize) {
+    fn prepare_column(&mut self, column: usize) {
         let modes = self.bank.modes();
         let shapes = &self.columns[column * modes..][..modes];
         for ((value, shape), k) in self.force.iter_mut().zip(shapes).zip(self.bank.coefficients(0)) {
@@ -161,25 +203,35 @@ impl Slave {
         }
     }
 
-    /// Modal force −Σ F_j λ_j of a solution into the scratch.
-    fn gather(&mut self, solution: &Solution) {
+    /// Modal force −Σ F_j λ_j of a solution with `per` directions per contact into the scratch.
+    fn gather(&mut self, solution: &Solution, per: usize) {
         let modes = self.bank.modes();
         self.force.fill(0.0);
-        for (column, value) in solution.values().iter().enumerate().filter(|(_, value)| **value != 0.0) {
-            let shapes = &self.columns[column * modes..][..modes];
-            self.force.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum -= value * shape);
+        let columns = self.members.iter().flat_map(|member| per * member..per * (member + 1));
+        for (column, value) in columns.map(|column| (column, solution.values()[column])) {
+            if value != 0.0 {
+                let shapes = &self.columns[column * modes..][..modes];
+                self.force.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum -= value * shape);
+            }
         }
     }
 
     /// What the forces of a solution would do to the control points.
-    pub fn respond(&mut self, solution: &Solution) {
-        self.gather(solution);
+    pub fn respond(&mut self, solution: &Solution, per: usize) {
+        self.gather(solution, per);
+        if self.members.is_empty() {
+            self.response.fill(0.0);
+            return;
+        }
         self.bank.response_to_modal(&self.force, &mut self.response);
     }
 
     /// Let the forces of the solution act that [`Slave::respond`] was asked about last.
     pub fn apply(&mut self, with_loss: bool) {
         self.delayed.copy_from_slice(&self.force);
+        if self.members.is_empty() {
+            return;
+        }
         self.bank.correct_modal(&self.force, &self.response, with_loss);
     }
 

@@ -1,5 +1,7 @@
 //! Features that scenes of uncoupled and of coupled sectors are tested with.
 
+#![allow(dead_code, reason = "each test binary uses its part")]
+
 use tiprub_core::Scene;
 use tiprub_core::settings::{CoatingSettings, Motion, StructureSettings};
 

@@ -142,7 +142,7 @@ pub fn casing_of(around: usize, along: usize, diameters: u32) -> Rom {
             .collect(),
         checks: RomChecks::default(),
         extras: RomExtras {
-            grid: Some(ContactGrid { around, along }),
+            grid: Some(ContactGrid { around, along, closed: true }),
             thermal: Some(Thermal {
                 loads: DMatrix::from_fn(order, 4, |mode, patch| 40.0 * (1.0 + mode as f64 + 3.0 * patch as f64).sin()),
                 patches: (0..4)

@@ -83,7 +83,7 @@ impl Reader<'_> {
             let problem = format!("{text:?} is not two whole numbers with a comma between them");
             return Err(self.error("metadata `contact_grid`", problem, WRITE_AGAIN));
         };
-        Ok(Some(ContactGrid { around, along }))
+        Ok(Some(ContactGrid { around, along, closed: true }))
     }
 }
 

@@ -138,7 +138,7 @@ impl GridNodes {
 
     /// Its shape, as the ROM has it.
     pub fn shape(&self) -> ContactGrid {
-        ContactGrid { around: self.around, along: self.along() }
+        ContactGrid { around: self.around, along: self.along(), closed: true }
     }
 
     /// The contact nodes in the cylindrical frame.

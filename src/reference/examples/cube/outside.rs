@@ -3,7 +3,10 @@
 use std::path::Path;
 
 use tiprub_reference::compare::relative_l2;
+use tiprub_reference::cube::calculix;
 use tiprub_reference::cube::history::History;
+use tiprub_reference::cube::mesh::cube_mesh;
+use tiprub_reference::cube::outside::COLUMNS;
 use tiprub_reference::cube::scene::{Mass, Setting};
 use tiprub_reference::methods::Method;
 use tiprub_reference::surface::SurfaceKind;
@@ -13,17 +16,22 @@ use super::run;
 /// End of the rebounds of the first touch in CalculiX's solution (s).
 const REBOUNDED: f64 = 1.2e-4;
 
-/// What a CalculiX `.dat` file says of node 1 of the cube.
+/// What a CalculiX `.dat` file says of the cube.
+#[derive(Default)]
 struct Theirs {
     times: Vec<f64>,
+    /// Of node 1 (m).
     displacements: Vec<[f64; 3]>,
-    /// Contact pressures (Pa), one per time.
+    /// Contact pressures of node 1 (Pa), one per time.
     pressures: Vec<f64>,
+    /// Normal forces on the left face (N), one per time.
+    left: Vec<f64>,
 }
 
 fn read(path: &str) -> Theirs {
     let text = std::fs::read_to_string(path).expect("the .dat file can be read");
-    let mut theirs = Theirs { times: Vec::new(), displacements: Vec::new(), pressures: Vec::new() };
+    let cube = cube_mesh();
+    let mut theirs = Theirs::default();
     let (mut in_displacements, mut in_contact) = (false, false);
     for line in text.lines() {
         if line.contains(" for ") {
@@ -32,32 +40,42 @@ fn read(path: &str) -> Theirs {
             if in_displacements {
                 theirs.times.push(line.rsplit(' ').next().and_then(|word| word.parse().ok()).expect("a time"));
                 theirs.pressures.push(0.0);
+                theirs.left.push(0.0);
             }
             continue;
         }
         let words: Vec<&str> = line.split_whitespace().collect();
-        if words.len() != 4 || words[0] != "1" {
+        let Some(node) = words.first().and_then(|word| word.parse::<usize>().ok()) else { continue };
+        if words.len() != 4 || !(in_displacements && node == 1 || in_contact) {
             continue;
         }
         let numbers: [f64; 3] = core::array::from_fn(|i| words[i + 1].parse().expect("a number"));
         if in_displacements {
             theirs.displacements.push(numbers);
-        } else if in_contact {
-            // Contact of an increment comes after its displacements.
-            *theirs.pressures.last_mut().expect("an increment") = numbers[0];
+            continue;
+        }
+        // Contact of an increment comes after its displacements.
+        let last = theirs.times.len() - 1;
+        if node == 1 {
+            theirs.pressures[last] = numbers[0];
+        }
+        if cube.sets["MASTER_LEFT"].contains(&(node - 1)) {
+            theirs.left[last] += numbers[0] * calculix::area(&cube, node - 1);
         }
     }
     theirs
 }
 
-/// Print how far node 1 is from CalculiX's, which has consistent mass, facets and large displacements.
+/// Print how far node 1 is from CalculiX's, which has consistent mass and facets, and write its table.
 /// `stiffness` is the
 /// pressure per overclosure of its run (Pa/m): by pressure over stiffness its node lies inside the ring, which is added to u1x.
 pub fn compare(directory: &Path, path: &str, stiffness: f64) {
-    let Theirs { times, mut displacements, pressures } = read(path);
-    let mut table = String::from("t,u1x,u1y,u1z,pressure\n");
-    for ((t, [x, y, z]), pressure) in times.iter().zip(&displacements).zip(&pressures) {
-        table.push_str(&format!("{t:e},{x:e},{y:e},{z:e},{pressure:e}\n"));
+    let Theirs { times, mut displacements, pressures, left } = read(path);
+    let corner = calculix::area(&cube_mesh(), 0);
+    let mut table = format!("{COLUMNS}\n");
+    for (i, t) in times.iter().enumerate() {
+        let ([x, y, z], first) = (displacements[i], pressures[i] * corner);
+        table.push_str(&format!("{t:e},{x:e},{y:e},{z:e},{first:.6e},{:.6e},0\n", left[i]));
     }
     std::fs::write(directory.join("cube_calculix.csv"), table).expect("a CSV file can be written");
     displacements.iter_mut().zip(&pressures).for_each(|(u, pressure)| u[0] += pressure / stiffness);

@@ -29,6 +29,14 @@ pub fn free_ring(n: u32, bending: f64, mass_per_length: f64, radius: f64) -> f64
     ((square * (square - 1.0).powi(2) / (square + 1.0)) * bending / mass_per_length).sqrt() / (radius * radius)
 }
 
+/// Out-of-plane bending and torsion of a free thin ring with n ≥ 2 waves (rad/s): ω² = n²(n² − 1)²/(n² + EI/GJ) EI/ρAR⁴, with EI of
+/// bending out of the plane and GJ of torsion (A. E. H. Love, Mathematical Theory of Elasticity, section 293).
+pub fn free_ring_out_of_plane(n: u32, bending: f64, torsion: f64, mass_per_length: f64, radius: f64) -> f64 {
+    let square = f64::from(n * n);
+    ((square * (square - 1.0).powi(2) / (square + bending / torsion)) * bending / mass_per_length).sqrt()
+        / (radius * radius)
+}
+
 /// Cyclic chain of N masses m on springs k, neighbours coupled by k_c (rad/s): ω² = (k + 4k_c sin²(πn/N))/m.
 pub fn cyclic_chain(n: u32, sectors: u32, mass: f64, spring: f64, coupling: f64) -> f64 {
     let sine = (PI * f64::from(n) / f64::from(sectors)).sin();

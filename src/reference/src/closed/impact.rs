@@ -51,6 +51,12 @@ impl Hertz {
         1.5 * force / (PI * self.contact_radius(force).powi(2))
     }
 
+    /// Pressure at a distance from the centre (m): p₀ √(1 − r²/a²) (Pa).
+    pub fn pressure_at(&self, force: f64, distance: f64) -> f64 {
+        let share = distance / self.contact_radius(force);
+        self.pressure(force) * (1.0 - share * share).max(0.0).sqrt()
+    }
+
     /// Impact of a mass (kg) at a speed (m/s): δ_max from ½mv² = 8/15 E*√R δ^{5/2}, duration 2.9432 δ_max/v.
     pub fn impact(&self, mass: f64, speed: f64) -> Bounce {
         let depth = (15.0 * mass * speed * speed / (16.0 * self.modulus * self.radius.sqrt())).powf(0.4);

@@ -2,5 +2,7 @@
 
 pub mod belt;
 pub mod bouncing_bar;
+pub mod chain;
 pub mod frequencies;
 pub mod impact;
+pub mod oscillator;

@@ -9,7 +9,7 @@ use tiprub_model::element::ElementKind;
 use tiprub_model::{Material, Mesh};
 
 use super::mesh::{cube_mesh, ring_mesh};
-use super::{Side, cube_material, ring_material};
+use super::{CUBE_ELEMENTS, SIDE, Side, cube_material, ring_material};
 
 /// Choices of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +26,10 @@ pub struct Run {
     pub contact_stiffness: f64,
     /// Friction stress per sticking displacement (Pa/m).
     pub stick_stiffness: f64,
+    /// Finite strains (`NLGEOM`); contact follows the moved bodies without it, too.
+    pub large: bool,
+    /// Contact between surfaces instead of nodes and surfaces.
+    pub surfaces: bool,
 }
 
 /// Text of the input file: full 3D, all three bodies, implicit steps of fixed size without numerical damping.
@@ -44,10 +48,14 @@ pub fn input(run: &Run) -> String {
             "CUBE" => {
                 cube_nodes = mesh.nodes.len();
                 for set in ["MASTER_LEFT", "MASTER_RIGHT"] {
-                    put(&mut text, format_args!("*SURFACE, NAME=S_{set}, TYPE=NODE\n{set}\n"));
+                    if run.surfaces {
+                        write_faces(&mut text, &format!("S_{set}"), mesh, set, first_element);
+                    } else {
+                        put(&mut text, format_args!("*SURFACE, NAME=S_{set}, TYPE=NODE\n{set}\n"));
+                    }
                 }
             }
-            _ => write_outer_faces(&mut text, name, mesh, first_element),
+            _ => write_faces(&mut text, &format!("F_{name}"), mesh, "SLAVE", first_element),
         }
         first_node += mesh.nodes.len();
         first_element += mesh.elements.len();
@@ -58,17 +66,20 @@ pub fn input(run: &Run) -> String {
     if run.friction > 0.0 {
         put(&mut text, format_args!("*FRICTION\n{}, {:e}\n", run.friction, run.stick_stiffness));
     }
+    let kind = if run.surfaces { "SURFACE TO SURFACE" } else { "NODE TO SURFACE" };
     for side in ["LEFT", "RIGHT"] {
-        put(
-            &mut text,
-            format_args!("*CONTACT PAIR, INTERACTION=TOUCH, TYPE=NODE TO SURFACE\nS_MASTER_{side}, F_{side}\n"),
-        );
+        put(&mut text, format_args!("*CONTACT PAIR, INTERACTION=TOUCH, TYPE={kind}\nS_MASTER_{side}, F_{side}\n"));
     }
     put(&mut text, format_args!("*INITIAL CONDITIONS, TYPE=VELOCITY\n"));
     (1..=cube_nodes).for_each(|node| put(&mut text, format_args!("{node}, 2, {}\n", -run.speed)));
     put(
         &mut text,
-        format_args!("*STEP, NLGEOM, INC=1000000\n*DYNAMIC, DIRECT, ALPHA=0.\n{:e}, {:e}\n", run.increment, run.end),
+        format_args!(
+            "*STEP{}, INC=1000000\n*DYNAMIC, DIRECT, ALPHA=0.\n{:e}, {:e}\n",
+            if run.large { ", NLGEOM" } else { "" },
+            run.increment,
+            run.end
+        ),
     );
     put(&mut text, format_args!("*NODE PRINT, NSET=N_CUBE\nU\n"));
     put(&mut text, format_args!("*CONTACT PRINT\nCSTR\n"));
@@ -100,15 +111,24 @@ fn write_body(text: &mut String, name: &str, mesh: &Mesh, material: &Material, f
     put(text, format_args!("*SOLID SECTION, ELSET=E_{name}, MATERIAL=M_{name}\n"));
 }
 
-fn write_outer_faces(text: &mut String, name: &str, mesh: &Mesh, first_element: usize) {
-    let slave = &mesh.sets["SLAVE"];
-    put(text, format_args!("*SURFACE, NAME=F_{name}, TYPE=ELEMENT\n"));
+/// The faces whose corners all are of a set, as a surface.
+fn write_faces(text: &mut String, name: &str, mesh: &Mesh, set: &str, first_element: usize) {
+    put(text, format_args!("*SURFACE, NAME={name}, TYPE=ELEMENT\n"));
     for (index, element) in mesh.elements.iter().enumerate() {
-        let outer = |face: &&[usize]| face.iter().all(|&corner| slave.binary_search(&element.nodes[corner]).is_ok());
-        if let Some(face) = ElementKind::Hex8.faces().iter().position(outer) {
+        let inside =
+            |face: &&[usize]| face.iter().all(|&corner| mesh.sets[set].binary_search(&element.nodes[corner]).is_ok());
+        if let Some(face) = ElementKind::Hex8.faces().iter().position(inside) {
             put(text, format_args!("{}, S{}\n", first_element + index, face + 1));
         }
     }
+}
+
+/// Area by which CalculiX multiplies the pressure of a master (m²): a quarter of every outer face at the node, those of the leading
+/// and trailing face and of the sides with it. So said the forces that its displacements need, to 1e-3.
+pub fn area(mesh: &Mesh, node: usize) -> f64 {
+    let face = (SIDE / CUBE_ELEMENTS as f64).powi(2);
+    let corner = ["CORNERS_LEFT", "CORNERS_RIGHT"].iter().any(|set| mesh.sets[*set].contains(&node));
+    if corner { 0.75 * face } else { face }
 }
 
 fn put(text: &mut String, arguments: std::fmt::Arguments<'_>) {

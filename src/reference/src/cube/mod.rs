@@ -8,6 +8,7 @@ pub mod calculix;
 pub mod files;
 pub mod history;
 pub mod mesh;
+pub mod outside;
 pub mod scene;
 
 use tiprub_model::Material;

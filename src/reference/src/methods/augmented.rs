@@ -20,6 +20,8 @@ use crate::surface::is_zero;
 pub struct Options {
     /// ε (N/m) per node.
     pub penalty: f64,
+    /// ε of a face's corner nodes over that of the other nodes.
+    pub corners: f64,
     /// Largest penetration without another augmentation (m).
     pub tolerance: f64,
 }
@@ -28,7 +30,7 @@ impl Default for Options {
     /// 24 times E·a of the cube's 10 mm elements, so that a node under 2500 N goes 5 µm deep; another augmentation beyond a
     /// hundredth of the element.
     fn default() -> Self {
-        Self { penalty: 5e8, tolerance: 1e-4 }
+        Self { penalty: 5e8, corners: 1.0, tolerance: 1e-4 }
     }
 }
 
@@ -130,6 +132,14 @@ fn memory(contacts: &[Contact], forces: &[Vector3<f64>]) -> Memory {
 }
 
 impl Problem<'_> {
+    /// ε of a contact (N/m).
+    fn penalty(&self, contact: &Contact) -> f64 {
+        let cube = &self.scene.bodies[0];
+        let node = cube.contact[contact.side * self.scene.masters + contact.master];
+        let corner = ["CORNERS_LEFT", "CORNERS_RIGHT"].iter().any(|set| cube.mesh.sets[*set].contains(&node));
+        self.options.penalty * if corner { self.options.corners } else { 1.0 }
+    }
+
     fn solve(&mut self, start: &SurfaceVectors, free: &SurfaceVectors, step: usize) -> Result<Found> {
         let masters = self.scene.masters;
         let mut moved = free.clone();
@@ -156,7 +166,8 @@ impl Problem<'_> {
                 })
                 .collect();
             let delassus = self.operator.delassus(&contacts, masters) * self.quarter;
-            let (forces, count) = self.newton(&delassus, &offsets, &given, step)?;
+            let penalties: Vec<f64> = contacts.iter().map(|contact| self.penalty(contact)).collect();
+            let (forces, count) = self.newton(&delassus, &offsets, &given, &penalties, step)?;
             iterations += count;
             let local: Vec<[f64; 3]> = forces.iter().map(|force| (*force).into()).collect();
             let response = self.operator.surface_response(&surface_forces(self.scene, &contacts, &local));
@@ -195,6 +206,7 @@ impl Problem<'_> {
         delassus: &DMatrix<f64>,
         offsets: &[Vector3<f64>],
         given: &[Vector3<f64>],
+        penalties: &[f64],
         step: usize,
     ) -> Result<(Vec<Vector3<f64>>, usize)> {
         let count = offsets.len();
@@ -204,10 +216,10 @@ impl Problem<'_> {
             let mut jacobian = DMatrix::identity(3 * count, 3 * count);
             let mut residual = DVector::zeros(3 * count);
             for a in 0..count {
-                let trial = given[a] - (offsets[a] + moved.fixed_rows::<3>(3 * a)) * self.options.penalty;
+                let trial = given[a] - (offsets[a] + moved.fixed_rows::<3>(3 * a)) * penalties[a];
                 let (law, slope) = law(trial, self.scene.setting.friction);
                 residual.fixed_rows_mut::<3>(3 * a).copy_from(&(forces.fixed_rows::<3>(3 * a) - law));
-                let rows = slope * delassus.rows(3 * a, 3) * self.options.penalty;
+                let rows = slope * delassus.rows(3 * a, 3) * penalties[a];
                 let mut view = jacobian.rows_mut(3 * a, 3);
                 view += rows;
             }

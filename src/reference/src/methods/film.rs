@@ -18,11 +18,21 @@ use crate::cube::scene::Scene;
 pub struct Options {
     /// Let contacts with a negative multiplier go and solve again for the others.
     pub release_tension: bool,
+    /// Solve the whole complementarity problem instead: also masters that only the others' forces push in take part, and
+    /// those let go may come back. The paper does not.
+    pub complementary: bool,
 }
+
+/// Masters closer than this take part in the complementarity problem (m).
+const MARGIN: f64 = 1e-4;
+/// A gap below minus this (m) is a penetration in the complementarity problem.
+const ROUNDING: f64 = 1e-14;
+/// Most exchanges of one contact in a complementarity problem.
+const EXCHANGES: usize = 10_000;
 
 impl Default for Options {
     fn default() -> Self {
-        Self { release_tension: true }
+        Self { release_tension: true, complementary: false }
     }
 }
 
@@ -49,7 +59,7 @@ pub fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
         let predicted: Vectors =
             core::array::from_fn(|index| now[index].iter().zip(&change[index]).map(|(u, d)| u + d).collect());
         let moved = surface_of(scene, &predicted);
-        let contacts = find(scene, &rest, &moved, 0.0);
+        let contacts = find(scene, &rest, &moved, if options.complementary { MARGIN } else { 0.0 });
         let mut forces = Vec::new();
         if !contacts.is_empty() {
             let slip = surface_of(scene, &change);
@@ -97,26 +107,64 @@ fn multipliers(
     let entry = |a: usize, b: usize| -> f64 {
         square * (0..3).map(|j| delassus[(3 * a, 3 * b + j)] * directions[b][j]).sum::<f64>()
     };
-    let mut active: Vec<usize> = (0..contacts.len()).collect();
-    let mut forces = vec![[0.0; 3]; contacts.len()];
-    loop {
-        recorder.iterations(1);
+    let solve = |active: &[usize]| -> Result<Vec<f64>> {
+        if active.is_empty() {
+            return Ok(Vec::new());
+        }
         let matrix = DMatrix::from_fn(active.len(), active.len(), |i, j| entry(active[i], active[j]));
         let right = DVector::from_fn(active.len(), |i, _| -contacts[active[i]].gap);
         let solution = matrix.lu().solve(&right).ok_or_else(|| {
             Error::invalid("contact matrix of film", "it is singular", "Check the surfaces of the scene")
         })?;
-        let kept: Vec<usize> =
-            (0..active.len()).filter(|i| !options.release_tension || solution[*i] > 0.0).map(|i| active[i]).collect();
-        if kept.len() == active.len() {
-            active
-                .iter()
-                .enumerate()
-                .for_each(|(i, &contact)| forces[contact] = directions[contact].map(|d| d * solution[i]));
+        Ok(solution.iter().copied().collect())
+    };
+    let mut active: Vec<usize> = (0..contacts.len()).filter(|a| contacts[*a].gap < 0.0).collect();
+    for _ in 0..EXCHANGES {
+        recorder.iterations(1);
+        let solution = solve(&active)?;
+        let kept: Vec<usize> = if options.complementary {
+            exchanged(&active, &solution, contacts, entry)
+        } else {
+            (0..active.len()).filter(|i| !options.release_tension || solution[*i] > 0.0).map(|i| active[i]).collect()
+        };
+        if kept == active {
+            let mut forces = vec![[0.0; 3]; contacts.len()];
+            for (multiplier, &contact) in solution.iter().zip(&active) {
+                forces[contact] = directions[contact].map(|d| d * multiplier);
+            }
             return Ok(forces);
         }
         active = kept;
     }
+    let problem = format!("{} contacts are not settled after {EXCHANGES} exchanges", contacts.len());
+    Err(Error::invalid("contact problem of film", problem, "Take a smaller step or less friction"))
+}
+
+/// Active contacts after one exchange: the first contact that pulls or that would be inside changes sides (K. G. Murty's rule,
+/// which ends for every P-matrix). The same contacts when there is none.
+fn exchanged(
+    active: &[usize],
+    multipliers: &[f64],
+    contacts: &[Contact],
+    entry: impl Fn(usize, usize) -> f64,
+) -> Vec<usize> {
+    let wrong = (0..contacts.len()).find(|&a| match active.binary_search(&a) {
+        Ok(place) => multipliers[place] < 0.0,
+        Err(_) => {
+            let pushed: f64 = active.iter().zip(multipliers).map(|(&b, multiplier)| entry(a, b) * multiplier).sum();
+            contacts[a].gap + pushed < -ROUNDING
+        }
+    });
+    let mut changed = active.to_vec();
+    if let Some(a) = wrong {
+        match active.binary_search(&a) {
+            Ok(place) => {
+                changed.remove(place);
+            }
+            Err(place) => changed.insert(place, a),
+        }
+    }
+    changed
 }
 
 /// Force per multiplier in the frame: the normal, and µ against the predicted sliding.

@@ -100,6 +100,7 @@ pub(crate) fn unit(a: [f64; 3]) -> [f64; 3] {
     scaled(a, 1.0 / dot(a, a).sqrt())
 }
 
+#[cfg(feature = "cube")]
 pub(crate) fn is_zero(a: &[f64; 3]) -> bool {
     a.iter().all(|x| *x == 0.0)
 }

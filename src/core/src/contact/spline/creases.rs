@@ -3,8 +3,7 @@
 //! Between its creases the surface is a smooth sheet with its own closest point, which may lie on a crease.
 
 use super::foot::{Foot, Held, noise};
-use super::projection::ROUNDING;
-use super::{Place, SurfaceSpline};
+use super::{Ends, Place, SurfaceSpline};
 use crate::contact::gap::dot;
 use crate::settings::Interpolation;
 
@@ -17,7 +16,7 @@ impl SurfaceSpline {
     /// A sheet across a crease at the distance b along this one can only hold a closer point if b < |r| tan(φ/2) for a
     /// fold of angle φ: b ≤ 2|r| covers folds up to 126°.
     pub(super) fn search_sheets(&self, x: [f64; 3], start: Foot) -> Option<Foot> {
-        let rounding = ROUNDING * dot(x, x).sqrt();
+        let rounding = self.rounding(x, &start);
         let mut best = start;
         // Every round lowers f, and a start on the opposite side has half the facets to walk over.
         for _ in 0..self.around + self.along {
@@ -45,6 +44,10 @@ impl SurfaceSpline {
             side == 0 || distance * distance * length <= 8.0 * foot.half_square || distance <= 0.0
         };
         if !(near(sides[0], s, room[0], length_s) && near(sides[1], t, room[1], length_t)) {
+            return None;
+        }
+        let last = p + 1 == self.columns();
+        if self.ends == Ends::Open && ((sides[0] < 0 && p == 0) || (sides[0] > 0 && last)) {
             return None;
         }
         let (column, s) = match (sides[0], self.interpolation) {

@@ -6,8 +6,9 @@
 //!
 //! with the 4 × 4 control points Q_{p−1..p+2, q−1..q+2}. The control points solve the interpolation problem
 //! S(data point) = P. Along the axis both edges are free: S_tt = 0 there. Around, the surface closes with continuous
-//! first and second derivatives ([`Closure::Smooth`], fig. 8b), or with free ends that meet in position only
-//! ([`Closure::FreeEnds`], fig. 8a). [`Interpolation::Facets`] replaces all of it by bilinear patches.
+//! first and second derivatives ([`Closure::Smooth`], fig. 8b), with free ends that meet in position only
+//! ([`Closure::FreeEnds`], fig. 8a), or not at all: an open surface ([`SurfaceSpline::open`]) has two more free edges,
+//! S_ss = 0 there, and stands anywhere in space. [`Interpolation::Facets`] replaces all of it by bilinear patches.
 //!
 //! A free end is the phantom control point Q₋₁ = 2 Q₀ − Q₁, so that phantoms depend on the others and there is exactly
 //! one control point per data point, with the same index. Displacements of the data points become displacements of the
@@ -30,27 +31,40 @@ use interpolation::Line;
 
 /// Fewest data points around: below them the four control points of a patch would not be different ones.
 pub const FEWEST_AROUND: usize = 4;
-/// Fewest rings of data points along the axis.
+/// Fewest rings of data points along the axis, and of data points in either direction of an open surface.
 pub const FEWEST_ALONG: usize = 2;
+
+/// The two ends of a row of data points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ends {
+    /// Closed, continuous up to the second derivative.
+    Smooth,
+    /// Closed, free ends that meet in position.
+    Meeting,
+    /// Free edges.
+    Open,
+}
 
 /// A place on the surface: a patch and the parameters in it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Place {
-    /// Patch (p, q): p < around counts around from the first data point, q < along − 1 along the axis.
+    /// Patch (p, q): p < around (around − 1 of an open surface) counts around from the first data point, q < along − 1
+    /// along the axis.
     pub patch: [usize; 2],
-    /// Parameter around, 0 at data point p and 1 at p + 1.
+    /// Parameter around, 0 at data point p and 1 at p + 1; beyond that by rounding at the edges of an open surface.
     pub s: f64,
     /// Parameter along the axis, 0 at ring q and 1 at ring q + 1; beyond that by rounding at the two edges.
     pub t: f64,
 }
 
-/// A closed surface through around × along data points, index `along · around + i`: rings in order of growing z, the
-/// points of a ring at angles growing by 2π/around about z. Nothing but construction allocates.
+/// A surface through around × along data points, index `along · around + i`. A closed one has rings in order of growing z,
+/// the points of a ring at angles growing by 2π/around about z; an open one is a quadrilateral grid of any shape, whose
+/// "around" and "along" are its two directions. Nothing but construction allocates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceSpline {
     around: usize,
     along: usize,
-    closure: Closure,
+    ends: Ends,
     interpolation: Interpolation,
     /// Interpolation problems around and along.
     lines: [Line; 2],
@@ -63,6 +77,8 @@ pub struct SurfaceSpline {
     first_angle: f64,
     /// Mean axial position of each ring (m), undeformed.
     rings: Vec<f64>,
+    /// Data points of an open surface (m), undeformed.
+    data: Vec<[f64; 3]>,
 }
 
 impl SurfaceSpline {
@@ -78,9 +94,35 @@ impl SurfaceSpline {
         closure: Closure,
         interpolation: Interpolation,
     ) -> Result<Self> {
-        let remedy = "Give at least 4 points around and 2 rings along the axis";
+        let ends = match closure {
+            Closure::Smooth => Ends::Smooth,
+            Closure::FreeEnds => Ends::Meeting,
+        };
+        Self::with_ends(data, around, along, ends, interpolation)
+    }
+
+    /// An open surface through `data`, Cartesian points (m) of a quadrilateral grid of any shape: free edges on all four
+    /// sides. Its normal is S_t × S_s/|S_t × S_s|, with s from point to point of a row and t from row to row.
+    ///
+    /// # Errors
+    /// Fewer than 2 × 2 points, a wrong number of them, points that are not finite.
+    pub fn open(data: &[[f64; 3]], around: usize, along: usize, interpolation: Interpolation) -> Result<Self> {
+        Self::with_ends(data, around, along, Ends::Open, interpolation)
+    }
+
+    fn with_ends(
+        data: &[[f64; 3]],
+        around: usize,
+        along: usize,
+        ends: Ends,
+        interpolation: Interpolation,
+    ) -> Result<Self> {
+        let (fewest, remedy) = match ends {
+            Ends::Open => (FEWEST_ALONG, "Give at least 2 x 2 points"),
+            _ => (FEWEST_AROUND, "Give at least 4 points around and 2 rings along the axis"),
+        };
         let counts = format!("{around} points around and {along} rings");
-        if around < FEWEST_AROUND || along < FEWEST_ALONG {
+        if around < fewest || along < FEWEST_ALONG {
             return Err(Error::invalid("surface spline", counts, remedy));
         }
         let addressable = around.checked_mul(along).is_some_and(|count| u32::try_from(count).is_ok());
@@ -90,9 +132,10 @@ impl SurfaceSpline {
         let lines = match interpolation {
             Interpolation::Facets => [Line::facets(), Line::facets()],
             Interpolation::Spline => {
-                let ring = match closure {
-                    Closure::Smooth => Line::closed(around),
-                    Closure::FreeEnds => Line::free_ends_meeting(around),
+                let ring = match ends {
+                    Ends::Smooth => Line::closed(around),
+                    Ends::Meeting => Line::free_ends_meeting(around),
+                    Ends::Open => Line::free_ends(around),
                 };
                 [ring, Line::free_ends(along)]
             }
@@ -100,13 +143,14 @@ impl SurfaceSpline {
         let mut surface = Self {
             around,
             along,
-            closure,
+            ends,
             interpolation,
             lines,
             control: vec![[0.0; 3]; around * along],
             mesh: vec![[0.0; 4]; (around + 3) * (along + 2)],
             first_angle: 0.0,
             rings: vec![0.0; along],
+            data: if ends == Ends::Open { data.to_vec() } else { Vec::new() },
         };
         surface.set_data(data)?;
         Ok(surface)
@@ -118,6 +162,9 @@ impl SurfaceSpline {
     /// As [`SurfaceSpline::new`]; the surface is then unchanged.
     pub fn set_data(&mut self, data: &[[f64; 3]]) -> Result<()> {
         self.check(data)?;
+        if self.ends == Ends::Open {
+            self.data.copy_from_slice(data);
+        }
         self.first_angle = libm::atan2(data[0][1], data[0][0]);
         for (ring, points) in self.rings.iter_mut().zip(data.chunks(self.around)) {
             *ring = mean_axial(points);
@@ -141,6 +188,9 @@ impl SurfaceSpline {
         }
         if let Some(index) = data.iter().position(|point| point.iter().any(|value| !value.is_finite())) {
             return refuse(format!("surface spline, data point {}", index + 1), format!("{:?} m", data[index]));
+        }
+        if self.ends == Ends::Open {
+            return Ok(());
         }
         let spacing = std::f64::consts::TAU / real(self.around);
         let first = libm::atan2(data[0][1], data[0][0]);
@@ -185,9 +235,17 @@ impl SurfaceSpline {
         self.along
     }
 
-    /// Place at about the angle and the axial position of a point (m), on the edge for points beyond it: the start
-    /// for [`SurfaceSpline::project`] when there is none from the last step.
+    /// Patches around.
+    pub fn columns(&self) -> usize {
+        if self.ends == Ends::Open { self.around - 1 } else { self.around }
+    }
+
+    /// Place at about the angle and the axial position of a point (m), on the edge for points beyond it, or the nearest
+    /// data point of an open surface: the start for [`SurfaceSpline::project`] when there is none from the last step.
     pub fn locate(&self, point: [f64; 3]) -> Place {
+        if self.ends == Ends::Open {
+            return self.nearest_data_point(point);
+        }
         let turns = (libm::atan2(point[1], point[0]) - self.first_angle) / std::f64::consts::TAU;
         let (p, s) = split((turns - turns.floor()) * real(self.around), self.around);
         let q = self.rings[1..self.along - 1].iter().filter(|axial| **axial <= point[2]).count();
@@ -195,7 +253,16 @@ impl SurfaceSpline {
         Place { patch: [p, q], s, t: if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 } }
     }
 
-    /// The place `turns` revolutions about z further, to start from when the rotor has turned.
+    fn nearest_data_point(&self, point: [f64; 3]) -> Place {
+        let square = |data: &[f64; 3]| (0..3).map(|i| (point[i] - data[i]) * (point[i] - data[i])).sum::<f64>();
+        let nearest = self.data.iter().map(square).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        let index = nearest.map_or(0, |(index, _)| index);
+        let (p, q) = (index % self.around, index / self.around);
+        let patch = [p.min(self.around - 2), q.min(self.along - 2)];
+        Place { patch, s: real(p - patch[0]), t: real(q - patch[1]) }
+    }
+
+    /// The place `turns` revolutions about z further, to start from when the rotor has turned; on closed surfaces only.
     pub fn advance(&self, place: Place, turns: f64) -> Place {
         let whole = real(self.around);
         let s = place.s + turns * whole;
@@ -215,8 +282,13 @@ impl SurfaceSpline {
             for (slot, [x, y, z]) in row[1..=around].iter_mut().zip(points) {
                 *slot = [*x, *y, *z, 0.0];
             }
-            let ends = match (self.interpolation, self.closure) {
-                (Interpolation::Spline, Closure::FreeEnds) => {
+            let ends = match (self.interpolation, self.ends) {
+                (_, Ends::Open) => {
+                    // The last slot belongs to no patch.
+                    let beyond = phantom(row[around], row[around - 1]);
+                    [phantom(row[1], row[2]), beyond, beyond]
+                }
+                (Interpolation::Spline, Ends::Meeting) => {
                     [phantom(row[1], row[2]), row[1], phantom(row[1], row[around])]
                 }
                 _ => [row[around], row[1], row[2]],

@@ -1,7 +1,7 @@
 //! One patch: point, derivatives, and the weights of the control points.
 
-use super::{Place, SurfaceSpline};
-use crate::settings::{Closure, Interpolation};
+use super::{Ends, Place, SurfaceSpline};
+use crate::settings::Interpolation;
 
 /// Point and derivatives with respect to the parameters of the patch (all in m).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,7 +113,7 @@ impl SurfaceSpline {
 
     #[inline(always)]
     fn assert_exists(&self, place: Place) {
-        assert!(place.patch[0] < self.around && place.patch[1] < self.along - 1, "no such patch");
+        assert!(place.patch[0] < self.columns() && place.patch[1] < self.along - 1, "no such patch");
     }
 
     /// Without `SECOND` the second derivatives are left zero.
@@ -188,9 +188,10 @@ impl SurfaceSpline {
         let mut fold = Fold::new();
         for (offset, value) in values.into_iter().enumerate() {
             // Control point p + offset − 1.
-            match (self.closure, p + offset) {
-                (Closure::FreeEnds, 0) => fold.add_phantom(0, 1, value),
-                (Closure::FreeEnds, slot) if slot == count + 2 => fold.add_phantom(0, count - 1, value),
+            match (self.ends, p + offset) {
+                (Ends::Meeting | Ends::Open, 0) => fold.add_phantom(0, 1, value),
+                (Ends::Meeting, slot) if slot == count + 2 => fold.add_phantom(0, count - 1, value),
+                (Ends::Open, slot) if slot == count + 1 => fold.add_phantom(count - 1, count - 2, value),
                 (_, slot) => fold.add((slot + count - 1) % count, value),
             }
         }

@@ -2,14 +2,14 @@
 //!
 //! Newton on f = ½|x − S|², r = x − S: gradient −(S_s·r, S_t·r), Hessian [S_s·S_s − r·S_ss, S_s·S_t − r·S_st; …], and
 //! the first fundamental form in its place where it is not positive definite. Steps are cut until f falls, so iterations
-//! never cycle. Patch borders are crossed freely where the surface is smooth. At the edges in z, and at creases (borders
+//! never cycle. Patch borders are crossed freely where the surface is smooth. At free edges, and at creases (borders
 //! of facets, the seam of free ends), the step is projected onto the sheet between them; neighbouring sheets are then
 //! searched for a closer point.
 
 use super::foot::{CONVEX, DEGENERATE, Foot, Held, Room, noise, solve};
-use super::{Place, SurfaceSpline};
+use super::{Ends, Place, SurfaceSpline};
 use crate::contact::gap::dot;
-use crate::settings::{Closure, Interpolation};
+use crate::settings::Interpolation;
 
 /// Result of a projection.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +26,7 @@ pub enum Projection {
         /// (x − S)·n (m), negative outside the casing.
         gap: f64,
     },
-    /// The node has left the surface over a free edge in z.
+    /// The node has left the surface over a free edge: in z, or any of the four of an open surface.
     BeyondEdge {
         /// The closest point of the edge; start of the next projection of this node.
         place: Place,
@@ -35,13 +35,13 @@ pub enum Projection {
     Lost,
 }
 
-/// A node this far (in patches) beyond an edge in z is still on the surface, so that rounding does not decide for nodes
+/// A node this far (in patches) beyond a free edge is still on the surface, so that rounding does not decide for nodes
 /// that stand exactly on it.
 const EDGE_TOLERANCE: f64 = 1e-9;
 /// Newton steps below this (in patches) end the iteration.
 const STEP_TOLERANCE: f64 = 1e-11;
-/// Rounding of the coordinates of x − S, relative to |x|.
-pub(super) const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// Rounding of the coordinates of x − S, relative to |x| (and |x − S|).
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// Corrections near a good start; one or two are the rule.
 const MAX_CORRECTIONS: usize = 6;
 /// Far beyond what starts on the opposite side of the casing need (about 30).
@@ -62,7 +62,8 @@ impl SurfaceSpline {
         if !x.iter().all(|value| value.is_finite()) {
             return Projection::Lost;
         }
-        let (s, t) = (guess.s.clamp(0.0, 1.0), guess.t.clamp(-EDGE_TOLERANCE, 1.0 + EDGE_TOLERANCE));
+        let loose = |value: f64| value.clamp(-EDGE_TOLERANCE, 1.0 + EDGE_TOLERANCE);
+        let (s, t) = (if self.ends == Ends::Open { loose(guess.s) } else { guess.s.clamp(0.0, 1.0) }, loose(guess.t));
         let Some(mut foot) = self.descend(x, Place { s, t, ..guess }) else { return Projection::Lost };
         if self.has_creases() {
             match self.search_sheets(x, foot) {
@@ -95,7 +96,8 @@ impl SurfaceSpline {
             let step = solve(hessian, inverse, foot.gradient());
             let is_within = |limit: f64| step[0].abs() <= limit && step[1].abs() <= limit;
             if is_within(STEP_TOLERANCE) {
-                let is_inside = foot.place.t >= 0.0 && foot.place.t <= 1.0;
+                let is_inside = (0.0..=1.0).contains(&foot.place.t)
+                    && (self.ends != Ends::Open || (0.0..=1.0).contains(&foot.place.s));
                 return (is_inside && self.is_far_from_seam(&foot, metric[0])).then(|| foot.found());
             }
             let place = Place { s: foot.place.s + step[0], t: foot.place.t + step[1], ..guess };
@@ -111,20 +113,22 @@ impl SurfaceSpline {
     /// Whether the seam of free ends is too far away to hold a closer point on its other side.
     fn is_far_from_seam(&self, foot: &Foot, length_s: f64) -> bool {
         let column = foot.place.patch[0];
-        self.closure == Closure::Smooth || (column > 0 && column + 1 < self.around && 8.0 * foot.half_square < length_s)
+        self.ends != Ends::Meeting || (column > 0 && column + 1 < self.around && 8.0 * foot.half_square < length_s)
     }
 
     fn has_creases(&self) -> bool {
-        self.interpolation == Interpolation::Facets || self.closure == Closure::FreeEnds
+        self.interpolation == Interpolation::Facets || self.ends == Ends::Meeting
     }
 
     fn is_over_edge(&self, foot: &Foot) -> bool {
-        let ring = foot.place.patch[1];
-        match foot.held[1] {
+        let ([column, ring], smooth) = (foot.place.patch, self.interpolation == Interpolation::Spline);
+        let over = |held: Held, first: bool, last: bool| match held {
             Held::No => false,
-            Held::Low => ring == 0 || self.interpolation == Interpolation::Spline,
-            Held::High => ring + 2 == self.along || self.interpolation == Interpolation::Spline,
-        }
+            Held::Low => smooth || first,
+            Held::High => smooth || last,
+        };
+        over(foot.held[1], ring == 0, ring + 2 == self.along)
+            || (self.ends == Ends::Open && over(foot.held[0], column == 0, column + 2 == self.around))
     }
 
     /// The sheet around a place: a facet, or everything up to the edges and the seam.
@@ -132,13 +136,17 @@ impl SurfaceSpline {
     pub(super) fn room(&self, place: Place) -> Room {
         let [p, q] = place.patch.map(super::real);
         if self.interpolation == Interpolation::Facets {
-            let low = if place.patch[1] == 0 { -EDGE_TOLERANCE } else { 0.0 };
-            let high = if place.patch[1] + 2 == self.along { 1.0 + EDGE_TOLERANCE } else { 1.0 };
-            return [[0.0, 1.0], [low, high]];
+            let side = |patch: usize, count: usize| {
+                let low = if patch == 0 { -EDGE_TOLERANCE } else { 0.0 };
+                [low, if patch + 2 == count { 1.0 + EDGE_TOLERANCE } else { 1.0 }]
+            };
+            let along = side(place.patch[1], self.along);
+            return [if self.ends == Ends::Open { side(place.patch[0], self.around) } else { [0.0, 1.0] }, along];
         }
-        let around = match self.closure {
-            Closure::Smooth => [f64::NEG_INFINITY, f64::INFINITY],
-            Closure::FreeEnds => [-p, super::real(self.around) - p],
+        let around = match self.ends {
+            Ends::Smooth => [f64::NEG_INFINITY, f64::INFINITY],
+            Ends::Meeting => [-p, super::real(self.around) - p],
+            Ends::Open => [-p - EDGE_TOLERANCE, super::real(self.around - 1) - p + EDGE_TOLERANCE],
         };
         [around, [-q - EDGE_TOLERANCE, super::real(self.along - 1) - q + EDGE_TOLERANCE]]
     }
@@ -152,25 +160,37 @@ impl SurfaceSpline {
         let [p, q] = patch.map(super::real);
         let whole = super::real(self.around);
         let mut column = p + s.floor();
-        if self.closure == Closure::Smooth {
+        if self.ends == Ends::Smooth {
             column -= whole * (column / whole).floor();
         }
-        let column = column.clamp(0.0, whole - 1.0);
+        let column = column.clamp(0.0, super::real(self.columns() - 1));
         let ring = (q + t.floor()).clamp(0.0, super::real(self.along - 2));
-        let s = match self.closure {
-            Closure::Smooth => s - s.floor(),
-            Closure::FreeEnds => s - (column - p),
+        let s = match self.ends {
+            Ends::Smooth => s - s.floor(),
+            Ends::Meeting | Ends::Open => s - (column - p),
         };
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the patches")]
         let patch = [column as usize, ring as usize];
         Place { patch, s, t: t - (ring - q) }
     }
 
+    /// Rounding of the coordinates of x − S (m), and of the place of S. A node inside a casing is near the surface and as
+    /// far from the axis. One that faces an open surface may be anywhere, and so may that: rounding of the tangents, which
+    /// is that of the coordinates over a patch, moves the closest point in proportion to the distance.
+    pub(super) fn rounding(&self, x: [f64; 3], foot: &Foot) -> f64 {
+        let size = dot(x, x).sqrt();
+        if self.ends != Ends::Open {
+            return ROUNDING * size;
+        }
+        let (distance, metric) = ((2.0 * foot.half_square).sqrt(), foot.metric());
+        ROUNDING * (size + distance) * (1.0 + distance / metric[0].min(metric[2]).sqrt())
+    }
+
     /// Minimum of f on the sheet of `start`.
     pub(super) fn descend(&self, x: [f64; 3], start: Place) -> Option<Foot> {
-        let rounding = ROUNDING * dot(x, x).sqrt();
         let longest = (0.125 * super::real(self.around)).max(1.0);
         let mut foot = Foot::at(self, x, start);
+        let rounding = self.rounding(x, &foot);
         for _ in 0..MAX_ITERATIONS {
             let room = self.room(foot.place);
             let metric = foot.metric();

@@ -58,7 +58,7 @@ pub fn parameters(table: &mut Builder, scene: &Parts) {
     if let Some((carrier, rom)) = scene.carrier {
         let ratio = carrier.damping_ratio.unwrap_or(rom.damping_ratio);
         let text = "Modal damping ratio of the casing";
-        let row = table.parameter(Quantity::SlaveDampingRatio, "casing_damping_ratio", None, ratio, text);
+        let row = table.parameter(Quantity::SlaveDampingRatio(0), "casing_damping_ratio", None, ratio, text);
         (row.min, row.max) = (Some(0.0), Some(MAX_DAMPING));
     }
     if let Some(load) = scene.carrier.and_then(|(carrier, _)| carrier.load) {

@@ -1,6 +1,7 @@
 //! The variable table of a scene: one row per thing an importer can see. Features that are off have no row.
 
 mod features;
+mod free;
 
 use super::compile::{Roles, SMALL_FRACTION};
 use super::patches::Patches;
@@ -25,6 +26,8 @@ static ANGLE: Unit = Unit {
 };
 /// m.
 static LENGTH: Unit = Unit { name: "m", exponents: [0, 1, 0, 0, 0], display: &[("mm", 1e3), ("um", 1e6)] };
+/// m/s.
+static LINEAR_SPEED: Unit = Unit { name: "m/s", exponents: [0, 1, -1, 0, 0], display: &[] };
 /// s.
 static TIME: Unit = Unit { name: "s", exponents: [0, 0, 1, 0, 0], display: &[("ms", 1e3), ("us", 1e6)] };
 /// N.
@@ -188,6 +191,9 @@ impl Builder {
 /// # Errors
 /// A watched sector or nodal diameter the ROM does not have.
 pub fn build(scene: &Scene) -> Result<VariableTable> {
+    if scene.settings.free_master().is_some() {
+        return free::build(scene);
+    }
     let scene = &Parts::new(scene)?;
     let mut table = Builder { variables: Vec::new(), next: 0 };
     let time = table.push(Quantity::Time, "time", "Simulated time");
@@ -204,11 +210,16 @@ pub fn build(scene: &Scene) -> Result<VariableTable> {
     if scene.settings.outputs.energies {
         energies(&mut table, scene);
     }
+    internal_steps(&mut table, scene.settings);
+    VariableTable::new(table.variables)
+}
+
+fn internal_steps(table: &mut Builder, settings: &SceneSettings) {
     let internal = table.output(
         Quantity::InternalStep,
         "internal_step",
         Span::Point,
-        Some((&TIME, scene.settings.time.step)),
+        Some((&TIME, settings.time.step)),
         "Internal time step in use",
     );
     internal.variability = Variability::Discrete;
@@ -220,7 +231,6 @@ pub fn build(scene: &Scene) -> Result<VariableTable> {
         "Internal steps done since the start",
     );
     steps.variability = Variability::Discrete;
-    VariableTable::new(table.variables)
 }
 
 /// Lengths beyond this are not small against the radius of the contact nodes (m).
@@ -439,64 +449,77 @@ fn watched(table: &mut Builder, scene: &Parts) -> Result<()> {
             ));
         }
         let (index, list) = (sector - 1, node_list(scene));
-        let rows: [(Quantity, &str, Span, _, &str); 4] = [
-            (
-                Quantity::Clearance(index),
-                "clearance",
-                Span::Point,
-                gap,
-                "Clearance normal to the casing at the communication point",
-            ),
-            (
-                Quantity::WatchedClearanceMinimum(index),
-                "clearance_minimum",
-                Span::Window,
-                gap,
-                "Smallest clearance within the communication step",
-            ),
-            (
-                Quantity::NormalForce(index),
-                "normal_force",
-                Span::Mean,
-                force,
-                "Normal contact force, mean over the communication step",
-            ),
-            (
-                Quantity::TangentialForce(index),
-                "tangential_force",
-                Span::Mean,
-                force,
-                "Magnitude of the friction force (axial part included), mean over the communication step",
-            ),
-        ];
-        let now: [(Quantity, &str, Span, _, &str); 2] = [
-            (
-                Quantity::NormalForceNow(index),
-                "normal_force_now",
-                Span::Point,
-                force,
-                "Normal contact force of the last internal step",
-            ),
-            (
-                Quantity::TangentialForceNow(index),
-                "tangential_force_now",
-                Span::Point,
-                force,
-                "Friction force of the last internal step",
-            ),
-        ];
-        let now = if scene.settings.outputs.instantaneous_forces { &now[..] } else { &[] };
-        let tangential =
-            |quantity: &Quantity| matches!(quantity, Quantity::TangentialForce(_) | Quantity::TangentialForceNow(_));
-        let chosen = rows.iter().chain(now).filter(|row| has_friction(scene) || !tangential(&row.0));
-        for (quantity, name, span, unit, text) in chosen {
+        let rows = watched_rows(index, [gap, force], scene.settings.outputs.instantaneous_forces, has_friction(scene));
+        for (quantity, name, span, unit, text) in rows {
             let name = format!("blade[{sector}].{name}");
-            let variable = table.output(*quantity, name, *span, *unit, format!("{text} ({list})"));
+            let variable = table.output(quantity, name, span, unit, format!("{text} ({list})"));
             variable.dimension = Some(rom.contact_nodes.len());
             variable.display = unit.filter(|(unit, _)| **unit == LENGTH).map(|_| 1);
         }
     }
     Ok(())
+}
+
+/// Quantity, name, span, unit and description of an output per contact node.
+type NodeRow = (Quantity, &'static str, Span, Option<(&'static Unit, f64)>, &'static str);
+
+/// Outputs over the contact nodes of a sector (0-based); units of gaps and forces.
+fn watched_rows(
+    index: usize,
+    [gap, force]: [Option<(&'static Unit, f64)>; 2],
+    instantaneous: bool,
+    friction: bool,
+) -> impl Iterator<Item = NodeRow> {
+    let rows: [NodeRow; 6] = [
+        (
+            Quantity::Clearance(index),
+            "clearance",
+            Span::Point,
+            gap,
+            "Clearance normal to the casing at the communication point",
+        ),
+        (
+            Quantity::WatchedClearanceMinimum(index),
+            "clearance_minimum",
+            Span::Window,
+            gap,
+            "Smallest clearance within the communication step",
+        ),
+        (
+            Quantity::NormalForce(index),
+            "normal_force",
+            Span::Mean,
+            force,
+            "Normal contact force, mean over the communication step",
+        ),
+        (
+            Quantity::TangentialForce(index),
+            "tangential_force",
+            Span::Mean,
+            force,
+            "Magnitude of the friction force (axial part included), mean over the communication step",
+        ),
+        (
+            Quantity::NormalForceNow(index),
+            "normal_force_now",
+            Span::Point,
+            force,
+            "Normal contact force of the last internal step",
+        ),
+        (
+            Quantity::TangentialForceNow(index),
+            "tangential_force_now",
+            Span::Point,
+            force,
+            "Friction force of the last internal step",
+        ),
+    ];
+    rows.into_iter().filter(move |row| match row.0 {
+        Quantity::TangentialForce(_) => friction,
+        Quantity::NormalForceNow(_) => instantaneous,
+        Quantity::TangentialForceNow(_) => instantaneous && friction,
+        _ => true,
+    })
 }
 
 fn fields(table: &mut Builder, scene: &Parts) -> Result<()> {

@@ -1,0 +1,77 @@
+//! Contact grids: what a surface can be laid through.
+
+use super::{ContactGrid, ContactNode, Frame, Rom};
+use crate::{Error, Result};
+
+/// Nodes this much nearer than the longest edge of an open grid are the same node.
+const SAME_NODE: f64 = 1e-9;
+
+impl Rom {
+    /// Check that the contact nodes are the grid that the ROM says they are.
+    pub(super) fn validate_grid(&self) -> Result<()> {
+        let Some(grid) = self.extras.grid else { return Ok(()) };
+        let (nodes, [least_around, least_along]) =
+            (self.contact_nodes.len(), if grid.closed { [4, 2] } else { [2, 2] });
+        let fits = grid.around.checked_mul(grid.along) == Some(nodes);
+        if !fits || grid.around < least_around || grid.along < least_along {
+            let ContactGrid { around, along, .. } = grid;
+            return refuse(format!(
+                "{around} around x {along} along, at least {least_around} x {least_along} of {nodes} nodes"
+            ));
+        }
+        if self.sectors != 1 {
+            return refuse("a contact grid needs one sector".to_owned());
+        }
+        match (grid.closed, self.frame) {
+            (true, Frame::Cylindrical) => closed_ring(grid, &self.contact_nodes),
+            (false, Frame::Cartesian) => open_grid(grid, &self.contact_nodes),
+            (true, Frame::Cartesian) => refuse("a closed contact grid needs a cylindrical frame".to_owned()),
+            (false, Frame::Cylindrical) => refuse("an open contact grid needs a Cartesian frame".to_owned()),
+        }
+    }
+}
+
+fn refuse(problem: String) -> Result<()> {
+    let remedy = "Write the ROM again with `tiprub reduce`, or see the ROM file chapter of the user guide";
+    Err(Error::invalid("ROM metadata `contact_grid`", problem, remedy))
+}
+
+/// Rings of growing z, their nodes equally spaced about z.
+fn closed_ring(grid: ContactGrid, nodes: &[ContactNode]) -> Result<()> {
+    #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
+    let step = std::f64::consts::TAU / grid.around as f64;
+    for (along, ring) in nodes.chunks(grid.around).enumerate() {
+        let (first, axial) = (nodes[0].position[1], ring[0].position[2]);
+        for (i, node) in ring.iter().enumerate() {
+            #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
+            let turns = (node.position[1] - first - step * i as f64) / std::f64::consts::TAU;
+            let off = (turns - turns.round()).abs() * std::f64::consts::TAU;
+            if off > 1e-3 * step || (node.position[2] - axial).abs() > 1e-3 * step * node.position[0] {
+                return refuse(format!("node {} of ring {} is not at its place of the grid", i + 1, along + 1));
+            }
+        }
+        if along > 0 && axial <= nodes[(along - 1) * grid.around].position[2] {
+            return refuse(format!("ring {} does not lie beyond ring {along} in z", along + 1));
+        }
+    }
+    Ok(())
+}
+
+/// No edge between neighbours of a row or of a column may have shrunk to a point.
+fn open_grid(grid: ContactGrid, nodes: &[ContactNode]) -> Result<()> {
+    let length = |a: usize, b: usize| {
+        let apart: [f64; 3] = std::array::from_fn(|i| nodes[a].position[i] - nodes[b].position[i]);
+        apart.iter().map(|value| value * value).sum::<f64>().sqrt()
+    };
+    let around = (0..nodes.len()).filter(|node| (node + 1) % grid.around != 0).map(|node| [node, node + 1]);
+    let along = (0..nodes.len() - grid.around).map(|node| [node, node + grid.around]);
+    let edges: Vec<[usize; 2]> = around.chain(along).collect();
+    let longest = edges.iter().fold(0.0, |longest: f64, [a, b]| longest.max(length(*a, *b)));
+    match edges.iter().find(|[a, b]| length(*a, *b) <= SAME_NODE * longest) {
+        None => Ok(()),
+        Some([a, b]) => {
+            let (a, b) = (&nodes[*a].name, &nodes[*b].name);
+            refuse(format!("the neighbouring nodes `{a}` and `{b}` are at the same place"))
+        }
+    }
+}

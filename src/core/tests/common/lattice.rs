@@ -1,0 +1,235 @@
+//! A free block of masses and springs between two plates, with nothing reduced: every node is a contact node.
+
+#![allow(dead_code, reason = "each test binary uses its part")]
+
+use nalgebra::{DMatrix, Vector3};
+use tiprub_core::rom::{ContactGrid, ContactNode, Frame, Rom, RomChecks, RomExtras};
+use tiprub_core::settings::*;
+use tiprub_core::{Scene, Simulation};
+
+/// Side of the block (m).
+pub const SIDE: f64 = 0.04;
+/// Nodes per side of the block.
+pub const PER_SIDE: usize = 3;
+/// Radius of curved plates (m).
+pub const RADIUS: f64 = 0.18;
+
+fn rom(name: &str, mass: DMatrix<f64>, stiffness: DMatrix<f64>, nodes: Vec<(String, [f64; 3])>) -> Rom {
+    let node = |(name, position)| ContactNode { name, position, meridional_slope: 0.0 };
+    Rom {
+        name: name.into(),
+        origin: "masses and springs".into(),
+        sectors: 1,
+        frame: Frame::Cartesian,
+        contact_map: DMatrix::identity(mass.nrows(), mass.nrows()),
+        mass,
+        stiffness,
+        damping_ratio: 0.0,
+        contact_nodes: nodes.into_iter().map(node).collect(),
+        checks: RomChecks::default(),
+        extras: RomExtras::default(),
+    }
+}
+
+/// Spring of stiffness `k` (N/m) between two nodes along the line that joins them.
+fn spring(matrix: &mut DMatrix<f64>, positions: &[[f64; 3]], [a, b]: [usize; 2], k: f64) {
+    let along = (Vector3::from(positions[a]) - Vector3::from(positions[b])).normalize();
+    for i in 0..3 {
+        for j in 0..3 {
+            let value = k * along[i] * along[j];
+            matrix[(3 * a + i, 3 * a + j)] += value;
+            matrix[(3 * b + i, 3 * b + j)] += value;
+            matrix[(3 * a + i, 3 * b + j)] -= value;
+            matrix[(3 * b + i, 3 * a + j)] -= value;
+        }
+    }
+}
+
+/// Mass of a node of the block (kg): not the same in all corners, yet alike in x and −x.
+pub fn node_mass(place: [usize; 3]) -> f64 {
+    0.01 * (1.0 + 0.2 * place[1] as f64 + 0.1 * place[2] as f64)
+}
+
+/// Places of the nodes of the block.
+pub fn places() -> impl Iterator<Item = [usize; 3]> {
+    (0..PER_SIDE).flat_map(|x| (0..PER_SIDE).flat_map(move |y| (0..PER_SIDE).map(move |z| [x, y, z])))
+}
+
+/// The block, its middle at `centre` (m), springs to all neighbours; nodes `left_…` at low x, `right_…` at high x and `core_…`.
+pub fn block(centre: [f64; 3], k: f64) -> Rom {
+    let step = SIDE / (PER_SIDE - 1) as f64;
+    let places: Vec<[usize; 3]> = places().collect();
+    // Exactly antisymmetric about the middle.
+    let at = |place: usize| 0.5 * step * (2.0 * place as f64 - (PER_SIDE - 1) as f64);
+    let positions: Vec<[f64; 3]> =
+        places.iter().map(|place| std::array::from_fn(|i| centre[i] + at(place[i]))).collect();
+    let order = 3 * places.len();
+    let mut stiffness = DMatrix::zeros(order, order);
+    for a in 0..places.len() {
+        for b in a + 1..places.len() {
+            let apart = (0..3).map(|i| places[a][i].abs_diff(places[b][i])).max();
+            if apart == Some(1) {
+                spring(&mut stiffness, &positions, [a, b], k);
+            }
+        }
+    }
+    let mass = DMatrix::from_fn(order, order, |i, j| if i == j { node_mass(places[i / 3]) } else { 0.0 });
+    let name = |place: &[usize; 3]| {
+        let side = ["left", "core", "right"][if place[0] == 0 { 0 } else { 1 + usize::from(place[0] == PER_SIDE - 1) }];
+        format!("{side}_{}{}{}", place[0], place[1], place[2])
+    };
+    let nodes = places.iter().map(name).zip(positions).collect();
+    rom("block", mass, stiffness, nodes)
+}
+
+/// Which side of the block a plate is on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    Left,
+    Right,
+}
+
+impl Side {
+    pub fn sign(self) -> f64 {
+        if self == Self::Left { -1.0 } else { 1.0 }
+    }
+}
+
+/// Points of a plate over y and z, `rows` along y and `columns` along z, whose nearest line to the block is x = ±`distance`;
+/// flat, or a cylinder about z. Row after row along y; z runs so that the normal points to the block.
+pub fn plate_points(side: Side, distance: f64, curved: bool, [rows, columns]: [usize; 2]) -> Vec<[f64; 3]> {
+    let centred = |index: usize, count: usize| (2.0 * index as f64 - (count - 1) as f64) / (count - 1) as f64;
+    (0..rows)
+        .flat_map(|row| (0..columns).map(move |column| (row, column)))
+        .map(|(row, column)| {
+            let (y, z) = (centred(row, rows), 0.05 * centred(column, columns) * -side.sign());
+            let angle = 0.5 * y;
+            if curved {
+                let x = distance + RADIUS * (1.0 - angle.cos());
+                [side.sign() * x, RADIUS * angle.sin(), z]
+            } else {
+                [side.sign() * distance, 0.09 * y, z]
+            }
+        })
+        .collect()
+}
+
+/// A plate of masses on springs to the ground and to their neighbours.
+pub fn plate(side: Side, distance: f64, curved: bool, k: f64) -> Rom {
+    let [rows, columns] = [9, 5];
+    let points = plate_points(side, distance, curved, [rows, columns]);
+    let order = 3 * points.len();
+    let mut stiffness = DMatrix::identity(order, order) * (0.05 * k);
+    for node in 0..points.len() {
+        let right = ((node + 1) % columns != 0).then_some(node + 1);
+        let above = (node + columns < points.len()).then_some(node + columns);
+        for other in [right, above].into_iter().flatten() {
+            for i in 0..3 {
+                let (a, b) = (3 * node + i, 3 * other + i);
+                stiffness[(a, a)] += k;
+                stiffness[(b, b)] += k;
+                stiffness[(a, b)] -= k;
+                stiffness[(b, a)] -= k;
+            }
+        }
+    }
+    let nodes = points.iter().enumerate().map(|(node, point)| (format!("p{node}"), *point)).collect();
+    let mut rom = rom("plate", DMatrix::identity(order, order) * 0.02, stiffness, nodes);
+    rom.damping_ratio = 0.01;
+    rom.extras.grid = Some(ContactGrid { around: columns, along: rows, closed: false });
+    rom
+}
+
+/// The block between plates: `left` and `right` each a distance (m) from x = 0.
+pub fn scene(block: Rom, plates: &[(Side, f64)], curved: bool, velocity: [f64; 3]) -> Scene {
+    let names = |side: Side| {
+        if side == Side::Left { ("left_plate", "left_face", "left") } else { ("right_plate", "right_face", "right") }
+    };
+    let mut structures = vec![StructureSettings {
+        name: "block".into(),
+        rom: "block".into(),
+        motion: Motion::Free,
+        velocity,
+        ..StructureSettings::default()
+    }];
+    let mut roms = vec![block];
+    for (side, distance) in plates {
+        let (name, ..) = names(*side);
+        structures.push(StructureSettings {
+            name: name.into(),
+            rom: name.into(),
+            motion: Motion::Still,
+            ..StructureSettings::default()
+        });
+        roms.push(plate(*side, *distance, curved, 2e8));
+    }
+    let surface = |(side, _): &(Side, f64)| SurfaceSettings {
+        name: names(*side).1.into(),
+        structure: Some(names(*side).0.into()),
+        ..SurfaceSettings::default()
+    };
+    let contact = |(side, _): &(Side, f64)| ContactSettings {
+        master: "block".into(),
+        slave: names(*side).1.into(),
+        nodes: Some(names(*side).2.into()),
+        ..ContactSettings::default()
+    };
+    let settings = SceneSettings {
+        name: "free_block".into(),
+        description: String::new(),
+        structures,
+        surfaces: plates.iter().map(surface).collect(),
+        contacts: plates.iter().map(contact).collect(),
+        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6 },
+        outputs: OutputSettings::default(),
+        experiment: ExperimentSettings { start: 0.0, stop: 0.01, communication_step: 1e-5 },
+    };
+    Scene { settings, roms }
+}
+
+/// Friction, solver and scheme of all pairs.
+pub fn with(mut scene: Scene, friction: f64, solver: Solver, scheme: Scheme) -> Scene {
+    for contact in &mut scene.settings.contacts {
+        (contact.friction, contact.solver) = (friction, solver);
+    }
+    scene.settings.time.scheme = scheme;
+    scene
+}
+
+/// The block, 0.3 mm too wide on each side, thrown between two cylinders.
+pub fn squeezed() -> Scene {
+    squeezed_by(3e-4, [0.0, -40.0, 0.0])
+}
+
+/// The same with this interference (m) and velocity (m/s).
+pub fn squeezed_by(interference: f64, velocity: [f64; 3]) -> Scene {
+    let distance = 0.5 * SIDE - interference;
+    scene(block([0.0, 0.045, 0.0], 3e6), &[(Side::Left, distance), (Side::Right, distance)], true, velocity)
+}
+
+#[track_caller]
+pub fn started(scene: &Scene) -> Simulation {
+    let mut simulation = Simulation::new(scene).unwrap();
+    simulation.initialise(0.0).unwrap();
+    simulation
+}
+
+#[track_caller]
+pub fn real(simulation: &Simulation, name: &str) -> f64 {
+    element(simulation, name, 0)
+}
+
+#[track_caller]
+pub fn element(simulation: &Simulation, name: &str, element: u32) -> f64 {
+    let reference = simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference;
+    simulation.real(reference + element).unwrap()
+}
+
+pub fn vector(simulation: &Simulation, name: &str) -> [f64; 3] {
+    ["x", "y", "z"].map(|axis| real(simulation, &format!("{name}_{axis}")))
+}
+
+/// One communication step of length H (s).
+pub fn advance(simulation: &mut Simulation, length: f64) {
+    simulation.do_step(simulation.time(), length).unwrap();
+}

@@ -1,0 +1,130 @@
+//! Elastic rods of linear elements with lumped mass, and other small systems given by their modes.
+
+#![allow(dead_code, reason = "each test binary uses its part")]
+
+use nalgebra::DMatrix;
+use tiprub_core::contact::gap::{FixedGap, GapLaw};
+use tiprub_core::dynamics::bank::BankOptions;
+use tiprub_core::dynamics::modal::ModalModel;
+use tiprub_core::dynamics::scheme::free_increment;
+use tiprub_core::dynamics::sectors::SectorModel;
+use tiprub_core::rom::{ContactNode, Frame, Rom, RomChecks, RomExtras};
+use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::stability::massless::{MasslessCheck, QUIET};
+use tiprub_core::system::{System, SystemParts, SystemSettings};
+
+pub const SCHEMES: [Scheme; 3] = [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary];
+pub const SOLVERS: [Solver; 3] = [Solver::Film, Solver::Lcp, Solver::Coulomb];
+
+/// Share of its mass that the contact node of a rod keeps where it is to be massless; the matrix must stay invertible.
+pub const NEARLY_NONE: f64 = 1e-4;
+
+/// A straight rod along x.
+#[derive(Debug, Clone, Copy)]
+pub struct Rod {
+    pub young: f64,
+    pub density: f64,
+    pub area: f64,
+    pub length: f64,
+    pub elements: usize,
+    /// Contact node, 0 or `elements`.
+    pub end: usize,
+    /// Share of its lumped mass that the contact node keeps; the rest goes to its neighbour.
+    pub kept: f64,
+}
+
+impl Rod {
+    pub fn wave_time(&self) -> f64 {
+        self.length / self.elements as f64 / (self.young / self.density).sqrt()
+    }
+
+    pub fn rom(&self) -> Rom {
+        let size = self.length / self.elements as f64;
+        let (stiffness, mass) = (self.young * self.area / size, self.density * self.area * size);
+        let nodes = self.elements + 1;
+        let (mut k, mut m) = (DMatrix::zeros(nodes, nodes), DMatrix::zeros(nodes, nodes));
+        for element in 0..self.elements {
+            for (i, j, sign) in [(0, 0, 1.0), (1, 1, 1.0), (0, 1, -1.0), (1, 0, -1.0)] {
+                k[(element + i, element + j)] += sign * stiffness;
+            }
+            m[(element, element)] += mass / 2.0;
+            m[(element + 1, element + 1)] += mass / 2.0;
+        }
+        let moved = (1.0 - self.kept) * m[(self.end, self.end)];
+        let neighbour = if self.end == 0 { 1 } else { self.end - 1 };
+        m[(self.end, self.end)] -= moved;
+        m[(neighbour, neighbour)] += moved;
+        let mut map = DMatrix::zeros(3, nodes);
+        map[(0, self.end)] = 1.0;
+        Rom {
+            name: "rod".into(),
+            origin: "linear rod elements, lumped mass".into(),
+            sectors: 1,
+            frame: Frame::Cartesian,
+            mass: m,
+            stiffness: k,
+            damping_ratio: 0.0,
+            contact_map: map,
+            contact_nodes: vec![ContactNode { name: "end".into(), position: [0.0; 3], meridional_slope: 0.0 }],
+            checks: RomChecks::default(),
+            extras: RomExtras::default(),
+        }
+    }
+
+    /// Its modes; one of them, the highest, is the flexibility of the contact node.
+    pub fn model(&self) -> ModalModel {
+        ModalModel { quasi_static: 1, ..ModalModel::from_rom(&self.rom(), 0.0).unwrap() }
+    }
+}
+
+/// Modes in ascending order of their frequencies, after structures were put side by side.
+pub fn ascending(model: &ModalModel, quasi_static: usize) -> ModalModel {
+    let mut order: Vec<usize> = (0..model.len()).collect();
+    order.sort_by(|a, b| model.frequencies[*a].total_cmp(&model.frequencies[*b]));
+    ModalModel {
+        frequencies: order.iter().map(|mode| model.frequencies[*mode]).collect(),
+        damping_ratios: order.iter().map(|mode| model.damping_ratios[*mode]).collect(),
+        contact_modes: model.contact_modes.select_columns(&order),
+        shapes: model.shapes.select_columns(&order),
+        quasi_static,
+    }
+}
+
+/// One contact node that moves along x only, given by its modes (ω, displacement of the node per unit amplitude).
+pub fn single(modes: &[(f64, f64)], quasi_static: usize) -> ModalModel {
+    ModalModel {
+        frequencies: modes.iter().map(|mode| mode.0).collect(),
+        damping_ratios: vec![0.0; modes.len()],
+        contact_modes: DMatrix::from_fn(3, modes.len(), |row, mode| if row == 0 { modes[mode].1 } else { 0.0 }),
+        shapes: DMatrix::identity(modes.len(), modes.len()),
+        quasi_static,
+    }
+}
+
+/// One node against a plane across x; `normal` is +1 where the plane is below it, −1 where it is above.
+pub fn against_plane(model: &ModalModel, methods: (Scheme, Solver), normal: f64, gap: f64, loads: bool) -> System {
+    let law = FixedGap { normals: vec![[normal, 0.0, 0.0]], gaps: vec![gap], sliding: vec![[0.0; 3]] };
+    let settings = SystemSettings { scheme: methods.0, solver: methods.1, friction: 0.0, ledger: true };
+    let bank = BankOptions { loads, ..BankOptions::default() };
+    let parts = SystemParts { bank, sticking: methods.1 == Solver::Coulomb, ..SystemParts::default() };
+    System::with_parts(SectorModel::Uncoupled(model, 1), GapLaw::Fixed(law), settings, parts)
+}
+
+/// Set amplitude and increment q(0) − q(−h) of a mode.
+pub fn set_samples(system: &mut System, model: &ModalModel, mode: usize, now: f64, before: f64) {
+    let (frequency, step) = (model.frequencies[mode], system.bank().step());
+    let at_rest = free_increment(frequency, 0.0, now, 0.0, step);
+    let per_velocity = free_increment(frequency, 0.0, 0.0, 1.0, step);
+    system.bank_mut().set_modal_state(mode, 0, now, (now - before - at_rest) / per_velocity);
+}
+
+/// Step of massless-boundary at which contact that opens and closes gains no energy, at most `largest` (s).
+pub fn quiet_step(model: &ModalModel, largest: f64) -> f64 {
+    let check = MasslessCheck { model, normals: vec![[1.0, 0.0, 0.0]], slave: None };
+    (0.95 * QUIET * check.limit(1e3 * largest).unwrap()).min(largest)
+}
+
+/// Order of convergence from errors at steps halved again and again.
+pub fn orders(errors: &[f64]) -> Vec<f64> {
+    errors.windows(2).map(|pair| (pair[0] / pair[1]).log2()).collect()
+}

@@ -1,0 +1,484 @@
+//! A free master: flight, impact, sliding between two surfaces. Laws of mechanics, and states that continue.
+
+#[path = "common/counting.rs"]
+mod counting;
+#[path = "common/lattice.rs"]
+mod lattice;
+
+use lattice::*;
+use tiprub_core::settings::*;
+use tiprub_core::{Scene, Simulation};
+
+const SCHEMES: [Scheme; 2] = [Scheme::CentralDifference, Scheme::ModalExact];
+const SOLVERS: [Solver; 3] = [Solver::Film, Solver::Lcp, Solver::Coulomb];
+
+fn total_mass() -> f64 {
+    places().map(node_mass).sum()
+}
+
+fn size(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+#[test]
+fn a_body_that_touches_nothing_flies_straight_with_exact_energies() {
+    let velocity = [30.0, -20.0, 5.0];
+    for scheme in SCHEMES {
+        let far = scene(block([0.0; 3], 3e6), &[(Side::Left, 9.0), (Side::Right, 9.0)], false, velocity);
+        let mut simulation = started(&with(far, 0.2, Solver::Lcp, scheme));
+        let kinetic = 0.5 * total_mass() * size(velocity).powi(2);
+        for _ in 0..300 {
+            advance(&mut simulation, 3.7e-5);
+        }
+        let time = simulation.time();
+        let moved = vector(&simulation, "block.displacement");
+        // A position is the sum of 11400 steps.
+        for axis in 0..3 {
+            let exact = velocity[axis] * time;
+            assert!((moved[axis] - exact).abs() < 1e-12 * exact.abs(), "{scheme:?}: {} m, {exact} m", moved[axis]);
+            let name = format!("block.node_displacement_{}", ["x", "y", "z"][axis]);
+            for node in 0..27 {
+                assert!((element(&simulation, &name, node) - exact).abs() < 1e-12 * exact.abs());
+            }
+        }
+        let found = vector(&simulation, "block.velocity");
+        assert!((0..3).all(|axis| (found[axis] - velocity[axis]).abs() < 2e-15 * size(velocity)), "{found:?}");
+        let energies = ["kinetic_energy", "strain_energy", "energy_residual"].map(|name| real(&simulation, name));
+        println!(
+            "{scheme:?}: kinetic {:.17} J of {kinetic:.17} J, strain {:.1e} J, residual {:.1e} J",
+            energies[0], energies[1], energies[2]
+        );
+        assert!(
+            (energies[0] / kinetic - 1.0).abs() < 1e-14 && energies[1] == 0.0 && energies[2] == 0.0,
+            "{energies:?}"
+        );
+        assert!(real(&simulation, "normal_impulse") == 0.0);
+    }
+}
+
+/// Scenes in which something happens: (name, scene, communication steps of 1e-5 s).
+fn events() -> Vec<(&'static str, Scene, usize)> {
+    let thrown = |velocity| scene(block([0.0; 3], 3e6), &[(Side::Left, 0.0203), (Side::Right, 0.021)], false, velocity);
+    let mut corner = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.0203)], false, [-15.0, 3.0, 2.0]);
+    corner.settings.contacts[0].nodes = Some("left_00".into());
+    let mut facets = squeezed();
+    let mut rigid = squeezed_by(1e-4, [0.0, -40.0, 1.0]);
+    for surface in &mut facets.settings.surfaces {
+        surface.spline = Some(SplineSettings { interpolation: Interpolation::Facets, ..SplineSettings::default() });
+    }
+    rigid.settings.surfaces[1].rigid = true;
+    vec![
+        ("bounces between plates", thrown([-12.0, 6.0, 1.0]), 60),
+        ("one edge hits", corner, 35),
+        ("squeezed through", squeezed(), 150),
+        ("squeezed through facets", facets, 130),
+        ("one side rigid", rigid, 130),
+    ]
+}
+
+#[test]
+fn momentum_and_energy_are_kept_by_every_scheme_and_solver() {
+    println!("| scene | scheme | solver | µ | momentum | residual / energy |\n|---|---|---|---|---|---|");
+    let (mut momentum_off, mut residual_off) = (0.0_f64, 0.0_f64);
+    for (name, scene, steps) in events() {
+        for (scheme, solver, friction) in SCHEMES.iter().flat_map(|scheme| {
+            SOLVERS.iter().flat_map(move |solver| [0.0, 0.2].map(|friction| (*scheme, *solver, friction)))
+        }) {
+            let mut simulation = started(&with(scene.clone(), friction, solver, scheme));
+            let (start, mut impulse, mut exchanged) = (vector(&simulation, "block.velocity"), [0.0; 3], 0.0_f64);
+            let (mut off, mut residual) = (0.0_f64, 0.0_f64);
+            for _ in 0..steps {
+                advance(&mut simulation, 1e-5);
+                let force = vector(&simulation, "force");
+                let pairs = scene
+                    .settings
+                    .surfaces
+                    .iter()
+                    .map(|surface| vector(&simulation, &format!("{}.force", surface.name)));
+                let sum = pairs.fold([0.0; 3], |sum, force| std::array::from_fn(|i| sum[i] + force[i]));
+                let apart: [f64; 3] = std::array::from_fn(|i| sum[i] - force[i]);
+                assert!(size(apart) <= 1e-12 * size(force), "pairs {sum:?}, all {force:?}");
+                impulse = std::array::from_fn(|i| impulse[i] + 1e-5 * force[i]);
+                exchanged += 1e-5 * size(force);
+                let velocity = vector(&simulation, "block.velocity");
+                let missed = std::array::from_fn(|i| total_mass() * (velocity[i] - start[i]) - impulse[i]);
+                off = off.max(size(missed));
+                residual = residual.max(real(&simulation, "energy_residual_relative").abs());
+            }
+            let off = off / (exchanged + total_mass() * size(start));
+            println!("| {name} | {scheme:?} | {solver:?} | {friction} | {off:.1e} | {residual:.1e} |");
+            assert!(exchanged > 0.02 * total_mass() * 10.0, "{name}: hardly anything happened, {exchanged} N·s");
+            (momentum_off, residual_off) = (momentum_off.max(off), residual_off.max(residual));
+            assert!(
+                off < 1e-13 && residual < 1e-13,
+                "{name}, {scheme:?}, {solver:?}, {friction}: {off:e}, {residual:e}"
+            );
+            if friction == 0.0 {
+                assert!(simulation.table().find("friction_loss").is_none());
+            } else {
+                assert!(real(&simulation, "friction_loss") > 0.0);
+            }
+        }
+    }
+    println!("momentum within {momentum_off:.1e}, energy within {residual_off:.1e}");
+}
+
+/// Angular momentum about z of linear theory, Σ m (X × v), from the displacements of all nodes.
+fn angular_momentum(simulation: &Simulation, rom: &tiprub_core::Rom) -> f64 {
+    let bank = simulation.system().bank();
+    let rate = |node: usize, i: usize| {
+        (bank.displacement()[3 * node + i] - bank.displacement_before()[3 * node + i]) / bank.step()
+    };
+    let of = |(node, place): (usize, [usize; 3])| {
+        let [x, y, _] = rom.contact_nodes[node].position;
+        node_mass(place) * (x * rate(node, 1) - y * rate(node, 0))
+    };
+    places().enumerate().map(of).sum()
+}
+
+#[test]
+fn an_edge_that_hits_turns_the_body_by_the_moment_of_its_impulse() {
+    for (scheme, friction) in [(Scheme::CentralDifference, 0.0), (Scheme::ModalExact, 0.3)] {
+        let (_, scene, _) = events().swap_remove(1);
+        let scene = with(scene, friction, Solver::Lcp, scheme);
+        let mut simulation = started(&scene);
+        let (start, mut moment, mut largest) = (angular_momentum(&simulation, &scene.roms[0]), 0.0, 0.0_f64);
+        simulation.begin_step(0.0, 3.5e-4).unwrap();
+        loop {
+            let finished = simulation.advance().unwrap().finished;
+            for event in simulation.system().events() {
+                let [x, y, _] = scene.roms[0].contact_nodes[event.node].position;
+                moment += (x * event.force[1] - y * event.force[0]) * simulation.system().bank().step();
+            }
+            largest = largest.max(moment.abs());
+            let off = angular_momentum(&simulation, &scene.roms[0]) - start - moment;
+            // Velocities are differences of positions of 1e-2 m over 1e-6 s.
+            assert!(off.abs() < 1e-9 * (largest + 1e-3), "{scheme:?}: {off:e} N·m·s of {largest:e}");
+            if finished {
+                break;
+            }
+        }
+        println!("{scheme:?}: angular impulse {moment:.3e} N·m·s");
+        assert!(largest > 1e-3, "nothing turned: {largest:e}");
+    }
+}
+
+/// Largest difference between left and right and largest value: displacements across (m), forces (N).
+fn asymmetry(simulation: &Simulation) -> [[f64; 2]; 2] {
+    let mirror = |node: usize| (PER_SIDE - 1 - node / 9) * 9 + node % 9;
+    let values = |name: &str| (0..27).map(|node| element(simulation, name, node)).collect::<Vec<_>>();
+    let (x, force) = (values("block.node_displacement_x"), values("block.normal_force"));
+    let largest = |values: &[f64]| values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    let off = (0..27).map(|node| (x[node] + x[mirror(node)]).abs()).fold(0.0, f64::max);
+    let uneven = (0..27).map(|node| (force[node] - force[mirror(node)]).abs()).fold(0.0, f64::max);
+    [[off, largest(&x)], [uneven, largest(&force)]]
+}
+
+#[test]
+fn a_symmetric_scene_stays_symmetric_to_rounding() {
+    for (scheme, solver) in SCHEMES.iter().flat_map(|scheme| SOLVERS.map(|solver| (*scheme, solver))) {
+        let mut simulation = started(&with(squeezed(), 0.15, solver, scheme));
+        let mut most = [[0.0_f64; 2]; 2];
+        for _ in 0..60 {
+            advance(&mut simulation, 1e-5);
+            let now = asymmetry(&simulation);
+            most = std::array::from_fn(|i| std::array::from_fn(|j| most[i][j].max(now[i][j])));
+        }
+        let [off, uneven] = most.map(|[off, largest]| off / largest);
+        let most = most[1][1];
+        println!("{scheme:?}, {solver:?}: displacements {off:.1e}, forces {uneven:.1e} of {most:.3e} N");
+        // Gauss-Seidel goes through the contacts one by one and ends at its tolerance.
+        let bound = if solver == Solver::Coulomb { 1e-8 } else { 1e-10 };
+        assert!(off < bound && uneven < bound && most > 100.0, "{scheme:?}, {solver:?}: {off:e}, {uneven:e}");
+    }
+}
+
+#[test]
+fn film_with_central_differences_is_the_papers_form() {
+    use nalgebra::{DMatrix, DVector};
+    let (h, friction, velocity) = (1e-6, 0.2, [-12.0, 6.0, 1.0]);
+    let distances = [0.0203, 0.0205];
+    let plates = [(Side::Left, distances[0]), (Side::Right, distances[1])];
+    let mut scene =
+        with(scene(block([0.0; 3], 3e6), &plates, false, velocity), friction, Solver::Film, Scheme::CentralDifference);
+    scene.settings.surfaces.iter_mut().for_each(|surface| surface.rigid = true);
+    let (mut simulation, rom) = (started(&scene), &scene.roms[0]);
+    let order = rom.order();
+    let start = DVector::from_fn(order, |row, _| -h * velocity[row % 3]);
+    let none = DMatrix::zeros(order, order);
+    let (mass, stiffness) = (rom.mass.clone(), rom.stiffness.clone());
+    let mut dense = tiprub_reference::paper::DenseFilm::new(mass, none, stiffness, h, DVector::zeros(order), start);
+    let contacts: Vec<(usize, f64)> = (0..27)
+        .filter_map(|node| [(0, 1.0), (2, -1.0)].into_iter().find(|side| side.0 == node / 9).map(|side| (node, side.1)))
+        .collect();
+    let gaps = DVector::from_iterator(18, contacts.iter().map(|(_, x)| distances[usize::from(*x < 0.0)] - 0.5 * SIDE));
+    let (mut off, mut force_off, mut touched) = (0.0_f64, 0.0_f64, 0);
+    for _ in 0..500 {
+        // Prediction (9), whose slip gives the direction of friction.
+        let force = &rom.stiffness * &dense.now;
+        let moved = DVector::from_fn(order, |row, _| {
+            dense.now[row] - dense.before[row] - h * h * force[row] / rom.mass[(row, row)]
+        });
+        let (mut normal, mut sliding) = (DMatrix::zeros(order, 18), DMatrix::zeros(order, 18));
+        for (column, (node, x)) in contacts.iter().enumerate() {
+            let [y, z] = [1, 2].map(|i| moved[3 * node + i]);
+            normal[(3 * node, column)] = *x;
+            sliding[(3 * node, column)] = *x;
+            sliding[(3 * node + 1, column)] = -friction * y / y.hypot(z);
+            sliding[(3 * node + 2, column)] = -friction * z / y.hypot(z);
+        }
+        let multipliers = dense.step(&normal, &sliding, &gaps);
+        advance(&mut simulation, h);
+        touched += multipliers.iter().filter(|value| **value != 0.0).count();
+        let displacement = simulation.system().bank().displacement();
+        off = (0..order).fold(off, |off, row| off.max((displacement[row] - dense.now[row]).abs()));
+        for (column, (node, _)) in contacts.iter().enumerate() {
+            force_off = force_off.max((simulation.system().multiplier(*node, 0) - multipliers[column]).abs());
+        }
+    }
+    println!("{touched} contacts, displacements {off:.1e} m, forces {force_off:.1e} N");
+    assert!(touched > 200 && off < 1e-14 && force_off < 1e-4, "{touched}, {off:e}, {force_off:e}");
+}
+
+#[test]
+fn a_pair_far_away_changes_nothing() {
+    let (body, velocity) = (|| block([0.0; 3], 3e6), [-12.0, 6.0, 1.0]);
+    let one = scene(body(), &[(Side::Left, 0.0203)], true, velocity);
+    let two = scene(body(), &[(Side::Left, 0.0203), (Side::Right, 5.0)], true, velocity);
+    for solver in SOLVERS {
+        let mut runs = [&one, &two].map(|scene| started(&with(scene.clone(), 0.2, solver, Scheme::ModalExact)));
+        let mut touched = false;
+        for _ in 0..60 {
+            for simulation in &mut runs {
+                advance(simulation, 1e-5);
+            }
+            let [first, second] = &runs;
+            let bits = |simulation: &Simulation| {
+                simulation.system().bank().displacement().iter().map(|value| value.to_bits()).collect::<Vec<_>>()
+            };
+            assert_eq!(bits(first), bits(second));
+            touched |= real(first, "normal_impulse") > 0.0;
+        }
+        assert!(touched);
+    }
+}
+
+#[test]
+fn friction_with_sticking_blocks_the_body() {
+    let mut scene = with(squeezed_by(6e-4, [0.0, -14.0, 0.0]), 0.9, Solver::Coulomb, Scheme::ModalExact);
+    scene.settings.structures.iter_mut().for_each(|structure| structure.damping_ratio = Some(0.05));
+    let mut simulation = started(&scene);
+    for _ in 0..800 {
+        advance(&mut simulation, 1e-5);
+    }
+    let (kinetic, strain) = (real(&simulation, "kinetic_energy"), real(&simulation, "strain_energy"));
+    let velocity = size(vector(&simulation, "block.velocity"));
+    let start = 0.5 * total_mass() * 14.0_f64.powi(2);
+    println!("kinetic {kinetic:.2e} J of {start:.1} J, strain {strain:.2e} J, {velocity:.2e} m/s");
+    assert!(kinetic < 1e-3 * start && strain > 10.0 * kinetic && velocity < 0.3);
+    assert!(real(&simulation, "energy_residual_relative").abs() < 1e-13);
+    assert!(simulation.integer(simulation.table().find("contact_count").unwrap().reference).unwrap() > 3);
+}
+
+#[test]
+fn a_saved_state_continues_with_the_same_bits_and_reset_starts_again() {
+    for solver in SOLVERS {
+        let scene = with(squeezed(), 0.15, solver, Scheme::ModalExact);
+        let values = |simulation: &Simulation| {
+            (0..u32::try_from(simulation.table().references()).unwrap())
+                .filter_map(|reference| simulation.real(reference).ok().map(f64::to_bits))
+                .collect::<Vec<_>>()
+        };
+        let mut simulation = started(&scene);
+        (0..35).for_each(|_| advance(&mut simulation, 1e-5));
+        let mut state = vec![0; simulation.state_size()];
+        simulation.save_state(&mut state).unwrap();
+        (0..30).for_each(|_| advance(&mut simulation, 1e-5));
+        let end = values(&simulation);
+        assert!(real(&simulation, "normal_impulse") > 0.0, "still in contact");
+
+        simulation.restore_state(&state).unwrap();
+        (0..30).for_each(|_| advance(&mut simulation, 1e-5));
+        assert_eq!(values(&simulation), end);
+        let mut other = Simulation::new(&scene).unwrap();
+        other.restore_state(&state).unwrap();
+        (0..30).for_each(|_| advance(&mut other, 1e-5));
+        assert_eq!(values(&other), end);
+
+        simulation.reset();
+        simulation.initialise(0.0).unwrap();
+        (0..65).for_each(|_| advance(&mut simulation, 1e-5));
+        assert_eq!(values(&simulation), end);
+    }
+}
+
+#[test]
+fn the_books_close_when_the_step_changes() {
+    for scheme in SCHEMES {
+        let mut simulation = started(&with(squeezed(), 0.15, Solver::Lcp, scheme));
+        for index in 0..120 {
+            advance(&mut simulation, if index % 2 == 0 { 1e-5 } else { 0.63e-5 });
+            let residual = real(&simulation, "energy_residual_relative");
+            assert!(residual.abs() < 1e-13, "{scheme:?}, step {index}: {residual:e}");
+        }
+        let (change, start) = (real(&simulation, "step_change_energy"), 0.5 * total_mass() * 1600.0);
+        println!("{scheme:?}: energy by changes of the step {change:.2e} J of {start:.1} J");
+        assert!(change != 0.0 && change.abs() < 0.02 * start);
+    }
+}
+
+#[test]
+fn the_initial_velocity_is_a_parameter() {
+    let mut simulation = Simulation::new(&squeezed()).unwrap();
+    let reference = simulation.table().find("initial_velocity_z").unwrap().reference;
+    simulation.set_real(reference, 7.0).unwrap();
+    simulation.initialise(0.0).unwrap();
+    let velocity = vector(&simulation, "block.velocity");
+    assert!((velocity[1] + 40.0).abs() < 1e-13 && (velocity[2] - 7.0).abs() < 1e-14, "{velocity:?}");
+    assert!(simulation.set_real(reference, 8.0).is_err(), "fixed");
+}
+
+#[test]
+fn a_step_asks_for_no_memory() {
+    for solver in SOLVERS {
+        let mut simulation = started(&with(squeezed(), 0.15, solver, Scheme::ModalExact));
+        let mut time = 0.0;
+        let count = counting::allocations_of(|| {
+            for _ in 0..150 {
+                simulation.do_step(time, 1e-5).unwrap();
+                time = simulation.time();
+            }
+        });
+        assert_eq!(count, 0, "{solver:?}");
+        assert!(simulation.system().factorisations() > 0, "{solver:?}: nothing touched");
+    }
+}
+
+#[test]
+fn what_flies_into_a_surface_too_deep_ends_with_the_reason() {
+    let fast = scene(block([0.0; 3], 1e3), &[(Side::Left, 0.0203)], false, [-400.0, 0.0, 0.0]);
+    let mut simulation = started(&fast);
+    let error = (0..200).find_map(|_| simulation.do_step(simulation.time(), 1e-5).err()).unwrap().to_string();
+    assert!(error.contains("a tenth of the extent"), "{error}");
+}
+
+/// Why a scene is refused.
+#[track_caller]
+fn refusal(change: impl FnOnce(&mut Scene)) -> String {
+    let mut scene = squeezed();
+    change(&mut scene);
+    match Simulation::new(&scene) {
+        Err(error) => error.to_string(),
+        Ok(mut simulation) => simulation.initialise(0.0).unwrap_err().to_string(),
+    }
+}
+
+#[test]
+fn scenes_that_make_no_sense_are_refused_with_the_reason() {
+    type Case = (&'static str, fn(&mut Scene));
+    let cases: [Case; 24] = [
+        ("held", |scene| scene.roms[0].stiffness[(4, 4)] += 1e3),
+        ("no contact node", |scene| scene.settings.contacts[0].nodes = Some("top".into())),
+        ("claims the node `left_000`", |scene| scene.settings.contacts[1].nodes = Some("le".into())),
+        ("claims all contact nodes", |scene| scene.settings.contacts[0].nodes = None),
+        ("empty text", |scene| scene.settings.contacts[0].nodes = Some(String::new())),
+        ("gap", |scene| scene.settings.contacts[0].gap = 1e-3),
+        ("sector_gaps", |scene| scene.settings.contacts[0].sector_gaps = vec![1e-3]),
+        ("meridian", |scene| scene.settings.contacts[0].meridian = Meridian::Cylinder),
+        ("heat_to_slave", |scene| scene.settings.contacts[0].heat_to_slave = Some(0.5)),
+        ("friction or solver differs", |scene| scene.settings.contacts[1].friction = 0.3),
+        ("needs to know where it is", |scene| scene.settings.surfaces[0].structure = None),
+        ("shape", |scene| scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order: 2, phase: 0.0 }),
+        ("moving", |scene| scene.settings.surfaces[0].moving = true),
+        ("named 0 times", |scene| drop(scene.settings.contacts.pop())),
+        ("massless-boundary", |scene| scene.settings.time.scheme = Scheme::MasslessBoundary),
+        ("all_sectors", |scene| scene.settings.outputs.all_sectors = true),
+        ("nodal_diameters", |scene| scene.settings.outputs.nodal_diameters = Some(0)),
+        ("no open contact grid", |scene| scene.roms[1].extras.grid = None),
+        ("at the same place", |scene| {
+            scene.roms[1].contact_nodes[1].position = scene.roms[1].contact_nodes[0].position
+        }),
+        ("only a free structure has it", |scene| scene.settings.structures[1].velocity = [1.0, 0.0, 0.0]),
+        ("only a rotating structure has it", |scene| scene.settings.structures[0].whirl = true),
+        ("carries one surface", |scene| scene.settings.surfaces[1].structure = Some("left_plate".into())),
+        ("ω_max·h", |scene| {
+            (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::CentralDifference, 1e-5)
+        }),
+        ("start inside", |scene| {
+            scene.roms[0].contact_nodes.iter_mut().for_each(|node| node.position[1] -= 0.045);
+        }),
+    ];
+    for (part, change) in cases {
+        let error = refusal(change);
+        assert!(error.contains(part), "{part}: {error}");
+    }
+}
+
+/// The block before a rigid plate, with a light mode of its own that moves some contact nodes by some vectors.
+fn with_local_mode(shape: &[(usize, [f64; 3])]) -> Scene {
+    let mut scene = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.0203)], false, [-15.0, 3.0, 0.0]);
+    scene.settings.surfaces[0].rigid = true;
+    let rom = &mut scene.roms[0];
+    let order = rom.order();
+    let grown = |matrix: &nalgebra::DMatrix<f64>, rows: usize| matrix.clone().resize(rows, order + 1, 0.0);
+    (rom.mass, rom.stiffness) = (grown(&rom.mass, order + 1), grown(&rom.stiffness, order + 1));
+    rom.mass[(order, order)] = 1e-4;
+    rom.stiffness[(order, order)] = 1e-4 * 1e4_f64.powi(2);
+    rom.contact_map = grown(&rom.contact_map, order);
+    for (node, vector) in shape {
+        (0..3).for_each(|i| rom.contact_map[(3 * node + i, order)] = vector[i]);
+    }
+    with(scene, 1.5, Solver::Lcp, Scheme::ModalExact)
+}
+
+#[test]
+fn friction_that_jams_a_contact_on_the_flight_is_refused() {
+    // Pushed in, the node moves along its slip: friction against the slip pushes it in further.
+    let mut simulation = Simulation::new(&with_local_mode(&[(0, [1.0, 1.0, 0.0])])).unwrap();
+    let error = simulation.initialise(0.0).unwrap_err().to_string();
+    assert!(error.contains("contact of left_000 alone has no unique solution"), "{error}");
+    let mut other = Simulation::new(&with_local_mode(&[(0, [1.0, -1.0, 0.0])])).unwrap();
+    other.initialise(0.0).unwrap();
+    assert!(other.warnings().is_empty(), "{:?}", other.warnings());
+}
+
+#[test]
+fn friction_that_may_leave_the_flight_without_one_solution_is_warned_of() {
+    let mut simulation = Simulation::new(&with_local_mode(&[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])])).unwrap();
+    simulation.initialise(0.0).unwrap();
+    let told = simulation.warnings().join(" ");
+    assert!(told.contains("cannot be shown to have one solution"), "{told}");
+    let mut frictionless = with_local_mode(&[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]);
+    frictionless.settings.contacts[0].friction = 0.0;
+    let mut simulation = Simulation::new(&frictionless).unwrap();
+    simulation.initialise(0.0).unwrap();
+    assert!(simulation.warnings().is_empty(), "{:?}", simulation.warnings());
+}
+
+#[test]
+fn the_chapter_on_variables_lists_every_variable() {
+    let chapter = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/variables.md")).unwrap();
+    let (_, free) = chapter.split_once("## Scenes of a free structure").unwrap();
+    let mut scene = with(squeezed(), 0.15, Solver::Lcp, Scheme::ModalExact);
+    scene.settings.outputs.instantaneous_forces = true;
+    for variable in Simulation::new(&scene).unwrap().table().variables() {
+        let name = variable.name.replace("right", "left");
+        let name = name.strip_suffix("_y").or(name.strip_suffix("_z")).map_or(name.clone(), |axis| format!("{axis}_x"));
+        assert!(name == "time" || free.contains(&format!("`{name}`")), "{name}");
+    }
+}
+
+#[test]
+fn gaps_at_the_start_are_distances_to_the_surfaces() {
+    let flat = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.0203), (Side::Right, 0.021)], false, [0.0; 3]);
+    let simulation = started(&flat);
+    for (node, place) in places().enumerate() {
+        let expected = match place[0] {
+            0 => 0.0003,
+            2 => 0.001,
+            _ => 1.0,
+        };
+        let found = element(&simulation, "block.clearance", u32::try_from(node).unwrap());
+        assert!((found - expected).abs() < 1e-16, "{found} m, {expected} m");
+    }
+}
