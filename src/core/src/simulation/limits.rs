@@ -332,7 +332,7 @@ impl Checking<'_> {
             (Some(_), GapLaw::Spline(spline)) => Some((self.compiled.slave_modes(spline), spline)),
             _ => None,
         };
-        let largest = self.parameters.step.max(step) / massless::QUIET;
+        let largest = 1.01 * self.parameters.step.max(step) / massless::USABLE_STIFF;
         let (mut limit, mut worst) = (MasslessLimit::NONE, (0.0, 0.0));
         for (diameter, model) in self.models.iter().enumerate() {
             let normals = self.directions(model, 1.0).into_iter().map(|(normal, _)| normal).collect();
