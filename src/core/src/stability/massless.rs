@@ -30,7 +30,7 @@ const STIFF: f64 = 10.0;
 /// From here on nothing helps: at 1000 the same nodes keep bouncing at 0.2 of the limit, with forces that mean nothing.
 const TOO_STIFF: f64 = 300.0;
 /// Share of the limit up to which the same blades gain none without damping either: at 0.5 it is a fifth of theirs.
-const QUIET: f64 = 0.4;
+pub const QUIET: f64 = 0.4;
 
 /// Steps (s) at which the scheme meets its limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
