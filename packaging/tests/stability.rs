@@ -4,7 +4,8 @@ use std::{path::Path, process::Command};
 
 use serde_json::Value;
 
-fn stability(root: &Path, arguments: &[&str]) -> Value {
+/// What a run that ends with `code` writes on stdout.
+fn stability(root: &Path, arguments: &[&str], code: i32) -> Value {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
     command.current_dir(root).args(["--json", "--quiet", "stability", "--out", "out"]).args(arguments);
     // A library built elsewhere is tested where one is named; else the program builds one.
@@ -12,14 +13,14 @@ fn stability(root: &Path, arguments: &[&str]) -> Value {
         command.arg("--library").arg(library);
     }
     let output = command.env("TIPRUB_CACHE", env!("CARGO_TARGET_TMPDIR")).output().unwrap();
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(code), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
 #[test]
 fn every_quick_case_is_right_or_refused() {
     let root = tempfile::tempdir().unwrap();
-    let json = stability(root.path(), &["--quick"]);
+    let json = stability(root.path(), &["--quick"], 0);
     for row in json["rows"].as_array().unwrap() {
         assert!(["right", "refused"].contains(&row["verdict"].as_str().unwrap()), "{row:#}");
     }
@@ -36,7 +37,15 @@ fn every_quick_case_is_right_or_refused() {
 #[test]
 fn the_judge_sees_every_way_to_fail() {
     let root = tempfile::tempdir().unwrap();
-    let json = stability(root.path(), &["--case", "judge/"]);
+    // What is not sound is a failure of the command, with the table written all the same.
+    let failure = stability(root.path(), &["--case", "judge/"], 1);
+    let told = failure.to_string();
+    assert!(
+        told.contains("9 of 9 cases are neither right nor refused") && told.contains("WRONG judge/wrong"),
+        "{told}"
+    );
+    let written = std::fs::read_to_string(root.path().join("out").join("results.json")).unwrap();
+    let json: Value = serde_json::from_str(&written).unwrap();
     let verdict = |name: &str| {
         let rows = json["rows"].as_array().unwrap();
         let row = rows.iter().find(|row| row["case"] == format!("judge/{name}")).unwrap();

@@ -43,7 +43,27 @@ pub fn run(arguments: &StabilityArguments, console: &Console) -> Result<Outcome>
     if let Some(path) = &arguments.chapter {
         write_chapter(path, &table)?;
     }
-    Ok(outcome)
+    verdict(&table, &arguments.out).map_or(Ok(outcome), Err)
+}
+
+/// Names at most this many unsound cases.
+const NAMED: usize = 5;
+
+/// The failure of a table with cases that are neither right nor refused as they should be.
+fn verdict(table: &Table, directory: &std::path::Path) -> Option<Failure> {
+    let unsound: Vec<String> = table.unsound().map(|row| format!("{} {}", row.verdict.name(), row.name)).collect();
+    if unsound.is_empty() {
+        return None;
+    }
+    let named = unsound[..unsound.len().min(NAMED)].join(", ");
+    let more = if unsound.len() > NAMED { ", ..." } else { "" };
+    let problem = format!(
+        "{} of {} cases are neither right nor refused as they should be: {named}{more}",
+        unsound.len(),
+        table.rows.len()
+    );
+    let remedy = format!("See {}", directory.join("index.html").display());
+    Some(Failure::new("stability", problem, remedy))
 }
 
 /// The scenes whose variables are walked, as FMUs of both versions in a temporary directory.

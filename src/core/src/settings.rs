@@ -79,6 +79,13 @@ fn is_positive_zero(value: &f64) -> bool {
     value.to_bits() == 0
 }
 
+/// Three numbers: of a longer list none is passed over in silence.
+fn three<'de, D: serde::Deserializer<'de>>(source: D) -> std::result::Result<[f64; 3], D::Error> {
+    let values = Vec::<f64>::deserialize(source)?;
+    let length = values.len();
+    values.try_into().map_err(|_| serde::de::Error::invalid_length(length, &"an array of length 3"))
+}
+
 fn is_at_rest(velocity: &[f64; 3]) -> bool {
     velocity.iter().all(is_positive_zero)
 }
@@ -155,7 +162,7 @@ pub struct StructureSettings {
     #[serde(default)]
     pub speed: f64,
     /// Start value of the velocity of the whole body along x, y, z (m/s); of a free structure only.
-    #[serde(default, skip_serializing_if = "is_at_rest")]
+    #[serde(default, deserialize_with = "three", skip_serializing_if = "is_at_rest")]
     pub velocity: [f64; 3],
     /// Modal damping ratio ξ (-), 0 ≤ ξ < 1; the ROM's own when absent.
     #[serde(default)]

@@ -456,6 +456,125 @@ fn friction_that_may_leave_the_flight_without_one_solution_is_warned_of() {
 }
 
 #[test]
+fn the_first_step_may_have_any_length() {
+    let velocity = [-12.0, 6.0, 1.0];
+    for scheme in SCHEMES {
+        let scene = with(
+            scene(block([0.0; 3], 3e6), &[(Side::Left, 0.1), (Side::Right, 0.1)], false, velocity),
+            0.2,
+            Solver::Lcp,
+            scheme,
+        );
+        // The scene's own steps are 1e-6 s; these make others.
+        for first in [1e-5, 0.7e-6, 1.4e-6, 3.3e-6, 1e-9, 1e-12] {
+            let mut simulation = started(&scene);
+            let mut state = vec![0; simulation.state_size()];
+            simulation.save_state(&mut state).unwrap();
+            let mut restored = Simulation::new(&scene).unwrap();
+            restored.restore_state(&state).unwrap();
+            for simulation in [&mut simulation, &mut restored] {
+                for length in [first, first, 1e-5, 0.63e-5] {
+                    advance(simulation, length);
+                }
+                let (found, moved) = (vector(simulation, "block.velocity"), vector(simulation, "block.displacement"));
+                for axis in 0..3 {
+                    let way = velocity[axis] * simulation.time();
+                    assert!((found[axis] - velocity[axis]).abs() < 1e-10 * size(velocity), "H = {first} s: {found:?}");
+                    assert!((moved[axis] - way).abs() < 1e-10 * way.abs(), "H = {first} s: {moved:?} m, not {way} m");
+                }
+                assert!(real(simulation, "energy_residual_relative").abs() < 1e-10, "H = {first} s");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_body_too_fast_for_the_step_is_refused_and_passes_nothing_unseen() {
+    // Obliquely through the plate within one step: beyond its edge before and after.
+    for velocity in [[-1e6, 1e6, 0.0], [-1e6, 0.0, 0.0], [0.0, 0.0, -1e300], [5000.0, 0.0, 0.0]] {
+        let scene = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.06)], false, velocity);
+        let mut simulation = started(&with(scene, 0.0, Solver::Lcp, Scheme::ModalExact));
+        let error = simulation.do_step(0.0, 1e-5).unwrap_err().to_string();
+        assert!(error.contains("could pass a surface unseen") && error.contains("smaller internal step"), "{error}");
+    }
+    // A tenth of the block in one step is the limit.
+    let mut slow = started(&scene(block([0.0; 3], 3e6), &[(Side::Left, 0.5)], false, [3900.0, 0.0, 0.0]));
+    advance(&mut slow, 1e-5);
+}
+
+#[test]
+fn a_node_that_comes_over_an_edge_from_behind_is_refused() {
+    let thrown = |distance, velocity, steps: u32| {
+        let scene = scene(block([0.0, 0.1101, 0.0], 3e6), &[(Side::Left, distance)], false, velocity);
+        let mut simulation = started(&with(scene, 0.15, Solver::Lcp, Scheme::ModalExact));
+        (0..steps).try_for_each(|_| simulation.do_step(simulation.time(), 1e-5)).map(|()| simulation)
+    };
+    // Its face flies 0.2 mm to 0.2 µm behind the plate.
+    for depth in [2e-4, 2e-5, 2e-7] {
+        let error = thrown(0.02 - depth, [0.0, -40.0, 0.0], 60).unwrap_err().to_string();
+        assert!(error.contains("the contact node left_00") && error.contains("over the edge"), "{depth} m: {error}");
+    }
+    // In front of it all is well, and what arrives from in front in the step that passes the edge is an impact.
+    assert!(real(&thrown(0.0203, [0.0, -40.0, 0.0], 60).unwrap(), "impact_loss") == 0.0);
+    for distance in [0.020_010, 0.020_05] {
+        let hit = thrown(distance, [-4.0, -40.0, 0.0], 8).unwrap();
+        assert!(vector(&hit, "block.velocity")[0] > -3.9, "{distance} m: it was not hit");
+        assert!(real(&hit, "energy_residual_relative").abs() < 1e-13);
+    }
+}
+
+/// The scene turned about the origin by the rotation `r` and moved by `shift` (m).
+fn carried_elsewhere(scene: &Scene, r: [[f64; 3]; 3], shift: [f64; 3]) -> Scene {
+    let turned = |v: [f64; 3]| r.map(|row| (0..3).map(|j| row[j] * v[j]).sum::<f64>());
+    let mut scene = scene.clone();
+    for rom in &mut scene.roms {
+        for node in &mut rom.contact_nodes {
+            let position = turned(node.position);
+            node.position = std::array::from_fn(|i| position[i] + shift[i]);
+        }
+        let map = rom.contact_map.clone();
+        for node in 0..rom.contact_nodes.len() {
+            for column in 0..map.ncols() {
+                let moved = turned([0, 1, 2].map(|i| map[(3 * node + i, column)]));
+                (0..3).for_each(|i| rom.contact_map[(3 * node + i, column)] = moved[i]);
+            }
+        }
+    }
+    scene.settings.structures[0].velocity = turned(scene.settings.structures[0].velocity);
+    scene
+}
+
+#[test]
+fn the_answer_does_not_depend_on_where_and_how_the_scene_stands() {
+    let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let about_z = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+    let oblique = [[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]];
+    for solver in SOLVERS {
+        let here = with(squeezed_by(3e-4, [0.0, -40.0, 3.0]), 0.15, solver, Scheme::ModalExact);
+        for (r, shift, bound) in [
+            (about_z, [0.0; 3], 1e-10),
+            (oblique, [0.0; 3], 1e-10),
+            // Coordinates of 10 m round to 2e-15 m, penetrations are 1e-8 m.
+            (identity, [10.0, -7.0, 3.0], 1e-7),
+        ] {
+            let mut runs = [started(&here), started(&carried_elsewhere(&here, r, shift))];
+            let (mut off, mut largest) = (0.0_f64, 0.0_f64);
+            for _ in 0..40 {
+                runs.iter_mut().for_each(|simulation| advance(simulation, 1e-5));
+                for node in 0..27 {
+                    let [first, second] = [0, 1].map(|run| element(&runs[run], "block.normal_force", node));
+                    (off, largest) = (off.max((first - second).abs()), largest.max(first));
+                }
+            }
+            println!("{solver:?}, {r:?} {shift:?}: {:.1e} of {largest:.2e} N", off / largest);
+            assert!(largest > 100.0 && off < bound * largest, "{solver:?}, {shift:?}: {off:e} N");
+            let losses = [0, 1].map(|run| real(&runs[run], "friction_loss"));
+            assert!((losses[0] - losses[1]).abs() < bound * losses[0], "{losses:?}");
+        }
+    }
+}
+
+#[test]
 fn the_chapter_on_variables_lists_every_variable() {
     let chapter = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/variables.md")).unwrap();
     let (_, free) = chapter.split_once("## Scenes of a free structure").unwrap();

@@ -44,6 +44,7 @@ fn slips_of_free_masters_are_located() {
     told("motion = \"free\"", "motion = \"fre\"", &["structure[1].motion", "Did you mean `free`?"]);
     told("[0.0, -100.0, 0.5]", "-100.0", &["structure[1].velocity: ", "list of 3 numbers, m/s"]);
     told("[0.0, -100.0, 0.5]", "[0.0, -100.0]", &["structure[1].velocity: ", "list of 3 numbers, m/s"]);
+    told("[0.0, -100.0, 0.5]", "[0.0, -100.0, 0.5, 7.0]", &["structure[1].velocity: ", "list of 3 numbers, m/s"]);
     told("[0.0, -100.0, 0.5]", "[0.0, nan, 0.5]", &["structure[1].velocity"]);
     told("motion = \"free\"", "motion = \"rotating\"", &["structure[1].velocity: only a free structure has it"]);
     told("nodes = \"left_\"", "nodes = 3", &["contact[1].nodes: integer `3` found"]);
@@ -192,7 +193,7 @@ fn numbers_of_coatings_have_their_ranges() {
         move |scene: &mut SceneSettings| change(scene.contacts[0].coating.as_mut().unwrap())
     };
     refused(coating(|c| c.thickness = 0.0), &["contact[1].coating.thickness: 0 m", "finite value > 0"]);
-    refused(coating(|c| c.thickness = 0.11), &["contact[1].coating.thickness: 0.11", "between 0.0 and 0.1"]);
+    refused(coating(|c| c.thickness = 0.11), &["contact[1].coating.thickness: 0.11", "between 1e-9 and 0.1"]);
     refused(coating(|c| c.modulus = -1.0), &["contact[1].coating.modulus: -1 Pa"]);
     refused(coating(|c| c.modulus = f64::INFINITY), &["contact[1].coating.modulus: inf"]);
     refused(coating(|c| c.modulus = 2e13), &["contact[1].coating.modulus", "between 0.0 and 1e13"]);

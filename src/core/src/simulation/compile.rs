@@ -554,6 +554,14 @@ impl Simulation {
             .iter()
             .enumerate()
             .fold((0, 0.0), |worst, (index, gap)| if *gap < worst.1 { (index, *gap) } else { worst });
+        if let Some(lost) = self.system.gaps().iter().position(|gap| gap.is_nan()) {
+            let node = &self.compiled.master().1.contact_nodes[lost / lanes].name;
+            return Err(Error::invalid(
+                "initial clearance",
+                format!("{node} finds no closest point of its surface"),
+                "Check the contact grid of the surface: it must not be folded, or flattened to a line",
+            ));
+        }
         if deepest.1 >= 0.0 {
             return Ok(());
         }

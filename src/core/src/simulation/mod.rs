@@ -284,7 +284,7 @@ impl Simulation {
         }
     }
 
-    /// A free master flies with its initial velocity as a whole.
+    /// A free master flies with its initial velocity as a whole; again for another length of the first step.
     fn launch(&mut self) {
         let Some(free) = &self.compiled.free else { return };
         let velocity = [0, 1, 2].map(|axis| self.value_of(Quantity::InitialVelocity(axis)));

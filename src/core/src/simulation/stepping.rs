@@ -33,6 +33,10 @@ impl Simulation {
         self.check_step_size(step, [self.inputs.speed.at(0.0), self.inputs.speed.at(step_size)])?;
         if (step - self.system.bank().step()).abs() > SAME_STEP * step {
             self.system.set_step(step);
+            if self.system.steps() == 0 {
+                // Increments of the first step are the velocity times its length.
+                self.launch();
+            }
         }
         if self.compiled.spins() {
             let (first, last) = (self.inputs.speed.at(0.0), self.inputs.speed.at(step_size));
@@ -185,6 +189,11 @@ impl Simulation {
                          saved state or reset first"
                     .to_owned(),
             },
+            // Of free masters only, dealt with above.
+            StepFailure::TooFast | StepFailure::BehindEdge { .. } => Error::Unstable {
+                problem: format!("a contact node moves too far in one internal step at t = {time} s"),
+                remedy: "Use a smaller internal step; restore a saved state or reset first".to_owned(),
+            },
             StepFailure::CasingImplausible => Error::Unstable {
                 problem: format!(
                     "at t = {time} s (last good time {} s) the casing is displaced by more than a tenth of the radius",
@@ -209,8 +218,21 @@ impl Simulation {
     /// What only means something else for a free master.
     fn free_failure(&self, failure: StepFailure, time: f64) -> Option<Error> {
         self.compiled.free.as_ref()?;
+        let behind;
         let problem = match failure {
             StepFailure::NonFinite => return None,
+            StepFailure::TooFast => {
+                "contact nodes of the free structure move by more than a tenth of the extent of the contact nodes in one internal \
+                 step, and could pass a surface unseen"
+            }
+            StepFailure::BehindEdge { node } => {
+                let name = &self.compiled.master().1.contact_nodes[node].name;
+                behind = format!(
+                    "the contact node {name} comes over the edge of a surface and is behind it already: what is at an edge \
+                     is not described, and pushing the node out would be an impact of arbitrary strength"
+                );
+                &behind
+            }
             StepFailure::Implausible { .. } => {
                 "contact nodes of the free structure have moved against each other, or into a surface, by more than a tenth of \
                  the extent of the contact nodes"
@@ -222,6 +244,11 @@ impl Simulation {
         };
         let remedy = match failure {
             StepFailure::Unsolved { .. } => "Use less friction, another internal step or the solver coulomb",
+            StepFailure::TooFast => "Use a smaller internal step or a lower velocity",
+            StepFailure::BehindEdge { .. } => {
+                "Extend the contact grid to where nodes may come, or move one of the structures; check that S_t x S_s of each \
+                 contact grid points to the master"
+            }
             _ => "Check positions and velocity; small displacements beside rigid flight cannot describe this",
         };
         Some(Error::Unstable {

@@ -1,11 +1,15 @@
 //! What carries a running state on: another step size, saving and restoring, and whether it still makes sense.
 
-use super::{ContactEvent, Slave, StepFailure, System, frame_of};
-use crate::contact::gap::GapLaw;
+use super::{ContactEvent, Member, Slave, StepFailure, System, frame_of};
+use crate::contact::gap::{GapLaw, dot};
+use crate::contact::spline_gap::BEYOND_EDGE;
 use crate::persist::{Persist, Reader, Writer};
 
 /// A contact force is continued over steps at most this many times as long as the one it was found in.
 const FORCE_REACH: f64 = 4.0;
+/// How far behind a surface, continued beyond its edge, a node may have been: share of its way in the step, since the surface
+/// may bend, and of the largest displacement that counts as small.
+const BEHIND_EDGE: [f64; 2] = [1e-3, 1e-6];
 
 impl System {
     /// Use step size `step` (s) from here. A running state is carried over by resampling the modal motion under
@@ -72,6 +76,31 @@ impl System {
                 }
             }
         }
+    }
+
+    /// A node of a free master that moves far in one step could pass a surface, or its edge, between two looks.
+    pub(super) fn check_travel(&self) -> Result<(), StepFailure> {
+        let GapLaw::Free(law) = &self.law else { return Ok(()) };
+        let (now, before) = (self.bank.displacement(), self.bank.displacement_before());
+        let mut moved = now.iter().zip(before).map(|(now, before)| (now - before).abs());
+        if moved.any(|moved| moved > law.largest()) { Err(StepFailure::TooFast) } else { Ok(()) }
+    }
+
+    /// A node that comes over a free edge was in front of the surface, continued beyond the edge; else it is a start in
+    /// penetration, an impact of arbitrary strength.
+    pub(super) fn check_edges(&self) -> Result<(), StepFailure> {
+        let GapLaw::Free(law) = &self.law else { return Ok(()) };
+        for (node, (gap, before)) in self.state.gap.iter().zip(&self.state.gap_before).enumerate() {
+            if *gap < 0.0 && *before >= BEYOND_EDGE {
+                let moved = self.slip_of_deformation(Member { node, sector: 0, index: node });
+                let approach = dot(moved, self.state.geometry.normal_at(node));
+                let travel = dot(moved, moved).sqrt();
+                if gap - approach < -(BEHIND_EDGE[0] * travel + BEHIND_EDGE[1] * law.largest()) {
+                    return Err(StepFailure::BehindEdge { node });
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Whether the state is still what the model describes.

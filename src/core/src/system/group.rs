@@ -183,7 +183,7 @@ impl System {
 
     /// Displacement of a node relative to the slave over the step, prediction included (m), without rigid motion.
     #[inline(always)]
-    fn slip_of_deformation(&self, Member { node, sector, index }: Member) -> [f64; 3] {
+    pub(super) fn slip_of_deformation(&self, Member { node, sector, index }: Member) -> [f64; 3] {
         let (lanes, now, before) = (self.lanes, self.bank.displacement(), self.bank.displacement_before());
         let mut moved: [f64; 3] = std::array::from_fn(|component| {
             let row = (3 * node + component) * lanes + sector;

@@ -78,6 +78,13 @@ pub enum StepFailure {
     },
     /// A structure that carries a slave surface is displaced by more than a tenth of the radius, or of the extent.
     CasingImplausible,
+    /// A contact node of a free master moves by more than a tenth of the extent in one step: it could pass a surface unseen.
+    TooFast,
+    /// A node of a free master comes over a free edge and is behind the surface already.
+    BehindEdge {
+        /// Contact node (0-based).
+        node: usize,
+    },
     /// The contact problem of a sector has no solution within the pivoting limit.
     Unsolved {
         /// Sector (0-based).
@@ -421,7 +428,9 @@ impl System {
         self.state.angle_before = self.state.angle;
         self.state.angle = drive.rotor_angle;
         self.law.turn(self.state.angle - self.state.angle_before);
+        self.check_travel()?;
         self.evaluate_gaps(drive, true);
+        self.check_edges()?;
         self.retire_events();
         if self.coupled {
             self.solve_coupled(drive)?;
