@@ -53,7 +53,7 @@ impl<'a, S: Scene> OutsideRun<'a, S> {
                 Box::new(Augmented::new(scene, step, Options { penalty: 10.0 * stiffness, tolerance, margin }))
             }
             Competitor::Penalty(times) => Box::new(Penalty::new(scene, step, f64::from(times) * stiffness)?),
-            Competitor::Core(..) => return Err("this is no method of the reference crate".into()),
+            Competitor::Core(..) | Competitor::Full(_) => return Err("this is no method of the reference crate".into()),
         };
         Ok(Self { scene, method, step, steps: 0, division })
     }

@@ -168,7 +168,7 @@ impl Case for Wheel {
 
     /// Outside methods at the standard size only, where they are second reference and competitors.
     fn competitors(&self, size: usize) -> Vec<Competitor> {
-        let all = Competitor::all().into_iter();
+        let all = Competitor::reduced().into_iter();
         all.filter(|competitor| competitor.is_core() || size == self.standard()).collect()
     }
 
