@@ -22,23 +22,23 @@ use crate::{Failure, Result, console::Console, reduction, rom_cache::RomCache, s
 const MODES: [usize; 3] = [20, 100, 300];
 const QUICK_MODES: [usize; 2] = [20, 60];
 /// Time between samples (s).
-const INTERVAL: f64 = 4e-6;
+const INTERVAL: f64 = 8e-6;
 /// Samples of the window: while node 1 touches.
-const SAMPLES: usize = 94;
-const QUICK_SAMPLES: usize = 20;
+const SAMPLES: usize = 47;
+const QUICK_SAMPLES: usize = 10;
 /// Internal steps per sample; the limit of central differences is between the first two of the full list.
-const DIVISIONS: [u32; 6] = [1, 2, 4, 8, 16, 32];
-const OTHER_DIVISIONS: [u32; 3] = [2, 8, 16];
-const QUICK_DIVISIONS: [u32; 3] = [1, 4, 8];
+const DIVISIONS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
+const OTHER_DIVISIONS: [u32; 4] = [2, 4, 16, 32];
+const QUICK_DIVISIONS: [u32; 4] = [1, 2, 8, 16];
 /// Internal steps per sample of the methods a, b, c, d; those of a and b as references.
-const FULL_DIVISIONS: [&[u32]; 4] = [&[2, 4, 8, 16, 32], &[1, 2, 4, 8], &[1, 2, 4], &[4, 16, 32]];
-const QUICK_FULL_DIVISIONS: [&[u32]; 4] = [&[4, 8], &[2, 4], &[], &[]];
-const FULL_REFERENCES: [u32; 2] = [80, 16];
-const QUICK_FULL_REFERENCES: [u32; 2] = [32, 8];
+const FULL_DIVISIONS: [&[u32]; 4] = [&[4, 8, 16, 32, 64], &[1, 2, 4, 8, 16], &[2, 4, 8], &[8, 32, 64]];
+const QUICK_FULL_DIVISIONS: [&[u32]; 4] = [&[8, 16], &[4, 8], &[], &[]];
+const FULL_REFERENCES: [u32; 2] = [160, 32];
+const QUICK_FULL_REFERENCES: [u32; 2] = [64, 16];
 /// The same of the product's reference, and of the runs that show whether trajectories part.
-const REFERENCE: u32 = 128;
-const QUICK_REFERENCE: u32 = 32;
-const PARTING_DIVISION: u32 = 8;
+const REFERENCE: u32 = 256;
+const QUICK_REFERENCE: u32 = 64;
+const PARTING_DIVISION: u32 = 16;
 
 /// The cube with several numbers of modes of its rings.
 pub struct Cube {
@@ -137,7 +137,7 @@ impl Case for Cube {
     }
 
     fn impulse_window(&self) -> usize {
-        5
+        2
     }
 
     fn divisions(&self, size: usize) -> Vec<u32> {
