@@ -171,7 +171,7 @@ fn damping_is_part_of_the_limit() {
 fn dragged(step: f64, solver: Solver) -> (System, f64) {
     let (outer, inner, light) = (1e6, 1e4, 1e-6);
     // What presses along x also deflects along y.
-    let between = [[outer, -0.3 * outer], [-0.3 * outer, outer]];
+    let between = [[outer, 0.6 * outer], [0.6 * outer, outer]];
     let stiffness = DMatrix::from_fn(4, 4, |i, j| {
         let ground = if i == j && i > 1 { inner } else { 0.0 };
         ground + if (i > 1) == (j > 1) { between[i % 2][j % 2] } else { -between[i % 2][j % 2] }
