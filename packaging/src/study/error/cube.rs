@@ -20,7 +20,7 @@ use crate::{Failure, Result, console::Console, reduction, rom_cache::RomCache, s
 
 /// Modes of each ring; the middle one is what ships.
 const MODES: [usize; 3] = [20, 100, 300];
-const QUICK_MODES: [usize; 2] = [20, 60];
+const QUICK_MODES: [usize; 2] = [20, 100];
 /// Time between samples (s).
 const INTERVAL: f64 = 8e-6;
 /// Samples of the window: while node 1 touches.
