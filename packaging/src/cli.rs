@@ -269,6 +269,8 @@ pub enum ErrorScene {
     Carpenter,
     /// The bouncing bar.
     BouncingBar,
+    /// The cube between two rings.
+    Cube,
     /// Rotor 37 touching lightly.
     #[value(name = "rotor37-light")]
     Rotor37Light,
@@ -281,8 +283,8 @@ pub enum ErrorScene {
 
 impl ErrorScene {
     /// All of them.
-    pub const ALL: [Self; 5] =
-        [Self::Carpenter, Self::BouncingBar, Self::Rotor37Light, Self::Rotor37Heavy, Self::Stage];
+    pub const ALL: [Self; 6] =
+        [Self::Carpenter, Self::BouncingBar, Self::Cube, Self::Rotor37Light, Self::Rotor37Heavy, Self::Stage];
 }
 
 /// Arguments of `tiprub stability`.

@@ -125,7 +125,7 @@ fn count(steps: f64) -> usize {
 
 fn measure(scene: &Scene, method: Method, division: u32, steps: usize, exact: &Trace) -> Result<(f64, Errors), String> {
     let last = trace(scene, method, division, steps)?;
-    let seconds = run::time(&|| start(scene, method, division), steps, run::REPETITIONS)?;
+    let seconds = run::time(&|| start(scene, method, division), steps, run::REPETITIONS, None)?;
     let impulse = |trace: &Trace| trace.impulses.iter().sum::<f64>();
     let errors = Errors {
         displacement: apart(&last.displacements, &exact.displacements),

@@ -81,3 +81,20 @@ fn film_levels_off_in_a_rub_where_lcp_converges() {
     assert!(finest(scene, "modal-exact + film", "least_force") < 0.0, "film lets contacts pull");
     assert!(finest(scene, "modal-exact + lcp", "ledger_residual") < 1e-12);
 }
+
+#[test]
+fn the_cube_comes_nearer_to_the_full_model_with_steps_and_modes() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), &["cube"]);
+    let scene = &json["results"]["scenes"][0];
+    let truncation: Vec<f64> =
+        scene["reference_from_truth"].as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect();
+    assert!(truncation[1] < 0.85 * truncation[0] && truncation[0] < 1e-2, "{truncation:?}");
+    for competitor in ["modal-exact + lcp", "central-difference + film", "b, bi-potential, full model"] {
+        let errors = values(scene, competitor, "error_of_steps");
+        let [.., coarse, fine] = &errors[..] else { panic!("{errors:?}") };
+        assert!(fine.1.unwrap() < 0.6 * coarse.1.unwrap(), "{competitor}: {errors:?}");
+    }
+    assert!(values(scene, "massless-boundary + lcp", "seconds").iter().all(|(_, seconds)| seconds.is_none()));
+    assert!(finest(scene, "modal-exact + lcp", "ledger_residual").abs() < 1e-12);
+}

@@ -166,3 +166,57 @@ fn damping_is_part_of_the_limit() {
         assert!(below < 1.0 + 1e-12 && above > 1.0, "ξ = {damping_ratio}");
     }
 }
+
+/// Two bodies behind a light end node, stiff along x and along y: pressed against a wall at x and dragged along +y at 1 m/s.
+fn dragged(step: f64, solver: Solver) -> (System, f64) {
+    let (outer, inner, light) = (1e6, 1e4, 1e-6);
+    // What presses along x also deflects along y.
+    let between = [[outer, 0.6 * outer], [0.6 * outer, outer]];
+    let stiffness = DMatrix::from_fn(4, 4, |i, j| {
+        let ground = if i == j && i > 1 { inner } else { 0.0 };
+        ground + if (i > 1) == (j > 1) { between[i % 2][j % 2] } else { -between[i % 2][j % 2] }
+    });
+    let mut map = DMatrix::zeros(3, 4);
+    (map[(0, 0)], map[(1, 1)]) = (1.0, 1.0);
+    let rom = Rom {
+        name: "dragged".into(),
+        origin: "springs and masses".into(),
+        sectors: 1,
+        frame: Frame::Cartesian,
+        mass: DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![light, light, 1.0, 1.0])),
+        stiffness,
+        damping_ratio: 0.0,
+        contact_map: map,
+        contact_nodes: vec![ContactNode { name: "end".into(), position: [0.0; 3], meridional_slope: 0.0 }],
+        checks: RomChecks::default(),
+        extras: RomExtras::default(),
+    };
+    let model = ModalModel { quasi_static: 2, ..ModalModel::from_rom(&rom, 0.0).unwrap() };
+    let sliding = vec![[0.0, 1.0, 0.0]];
+    let law = FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![-1e-4], sliding };
+    let settings = SystemSettings { scheme: Scheme::MasslessBoundary, solver, friction: 0.3, ledger: true };
+    let mut system = System::new(&model, 1, GapLaw::Fixed(law), settings);
+    system.set_step(step);
+    system.start(&Drive::default());
+    (system, step)
+}
+
+#[test]
+fn friction_opposes_sliding_however_short_the_step_is() {
+    for solver in [Solver::Lcp, Solver::Film] {
+        // By its forces the node stands 1e-5 m and more away from where it would be without: 10 m/s at the first of these steps.
+        let ends = [1e-6, 1e-7, 1e-8].map(|step| {
+            let (mut system, step) = dragged(step, solver);
+            let mut time = 0.0;
+            while time < 1e-4 {
+                system.step(&Drive::default()).unwrap();
+                time += step;
+                let event = system.events()[0];
+                assert!((event.force[1] + 0.3 * event.normal).abs() < 1e-12 * event.normal, "h = {step:e}: {event:?}");
+            }
+            system.bank().row(1, 0)
+        });
+        println!("{solver:?}: {ends:?}");
+        assert!(ends[0].abs() > 1e-6 && (ends[1] - ends[2]).abs() < 0.2 * (ends[0] - ends[2]).abs(), "{ends:?}");
+    }
+}

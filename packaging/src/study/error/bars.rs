@@ -226,7 +226,7 @@ impl Case for Bars {
     }
 
     fn competitors(&self, _: usize) -> Vec<Competitor> {
-        Competitor::all()
+        Competitor::reduced()
     }
 
     fn start<'a>(

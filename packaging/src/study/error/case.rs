@@ -40,12 +40,27 @@ pub trait Case {
     /// Internal steps per sample to be tried, ascending; the first are beyond the limit of central differences.
     fn divisions(&self, size: usize) -> Vec<u32>;
 
+    /// The same for one competitor.
+    fn divisions_of(&self, size: usize, _: Competitor) -> Vec<u32> {
+        self.divisions(size)
+    }
+
     /// Internal steps per sample of the references: the product's, and the outside one's where the scene has one.
     fn reference_divisions(&self, size: usize) -> (u32, u32);
 
     /// The second reference, and the competitors at a size.
     fn second(&self) -> Competitor {
         Competitor::Moreau
+    }
+
+    /// The second reference where it is the same at all sizes.
+    fn second_trace(&self) -> Option<Trace> {
+        None
+    }
+
+    /// How far apart two references are that share no code with the product, and what they are, where there are two.
+    fn meeting(&self) -> Option<(f64, String)> {
+        None
     }
 
     /// Who takes part at a size.
@@ -63,7 +78,7 @@ pub trait Case {
         perturbation: f64,
     ) -> Result<Box<dyn Run + 'a>, String>;
 
-    /// The exact solution, where there is one.
+    /// The exact solution, or that of the full model, where there is one.
     fn exact(&self) -> Option<Trace> {
         None
     }
@@ -82,6 +97,11 @@ pub trait Case {
     /// solution is known.
     fn parting(&self) -> &[f64] {
         &[]
+    }
+
+    /// What is changed by almost nothing for that.
+    fn perturbed(&self) -> &'static str {
+        "a gap"
     }
 
     /// Whether contact nodes act on each other, so that solvers differ.

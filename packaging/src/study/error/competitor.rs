@@ -13,6 +13,26 @@ pub enum Competitor {
     Augmented,
     /// Central differences with contact springs of so many times the scene's own stiffness.
     Penalty(u32),
+    /// A method on the full finite-element model.
+    Full(Full),
+}
+
+/// Methods of the reference crate on the full finite-element model of the cube and its rings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Full {
+    /// a: central differences with film, the paper's method.
+    Film,
+    /// b: bi-potential, implicit.
+    Bipotential,
+    /// c: augmented Lagrangian with Newmark's method.
+    Augmented,
+    /// d: central differences with a penalty.
+    Penalty,
+}
+
+impl Full {
+    /// All four.
+    pub const ALL: [Self; 4] = [Self::Film, Self::Bipotential, Self::Augmented, Self::Penalty];
 }
 
 /// Schemes of the product.
@@ -53,6 +73,11 @@ impl Family {
 impl Competitor {
     /// Everyone, the product's own first.
     pub fn all() -> Vec<Self> {
+        Self::reduced().into_iter().chain(Full::ALL.map(Self::Full)).collect()
+    }
+
+    /// Everyone who steps a reduced model, the product's own first.
+    pub fn reduced() -> Vec<Self> {
         let own = SCHEMES.into_iter().flat_map(|scheme| SOLVERS.map(|solver| Self::Core(scheme, solver)));
         own.chain([Self::Moreau, Self::Augmented, Self::Penalty(1), Self::Penalty(10)]).collect()
     }
@@ -60,6 +85,11 @@ impl Competitor {
     /// The product's own.
     pub fn is_core(self) -> bool {
         matches!(self, Self::Core(..))
+    }
+
+    /// Whether it steps the full finite-element model.
+    pub fn is_full(self) -> bool {
+        matches!(self, Self::Full(_))
     }
 
     /// The equations it solves.
@@ -76,6 +106,10 @@ impl Competitor {
             Self::Augmented => "Newmark, augmented Lagrangian".into(),
             Self::Penalty(1) => "central differences, penalty".into(),
             Self::Penalty(times) => format!("central differences, penalty × {times}"),
+            Self::Full(Full::Film) => "a, film, full model".into(),
+            Self::Full(Full::Bipotential) => "b, bi-potential, full model".into(),
+            Self::Full(Full::Augmented) => "c, augmented Lagrangian, full model".into(),
+            Self::Full(Full::Penalty) => "d, penalty, full model".into(),
         }
     }
 
@@ -88,16 +122,18 @@ impl Competitor {
             Self::Moreau => 3,
             Self::Augmented => 4,
             Self::Penalty(_) => 5,
+            Self::Full(_) => 6,
         }
     }
 
     /// Index of the marker: one per solver; outside methods have a cross, the stiffer penalty another.
     pub fn marker(self) -> usize {
         match self {
-            Self::Core(_, Solver::Film) => 0,
-            Self::Core(_, Solver::Lcp) => 1,
+            Self::Core(_, Solver::Film) | Self::Full(Full::Film) => 0,
+            Self::Core(_, Solver::Lcp) | Self::Full(Full::Bipotential) => 1,
             Self::Core(_, Solver::Coulomb) => 2,
             Self::Penalty(times) if times > 1 => 4,
+            Self::Full(Full::Penalty) => 4,
             _ => 3,
         }
     }

@@ -106,8 +106,11 @@ fn windows_apart(a: &[f64], b: &[f64], window: usize) -> f64 {
 
 /// Number of runs of a scene, for progress.
 pub fn count(case: &dyn Case) -> u64 {
-    let each = |size: usize| case.competitors(size).len() * case.divisions(size).len() + 1;
-    (0..case.sizes().len()).map(each).sum::<usize>() as u64
+    let of = |size: usize| {
+        let all = case.competitors(size).into_iter();
+        all.map(|competitor| case.divisions_of(size, competitor).len()).sum::<usize>() + 1
+    };
+    (0..case.sizes().len()).map(of).sum::<usize>() as u64
 }
 
 /// Run everything, configurations so many times each for their time. One run at a time.
@@ -131,7 +134,7 @@ pub fn measure(case: &dyn Case, repetitions: usize, task: &Task) -> Result<Measu
     let mut rows = Vec::new();
     for (size, own) in references.iter().enumerate() {
         for competitor in case.competitors(size) {
-            for division in case.divisions(size) {
+            for division in case.divisions_of(size, competitor) {
                 let outcome = judge(case, size, (competitor, division), own, truth, repetitions);
                 rows.push(Row { size, competitor, step: case.interval() / f64::from(division), outcome });
                 tick();
@@ -155,7 +158,8 @@ fn refer(case: &dyn Case, size: usize) -> Result<References> {
             )
         })
     };
-    let (first, second) = (trace(DEFAULT, division)?, trace(case.second(), outside)?);
+    let first = trace(DEFAULT, division)?;
+    let second = case.second_trace().map_or_else(|| trace(case.second(), outside), Ok)?;
     // Equations that are refused at this size have no limit; their rows say why.
     let limits =
         case.families(size).into_iter().map(|family| Some((family, trace(family.reference(), division).ok()?)));
@@ -180,23 +184,26 @@ fn judge(
     repetitions: usize,
 ) -> Result<Figures, String> {
     let start = || case.start(size, competitor, division, 0.0);
-    let found = run::trace(start()?.as_mut(), case.samples())?;
-    let error = apart(&found.displacements, &own.first.displacements);
+    let mut run = start()?;
+    let found = run::trace(run.as_mut(), case.samples())?;
+    // The full model has a limit of its own.
+    let plain = if competitor.is_full() { truth } else { &own.first };
+    let error = apart(&found.displacements, &plain.displacements);
     if error.is_nan() || error > DIVERGED {
         return Err(format!("diverged: displacements are {error:.0e} times their size away"));
     }
-    let limit = own.limit(competitor.family());
+    let limit = if competitor.is_full() { truth } else { own.limit(competitor.family()) };
     let window = case.impulse_window();
     let energies = truth.energies.iter().chain(&own.first.energies).chain([&truth.initial_energy]);
     let largest = energies.fold(f64::MIN_POSITIVE, |largest, energy| largest.max(energy.abs()));
     let largest = case.energy_scale().unwrap_or(largest);
     let last = |trace: &Trace| trace.energies.last().copied().unwrap_or(0.0);
     Ok(Figures {
-        seconds: run::time(&start, case.samples(), repetitions)?,
+        seconds: run::time(&start, case.samples(), repetitions, run.own_seconds())?,
         total: apart(&found.displacements, &truth.displacements),
         of_time: error,
         of_own: apart(&found.displacements, &limit.displacements),
-        impulse: windows_apart(&found.impulses, &own.first.impulses, window),
+        impulse: windows_apart(&found.impulses, &plain.impulses, window),
         impulse_total: windows_apart(&found.impulses, &truth.impulses, window),
         energy: (last(&found) - last(truth)).abs() / largest,
         residual: found.residual.map(f64::abs),

@@ -8,6 +8,8 @@ pub mod case;
 pub mod chart;
 pub mod clock;
 pub mod competitor;
+pub mod cube;
+pub mod full;
 pub mod machine;
 pub mod measure;
 pub mod outside;
@@ -36,6 +38,7 @@ use bars::Bars;
 use case::Case;
 use chart::Chart;
 use competitor::{Competitor, Family, SCHEMES};
+use cube::Cube;
 use measure::{Measured, Row};
 use ranking::Kind;
 use rotor::Rotor;
@@ -102,6 +105,7 @@ fn case_of(scene: ErrorScene, quick: bool, cache: &RomCache, console: &Console) 
         ErrorScene::BouncingBar => Box::new(Bars::bouncing(quick).map_err(never)?),
         ErrorScene::Rotor37Light => Box::new(Rotor::new(false, quick, cache, console)?),
         ErrorScene::Rotor37Heavy => Box::new(Rotor::new(true, quick, cache, console)?),
+        ErrorScene::Cube => Box::new(Cube::new(quick, cache, console)?),
         ErrorScene::Stage => Box::new(Wheel::new(quick, cache, console)?),
     })
 }
@@ -186,39 +190,81 @@ fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> Stri
 /// What every scene should show.
 fn statements(case: &dyn Case, found: &Measured) -> Vec<Statement> {
     let title = case.title();
-    let apart = found.references[case.standard()].apart[0];
-    let own = |competitor: Competitor| found.rows.iter().filter(move |row| row.competitor == competitor);
-    let refused = SCHEMES.into_iter().flat_map(|scheme| own(Competitor::Core(scheme, Solver::Lcp)));
-    let refused: Vec<&Row> = refused.filter(|row| row.outcome.is_err()).collect();
-    let of = |scheme: Scheme, refused: &[&Row]| {
-        refused.iter().filter(|row| matches!(row.competitor, Competitor::Core(own, _) if own == scheme)).count()
-    };
-    let (central, exact) = (of(Scheme::CentralDifference, &refused), of(Scheme::ModalExact, &refused));
-    let lcp = SCHEMES.into_iter().flat_map(|scheme| own(Competitor::Core(scheme, Solver::Lcp)));
+    let lcp = SCHEMES.map(|scheme| Competitor::Core(scheme, Solver::Lcp));
     let (mut deepest, mut least) = (0.0_f64, 0.0_f64);
-    for figures in lcp.filter_map(|row| row.outcome.as_ref().ok()) {
-        (deepest, least) = (deepest.max(figures.penetration), least.min(figures.adhesion));
+    for row in found.rows.iter().filter(|row| lcp.contains(&row.competitor)) {
+        if let Ok(figures) = &row.outcome {
+            (deepest, least) = (deepest.max(figures.penetration), least.min(figures.adhesion));
+        }
     }
-    let mut all = vec![
-        Statement::tested(
-            format!("{title}: the two references, which share no code, meet"),
-            apart < MEET,
-            format!("displacements {apart:.1e} apart at {} {}", case.sizes()[case.standard()], case.size_name()),
-        ),
-        Statement::tested(
-            format!(
-                "{title}: steps beyond the limit of central differences are refused; modal-exact takes longer ones"
-            ),
-            central > exact,
-            format!("{central} and {exact} refusals with lcp"),
-        ),
-        Statement::tested(
-            format!("{title}: lcp neither penetrates nor pulls"),
-            deepest <= 0.0 && least >= 0.0,
-            format!("deepest {deepest:.1e} m, least force {least:.1e} N"),
-        ),
-    ];
+    let mut all = meeting(case, found);
+    all.extend(limits(case, found));
+    all.push(Statement::tested(
+        format!("{title}: lcp neither penetrates nor pulls"),
+        deepest <= 0.0 && least >= 0.0,
+        format!("deepest {deepest:.1e} m, least force {least:.1e} N"),
+    ));
     all.extend(ranking::floor(case, found));
     all.extend(window::statement(case));
     all
+}
+
+/// Two references that share no code meet.
+fn meeting(case: &dyn Case, found: &Measured) -> Vec<Statement> {
+    let title = case.title();
+    let (size, apart) = (case.sizes()[case.standard()], found.references[case.standard()].apart[0]);
+    let Some((full, who)) = case.meeting() else {
+        return vec![Statement::tested(
+            format!("{title}: the two references, which share no code, meet"),
+            apart < MEET,
+            format!("displacements {apart:.1e} apart at {size} {}", case.size_name()),
+        )];
+    };
+    let truncation: Vec<String> = zip(case.sizes(), &found.truncation)
+        .map(|(size, apart)| format!("{apart:.1e} with {size} {}", case.size_name()))
+        .collect();
+    vec![
+        Statement::tested(
+            format!("{title}: two references that share neither stepping nor contact code meet"),
+            full < MEET,
+            format!("displacements {full:.1e} apart: {who}"),
+        ),
+        Statement::tested(
+            format!("{title}: the product comes nearer to them with the number of {}", case.size_name()),
+            found.truncation.windows(2).all(|pair| pair[1] < pair[0]),
+            truncation.join(", "),
+        ),
+    ]
+}
+
+/// What central differences refuse, and how long the steps of modal-exact may be.
+fn limits(case: &dyn Case, found: &Measured) -> [Statement; 2] {
+    let own = |scheme: Scheme| {
+        let competitor = Competitor::Core(scheme, Solver::Lcp);
+        found.rows.iter().filter(move |row| row.size == case.standard() && row.competitor == competitor)
+    };
+    let longest = |scheme: Scheme| -> f64 {
+        own(scheme).filter(|row| row.outcome.is_ok()).map(|row| row.step).fold(0.0, f64::max)
+    };
+    let central = longest(Scheme::CentralDifference);
+    let paper = Competitor::Core(Scheme::CentralDifference, Solver::Lcp);
+    let refused = |row: &&Row| row.competitor == paper && row.outcome.is_err();
+    let refused = found.rows.iter().filter(refused).count();
+    let exact = longest(Scheme::ModalExact);
+    [
+        Statement::tested(
+            format!("{}: steps beyond the limit of central differences are refused", case.title()),
+            refused > 0 && central > 0.0,
+            format!(
+                "{refused} refused over all sizes, the longest that ran with {} {} is {:.3} µs",
+                case.sizes()[case.standard()],
+                case.size_name(),
+                1e6 * central
+            ),
+        ),
+        Statement::remark(
+            format!("{}: longest step of modal-exact that ran", case.title()),
+            format!("{:.3} µs, {:.1} times that of central differences", 1e6 * exact, exact / central),
+        ),
+    ]
 }

@@ -31,6 +31,8 @@ pub struct OutsideRun<'a, S: Scene> {
     steps: u64,
     /// Internal steps per sample.
     division: u32,
+    /// Count the potential of the loads as energy.
+    potential: bool,
 }
 
 impl<'a, S: Scene> OutsideRun<'a, S> {
@@ -53,9 +55,14 @@ impl<'a, S: Scene> OutsideRun<'a, S> {
                 Box::new(Augmented::new(scene, step, Options { penalty: 10.0 * stiffness, tolerance, margin }))
             }
             Competitor::Penalty(times) => Box::new(Penalty::new(scene, step, f64::from(times) * stiffness)?),
-            Competitor::Core(..) => return Err("this is no method of the reference crate".into()),
+            Competitor::Core(..) | Competitor::Full(_) => return Err("this is no method of the reference crate".into()),
         };
-        Ok(Self { scene, method, step, steps: 0, division })
+        Ok(Self { scene, method, step, steps: 0, division, potential: true })
+    }
+
+    /// Leave the potential of the loads out of the energy, as a whole scene does.
+    pub fn without_potential(self) -> Self {
+        Self { potential: false, ..self }
     }
 
     #[expect(clippy::cast_precision_loss, reason = "step counts are below 2^52")]
@@ -84,6 +91,9 @@ impl<S: Scene> Run for OutsideRun<'_, S> {
     }
 
     fn energy(&self) -> f64 {
+        if !self.potential {
+            return self.method.energy();
+        }
         let potential: f64 = self.scene.load().iter().zip(self.method.state().0).map(|(f, q)| f * q).sum();
         self.method.energy() - potential
     }

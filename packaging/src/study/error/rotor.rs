@@ -176,7 +176,7 @@ impl Case for Rotor {
 
     /// Outside methods at the standard size only: they take long, and truncation is the same for all.
     fn competitors(&self, size: usize) -> Vec<Competitor> {
-        let all = Competitor::all().into_iter();
+        let all = Competitor::reduced().into_iter();
         all.filter(|competitor| competitor.is_core() || size == self.standard()).collect()
     }
 

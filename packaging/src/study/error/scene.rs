@@ -41,7 +41,8 @@ impl SceneRun {
         Ok(Self { simulation, start, interval, division, samples: 0 })
     }
 
-    fn time(&self) -> f64 {
+    /// Time reached (s).
+    pub fn time(&self) -> f64 {
         self.start + f64::from(self.samples) * self.interval
     }
 }

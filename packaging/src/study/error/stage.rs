@@ -32,7 +32,9 @@ const PARTING_DIVISION: u32 = 16;
 const DIVISIONS: [u32; 6] = [4, 8, 12, 16, 32, 64];
 const QUICK_DIVISIONS: [u32; 3] = [2, 8, 16];
 const REFERENCES: (u32, u32) = (256, 128);
-const QUICK_REFERENCES: (u32, u32) = (64, 16);
+const QUICK_REFERENCES: (u32, u32) = (64, 64);
+/// Internal steps per sample of the outside methods, whose steps take ten times as long.
+const OUTSIDE_DIVISIONS: [u32; 3] = [8, 16, 32];
 /// Contact stiffness of soft methods (N/m) per node, the penetration they may leave and how near a node takes part (m).
 const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 5e-6, margin: 2e-5 };
 
@@ -157,8 +159,18 @@ impl Case for Wheel {
         5
     }
 
-    fn divisions(&self, _: usize) -> Vec<u32> {
-        self.divisions.clone()
+    /// Steps are compared at the standard size; the others leave the finest out.
+    fn divisions(&self, size: usize) -> Vec<u32> {
+        let count = self.divisions.len();
+        self.divisions[..if size == self.standard() { count } else { count - 1 }].to_vec()
+    }
+
+    fn divisions_of(&self, size: usize, competitor: Competitor) -> Vec<u32> {
+        if competitor.is_core() || self.divisions.len() == QUICK_DIVISIONS.len() {
+            self.divisions(size)
+        } else {
+            OUTSIDE_DIVISIONS.to_vec()
+        }
     }
 
     fn reference_divisions(&self, size: usize) -> (u32, u32) {
@@ -168,7 +180,7 @@ impl Case for Wheel {
 
     /// Outside methods at the standard size only, where they are second reference and competitors.
     fn competitors(&self, size: usize) -> Vec<Competitor> {
-        let all = Competitor::all().into_iter();
+        let all = Competitor::reduced().into_iter();
         all.filter(|competitor| competitor.is_core() || size == self.standard()).collect()
     }
 
@@ -193,7 +205,7 @@ impl Case for Wheel {
             Competitor::Core(scheme, solver) => {
                 Box::new(SceneRun::new(scene, (scheme, solver), INTERVAL, division, perturbation)?)
             }
-            _ => Box::new(OutsideRun::new(outside, competitor, INTERVAL, division, SOFTNESS)?),
+            _ => Box::new(OutsideRun::new(outside, competitor, INTERVAL, division, SOFTNESS)?.without_potential()),
         })
     }
 }

@@ -20,7 +20,7 @@ pub const PARTED: f64 = 1e-6;
 const DIVISION: u32 = 20;
 const FINE: u32 = 160;
 
-/// Difference of two runs at every sample, relative to the largest displacements so far, over `samples` samples.
+/// Difference of two runs at every sample, relative to the largest displacements, over `samples` samples.
 ///
 /// # Errors
 /// A run fails.
@@ -30,13 +30,11 @@ pub fn parting(case: &dyn Case, division: u32, samples: usize) -> Result<Vec<f64
         run::trace(run.as_mut(), samples)
     };
     let (plain, perturbed) = (trace(0.0)?, trace(PERTURBATION)?);
-    let mut largest = f64::MIN_POSITIVE;
     let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>().sqrt();
+    let sizes = plain.displacements.iter().map(|all| norm(&mut all.iter().copied()));
+    let largest = sizes.fold(f64::MIN_POSITIVE, f64::max);
     Ok(zip(&plain.displacements, &perturbed.displacements)
-        .map(|(a, b)| {
-            largest = largest.max(norm(&mut a.iter().copied()));
-            norm(&mut zip(a, b).map(|(a, b)| a - b)) / largest
-        })
+        .map(|(a, b)| norm(&mut zip(a, b).map(|(a, b)| a - b)) / largest)
         .collect())
 }
 
@@ -59,7 +57,8 @@ pub fn statement(case: &dyn Case) -> Option<Statement> {
         ),
         end <= PARTED,
         format!(
-            "a gap changed by {PERTURBATION:.0e} has moved the nodes by {end:.1e} at the end of the window, by {last:.1e} after {:.1} ms",
+            "{} changed by {PERTURBATION:.0e} has moved the nodes by {end:.1e} at the end of the window, by {last:.1e} after {:.1} ms",
+            case.perturbed(),
             1e3 * long
         ),
     ))

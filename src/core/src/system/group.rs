@@ -168,7 +168,7 @@ impl System {
             }
             let slip = if friction > 0.0 {
                 let mut velocity = self.law.sliding_velocity(at.node, index, drive);
-                let moved = self.slip_of_deformation(at);
+                let moved = if self.is_delayed() { self.slip_of_inertia(at) } else { self.slip_of_deformation(at) };
                 for (value, moved) in velocity.iter_mut().zip(moved) {
                     *value += moved / self.bank.step();
                 }
@@ -183,8 +183,19 @@ impl System {
 
     /// Displacement of a node relative to the slave over the step, prediction included (m), without rigid motion.
     #[inline(always)]
-    pub(super) fn slip_of_deformation(&self, Member { node, sector, index }: Member) -> [f64; 3] {
-        let (lanes, now, before) = (self.lanes, self.bank.displacement(), self.bank.displacement_before());
+    pub(super) fn slip_of_deformation(&self, at: Member) -> [f64; 3] {
+        self.slip_between(at, self.bank.displacement(), self.bank.displacement_before())
+    }
+
+    /// The same of the modes with inertia alone. The prediction of massless-boundary is without the forces that deform
+    /// quasi-static modes, however short the step is: taken for a slip over h it would grow without bounds.
+    fn slip_of_inertia(&self, at: Member) -> [f64; 3] {
+        self.slip_between(at, &self.state.predicted, &self.predicted_before)
+    }
+
+    #[inline(always)]
+    fn slip_between(&self, Member { node, sector, index }: Member, now: &[f64], before: &[f64]) -> [f64; 3] {
+        let lanes = self.lanes;
         let mut moved: [f64; 3] = std::array::from_fn(|component| {
             let row = (3 * node + component) * lanes + sector;
             now[row] - before[row]

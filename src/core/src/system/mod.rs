@@ -119,6 +119,9 @@ struct SystemState {
     force: Vec<f64>,
     /// Part of λ that the coating carries (N); empty without one.
     coating_force: Vec<f64>,
+    /// Displacement of the contact rows as the last step predicted it (m); of massless-boundary alone, whose prediction is
+    /// that of the modes with inertia.
+    predicted: Vec<f64>,
     /// Normals and places of the last step.
     geometry: Geometry,
     /// Rotor angle of the last step and of the one before (rad).
@@ -135,6 +138,7 @@ persist_fields!(SystemState {
     multiplier,
     force,
     coating_force,
+    predicted,
     geometry,
     angle,
     angle_before,
@@ -179,6 +183,7 @@ pub struct System {
     gap_oldest: Vec<f64>,
     geometry_before: Geometry,
     displacement_oldest: Vec<f64>,
+    predicted_before: Vec<f64>,
     state: SystemState,
 }
 
@@ -230,6 +235,7 @@ impl System {
             gap_oldest: vec![f64::INFINITY; contacts],
             geometry_before: law.geometry(lanes),
             displacement_oldest: vec![0.0; 3 * contacts],
+            predicted_before: vec![0.0; 3 * contacts],
             state: SystemState {
                 steps: 0,
                 factorisations: 0,
@@ -239,6 +245,7 @@ impl System {
                 multiplier: vec![0.0; contacts],
                 force: vec![0.0; 3 * contacts],
                 coating_force: vec![0.0; contacts],
+                predicted: vec![0.0; 3 * contacts],
                 geometry: law.geometry(lanes),
                 angle: 0.0,
                 angle_before: 0.0,
@@ -379,6 +386,7 @@ impl System {
         (self.state.angle, self.state.angle_before) = (drive.rotor_angle, drive.rotor_angle);
         self.evaluate_gaps(drive, false);
         self.state.gap_before.copy_from_slice(&self.state.gap);
+        self.state.predicted.copy_from_slice(self.bank.displacement());
         self.state.ledger = Ledger { initial: self.mechanical_energy(), ..Ledger::default() };
     }
 
@@ -421,6 +429,8 @@ impl System {
         self.slaves.iter_mut().for_each(|slave| slave.predict(delayed, ledger));
         if delayed {
             self.act_delayed();
+            std::mem::swap(&mut self.predicted_before, &mut self.state.predicted);
+            self.state.predicted.copy_from_slice(self.bank.displacement());
         }
         std::mem::swap(&mut self.gap_oldest, &mut self.state.gap_before);
         std::mem::swap(&mut self.state.gap_before, &mut self.state.gap);

@@ -1,0 +1,92 @@
+//! Runs of the methods of `tiprub-reference` on the full finite-element model of the cube and its rings.
+
+use tiprub_reference::{
+    cube::{history::History, scene::Scene},
+    methods::{self, Method},
+};
+
+use super::{
+    competitor::Full,
+    run::{Run, Seen},
+};
+
+/// A run that is over: the methods run to the end in one go and keep a history, which is then walked through.
+pub struct FullRun {
+    history: History,
+    step: f64,
+    speed: f64,
+    interval: f64,
+    samples: usize,
+    /// Records that belong to the samples so far.
+    record: usize,
+}
+
+impl FullRun {
+    /// Run to the end of `samples` samples with `division` steps each.
+    ///
+    /// # Errors
+    /// What the method refuses.
+    pub fn new(scene: &Scene, method: Full, (interval, samples): (f64, usize), division: u32) -> Result<Self, String> {
+        let method = match method {
+            Full::Film => Method::Film(Default::default()),
+            Full::Bipotential => Method::Bipotential,
+            Full::Augmented => Method::Augmented(Default::default()),
+            Full::Penalty => Method::Penalty(Default::default()),
+        };
+        let step = interval / f64::from(division);
+        let end = |sample: usize| (sample + 1) as f64 * interval;
+        let snapshots = (0..samples).map(end).collect();
+        let run = methods::Run { step, end: end(samples - 1), stride: 1, snapshots };
+        let history = method.run(scene, &run).map_err(|error| error.to_string())?;
+        if history.snapshots.len() < samples {
+            return Err("the run has ended early".into());
+        }
+        let record = history.times.iter().take_while(|time| **time < 0.5 * step).count();
+        Ok(Self { history, step, speed: scene.setting.speed, interval, samples: 0, record })
+    }
+}
+
+/// Displacements of the nodes of a body that flies along −y, without the flight (m).
+pub fn without_flight(displacements: impl IntoIterator<Item = f64>, flown: f64) -> Vec<f64> {
+    let all = displacements.into_iter().enumerate();
+    all.map(|(index, value)| if index % 3 == 1 { value + flown } else { value }).collect()
+}
+
+impl Run for FullRun {
+    fn advance(&mut self) -> Result<(), String> {
+        self.watch(&mut Seen::nothing())
+    }
+
+    fn watch(&mut self, seen: &mut Seen) -> Result<(), String> {
+        self.samples += 1;
+        let end = self.samples as f64 * self.interval + 0.5 * self.step;
+        let history = &self.history;
+        while self.record < history.times.len() && history.times[self.record] < end {
+            let forces = history.forces[self.record].into_iter();
+            seen.add(history.times[self.record], self.step, forces, -history.penetration[self.record]);
+            // Sums over a face hide what a single node pulls.
+            seen.adhesion = history.corner_forces[self.record].into_iter().fold(seen.adhesion, f64::min);
+            self.record += 1;
+        }
+        Ok(())
+    }
+
+    fn displacements(&self) -> Vec<f64> {
+        let Some(index) = self.samples.checked_sub(1) else { return Vec::new() };
+        let snapshot = &self.history.snapshots[index];
+        without_flight(snapshot.masters.iter().flatten().copied(), self.speed * snapshot.time)
+    }
+
+    fn energy(&self) -> f64 {
+        let record = self.record.saturating_sub(1);
+        self.history.kinetic[record] + self.history.strain[record]
+    }
+
+    fn residual(&self) -> Option<f64> {
+        None
+    }
+
+    fn own_seconds(&self) -> Option<f64> {
+        Some(self.history.processor_time)
+    }
+}
