@@ -12,7 +12,7 @@ use crate::{casing_arguments::CasingArguments, file_arguments::FileArguments, ro
 #[command(
     name = "tiprub",
     version,
-    about = "Blade-tip/casing contact (rub) as an FMU: reduce, package, run, inspect, study, demo",
+    about = "Blade-tip/casing contact (rub) as an FMU: reduce, package, run, inspect, study, stability, demo",
     long_about = "Marches the contact of a bladed disk (a reduced-order model) with its casing in time, rigid or \
                   flexible, and ships that as an FMU for any FMI 2.0 or FMI 3.0 importer.\n\nSI units everywhere (m, kg, s, N, rad).",
     after_help = "Examples:\n  tiprub demo\n  tiprub run builtin:rotor37 --csv rub.csv\n  \
