@@ -75,6 +75,38 @@ fn the_ledger_closes_for_every_scheme_and_solver() {
     }
 }
 
+/// On a round casing tips slide along the circumference: µλ times the way of the rotor plus half of what the node moved over
+/// the last two steps, since forces act at the middle instant of those. Impulses and displacements are read from outside.
+#[test]
+fn friction_heat_is_force_times_sliding() {
+    let (friction, radius, sectors) = (0.15, 0.25, 4);
+    let mut scene = common::scene(sectors);
+    scene.settings.surfaces[0].shape = Shape::Circular {};
+    let mut simulation = started(&scene);
+    simulation.set_real(reference(&simulation, "casing_radius_change"), -4.2e-4).unwrap();
+    let (step, speed) = (1e-6, 1300.0);
+    let tangential =
+        |simulation: &Simulation, node: usize, sector: usize| simulation.system().bank().row(3 * node + 1, sector);
+    let all = |simulation: &Simulation| -> Vec<f64> {
+        (0..3 * sectors).map(|index| tangential(simulation, index / sectors, index % sectors)).collect()
+    };
+    let (mut oldest, mut before, mut heat) = (all(&simulation), all(&simulation), 0.0);
+    for _ in 0..3000 {
+        let time = simulation.time();
+        simulation.do_step(time, step).unwrap();
+        for event in simulation.system().events() {
+            let place = event.node * sectors + event.sector;
+            let moved = 0.5 * (tangential(&simulation, event.node, event.sector) - oldest[place]);
+            heat += friction * event.normal * (speed * radius * step + moved);
+        }
+        oldest = std::mem::replace(&mut before, all(&simulation));
+    }
+    let booked = real(&simulation, "friction_loss");
+    println!("friction heat {booked:.6} J, force times sliding {heat:.6} J");
+    assert!(heat > 1.0, "{heat} J: no rub to speak of");
+    assert!((booked / heat - 1.0).abs() < 1e-9, "{booked} J booked, {heat} J slid");
+}
+
 #[test]
 fn shaft_power_is_torque_times_speed() {
     // Without friction the power comes from the slope of the lobes alone.
