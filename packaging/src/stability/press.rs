@@ -80,6 +80,7 @@ impl Press {
         simulation.initialise(0.0)?;
         let mut watch = Watch::new(&scene);
         watch.scale = watch.scale.max(self.depth);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number of steps")]
         let count = ((self.rise + self.hold) / step).ceil() as u64;
         for index in 0..count.max(400) {
             set(&mut simulation, "casing_radius_change", self.change(index as f64 * step))?;

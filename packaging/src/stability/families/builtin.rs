@@ -198,8 +198,8 @@ fn harmonics(swap: bool) -> Result<Vec<Check>> {
     let mut rom = tower.rom();
     let wheel = tiprub_core::dynamics::cyclic::CyclicModel::from_rom(&rom, 0.0)?;
     let mut all: Vec<(f64, u32)> = Vec::new();
-    for (number, diameter) in wheel.diameters.iter().enumerate() {
-        all.extend(diameter.frequencies.iter().take(2).map(|omega| (omega / std::f64::consts::TAU, number as u32)));
+    for (diameter, number) in wheel.diameters.iter().zip(0_u32..) {
+        all.extend(diameter.frequencies.iter().take(2).map(|omega| (omega / std::f64::consts::TAU, number)));
     }
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     rom.checks.reduced_frequencies = all.iter().map(|(frequency, _)| *frequency).collect();

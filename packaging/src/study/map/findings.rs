@@ -51,7 +51,7 @@ pub struct Coincidence {
 
 impl MapPeak {
     /// For programs.
-    pub fn to_json(&self) -> Value {
+    pub fn json(&self) -> Value {
         json!({ "speed": self.speed, "frequency": self.frequency, "amplitude": self.amplitude, "engine_order": self.order })
     }
 
@@ -70,7 +70,7 @@ impl Coincidence {
     }
 
     /// For programs.
-    pub fn to_json(&self) -> Value {
+    pub fn json(&self) -> Value {
         json!({
             "engine_order": self.crossing.order,
             "mode": self.crossing.mode + 1,

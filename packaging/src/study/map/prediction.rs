@@ -108,8 +108,9 @@ impl Prediction {
     /// All crossings within a range of speeds (rad/s) and below a frequency (Hz), by frequency and speed.
     pub fn crossings(&self, range: [f64; 2], top: f64) -> Vec<Crossing> {
         let mut found = Vec::new();
-        let most = (1..10_000).take_while(|order| f64::from(*order) * range[0] / std::f64::consts::TAU < top).last();
-        for order in 1..=most.unwrap_or(0) as usize {
+        let most =
+            (1..10_000_u16).take_while(|order| f64::from(*order) * range[0] / std::f64::consts::TAU < top).last();
+        for order in 1..=usize::from(most.unwrap_or(0)) {
             for mode in 0..self.modes(order, range[0]).len() {
                 let Some(speed) = self.meeting(order, mode) else { continue };
                 let frequency = order as f64 * speed / std::f64::consts::TAU;

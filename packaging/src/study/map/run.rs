@@ -225,7 +225,7 @@ impl March<'_> {
                 tally.add(system, &mut touched);
             })?;
         }
-        let steps = (self.internal_steps - before) as usize;
+        let steps = usize::try_from(self.internal_steps - before).unwrap_or(usize::MAX);
         if steps != factor * (count + Decimator::TAIL) {
             let problem = format!("{steps} internal steps in {count} samples of {factor}");
             return Err(Failure::new("sampling", problem, "Report this to the developers"));
@@ -237,7 +237,7 @@ impl March<'_> {
     fn factor(&mut self) -> Result<usize> {
         let before = self.internal_steps;
         self.advance(|_| {})?;
-        Ok((self.internal_steps - before) as usize)
+        Ok(usize::try_from(self.internal_steps - before).unwrap_or(usize::MAX))
     }
 
     fn finish(self, recording: Recording, clock: Instant) -> Result<Response> {
