@@ -14,19 +14,27 @@ use crate::{Failure, Result};
 /// Plots are drawn at twice the size they are shown at: the SVG backend rounds to whole units.
 const SCALE: u32 = 2;
 const WIDTH: u32 = 920 * SCALE;
-/// Height of a legend above the plot, in CSS pixels.
-const LEGEND: u32 = 28;
+/// Height of a line of a legend above the plot, and of the room around it, in CSS pixels.
+const LEGEND_LINE: u32 = 22;
+const LEGEND_ROOM: u32 = 6;
+/// Where the lines of a legend begin, in CSS pixels.
+const LEGEND_LEFT: u32 = 86;
 const BUCKETS: usize = 700;
 const INK: RGBColor = RGBColor(52, 58, 66);
 const GRID: RGBColor = RGBColor(232, 235, 239);
 
 /// Line colours, distinguishable with colour-vision deficiency and on grey paper.
-pub const COLORS: [RGBColor; 5] = [
+pub const COLORS: [RGBColor; 10] = [
     RGBColor(31, 93, 160),
     RGBColor(214, 112, 24),
     RGBColor(36, 140, 118),
     RGBColor(170, 52, 116),
     RGBColor(110, 116, 124),
+    RGBColor(92, 172, 222),
+    RGBColor(120, 82, 28),
+    RGBColor(152, 178, 40),
+    RGBColor(226, 132, 172),
+    RGBColor(20, 22, 26),
 ];
 
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
@@ -144,7 +152,24 @@ impl Plot {
     /// # Errors
     /// As [`Plot::to_svg`].
     pub fn to_whole_svg(&self) -> Result<String> {
-        self.svg(if self.series.len() > 1 { LEGEND } else { 0 })
+        let lines = self.legend_places().iter().map(|(_, line)| line + 1).max().unwrap_or(0);
+        self.svg(if self.series.len() > 1 { LEGEND_LINE * lines + LEGEND_ROOM } else { 0 })
+    }
+
+    /// Left edge (CSS pixels) and line of every entry of the legend.
+    fn legend_places(&self) -> Vec<(u32, u32)> {
+        let (mut left, mut line) = (LEGEND_LEFT, 0);
+        let mut places = Vec::new();
+        for (series, _) in self.legend() {
+            // Widths of letters are not known here: a little more than a usual one each.
+            let width = 44 + 8 * u32::try_from(series.label.chars().count()).unwrap_or(0);
+            if left + width > WIDTH / SCALE && left > LEGEND_LEFT {
+                (left, line) = (LEGEND_LEFT, line + 1);
+            }
+            places.push((left, line));
+            left += width;
+        }
+        places
     }
 
     /// With so much room for a legend above the plot.
@@ -164,14 +189,13 @@ impl Plot {
 
     fn draw_legend(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), String> {
         let font = ("sans-serif", 14 * SCALE).into_font().color(&INK);
-        let (size, mut left) = (i32::try_from(SCALE).unwrap_or(1), 86 * i32::try_from(SCALE).unwrap_or(1));
-        for (series, color) in self.legend() {
-            let line = Rectangle::new([(left, 12 * size), (left + 20 * size, 15 * size)], color.filled());
-            area.draw(&line).map_err(|error| error.to_string())?;
-            let text = Text::new(series.label.clone(), (left + 26 * size, 6 * size), font.clone());
+        let pixels = |value: u32| i32::try_from(value * SCALE).unwrap_or(i32::MAX);
+        for ((series, color), (left, line)) in self.legend().zip(self.legend_places()) {
+            let top = line * LEGEND_LINE;
+            let corners = [(pixels(left), pixels(top + 12)), (pixels(left + 20), pixels(top + 15))];
+            area.draw(&Rectangle::new(corners, color.filled())).map_err(|error| error.to_string())?;
+            let text = Text::new(series.label.clone(), (pixels(left + 26), pixels(top + 6)), font.clone());
             area.draw(&text).map_err(|error| error.to_string())?;
-            // Widths of letters are not known here: a little more than a usual one each.
-            left += (44 + 8 * i32::try_from(series.label.chars().count()).unwrap_or(0)) * size;
         }
         Ok(())
     }
@@ -334,6 +358,20 @@ mod tests {
         assert!(!plot.to_svg().unwrap().contains("first"), "a page has it beside the picture");
         assert_eq!(svg.matches("<circle").count(), 2);
         assert_eq!(plot.to_html().unwrap().matches("<i style").count(), 2);
+    }
+
+    #[test]
+    fn a_long_legend_takes_several_lines_within_the_picture() {
+        let line =
+            |index: u32| Series::line(format!("a method with a long name {index}"), vec![(0.0, 1.0), (1.0, 2.0)]);
+        let plot = Plot::new("x", "y", (0..7).map(line).collect());
+        let places = plot.legend_places();
+        assert!(places.iter().all(|(left, _)| left + 44 + 8 * 27 <= WIDTH / SCALE), "{places:?}");
+        assert!(places.windows(2).all(|pair| pair[1] > pair[0] || pair[1].1 > pair[0].1));
+        assert_eq!(places.last().unwrap().1, 2);
+        let height =
+            |svg: String| svg.split("height=\"").nth(1).unwrap().split('"').next().unwrap().parse::<u32>().unwrap();
+        assert_eq!(height(plot.to_whole_svg().unwrap()) - height(plot.to_svg().unwrap()), (3 * 22 + 6) * SCALE);
     }
 
     #[test]
