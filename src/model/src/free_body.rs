@@ -33,8 +33,8 @@ pub struct FreeBodyOptions {
 /// Reduce an unsupported body to its contact nodes; frame Cartesian, M = I, K = Λ with six zeros first.
 ///
 /// # Errors
-/// [`Error::Invalid`] for contact nodes that are repeated or do not exist;
-/// [`Error::NotPositiveDefinite`] for contact nodes on one line, and where the body
+/// [`crate::Error::Invalid`] for contact nodes that are repeated or do not exist;
+/// [`crate::Error::NotPositiveDefinite`] for contact nodes on one line, and where the body
 /// is not one connected part.
 pub fn reduce_free_body(
     model: FeModel,

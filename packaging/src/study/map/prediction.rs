@@ -136,7 +136,7 @@ pub fn master(scene: &Scene) -> Result<usize> {
         .ok_or_else(|| Failure::new(format!("scene `{}`", settings.name), "it has no contact with a master", "Add one"))
 }
 
-/// The casing's rigid shape at [`ANGLES`] angles (m).
+/// The casing's rigid shape at equally spaced angles (m).
 ///
 /// # Errors
 /// A shape that cannot be evaluated.
