@@ -14,7 +14,10 @@ fn study(root: &Path, scenes: &[&str]) -> Value {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();
     for statement in json["statements"].as_array().unwrap() {
-        assert_ne!(statement["holds"], Value::Bool(false), "{statement:#}");
+        // Remarks, which hold nothing, are these two only.
+        let expected = statement["expected"].as_str().unwrap();
+        let is_remark = expected.contains("longest step of modal-exact") || expected.contains("film behind lcp");
+        assert_eq!(statement["holds"], if is_remark { Value::Null } else { Value::Bool(true) }, "{statement:#}");
     }
     assert_eq!(json["facts"]["date"], "2000-02-29");
     json
