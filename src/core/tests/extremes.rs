@@ -158,7 +158,7 @@ fn a_whole_casing_closing_in_presses_every_blade() {
 }
 
 #[test]
-fn ten_million_undamped_steps_keep_the_energy() {
+fn a_blade_keeps_its_energy_over_ten_million_undamped_steps() {
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
         let mut scene = common::scene(1);
         scene.settings.time.scheme = scheme;

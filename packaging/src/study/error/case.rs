@@ -26,7 +26,9 @@ pub trait Case {
     fn sizes(&self) -> Vec<usize>;
 
     /// Index of the size at which all competitors are compared for their steps.
-    fn standard(&self) -> usize;
+    fn standard(&self) -> usize {
+        self.sizes().len().saturating_sub(2)
+    }
 
     /// Time between samples (s), common to all runs.
     fn interval(&self) -> f64;
@@ -63,8 +65,12 @@ pub trait Case {
         None
     }
 
-    /// Who takes part at a size.
-    fn competitors(&self, size: usize) -> Vec<Competitor>;
+    /// Who takes part at a size: outside methods at the standard size only, since they take long and truncation is the same
+    /// for all.
+    fn competitors(&self, size: usize) -> Vec<Competitor> {
+        let all = Competitor::reduced().into_iter();
+        all.filter(|competitor| competitor.is_core() || size == self.standard()).collect()
+    }
 
     /// Start a run at a size, with a relative perturbation of the initial gap.
     ///
@@ -111,4 +117,9 @@ pub trait Case {
 
     /// Equations other than those of the first reference whose limits are computed at a size.
     fn families(&self, size: usize) -> Vec<Family>;
+}
+
+/// Of the divisions at the standard size, those of another size: without the finest.
+pub fn without_finest(divisions: &[u32], standard: bool) -> Vec<u32> {
+    divisions[..divisions.len() - usize::from(!standard)].to_vec()
 }

@@ -124,10 +124,6 @@ impl Case for Cube {
         self.sizes.iter().map(|size| size.0).collect()
     }
 
-    fn standard(&self) -> usize {
-        self.sizes.len().saturating_sub(2)
-    }
-
     fn interval(&self) -> f64 {
         INTERVAL
     }

@@ -5,7 +5,7 @@ use tiprub_model::{Rotor37Options, rotor37::MeshCounts};
 use tiprub_reference::reduced::rub::{BladeScene, Blades, Tip};
 
 use super::{
-    case::Case,
+    case::{Case, without_finest},
     competitor::{Competitor, Family},
     outside::{OutsideRun, Softness},
     run::Run,
@@ -137,10 +137,6 @@ impl Case for Rotor {
         self.sizes.iter().map(|size| size.0).collect()
     }
 
-    fn standard(&self) -> usize {
-        self.sizes.len().saturating_sub(2)
-    }
-
     fn interval(&self) -> f64 {
         INTERVAL
     }
@@ -155,8 +151,7 @@ impl Case for Rotor {
 
     /// Steps are compared at the standard size; the others leave the finest out.
     fn divisions(&self, size: usize) -> Vec<u32> {
-        let count = self.divisions.len();
-        self.divisions[..if size == self.standard() { count } else { count - 1 }].to_vec()
+        without_finest(&self.divisions, size == self.standard())
     }
 
     fn reference_divisions(&self, size: usize) -> (u32, u32) {
@@ -172,12 +167,6 @@ impl Case for Rotor {
 
     fn parting(&self) -> &[f64] {
         &self.parting
-    }
-
-    /// Outside methods at the standard size only: they take long, and truncation is the same for all.
-    fn competitors(&self, size: usize) -> Vec<Competitor> {
-        let all = Competitor::reduced().into_iter();
-        all.filter(|competitor| competitor.is_core() || size == self.standard()).collect()
     }
 
     fn start<'a>(

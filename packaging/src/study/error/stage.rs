@@ -7,7 +7,7 @@ use tiprub_model::stage::StageOptions;
 use tiprub_reference::reduced::wheel::{Casing, Pencil, Stage, StageScene};
 
 use super::{
-    case::Case,
+    case::{Case, without_finest},
     competitor::{Competitor, Family},
     outside::{OutsideRun, Softness},
     run::Run,
@@ -143,10 +143,6 @@ impl Case for Wheel {
         self.sizes.iter().map(|size| size.0).collect()
     }
 
-    fn standard(&self) -> usize {
-        self.sizes.len().saturating_sub(2)
-    }
-
     fn interval(&self) -> f64 {
         INTERVAL
     }
@@ -161,8 +157,7 @@ impl Case for Wheel {
 
     /// Steps are compared at the standard size; the others leave the finest out.
     fn divisions(&self, size: usize) -> Vec<u32> {
-        let count = self.divisions.len();
-        self.divisions[..if size == self.standard() { count } else { count - 1 }].to_vec()
+        without_finest(&self.divisions, size == self.standard())
     }
 
     fn divisions_of(&self, size: usize, competitor: Competitor) -> Vec<u32> {
@@ -176,12 +171,6 @@ impl Case for Wheel {
     fn reference_divisions(&self, size: usize) -> (u32, u32) {
         let (own, outside) = self.references;
         (own, if size == self.standard() { outside } else { outside / 4 })
-    }
-
-    /// Outside methods at the standard size only, where they are second reference and competitors.
-    fn competitors(&self, size: usize) -> Vec<Competitor> {
-        let all = Competitor::reduced().into_iter();
-        all.filter(|competitor| competitor.is_core() || size == self.standard()).collect()
     }
 
     fn families(&self, size: usize) -> Vec<Family> {

@@ -10,18 +10,17 @@ use crate::dynamics::cyclic::CyclicModel;
 use crate::dynamics::modal::{ModalModel, ModalSpin};
 use crate::dynamics::rigid::free_modes;
 use crate::dynamics::sectors::SectorModel;
-use crate::rom::Frame;
-use crate::settings::{ContactSettings, Motion, Scheme, Solver, StructureSettings, SurfaceSettings};
+use crate::settings::{ContactSettings, Motion, Solver, StructureSettings, SurfaceSettings};
 use crate::system::{System, SystemParts, SystemSettings};
 use crate::variables::Quantity;
 use crate::{Error, Result, Rom, Scene};
 use nalgebra::DMatrix;
 
-use super::Simulation;
+use super::checks::{check_coupling, check_rom};
 use super::free::FreeParts;
 use super::loads::LoadVectors;
 use super::patches::Patches;
-use super::slave_surface::{Carrier, control_modes, spline_law};
+use super::slave_surface::{Carrier, spline_law};
 
 /// Gaps, casing shapes and displacements beyond this share of the radius are not what the model describes.
 pub const SMALL_FRACTION: f64 = 0.1;
@@ -148,7 +147,7 @@ impl Compiled {
             ramp_time: place(Quantity::RampTime),
         };
         let mut compiled = Self {
-            fingerprint: fingerprint(scene),
+            fingerprint: super::fingerprint::of_scene(scene),
             scene: scene.clone(),
             roles,
             model,
@@ -297,7 +296,7 @@ impl Compiled {
         if let Some(free) = &self.free {
             return self.free_system(free);
         }
-        let (settings, contact) = (&self.scene.settings, self.contact());
+        let contact = self.contact();
         let (structure, rom) = self.master();
         let clearances =
             if contact.sector_gaps.is_empty() { vec![contact.gap; rom.sectors] } else { contact.sector_gaps.clone() };
@@ -323,12 +322,6 @@ impl Compiled {
             ));
         }
         let (law, slave) = self.law(surface, &clearances, lanes)?;
-        let system_settings = SystemSettings {
-            scheme: settings.time.scheme,
-            solver: contact.solver,
-            friction: contact.friction,
-            ledger: settings.outputs.energies,
-        };
         let parts = SystemParts {
             bank: self.bank_options(structure, rom),
             slaves: slave.map(|model| (model, self.loads.on_slave())).into_iter().collect(),
@@ -337,7 +330,18 @@ impl Compiled {
         };
         let uncoupled = SectorModel::Uncoupled(&self.model, rom.sectors);
         let model = self.wheel.as_ref().map_or(uncoupled, SectorModel::Coupled);
-        Ok(System::with_parts(model, law, system_settings, parts))
+        Ok(System::with_parts(model, law, self.system_settings(), parts))
+    }
+
+    /// Scheme, solver, friction and ledger of the kernels.
+    pub(super) fn system_settings(&self) -> SystemSettings {
+        let (settings, contact) = (&self.scene.settings, self.contact());
+        SystemSettings {
+            scheme: settings.time.scheme,
+            solver: contact.solver,
+            friction: contact.friction,
+            ledger: settings.outputs.energies,
+        }
     }
 
     fn law(&self, surface: Surface, clearances: &[f64], lanes: usize) -> Result<(GapLaw, Option<ModalModel>)> {
@@ -353,7 +357,7 @@ impl Compiled {
         let carrier = carrier.map(|(index, model)| Carrier { rom: &self.scene.roms[index], model });
         let law = spline_law(rom, layout, contact, settings, carrier)?;
         let slave = match (&law, carrier) {
-            (GapLaw::Spline(law), Some(carrier)) => Some(control_modes(carrier, law)),
+            (GapLaw::Spline(law), Some(carrier)) => Some(carrier.control_modes(&law.surface)),
             _ => None,
         };
         Ok((law, slave))
@@ -396,7 +400,7 @@ impl Compiled {
         let carrier = self.roles.carrier.zip(self.carrier.as_ref());
         carrier.map_or_else(
             || self.model.with_nodes(&[]),
-            |(index, model)| control_modes(Carrier { rom: &self.scene.roms[index], model }, law),
+            |(index, model)| Carrier { rom: &self.scene.roms[index], model }.control_modes(&law.surface),
         )
     }
 
@@ -405,40 +409,6 @@ impl Compiled {
         let contact = self.contact();
         let small = self.roles.carrier.is_none() && self.wheel.is_none() && self.free.is_none();
         contact.solver == Solver::Coulomb || (small && contact.friction > 0.0 && contact.coating.is_none())
-    }
-
-    /// Combinations of scheme and solver that this scene cannot be stepped with.
-    ///
-    /// # Errors
-    /// Naming parameter and remedy.
-    pub fn check_methods(&self, scheme: Scheme, solver: Solver) -> Result<()> {
-        let refuse = |what: &str, problem: &str, remedy: &str| Err(Error::invalid(what, problem, remedy));
-        if self.free.is_some() {
-            return self.check_free_methods(scheme, solver);
-        }
-        let (structure, _) = self.master();
-        if solver == Solver::Coulomb && !self.may_stick() {
-            let remedy = "Package the scene with friction and contact.solver = \"coulomb\", without coating";
-            return refuse("parameter `solver`", "`coulomb` is not prepared in this scene", remedy);
-        }
-        if self.contact().coating.is_some() && solver != Solver::Lcp {
-            return refuse("parameter `solver`", "a coating is solved with `lcp` only", "Use lcp, or no coating");
-        }
-        if scheme == Scheme::MasslessBoundary && structure.spin.coriolis {
-            let remedy = "Use modal-exact, or leave coriolis out";
-            return refuse("parameter `scheme`", "`massless-boundary` does not take the Coriolis force", remedy);
-        }
-        let left = |modes: usize| modes == 0;
-        let none_left = self.wheel.as_ref().map_or_else(
-            || left(self.model.dynamic_modes(scheme)),
-            |wheel| wheel.diameters.iter().any(|diameter| left(diameter.dynamic_modes(scheme))),
-        );
-        if scheme == Scheme::MasslessBoundary && none_left {
-            let problem =
-                "`massless-boundary` makes the highest modes quasi-static, three per contact node: none is left";
-            return refuse("parameter `scheme`", problem, "Use more modes or fewer contact nodes, or modal-exact");
-        }
-        Ok(())
     }
 }
 
@@ -453,136 +423,4 @@ fn wheel(scene: &Scene, index: usize) -> Result<Option<CyclicModel>> {
     let (structure, rom) = (&scene.settings.structures[index], &scene.roms[index]);
     let ratio = structure.damping_ratio.unwrap_or(rom.damping_ratio);
     rom.is_cyclic().then(|| CyclicModel::from_rom(rom, ratio)).transpose()
-}
-
-/// What coupled sectors do not take, and where they cannot be.
-fn check_coupling(scene: &Scene, roles: Roles) -> Result<()> {
-    let refuse = |what: &str, problem: String, remedy: &str| Err(Error::invalid(what, problem, remedy));
-    if let Some(index) = roles.carrier.filter(|index| scene.roms[*index].is_cyclic()) {
-        let problem = format!("the sectors of ROM `{}` are coupled by harmonics", scene.roms[index].name);
-        let remedy = "Give a structure of its own, reduced as a whole (sectors = 1), to carry the surface";
-        return refuse("surface.structure", problem, remedy);
-    }
-    let (structure, rom) = (&scene.settings.structures[roles.master], &scene.roms[roles.master]);
-    if !rom.is_cyclic() {
-        return Ok(());
-    }
-    let of = |feature: &str| format!("{feature} with the coupled sectors of ROM `{}`", rom.name);
-    let uncoupled = "Leave it out, or use a ROM of uncoupled sectors (without harmonics)";
-    if !structure.frequency_factors.is_empty() {
-        return refuse("structure.frequency_factors", of("mistuning of single sectors"), uncoupled);
-    }
-    if structure.spin.stiffening {
-        return refuse("structure.spin.stiffening", of("stiffening"), uncoupled);
-    }
-    if structure.spin.coriolis {
-        return refuse("structure.spin.coriolis", of("Coriolis force"), uncoupled);
-    }
-    Ok(())
-}
-
-/// What a structure asks of its ROM.
-fn check_rom(structure: &StructureSettings, rom: &Rom) -> Result<()> {
-    let what = format!("ROM `{}`", rom.name);
-    if rom.frame != Frame::Cylindrical {
-        return Err(Error::invalid(
-            what,
-            "its contact displacements are Cartesian; surfaces around an axis need (radial, tangential, axial)",
-            "Write the ROM with frame = cylindrical",
-        ));
-    }
-    let spin = structure.spin.stiffening || structure.spin.growth || structure.spin.coriolis;
-    if spin && rom.extras.spin.is_none() {
-        let problem = format!("it has no spin matrices, which `spin` of structure `{}` needs", structure.name);
-        return Err(Error::invalid(what, problem, "Reduce it with `tiprub reduce --spin`, or leave spin out"));
-    }
-    if structure.thermal && rom.extras.thermal.is_none() {
-        let problem = format!("it has no thermal loads, which `thermal` of structure `{}` needs", structure.name);
-        return Err(Error::invalid(what, problem, "Reduce it with thermal patches, or leave thermal out"));
-    }
-    if structure.load.is_some() && rom.extras.grid.is_none() {
-        let problem = format!("it has no contact grid, which `load` of structure `{}` needs", structure.name);
-        return Err(Error::invalid(what, problem, "Give a ROM with a contact grid, or leave the load out"));
-    }
-    let factors = structure.frequency_factors.len();
-    if factors != 0 && factors != rom.sectors {
-        return Err(Error::invalid(
-            "structure.frequency_factors",
-            format!("{factors} values for {} sectors", rom.sectors),
-            "Give one factor per sector, or remove the line",
-        ));
-    }
-    Ok(())
-}
-
-fn fingerprint(scene: &Scene) -> u64 {
-    let mut hash = crate::persist::fingerprint(format!("{:?}", scene.settings).as_bytes(), 0);
-    for rom in &scene.roms {
-        let mut matrices = vec![&rom.mass, &rom.stiffness, &rom.contact_map];
-        if let Some(spin) = &rom.extras.spin {
-            matrices.extend([&spin.stiffness_speed2, &spin.stiffness_speed4, &spin.coriolis]);
-            let loads = format!("{:?} {:?}", spin.centrifugal_load, spin.centrifugal_load_speed4);
-            hash = crate::persist::fingerprint(loads.as_bytes(), hash);
-        }
-        matrices.extend(rom.extras.thermal.iter().map(|thermal| &thermal.loads));
-        for matrix in matrices {
-            for value in matrix.iter() {
-                hash = crate::persist::fingerprint(&value.to_bits().to_le_bytes(), hash);
-            }
-        }
-        for harmonic in &rom.extras.harmonics {
-            for matrix in [&harmonic.mass, &harmonic.stiffness, &harmonic.contact_map] {
-                for value in matrix.iter().flat_map(|value| [value.re, value.im]) {
-                    hash = crate::persist::fingerprint(&value.to_bits().to_le_bytes(), hash);
-                }
-            }
-        }
-        let patches = rom.extras.thermal.as_ref().map(|thermal| &thermal.patches);
-        let rest = format!("{} {:?} {:?} {:?}", rom.sectors, rom.contact_nodes, rom.extras.grid, patches);
-        hash = crate::persist::fingerprint(rest.as_bytes(), hash);
-    }
-    hash
-}
-
-impl Simulation {
-    /// A start in penetration would be an impact of arbitrary strength.
-    pub(super) fn check_initial_gaps(&self) -> Result<()> {
-        let lanes = self.system.bank().lanes();
-        let deepest = self
-            .system
-            .gaps()
-            .iter()
-            .enumerate()
-            .fold((0, 0.0), |worst, (index, gap)| if *gap < worst.1 { (index, *gap) } else { worst });
-        if let Some(lost) = self.system.gaps().iter().position(|gap| gap.is_nan()) {
-            let node = &self.compiled.master().1.contact_nodes[lost / lanes].name;
-            return Err(Error::invalid(
-                "initial clearance",
-                format!("{node} finds no closest point of its surface"),
-                "Check the contact grid of the surface: it must not be folded, or flattened to a line",
-            ));
-        }
-        if deepest.1 >= 0.0 {
-            return Ok(());
-        }
-        let touching = self.system.gaps().iter().filter(|gap| **gap < 0.0).count();
-        let node = &self.compiled.master().1.contact_nodes[deepest.0 / lanes].name;
-        if self.compiled.free.is_some() {
-            return Err(Error::invalid(
-                "initial clearance",
-                format!("{touching} contact nodes start inside the surfaces, deepest {:.3e} m at {node}", deepest.1),
-                "Move one of the structures: gaps follow from the contact positions in the ROMs; check that S_t x S_s of \
-                 each contact grid points to the master",
-            ));
-        }
-        Err(Error::invalid(
-            "initial clearance",
-            format!(
-                "{touching} contact nodes start inside the casing, deepest {:.3e} m at {node} of sector {}",
-                deepest.1,
-                deepest.0 % lanes + 1
-            ),
-            "Enlarge the gap, let the casing shape grow in with ramp_time (casing_ramp_time), start at another rotor angle, or give other start values to the inputs that move casing, shaft or load them",
-        ))
-    }
 }

@@ -1,6 +1,7 @@
 //! Scenes with a free master: its pairs, the open surfaces it meets, and the system made of them.
 
 use super::compile::{Compiled, MOST_COUPLED};
+use super::slave_surface::Carrier;
 use crate::contact::free_gap::{FreeGap, OpenSurface};
 use crate::contact::gap::GapLaw;
 use crate::contact::spline::SurfaceSpline;
@@ -8,8 +9,8 @@ use crate::dynamics::modal::ModalModel;
 use crate::dynamics::rigid::Translations;
 use crate::dynamics::sectors::SectorModel;
 use crate::rom::{ContactGrid, Frame};
-use crate::settings::{Motion, Scheme, Solver};
-use crate::system::{System, SystemParts, SystemSettings};
+use crate::settings::Motion;
+use crate::system::{System, SystemParts};
 use crate::{Error, Result, Rom, Scene};
 
 /// One contact pair of a free master.
@@ -113,25 +114,6 @@ impl Pair {
     }
 }
 
-/// Modes of a carrier (seen at its contact grid), as those of the control points of its surface.
-fn control_modes(model: &ModalModel, surface: &SurfaceSpline) -> ModalModel {
-    let mut model = model.clone();
-    let mut points = vec![[0.0; 3]; model.contact_modes.nrows() / 3];
-    for mode in 0..model.len() {
-        for (node, point) in points.iter_mut().enumerate() {
-            *point = std::array::from_fn(|i| model.contact_modes[(3 * node + i, mode)]);
-        }
-        surface.interpolate(&mut points);
-        for (node, point) in points.iter().enumerate() {
-            for (component, value) in point.iter().enumerate() {
-                model.contact_modes[(3 * node + component, mode)] = *value;
-            }
-        }
-    }
-    model.quasi_static = 0;
-    model
-}
-
 impl FreeParts {
     /// Solve the eigenproblems of the carriers.
     ///
@@ -143,7 +125,7 @@ impl FreeParts {
         for pair in pairs.iter().filter(|pair| pair.carrier.is_some()) {
             let (structure, rom) = (&scene.settings.structures[pair.structure], &scene.roms[pair.structure]);
             let model = ModalModel::from_rom(rom, structure.damping_ratio.unwrap_or(rom.damping_ratio))?;
-            carriers.push(control_modes(&model, &pair.surface(scene)?));
+            carriers.push(Carrier { rom, model: &model }.control_modes(&pair.surface(scene)?));
         }
         Ok(Self { pairs, carriers, translations })
     }
@@ -168,7 +150,6 @@ impl FreeParts {
 impl Compiled {
     /// Fresh kernels of a free master at rest.
     pub(super) fn free_system(&self, free: &FreeParts) -> Result<System> {
-        let (settings, contact) = (&self.scene.settings, self.contact());
         let taking_part: usize = free.pairs.iter().map(|pair| pair.nodes.len()).sum();
         if taking_part > MOST_COUPLED {
             return Err(Error::invalid(
@@ -177,32 +158,12 @@ impl Compiled {
                 "Choose fewer, or a coarser mesh",
             ));
         }
-        let system_settings = SystemSettings {
-            scheme: settings.time.scheme,
-            solver: contact.solver,
-            friction: contact.friction,
-            ledger: settings.outputs.energies,
-        };
         let parts = SystemParts {
             slaves: free.carriers.iter().map(|model| (model.clone(), false)).collect(),
             sticking: self.may_stick(),
             ..SystemParts::default()
         };
         let law = GapLaw::Free(Box::new(free.law(&self.scene, self.roles.master)?));
-        Ok(System::with_parts(SectorModel::Uncoupled(&self.model, 1), law, system_settings, parts))
-    }
-
-    /// Schemes and solvers that a free master is not stepped with.
-    pub(super) fn check_free_methods(&self, scheme: Scheme, solver: Solver) -> Result<()> {
-        let refuse = |what: &str, problem: &str, remedy: &str| Err(Error::invalid(what, problem, remedy));
-        if scheme == Scheme::MasslessBoundary {
-            let problem = "`massless-boundary` is not made for a master that flies freely";
-            return refuse("parameter `scheme`", problem, "Use modal-exact or central-difference");
-        }
-        if solver == Solver::Coulomb && !self.may_stick() {
-            let remedy = "Package the scene with friction and contact.solver = \"coulomb\"";
-            return refuse("parameter `solver`", "`coulomb` is not prepared in this scene", remedy);
-        }
-        Ok(())
+        Ok(System::with_parts(SectorModel::Uncoupled(&self.model, 1), law, self.system_settings(), parts))
     }
 }

@@ -1,8 +1,10 @@
 //! A compiled scene with its state: what an FMU instance, the native run and the tests all drive.
 
 mod access;
+mod checks;
 mod compile;
 mod drive;
+mod fingerprint;
 mod free;
 mod limits;
 mod loads;

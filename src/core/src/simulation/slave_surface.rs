@@ -6,6 +6,7 @@ use crate::contact::spline::SurfaceSpline;
 use crate::contact::spline_gap::SplineGap;
 use crate::contact::surface::Surface;
 use crate::dynamics::modal::ModalModel;
+use crate::rom::Frame;
 use crate::settings::{ContactSettings, Meridian, SplineSettings, SurfaceSettings};
 use crate::{Error, Result, Rom};
 
@@ -73,28 +74,38 @@ pub fn spline_law(
     Ok(GapLaw::Spline(Box::new(SplineGap::new(layout, contact.gap, spline, change, shape.angular_scale()))))
 }
 
-/// The carrier's modes, seen at the control points along x, y, z.
-pub fn control_modes(carrier: Carrier<'_>, law: &SplineGap) -> ModalModel {
-    let nodes = carrier.rom.contact_nodes.len();
-    let mut model = carrier.model.clone();
-    let mut points = vec![[0.0; 3]; nodes];
-    for mode in 0..model.len() {
-        for (node, point) in points.iter_mut().enumerate() {
-            let [radial, tangential, axial] =
-                std::array::from_fn(|component| carrier.model.contact_modes[(3 * node + component, mode)]);
-            let (sine, cosine) = libm::sincos(carrier.rom.contact_nodes[node].position[1]);
-            *point = [radial * cosine - tangential * sine, radial * sine + tangential * cosine, axial];
-        }
-        law.surface.interpolate(&mut points);
-        for (node, point) in points.iter().enumerate() {
-            for (component, value) in point.iter().enumerate() {
-                model.contact_modes[(3 * node + component, mode)] = *value;
+impl Carrier<'_> {
+    /// Its modes, seen at the control points of the surface along x, y, z.
+    pub fn control_modes(&self, surface: &SurfaceSpline) -> ModalModel {
+        let nodes = self.rom.contact_nodes.len();
+        let mut model = self.model.clone();
+        let mut points = vec![[0.0; 3]; nodes];
+        for mode in 0..model.len() {
+            for (node, point) in points.iter_mut().enumerate() {
+                let own = std::array::from_fn(|component| self.model.contact_modes[(3 * node + component, mode)]);
+                *point = along_axes(self.rom, node, own);
+            }
+            surface.interpolate(&mut points);
+            for (node, point) in points.iter().enumerate() {
+                for (component, value) in point.iter().enumerate() {
+                    model.contact_modes[(3 * node + component, mode)] = *value;
+                }
             }
         }
+        // Contact acts on the master's residual flexibility; all modes of the slave keep their inertia.
+        model.quasi_static = 0;
+        model
     }
-    // Contact acts on the master's residual flexibility; all modes of the slave keep their inertia.
-    model.quasi_static = 0;
-    model
+}
+
+/// A displacement of a contact node along x, y, z.
+fn along_axes(rom: &Rom, node: usize, own: [f64; 3]) -> [f64; 3] {
+    if rom.frame == Frame::Cartesian {
+        return own;
+    }
+    let [radial, tangential, axial] = own;
+    let (sine, cosine) = libm::sincos(rom.contact_nodes[node].position[1]);
+    [radial * cosine - tangential * sine, radial * sine + tangential * cosine, axial]
 }
 
 fn carried_grid(rom: &Rom, contour: &Contour) -> Result<Grid> {

@@ -75,6 +75,16 @@ impl Rod {
     pub fn model(&self) -> ModalModel {
         ModalModel { quasi_static: 1, ..ModalModel::from_rom(&self.rom(), 0.0).unwrap() }
     }
+
+    /// The same, held at the other end.
+    pub fn clamped_model(&self) -> ModalModel {
+        let mut rom = self.rom();
+        let held = self.elements - self.end;
+        rom.mass = rom.mass.remove_row(held).remove_column(held);
+        rom.stiffness = rom.stiffness.remove_row(held).remove_column(held);
+        rom.contact_map = rom.contact_map.remove_column(held);
+        ModalModel { quasi_static: 1, ..ModalModel::from_rom(&rom, 0.0).unwrap() }
+    }
 }
 
 /// Modes in ascending order of their frequencies, after structures were put side by side.

@@ -1,9 +1,8 @@
 //! Rows of what only some scenes ask for.
 
-use super::{
-    ANGLE, Builder, ENERGY, LENGTH, LINE_LOAD, POWER, Parts, TEMPERATURE, VOLUME, has_friction, largest_length,
-};
-use crate::settings::MAX_DAMPING;
+use super::builder::Builder;
+use super::units::{ANGLE, ENERGY, LENGTH, LINE_LOAD, POWER, TEMPERATURE, VOLUME};
+use super::{Parts, has_friction, largest_length};
 use crate::variables::{Kind, Quantity, Span, Start, Variability};
 
 /// Temperatures beyond this are not what a linear expansion describes (K).
@@ -58,8 +57,7 @@ pub fn parameters(table: &mut Builder, scene: &Parts) {
     if let Some((carrier, rom)) = scene.carrier {
         let ratio = carrier.damping_ratio.unwrap_or(rom.damping_ratio);
         let text = "Modal damping ratio of the casing";
-        let row = table.parameter(Quantity::SlaveDampingRatio(0), "casing_damping_ratio", None, ratio, text);
-        (row.min, row.max) = (Some(0.0), Some(MAX_DAMPING));
+        table.damping(Quantity::SlaveDampingRatio(0), "casing_damping_ratio", ratio, text);
     }
     if let Some(load) = scene.carrier.and_then(|(carrier, _)| carrier.load) {
         let text = "Number of nodal diameters of the radial line load on the casing";

@@ -1,12 +1,14 @@
 //! The variable table of a scene with a free master.
 
-use super::{Builder, ENERGY, FORCE, IMPULSE, LENGTH, LINEAR_SPEED, POWER, SCHEMES, SOLVERS, TIME, watched_rows};
+use super::builder::Builder;
+use super::outputs::watched_rows;
+use super::units::{ENERGY, FORCE, IMPULSE, LENGTH, LINEAR_SPEED, POWER};
 use crate::Result;
 use crate::Rom;
-use crate::settings::{LONGEST_STEP, MAX_DAMPING, MAX_FRICTION, SHORTEST_STEP, Scene, StructureSettings};
+use crate::settings::{Scene, StructureSettings};
 use crate::simulation::compile::Roles;
 use crate::simulation::free::{Pair, pairs};
-use crate::variables::{Causality, Kind, Quantity, Span, Start, Unit, Variability, VariableTable};
+use crate::variables::{Kind, Quantity, Span, Unit, Variability, VariableTable};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -25,10 +27,8 @@ pub fn build(scene: &Scene) -> Result<VariableTable> {
     let roles = Roles::new(scene)?;
     let master = (&scene.settings.structures[roles.master], &scene.roms[roles.master]);
     let parts = Parts { scene, master, pairs: pairs(scene)? };
-    let mut table = Builder { variables: Vec::new(), next: 0 };
-    let time = table.push(Quantity::Time, "time", "Simulated time");
-    time.causality = Causality::Independent;
-    time.unit = Some(&TIME);
+    let mut table = Builder::default();
+    table.time();
     parameters(&mut table, &parts);
     totals(&mut table, &parts);
     body(&mut table, &parts);
@@ -36,8 +36,8 @@ pub fn build(scene: &Scene) -> Result<VariableTable> {
     if scene.settings.outputs.energies {
         energies(&mut table, &parts);
     }
-    super::internal_steps(&mut table, &scene.settings);
-    VariableTable::new(table.variables)
+    table.internal_steps(&scene.settings);
+    table.finish()
 }
 
 impl Parts<'_> {
@@ -64,42 +64,19 @@ fn parameters(table: &mut Builder, parts: &Parts) {
         velocity.nominal = Some(100.0);
     }
     if parts.has_friction() {
-        let friction = table.parameter(
-            Quantity::Friction,
-            "friction_coefficient",
-            None,
-            contact.friction,
-            "Coulomb friction coefficient of all contacts",
-        );
-        (friction.min, friction.max, friction.variability) = (Some(0.0), Some(MAX_FRICTION), Variability::Tunable);
+        table.friction(contact, "Coulomb friction coefficient of all contacts");
     }
-    let mut damping = |quantity, name: &str, start, text: &str| {
-        let row = table.parameter(quantity, name, None, start, text);
-        (row.min, row.max) = (Some(0.0), Some(MAX_DAMPING));
-    };
     let text = format!("Modal damping ratio of {}; its rigid modes are not damped", master.name);
-    damping(Quantity::DampingRatio, "damping_ratio", master.damping_ratio.unwrap_or(rom.damping_ratio), &text);
+    table.damping(Quantity::DampingRatio, "damping_ratio", master.damping_ratio.unwrap_or(rom.damping_ratio), &text);
     for (carrier, pair) in parts.pairs.iter().filter(|pair| pair.carrier.is_some()).enumerate() {
         let (structure, rom) = (&settings.structures[pair.structure], &parts.scene.roms[pair.structure]);
         let name = format!("{}.damping_ratio", structure.name);
         let text = format!("Modal damping ratio of {}", structure.name);
         let start = structure.damping_ratio.unwrap_or(rom.damping_ratio);
-        damping(Quantity::SlaveDampingRatio(carrier), &name, start, &text);
+        table.damping(Quantity::SlaveDampingRatio(carrier), &name, start, &text);
     }
-    let step = table.parameter(
-        Quantity::StepMax,
-        "internal_step_max",
-        Some(&TIME),
-        settings.time.step,
-        "Largest internal time step; the step in use divides the communication step evenly",
-    );
-    (step.min, step.max) = (Some(SHORTEST_STEP), Some(LONGEST_STEP));
-    (step.nominal, step.display) = (Some(settings.time.step), Some(1));
-    table.choice(Quantity::SchemeChoice, "scheme", &SCHEMES, settings.time.scheme as i32 + 1, "Time-stepping scheme");
-    table.choice(Quantity::SolverChoice, "solver", &SOLVERS, contact.solver as i32 + 1, "Contact solver");
-    let name = table.push(Quantity::SceneName, "scene", "Name of the scene this FMU was made from");
-    (name.kind, name.causality, name.variability) = (Kind::String, Causality::Local, Variability::Constant);
-    name.start = Some(Start::String(settings.name.clone()));
+    table.methods(settings);
+    table.scene_name(settings);
 }
 
 fn totals(table: &mut Builder, parts: &Parts) {
