@@ -22,13 +22,14 @@ pub fn cases() -> Vec<Case> {
 /// Angle of the principal axes at which the flexibility couples radius and circumference.
 const TURNED: f64 = 0.45;
 
-/// w_nn/|w_nt| of the turned tower: beyond it W = w_nn − µ w_nt sense is negative in one sense of rotation.
+/// −w_rr/w_rθ of the turned tower: beyond it W = w_rr + µ w_rθ is negative where tips slide along +θ, and never where they
+/// slide along −θ.
 fn turned_limit() -> f64 {
     let tower = Tower { turned: TURNED, slope: 0.0, ..Tower::default() };
     let (sine, cosine) = TURNED.sin_cos();
     let [a, b] = [1.0 / tower.base[0], 1.0 / tower.base[1]];
     let across = a * cosine * cosine + b * sine * sine + 1.0 / tower.tip;
-    across / ((a - b) * sine * cosine).abs()
+    across / ((b - a) * sine * cosine)
 }
 
 fn coefficients() -> Vec<Case> {
@@ -68,14 +69,15 @@ fn sliding(model: &str, friction: f64, solver: Solver, scheme: Scheme, sense: f6
         Ok(mut checks) => {
             if model == "turned" {
                 let limit = turned_limit();
-                checks.push(Check::so(format!("µ below w_nn/w_nt = {limit:.3}, where W > 0"), friction < limit));
+                let text = format!("along −θ, or µ below −w_rr/w_rθ = {limit:.3}: there W > 0");
+                checks.push(Check::so(text, sense < 0.0 || friction < limit));
             }
             Happened::answer(checks)
         }
         Err(error) => {
             // A refusal is right where W loses its sign statically, or where the scheme or the contact grows.
             let message = error.to_string();
-            let lost = friction >= 0.99 * turned_limit();
+            let lost = sense > 0.0 && friction >= 0.99 * turned_limit();
             let text = format!("statically lost at µ = {:.3}, or growth is named", turned_limit());
             let checks = vec![Check::so(text, lost || message.contains("grows"))];
             Happened { checks, ..Happened::refused(message) }

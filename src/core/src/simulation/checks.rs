@@ -1,0 +1,148 @@
+//! What a scene asks of its ROMs, its methods and its start.
+
+use super::Simulation;
+use super::compile::{Compiled, Roles};
+use crate::rom::Frame;
+use crate::settings::{Scheme, Solver, StructureSettings};
+use crate::{Error, Result, Rom, Scene};
+
+impl Compiled {
+    /// Combinations of scheme and solver that this scene cannot be stepped with.
+    ///
+    /// # Errors
+    /// Naming parameter and remedy.
+    pub fn check_methods(&self, scheme: Scheme, solver: Solver) -> Result<()> {
+        let refuse = |what: &str, problem: &str, remedy: &str| Err(Error::invalid(what, problem, remedy));
+        let (structure, _) = self.master();
+        if solver == Solver::Coulomb && !self.may_stick() {
+            let remedy = "Package the scene with friction and contact.solver = \"coulomb\", without coating";
+            return refuse("parameter `solver`", "`coulomb` is not prepared in this scene", remedy);
+        }
+        if self.free.is_some() && scheme == Scheme::MasslessBoundary {
+            let problem = "`massless-boundary` is not made for a master that flies freely";
+            return refuse("parameter `scheme`", problem, "Use modal-exact or central-difference");
+        }
+        if self.contact().coating.is_some() && solver != Solver::Lcp {
+            return refuse("parameter `solver`", "a coating is solved with `lcp` only", "Use lcp, or no coating");
+        }
+        if scheme == Scheme::MasslessBoundary && structure.spin.coriolis {
+            let remedy = "Use modal-exact, or leave coriolis out";
+            return refuse("parameter `scheme`", "`massless-boundary` does not take the Coriolis force", remedy);
+        }
+        let left = |modes: usize| modes == 0;
+        let none_left = self.wheel.as_ref().map_or_else(
+            || left(self.model.dynamic_modes(scheme)),
+            |wheel| wheel.diameters.iter().any(|diameter| left(diameter.dynamic_modes(scheme))),
+        );
+        if scheme == Scheme::MasslessBoundary && none_left {
+            let problem =
+                "`massless-boundary` makes the highest modes quasi-static, three per contact node: none is left";
+            return refuse("parameter `scheme`", problem, "Use more modes or fewer contact nodes, or modal-exact");
+        }
+        Ok(())
+    }
+}
+
+/// What coupled sectors do not take, and where they cannot be.
+pub fn check_coupling(scene: &Scene, roles: Roles) -> Result<()> {
+    let refuse = |what: &str, problem: String, remedy: &str| Err(Error::invalid(what, problem, remedy));
+    if let Some(index) = roles.carrier.filter(|index| scene.roms[*index].is_cyclic()) {
+        let problem = format!("the sectors of ROM `{}` are coupled by harmonics", scene.roms[index].name);
+        let remedy = "Give a structure of its own, reduced as a whole (sectors = 1), to carry the surface";
+        return refuse("surface.structure", problem, remedy);
+    }
+    let (structure, rom) = (&scene.settings.structures[roles.master], &scene.roms[roles.master]);
+    if !rom.is_cyclic() {
+        return Ok(());
+    }
+    let of = |feature: &str| format!("{feature} with the coupled sectors of ROM `{}`", rom.name);
+    let uncoupled = "Leave it out, or use a ROM of uncoupled sectors (without harmonics)";
+    if !structure.frequency_factors.is_empty() {
+        return refuse("structure.frequency_factors", of("mistuning of single sectors"), uncoupled);
+    }
+    if structure.spin.stiffening {
+        return refuse("structure.spin.stiffening", of("stiffening"), uncoupled);
+    }
+    if structure.spin.coriolis {
+        return refuse("structure.spin.coriolis", of("Coriolis force"), uncoupled);
+    }
+    Ok(())
+}
+
+/// What a structure asks of its ROM.
+pub fn check_rom(structure: &StructureSettings, rom: &Rom) -> Result<()> {
+    let what = format!("ROM `{}`", rom.name);
+    if rom.frame != Frame::Cylindrical {
+        return Err(Error::invalid(
+            what,
+            "its contact displacements are Cartesian; surfaces around an axis need (radial, tangential, axial)",
+            "Write the ROM with frame = cylindrical",
+        ));
+    }
+    let spin = structure.spin.stiffening || structure.spin.growth || structure.spin.coriolis;
+    if spin && rom.extras.spin.is_none() {
+        let problem = format!("it has no spin matrices, which `spin` of structure `{}` needs", structure.name);
+        return Err(Error::invalid(what, problem, "Reduce it with `tiprub reduce --spin`, or leave spin out"));
+    }
+    if structure.thermal && rom.extras.thermal.is_none() {
+        let problem = format!("it has no thermal loads, which `thermal` of structure `{}` needs", structure.name);
+        return Err(Error::invalid(what, problem, "Reduce it with thermal patches, or leave thermal out"));
+    }
+    if structure.load.is_some() && rom.extras.grid.is_none() {
+        let problem = format!("it has no contact grid, which `load` of structure `{}` needs", structure.name);
+        return Err(Error::invalid(what, problem, "Give a ROM with a contact grid, or leave the load out"));
+    }
+    let factors = structure.frequency_factors.len();
+    if factors != 0 && factors != rom.sectors {
+        return Err(Error::invalid(
+            "structure.frequency_factors",
+            format!("{factors} values for {} sectors", rom.sectors),
+            "Give one factor per sector, or remove the line",
+        ));
+    }
+    Ok(())
+}
+
+impl Simulation {
+    /// A start in penetration would be an impact of arbitrary strength.
+    pub(super) fn check_initial_gaps(&self) -> Result<()> {
+        let lanes = self.system.bank().lanes();
+        let deepest = self
+            .system
+            .gaps()
+            .iter()
+            .enumerate()
+            .fold((0, 0.0), |worst, (index, gap)| if *gap < worst.1 { (index, *gap) } else { worst });
+        if let Some(lost) = self.system.gaps().iter().position(|gap| gap.is_nan()) {
+            let node = &self.compiled.master().1.contact_nodes[lost / lanes].name;
+            return Err(Error::invalid(
+                "initial clearance",
+                format!("{node} finds no closest point of its surface"),
+                "Check start values of loads and temperatures, which may deform the surface beyond all bounds, and its contact grid: \
+                 it must not be folded, or flattened to a line",
+            ));
+        }
+        if deepest.1 >= 0.0 {
+            return Ok(());
+        }
+        let touching = self.system.gaps().iter().filter(|gap| **gap < 0.0).count();
+        let node = &self.compiled.master().1.contact_nodes[deepest.0 / lanes].name;
+        if self.compiled.free.is_some() {
+            return Err(Error::invalid(
+                "initial clearance",
+                format!("{touching} contact nodes start inside the surfaces, deepest {:.3e} m at {node}", deepest.1),
+                "Move one of the structures: gaps follow from the contact positions in the ROMs; check that S_t x S_s of \
+                 each contact grid points to the master",
+            ));
+        }
+        Err(Error::invalid(
+            "initial clearance",
+            format!(
+                "{touching} contact nodes start inside the casing, deepest {:.3e} m at {node} of sector {}",
+                deepest.1,
+                deepest.0 % lanes + 1
+            ),
+            "Enlarge the gap, let the casing shape grow in with ramp_time (casing_ramp_time), start at another rotor angle, or give other start values to loads, temperatures and the inputs that move casing and shaft",
+        ))
+    }
+}

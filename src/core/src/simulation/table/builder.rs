@@ -1,0 +1,174 @@
+//! Rows of the variable table, and those that every scene has.
+
+use super::units::{SCHEMES, SOLVERS, TIME};
+use crate::Result;
+use crate::settings::{ContactSettings, LONGEST_STEP, MAX_DAMPING, MAX_FRICTION, SHORTEST_STEP, SceneSettings};
+use crate::variables::{
+    Causality, Enumeration, Kind, Quantity, Span, Start, Unit, Variability, Variable, VariableTable,
+};
+
+/// Collects rows and hands out references.
+#[derive(Default)]
+pub struct Builder {
+    variables: Vec<Variable>,
+    next: u32,
+}
+
+impl Builder {
+    pub fn push(
+        &mut self,
+        quantity: Quantity,
+        name: impl Into<String>,
+        description: impl Into<String>,
+    ) -> &mut Variable {
+        self.close();
+        self.variables.push(Variable {
+            name: name.into(),
+            reference: self.next,
+            dimension: None,
+            kind: Kind::Real,
+            causality: Causality::Output,
+            variability: Variability::Continuous,
+            span: Span::Point,
+            unit: None,
+            display: None,
+            min: None,
+            max: None,
+            nominal: None,
+            start: None,
+            description: description.into(),
+            quantity,
+        });
+        self.variables.last_mut().unwrap_or_else(|| unreachable!("just pushed"))
+    }
+
+    /// Account for the references of the last row, whose dimension is known by now.
+    fn close(&mut self) {
+        self.next = self
+            .variables
+            .last()
+            .map_or(0, |last| last.reference.saturating_add(u32::try_from(last.len()).unwrap_or(u32::MAX)));
+    }
+
+    pub fn input(
+        &mut self,
+        quantity: Quantity,
+        name: &str,
+        unit: Option<&'static Unit>,
+        start: f64,
+        text: &str,
+    ) -> &mut Variable {
+        let variable = self.push(quantity, name, text);
+        variable.causality = Causality::Input;
+        variable.unit = unit;
+        variable.start = Some(Start::Real(vec![start]));
+        variable
+    }
+
+    pub fn parameter(
+        &mut self,
+        quantity: Quantity,
+        name: &str,
+        unit: Option<&'static Unit>,
+        start: f64,
+        text: &str,
+    ) -> &mut Variable {
+        let variable = self.input(quantity, name, unit, start, text);
+        variable.causality = Causality::Parameter;
+        variable.variability = Variability::Fixed;
+        variable
+    }
+
+    pub fn choice(&mut self, quantity: Quantity, name: &str, choices: &'static Enumeration, start: i32, text: &str) {
+        let variable = self.parameter(quantity, name, None, 0.0, text);
+        variable.kind = Kind::Enumeration(choices);
+        variable.start = Some(Start::Integer(start));
+    }
+
+    pub fn output(
+        &mut self,
+        quantity: Quantity,
+        name: impl Into<String>,
+        span: Span,
+        unit: Option<(&'static Unit, f64)>,
+        text: impl Into<String>,
+    ) -> &mut Variable {
+        let variable = self.push(quantity, name, text);
+        variable.span = span;
+        if let Some((unit, nominal)) = unit {
+            variable.unit = Some(unit);
+            variable.nominal = Some(nominal);
+        }
+        variable
+    }
+
+    /// Friction coefficient, which may change between communication steps.
+    pub fn friction(&mut self, contact: &ContactSettings, text: &str) {
+        let row = self.parameter(Quantity::Friction, "friction_coefficient", None, contact.friction, text);
+        (row.min, row.max, row.variability) = (Some(0.0), Some(MAX_FRICTION), Variability::Tunable);
+    }
+
+    /// A modal damping ratio.
+    pub fn damping(&mut self, quantity: Quantity, name: &str, start: f64, text: &str) {
+        let row = self.parameter(quantity, name, None, start, text);
+        (row.min, row.max) = (Some(0.0), Some(MAX_DAMPING));
+    }
+
+    /// Internal step, scheme and solver.
+    pub fn methods(&mut self, settings: &SceneSettings) {
+        let step = self.parameter(
+            Quantity::StepMax,
+            "internal_step_max",
+            Some(&TIME),
+            settings.time.step,
+            "Largest internal time step; the step in use divides the communication step evenly",
+        );
+        (step.min, step.max) = (Some(SHORTEST_STEP), Some(LONGEST_STEP));
+        (step.nominal, step.display) = (Some(settings.time.step), Some(1));
+        let (scheme, solver) = (settings.time.scheme as i32 + 1, settings.contacts[0].solver as i32 + 1);
+        self.choice(Quantity::SchemeChoice, "scheme", &SCHEMES, scheme, "Time-stepping scheme");
+        self.choice(Quantity::SolverChoice, "solver", &SOLVERS, solver, "Contact solver");
+    }
+
+    /// Name of the scene.
+    pub fn scene_name(&mut self, settings: &SceneSettings) {
+        let name = self.push(Quantity::SceneName, "scene", "Name of the scene this FMU was made from");
+        (name.kind, name.causality, name.variability) = (Kind::String, Causality::Local, Variability::Constant);
+        name.start = Some(Start::String(settings.name.clone()));
+    }
+
+    /// Time, the independent variable.
+    pub fn time(&mut self) {
+        let time = self.push(Quantity::Time, "time", "Simulated time");
+        time.causality = Causality::Independent;
+        time.unit = Some(&TIME);
+    }
+
+    /// Internal step in use and number of steps.
+    pub fn internal_steps(&mut self, settings: &SceneSettings) {
+        let internal = self.output(
+            Quantity::InternalStep,
+            "internal_step",
+            Span::Point,
+            Some((&TIME, settings.time.step)),
+            "Internal time step in use",
+        );
+        internal.variability = Variability::Discrete;
+        let steps = self.output(
+            Quantity::InternalSteps,
+            "internal_steps",
+            Span::Total,
+            None,
+            "Internal steps done since the start",
+        );
+        steps.variability = Variability::Discrete;
+    }
+
+    /// The table of all rows.
+    ///
+    /// # Errors
+    /// Names given twice.
+    pub fn finish(self) -> Result<VariableTable> {
+        VariableTable::new(self.variables)
+    }
+}
