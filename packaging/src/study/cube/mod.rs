@@ -5,6 +5,7 @@ mod figures;
 mod pairs;
 mod product;
 mod runs;
+mod sizes;
 
 use serde_json::json;
 use tiprub_core::Scene;
@@ -19,6 +20,8 @@ use crate::{
 };
 use pairs::Pair;
 use runs::{A, B, BEST, C, Flight, Outcome, PAPER, STICKING, competitors, released};
+
+use sizes::Sizes;
 
 /// The paper's flight, and the slower one of its energies.
 const FAST: f64 = 100.0;
@@ -70,7 +73,9 @@ pub fn study(arguments: &StudyArguments, console: &Console) -> Result<Study> {
         flown.push(fly(flight, &scene, quick, *flight == all[0], (&task, &mut done))?);
     }
     drop(task);
-    report(&scene, &flown, quick)
+    let a = flown[0].outcome(A)?.history().ok_or_else(|| Failure::new("study cube", "method a failed", ""))?;
+    let sizes = Sizes::new(&scene, &all[0], a, quick, (&arguments.cache.cache(), console))?;
+    report(&scene, &flown, &sizes, quick)
 }
 
 fn fly(flight: &Flight, scene: &Scene, quick: bool, facets: bool, (task, done): (&Task, &mut u64)) -> Result<Flown> {
@@ -85,7 +90,7 @@ fn fly(flight: &Flight, scene: &Scene, quick: bool, facets: bool, (task, done): 
     Ok(Flown { flight: *flight, outcomes, pairs })
 }
 
-fn report(scene: &Scene, flown: &[Flown], quick: bool) -> Result<Study> {
+fn report(scene: &Scene, flown: &[Flown], sizes: &Sizes, quick: bool) -> Result<Study> {
     let main = flown.first().ok_or_else(|| Failure::new("study cube", "no flight", ""))?;
     let best = main.outcome(BEST)?;
     let mut figures = vec![figures::scene()];
@@ -101,13 +106,15 @@ fn report(scene: &Scene, flown: &[Flown], quick: bool) -> Result<Study> {
         }
     }
     figures.push(figures::agreement(&main.pairs)?);
-    let tables: Vec<String> = flown
+    let mut tables: Vec<String> = flown
         .iter()
         .map(|flown| format!("## {}\n\n{}", flown.title(), pairs::markdown(&flown.outcomes, &flown.pairs)))
         .collect();
+    tables.push(sizes.markdown());
     let all = flown.iter().map(|flown| pairs::json(&flown.outcomes, &flown.pairs, &flown.flight));
     let mut statements = meeting(main);
     statements.extend(at_any_speed(flown));
+    statements.push(truncation(sizes));
     if !quick {
         statements.extend(slow(flown)?);
         statements.push(times(main)?);
@@ -123,7 +130,7 @@ fn report(scene: &Scene, flown: &[Flown], quick: bool) -> Result<Study> {
         facts: scene.roms.iter().map(|rom| (rom.name.clone(), rom.origin.clone())).collect(),
         statements,
         figures,
-        results: json!({ "flights": all.collect::<Vec<_>>() }),
+        results: json!({ "flights": all.collect::<Vec<_>>(), "sizes": sizes.json() }),
         files: vec![("tables.md".into(), "all pairs and runs, as Markdown".into(), tables.join("\n").into_bytes())],
     })
 }
@@ -162,6 +169,21 @@ fn meeting(main: &Flown) -> Vec<Statement> {
         all.push(near(main, BEST, C, [3.0, 3.0, 4.0], ", whose contact is softer"));
     }
     all
+}
+
+/// What is left out by reducing the rings.
+fn truncation(sizes: &Sizes) -> Statement {
+    let modal: Vec<_> = sizes.rings.iter().filter(|size| size.static_responses == 0).collect();
+    let falls = modal.windows(2).all(|pair| (0..3).all(|i| pair[1].apart[i] < pair[0].apart[i]));
+    let told = modal.iter().map(|size| {
+        let [x, slowing, z, _] = size.apart.map(|share| 100.0 * share);
+        format!("{} modes {x:.3}, {slowing:.3}, {z:.3} %", size.modes)
+    });
+    Statement::tested(
+        "More modes of the rings bring the product nearer to method a: u1x, slowing and u1z",
+        falls && modal.len() > 1,
+        told.collect::<Vec<_>>().join("; "),
+    )
 }
 
 /// What holds in every flight.

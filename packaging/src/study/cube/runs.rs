@@ -100,7 +100,7 @@ pub fn competitors(flight: &Flight, quick: bool, facets: bool) -> Vec<(&'static 
 }
 
 /// Interval of the records (s), the same for all.
-const RECORD: f64 = 1e-6;
+pub const RECORD: f64 = 1e-6;
 
 /// One run to `end` (s), alone, so that processor time is its own.
 ///
