@@ -4,6 +4,7 @@
 pub mod api;
 pub mod fmi2;
 pub mod fmi3;
+pub mod refusals;
 pub mod scene;
 
 use std::ffi::{CStr, c_char, c_void};

@@ -1,0 +1,144 @@
+//! What a scene with a free master is refused for, before it flies and on the flight.
+
+#[path = "common/lattice.rs"]
+mod lattice;
+
+use lattice::*;
+use tiprub_core::settings::*;
+use tiprub_core::{Scene, Simulation};
+
+#[test]
+fn what_flies_into_a_surface_too_deep_ends_with_the_reason() {
+    let fast = scene(block([0.0; 3], 1e3), &[(Side::Left, 0.0203)], false, [-400.0, 0.0, 0.0]);
+    let mut simulation = started(&fast);
+    let error = (0..200).find_map(|_| simulation.do_step(simulation.time(), 1e-5).err()).unwrap().to_string();
+    assert!(error.contains("a tenth of the extent"), "{error}");
+}
+
+/// Why a scene is refused.
+#[track_caller]
+fn refusal(change: impl FnOnce(&mut Scene)) -> String {
+    let mut scene = squeezed();
+    change(&mut scene);
+    match Simulation::new(&scene) {
+        Err(error) => error.to_string(),
+        Ok(mut simulation) => simulation.initialise(0.0).unwrap_err().to_string(),
+    }
+}
+
+#[test]
+fn scenes_that_make_no_sense_are_refused_with_the_reason() {
+    type Case = (&'static str, fn(&mut Scene));
+    let cases: [Case; 24] = [
+        ("held", |scene| scene.roms[0].stiffness[(4, 4)] += 1e3),
+        ("no contact node", |scene| scene.settings.contacts[0].nodes = Some("top".into())),
+        ("claims the node `left_000`", |scene| scene.settings.contacts[1].nodes = Some("le".into())),
+        ("claims all contact nodes", |scene| scene.settings.contacts[0].nodes = None),
+        ("empty text", |scene| scene.settings.contacts[0].nodes = Some(String::new())),
+        ("gap", |scene| scene.settings.contacts[0].gap = 1e-3),
+        ("sector_gaps", |scene| scene.settings.contacts[0].sector_gaps = vec![1e-3]),
+        ("meridian", |scene| scene.settings.contacts[0].meridian = Meridian::Cylinder),
+        ("heat_to_slave", |scene| scene.settings.contacts[0].heat_to_slave = Some(0.5)),
+        ("friction or solver differs", |scene| scene.settings.contacts[1].friction = 0.3),
+        ("needs to know where it is", |scene| scene.settings.surfaces[0].structure = None),
+        ("shape", |scene| scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order: 2, phase: 0.0 }),
+        ("moving", |scene| scene.settings.surfaces[0].moving = true),
+        ("named 0 times", |scene| drop(scene.settings.contacts.pop())),
+        ("massless-boundary", |scene| scene.settings.time.scheme = Scheme::MasslessBoundary),
+        ("all_sectors", |scene| scene.settings.outputs.all_sectors = true),
+        ("nodal_diameters", |scene| scene.settings.outputs.nodal_diameters = Some(0)),
+        ("no open contact grid", |scene| scene.roms[1].extras.grid = None),
+        ("at the same place", |scene| {
+            scene.roms[1].contact_nodes[1].position = scene.roms[1].contact_nodes[0].position
+        }),
+        ("only a free structure has it", |scene| scene.settings.structures[1].velocity = [1.0, 0.0, 0.0]),
+        ("only a rotating structure has it", |scene| scene.settings.structures[0].whirl = true),
+        ("carries one surface", |scene| scene.settings.surfaces[1].structure = Some("left_plate".into())),
+        ("ω_max·h", |scene| {
+            (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::CentralDifference, 1e-5)
+        }),
+        ("start inside", |scene| {
+            scene.roms[0].contact_nodes.iter_mut().for_each(|node| node.position[1] -= 0.045);
+        }),
+    ];
+    for (part, change) in cases {
+        let error = refusal(change);
+        assert!(error.contains(part), "{part}: {error}");
+    }
+}
+
+/// The block before a rigid plate, with a light mode of its own that moves some contact nodes by some vectors.
+fn with_local_mode(shape: &[(usize, [f64; 3])]) -> Scene {
+    let mut scene = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.0203)], false, [-15.0, 3.0, 0.0]);
+    scene.settings.surfaces[0].rigid = true;
+    let rom = &mut scene.roms[0];
+    let order = rom.order();
+    let grown = |matrix: &nalgebra::DMatrix<f64>, rows: usize| matrix.clone().resize(rows, order + 1, 0.0);
+    (rom.mass, rom.stiffness) = (grown(&rom.mass, order + 1), grown(&rom.stiffness, order + 1));
+    rom.mass[(order, order)] = 1e-4;
+    rom.stiffness[(order, order)] = 1e-4 * 1e4_f64.powi(2);
+    rom.contact_map = grown(&rom.contact_map, order);
+    for (node, vector) in shape {
+        (0..3).for_each(|i| rom.contact_map[(3 * node + i, order)] = vector[i]);
+    }
+    with(scene, 1.5, Solver::Lcp, Scheme::ModalExact)
+}
+
+#[test]
+fn friction_that_jams_a_contact_on_the_flight_is_refused() {
+    // Pushed in, the node moves along its slip: friction against the slip pushes it in further.
+    let mut simulation = Simulation::new(&with_local_mode(&[(0, [1.0, 1.0, 0.0])])).unwrap();
+    let error = simulation.initialise(0.0).unwrap_err().to_string();
+    assert!(error.contains("contact of left_000 alone has no unique solution"), "{error}");
+    let mut other = Simulation::new(&with_local_mode(&[(0, [1.0, -1.0, 0.0])])).unwrap();
+    other.initialise(0.0).unwrap();
+    assert!(other.warnings().is_empty(), "{:?}", other.warnings());
+}
+
+#[test]
+fn friction_that_may_leave_the_flight_without_one_solution_is_warned_of() {
+    let mut simulation = Simulation::new(&with_local_mode(&[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])])).unwrap();
+    simulation.initialise(0.0).unwrap();
+    let told = simulation.warnings().join(" ");
+    assert!(told.contains("cannot be shown to have one solution"), "{told}");
+    let mut frictionless = with_local_mode(&[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]);
+    frictionless.settings.contacts[0].friction = 0.0;
+    let mut simulation = Simulation::new(&frictionless).unwrap();
+    simulation.initialise(0.0).unwrap();
+    assert!(simulation.warnings().is_empty(), "{:?}", simulation.warnings());
+}
+
+#[test]
+fn a_body_too_fast_for_the_step_is_refused_and_passes_nothing_unseen() {
+    // Obliquely through the plate within one step: beyond its edge before and after.
+    for velocity in [[-1e6, 1e6, 0.0], [-1e6, 0.0, 0.0], [0.0, 0.0, -1e300], [5000.0, 0.0, 0.0]] {
+        let scene = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.06)], false, velocity);
+        let mut simulation = started(&with(scene, 0.0, Solver::Lcp, Scheme::ModalExact));
+        let error = simulation.do_step(0.0, 1e-5).unwrap_err().to_string();
+        assert!(error.contains("could pass a surface unseen") && error.contains("smaller internal step"), "{error}");
+    }
+    // A tenth of the block in one step is the limit.
+    let mut slow = started(&scene(block([0.0; 3], 3e6), &[(Side::Left, 0.5)], false, [3900.0, 0.0, 0.0]));
+    advance(&mut slow, 1e-5);
+}
+
+#[test]
+fn a_node_that_comes_over_an_edge_from_behind_is_refused() {
+    let thrown = |distance, velocity, steps: u32| {
+        let scene = scene(block([0.0, 0.1101, 0.0], 3e6), &[(Side::Left, distance)], false, velocity);
+        let mut simulation = started(&with(scene, 0.15, Solver::Lcp, Scheme::ModalExact));
+        (0..steps).try_for_each(|_| simulation.do_step(simulation.time(), 1e-5)).map(|()| simulation)
+    };
+    // Its face flies 0.2 mm to 0.2 µm behind the plate.
+    for depth in [2e-4, 2e-5, 2e-7] {
+        let error = thrown(0.02 - depth, [0.0, -40.0, 0.0], 60).unwrap_err().to_string();
+        assert!(error.contains("the contact node left_00") && error.contains("over the edge"), "{depth} m: {error}");
+    }
+    // In front of it all is well, and what arrives from in front in the step that passes the edge is an impact.
+    assert!(real(&thrown(0.0203, [0.0, -40.0, 0.0], 60).unwrap(), "impact_loss") == 0.0);
+    for distance in [0.020_010, 0.020_05] {
+        let hit = thrown(distance, [-4.0, -40.0, 0.0], 8).unwrap();
+        assert!(vector(&hit, "block.velocity")[0] > -3.9, "{distance} m: it was not hit");
+        assert!(real(&hit, "energy_residual_relative").abs() < 1e-13);
+    }
+}
