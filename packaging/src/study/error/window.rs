@@ -108,15 +108,32 @@ pub fn statistics(case: &dyn Case) -> Option<Table> {
                     format!("{:.1e}", apart(&late(&found), &late(&fine))),
                 ]
             }
-            Err(problem) => [problem, String::new(), String::new()],
+            Err(problem) => [shortened(&problem), String::new(), String::new()],
         });
         table.rows.push(cells);
     }
     Some(table)
 }
 
+/// The beginning of a reason, which stands whole beside the run in the table of all runs where this step was tried.
+fn shortened(problem: &str) -> String {
+    const MOST: usize = 80;
+    match problem.char_indices().nth(MOST) {
+        None => problem.to_owned(),
+        Some((end, _)) => format!("{} …", problem[..end].rsplit_once(' ').map_or(&problem[..end], |(start, _)| start)),
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn long_reasons_end_between_words() {
+        let long = "refused: µ ".repeat(20);
+        let short = super::shortened(&long);
+        assert!(short.chars().count() <= 82 && short.ends_with(" µ …"), "{short}");
+        assert_eq!(super::shortened("refused"), "refused");
+    }
+
     #[test]
     fn a_window_ends_where_runs_part() {
         assert_eq!(super::samples(&[1e-9, 1e-8, 1e-7, 1e-5, 1e-8], 10), 3);
