@@ -229,6 +229,7 @@ def arguments():
     parser.add_argument("--scheme", choices=["newmark", "held"], default="newmark")
     parser.add_argument("--law", choices=["linear", "stvk"], default="linear")
     parser.add_argument("--stride", type=int, default=1, help="steps per row; forces are means over them")
+    parser.add_argument("--origin", default="GetFEM", help="version, for the table's first line")
     parser.add_argument("--lumped", action="store_true")
     options = parser.parse_args()
     if (options.stiffness is None) == (options.per_area is None):
@@ -420,7 +421,9 @@ def main():
     left = 3 * cube.sets["MASTER_LEFT"][:, None] + np.arange(3)
     mass = np.asarray(cube.mass.sum(axis=1)).ravel()
     with open(options.out, "w") as out:
-        out.write(f"# {' '.join(sys.argv[2:])}\nt,u1x,u1y,u1z,lambda1,left,vy\n")
+        given = [word for word in sys.argv[3:] if word not in ("--origin", options.origin)]
+        out.write(f"# {options.origin}, {options.speed:.0f} m/s, facets; cube_getfem.py FILES TABLE {' '.join(given)}; SI units.\n")
+        out.write("t,u1x,u1y,u1z,lambda1,left,vy\n")
         sums = np.zeros(2)
         for index in range(1, round(options.end / options.step) + 1):
             before = stepper.u[0][first : first + 3]
@@ -434,7 +437,7 @@ def main():
             u = before if held else stepper.u[0][first : first + 3]
             speed = (mass[1::3] @ stepper.v[0][1::3]) / mass[1::3].sum()
             row = [at * options.step, *u, *(sums / options.stride), speed]
-            out.write(",".join(f"{x:.7e}" for x in row) + "\n")
+            out.write(",".join(f"{x:.6e}" for x in row) + "\n")
             sums[:] = 0.0
             if index % 100 == 0:
                 out.flush()

@@ -32,7 +32,9 @@ pub fn compare(path: &str, words: &[&str]) {
             Method::Augmented(augmented::Options { penalty: number(rest[0]), corners: number(rest[1]), tolerance: 1.0 })
         }
     };
-    let ours = run(method, setting, number(step), end, 1);
+    // Recorded as often as theirs, so that both are interpolated alike.
+    let stride = (1..).find(|k| (*k as f64 + 0.5) * number(step) > theirs.step).expect("some multiple");
+    let ours = run(method, setting, number(step), end + number(step), stride);
     println!("{path} / {}", words.join(" "));
     print(&theirs, &ours, setting.speed, end);
 }
