@@ -1,6 +1,7 @@
 //! The cases, family by family.
 
 pub mod builtin;
+pub mod decay;
 pub mod friction;
 pub mod gaps;
 pub mod limits;
@@ -8,7 +9,9 @@ pub mod loads;
 pub mod proof;
 pub mod random;
 pub mod stepping;
+pub mod turning;
 pub mod values;
+pub mod wheel;
 
 use super::Case;
 
@@ -20,6 +23,9 @@ pub fn all() -> Vec<Case> {
         gaps::cases(),
         stepping::cases(),
         loads::cases(),
+        decay::cases(),
+        turning::cases(),
+        wheel::cases(),
         builtin::cases(),
         random::cases(),
         values::cases(),

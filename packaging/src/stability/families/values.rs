@@ -92,7 +92,7 @@ fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64)
             && variable.min.is_none_or(|min| value >= min)
             && variable.max.is_none_or(|max| value <= max);
         if !finite {
-            Expected::Refused(vec![variable.name.clone()])
+            Expected::refused([&variable.name])
         } else if variable.name == "casing_ramp_time" && value.abs() <= 1.0 {
             // Without a ramp some blades start inside the bumps.
             Expected::either(against, ["initial clearance"])
@@ -122,7 +122,7 @@ fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64)
         let expected = if value.is_finite() {
             Expected::either(against, [""])
         } else {
-            Expected::Refused(vec![variable.name.clone()])
+            Expected::refused([&variable.name])
         };
         let work = move |_: &Context| by_slope(scene, &owned, value);
         let case = Case::new(format!("values/{scene}/{name}/{text}/slope"), expected, work);
@@ -351,7 +351,7 @@ fn settings() -> Vec<Case> {
             let expected = if value.is_finite() {
                 Expected::either("finite, books that close", [""])
             } else {
-                Expected::Refused(vec![word.to_owned()])
+                Expected::refused([word])
             };
             let work = move |_: &Context| {
                 let mut scene = scene("bumps");
