@@ -2,8 +2,10 @@
 
 pub mod builtin;
 pub mod decay;
+pub mod free;
 pub mod friction;
 pub mod gaps;
+pub mod heat;
 pub mod limits;
 pub mod loads;
 pub mod proof;
@@ -20,12 +22,14 @@ pub fn all() -> Vec<Case> {
     let families = [
         limits::cases(),
         friction::cases(),
+        heat::cases(),
         gaps::cases(),
         stepping::cases(),
         loads::cases(),
         decay::cases(),
         turning::cases(),
         wheel::cases(),
+        free::cases(),
         builtin::cases(),
         random::cases(),
         values::cases(),

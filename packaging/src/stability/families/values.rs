@@ -119,11 +119,8 @@ fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64)
     }
     if variable.causality == Causality::Input {
         let owned = name.clone();
-        let expected = if value.is_finite() {
-            Expected::either(against, [""])
-        } else {
-            Expected::refused([&variable.name])
-        };
+        let expected =
+            if value.is_finite() { Expected::either(against, [""]) } else { Expected::refused([&variable.name]) };
         let work = move |_: &Context| by_slope(scene, &owned, value);
         let case = Case::new(format!("values/{scene}/{name}/{text}/slope"), expected, work);
         cases.push(case.quick(scene == "round" && (text == "NaN" || text == "1e308" || text == "denormal")));

@@ -33,7 +33,8 @@ pub fn cases() -> Vec<Case> {
                 for friction in [0.0, 0.3] {
                     let still = Still { scheme, solver, sectors, friction, coupling: COUPLING };
                     let name = format!("wheel/flexibility/{sectors}/µ={friction}/{scheme_name}/{solver_name}");
-                    let expected = Expected::right("static λ and every blade's place from the matrix of the whole wheel");
+                    let expected =
+                        Expected::right("static λ and every blade's place from the matrix of the whole wheel");
                     let work = move |_: &_| Happened::of(still.run());
                     cases.push(Case::new(name, expected, work).quick(quick && sectors == 8));
                 }
@@ -114,7 +115,8 @@ impl Still {
                 view += block;
             }
         }
-        let map = DMatrix::from_fn(6 * count, 3 * count, |i, j| f64::from(u8::from(i / 6 == j / 3 && i % 6 == 3 + j % 3)));
+        let map =
+            DMatrix::from_fn(6 * count, 3 * count, |i, j| f64::from(u8::from(i / 6 == j / 3 && i % 6 == 3 + j % 3)));
         let moved = whole.lu().solve(&map).unwrap_or_else(|| DMatrix::from_element(6 * count, 3 * count, f64::NAN));
         map.transpose() * moved
     }
@@ -158,12 +160,16 @@ impl Still {
         }
         let place = &flexible * force;
         let system = simulation.system();
-        let off = pressed.iter().zip(exact.iter()).map(|(sector, exact)| (system.multiplier(0, *sector) / exact - 1.0).abs());
+        let off =
+            pressed.iter().zip(exact.iter()).map(|(sector, exact)| (system.multiplier(0, *sector) / exact - 1.0).abs());
         let moved = |row: usize| system.bank().row(row % 3, row / 3) - place[row];
         Ok([
             watch.books_of(self.scheme),
             vec![
-                Check::so("these blades touch and no others", system.events().len() == count && exact.iter().all(|v| *v > 0.0)),
+                Check::so(
+                    "these blades touch and no others",
+                    system.events().len() == count && exact.iter().all(|v| *v > 0.0),
+                ),
                 Check::at_most("λ from the static solution", off.fold(0.0, f64::max), 1e-8),
                 Check::at_most(
                     "place of any blade from the static one",
