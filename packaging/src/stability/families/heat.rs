@@ -71,7 +71,7 @@ impl Heat {
         };
         let late = self.scheme == Scheme::MasslessBoundary;
         let (mut before, mut oldest, mut forces) = ([0.0; 12], [0.0; 12], [0.0; 12]);
-        let (mut heat, mut power, mut reversed, mut touched) = (0.0, 0.0, 0.0_f64, 0);
+        let (mut heat, mut power, mut reversed, mut touched) = (0.0, 0.0, f64::NEG_INFINITY, 0);
         let travel = RADIUS * self.speed * STEP;
         for index in 0..3200 {
             // Twice onto the blades, and away at the end.

@@ -223,8 +223,8 @@ impl Pressed {
         let at_rest = depth / (1.0 / tower.base[0] + 1.0 / tower.tip);
         let mut watch = Watch::new(&scene);
         let (mut off, mut open) = (0.0_f64, 0);
-        let stride = (TAU / omega.abs() / step / 400.0).clamp(1.0, 1e4).ceil();
-        for _ in 0..400 {
+        let stride = (TAU / omega.abs() / step / 100.0).clamp(1.0, 1e3).ceil();
+        for _ in 0..100 {
             if stride > 1.0 {
                 simulation.do_step(simulation.time(), (stride - 1.0) * step)?;
             }
