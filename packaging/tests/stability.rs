@@ -41,7 +41,7 @@ fn the_judge_sees_every_way_to_fail() {
     let failure = stability(root.path(), &["--case", "judge/"], 1);
     let told = failure.to_string();
     assert!(
-        told.contains("20 of 20 cases are neither right nor refused") && told.contains("WRONG judge/wrong"),
+        told.contains("21 of 21 cases are neither right nor refused") && told.contains("WRONG judge/wrong"),
         "{told}"
     );
     let written = std::fs::read_to_string(root.path().join("out").join("results.json")).unwrap();
@@ -75,6 +75,7 @@ fn the_judge_sees_every_way_to_fail() {
         ("damping-of-blades-0.1%", "displacement from the decay of the modes"),
         ("damping-of-a-ring-10%", "amplitude from the decay of the mode"),
         ("speed-1%", "λ from the dynamic stiffness of the blade"),
+        ("rotor-a-step-early", "λ from the blade without any scheme"),
         ("load-a-step-early", "wave from that of the oscillator"),
         ("slope-of-a-lobe-1%", "tangential force from λ n_t"),
         ("coupling-of-sectors-1%", "place of any blade from the static one"),

@@ -53,7 +53,7 @@ fn flights() -> Vec<Case> {
                 let work = move |_: &_| Happened::of(flight(scheme, speed, mass));
                 let expected = Expected::right("x = vt, velocity and energy kept, nothing touched");
                 let case = Case::new(format!("free/flight/{speed:e}/m={mass:e}/{name}"), expected, work);
-                cases.push(case.quick(mass == 1.0 || speed == 1.0));
+                cases.push(case.quick((mass - 1.0).abs() < 0.5 || (speed - 1.0).abs() < 0.5));
             }
         }
     }
@@ -144,7 +144,7 @@ fn impacts() -> Vec<Case> {
                         let name = format!(
                             "free/impact/{speed:e}/m={mass:e}/µ={friction}/w={along}/{scheme_name}/{solver_name}"
                         );
-                        let quick = mass == 1.0 && scheme == Scheme::ModalExact && solver != Solver::Film;
+                        let quick = (mass - 1.0).abs() < 0.5 && scheme == Scheme::ModalExact && solver != Solver::Film;
                         cases.push(Case::new(name, expected, work).quick(quick));
                     }
                 }

@@ -34,7 +34,12 @@ fn faults() -> Vec<Case> {
             Released { scheme, solver, turned: 0.0, ratio: 0.05005, told: 0.05 }.blade()
         }),
         case("damping-of-a-ring-10%", |scheme, _| decay::ring(scheme, 2, 0.055, 0.05)),
-        case("speed-1%", |scheme, solver| Pressed { scheme, solver, order: 3, speed: 1300.0, factor: 1.01 }.run()),
+        case("speed-1%", |scheme, solver| {
+            Pressed { scheme, solver, order: 3, speed: 1300.0, factor: 1.01, early: 0.0 }.run()
+        }),
+        case("rotor-a-step-early", |scheme, solver| {
+            Pressed { scheme, solver, order: 3, speed: 1300.0, factor: 1.0, early: 1.0 }.run()
+        }),
         case("load-a-step-early", |scheme, _| Travelling { scheme, order: 2, ratio: 0.3, early: 1.0 }.run()),
         case("slope-of-a-lobe-1%", |scheme, solver| Flank { scheme, solver, slope: 0.05, share: 1.01 }.run()),
         case("coupling-of-sectors-1%", |scheme, solver| {

@@ -24,7 +24,7 @@ use super::{
 /// Internal step (s).
 const STEP: f64 = 2e-6;
 /// How near the wave of λ comes to that of a blade without any scheme: its highest modes are followed coarsely.
-const BESIDE: f64 = 2e-3;
+const BESIDE: f64 = 5e-4;
 
 /// All of them.
 pub fn cases() -> Vec<Case> {
@@ -81,7 +81,7 @@ fn loads() -> Vec<Case> {
                 let work = move |_: &_| Happened::of(travelling.run());
                 let expected = Expected::right("amplitude and phase of the nodal diameter under the travelling load");
                 let case = Case::new(format!("turning/load/{order}/{ratio}/{name}"), expected, work);
-                cases.push(case.quick(order == 2 && ratio != 0.01));
+                cases.push(case.quick(order == 2 && ratio.abs() > 0.1));
             }
         }
     }
@@ -147,6 +147,8 @@ pub struct Pressed {
     pub speed: f64,
     /// The rotor in the scene turns faster by this factor: must be found out unless 1.
     pub factor: f64,
+    /// It is ahead by so many internal steps: must be found out.
+    pub early: f64,
 }
 
 fn lobes() -> Vec<Case> {
@@ -155,7 +157,7 @@ fn lobes() -> Vec<Case> {
         for (solver, solver_name) in SOLVERS {
             for order in [1, 3, 12, 40] {
                 for speed in [0.1, 50.0, 1300.0, -1300.0, 5000.0] {
-                    let pressed = Pressed { scheme, solver, order, speed, factor: 1.0 };
+                    let pressed = Pressed { scheme, solver, order, speed, factor: 1.0, early: 0.0 };
                     let work = move |_: &_| Happened::of(pressed.run());
                     let expected =
                         Expected::right("λ of every blade from the dynamic stiffness, over a pass of a lobe");
@@ -209,7 +211,8 @@ impl Pressed {
     fn own_stiffness(tower: &Tower, omega: f64) -> Complex<f64> {
         let rom = tower.rom();
         let (frequencies, shapes) = modes(&rom.mass, &rom.stiffness);
-        let seen = frequencies.iter().enumerate().map(|(index, own)| mode(*own, 0.1, omega) * shapes[(3, index)].powi(2));
+        let seen =
+            frequencies.iter().enumerate().map(|(index, own)| mode(*own, 0.1, omega) * shapes[(3, index)].powi(2));
         seen.sum::<Complex<f64>>().inv()
     }
 
@@ -223,6 +226,7 @@ impl Pressed {
         let (lobes, depth) = (f64::from(self.order), 2e-5);
         let omega = lobes * self.speed;
         let mut simulation = Simulation::new(&scene)?;
+        set(&mut simulation, "initial_rotor_angle", self.early * self.speed * step)?;
         simulation.initialise(0.0)?;
         let row = simulation.table().find("casing_radius_change").map_or(0, |row| row.reference);
         simulation.set_input_derivative(row, 1, -(GAP + depth) / 4e-3)?;
@@ -258,7 +262,11 @@ impl Pressed {
         // Massless-boundary takes most of the force a step late.
         if self.scheme != Scheme::MasslessBoundary {
             let bound = BESIDE + (omega * step).powi(2);
-            checks.push(Check::at_most("λ from the blade without any scheme", beside / (own.norm() * amplitude), bound));
+            checks.push(Check::at_most(
+                "λ from the blade without any scheme",
+                beside / (own.norm() * amplitude),
+                bound,
+            ));
         }
         Ok(checks)
     }
