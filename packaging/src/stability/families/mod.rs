@@ -8,6 +8,7 @@ pub mod gaps;
 pub mod heat;
 pub mod limits;
 pub mod loads;
+pub mod plates;
 pub mod proof;
 pub mod random;
 pub mod stepping;
@@ -30,6 +31,7 @@ pub fn all() -> Vec<Case> {
         turning::cases(),
         wheel::cases(),
         free::cases(),
+        plates::cases(),
         builtin::cases(),
         random::cases(),
         values::cases(),

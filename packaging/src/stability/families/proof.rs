@@ -7,8 +7,9 @@ use tiprub_core::settings::{Scheme, Solver};
 use super::{
     super::{Case, Check, Expected, Happened},
     decay::{self, Released},
-    free::{Balance, Impact},
+    free::Impact,
     heat::Heat,
+    plates::Balance,
     turning::{Flank, Pressed, Travelling},
     wheel::{Mirrored, Still},
 };
