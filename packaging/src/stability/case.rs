@@ -12,10 +12,10 @@ const TIME_LIMIT: f64 = 120.0;
 pub enum Expected {
     /// A right answer, and what it is held against.
     Right(String),
-    /// A refusal that contains all of these words.
-    Refused(Vec<String>),
-    /// Either; a refusal contains all of the words.
-    Either(String, Vec<String>),
+    /// A refusal that contains all words of one of these lists.
+    Refused(Vec<Vec<String>>),
+    /// Either; a refusal contains all words of one of the lists.
+    Either(String, Vec<Vec<String>>),
 }
 
 impl Expected {
@@ -26,23 +26,53 @@ impl Expected {
 
     /// A refusal that contains all of these words.
     pub fn refused<const N: usize>(words: [&str; N]) -> Self {
-        Self::Refused(words.map(String::from).to_vec())
+        Self::refused_as(&[&words])
+    }
+
+    /// A refusal that contains all words of one of these lists: where several are sound.
+    pub fn refused_as(lists: &[&[&str]]) -> Self {
+        Self::Refused(owned(lists))
     }
 
     /// A right answer or such a refusal.
     pub fn either<const N: usize>(against: impl Into<String>, words: [&str; N]) -> Self {
-        Self::Either(against.into(), words.map(String::from).to_vec())
+        Self::either_as(against, &[&words])
+    }
+
+    /// A right answer or a refusal that contains all words of one of these lists.
+    pub fn either_as(against: impl Into<String>, lists: &[&[&str]]) -> Self {
+        Self::Either(against.into(), owned(lists))
     }
 
     /// For tables.
     pub fn to_text(&self) -> String {
-        let named = |words: &[String]| format!("refusal naming {}", words.join(", "));
+        let named = |lists: &[Vec<String>]| {
+            let lists: Vec<String> = lists.iter().map(|words| words.join(", ")).collect();
+            format!("refusal naming {}", lists.join(" | "))
+        };
         match self {
             Self::Right(against) => against.clone(),
-            Self::Refused(words) => named(words),
-            Self::Either(against, words) => format!("{against}; or {}", named(words)),
+            Self::Refused(lists) => named(lists),
+            Self::Either(against, lists) => format!("{against}; or {}", named(lists)),
         }
     }
+}
+
+fn owned(lists: &[&[&str]]) -> Vec<Vec<String>> {
+    lists.iter().map(|words| words.iter().map(|word| (*word).to_owned()).collect()).collect()
+}
+
+/// What a refusal leaves unnamed, if none of the lists is named in full. An empty word names nothing.
+fn unnamed(message: &str, lists: &[Vec<String>]) -> Option<String> {
+    let named = |word: &String| !word.is_empty() && message.contains(word.as_str());
+    if lists.iter().any(|words| !words.is_empty() && words.iter().all(named)) {
+        return None;
+    }
+    let missing = |words: &Vec<String>| {
+        let missing: Vec<&str> = words.iter().filter(|word| !named(word)).map(String::as_str).collect();
+        missing.join(", ")
+    };
+    Some(lists.iter().map(missing).collect::<Vec<_>>().join(" | "))
 }
 
 /// One comparison: holds while `found` is a number and at most `bound`.
@@ -197,9 +227,8 @@ pub fn judge(expected: &Expected, happened: &Happened) -> (Verdict, String) {
     match (&happened.refusal, words) {
         (Some(message), None) => (Verdict::Wrong, format!("refused: {message}")),
         (Some(message), Some(words)) => {
-            let missing: Vec<&str> = words.iter().map(String::as_str).filter(|word| !message.contains(*word)).collect();
-            if !missing.is_empty() {
-                return (Verdict::Wrong, format!("refused without naming {}: {message}", missing.join(", ")));
+            if let Some(missing) = unnamed(message, words) {
+                return (Verdict::Wrong, format!("refused without naming {missing}: {message}"));
             }
             if !failed.is_empty() {
                 return (Verdict::Wrong, format!("{}; refused: {message}", failed.join("; ")));
@@ -318,6 +347,13 @@ mod tests {
         let refused = || Expected::refused(["µ", "h ="]);
         assert_eq!(verdict(refused(), Happened::refused("µ = 2 with h = 1 s")), Verdict::Refused);
         assert_eq!(verdict(refused(), Happened::refused("µ = 2")), Verdict::Wrong);
+        let several = || Expected::refused_as(&[&["µ", "h ="], &["load"]]);
+        assert_eq!(verdict(several(), Happened::refused("the load is 1e300")), Verdict::Refused);
+        assert_eq!(verdict(several(), Happened::refused("µ = 2")), Verdict::Wrong);
+        // Nothing named is nothing asked: no refusal counts.
+        for nothing in [Expected::refused([""]), Expected::refused([]), Expected::refused_as(&[])] {
+            assert_eq!(verdict(nothing, Happened::refused("no")), Verdict::Wrong);
+        }
         let answer = Happened::answer(vec![Check::so("a", true)]);
         assert_eq!(verdict(refused(), answer.clone()), Verdict::Wrong);
         let either = || Expected::either("x", ["µ"]);

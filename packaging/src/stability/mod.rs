@@ -4,6 +4,7 @@
 //! happened into a [`Verdict`]. Every case runs in a child process of this program with a time limit ([`child`]), so that a
 //! crash, an abort or a hang is seen as what it is. [`families`] holds the cases, [`table`] writes them down.
 
+pub mod bodies;
 pub mod case;
 pub mod child;
 pub mod families;

@@ -44,6 +44,20 @@ pub fn bits(simulation: &Simulation) -> Vec<u64> {
     outputs(simulation).into_iter().map(f64::to_bits).collect()
 }
 
+/// Of the radial displacement of the first ring of the 36 × 3 nodes of the casing: amplitudes of cos nθ and of sin nθ, and the
+/// largest rest at any node (m).
+pub fn amplitudes(simulation: &Simulation, order: u32) -> [f64; 3] {
+    let Some(row) = simulation.table().find("casing_displacement").map(|row| row.reference) else {
+        return [f64::NAN; 3];
+    };
+    let values: Vec<f64> = (0..36).map(|i| simulation.real(row + i).unwrap_or(f64::NAN)).collect();
+    let angle = |i: usize| f64::from(order) * std::f64::consts::TAU * i as f64 / 36.0;
+    let sum = |weight: &dyn Fn(f64) -> f64| values.iter().enumerate().map(|(i, u)| u * weight(angle(i))).sum::<f64>();
+    let [cosine, sine] = [sum(&f64::cos) / 18.0, sum(&f64::sin) / 18.0];
+    let rest = |(i, u): (usize, &f64)| (u - cosine * angle(i).cos() - sine * angle(i).sin()).abs();
+    [cosine, sine, values.iter().enumerate().map(rest).fold(0.0, f64::max)]
+}
+
 /// Largest of everything that should be small, over a run.
 #[derive(Debug, Clone)]
 pub struct Watch {

@@ -56,5 +56,37 @@ impl Error {
     }
 }
 
+/// A number as a user would write it: 1e308 has no three hundred zeros.
+pub(crate) fn number(value: f64) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-5..1e7).contains(&value.abs());
+    if plain { format!("{value}") } else { format!("{value:e}") }
+}
+
 /// Result of this floor.
 pub type Result<T, E = Error> = core::result::Result<T, E>;
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+
+    #[test]
+    fn numbers_stay_short_and_exact() {
+        for (value, text) in [
+            (0.0, "0"),
+            (-0.0, "-0"),
+            (2.1, "2.1"),
+            (-1e-5, "-0.00001"),
+            (9.5e-6, "9.5e-6"),
+            (1e7, "1e7"),
+            (-1e308, "-1e308"),
+            (5e-324, "5e-324"),
+            (f64::NAN, "NaN"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(number(value), text);
+            assert!(
+                number(value).parse::<f64>().is_ok_and(|parsed| parsed.to_bits() == value.to_bits() || value.is_nan())
+            );
+        }
+    }
+}

@@ -1,8 +1,10 @@
 //! Extreme cases: each ends in a right answer or in a refusal that says why.
 
 mod common;
+#[path = "common/features.rs"]
+mod features;
 
-use tiprub_core::settings::{Scheme, Shape};
+use tiprub_core::settings::{LoadSettings, Scheme, Shape};
 use tiprub_core::{Scene, Simulation};
 
 fn reference(simulation: &Simulation, name: &str) -> u32 {
@@ -72,6 +74,34 @@ fn casings_that_small_displacements_cannot_describe_are_refused() {
     let mut scene = common::scene(12);
     scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 4e-3, order: 300, phase: 0.0 };
     assert!(refusal(&scene).contains("45°"));
+}
+
+#[test]
+fn a_load_that_is_too_large_at_the_start_is_named_and_not_the_surface_it_folds() {
+    let mut scene = common::scene(12);
+    features::flexible(&mut scene);
+    for amplitude in [1e9, 1e12, 1e100, 1e200, 1e308] {
+        scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude, phase: 0.0 });
+        let message = refusal(&scene);
+        assert!(message.contains("initial state") && message.contains("loads"), "{amplitude:e}: {message}");
+    }
+}
+
+#[test]
+fn refusals_write_numbers_of_any_size_in_short() {
+    let mut scene = common::scene(12);
+    scene.settings.structures[0].damping_ratio = Some(1e308);
+    let message = refusal(&scene);
+    assert!(message.contains("damping_ratio: 1e308. Give"), "{message}");
+    scene.settings.structures[0].damping_ratio = None;
+    scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 4e-4, order: 100_000, phase: 0.0 };
+    let message = refusal(&scene);
+    assert!(message.contains("features of the casing shape 1.000e-5 rad wide"), "{message}");
+    // What is wrong is that entries are too far apart, not that stiffness is negative.
+    scene = common::scene(12);
+    scene.roms[0].mass[(2, 2)] = 1e-310;
+    let message = refusal(&scene);
+    assert!(message.contains("`mass` and `stiffness`") && message.contains("orders of magnitude"), "{message}");
 }
 
 #[test]

@@ -1,14 +1,20 @@
 //! The cases, family by family.
 
 pub mod builtin;
+pub mod decay;
+pub mod free;
 pub mod friction;
 pub mod gaps;
+pub mod heat;
 pub mod limits;
 pub mod loads;
+pub mod plates;
 pub mod proof;
 pub mod random;
 pub mod stepping;
+pub mod turning;
 pub mod values;
+pub mod wheel;
 
 use super::Case;
 
@@ -17,9 +23,15 @@ pub fn all() -> Vec<Case> {
     let families = [
         limits::cases(),
         friction::cases(),
+        heat::cases(),
         gaps::cases(),
         stepping::cases(),
         loads::cases(),
+        decay::cases(),
+        turning::cases(),
+        wheel::cases(),
+        free::cases(),
+        plates::cases(),
         builtin::cases(),
         random::cases(),
         values::cases(),

@@ -2,10 +2,63 @@
 
 use std::time::Duration;
 
-use super::super::{Case, Check, Expected, Happened};
+use tiprub_core::settings::{Scheme, Solver};
 
-/// One case per way to fail.
+use super::{
+    super::{Case, Check, Expected, Happened},
+    decay::{self, Released},
+    free::Impact,
+    heat::Heat,
+    plates::Balance,
+    turning::{Flank, Pressed, Travelling},
+    wheel::{Mirrored, Still},
+};
+
+/// All of them.
 pub fn cases() -> Vec<Case> {
+    [ways(), faults()].into_iter().flatten().collect()
+}
+
+/// Small faults of mechanics: what is run and what the closed form is told differ by them.
+fn faults() -> Vec<Case> {
+    let (scheme, solver) = (Scheme::ModalExact, Solver::Lcp);
+    let case = |name: &str, work: fn(Scheme, Solver) -> tiprub_core::Result<Vec<Check>>| {
+        Case::new(format!("judge/{name}"), Expected::right("what is not so"), move |_| {
+            Happened::of(work(scheme, solver))
+        })
+    };
+    vec![
+        case("damping-of-blades-10%", |scheme, solver| {
+            Released { scheme, solver, turned: 0.45, ratio: 0.055, told: 0.05 }.blade()
+        }),
+        case("damping-of-blades-0.1%", |scheme, solver| {
+            Released { scheme, solver, turned: 0.0, ratio: 0.05005, told: 0.05 }.blade()
+        }),
+        case("damping-of-a-ring-10%", |scheme, _| decay::ring(scheme, 2, 0.055, 0.05)),
+        case("speed-1%", |scheme, solver| {
+            Pressed { scheme, solver, order: 3, speed: 1300.0, factor: 1.01, early: 0.0 }.run()
+        }),
+        case("rotor-a-step-early", |scheme, solver| {
+            Pressed { scheme, solver, order: 3, speed: 1300.0, factor: 1.0, early: 1.0 }.run()
+        }),
+        case("load-a-step-early", |scheme, _| Travelling { scheme, order: 2, ratio: 0.3, early: 1.0 }.run()),
+        case("slope-of-a-lobe-1%", |scheme, solver| Flank { scheme, solver, slope: 0.05, share: 1.01 }.run()),
+        case("coupling-of-sectors-1%", |scheme, solver| {
+            Still { scheme, solver, sectors: 8, friction: 0.0, coupling: 8.08e6 }.run()
+        }),
+        case("wheel-not-mirrored", |scheme, solver| Mirrored { scheme, solver, sectors: 8, conjugate: false }.run()),
+        case("heat-1%", |scheme, solver| Heat { scheme, solver, friction: 0.15, speed: 1300.0, share: 1.01 }.run()),
+        case("impact-loses-momentum-1%", |scheme, solver| {
+            Impact { scheme, solver, speed: 1.0, mass: 1.0, friction: 0.15, along: 0.5, share: 1.01 }.run()
+        }),
+        case("momentum-1e-9", |scheme, solver| {
+            Balance { scheme, solver, friction: 0.15, speed: 1.0, share: 1.0 + 1e-9 }.run()
+        }),
+    ]
+}
+
+/// One way to fail each.
+fn ways() -> Vec<Case> {
     let right = || Expected::right("two and two are five");
     vec![
         Case::new("judge/wrong", right(), |_| Happened::answer(vec![Check::relative("2 + 2", 4.0, 5.0, 1e-9)])),

@@ -92,7 +92,7 @@ fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64)
             && variable.min.is_none_or(|min| value >= min)
             && variable.max.is_none_or(|max| value <= max);
         if !finite {
-            Expected::Refused(vec![variable.name.clone()])
+            Expected::refused([&variable.name])
         } else if variable.name == "casing_ramp_time" && value.abs() <= 1.0 {
             // Without a ramp some blades start inside the bumps.
             Expected::either(against, ["initial clearance"])
@@ -120,9 +120,9 @@ fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64)
     if variable.causality == Causality::Input {
         let owned = name.clone();
         let expected = if value.is_finite() {
-            Expected::either(against, [""])
+            Expected::either_as(against, &[&[&variable.name], &[word]])
         } else {
-            Expected::Refused(vec![variable.name.clone()])
+            Expected::refused([&variable.name])
         };
         let work = move |_: &Context| by_slope(scene, &owned, value);
         let case = Case::new(format!("values/{scene}/{name}/{text}/slope"), expected, work);
@@ -313,6 +313,33 @@ fn by_import(context: &Context, scene: &str, version: u8, variable: &str, value:
     outcome.unwrap_or_else(Happened::refused)
 }
 
+/// How a finite but extreme value of a setting may be refused: the field, and what is wrong or what to do.
+fn refusals(field: &str) -> &'static [&'static [&'static str]] {
+    match field {
+        "speed" => &[&["variable `speed`", "Use a lower speed"]],
+        "damping_ratio" => &[&["structure[1].damping_ratio", "between 0.0 and 0.99"]],
+        "frequency_factors" => &[&["structure[1].frequency_factors[4]", "between 0.5 and 2.0"]],
+        "gap" => &[&["contact[1].gap", "> 0"], &["contact.gap", "in metres"]],
+        "sector_gaps" => &[&["contact[1].sector_gaps", "> 0"], &["contact.gap", "in metres"]],
+        "friction" => &[&["contact[1].friction", "between 0.0 and 2.0"]],
+        "ramp_time" => &[
+            &["surface[1].ramp_time", "between 0.0 and 1e9"],
+            &["initial clearance", "start inside the casing", "ramp_time"],
+        ],
+        "time.step" => &[&["time.step", "between 1e-12 and 1.0"]],
+        "communication_step" => &[&["experiment.communication_step", "> 0"]],
+        "shape.depth" => &[&["surface.shape", "in metres"]],
+        "shape.width" => &[&["surface[1].shape.width", "between 0.001 and 0.25"]],
+        "rom.mass" => &[&["`mass`", "not positive definite"], &["`mass` and `stiffness`", "orders of magnitude"]],
+        "rom.stiffness" => &[
+            &["`mass` and `stiffness`", "orders of magnitude"],
+            &["`stiffness`", "not positive semidefinite"],
+            &["µ", "no unique solution", "Use no friction"],
+        ],
+        _ => &[],
+    }
+}
+
 /// Settings of a scene, which have no setter.
 fn settings() -> Vec<Case> {
     type Change = fn(&mut Scene, f64);
@@ -349,9 +376,9 @@ fn settings() -> Vec<Case> {
     for (field, word, change) in fields {
         for (text, value) in VALUES {
             let expected = if value.is_finite() {
-                Expected::either("finite, books that close", [""])
+                Expected::either_as("finite, books that close", refusals(field))
             } else {
-                Expected::Refused(vec![word.to_owned()])
+                Expected::refused([word])
             };
             let work = move |_: &Context| {
                 let mut scene = scene("bumps");

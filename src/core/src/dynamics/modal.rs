@@ -258,6 +258,13 @@ pub(super) fn check_semidefinite(smallest: f64, largest: f64, suffix: &str) -> R
     if smallest >= -1e-9 * largest {
         return Ok(());
     }
+    if !(smallest.is_finite() && largest.is_finite()) {
+        return Err(Error::invalid(
+            format!("ROM arrays `mass{suffix}` and `stiffness{suffix}`"),
+            "no finite frequencies: their entries are too large, or too many orders of magnitude apart",
+            "Check the units, and write the ROM again",
+        ));
+    }
     Err(Error::invalid(
         format!("ROM array `stiffness{suffix}`"),
         format!("not positive semidefinite: eigenvalue {smallest:.3e} rad²/s² at largest {largest:.3e}"),

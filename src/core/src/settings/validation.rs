@@ -6,6 +6,7 @@ use super::{
     CoatingSettings, ContactSettings, Motion, SceneSettings, Scheme, Shape, Solver, SplineSettings, StructureSettings,
     SurfaceSettings,
 };
+use crate::error::number;
 use crate::{Error, Result};
 
 impl SceneSettings {
@@ -337,14 +338,14 @@ const MAX_STRESS: f64 = 1e13;
 const MAX_CELLS: usize = 10_000_000;
 
 fn finite(field: &str, value: f64) -> Result<()> {
-    if value.is_finite() { Ok(()) } else { Err(Error::invalid(field, format!("{value}"), "Give a finite number")) }
+    if value.is_finite() { Ok(()) } else { Err(Error::invalid(field, number(value), "Give a finite number")) }
 }
 
 fn positive(field: &str, value: f64, unit: &str) -> Result<()> {
     if value.is_finite() && value > 0.0 {
         Ok(())
     } else {
-        Err(Error::invalid(field, format!("{value} {unit}"), "Give a finite value > 0"))
+        Err(Error::invalid(field, format!("{} {unit}", number(value)), "Give a finite value > 0"))
     }
 }
 
@@ -354,7 +355,7 @@ fn within(field: &str, value: f64, low: f64, high: f64) -> Result<()> {
     } else {
         let shown = |value: f64| if value.abs() < 1e7 { format!("{value:?}") } else { format!("{value:e}") };
         let remedy = format!("Give a value between {} and {}", shown(low), shown(high));
-        Err(Error::invalid(field, format!("{value}"), remedy))
+        Err(Error::invalid(field, number(value), remedy))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::drive::Input;
 use super::{Phase, Simulation};
+use crate::error::number;
 use crate::variables::{Causality, Kind, Quantity, Start, Variability, Variable};
 use crate::{Error, Result};
 
@@ -219,7 +220,7 @@ impl Simulation {
             return Err(Error::invalid(what, format!("order {order}"), "Inputs are linear in time: give order 1"));
         }
         if !value.is_finite() {
-            return Err(Error::invalid(what, format!("{value}"), "Give a finite number"));
+            return Err(Error::invalid(what, number(value), "Give a finite number"));
         }
         Ok(())
     }
@@ -252,7 +253,7 @@ fn check_range(variable: &Variable, value: f64) -> Result<()> {
         return Ok(());
     }
     let problem = if value.is_finite() {
-        format!("{value} is outside {low} … {high}")
+        format!("{} is outside {} … {}", number(value), number(low), number(high))
     } else {
         format!("{value} is not finite")
     };

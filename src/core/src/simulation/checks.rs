@@ -4,6 +4,7 @@ use super::Simulation;
 use super::compile::{Compiled, Roles};
 use crate::rom::Frame;
 use crate::settings::{Scheme, Solver, StructureSettings};
+use crate::system::StepFailure;
 use crate::{Error, Result, Rom, Scene};
 
 impl Compiled {
@@ -104,6 +105,27 @@ pub fn check_rom(structure: &StructureSettings, rom: &Rom) -> Result<()> {
 }
 
 impl Simulation {
+    /// Loads and speed at the start have displaced the structures already: by what small displacements can describe?
+    pub(super) fn check_initial_state(&self) -> Result<()> {
+        let Err(failure) = self.system.check_state() else { return Ok(()) };
+        let (what, remedy) = match failure {
+            StepFailure::CasingImplausible => (
+                "the casing is displaced at the start by more than a tenth of the radius of the contact nodes",
+                "Check the start values of its loads and temperatures; small displacements cannot describe this",
+            ),
+            StepFailure::NonFinite => (
+                "the displacements at the start are not finite",
+                "Check the start values of loads, temperatures and speed",
+            ),
+            _ => (
+                "blades are displaced at the start by more than a tenth of the radius of the contact nodes",
+                "Check the start value of the speed and the centrifugal loads of the ROM; small displacements cannot \
+                 describe this",
+            ),
+        };
+        Err(Error::invalid("initial state", what, remedy))
+    }
+
     /// A start in penetration would be an impact of arbitrary strength.
     pub(super) fn check_initial_gaps(&self) -> Result<()> {
         let lanes = self.system.bank().lanes();

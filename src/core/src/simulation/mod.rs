@@ -237,6 +237,7 @@ impl Simulation {
         self.settle(drive.speed);
         self.launch();
         self.system.start(&drive);
+        self.check_initial_state()?;
         self.check_initial_gaps()?;
         self.window.open(self.system.gaps());
         self.phase = Phase::Ready;

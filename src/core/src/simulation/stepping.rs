@@ -109,8 +109,8 @@ impl Simulation {
         Err(Error::invalid(
             "variable `speed`",
             format!(
-                "the rotor turns {turned:.3} rad in one internal step of {step:.3e} s at t = {} s, past features of the casing \
-                 shape {scale:.3} rad wide",
+                "the rotor turns {turned:.3e} rad in one internal step of {step:.3e} s at t = {} s, past features of the casing \
+                 shape {scale:.3e} rad wide",
                 self.time
             ),
             "Use a lower speed or a smaller internal_step_max",

@@ -1,0 +1,228 @@
+//! Free bodies whose flights and impacts can be written down: lumps in a row, springs between them, plates beside them.
+
+use nalgebra::DMatrix;
+use tiprub_core::{
+    Rom, Scene, Simulation,
+    rom::{ContactGrid, ContactNode, Frame, RomChecks, RomExtras},
+    settings::{
+        ContactSettings, ExperimentSettings, Motion, OutputSettings, SceneSettings, Scheme, Solver, StructureSettings,
+        SurfaceSettings, TimeSettings,
+    },
+};
+
+use super::observe::real;
+
+/// Half the side of the body (m), and half its width.
+pub const HALF: f64 = 0.02;
+/// Half the extent of a plate along y (m).
+pub const PLATE: f64 = 0.09;
+/// Nodes that move in one step by more than this could pass a surface unseen (m): a tenth of the body.
+pub const FURTHEST: f64 = 0.1 * 2.0 * HALF;
+
+/// Lumps in a row along x, the first at the left face and the last at the right one; four contact nodes on each of these faces.
+/// One lump is a rigid body without rotation: it has both faces.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Body {
+    /// Masses of the lumps (kg).
+    pub masses: Vec<f64>,
+    /// Stiffness of the springs between neighbours, each direction (N/m).
+    pub spring: f64,
+    /// Where the middle is (m).
+    pub centre: [f64; 3],
+    /// Stiffness of a spring from each lump to the ground (N/m): 0 for a body that is free.
+    pub ground: f64,
+}
+
+impl Body {
+    /// One lump at the origin.
+    pub fn rigid(mass: f64) -> Self {
+        Self { masses: vec![mass], spring: 0.0, centre: [0.0; 3], ground: 0.0 }
+    }
+
+    /// Lumps at the origin.
+    pub fn elastic(masses: &[f64], spring: f64) -> Self {
+        Self { masses: masses.to_vec(), spring, ..Self::rigid(1.0) }
+    }
+
+    /// With its middle elsewhere.
+    pub fn at(self, centre: [f64; 3]) -> Self {
+        Self { centre, ..self }
+    }
+
+    /// Mass of all of it (kg).
+    pub fn mass(&self) -> f64 {
+        self.masses.iter().sum()
+    }
+
+    fn rom(&self) -> Rom {
+        let (lumps, order) = (self.masses.len(), 3 * self.masses.len());
+        let mut stiffness = DMatrix::from_diagonal_element(order, order, self.ground);
+        for row in 0..order.saturating_sub(3) {
+            let next = row + 3;
+            stiffness[(row, row)] += self.spring;
+            stiffness[(next, next)] += self.spring;
+            stiffness[(row, next)] -= self.spring;
+            stiffness[(next, row)] -= self.spring;
+        }
+        let faces = [("left", -1.0, 0), ("right", 1.0, lumps - 1)];
+        let nodes: Vec<(String, [f64; 3], usize)> = faces
+            .iter()
+            .flat_map(|(name, side, lump)| {
+                (0..4).map(move |corner| {
+                    let sign = |bit: usize| if corner >> bit & 1 == 0 { -HALF } else { HALF };
+                    (format!("{name}_{corner}"), [side * HALF, sign(0), sign(1)], *lump)
+                })
+            })
+            .collect();
+        let map = DMatrix::from_fn(3 * nodes.len(), order, |row, column| {
+            f64::from(u8::from(3 * nodes[row / 3].2 + row % 3 == column))
+        });
+        let place = |place: [f64; 3]| std::array::from_fn(|i| self.centre[i] + place[i]);
+        rom(
+            "body",
+            DMatrix::from_fn(order, order, |i, j| if i == j { self.masses[i / 3] } else { 0.0 }),
+            stiffness,
+            map,
+            nodes.iter().map(|(name, at, _)| (name.clone(), place(*at))).collect(),
+        )
+    }
+}
+
+fn rom(
+    name: &str,
+    mass: DMatrix<f64>,
+    stiffness: DMatrix<f64>,
+    contact_map: DMatrix<f64>,
+    nodes: Vec<(String, [f64; 3])>,
+) -> Rom {
+    let node = |(name, position)| ContactNode { name, position, meridional_slope: 0.0 };
+    Rom {
+        name: name.into(),
+        origin: "lumps and springs".into(),
+        sectors: 1,
+        frame: Frame::Cartesian,
+        mass,
+        stiffness,
+        damping_ratio: 0.0,
+        contact_map,
+        contact_nodes: nodes.into_iter().map(node).collect(),
+        checks: RomChecks::default(),
+        extras: RomExtras::default(),
+    }
+}
+
+/// A plate beside the body: at x = −distance on the left, +distance on the right.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plate {
+    /// −1 left, 1 right.
+    pub side: f64,
+    /// From x = 0 (m), at the line nearest to the body.
+    pub distance: f64,
+    /// Radius of a cylinder about z (m); 0 for a flat plate.
+    pub radius: f64,
+    /// Stiffness of each node to the ground (N/m); 0 for a plate that does not give way.
+    pub stiffness: f64,
+}
+
+impl Plate {
+    /// Flat and rigid, to the left.
+    pub fn left(distance: f64) -> Self {
+        Self { side: -1.0, distance, radius: 0.0, stiffness: 0.0 }
+    }
+
+    /// Flat and rigid, to the right.
+    pub fn right(distance: f64) -> Self {
+        Self { side: 1.0, ..Self::left(distance) }
+    }
+
+    fn rom(self) -> Rom {
+        let [rows, columns] = [9, 5];
+        let centred = |index: usize, count: usize| (2.0 * index as f64 - (count - 1) as f64) / (count - 1) as f64;
+        let point = |row: usize, column: usize| {
+            // z runs so that S_t × S_s points to the body.
+            let (y, z) = (PLATE * centred(row, rows), -0.05 * self.side * centred(column, columns));
+            if self.radius == 0.0 {
+                return [self.side * self.distance, y, z];
+            }
+            let (sine, cosine) = (y / self.radius).sin_cos();
+            [self.side * (self.distance + self.radius * (1.0 - cosine)), self.radius * sine, z]
+        };
+        let nodes = (0..rows * columns).map(|node| (format!("p{node}"), point(node / columns, node % columns)));
+        let order = 3 * rows * columns;
+        let stiffness = if self.stiffness > 0.0 { self.stiffness } else { 1e7 };
+        let diagonal = |value: f64| DMatrix::from_diagonal_element(order, order, value);
+        let mut rom = rom("plate", diagonal(0.02), diagonal(stiffness), diagonal(1.0), nodes.collect());
+        rom.extras.grid = Some(ContactGrid { around: columns, along: rows, closed: false });
+        rom
+    }
+}
+
+/// A body thrown among plates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Throw {
+    /// The body.
+    pub body: Body,
+    /// Where it goes (m/s).
+    pub velocity: [f64; 3],
+    /// At most one on each side.
+    pub plates: Vec<Plate>,
+    /// Coefficient µ of all pairs.
+    pub friction: f64,
+    /// Scheme.
+    pub scheme: Scheme,
+    /// Solver.
+    pub solver: Solver,
+    /// Internal step and communication step (s).
+    pub step: f64,
+}
+
+impl Throw {
+    /// The scene.
+    pub fn scene(&self) -> Scene {
+        let name = |plate: &Plate| if plate.side < 0.0 { "left" } else { "right" };
+        let mut structures = vec![StructureSettings {
+            name: "body".into(),
+            rom: "body".into(),
+            motion: Motion::Free,
+            velocity: self.velocity,
+            ..StructureSettings::default()
+        }];
+        structures.extend(self.plates.iter().map(|plate| StructureSettings {
+            name: format!("{}_plate", name(plate)),
+            rom: "plate".into(),
+            motion: Motion::Still,
+            ..StructureSettings::default()
+        }));
+        let surface = |plate: &Plate| SurfaceSettings {
+            name: format!("{}_face", name(plate)),
+            structure: Some(format!("{}_plate", name(plate))),
+            rigid: plate.stiffness == 0.0,
+            ..SurfaceSettings::default()
+        };
+        let contact = |plate: &Plate| ContactSettings {
+            master: "body".into(),
+            slave: format!("{}_face", name(plate)),
+            nodes: Some(name(plate).into()),
+            friction: self.friction,
+            solver: self.solver,
+            ..ContactSettings::default()
+        };
+        let settings = SceneSettings {
+            name: "thrown".into(),
+            description: String::new(),
+            structures,
+            surfaces: self.plates.iter().map(surface).collect(),
+            contacts: self.plates.iter().map(contact).collect(),
+            time: TimeSettings { scheme: self.scheme, step: self.step },
+            outputs: OutputSettings::default(),
+            experiment: ExperimentSettings { start: 0.0, stop: 1.0, communication_step: self.step },
+        };
+        let plates = self.plates.iter().map(|plate| plate.rom());
+        Scene { settings, roms: std::iter::once(self.body.rom()).chain(plates).collect() }
+    }
+}
+
+/// Three components of an output.
+pub fn vector(simulation: &Simulation, name: &str) -> [f64; 3] {
+    ["x", "y", "z"].map(|axis| real(simulation, &format!("{name}_{axis}")))
+}

@@ -1,0 +1,222 @@
+//! Free vibration after a release: blades that a casing let go, rings that a load let go, against the decay of each mode.
+//!
+//! A structure at rest under a force that ends goes on from q₀ = q₋₁ = φᵀf/ω². Without force every scheme is a recurrence whose
+//! two roots ρe^(±iφ) are known: ρ = e^(−ξωh), φ = ω√(1 − ξ²)h where it is exact, those of central differences else. So
+//! q_n = ρⁿ(cos nφ + sin nφ (cos φ − ρ)/sin φ) q₀ to rounding, and the logarithmic decrement is 2π ln(1/ρ)/φ.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{DMatrix, DVector};
+use tiprub_core::{
+    Result, Simulation,
+    settings::{LoadSettings, Scheme, Solver},
+};
+
+use super::super::{
+    Case, Check, Expected, Happened,
+    models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, on_ring, round, with_methods, with_step},
+    observe::{amplitudes, real, set},
+    press::pressed,
+};
+
+/// How far the casing is pressed on before it lets go (m).
+const DEPTH: f64 = 5e-5;
+/// The motion is followed until this share of the slowest mode is left.
+const LEFT: f64 = 1e-4;
+
+/// All of them.
+pub fn cases() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (scheme, scheme_name) in SCHEMES {
+        for ratio in [1e-3, 0.005, 0.05, 0.3, 0.9] {
+            for (kind, turned) in [("straight", 0.0), ("turned", 0.45)] {
+                for (solver, solver_name) in SOLVERS {
+                    let released = Released { scheme, solver, turned, ratio, told: ratio };
+                    let work = move |_: &_| Happened::of(released.blade());
+                    let name = format!("decay/blade/{kind}/ξ={ratio}/{scheme_name}/{solver_name}");
+                    let expected = Expected::right("decay of every mode from the static place, step by step");
+                    let quick =
+                        solver == Solver::Lcp && ratio >= if scheme == Scheme::ModalExact { 0.005 } else { 0.05 };
+                    cases.push(Case::new(name, expected, work).quick(quick));
+                }
+            }
+            for order in [1, 2, 3, 4] {
+                let work = move |_: &_| Happened::of(ring(scheme, order, ratio, ratio));
+                let name = format!("decay/ring/{order}/ξ={ratio}/{scheme_name}");
+                let expected = Expected::right("decay of the nodal diameter from the static amplitude, step by step");
+                cases.push(Case::new(name, expected, work).quick(order == 2 && ratio >= 0.05));
+            }
+        }
+    }
+    cases
+}
+
+/// A blade with one node that is let go.
+#[derive(Debug, Clone, Copy)]
+pub struct Released {
+    /// Scheme.
+    pub scheme: Scheme,
+    /// Solver.
+    pub solver: Solver,
+    /// Turn of the principal axes of the base (rad).
+    pub turned: f64,
+    /// Damping ratio of the scene.
+    pub ratio: f64,
+    /// Damping ratio that the closed form is told: another one must be found out.
+    pub told: f64,
+}
+
+/// Decay of one mode from rest under a force that has just ended.
+struct Decay {
+    radius: f64,
+    angle: f64,
+    sine: f64,
+}
+
+impl Decay {
+    fn new(scheme: Scheme, frequency: f64, ratio: f64, step: f64) -> Self {
+        let (rate, angle) = (ratio * frequency * step, frequency * step);
+        let (radius, angle) = if scheme == Scheme::CentralDifference {
+            // Roots of (1 + ξωh) z² − (2 − ω²h²) z + (1 − ξωh).
+            let radius = ((1.0 - rate) / (1.0 + rate)).sqrt();
+            (radius, ((2.0 - angle * angle) / (2.0 * (1.0 + rate) * radius)).acos())
+        } else {
+            ((-rate).exp(), angle * (1.0 - ratio * ratio).sqrt())
+        };
+        Self { radius, angle, sine: (angle.cos() - radius) / angle.sin() }
+    }
+
+    /// Displacement after `n` steps without force, per displacement at rest.
+    fn at(&self, n: f64) -> f64 {
+        let (sine, cosine) = (n * self.angle).sin_cos();
+        self.radius.powf(n) * (cosine + self.sine * sine)
+    }
+
+    /// Steps until `share` of the motion is left.
+    fn steps(&self, share: f64) -> f64 {
+        (share.ln() / self.radius.ln()).ceil()
+    }
+}
+
+/// Modes of a pencil with diagonal mass: frequencies (rad/s) ascending, and mass-normalised shapes.
+pub fn modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
+    let order = mass.nrows();
+    let scale = |i: usize| 1.0 / mass[(i, i)].sqrt();
+    let eigen = DMatrix::from_fn(order, order, |i, j| scale(i) * stiffness[(i, j)] * scale(j)).symmetric_eigen();
+    let mut places: Vec<usize> = (0..order).collect();
+    places.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+    let shapes = DMatrix::from_fn(order, order, |i, j| scale(i) * eigen.eigenvectors[(i, places[j])]);
+    (places.iter().map(|place| eigen.eigenvalues[*place].sqrt()).collect(), shapes)
+}
+
+impl Released {
+    /// Press at rest, let go, and compare the node's displacement in every step.
+    ///
+    /// # Errors
+    /// The scene is refused.
+    pub fn blade(self) -> Result<Vec<Check>> {
+        let step = 2e-6;
+        let tower = Tower { sectors: 1, turned: self.turned, ..Tower::default() };
+        let mut scene = with_step(with_methods(round(tower.rom()), self.scheme, self.solver), step);
+        scene.settings.structures[0].damping_ratio = Some(self.ratio);
+        let rom = &scene.roms[0];
+        let (frequencies, shapes) = modes(&rom.mass, &rom.stiffness);
+        let seen = &rom.contact_map * &shapes;
+        let decays: Vec<Decay> =
+            frequencies.iter().map(|frequency| Decay::new(self.scheme, *frequency, self.told, step)).collect();
+        let mut simulation = Simulation::new(&scene)?;
+        simulation.initialise(0.0)?;
+        let settle = 30.0 / (self.ratio * frequencies[0]);
+        close(&mut simulation, settle)?;
+        // With the radial depth, λ along the normal of the sloped tip.
+        let length = (1.0 + tower.slope * tower.slope).sqrt();
+        let force = pressed(rom, 0.0, DEPTH).multipliers[0] / length;
+        let force = DVector::from_row_slice(&[-force, 0.0, tower.slope * force]);
+        let rest: Vec<f64> = (0..frequencies.len())
+            .map(|mode| seen.column(mode).dot(&force) / (frequencies[mode] * frequencies[mode]))
+            .collect();
+        let massless = self.scheme == Scheme::MasslessBoundary;
+        // Its highest modes have no inertia, and the force acts on the others one step longer.
+        let (moving, late) = if massless { (frequencies.len() - 3, 1.0) } else { (frequencies.len(), 0.0) };
+        let slowest = decays[..moving].iter().max_by(|a, b| a.radius.total_cmp(&b.radius));
+        let Some(slowest) = slowest else { return Ok(Vec::new()) };
+        let place = |n: f64, row: usize| -> f64 {
+            let n = (n - late).max(0.0);
+            (0..moving).map(|mode| seen[(row, mode)] * rest[mode] * decays[mode].at(n)).sum()
+        };
+        let scale = |n: f64| {
+            (0..moving).map(|mode| seen.column(mode).amax() * rest[mode].abs()).sum::<f64>() * slowest.radius.powf(n)
+        };
+        let row = |simulation: &Simulation, row: usize| simulation.system().bank().row(row, 0);
+        let found: [f64; 3] = std::array::from_fn(|i| row(&simulation, i));
+        let still = (0..3)
+            .map(|i| (0..frequencies.len()).map(|mode| seen[(i, mode)] * rest[mode]).sum::<f64>() - found[i])
+            .fold(0.0, |most: f64, off| most.max(off.abs()));
+        set(&mut simulation, "casing_radius_change", 2e-2)?;
+        let (mut off, mut n) = (0.0_f64, 0.0);
+        while n < slowest.steps(LEFT).max(10.0) {
+            simulation.do_step(simulation.time(), step)?;
+            n += 1.0;
+            for i in 0..3 {
+                off = off.max((row(&simulation, i) - place(n, i)).abs() / scale(n));
+            }
+        }
+        Ok(vec![
+            Check::at_most("place before the release from the static one", still / DEPTH, 1e-9),
+            Check::at_most("displacement from the decay of the modes, per what is left", off, 1e-6),
+            Check::so("something was left to see", n >= 10.0),
+        ])
+    }
+}
+
+/// Close over 2 ms and wait (s).
+fn close(simulation: &mut Simulation, settle: f64) -> Result<()> {
+    let Some(row) = simulation.table().find("casing_radius_change").map(|row| row.reference) else { return Ok(()) };
+    simulation.set_input_derivative(row, 1, -(GAP + DEPTH) / 2e-3)?;
+    simulation.do_step(0.0, 2e-3)?;
+    simulation.set_real(row, -(GAP + DEPTH))?;
+    let count = (settle / 0.05).ceil();
+    let mut done = 0.0;
+    while done < count {
+        simulation.do_step(simulation.time(), (settle / count / 2e-6).ceil() * 2e-6)?;
+        done += 1.0;
+    }
+    Ok(())
+}
+
+/// A ring under a nodal-diameter load that ends; damping `ratio` in the scene, `told` in the closed form.
+///
+/// # Errors
+/// The scene is refused.
+pub fn ring(scheme: Scheme, order: u32, ratio: f64, told: f64) -> Result<Vec<Check>> {
+    let step = 2e-6;
+    let mut scene = with_methods(round(Tower { slope: 0.0, ..Tower::default() }.rom()), scheme, Solver::Lcp);
+    on_ring(&mut scene, ratio);
+    scene.settings.structures[1].load = Some(LoadSettings { order, amplitude: 1e4, phase: 0.0 });
+    scene.settings.outputs.slave_displacement = true;
+    scene.settings.contacts[0].gap = 0.02;
+    let mut simulation = Simulation::new(&with_step(scene, step))?;
+    simulation.initialise(0.0)?;
+    let omega = TAU * [9000.0, 900.0, 400.0, 1100.0, 2100.0][order as usize];
+    let rest = 0.25 * 1e4 * PI * RADIUS / (omega * omega);
+    // Only contact modes of the blades lose their inertia.
+    let decay = Decay::new(scheme, omega, told, step);
+    set(&mut simulation, "casing_load_amplitude", 0.0)?;
+    let (mut off, mut across, mut n) = (0.0_f64, 0.0_f64, 0.0);
+    let last = decay.steps(LEFT).max(10.0);
+    let stride = (last / 3000.0).ceil();
+    while n < last {
+        simulation.do_step(simulation.time(), stride * step)?;
+        n += stride;
+        let [cosine, sine, _] = amplitudes(&simulation, order);
+        let scale = rest * decay.radius.powf(n);
+        off = off.max((cosine - rest * decay.at(n)).abs() / scale);
+        across = across.max(sine.abs() / scale);
+    }
+    let energy = real(&simulation, "energy_residual_relative").abs();
+    Ok(vec![
+        Check::at_most("amplitude from the decay of the mode, per what is left", off, 1e-6),
+        Check::at_most("amplitude across", across, 1e-6),
+        Check::at_most("ledger residual", energy, 1e-9),
+    ])
+}

@@ -1,0 +1,104 @@
+//! Friction heat again: ∫ µ λ |v| dt from recorded normal forces and places of the tips, which the ledger knows nothing of.
+//!
+//! A force that acts between t − h and t + h does its work over (x(t + h) − x(t − h))/2, Ωrh included.
+
+use std::f64::consts::TAU;
+
+use tiprub_core::{
+    Result, Simulation,
+    settings::{Scheme, Solver},
+};
+
+use super::super::{
+    Case, Check, Expected, Happened,
+    models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, round, with_methods, with_step},
+    observe::{real, set},
+};
+
+/// Internal step (s).
+const STEP: f64 = 1e-6;
+
+/// Blades that a casing touches twice.
+#[derive(Debug, Clone, Copy)]
+pub struct Heat {
+    /// Scheme.
+    pub scheme: Scheme,
+    /// Solver.
+    pub solver: Solver,
+    /// Coefficient µ.
+    pub friction: f64,
+    /// Speed (rad/s).
+    pub speed: f64,
+    /// The integral is told this share of µ: another than 1 must be found out.
+    pub share: f64,
+}
+
+/// All of them.
+pub fn cases() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (scheme, scheme_name) in SCHEMES {
+        for (solver, solver_name) in SOLVERS {
+            for friction in [1e-6, 0.15, 1.0, 2.0] {
+                for speed in [300.0, 1300.0, -1300.0, 1e5] {
+                    let heat = Heat { scheme, solver, friction, speed, share: 1.0 };
+                    let work = move |_: &_| Happened::of(heat.run());
+                    let expected = Expected::right("∫ µ λ |v| dt from forces and places, the integral of the power");
+                    let name = format!("friction/heat/µ={friction}/Ω={speed}/{scheme_name}/{solver_name}");
+                    let quick =
+                        scheme == Scheme::ModalExact || (solver == Solver::Lcp && (friction - 0.15).abs() < 0.1);
+                    cases.push(Case::new(name, expected, work).quick(quick && speed.abs() > 500.0 && speed < 1e4));
+                }
+            }
+        }
+    }
+    cases
+}
+
+impl Heat {
+    /// Rub, and add up.
+    ///
+    /// # Errors
+    /// The scene is refused.
+    pub fn run(self) -> Result<Vec<Check>> {
+        let tower = Tower { slope: 0.0, ..Tower::default() };
+        let mut scene = with_step(with_methods(round(tower.rom()), self.scheme, self.solver), STEP);
+        scene.settings.contacts[0].friction = self.friction;
+        scene.settings.structures[0].speed = self.speed;
+        scene.settings.structures[0].damping_ratio = Some(0.02);
+        let mut simulation = Simulation::new(&scene)?;
+        simulation.initialise(0.0)?;
+        let tips = |simulation: &Simulation| -> [f64; 12] {
+            std::array::from_fn(|sector| simulation.system().bank().row(1, sector))
+        };
+        let late = self.scheme == Scheme::MasslessBoundary;
+        let (mut before, mut oldest, mut forces) = ([0.0; 12], [0.0; 12], [0.0; 12]);
+        let (mut heat, mut power, mut reversed, mut touched) = (0.0, 0.0, f64::NEG_INFINITY, 0);
+        let travel = RADIUS * self.speed * STEP;
+        for index in 0..3200 {
+            // Twice onto the blades, and away at the end.
+            let swing = 0.5 - 0.5 * (TAU * f64::from(index.min(3000)) / 1500.0).cos();
+            set(&mut simulation, "casing_radius_change", -(GAP + 3e-5) * swing)?;
+            simulation.do_step(simulation.time(), STEP)?;
+            let now = tips(&simulation);
+            let found: [f64; 12] = std::array::from_fn(|sector| simulation.system().multiplier(0, sector));
+            // Massless-boundary: forces found in one step act over the next.
+            let acting = if late { forces } else { found };
+            for sector in 0..12 {
+                let slip = travel + 0.5 * (now[sector] - oldest[sector]);
+                heat += self.share * self.friction * acting[sector] * slip.abs();
+                if acting[sector] > 0.0 {
+                    reversed = reversed.max(-slip / travel);
+                }
+            }
+            touched += simulation.system().events().len();
+            power += STEP * real(&simulation, "friction_power");
+            (oldest, before, forces) = (before, now, found);
+        }
+        let booked = real(&simulation, "friction_loss");
+        Ok(vec![
+            Check::so("tips touched, and all slide one way", touched > 100 && reversed < 0.0),
+            Check::relative("friction loss from ∫ µ λ |v| dt", booked, heat, 1e-9),
+            Check::relative("integral of the friction power from it", power, heat, 1e-9),
+        ])
+    }
+}

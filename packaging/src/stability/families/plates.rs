@@ -1,0 +1,295 @@
+//! Free bodies among plates: balances of momentum and energy, left and right, edges, starts that are refused.
+
+use tiprub_core::{
+    Result,
+    settings::{Scheme, Solver},
+};
+
+use super::{
+    super::{
+        Case, Check, Expected, Happened,
+        bodies::{Body, HALF, PLATE, Plate, Throw, vector},
+        models::SOLVERS,
+        observe::{outputs, real},
+    },
+    free::{SCHEMES, STEP, apart, size, started, throw},
+};
+
+/// All of them.
+pub fn cases() -> Vec<Case> {
+    [balances(), mirrors(), edges(), starts()].into_iter().flatten().collect()
+}
+
+/// Between two plates that give way, one of them curved.
+#[derive(Debug, Clone, Copy)]
+pub struct Balance {
+    /// Scheme.
+    pub scheme: Scheme,
+    /// Solver.
+    pub solver: Solver,
+    /// Coefficient µ.
+    pub friction: f64,
+    /// Speed (m/s).
+    pub speed: f64,
+    /// The balance is told this share of the mass: another than 1 must be found out.
+    pub share: f64,
+}
+
+fn balances() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (scheme, scheme_name) in SCHEMES {
+        for (solver, solver_name) in SOLVERS {
+            for friction in [0.0, 0.15, 1.0] {
+                for speed in [0.01, 1.0, 10.0, 100.0] {
+                    let balance = Balance { scheme, solver, friction, speed, share: 1.0 };
+                    let work = move |_: &_| Happened::of(balance.run());
+                    // 100 m/s dent the plates by more than what counts as small.
+                    let expected = if speed > 50.0 {
+                        Expected::refused(["carries a surface is displaced", "Check positions and velocity"])
+                    } else {
+                        Expected::right("momentum and energy kept, forces of pairs add up, contact takes energy")
+                    };
+                    let name = format!("free/balance/µ={friction}/v={speed}/{scheme_name}/{solver_name}");
+                    cases.push(Case::new(name, expected, work).quick(scheme == Scheme::ModalExact && friction < 1.0));
+                }
+            }
+        }
+    }
+    cases
+}
+
+impl Balance {
+    /// Fly to and fro.
+    ///
+    /// # Errors
+    /// The scene is refused.
+    pub fn run(self) -> Result<Vec<Check>> {
+        let body = Body::elastic(&[0.1, 0.15, 0.05], 2e7);
+        let mass = body.mass() * self.share;
+        let gap = 30.4 * self.speed * STEP;
+        let left = Plate { stiffness: 1e7, ..Plate::left(HALF + gap) };
+        let right = Plate { stiffness: 3e7, radius: 0.18, ..Plate::right(HALF + 1.3 * gap) };
+        let velocity = [-self.speed, 0.5 * self.speed, 0.1 * self.speed];
+        let throw = Throw {
+            friction: self.friction,
+            scheme: self.scheme,
+            solver: self.solver,
+            ..throw(body, velocity, vec![left, right])
+        };
+        let mut simulation = started(&throw)?;
+        let (mut impulse, mut exchanged, mut off, mut sums) = ([0.0_f64; 3], 0.0_f64, 0.0_f64, 0.0_f64);
+        let (mut residual, mut fallen, mut before, mut finite) = (0.0_f64, 0.0_f64, 0.0, true);
+        let energy = 0.5 * mass * size(velocity).powi(2);
+        for _ in 0..400 {
+            simulation.do_step(simulation.time(), STEP)?;
+            let [force, first, second] =
+                ["force", "left_face.force", "right_face.force"].map(|name| vector(&simulation, name));
+            sums = sums.max(apart(force, std::array::from_fn(|i| first[i] + second[i])) / size(force).max(1e-300));
+            impulse = std::array::from_fn(|i| impulse[i] + STEP * force[i]);
+            exchanged += STEP * size(force);
+            let now = vector(&simulation, "body.velocity");
+            let change = std::array::from_fn(|i| mass * (now[i] - velocity[i]));
+            off = off.max(apart(change, impulse) / (exchanged + mass * self.speed));
+            residual = residual.max(real(&simulation, "energy_residual_relative").abs());
+            let lost = real(&simulation, "impact_loss");
+            (fallen, before) = (fallen.max((before - lost) / energy), lost);
+            finite &= outputs(&simulation).iter().all(|value| value.is_finite());
+        }
+        let curved = real(&simulation, "curvature_work");
+        let mut checks = vec![
+            Check::so("both plates were touched or one twice", exchanged > 1.05 * mass * self.speed),
+            Check::at_most("change of momentum from the impulse", off, 1e-12),
+            Check::at_most("forces of pairs from the sum", sums, 1e-12),
+            Check::at_most("energy residual", residual, 1e-10),
+            Check::so("all outputs finite", finite),
+        ];
+        if self.solver != Solver::Film {
+            checks.push(Check::at_most("impact loss falls by", fallen, 1e-9));
+        }
+        let held = real(&simulation, "kinetic_energy") + real(&simulation, "strain_energy");
+        checks.push(Check::at_most("energy gained beside curvature", (held - curved) / energy - 1.0, 1e-9));
+        Ok(checks)
+    }
+}
+
+fn mirrors() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (scheme, scheme_name) in SCHEMES {
+        for (solver, solver_name) in SOLVERS {
+            for friction in [0.0, 0.15, 0.5] {
+                let work = move |_: &_| Happened::of(symmetric(scheme, solver, friction));
+                let expected = Expected::right("left and right alike, no force across");
+                let name = format!("free/symmetric/µ={friction}/{scheme_name}/{solver_name}");
+                cases.push(Case::new(name, expected, work).quick(scheme == Scheme::ModalExact));
+            }
+        }
+    }
+    cases
+}
+
+/// A body 0.2 mm too wide on each side that is thrown between two cylinders.
+fn symmetric(scheme: Scheme, solver: Solver, friction: f64) -> Result<Vec<Check>> {
+    let plate = |side: f64| Plate { side, radius: 0.18, stiffness: 1e7, ..Plate::left(HALF - 2e-4) };
+    let body = Body::elastic(&[0.1, 0.1, 0.1], 2e7).at([0.0, 0.045, 0.0]);
+    let throw = Throw { friction, scheme, solver, ..throw(body, [0.0, -40.0, 0.0], vec![plate(-1.0), plate(1.0)]) };
+    let mut simulation = started(&throw)?;
+    let (mut off, mut largest, mut across, mut pushed) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+    for _ in 0..80 {
+        simulation.do_step(simulation.time(), 10.0 * STEP)?;
+        let row = |node: usize, i: usize| simulation.system().bank().row(3 * node + i, 0);
+        for node in 0..4 {
+            let sides = [row(node, 0) + row(node + 4, 0), row(node, 1) - row(node + 4, 1)];
+            off = sides.iter().fold(off, |most, side| most.max(side.abs()));
+            largest = largest.max(row(node, 0).abs());
+        }
+        across = across.max(vector(&simulation, "force")[0].abs());
+        pushed = pushed.max(vector(&simulation, "left_face.force")[0].abs());
+    }
+    // Gauss-Seidel goes through the contacts one by one and ends at its tolerance.
+    let bound = if solver == Solver::Coulomb && friction > 0.0 { 1e-7 } else { 1e-9 };
+    Ok(vec![
+        Check::so("it was squeezed", pushed > 100.0),
+        Check::at_most("places differ", off / largest, bound),
+        Check::at_most("force across", across / pushed, bound),
+    ])
+}
+
+fn edges() -> Vec<Case> {
+    let mut cases = Vec::new();
+    // From beyond the edge y = 0.09 m inwards, the face so far in front of the plate.
+    let beyond = PLATE + HALF + 1e-4;
+    for (solver, name) in SOLVERS {
+        for (what, front, velocity) in [
+            ("behind-0.2mm", -2e-4, [0.0, -40.0, 0.0]),
+            ("behind-0.2µm", -2e-7, [0.0, -40.0, 0.0]),
+            ("behind-0.2mm-fast", -2e-4, [0.0, -3000.0, 0.0]),
+            ("in-front", 3e-4, [0.0, -40.0, 0.0]),
+            ("in-front-by-1nm", 1e-9, [0.0, -40.0, 0.0]),
+            ("hits-the-edge", 1e-5, [-4.0, -40.0, 0.0]),
+        ] {
+            let expected = if front < 0.0 {
+                Expected::refused(["left_", "over the edge", "Extend the contact grid"])
+            } else if velocity[0] < 0.0 {
+                Expected::right("an impact: momentum balance, energy only lost")
+            } else {
+                Expected::right("passes without a force, velocity kept")
+            };
+            let work = move |_: &_| Happened::of(edge(solver, [0.0, beyond, 0.0], HALF + front, velocity));
+            cases.push(Case::new(format!("free/edge/{what}/{name}"), expected, work).quick(true));
+        }
+        for clearance in [1e-3, 1e-9, 1e-15] {
+            let expected = Expected::right("passes without a force, velocity kept");
+            let work = move |_: &_| Happened::of(edge(solver, [0.0; 3], HALF + clearance, [0.0, -40.0, 7.0]));
+            cases.push(Case::new(format!("free/grazing/{clearance:e}/{name}"), expected, work).quick(true));
+        }
+    }
+    cases
+}
+
+fn edge(solver: Solver, centre: [f64; 3], distance: f64, velocity: [f64; 3]) -> Result<Vec<Check>> {
+    let throw =
+        Throw { friction: 0.15, solver, ..throw(Body::rigid(0.3).at(centre), velocity, vec![Plate::left(distance)]) };
+    let mut simulation = started(&throw)?;
+    let (mut impulse, mut residual) = ([0.0_f64; 3], 0.0_f64);
+    for _ in 0..600 {
+        simulation.do_step(simulation.time(), STEP)?;
+        let force = vector(&simulation, "force");
+        impulse = std::array::from_fn(|i| impulse[i] + STEP * force[i]);
+        residual = residual.max(real(&simulation, "energy_residual_relative").abs());
+    }
+    let now = vector(&simulation, "body.velocity");
+    let change: [f64; 3] = std::array::from_fn(|i| 0.3 * (now[i] - velocity[i]));
+    let all = 0.3 * size(velocity);
+    let mut checks = vec![
+        Check::at_most("change of momentum from the impulse", apart(change, impulse) / all, 1e-12),
+        Check::at_most("energy residual", residual, 1e-12),
+        Check::at_most("energy gained", size(now) / size(velocity) - 1.0, 1e-12),
+    ];
+    checks.push(if velocity[0] < 0.0 {
+        Check::at_most("velocity into the plate", now[0].abs() / size(velocity), 1e-9)
+    } else {
+        Check::so("no force", size(impulse) == 0.0)
+    });
+    Ok(checks)
+}
+
+fn starts() -> Vec<Case> {
+    let rigid = || throw(Body::rigid(1.0), [-1.0, 0.0, 0.0], vec![Plate::left(0.021)]);
+    let elastic = || throw(Body::elastic(&[0.1, 0.2, 0.1], 1e7), [-1.0, 0.0, 0.0], vec![Plate::left(0.021)]);
+    let fastest = (1e7_f64 * (1.0 / 0.1 + 2.0 / 0.2)).sqrt();
+    let central = |factor: f64| Throw { scheme: Scheme::CentralDifference, step: factor * 2.0 / fastest, ..elastic() };
+    let refused: Vec<(&str, Throw, Expected)> = vec![
+        (
+            "inside",
+            Throw { plates: vec![Plate::left(0.0199)], ..rigid() },
+            Expected::refused(["4 contact nodes start inside", "Move one of the structures"]),
+        ),
+        (
+            "deep-inside",
+            Throw { plates: vec![Plate::left(-1.0)], ..rigid() },
+            Expected::refused(["start inside", "Move"]),
+        ),
+        (
+            "massless",
+            Throw { scheme: Scheme::MasslessBoundary, ..elastic() },
+            Expected::refused(["massless-boundary", "Use \"modal-exact\""]),
+        ),
+        (
+            "held",
+            Throw { body: Body { ground: 1e5, ..elastic().body }, ..elastic() },
+            Expected::refused(["the structure is held", "without supports"]),
+        ),
+        ("step-beyond-limit", central(1.001), Expected::refused(["central-difference", "ω_max", "internal step"])),
+        ("step-far-beyond-limit", central(30.0), Expected::refused(["central-difference", "ω_max", "internal step"])),
+        (
+            "infinite-velocity",
+            Throw { velocity: [f64::INFINITY, 0.0, 0.0], ..rigid() },
+            Expected::refused(["velocity", "finite"]),
+        ),
+        (
+            "NaN-velocity",
+            Throw { velocity: [0.0, f64::NAN, 0.0], ..rigid() },
+            Expected::refused(["velocity", "finite"]),
+        ),
+        ("no-mass", Throw { body: Body::rigid(0.0), ..rigid() }, Expected::refused(["mass", "not positive definite"])),
+        (
+            "negative-mass",
+            Throw { body: Body::rigid(-1.0), ..rigid() },
+            Expected::refused(["mass", "not positive definite"]),
+        ),
+        (
+            "too-much-friction",
+            Throw { friction: 2.1, ..rigid() },
+            Expected::refused(["friction", "between 0.0 and 2.0"]),
+        ),
+    ];
+    let case = |(name, throw, expected): (&str, Throw, Expected)| {
+        let work = move |_: &_| Happened::of(begin(&throw));
+        Case::new(format!("free/start/{name}"), expected, work).quick(true)
+    };
+    let mut cases: Vec<Case> = refused.into_iter().map(case).collect();
+    for factor in [0.9, 0.999] {
+        let throw = central(factor);
+        let expected = Expected::right("momentum balance near the step limit");
+        let work = move |_: &_| Happened::of(begin(&throw));
+        cases.push(Case::new(format!("free/start/step={factor}-of-limit"), expected, work).quick(true));
+    }
+    cases
+}
+
+/// A few hundred steps with their balance.
+fn begin(throw: &Throw) -> Result<Vec<Check>> {
+    let mut simulation = started(throw)?;
+    let (mut impulse, mut residual) = (0.0, 0.0_f64);
+    for _ in 0..300 {
+        simulation.do_step(simulation.time(), throw.step)?;
+        impulse += throw.step * real(&simulation, "force_x");
+        residual = residual.max(real(&simulation, "energy_residual_relative").abs());
+    }
+    let change = throw.body.mass() * (vector(&simulation, "body.velocity")[0] - throw.velocity[0]);
+    Ok(vec![
+        Check::so("it touched", impulse > 0.0),
+        Check::relative("change of momentum from the impulse", change, impulse, 1e-11),
+        Check::at_most("energy residual", residual, 1e-11),
+    ])
+}

@@ -1,0 +1,368 @@
+//! What turns: a rotor pressed into lobes, a load that travels around a ring, a blade on the flank of a lobe.
+//!
+//! Phases give away a speed or an instant that is off. Under a force of e^(iΩt) each mode answers as its recurrence
+//! q⁺ = (1 + β − κ) q − β q⁻ + c f does, Q = c F/(z − 1 − β + κ + β/z) with z = e^(iΩh): to rounding, and within (Ωh)² of
+//! F/(ω² − Ω² + 2iξωΩ), which is looked at as well since it knows nothing of the scheme.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::Complex;
+use tiprub_core::{
+    Result, Scene, Simulation,
+    settings::{LoadSettings, Scheme, Shape, Solver},
+};
+
+use super::{
+    super::{
+        Case, Check, Expected, Happened,
+        models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, on_ring, round, with_methods, with_step},
+        observe::{Watch, amplitudes, real, set},
+    },
+    decay::modes,
+};
+
+/// Internal step (s).
+const STEP: f64 = 2e-6;
+/// How near the wave of λ comes to that of a blade without any scheme: its highest modes are followed coarsely.
+const BESIDE: f64 = 5e-4;
+
+/// All of them.
+pub fn cases() -> Vec<Case> {
+    [loads(), lobes(), flanks()].into_iter().flatten().collect()
+}
+
+/// Recurrence of one mode as its formula says, not as the core holds it: (β, κ, c).
+fn recurrence(scheme: Scheme, frequency: f64, ratio: f64, step: f64) -> [f64; 3] {
+    let (rate, angle) = (ratio * frequency * step, frequency * step);
+    if scheme == Scheme::CentralDifference {
+        return [(1.0 - rate) / (1.0 + rate), angle * angle / (1.0 + rate), step * step / (1.0 + rate)];
+    }
+    let damped = angle * (1.0 - ratio * ratio).sqrt();
+    let kappa = (-rate).exp_m1().powi(2) + 4.0 * (-rate).exp() * (0.5 * damped).sin().powi(2);
+    [(-2.0 * rate).exp(), kappa, kappa / (frequency * frequency)]
+}
+
+/// Displacement per unit modal force, both as e^(iΩnh).
+fn response(scheme: Scheme, frequency: f64, ratio: f64, omega: f64, step: f64) -> Complex<f64> {
+    let [beta, kappa, compliance] = recurrence(scheme, frequency, ratio, step);
+    let z = Complex::from_polar(1.0, omega * step);
+    Complex::from(compliance) / (z - (1.0 + beta - kappa) + z.inv() * beta)
+}
+
+/// The same of the mode itself.
+fn mode(frequency: f64, ratio: f64, omega: f64) -> Complex<f64> {
+    Complex::new(frequency * frequency - omega * omega, 2.0 * ratio * frequency * omega).inv()
+}
+
+/// A load that travels around a ring.
+#[derive(Debug, Clone, Copy)]
+pub struct Travelling {
+    /// Scheme.
+    pub scheme: Scheme,
+    /// Nodal diameters.
+    pub order: u32,
+    /// Ω over the natural frequency, with the sense.
+    pub ratio: f64,
+    /// The load in the scene comes by so many internal steps too early: must be found out.
+    pub early: f64,
+}
+
+/// Natural frequency (rad/s) of the ring's nodal diameters.
+fn ring_frequency(order: u32) -> f64 {
+    TAU * [9000.0, 900.0, 400.0, 1100.0, 2100.0][order as usize]
+}
+
+fn loads() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (scheme, name) in SCHEMES {
+        for order in [1, 2, 3, 4] {
+            for ratio in [0.01, 0.3, 1.0, 1.7, 10.0, -0.3, -1.0, -1.7] {
+                let travelling = Travelling { scheme, order, ratio, early: 0.0 };
+                let work = move |_: &_| Happened::of(travelling.run());
+                let expected = Expected::right("amplitude and phase of the nodal diameter under the travelling load");
+                let case = Case::new(format!("turning/load/{order}/{ratio}/{name}"), expected, work);
+                cases.push(case.quick(order == 2 && ratio.abs() > 0.1));
+            }
+        }
+    }
+    cases
+}
+
+impl Travelling {
+    /// cos(nθ − Ωt) around the ring: wait, then compare over a turn.
+    ///
+    /// # Errors
+    /// The scene is refused.
+    pub fn run(self) -> Result<Vec<Check>> {
+        let (damping, load) = (0.05, 1e3);
+        let frequency = ring_frequency(self.order);
+        let omega = self.ratio * frequency;
+        let mut scene = with_methods(round(Tower { slope: 0.0, ..Tower::default() }.rom()), self.scheme, Solver::Lcp);
+        on_ring(&mut scene, damping);
+        scene.settings.structures[1].load = Some(LoadSettings { order: self.order, amplitude: load, phase: 0.0 });
+        scene.settings.outputs.slave_displacement = true;
+        scene.settings.contacts[0].gap = 0.02;
+        let mut simulation = Simulation::new(&with_step(scene, STEP))?;
+        set(&mut simulation, "casing_load_phase", self.early * omega * STEP)?;
+        simulation.initialise(0.0)?;
+        let row = simulation.table().find("casing_load_phase").map_or(0, |row| row.reference);
+        simulation.set_input_derivative(row, 1, omega)?;
+        let settle = (25.0 / (damping * frequency) / STEP).ceil() * STEP;
+        simulation.do_step(0.0, settle)?;
+        let force = 0.25 * load * PI * RADIUS;
+        let discrete = response(self.scheme, frequency, damping, omega, STEP) * force;
+        let exact = mode(frequency, damping, omega) * force;
+        let (mut off, mut beside, mut rest) = (0.0_f64, 0.0_f64, 0.0_f64);
+        let stride = (TAU / omega.abs() / STEP / 200.0).ceil();
+        for _ in 0..200 {
+            simulation.do_step(simulation.time(), stride * STEP)?;
+            let turned = Complex::from_polar(1.0, omega * simulation.time());
+            // cos and sin parts of cos(nθ − Ωt) are the real and the imaginary part of e^(iΩt).
+            let [cosine, sine, other] = amplitudes(&simulation, self.order);
+            off = off.max((Complex::new(cosine, sine) - discrete * turned).norm());
+            beside = beside.max((Complex::new(cosine, sine) - exact * turned).norm());
+            rest = rest.max(other);
+        }
+        let size = discrete.norm();
+        let fine = (omega.abs().max(frequency) * STEP).powi(2);
+        Ok(vec![
+            Check::at_most("wave from that of the recurrence", off / size, 1e-8),
+            Check::at_most("wave from that of the oscillator", beside / exact.norm(), fine / (2.0 * damping)),
+            Check::at_most("other shapes", rest / size, 1e-8),
+            Check::at_most("ledger residual", real(&simulation, "energy_residual_relative").abs(), 1e-9),
+        ])
+    }
+}
+
+/// A rotor all of whose blades are pressed on a casing with lobes.
+#[derive(Debug, Clone, Copy)]
+pub struct Pressed {
+    /// Scheme.
+    pub scheme: Scheme,
+    /// Solver.
+    pub solver: Solver,
+    /// Lobes.
+    pub order: u32,
+    /// Speed that the closed form is told (rad/s).
+    pub speed: f64,
+    /// The rotor in the scene turns faster by this factor: must be found out unless 1.
+    pub factor: f64,
+    /// It is ahead by so many internal steps: must be found out.
+    pub early: f64,
+}
+
+fn lobes() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (scheme, scheme_name) in SCHEMES {
+        for (solver, solver_name) in SOLVERS {
+            for order in [1, 3, 12, 40] {
+                for speed in [0.1, 50.0, 1300.0, -1300.0, 5000.0] {
+                    let pressed = Pressed { scheme, solver, order, speed, factor: 1.0, early: 0.0 };
+                    let work = move |_: &_| Happened::of(pressed.run());
+                    let expected =
+                        Expected::right("λ of every blade from the dynamic stiffness, over a pass of a lobe");
+                    let name = format!("turning/lobes/{order}/Ω={speed}/{scheme_name}/{solver_name}");
+                    cases.push(
+                        Case::new(name, expected, work).quick(solver == Solver::Lcp && order % 2 == 1 && speed > 1.0),
+                    );
+                }
+            }
+        }
+    }
+    cases
+}
+
+impl Pressed {
+    fn scene(self) -> (Tower, Scene, f64) {
+        // Hardly any tangential motion: the blade is where the rotor is.
+        let tower = Tower { sectors: 7, base: [4e7, 1e10, 2e7], tip: 2e8, slope: 0.0, ..Tower::default() };
+        let mut scene = with_step(with_methods(round(tower.rom()), self.scheme, self.solver), 5e-7);
+        // Lobes that move the tip by less acceleration than the pressure on it stands.
+        let lobes = f64::from(self.order);
+        let fast = (lobes * self.speed).abs();
+        let amplitude = 1e-6 / (1.0 + (fast / 2e4).powi(2)) / (1.0 + 0.1 * lobes);
+        scene.settings.surfaces[0].shape = Shape::Lobes { amplitude, order: self.order, phase: 0.4 };
+        scene.settings.structures[0].damping_ratio = Some(0.1);
+        scene.settings.structures[0].speed = self.speed * self.factor;
+        (tower, scene, amplitude)
+    }
+
+    /// λ at the beginning of a step per tip displacement at its end, as e^(ikΩt).
+    fn stiffness(self, tower: &Tower, step: f64, omega: f64) -> Complex<f64> {
+        let rom = tower.rom();
+        let (frequencies, shapes) = modes(&rom.mass, &rom.stiffness);
+        let z = Complex::from_polar(1.0, omega * step);
+        let moving = frequencies.len() - if self.scheme == Scheme::MasslessBoundary { 3 } else { 0 };
+        let compliance = |mode: usize| -> Complex<f64> {
+            let (frequency, seen) = (frequencies[mode], shapes[(3, mode)]);
+            let per_force = if self.scheme != Scheme::MasslessBoundary {
+                response(self.scheme, frequency, 0.1, omega, step) * z
+            } else if mode < moving {
+                response(self.scheme, frequency, 0.1, omega, step)
+            } else {
+                Complex::from(1.0 / (frequency * frequency))
+            };
+            per_force * (seen * seen)
+        };
+        (0..frequencies.len()).map(compliance).sum::<Complex<f64>>().inv()
+    }
+
+    /// λ per tip displacement of the same time, of the blade itself.
+    fn own_stiffness(tower: &Tower, omega: f64) -> Complex<f64> {
+        let rom = tower.rom();
+        let (frequencies, shapes) = modes(&rom.mass, &rom.stiffness);
+        let seen =
+            frequencies.iter().enumerate().map(|(index, own)| mode(*own, 0.1, omega) * shapes[(3, index)].powi(2));
+        seen.sum::<Complex<f64>>().inv()
+    }
+
+    /// Close, wait, compare over one lobe.
+    ///
+    /// # Errors
+    /// The scene is refused.
+    pub fn run(self) -> Result<Vec<Check>> {
+        let (tower, scene, amplitude) = self.scene();
+        let step = scene.settings.time.step;
+        let (lobes, depth) = (f64::from(self.order), 2e-5);
+        let omega = lobes * self.speed;
+        let mut simulation = Simulation::new(&scene)?;
+        set(&mut simulation, "initial_rotor_angle", self.early * self.speed * step)?;
+        simulation.initialise(0.0)?;
+        let row = simulation.table().find("casing_radius_change").map_or(0, |row| row.reference);
+        simulation.set_input_derivative(row, 1, -(GAP + depth) / 4e-3)?;
+        simulation.do_step(0.0, 4e-3)?;
+        simulation.set_real(row, -(GAP + depth))?;
+        simulation.do_step(simulation.time(), 2e-2)?;
+        let stiffness = self.stiffness(&tower, step, omega);
+        let at_rest = depth / (1.0 / tower.base[0] + 1.0 / tower.tip);
+        let mut watch = Watch::new(&scene);
+        // λ is the force at the beginning of its step.
+        let own = Self::own_stiffness(&tower, omega) * Complex::from_polar(1.0, -omega * step);
+        let (mut off, mut beside, mut open) = (0.0_f64, 0.0_f64, 0);
+        let stride = (TAU / omega.abs() / step / 100.0).clamp(1.0, 1e3).ceil();
+        for _ in 0..100 {
+            if stride > 1.0 {
+                simulation.do_step(simulation.time(), (stride - 1.0) * step)?;
+            }
+            watch.step(&mut simulation, step)?;
+            open += tower.sectors - simulation.system().events().len();
+            for event in simulation.system().events() {
+                // Tip −depth − A cos(kθ − φ) at the end of the step: pushed in where the casing is narrow.
+                let angle = lobes * TAU * event.sector as f64 / tower.sectors as f64 + omega * simulation.time() - 0.4;
+                let [wave, exact] = [stiffness, own].map(|force| (force * Complex::from_polar(amplitude, angle)).re);
+                off = off.max((event.normal - at_rest - wave).abs());
+                beside = beside.max((event.normal - at_rest - exact).abs());
+            }
+        }
+        let mut checks = vec![
+            Check::so("all blades in contact", open == 0),
+            Check::at_most("λ from the dynamic stiffness of the blade", off / (stiffness.norm() * amplitude), 1e-6),
+            watch.ledger(),
+        ];
+        // Massless-boundary takes most of the force a step late.
+        if self.scheme != Scheme::MasslessBoundary {
+            let bound = BESIDE + (omega * step).powi(2);
+            checks.push(Check::at_most(
+                "λ from the blade without any scheme",
+                beside / (own.norm() * amplitude),
+                bound,
+            ));
+        }
+        Ok(checks)
+    }
+}
+
+/// A blade that stands on the flank of a lobe; nothing turns, nothing rubs.
+#[derive(Debug, Clone, Copy)]
+pub struct Flank {
+    /// Scheme.
+    pub scheme: Scheme,
+    /// Solver.
+    pub solver: Solver,
+    /// Slope of the flank, ds/dθ/R.
+    pub slope: f64,
+    /// Share of the tangential part of the normal that the closed form is told: another than 1 must be found out.
+    pub share: f64,
+}
+
+fn flanks() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (scheme, scheme_name) in SCHEMES {
+        for (solver, solver_name) in SOLVERS {
+            for slope in [1e-6, -1e-3, 0.05, -0.3, 0.9, 1.1, -2.0] {
+                let flank = Flank { scheme, solver, slope, share: 1.0 };
+                let work = move |_: &_| Happened::of(flank.run());
+                let expected = if slope.abs() > 1.0 {
+                    Expected::refused(["45°"])
+                } else {
+                    Expected::right("static contact with the tilted normal, torque λ n_t r")
+                };
+                let name = format!("turning/flank/{slope}/{scheme_name}/{solver_name}");
+                cases.push(Case::new(name, expected, work).quick(solver == Solver::Lcp));
+            }
+        }
+    }
+    cases
+}
+
+impl Flank {
+    /// Place of the tip and λ at rest: the tip stands on s(θ), θ = u_t/R, pushed along the normal there.
+    fn at_rest(self, tower: &Tower, shape: impl Fn(f64) -> [f64; 2], depth: f64) -> [f64; 4] {
+        let flexible = [0, 1].map(|i| 1.0 / tower.base[i] + 1.0 / tower.tip);
+        let (mut tangential, mut radial, mut force, mut tilt) = (0.0, 0.0, 0.0, 0.0);
+        for _ in 0..200 {
+            let [height, slope] = shape(tangential / RADIUS);
+            let sideways = self.share * slope / RADIUS;
+            let length = (1.0 + sideways * sideways).sqrt();
+            tilt = sideways / length;
+            // u_r = −S_r λ/N must be at height − depth.
+            radial = height - depth;
+            force = -radial * length / flexible[0];
+            tangential = flexible[1] * force * tilt;
+        }
+        [radial, tangential, force, tilt]
+    }
+
+    /// Press slowly, come to rest, compare.
+    ///
+    /// # Errors
+    /// The scene is refused, or the flank is too steep.
+    pub fn run(self) -> Result<Vec<Check>> {
+        let tower = Tower { sectors: 1, base: [4e7, 4e7, 2e7], slope: 0.0, ..Tower::default() };
+        let mut scene = with_step(with_methods(round(tower.rom()), self.scheme, self.solver), 5e-7);
+        let (order, depth) = (30, 1e-5);
+        let lobes = f64::from(order);
+        // −A cos(kθ − π/2) = −A sin kθ: the slope at θ = 0 is −kA.
+        let amplitude = -self.slope * RADIUS / lobes;
+        let phase = 0.5 * PI;
+        scene.settings.surfaces[0].shape = Shape::Lobes { amplitude, order, phase };
+        scene.settings.structures[0].speed = 0.0;
+        scene.settings.structures[0].damping_ratio = Some(0.3);
+        let shape = |angle: f64| {
+            let (sine, cosine) = (lobes * angle - phase).sin_cos();
+            [-amplitude * cosine, amplitude * lobes * sine]
+        };
+        let mut simulation = Simulation::new(&scene)?;
+        simulation.initialise(0.0)?;
+        let row = simulation.table().find("casing_radius_change").map_or(0, |row| row.reference);
+        let mut watch = Watch::new(&scene);
+        simulation.set_input_derivative(row, 1, -(GAP + depth) / 4e-3)?;
+        watch.step(&mut simulation, 4e-3)?;
+        simulation.set_real(row, -(GAP + depth))?;
+        watch.step(&mut simulation, 2e-2)?;
+        let [radial, tangential, force, tilt] = self.at_rest(&tower, shape, depth);
+        let system = simulation.system();
+        let found = [0, 1].map(|row| system.bank().row(row, 0));
+        let sideways = system.events().first().map_or(f64::NAN, |event| event.force[1]);
+        Ok([
+            watch.books(),
+            vec![
+                Check::relative("λ from the static solution", system.multiplier(0, 0), force, 1e-6),
+                Check::at_most("radial place from the static one", (found[0] - radial).abs() / depth, 1e-6),
+                Check::at_most("tangential place from the static one", (found[1] / tangential - 1.0).abs(), 1e-6),
+                Check::relative("tangential force from λ n_t", sideways, force * tilt, 1e-6),
+            ],
+        ]
+        .concat())
+    }
+}

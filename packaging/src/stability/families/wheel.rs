@@ -1,0 +1,246 @@
+//! Coupled sectors whose waves have a sense: the whole wheel at rest under a few blades' forces, and the wheel in the mirror.
+//!
+//! A spring from each sector to the next acts along one direction here and along another one there, so that waves of both
+//! senses differ: an exchange of harmonics with their complex conjugates, of sectors or of senses is seen.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Complex, DMatrix, DVector};
+use tiprub_core::{
+    Result, Rom, Scene, Simulation,
+    rom::Harmonic,
+    settings::{Scheme, Shape, Solver},
+};
+
+use super::super::{
+    Case, Check, Expected, Happened,
+    models::{GAP, SCHEMES, SOLVERS, Tower, round, with_methods, with_step},
+    observe::{Watch, apart, displacements, set},
+};
+
+/// Stiffness of the spring from sector to sector (N/m).
+const COUPLING: f64 = 8e6;
+/// How far the casing is pressed on (m).
+const DEPTH: f64 = 5e-5;
+
+/// All of them.
+pub fn cases() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (scheme, scheme_name) in SCHEMES {
+        for (solver, solver_name) in SOLVERS {
+            let quick = solver == Solver::Lcp;
+            for sectors in [2, 3, 8, 12] {
+                for friction in [0.0, 0.3] {
+                    let still = Still { scheme, solver, sectors, friction, coupling: COUPLING };
+                    let name = format!("wheel/flexibility/{sectors}/µ={friction}/{scheme_name}/{solver_name}");
+                    let expected =
+                        Expected::right("static λ and every blade's place from the matrix of the whole wheel");
+                    let work = move |_: &_| Happened::of(still.run());
+                    cases.push(Case::new(name, expected, work).quick(quick && sectors == 8));
+                }
+                let mirrored = Mirrored { scheme, solver, sectors, conjugate: true };
+                let name = format!("wheel/mirrored/{sectors}/{scheme_name}/{solver_name}");
+                let expected = Expected::right("speed, shape and wheel mirrored: the mirrored answer");
+                let work = move |_: &_| Happened::of(mirrored.run());
+                cases.push(Case::new(name, expected, work).quick(quick && sectors > 2));
+            }
+        }
+    }
+    cases
+}
+
+/// Own stiffness of a sector, and that of a sector (rows) with the next (columns), base and tip by directions.
+fn blocks(tower: &Tower, coupling: f64) -> [DMatrix<f64>; 2] {
+    let here = DVector::from_row_slice(&[0.8, 0.5, 0.2, 0.0, 0.0, 0.0]);
+    let there = DVector::from_row_slice(&[0.0, 0.3, 0.4, 0.6, -0.3, 0.0]);
+    let own = tower.rom().stiffness + (&here * here.transpose() + &there * there.transpose()) * coupling;
+    [own, &here * there.transpose() * -coupling]
+}
+
+fn tower(sectors: usize) -> Tower {
+    Tower { sectors, turned: 0.2, ..Tower::default() }
+}
+
+/// The wheel as one pencil per nodal diameter; in the mirror sector s is sector −s, and tangential motion goes the other way.
+fn wheel(sectors: usize, mirrored: bool, conjugate: bool) -> Rom {
+    let tower = tower(sectors);
+    let [own, next] = blocks(&tower, COUPLING);
+    let mut rom = tower.rom();
+    let sign = |i: usize| if mirrored && i % 3 == 1 { -1.0 } else { 1.0 };
+    let pencil = |diameter: usize| -> DMatrix<Complex<f64>> {
+        let angle = TAU * diameter as f64 / sectors as f64;
+        let turn = Complex::new(angle.cos(), if 2 * diameter == sectors { 0.0 } else { angle.sin() });
+        let turn = if mirrored && conjugate { turn.conj() } else { turn };
+        DMatrix::from_fn(6, 6, |i, j| {
+            (turn * next[(i, j)] + turn.conj() * next[(j, i)] + own[(i, j)]) * (sign(i) * sign(j))
+        })
+    };
+    rom.stiffness = pencil(0).map(|value| value.re);
+    let complex = |matrix: &DMatrix<f64>| matrix.map(Complex::from);
+    let harmonic = |diameter: usize| Harmonic {
+        mass: complex(&rom.mass),
+        stiffness: pencil(diameter),
+        contact_map: complex(&rom.contact_map),
+    };
+    rom.extras.harmonics = (1..=sectors / 2).map(harmonic).collect();
+    rom
+}
+
+/// Some blades of a wheel pressed, the others free to follow.
+#[derive(Debug, Clone, Copy)]
+pub struct Still {
+    /// Scheme.
+    pub scheme: Scheme,
+    /// Solver.
+    pub solver: Solver,
+    /// Number of sectors.
+    pub sectors: usize,
+    /// Coefficient µ.
+    pub friction: f64,
+    /// Coupling that the closed form is told (N/m): another than that of the wheel must be found out.
+    pub coupling: f64,
+}
+
+impl Still {
+    /// Displacement of all tips per force on them, from the matrix of the whole wheel.
+    fn flexibility(self) -> DMatrix<f64> {
+        let (count, [own, next]) = (self.sectors, blocks(&tower(self.sectors), self.coupling));
+        let mut whole = DMatrix::zeros(6 * count, 6 * count);
+        for sector in 0..count {
+            let after = (sector + 1) % count;
+            for (row, column, block) in
+                [(sector, sector, own.clone()), (sector, after, next.clone()), (after, sector, next.transpose())]
+            {
+                let mut view = whole.view_mut((6 * row, 6 * column), (6, 6));
+                view += block;
+            }
+        }
+        let map =
+            DMatrix::from_fn(6 * count, 3 * count, |i, j| f64::from(u8::from(i / 6 == j / 3 && i % 6 == 3 + j % 3)));
+        let moved = whole.lu().solve(&map).unwrap_or_else(|| DMatrix::from_element(6 * count, 3 * count, f64::NAN));
+        map.transpose() * moved
+    }
+
+    /// Close, come to rest, compare.
+    ///
+    /// # Errors
+    /// The scene is refused.
+    pub fn run(self) -> Result<Vec<Check>> {
+        let pressed: Vec<usize> = (0..self.sectors).filter(|sector| [0, 3].contains(sector)).collect();
+        let rom = wheel(self.sectors, false, true);
+        let slope = rom.contact_nodes[0].meridional_slope;
+        let mut scene = with_step(with_methods(round(rom), self.scheme, self.solver), 2e-6);
+        scene.settings.contacts[0].friction = self.friction;
+        scene.settings.contacts[0].sector_gaps =
+            (0..self.sectors).map(|sector| if pressed.contains(&sector) { GAP } else { 10.0 * GAP }).collect();
+        scene.settings.structures[0].damping_ratio = Some(0.3);
+        let mut simulation = Simulation::new(&scene)?;
+        simulation.initialise(0.0)?;
+        let mut watch = Watch::new(&scene);
+        for index in 0..20_000 {
+            let share = (f64::from(index) / 2000.0).min(1.0);
+            set(&mut simulation, "casing_radius_change", -(GAP + DEPTH) * share * share * (3.0 - 2.0 * share))?;
+            watch.step(&mut simulation, 2e-6)?;
+        }
+        let length = (1.0 + slope * slope).sqrt();
+        let normal = [-1.0 / length, 0.0, slope / length];
+        let push = [normal[0], -self.friction, normal[2]];
+        let flexible = self.flexibility();
+        let count = pressed.len();
+        let delassus = DMatrix::from_fn(count, count, |i, j| {
+            let block = flexible.view((3 * pressed[i], 3 * pressed[j]), (3, 3));
+            (0..3).map(|a| (0..3).map(|b| normal[a] * block[(a, b)] * push[b]).sum::<f64>()).sum()
+        });
+        let Some(exact) = delassus.lu().solve(&DVector::from_element(count, DEPTH / length)) else {
+            return Ok(vec![Check::so("there is a static solution", false)]);
+        };
+        let mut force = DVector::zeros(3 * self.sectors);
+        for (sector, value) in pressed.iter().zip(exact.iter()) {
+            (0..3).for_each(|i| force[3 * sector + i] = value * push[i]);
+        }
+        let place = &flexible * force;
+        let system = simulation.system();
+        let off =
+            pressed.iter().zip(exact.iter()).map(|(sector, exact)| (system.multiplier(0, *sector) / exact - 1.0).abs());
+        let moved = |row: usize| system.bank().row(row % 3, row / 3) - place[row];
+        Ok([
+            watch.books_of(self.scheme),
+            vec![
+                Check::so(
+                    "these blades touch and no others",
+                    system.events().len() == count && exact.iter().all(|v| *v > 0.0),
+                ),
+                Check::at_most("λ from the static solution", off.fold(0.0, f64::max), 1e-8),
+                Check::at_most(
+                    "place of any blade from the static one",
+                    (0..3 * self.sectors).map(|row| moved(row).abs()).fold(0.0, f64::max) / DEPTH,
+                    1e-8,
+                ),
+            ],
+        ]
+        .concat())
+    }
+}
+
+/// A rub and the same in the mirror.
+#[derive(Debug, Clone, Copy)]
+pub struct Mirrored {
+    /// Scheme.
+    pub scheme: Scheme,
+    /// Solver.
+    pub solver: Solver,
+    /// Number of sectors.
+    pub sectors: usize,
+    /// The mirrored wheel has the complex conjugate harmonics; without it must be found out.
+    pub conjugate: bool,
+}
+
+impl Mirrored {
+    fn scene(self, mirrored: bool) -> Scene {
+        let sense = if mirrored { -1.0 } else { 1.0 };
+        let rom = wheel(self.sectors, mirrored, self.conjugate);
+        let mut scene = with_step(with_methods(round(rom), self.scheme, self.solver), 1e-6);
+        scene.settings.structures[0].speed = 1300.0 * sense;
+        scene.settings.structures[0].damping_ratio = Some(0.02);
+        scene.settings.contacts[0].friction = 0.15;
+        let shape = Shape::Lobes { amplitude: 0.3 * GAP, order: 1, phase: 0.7 * sense };
+        scene.settings.surfaces[0].shape = shape;
+        scene
+    }
+
+    /// Close on the blades and follow them for 1.5 ms.
+    fn history(self, mirrored: bool) -> Result<(Vec<f64>, u64)> {
+        let scene = self.scene(mirrored);
+        let mut simulation = Simulation::new(&scene)?;
+        simulation.initialise(0.0)?;
+        let mut watch = Watch::new(&scene);
+        let mut history = Vec::new();
+        for index in 0..1500 {
+            let share = (f64::from(index) / 800.0).min(1.0);
+            set(&mut simulation, "casing_radius_change", -0.9 * GAP * share * share * (3.0 - 2.0 * share))?;
+            watch.step(&mut simulation, 1e-6)?;
+            if index % 10 == 0 {
+                let places = displacements(&simulation);
+                let seen = |sector: usize| if mirrored { (self.sectors - sector) % self.sectors } else { sector };
+                for sector in 0..self.sectors {
+                    let [radial, tangential, axial] = std::array::from_fn(|i| places[3 * seen(sector) + i]);
+                    history.extend([radial, if mirrored { -tangential } else { tangential }, axial]);
+                }
+            }
+        }
+        Ok((history, watch.contacts))
+    }
+
+    /// Run both and compare.
+    ///
+    /// # Errors
+    /// The scene is refused.
+    pub fn run(self) -> Result<Vec<Check>> {
+        let (first, contacts) = self.history(false)?;
+        let (second, _) = self.history(true)?;
+        Ok(vec![
+            Check::so("blades touched", contacts > 100),
+            Check::at_most("displacements from the mirrored ones", apart(&second, &first), 1e-8),
+        ])
+    }
+}
