@@ -40,9 +40,9 @@ const DECAY_TIMES: f64 = 5.0;
 const LEAST_TRANSIENT: usize = 20;
 const MOST_TRANSIENT: usize = 400;
 const QUICK_TRANSIENT: usize = 40;
-/// Modes in the map, and room above the last one.
+/// Modes in the map, and room above the last one: a response that leans to higher speeds leans to higher frequencies.
 const MODES: usize = 3;
-const ABOVE: f64 = 1.1;
+const ABOVE: f64 = LEAN;
 /// Sampling rate relative to the highest frequency of the map; see [`spectrum::Decimator`].
 const OVERSAMPLING: f64 = 8.0;
 /// Order of the casing's base order at whose resonance the range of speeds lies.
