@@ -37,7 +37,7 @@ pub fn scene() -> Figure {
     for set in ["CORNERS_LEFT", "CORNERS_RIGHT"] {
         marks.extend(cube.sets[set].iter().map(|&node| cube.nodes[node]));
     }
-    let view = View::of_blade(&whole, 0.5, 0.5);
+    let view = View::of_blade(&whole, 1.1, 0.45);
     let svg = picture::draw(&whole, None, &marks, &Frame::around(&whole, &view, 0.05), &view);
     let mut sheet = Sheet::new(["x (m)", "y (m)", "z (m)"]);
     sheet.rows = marks.iter().map(|place| place.to_vec()).collect();
