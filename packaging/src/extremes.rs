@@ -22,40 +22,27 @@ pub struct Extreme {
 
 /// Those of the variables that a recording has: forces, clearance, contacts.
 pub fn extremes(recording: &Recording) -> Vec<Extreme> {
-    let rows = || recording.times.iter().copied();
-    let found = |name, text, unit, values: Option<Vec<f64>>, before: fn(f64, f64) -> bool| {
-        let (value, time) =
-            values?.into_iter().zip(rows()).reduce(|best, next| if before(next.0, best.0) { next } else { best })?;
+    // The largest of a column, or with `sense` −1 the smallest, and when it is reached first.
+    let found = |name, text, unit, sense: f64, values: Option<Vec<f64>>| {
+        let values = values?.into_iter().zip(recording.times.iter().copied());
+        let further = |best: (f64, f64), next: (f64, f64)| if sense * (next.0 - best.0) > 0.0 { next } else { best };
+        let (value, time) = values.reduce(further)?;
         Some(Extreme { name, text, unit, value, time })
     };
-    let (above, below): (fn(f64, f64) -> bool, fn(f64, f64) -> bool) = (|a, b| a > b, |a, b| a < b);
-    [
-        found(
-            "largest_total_normal_force",
-            "largest normal force of all contact nodes together, mean over a communication step",
-            "N",
-            total_normal_force(recording),
-            above,
-        ),
-        found(
-            "largest_node_normal_force",
-            "largest normal force of one contact node in an internal step",
-            "N",
-            recording.column("normal_force_peak"),
-            above,
-        ),
-        found("smallest_clearance", "smallest clearance", "m", recording.column("clearance_minimum"), below),
-        found(
-            "most_contacts",
-            "most contact nodes touching at a communication point",
-            "",
-            recording.column("contact_count"),
-            above,
-        ),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
+    let [total, one, least, most] = [
+        "largest normal force of all contact nodes together, mean over a communication step",
+        "largest normal force of one contact node in an internal step",
+        "smallest clearance",
+        "most contact nodes touching at a communication point",
+    ];
+    let column = |name: &str| recording.column(name);
+    let all = [
+        found("largest_total_normal_force", total, "N", 1.0, total_normal_force(recording)),
+        found("largest_node_normal_force", one, "N", 1.0, column("normal_force_peak")),
+        found("smallest_clearance", least, "m", -1.0, column("clearance_minimum")),
+        found("most_contacts", most, "", 1.0, column("contact_count")),
+    ];
+    all.into_iter().flatten().collect()
 }
 
 /// Impulse of every communication step over its length (N); 0 at the start.
