@@ -27,8 +27,8 @@ const SCENE: &str = "builtin:rotor37";
 /// Angular velocities, relative to the one at which the second harmonic of the casing meets the first mode: a fifth to both
 /// sides, and above it room for what leans to higher speeds (see [`LEAN`]).
 const RANGE: [f64; 2] = [0.8, 1.2 * LEAN];
-/// Every crossing up to a fifth above the middle has this much of its own speed above it: in rubbing blades of rotor 37 the
-/// largest response lies at 1.18.
+/// Every crossing up to a fifth above the middle has this much of its own speed above it, which is as far as rotor 37 was seen to
+/// lean; the middle itself has more.
 const LEAN: f64 = 1.25;
 const COUNT: usize = 141;
 const QUICK_COUNT: usize = 8;
