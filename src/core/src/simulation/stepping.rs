@@ -113,7 +113,7 @@ impl Simulation {
         Err(Error::invalid(
             "variable `speed`",
             format!(
-                "the rotor turns {turned:.3} rad in one internal step of {step:.3e} s at t = {} s, past features of the casing \
+                "the rotor turns {turned:.3e} rad in one internal step of {step:.3e} s at t = {} s, past features of the casing \
                  shape {scale:.3} rad wide",
                 shown(self.time)
             ),
