@@ -237,8 +237,8 @@ pub struct StudyArguments {
     #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true)]
     pub speed: Option<f64>,
     /// Of `stage` and `map`: angular velocities (rad/s), from, to and how many [default: of `stage` 0.5 to 1.5 times the one
-    /// where an oval casing meets the first mode of nodal diameter 2; of `map` 81 from 0.8 to 1.2 times the one where twice the
-    /// casing's lowest engine order meets the first mode].
+    /// where an oval casing meets the first mode of nodal diameter 2; of `map` 141 from 0.8 to 1.5 times the one where twice the
+    /// casing's lowest engine order meets the first mode, where the model holds].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = speeds)]
     pub speeds: Option<Speeds>,
     /// Of `stage` and `map`: runs at the same time [default: one per processor].
@@ -302,7 +302,7 @@ pub struct StabilityArguments {
     /// Cases at the same time [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
-    /// Also write the table into this chapter of the guide, below what stands there.
+    /// Also write the table into this chapter of the guide, below the line that marks its place; not with --case.
     #[arg(long, value_name = "FILE")]
     pub chapter: Option<PathBuf>,
     /// FMU library for the cases that import FMUs, instead of the one found or built.

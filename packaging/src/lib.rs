@@ -23,6 +23,7 @@ pub mod commands;
 pub mod console;
 pub mod cube_models;
 pub mod error_study;
+pub mod extremes;
 pub mod failure;
 pub mod file_arguments;
 pub mod fmu;

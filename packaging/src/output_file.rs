@@ -18,6 +18,25 @@ pub fn create_directory(path: &Path) -> Result<()> {
     fs::create_dir_all(path).map_err(|error| Failure::file(path, "cannot create the directory", &error))
 }
 
+/// Whether files can be written into the directory, made for the trial if it is not there: so that long work does not end at a
+/// wrong path. Nothing stays.
+///
+/// # Errors
+/// The directory cannot be made, or not be written to.
+pub fn try_directory(path: &Path) -> Result<()> {
+    let named = path.ancestors().filter(|ancestor| !ancestor.as_os_str().is_empty());
+    let missing: Vec<&Path> = named.take_while(|ancestor| !ancestor.exists()).collect();
+    let trial = create_directory(path).and_then(|()| {
+        let file = tempfile::Builder::new().prefix(".tiprub-").suffix(".part").tempfile_in(path);
+        file.map(drop).map_err(|error| Failure::file(path, "cannot write there", &error))
+    });
+    for made in missing {
+        // Those that were not made are not there.
+        let _ = fs::remove_dir(made);
+    }
+    trial
+}
+
 /// What already is under the name of a target.
 enum Place {
     /// Nothing, or a file to replace, at this path (symbolic links resolved).
@@ -197,6 +216,25 @@ mod tests {
         refuse_to_replace(&target, "old", "Move it").unwrap();
         let failure = refuse_to_replace(&target, "new", "Move it").unwrap_err();
         assert!(failure.what.ends_with("scene.toml") && failure.remedy == "Move it", "{failure}");
+    }
+
+    #[test]
+    fn a_directory_is_tried_and_nothing_stays() {
+        let root = tempfile::tempdir().unwrap();
+        try_directory(&root.path().join("a/b")).unwrap();
+        assert_eq!(names(root.path()).len(), 0);
+        fs::create_dir(root.path().join("there")).unwrap();
+        try_directory(&root.path().join("there")).unwrap();
+        assert_eq!(names(root.path()), ["there"]);
+        assert_eq!(names(&root.path().join("there")).len(), 0);
+        fs::write(root.path().join("file"), "").unwrap();
+        for bad in ["file", "file/inside"] {
+            let failure = try_directory(&root.path().join(bad)).unwrap_err();
+            assert!(failure.problem.contains("cannot create the directory"), "{failure}");
+        }
+        // Made, but not to be written into: no file system takes files there.
+        #[cfg(target_os = "linux")]
+        assert!(try_directory(Path::new("/proc/self")).unwrap_err().problem.contains("cannot write there"));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::{cell::RefCell, fs, path::Path};
 
-use tiprub_core::{Rom, Scene};
+use tiprub_core::{Rom, Scene, settings::SceneSettings};
 
 use crate::{Failure, Result, builtin, console::Console, rom_cache::RomCache};
 
@@ -34,15 +34,38 @@ pub const BUILTIN: &str = "builtin:";
 /// Missing or wrong files, naming file, line, field and remedy.
 pub fn load(argument: &str, cache: &RomCache, console: &Console) -> Result<Scene> {
     let reduce = |name: &str| Some(builtin::rom(name, cache, console)?.map_err(|failure| failure.to_string()));
+    match source(argument)? {
+        Source::Embedded(text) => builtin_scene(argument, text, &reduce),
+        Source::File(path) => tiprub_format::load_scene(path, &reduce).map_err(Failure::from),
+    }
+}
+
+/// What [`load`] would load, without its models: nothing is reduced.
+///
+/// # Errors
+/// As [`load`], but for the models.
+pub fn settings(argument: &str) -> Result<SceneSettings> {
+    Ok(match source(argument)? {
+        Source::Embedded(text) => tiprub_format::parse_scene(text, argument)?,
+        Source::File(path) => tiprub_format::load_settings(path)?,
+    })
+}
+
+/// Where a scene is.
+enum Source<'a> {
+    /// One of [`BUILTIN_SCENES`].
+    Embedded(&'static str),
+    File(&'a Path),
+}
+
+fn source(argument: &str) -> Result<Source<'_>> {
     if let Some(name) = argument.strip_prefix(BUILTIN) {
-        return match BUILTIN_SCENES.iter().find(|(known, _)| *known == name) {
-            Some((_, text)) => builtin_scene(argument, text, &reduce),
-            None => {
-                let names: Vec<String> = BUILTIN_SCENES.iter().map(|(known, _)| format!("{BUILTIN}{known}")).collect();
-                let problem = format!("there is no built-in scene `{name}`");
-                Err(Failure::usage("SCENE", problem, format!("Give a scene file, or one of {}", names.join(", "))))
-            }
+        let Some((_, text)) = BUILTIN_SCENES.iter().find(|(known, _)| *known == name) else {
+            let names: Vec<String> = BUILTIN_SCENES.iter().map(|(known, _)| format!("{BUILTIN}{known}")).collect();
+            let problem = format!("there is no built-in scene `{name}`");
+            return Err(Failure::usage("SCENE", problem, format!("Give a scene file, or one of {}", names.join(", "))));
         };
+        return Ok(Source::Embedded(text));
     }
     let path = Path::new(argument);
     if path.is_dir() {
@@ -54,11 +77,13 @@ pub fn load(argument: &str, cache: &RomCache, console: &Console) -> Result<Scene
         Some("safetensors") => Some("is a ROM, not a scene file"),
         _ => None,
     };
-    if let Some(problem) = other {
-        let remedy = "Give a scene file (TOML); `tiprub inspect` shows what is in this one";
-        return Err(Failure::usage(argument, problem, remedy));
+    match other {
+        Some(problem) => {
+            let remedy = "Give a scene file (TOML); `tiprub inspect` shows what is in this one";
+            Err(Failure::usage(argument, problem, remedy))
+        }
+        None => Ok(Source::File(path)),
     }
-    tiprub_format::load_scene(path, &reduce).map_err(Failure::from)
 }
 
 /// An embedded scene with embedded models from `reduce`.

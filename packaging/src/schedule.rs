@@ -1,6 +1,6 @@
 //! Communication points, counted rather than accumulated.
 
-use tiprub_core::settings::ExperimentSettings;
+use tiprub_core::{settings::ExperimentSettings, shown};
 
 use crate::{Failure, Result};
 
@@ -33,14 +33,14 @@ impl Schedule {
         if !(stop.is_finite() && stop > start) {
             return Err(Failure::usage(
                 name(stop_option, "--stop", "experiment.stop"),
-                format!("{stop} s is not after the start time {start} s"),
+                format!("{} s is not after the start time {} s", shown(stop), shown(start)),
                 "Give a later time in seconds",
             ));
         }
         if !(step.is_finite() && step > 0.0) {
             return Err(Failure::usage(
                 name(step_option, "--step", "experiment.communication_step"),
-                format!("{step} s is not a positive length of time"),
+                format!("{} s is not a positive length of time", shown(step)),
                 "Give the communication step H in seconds, for example 1e-5",
             ));
         }
@@ -48,7 +48,7 @@ impl Schedule {
         if steps > MOST_STEPS {
             return Err(Failure::usage(
                 name(step_option, "--step", "experiment.communication_step"),
-                format!("{steps:.3e} communication points between {start} s and {stop} s"),
+                format!("{steps:.3e} communication points between {} s and {} s", shown(start), shown(stop)),
                 format!("Choose a longer step, so that there are at most {MOST_STEPS:.0e}"),
             ));
         }
@@ -61,9 +61,10 @@ impl Schedule {
         let one_step = self.step > length && !is_close(self.step, length);
         let warning = || {
             format!(
-                "the communication step {} s is longer than the run of {length} s: one step covers all of it, with no \
+                "the communication step {} s is longer than the run of {} s: one step covers all of it, with no \
                  point in between; choose a shorter communication step",
-                self.step
+                shown(self.step),
+                shown(length)
             )
         };
         one_step.then(warning).into_iter().collect()

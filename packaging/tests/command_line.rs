@@ -124,6 +124,68 @@ fn a_native_run_writes_one_row_per_communication_point() {
     assert_eq!(columns(&again).1, rows, "the same run gives the same bits");
 }
 
+/// What the CSV says, without looking for it: the lobes of the scene reach through the gap.
+#[test]
+fn the_summary_of_a_run_tells_its_extremes() {
+    let project = Project::new();
+    let text = project.succeed(&["run", "scene.toml", "--csv", "out.csv", "--quiet"]);
+    let json = project.succeed(&["run", "scene.toml", "--json", "--quiet"]);
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let (names, rows) = columns(&fs::read_to_string(project.path("out.csv")).unwrap());
+    let column = |name: &str| {
+        let index = names.iter().position(|other| other == name).unwrap();
+        rows.iter().map(|row| (row[0], row[index])).collect::<Vec<_>>()
+    };
+    // Communication steps of 1 ms.
+    let total: Vec<_> = column("normal_impulse").into_iter().map(|(time, impulse)| (time, impulse / 1e-3)).collect();
+    let largest = |column: Vec<(f64, f64)>| column.into_iter().map(|row| row.1).fold(f64::MIN, f64::max);
+    let least = column("clearance_minimum").into_iter().map(|row| row.1).fold(f64::MAX, f64::min);
+    for (name, value) in [
+        ("largest_total_normal_force", largest(total.clone())),
+        ("largest_node_normal_force", largest(column("normal_force_peak"))),
+        ("smallest_clearance", least),
+        ("most_contacts", largest(column("contact_count"))),
+    ] {
+        let found = &json["extremes"][name];
+        assert!((found["value"].as_f64().unwrap() - value).abs() <= 1e-9 * value.abs(), "{name}: {found}, {value}");
+    }
+    let force = &json["extremes"]["largest_total_normal_force"];
+    assert!(force["value"].as_f64().unwrap() > 1.0, "{force}");
+    let at = force["time"].as_f64().unwrap();
+    let there = total.iter().find(|row| row.0.to_bits() == at.to_bits()).unwrap();
+    assert!((there.1 - largest(total.clone())).abs() <= 1e-9 * there.1, "{there:?}");
+    let told = text.split("over the run:").nth(1).unwrap();
+    assert!(told.contains(&format!(" N at t = {at} s")) && told.contains("smallest clearance: "), "{text}");
+    assert!(told.contains("most contact nodes touching at a communication point: "), "{text}");
+}
+
+/// Whatever is given, an error is a line or two: no number is written out with three hundred digits.
+#[test]
+fn numbers_in_errors_are_short() {
+    let project = Project::new();
+    for (from, to, number) in [
+        ("friction = 0.1", "friction = 1e300", "1e300"),
+        ("gap = 1e-3", "gap = -1e300", "-1e300"),
+        ("stop = 0.05", "stop = -1e300", "-1e300"),
+        ("step = 1e-4", "step = 1e-300", "1e-300"),
+        ("ramp_time = 0.02", "ramp_time = 1e300", "1e300"),
+    ] {
+        fs::write(project.path("wrong.toml"), SCENE.replacen(from, to, 1)).unwrap();
+        let told = project.fail(&["run", "wrong.toml"], 1);
+        assert!(told.contains(number) && told.len() < 300, "{told}");
+    }
+    for (arguments, number) in [
+        (["--set", "damping_ratio=1e300"], "1e300"),
+        (["--set", "damping_ratio=-1e300"], "-1e300"),
+        (["--set", "friction_coefficient=1e300"], "1e300"),
+        (["--stop", "-1e300"], "-1e300"),
+        (["--step", "-1e300"], "-1e300"),
+    ] {
+        let told = project.fail(&[&["run", "scene.toml"], &arguments[..]].concat(), 2);
+        assert!(told.contains(number) && told.len() < 300, "{told}");
+    }
+}
+
 #[test]
 fn settings_and_times_can_be_replaced() {
     let project = Project::new();

@@ -89,3 +89,29 @@ fn the_judge_sees_every_way_to_fail() {
         assert!(told.contains(check) && !told.contains("refused") && !told.contains("not so"), "{name}: {told}");
     }
 }
+
+/// Whatever would fail after an hour of cases fails before the first, and leaves nothing.
+#[test]
+fn wrong_places_for_results_are_told_before_the_first_case() {
+    let root = tempfile::tempdir().unwrap();
+    let path = |name: &str| root.path().join(name);
+    std::fs::write(path("file"), "").unwrap();
+    std::fs::write(path("chapter.md"), "# Chapter\n").unwrap();
+    let refuse = |arguments: &[&str], code: i32| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+        let output = command.current_dir(root.path()).arg("stability").args(arguments).output().unwrap();
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{told}");
+        assert!(!path("out").exists() && !told.contains("Stability"), "{told}");
+        told
+    };
+    let told = refuse(&["--case", "judge/hang", "--out", "file/out"], 1);
+    assert!(told.contains("file/out: cannot create the directory"), "{told}");
+    let told = refuse(&["--chapter", "none.md", "--out", "out"], 1);
+    assert!(told.contains("none.md: the chapter cannot be read"), "{told}");
+    let told = refuse(&["--chapter", "chapter.md", "--out", "out"], 1);
+    assert!(told.contains("has no mark") && told.contains("<!-- the table below is written by"), "{told}");
+    let told = refuse(&["--chapter", "chapter.md", "--case", "judge/", "--out", "out"], 2);
+    assert!(told.contains("--chapter: with --case") && told.contains("Leave out one of the two"), "{told}");
+    assert_eq!(std::fs::read_to_string(path("chapter.md")).unwrap(), "# Chapter\n");
+}

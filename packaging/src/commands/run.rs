@@ -8,6 +8,7 @@ use crate::{
     Failure, Result,
     cli::RunArguments,
     console::{Console, Outcome},
+    extremes::{Extreme, extremes},
     native,
     recording::shortest,
     scene_source,
@@ -45,6 +46,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
         .zip(run.recording.row(rows - 1))
         .map(|(name, value)| (name.clone(), json!(value)))
         .collect();
+    let extremes = extremes(&run.recording);
     let json = json!({
         "model": scene.settings.name,
         "start": schedule.start,
@@ -58,12 +60,13 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
         "real_time_factor": stepping / simulated,
         "warnings": run.warnings,
         "csv": arguments.csv,
+        "extremes": Extreme::json(&extremes),
         "last": last,
     });
     let text = if to_stdout {
         run.recording.to_csv()
     } else {
-        summary(&json, &run.recording.names, run.recording.row(rows - 1))
+        summary(&json, &extremes, &run.recording.names, run.recording.row(rows - 1))
     };
     Ok(Outcome { text, json })
 }
@@ -71,11 +74,11 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
 /// Longer arrays are told by their range.
 const MOST_LISTED: usize = 12;
 
-fn summary(json: &Value, names: &[String], last: &[f64]) -> String {
+fn summary(json: &Value, extremes: &[Extreme], names: &[String], last: &[f64]) -> String {
     let number = |name: &str| json[name].as_f64().unwrap_or(f64::NAN);
     let mut text = format!(
         "{}: t = {} s to {} s, communication steps: {}, internal steps: {}\n\
-         stepping took {:.3} s: {:.3} µs per internal step, {:.3} s of computing per simulated second\n\nat the end:\n",
+         stepping took {:.3} s: {:.3} µs per internal step, {:.3} s of computing per simulated second\n",
         json["model"].as_str().unwrap_or_default(),
         json["start"],
         json["stop"],
@@ -85,6 +88,11 @@ fn summary(json: &Value, names: &[String], last: &[f64]) -> String {
         number("microseconds_per_internal_step"),
         number("real_time_factor"),
     );
+    if !extremes.is_empty() {
+        text.push_str("\nover the run:\n");
+        text.extend(extremes.iter().map(|extreme| format!("  {}\n", extreme.line())));
+    }
+    text.push_str("\nat the end:\n");
     let width = names.iter().map(String::len).max().unwrap_or(0);
     let array = |name: &str| name.rsplit_once('[').map_or(name, |(array, _)| array).to_owned();
     let mut rest = names.iter().zip(last).peekable();

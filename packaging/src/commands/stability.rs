@@ -20,6 +20,9 @@ pub fn run(arguments: &StabilityArguments, console: &Console) -> Result<Outcome>
         return Ok(Outcome { text: json.to_string(), json });
     }
     let cases = chosen(arguments)?;
+    // Before the long work: what would fail after it.
+    output_file::try_directory(&arguments.out)?;
+    let above = arguments.chapter.as_deref().map(|path| above_table(path, arguments)).transpose()?;
     // Lives as long as the cases run.
     let fmus = if cases.iter().any(|case| case.imports) { Some(package(arguments, console)?) } else { None };
     let context = Context { fmus: fmus.as_ref().map(|directory| directory.path().to_owned()) };
@@ -40,8 +43,8 @@ pub fn run(arguments: &StabilityArguments, console: &Console) -> Result<Outcome>
     drop(task);
     let table = Table { rows };
     let outcome = table.write(&arguments.out)?;
-    if let Some(path) = &arguments.chapter {
-        write_chapter(path, &table)?;
+    if let (Some(path), Some(above)) = (&arguments.chapter, above) {
+        output_file::write(path, format!("{above}{MARK}\n\n{}", table.to_markdown()))?;
     }
     verdict(&table, &arguments.out).map_or(Ok(outcome), Err)
 }
@@ -95,11 +98,24 @@ fn chosen(arguments: &StabilityArguments) -> Result<Vec<Case>> {
     Ok(cases)
 }
 
-/// What stands above the table of the guide is kept.
-fn write_chapter(path: &std::path::Path, table: &Table) -> Result<()> {
-    let present = std::fs::read_to_string(path).unwrap_or_default();
-    let above = present.split_once(MARK).map_or(present.as_str(), |(above, _)| above);
-    output_file::write(path, format!("{above}{MARK}\n\n{}", table.to_markdown()))
+/// What stands above the table of the guide, which is kept.
+fn above_table(path: &std::path::Path, arguments: &StabilityArguments) -> Result<String> {
+    if arguments.case.is_some() {
+        return Err(Failure::usage(
+            "--chapter",
+            format!("with --case a few cases would replace the whole table of {}", path.display()),
+            "Leave out one of the two; stability.md in the directory of --out holds the table of a few cases",
+        ));
+    }
+    let present =
+        std::fs::read_to_string(path).map_err(|error| Failure::file(path, "the chapter cannot be read", &error))?;
+    let Some((above, _)) = present.split_once(MARK) else {
+        let remedy = format!("Name the chapter, or put this line where the table shall begin: {MARK}");
+        return Err(Failure::new(path.display(), "has no mark below which the table belongs", remedy));
+    };
+    // Where the file would be replaced, so that it is known to be possible.
+    output_file::begin(path)?;
+    Ok(above.to_owned())
 }
 
 /// The table begins below this line.

@@ -2,11 +2,14 @@
 
 use std::path::PathBuf;
 
+use clap::ValueEnum;
+
 use crate::{
     Failure, Result,
     builtin::DiskModel,
     cli::{StudyArguments, StudyChoice},
     console::{Console, Outcome},
+    output_file,
     study::{self, convergence, cube, error, map, modes, stage},
 };
 
@@ -17,22 +20,29 @@ use crate::{
 pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
     refuse_other_options(arguments)?;
     let quick = arguments.quick;
-    let (name, study) = match arguments.study {
+    let directory = directory(arguments);
+    output_file::try_directory(&directory)?;
+    let study = match arguments.study {
         StudyChoice::Convergence => {
             let (reduction, _) = DiskModel::new(quick).reduce(console)?;
-            ("convergence", convergence::study(&reduction, quick)?)
+            convergence::study(&reduction, quick)?
         }
         StudyChoice::Modes => {
             let (reduction, mesh) = DiskModel::new(quick).reduce(console)?;
-            ("modes", modes::study(&reduction, &mesh, arguments.speed, quick)?)
+            modes::study(&reduction, &mesh, arguments.speed, quick)?
         }
-        StudyChoice::Cube => ("cube", cube::study(arguments, console)?),
-        StudyChoice::Stage => ("stage", stage::study(arguments, console)?),
-        StudyChoice::Map => ("map", map::study(arguments, console)?),
-        StudyChoice::Error => ("error", error::study(arguments, console)?),
+        StudyChoice::Cube => cube::study(arguments, console)?,
+        StudyChoice::Stage => stage::study(arguments, console)?,
+        StudyChoice::Map => map::study(arguments, console)?,
+        StudyChoice::Error => error::study(arguments, console)?,
     };
-    let directory = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("study-{name}")));
     study::output::write(&study, &directory)
+}
+
+/// Where everything goes.
+fn directory(arguments: &StudyArguments) -> PathBuf {
+    let name = arguments.study.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+    arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("study-{name}")))
 }
 
 /// Options of another study would be passed over in silence.
@@ -83,6 +93,8 @@ mod tests {
             let Ok(Cli { command: Command::Study(arguments), .. }) = Cli::try_parse_from(words) else {
                 panic!("{line}")
             };
+            let name = line.split(' ').next().unwrap();
+            assert_eq!(directory(&arguments), PathBuf::from(format!("study-{name}")));
             let refused = refuse_other_options(&arguments).err().map(|failure| failure.what);
             assert_eq!(refused.as_deref(), wrong, "{line}");
         }

@@ -36,8 +36,10 @@ const SCALE_COLORS: [[f64; 3]; 7] = [
     [127.0, 10.0, 30.0],
 ];
 
-/// Every face is drawn as this many by this many patches of constant colour.
+/// Every face of a coloured surface is drawn as this many by this many patches of constant colour.
 const PATCHES: usize = 2;
+/// A mark is hidden by what lies in front of it by more than this share of the size of the surface.
+const HIDING: f64 = 1e-6;
 
 impl View {
     /// A view of a blade standing on the z axis: radial direction of its centre upwards, seen from `azimuth` (rad)
@@ -62,7 +64,8 @@ impl View {
 }
 
 /// The surface, displaced by `scale · displacement`, coloured by |displacement| (0 to its own maximum), as an SVG
-/// element. Without displacement it is plain grey. `marks` are drawn as dots (the contact nodes).
+/// element. Without displacement it is plain grey with the lines of the mesh. `marks` are drawn as dots (the contact nodes),
+/// those hidden by the surface as circles.
 pub fn draw(
     surface: &Surface,
     displacement: Option<(&[[f64; 3]], f64)>,
@@ -81,6 +84,7 @@ pub fn draw(
         }
         None => surface.points.clone(),
     };
+    let pieces = if displacement.is_some() { PATCHES } else { 1 };
     let mut patches = Vec::new();
     for face in &surface.faces {
         let corners = face.map(|index| moved[index]);
@@ -88,7 +92,7 @@ pub fn draw(
         // Faces turned away are hidden by the rest of a closed surface.
         if dot(facing, view.towards) > 0.0 {
             let shade = brightness(facing, view);
-            subdivide(&corners, face.map(|index| magnitudes[index] / largest), shade, view, &mut patches);
+            subdivide(&corners, face.map(|index| magnitudes[index] / largest), shade, view, pieces, &mut patches);
         }
     }
     patches.sort_by(|a, b| a.depth.total_cmp(&b.depth));
@@ -96,22 +100,32 @@ pub fn draw(
     for patch in &patches {
         let base = if displacement.is_some() { scale_color(patch.share) } else { [198.0, 205.0, 214.0] };
         let color = hex(base.map(|channel| channel * patch.shade));
+        // Lines of the mesh belong to the faces: those of far ones are covered by nearer ones.
+        let line = if displacement.is_some() { &color } else { MESH_LINE };
         let [a, b, c, d] = patch.corners.map(|corner| frame.place(corner));
         let _ = write!(
             svg,
-            r##"<path d="M{} {}L{} {}L{} {}L{} {}Z" fill="{color}" stroke="{color}"/>"##,
+            r##"<path d="M{} {}L{} {}L{} {}L{} {}Z" fill="{color}" stroke="{line}"/>"##,
             a.0, a.1, b.0, b.1, c.0, c.1, d.0, d.1
         );
     }
-    if displacement.is_none() {
-        draw_edges(&mut svg, surface, frame, view);
-    }
-    for mark in marks {
-        let (x, y) = frame.place(view.project(*mark));
-        let _ = write!(svg, r##"<circle cx="{x}" cy="{y}" r="5" fill="#c7254e" stroke="#fff" stroke-width="1.5"/>"##);
-    }
+    let places: Vec<[f64; 3]> = marks.iter().map(|mark| view.project(*mark)).collect();
+    draw_marks(&mut svg, &places, &patches, frame);
     svg.push_str("</svg>");
     svg
+}
+
+/// Colour of the lines of a mesh.
+const MESH_LINE: &str = "#6c7784";
+
+fn draw_marks(svg: &mut String, places: &[[f64; 3]], patches: &[Patch], frame: &Frame) {
+    let margin = HIDING * EDGE / frame.magnification;
+    for place in places {
+        let (x, y) = frame.place(*place);
+        let hidden = patches.iter().any(|patch| patch.depth_at(*place).is_some_and(|depth| depth > place[2] + margin));
+        let style = if hidden { r##"fill="none" stroke="#c7254e""## } else { r##"fill="#c7254e" stroke="#fff""## };
+        let _ = write!(svg, r#"<circle cx="{x}" cy="{y}" r="5" {style} stroke-width="1.5"/>"#);
+    }
 }
 
 /// Where projected points come to lie in a picture: the same for all pictures of one surface.
@@ -192,15 +206,37 @@ struct Patch {
     shade: f64,
 }
 
-/// Cut a face into patches by bilinear interpolation of corners and shares.
-fn subdivide(corners: &[[f64; 3]; 4], shares: [f64; 4], shade: f64, view: &View, patches: &mut Vec<Patch>) {
+impl Patch {
+    /// Distance towards the observer where a projected point lies on the patch, seen as two triangles.
+    fn depth_at(&self, point: [f64; 3]) -> Option<f64> {
+        let [a, b, c, d] = self.corners;
+        [[a, b, c], [a, c, d]].into_iter().find_map(|[a, b, c]| {
+            let area =
+                |p: [f64; 3], q: [f64; 3], r: [f64; 3]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+            let whole = area(a, b, c);
+            let shares = [area(point, b, c), area(a, point, c), area(a, b, point)].map(|part| part / whole);
+            let inside = shares.iter().all(|share| *share >= 0.0);
+            inside.then(|| shares[0] * a[2] + shares[1] * b[2] + shares[2] * c[2])
+        })
+    }
+}
+
+/// Cut a face into `pieces` by `pieces` patches by bilinear interpolation of corners and shares.
+fn subdivide(
+    corners: &[[f64; 3]; 4],
+    shares: [f64; 4],
+    shade: f64,
+    view: &View,
+    pieces: usize,
+    patches: &mut Vec<Patch>,
+) {
     let weights = |u: f64, v: f64| [(1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v];
     let point = |u: f64, v: f64| {
         let weights = weights(u, v);
         view.project(std::array::from_fn(|axis| (0..4).map(|corner| weights[corner] * corners[corner][axis]).sum()))
     };
-    let step = 1.0 / PATCHES as f64;
-    for (row, column) in (0..PATCHES).flat_map(|row| (0..PATCHES).map(move |column| (row, column))) {
+    let step = 1.0 / pieces as f64;
+    for (row, column) in (0..pieces).flat_map(|row| (0..pieces).map(move |column| (row, column))) {
         let (u, v) = (row as f64 * step, column as f64 * step);
         let middle = weights(u + 0.5 * step, v + 0.5 * step);
         patches.push(Patch {
@@ -210,19 +246,6 @@ fn subdivide(corners: &[[f64; 3]; 4], shares: [f64; 4], shade: f64, view: &View,
             shade,
         });
     }
-}
-
-/// The mesh lines of the faces turned to the observer.
-fn draw_edges(svg: &mut String, surface: &Surface, frame: &Frame, view: &View) {
-    svg.push_str(r##"<path fill="none" stroke="#6c7784" stroke-width="0.7" d=""##);
-    for face in &surface.faces {
-        let corners = face.map(|index| surface.points[index]);
-        if dot(normal(&corners), view.towards) > 0.0 {
-            let [a, b, c, d] = corners.map(|corner| frame.place(view.project(corner)));
-            let _ = write!(svg, "M{} {}L{} {}L{} {}L{} {}Z", a.0, a.1, b.0, b.1, c.0, c.1, d.0, d.1);
-        }
-    }
-    svg.push_str(r#""/>"#);
 }
 
 /// Normal of a face from its diagonals, of unit length.
@@ -316,7 +339,22 @@ mod tests {
         surface.faces[1].reverse();
         let view = View::of_blade(&surface, 0.0, std::f64::consts::FRAC_PI_2);
         let svg = draw(&surface, None, &[], &Frame::around(&surface, &view, 0.1), &view);
-        assert_eq!(svg.matches("<path").count(), PATCHES * PATCHES + 1, "one face and the mesh lines");
+        assert_eq!(svg.matches("<path").count(), 1, "one face");
+    }
+
+    /// The lines of the far square and a dot on it are covered by the near one; a dot on the near one is not.
+    #[test]
+    fn lines_and_marks_behind_a_face_are_hidden() {
+        let surface = two_squares();
+        let view = View::of_blade(&surface, 0.0, std::f64::consts::FRAC_PI_2);
+        let frame = Frame::around(&surface, &view, 0.1);
+        let (far, near, beside) = ([1.0, 0.1, 0.5], [2.0, 0.1, 0.5], [1.0, 0.7, 0.5]);
+        let svg = draw(&surface, None, &[far, near, beside], &frame, &view);
+        let paths: Vec<&str> = svg.split("<path ").skip(1).collect();
+        assert!(paths.len() == 2 && paths.iter().all(|path| path.contains(MESH_LINE)), "each with its lines: {svg}");
+        let filled: Vec<bool> =
+            svg.split("<circle ").skip(1).map(|circle| circle.contains(r##"fill="#c7254e""##)).collect();
+        assert_eq!(filled, [false, true, true], "{svg}");
     }
 
     #[test]

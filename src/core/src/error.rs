@@ -32,7 +32,7 @@ pub enum Error {
         remedy: String,
     },
     /// The state became non-finite during a step.
-    #[error("the state became non-finite between t = {last_good_time} s and t = {time} s. {remedy}")]
+    #[error("the state became non-finite between t = {} s and t = {} s. {remedy}", shown(*last_good_time), shown(*time))]
     NonFinite {
         /// The last communication point with a finite state (s).
         last_good_time: f64,
@@ -56,9 +56,10 @@ impl Error {
     }
 }
 
-/// A number as a user would write it: 1e308 has no three hundred zeros.
-pub(crate) fn number(value: f64) -> String {
-    let plain = value == 0.0 || !value.is_finite() || (1e-5..1e7).contains(&value.abs());
+/// A number for people: plain, or with an exponent where that would be long.
+pub fn shown(value: f64) -> String {
+    let size = value.abs();
+    let plain = size == 0.0 || (1e-4..1e6).contains(&size) || !value.is_finite();
     if plain { format!("{value}") } else { format!("{value:e}") }
 }
 
@@ -67,26 +68,25 @@ pub type Result<T, E = Error> = core::result::Result<T, E>;
 
 #[cfg(test)]
 mod tests {
-    use super::number;
+    use super::*;
 
     #[test]
-    fn numbers_stay_short_and_exact() {
+    fn numbers_are_short_and_read_back() {
         for (value, text) in [
             (0.0, "0"),
-            (-0.0, "-0"),
-            (2.1, "2.1"),
-            (-1e-5, "-0.00001"),
-            (9.5e-6, "9.5e-6"),
-            (1e7, "1e7"),
-            (-1e308, "-1e308"),
-            (5e-324, "5e-324"),
-            (f64::NAN, "NaN"),
-            (f64::INFINITY, "inf"),
+            (-0.25, "-0.25"),
+            (1e-4, "0.0001"),
+            (9.5e-5, "9.5e-5"),
+            (999_999.5, "999999.5"),
+            (-1e6, "-1e6"),
+            (1e300, "1e300"),
+            (f64::MIN_POSITIVE, "2.2250738585072014e-308"),
         ] {
-            assert_eq!(number(value), text);
-            assert!(
-                number(value).parse::<f64>().is_ok_and(|parsed| parsed.to_bits() == value.to_bits() || value.is_nan())
-            );
+            assert_eq!(shown(value), text);
+            assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits());
         }
+        assert_eq!([f64::INFINITY, f64::NAN].map(shown), ["inf", "NaN"]);
+        let error = Error::NonFinite { last_good_time: 1e300, time: 2e300, remedy: "Reset".into() };
+        assert_eq!(error.to_string(), "the state became non-finite between t = 1e300 s and t = 2e300 s. Reset");
     }
 }

@@ -20,7 +20,7 @@ pub mod stability;
 pub mod system;
 pub mod variables;
 
-pub use error::{Error, Result};
+pub use error::{Error, Result, shown};
 pub use ledger::{Ledger, Sum};
 pub use rom::Rom;
 pub use settings::Scene;

@@ -10,7 +10,7 @@ mod grid;
 
 use nalgebra::DMatrix;
 
-use crate::{Error, Result};
+use crate::{Error, Result, shown};
 pub use cyclic::Harmonic;
 pub(crate) use cyclic::cholesky;
 
@@ -204,7 +204,7 @@ impl Rom {
         if !(0.0..1.0).contains(&self.damping_ratio) {
             return Err(Error::invalid(
                 "ROM metadata `damping_ratio`",
-                format!("{} is not in 0 ≤ ξ < 1", self.damping_ratio),
+                format!("{} is not in 0 ≤ ξ < 1", shown(self.damping_ratio)),
                 remedy,
             ));
         }
@@ -267,7 +267,7 @@ impl Rom {
             }
         }
         if !(spin.largest_speed.is_finite() && spin.largest_speed > 0.0) {
-            let problem = format!("{} rad/s is not a finite speed > 0", spin.largest_speed);
+            let problem = format!("{} rad/s is not a finite speed > 0", shown(spin.largest_speed));
             return Err(Error::invalid("ROM metadata `largest_speed`", problem, remedy));
         }
         Ok(())

@@ -17,7 +17,7 @@ mod scene_layout;
 mod suggestion;
 
 pub use error::Error;
-pub use load::{BUILTIN_PREFIX, load_scene};
+pub use load::{BUILTIN_PREFIX, load_scene, load_settings};
 pub use resources::{
     PACKAGE_FILE, RESOURCES_FORMAT_VERSION, Resources, SCENE_FILE, instantiation_token, load_resources, packed_roms,
     resource_files,

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use tiprub_core::settings::StructureSettings;
+use tiprub_core::settings::{SceneSettings, StructureSettings};
 use tiprub_core::{Rom, Scene};
 
 use crate::{Error, Result, parse_scene, read_rom};
@@ -17,8 +17,7 @@ pub const BUILTIN_PREFIX: &str = "builtin:";
 /// # Errors
 /// [`Error::File`] for files that cannot be read, else as [`parse_scene`] and [`read_rom`].
 pub fn load_scene(path: &Path, builtin: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
-    let text = read_text(path, "Give the path of a scene file (TOML)")?;
-    let settings = parse_scene(&text, &path.display().to_string())?;
+    let settings = load_settings(path)?;
     let directory = path.parent().unwrap_or(Path::new(""));
     let rom = |(index, structure): (usize, &StructureSettings)| match structure.rom.strip_prefix(BUILTIN_PREFIX) {
         Some(name) => builtin_rom(path, index, name, builtin(name)),
@@ -34,6 +33,14 @@ pub fn load_scene(path: &Path, builtin: &dyn Fn(&str) -> Option<Result<Rom, Stri
     };
     let roms = settings.structures.iter().enumerate().map(rom).collect::<Result<_>>()?;
     Ok(Scene { settings, roms })
+}
+
+/// Read a scene file, without the ROM files.
+///
+/// # Errors
+/// [`Error::File`] for a file that cannot be read, else as [`parse_scene`].
+pub fn load_settings(path: &Path) -> Result<SceneSettings> {
+    parse_scene(&read_text(path, "Give the path of a scene file (TOML)")?, &path.display().to_string())
 }
 
 fn builtin_rom(scene: &Path, index: usize, name: &str, answer: Option<Result<Rom, String>>) -> Result<Rom> {

@@ -1,5 +1,7 @@
 //! Linear isotropic material.
 
+use tiprub_core::shown;
+
 use crate::{Error, Result};
 
 /// A linear elastic isotropic material.
@@ -62,7 +64,7 @@ impl Material {
         let fail = |property: &str, value: f64, range: &str| {
             Err(Error::invalid(
                 format!("material `{}`, {property}", self.name),
-                format!("{value} is outside {range}"),
+                format!("{} is outside {range}", shown(value)),
                 "Give SI units: Pa, kg/m³ and 1/K",
             ))
         };

@@ -8,6 +8,7 @@ use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
 use tiprub_core::rom::{Frame, RomChecks};
+use tiprub_core::shown;
 
 use crate::assembly::{Assembled, free_dofs};
 use crate::craig_bampton::{CraigBampton, craig_bampton, dense_modes};
@@ -172,7 +173,7 @@ fn check_speed(speed: f64) -> Result<()> {
     if speed.is_finite() && speed > 0.0 {
         return Ok(());
     }
-    let problem = format!("{speed} rad/s is not a finite speed > 0");
+    let problem = format!("{} rad/s is not a finite speed > 0", shown(speed));
     Err(Error::invalid("largest speed", problem, "Give the largest speed that is to be computed"))
 }
 

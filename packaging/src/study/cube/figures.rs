@@ -37,24 +37,25 @@ pub fn scene() -> Figure {
     for set in ["CORNERS_LEFT", "CORNERS_RIGHT"] {
         marks.extend(cube.sets[set].iter().map(|&node| cube.nodes[node]));
     }
-    let view = View::of_blade(&whole, 0.5, 0.5);
+    let view = View::of_blade(&whole, 1.1, 0.45);
     let svg = picture::draw(&whole, None, &marks, &Frame::around(&whole, &view, 0.05), &view);
     let mut sheet = Sheet::new(["x (m)", "y (m)", "z (m)"]);
     sheet.rows = marks.iter().map(|place| place.to_vec()).collect();
     Figure {
         name: "scene",
         caption:
-            "The cube before it enters, and the two rings; dots are the corners of its contact faces (figs 1 and 2)."
+            "The cube before it enters, and the two rings; dots are the corners of its contact faces, circles those behind \
+             something (figs 1 and 2)."
                 .into(),
         picture: Picture { html: svg.clone(), svg },
         sheet,
     }
 }
 
-/// Mean forces over windows, at their middles.
+/// Mean forces over the windows that lie within the times, at their middles.
 fn means(times: &[f64], force: &[f64]) -> Vec<(f64, f64)> {
     let end = times.last().copied().unwrap_or(0.0);
-    let windows = windowed(times, force, MEAN, end + MEAN);
+    let windows = windowed(times, force, MEAN, end);
     windows.iter().enumerate().map(|(index, mean)| (1e3 * MEAN * (index as f64 + 0.5), *mean)).collect()
 }
 
@@ -62,7 +63,7 @@ fn line(times: &[f64], values: impl Iterator<Item = f64>, end: f64) -> Vec<(f64,
     times.iter().zip(values).filter(|(time, _)| **time <= end).map(|(time, value)| (1e3 * time, value)).collect()
 }
 
-/// Columns side by side; shorter ones end with their last value.
+/// Columns side by side; shorter ones end without numbers.
 fn sheet(series: &[(String, Vec<(f64, f64)>)]) -> Sheet {
     let mut sheet = Sheet::default();
     sheet.columns.push(TIME.into());
@@ -70,7 +71,7 @@ fn sheet(series: &[(String, Vec<(f64, f64)>)]) -> Sheet {
     let longest = series.iter().map(|(_, points)| points.len()).max().unwrap_or(0);
     for row in 0..longest {
         let time = series.iter().find_map(|(_, points)| points.get(row)).map_or(0.0, |point| point.0);
-        let value = |points: &Vec<(f64, f64)>| points.get(row).or(points.last()).map_or(f64::NAN, |point| point.1);
+        let value = |points: &Vec<(f64, f64)>| points.get(row).map_or(f64::NAN, |point| point.1);
         sheet.rows.push([time].into_iter().chain(series.iter().map(|(_, points)| value(points))).collect());
     }
     sheet
@@ -174,4 +175,40 @@ pub fn agreement(pairs: &[Pair]) -> Result<Figure> {
         picture,
         sheet,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 100 N to the last record, which lies within a window: the mean over what is not there would be less.
+    #[test]
+    fn the_curve_of_a_force_ends_with_its_windows() {
+        let times: Vec<f64> = (0..=104).map(|index| f64::from(index) * 1e-6).collect();
+        let points = means(&times, &vec![100.0; times.len()]);
+        assert_eq!(points.len(), 10, "{points:?}");
+        assert!(points.iter().all(|(_, force)| (force - 100.0).abs() < 1e-9), "{points:?}");
+        assert!((points[9].0 - 0.095).abs() < 1e-12, "{points:?}");
+        // A window that ends with the records is whole.
+        assert_eq!(means(&times[..=100], &vec![100.0; 101]).len(), 10);
+    }
+
+    #[test]
+    fn columns_that_end_early_hold_no_numbers_after() {
+        let column = |name: &str, count: u32| {
+            (name.to_owned(), (0..count).map(|index| (f64::from(index), 2.0)).collect::<Vec<_>>())
+        };
+        let rows = sheet(&[column("long", 3), column("short", 2)]).rows;
+        assert_eq!(rows[..2], [vec![0.0, 2.0, 2.0], vec![1.0, 2.0, 2.0]]);
+        assert!(rows[2][1].to_bits() == 2.0_f64.to_bits() && rows[2][2].is_nan(), "{rows:?}");
+    }
+
+    /// Of the eight corners some are behind the cube itself or a ring.
+    #[test]
+    fn the_picture_of_the_scene_hides_what_is_behind() {
+        let svg = scene().picture.svg;
+        let circles: Vec<&str> = svg.split("<circle ").skip(1).collect();
+        let hidden = circles.iter().filter(|circle| circle.contains(r#"fill="none""#)).count();
+        assert!(circles.len() == 8 && (1..8).contains(&hidden), "{hidden} of {}", circles.len());
+    }
 }

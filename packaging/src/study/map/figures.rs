@@ -20,7 +20,8 @@ const CURVES: usize = 3;
 
 /// All figures.
 pub fn figures(map: &Map) -> Result<Vec<Figure>> {
-    let mut figures = vec![heat_map(map), amplitudes(map)?, contact(map)?];
+    let mut figures = vec![heat_map(map), amplitudes(map)?];
+    figures.extend(contact(map)?);
     figures.extend(spectrum(map)?);
     Ok(figures)
 }
@@ -170,23 +171,37 @@ fn amplitudes(map: &Map) -> Result<Figure> {
     })
 }
 
-fn contact(map: &Map) -> Result<Figure> {
-    let share = map.answered().map(|(speed, response)| (speed, 100.0 * response.contact_share)).collect();
-    let force = map.answered().map(|(speed, response)| (speed, response.normal_force)).collect();
-    let series =
-        vec![Series::line("share of time in contact (%)", share), Series::line("mean normal force (N)", force)];
-    let plot = Plot { height: 300, ..Plot::new("angular velocity (rad/s)", "see the legend", series) };
-    let mut sheet = Sheet::new(["speed (rad/s)", "share of time in contact", "mean normal force (N)"]);
-    let row = |(speed, response): (f64, &Response)| vec![speed, response.contact_share, response.normal_force];
-    sheet.rows = map.answered().map(row).collect();
-    Ok(Figure {
-        name: "contact",
-        caption: "Share of time in which a blade touches (mean of all blades), and the sum of all normal forces (mean over time), \
-                  against angular velocity."
-            .into(),
-        picture: Picture::plot(&plot)?,
-        sheet,
-    })
+/// A quantity of every run against angular velocity.
+fn against_speed(
+    map: &Map,
+    name: &'static str,
+    [caption, column, axis]: [&str; 3],
+    shown: f64,
+    value: impl Fn(&Response) -> f64,
+) -> Result<Figure> {
+    let points: Vec<(f64, f64)> = map.answered().map(|(speed, response)| (speed, value(response))).collect();
+    let series = Series::line("", points.iter().map(|(speed, value)| (*speed, shown * value)).collect());
+    let plot = Plot { height: 260, ..Plot::new("angular velocity (rad/s)", axis, vec![series]) };
+    let mut sheet = Sheet::new(["speed (rad/s)", column]);
+    sheet.rows = points.into_iter().map(|(speed, value)| vec![speed, value]).collect();
+    Ok(Figure { name, caption: caption.into(), picture: Picture::plot(&plot)?, sheet })
+}
+
+fn contact(map: &Map) -> Result<[Figure; 2]> {
+    let time = [
+        "Share of time in which a blade touches (mean of all blades) against angular velocity.",
+        "share of time in contact",
+        "share of time in contact (%)",
+    ];
+    let force = [
+        "The sum of all normal forces (mean over time) against angular velocity.",
+        "mean normal force (N)",
+        "mean normal force (N)",
+    ];
+    Ok([
+        against_speed(map, "contact", time, 100.0, |response| response.contact_share)?,
+        against_speed(map, "normal-force", force, 1.0, |response| response.normal_force)?,
+    ])
 }
 
 /// The spectrum at the speed of the largest response.

@@ -16,9 +16,8 @@ use crate::{
 
 /// Peaks below this share of the largest amplitude of the map are not listed; side lobes of the window are below it, too.
 const LEAST_PEAK: f64 = 1e-2;
-/// A resonance is sought within this relative distance of the predicted speed.
-const REACH: f64 = 0.15;
-/// A response counts as lying at a coincidence within this relative distance of its speed.
+/// A response counts as lying at a coincidence within this relative distance of its speed; further below one it is that of
+/// the crossing before.
 const NEAR: f64 = 0.05;
 /// Change of the effective displacement within the window that counts as none.
 const STEADY: f64 = 0.02;
@@ -45,8 +44,12 @@ pub struct MapPeak {
 pub struct Coincidence {
     /// The crossing predicted.
     pub crossing: Crossing,
-    /// Angular velocity (rad/s) and amplitude (m) of the response's maximum; none where it has none nearby.
+    /// Angular velocities (rad/s) between which the response is that of this crossing and of no neighbour.
+    pub window: [f64; 2],
+    /// Angular velocity (rad/s) and amplitude (m) of the response's maximum in the window; none where it has none.
     pub response: Option<(f64, f64)>,
+    /// The same at that end of the range of speeds where the response is larger still, if it is.
+    pub beyond: Option<(f64, f64)>,
 }
 
 impl MapPeak {
@@ -79,6 +82,9 @@ impl Coincidence {
             "response_speed": self.response.map(|response| response.0),
             "response_amplitude": self.response.map(|response| response.1),
             "relative_shift": self.shift(),
+            "sought_from": self.window[0],
+            "sought_to": self.window[1],
+            "larger_at_the_end": self.beyond.map(|end| end.0),
         })
     }
 }
@@ -109,20 +115,45 @@ pub fn order_curve(runs: &[Run], order: usize, revolutions: usize) -> Vec<(f64, 
     runs.iter().filter_map(|run| Some((run.speed, amplitude(run)?))).collect()
 }
 
-/// The excited crossings with the response found near them.
-pub fn coincidences(runs: &[Run], crossings: &[Crossing], revolutions: usize) -> Vec<Coincidence> {
+/// The excited crossings with the response found between those of the same engine order beside them.
+pub fn coincidences(
+    runs: &[Run],
+    prediction: &Prediction,
+    crossings: &[Crossing],
+    revolutions: usize,
+) -> Vec<Coincidence> {
     let excited = crossings.iter().filter(|crossing| crossing.excited);
     let found = |crossing: &Crossing| {
         let curve = order_curve(runs, crossing.order, revolutions);
-        Coincidence { crossing: *crossing, response: resonance(&curve, crossing.speed) }
+        let ends: Vec<(f64, f64)> = [curve.first(), curve.last()].into_iter().flatten().copied().collect();
+        let [low, high] = window(prediction, crossing);
+        let range = [0, 1].map(|end| ends.get(end).map_or(crossing.speed, |end| end.0));
+        let window = [low.max(range[0]), high.min(range[1])];
+        let response = resonance(&curve, window);
+        let most = response.map_or(0.0, |response| response.1);
+        let larger = ends.into_iter().filter(|end| (low..=high).contains(&end.0) && end.1 > most);
+        let beyond = larger.max_by(|a, b| a.1.total_cmp(&b.1));
+        Coincidence { crossing: *crossing, window, response, beyond }
     };
     excited.map(found).collect()
 }
 
-/// The largest local maximum of a curve within [`REACH`] of a speed, refined by a parabola; its ends are none.
-fn resonance(curve: &[(f64, f64)], speed: f64) -> Option<(f64, f64)> {
-    let near = |point: &(f64, f64)| (point.0 / speed - 1.0).abs() <= REACH;
-    let tops = curve.windows(3).filter(|three| three[1].1 > three[0].1 && three[1].1 >= three[2].1 && near(&three[1]));
+/// Speeds (rad/s) at which the response to an engine order is that of this crossing. Contact stiffens, so that it leans
+/// upwards from the crossing, maybe far: it ends only where that of the next crossing of the same order may begin.
+fn window(prediction: &Prediction, crossing: &Crossing) -> [f64; 2] {
+    let Crossing { order, speed, .. } = *crossing;
+    let all = || (0..prediction.modes(order, speed).len()).filter_map(|mode| prediction.meeting(order, mode));
+    let below = all().filter(|other| *other < speed && *other > 0.0).max_by(f64::total_cmp);
+    let above = all().filter(|other| *other > speed).min_by(f64::total_cmp);
+    let border = |low: f64, high: f64| low.midpoint(high).max((1.0 - NEAR) * high);
+    [below.map_or(0.0, |below| border(below, speed)), above.map_or(f64::INFINITY, |above| border(speed, above))]
+}
+
+/// The largest local maximum of a curve within a window of speeds, refined by a parabola; the ends of the curve are none.
+fn resonance(curve: &[(f64, f64)], window: [f64; 2]) -> Option<(f64, f64)> {
+    let within = |point: &(f64, f64)| (window[0]..=window[1]).contains(&point.0);
+    let tops =
+        curve.windows(3).filter(|three| three[1].1 > three[0].1 && three[1].1 >= three[2].1 && within(&three[1]));
     let top = tops.max_by(|a, b| a[1].1.total_cmp(&b[1].1))?;
     let (offset, height) = spectrum::parabola([0, 1, 2].map(|index| top[index].1.ln()));
     Some((top[1].0 + offset * 0.5 * (top[2].0 - top[0].0), height.exp()))
@@ -134,7 +165,7 @@ fn resonance(curve: &[(f64, f64)], speed: f64) -> Option<(f64, f64)> {
 /// # Errors
 /// A ROM whose eigenproblem cannot be solved.
 pub fn static_displacement(scene: &Scene, depth: f64) -> Result<Option<f64>> {
-    let rom = &scene.roms[prediction::master(scene)?];
+    let rom = &scene.roms[prediction::master(&scene.settings)?];
     if rom.is_cyclic() || depth <= 0.0 {
         return Ok(None);
     }
@@ -182,6 +213,9 @@ pub fn coincidence_sheet(coincidences: &[Coincidence]) -> Sheet {
         "speed of the largest response to that order (rad/s)",
         "its amplitude (m)",
         "relative shift",
+        "sought from (rad/s)",
+        "sought to (rad/s)",
+        "larger still at the end of the range (rad/s)",
     ]);
     sheet.rows = coincidences
         .iter()
@@ -189,7 +223,9 @@ pub fn coincidence_sheet(coincidences: &[Coincidence]) -> Sheet {
             let (speed, amplitude) = one.response.unwrap_or((f64::NAN, f64::NAN));
             let Crossing { order, mode, speed: predicted, frequency, .. } = one.crossing;
             let shift = one.shift().unwrap_or(f64::NAN);
-            vec![order as f64, mode as f64 + 1.0, predicted, frequency, speed, amplitude, shift]
+            let beyond = one.beyond.map_or(f64::NAN, |end| end.0);
+            let [from, to] = one.window;
+            vec![order as f64, mode as f64 + 1.0, predicted, frequency, speed, amplitude, shift, from, to, beyond]
         })
         .collect();
     sheet
@@ -200,6 +236,7 @@ pub fn statements(map: &Map) -> Vec<Statement> {
     let mut all = vec![runs_end(map)];
     all.extend(contact(map));
     all.push(on_orders(map));
+    all.extend(room(map));
     all.extend(at_coincidence(map));
     all.extend(stiffening(map));
     all.extend(scale(map));
@@ -311,6 +348,17 @@ fn at_coincidence(map: &Map) -> Option<Statement> {
     Some(Statement::tested(format!("{expected} (within {:.0} %)", 100.0 * NEAR), distance(&nearest) <= NEAR, found))
 }
 
+/// A branch that leans out of the range of speeds has its largest response elsewhere.
+fn room(map: &Map) -> Option<Statement> {
+    let peak = map.peaks.iter().max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))?;
+    let [first, last] = [map.answered().next()?, map.answered().last()?].map(|end| end.0);
+    Some(Statement::tested(
+        "The largest response lies within the range of speeds, not at an end of it",
+        first < peak.speed && peak.speed < last,
+        format!("it is at {:.2} rad/s, the runs reach from {first:.2} to {last:.2} rad/s", peak.speed),
+    ))
+}
+
 /// One-sided contact can only stiffen: resonance should lie above the free one.
 fn stiffening(map: &Map) -> Option<Statement> {
     let found: Vec<&Coincidence> = map.coincidences.iter().filter(|one| one.response.is_some()).collect();
@@ -321,13 +369,18 @@ fn stiffening(map: &Map) -> Option<Statement> {
     let spacing = (map.runs[map.runs.len() - 1].speed - map.runs[0].speed) / (map.runs.len().max(2) - 1) as f64;
     let text = |one: &&Coincidence| {
         let (speed, amplitude) = one.response.unwrap_or_default();
+        let beyond = one.beyond.map_or(String::new(), |(speed, amplitude)| {
+            format!(", larger still at the end of the range, {:.2} µm at {speed:.2} rad/s", 1e6 * amplitude)
+        });
         format!(
-            "engine order {} on mode {}: {:+.2} % ({speed:.2} for {:.2} rad/s, {:.2} µm)",
+            "engine order {} on mode {}: {:+.2} % ({speed:.2} for {:.2} rad/s, {:.2} µm, sought from {:.1} to {:.1} rad/s{beyond})",
             one.crossing.order,
             one.crossing.mode + 1,
             100.0 * one.shift().unwrap_or(0.0),
             one.crossing.speed,
-            1e6 * amplitude
+            1e6 * amplitude,
+            one.window[0],
+            one.window[1]
         )
     };
     let list: Vec<String> = found.iter().map(text).collect();

@@ -9,7 +9,7 @@ mod run;
 mod spectrum;
 
 use serde_json::json;
-use tiprub_core::{Scene, variables::Quantity};
+use tiprub_core::{Scene, settings::SpinSettings, variables::Quantity};
 
 use super::{Statement, Study, sweep};
 use crate::{
@@ -24,10 +24,14 @@ pub use run::{Response, Run, Setup};
 
 /// The scene where none is named.
 const SCENE: &str = "builtin:rotor37";
-/// Angular velocities, relative to the one at which the second harmonic of the casing meets the first mode.
-const RANGE: [f64; 2] = [0.8, 1.2];
-const COUNT: usize = 81;
-const QUICK_COUNT: usize = 7;
+/// Angular velocities, relative to the one at which the second harmonic of the casing meets the first mode: a fifth to both
+/// sides, and above it room for what leans to higher speeds (see [`LEAN`]).
+const RANGE: [f64; 2] = [0.8, 1.2 * LEAN];
+/// Every crossing up to a fifth above the middle has this much of its own speed above it, which is as far as rotor 37 was seen to
+/// lean; the middle itself has more.
+const LEAN: f64 = 1.25;
+const COUNT: usize = 141;
+const QUICK_COUNT: usize = 8;
 /// Revolutions of the window: a bin is as wide as the speed divided by this.
 const REVOLUTIONS: usize = 64;
 const QUICK_REVOLUTIONS: usize = 16;
@@ -36,9 +40,9 @@ const DECAY_TIMES: f64 = 5.0;
 const LEAST_TRANSIENT: usize = 20;
 const MOST_TRANSIENT: usize = 400;
 const QUICK_TRANSIENT: usize = 40;
-/// Modes in the map, and room above the last one.
+/// Modes in the map, and room above the last one: a response that leans to higher speeds leans to higher frequencies.
 const MODES: usize = 3;
-const ABOVE: f64 = 1.1;
+const ABOVE: f64 = LEAN;
 /// Sampling rate relative to the highest frequency of the map; see [`spectrum::Decimator`].
 const OVERSAMPLING: f64 = 8.0;
 /// Order of the casing's base order at whose resonance the range of speeds lies.
@@ -68,6 +72,8 @@ struct Map {
 /// A scene that cannot be loaded, or that is refused at every speed.
 pub fn study(arguments: &StudyArguments, console: &Console) -> Result<Study> {
     let name = arguments.scene.as_deref().unwrap_or(SCENE);
+    // Before models are reduced for nothing.
+    prediction::master(&scene_source::settings(name)?)?;
     let scene = scene_source::load(name, &arguments.cache.cache(), console)?;
     let request = Request {
         quick: arguments.quick,
@@ -125,7 +131,7 @@ pub fn of_scene(
         ));
     }
     map.peaks = findings::peaks(&map.runs);
-    map.coincidences = findings::coincidences(&map.runs, &map.crossings, map.setup.revolutions);
+    map.coincidences = findings::coincidences(&map.runs, &map.prediction, &map.crossings, map.setup.revolutions);
     let warnings = map.warnings();
     Ok((map.report(request.quick)?, warnings))
 }
@@ -138,10 +144,11 @@ impl Map {
         }
         let mut setup =
             Setup { scene, settings: request.settings.clone(), samples: 0, transient: 0, revolutions: 0, top: 0.0 };
-        let master = prediction::master(&setup.scene)?;
+        let master = prediction::master(&setup.scene.settings)?;
         let fastest = setup.scene.roms[master].extras.spin.as_ref().map_or(0.0, |spin| spin.largest_speed);
         let prediction = Prediction::new(&setup.scene, fastest)?;
-        let speeds = speeds(&prediction, request)?;
+        let turns = setup.scene.settings.structures[master].spin != SpinSettings::default();
+        let speeds = speeds(&prediction, request, if turns { fastest } else { f64::INFINITY })?;
         let range = [speeds[0], speeds[speeds.len() - 1]];
         // At its own speed: those of the study may be refused.
         let probe = setup.simulation(setup.scene.settings.structures[master].speed)?;
@@ -247,7 +254,7 @@ impl Map {
 
     fn facts(&self, steps: u64, stepping: f64) -> Result<Vec<(String, String)>> {
         let (setup, settings) = (&self.setup, &self.setup.scene.settings);
-        let rom = &setup.scene.roms[prediction::master(&setup.scene)?];
+        let rom = &setup.scene.roms[prediction::master(&setup.scene.settings)?];
         let contact = &settings.contacts[0];
         let middle = self.runs[self.runs.len() / 2].speed;
         let modes = self.prediction.modes(self.prediction.base_order.max(1), middle);
@@ -319,8 +326,9 @@ impl Map {
     }
 }
 
-/// The angular velocities asked for, or those around the resonance of the second harmonic of the casing.
-fn speeds(prediction: &Prediction, request: &Request) -> Result<Vec<f64>> {
+/// The angular velocities asked for, or those around the resonance of the second harmonic of the casing, up to the `fastest`
+/// one (rad/s) that the model holds for.
+fn speeds(prediction: &Prediction, request: &Request, fastest: f64) -> Result<Vec<f64>> {
     if let Some(speeds) = request.speeds {
         return Ok(speeds.values());
     }
@@ -331,7 +339,10 @@ fn speeds(prediction: &Prediction, request: &Request) -> Result<Vec<f64>> {
         Failure::new("study map", format!("no mode meets engine order {order}"), "Give --speeds FROM:TO:COUNT")
     })?;
     let count = if request.quick { QUICK_COUNT } else { COUNT };
-    Ok(Speeds { from: RANGE[0] * middle, to: RANGE[1] * middle, count }.values())
+    let [from, to] = RANGE.map(|share| share * middle);
+    // Where not even the resonance is in reach, the refusals of the runs say so.
+    let to = if fastest > middle { to.min(fastest) } else { to };
+    Ok(Speeds { from, to, count }.values())
 }
 
 /// Samples per revolution, a power of two, so that even at the slowest speed (rad/s) the rate is [`OVERSAMPLING`] times the

@@ -5,6 +5,7 @@ use tiprub_core::{
     Scene,
     contact::surface::Surface,
     dynamics::{cyclic::CyclicModel, modal::ModalModel},
+    settings::{Motion, SceneSettings},
 };
 
 use super::super::modes::folded;
@@ -53,7 +54,7 @@ impl Prediction {
     /// # Errors
     /// A ROM whose eigenproblem cannot be solved, a shape that cannot be evaluated.
     pub fn new(scene: &Scene, fastest: f64) -> Result<Self> {
-        let master = master(scene)?;
+        let master = master(&scene.settings)?;
         let (structure, rom) = (&scene.settings.structures[master], &scene.roms[master]);
         let in_rom = |error| Failure::from_core(format!("ROM `{}`", rom.name), error);
         let hertz = |frequencies: &[f64]| frequencies.iter().map(|omega| omega / std::f64::consts::TAU).collect();
@@ -124,16 +125,26 @@ impl Prediction {
     }
 }
 
-/// The structure that is master of the first contact.
+/// The structure that is master of the first contact, which must be one that can turn.
 ///
 /// # Errors
-/// There is none.
-pub fn master(scene: &Scene) -> Result<usize> {
-    let settings = &scene.settings;
+/// There is none, or it flies freely or stands still.
+pub fn master(settings: &SceneSettings) -> Result<usize> {
+    let what = || format!("scene `{}`", settings.name);
     let name = settings.contacts.first().map(|contact| &contact.master);
     let found = settings.structures.iter().position(|structure| Some(&structure.name) == name);
-    found
-        .ok_or_else(|| Failure::new(format!("scene `{}`", settings.name), "it has no contact with a master", "Add one"))
+    let master = found.ok_or_else(|| Failure::new(what(), "it has no contact with a master", "Add one"))?;
+    let instead = match settings.structures[master].motion {
+        Motion::Rotating => return Ok(master),
+        Motion::Free => "flies freely",
+        Motion::Still => "stands still",
+    };
+    let name = &settings.structures[master].name;
+    Err(Failure::usage(
+        what(),
+        format!("an interaction map is over angular velocities, and the master of its contact, `{name}`, {instead}"),
+        "Give a scene whose first contact has a rotating master, such as builtin:rotor37; `tiprub run` runs this one",
+    ))
 }
 
 /// The casing's rigid shape at equally spaced angles (m).

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use tiprub_core::{Scene, Simulation, system::System, variables::Quantity};
+use tiprub_core::{Scene, Simulation, shown, system::System, variables::Quantity};
 
 use super::{
     prediction,
@@ -106,7 +106,7 @@ impl Setup {
     /// A refused scene, unknown or wrong settings.
     pub fn simulation(&self, speed: f64) -> Result<Simulation> {
         let mut scene = self.scene.clone();
-        let master = prediction::master(&scene)?;
+        let master = prediction::master(&scene.settings)?;
         scene.settings.structures[master].speed = speed;
         let mut simulation = Simulation::new(&scene).map_err(|error| self.at(speed, error))?;
         for (name, value) in &self.settings {
@@ -116,7 +116,7 @@ impl Setup {
     }
 
     fn at(&self, speed: f64, error: tiprub_core::Error) -> Failure {
-        Failure::from_core(format!("scene `{}` at {speed} rad/s", self.scene.settings.name), error)
+        Failure::from_core(format!("scene `{}` at {} rad/s", self.scene.settings.name, shown(speed)), error)
     }
 
     /// Run at one speed (rad/s). A refusal is an outcome, not a failure.
@@ -139,7 +139,7 @@ impl Setup {
             let (reference, coarsest) = (variable.reference, step / LEAST_FACTOR);
             if simulation.real(reference).is_ok_and(|longest| longest > coarsest) {
                 return Err(Failure::new(
-                    format!("scene `{}` at {speed} rad/s", self.scene.settings.name),
+                    format!("scene `{}` at {} rad/s", self.scene.settings.name, shown(speed)),
                     format!("its internal step is longer than a quarter of the {step:.3e} s from sample to sample"),
                     format!(
                         "Use an internal step of at most {coarsest:.3e} s (--set internal_step_max={coarsest:.1e})"

@@ -94,11 +94,128 @@ fn rigid_contact_moves_the_response_above_the_crossing() {
     assert!(rows.iter().all(|row| row[6].abs() < 1.0), "{rows:?}");
 }
 
+/// Runs in which only one engine order moves, by `amplitude` (m) at a speed.
+fn runs_of_order(order: usize, speeds: &[f64], amplitude: impl Fn(f64) -> f64) -> Vec<Run> {
+    let response = |speed: f64| {
+        let mut spectrum = vec![0.0; order + 2];
+        spectrum[order] = amplitude(speed);
+        Response {
+            resolution: speed / std::f64::consts::TAU,
+            first_blade: [spectrum.clone(), spectrum.clone()],
+            largest_blade: [spectrum.clone(), spectrum],
+            deflection: [0.0; 2],
+            contact_share: 0.0,
+            normal_force: 0.0,
+            largest_force: 0.0,
+            penetration: 0.0,
+            drift: 0.0,
+            energy_residual: 0.0,
+            factor: 1,
+            internal_steps: 0,
+            stepping: std::time::Duration::ZERO,
+            warnings: Vec::new(),
+        }
+    };
+    speeds.iter().map(|&speed| Run { speed, outcome: Ok(response(speed)) }).collect()
+}
+
+/// A bell of this height around a speed.
+fn bell(speed: f64, middle: f64, height: f64) -> f64 {
+    height / (1.0 + (40.0 * (speed / middle - 1.0)).powi(2))
+}
+
+/// A branch that leans to +18 %, with a small maximum on the way, and another beyond the range.
+#[test]
+fn a_resonance_is_followed_as_far_as_it_leans() {
+    let prediction = Prediction::new(&scene(FIRST, 4), 0.0).unwrap();
+    let speeds = around(CROSSING, 0.3, 61).values();
+    let [low, high] = [speeds[0], speeds[60]];
+    let crossings = prediction.crossings([low, high], 1.5 * FIRST);
+    let lean = |speed: f64| bell(speed, 1.18 * CROSSING, 3e-3) + bell(speed, 1.08 * CROSSING, 1e-3);
+    let found = findings::coincidences(&runs_of_order(4, &speeds, lean), &prediction, &crossings, 1);
+    let one = found.iter().find(|one| one.crossing.order == 4).unwrap();
+    assert!((one.shift().unwrap() - 0.18).abs() < 1e-3, "{one:?}");
+    assert_eq!((one.window, one.beyond), ([low, high], None));
+    // The second mode, ten times as high, meets the order far above.
+    let more = |speed: f64| lean(speed) + bell(speed, 1.6 * CROSSING, 1.0);
+    let found = findings::coincidences(&runs_of_order(4, &speeds, more), &prediction, &crossings, 1);
+    let one = found.iter().find(|one| one.crossing.order == 4).unwrap();
+    assert!((one.shift().unwrap() - 0.18).abs() < 0.01, "{one:?}");
+    let (end, amplitude) = one.beyond.unwrap();
+    assert!(end.to_bits() == high.to_bits() && amplitude > one.response.unwrap().1, "{one:?}");
+}
+
+/// Two modes a tenth apart, the lower one responding more: each crossing keeps its own maximum.
+#[test]
+fn neighbouring_resonances_are_told_apart() {
+    let mut scene = scene(FIRST, 4);
+    let rom = &mut scene.roms[0];
+    rom.stiffness[(1, 1)] = rom.stiffness[(0, 0)] * 1.1_f64.powi(2);
+    let prediction = Prediction::new(&scene, 0.0).unwrap();
+    let speeds = around(CROSSING, 0.3, 121).values();
+    let crossings = prediction.crossings([speeds[0], speeds[120]], 1.5 * FIRST);
+    // Half a percent below its own crossing the second one is still that of it.
+    for second in [1.095, 1.13] {
+        let two = |speed: f64| bell(speed, 1.03 * CROSSING, 2e-3) + bell(speed, second * CROSSING, 1e-3);
+        let found = findings::coincidences(&runs_of_order(4, &speeds, two), &prediction, &crossings, 1);
+        let of_order = found.iter().filter(|one| one.crossing.order == 4);
+        let tops: Vec<f64> = of_order.map(|one| one.response.unwrap().0 / CROSSING).collect();
+        assert_eq!(tops.len(), 2, "{found:?}");
+        assert!((tops[0] - 1.03).abs() < 5e-3 && (tops[1] - second).abs() < 5e-3, "{tops:?}");
+    }
+}
+
+/// Whatever the scene: a fifth above the resonance sought, there is room for a branch that leans by another fifth.
+#[test]
+fn the_speeds_chosen_leave_room_above_the_resonance() {
+    let mut scene = scene(FIRST, 4);
+    let chosen = |scene: &Scene, quick| {
+        let request = Request { quick, ..Request::default() };
+        let (map, speeds) = Map::prepare(scene.clone(), &request).unwrap();
+        let crossing = map.prediction.meeting(4, 0).unwrap();
+        (speeds.iter().map(|speed| speed / crossing).collect::<Vec<_>>(), crossing)
+    };
+    for (quick, distance) in [(false, 0.005), (true, 0.1)] {
+        let (speeds, _) = chosen(&scene, quick);
+        assert!(speeds[0] <= 0.8 + 1e-9 && *speeds.last().unwrap() >= 1.2 * 1.2, "{speeds:?}");
+        assert!(speeds.windows(2).all(|two| (two[1] - two[0] - distance).abs() < 1e-9), "{speeds:?}");
+    }
+    // A model that holds up to some speed is not asked beyond it.
+    let rom = &mut scene.roms[0];
+    rom.extras.spin = Some(Spin {
+        stiffness_speed2: rom.mass.clone() * 0.1,
+        stiffness_speed4: rom.mass.clone() * 0.0,
+        coriolis: rom.mass.clone() * 0.0,
+        centrifugal_load: vec![0.0; 2],
+        centrifugal_load_speed4: vec![0.0; 2],
+        largest_speed: 1.3 * CROSSING,
+    });
+    scene.settings.structures[0].speed = CROSSING;
+    assert!((chosen(&scene, false).0.last().unwrap() - 1.5).abs() < 1e-9, "spin is not asked for");
+    scene.settings.structures[0].spin.stiffening = true;
+    let (speeds, crossing) = chosen(&scene, false);
+    assert!((speeds.last().unwrap() * crossing / CROSSING - 1.3).abs() < 1e-9, "{speeds:?}");
+}
+
+#[test]
+fn a_master_that_does_not_turn_is_refused_before_anything_is_reduced() {
+    let settings = scene_source::settings("builtin:cube-between-rings").unwrap();
+    let failure = prediction::master(&settings).unwrap_err();
+    assert!(failure.usage && failure.problem.contains("`cube`, flies freely"), "{failure}");
+    assert!(failure.remedy.contains("builtin:rotor37"), "{failure}");
+    let without = Scene { settings, roms: Vec::new() };
+    assert_eq!(of_scene(without, &Request::default(), 1, |_, _| {}).unwrap_err(), failure);
+}
+
 #[test]
 fn numbers_do_not_depend_on_threads() {
     let request = Request { revolutions: Some(4), transient: Some(3), ..request(BUMP, around(CROSSING, 0.1, 5)) };
     let [one, three] = [1, 3].map(|threads| run(scene(FIRST, 4), &request, threads));
-    assert_eq!(one.figures.len(), 4);
+    assert_eq!(one.figures.len(), 5);
+    // One unit on each axis.
+    for (name, unit) in [("contact", "share of time in contact (%)"), ("normal-force", "mean normal force (N)")] {
+        assert_eq!(one.figure(name).unwrap().picture.svg.matches(unit).count(), 1, "{name}");
+    }
     for (a, b) in one.figures.iter().zip(&three.figures) {
         assert_eq!((a.sheet.to_csv(), &a.picture), (b.sheet.to_csv(), &b.picture), "{}", a.name);
     }

@@ -18,7 +18,7 @@ pub use rod::{Branch, Rod};
 
 use crate::persist::{Persist, Reader, Writer};
 use crate::settings::CoatingSettings;
-use crate::{Error, Result};
+use crate::{Error, Result, shown};
 
 /// Contact nodes closer than this share of the axial extent are at the same place.
 const SAME_PLACE: f64 = 1e-6;
@@ -213,7 +213,7 @@ fn sorted(axial: &[f64], radii: &[f64], extent: [f64; 2]) -> Result<Vec<usize>> 
     let mut order: Vec<usize> = (0..axial.len()).collect();
     order.sort_by(|a, b| axial[*a].total_cmp(&axial[*b]));
     if !(length.is_finite() && length > 0.0) || radii.len() != axial.len() {
-        let problem = format!("{} contact nodes per blade over {length} m along the axis", axial.len());
+        let problem = format!("{} contact nodes per blade over {} m along the axis", axial.len(), shown(length));
         return refuse(problem, "A coating needs a ROM with contact nodes at two or more axial positions");
     }
     match order.windows(2).find(|pair| axial[pair[1]] - axial[pair[0]] <= SAME_PLACE * length) {

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::scheme::ModeCoefficients;
 use crate::settings::Scheme;
-use crate::{Error, Result, Rom};
+use crate::{Error, Result, Rom, shown};
 
 /// Eigenvalues below this fraction of the largest are not resolved by the eigenproblem; the Rayleigh quotient decides.
 pub(super) const RIGID_FRACTION: f64 = 1e-13;
@@ -83,7 +83,7 @@ impl ModalModel {
         if !(0.0..1.0).contains(&damping_ratio) {
             return Err(Error::invalid(
                 "damping_ratio",
-                format!("{damping_ratio} is not in 0 ≤ ξ < 1"),
+                format!("{} is not in 0 ≤ ξ < 1", shown(damping_ratio)),
                 "Give the modal damping ratio as a fraction of critical, for example 0.005",
             ));
         }

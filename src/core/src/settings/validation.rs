@@ -6,8 +6,7 @@ use super::{
     CoatingSettings, ContactSettings, Motion, SceneSettings, Scheme, Shape, Solver, SplineSettings, StructureSettings,
     SurfaceSettings,
 };
-use crate::error::number;
-use crate::{Error, Result};
+use crate::{Error, Result, shown};
 
 impl SceneSettings {
     /// Check every value against its documented range, and the names against each other.
@@ -55,7 +54,11 @@ impl SceneSettings {
         if !(self.experiment.stop.is_finite() && self.experiment.stop > self.experiment.start) {
             return Err(Error::invalid(
                 "experiment.stop",
-                format!("{} s is not after experiment.start = {} s", self.experiment.stop, self.experiment.start),
+                format!(
+                    "{} s is not after experiment.start = {} s",
+                    shown(self.experiment.stop),
+                    shown(self.experiment.start)
+                ),
                 "Give a stop time after the start time",
             ));
         }
@@ -124,7 +127,7 @@ impl StructureSettings {
         if let Some(other) = other.filter(|_| self.speed != 0.0) {
             return Err(Error::invalid(
                 format!("{at}.speed"),
-                format!("{} rad/s for a structure that {other}", self.speed),
+                format!("{} rad/s for a structure that {other}", shown(self.speed)),
                 "Remove the speed, or set motion = \"rotating\"",
             ));
         }
@@ -338,14 +341,14 @@ const MAX_STRESS: f64 = 1e13;
 const MAX_CELLS: usize = 10_000_000;
 
 fn finite(field: &str, value: f64) -> Result<()> {
-    if value.is_finite() { Ok(()) } else { Err(Error::invalid(field, number(value), "Give a finite number")) }
+    if value.is_finite() { Ok(()) } else { Err(Error::invalid(field, shown(value), "Give a finite number")) }
 }
 
 fn positive(field: &str, value: f64, unit: &str) -> Result<()> {
     if value.is_finite() && value > 0.0 {
         Ok(())
     } else {
-        Err(Error::invalid(field, format!("{} {unit}", number(value)), "Give a finite value > 0"))
+        Err(Error::invalid(field, format!("{} {unit}", shown(value)), "Give a finite value > 0"))
     }
 }
 
@@ -353,9 +356,8 @@ fn within(field: &str, value: f64, low: f64, high: f64) -> Result<()> {
     if (low..=high).contains(&value) {
         Ok(())
     } else {
-        let shown = |value: f64| if value.abs() < 1e7 { format!("{value:?}") } else { format!("{value:e}") };
         let remedy = format!("Give a value between {} and {}", shown(low), shown(high));
-        Err(Error::invalid(field, number(value), remedy))
+        Err(Error::invalid(field, shown(value), remedy))
     }
 }
 

@@ -2,9 +2,8 @@
 
 use super::drive::Input;
 use super::{Phase, Simulation};
-use crate::error::number;
 use crate::variables::{Causality, Kind, Quantity, Start, Variability, Variable};
-use crate::{Error, Result};
+use crate::{Error, Result, shown};
 
 impl Simulation {
     /// Read one element of a real variable (inputs and parameters give back what was set).
@@ -220,7 +219,7 @@ impl Simulation {
             return Err(Error::invalid(what, format!("order {order}"), "Inputs are linear in time: give order 1"));
         }
         if !value.is_finite() {
-            return Err(Error::invalid(what, number(value), "Give a finite number"));
+            return Err(Error::invalid(what, shown(value), "Give a finite number"));
         }
         Ok(())
     }
@@ -253,7 +252,7 @@ fn check_range(variable: &Variable, value: f64) -> Result<()> {
         return Ok(());
     }
     let problem = if value.is_finite() {
-        format!("{} is outside {} … {}", number(value), number(low), number(high))
+        format!("{} is outside {} … {}", shown(value), shown(low), shown(high))
     } else {
         format!("{value} is not finite")
     };

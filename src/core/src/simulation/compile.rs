@@ -13,7 +13,7 @@ use crate::dynamics::sectors::SectorModel;
 use crate::settings::{ContactSettings, Motion, Solver, StructureSettings, SurfaceSettings};
 use crate::system::{System, SystemParts, SystemSettings};
 use crate::variables::Quantity;
-use crate::{Error, Result, Rom, Scene};
+use crate::{Error, Result, Rom, Scene, shown};
 use nalgebra::DMatrix;
 
 use super::checks::{check_coupling, check_rom};
@@ -281,8 +281,9 @@ impl Compiled {
         Err(Error::invalid(
             "variable `speed`",
             format!(
-                "{speed} rad/s is beyond the {} rad/s that stiffening and growth were fitted for",
-                spin.largest_speed
+                "{} rad/s is beyond the {} rad/s that stiffening and growth were fitted for",
+                shown(speed),
+                shown(spin.largest_speed)
             ),
             "Reduce the structure again with a larger speed (`tiprub reduce --spin`), or leave spin out",
         ))

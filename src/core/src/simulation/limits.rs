@@ -10,7 +10,7 @@ use crate::settings::{Meridian, Scheme, Solver};
 use crate::stability::massless::MasslessLimit;
 use crate::stability::{self, ContactDirections, Growth, massless};
 use crate::variables::Quantity;
-use crate::{Error, Result};
+use crate::{Error, Result, shown};
 use nalgebra::DMatrix;
 
 /// Contact nodes up to this number are looked at in every combination; beyond, alone, in neighbouring pairs, and all.
@@ -317,7 +317,8 @@ impl Checking<'_> {
             warnings.push(format!(
                 "with µ = {friction} the casing's part of the Delassus matrix is not positive semidefinite (lowest eigenvalue \
                  {worst:.2e} of the largest, at θ = {at:.2} rad): where the blades add less flexibility than that, a step \
-                 may have no unique solution and is then refused"
+                 may have no unique solution and is then refused",
+                friction = shown(friction)
             ));
         }
         Ok(warnings)
@@ -473,7 +474,7 @@ impl Checking<'_> {
         let where_closed = if self.compiled.wheel.is_some() { " of all sectors" } else { "" };
         format!(
             "with µ = {}, contact closed at {}{where_closed} and sliding in {direction}",
-            self.parameters.friction,
+            shown(self.parameters.friction),
             names.join(", ")
         )
     }

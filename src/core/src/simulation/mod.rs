@@ -20,7 +20,7 @@ use crate::contact::gap::Drive;
 use crate::settings::Solver;
 use crate::system::System;
 use crate::variables::{Quantity, Start, VariableTable};
-use crate::{Error, Result, Scene};
+use crate::{Error, Result, Scene, shown};
 use compile::Compiled;
 use drive::{Input, RotorAngle};
 use window::Window;
@@ -212,7 +212,7 @@ impl Simulation {
     /// Refusals with numbers and remedy; the instance can be given other parameters and asked again.
     pub fn initialise(&mut self, start_time: f64) -> Result<()> {
         if !start_time.is_finite() {
-            return Err(Error::invalid("start time", format!("{start_time}"), "Give a finite start time"));
+            return Err(Error::invalid("start time", shown(start_time), "Give a finite start time"));
         }
         let parameters = self.parameters();
         self.warnings.clear();
@@ -262,7 +262,7 @@ impl Simulation {
             "the rotor starts at speed {} rad/s with friction: the sliding law does not model sticking; results are \
              meaningful once the tips slide faster than they vibrate, which they do not below some {slow:.1e} rad/s (the \
              solver coulomb models it)",
-            speed.value
+            shown(speed.value)
         ));
     }
 

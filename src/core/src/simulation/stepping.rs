@@ -3,7 +3,7 @@
 use super::{Communication, MOST_STEPS, Phase, Progress, SAME_STEP, Simulation, TIME_TOLERANCE};
 use crate::contact::coating::Coating;
 use crate::system::StepFailure;
-use crate::{Error, Result};
+use crate::{Error, Result, shown};
 
 impl Simulation {
     /// Begin a communication step of length H from the current time, landing exactly on `current_time + step_size`.
@@ -55,21 +55,25 @@ impl Simulation {
         if !(step_size.is_finite() && step_size > 0.0) {
             return Err(Error::invalid(
                 "communicationStepSize",
-                format!("{step_size} s at t = {} s", self.time),
+                format!("{} s at t = {} s", shown(step_size), shown(self.time)),
                 "Give a finite communication step > 0",
             ));
         }
         if !current_time.is_finite() || (current_time - self.time).abs() > TIME_TOLERANCE * step_size {
             return Err(Error::invalid(
                 "currentCommunicationPoint",
-                format!("{current_time} s, but this instance is at t = {} s", self.time),
+                format!("{} s, but this instance is at t = {} s", shown(current_time), shown(self.time)),
                 "Continue from the end of the last step, or restore a saved state",
             ));
         }
         if current_time + step_size <= current_time {
             return Err(Error::invalid(
                 "communicationStepSize",
-                format!("{step_size} s does not change the time {current_time} s in double precision"),
+                format!(
+                    "{} s does not change the time {} s in double precision",
+                    shown(step_size),
+                    shown(current_time)
+                ),
                 "Use a longer communication step or a start time closer to 0",
             ));
         }
@@ -77,7 +81,7 @@ impl Simulation {
         if ratio > MOST_STEPS {
             return Err(Error::invalid(
                 "communicationStepSize",
-                format!("{step_size} s would need {ratio:.3e} internal steps"),
+                format!("{} s would need {ratio:.3e} internal steps", shown(step_size)),
                 "Use a shorter communication step or a larger internal_step_max",
             ));
         }
@@ -98,7 +102,7 @@ impl Simulation {
                 format!(
                     "the rotor turns {passed:.3e} rad in one internal step of {step:.3e} s at t = {} s, past cells of the \
                      coating {cell:.3e} rad wide, which would stay unworn",
-                    self.time
+                    shown(self.time)
                 ),
                 "Use fewer cells around, a lower speed or a smaller internal_step_max",
             ));
@@ -111,7 +115,7 @@ impl Simulation {
             format!(
                 "the rotor turns {turned:.3e} rad in one internal step of {step:.3e} s at t = {} s, past features of the casing \
                  shape {scale:.3e} rad wide",
-                self.time
+                shown(self.time)
             ),
             "Use a lower speed or a smaller internal_step_max",
         ))
@@ -179,9 +183,10 @@ impl Simulation {
             },
             StepFailure::Implausible { sector } => Error::Unstable {
                 problem: format!(
-                    "at t = {time} s (last good time {} s) a contact node of sector {} is displaced by more than a tenth of \
+                    "at t = {} s (last good time {} s) a contact node of sector {} is displaced by more than a tenth of \
                      its radius, is as deep inside the casing, or meets a flank of the casing shape steeper than 45°{}",
-                    self.time,
+                    shown(time),
+                    shown(self.time),
                     sector + 1,
                     self.instability()
                 ),
@@ -191,13 +196,14 @@ impl Simulation {
             },
             // Of free masters only, dealt with above.
             StepFailure::TooFast | StepFailure::BehindEdge { .. } => Error::Unstable {
-                problem: format!("a contact node moves too far in one internal step at t = {time} s"),
+                problem: format!("a contact node moves too far in one internal step at t = {} s", shown(time)),
                 remedy: "Use a smaller internal step; restore a saved state or reset first".to_owned(),
             },
             StepFailure::CasingImplausible => Error::Unstable {
                 problem: format!(
-                    "at t = {time} s (last good time {} s) the casing is displaced by more than a tenth of the radius",
-                    self.time
+                    "at t = {} s (last good time {} s) the casing is displaced by more than a tenth of the radius",
+                    shown(time),
+                    shown(self.time)
                 ),
                 remedy:
                     "Check its loads and temperatures; small displacements cannot describe this. Restore a saved state \
@@ -206,9 +212,10 @@ impl Simulation {
             },
             StepFailure::Unsolved { sector } => Error::Unstable {
                 problem: format!(
-                    "the contact problem of sector {} has no solution at t = {time} s (last good time {} s)",
+                    "the contact problem of sector {} has no solution at t = {} s (last good time {} s)",
                     sector + 1,
-                    self.time
+                    shown(time),
+                    shown(self.time)
                 ),
                 remedy: "Use less friction or another internal step; restore a saved state or reset first".to_owned(),
             },
@@ -252,7 +259,7 @@ impl Simulation {
             _ => "Check positions and velocity; small displacements beside rigid flight cannot describe this",
         };
         Some(Error::Unstable {
-            problem: format!("at t = {time} s (last good time {} s) {problem}", self.time),
+            problem: format!("at t = {} s (last good time {} s) {problem}", shown(time), shown(self.time)),
             remedy: format!("{remedy}. Restore a saved state or reset first"),
         })
     }

@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 use crate::contact::gap::dot;
 use crate::dynamics::modal::ModalModel;
 use crate::settings::Scheme;
-use crate::{Error, Result};
+use crate::{Error, Result, shown};
 
 /// Margin under the limit ω_max h = 2 of central differences.
 const CENTRAL_MARGIN: f64 = 1e-9;
@@ -186,7 +186,8 @@ fn refuse_unsolvable(solvable: impl Fn(f64) -> bool, exact: bool, step: f64, fri
     };
     Err(Error::Unstable {
         problem: format!(
-            "with friction_coefficient µ = {friction} and internal steps up to h = {step:.3e} s the contact problem {what} ({why})"
+            "with friction_coefficient µ = {friction} and internal steps up to h = {step:.3e} s the contact problem {what} ({why})",
+            friction = shown(friction)
         ),
         remedy: if low > 1e-9 * friction {
             format!("Use µ below {low:.4} for this structure, or another internal step")

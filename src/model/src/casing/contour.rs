@@ -3,6 +3,8 @@
 //! Slopes at the points are the weighted harmonic means of Fritsch and Butland (SIAM J. Sci. Stat. Comput. 5(2), 1984),
 //! those at the ends the slopes of the outer segments. Two points give a cylinder or a cone, exactly.
 
+use tiprub_core::shown;
+
 use crate::{Error, Result};
 
 /// The contour of an inner surface.
@@ -25,10 +27,14 @@ impl Contour {
             return refuse(format!("{} point", points.len()));
         }
         if let Some([z, r]) = points.iter().find(|[z, r]| !(z.is_finite() && r.is_finite() && *r > 0.0)) {
-            return refuse(format!("the point z = {z} m, r = {r} m is not finite, or its radius is not positive"));
+            return refuse(format!(
+                "the point z = {} m, r = {} m is not finite, or its radius is not positive",
+                shown(*z),
+                shown(*r)
+            ));
         }
         if let Some(pair) = points.windows(2).find(|pair| pair[1][0] <= pair[0][0]) {
-            return refuse(format!("z = {} m does not lie beyond z = {} m", pair[1][0], pair[0][0]));
+            return refuse(format!("z = {} m does not lie beyond z = {} m", shown(pair[1][0]), shown(pair[0][0])));
         }
         let secants: Vec<f64> =
             points.windows(2).map(|pair| (pair[1][1] - pair[0][1]) / (pair[1][0] - pair[0][0])).collect();

@@ -6,6 +6,8 @@
 use core::f64::consts::TAU;
 use std::collections::BTreeMap;
 
+use tiprub_core::shown;
+
 use super::contour::Contour;
 use super::grid::GridNodes;
 use crate::element::ElementKind;
@@ -79,7 +81,11 @@ impl RingGeometry {
             if value.is_finite() && value > 0.0 {
                 return Ok(());
             }
-            Err(Error::invalid(format!("casing, {what}"), format!("{value} m is not positive"), "Give lengths in m"))
+            Err(Error::invalid(
+                format!("casing, {what}"),
+                format!("{} m is not positive", shown(value)),
+                "Give lengths in m",
+            ))
         };
         positive("thickness", self.thickness)?;
         for flange in self.flanges.iter().flatten() {
@@ -88,7 +94,7 @@ impl RingGeometry {
         }
         let taken: f64 = self.flanges.iter().flatten().map(|flange| flange.thickness).sum();
         if taken >= high - low {
-            let problem = format!("flanges of {taken} m in all fill the length of {} m", high - low);
+            let problem = format!("flanges of {} m in all fill the length of {} m", shown(taken), shown(high - low));
             return Err(Error::invalid("casing, flange thickness", problem, "Give thinner flanges or a longer casing"));
         }
         Ok(())
@@ -167,7 +173,10 @@ fn contact_positions(geometry: &RingGeometry, rings: ContactRings) -> Result<Vec
     let ([low, high], [first, last]) = (geometry.contour.axial(), rings.axial);
     // Written so that a NaN is refused, too.
     if !(first > low && first < last && last < high) {
-        let problem = format!("{first} m to {last} m does not lie inside the casing, {low} m to {high} m");
+        let problem = {
+            let [first, last, low, high] = [first, last, low, high].map(shown);
+            format!("{first} m to {last} m does not lie inside the casing, {low} m to {high} m")
+        };
         return Err(Error::invalid("casing, axial positions of the contact rings", problem, "Choose them inside"));
     }
     let share = |k: usize| k as f64 / (rings.along - 1) as f64;

@@ -4,6 +4,8 @@
 
 use core::f64::consts::TAU;
 
+use tiprub_core::shown;
+
 use super::{SECTORS, TIP_AXIAL, TIP_RADIUS};
 use crate::{Error, Result};
 
@@ -206,7 +208,11 @@ impl SectorGeometry {
             disk.rim_axial[1],
         )?;
         if blade.fillet.is_nan() || blade.fillet < 0.0 {
-            return Err(Error::invalid("stage, fillet radius", format!("{} m is below 0", blade.fillet), REMEDY));
+            return Err(Error::invalid(
+                "stage, fillet radius",
+                format!("{} m is below 0", shown(blade.fillet)),
+                REMEDY,
+            ));
         }
         for end in 0..2 {
             rising(
@@ -254,5 +260,9 @@ fn not_above(low: &str, value: f64, high: &str, limit: f64) -> Result<()> {
     if value <= limit {
         return Ok(());
     }
-    Err(Error::invalid(format!("stage, {low}"), format!("{value} is above {limit}, the {high}"), REMEDY))
+    Err(Error::invalid(
+        format!("stage, {low}"),
+        format!("{} is above {}, the {high}", shown(value), shown(limit)),
+        REMEDY,
+    ))
 }

@@ -12,7 +12,7 @@ use crate::dynamics::modal::{ModalModel, RIGID_FRACTION, check_semidefinite, rea
 use crate::dynamics::scheme::ModeCoefficients;
 use crate::rom::{Harmonic, cholesky};
 use crate::settings::Scheme;
-use crate::{Error, Result, Rom};
+use crate::{Error, Result, Rom, shown};
 
 /// Entries of a mode shape this close to the largest count as equally large when the phase is chosen.
 const SAME_SIZE: f64 = 1e-6;
@@ -138,8 +138,10 @@ impl CyclicModel {
                     return Err(Error::invalid(
                         "ROM harmonics",
                         format!(
-                            "nodal diameter {} has a mode of {found} Hz where the checks of the ROM tell {told} Hz",
-                            diameter.nodal_diameter
+                            "nodal diameter {} has a mode of {} Hz where the checks of the ROM tell {} Hz",
+                            diameter.nodal_diameter,
+                            shown(found),
+                            shown(*told)
                         ),
                         "Write the harmonics in the order of the nodal diameters, or the ROM again with `tiprub reduce`",
                     ));

@@ -18,7 +18,7 @@ use crate::simulation::compile::Compiled;
 use crate::simulation::free::FreeParts;
 use crate::stability::massless::MasslessLimit;
 use crate::stability::{self, ContactDirections};
-use crate::{Error, Result};
+use crate::{Error, Result, shown};
 
 /// The flight is looked at in this many places, this share of the extent apart.
 const PLACES: u32 = 48;
@@ -70,7 +70,8 @@ impl Compiled {
             warnings.push(format!(
                 "with µ = {friction} the contact problem cannot be shown to have one solution for all contacts that the flight \
                  of the undeformed structure leads to (the symmetric part of the Delassus matrix has the eigenvalue \
-                 {worst:.2e} of its diagonal); a step whose problem is not solved is refused"
+                 {worst:.2e} of its diagonal); a step whose problem is not solved is refused",
+                friction = shown(friction)
             ));
         }
         Ok(warnings)
@@ -100,7 +101,8 @@ impl Compiled {
             return Err(Error::Unstable {
                 problem: format!(
                     "with friction_coefficient µ = {friction} and an internal step of {step:.3e} s the contact of {node} alone has \
-                     no unique solution on the flight: friction drives it into the surface"
+                     no unique solution on the flight: friction drives it into the surface",
+                    friction = shown(friction)
                 ),
                 remedy: "Use less friction, another internal step, or the solver coulomb".to_owned(),
             });
