@@ -241,7 +241,7 @@ impl Watch {
 }
 
 /// The larger one; not-a-number sticks.
-fn worse(before: f64, now: f64) -> f64 {
+pub fn worse(before: f64, now: f64) -> f64 {
     if before >= now || before.is_nan() { before } else { now }
 }
 

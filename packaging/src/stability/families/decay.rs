@@ -1,12 +1,12 @@
 //! Free vibration after a release: blades that a casing let go, rings that a load let go, against the decay of each mode.
 //!
 //! A structure at rest under a force that ends goes on from q₀ = q₋₁ = φᵀf/ω². Without force every scheme is a recurrence whose
-//! two roots ρe^(±iφ) are known: ρ = e^(−ξωh), φ = ω√(1 − ξ²)h where it is exact, those of central differences else. So
-//! q_n = ρⁿ(cos nφ + sin nφ (cos φ − ρ)/sin φ) q₀ to rounding, and the logarithmic decrement is 2π ln(1/ρ)/φ.
+//! two roots a, b are known: e^(−ξωh ± iω√(1 − ξ²)h) where it is exact, those of central differences else. So
+//! q_n = (A aⁿ + B bⁿ) q₀ to rounding, with A + B = A/a + B/b = 1, logarithmic decrement and all.
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector};
 use tiprub_core::{
     Result, Simulation,
     settings::{LoadSettings, Scheme, Solver},
@@ -15,7 +15,7 @@ use tiprub_core::{
 use super::super::{
     Case, Check, Expected, Happened,
     models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, on_ring, round, with_methods, with_step},
-    observe::{amplitudes, real, set},
+    observe::{amplitudes, real, set, worse},
     press::pressed,
 };
 
@@ -66,30 +66,36 @@ pub struct Released {
     pub told: f64,
 }
 
-/// Decay of one mode from rest under a force that has just ended.
+/// Decay of one mode from rest under a force that has just ended: Re(A aⁿ + B bⁿ) with the roots a, b of its recurrence.
 struct Decay {
+    roots: [Complex<f64>; 2],
+    shares: [Complex<f64>; 2],
+    /// Of the slower root.
     radius: f64,
-    angle: f64,
-    sine: f64,
 }
 
 impl Decay {
     fn new(scheme: Scheme, frequency: f64, ratio: f64, step: f64) -> Self {
         let (rate, angle) = (ratio * frequency * step, frequency * step);
-        let (radius, angle) = if scheme == Scheme::CentralDifference {
-            // Roots of (1 + ξωh) z² − (2 − ω²h²) z + (1 − ξωh).
-            let radius = ((1.0 - rate) / (1.0 + rate)).sqrt();
-            (radius, ((2.0 - angle * angle) / (2.0 * (1.0 + rate) * radius)).acos())
+        let roots = if scheme == Scheme::CentralDifference {
+            // Of (1 + ξωh) z² − (2 − ω²h²) z + (1 − ξωh); real where damping is high and the step coarse.
+            let (middle, product) = ((1.0 - 0.5 * angle * angle) / (1.0 + rate), (1.0 - rate) / (1.0 + rate));
+            let apart = Complex::from(middle * middle - product).sqrt();
+            [apart + middle, -apart + middle]
         } else {
-            ((-rate).exp(), angle * (1.0 - ratio * ratio).sqrt())
+            let turned = angle * (1.0 - ratio * ratio).sqrt();
+            [turned, -turned].map(|turned| Complex::from_polar((-rate).exp(), turned))
         };
-        Self { radius, angle, sine: (angle.cos() - radius) / angle.sin() }
+        // One at n = 0 and at n = −1.
+        let [a, b] = roots;
+        let one = Complex::from(1.0);
+        let shares = [a * (one - b) / (a - b), b * (one - a) / (b - a)];
+        Self { roots, shares, radius: a.norm().max(b.norm()) }
     }
 
     /// Displacement after `n` steps without force, per displacement at rest.
     fn at(&self, n: f64) -> f64 {
-        let (sine, cosine) = (n * self.angle).sin_cos();
-        self.radius.powf(n) * (cosine + self.sine * sine)
+        self.roots.iter().zip(self.shares).map(|(root, share)| (share * root.powf(n)).re).sum()
     }
 
     /// Steps until `share` of the motion is left.
@@ -151,14 +157,14 @@ impl Released {
         let found: [f64; 3] = std::array::from_fn(|i| row(&simulation, i));
         let still = (0..3)
             .map(|i| (0..frequencies.len()).map(|mode| seen[(i, mode)] * rest[mode]).sum::<f64>() - found[i])
-            .fold(0.0, |most: f64, off| most.max(off.abs()));
+            .fold(0.0, |most: f64, off| worse(most, off.abs()));
         set(&mut simulation, "casing_radius_change", 2e-2)?;
         let (mut off, mut n) = (0.0_f64, 0.0);
         while n < slowest.steps(LEFT).max(10.0) {
             simulation.do_step(simulation.time(), step)?;
             n += 1.0;
             for i in 0..3 {
-                off = off.max((row(&simulation, i) - place(n, i)).abs() / scale(n));
+                off = worse(off, (row(&simulation, i) - place(n, i)).abs() / scale(n));
             }
         }
         Ok(vec![
@@ -210,8 +216,8 @@ pub fn ring(scheme: Scheme, order: u32, ratio: f64, told: f64) -> Result<Vec<Che
         n += stride;
         let [cosine, sine, _] = amplitudes(&simulation, order);
         let scale = rest * decay.radius.powf(n);
-        off = off.max((cosine - rest * decay.at(n)).abs() / scale);
-        across = across.max(sine.abs() / scale);
+        off = worse(off, (cosine - rest * decay.at(n)).abs() / scale);
+        across = worse(across, sine.abs() / scale);
     }
     let energy = real(&simulation, "energy_residual_relative").abs();
     Ok(vec![

@@ -9,7 +9,7 @@ use super::super::{
     Case, Check, Expected, Happened,
     bodies::{Body, FURTHEST, HALF, Plate, Throw, vector},
     models::SOLVERS,
-    observe::real,
+    observe::{real, worse},
 };
 
 /// Internal step of most cases (s).
@@ -40,7 +40,7 @@ pub fn started(throw: &Throw) -> Result<Simulation> {
 /// Length of a vector.
 pub fn size(v: [f64; 3]) -> f64 {
     // Scaled: squares of what is tiny or huge leave the range of numbers.
-    let largest = v.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let largest = v.iter().fold(0.0, |most: f64, x| worse(most, x.abs()));
     if largest == 0.0 { 0.0 } else { largest * v.iter().map(|x| (x / largest).powi(2)).sum::<f64>().sqrt() }
 }
 
@@ -74,9 +74,9 @@ fn flight(scheme: Scheme, speed: f64, mass: f64) -> Result<Vec<Check>> {
     for _ in 0..300 {
         simulation.do_step(simulation.time(), 3.7 * STEP)?;
         let exact = velocity.map(|component| component * simulation.time());
-        off = off.max(apart(vector(&simulation, "body.displacement"), exact) / size(exact));
+        off = worse(off, apart(vector(&simulation, "body.displacement"), exact) / size(exact));
         let row = |node: usize| std::array::from_fn(|i| simulation.system().bank().row(3 * node + i, 0));
-        nodes = (0..8).fold(nodes, |most, node| most.max(apart(row(node), exact) / size(exact)));
+        nodes = (0..8).fold(nodes, |most, node| worse(most, apart(row(node), exact) / size(exact)));
     }
     let kinetic = 0.5 * mass * size(velocity).powi(2);
     Ok(vec![
@@ -179,7 +179,7 @@ impl Impact {
             simulation.do_step(simulation.time(), STEP)?;
             let force = vector(&simulation, "force");
             impulse = std::array::from_fn(|i| impulse[i] + STEP * force[i]);
-            peak = peak.max(real(&simulation, "energy_residual_relative").abs());
+            peak = worse(peak, real(&simulation, "energy_residual_relative").abs());
         }
         let left = (sideways - self.friction * speed).max(0.0);
         let kept = if sideways > 0.0 { left / sideways } else { 0.0 };
@@ -249,7 +249,7 @@ fn rebound(scheme: Scheme, solver: Solver, ratio: f64, speed: f64) -> Result<Vec
     while simulation.time() < end {
         simulation.do_step(simulation.time(), step)?;
         impulse += step * real(&simulation, "force_x");
-        residual = residual.max(real(&simulation, "energy_residual_relative").abs());
+        residual = worse(residual, real(&simulation, "energy_residual_relative").abs());
         if !simulation.system().events().is_empty() {
             touched.get_or_insert(simulation.time());
             last = simulation.time();

@@ -12,7 +12,7 @@ use tiprub_core::{
 use super::super::{
     Case, Check, Expected, Happened,
     models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, round, with_methods, with_step},
-    observe::{real, set},
+    observe::{real, set, worse},
 };
 
 /// Internal step (s).
@@ -87,7 +87,7 @@ impl Heat {
                 let slip = travel + 0.5 * (now[sector] - oldest[sector]);
                 heat += self.share * self.friction * acting[sector] * slip.abs();
                 if acting[sector] > 0.0 {
-                    reversed = reversed.max(-slip / travel);
+                    reversed = worse(reversed, -slip / travel);
                 }
             }
             touched += simulation.system().events().len();

@@ -10,7 +10,7 @@ use super::{
         Case, Check, Expected, Happened,
         bodies::{Body, HALF, PLATE, Plate, Throw, vector},
         models::SOLVERS,
-        observe::{outputs, real},
+        observe::{outputs, real, worse},
     },
     free::{SCHEMES, STEP, apart, size, started, throw},
 };
@@ -84,15 +84,15 @@ impl Balance {
             simulation.do_step(simulation.time(), STEP)?;
             let [force, first, second] =
                 ["force", "left_face.force", "right_face.force"].map(|name| vector(&simulation, name));
-            sums = sums.max(apart(force, std::array::from_fn(|i| first[i] + second[i])) / size(force).max(1e-300));
+            sums = worse(sums, apart(force, std::array::from_fn(|i| first[i] + second[i])) / size(force).max(1e-300));
             impulse = std::array::from_fn(|i| impulse[i] + STEP * force[i]);
             exchanged += STEP * size(force);
             let now = vector(&simulation, "body.velocity");
             let change = std::array::from_fn(|i| mass * (now[i] - velocity[i]));
-            off = off.max(apart(change, impulse) / (exchanged + mass * self.speed));
-            residual = residual.max(real(&simulation, "energy_residual_relative").abs());
+            off = worse(off, apart(change, impulse) / (exchanged + mass * self.speed));
+            residual = worse(residual, real(&simulation, "energy_residual_relative").abs());
             let lost = real(&simulation, "impact_loss");
-            (fallen, before) = (fallen.max((before - lost) / energy), lost);
+            (fallen, before) = (worse(fallen, (before - lost) / energy), lost);
             finite &= outputs(&simulation).iter().all(|value| value.is_finite());
         }
         let curved = real(&simulation, "curvature_work");
@@ -139,10 +139,10 @@ fn symmetric(scheme: Scheme, solver: Solver, friction: f64) -> Result<Vec<Check>
         let row = |node: usize, i: usize| simulation.system().bank().row(3 * node + i, 0);
         for node in 0..4 {
             let sides = [row(node, 0) + row(node + 4, 0), row(node, 1) - row(node + 4, 1)];
-            off = sides.iter().fold(off, |most, side| most.max(side.abs()));
-            largest = largest.max(row(node, 0).abs());
+            off = sides.iter().fold(off, |most, side| worse(most, side.abs()));
+            largest = worse(largest, row(node, 0).abs());
         }
-        across = across.max(vector(&simulation, "force")[0].abs());
+        across = worse(across, vector(&simulation, "force")[0].abs());
         pushed = pushed.max(vector(&simulation, "left_face.force")[0].abs());
     }
     // Gauss-Seidel goes through the contacts one by one and ends at its tolerance.
@@ -195,7 +195,7 @@ fn edge(solver: Solver, centre: [f64; 3], distance: f64, velocity: [f64; 3]) -> 
         simulation.do_step(simulation.time(), STEP)?;
         let force = vector(&simulation, "force");
         impulse = std::array::from_fn(|i| impulse[i] + STEP * force[i]);
-        residual = residual.max(real(&simulation, "energy_residual_relative").abs());
+        residual = worse(residual, real(&simulation, "energy_residual_relative").abs());
     }
     let now = vector(&simulation, "body.velocity");
     let change: [f64; 3] = std::array::from_fn(|i| 0.3 * (now[i] - velocity[i]));
@@ -284,7 +284,7 @@ fn begin(throw: &Throw) -> Result<Vec<Check>> {
     for _ in 0..300 {
         simulation.do_step(simulation.time(), throw.step)?;
         impulse += throw.step * real(&simulation, "force_x");
-        residual = residual.max(real(&simulation, "energy_residual_relative").abs());
+        residual = worse(residual, real(&simulation, "energy_residual_relative").abs());
     }
     let change = throw.body.mass() * (vector(&simulation, "body.velocity")[0] - throw.velocity[0]);
     Ok(vec![

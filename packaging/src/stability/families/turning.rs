@@ -16,7 +16,7 @@ use super::{
     super::{
         Case, Check, Expected, Happened,
         models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, on_ring, round, with_methods, with_step},
-        observe::{Watch, amplitudes, real, set},
+        observe::{Watch, amplitudes, real, set, worse},
     },
     decay::modes,
 };
@@ -119,9 +119,9 @@ impl Travelling {
             let turned = Complex::from_polar(1.0, omega * simulation.time());
             // cos and sin parts of cos(nθ − Ωt) are the real and the imaginary part of e^(iΩt).
             let [cosine, sine, other] = amplitudes(&simulation, self.order);
-            off = off.max((Complex::new(cosine, sine) - discrete * turned).norm());
-            beside = beside.max((Complex::new(cosine, sine) - exact * turned).norm());
-            rest = rest.max(other);
+            off = worse(off, (Complex::new(cosine, sine) - discrete * turned).norm());
+            beside = worse(beside, (Complex::new(cosine, sine) - exact * turned).norm());
+            rest = worse(rest, other);
         }
         let size = discrete.norm();
         let fine = (omega.abs().max(frequency) * STEP).powi(2);
@@ -250,8 +250,8 @@ impl Pressed {
                 // Tip −depth − A cos(kθ − φ) at the end of the step: pushed in where the casing is narrow.
                 let angle = lobes * TAU * event.sector as f64 / tower.sectors as f64 + omega * simulation.time() - 0.4;
                 let [wave, exact] = [stiffness, own].map(|force| (force * Complex::from_polar(amplitude, angle)).re);
-                off = off.max((event.normal - at_rest - wave).abs());
-                beside = beside.max((event.normal - at_rest - exact).abs());
+                off = worse(off, (event.normal - at_rest - wave).abs());
+                beside = worse(beside, (event.normal - at_rest - exact).abs());
             }
         }
         let mut checks = vec![
