@@ -295,7 +295,7 @@ fn flanks() -> Vec<Case> {
                 let expected = if slope.abs() > 1.0 {
                     Expected::refused(["45°"])
                 } else {
-                    Expected::right("static contact with the tilted normal, torque λ n_t r")
+                    Expected::right("static contact with the tilted normal, tangential force λ n_t")
                 };
                 let name = format!("turning/flank/{slope}/{scheme_name}/{solver_name}");
                 cases.push(Case::new(name, expected, work).quick(solver == Solver::Lcp));
