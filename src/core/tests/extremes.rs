@@ -106,6 +106,26 @@ fn refusals_write_numbers_of_any_size_in_short() {
 }
 
 #[test]
+fn a_derivative_that_leaves_the_range_within_the_step_is_refused_and_changes_nothing() {
+    let mut scene = common::scene(12);
+    scene.settings.surfaces[0].moving = true;
+    let (mut refused, mut other) = (started(&scene), started(&scene));
+    let radius = reference(&refused, "casing_radius_change");
+    for (slope, said) in [(1e6, "outside"), (-1e6, "outside"), (1e308, "1e308")] {
+        refused.set_input_derivative(radius, 1, slope).unwrap();
+        let error = refused.do_step(0.0, 1e-4).unwrap_err().to_string();
+        assert!(error.contains("casing_radius_change") && error.contains(said) && error.contains("smaller"), "{error}");
+    }
+    for simulation in [&mut refused, &mut other] {
+        simulation.set_real(radius, 0.0).unwrap();
+        simulation.set_input_derivative(radius, 1, 0.01).unwrap();
+        simulation.do_step(0.0, 1e-4).unwrap();
+    }
+    assert_eq!(real(&refused, "rotor_angle").to_bits(), real(&other, "rotor_angle").to_bits());
+    assert_eq!(real(&refused, "clearance_minimum").to_bits(), real(&other, "clearance_minimum").to_bits());
+}
+
+#[test]
 fn what_counts_is_the_step_in_use_not_the_largest_allowed() {
     // Central differences far beyond their limit by internal_step_max, well within it by the communication step.
     let mut scene = common::scene(12);

@@ -317,16 +317,16 @@ fn by_import(context: &Context, scene: &str, version: u8, variable: &str, value:
 fn refusals(field: &str) -> &'static [&'static [&'static str]] {
     match field {
         "speed" => &[&["variable `speed`", "Use a lower speed"]],
-        "damping_ratio" => &[&["structure[1].damping_ratio", "between 0.0 and 0.99"]],
-        "frequency_factors" => &[&["structure[1].frequency_factors[4]", "between 0.5 and 2.0"]],
+        "damping_ratio" => &[&["structure[1].damping_ratio", "between 0 and 0.99"]],
+        "frequency_factors" => &[&["structure[1].frequency_factors[4]", "between 0.5 and 2"]],
         "gap" => &[&["contact[1].gap", "> 0"], &["contact.gap", "in metres"]],
         "sector_gaps" => &[&["contact[1].sector_gaps", "> 0"], &["contact.gap", "in metres"]],
-        "friction" => &[&["contact[1].friction", "between 0.0 and 2.0"]],
+        "friction" => &[&["contact[1].friction", "between 0 and 2"]],
         "ramp_time" => &[
-            &["surface[1].ramp_time", "between 0.0 and 1e9"],
+            &["surface[1].ramp_time", "between 0 and 1e9"],
             &["initial clearance", "start inside the casing", "ramp_time"],
         ],
-        "time.step" => &[&["time.step", "between 1e-12 and 1.0"]],
+        "time.step" => &[&["time.step", "between 1e-12 and 1"]],
         "communication_step" => &[&["experiment.communication_step", "> 0"]],
         "shape.depth" => &[&["surface.shape", "in metres"]],
         "shape.width" => &[&["surface[1].shape.width", "between 0.001 and 0.25"]],

@@ -3,6 +3,7 @@
 use super::{Communication, MOST_STEPS, Phase, Progress, SAME_STEP, Simulation, TIME_TOLERANCE};
 use crate::contact::coating::Coating;
 use crate::system::StepFailure;
+use crate::variables::Causality;
 use crate::{Error, Result, shown};
 
 impl Simulation {
@@ -23,6 +24,7 @@ impl Simulation {
             }
         }
         self.check_step(current_time, step_size)?;
+        self.check_slopes(step_size)?;
         let limit = self.values[self.compiled.references.step_max];
         let ratio = step_size / limit;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 ≤ value ≤ 1e9")]
@@ -84,6 +86,35 @@ impl Simulation {
                 format!("{} s would need {ratio:.3e} internal steps", shown(step_size)),
                 "Use a shorter communication step or a larger internal_step_max",
             ));
+        }
+        Ok(())
+    }
+
+    /// Inputs with derivatives must not leave their ranges before the end of the step. Allocates only to refuse.
+    fn check_slopes(&mut self, step_size: f64) -> Result<()> {
+        if self.inputs.all_mut().all(|input| input.slope == 0.0) {
+            return Ok(());
+        }
+        for variable in self.table.variables().iter().filter(|variable| variable.causality == Causality::Input) {
+            let range = variable.min.unwrap_or(f64::MIN)..=variable.max.unwrap_or(f64::MAX);
+            for element in 0..variable.len() {
+                let Some(input) = self.inputs.get_mut(variable.quantity, element) else { continue };
+                let end = input.at(step_size);
+                if input.slope != 0.0 && !range.contains(&end) {
+                    return Err(Error::invalid(
+                        format!("variable `{}`", variable.element_name(element)),
+                        format!(
+                            "its derivative {} takes it to {} by t = {} s, outside {} … {}",
+                            shown(input.slope),
+                            shown(end),
+                            shown(self.time + step_size),
+                            shown(*range.start()),
+                            shown(*range.end())
+                        ),
+                        "Give a smaller derivative or none, or a shorter communication step",
+                    ));
+                }
+            }
         }
         Ok(())
     }
@@ -190,9 +221,10 @@ impl Simulation {
                     sector + 1,
                     self.instability()
                 ),
-                remedy: "Check gap, casing shape and its inputs; small displacements cannot describe this. Restore a \
+                remedy:
+                    "Check gap, casing shape, loads and inputs; small displacements cannot describe this. Restore a \
                          saved state or reset first"
-                    .to_owned(),
+                        .to_owned(),
             },
             // Of free masters only, dealt with above.
             StepFailure::TooFast | StepFailure::BehindEdge { .. } => Error::Unstable {
