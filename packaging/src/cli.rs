@@ -86,7 +86,7 @@ pub enum Command {
     /// Stiff and extreme cases: each must end in a right answer or in a refusal that says why.
     #[command(
         after_help = "Examples:\n  tiprub stability --quick\n  tiprub stability --case friction/ --out friction\n  \
-                            tiprub stability --out stability --chapter docs/stability.md\n\n\
+                            tiprub stability --out stability --chapter docs/stability-table.md\n\n\
                             Every case runs in a process of its own with a time limit. DIR then holds index.html, \
                             stability.csv, stability.md and results.json."
     )]
