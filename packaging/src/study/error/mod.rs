@@ -79,22 +79,39 @@ pub fn study(arguments: &StudyArguments, console: &Console) -> Result<Study> {
         measured.push((case, found));
     }
     let orders = orders(&measured, console)?;
-    let mut tables = Vec::new();
+    let mut text = guide_page(&study.facts);
     let mut results = Vec::new();
     for (case, found) in &measured {
-        tables.extend(add(&mut study, case.as_ref(), found));
+        let tables = add(&mut study, case.as_ref(), found);
+        text.push_str(&section(case.as_ref(), &tables));
         results.push(sheets::to_json(case.as_ref(), found));
     }
     if let Some(last) = study.figures.last_mut() {
         last.picture.html.push_str(&orders.to_html(false));
     }
-    tables.push(orders);
-    let facts: String = study.facts.iter().map(|(name, value)| format!("* {name}: {value}\n")).collect();
-    let text: Vec<String> = tables.iter().map(Table::to_markdown).collect();
-    let markdown = format!("{facts}\n{}", text.join("\n"));
-    study.files.push(("tables.md".into(), "the tables as text".into(), markdown.into_bytes()));
+    text.push_str(&format!("\n## Orders\n\n{}", orders.to_markdown()));
+    study.files.push(("tables.md".into(), "pictures and tables as Markdown".into(), text.into_bytes()));
     study.results = json!({ "scenes": results, "quick": quick });
     Ok(study)
+}
+
+/// Head of the page of the guide.
+fn guide_page(facts: &[(String, String)]) -> String {
+    let facts: String = facts.iter().map(|(name, value)| format!("* {name}: {value}\n")).collect();
+    format!("# Error against run time: pictures and tables\n\n{facts}")
+}
+
+/// A scene's part of it.
+fn section(case: &dyn Case, tables: &[Table]) -> String {
+    let title = case.title();
+    let pictures = case.figures().map(|figure| format!("![{title}]({figure}.svg)\n\n")).concat();
+    // Captions on the page of all scenes begin with the scene.
+    let own = |table: &Table| {
+        let caption =
+            table.caption.strip_prefix(title).map_or(table.caption.as_str(), |rest| rest.trim_start_matches(": "));
+        Table { caption: format!("**{caption}**"), ..table.clone() }.to_markdown()
+    };
+    format!("\n## {title}\n\n{pictures}{}", tables.iter().map(own).collect::<Vec<_>>().join("\n"))
 }
 
 /// The scene of this name, reduced where it has to be.
