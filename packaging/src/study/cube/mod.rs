@@ -11,7 +11,7 @@ use serde_json::json;
 use tiprub_core::Scene;
 use tiprub_reference::compare::{asymmetry, exit_speed};
 
-use super::{Statement, Study};
+use super::{Statement, Study, machine};
 use crate::{
     Failure, Result,
     cli::StudyArguments,
@@ -106,10 +106,12 @@ fn report(scene: &Scene, flown: &[Flown], sizes: &Sizes, quick: bool) -> Result<
         }
     }
     figures.push(figures::agreement(&main.pairs)?);
-    let mut tables: Vec<String> = flown
-        .iter()
-        .map(|flown| format!("## {}\n\n{}", flown.title(), pairs::markdown(&flown.outcomes, &flown.pairs)))
-        .collect();
+    let facts = machine::facts().into_iter().map(|(name, value)| format!("* {name}: {value}\n"));
+    let mut tables =
+        vec![format!("# A cube between two rings: every pair of methods\n\n{}", facts.collect::<String>())];
+    let flights =
+        flown.iter().map(|flown| format!("## {}\n\n{}", flown.title(), pairs::markdown(&flown.outcomes, &flown.pairs)));
+    tables.extend(flights);
     tables.push(sizes.markdown());
     let all = flown.iter().map(|flown| pairs::json(&flown.outcomes, &flown.pairs, &flown.flight));
     let mut statements = meeting(main);

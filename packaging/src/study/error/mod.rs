@@ -10,7 +10,6 @@ pub mod clock;
 pub mod competitor;
 pub mod cube;
 pub mod full;
-pub mod machine;
 pub mod measure;
 pub mod outside;
 pub mod ranking;
@@ -62,7 +61,7 @@ pub fn study(arguments: &StudyArguments, console: &Console) -> Result<Study> {
         summary: "Every time scheme and contact solver, at steps on both sides of the stability limit and with several numbers of modes, beside \
                   methods that share no code with them."
             .into(),
-        facts: machine::facts(),
+        facts: super::machine::facts(),
         statements: Vec::new(),
         figures: Vec::new(),
         results: Value::Null,
