@@ -24,7 +24,7 @@ const INK: RGBColor = RGBColor(52, 58, 66);
 const GRID: RGBColor = RGBColor(232, 235, 239);
 
 /// Line colours, distinguishable with colour-vision deficiency and on grey paper.
-pub const COLORS: [RGBColor; 10] = [
+pub const COLORS: [RGBColor; 11] = [
     RGBColor(31, 93, 160),
     RGBColor(214, 112, 24),
     RGBColor(36, 140, 118),
@@ -35,6 +35,7 @@ pub const COLORS: [RGBColor; 10] = [
     RGBColor(152, 178, 40),
     RGBColor(226, 132, 172),
     RGBColor(20, 22, 26),
+    RGBColor(116, 78, 178),
 ];
 
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
