@@ -116,6 +116,13 @@ fn a_derivative_that_leaves_the_range_within_the_step_is_refused_and_changes_not
         let error = refused.do_step(0.0, 1e-4).unwrap_err().to_string();
         assert!(error.contains("casing_radius_change") && error.contains(said) && error.contains("smaller"), "{error}");
     }
+    // To the bound and not beyond, in steps whose sum is rounded.
+    let most = refused.table().find("casing_radius_change").unwrap().max.unwrap();
+    let mut ramp = started(&scene);
+    for index in 0..30 {
+        ramp.set_input_derivative(radius, 1, most / 30.0 / 1e-4).unwrap();
+        ramp.do_step(ramp.time(), 1e-4).unwrap_or_else(|error| panic!("step {index}: {error}"));
+    }
     for simulation in [&mut refused, &mut other] {
         simulation.set_real(radius, 0.0).unwrap();
         simulation.set_input_derivative(radius, 1, 0.01).unwrap();

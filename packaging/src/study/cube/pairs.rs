@@ -85,15 +85,18 @@ fn readings(outcome: &Outcome) -> Vec<String> {
         format!("{:.3} … {:.3}", 1e3 * low, 1e3 * high)
     };
     let end = history.times.last().copied().unwrap_or(0.0);
+    // What has not ended with the run has no time.
+    let ended = |time: f64, text: String| if time < end * (1.0 - 1e-9) { text } else { "–".into() };
+    let (leaves, last) = (released(history), history.last_contact().unwrap_or(0.0));
     let means = windowed(&history.times, &history.first_force(), WINDOW, end);
     let [moved, force] = asymmetry(history, f64::MAX);
     vec![
         span(0),
         span(2),
         format!("{:.0}", means.iter().fold(0.0, |most: f64, mean| most.max(*mean))),
-        format!("{:.3}", 1e3 * released(history)),
-        format!("{:.3}", 1e3 * history.last_contact().unwrap_or(0.0)),
-        format!("{:.3}", exit_speed(history)),
+        ended(leaves, format!("{:.3}", 1e3 * leaves)),
+        ended(last, format!("{:.3}", 1e3 * last)),
+        ended(last, format!("{:.3}", exit_speed(history))),
         format!("{moved:.0e}, {force:.0e}"),
         format!("{:.0e}", history.penetration.iter().fold(0.0, |most: f64, depth| most.max(*depth))),
         format!("{:.1} + {:.1}", history.processor_time, history.preparation_time),

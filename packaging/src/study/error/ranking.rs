@@ -42,6 +42,17 @@ impl Kind {
     }
 }
 
+/// Errors below this cannot be read: how far two references that share no code are apart where the truth is one of them.
+pub fn readable(case: &dyn Case, measured: &Measured, kind: Kind) -> f64 {
+    let apart = |size: usize| measured.references.get(size).map_or(0.0, |references| references.apart[0]);
+    match (case.meeting(), kind) {
+        (Some((distance, _)), _) => distance,
+        (None, Kind::OfTime) => apart(case.standard()),
+        (None, Kind::Total) if case.exact().is_some() => 0.0,
+        (None, Kind::Total) => apart(measured.references.len().saturating_sub(1)),
+    }
+}
+
 /// The row of least time with at most this error, among those of a competitor or of all.
 pub fn cheapest<'a>(
     rows: &[&'a Row],
@@ -81,7 +92,14 @@ pub fn winners(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
     };
     let columns = ["error", "cheapest", case.size_name(), "h (µs)", "time", "the paper's method", "factor"];
     let mut table = Table::new(what, columns);
+    let readable = readable(case, measured, kind);
     for target in TARGETS {
+        if target < readable && cheapest(&rows, kind, None, target).is_some() {
+            let why = format!("not to be read: the references are {readable:.1e} apart");
+            let empty = std::iter::repeat_n(String::new(), table.columns.len() - 2);
+            table.rows.push([format!("{target:.0e}"), why].into_iter().chain(empty).collect());
+            continue;
+        }
         let paper = cheapest(&rows, kind, Some(PAPER), target);
         let text = |(row, figures): (&Row, &Figures)| {
             let size =
@@ -113,6 +131,7 @@ pub fn costs(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
     let caption = format!("{}: time that every competitor needs for an error of {of}", case.title());
     let mut table =
         Table::new(caption, ["competitor", "1e-2", "1e-3", "1e-4", "least error", "largest h that ran (µs)"]);
+    let readable = readable(case, measured, kind);
     for competitor in Competitor::all() {
         let own: Vec<&Row> = rows.iter().copied().filter(|row| row.competitor == competitor).collect();
         let done = || own.iter().filter_map(|row| row.outcome.as_ref().ok().map(|figures| (row, figures)));
@@ -120,8 +139,10 @@ pub fn costs(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
             continue;
         }
         let mut cells = vec![competitor.name()];
-        cells.extend(TARGETS.map(|target| {
-            cheapest(&own, kind, None, target).map_or_else(|| "-".into(), |(_, figures)| seconds(figures.seconds))
+        cells.extend(TARGETS.map(|target| match cheapest(&own, kind, None, target) {
+            None => "-".into(),
+            Some(_) if target < readable => "not to be read".into(),
+            Some((_, figures)) => seconds(figures.seconds),
         }));
         if done().next().is_none() {
             cells.extend(["none", "none"].map(String::from));
