@@ -133,6 +133,24 @@ fn a_derivative_that_leaves_the_range_within_the_step_is_refused_and_changes_not
 }
 
 #[test]
+fn a_speed_beyond_the_fitted_one_is_refused_before_anything_changes() {
+    let mut scene = common::scene(12);
+    let order = scene.roms[0].order();
+    scene.roms[0].extras.spin = Some(common::spin(order));
+    scene.settings.structures[0].spin.stiffening = true;
+    let mut simulation = started(&scene);
+    simulation.do_step(0.0, 1e-5).unwrap();
+    let speed = reference(&simulation, "speed");
+    let (mut before, mut after) = (vec![0; simulation.state_size()], vec![0; simulation.state_size()]);
+    simulation.set_input_derivative(speed, 1, 1e8).unwrap();
+    simulation.save_state(&mut before).unwrap();
+    let error = simulation.do_step(simulation.time(), 2.3e-5).unwrap_err().to_string();
+    assert!(error.contains("fitted for"), "{error}");
+    simulation.save_state(&mut after).unwrap();
+    assert_eq!(before, after);
+}
+
+#[test]
 fn what_counts_is_the_step_in_use_not_the_largest_allowed() {
     // Central differences far beyond their limit by internal_step_max, well within it by the communication step.
     let mut scene = common::scene(12);
