@@ -59,7 +59,7 @@ fn verdict(table: &Table, directory: &std::path::Path) -> Option<Failure> {
         return None;
     }
     let named = unsound[..unsound.len().min(NAMED)].join(", ");
-    let more = if unsound.len() > NAMED { ", ..." } else { "" };
+    let more = if unsound.len() > NAMED { format!(" and {} more", unsound.len() - NAMED) } else { String::new() };
     let problem = format!(
         "{} of {} cases are neither right nor refused as they should be: {named}{more}",
         unsound.len(),
@@ -89,10 +89,12 @@ fn chosen(arguments: &StabilityArguments) -> Result<Vec<Case>> {
     let Some(prefix) = &arguments.case else { return Ok(stability::cases(arguments.quick)) };
     let cases = stability::named(prefix, arguments.quick);
     if cases.is_empty() {
-        let families: Vec<String> = stability::cases(false).iter().map(|case| case.family().to_owned()).collect();
-        let mut families = families;
+        let cases = stability::cases(arguments.quick);
+        let mut families: Vec<&str> = cases.iter().map(Case::family).chain(["judge"]).collect();
+        families.sort_unstable();
         families.dedup();
-        let problem = format!("no case begins with `{prefix}`");
+        let of = if arguments.quick { " of the quick form" } else { "" };
+        let problem = format!("no case{of} begins with `{prefix}`");
         return Err(Failure::usage("--case", problem, format!("Begin with one of {}", families.join(", "))));
     }
     Ok(cases)
