@@ -12,13 +12,18 @@ use crate::{Failure, Result, native};
 
 /// Most numbers of recorded displacements in memory per run; beyond it not every blade is recorded.
 const MOST_SAMPLES: usize = 16_000_000;
+/// Numbers recorded of a blade at a time: two nodes, three components each.
+const ROWS: usize = 6;
+/// Most memory for the spectra of all runs together, and what one bin of them takes: numbers, their table and its text.
+const MOST_BYTES: usize = 2 << 30;
+const BYTES_PER_BIN: usize = 256;
 /// What happens between samples is filtered by [`Decimator`] only where there is something between them.
 const LEAST_FACTOR: f64 = 4.0;
 
 /// What all runs share.
 #[derive(Debug, Clone)]
 pub struct Setup {
-    /// The scene, but for its speed.
+    /// The scene, but for the size of its speed.
     pub scene: Scene,
     /// Start values replaced (name, value as text).
     pub settings: Vec<(String, String)>,
@@ -100,19 +105,47 @@ impl Tally {
 }
 
 impl Setup {
-    /// A simulation with its start values, not yet initialised.
+    /// A simulation with its start values, not yet initialised, that turns with `speed` (rad/s) in the sense of the scene: as
+    /// the sign of its own speed says.
     ///
     /// # Errors
     /// A refused scene, unknown or wrong settings.
     pub fn simulation(&self, speed: f64) -> Result<Simulation> {
         let mut scene = self.scene.clone();
         let master = prediction::master(&scene.settings)?;
-        scene.settings.structures[master].speed = speed;
+        let own = &mut scene.settings.structures[master].speed;
+        *own = if *own < 0.0 { -speed } else { speed };
         let mut simulation = Simulation::new(&scene).map_err(|error| self.at(speed, error))?;
         for (name, value) in &self.settings {
             native::set(&mut simulation, name, value)?;
         }
         Ok(simulation)
+    }
+
+    /// What would not fit into memory is refused: samples of one blade in one run, and the spectra of all `runs`.
+    ///
+    /// # Errors
+    /// Naming the most revolutions that would fit.
+    pub fn check_size(&self, runs: usize) -> Result<()> {
+        let per_blade = ROWS * self.samples;
+        let spectra = runs.saturating_mul(self.samples / 2).saturating_mul(BYTES_PER_BIN);
+        let most = (MOST_SAMPLES / per_blade).min(MOST_BYTES / spectra.max(1));
+        if self.revolutions <= most {
+            return Ok(());
+        }
+        Err(Failure::usage(
+            format!("--revolutions {}", self.revolutions),
+            format!(
+                "with {} samples per revolution and {runs} angular velocities the samples of one blade and the spectra of all \
+                 runs would not fit into 2 GiB",
+                self.samples
+            ),
+            if most > 0 {
+                format!("Give at most {most} revolutions, or fewer or higher --speeds")
+            } else {
+                "Give fewer or higher --speeds".into()
+            },
+        ))
     }
 
     fn at(&self, speed: f64, error: tiprub_core::Error) -> Failure {
@@ -149,7 +182,7 @@ impl Setup {
         }
         let mut march = March { setup: self, speed, start, step, simulation, internal_steps: 0, index: 0 };
         let clock = Instant::now();
-        march.skip(self.transient * self.samples)?;
+        march.skip(self.transient.saturating_mul(self.samples))?;
         let recording = march.record()?;
         march.finish(recording, clock)
     }

@@ -31,7 +31,7 @@ fn around(crossing: f64, half: f64, count: usize) -> Speeds {
 
 #[track_caller]
 fn run(scene: Scene, request: &Request, threads: usize) -> Study {
-    of_scene(scene, request, threads, |_, _| {}).unwrap().0
+    of_scene(scene, request, threads, |_, _, _| {}).unwrap().0
 }
 
 /// One blade of rotor 37, damped enough for the free vibration to die out soon, without friction.
@@ -46,7 +46,7 @@ fn blade37() -> Scene {
 }
 
 fn meeting(scene: &Scene) -> f64 {
-    Prediction::new(scene, 0.0).unwrap().meeting(4, 0).unwrap()
+    Prediction::new(scene, &Start::default(), 0.0).unwrap().meeting(4, 0).unwrap()
 }
 
 /// A casing as soft as nothing pushes without holding: the response is linear, and resonance where linear theory has it.
@@ -127,7 +127,7 @@ fn bell(speed: f64, middle: f64, height: f64) -> f64 {
 /// A branch that leans to +18 %, with a small maximum on the way, and another beyond the range.
 #[test]
 fn a_resonance_is_followed_as_far_as_it_leans() {
-    let prediction = Prediction::new(&scene(FIRST, 4), 0.0).unwrap();
+    let prediction = Prediction::new(&scene(FIRST, 4), &Start::default(), 0.0).unwrap();
     let speeds = around(CROSSING, 0.3, 61).values();
     let [low, high] = [speeds[0], speeds[60]];
     let crossings = prediction.crossings([low, high], 1.5 * FIRST);
@@ -151,7 +151,7 @@ fn neighbouring_resonances_are_told_apart() {
     let mut scene = scene(FIRST, 4);
     let rom = &mut scene.roms[0];
     rom.stiffness[(1, 1)] = rom.stiffness[(0, 0)] * 1.1_f64.powi(2);
-    let prediction = Prediction::new(&scene, 0.0).unwrap();
+    let prediction = Prediction::new(&scene, &Start::default(), 0.0).unwrap();
     let speeds = around(CROSSING, 0.3, 121).values();
     let crossings = prediction.crossings([speeds[0], speeds[120]], 1.5 * FIRST);
     // Half a percent below its own crossing the second one is still that of it.
@@ -204,7 +204,7 @@ fn a_master_that_does_not_turn_is_refused_before_anything_is_reduced() {
     assert!(failure.usage && failure.problem.contains("`cube`, flies freely"), "{failure}");
     assert!(failure.remedy.contains("builtin:rotor37"), "{failure}");
     let without = Scene { settings, roms: Vec::new() };
-    assert_eq!(of_scene(without, &Request::default(), 1, |_, _| {}).unwrap_err(), failure);
+    assert_eq!(of_scene(without, &Request::default(), 1, |_, _, _| {}).unwrap_err(), failure);
 }
 
 #[test]
@@ -249,7 +249,7 @@ fn refused_speeds_are_marked_and_all_refused_is_a_failure() {
         map.sheet.rows.iter().filter(|row| row[1].is_nan()).map(|row| row[0]).collect::<Vec<_>>(),
         [170.0, 190.0]
     );
-    let failure = of_scene(scene, &request(speeds(170.0, 190.0)), 1, |_, _| {}).unwrap_err();
+    let failure = of_scene(scene, &request(speeds(170.0, 190.0)), 1, |_, _, _| {}).unwrap_err();
     assert!(failure.problem.contains("every angular velocity is refused"), "{failure}");
 }
 
@@ -258,8 +258,8 @@ fn steps_too_coarse_for_the_filter_and_a_speed_set_are_refused() {
     let mut coarse = request(BUMP, around(CROSSING, 0.1, 2));
     coarse.settings.retain(|(name, _)| name != "internal_step_max");
     coarse.settings.push(("internal_step_max".into(), "1e-4".into()));
-    let failure = of_scene(scene(FIRST, 2), &coarse, 1, |_, _| {}).unwrap_err();
+    let failure = of_scene(scene(FIRST, 2), &coarse, 1, |_, _, _| {}).unwrap_err();
     assert!(failure.problem.contains("internal_step_max="), "{failure}");
     let request = Request { settings: vec![("speed".into(), "1".into())], ..Request::default() };
-    assert!(of_scene(scene(FIRST, 2), &request, 1, |_, _| {}).unwrap_err().usage);
+    assert!(of_scene(scene(FIRST, 2), &request, 1, |_, _, _| {}).unwrap_err().usage);
 }
