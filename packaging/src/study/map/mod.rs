@@ -293,10 +293,11 @@ impl Map {
             (
                 "angular velocities".into(),
                 format!(
-                    "{} from {:.3} to {:.3} rad/s",
+                    "{} from {:.3} to {:.3} rad/s, in the {} sense about +z",
                     self.runs.len(),
                     self.runs[0].speed,
-                    self.runs[self.runs.len() - 1].speed
+                    self.runs[self.runs.len() - 1].speed,
+                    if setup.sense() < 0.0 { "negative" } else { "positive" }
                 ),
             ),
             (

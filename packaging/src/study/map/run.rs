@@ -105,21 +105,25 @@ impl Tally {
 }
 
 impl Setup {
-    /// A simulation with its start values, not yet initialised, that turns with `speed` (rad/s) in the sense of the scene: as
-    /// the sign of its own speed says.
+    /// A simulation with its start values, not yet initialised, that turns with `speed` (rad/s) in the sense of the scene.
     ///
     /// # Errors
     /// A refused scene, unknown or wrong settings.
     pub fn simulation(&self, speed: f64) -> Result<Simulation> {
         let mut scene = self.scene.clone();
         let master = prediction::master(&scene.settings)?;
-        let own = &mut scene.settings.structures[master].speed;
-        *own = if *own < 0.0 { -speed } else { speed };
+        scene.settings.structures[master].speed = self.sense() * speed;
         let mut simulation = Simulation::new(&scene).map_err(|error| self.at(speed, error))?;
         for (name, value) in &self.settings {
             native::set(&mut simulation, name, value)?;
         }
         Ok(simulation)
+    }
+
+    /// −1 where the scene's own speed is negative, else 1.
+    pub fn sense(&self) -> f64 {
+        let master = prediction::master(&self.scene.settings);
+        if master.is_ok_and(|master| self.scene.settings.structures[master].speed < 0.0) { -1.0 } else { 1.0 }
     }
 
     /// What would not fit into memory is refused: samples of one blade in one run, and the spectra of all `runs`.

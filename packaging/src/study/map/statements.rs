@@ -218,11 +218,12 @@ fn scale(map: &Map) -> Option<Statement> {
         expected,
         largest <= MOST_DYNAMIC * slow,
         format!(
-            "the leading edge swings by {:.1} to {:.1} µm about its mean; the casing reaches {:.1} µm beyond the tips, its radius \
+            "the leading edge swings by {:.1} to {:.1} µm about its mean; the casing reaches {:.1} µm beyond the tips{}, its radius \
              varies by {:.1} µm, and a slow push by that much moves the leading edge by {:.1} µm",
             1e6 * smallest,
             1e6 * largest,
             1e6 * map.intrusion,
+            map.start.without(),
             1e6 * map.depth,
             1e6 * slow
         ),
