@@ -17,6 +17,8 @@ const ROWS: usize = 6;
 /// Most memory for the spectra of all runs together, and what one bin of them takes: numbers, their table and its text.
 const MOST_BYTES: usize = 2 << 30;
 const BYTES_PER_BIN: usize = 256;
+/// At most one bin for so many samples is kept: the sampling rate is [`super::OVERSAMPLING`] times the highest frequency.
+const BIN_SHARE: usize = 8;
 /// What happens between samples is filtered by [`Decimator`] only where there is something between them.
 const LEAST_FACTOR: f64 = 4.0;
 
@@ -132,7 +134,7 @@ impl Setup {
     /// Naming the most revolutions that would fit.
     pub fn check_size(&self, runs: usize) -> Result<()> {
         let per_blade = ROWS * self.samples;
-        let spectra = runs.saturating_mul(self.samples / 2).saturating_mul(BYTES_PER_BIN);
+        let spectra = runs.saturating_mul(self.samples.div_ceil(BIN_SHARE)).saturating_mul(BYTES_PER_BIN);
         let most = (MOST_SAMPLES / per_blade).min(MOST_BYTES / spectra.max(1));
         if self.revolutions <= most {
             return Ok(());

@@ -407,11 +407,11 @@ fn stiffening_is_decided_only_where_it_shows() {
 fn a_maximum_stays_in_its_window() {
     let mut scene = scene(FIRST, 4);
     let rom = &mut scene.roms[0];
-    rom.stiffness[(1, 1)] = rom.stiffness[(0, 0)] * 1.2_f64.powi(2);
+    rom.stiffness[(1, 1)] = rom.stiffness[(0, 0)] * 1.25_f64.powi(2);
     let prediction = Prediction::new(&scene, &Start::default(), 0.0).unwrap();
     let speeds = [0.9, 1.0, 1.1, 1.2, 1.3].map(|share| share * CROSSING);
     let crossings = prediction.crossings([speeds[0], speeds[4]], 1.5 * FIRST);
-    // The second mode's window begins at 1.14 times the crossing of the first one, the maximum is at 1.155.
+    // The second mode's window begins at 1.1875 times the crossing of the first one, the top of the parabola is at 1.15.
     let two = |speed: f64| {
         if speed < 1.15 * CROSSING && speed > 1.05 * CROSSING { 0.999e-3 } else { bell(speed, 1.2 * CROSSING, 1e-3) }
     };
