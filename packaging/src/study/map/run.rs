@@ -142,8 +142,8 @@ impl Setup {
         Err(Failure::usage(
             format!("--revolutions {}", self.revolutions),
             format!(
-                "with {} samples per revolution and {runs} angular velocities the samples of one blade and the spectra of all \
-                 runs would not fit into 2 GiB",
+                "with {} samples per revolution and {runs} angular velocities that is more than {MOST_SAMPLES} recorded numbers \
+                 per blade, or more than 2 GiB for the spectra of all runs",
                 self.samples
             ),
             if most > 0 {
