@@ -364,7 +364,8 @@ fn samples(top: f64, slowest: f64) -> Result<usize> {
     if least <= MOST_PER_REVOLUTION {
         return Ok(whole(least).next_power_of_two());
     }
-    let lowest = OVERSAMPLING * top * std::f64::consts::TAU / MOST_PER_REVOLUTION;
+    // Two digits are shown: rounded down they would be refused again.
+    let lowest = 1.05 * OVERSAMPLING * top * std::f64::consts::TAU / MOST_PER_REVOLUTION;
     Err(Failure::usage(
         "--speeds",
         format!("at {slowest} rad/s a revolution would need {least:.1e} samples to show frequencies up to {top:.0} Hz"),

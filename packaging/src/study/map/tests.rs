@@ -323,6 +323,10 @@ fn what_does_not_fit_is_refused_before_the_work() {
     let slow = request(BUMP, Speeds { from: 1e-3, to: 1.0, count: 5 });
     let failure = refused(&slow);
     assert!(failure.usage && failure.what == "--speeds" && failure.problem.contains("0.001 rad/s"), "{failure}");
+    let least: f64 = failure.remedy.split(' ').find_map(|word| word.parse().ok()).unwrap();
+    let from = |from| Request { revolutions: Some(1), ..request(BUMP, Speeds { from, to: 1.0, count: 5 }) };
+    assert!(Map::prepare(scene(FIRST, 36), &from(least)).is_ok(), "{failure}");
+    assert!(refused(&from(0.9 * least)).usage, "{failure}");
 }
 
 #[test]
