@@ -287,7 +287,7 @@ impl Map {
                 format!("clearance at rest{without}"),
                 if low < high { format!("{low:.4e} to {high:.4e} m") } else { format!("{low:.4e} m") },
             ),
-            (format!("the casing reaches beyond the tips{without} by"), format!("{:.4e} m", self.intrusion)),
+            (format!("the casing reaches beyond the tips by{without}"), format!("{:.4e} m", self.intrusion)),
             ("friction coefficient".into(), self.start.friction.to_string()),
             ("damping ratio".into(), self.start.damping_ratio.to_string()),
             (
