@@ -1,28 +1,20 @@
-//! What the map shows: peaks, coincidences with predicted resonances, and whether expectations hold.
+//! What the map shows: peaks, and coincidences with predicted resonances.
 
 use serde_json::{Value, json};
 use tiprub_core::{Scene, dynamics::modal::ModalModel};
 
 use super::{
-    Map,
     prediction::{self, Crossing, Prediction},
     run::Run,
     spectrum,
 };
-use crate::{
-    Failure, Result,
-    study::{Sheet, Statement},
-};
+use crate::{Failure, Result, study::Sheet};
 
 /// Peaks below this share of the largest amplitude of the map are not listed; side lobes of the window are below it, too.
 const LEAST_PEAK: f64 = 1e-2;
 /// A response counts as lying at a coincidence within this relative distance of its speed; further below one it is that of
 /// the crossing before.
-const NEAR: f64 = 0.05;
-/// Change of the effective displacement within the window that counts as none.
-const STEADY: f64 = 0.02;
-/// Largest plausible ratio of the response to what follows the casing's whole depth slowly.
-const MOST_DYNAMIC: f64 = 10.0;
+pub const NEAR: f64 = 0.05;
 
 /// A peak of the map, at the leading edge of the blade that swings most.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,7 +51,7 @@ impl MapPeak {
     }
 
     /// Whether it lies on an engine order that the casing excites, to within a bin.
-    fn on_order(&self, prediction: &Prediction) -> bool {
+    pub fn on_order(&self, prediction: &Prediction) -> bool {
         let nearest = self.order.round();
         let excited = prediction.base_order > 0 && (nearest / prediction.base_order as f64).fract() == 0.0;
         excited && nearest > 0.0 && (self.order - nearest).abs() <= self.bin
@@ -156,7 +148,8 @@ fn resonance(curve: &[(f64, f64)], window: [f64; 2]) -> Option<(f64, f64)> {
         curve.windows(3).filter(|three| three[1].1 > three[0].1 && three[1].1 >= three[2].1 && within(&three[1]));
     let top = tops.max_by(|a, b| a[1].1.total_cmp(&b[1].1))?;
     let (offset, height) = spectrum::parabola([0, 1, 2].map(|index| top[index].1.ln()));
-    Some((top[1].0 + offset * 0.5 * (top[2].0 - top[0].0), height.exp()))
+    let speed = top[1].0 + offset * 0.5 * (top[2].0 - top[0].0);
+    Some((speed.clamp(window[0], window[1]), height.exp()))
 }
 
 /// Length of the displacement of the leading edge when a contact pushes it inwards by `depth` (m), slowly; none of
@@ -229,201 +222,4 @@ pub fn coincidence_sheet(coincidences: &[Coincidence]) -> Sheet {
         })
         .collect();
     sheet
-}
-
-/// What the map should show and whether it does.
-pub fn statements(map: &Map) -> Vec<Statement> {
-    let mut all = vec![runs_end(map)];
-    all.extend(contact(map));
-    all.push(on_orders(map));
-    all.extend(room(map));
-    all.extend(at_coincidence(map));
-    all.extend(stiffening(map));
-    all.extend(scale(map));
-    all.push(steadiness(map));
-    let residual = map.answered().map(|(_, response)| response.energy_residual).fold(0.0, f64::max);
-    all.push(Statement::tested(
-        "The energy ledger closes in every run",
-        residual < 1e-9,
-        format!("largest residual {residual:.1e} of the energy exchanged"),
-    ));
-    let warned = map.warnings();
-    all.push(Statement::remark(
-        "Warnings of the runs",
-        if warned.is_empty() { "none".into() } else { warned.join("; ") },
-    ));
-    all
-}
-
-fn runs_end(map: &Map) -> Statement {
-    let refused: Vec<String> = map
-        .runs
-        .iter()
-        .filter_map(|run| Some(format!("{:.2} rad/s: {}", run.speed, run.outcome.as_ref().err()?)))
-        .collect();
-    let found = match refused.first() {
-        None => format!("all {} runs", map.runs.len()),
-        Some(first) => format!("{} of {} are refused, marked grey in the map; {first}", refused.len(), map.runs.len()),
-    };
-    Statement::tested("Every run reaches its end", refused.is_empty(), found)
-}
-
-fn contact(map: &Map) -> Vec<Statement> {
-    let touching = map.answered().filter(|(_, response)| response.contact_share > 0.0).count();
-    let most =
-        |value: fn(&super::Response) -> f64| map.answered().map(|(_, response)| value(response)).fold(0.0, f64::max);
-    let (share, force) = (most(|response| response.contact_share), most(|response| response.normal_force));
-    let depth = most(|response| response.penetration);
-    let sum = format!(
-        "at {touching} of {} angular velocities; a blade touches at most {:.2} % of the time, the mean of all normal forces \
-         together is at most {force:.1} N, the largest one of a node {:.0} N",
-        map.runs.len(),
-        100.0 * share,
-        most(|response| response.largest_force)
-    );
-    let gap = map.setup.scene.settings.contacts[0].gap;
-    let found =
-        format!("deepest at any internal step of any window: {depth:.2e} m, {:.1e} of the clearance", depth / gap);
-    vec![
-        Statement::tested("The tips touch the casing", touching > 0, sum),
-        Statement::tested("No node penetrates by more than a thousandth of the clearance", depth <= 1e-3 * gap, found),
-    ]
-}
-
-fn on_orders(map: &Map) -> Statement {
-    let weight = |on: bool| {
-        let peaks = map.peaks.iter().filter(|peak| !on || peak.on_order(&map.prediction));
-        peaks.fold((0_usize, 0.0), |(count, sum), peak| (count + 1, sum + peak.amplitude * peak.amplitude))
-    };
-    let (all, on) = (weight(false), weight(true));
-    let off = map.peaks.iter().filter(|peak| !peak.on_order(&map.prediction));
-    let strongest = off.max_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
-    let strongest = strongest.map_or(String::new(), |peak| {
-        format!(
-            "; the largest that does not: {:.2} µm, {:.3} times the rotational frequency ({:.1} Hz) at {:.1} rad/s",
-            1e6 * peak.amplitude,
-            peak.order,
-            peak.frequency,
-            peak.speed
-        )
-    });
-    Statement::tested(
-        "Response is a repetition of the casing's shape: peaks lie on engine orders that the casing excites",
-        all.0 > 0 && on.1 >= 0.99 * all.1,
-        format!(
-            "multiples of {}: {} of {} peaks, {:.3} % of the sum of their squared amplitudes{strongest}",
-            map.prediction.base_order,
-            on.0,
-            all.0,
-            100.0 * on.1 / all.1.max(f64::MIN_POSITIVE)
-        ),
-    )
-}
-
-fn at_coincidence(map: &Map) -> Option<Statement> {
-    let peak = map.peaks.iter().max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))?;
-    let expected = "The largest response lies at a predicted coincidence";
-    let orders = map.coincidences.iter().filter(|one| (one.crossing.order as f64 - peak.order).abs() <= peak.bin);
-    let distance = |one: &&Coincidence| (peak.speed / one.crossing.speed - 1.0).abs();
-    let place = format!(
-        "largest: {:.2} µm at {:.2} Hz and {:.2} rad/s, {:.3} times the rotational frequency",
-        1e6 * peak.amplitude,
-        peak.frequency,
-        peak.speed,
-        peak.order
-    );
-    let Some(nearest) = orders.min_by(|a, b| distance(a).total_cmp(&distance(b))) else {
-        return Some(Statement::tested(
-            expected,
-            false,
-            format!("{place}; no excited order there meets a mode in this range"),
-        ));
-    };
-    let Crossing { order, mode, speed, frequency, .. } = nearest.crossing;
-    let found = format!(
-        "{place}; engine order {order} meets mode {} at {frequency:.2} Hz and {speed:.2} rad/s, {:+.2} % away",
-        mode + 1,
-        100.0 * (peak.speed / speed - 1.0)
-    );
-    Some(Statement::tested(format!("{expected} (within {:.0} %)", 100.0 * NEAR), distance(&nearest) <= NEAR, found))
-}
-
-/// A branch that leans out of the range of speeds has its largest response elsewhere.
-fn room(map: &Map) -> Option<Statement> {
-    let peak = map.peaks.iter().max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))?;
-    let [first, last] = [map.answered().next()?, map.answered().last()?].map(|end| end.0);
-    Some(Statement::tested(
-        "The largest response lies within the range of speeds, not at an end of it",
-        first < peak.speed && peak.speed < last,
-        format!("it is at {:.2} rad/s, the runs reach from {first:.2} to {last:.2} rad/s", peak.speed),
-    ))
-}
-
-/// One-sided contact can only stiffen: resonance should lie above the free one.
-fn stiffening(map: &Map) -> Option<Statement> {
-    let found: Vec<&Coincidence> = map.coincidences.iter().filter(|one| one.response.is_some()).collect();
-    let strongest = found.iter().max_by(|a, b| {
-        let amplitude = |one: &Coincidence| one.response.map_or(0.0, |response| response.1);
-        amplitude(a).total_cmp(&amplitude(b))
-    })?;
-    let spacing = (map.runs[map.runs.len() - 1].speed - map.runs[0].speed) / (map.runs.len().max(2) - 1) as f64;
-    let text = |one: &&Coincidence| {
-        let (speed, amplitude) = one.response.unwrap_or_default();
-        let beyond = one.beyond.map_or(String::new(), |(speed, amplitude)| {
-            format!(", larger still at the end of the range, {:.2} µm at {speed:.2} rad/s", 1e6 * amplitude)
-        });
-        format!(
-            "engine order {} on mode {}: {:+.2} % ({speed:.2} for {:.2} rad/s, {:.2} µm, sought from {:.1} to {:.1} rad/s{beyond})",
-            one.crossing.order,
-            one.crossing.mode + 1,
-            100.0 * one.shift().unwrap_or(0.0),
-            one.crossing.speed,
-            1e6 * amplitude,
-            one.window[0],
-            one.window[1]
-        )
-    };
-    let list: Vec<String> = found.iter().map(text).collect();
-    Some(Statement::tested(
-        "Contact stiffens: the strongest resonance lies above the predicted one",
-        strongest.shift().is_some_and(|shift| shift > 0.0),
-        format!("{}; one speed is {spacing:.2} rad/s from the next", list.join("; ")),
-    ))
-}
-
-fn scale(map: &Map) -> Option<Statement> {
-    let slow = map.static_displacement?;
-    let largest = map.answered().map(|(_, response)| response.deflection[0]).fold(0.0, f64::max);
-    let smallest = map.answered().map(|(_, response)| response.deflection[0]).fold(f64::INFINITY, f64::min);
-    Some(Statement::tested(
-        "The scale of the response is plausible: that of a blade pushed back by the depth of the casing's shape, up to ten times",
-        largest <= MOST_DYNAMIC * slow,
-        format!(
-            "the leading edge swings by {:.1} to {:.1} µm about its mean; the casing reaches {:.1} µm beyond the tips, its radius \
-             varies by {:.1} µm, and a slow push by that much moves the leading edge by {:.1} µm",
-            1e6 * smallest,
-            1e6 * largest,
-            1e6 * map.intrusion,
-            1e6 * map.depth,
-            1e6 * slow
-        ),
-    ))
-}
-
-fn steadiness(map: &Map) -> Statement {
-    let unsteady = map.answered().filter(|(_, response)| response.drift.abs() > STEADY);
-    let (count, worst) = unsteady.fold((0, (0.0, 0.0_f64)), |(count, worst), (speed, response)| {
-        (count + 1, if response.drift.abs() > worst.1.abs() { (speed, response.drift) } else { worst })
-    });
-    let found = match count {
-        0 => format!("all {} within {:.0} %", map.answered().count(), 100.0 * STEADY),
-        _ => format!(
-            "{count} of {} change by more than {:.0} % from the first half of the window to the second, most at {:.2} rad/s: {:+.1} %",
-            map.answered().count(),
-            100.0 * STEADY,
-            worst.0,
-            100.0 * worst.1
-        ),
-    };
-    Statement::remark("Effective displacement is steady over the window", found)
 }

@@ -7,9 +7,11 @@ mod picture;
 pub mod prediction;
 mod run;
 mod spectrum;
+mod start;
+mod statements;
 
 use serde_json::json;
-use tiprub_core::{Scene, settings::SpinSettings, variables::Quantity};
+use tiprub_core::{Scene, settings::SpinSettings};
 
 use super::{Statement, Study, sweep};
 use crate::{
@@ -21,6 +23,7 @@ use crate::{
 use findings::{Coincidence, MapPeak};
 use prediction::{Crossing, Prediction};
 pub use run::{Response, Run, Setup};
+use start::Start;
 
 /// The scene where none is named.
 const SCENE: &str = "builtin:rotor37";
@@ -45,6 +48,8 @@ const MODES: usize = 3;
 const ABOVE: f64 = LEAN;
 /// Sampling rate relative to the highest frequency of the map; see [`spectrum::Decimator`].
 const OVERSAMPLING: f64 = 8.0;
+/// Most samples in a revolution.
+const MOST_PER_REVOLUTION: f64 = 1e6;
 /// Order of the casing's base order at whose resonance the range of speeds lies.
 const HARMONIC: usize = 2;
 
@@ -62,8 +67,7 @@ struct Map {
     depth: f64,
     /// Displacement of the leading edge when it is pushed back slowly by that much (m).
     static_displacement: Option<f64>,
-    damping_ratio: f64,
-    friction: f64,
+    start: Start,
 }
 
 /// The study: run all speeds, transform, draw, compare.
@@ -85,9 +89,9 @@ pub fn study(arguments: &StudyArguments, console: &Console) -> Result<Study> {
     let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
     let (study, warnings) = {
         let task = console.task("Running the interaction map", None);
-        of_scene(scene, &request, threads, |done, all| {
-            task.now(&format!("Running the interaction map: {done} of {all}"));
-            task.line(&format!("{done} of {all} angular velocities"));
+        of_scene(scene, &request, threads, |done, all, steps| {
+            task.now(&format!("Running the interaction map: {done} of {all} ({steps:.1e} internal steps in all)"));
+            task.line(&format!("{done} of {all} angular velocities, {steps:.1e} internal steps in all"));
         })?
     };
     console.warn(&warnings);
@@ -109,7 +113,8 @@ pub struct Request {
     pub settings: Vec<(String, String)>,
 }
 
-/// The study of a scene, and the warnings of its runs; `progress` is told the runs done and all.
+/// The study of a scene, and the warnings of its runs; `progress` is told the runs done and all, first before any is, and
+/// the internal steps of all.
 ///
 /// # Errors
 /// As [`study`].
@@ -117,10 +122,13 @@ pub fn of_scene(
     scene: Scene,
     request: &Request,
     threads: usize,
-    progress: impl Fn(usize, usize),
+    progress: impl Fn(usize, usize, f64),
 ) -> Result<(Study, Vec<String>)> {
     let (mut map, speeds) = Map::prepare(scene, request)?;
-    map.runs = sweep::sweep(&speeds, threads, |speed| map.setup.run(*speed), |done| progress(done, speeds.len()))?;
+    let steps = map.internal_steps(&speeds);
+    let told = |done| progress(done, speeds.len(), steps);
+    told(0);
+    map.runs = sweep::sweep(&speeds, threads, |speed| map.setup.run(*speed), told)?;
     if let (true, Some(Err(refusal))) =
         (map.answered().next().is_none(), map.runs.first().map(|run| run.outcome.as_ref().map(|_| ())))
     {
@@ -146,36 +154,29 @@ impl Map {
             Setup { scene, settings: request.settings.clone(), samples: 0, transient: 0, revolutions: 0, top: 0.0 };
         let master = prediction::master(&setup.scene.settings)?;
         let fastest = setup.scene.roms[master].extras.spin.as_ref().map_or(0.0, |spin| spin.largest_speed);
-        let prediction = Prediction::new(&setup.scene, fastest)?;
+        // At its own speed: those of the study may be refused.
+        let probe = setup.simulation(setup.scene.settings.structures[master].speed.abs())?;
+        let start = Start::of(&setup.scene, &probe)?;
+        let prediction = Prediction::new(&setup.scene, &start, fastest)?;
         let turns = setup.scene.settings.structures[master].spin != SpinSettings::default();
         let speeds = speeds(&prediction, request, if turns { fastest } else { f64::INFINITY })?;
         let range = [speeds[0], speeds[speeds.len() - 1]];
-        // At its own speed: those of the study may be refused.
-        let probe = setup.simulation(setup.scene.settings.structures[master].speed)?;
-        let value = |quantity| {
-            probe
-                .table()
-                .with_quantity(quantity)
-                .and_then(|variable| probe.real(variable.reference).ok())
-                .unwrap_or(0.0)
-        };
-        let (damping_ratio, friction) = (value(Quantity::DampingRatio), value(Quantity::Friction));
         let elastic: Vec<f64> =
             prediction.modes(prediction.base_order.max(1), range[1]).into_iter().filter(|mode| *mode > 0.0).collect();
         let first = *elastic.first().ok_or_else(|| Failure::new("study map", "the master has no elastic mode", ""))?;
         setup.top = ABOVE * elastic[(MODES - 1).min(elastic.len() - 1)];
-        setup.samples = samples(setup.top, range[0]);
+        setup.samples = samples(setup.top, range[0])?;
         setup.revolutions = request.revolutions.unwrap_or(if request.quick { QUICK_REVOLUTIONS } else { REVOLUTIONS });
-        let decay = DECAY_TIMES / (damping_ratio * std::f64::consts::TAU * first);
-        let patience = whole((value(Quantity::RampTime) + decay) * range[1] / std::f64::consts::TAU);
+        let decay = DECAY_TIMES / (start.damping_ratio * std::f64::consts::TAU * first);
+        let patience = whole((start.ramp_time + decay) * range[1] / std::f64::consts::TAU);
         let most = if request.quick { QUICK_TRANSIENT } else { MOST_TRANSIENT };
         setup.transient = request.transient.unwrap_or(patience.clamp(LEAST_TRANSIENT, most));
+        setup.check_size(speeds.len())?;
         let crossings = prediction.crossings(range, setup.top);
-        let gap = setup.scene.settings.contacts[0].gap + value(Quantity::GapOffset);
-        let shape = prediction::shape(&setup.scene)?;
+        let shape = prediction::shape(&setup.scene, start.shape_factor)?;
         let lowest = shape.iter().copied().fold(f64::INFINITY, f64::min);
         let highest = shape.into_iter().fold(f64::NEG_INFINITY, f64::max);
-        let intrusion = -(gap + lowest);
+        let intrusion = -(start.clearance[0] + lowest);
         let static_displacement = findings::static_displacement(&setup.scene, highest - lowest)?;
         let map = Self {
             setup,
@@ -187,10 +188,17 @@ impl Map {
             intrusion,
             depth: highest - lowest,
             static_displacement,
-            damping_ratio,
-            friction,
+            start,
         };
         Ok((map, speeds))
+    }
+
+    /// How many internal steps the runs at these speeds (rad/s) will make.
+    fn internal_steps(&self, speeds: &[f64]) -> f64 {
+        let Setup { samples, transient, revolutions, .. } = self.setup;
+        let count = (transient as f64 + revolutions as f64) * samples as f64;
+        let per_sample = |speed: &f64| std::f64::consts::TAU / (speed * samples as f64 * self.start.longest_step);
+        speeds.iter().map(|speed| count * per_sample(speed).ceil().max(1.0)).sum()
     }
 
     /// The runs that were not refused.
@@ -255,7 +263,7 @@ impl Map {
     fn facts(&self, steps: u64, stepping: f64) -> Result<Vec<(String, String)>> {
         let (setup, settings) = (&self.setup, &self.setup.scene.settings);
         let rom = &setup.scene.roms[prediction::master(&setup.scene.settings)?];
-        let contact = &settings.contacts[0];
+        let ([low, high], without) = (self.start.clearance, self.start.without());
         let middle = self.runs[self.runs.len() / 2].speed;
         let modes = self.prediction.modes(self.prediction.base_order.max(1), middle);
         let shown: Vec<String> = modes.iter().take(MODES).map(|mode| format!("{mode:.2}")).collect();
@@ -275,17 +283,21 @@ impl Map {
                 ),
                 format!("{} Hz", shown.join(", ")),
             ),
-            ("clearance at rest".into(), format!("{} m", contact.gap)),
-            ("the casing reaches beyond the tips by".into(), format!("{:.4e} m", self.intrusion)),
-            ("friction coefficient".into(), self.friction.to_string()),
-            ("damping ratio".into(), self.damping_ratio.to_string()),
+            (
+                format!("clearance at rest{without}"),
+                if low < high { format!("{low:.4e} to {high:.4e} m") } else { format!("{low:.4e} m") },
+            ),
+            (format!("the casing reaches beyond the tips by{without}"), format!("{:.4e} m", self.intrusion)),
+            ("friction coefficient".into(), self.start.friction.to_string()),
+            ("damping ratio".into(), self.start.damping_ratio.to_string()),
             (
                 "angular velocities".into(),
                 format!(
-                    "{} from {:.3} to {:.3} rad/s",
+                    "{} from {:.3} to {:.3} rad/s, in the {} sense about +z",
                     self.runs.len(),
                     self.runs[0].speed,
-                    self.runs[self.runs.len() - 1].speed
+                    self.runs[self.runs.len() - 1].speed,
+                    if setup.sense() < 0.0 { "negative" } else { "positive" }
                 ),
             ),
             (
@@ -322,7 +334,7 @@ impl Map {
     }
 
     fn statements(&self) -> Vec<Statement> {
-        findings::statements(self)
+        statements::statements(self)
     }
 }
 
@@ -347,8 +359,18 @@ fn speeds(prediction: &Prediction, request: &Request, fastest: f64) -> Result<Ve
 
 /// Samples per revolution, a power of two, so that even at the slowest speed (rad/s) the rate is [`OVERSAMPLING`] times the
 /// top frequency (Hz).
-fn samples(top: f64, slowest: f64) -> usize {
-    whole(OVERSAMPLING * top * std::f64::consts::TAU / slowest).next_power_of_two()
+fn samples(top: f64, slowest: f64) -> Result<usize> {
+    let least = OVERSAMPLING * top * std::f64::consts::TAU / slowest;
+    if least <= MOST_PER_REVOLUTION {
+        return Ok(whole(least).next_power_of_two());
+    }
+    // Two digits are shown: rounded down they would be refused again.
+    let lowest = 1.05 * OVERSAMPLING * top * std::f64::consts::TAU / MOST_PER_REVOLUTION;
+    Err(Failure::usage(
+        "--speeds",
+        format!("at {slowest} rad/s a revolution would need {least:.1e} samples to show frequencies up to {top:.0} Hz"),
+        format!("Begin at {lowest:.1e} rad/s or above"),
+    ))
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped before")]

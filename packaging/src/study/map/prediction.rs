@@ -8,7 +8,7 @@ use tiprub_core::{
     settings::{Motion, SceneSettings},
 };
 
-use super::super::modes::folded;
+use super::{super::modes::folded, start::Start};
 use crate::{Failure, Result};
 
 /// Speeds at which modes that stiffen are computed; linear in between.
@@ -49,11 +49,11 @@ pub struct Crossing {
 }
 
 impl Prediction {
-    /// Of the first master of a scene, at speeds up to `fastest` (rad/s).
+    /// Of the first master of a scene with its start values, at speeds up to `fastest` (rad/s).
     ///
     /// # Errors
     /// A ROM whose eigenproblem cannot be solved, a shape that cannot be evaluated.
-    pub fn new(scene: &Scene, fastest: f64) -> Result<Self> {
+    pub fn new(scene: &Scene, start: &Start, fastest: f64) -> Result<Self> {
         let master = master(&scene.settings)?;
         let (structure, rom) = (&scene.settings.structures[master], &scene.roms[master]);
         let in_rom = |error| Failure::from_core(format!("ROM `{}`", rom.name), error);
@@ -73,7 +73,7 @@ impl Prediction {
             let model = ModalModel::from_rom(rom, rom.damping_ratio).map_err(in_rom)?;
             frequencies.push(vec![hertz(&model.frequencies)]);
         }
-        Ok(Self { speeds, frequencies, sectors: rom.sectors, base_order: base_order(scene)?, stiffening })
+        Ok(Self { speeds, frequencies, sectors: rom.sectors, base_order: base_order(scene, start)?, stiffening })
     }
 
     /// Natural frequencies that an engine order can excite at a speed (rad/s), in Hz.
@@ -147,31 +147,30 @@ pub fn master(settings: &SceneSettings) -> Result<usize> {
     ))
 }
 
-/// The casing's rigid shape at equally spaced angles (m).
+/// The casing's rigid shape at equally spaced angles (m), `factor` times that of the scene.
 ///
 /// # Errors
 /// A shape that cannot be evaluated.
-pub fn shape(scene: &Scene) -> Result<Vec<f64>> {
+pub fn shape(scene: &Scene, factor: f64) -> Result<Vec<f64>> {
     let (Some(contact), Some(surface)) = (scene.settings.contacts.first(), scene.settings.surfaces.first()) else {
         return Ok(vec![0.0; ANGLES]);
     };
     let shape = Surface::new(&surface.shape, contact.gap).map_err(|error| Failure::from_core("casing", error))?;
     let angle = |index: usize| std::f64::consts::TAU * index as f64 / ANGLES as f64;
-    Ok((0..ANGLES).map(|index| shape.evaluate(angle(index)).0).collect())
+    Ok((0..ANGLES).map(|index| factor * shape.evaluate(angle(index)).0).collect())
 }
 
-/// Greatest common divisor of the orders in the shape of the casing and in the load on it. Contact makes harmonics of what
+/// Greatest common divisor of the orders in the shape of the casing and in what else acts. Contact makes harmonics of what
 /// is there, and nothing else as long as the motion repeats with it.
-fn base_order(scene: &Scene) -> Result<usize> {
-    let mut values = shape(scene)?;
+fn base_order(scene: &Scene, start: &Start) -> Result<usize> {
+    let mut values = shape(scene, start.shape_factor)?;
     let transform = RealFftPlanner::new().plan_fft_forward(values.len());
     let mut harmonics = transform.make_output_vec();
     let transformed = transform.process(&mut values, &mut harmonics);
     transformed.map_err(|error| Failure::new("casing", error, "Report this to the developers"))?;
     let largest = harmonics.iter().skip(1).map(|harmonic| harmonic.norm()).fold(0.0, f64::max);
     let present = |order: &usize| largest > 0.0 && harmonics[*order].norm() > NOTHING * largest;
-    let loads = scene.settings.structures.iter().filter_map(|structure| Some(structure.load?.order as usize));
-    Ok((1..harmonics.len()).filter(present).chain(loads).fold(0, divisor))
+    Ok((1..harmonics.len()).filter(present).chain(start.orders.iter().copied()).fold(0, divisor))
 }
 
 fn divisor(a: usize, b: usize) -> usize {
@@ -218,22 +217,26 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn two_lobes_excite_even_orders_and_a_load_adds_its_own() {
+    fn two_lobes_excite_even_orders_and_what_acts_adds_its_own() {
         let mut scene = scene(100.0, 4);
-        let base = |scene: &Scene| Prediction::new(scene, 1.0).unwrap().base_order;
+        let with = |scene: &Scene, start: &Start| Prediction::new(scene, start, 1.0).unwrap().base_order;
+        let base = |scene: &Scene| with(scene, &Start::default());
+        let acting = |orders: &[usize]| Start { orders: orders.to_vec(), ..Start::default() };
         assert_eq!(base(&scene), 2);
+        assert_eq!(with(&scene, &acting(&[6])), 2);
+        assert_eq!(with(&scene, &acting(&[3])), 1);
+        assert_eq!(with(&scene, &Start { shape_factor: 0.0, ..acting(&[]) }), 0);
+        assert_eq!(with(&scene, &Start { shape_factor: 0.0, ..acting(&[6, 9]) }), 3);
         scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order: 3, phase: 0.2 };
         assert_eq!(base(&scene), 3);
         scene.settings.surfaces[0].shape = Shape::Circular {};
         assert_eq!(base(&scene), 0);
-        scene.settings.structures[0].load =
-            Some(tiprub_core::settings::LoadSettings { order: 5, amplitude: 1.0, phase: 0.0 });
-        assert_eq!(base(&scene), 5);
+        assert_eq!(with(&scene, &acting(&[5])), 5);
     }
 
     #[test]
     fn engine_orders_meet_modes_where_they_should() {
-        let prediction = Prediction::new(&scene(100.0, 4), 1.0).unwrap();
+        let prediction = Prediction::new(&scene(100.0, 4), &Start::default(), 1.0).unwrap();
         let found = prediction.crossings([140.0, 160.0], 1100.0);
         let of_first: Vec<_> = found.iter().filter(|crossing| crossing.mode == 0).collect();
         assert_eq!(of_first.len(), 1, "{found:?}");
@@ -256,7 +259,7 @@ pub(super) mod tests {
             centrifugal_load_speed4: vec![0.0; 2],
             largest_speed: 1000.0,
         });
-        let meeting = |scene: &Scene| Prediction::new(scene, 400.0).unwrap().meeting(4, 0).unwrap();
+        let meeting = |scene: &Scene| Prediction::new(scene, &Start::default(), 400.0).unwrap().meeting(4, 0).unwrap();
         assert!((meeting(&scene) - 50.0 * std::f64::consts::PI).abs() < 1e-9, "stiffening is not asked for");
         scene.settings.structures[0].spin.stiffening = true;
         let expected = std::f64::consts::TAU * 100.0 / (16.0 - campbell).sqrt();

@@ -12,13 +12,20 @@ use crate::{Failure, Result, native};
 
 /// Most numbers of recorded displacements in memory per run; beyond it not every blade is recorded.
 const MOST_SAMPLES: usize = 16_000_000;
+/// Numbers recorded of a blade at a time: two nodes, three components each.
+const ROWS: usize = 6;
+/// Most memory for the spectra of all runs together, and what one bin of them takes: numbers, their table and its text.
+const MOST_BYTES: usize = 2 << 30;
+const BYTES_PER_BIN: usize = 256;
+/// At most one bin for so many samples is kept: the sampling rate is [`super::OVERSAMPLING`] times the highest frequency.
+const BIN_SHARE: usize = 8;
 /// What happens between samples is filtered by [`Decimator`] only where there is something between them.
 const LEAST_FACTOR: f64 = 4.0;
 
 /// What all runs share.
 #[derive(Debug, Clone)]
 pub struct Setup {
-    /// The scene, but for its speed.
+    /// The scene, but for the size of its speed.
     pub scene: Scene,
     /// Start values replaced (name, value as text).
     pub settings: Vec<(String, String)>,
@@ -100,19 +107,51 @@ impl Tally {
 }
 
 impl Setup {
-    /// A simulation with its start values, not yet initialised.
+    /// A simulation with its start values, not yet initialised, that turns with `speed` (rad/s) in the sense of the scene.
     ///
     /// # Errors
     /// A refused scene, unknown or wrong settings.
     pub fn simulation(&self, speed: f64) -> Result<Simulation> {
         let mut scene = self.scene.clone();
         let master = prediction::master(&scene.settings)?;
-        scene.settings.structures[master].speed = speed;
+        scene.settings.structures[master].speed = self.sense() * speed;
         let mut simulation = Simulation::new(&scene).map_err(|error| self.at(speed, error))?;
         for (name, value) in &self.settings {
             native::set(&mut simulation, name, value)?;
         }
         Ok(simulation)
+    }
+
+    /// −1 where the scene's own speed is negative, else 1.
+    pub fn sense(&self) -> f64 {
+        let master = prediction::master(&self.scene.settings);
+        if master.is_ok_and(|master| self.scene.settings.structures[master].speed < 0.0) { -1.0 } else { 1.0 }
+    }
+
+    /// What would not fit into memory is refused: samples of one blade in one run, and the spectra of all `runs`.
+    ///
+    /// # Errors
+    /// Naming the most revolutions that would fit.
+    pub fn check_size(&self, runs: usize) -> Result<()> {
+        let per_blade = ROWS * self.samples;
+        let spectra = runs.saturating_mul(self.samples.div_ceil(BIN_SHARE)).saturating_mul(BYTES_PER_BIN);
+        let most = (MOST_SAMPLES / per_blade).min(MOST_BYTES / spectra.max(1));
+        if self.revolutions <= most {
+            return Ok(());
+        }
+        Err(Failure::usage(
+            format!("--revolutions {}", self.revolutions),
+            format!(
+                "with {} samples per revolution and {runs} angular velocities that is more than {MOST_SAMPLES} recorded numbers \
+                 per blade, or more than 2 GiB for the spectra of all runs",
+                self.samples
+            ),
+            if most > 0 {
+                format!("Give at most {most} revolutions, or fewer or higher --speeds")
+            } else {
+                "Give fewer or higher --speeds".into()
+            },
+        ))
     }
 
     fn at(&self, speed: f64, error: tiprub_core::Error) -> Failure {
@@ -149,7 +188,7 @@ impl Setup {
         }
         let mut march = March { setup: self, speed, start, step, simulation, internal_steps: 0, index: 0 };
         let clock = Instant::now();
-        march.skip(self.transient * self.samples)?;
+        march.skip(self.transient.saturating_mul(self.samples))?;
         let recording = march.record()?;
         march.finish(recording, clock)
     }

@@ -31,7 +31,7 @@ fn around(crossing: f64, half: f64, count: usize) -> Speeds {
 
 #[track_caller]
 fn run(scene: Scene, request: &Request, threads: usize) -> Study {
-    of_scene(scene, request, threads, |_, _| {}).unwrap().0
+    of_scene(scene, request, threads, |_, _, _| {}).unwrap().0
 }
 
 /// One blade of rotor 37, damped enough for the free vibration to die out soon, without friction.
@@ -46,7 +46,7 @@ fn blade37() -> Scene {
 }
 
 fn meeting(scene: &Scene) -> f64 {
-    Prediction::new(scene, 0.0).unwrap().meeting(4, 0).unwrap()
+    Prediction::new(scene, &Start::default(), 0.0).unwrap().meeting(4, 0).unwrap()
 }
 
 /// A casing as soft as nothing pushes without holding: the response is linear, and resonance where linear theory has it.
@@ -67,6 +67,12 @@ fn the_softest_contact_leaves_resonance_where_linear_theory_has_it() {
     let coincidences = study.results["coincidences"].as_array().unwrap();
     let one = coincidences.iter().find(|one| one["engine_order"] == 4 && one["mode"] == 1).unwrap();
     assert!((one["predicted_speed"].as_f64().unwrap() / crossing - 1.0).abs() < 1e-12, "{one}");
+    assert!(
+        study.statements.iter().all(|one| !one.expected.starts_with("No node penetrates")),
+        "gaps of an unworn coating"
+    );
+    let unworn = study.statements.iter().find(|one| one.expected.contains("unworn surface")).unwrap();
+    assert_eq!(unworn.holds, None);
     // A tenth of the half-power width, a fifth of the distance of the speeds.
     assert!(one["relative_shift"].as_f64().unwrap().abs() < 1e-3, "{one}");
     let value = |peak: &serde_json::Value, name: &str| peak[name].as_f64().unwrap();
@@ -127,7 +133,7 @@ fn bell(speed: f64, middle: f64, height: f64) -> f64 {
 /// A branch that leans to +18 %, with a small maximum on the way, and another beyond the range.
 #[test]
 fn a_resonance_is_followed_as_far_as_it_leans() {
-    let prediction = Prediction::new(&scene(FIRST, 4), 0.0).unwrap();
+    let prediction = Prediction::new(&scene(FIRST, 4), &Start::default(), 0.0).unwrap();
     let speeds = around(CROSSING, 0.3, 61).values();
     let [low, high] = [speeds[0], speeds[60]];
     let crossings = prediction.crossings([low, high], 1.5 * FIRST);
@@ -151,7 +157,7 @@ fn neighbouring_resonances_are_told_apart() {
     let mut scene = scene(FIRST, 4);
     let rom = &mut scene.roms[0];
     rom.stiffness[(1, 1)] = rom.stiffness[(0, 0)] * 1.1_f64.powi(2);
-    let prediction = Prediction::new(&scene, 0.0).unwrap();
+    let prediction = Prediction::new(&scene, &Start::default(), 0.0).unwrap();
     let speeds = around(CROSSING, 0.3, 121).values();
     let crossings = prediction.crossings([speeds[0], speeds[120]], 1.5 * FIRST);
     // Half a percent below its own crossing the second one is still that of it.
@@ -204,7 +210,7 @@ fn a_master_that_does_not_turn_is_refused_before_anything_is_reduced() {
     assert!(failure.usage && failure.problem.contains("`cube`, flies freely"), "{failure}");
     assert!(failure.remedy.contains("builtin:rotor37"), "{failure}");
     let without = Scene { settings, roms: Vec::new() };
-    assert_eq!(of_scene(without, &Request::default(), 1, |_, _| {}).unwrap_err(), failure);
+    assert_eq!(of_scene(without, &Request::default(), 1, |_, _, _| {}).unwrap_err(), failure);
 }
 
 #[test]
@@ -249,7 +255,7 @@ fn refused_speeds_are_marked_and_all_refused_is_a_failure() {
         map.sheet.rows.iter().filter(|row| row[1].is_nan()).map(|row| row[0]).collect::<Vec<_>>(),
         [170.0, 190.0]
     );
-    let failure = of_scene(scene, &request(speeds(170.0, 190.0)), 1, |_, _| {}).unwrap_err();
+    let failure = of_scene(scene, &request(speeds(170.0, 190.0)), 1, |_, _, _| {}).unwrap_err();
     assert!(failure.problem.contains("every angular velocity is refused"), "{failure}");
 }
 
@@ -258,8 +264,166 @@ fn steps_too_coarse_for_the_filter_and_a_speed_set_are_refused() {
     let mut coarse = request(BUMP, around(CROSSING, 0.1, 2));
     coarse.settings.retain(|(name, _)| name != "internal_step_max");
     coarse.settings.push(("internal_step_max".into(), "1e-4".into()));
-    let failure = of_scene(scene(FIRST, 2), &coarse, 1, |_, _| {}).unwrap_err();
+    let failure = of_scene(scene(FIRST, 2), &coarse, 1, |_, _, _| {}).unwrap_err();
     assert!(failure.problem.contains("internal_step_max="), "{failure}");
     let request = Request { settings: vec![("speed".into(), "1".into())], ..Request::default() };
-    assert!(of_scene(scene(FIRST, 2), &request, 1, |_, _| {}).unwrap_err().usage);
+    assert!(of_scene(scene(FIRST, 2), &request, 1, |_, _, _| {}).unwrap_err().usage);
+}
+
+/// With friction the sense matters; a blade mirrored about its middle, turning the other way, is the same in a mirror.
+#[test]
+fn the_rotor_turns_in_the_sense_of_the_scene() {
+    let speeds = around(CROSSING, 0.1, 2);
+    let request = Request { revolutions: Some(2), transient: Some(1), ..request(BUMP, speeds) };
+    let request = Request {
+        settings: request.settings.iter().filter(|(name, _)| name != "friction_coefficient").cloned().collect(),
+        ..request
+    };
+    let forces = |sense: f64, mirrored: bool| {
+        let mut scene = scene(FIRST, 1);
+        scene.settings.contacts[0].friction = 0.4;
+        scene.settings.structures[0].speed = sense;
+        if mirrored {
+            [1, 4].iter().for_each(|row| scene.roms[0].contact_map.row_mut(*row).neg_mut());
+        }
+        let study = run(scene, &request, 1);
+        let told = study.facts.iter().find(|(name, _)| name == "angular velocities").unwrap().1.clone();
+        assert!(told.contains(if sense < 0.0 { "negative sense" } else { "positive sense" }), "{told}");
+        let rows = &study.figure("normal-force").unwrap().sheet.rows;
+        assert!(rows.iter().all(|row| row[1] > 1.0), "{rows:?}");
+        [rows[0][1], rows[1][1]]
+    };
+    let [forward, zero, backward, mirrored] =
+        [(100.0, false), (0.0, false), (-100.0, false), (-100.0, true)].map(|(sense, mirror)| forces(sense, mirror));
+    for (index, force) in forward.iter().enumerate() {
+        assert_eq!(force.to_bits(), zero[index].to_bits());
+        assert!((mirrored[index] / force - 1.0).abs() < 1e-6, "{forward:?} {mirrored:?}");
+        assert!((backward[index] / force - 1.0).abs() > 1e-3, "{forward:?} {backward:?}");
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused_before_the_work() {
+    let refused = |request: &Request| Map::prepare(scene(FIRST, 36), request).map(|_| ()).unwrap_err();
+    for revolutions in [100_000_000, usize::MAX] {
+        let request = Request { revolutions: Some(revolutions), ..request(BUMP, around(CROSSING, 0.1, 5)) };
+        let failure = refused(&request);
+        assert!(failure.usage && failure.what.contains(&format!("--revolutions {revolutions}")), "{failure}");
+        // As many as the remedy names do fit, one more does not.
+        let most: usize = failure.remedy.split(' ').find_map(|word| word.parse().ok()).unwrap();
+        let with = |revolutions| Request { revolutions: Some(revolutions), ..request.clone() };
+        assert!(Map::prepare(scene(FIRST, 36), &with(most)).is_ok(), "{failure}");
+        assert!(refused(&with(most + 1)).usage, "{failure}");
+        assert!(most > 1000, "{failure}");
+    }
+    // Spectra of many runs are what does not fit.
+    let many = |count| Request { revolutions: Some(2000), ..request(BUMP, around(CROSSING, 0.1, count)) };
+    assert!(Map::prepare(scene(FIRST, 36), &many(5)).is_ok());
+    assert!(refused(&many(1000)).what.contains("--revolutions 2000"));
+    let slow = request(BUMP, Speeds { from: 1e-3, to: 1.0, count: 5 });
+    let failure = refused(&slow);
+    assert!(failure.usage && failure.what == "--speeds" && failure.problem.contains("0.001 rad/s"), "{failure}");
+    let least: f64 = failure.remedy.split(' ').find_map(|word| word.parse().ok()).unwrap();
+    let from = |from| Request { revolutions: Some(1), ..request(BUMP, Speeds { from, to: 1.0, count: 5 }) };
+    assert!(Map::prepare(scene(FIRST, 36), &from(least)).is_ok(), "{failure}");
+    assert!(refused(&from(0.9 * least)).usage, "{failure}");
+}
+
+#[test]
+fn the_cost_told_is_what_is_done() {
+    let request = Request { revolutions: Some(4), transient: Some(3), ..request(BUMP, around(CROSSING, 0.1, 2)) };
+    let told = std::cell::RefCell::new(Vec::new());
+    let tell = |done: usize, all: usize, steps: f64| told.borrow_mut().push((done, all, steps));
+    let (study, _) = of_scene(scene(FIRST, 4), &request, 1, tell).unwrap();
+    let done = study.results["internal_steps"].as_f64().unwrap();
+    assert_eq!(told.borrow().iter().map(|told| (told.0, told.1)).collect::<Vec<_>>(), [(0, 2), (1, 2), (2, 2)]);
+    assert!((told.borrow()[0].2 / done - 1.0).abs() < 0.02, "{told:?} {done}");
+}
+
+#[test]
+fn start_values_count_in_orders_and_facts() {
+    let prepared = |change: fn(&mut Scene), set: &[(&str, &str)]| {
+        let mut scene = scene(FIRST, 2);
+        scene.settings.surfaces[0].moving = true;
+        change(&mut scene);
+        let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
+        let request = Request { settings: set, speeds: Some(around(CROSSING, 0.1, 2)), ..Request::default() };
+        Map::prepare(scene, &request).unwrap().0
+    };
+    let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} {b}");
+    let plain = prepared(|_| {}, &[]);
+    assert_eq!((plain.prediction.base_order, plain.start.without()), (2, String::new()));
+    near(plain.intrusion, BUMP);
+    let gap = plain.start.clearance[0];
+    let moved = [("gap_offset", "1e-5"), ("casing_radius_change", "2e-5"), ("casing_shape_factor", "0.5")];
+    let moved = prepared(|scene| scene.settings.contacts[0].sector_gaps = vec![3e-4, 5e-4], &moved);
+    near(moved.start.clearance[0], 3.3e-4);
+    near(moved.start.clearance[1], 5.3e-4);
+    near(moved.depth, 0.5 * plain.depth);
+    near(moved.intrusion, 0.5 * (gap + BUMP) - 3.3e-4);
+    let round = prepared(|_| {}, &[("casing_shape_factor", "0")]);
+    assert_eq!((round.prediction.base_order, round.static_displacement), (0, None));
+    let whirl = |scene: &mut Scene| scene.settings.structures[0].whirl = true;
+    assert_eq!(prepared(whirl, &[]).prediction.base_order, 2, "a shaft in the middle has no order");
+    let whirling = prepared(whirl, &[("whirl_y", "-1e-5")]);
+    assert_eq!((whirling.prediction.base_order, whirling.start.without()), (1, ", without whirl".into()));
+}
+
+/// Where nothing touches nothing is said about the response.
+#[test]
+fn nothing_that_moves_is_no_verdict() {
+    let request = Request { revolutions: Some(4), transient: Some(3), ..request(-1e-4, around(CROSSING, 0.1, 2)) };
+    let study = run(scene(FIRST, 2), &request, 1);
+    let holds = |start: &str| study.statements.iter().find(|one| one.expected.starts_with(start)).unwrap().holds;
+    assert_eq!(holds("The tips touch"), Some(false));
+    assert_eq!([holds("The scale of the response"), holds("Response is a repetition")], [None, None]);
+}
+
+#[test]
+fn stiffening_is_decided_only_where_it_shows() {
+    let crossing = |order, speed| Crossing { order, mode: 0, speed, frequency: 100.0, excited: true };
+    let one = |order, response, beyond| Coincidence {
+        crossing: crossing(order, 100.0),
+        window: [90.0, 150.0],
+        response,
+        beyond,
+    };
+    let verdict =
+        |all: &[Coincidence]| statements::stiffens(all, 2.0).map(|statement| (statement.holds, statement.found));
+    assert_eq!(verdict(&[one(4, None, None)]), None);
+    let above = one(4, Some((110.0, 3e-3)), None);
+    assert_eq!(verdict(&[above]).unwrap().0, Some(true));
+    assert_eq!(verdict(&[one(4, Some((95.0, 3e-3)), None), one(6, Some((120.0, 1e-3)), None)]).unwrap().0, Some(false));
+    for shift in [-1.9, 1.9] {
+        let (holds, found) = verdict(&[one(4, Some((100.0 + shift, 3e-3)), None)]).unwrap();
+        assert!(holds.is_none() && found.contains("below the distance of the speeds"), "{found}");
+    }
+    // Another crossing runs out of the range: smaller there it does not matter, larger it may be the strongest.
+    assert_eq!(verdict(&[above, one(6, Some((104.0, 1e-3)), Some((150.0, 2e-3)))]).unwrap().0, Some(true));
+    for response in [None, Some((104.0, 1e-3))] {
+        let (holds, found) = verdict(&[above, one(6, response, Some((150.0, 4e-3)))]).unwrap();
+        assert!(holds.is_none() && found.starts_with("undecided: the response of engine order 6 on mode 1"), "{found}");
+    }
+}
+
+/// Two runs beside a border of the window: the parabola's top lies beyond it.
+#[test]
+fn a_maximum_stays_in_its_window() {
+    let mut scene = scene(FIRST, 4);
+    let rom = &mut scene.roms[0];
+    rom.stiffness[(1, 1)] = rom.stiffness[(0, 0)] * 1.25_f64.powi(2);
+    let prediction = Prediction::new(&scene, &Start::default(), 0.0).unwrap();
+    let speeds = [0.9, 1.0, 1.1, 1.2, 1.3].map(|share| share * CROSSING);
+    let crossings = prediction.crossings([speeds[0], speeds[4]], 1.5 * FIRST);
+    // The second mode's window begins at 1.1875 times the crossing of the first one, the top of the parabola is at 1.15.
+    let two = |speed: f64| {
+        if speed < 1.15 * CROSSING && speed > 1.05 * CROSSING { 0.999e-3 } else { bell(speed, 1.2 * CROSSING, 1e-3) }
+    };
+    let found = findings::coincidences(&runs_of_order(4, &speeds, two), &prediction, &crossings, 1);
+    for one in found.iter().filter(|one| one.crossing.order == 4) {
+        let Some((speed, _)) = one.response else { continue };
+        assert!((one.window[0]..=one.window[1]).contains(&speed), "{one:?}");
+    }
+    let second = found.iter().find(|one| one.crossing.order == 4 && one.crossing.speed > 1.1 * CROSSING).unwrap();
+    assert!(second.response.is_some(), "{found:?}");
 }
