@@ -7,7 +7,7 @@ mod counting;
 use std::collections::BTreeMap;
 
 use tiprub_core::settings::{Scheme, Shape, Solver};
-use tiprub_core::variables::{Causality, Kind};
+use tiprub_core::variables::{Causality, Kind, Variability};
 use tiprub_core::{Error, Scene, Simulation};
 
 fn reference(simulation: &Simulation, name: &str) -> u32 {
@@ -235,6 +235,125 @@ fn a_saved_state_continues_with_identical_bits() {
     other.restore_state(&state).unwrap();
     run(&mut other, 40, 5e-5);
     assert_eq!(bits(&other), first);
+}
+
+/// Every element of every continuous output: its derivative (1/s), as bits.
+fn derivatives(simulation: &Simulation) -> BTreeMap<u32, u64> {
+    let rows = simulation.table().variables().iter();
+    let rows = rows.filter(|row| row.causality == Causality::Output && row.variability == Variability::Continuous);
+    rows.flat_map(|row| (0..row.len()).map(|i| row.reference + u32::try_from(i).unwrap()))
+        .map(|reference| (reference, simulation.output_derivative(reference, 1).unwrap().to_bits()))
+        .collect()
+}
+
+/// Steps of other lengths lie behind the instance that takes the state over: none of them counts.
+#[test]
+fn a_restored_state_gives_the_derivatives_of_its_own_steps() {
+    let scene = common::scene(12);
+    let names = ["force_x", "torque", "kinetic_energy", "external_work"];
+    let read = |simulation: &Simulation| names.map(|name| real(simulation, name));
+    let mut simulation = started(&scene);
+    run(&mut simulation, 40, 5e-5);
+    run(&mut simulation, 1, 3e-5);
+    let before = read(&simulation);
+    run(&mut simulation, 1, 7e-5);
+    let now = read(&simulation);
+    let mut state = vec![0; simulation.state_size()];
+    simulation.save_state(&mut state).unwrap();
+    let at_save = derivatives(&simulation);
+    // Means belong to the middles of their steps.
+    for (index, length) in [5e-5, 5e-5, 7e-5, 7e-5].into_iter().enumerate() {
+        let exact = (now[index] - before[index]) / length;
+        let found = simulation.output_derivative(reference(&simulation, names[index]), 1).unwrap();
+        assert!(exact != 0.0 && (found / exact - 1.0).abs() < 1e-12, "{}: {found}, exactly {exact}", names[index]);
+    }
+    run(&mut simulation, 1, 4e-5);
+    let after = derivatives(&simulation);
+    for lengths in [&[][..], &[9e-5], &[1.1e-5, 6e-5], &[5e-5, 2e-5, 8e-5]] {
+        let mut other = started(&scene);
+        for length in lengths {
+            run(&mut other, 1, *length);
+        }
+        other.restore_state(&state).unwrap();
+        assert_eq!(derivatives(&other), at_save, "after steps of {lengths:?}");
+        run(&mut other, 1, 4e-5);
+        assert_eq!(derivatives(&other), after, "a step after steps of {lengths:?}");
+        // And into an instance that has stepped since, or was never started.
+        other.restore_state(&state).unwrap();
+        assert_eq!(derivatives(&other), at_save);
+    }
+    let mut fresh = Simulation::new(&scene).unwrap();
+    fresh.restore_state(&state).unwrap();
+    assert_eq!(derivatives(&fresh), at_save);
+}
+
+/// Outputs over a communication step, gathered a second time from what can be seen between its internal steps.
+#[test]
+fn outputs_over_a_communication_step_are_those_of_its_internal_steps() {
+    let (sectors, nodes) = (12, 3);
+    let mut simulation = started(&common::scene(sectors));
+    let lanes = simulation.system().bank().lanes();
+    let least = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min);
+    // Per kind: clearances that were smaller within the step than at its end.
+    let (mut passed, mut pressed, mut peaks) = ([0; 4], 0, 0);
+    for communication in 0..120 {
+        let length = if communication % 3 == 0 { 5e-5 } else { 3.1e-5 };
+        simulation.begin_step(simulation.time(), length).unwrap();
+        let mut lowest = simulation.system().gaps().to_vec();
+        let (mut normal, mut tangential) = (vec![0.0; lowest.len()], vec![0.0; lowest.len()]);
+        let (mut peak, mut last, mut finished) = (0.0_f64, 0.0_f64, false);
+        while !finished {
+            finished = simulation.advance().unwrap().finished;
+            let (system, share) = (simulation.system(), simulation.system().bank().step() / length);
+            lowest.iter_mut().zip(system.gaps()).for_each(|(low, gap)| *low = low.min(*gap));
+            last = 0.0;
+            for event in system.events() {
+                normal[event.node * lanes + event.sector] += event.normal * share;
+                tangential[event.node * lanes + event.sector] += 0.15 * event.normal * share;
+                last = last.max(event.normal);
+            }
+            peak = peak.max(last);
+        }
+        let now = simulation.system().gaps();
+        let column =
+            |values: &[f64], sector: usize| (0..nodes).map(|node| values[node * lanes + sector]).collect::<Vec<_>>();
+        let row = |values: &[f64], node: usize| values[node * lanes..][..sectors].to_vec();
+        let mut check = |kind: usize, name: &str, element: usize, places: &dyn Fn(&[f64]) -> Vec<f64>| {
+            let found = simulation.real(reference(&simulation, name) + u32::try_from(element).unwrap()).unwrap();
+            let exact = least(&mut places(&lowest).into_iter());
+            assert_eq!(
+                found.to_bits(),
+                exact.to_bits(),
+                "{name}[{element}], step {communication}: {found}, not {exact}"
+            );
+            passed[kind] += usize::from(exact < least(&mut places(now).into_iter()) - 1e-6);
+        };
+        check(0, "clearance_minimum", 0, &|values| (0..nodes).flat_map(|node| row(values, node)).collect());
+        (0..nodes).for_each(|node| check(1, "node_clearance_minimum", node, &|values| row(values, node)));
+        (0..sectors).for_each(|sector| check(2, "sector_clearance_minimum", sector, &|values| column(values, sector)));
+        for (sector, node) in (0..2).flat_map(|sector| (0..nodes).map(move |node| (sector, node))) {
+            let name = format!("blade[{}].clearance_minimum", sector + 1);
+            check(3, &name, node, &|values| vec![values[node * lanes + sector]]);
+            for (output, exact) in [("normal_force", &normal), ("tangential_force", &tangential)] {
+                let name = format!("blade[{}].{output}", sector + 1);
+                let found = simulation.real(reference(&simulation, &name) + u32::try_from(node).unwrap()).unwrap();
+                let exact = exact[node * lanes + sector];
+                assert!((found - exact).abs() <= 1e-9 * exact, "{name}[{node}]: {found} N, exactly {exact} N");
+                pressed += usize::from(exact > 0.0);
+            }
+        }
+        for sector in 0..sectors {
+            let exact: f64 = column(&normal, sector).iter().sum();
+            let found = reference(&simulation, "sector_normal_force") + u32::try_from(sector).unwrap();
+            assert!((simulation.real(found).unwrap() - exact).abs() <= 1e-9 * exact);
+        }
+        assert_eq!(real(&simulation, "normal_force_peak").to_bits(), peak.to_bits());
+        let impulse = length * normal.iter().sum::<f64>();
+        assert!((real(&simulation, "normal_impulse") - impulse).abs() <= 1e-9 * impulse);
+        peaks += usize::from(peak > 1.01 * last);
+    }
+    println!("smaller within the step than at its end: {passed:?}; forces {pressed}, peaks {peaks}");
+    assert!(passed.iter().all(|count| *count > 10) && pressed > 10 && peaks > 10, "{passed:?}, {pressed}, {peaks}");
 }
 
 #[test]

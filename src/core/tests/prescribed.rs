@@ -1,0 +1,457 @@
+//! What is prescribed and where it acts, against closed forms that know signs and places: how inputs and parameters move casing
+//! and shaft, what slides on what, which sector and which structure a setting belongs to.
+
+mod common;
+#[path = "common/features.rs"]
+mod features;
+#[path = "common/lattice.rs"]
+mod lattice;
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector};
+use tiprub_core::contact::free_gap::{FreeGap, OpenSurface};
+use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw};
+use tiprub_core::contact::spline::SurfaceSpline;
+use tiprub_core::dynamics::modal::ModalModel;
+use tiprub_core::dynamics::sectors::SectorModel;
+use tiprub_core::settings::{Interpolation, LoadSettings, Scheme, Shape, Solver, SplineSettings};
+use tiprub_core::system::{System, SystemParts, SystemSettings};
+use tiprub_core::{Rom, Scene, Simulation};
+
+fn place(simulation: &Simulation, name: &str) -> u32 {
+    simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
+}
+
+fn real(simulation: &Simulation, name: &str) -> f64 {
+    simulation.real(place(simulation, name)).unwrap()
+}
+
+fn set(simulation: &mut Simulation, name: &str, value: f64) {
+    simulation.set_real(place(simulation, name), value).unwrap();
+}
+
+/// From `value` on with a constant rate.
+fn move_on(simulation: &mut Simulation, name: &str, value: f64, rate: f64) {
+    let reference = place(simulation, name);
+    simulation.set_real(reference, value).unwrap();
+    simulation.set_input_derivative(reference, 1, rate).unwrap();
+}
+
+fn run(simulation: &mut Simulation, length: f64) {
+    simulation.do_step(simulation.time(), length).unwrap();
+}
+
+const SECTORS: usize = 5;
+const SLOPE: f64 = -0.2;
+const LOBES: (f64, u32, f64) = (8e-5, 3, 0.4);
+const GAPS: [f64; SECTORS] = [5e-4, 5.3e-4, 4.8e-4, 5.1e-4, 5.6e-4];
+
+/// Blades with conical tips in a casing of lobes that can be moved in every way.
+fn movable() -> Scene {
+    let mut scene = common::scene(SECTORS);
+    for node in &mut scene.roms[0].contact_nodes {
+        (node.position[0], node.meridional_slope) = (0.25 + SLOPE * node.position[2], SLOPE);
+    }
+    (scene.settings.structures[0].whirl, scene.settings.structures[0].axial_shift) = (true, true);
+    let (amplitude, order, phase) = LOBES;
+    scene.settings.surfaces[0].shape = Shape::Lobes { amplitude, order, phase };
+    scene.settings.surfaces[0].ramp_time = 0.0;
+    scene.settings.contacts[0].sector_gaps = GAPS.to_vec();
+    scene.settings.outputs.watched_sectors = (1..=SECTORS).collect();
+    scene
+}
+
+/// Distance of a node from the cone with lobes, in Cartesian coordinates, for the values of [`INPUTS`].
+fn distance(rom: &Rom, node: usize, sector: usize, values: [f64; 8]) -> f64 {
+    let [offset, change, factor, rotation, whirl_x, whirl_y, shift, start] = values;
+    let [radius, theta, z] = rom.contact_nodes[node].position;
+    let angle = theta + TAU * sector as f64 / SECTORS as f64 + start;
+    let [x, y, z] = [radius * angle.cos() + whirl_x, radius * angle.sin() + whirl_y, z + shift];
+    let (amplitude, order, phase) = LOBES;
+    let lobe = f64::from(order) * (y.atan2(x) - rotation) - phase;
+    let casing = 0.25 + SLOPE * z + GAPS[sector] + offset + change - factor * amplitude * lobe.cos();
+    let flank = factor * amplitude * f64::from(order) * lobe.sin() / radius;
+    (casing - x.hypot(y)) / (1.0 + flank * flank + SLOPE * SLOPE).sqrt()
+}
+
+/// Name, value where nothing is moved, value tried.
+const INPUTS: [(&str, f64, f64); 8] = [
+    ("gap_offset", 0.0, 7e-5),
+    ("casing_radius_change", 0.0, -9e-5),
+    ("casing_shape_factor", 1.0, -1.4),
+    ("casing_shape_rotation", 0.0, 0.35),
+    ("whirl_x", 0.0, 1.1e-4),
+    ("whirl_y", 0.0, -1.3e-4),
+    ("axial_shift", 0.0, 8e-4),
+    ("initial_rotor_angle", 0.0, 0.3),
+];
+
+/// Each kind of surface, each input alone and all of them together.
+#[test]
+fn gaps_are_distances_in_space_whatever_moves_casing_and_shaft() {
+    type Kind = (&'static str, fn(&mut Scene));
+    let kinds: [Kind; 3] = [
+        ("revolution", |_| {}),
+        ("spline", |scene| scene.settings.surfaces[0].spline = Some(SplineSettings::default())),
+        ("flexible casing", features::flexible),
+    ];
+    for (kind, change) in kinds {
+        let mut scene = movable();
+        change(&mut scene);
+        let template = Simulation::new(&scene).unwrap();
+        for moved in (0..INPUTS.len()).map(|input| vec![input]).chain([(0..INPUTS.len()).collect()]) {
+            let mut simulation = template.clone();
+            let (mut values, unmoved) = (INPUTS.map(|input| input.1), INPUTS.map(|input| input.1));
+            for input in &moved {
+                let (name, _, value) = INPUTS[*input];
+                // The shape of a casing that a structure carries does not turn.
+                if simulation.table().find(name).is_some() {
+                    set(&mut simulation, name, value);
+                    values[*input] = value;
+                }
+            }
+            simulation.initialise(0.0).unwrap_or_else(|error| panic!("{kind}, {moved:?}: {error}"));
+            let (mut error, mut effect) = (0.0_f64, 0.0_f64);
+            for (node, sector) in (0..3).flat_map(|node| (0..SECTORS).map(move |sector| (node, sector))) {
+                let exact = distance(&scene.roms[0], node, sector, values);
+                error = error.max((simulation.system().gap(node, sector) - exact).abs());
+                effect = effect.max((exact - distance(&scene.roms[0], node, sector, unmoved)).abs());
+                let watched = place(&simulation, &format!("blade[{}].clearance", sector + 1)) + node as u32;
+                assert_eq!(simulation.real(watched).unwrap(), simulation.system().gap(node, sector));
+            }
+            println!("{kind}, {moved:?}: gaps move by {effect:.1e} m, off by {error:.1e} m");
+            assert!(effect > 5e-5 || values == unmoved, "{kind}, {moved:?}: {effect:e}");
+            assert!(error < 1e-6, "{kind}, {moved:?}: {error:e}");
+        }
+    }
+}
+
+/// Circular frequency of the radial, tangential and axial mode, and displacement per unit of each.
+const MODES: [f64; 3] = [TAU * 850.0, TAU * 6000.0, TAU * 6500.0];
+const SHAPE: f64 = 4.0;
+const STIFFNESS: f64 = MODES[0] * MODES[0] / (SHAPE * SHAPE);
+const CLOSING: f64 = 2e-4;
+const FRICTION: f64 = 0.1;
+const VELOCITY: f64 = 0.02;
+/// Direction of the motion of the shaft or the casing: no blade is near it or across it.
+const TOWARDS: f64 = 0.3;
+
+/// Blades with one mode along each direction, in a round casing that can close; nothing turns.
+fn blades(scheme: Scheme, solver: Solver, friction: f64) -> Scene {
+    let mut scene = common::scene(SECTORS);
+    let rom = &mut scene.roms[0];
+    rom.mass = DMatrix::identity(3, 3);
+    rom.stiffness = DMatrix::from_diagonal(&DVector::from_iterator(3, MODES.iter().map(|mode| mode * mode)));
+    rom.contact_map = DMatrix::identity(3, 3) * SHAPE;
+    rom.contact_nodes.truncate(1);
+    (rom.contact_nodes[0].position, rom.contact_nodes[0].meridional_slope) = ([0.25, 0.0, 0.0], 0.0);
+    let structure = &mut scene.settings.structures[0];
+    (structure.speed, structure.damping_ratio) = (0.0, Some(0.5));
+    (structure.whirl, structure.axial_shift) = (true, true);
+    scene.settings.surfaces[0].shape = Shape::Circular {};
+    (scene.settings.contacts[0].solver, scene.settings.contacts[0].friction) = (solver, friction);
+    (scene.settings.time.scheme, scene.settings.time.step) = (scheme, 2e-6);
+    scene
+}
+
+fn started(scene: &Scene) -> Simulation {
+    let mut simulation = Simulation::new(scene).unwrap_or_else(|error| panic!("{error}"));
+    simulation.initialise(0.0).unwrap_or_else(|error| panic!("{error}"));
+    simulation
+}
+
+/// Close the casing by more than the gap, and wait.
+fn close(simulation: &mut Simulation, closing: f64) {
+    move_on(simulation, "casing_radius_change", 0.0, -closing / 4e-3);
+    run(simulation, 4e-3);
+    move_on(simulation, "casing_radius_change", -closing, 0.0);
+    run(simulation, 4e-3);
+}
+
+/// Every blade that slides with `slip(θ)` (tangential, axial; m/s) is held back by µλ against it, and heats by µλ|slip|.
+fn check_friction(simulation: &Simulation, case: &str, slip: impl Fn(f64) -> [f64; 2]) {
+    let (mut heat, mut torque, mut axial) = (0.0, 0.0, 0.0);
+    assert_eq!(simulation.system().events().len(), SECTORS, "{case}: open");
+    for event in simulation.system().events() {
+        let [around, along] = slip(TAU * event.sector as f64 / SECTORS as f64);
+        let speed = around.hypot(along);
+        let exact = [around, along].map(|slip| -FRICTION * event.normal * slip / speed);
+        for (found, exact) in [(event.force[1], exact[0]), (event.force[2], exact[1])] {
+            let off = (found - exact).abs() / (FRICTION * event.normal);
+            assert!(off < 0.05, "{case}, sector {}: friction {found} N, exactly {exact} N", event.sector);
+        }
+        heat += FRICTION * event.normal * speed;
+        torque += 0.25 * exact[0];
+        axial += exact[1];
+    }
+    for (name, exact, scale) in [
+        ("friction_power", heat, heat),
+        ("torque", torque, heat / VELOCITY * 0.25),
+        ("force_z", axial, heat / VELOCITY),
+    ] {
+        let found = real(simulation, name);
+        println!("{case}: {name} {found:.5}, exactly {exact:.5}");
+        assert!((found - exact).abs() < 0.05 * scale, "{case}: {name} {found}, exactly {exact}");
+    }
+}
+
+/// The shaft moves sideways (and along) at a constant velocity, while the rotor turns slowly or not at all.
+#[test]
+fn friction_opposes_whirl_and_axial_motion_of_the_shaft() {
+    for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
+        for solver in [Solver::Film, Solver::Lcp, Solver::Coulomb] {
+            for (speed, along) in [(0.0, 0.0), (0.04, 0.0), (-0.04, 0.0), (0.04, 0.02), (-0.04, -0.02)] {
+                // Axial slip is the business of `coulomb`.
+                if along != 0.0 && solver != Solver::Coulomb {
+                    continue;
+                }
+                let mut scene = blades(scheme, solver, FRICTION);
+                scene.settings.structures[0].speed = speed;
+                let sideways = if along == 0.0 { VELOCITY } else { 0.0 };
+                let mut simulation = started(&scene);
+                close(&mut simulation, 3.56e-4 + CLOSING);
+                let rates = [sideways * TOWARDS.cos(), sideways * TOWARDS.sin(), along];
+                let mut moved = 0.0;
+                for length in [4e-3, 5e-5] {
+                    for (name, rate) in ["whirl_x", "whirl_y", "axial_shift"].into_iter().zip(rates) {
+                        move_on(&mut simulation, name, rate * moved, rate);
+                    }
+                    run(&mut simulation, length);
+                    moved += length;
+                }
+                let case = format!("{scheme:?}, {solver:?}, speed {speed}, along {along}");
+                check_friction(&simulation, &case, |angle| [0.25 * speed + sideways * (TOWARDS - angle).sin(), along]);
+            }
+        }
+    }
+}
+
+/// A load of one nodal diameter that grows moves the casing as a whole; the blades stand still and are dragged along.
+#[test]
+fn friction_drags_the_blades_along_with_a_casing_that_moves() {
+    for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
+        for solver in [Solver::Lcp, Solver::Coulomb] {
+            let mut scene = blades(scheme, solver, FRICTION);
+            features::flexible(&mut scene);
+            scene.settings.structures[1].damping_ratio = Some(0.5);
+            scene.settings.structures[1].load = Some(LoadSettings { order: 1, amplitude: 0.0, phase: TOWARDS });
+            scene.settings.outputs.slave_displacement = true;
+            let mut simulation = started(&scene);
+            close(&mut simulation, 3.56e-4 + CLOSING);
+            // The mode has the displacement 0.5 cos θ and the mass 1: line load times π R/2 is its force.
+            let rate = VELOCITY * (TAU * 900.0).powi(2) / (0.5 * 0.5 * std::f64::consts::PI * 0.25);
+            move_on(&mut simulation, "casing_load_amplitude", 0.0, rate);
+            run(&mut simulation, 4e-3);
+            // Nodes at 0 and 90 degrees of the first ring.
+            let first = place(&simulation, "casing_displacement");
+            let position = |simulation: &Simulation| [0, 9].map(|node| simulation.real(first + node).unwrap());
+            let before = position(&simulation);
+            move_on(&mut simulation, "casing_load_amplitude", rate * 4e-3, rate);
+            run(&mut simulation, 5e-5);
+            let now = position(&simulation);
+            let [x, y] = [0, 1].map(|axis| (now[axis] - before[axis]) / 5e-5);
+            let case = format!("{scheme:?}, {solver:?}: casing at ({x:.4}, {y:.4}) m/s");
+            assert!(x.hypot(y) > 0.8 * VELOCITY && (y.atan2(x) - TOWARDS).abs() < 0.1, "{case}");
+            check_friction(&simulation, &case, |angle| [x * angle.sin() - y * angle.cos(), 0.0]);
+        }
+    }
+}
+
+const SWING: f64 = 60.0;
+const PRESS: f64 = 200.0;
+const DEPTH: f64 = 2e-4;
+/// Flexibility of the contact of massless-boundary (m/N).
+const SOFT: f64 = 1e-6;
+
+/// Unit masses on springs: (ω, direction, displacement of the node), of which the last `quasi_static` have no inertia.
+fn masses(modes: &[(f64, usize, f64)], rows: usize, quasi_static: usize) -> ModalModel {
+    ModalModel {
+        frequencies: modes.iter().map(|mode| mode.0).collect(),
+        damping_ratios: vec![0.0; modes.len()],
+        contact_modes: DMatrix::from_fn(
+            rows,
+            modes.len(),
+            |row, mode| {
+                if row % 3 == modes[mode].1 { modes[mode].2 } else { 0.0 }
+            },
+        ),
+        shapes: DMatrix::identity(modes.len(), modes.len()),
+        quasi_static,
+    }
+}
+
+/// A mass that is pressed along z by its spring and swings along x, on a plane.
+fn swinging_blade(scheme: Scheme, settings: SystemSettings) -> System {
+    let modes = [(SWING, 0, 1.0), (PRESS, 2, 1.0), (1e4, 0, 1e4 * SOFT.sqrt()), (1e4, 2, 1e4 * SOFT.sqrt())];
+    let delayed = scheme == Scheme::MasslessBoundary;
+    let model = if delayed { masses(&modes, 3, 2) } else { masses(&modes[..2], 3, 0) };
+    let law = FixedGap { normals: vec![[0.0, 0.0, 1.0]], gaps: vec![-DEPTH], sliding: vec![[0.0; 3]] };
+    System::new(&model, 1, GapLaw::Fixed(law), settings)
+}
+
+/// The same, where the plane swings. A second node, which meets nothing, gives the free structure an extent.
+fn swinging_plane(scheme: Scheme, settings: SystemSettings) -> System {
+    let modes = [(PRESS, 2, 1.0), (1e4, 0, 1e4 * SOFT.sqrt()), (1e4, 2, 1e4 * SOFT.sqrt())];
+    let delayed = scheme == Scheme::MasslessBoundary;
+    let model = if delayed { masses(&modes, 6, 2) } else { masses(&modes[..1], 6, 0) };
+    let grid: Vec<[f64; 3]> =
+        (0..16).map(|index| [0.05 * f64::from(index / 4) - 0.075, 0.05 * f64::from(index % 4) - 0.075, 0.0]).collect();
+    let surface = SurfaceSpline::open(&grid, 4, 4, Interpolation::Spline).unwrap();
+    let plane = masses(&[(SWING, 0, 1.0)], 48, 0);
+    let positions = vec![[0.0, 0.0, -DEPTH], [0.1, 0.0, 0.0]];
+    let law = FreeGap::new(positions, vec![Some(0), None], vec![OpenSurface::new(surface, Some(0))]);
+    let sticking = settings.solver == Solver::Coulomb;
+    let parts = SystemParts { slaves: vec![(plane, false)], sticking, ..SystemParts::default() };
+    System::with_parts(SectorModel::Uncoupled(&model, 1), GapLaw::Free(Box::new(law)), settings, parts)
+}
+
+/// Friction F on a mass on a spring k takes 2F/k of the amplitude at every turn, whichever of the two bodies swings.
+#[test]
+fn a_mass_that_swings_on_a_plane_loses_the_same_amplitude_every_half_turn() {
+    println!("| swings | scheme | solver | amplitudes (mm) | largest error |\n|---|---|---|---|---|");
+    let (friction, amplitude, step) = (0.1, 4e-3, 5e-5);
+    for scheme in [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary] {
+        for solver in [Solver::Film, Solver::Lcp, Solver::Coulomb] {
+            for plane in [false, true] {
+                let settings = SystemSettings { scheme, solver, friction, ledger: true };
+                let mut system =
+                    if plane { swinging_plane(scheme, settings) } else { swinging_blade(scheme, settings) };
+                system.set_step(step);
+                let soft = if scheme == Scheme::MasslessBoundary { SOFT } else { 0.0 };
+                let pressed = DEPTH / (1.0 + PRESS * PRESS * soft);
+                if plane {
+                    system.bank_mut().set_modal_state(0, 0, pressed, 0.0);
+                    system.slaves_mut()[0].bank.set_modal_state(0, 0, amplitude, 0.0);
+                } else {
+                    system.bank_mut().set_modal_state(0, 0, amplitude, 0.0);
+                    system.bank_mut().set_modal_state(1, 0, pressed, 0.0);
+                }
+                system.start(&Drive::default());
+                let normal = PRESS * PRESS * pressed;
+                let (mut turns, mut last) = (Vec::new(), amplitude);
+                while turns.len() < 6 {
+                    system.step(&Drive::default()).unwrap();
+                    let bank = if plane { &system.slaves()[0].bank } else { system.bank().uncoupled().unwrap() };
+                    let (now, increment) = bank.modal_state(0, 0);
+                    let towards = if turns.len() % 2 == 0 { -1.0 } else { 1.0 };
+                    if increment * towards < 0.0 && system.steps() > 100 {
+                        turns.push(last);
+                    }
+                    last = now;
+                    assert!(system.steps() < 10_000, "no turn after {turns:?}");
+                }
+                let mut worst = 0.0_f64;
+                for (turn, found) in turns.iter().enumerate() {
+                    let left = amplitude - 2.0 * (turn + 1) as f64 * friction * normal / (SWING * SWING);
+                    let exact = if turn % 2 == 0 { -left } else { left };
+                    worst = worst.max((found - exact).abs() / amplitude);
+                }
+                let swings = if plane { "plane" } else { "mass" };
+                let shown = [turns[0], turns[5]].map(|turn| 1e3 * turn);
+                println!("| {swings} | {scheme:?} | {solver:?} | {shown:.4?} | {worst:.1e} |");
+                assert!(worst < 0.01, "{swings}, {scheme:?}, {solver:?}: {turns:?}");
+            }
+        }
+    }
+}
+
+/// Blades of different frequencies behind different gaps, grown by spin, pressed on the casing: each carries its own force.
+#[test]
+fn gaps_and_frequency_factors_belong_to_their_own_sectors() {
+    let factors = [1.0, 1.1, 0.85, 0.95, 1.25];
+    let (speed, load) = (600.0, 2e-3);
+    for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
+        let mut scene = blades(scheme, Solver::Lcp, 0.0);
+        scene.settings.structures[0].speed = speed;
+        scene.settings.structures[0].frequency_factors = factors.to_vec();
+        scene.settings.contacts[0].sector_gaps = GAPS.to_vec();
+        let mut spin = common::spin(3);
+        (spin.centrifugal_load, spin.centrifugal_load_speed4) = (vec![load, 0.0, 0.0], vec![0.0; 3]);
+        scene.roms[0].extras.spin = Some(spin);
+        scene.settings.structures[0].spin.growth = true;
+        let mut simulation = started(&scene);
+        let stiffness = |sector: usize| STIFFNESS * factors[sector] * factors[sector];
+        let push = load * speed * speed / SHAPE;
+        for (sector, gap) in GAPS.iter().enumerate() {
+            let (found, exact) = (simulation.system().gap(0, sector), gap - push / stiffness(sector));
+            assert!((found - exact).abs() < 1e-12, "{scheme:?}, sector {sector}: gap {found}, exactly {exact}");
+        }
+        close(&mut simulation, 8e-4);
+        for (sector, gap) in GAPS.iter().enumerate() {
+            let (found, exact) = (simulation.system().multiplier(0, sector), stiffness(sector) * (8e-4 - gap) + push);
+            println!("{scheme:?}, sector {sector}: {found:.4} N, exactly {exact:.4} N");
+            assert!((found / exact - 1.0).abs() < 1e-5, "{scheme:?}, sector {sector}: {found} N, exactly {exact} N");
+        }
+    }
+}
+
+/// e^(−2ξωh) of every mode: damping given as a parameter reaches the structure it is named after.
+#[test]
+fn damping_parameters_belong_to_their_own_structures() {
+    let mut ring = common::scene(3);
+    features::flexible(&mut ring);
+    let plates = lattice::with(lattice::squeezed(), 0.0, Solver::Lcp, Scheme::ModalExact);
+    let cases: [(Scene, &[(&str, f64)]); 2] = [
+        (ring, &[("damping_ratio", 0.03), ("casing_damping_ratio", 0.11)]),
+        (plates, &[("damping_ratio", 0.04), ("left_plate.damping_ratio", 0.07), ("right_plate.damping_ratio", 0.13)]),
+    ];
+    for (scene, ratios) in cases {
+        let mut simulation = Simulation::new(&scene).unwrap();
+        for (name, ratio) in ratios {
+            set(&mut simulation, name, *ratio);
+        }
+        simulation.initialise(0.0).unwrap();
+        run(&mut simulation, 7.7e-7);
+        let system = simulation.system();
+        let banks =
+            [system.bank().uncoupled().unwrap()].into_iter().chain(system.slaves().iter().map(|slave| &slave.bank));
+        let banks: Vec<_> = banks.collect();
+        assert_eq!(banks.len(), ratios.len());
+        for (bank, (name, ratio)) in banks.iter().zip(ratios) {
+            for (mode, frequency) in bank.model().frequencies.iter().enumerate() {
+                let exact = (-2.0 * ratio * frequency * bank.step()).exp();
+                let found = bank.coefficients(0)[mode].beta;
+                assert!((found - exact).abs() < 1e-14, "{name}, mode {mode}: {found}, exactly {exact}");
+            }
+        }
+    }
+}
+
+/// What is let go decays by its own damping, whatever the scene said: the casing by its load, the blades by their speed.
+#[test]
+fn casing_and_blades_swing_out_at_the_rate_of_their_parameters() {
+    let (casing, rotor) = (0.06, 0.03);
+    let mut scene = blades(Scheme::ModalExact, Solver::Lcp, 0.0);
+    features::flexible(&mut scene);
+    scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 2e3, phase: 0.0 });
+    scene.settings.outputs.slave_displacement = true;
+    scene.settings.structures[0].speed = 600.0;
+    let mut spin = common::spin(3);
+    (spin.centrifugal_load, spin.centrifugal_load_speed4) = (vec![2e-3, 0.0, 0.0], vec![0.0; 3]);
+    scene.roms[0].extras.spin = Some(spin);
+    scene.settings.structures[0].spin.growth = true;
+    let mut simulation = Simulation::new(&scene).unwrap();
+    set(&mut simulation, "casing_damping_ratio", casing);
+    set(&mut simulation, "damping_ratio", rotor);
+    simulation.initialise(0.0).unwrap();
+    let read = |simulation: &Simulation| {
+        [simulation.real(place(simulation, "casing_displacement")).unwrap(), simulation.system().bank().row(0, 0)]
+    };
+    let start = read(&simulation);
+    set(&mut simulation, "casing_load_amplitude", 0.0);
+    set(&mut simulation, "speed", 0.0);
+    // One internal step of a thousandth of a period: how the load goes within it does not matter.
+    run(&mut simulation, 1e-6);
+    for _ in 0..40 {
+        run(&mut simulation, 1e-4);
+        let found = read(&simulation);
+        for (body, (ratio, omega)) in [(casing, TAU * 400.0), (rotor, MODES[0])].into_iter().enumerate() {
+            let damped = omega * (1.0_f64 - ratio * ratio).sqrt();
+            let (time, lag) = (simulation.time() - 5e-7, ratio * omega / damped);
+            let exact = (-ratio * omega * time).exp() * ((damped * time).cos() + lag * (damped * time).sin());
+            let found = found[body] / start[body];
+            assert!((found - exact).abs() < 0.01, "body {body} at {time}: {found}, exactly {exact}");
+        }
+    }
+}
