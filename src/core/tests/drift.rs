@@ -157,10 +157,13 @@ fn sums_keep_what_rounding_would_drop() {
     assert_eq!(sum.value().to_bits(), 2.0_f64.to_bits());
 }
 
+/// A term of the balance and its sign.
+type Term = (fn(&mut Ledger) -> &mut Sum, f64);
+
 /// Every term has its sign, and large work in and out leaves the small rest that is in the books.
 #[test]
 fn the_residual_is_the_balance_of_all_terms_without_cancellation() {
-    let terms: [(fn(&mut Ledger) -> &mut Sum, f64); 7] = [
+    let terms: [Term; 7] = [
         (|ledger| &mut ledger.external_work, 1.0),
         (|ledger| &mut ledger.friction_loss, -1.0),
         (|ledger| &mut ledger.load_work, 1.0),
