@@ -173,8 +173,7 @@ impl Simulation {
         if let Err(failure) = self.system.step(&drive) {
             return Err(self.fail(failure, time));
         }
-        self.window.add(&self.system, drive.rotor_angle, self.system.bank().step());
-        self.window.add_heat(&self.system, drive.rotor_angle, self.compiled.patches.as_ref());
+        self.window.add(&self.system, self.compiled.patches.as_ref(), self.system.bank().step());
         self.communication.done = next;
         let finished = next == self.communication.count;
         if finished {

@@ -3,6 +3,7 @@
 use super::{ContactEvent, Member, Slave, StepFailure, System, frame_of};
 use crate::contact::gap::{GapLaw, dot};
 use crate::contact::spline_gap::BEYOND_EDGE;
+use crate::contact::wrench::At;
 use crate::persist::{Persist, Reader, Writer};
 
 /// A contact force is continued over steps at most this many times as long as the one it was found in.
@@ -26,6 +27,7 @@ impl System {
             self.bank.resample(self.settings.scheme, step, &self.displacement_oldest);
             self.resample_slaves(step);
             let ratio = step / old;
+            self.state.motion = self.state.motion.over(ratio);
             for (before, now) in self.state.gap_before.iter_mut().zip(&self.state.gap) {
                 if now.is_finite() {
                     *before = now - ratio * (now - *before);
@@ -53,7 +55,7 @@ impl System {
             if let (true, Some((surface, carrier))) =
                 (force.iter().any(|value| *value != 0.0), self.law.spline_of(node))
             {
-                let frame = frame_of(&self.law, index, self.state.angle);
+                let frame = frame_of(&self.law, index, self.state.drive.rotor_angle);
                 self.slaves[carrier].add_lasting(surface, self.state.geometry.places[index], frame, force);
             }
         }
@@ -162,9 +164,12 @@ impl System {
             for node in 0..self.law.nodes() {
                 let normal = self.state.multiplier[node * lanes + sector];
                 if normal != 0.0 {
-                    let force = std::array::from_fn(|i| self.state.force[(3 * node + i) * lanes + sector]);
-                    let coating = self.state.coating_force[node * lanes + sector];
-                    self.events.push(ContactEvent::new(sector, node, normal, force, coating));
+                    let index = node * lanes + sector;
+                    let of = |rows: &[f64]| std::array::from_fn(|i| rows[(3 * node + i) * lanes + sector]);
+                    let (force, point) = (of(&self.state.force), of(&self.state.points));
+                    let wrench = self.law.wrench(At { node, index, drive: &self.state.drive }, point, force);
+                    let (place, coating) = ((sector, node), self.state.coating_force[index]);
+                    self.events.push(ContactEvent::new(place, normal, force, coating, (point, wrench)));
                 }
             }
         }
