@@ -282,6 +282,11 @@ impl System {
         &self.state.geometry
     }
 
+    /// Prescribed motion at the last step.
+    pub fn drive(&self) -> &Drive {
+        &self.state.drive
+    }
+
     /// The structure that carries the slave surface; of several the first.
     pub fn slave(&self) -> Option<&Slave> {
         self.slaves.first()
