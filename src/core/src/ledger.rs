@@ -113,6 +113,12 @@ impl Ledger {
         balance.value()
     }
 
+    /// All energy that came in or was lost (J).
+    pub fn exchanged(&self) -> f64 {
+        let losses = [self.damping_loss, self.friction_loss, self.impact_loss, self.wear_work];
+        self.scale() + losses.iter().map(|loss| loss.value().abs()).sum::<f64>()
+    }
+
     /// What the residual is compared with (J): initial energy plus all work exchanged.
     pub fn scale(&self) -> f64 {
         self.initial.abs() + self.turnover.value()

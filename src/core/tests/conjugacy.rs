@@ -195,7 +195,6 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
         let (gap, normal, _) = looked(&mut law, lanes, &drive, &displacement);
         let drive = Drive { radius_change: gap / normal[0], ..drive };
         let (gap, normal, places) = looked(&mut law, lanes, &drive, &displacement);
-        let size = 1e-7;
         let at = At { node: 0, index: 0, drive: &drive };
         let moved = [0, 1, 2].map(|component| displacement[component * lanes]);
         let point = law.contact_point(at, moved, &places);
@@ -229,4 +228,41 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
         check("shape factor", factor, &|by, drive, _| drive.shape_factor += by);
         check("shape rotation", rotation, &|by, drive, _| drive.shape_rotation += by);
     }
+}
+
+#[test]
+fn friction_heat_goes_to_the_patch_that_the_displaced_node_faces() {
+    let scene = scene(FEATURES[1], Scheme::ModalExact, Solver::Lcp, 0.15, 1e-6);
+    let mut simulation = Simulation::new(&scene).unwrap();
+    simulation.initialise(0.0).unwrap();
+    let first = simulation.table().find("casing_friction_power").unwrap().reference;
+    let (mut moved, mut total) = (0.0, 0.0);
+    for _ in 0..200 {
+        drive(&mut simulation);
+        simulation.begin_step(simulation.time(), LENGTH).unwrap();
+        let (mut heat, mut finished) = ([0.0; 4], false);
+        while !finished {
+            finished = simulation.advance().unwrap().finished;
+            let system = simulation.system();
+            for event in system.acted() {
+                let node = &scene.roms[0].contact_nodes[event.node].position;
+                let undisplaced =
+                    node[1] + std::f64::consts::TAU * event.sector as f64 / 12.0 + system.drive().rotor_angle;
+                let ([u, v, _], [x, y, _]) = (event.point, system.drive().shaft);
+                let angle = undisplaced + v / node[0];
+                let place = [(node[0] + u) * angle.cos() + x, (node[0] + u) * angle.sin() + y];
+                let patch = |angle: f64| (angle.rem_euclid(std::f64::consts::TAU) / std::f64::consts::FRAC_PI_2) as usize % 4;
+                let found = patch(place[1].atan2(place[0]));
+                heat[found] += event.friction_heat;
+                total += event.friction_heat;
+                moved += if found == patch(undisplaced) { 0.0 } else { event.friction_heat };
+            }
+        }
+        for (patch, heat) in (0..).zip(heat) {
+            let told = simulation.real(first + patch).unwrap() * LENGTH;
+            assert!((told - heat).abs() < 1e-9 * (heat + 1e-3), "{patch}: {told} for {heat}");
+        }
+    }
+    println!("{moved:.3} J of {total:.1} J are heat of another patch than that of the undisplaced node");
+    assert!(moved > 1e-4 * total, "{moved} of {total}");
 }

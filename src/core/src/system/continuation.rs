@@ -11,6 +11,8 @@ const FORCE_REACH: f64 = 4.0;
 /// How far behind a surface, continued beyond its edge, a node may have been: share of its way in the step, since the surface
 /// may bend, and of the largest displacement that counts as small.
 const BEHIND_EDGE: [f64; 2] = [1e-3, 1e-6];
+/// Curvature work beyond this share of all energy exchanged is more than an error of truncation.
+const MOST_CURVATURE: f64 = 0.1;
 
 impl System {
     /// Use step size `step` (s) from here. A running state is carried over by resampling the modal motion under
@@ -101,6 +103,20 @@ impl System {
                     return Err(StepFailure::BehindEdge { node });
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Whether curvature work, which no input does, is still small beside what was exchanged; at the end of a communication
+    /// step.
+    ///
+    /// # Errors
+    /// It is not: [`StepFailure::Curved`].
+    pub fn check_books(&self) -> Result<(), StepFailure> {
+        let ledger = &self.state.ledger;
+        let curved = ledger.curvature_work.value();
+        if curved.abs() > MOST_CURVATURE * ledger.exchanged() {
+            return Err(StepFailure::Curved { work: curved, exchanged: ledger.exchanged() });
         }
         Ok(())
     }

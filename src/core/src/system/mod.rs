@@ -77,7 +77,7 @@ pub struct SystemParts {
 }
 
 /// Why a step failed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepFailure {
     /// A displacement or gap became infinite or NaN.
     NonFinite,
@@ -95,6 +95,13 @@ pub enum StepFailure {
     BehindEdge {
         /// Contact node (0-based).
         node: usize,
+    },
+    /// Normals turn and surfaces curve so far within steps that this adds energy which no input brings.
+    Curved {
+        /// What it has added (J).
+        work: f64,
+        /// All energy exchanged (J).
+        exchanged: f64,
     },
     /// The contact problem of a sector has no solution within the pivoting limit.
     Unsolved {
