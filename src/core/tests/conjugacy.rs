@@ -168,7 +168,12 @@ fn mean_torque_times_speed_is_the_work_of_the_shaft_and_the_rest_vanishes_with_t
 }
 
 /// Gap and normal of the first node of a law at a state.
-fn looked(law: &mut GapLaw, lanes: usize, drive: &Drive, displacement: &[f64]) -> (f64, [f64; 3], Vec<tiprub_core::contact::spline::Place>) {
+fn looked(
+    law: &mut GapLaw,
+    lanes: usize,
+    drive: &Drive,
+    displacement: &[f64],
+) -> (f64, [f64; 3], Vec<tiprub_core::contact::spline::Place>) {
     let mut geometry = law.geometry(lanes);
     let mut gap = vec![f64::INFINITY; law.nodes() * lanes];
     law.evaluate(drive, displacement, &[], None, &mut geometry, &mut gap);
@@ -251,7 +256,8 @@ fn friction_heat_goes_to_the_patch_that_the_displaced_node_faces() {
                 let ([u, v, _], [x, y, _]) = (event.point, system.drive().shaft);
                 let angle = undisplaced + v / node[0];
                 let place = [(node[0] + u) * angle.cos() + x, (node[0] + u) * angle.sin() + y];
-                let patch = |angle: f64| (angle.rem_euclid(std::f64::consts::TAU) / std::f64::consts::FRAC_PI_2) as usize % 4;
+                let patch =
+                    |angle: f64| (angle.rem_euclid(std::f64::consts::TAU) / std::f64::consts::FRAC_PI_2) as usize % 4;
                 let found = patch(place[1].atan2(place[0]));
                 heat[found] += event.friction_heat;
                 total += event.friction_heat;

@@ -291,9 +291,12 @@ fn a_state_with_any_bit_changed_is_refused_and_changes_nothing() {
 
 #[test]
 fn action_equals_reaction_and_angular_momentum_is_kept() {
-    for (name, feature) in [("flexible casing", flexible as fn(&mut Scene)), ("rigid spline", |scene: &mut Scene| {
-        scene.settings.surfaces[0].spline = Some(SplineSettings::default());
-    })] {
+    for (name, feature) in [
+        ("flexible casing", flexible as fn(&mut Scene)),
+        ("rigid spline", |scene: &mut Scene| {
+            scene.settings.surfaces[0].spline = Some(SplineSettings::default());
+        }),
+    ] {
         for (scheme, solver) in [
             (Scheme::CentralDifference, Solver::Film),
             (Scheme::ModalExact, Solver::Lcp),
@@ -304,7 +307,9 @@ fn action_equals_reaction_and_angular_momentum_is_kept() {
             scene.settings.structures[0].whirl = true;
             scene.settings.structures[0].axial_shift = true;
             let [force, moment, modal] = balance(&scene);
-            println!("{name} {scheme:?} {solver:?}: forces {force:.1e}, moments {moment:.1e}, modal forces {modal:.1e}");
+            println!(
+                "{name} {scheme:?} {solver:?}: forces {force:.1e}, moments {moment:.1e}, modal forces {modal:.1e}"
+            );
             assert!(force < 1e-14 && moment < 1e-13 && modal < 1e-12, "{force:e}, {moment:e}, {modal:e}");
         }
     }
@@ -316,7 +321,8 @@ fn balance(scene: &Scene) -> [f64; 3] {
     let mut simulation = Simulation::new(scene).unwrap();
     simulation.initialise(0.0).unwrap();
     let (mut worst, mut contacts) = ([0.0_f64; 3], 0);
-    let cross = |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     for index in 0..150 {
         disturb(&mut simulation, index);
         let time = simulation.time();

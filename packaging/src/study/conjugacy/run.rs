@@ -2,12 +2,7 @@
 
 use tiprub_core::{
     Result, Scene, Simulation,
-    contact::{
-        gap::GapLaw,
-        spline::SurfaceSpline,
-        surface::Surface,
-        wrench::Wrench,
-    },
+    contact::{gap::GapLaw, spline::SurfaceSpline, surface::Surface, wrench::Wrench},
     settings::{CoatingSettings, Scheme, Shape, Solver, SplineSettings},
     system::{ContactEvent, System},
 };
@@ -20,7 +15,7 @@ use crate::stability::{
 
 /// Length of the communication steps of a rotor (s), and how many there are.
 const LENGTH: f64 = 1e-5;
-const COUNT: u32 = 200;
+const COUNT: u32 = 120;
 /// Rate of whirl, shift and casing (rad/s).
 const RATE: f64 = 900.0;
 /// Angular acceleration of the rotor (rad/s²).
@@ -47,15 +42,8 @@ pub enum Feature {
 
 impl Feature {
     /// All of them.
-    pub const ALL: [Self; 7] = [
-        Self::Revolution,
-        Self::Spline,
-        Self::Casing,
-        Self::Wheel,
-        Self::WheelInCasing,
-        Self::Coating,
-        Self::Free,
-    ];
+    pub const ALL: [Self; 7] =
+        [Self::Revolution, Self::Spline, Self::Casing, Self::Wheel, Self::WheelInCasing, Self::Coating, Self::Free];
 
     /// For the table.
     pub fn name(self) -> &'static str {
@@ -67,6 +55,15 @@ impl Feature {
             Self::WheelInCasing => "coupled sectors, flexible casing",
             Self::Coating => "coating",
             Self::Free => "free body",
+        }
+    }
+
+    /// What is known of the other side.
+    pub fn side(self) -> Side {
+        match self {
+            Self::Revolution | Self::Wheel => Side::Surface,
+            Self::Coating => Side::Dented,
+            _ => Side::ControlPoints,
         }
     }
 
@@ -125,6 +122,17 @@ impl Feature {
     }
 }
 
+/// What forces and moments on the slave follow from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Forces on control points, where they stand.
+    ControlPoints,
+    /// The same force where the surface of revolution is.
+    Surface,
+    /// A coating yields: the contact stands in it.
+    Dented,
+}
+
 /// What a run showed; residuals are relative.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Seen {
@@ -166,7 +174,9 @@ pub fn run(scene: &Scene, step: f64) -> Result<Seen> {
             look(&scene, &simulation, &mut seen);
         }
         look(&scene, &simulation, &mut seen);
-        supplied += if simulation.table().find("torque").is_some() { real(&simulation, "torque") } else { 0.0 } * speed * LENGTH;
+        supplied += if simulation.table().find("torque").is_some() { real(&simulation, "torque") } else { 0.0 }
+            * speed
+            * LENGTH;
     }
     let ledger = simulation.system().ledger();
     seen.turnover = ledger.scale();
@@ -246,7 +256,9 @@ fn reaction(scene: &Scene, simulation: &Simulation) -> [[f64; 3]; 3] {
             let acts = event.wrench.force.map(|value| -weight * value);
             add(&mut force, 1.0, acts);
             add(&mut moment, 1.0, cross(point, acts));
-            if let Some((slave, modal)) = carrier.and_then(|index| Some((system.slaves().get(index)?, &mut expected[index]))) {
+            if let Some((slave, modal)) =
+                carrier.and_then(|index| Some((system.slaves().get(index)?, &mut expected[index])))
+            {
                 for (component, value) in acts.iter().enumerate() {
                     let shapes = slave.bank.contact_row(3 * index + component);
                     modal.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += value * shape);
@@ -287,8 +299,12 @@ fn on_revolution(scene: &Scene, simulation: &Simulation, event: &ContactEvent) -
     let (settings, drive) = (&scene.settings, simulation.system().drive());
     let node = &scene.roms[0].contact_nodes[event.node];
     let angle = y.atan2(x);
-    let shape = Surface::new(&settings.surfaces[0].shape, GAP).map_or(0.0, |shape| shape.evaluate(angle - drive.shape_rotation).0);
-    let radius = node.position[0] + GAP + drive.radius_change + drive.shape_factor * shape
+    let shape = Surface::new(&settings.surfaces[0].shape, GAP)
+        .map_or(0.0, |shape| shape.evaluate(angle - drive.shape_rotation).0);
+    let radius = node.position[0]
+        + GAP
+        + drive.radius_change
+        + drive.shape_factor * shape
         + node.meridional_slope * (z - node.position[2]);
     [radius * angle.cos(), radius * angle.sin(), z]
 }

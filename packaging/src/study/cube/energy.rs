@@ -81,7 +81,8 @@ impl Losses {
 
     /// For programs.
     pub fn json(&self) -> Value {
-        let rows = self.0.iter().map(|loss| json!({"step": loss.step, "lost": loss.lost, "without_gain": loss.without_gain}));
+        let rows =
+            self.0.iter().map(|loss| json!({"step": loss.step, "lost": loss.lost, "without_gain": loss.without_gain}));
         json!({ "rows": rows.collect::<Vec<_>>(), "limit": self.limit() })
     }
 }

@@ -152,9 +152,7 @@ impl GapLaw {
     pub fn shaft_motion(&self, At { node, index, drive }: At<'_>, point: [f64; 3], motion: &Motion) -> [f64; 3] {
         match self {
             Self::Fixed(_) | Self::Free(_) => [0.0; 3],
-            Self::Revolution(law) => {
-                law.layout.shaft_motion(node, index, drive.rotor_angle, point, motion.shaft)
-            }
+            Self::Revolution(law) => law.layout.shaft_motion(node, index, drive.rotor_angle, point, motion.shaft),
             Self::Spline(law) => law.frame(index, drive.rotor_angle).local(motion.shaft),
         }
     }
