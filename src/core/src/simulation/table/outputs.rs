@@ -42,7 +42,9 @@ pub fn totals(table: &mut Builder, scene: &Parts) {
             format!("Contact force on the rotor along fixed {axis}, mean over the communication step"),
         );
     }
-    for (component, name) in ["moment_x", "moment_y", "torque"].into_iter().enumerate() {
+    // The other two are for a model of the shaft, which is what gives whirl.
+    let moments = ["moment_x", "moment_y", "torque"].into_iter().enumerate();
+    for (component, name) in moments.filter(|(component, _)| *component == 2 || scene.master.whirl) {
         let text = match component {
             2 => {
                 "Torque of the contact forces on the rotor about +z through the shaft's centre, conjugate to the rotor angle, mean \
@@ -310,6 +312,7 @@ pub fn energies(table: &mut Builder, scene: &Parts) {
         Quantity::StiffeningWork => scene.master.spin.stiffening,
         Quantity::WhirlWork => scene.master.whirl,
         Quantity::ShiftWork => scene.master.axial_shift,
+        Quantity::CasingWork => scene.surface.moving,
         _ => true,
     };
     for (quantity, name, span, text) in rows.into_iter().filter(|row| exists(row.0)) {
