@@ -328,6 +328,8 @@ pub enum StudyChoice {
     Map,
     /// Error against run time of every scheme and solver, beside independent methods.
     Error,
+    /// Forces and moments on both sides of contacts, torque against the work of the shaft, and the ledger, over all features.
+    Conjugacy,
 }
 
 /// A range of angular velocities (rad/s).

@@ -121,6 +121,24 @@ fn the_quick_study_of_the_cube_meets_independent_methods() {
     assert!(tables.contains("| product, lcp, modal-exact / a, film |"), "{tables}");
 }
 
+#[test]
+fn the_quick_study_of_conjugacy_finds_forces_moments_and_work_that_agree() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "conjugacy", &[]);
+    for statement in json["statements"].as_array().unwrap() {
+        assert_eq!(statement["holds"], true, "{statement}");
+    }
+    let rows = json["results"]["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 25);
+    // Whirl turns: a moment that is not zero about the shaft is about the axis of the casing.
+    for row in rows {
+        assert!(row["contacts"].as_u64().unwrap() > 300, "{row}");
+        assert!(row["shaft"].as_f64().unwrap() < 1e-12 && row["ledger"].as_f64().unwrap() < 1e-12, "{row}");
+    }
+    let table = fs::read_to_string(root.path().join("out/table.md")).unwrap();
+    assert_eq!(table.lines().count(), 27, "{table}");
+}
+
 /// The branch of engine order 4 leans far above its crossing with the first mode. Linear theory does not place it, and the motion
 /// is not all multiples of the casing's two lobes: these two statements are answered with no, and all others hold.
 #[test]

@@ -197,3 +197,23 @@ fn a_packaged_scene_of_features_runs_as_it_does_without_packaging() {
     }
     assert!(touching > 5, "{touching} steps with contact");
 }
+
+/// What an importer does with the outputs: mean torque times speed, step after step, while the rotor slows down.
+#[test]
+fn mean_torque_times_speed_is_the_work_of_the_shaft() {
+    let (path, mut scene) = (shipped(), scene());
+    scene.settings.outputs.energies = true;
+    let [speed, torque, work] = ["speed", "torque", "shaft_work"].map(|name| of(&scene, name));
+    let (api, resources) = (fmi2::load(&path), Resources::of(&scene, true));
+    let slave = fmi2::Slave::initialised(&api, &resources);
+    let (mut supplied, mut step) = (0.0, 0.0);
+    for index in 0..400 {
+        let now = 300.0 - 0.2 * f64::from(index);
+        slave.expect(slave.set_reals(&[speed], &[now]));
+        slave.expect(slave.step(step, 1e-4));
+        step += 1e-4;
+        supplied += slave.reals(&[torque])[0] * now * 1e-4;
+    }
+    let booked = slave.reals(&[work])[0];
+    assert!(booked.abs() > 1e-6 && (supplied + booked).abs() < 1e-10 * booked.abs(), "{supplied} and {booked}");
+}

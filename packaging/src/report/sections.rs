@@ -272,7 +272,7 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>>
             caption: format!("Number of nodes in contact at the communication points, of {all} on the whole disk."),
         });
     }
-    if let Some(series) = results.series("torque", Quantity::Torque, 1.0) {
+    if let Some(series) = results.series("torque", Quantity::Moment(2), 1.0) {
         let mut plot = Plot::new("time (ms)", "torque on the rotor (N·m)", vec![series]);
         plot.height = 220;
         figures.push(Figure {

@@ -4,6 +4,7 @@
 //! was found. [`output`] writes it, always in the same way: one HTML page that opens offline, an SVG and a CSV per
 //! figure, and `results.json`. Runs that do not depend on each other go through [`sweep`].
 
+pub mod conjugacy;
 pub mod convergence;
 pub mod cube;
 pub mod error;

@@ -1,5 +1,5 @@
-//! Energy ledger: kinetic + strain = initial + external work + load work + step changes − damping − friction − impact
-//! losses − wear work.
+//! Energy ledger: kinetic + strain = initial + external work + curvature work + load work + step changes − damping −
+//! friction − impact losses − wear work.
 //!
 //! All terms are those of the discrete equations (see [`crate::dynamics::scheme`]), so the closure residual measures
 //! rounding and programming errors, not the scheme's truncation error.
@@ -47,8 +47,21 @@ pub struct Ledger {
     pub wear_energy: Sum,
     /// Work of centrifugal, thermal and nodal-diameter loads.
     pub load_work: Sum,
-    /// Work done by the shaft and by a moving casing through the contacts.
-    pub external_work: Sum,
+    /// Work of the shaft through the contacts, −∫ torque dθ_r; of what slides along fixed obstacles.
+    pub shaft_work: Sum,
+    /// Work of the shaft on rotors whose modes depend on the speed: strain energy by stiffening.
+    pub stiffening_work: Sum,
+    /// Work of whirl, −∫ F·de.
+    pub whirl_work: Sum,
+    /// Work of axial shift.
+    pub shift_work: Sum,
+    /// Work of prescribed motion of the casing, along the normals of the contacts.
+    pub casing_work: Sum,
+    /// What lies between the work of contact forces in the scheme and all that has a name: normals turn and surfaces curve
+    /// within a step. It vanishes with the step.
+    pub curvature_work: Sum,
+    /// Sum of the magnitudes of its terms.
+    pub curvature_turnover: Sum,
     /// Energy added (or removed) by carrying the state to another step size.
     pub step_change: Sum,
     /// Sum of the magnitudes of all external work: the scale of the residual.
@@ -63,17 +76,33 @@ persist_fields!(Ledger {
     wear_work,
     wear_energy,
     load_work,
-    external_work,
+    shaft_work,
+    stiffening_work,
+    whirl_work,
+    shift_work,
+    casing_work,
+    curvature_work,
+    curvature_turnover,
     step_change,
     turnover
 });
 
 impl Ledger {
+    /// Work of all inputs but loads (J): shaft, whirl, axial shift, moving casing.
+    pub fn external_work(&self) -> f64 {
+        let mut sum = Sum::default();
+        for work in [self.shaft_work, self.stiffening_work, self.whirl_work, self.shift_work, self.casing_work] {
+            sum.add(work.value());
+        }
+        sum.value()
+    }
+
     /// Energy that should be there minus what is (J), given kinetic + strain energy now.
     pub fn residual(&self, mechanical: f64) -> f64 {
         let mut balance = Sum::default();
         balance.add(self.initial);
-        balance.add(self.external_work.value());
+        balance.add(self.external_work());
+        balance.add(self.curvature_work.value());
         balance.add(self.step_change.value());
         balance.add(-self.damping_loss.value());
         balance.add(-self.friction_loss.value());
@@ -82,6 +111,12 @@ impl Ledger {
         balance.add(self.load_work.value());
         balance.add(-mechanical);
         balance.value()
+    }
+
+    /// All energy that came in or was lost (J).
+    pub fn exchanged(&self) -> f64 {
+        let losses = [self.damping_loss, self.friction_loss, self.impact_loss, self.wear_work];
+        self.scale() + losses.iter().map(|loss| loss.value().abs()).sum::<f64>()
     }
 
     /// What the residual is compared with (J): initial energy plus all work exchanged.

@@ -209,8 +209,11 @@ pub enum Quantity {
     CentreDisplacement(usize),
     /// Displacements of all contact nodes of a free master along x, y, z.
     NodeDisplacement(usize),
-    /// Mean contact torque on the rotor about z.
-    Torque,
+    /// Mean moment of the contact forces about fixed x, y, z: on the rotor about the shaft's centre (z: the torque), on a
+    /// free master about the origin.
+    Moment(usize),
+    /// Mean moment of the contact forces on a free master from the surface of one pair (0-based) about x, y, z.
+    PairMoment(usize, usize),
     /// Largest λ of any node within the step.
     NormalForcePeak,
     /// ∫Σλ dt within the step.
@@ -255,8 +258,20 @@ pub enum Quantity {
     WearEnergy,
     /// Work of centrifugal, thermal and nodal-diameter loads.
     LoadWork,
-    /// External work.
+    /// Work of all inputs but loads.
     ExternalWork,
+    /// Work of the shaft through the contacts.
+    ShaftWork,
+    /// Work of the shaft on rotors that stiffen with the speed.
+    StiffeningWork,
+    /// Work of whirl.
+    WhirlWork,
+    /// Work of axial shift.
+    ShiftWork,
+    /// Work of prescribed motion of the casing.
+    CasingWork,
+    /// What turning normals and curving surfaces add within steps.
+    CurvatureWork,
     /// Energy added by changes of the internal step.
     StepChangeEnergy,
     /// Closure residual.

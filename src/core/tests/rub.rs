@@ -148,8 +148,11 @@ fn forces_and_torque_are_those_of_the_touching_blade_in_the_fixed_frame() {
         let (mut force, mut torque, mut size) = ([0.0; 3], 0.0, 0.0);
         for event in simulation.system().events() {
             let [r, theta, _] = nodes[event.node].position;
-            let theta = theta + std::f64::consts::TAU * event.sector as f64 / 12.0 + angle;
-            let [radial, tangential, axial] = event.force;
+            // Where the step found the contact: the displacement around is an arc of the undeformed radius.
+            let [outwards, around, _] = event.point;
+            let theta = theta + std::f64::consts::TAU * event.sector as f64 / 12.0 + angle + around / r;
+            let [radial, conjugate, axial] = event.force;
+            let (tangential, r) = (conjugate * r / (r + outwards), r + outwards);
             let (fx, fy) =
                 (radial * theta.cos() - tangential * theta.sin(), radial * theta.sin() + tangential * theta.cos());
             force = [force[0] + fx, force[1] + fy, force[2] + axial];

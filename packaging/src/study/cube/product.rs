@@ -30,6 +30,8 @@ pub struct Product {
 #[derive(Debug, Clone)]
 pub struct ProductRun {
     pub history: History,
+    /// Curvature work at every record (J).
+    pub curvature: Vec<f64>,
     /// Largest closure residual of the energy ledger, relative.
     pub residual: f64,
     /// Wall time of the steps.
@@ -49,6 +51,7 @@ impl Product {
         let columns = Columns::new(&simulation);
         let mut run = ProductRun {
             history: History { method: "product".into(), step: self.step, ..History::default() },
+            curvature: Vec::new(),
             residual: 0.0,
             stepping: Duration::ZERO,
             internal_steps: 0,
@@ -96,6 +99,7 @@ struct Columns {
     velocity: [u32; 3],
     kinetic: u32,
     strain: u32,
+    curvature: u32,
     residual: u32,
 }
 
@@ -109,6 +113,7 @@ impl Columns {
             velocity: [0, 1, 2].map(|axis| first(Quantity::CentreVelocity(axis))),
             kinetic: first(Quantity::KineticEnergy),
             strain: first(Quantity::StrainEnergy),
+            curvature: first(Quantity::CurvatureWork),
             residual: first(Quantity::EnergyResidualRelative),
         }
     }
@@ -136,6 +141,7 @@ impl Columns {
         history.strain.push(simulation.real(self.strain)?);
         history.velocity.push(velocity);
         history.penetration.push(simulation.system().gaps().iter().fold(0.0, |most: f64, gap| most.max(-gap)));
+        run.curvature.push(simulation.real(self.curvature)?);
         run.residual = run.residual.max(simulation.real(self.residual)?.abs());
         Ok(())
     }

@@ -121,6 +121,7 @@ pub fn run(
             history.map_err(|error| error.to_string()).map(|history| ProductRun {
                 internal_steps: (history.times.len() * stride) as u64,
                 history,
+                curvature: Vec::new(),
                 residual: 0.0,
                 stepping: std::time::Duration::ZERO,
             })

@@ -82,6 +82,12 @@ impl FreeGap {
         self.positions[node]
     }
 
+    /// The point of the surface at the place that a node meets (m); the node itself if it belongs to no pair.
+    pub fn contact_point(&self, node: usize, place: Place) -> [f64; 3] {
+        let surface = self.surface_of[node].map(|index| &self.surfaces[index].surface);
+        surface.map_or(self.positions[node], |surface| surface.evaluate(place).point)
+    }
+
     /// Gaps (m), normals and places of all nodes for the displacements of the contact rows (m); closest points are sought
     /// from `guess`, or from the nearest data point.
     pub fn evaluate(&self, displacement: &[f64], guess: Option<&[Place]>, geometry: &mut Geometry, gap: &mut [f64]) {

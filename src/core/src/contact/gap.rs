@@ -5,13 +5,21 @@
 //! F = r_c(θ + u_θ/r, z) − r − u_r + m u_z has the gradient (−1, s'/r, m) with respect to (radial, tangential, axial)
 //! displacement; dividing by its length N gives the unit normal from the casing to the blade and the gap F/N. The
 //! slope is what lets a frictionless lobe draw power from the shaft: r n_θ λ is the torque conjugate to θ_r.
+//!
+//! u_θ is an arc: the node stands at φ = θ_node + θ_r + u_θ/r and the radius r + u_r, so that what is conjugate to u_θ is
+//! (1 + u_r/r) times the tangential force there. Forces of contacts are in these coordinates; [`super::wrench`] gives them
+//! in fixed directions. With the shaft's centre at (e_r, e_t, e_z), seen along the directions at φ, the node is at the
+//! radius ρ = √(a² + e_t²), a = r + u_r + e_r, and at φ + δ, tan δ = e_t/a, from the axis of the casing:
+//!
+//! F = r_c(φ + δ) − ρ + m (u_z + e_z),  ∇F = (−cos δ − s' sin δ/ρ, (1 + u_r/r)(−sin δ + s' cos δ/ρ), m).
 
 use super::free_gap::{FreeGap, tangent};
 use super::layout::Layout;
 pub use super::layout::sector_angle;
 use super::spline::{Place, SurfaceSpline};
-use super::spline_gap::{SplineGap, faces_inwards};
+use super::spline_gap::{Frame, SplineGap, faces_inwards};
 use super::surface::Surface;
+use super::wrench::{At, Motion};
 use crate::dynamics::dispatch::{InstructionSet, Kernel};
 use crate::persist::persist_fields;
 use crate::settings::Meridian;
@@ -37,6 +45,17 @@ pub struct Drive {
     /// Its velocity (m/s).
     pub shaft_velocity: [f64; 3],
 }
+
+persist_fields!(Drive {
+    rotor_angle,
+    speed,
+    gap_offset,
+    shape_factor,
+    shape_rotation,
+    radius_change,
+    shaft,
+    shaft_velocity
+});
 
 /// Unit normals of one instant, arrays `[node · lanes + lane]`.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,11 +108,14 @@ pub struct FixedGap {
 pub struct RevolutionGap {
     surface: Surface,
     instruction_set: InstructionSet,
-    layout: Layout,
+    /// Where the nodes are.
+    pub layout: Layout,
     /// Meridional slope per node.
     slopes: Vec<f64>,
     /// The shaft's centre moves.
     shaft_moves: bool,
+    /// Scratch of one row where it does: the node's place from the axis of the casing along its own directions (m).
+    arms: [Vec<f64>; 2],
 }
 
 impl RevolutionGap {
@@ -109,13 +131,74 @@ impl RevolutionGap {
             layout: Layout::new(rom, clearances, lanes)?,
             slopes: rom.contact_nodes.iter().map(|node| slope(node.meridional_slope)).collect(),
             shaft_moves: false,
+            arms: [Vec::new(), Vec::new()],
         })
     }
 
     /// Let whirl and axial shift of the shaft act.
     pub fn with_moving_shaft(self, shaft_moves: bool) -> Self {
-        Self { shaft_moves, ..self }
+        let room = || vec![0.0; if shaft_moves { self.layout.lanes } else { 0 }];
+        Self { shaft_moves, arms: [room(), room()], ..self }
     }
+
+    fn evaluate(&mut self, drive: &Drive, displacement: &[f64], geometry: &mut Geometry, gap: &mut [f64]) {
+        if !self.shaft_moves {
+            let law = Evaluate::<false> { law: self, drive, displacement, geometry, gap, arms: [&mut [], &mut []] };
+            return self.instruction_set.run(law);
+        }
+        let [mut outwards, mut sideways] = std::mem::take(&mut self.arms);
+        let arms = [&mut outwards[..], &mut sideways[..]];
+        self.instruction_set.run(Evaluate::<true> { law: self, drive, displacement, geometry, gap, arms });
+        self.arms = [outwards, sideways];
+    }
+}
+
+impl RevolutionGap {
+    /// How far prescribed motion of the surface has taken it along the normal at a node displaced by `moved` (m), whose
+    /// normal has the radial part `facing`: the share n_r/(n_r N) of what it has moved outwards.
+    pub fn surface_motion(&self, at: At<'_>, moved: [f64; 3], facing: f64, motion: &Motion) -> f64 {
+        if motion.casing_rests() {
+            return 0.0;
+        }
+        let (angle, drive) = (self.angle(at, moved), at.drive);
+        let [outwards, sideways] = self.shaft_offset(angle, drive);
+        let arm = self.layout.radii[at.node] + moved[0] + outwards;
+        let distance = libm::hypot(arm, sideways);
+        let seen = angle + libm::atan2(sideways, arm) - drive.shape_rotation;
+        let (shape, slope) = self.surface.evaluate(seen);
+        let tilt = arm / distance + drive.shape_factor * slope * sideways / (distance * distance);
+        let turned = drive.shape_factor * slope * motion.shape_rotation;
+        facing / tilt * (motion.opening + motion.shape_factor * shape - turned)
+    }
+
+    /// Angle of a displaced node about the shaft's centre (rad).
+    fn angle(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
+        self.layout.angles[at.index] + at.drive.rotor_angle + moved[1] * self.layout.per_radius[at.node]
+    }
+
+    /// Displacement of the shaft's centre across and along the circumference at an angle (m).
+    fn shaft_offset(&self, angle: f64, drive: &Drive) -> [f64; 2] {
+        if !self.shaft_moves {
+            return [0.0; 2];
+        }
+        let [outwards, sideways, _] = Frame::new(angle).local(drive.shaft);
+        [outwards, sideways]
+    }
+
+    /// Angle at which a displaced node faces the casing (rad), in the fixed frame.
+    pub fn angle_on_casing(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
+        let angle = self.angle(at, moved);
+        let [outwards, sideways] = self.shaft_offset(angle, at.drive);
+        angle + libm::atan2(sideways, self.layout.radii[at.node] + moved[0] + outwards)
+    }
+}
+
+/// arctan t for |t| ≤ 0.2 (truncation below 1e-16 of t), without branches or calls.
+#[inline(always)]
+fn small_arc_tangent(t: f64) -> f64 {
+    let square = t * t;
+    let series = [19.0, 17.0, 15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0].into_iter();
+    t * (1.0 - square * series.fold(1.0 / 21.0, |sum, odd: f64| 1.0 / odd - square * sum))
 }
 
 /// Gaps and normals of all nodes and lanes on a surface of revolution. `SHAFT`: the shaft's centre moves.
@@ -125,18 +208,19 @@ struct Evaluate<'a, const SHAFT: bool> {
     displacement: &'a [f64],
     geometry: &'a mut Geometry,
     gap: &'a mut [f64],
+    arms: [&'a mut [f64]; 2],
 }
 
 impl<const SHAFT: bool> Kernel for Evaluate<'_, SHAFT> {
     #[inline(always)]
     fn run(self) {
-        let Self { law, drive, displacement, geometry, gap } = self;
+        let Self { law, drive, displacement, geometry, gap, arms: [arms, offsets] } = self;
         let opening = drive.gap_offset + drive.radius_change;
         let turned = drive.rotor_angle - drive.shape_rotation;
         let factor = drive.shape_factor;
         let lanes = law.layout.lanes;
         for node in 0..law.layout.radii.len() {
-            let (slope, per_radius) = (law.slopes[node], law.layout.per_radius[node]);
+            let (slope, radius, per_radius) = (law.slopes[node], law.layout.radii[node], law.layout.per_radius[node]);
             let span = node * lanes..(node + 1) * lanes;
             let [radial, tangential, axial] =
                 std::array::from_fn(|component| &displacement[(3 * node + component) * lanes..][..lanes]);
@@ -149,22 +233,33 @@ impl<const SHAFT: bool> Kernel for Evaluate<'_, SHAFT> {
             for lane in 0..lanes {
                 normal_0[lane] = angles[lane] + turned + tangential[lane] * per_radius;
                 if SHAFT {
-                    let (sine, cosine) = libm::sincos(angles[lane] + drive.rotor_angle);
-                    normal_0[lane] += (drive.shaft[1] * cosine - drive.shaft[0] * sine) * per_radius;
-                    // Outward displacement of the shaft closes the gap; set before the gap is written.
-                    gap[lane] = drive.shaft[0] * cosine + drive.shaft[1] * sine - slope * drive.shaft[2];
+                    let (sine, cosine) = libm::sincos(normal_0[lane] + drive.shape_rotation);
+                    let outwards = drive.shaft[0] * cosine + drive.shaft[1] * sine;
+                    let offset = drive.shaft[1] * cosine - drive.shaft[0] * sine;
+                    let arm = radius + radial[lane] + outwards;
+                    let distance = (arm * arm + offset * offset).sqrt();
+                    normal_0[lane] += small_arc_tangent(offset / arm);
+                    (arms[lane], offsets[lane]) = (arm, offset);
+                    // ρ − r − u_r without cancellation: what the shaft closes of the gap; set before the gap is written.
+                    gap[lane] = outwards + offset * offset / (distance + arm) - slope * drive.shaft[2];
                 }
             }
             law.surface.evaluate_row(normal_0, normal_1, normal_2);
             for lane in 0..lanes {
-                let sideways = factor * normal_2[lane] * per_radius;
-                let per_length = 1.0 / (1.0 + sideways * sideways + slope * slope).sqrt();
+                let (mut facing, mut sideways) = (1.0, factor * normal_2[lane] * per_radius);
                 let mut clearance = clearances[lane] + opening + factor * normal_1[lane];
                 if SHAFT {
+                    let (arm, offset) = (arms[lane], offsets[lane]);
+                    let per_distance = 1.0 / (arm * arm + offset * offset).sqrt();
+                    let (sine, cosine) = (offset * per_distance, arm * per_distance);
+                    let steepness = factor * normal_2[lane] * per_distance;
+                    facing = cosine + steepness * sine;
+                    sideways = (1.0 + radial[lane] * per_radius) * (steepness * cosine - sine);
                     clearance -= gap[lane];
                 }
+                let per_length = 1.0 / (facing * facing + sideways * sideways + slope * slope).sqrt();
                 gap[lane] = (clearance - radial[lane] + slope * axial[lane]) * per_length;
-                normal_0[lane] = -per_length;
+                normal_0[lane] = -facing * per_length;
                 normal_1[lane] = sideways * per_length;
                 normal_2[lane] = slope * per_length;
             }
@@ -247,12 +342,7 @@ impl GapLaw {
                     gap[node] = initial + dot(*normal, std::array::from_fn(|i| displacement[3 * node + i]));
                 }
             }
-            Self::Revolution(law) if law.shaft_moves => {
-                law.instruction_set.run(Evaluate::<true> { law, drive, displacement, geometry, gap });
-            }
-            Self::Revolution(law) => {
-                law.instruction_set.run(Evaluate::<false> { law, drive, displacement, geometry, gap });
-            }
+            Self::Revolution(law) => law.evaluate(drive, displacement, geometry, gap),
             Self::Spline(law) => {
                 let guess = before.map(|before| &before.places[..]);
                 law.evaluate(drive, displacement, moved, guess, geometry, gap);
@@ -261,7 +351,7 @@ impl GapLaw {
         }
     }
 
-    /// The rotor has turned by `angle` (rad) since the last evaluation: closest points are sought from there.
+    /// The rotor has turned by `angle` (rad), to whole turns, since the last evaluation: closest points are sought from there.
     pub fn turn(&mut self, angle: f64) {
         if let Self::Spline(law) = self {
             law.turned = angle / std::f64::consts::TAU;
@@ -289,14 +379,14 @@ impl GapLaw {
         }
     }
 
-    /// Prescribed velocity of the master relative to the slave (m/s), without deformation; `index` is
-    /// `node · lanes + lane`.
+    /// Prescribed velocity of the master relative to the slave (m/s), of a node displaced by `moved` (m, own directions);
+    /// `index` is `node · lanes + lane`. In the coordinates of the displacements, whose arcs are r times angles.
     #[inline(always)]
-    pub fn sliding_velocity(&self, node: usize, index: usize, drive: &Drive) -> [f64; 3] {
+    pub fn sliding_velocity(&self, node: usize, index: usize, drive: &Drive, moved: [f64; 3]) -> [f64; 3] {
         match self {
             Self::Fixed(law) => law.sliding[index],
-            Self::Revolution(RevolutionGap { layout, .. }) => layout.rigid_velocity(node, index, drive),
-            Self::Spline(law) => law.layout.rigid_velocity(node, index, drive),
+            Self::Revolution(law) => law.layout.rigid_velocity(node, index, drive, moved),
+            Self::Spline(law) => law.rigid_velocity(node, index, drive, moved),
             // Free flight is part of the displacements.
             Self::Free(_) => [0.0; 3],
         }
@@ -340,6 +430,7 @@ mod tests {
             },
             slopes: vec![-0.26],
             shaft_moves: false,
+            arms: [Vec::new(), Vec::new()],
         };
         let displacement: Vec<f64> = (0..48).map(|i| 1e-4 * f64::from(i).sin()).collect();
         let drive = Drive { rotor_angle: 1.1, shape_factor: 1.0, ..Drive::default() };

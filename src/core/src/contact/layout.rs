@@ -1,6 +1,7 @@
 //! Where the contact nodes of all sectors stand around the axis, and how they move as a whole.
 
 use super::gap::Drive;
+use super::spline_gap::Frame;
 use crate::{Error, Result, Rom};
 
 /// Contact nodes of equally spaced sectors, arrays `[node · lanes + lane]` where they differ by sector.
@@ -59,16 +60,35 @@ impl Layout {
         self.radii.len()
     }
 
-    /// Velocity of an undeformed node with the rotor (m/s), in the directions of its own frame.
+    /// Velocity with the rotor (m/s) of a node displaced by `moved` (m), in the coordinates of its displacements: r Ω around,
+    /// since a displacement around is an arc of the undeformed radius r, and what the shaft's centre moves.
     #[inline(always)]
-    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &Drive) -> [f64; 3] {
+    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &Drive, moved: [f64; 3]) -> [f64; 3] {
         let spin = drive.speed * self.radii[node];
-        let [x, y, z] = drive.shaft_velocity;
-        if x == 0.0 && y == 0.0 {
-            return [0.0, spin, z];
+        if drive.shaft_velocity[0] == 0.0 && drive.shaft_velocity[1] == 0.0 {
+            return [0.0, spin, drive.shaft_velocity[2]];
         }
-        let (sine, cosine) = libm::sincos(self.angles[index] + drive.rotor_angle);
-        [x * cosine + y * sine, spin + y * cosine - x * sine, z]
+        let [x, y, z] = self.shaft_motion(node, index, drive.rotor_angle, moved, drive.shaft_velocity);
+        [x, spin + y, z]
+    }
+
+    /// A displacement or velocity `shaft` of the shaft's centre in fixed directions, in the coordinates of the displacements
+    /// of a node displaced by `moved` (m).
+    pub fn shaft_motion(
+        &self,
+        node: usize,
+        index: usize,
+        rotor_angle: f64,
+        moved: [f64; 3],
+        shaft: [f64; 3],
+    ) -> [f64; 3] {
+        let [outwards, around, along] = self.displaced_frame(node, index, rotor_angle, moved[1]).local(shaft);
+        [outwards, around / (1.0 + moved[0] * self.per_radius[node]), along]
+    }
+
+    /// Directions at a node that an arc `around` (m) has displaced, at a rotor angle (rad).
+    pub fn displaced_frame(&self, node: usize, index: usize, rotor_angle: f64, around: f64) -> Frame {
+        Frame::new(self.angles[index] + rotor_angle + around * self.per_radius[node])
     }
 }
 

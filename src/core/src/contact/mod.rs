@@ -9,3 +9,4 @@ pub mod solver;
 pub mod spline;
 pub mod spline_gap;
 pub mod surface;
+pub mod wrench;

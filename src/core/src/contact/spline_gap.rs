@@ -3,6 +3,7 @@
 use super::gap::{Drive, Geometry, dot};
 use super::layout::Layout;
 use super::spline::{Place, Projection, SurfaceSpline};
+use super::wrench::{At, Motion};
 use crate::persist::{Persist, Reader, Writer};
 
 /// Gap reported for a node that has left the surface at a free edge (m).
@@ -95,19 +96,9 @@ impl SplineGap {
             let local: [f64; 3] = std::array::from_fn(|component| displacement[(3 * node + component) * lanes + lane]);
             let angle = self.layout.angles[index] + drive.rotor_angle - drive.shape_rotation;
             let frame = Frame::new(angle);
-            let [x, y, z] = drive.shaft;
-            let [radial, tangential, axial] = if x == 0.0 && y == 0.0 {
-                [0.0, 0.0, z]
-            } else {
-                Frame::new(angle + drive.shape_rotation).local([x, y, z])
-            };
-            let clearance =
-                self.layout.clearances[lane] - self.nominal_clearance + drive.gap_offset + drive.radius_change;
-            let place = [
-                self.layout.radii[node] - clearance + local[0] + radial,
-                local[1] + tangential,
-                self.layout.axial[node] + local[2] + axial,
-            ];
+            let [radial, tangential, axial] = self.shaft_offset(angle, drive);
+            let arm = self.arm(node, lane, drive, local);
+            let place = [arm[0] + radial, arm[1] + tangential, arm[2] + axial];
             let point = frame.fixed(place);
             let start = guess
                 .map_or_else(|| self.surface.locate(point), |places| self.surface.advance(places[index], self.turned));
@@ -131,6 +122,64 @@ impl SplineGap {
                 Projection::Lost => *gap = f64::NAN,
             }
         }
+    }
+
+    /// Displacement of the shaft's centre along the directions of a node at `angle` from the shape (m).
+    fn shaft_offset(&self, angle: f64, drive: &Drive) -> [f64; 3] {
+        let [x, y, z] = drive.shaft;
+        if x == 0.0 && y == 0.0 { [0.0, 0.0, z] } else { Frame::new(angle + drive.shape_rotation).local([x, y, z]) }
+    }
+
+    /// A node displaced by `moved` from the shaft's centre (m, own directions); clearance that the surface does not have
+    /// moves it inwards.
+    #[inline(always)]
+    pub fn arm(&self, node: usize, lane: usize, drive: &Drive, moved: [f64; 3]) -> [f64; 3] {
+        let clearance = self.layout.clearances[lane] - self.nominal_clearance + drive.gap_offset + drive.radius_change;
+        [self.layout.radii[node] - clearance + moved[0], moved[1], self.layout.axial[node] + moved[2]]
+    }
+
+    /// Velocity with the rotor (m/s) of a node displaced by `moved` (m), in its own directions: Ω × (x − e) + ė.
+    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &Drive, moved: [f64; 3]) -> [f64; 3] {
+        let [outwards, around, _] = self.arm(node, index % self.layout.lanes, drive, moved);
+        let [x, y, z] = drive.shaft_velocity;
+        let [radial, tangential, axial] =
+            if x == 0.0 && y == 0.0 { [0.0, 0.0, z] } else { self.frame(index, drive.rotor_angle).local([x, y, z]) };
+        [radial - drive.speed * around, tangential + drive.speed * outwards, axial]
+    }
+
+    /// The contact point at `place` from the shaft's centre (m), in the directions of the node.
+    pub fn contact_arm(&self, index: usize, drive: &Drive, place: Place) -> [f64; 3] {
+        let angle = self.layout.angles[index] + drive.rotor_angle - drive.shape_rotation;
+        let point = Frame::new(angle).local(self.surface.evaluate(place).point);
+        let shaft = self.shaft_offset(angle, drive);
+        std::array::from_fn(|i| point[i] - shaft[i])
+    }
+
+    /// How far prescribed motion of the surface has taken it along `normal` at a contact point, `arm` from the shaft's
+    /// centre (m, directions of the node).
+    pub fn surface_motion(&self, at: At<'_>, arm: [f64; 3], normal: [f64; 3], place: Place, motion: &Motion) -> f64 {
+        if motion.casing_rests() {
+            return 0.0;
+        }
+        let angle = self.layout.angles[at.index] + at.drive.rotor_angle - at.drive.shape_rotation;
+        let mut grown = [0.0; 3];
+        if motion.shape_factor != 0.0 && !self.shape.is_empty() {
+            for (index, weight) in self.surface.weights(place).iter() {
+                grown = std::array::from_fn(|i| grown[i] + motion.shape_factor * weight * self.shape[index][i]);
+            }
+        }
+        let grown = Frame::new(angle).local(grown);
+        let shaft = self.shaft_offset(angle, at.drive);
+        let turned = [-(arm[1] + shaft[1]), arm[0] + shaft[0], 0.0].map(|arm| motion.shape_rotation * arm);
+        normal[0] * motion.opening + dot(normal, grown) + dot(normal, turned)
+    }
+
+    /// Angle at which a displaced node faces the casing (rad), in the fixed frame.
+    pub fn angle_on_casing(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
+        let angle = self.layout.angles[at.index] + at.drive.rotor_angle;
+        let arm = self.arm(at.node, at.index % self.layout.lanes, at.drive, moved);
+        let shaft = Frame::new(angle).local(at.drive.shaft);
+        angle + libm::atan2(arm[1] + shaft[1], arm[0] + shaft[0])
     }
 
     /// Radial, tangential and axial directions of a node at a rotor angle (rad), in the fixed frame.

@@ -9,7 +9,7 @@ use crate::variables::Quantity;
 use crate::{Error, Result};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 3;
+const VERSION: u64 = 4;
 const CHECKSUM_BYTES: usize = 8;
 
 persist_fields!(Communication { start, length, count, done });

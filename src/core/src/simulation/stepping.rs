@@ -173,8 +173,7 @@ impl Simulation {
         if let Err(failure) = self.system.step(&drive) {
             return Err(self.fail(failure, time));
         }
-        self.window.add(&self.system, drive.rotor_angle, self.system.bank().step());
-        self.window.add_heat(&self.system, drive.rotor_angle, self.compiled.patches.as_ref());
+        self.window.add(&self.system, self.compiled.patches.as_ref(), self.system.bank().step());
         self.communication.done = next;
         let finished = next == self.communication.count;
         if finished {
@@ -198,6 +197,9 @@ impl Simulation {
         if let Err(failure) = self.system.check_state() {
             return Err(self.fail(failure, time));
         }
+        if let Err(failure) = self.system.check_books() {
+            return Err(self.fail(failure, time));
+        }
         self.rotor.rebase(&self.inputs.speed, offset);
         self.update_outputs();
         self.rotor.shift(offset);
@@ -209,6 +211,9 @@ impl Simulation {
 
     fn fail(&mut self, failure: StepFailure, time: f64) -> Error {
         self.phase = Phase::Failed;
+        if let StepFailure::Curved { work, exchanged } = failure {
+            return self.curved(work, exchanged, time);
+        }
         if let Some(error) = self.free_failure(failure, time) {
             return error;
         }
@@ -233,7 +238,7 @@ impl Simulation {
                         .to_owned(),
             },
             // Of free masters only, dealt with above.
-            StepFailure::TooFast | StepFailure::BehindEdge { .. } => Error::Unstable {
+            StepFailure::TooFast | StepFailure::BehindEdge { .. } | StepFailure::Curved { .. } => Error::Unstable {
                 problem: format!("a contact node moves too far in one internal step at t = {} s", shown(time)),
                 remedy: "Use a smaller internal step; restore a saved state or reset first".to_owned(),
             },
@@ -260,12 +265,25 @@ impl Simulation {
         }
     }
 
+    /// Energy that no input brings.
+    fn curved(&self, work: f64, exchanged: f64, time: f64) -> Error {
+        Error::Unstable {
+            problem: format!(
+                "by t = {} s (last good time {} s) contact forces have added {work:.3e} J that no input brings, of {exchanged:.3e} J \
+                 exchanged: normals turn and surfaces curve too far within an internal step (curvature work)",
+                shown(time),
+                shown(self.time)
+            ),
+            remedy: "Use a smaller internal step; restore a saved state or reset first".to_owned(),
+        }
+    }
+
     /// What only means something else for a free master.
     fn free_failure(&self, failure: StepFailure, time: f64) -> Option<Error> {
         self.compiled.free.as_ref()?;
         let behind;
         let problem = match failure {
-            StepFailure::NonFinite => return None,
+            StepFailure::NonFinite | StepFailure::Curved { .. } => return None,
             StepFailure::TooFast => {
                 "contact nodes of the free structure move by more than a tenth of the extent of the contact nodes in one internal \
                  step, and could pass a surface unseen"

@@ -16,8 +16,8 @@ pub struct Window {
     pub tangential_impulse: Vec<f64>,
     /// ∫F dt on the rotor along fixed x, y, z (N·s).
     pub force_impulse: [f64; 3],
-    /// ∫T dt on the rotor about z (N·m·s).
-    pub torque_impulse: f64,
+    /// ∫M dt on the rotor about fixed x, y, z through the shaft's centre, or on a free master about the origin (N·m·s).
+    pub moment_impulse: [f64; 3],
     /// Friction heat (J).
     pub friction_heat: f64,
     /// Largest λ (N).
@@ -26,6 +26,8 @@ pub struct Window {
     pub patch_heat: Vec<f64>,
     /// ∫F dt on a free master along x, y, z (N·s) per pair; empty for rotors.
     pub pair_impulse: Vec<[f64; 3]>,
+    /// The same of ∫M dt about the origin (N·m·s).
+    pub pair_moment: Vec<[f64; 3]>,
 }
 
 persist_fields!(Window {
@@ -33,11 +35,12 @@ persist_fields!(Window {
     normal_impulse,
     tangential_impulse,
     force_impulse,
-    torque_impulse,
+    moment_impulse,
     friction_heat,
     normal_peak,
     patch_heat,
-    pair_impulse
+    pair_impulse,
+    pair_moment
 });
 
 impl Window {
@@ -48,11 +51,12 @@ impl Window {
             normal_impulse: vec![0.0; len],
             tangential_impulse: vec![0.0; len],
             force_impulse: [0.0; 3],
-            torque_impulse: 0.0,
+            moment_impulse: [0.0; 3],
             friction_heat: 0.0,
             normal_peak: 0.0,
             patch_heat: vec![0.0; patches],
             pair_impulse: vec![[0.0; 3]; pairs],
+            pair_moment: vec![[0.0; 3]; pairs],
         }
     }
 
@@ -62,53 +66,44 @@ impl Window {
         self.normal_impulse.fill(0.0);
         self.tangential_impulse.fill(0.0);
         self.force_impulse = [0.0; 3];
-        self.torque_impulse = 0.0;
+        self.moment_impulse = [0.0; 3];
         self.friction_heat = 0.0;
         self.normal_peak = 0.0;
         self.patch_heat.fill(0.0);
         self.pair_impulse.fill([0.0; 3]);
+        self.pair_moment.fill([0.0; 3]);
     }
 
-    /// Add the internal step just done, of length `step` (s), at the rotor phase `phase` (rad).
-    pub fn add(&mut self, system: &System, phase: f64, step: f64) {
+    /// Add the internal step just done, of length `step` (s).
+    pub fn add(&mut self, system: &System, patches: Option<&Patches>, step: f64) {
         for (lowest, gap) in self.lowest.iter_mut().zip(system.gaps()) {
             *lowest = if *gap < *lowest { *gap } else { *lowest };
         }
-        let lanes = system.bank().lanes();
         for event in system.events() {
+            self.normal_peak = self.normal_peak.max(event.normal);
+        }
+        let lanes = system.bank().lanes();
+        for event in system.acted() {
             let index = event.node * lanes + event.sector;
             self.normal_impulse[index] += event.normal * step;
             self.tangential_impulse[index] += event.tangential * step;
-            self.normal_peak = self.normal_peak.max(event.normal);
-            let [first, second, third] = event.force;
-            if let Some(layout) = system.law().layout() {
-                let (sine, cosine) = libm::sincos(layout.angles[index] + phase);
-                self.force_impulse[0] += step * (first * cosine - second * sine);
-                self.force_impulse[1] += step * (first * sine + second * cosine);
-                self.torque_impulse += step * second * layout.radii[event.node];
-            } else {
-                self.force_impulse[0] += step * first;
-                self.force_impulse[1] += step * second;
-            }
-            self.force_impulse[2] += step * third;
+            add_scaled(&mut self.force_impulse, step, event.wrench.force);
+            add_scaled(&mut self.moment_impulse, step, event.wrench.moment);
             if let GapLaw::Free(law) = system.law()
                 && let Some(pair) = law.surface_of(event.node)
             {
-                let sum = &mut self.pair_impulse[pair];
-                *sum = std::array::from_fn(|i| sum[i] + step * event.force[i]);
+                add_scaled(&mut self.pair_impulse[pair], step, event.wrench.force);
+                add_scaled(&mut self.pair_moment[pair], step, event.wrench.moment);
             }
-        }
-    }
-
-    /// Add the friction heat of the internal step just done.
-    pub fn add_heat(&mut self, system: &System, phase: f64, patches: Option<&Patches>) {
-        for event in system.heated() {
             self.friction_heat += event.friction_heat;
-            if let (Some(patches), Some(layout)) = (patches, system.law().layout()) {
-                let index = event.node * layout.lanes + event.sector;
-                let patch = patches.find(layout.angles[index] + phase, layout.axial[event.node]);
-                self.patch_heat[patch] += event.friction_heat;
+            if let Some(patches) = patches {
+                let [x, y, z] = event.wrench.point;
+                self.patch_heat[patches.find(libm::atan2(y, x), z)] += event.friction_heat;
             }
         }
     }
+}
+
+fn add_scaled(sum: &mut [f64; 3], factor: f64, term: [f64; 3]) {
+    *sum = std::array::from_fn(|i| sum[i] + factor * term[i]);
 }

@@ -3,6 +3,7 @@
 use super::{ContactEvent, Member, Slave, StepFailure, System, frame_of};
 use crate::contact::gap::{GapLaw, dot};
 use crate::contact::spline_gap::BEYOND_EDGE;
+use crate::contact::wrench::At;
 use crate::persist::{Persist, Reader, Writer};
 
 /// A contact force is continued over steps at most this many times as long as the one it was found in.
@@ -10,6 +11,8 @@ const FORCE_REACH: f64 = 4.0;
 /// How far behind a surface, continued beyond its edge, a node may have been: share of its way in the step, since the surface
 /// may bend, and of the largest displacement that counts as small.
 const BEHIND_EDGE: [f64; 2] = [1e-3, 1e-6];
+/// Curvature work beyond this share of all energy exchanged is more than an error of truncation.
+const MOST_CURVATURE: f64 = 0.1;
 
 impl System {
     /// Use step size `step` (s) from here. A running state is carried over by resampling the modal motion under
@@ -26,6 +29,7 @@ impl System {
             self.bank.resample(self.settings.scheme, step, &self.displacement_oldest);
             self.resample_slaves(step);
             let ratio = step / old;
+            self.state.motion = self.state.motion.over(ratio);
             for (before, now) in self.state.gap_before.iter_mut().zip(&self.state.gap) {
                 if now.is_finite() {
                     *before = now - ratio * (now - *before);
@@ -53,7 +57,7 @@ impl System {
             if let (true, Some((surface, carrier))) =
                 (force.iter().any(|value| *value != 0.0), self.law.spline_of(node))
             {
-                let frame = frame_of(&self.law, index, self.state.angle);
+                let frame = frame_of(&self.law, index, self.state.drive.rotor_angle);
                 self.slaves[carrier].add_lasting(surface, self.state.geometry.places[index], frame, force);
             }
         }
@@ -99,6 +103,20 @@ impl System {
                     return Err(StepFailure::BehindEdge { node });
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Whether curvature work, which no input does, is still small beside what was exchanged; at the end of a communication
+    /// step.
+    ///
+    /// # Errors
+    /// It is not: [`StepFailure::Curved`].
+    pub fn check_books(&self) -> Result<(), StepFailure> {
+        let ledger = &self.state.ledger;
+        let curved = ledger.curvature_work.value();
+        if curved.abs() > MOST_CURVATURE * ledger.exchanged() {
+            return Err(StepFailure::Curved { work: curved, exchanged: ledger.exchanged() });
         }
         Ok(())
     }
@@ -162,9 +180,12 @@ impl System {
             for node in 0..self.law.nodes() {
                 let normal = self.state.multiplier[node * lanes + sector];
                 if normal != 0.0 {
-                    let force = std::array::from_fn(|i| self.state.force[(3 * node + i) * lanes + sector]);
-                    let coating = self.state.coating_force[node * lanes + sector];
-                    self.events.push(ContactEvent::new(sector, node, normal, force, coating));
+                    let index = node * lanes + sector;
+                    let of = |rows: &[f64]| std::array::from_fn(|i| rows[(3 * node + i) * lanes + sector]);
+                    let (force, point) = (of(&self.state.force), of(&self.state.points));
+                    let wrench = self.law.wrench(At { node, index, drive: &self.state.drive }, point, force);
+                    let (place, coating) = ((sector, node), self.state.coating_force[index]);
+                    self.events.push(ContactEvent::new(place, normal, force, coating, (point, wrench)));
                 }
             }
         }

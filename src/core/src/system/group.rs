@@ -3,6 +3,7 @@
 use super::slave::carrier_of;
 use super::{ContactEvent, StepFailure, System, frame_of};
 use crate::contact::gap::{Drive, dot};
+use crate::contact::wrench::At;
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::cyclic::CyclicBank;
 use crate::dynamics::dispatch::Kernel;
@@ -167,7 +168,7 @@ impl System {
                 continue;
             }
             let slip = if friction > 0.0 {
-                let mut velocity = self.law.sliding_velocity(at.node, index, drive);
+                let mut velocity = self.law.sliding_velocity(at.node, index, drive, self.displacement(at));
                 let moved = if self.is_delayed() { self.slip_of_inertia(at) } else { self.slip_of_deformation(at) };
                 for (value, moved) in velocity.iter_mut().zip(moved) {
                     *value += moved / self.bank.step();
@@ -187,6 +188,12 @@ impl System {
         self.slip_between(at, self.bank.displacement(), self.bank.displacement_before())
     }
 
+    /// Displacement of a node as predicted (m), in its own directions.
+    #[inline(always)]
+    fn displacement(&self, Member { node, sector, .. }: Member) -> [f64; 3] {
+        std::array::from_fn(|i| self.bank.displacement()[(3 * node + i) * self.lanes + sector])
+    }
+
     /// The same of the modes with inertia alone. The prediction of massless-boundary is without the forces that deform
     /// quasi-static modes, however short the step is: taken for a slip over h it would grow without bounds.
     fn slip_of_inertia(&self, at: Member) -> [f64; 3] {
@@ -201,7 +208,7 @@ impl System {
             now[row] - before[row]
         });
         if let Some((slave, surface)) = carrier_of(&self.slaves, &self.law, node) {
-            let frame = self.frame(index, self.state.angle);
+            let frame = self.frame(index, self.state.drive.rotor_angle);
             let slave = slave.moved_last(surface, self.state.geometry.places[index], frame);
             moved = std::array::from_fn(|i| moved[i] - slave[i]);
         }
@@ -238,7 +245,7 @@ impl System {
             for (member, &Member { node, index, .. }) in self.members.iter().enumerate() {
                 let Some((surface, own)) = self.law.spline_of(node) else { continue };
                 if own == carrier {
-                    let frame = frame_of(&self.law, index, self.state.angle);
+                    let frame = frame_of(&self.law, index, self.state.drive.rotor_angle);
                     let span = per * member..per * (member + 1);
                     let (rows, columns) = (&self.row_directions[span.clone()], &self.column_directions[span]);
                     slave.see(member, surface, self.state.geometry.places[index], frame, rows, columns);
@@ -269,11 +276,9 @@ impl System {
         let (lanes, nodes) = (self.lanes, self.law.nodes());
         let Some((coating, problem)) = &mut self.coating else { return false };
         for blade in self.members.chunks_exact(nodes) {
-            if let Some(layout) = self.law.layout() {
-                for (angle, at) in self.angles.iter_mut().zip(blade) {
-                    let tangential = self.bank.displacement()[(3 * at.node + 1) * lanes + at.sector];
-                    *angle = layout.angles[at.index] + drive.rotor_angle + tangential * layout.per_radius[at.node];
-                }
+            for (angle, Member { node, sector, index }) in self.angles.iter_mut().zip(blade) {
+                let moved = std::array::from_fn(|i| self.bank.displacement()[(3 * node + i) * lanes + sector]);
+                *angle = self.law.angle_on_casing(At { node: *node, index: *index, drive }, moved);
             }
             coating.locate(problem, &self.angles);
         }
@@ -298,7 +303,7 @@ impl System {
         for member in 0..self.members.len() {
             let at = self.members[member];
             let Member { node, sector, index } = at;
-            let sliding = self.law.sliding_velocity(node, index, drive);
+            let sliding = self.law.sliding_velocity(node, index, drive, self.displacement(at));
             let moved = self.slip_of_deformation(at);
             let slip: [f64; 3] = std::array::from_fn(|i| sliding[i] * step + moved[i]);
             let last: [f64; 3] = std::array::from_fn(|i| self.force_before[(3 * node + i) * lanes + sector]);
@@ -418,12 +423,12 @@ impl System {
     /// Let the solution that was responded to last act on a wheel.
     #[inline(never)]
     fn apply_together(&mut self) {
-        if let Sectors::Coupled(wheel) = &mut self.bank {
-            wheel.act();
-        }
         for member in 0..self.members.len() {
             self.state.gap[self.members[member].index] = self.corrected[member];
             self.record(member, self.member_forces[member]);
+        }
+        if let Sectors::Coupled(wheel) = &mut self.bank {
+            wheel.act();
         }
     }
 
@@ -458,10 +463,15 @@ impl System {
         }
         self.state.multiplier[index] = normal;
         self.state.coating_force[index] = self.coating_share[member];
-        for (component, value) in force.iter().enumerate() {
-            self.state.force[(3 * node + component) * lanes + sector] = *value;
+        let at = At { node, index, drive: &self.state.drive };
+        // Where the gap was evaluated, whose normal has no moment about the axis of a round casing.
+        let point = self.law.contact_point(at, self.displacement(self.members[member]), &self.state.geometry.places);
+        let wrench = self.law.wrench(at, point, force);
+        for component in 0..3 {
+            let row = (3 * node + component) * lanes + sector;
+            (self.state.force[row], self.state.points[row]) = (force[component], point[component]);
         }
-        let event = ContactEvent::new(sector, node, normal, force, self.coating_share[member]);
+        let event = ContactEvent::new((sector, node), normal, force, self.coating_share[member], (point, wrench));
         self.events.push(event);
     }
 }

@@ -10,6 +10,7 @@ use crate::contact::coulomb::CoulombSolver;
 use crate::contact::gap::{Drive, GapLaw, Geometry, dot};
 use crate::contact::solver::ContactSolver;
 use crate::contact::spline_gap::Frame;
+use crate::contact::wrench::{Motion, Wrench};
 use crate::dynamics::bank::BankOptions;
 use crate::dynamics::modal::ModalModel;
 use crate::dynamics::sectors::{SectorModel, Sectors};
@@ -33,8 +34,12 @@ pub struct ContactEvent {
     pub normal: f64,
     /// Magnitude of the friction force (N): µλ against slip, less where the contact sticks; 0 without slip.
     pub tangential: f64,
-    /// Force on the master (N) in the directions of the structure's frame.
+    /// Force on the master (N) in the coordinates of its displacements.
     pub force: [f64; 3],
+    /// What tells the contact point, see [`GapLaw::contact_point`].
+    pub point: [f64; 3],
+    /// The force in fixed directions, its moment, and where it acts.
+    pub wrench: Wrench,
     /// Part of λ that a coating carries (N).
     pub coating: f64,
     /// Friction heat of the step (J).
@@ -42,11 +47,17 @@ pub struct ContactEvent {
 }
 
 impl ContactEvent {
-    fn new(sector: usize, node: usize, normal: f64, force: [f64; 3], coating: f64) -> Self {
+    fn new(
+        (sector, node): (usize, usize),
+        normal: f64,
+        force: [f64; 3],
+        coating: f64,
+        (point, wrench): ([f64; 3], Wrench),
+    ) -> Self {
         let square = dot(force, force) - normal * normal;
         // What rounding leaves of a frictionless contact is no friction.
         let tangential = if square > 1e-14 * normal * normal { square.sqrt() } else { 0.0 };
-        Self { sector, node, normal, tangential, force, coating, friction_heat: 0.0 }
+        Self { sector, node, normal, tangential, force, point, wrench, coating, friction_heat: 0.0 }
     }
 }
 
@@ -66,7 +77,7 @@ pub struct SystemParts {
 }
 
 /// Why a step failed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepFailure {
     /// A displacement or gap became infinite or NaN.
     NonFinite,
@@ -84,6 +95,13 @@ pub enum StepFailure {
     BehindEdge {
         /// Contact node (0-based).
         node: usize,
+    },
+    /// Normals turn and surfaces curve so far within steps that this adds energy which no input brings.
+    Curved {
+        /// What it has added (J).
+        work: f64,
+        /// All energy exchanged (J).
+        exchanged: f64,
     },
     /// The contact problem of a sector has no solution within the pivoting limit.
     Unsolved {
@@ -124,9 +142,11 @@ struct SystemState {
     predicted: Vec<f64>,
     /// Normals and places of the last step.
     geometry: Geometry,
-    /// Rotor angle of the last step and of the one before (rad).
-    angle: f64,
-    angle_before: f64,
+    /// Contact points of the last step as [`GapLaw::contact_point`] tells them, `[row · lanes + lane]`.
+    points: Vec<f64>,
+    /// Prescribed motion at the last step, and over it.
+    drive: Drive,
+    motion: Motion,
     ledger: Ledger,
 }
 
@@ -140,8 +160,9 @@ persist_fields!(SystemState {
     coating_force,
     predicted,
     geometry,
-    angle,
-    angle_before,
+    points,
+    drive,
+    motion,
     ledger
 });
 
@@ -182,6 +203,7 @@ pub struct System {
     angles: Vec<f64>,
     gap_oldest: Vec<f64>,
     geometry_before: Geometry,
+    drive_before: Drive,
     displacement_oldest: Vec<f64>,
     predicted_before: Vec<f64>,
     state: SystemState,
@@ -234,6 +256,7 @@ impl System {
             angles: vec![0.0; nodes],
             gap_oldest: vec![f64::INFINITY; contacts],
             geometry_before: law.geometry(lanes),
+            drive_before: Drive::default(),
             displacement_oldest: vec![0.0; 3 * contacts],
             predicted_before: vec![0.0; 3 * contacts],
             state: SystemState {
@@ -247,8 +270,9 @@ impl System {
                 coating_force: vec![0.0; contacts],
                 predicted: vec![0.0; 3 * contacts],
                 geometry: law.geometry(lanes),
-                angle: 0.0,
-                angle_before: 0.0,
+                points: vec![0.0; 3 * contacts],
+                drive: Drive::default(),
+                motion: Motion::default(),
                 ledger: Ledger::default(),
             },
             bank,
@@ -263,6 +287,11 @@ impl System {
     /// Normals and places of the last step.
     pub fn geometry(&self) -> &Geometry {
         &self.state.geometry
+    }
+
+    /// Prescribed motion at the last step.
+    pub fn drive(&self) -> &Drive {
+        &self.state.drive
     }
 
     /// The structure that carries the slave surface; of several the first.
@@ -285,9 +314,9 @@ impl System {
         self.coating.as_ref().map(|(coating, _)| coating)
     }
 
-    /// Contacts whose friction heat was entered for the last step: those of that step, or with massless-boundary those of
-    /// the step before, whose forces acted over it.
-    pub fn heated(&self) -> &[ContactEvent] {
+    /// Contacts whose forces acted over the last step, and whose work was entered for it: those of that step, or with
+    /// massless-boundary those of the step before.
+    pub fn acted(&self) -> &[ContactEvent] {
         if self.is_delayed() { &self.events_before } else { &self.events }
     }
 
@@ -383,7 +412,8 @@ impl System {
         self.state.coating_force.fill(0.0);
         self.events.clear();
         self.events_before.clear();
-        (self.state.angle, self.state.angle_before) = (drive.rotor_angle, drive.rotor_angle);
+        self.state.points.fill(0.0);
+        (self.state.drive, self.state.motion) = (*drive, Motion::default());
         self.evaluate_gaps(drive, false);
         self.state.gap_before.copy_from_slice(&self.state.gap);
         self.state.predicted.copy_from_slice(self.bank.displacement());
@@ -405,7 +435,7 @@ impl System {
     /// shaft.
     pub fn set_speed(&mut self, speed: f64) {
         let work = self.bank.set_speed(speed);
-        self.state.ledger.external_work.add(work);
+        self.state.ledger.stiffening_work.add(work);
         self.state.ledger.turnover.add(work.abs());
     }
 
@@ -435,9 +465,9 @@ impl System {
         std::mem::swap(&mut self.gap_oldest, &mut self.state.gap_before);
         std::mem::swap(&mut self.state.gap_before, &mut self.state.gap);
         std::mem::swap(&mut self.geometry_before, &mut self.state.geometry);
-        self.state.angle_before = self.state.angle;
-        self.state.angle = drive.rotor_angle;
-        self.law.turn(self.state.angle - self.state.angle_before);
+        self.drive_before = std::mem::replace(&mut self.state.drive, *drive);
+        let motion = Motion::between(&self.drive_before, drive, self.bank.step());
+        self.law.turn(motion.turn);
         self.check_travel()?;
         self.evaluate_gaps(drive, true);
         self.check_edges()?;
@@ -447,7 +477,8 @@ impl System {
         } else {
             self.solve_sectors(drive)?;
         }
-        self.book_all(drive);
+        self.book_all(&motion);
+        self.state.motion = motion;
         self.finish_loads();
         self.state.steps += 1;
         if self.state.steps.is_multiple_of(FLUSH_EVERY) {

@@ -79,6 +79,11 @@ impl Slave {
         self.delayed.fill(0.0);
     }
 
+    /// Modal forces of the contacts of the last step.
+    pub fn contact_force(&self) -> &[f64] {
+        &self.delayed
+    }
+
     /// Nothing has touched yet.
     pub fn start(&mut self) {
         self.bank.recover();

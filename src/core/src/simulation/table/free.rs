@@ -1,8 +1,8 @@
 //! The variable table of a scene with a free master.
 
 use super::builder::Builder;
-use super::outputs::watched_rows;
-use super::units::{ENERGY, FORCE, IMPULSE, LENGTH, LINEAR_SPEED, POWER};
+use super::outputs::{CURVATURE, watched_rows};
+use super::units::{ENERGY, FORCE, IMPULSE, LENGTH, LINEAR_SPEED, POWER, TORQUE};
 use crate::Result;
 use crate::Rom;
 use crate::settings::{Scene, StructureSettings};
@@ -95,8 +95,23 @@ fn totals(table: &mut Builder, parts: &Parts) {
         let text = format!("Contact force on {master} along {axis}, all pairs, mean over the communication step");
         table.output(Quantity::Force(component), format!("force_{axis}"), Span::Mean, force, text);
     }
+    let moment = Some((&TORQUE, 10.0));
+    for (axis, letter) in AXES.into_iter().enumerate() {
+        let text = format!(
+            "Moment of the contact forces on {master} about {letter} through the origin, all pairs, mean over the communication step"
+        );
+        table.output(Quantity::Moment(axis), format!("moment_{letter}"), Span::Mean, moment, text);
+    }
     for (index, pair) in parts.pairs.iter().enumerate() {
         let surface = parts.surface(pair);
+        for (axis, letter) in AXES.into_iter().enumerate() {
+            let text = format!(
+                "Moment of the contact force on {master} from {surface} about {letter} through the origin, mean over the \
+                 communication step"
+            );
+            let name = format!("{surface}.moment_{letter}");
+            table.output(Quantity::PairMoment(index, axis), name, Span::Mean, moment, text);
+        }
         for (component, axis) in AXES.into_iter().enumerate() {
             let text =
                 format!("Contact force on {master} from {surface} along {axis}, mean over the communication step");
@@ -195,13 +210,7 @@ fn energies(table: &mut Builder, parts: &Parts) {
             Span::Total,
             "Energy lost by contact nodes stopping at a surface since the start",
         ),
-        (
-            Quantity::ExternalWork,
-            "curvature_work",
-            Span::Total,
-            "Energy that normal forces add since the start because surfaces turn under the contacts within an internal step \
-             (of first order in the step)",
-        ),
+        (Quantity::CurvatureWork, "curvature_work", Span::Total, CURVATURE),
         (
             Quantity::StepChangeEnergy,
             "step_change_energy",

@@ -3,6 +3,7 @@
 use super::builder::Builder;
 use super::units::{ANGLE, ENERGY, FORCE, IMPULSE, LENGTH, POWER, TORQUE};
 use super::{Parts, features, has_friction};
+use crate::settings::Motion;
 use crate::variables::{Kind, Quantity, Span, Unit, Variability};
 use crate::{Error, Result};
 
@@ -41,13 +42,23 @@ pub fn totals(table: &mut Builder, scene: &Parts) {
             format!("Contact force on the rotor along fixed {axis}, mean over the communication step"),
         );
     }
-    table.output(
-        Quantity::Torque,
-        "torque",
-        Span::Mean,
-        Some((&TORQUE, 10.0)),
-        "Torque of the contact forces on the rotor about +z, mean over the communication step",
-    );
+    // The other two are for a model of the shaft, which is what gives whirl.
+    let moments = ["moment_x", "moment_y", "torque"].into_iter().enumerate();
+    for (component, name) in moments.filter(|(component, _)| *component == 2 || scene.master.whirl) {
+        let text = match component {
+            2 => {
+                "Torque of the contact forces on the rotor about +z through the shaft's centre, conjugate to the rotor angle, mean \
+                 over the communication step"
+                    .to_owned()
+            }
+            _ => format!(
+                "Moment of the contact forces on the rotor about fixed {} through the shaft's centre at z = 0 of the rotor \
+                 (whirl and axial shift move it), mean over the communication step",
+                ["x", "y"][component]
+            ),
+        };
+        table.output(Quantity::Moment(component), name, Span::Mean, Some((&TORQUE, 10.0)), text);
+    }
     table.output(
         Quantity::NormalForcePeak,
         "normal_force_peak",
@@ -220,6 +231,10 @@ pub fn fields(table: &mut Builder, scene: &Parts) -> Result<()> {
     Ok(())
 }
 
+/// Of every scene.
+pub const CURVATURE: &str = "Energy that contact forces add since the start because normals turn and surfaces curve within an \
+                             internal step (vanishes with the step)";
+
 pub fn energies(table: &mut Builder, scene: &Parts) {
     let rows = [
         (
@@ -253,8 +268,34 @@ pub fn energies(table: &mut Builder, scene: &Parts) {
             Quantity::ExternalWork,
             "external_work",
             Span::Total,
-            "Work of shaft and moving casing through the contacts since the start",
+            "Work of all inputs but loads since the start: shaft, whirl, axial shift, moving casing",
         ),
+        (
+            Quantity::ShaftWork,
+            "shaft_work",
+            Span::Total,
+            "Work of the shaft through the contacts since the start: minus the integral of torque times speed",
+        ),
+        (
+            Quantity::StiffeningWork,
+            "stiffening_work",
+            Span::Total,
+            "Strain energy that changes of the speed add by stiffening since the start",
+        ),
+        (
+            Quantity::WhirlWork,
+            "whirl_work",
+            Span::Total,
+            "Work of the whirling shaft since the start: minus the integral of force times velocity of its centre",
+        ),
+        (Quantity::ShiftWork, "shift_work", Span::Total, "Work of the axial shift of the rotor since the start"),
+        (
+            Quantity::CasingWork,
+            "casing_motion_work",
+            Span::Total,
+            "Work of prescribed motion of the casing (radius, gap offset, shape) since the start",
+        ),
+        (Quantity::CurvatureWork, "curvature_work", Span::Total, CURVATURE),
         (
             Quantity::StepChangeEnergy,
             "step_change_energy",
@@ -267,6 +308,11 @@ pub fn energies(table: &mut Builder, scene: &Parts) {
         Quantity::FrictionLoss => has_friction(scene),
         Quantity::WearWork => scene.settings.contacts[0].coating.is_some(),
         Quantity::LoadWork => features::is_loaded(scene),
+        Quantity::ShaftWork => scene.master.motion == Motion::Rotating,
+        Quantity::StiffeningWork => scene.master.spin.stiffening,
+        Quantity::WhirlWork => scene.master.whirl,
+        Quantity::ShiftWork => scene.master.axial_shift,
+        Quantity::CasingWork => scene.surface.moving,
         _ => true,
     };
     for (quantity, name, span, text) in rows.into_iter().filter(|row| exists(row.0)) {

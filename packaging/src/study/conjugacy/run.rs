@@ -1,0 +1,323 @@
+//! One scene run step by step: forces and moments on both sides, torque against shaft work, the ledger.
+
+use tiprub_core::{
+    Result, Scene, Simulation,
+    contact::{gap::GapLaw, spline::SurfaceSpline, surface::Surface, wrench::Wrench},
+    settings::{CoatingSettings, Scheme, Shape, Solver, SplineSettings},
+    system::{ContactEvent, System},
+};
+
+use crate::stability::{
+    bodies::{Body, HALF, Plate, Throw},
+    models::{GAP, RADIUS, Tower, blade, bumps, on_ring},
+    observe::{real, worse},
+};
+
+/// Length of the communication steps of a rotor (s), and how many there are.
+const LENGTH: f64 = 1e-5;
+const COUNT: u32 = 120;
+/// Rate of whirl, shift and casing (rad/s).
+const RATE: f64 = 900.0;
+/// Angular acceleration of the rotor (rad/s²).
+const RAMP: f64 = 4e4;
+
+/// What the contact nodes meet, and what moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Feature {
+    /// Rigid surface of revolution.
+    Revolution,
+    /// Rigid surface through data points.
+    Spline,
+    /// Flexible casing.
+    Casing,
+    /// Coupled sectors in a rigid casing.
+    Wheel,
+    /// Coupled sectors in a flexible casing.
+    WheelInCasing,
+    /// Coating on a rigid casing.
+    Coating,
+    /// A free body between an elastic and a rigid plate.
+    Free,
+}
+
+impl Feature {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Revolution, Self::Spline, Self::Casing, Self::Wheel, Self::WheelInCasing, Self::Coating, Self::Free];
+
+    /// For the table.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Revolution => "surface of revolution",
+            Self::Spline => "rigid spline",
+            Self::Casing => "flexible casing",
+            Self::Wheel => "coupled sectors",
+            Self::WheelInCasing => "coupled sectors, flexible casing",
+            Self::Coating => "coating",
+            Self::Free => "free body",
+        }
+    }
+
+    /// What is known of the other side.
+    pub fn side(self) -> Side {
+        match self {
+            Self::Revolution | Self::Wheel => Side::Surface,
+            Self::Coating => Side::Dented,
+            _ => Side::ControlPoints,
+        }
+    }
+
+    /// The rotor's scene; `None` for the free body.
+    fn rotor(self) -> Option<Scene> {
+        let wheel = || Tower { neighbour: 1e6, ..Tower::default() }.rom();
+        let mut scene = match self {
+            Self::Wheel | Self::WheelInCasing => bumps(wheel()),
+            Self::Free => return None,
+            _ => bumps(blade(12)),
+        };
+        match self {
+            Self::Spline => scene.settings.surfaces[0].spline = Some(SplineSettings::default()),
+            Self::Casing | Self::WheelInCasing => on_ring(&mut scene, 0.01),
+            Self::Coating => {
+                scene.settings.contacts[0].coating = Some(CoatingSettings {
+                    thickness: 1.5e-4,
+                    modulus: 2e8,
+                    yield_stress: 1e6,
+                    hardening: 2e7,
+                    cells_around: 500,
+                    cells_along: 7,
+                });
+            }
+            _ => {}
+        }
+        Some(scene)
+    }
+
+    /// The scene with friction, and with whirl and axial shift where there is a shaft. A round casing for the torque.
+    pub fn scene(self, friction: f64, moves: bool, round: bool) -> Scene {
+        let Some(mut scene) = self.rotor() else {
+            let left = Plate { stiffness: 1e7, ..Plate::left(HALF + 2e-4) };
+            let right = Plate { stiffness: 0.0, radius: 0.18, ..Plate::right(HALF + 3e-4) };
+            let throw = Throw {
+                body: Body::elastic(&[0.1, 0.15, 0.05], 2e7),
+                velocity: [-5.0, 2.5, 0.5],
+                plates: vec![left, right],
+                friction,
+                scheme: Scheme::ModalExact,
+                solver: Solver::Lcp,
+                step: 1e-6,
+            };
+            let mut scene = throw.scene();
+            scene.settings.outputs.energies = true;
+            return scene;
+        };
+        let settings = &mut scene.settings;
+        settings.contacts[0].friction = friction;
+        (settings.structures[0].whirl, settings.structures[0].axial_shift) = (moves, moves);
+        settings.outputs.energies = true;
+        if round {
+            settings.surfaces[0].shape = Shape::Circular {};
+        }
+        scene
+    }
+}
+
+/// What forces and moments on the slave follow from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Forces on control points, where they stand.
+    ControlPoints,
+    /// The same force where the surface of revolution is.
+    Surface,
+    /// A coating yields: the contact stands in it.
+    Dented,
+}
+
+/// What a run showed; residuals are relative.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Seen {
+    /// Contacts, summed over the steps.
+    pub contacts: usize,
+    /// Largest moment of a step about the axis of the casing, of Σ|F| r.
+    pub axis_moment: f64,
+    /// Forces on the slave's control points and on the master, of Σ|F|.
+    pub force: f64,
+    /// Their moments about the origin, of Σ|F| r.
+    pub moment: f64,
+    /// Modal forces on the carrier against those of the control points' forces, of the largest.
+    pub modal: f64,
+    /// ∫ torque·speed dt plus the shaft's work, of all work exchanged.
+    pub shaft: f64,
+    /// Closure of the ledger, of all work exchanged.
+    pub balance: f64,
+    /// Curvature work, of all work exchanged.
+    pub curvature: f64,
+    /// All work exchanged (J).
+    pub turnover: f64,
+}
+
+/// Run a scene with steps of length `step` (s).
+///
+/// # Errors
+/// The scene is refused, or fails.
+pub fn run(scene: &Scene, step: f64) -> Result<Seen> {
+    let mut scene = scene.clone();
+    scene.settings.time.step = step;
+    let mut simulation = Simulation::new(&scene)?;
+    simulation.initialise(0.0)?;
+    let (mut seen, mut supplied) = (Seen::default(), 0.0);
+    for _ in 0..COUNT {
+        let begin = simulation.time();
+        let speed = drive(&mut simulation, begin)?;
+        simulation.begin_step(begin, LENGTH)?;
+        while !simulation.advance()?.finished {
+            look(&scene, &simulation, &mut seen);
+        }
+        look(&scene, &simulation, &mut seen);
+        supplied += if simulation.table().find("torque").is_some() { real(&simulation, "torque") } else { 0.0 }
+            * speed
+            * LENGTH;
+    }
+    let ledger = simulation.system().ledger();
+    seen.turnover = ledger.scale();
+    seen.shaft = (supplied + ledger.shaft_work.value()).abs() / seen.turnover;
+    seen.balance = real(&simulation, "energy_residual_relative").abs();
+    seen.curvature = ledger.curvature_work.value() / seen.turnover;
+    Ok(seen)
+}
+
+/// Give every input that the scene has a value and a rate; returns the speed.
+fn drive(simulation: &mut Simulation, time: f64) -> Result<f64> {
+    let phase = RATE * time;
+    let (sine, cosine) = phase.sin_cos();
+    let speed = 1300.0 + RAMP * time;
+    let closing = if time < 1e-3 { -0.45 } else { 0.0 };
+    let inputs = [
+        // Held over the communication step, so that its work is the mean torque times it.
+        ("speed", speed, 0.0),
+        ("whirl_x", 5e-5 * sine, 5e-5 * RATE * cosine),
+        ("whirl_y", 5e-5 * (1.0 - cosine), 5e-5 * RATE * sine),
+        ("axial_shift", 1e-5 * sine, 1e-5 * RATE * cosine),
+        ("casing_radius_change", -0.45 * time.min(1e-3), closing),
+        ("casing_shape_rotation", 3.0 * time, 3.0),
+        ("casing_shape_factor", 1.0 + 0.1 * sine, 0.1 * RATE * cosine),
+    ];
+    for (name, value, slope) in inputs {
+        if let Some(reference) = simulation.table().find(name).map(|row| row.reference) {
+            simulation.set_real(reference, value)?;
+            simulation.set_input_derivative(reference, 1, slope)?;
+        }
+    }
+    Ok(speed)
+}
+
+/// Forces and moments of the internal step just done.
+fn look(scene: &Scene, simulation: &Simulation, seen: &mut Seen) {
+    let system = simulation.system();
+    let events = system.events();
+    if events.is_empty() {
+        return;
+    }
+    seen.contacts += events.len();
+    let (mut force, mut moment, mut scale, mut axis) = ([0.0; 3], [0.0; 3], 0.0, 0.0);
+    for event in events {
+        let Wrench { point, force: own, .. } = event.wrench;
+        add(&mut force, 1.0, own);
+        let own_moment = cross(point, own);
+        add(&mut moment, 1.0, own_moment);
+        scale += own.iter().map(|value| value * value).sum::<f64>().sqrt();
+        axis += own_moment[2];
+    }
+    let [slave_force, slave_moment, modal] = reaction(scene, simulation);
+    seen.axis_moment = worse(seen.axis_moment, axis.abs() / (RADIUS * scale));
+    for i in 0..3 {
+        seen.force = worse(seen.force, (force[i] + slave_force[i]).abs() / scale);
+        seen.moment = worse(seen.moment, (moment[i] + slave_moment[i]).abs() / (RADIUS * scale));
+    }
+    seen.modal = worse(seen.modal, modal[0]);
+}
+
+/// Force and moment on what the nodes touch, from where it stands: the control points of surfaces through data points, the
+/// casing's radius at the angle of the contact of a surface of revolution. The third: how far modal forces are off.
+fn reaction(scene: &Scene, simulation: &Simulation) -> [[f64; 3]; 3] {
+    let system = simulation.system();
+    let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
+    let mut expected: Vec<Vec<f64>> = system.slaves().iter().map(|slave| vec![0.0; slave.bank.modes()]).collect();
+    for event in system.events() {
+        let Some((surface, place, rotation)) = surface_of(simulation, event) else {
+            let point = on_revolution(scene, simulation, event);
+            add(&mut force, -1.0, event.wrench.force);
+            add(&mut moment, -1.0, cross(point, event.wrench.force));
+            continue;
+        };
+        let carrier = system.law().spline_of(event.node).map(|(_, carrier)| carrier);
+        for (index, weight) in surface.weights(place).iter() {
+            let point = turned(surface.control_points()[index], rotation);
+            let acts = event.wrench.force.map(|value| -weight * value);
+            add(&mut force, 1.0, acts);
+            add(&mut moment, 1.0, cross(point, acts));
+            if let Some((slave, modal)) =
+                carrier.and_then(|index| Some((system.slaves().get(index)?, &mut expected[index])))
+            {
+                for (component, value) in acts.iter().enumerate() {
+                    let shapes = slave.bank.contact_row(3 * index + component);
+                    modal.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += value * shape);
+                }
+            }
+        }
+    }
+    [force, moment, [modal_residual(system, &expected), 0.0, 0.0]]
+}
+
+fn modal_residual(system: &System, expected: &[Vec<f64>]) -> f64 {
+    let (mut off, mut largest) = (0.0_f64, 0.0_f64);
+    for (slave, expected) in system.slaves().iter().zip(expected) {
+        for (found, expected) in slave.contact_force().iter().zip(expected) {
+            (off, largest) = (off.max((found - expected).abs()), largest.max(expected.abs()));
+        }
+    }
+    if largest > 0.0 { off / largest } else { 0.0 }
+}
+
+/// Surface through data points, place and rotation of the surface (rad) of a contact.
+fn surface_of<'a>(
+    simulation: &'a Simulation,
+    event: &ContactEvent,
+) -> Option<(&'a SurfaceSpline, tiprub_core::contact::spline::Place, f64)> {
+    let system = simulation.system();
+    let place = *system.geometry().places.get(event.node * system.bank().lanes() + event.sector)?;
+    match system.law() {
+        GapLaw::Spline(law) => Some((&law.surface, place, system.drive().shape_rotation)),
+        GapLaw::Free(law) => Some((&law.surfaces[law.surface_of(event.node)?].surface, place, 0.0)),
+        _ => None,
+    }
+}
+
+/// Where the casing of revolution is at the angle of a contact (m).
+fn on_revolution(scene: &Scene, simulation: &Simulation, event: &ContactEvent) -> [f64; 3] {
+    let [x, y, z] = event.wrench.point;
+    let (settings, drive) = (&scene.settings, simulation.system().drive());
+    let node = &scene.roms[0].contact_nodes[event.node];
+    let angle = y.atan2(x);
+    let shape = Surface::new(&settings.surfaces[0].shape, GAP)
+        .map_or(0.0, |shape| shape.evaluate(angle - drive.shape_rotation).0);
+    let radius = node.position[0]
+        + GAP
+        + drive.radius_change
+        + drive.shape_factor * shape
+        + node.meridional_slope * (z - node.position[2]);
+    [radius * angle.cos(), radius * angle.sin(), z]
+}
+
+fn turned([x, y, z]: [f64; 3], angle: f64) -> [f64; 3] {
+    let (sine, cosine) = angle.sin_cos();
+    [x * cosine - y * sine, x * sine + y * cosine, z]
+}
+
+fn add(sum: &mut [f64; 3], factor: f64, term: [f64; 3]) {
+    *sum = std::array::from_fn(|i| sum[i] + factor * term[i]);
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
