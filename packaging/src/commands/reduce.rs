@@ -1,6 +1,9 @@
 //! `tiprub reduce`: from a blade or a casing to a ROM file, with its checks.
 
-use std::{fmt::Write as _, path::Path};
+use std::{
+    fmt::Write as _,
+    path::{Path, PathBuf},
+};
 
 use serde_json::{Value, json};
 use tiprub_model::{
@@ -30,21 +33,18 @@ use crate::{
 /// # Errors
 /// Counts that do not fit the mesh, wrong files, or files that cannot be written.
 pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
+    // What would fail after the work is said before it.
+    let named = arguments.output.clone().or_else(|| expected_output(arguments));
+    [&named, &arguments.inp, &arguments.vtk].into_iter().flatten().try_for_each(|path| check_target(path, arguments))?;
     let reduced = reduced(arguments, console)?;
-    let default_output = format!("{}.rom.safetensors", reduced.rom.name);
-    let output = &arguments.output.clone().unwrap_or_else(|| default_output.into());
-    let facts = RomFacts::of(&reduced.rom)?;
+    let output = &named.unwrap_or_else(|| output_of(&reduced.rom.name));
+    let facts = RomFacts::of(&reduced.rom, None)?;
     let mut files = vec![(output, tiprub_format::write_rom(&reduced.rom))];
     if let Some(path) = &arguments.inp {
         files.push((path, reduced.calculix()?));
     }
     if let Some(path) = &arguments.vtk {
         files.push((path, reduced.vtk()?));
-    }
-    if !arguments.force {
-        for (path, bytes) in &files {
-            output_file::refuse_to_replace(path, bytes, "Choose another file, or replace it with --force")?;
-        }
     }
     for (path, bytes) in &files {
         output_file::write(path, bytes)?;
@@ -55,6 +55,32 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     console.warn(&warnings);
     let paths: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
     Ok(Outcome { text: text(&reduced, &facts, &paths), json: json(&reduced, &facts, arguments, output, &warnings) })
+}
+
+fn output_of(name: &str) -> PathBuf {
+    format!("{name}.rom.safetensors").into()
+}
+
+/// The file that is written where none is named: that of the name which the model will have.
+fn expected_output(arguments: &ReduceArguments) -> Option<PathBuf> {
+    let name = match &arguments.model {
+        Some(Model::Rotor37) => "rotor37".to_owned(),
+        Some(Model::Casing) => casing_arguments::options(arguments).ok()?.name,
+        Some(Model::Stage) => builtin::stage(arguments.coarse).0.to_owned(),
+        Some(Model::StageCasing) => builtin::stage_casing(arguments.coarse).name,
+        Some(Model::Cube | Model::Ring(_)) => return None,
+        Some(Model::File(_)) | None => users_model::name(arguments),
+    };
+    Some(output_of(&name))
+}
+
+/// Whether a file can be written there, and replaces none without being told to. Devices and pipes take whatever comes.
+fn check_target(path: &Path, arguments: &ReduceArguments) -> Result<()> {
+    if path.is_file() && !arguments.force {
+        let remedy = "Choose another file, or replace it with --force";
+        return Err(Failure::new(path.display(), "is there already", remedy));
+    }
+    output_file::begin(path).map(drop)
 }
 
 /// For people.
