@@ -8,10 +8,7 @@ use tiprub_model::cube::{MassMatrix, Side};
 use crate::{Failure, casing_arguments::CasingArguments, file_arguments::FileArguments, rom_cache::RomCache};
 
 /// A command line that is not understood, for programs: where `--json` is among the `arguments`, and it asks for no help.
-pub fn usage_failure(
-    error: &clap::Error,
-    mut arguments: impl Iterator<Item = std::ffi::OsString>,
-) -> Option<Failure> {
+pub fn usage_failure(error: &clap::Error, mut arguments: impl Iterator<Item = std::ffi::OsString>) -> Option<Failure> {
     let asked = arguments.by_ref().take_while(|argument| argument != "--").any(|argument| argument == "--json");
     // Of help the exit code is 0.
     if !asked || error.exit_code() == 0 {

@@ -192,8 +192,7 @@ fn choose(imported: &Imported, arguments: &ReduceArguments) -> Result<Chosen> {
         fixed.extend(boundary.pairs.iter().flatten());
         fixed.sort_unstable();
     }
-    let free: Vec<usize> =
-        contact_nodes.into_iter().filter(|node| fixed.binary_search(node).is_err()).collect();
+    let free: Vec<usize> = contact_nodes.into_iter().filter(|node| fixed.binary_search(node).is_err()).collect();
     if free.is_empty() {
         let problem = "all of its nodes are clamped or lie on the faces to the neighbours";
         return Err(Failure::new(format!("--contact-set {contact_set}"), problem, "Choose a set whose nodes can move"));
@@ -394,7 +393,8 @@ fn nodes_of(imported: &Imported, text: &str, option: &str) -> Result<(Vec<usize>
     for number in numbers {
         let found = imported.node_numbers.iter().position(|own| *own == number);
         nodes.push(found.ok_or_else(|| {
-            let remedy = "Give the name of a set, or numbers of nodes of the file that belong to solid elements: 12,57,103";
+            let remedy =
+                "Give the name of a set, or numbers of nodes of the file that belong to solid elements: 12,57,103";
             Failure::new(format!("{option} {text}"), format!("the model has no node {number}"), remedy)
         })?);
     }

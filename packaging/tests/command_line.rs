@@ -521,9 +521,11 @@ fn results_that_stdout_does_not_take_are_a_failure() {
 #[test]
 fn a_command_line_that_is_not_understood_is_answered_in_json_too() {
     let project = Project::new();
-    for line in ["run --json", "frobnicate --json", "--json run scene.toml --stop", "package scene.toml --fmi 4 --json"] {
+    for line in ["run --json", "frobnicate --json", "--json run scene.toml --stop", "package scene.toml --fmi 4 --json"]
+    {
         let output = project.run(&line.split(' ').collect::<Vec<_>>());
-        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{line}: {error}"));
+        let json: serde_json::Value =
+            serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{line}: {error}"));
         assert_eq!((output.status.code(), json["error"]["exit_code"].as_u64()), (Some(2), Some(2)), "{line}");
         assert!(json["error"]["problem"].as_str().is_some_and(|text| !text.is_empty()), "{json}");
         assert!(!output.stderr.is_empty());
@@ -537,7 +539,8 @@ fn a_command_line_that_is_not_understood_is_answered_in_json_too() {
 fn a_run_is_warned_for_the_step_it_takes() {
     let project = Project::new();
     // 2/omega_max of the springs is 2 ms.
-    let scene = SCENE.replace("step = 1e-4", "step = 3e-3").replace("lobes\", amplitude = 2e-3", "lobes\", amplitude = 2e-6");
+    let scene =
+        SCENE.replace("step = 1e-4", "step = 3e-3").replace("lobes\", amplitude = 2e-3", "lobes\", amplitude = 2e-6");
     fs::write(project.path("scene.toml"), scene).unwrap();
     let warnings = |arguments: &[&str]| {
         let output = project.run(&[&["run", "scene.toml", "--quiet"], arguments].concat());
@@ -553,8 +556,11 @@ fn a_run_is_warned_for_the_step_it_takes() {
 #[test]
 fn slips_are_asked_about_by_every_command() {
     let project = Project::new();
-    fs::write(project.path("scene.toml"), SCENE.replace("speed = 100.0", "speed = 17188.0").replace("1e-3\n", "1e-4\n"))
-        .unwrap();
+    fs::write(
+        project.path("scene.toml"),
+        SCENE.replace("speed = 100.0", "speed = 17188.0").replace("1e-3\n", "1e-4\n"),
+    )
+    .unwrap();
     for line in [
         "run scene.toml --stop 1e-4 --step 1e-5",
         "inspect scene.toml",
@@ -580,7 +586,8 @@ fn slips_are_asked_about_by_every_command() {
 #[test]
 fn gaps_of_sectors_stand_for_the_gap_and_heat_needs_friction() {
     let project = Project::new();
-    fs::write(project.path("scene.toml"), SCENE.replace("gap = 1e-3", "sector_gaps = [1e-3, 1e-3, 1.2e-3, 1e-3]")).unwrap();
+    fs::write(project.path("scene.toml"), SCENE.replace("gap = 1e-3", "sector_gaps = [1e-3, 1e-3, 1.2e-3, 1e-3]"))
+        .unwrap();
     let (names, rows) = columns(&project.succeed(&["run", "scene.toml", "--csv", "-", "--quiet"]));
     let clearance = names.iter().position(|name| name == "clearance_minimum").unwrap();
     assert!(rows.last().unwrap()[clearance] <= 1e-3);

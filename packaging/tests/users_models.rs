@@ -311,7 +311,9 @@ fn contact_nodes_are_given_by_number_and_slips_of_tip_and_axis_are_asked_about()
     let line = "reduce blade_hex8.inp --sectors 36 --units mm-t-s --modes 4 --force";
     let swapped = project.succeed(&format!("{line} --contact-set ROOT --clamp-set TIP"));
     assert!(swapped["warnings"].to_string().contains("tip and root"), "{}", swapped["warnings"]);
-    let turned = project.succeed(&format!("{line} --contact-set TIP --clamp-set ROOT --axis x --sectors 400").replacen("--sectors 36 ", "", 1));
+    let turned = project.succeed(
+        &format!("{line} --contact-set TIP --clamp-set ROOT --axis x --sectors 400").replacen("--sectors 36 ", "", 1),
+    );
     assert!(turned["warnings"].to_string().contains("axis"), "{}", turned["warnings"]);
     let right = project.succeed(&format!("{line} --contact-set TIP --clamp-set ROOT"));
     assert!(!right["warnings"].to_string().contains("axis"), "{}", right["warnings"]);

@@ -154,6 +154,8 @@ fn inspect_resources(fmu: &UnpackedFmu, console: &Console) -> Result<Option<(Str
 fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
     let settings = &scene.settings;
     let in_scene = |error| Failure::from_core(format!("scene `{}`", settings.name), error);
+    // Of many coupled sectors it takes long.
+    let task = console.task(&format!("Checking limits of {}", settings.name), None);
     let mut simulation = Simulation::new(scene).map_err(in_scene)?;
     simulation.initialise(settings.experiment.start).map_err(in_scene)?;
     let table = simulation.table();
@@ -172,7 +174,6 @@ fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
         scalars(Causality::Parameter),
         scalars(Causality::Output)
     );
-    console.warn(simulation.warnings());
     for reversed in simulation.if_reversed() {
         let _ = writeln!(text, "  turned back   {reversed}");
     }
@@ -184,6 +185,8 @@ fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
         let _ = write!(text, "\n{}", facts.to_text());
         roms.push(facts.to_json());
     }
+    drop(task);
+    console.warn(simulation.warnings());
     let json = json!({
         "settings": serde_json::to_value(settings).unwrap_or(Value::Null),
         "features": features,

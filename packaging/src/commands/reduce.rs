@@ -35,7 +35,10 @@ use crate::{
 pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     // What would fail after the work is said before it.
     let named = arguments.output.clone().or_else(|| expected_output(arguments));
-    [&named, &arguments.inp, &arguments.vtk].into_iter().flatten().try_for_each(|path| check_target(path, arguments))?;
+    [&named, &arguments.inp, &arguments.vtk]
+        .into_iter()
+        .flatten()
+        .try_for_each(|path| check_target(path, arguments))?;
     let reduced = reduced(arguments, console)?;
     let output = &named.unwrap_or_else(|| output_of(&reduced.rom.name));
     let facts = RomFacts::of(&reduced.rom, None)?;

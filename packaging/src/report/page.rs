@@ -160,7 +160,10 @@ fn rom_section(facts: &[RomFacts]) -> String {
                 format!("{} rad/s", scientific(fact.largest_angular_frequency)),
             ),
             ("largest internal step", format!("{}: {}", fact.steps_hold_for(), steps.join("; "))),
-            ("all modes resolved up to", format!("{} s (2/ω<sub>max</sub>)", scientific(fact.central_difference_limit))),
+            (
+                "all modes resolved up to",
+                format!("{} s (2/ω<sub>max</sub>)", scientific(fact.central_difference_limit)),
+            ),
             ("contact problem solvable up to µ", format!("{friction} (all nodes closed; tried up to 2)")),
         ]));
         html.push_str(&checks_table(&fact.checks()));

@@ -36,6 +36,11 @@ pub fn of_speed(rom: &Rom, speed: f64) -> Option<String> {
     })
 }
 
+/// Speed up to which tips are not asked about (rad/s).
+pub fn fastest(rom: &Rom) -> f64 {
+    if rom.frame == Frame::Cylindrical { TIP_SPEED / radii(rom)[1] } else { f64::INFINITY }
+}
+
 /// A free body that is too fast at `velocity` (m/s).
 pub fn of_velocity(velocity: [f64; 3]) -> Option<String> {
     let size = velocity.iter().map(|component| component * component).sum::<f64>().sqrt();
@@ -99,7 +104,8 @@ fn of_sectors(rom: &Rom) -> Option<String> {
     #[expect(clippy::cast_precision_loss, reason = "at most 10 000 sectors")]
     let pitch = std::f64::consts::TAU / rom.sectors as f64;
     let line: Vec<[f64; 2]> = developed(rom);
-    let (low, high) = line.iter().fold((0.0_f64, 0.0_f64), |(low, high), [angle, _]| (low.min(*angle), high.max(*angle)));
+    let (low, high) =
+        line.iter().fold((0.0_f64, 0.0_f64), |(low, high), [angle, _]| (low.min(*angle), high.max(*angle)));
     let how = if high - low > PITCHES * pitch {
         format!("its contact nodes span {:.4} rad, {:.1} times", high - low, (high - low) / pitch)
     } else if crosses_neighbour(&line, pitch) {

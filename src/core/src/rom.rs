@@ -273,7 +273,8 @@ impl Rom {
                 let problem = format!("{} values, {order} finite ones expected", load.len());
                 return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
             }
-            load.iter().try_for_each(|value| ranges::at_most(&format!("ROM array `{name}`"), *value, ranges::MATRIX))?;
+            load.iter()
+                .try_for_each(|value| ranges::at_most(&format!("ROM array `{name}`"), *value, ranges::MATRIX))?;
         }
         if !(spin.largest_speed.is_finite() && spin.largest_speed > 0.0) {
             let problem = format!("{} rad/s is not a finite speed > 0", shown(spin.largest_speed));

@@ -70,7 +70,9 @@ fn communication() -> Vec<Case> {
                 Expected::right("finite outputs")
             };
             let case = move |_: &_| Happened::of(from(0.0, scheme, length));
-            cases.push(Case::new(format!("communication/from-0/H={length:e}/{scheme_name}"), expected, case).quick(true));
+            cases.push(
+                Case::new(format!("communication/from-0/H={length:e}/{scheme_name}"), expected, case).quick(true),
+            );
         }
     }
     cases

@@ -320,11 +320,9 @@ fn refusals(field: &str) -> &'static [&'static [&'static str]] {
         "damping_ratio" => &[&["structure[1].damping_ratio", "between 0 and 0.99"]],
         "frequency_factors" => &[&["structure[1].frequency_factors[4]", "between 0.5 and 2"]],
         "gap" => &[&["contact[1].gap", "> 0"], &["contact[1].gap", "1e-12"], &["contact.gap", "in metres"]],
-        "sector_gaps" => &[
-            &["contact[1].sector_gaps", "> 0"],
-            &["contact[1].sector_gaps", "1e-12"],
-            &["contact.gap", "in metres"],
-        ],
+        "sector_gaps" => {
+            &[&["contact[1].sector_gaps", "> 0"], &["contact[1].sector_gaps", "1e-12"], &["contact.gap", "in metres"]]
+        }
         "friction" => &[&["contact[1].friction", "between 0 and 2"]],
         "ramp_time" => &[
             &["surface[1].ramp_time", "between 0 and 1e9"],
@@ -341,7 +339,11 @@ fn refusals(field: &str) -> &'static [&'static [&'static str]] {
         "rom.slope" => &[&["`meridional_slopes`", "between -1e3 and 1e3"], &["µ"]],
         "rom.map" => &[&["`contact_map`", "beyond ±1e15"], &["µ"], &["small displacements"]],
         "shape.width" => &[&["surface[1].shape.width", "between 0.001 and 0.25"]],
-        "rom.mass" => &[&["`mass`", "beyond ±1e30"], &["`mass`", "not positive definite"], &["`mass` and `stiffness`", "orders of magnitude"]],
+        "rom.mass" => &[
+            &["`mass`", "beyond ±1e30"],
+            &["`mass`", "not positive definite"],
+            &["`mass` and `stiffness`", "orders of magnitude"],
+        ],
         "rom.stiffness" => &[
             &["`stiffness`", "beyond ±1e30"],
             &["`mass` and `stiffness`", "orders of magnitude"],

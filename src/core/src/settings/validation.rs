@@ -191,7 +191,8 @@ impl SurfaceSettings {
         within(&format!("{at}.ramp_time"), self.ramp_time, 0.0, ranges::TIME)?;
         self.validate_carrier(scene, at)?;
         if let Some(SplineSettings { around, along, .. }) = self.spline {
-            let ([least_around, most_around], [least_along, most_along]) = (ranges::SPLINE_AROUND, ranges::SPLINE_ALONG);
+            let ([least_around, most_around], [least_along, most_along]) =
+                (ranges::SPLINE_AROUND, ranges::SPLINE_ALONG);
             count(&format!("{at}.spline.around"), around, least_around, most_around)?;
             count(&format!("{at}.spline.along"), along, least_along, most_along)?;
         }

@@ -91,7 +91,7 @@ impl Simulation {
             let mut parameters = self.parameters();
             parameters.friction = value;
             let warnings = self.check_limits(&parameters)?;
-            warnings.into_iter().for_each(|text| self.note(text));
+            self.tell_of_friction(warnings);
             self.system.set_friction(value);
         }
         let offset = self.offset_now();

@@ -50,7 +50,9 @@ impl Compiled {
     pub fn doubts(&self) -> Vec<String> {
         let (master, rom) = self.master();
         let mut doubts = match &self.wheel {
-            Some(wheel) => plausibility::of_rom(rom, wheel.diameters.iter().flat_map(|one| one.frequencies.iter().copied())),
+            Some(wheel) => {
+                plausibility::of_rom(rom, wheel.diameters.iter().flat_map(|one| one.frequencies.iter().copied()))
+            }
             None => plausibility::of_rom(rom, self.model.frequencies.iter().copied()),
         };
         let flat = self.roles.carrier.into_iter().zip(&self.carrier);

@@ -11,9 +11,9 @@ use crate::settings::{Meridian, Scheme, Solver};
 use crate::stability::massless::MasslessLimit;
 use crate::stability::{self, ContactDirections, Growth, massless};
 use crate::variables::Quantity;
-pub(super) use told::Told;
 use crate::{Error, Result, shown};
 use nalgebra::DMatrix;
+pub(super) use told::Told;
 
 /// Contact nodes up to this number are looked at in every combination; beyond, alone, in neighbouring pairs, and all.
 const ALL_COMBINATIONS_UP_TO: usize = 3;

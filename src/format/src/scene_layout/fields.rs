@@ -140,7 +140,13 @@ pub const FIELDS: [SceneField; 69] = [
         "up to a tenth of the radius in size",
         "`lobes`: the casing radius changes by −amplitude·cos(order·θ − phase).",
     ),
-    field("surface.shape.order", "whole number", None, "1 to 1000000", "`lobes`: number of lobes around the circumference."),
+    field(
+        "surface.shape.order",
+        "whole number",
+        None,
+        "1 to 1000000",
+        "`lobes`: number of lobes around the circumference.",
+    ),
     field(
         "surface.shape.phase",
         "number, rad",
@@ -395,5 +401,11 @@ pub const FIELDS: [SceneField; 69] = [
     ),
     field("experiment.start", "number, s", Some("0"), "-1e9 to 1e9", "Start time proposed to the importer."),
     field("experiment.stop", "number, s", None, "> start, up to 1e9", "Stop time proposed to the importer."),
-    field("experiment.communication_step", "number, s", None, "1e-12 to 1e9", "Communication step proposed to the importer."),
+    field(
+        "experiment.communication_step",
+        "number, s",
+        None,
+        "1e-12 to 1e9",
+        "Communication step proposed to the importer.",
+    ),
 ];

@@ -1,10 +1,9 @@
 //! Scenes with a free master, and how many contact pairs a scene may have.
 
-use crate::settings::{
-    Closure, ContactSettings, Meridian, Motion, SceneSettings, Scheme, Shape, StructureSettings,
-    SurfaceSettings,
-};
 use crate::ranges::{self, at_most, within};
+use crate::settings::{
+    Closure, ContactSettings, Meridian, Motion, SceneSettings, Scheme, Shape, StructureSettings, SurfaceSettings,
+};
 use crate::{Error, Result};
 
 impl SceneSettings {

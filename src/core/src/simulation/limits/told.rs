@@ -20,8 +20,10 @@ pub struct Told {
     steps: [f64; KINDS],
     /// Senses of slip, + and −.
     senses: [bool; 2],
-    /// Tips too fast.
-    tips: bool,
+    /// Speed beyond which tips are too fast (rad/s); infinite once that was told.
+    fastest: f64,
+    /// Most warnings at once of one friction coefficient.
+    friction: usize,
 }
 
 impl Simulation {
@@ -33,11 +35,21 @@ impl Simulation {
             self.told.steps[kind] = if self.doubt(kind, expected).is_some() { expected } else { 0.0 };
         }
         senses_of(sense).for_each(|sense| self.told.senses[sense] = true);
+        let limits = self.limits.as_ref();
+        self.told.friction = limits.and_then(|limits| limits.warnings(sense).ok()).map_or(0, |warnings| warnings.len());
+        let (rom, speed) = (self.compiled.master().1, self.inputs.speed.value);
+        let fast = plausibility::of_speed(rom, speed);
+        self.told.fastest = if fast.is_some() { f64::INFINITY } else { plausibility::fastest(rom) };
         let doubts = self.compiled.doubts();
-        self.warnings.extend(doubts);
-        let fast = plausibility::of_speed(self.compiled.master().1, self.inputs.speed.value);
-        self.told.tips = fast.is_some();
-        self.warnings.extend(fast);
+        self.warnings.extend(doubts.into_iter().chain(fast));
+    }
+
+    /// Warnings of another friction coefficient, unless as many were told before.
+    pub(in crate::simulation) fn tell_of_friction(&mut self, warnings: Vec<String>) {
+        if warnings.len() > self.told.friction {
+            self.told.friction = warnings.len();
+            warnings.into_iter().for_each(|text| self.note(text));
+        }
     }
 
     /// Tell what holds for a step (s) and for speeds (rad/s) that were not told about. Allocates only to tell.
@@ -51,10 +63,10 @@ impl Simulation {
             }
         }
         for speed in speeds {
-            if !self.told.tips
+            if speed.abs() > self.told.fastest
                 && let Some(text) = plausibility::of_speed(self.compiled.master().1, speed)
             {
-                self.told.tips = true;
+                self.told.fastest = f64::INFINITY;
                 self.note(text);
             }
             for sense in senses_of(speed).filter(|_| speed != 0.0) {
