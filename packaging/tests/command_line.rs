@@ -488,7 +488,7 @@ fn a_casing_is_reduced_and_options_of_the_other_model_are_refused() {
     assert!(error.contains("describes a casing"), "{error}");
     let error = project.fail(&["reduce", "casing", "--contact-nodes", "3"], 2);
     assert!(error.contains("--contact-grid"), "{error}");
-    let error = project.fail(&["reduce", "casing", "--mesh", "30x1x8"], 1);
+    let error = project.fail(&["reduce", "casing", "--mesh", "30x1x8", "--force"], 1);
     assert!(error.contains("not a multiple of the 24 contact nodes"), "{error}");
 }
 
@@ -558,7 +558,10 @@ fn slips_are_asked_about_by_every_command() {
     let project = Project::new();
     fs::write(
         project.path("scene.toml"),
-        SCENE.replace("speed = 100.0", "speed = 17188.0").replace("1e-3\n", "1e-4\n"),
+        SCENE
+            .replace("speed = 100.0", "speed = 17188.0")
+            .replace("step = 1e-4", "step = 1e-5")
+            .replace("amplitude = 2e-3", "amplitude = 2e-6"),
     )
     .unwrap();
     for line in [

@@ -296,7 +296,7 @@ fn a_casing_of_ones_own_is_the_casing_that_ships() {
 #[test]
 fn contact_nodes_are_given_by_number_and_slips_of_tip_and_axis_are_asked_about() {
     let project = Project::new(&["blade_hex8.inp"]);
-    let line = "reduce blade_hex8.inp --clamp-set ROOT --sectors 36 --units mm-t-s --modes 4 --force";
+    let line = "reduce blade_hex8.inp --clamp-set ROOT --sectors 36 --units mm-t-s --material steel --modes 4 --force";
     let told = project.succeed(&format!("{line} --contact-set TIP -o set.rom.safetensors"));
     let numbers: Vec<String> =
         told["model"]["contact_nodes"].as_array().unwrap().iter().map(|node| node["node"].to_string()).collect();
@@ -308,7 +308,7 @@ fn contact_nodes_are_given_by_number_and_slips_of_tip_and_axis_are_asked_about()
     let error = project.fail(&format!("{line} --contact-set 1,999999999"), 1);
     assert!(error.contains("no node 999999999"), "{error}");
     // Held at the tip, touching with the root.
-    let line = "reduce blade_hex8.inp --sectors 36 --units mm-t-s --modes 4 --force";
+    let line = "reduce blade_hex8.inp --sectors 36 --units mm-t-s --material steel --modes 4 --force";
     let swapped = project.succeed(&format!("{line} --contact-set ROOT --clamp-set TIP"));
     assert!(swapped["warnings"].to_string().contains("tip and root"), "{}", swapped["warnings"]);
     let turned = project.succeed(

@@ -34,13 +34,10 @@ use crate::{
 /// Counts that do not fit the mesh, wrong files, or files that cannot be written.
 pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     // What would fail after the work is said before it.
-    let named = arguments.output.clone().or_else(|| expected_output(arguments));
-    [&named, &arguments.inp, &arguments.vtk]
-        .into_iter()
-        .flatten()
-        .try_for_each(|path| check_target(path, arguments))?;
+    let output = &arguments.output.clone().map_or_else(|| expected_output(arguments), Ok)?;
+    let others = arguments.inp.iter().chain(&arguments.vtk);
+    std::iter::once(output).chain(others).try_for_each(|path| check_target(path, arguments))?;
     let reduced = reduced(arguments, console)?;
-    let output = &named.unwrap_or_else(|| output_of(&reduced.rom.name));
     let facts = RomFacts::of(&reduced.rom, None)?;
     let mut files = vec![(output, tiprub_format::write_rom(&reduced.rom))];
     if let Some(path) = &arguments.inp {
@@ -60,21 +57,21 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     Ok(Outcome { text: text(&reduced, &facts, &paths), json: json(&reduced, &facts, arguments, output, &warnings) })
 }
 
-fn output_of(name: &str) -> PathBuf {
-    format!("{name}.rom.safetensors").into()
-}
-
 /// The file that is written where none is named: that of the name which the model will have.
-fn expected_output(arguments: &ReduceArguments) -> Option<PathBuf> {
+fn expected_output(arguments: &ReduceArguments) -> Result<PathBuf> {
     let name = match &arguments.model {
         Some(Model::Rotor37) => "rotor37".to_owned(),
-        Some(Model::Casing) => casing_arguments::options(arguments).ok()?.name,
+        Some(Model::Casing) => casing_arguments::options(arguments)?.name,
         Some(Model::Stage) => builtin::stage(arguments.coarse).0.to_owned(),
         Some(Model::StageCasing) => builtin::stage_casing(arguments.coarse).name,
-        Some(Model::Cube | Model::Ring(_)) => return None,
+        Some(Model::Cube) => builtin::CUBE.to_owned(),
+        Some(Model::Ring(side)) => {
+            let [left, right] = builtin::RINGS;
+            (if *side == left.1 { left.0 } else { right.0 }).to_owned()
+        }
         Some(Model::File(_)) | None => users_model::name(arguments),
     };
-    Some(output_of(&name))
+    Ok(format!("{name}.rom.safetensors").into())
 }
 
 /// Whether a file can be written there, and replaces none without being told to. Devices and pipes take whatever comes.
@@ -83,7 +80,11 @@ fn check_target(path: &Path, arguments: &ReduceArguments) -> Result<()> {
         let remedy = "Choose another file, or replace it with --force";
         return Err(Failure::new(path.display(), "is there already", remedy));
     }
-    output_file::begin(path).map(drop)
+    if path.exists() {
+        return output_file::begin(path).map(drop);
+    }
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    output_file::try_directory(directory.unwrap_or(Path::new(".")))
 }
 
 /// For people.
