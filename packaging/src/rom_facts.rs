@@ -14,7 +14,7 @@ use tiprub_core::{
 
 use crate::{
     Failure, Result,
-    step_limits::{StepLimit, step_limits},
+    step_limits::{Sliding, StepLimit, step_limits},
 };
 
 /// Friction coefficients for which solvability is tried, ascending.
@@ -52,10 +52,10 @@ pub struct RomFacts {
     /// Largest friction coefficient (in steps of 0.05, up to 2) for which the contact problem with all nodes of one
     /// sector closed has a unique solution at h = 1/ω_max, for slip in both directions; `None` if not even for 0.
     pub solvable_friction: Option<f64>,
-    /// Largest internal step of every scheme, with the friction given.
+    /// Internal step of every scheme below which all are accepted, with the contact given.
     pub step_limits: Vec<StepLimit>,
-    /// That friction, where one was given.
-    pub friction: Option<f64>,
+    /// The contact they hold for, where it was given.
+    pub sliding: Option<Sliding>,
 }
 
 /// One row of the table of checks.
@@ -74,11 +74,11 @@ pub struct CheckRow {
 }
 
 impl RomFacts {
-    /// Work out the facts of a ROM; `friction` is µ of its contact, where a scene gives it.
+    /// Work out the facts of a ROM; `sliding` is its contact, where a scene gives it.
     ///
     /// # Errors
     /// A ROM whose eigenproblem cannot be solved.
-    pub fn of(rom: &Rom, friction: Option<f64>) -> Result<Self> {
+    pub fn of(rom: &Rom, sliding: Option<Sliding>) -> Result<Self> {
         let in_rom = |error| Failure::from_core(format!("ROM `{}`", rom.name), error);
         let hertz = |frequencies: &[f64]| frequencies.iter().map(|omega| omega / std::f64::consts::TAU).collect();
         let mut by_nodal_diameter: Vec<Vec<f64>> = Vec::new();
@@ -100,8 +100,8 @@ impl RomFacts {
             largest_angular_frequency: models.iter().map(ModalModel::largest_frequency).fold(0.0, f64::max),
             central_difference_limit: limits.fold(f64::INFINITY, f64::min),
             solvable_friction: solvable_friction(rom, &models),
-            step_limits: step_limits(rom, &models, friction, &[1.0, -1.0].map(|sign| closed_contacts(rom, sign))),
-            friction,
+            step_limits: step_limits(rom, &models, sliding, &[1.0, -1.0].map(|sign| closed_contacts(rom, sign))),
+            sliding,
         })
     }
 
@@ -206,16 +206,22 @@ impl RomFacts {
 
     /// What the limits hold for.
     pub(crate) fn steps_hold_for(&self) -> String {
-        match self.friction {
-            Some(friction) if friction > 0.0 && !self.rom.is_cyclic() => format!("of one sector, with µ = {friction}"),
-            Some(friction) if friction > 0.0 => "of one wheel; with friction a scene may ask for less".to_owned(),
+        match self.sliding {
+            Some(Sliding { friction, speed }) if friction > 0.0 && !self.rom.is_cyclic() => {
+                let sense = if speed > 0.0 { "+θ" } else { "−θ" };
+                let sense = if speed == 0.0 { "either sense" } else { sense };
+                format!("of one sector, with µ = {friction} and sliding in {sense}")
+            }
+            Some(sliding) if sliding.friction > 0.0 => {
+                "of the wheel; with friction a scene may ask for less".to_owned()
+            }
             Some(_) => "without friction".to_owned(),
             None => "without friction; with it a scene may ask for less".to_owned(),
         }
     }
 
     fn steps_text(&self) -> String {
-        let mut text = format!("  largest internal step     {}\n", self.steps_hold_for());
+        let mut text = format!("  all steps accepted below  {}\n", self.steps_hold_for());
         for limit in &self.step_limits {
             let _ = writeln!(text, "    {:<24}{}", limit.scheme, limit.to_text());
         }
@@ -303,7 +309,7 @@ impl RomFacts {
                 "central-difference": self.step_limit("central-difference"),
                 "modal-exact": self.step_limit("modal-exact"),
                 "massless-boundary": self.step_limit("massless-boundary"),
-                "friction": self.friction,
+                "friction": self.sliding.map(|sliding| sliding.friction),
                 "modal-exact_resolves_all_modes_up_to": self.central_difference_limit,
             },
             "solvable_up_to_friction": self.solvable_friction,

@@ -1,4 +1,5 @@
-//! Largest internal step of each scheme with one structure, sought with the very checks that refuse steps.
+//! Internal step of each scheme with one structure below which all are accepted, sought with the very checks that refuse
+//! steps. Longer ones may be accepted too: growth by friction comes in bands.
 
 use tiprub_core::{
     Rom,
@@ -21,6 +22,15 @@ const TRIED: [f64; 2] = [0.1, 1e3];
 const HALVINGS: u32 = 7;
 /// Contact nodes up to this number are closed in every combination; of more, each alone, neighbours, and all.
 const ALL_COMBINATIONS_UP_TO: usize = 3;
+
+/// What is known of the contact from a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sliding {
+    /// Friction coefficient µ.
+    pub friction: f64,
+    /// Speed at the start (rad/s), whose sign is the sense of slip; both senses where it is 0.
+    pub speed: f64,
+}
 
 /// How far a scheme goes.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,16 +71,17 @@ impl StepLimit {
     }
 }
 
-/// Limits of every scheme for a structure whose `models` are its sector, or all nodal diameters of coupled sectors; `friction`
-/// is µ of its contact where it is known. With coupled sectors, growth by friction is left to the scene. `closed` are the
+/// Limits of every scheme for a structure whose `models` are its sector, or all nodal diameters of coupled sectors; `sliding`
+/// is its contact where it is known. With coupled sectors, growth by friction is left to the scene. `closed` are the
 /// directions of all contact nodes for slip in +θ and −θ.
 pub fn step_limits(
     rom: &Rom,
     models: &[ModalModel],
-    friction: Option<f64>,
+    sliding: Option<Sliding>,
     closed: &[ContactDirections; 2],
 ) -> Vec<StepLimit> {
-    let seeker = Seeker { rom, models, friction: friction.unwrap_or(0.0), closed };
+    let sliding = sliding.unwrap_or(Sliding { friction: 0.0, speed: 0.0 });
+    let seeker = Seeker { rom, models, sliding, closed };
     // A Cartesian ROM flies freely or stands still, where massless-boundary is not made or not asked for.
     let schemes = SCHEMES.iter().take(if rom.frame == Frame::Cartesian { 2 } else { 3 });
     schemes.map(|(scheme, name)| StepLimit { scheme: name, limit: seeker.limit(*scheme) }).collect()
@@ -79,7 +90,7 @@ pub fn step_limits(
 struct Seeker<'a> {
     rom: &'a Rom,
     models: &'a [ModalModel],
-    friction: f64,
+    sliding: Sliding,
     closed: &'a [ContactDirections; 2],
 }
 
@@ -141,14 +152,16 @@ impl Seeker<'_> {
             return false;
         }
         let [model] = self.models else { return true };
-        if self.friction == 0.0 || self.rom.is_cyclic() {
+        let Sliding { friction, speed } = self.sliding;
+        if friction == 0.0 || self.rom.is_cyclic() {
             return true;
         }
         self.combinations().iter().all(|nodes| {
             let seen = model.with_nodes(nodes);
-            self.closed.iter().all(|closed| {
+            let senses = self.closed.iter().zip([speed >= 0.0, speed <= 0.0]).filter(|(_, slides)| *slides);
+            senses.into_iter().all(|(closed, _)| {
                 let directions = nodes.iter().map(|node| closed[*node]).collect();
-                let found = stability::growth(&seen, scheme, step, self.friction, &directions);
+                let found = stability::growth(&seen, scheme, step, friction, &directions);
                 found.is_none_or(|found| !found.is_added())
             })
         })

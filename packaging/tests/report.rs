@@ -67,7 +67,7 @@ fn a_report_is_complete_offline_and_small() {
         "leading edge",
         "eq. 12",
         "eq. 13",
-        "largest internal step",
+        "all internal steps accepted below",
         "bit for bit",
         "href=\"results.csv\"",
         "relative error of the displacements",

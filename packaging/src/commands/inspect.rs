@@ -21,6 +21,7 @@ use crate::{
     importer::{UnpackedFmu, open_archive, read_entry},
     rom_facts::RomFacts,
     scene_features, scene_source,
+    step_limits::Sliding,
 };
 
 /// Kinds of files, told apart by name and, where that does not help, by their first bytes.
@@ -179,9 +180,9 @@ fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
     }
     let mut roms = Vec::new();
     for (rom, structure) in scene.roms.iter().zip(&settings.structures) {
-        // The friction that blades slide with.
         let contact = settings.contacts.iter().find(|contact| contact.master == structure.name);
-        let facts = RomFacts::of(rom, contact.map(|contact| contact.friction))?;
+        let sliding = contact.map(|contact| Sliding { friction: contact.friction, speed: structure.speed });
+        let facts = RomFacts::of(rom, sliding)?;
         let _ = write!(text, "\n{}", facts.to_text());
         roms.push(facts.to_json());
     }

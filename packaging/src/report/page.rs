@@ -159,7 +159,7 @@ fn rom_section(facts: &[RomFacts]) -> String {
                 "largest angular frequency ω<sub>max</sub>",
                 format!("{} rad/s", scientific(fact.largest_angular_frequency)),
             ),
-            ("largest internal step", format!("{}: {}", fact.steps_hold_for(), steps.join("; "))),
+            ("all internal steps accepted below", format!("{}: {}", fact.steps_hold_for(), steps.join("; "))),
             (
                 "all modes resolved up to",
                 format!("{} s (2/ω<sub>max</sub>)", scientific(fact.central_difference_limit)),

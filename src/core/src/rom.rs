@@ -234,13 +234,14 @@ impl Rom {
     /// Lengths in metres, of a machine.
     fn validate_place(&self, index: usize, node: &ContactNode) -> Result<()> {
         let what = format!("ROM array `contact_positions`, node {}", index + 1);
-        let lengths = if self.frame == Frame::Cylindrical { [0, 2, 2] } else { [0, 1, 2] };
-        lengths.into_iter().try_for_each(|axis| ranges::at_most(&what, node.position[axis], ranges::POSITION))?;
+        let mut lengths = &node.position[..];
         if self.frame == Frame::Cylindrical {
             ranges::within(&what, node.position[0], ranges::SMALLEST_RADIUS, ranges::POSITION)?;
             ranges::at_most(&what, node.position[1], ranges::ANGLE)?;
+            lengths = &node.position[2..];
         }
-        let what = format!("ROM array `meridional_slopes`, node {}", index + 1);
+        lengths.iter().try_for_each(|length| ranges::at_most(&what, *length, ranges::POSITION))?;
+        let what = format!("ROM array `contact_meridional_slopes`, node {}", index + 1);
         ranges::at_most(&what, node.meridional_slope, ranges::SLOPE)
     }
 

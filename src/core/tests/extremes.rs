@@ -410,7 +410,9 @@ fn numbers_beyond_the_table_of_ranges_are_refused_by_name() {
         ("`contact_map`", -2e15, |scene, value| scene.roms[0].contact_map[(2, 2)] = value),
         ("`contact_positions`, node 2", 2.5e199, |scene, value| scene.roms[0].contact_nodes[1].position[0] = value),
         ("`contact_positions`, node 2", 1e-6, |scene, value| scene.roms[0].contact_nodes[1].position[0] = value),
-        ("`meridional_slopes`, node 3", 2e3, |scene, value| scene.roms[0].contact_nodes[2].meridional_slope = value),
+        ("`contact_meridional_slopes`, node 3", 2e3, |scene, value| {
+            scene.roms[0].contact_nodes[2].meridional_slope = value
+        }),
     ];
     for (named, value, change) in changes {
         let mut scene = common::scene(4);
