@@ -5,7 +5,19 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use tiprub_model::cube::{MassMatrix, Side};
 
-use crate::{casing_arguments::CasingArguments, file_arguments::FileArguments, rom_cache::RomCache};
+use crate::{Failure, casing_arguments::CasingArguments, file_arguments::FileArguments, rom_cache::RomCache};
+
+/// A command line that is not understood, for programs: where `--json` is among the `arguments`, and it asks for no help.
+pub fn usage_failure(error: &clap::Error, mut arguments: impl Iterator<Item = std::ffi::OsString>) -> Option<Failure> {
+    let asked = arguments.by_ref().take_while(|argument| argument != "--").any(|argument| argument == "--json");
+    // Of help the exit code is 0.
+    if !asked || error.exit_code() == 0 {
+        return None;
+    }
+    let text = error.render().to_string();
+    let problem = text.split("\n\nUsage:").next().unwrap_or(&text).trim().trim_start_matches("error: ").to_owned();
+    Some(Failure::usage("command line", problem, "See `tiprub --help`, or `--help` of the command"))
+}
 
 /// Blade-tip/casing contact (rub) as an FMU.
 #[derive(Debug, Parser)]
@@ -134,7 +146,7 @@ pub struct ReduceArguments {
     /// options change it].
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// Replace files that are there already and hold something else.
+    /// Replace files that are there already.
     #[arg(long)]
     pub force: bool,
     /// Also write the mesh as a CalculiX/Abaqus input file that computes its frequencies.

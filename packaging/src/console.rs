@@ -94,6 +94,11 @@ impl Console {
     /// Print a failure: text on stderr, and with `--json` the object on stdout.
     pub fn fail(&self, failure: &Failure) {
         let _ = writeln!(std::io::stderr(), "error: {failure}");
+        self.answer(failure);
+    }
+
+    /// With `--json`, the object of a failure on stdout.
+    pub fn answer(&self, failure: &Failure) {
         if self.json {
             let _ = writeln!(std::io::stdout(), "{:#}", failure.to_json());
         }

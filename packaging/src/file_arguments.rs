@@ -14,10 +14,11 @@ use crate::{Failure, Result, casing_arguments::MaterialChoice};
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 #[command(next_help_heading = "Options of a model of your own")]
 pub struct FileArguments {
-    /// Set of nodes that can touch the casing: contact nodes are taken from it.
+    /// Set of nodes that can touch the casing: contact nodes are taken from it. Or their numbers in the file, such as 12,57,103:
+    /// then all of them.
     #[arg(long, value_name = "SET")]
     pub contact_set: Option<String>,
-    /// Set of nodes that are held; may be repeated. `none`: the structure flies freely.
+    /// Set of nodes that are held, or their numbers in the file; may be repeated. `none`: the structure flies freely.
     #[arg(long, value_name = "SET")]
     pub clamp_set: Vec<String>,
     /// Names of the contact nodes, by growing z [default: tip_1,tip_2,...].

@@ -6,6 +6,7 @@
 //! - [`scene_source`]: a scene file (or the embedded rotor 37 scene) with its ROMs;
 //! - [`builtin`], [`rom_cache`]: the models that ship, reduced once and kept in the user's cache directory;
 //! - [`scene_features`]: what a scene asks for beyond a plain rub, and its limits, in words;
+//! - [`rom_facts`], [`step_limits`]: what is to be known of a ROM before it is trusted;
 //! - [`schedule`], [`recording`], [`native`]: communication points, the table of results, the run without FMI;
 //! - [`error_study`]: error against run time for every scheme and solver;
 //! - [`archive`], [`fmu`], [`library`]: the reproducible zip, its contents, and the shared library that goes in;
@@ -41,6 +42,7 @@ pub mod scene_features;
 pub mod scene_source;
 pub mod schedule;
 pub mod stability;
+pub mod step_limits;
 pub mod study;
 pub mod users_model;
 

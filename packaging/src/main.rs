@@ -3,10 +3,22 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use tiprub_packaging::{cli::Cli, commands, console::Console};
+use tiprub_packaging::{
+    cli::{self, Cli},
+    commands,
+    console::Console,
+};
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            if let Some(failure) = cli::usage_failure(&error, std::env::args_os().skip(1)) {
+                Console::new(true, true).answer(&failure);
+            }
+            error.exit()
+        }
+    };
     let console = Console::new(cli.quiet, cli.json);
     match commands::run(&cli.command, &console).and_then(|outcome| console.deliver(&outcome)) {
         Ok(()) => ExitCode::SUCCESS,

@@ -18,7 +18,7 @@ pub struct NativeRun {
     pub stepping: Duration,
     /// Internal steps done.
     pub internal_steps: u64,
-    /// Warnings of the initialisation and of the schedule.
+    /// Warnings of the initialisation, of the run and of the schedule.
     pub warnings: Vec<String>,
 }
 
@@ -32,9 +32,12 @@ pub fn run(
     settings: &[(String, String)],
     progress: &dyn Fn(usize),
 ) -> Result<NativeRun> {
-    let name = &scene.settings.name;
+    let name = scene.settings.name.clone();
     let in_scene = |error: tiprub_core::Error| Failure::from_core(format!("scene `{name}`"), error);
-    let mut simulation = Simulation::new(scene).map_err(in_scene)?;
+    // Checks and warnings are for the step that is taken.
+    let mut scene = scene.clone();
+    scene.settings.experiment.communication_step = schedule.time(1) - schedule.time(0);
+    let mut simulation = Simulation::new(&scene).map_err(in_scene)?;
     for (variable, value) in settings {
         set(&mut simulation, variable, value)?;
     }

@@ -6,12 +6,16 @@ use serde_json::{Value, json};
 use tiprub_core::{
     Rom,
     dynamics::{cyclic::CyclicModel, modal::ModalModel},
+    plausibility,
     rom::Frame,
     settings::Scheme,
     stability::{self, ContactDirections},
 };
 
-use crate::{Failure, Result};
+use crate::{
+    Failure, Result,
+    step_limits::{Sliding, StepLimit, step_limits},
+};
 
 /// Friction coefficients for which solvability is tried, ascending.
 const FRICTION_STEPS: u32 = 40;
@@ -48,6 +52,10 @@ pub struct RomFacts {
     /// Largest friction coefficient (in steps of 0.05, up to 2) for which the contact problem with all nodes of one
     /// sector closed has a unique solution at h = 1/ω_max, for slip in both directions; `None` if not even for 0.
     pub solvable_friction: Option<f64>,
+    /// Internal step of every scheme below which all are accepted, with the contact given.
+    pub step_limits: Vec<StepLimit>,
+    /// The contact they hold for, where it was given.
+    pub sliding: Option<Sliding>,
 }
 
 /// One row of the table of checks.
@@ -66,11 +74,11 @@ pub struct CheckRow {
 }
 
 impl RomFacts {
-    /// Work out the facts of a ROM.
+    /// Work out the facts of a ROM; `sliding` is its contact, where a scene gives it.
     ///
     /// # Errors
     /// A ROM whose eigenproblem cannot be solved.
-    pub fn of(rom: &Rom) -> Result<Self> {
+    pub fn of(rom: &Rom, sliding: Option<Sliding>) -> Result<Self> {
         let in_rom = |error| Failure::from_core(format!("ROM `{}`", rom.name), error);
         let hertz = |frequencies: &[f64]| frequencies.iter().map(|omega| omega / std::f64::consts::TAU).collect();
         let mut by_nodal_diameter: Vec<Vec<f64>> = Vec::new();
@@ -92,6 +100,8 @@ impl RomFacts {
             largest_angular_frequency: models.iter().map(ModalModel::largest_frequency).fold(0.0, f64::max),
             central_difference_limit: limits.fold(f64::INFINITY, f64::min),
             solvable_friction: solvable_friction(rom, &models),
+            step_limits: step_limits(rom, &models, sliding, &[1.0, -1.0].map(|sign| closed_contacts(rom, sign))),
+            sliding,
         })
     }
 
@@ -103,14 +113,15 @@ impl RomFacts {
         let poor = |row: &CheckRow| row.deviation.abs() > DEVIATION_LIMIT || row.residual > RESIDUAL_LIMIT;
         let poor = |row: &CheckRow| poor(row) && !(row.full.abs() < rigid && row.reduced.abs() < rigid);
         let rows = (1..).zip(checks).take(self.first_modes()).filter(|(_, row)| poor(row));
-        rows.map(|(mode, row)| {
+        let poor = rows.map(|(mode, row)| {
             format!(
                 "ROM `{}`: mode {mode} ({:.1} Hz) deviates by {:.3} % from the full model (eq. 13) with a residual of \
                  {:.3} % (eq. 12); good models stay below {DEVIATION_LIMIT} % and {RESIDUAL_LIMIT} %. Keep more modes",
                 self.rom.name, row.full, row.deviation, row.residual
             )
-        })
-        .collect()
+        });
+        let frequencies = self.frequencies.iter().map(|hertz| hertz * std::f64::consts::TAU);
+        poor.chain(plausibility::of_rom(&self.rom, frequencies)).collect()
     }
 
     /// How many of the checked modes are to be good.
@@ -183,19 +194,39 @@ impl RomFacts {
         let _ = writeln!(text, "  damping ratio             {}", rom.damping_ratio);
         text.push_str(&extras_text(rom));
         let _ = writeln!(text, "  largest frequency         {:.6e} rad/s", self.largest_angular_frequency);
-        let _ =
-            writeln!(text, "  largest stable step h     central-difference {:.4e} s", self.central_difference_limit);
-        let _ = writeln!(
-            text,
-            "                            modal-exact: none; resolves all modes up to {:.4e} s",
-            self.central_difference_limit
-        );
+        text.push_str(&self.steps_text());
         if rom.frame == Frame::Cylindrical {
             let friction = self.solvable_friction.map_or("none".into(), |value| format!("{value}"));
             let _ = writeln!(text, "  contact solvable up to µ  {friction} (all nodes closed, tried up to 2)");
         }
         self.write_frequencies(&mut text);
         self.write_checks(&mut text);
+        text
+    }
+
+    /// What the limits hold for.
+    pub(crate) fn steps_hold_for(&self) -> String {
+        match self.sliding {
+            Some(Sliding { friction, speed }) if friction > 0.0 && !self.rom.is_cyclic() => {
+                let sense = if speed > 0.0 { "+θ" } else { "−θ" };
+                let sense = if speed == 0.0 { "either sense" } else { sense };
+                format!("of one sector, with µ = {friction} and sliding in {sense}")
+            }
+            Some(sliding) if sliding.friction > 0.0 => {
+                "of the wheel; with friction a scene may ask for less".to_owned()
+            }
+            Some(_) => "without friction".to_owned(),
+            None => "without friction; with it a scene may ask for less".to_owned(),
+        }
+    }
+
+    fn steps_text(&self) -> String {
+        let mut text = format!("  all steps accepted below  {}\n", self.steps_hold_for());
+        for limit in &self.step_limits {
+            let _ = writeln!(text, "    {:<24}{}", limit.scheme, limit.to_text());
+        }
+        let resolved = self.central_difference_limit;
+        let _ = writeln!(text, "    all modes resolved up to {resolved:.4e} s");
         text
     }
 
@@ -243,6 +274,10 @@ impl RomFacts {
         }
     }
 
+    fn step_limit(&self, scheme: &str) -> Option<f64> {
+        self.step_limits.iter().find(|limit| limit.scheme == scheme).and_then(StepLimit::below)
+    }
+
     /// For programs.
     pub fn to_json(&self) -> Value {
         let rom = &self.rom;
@@ -271,8 +306,10 @@ impl RomFacts {
             "frequencies_hz": self.frequencies,
             "largest_angular_frequency": self.largest_angular_frequency,
             "largest_stable_step": {
-                "central-difference": self.central_difference_limit,
-                "modal-exact": null,
+                "central-difference": self.step_limit("central-difference"),
+                "modal-exact": self.step_limit("modal-exact"),
+                "massless-boundary": self.step_limit("massless-boundary"),
+                "friction": self.sliding.map(|sliding| sliding.friction),
                 "modal-exact_resolves_all_modes_up_to": self.central_difference_limit,
             },
             "solvable_up_to_friction": self.solvable_friction,

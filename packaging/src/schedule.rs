@@ -1,6 +1,6 @@
 //! Communication points, counted rather than accumulated.
 
-use tiprub_core::{settings::ExperimentSettings, shown};
+use tiprub_core::{ranges, settings::ExperimentSettings, shown};
 
 use crate::{Failure, Result};
 
@@ -37,10 +37,10 @@ impl Schedule {
                 "Give a later time in seconds",
             ));
         }
-        if !(step.is_finite() && step > 0.0) {
+        if !(ranges::SHORTEST_STEP..=ranges::TIME).contains(&step) {
             return Err(Failure::usage(
                 name(step_option, "--step", "experiment.communication_step"),
-                format!("{} s is not a positive length of time", shown(step)),
+                format!("{} s is no length of a step, which is 1e-12 s to 1e9 s", shown(step)),
                 "Give the communication step H in seconds, for example 1e-5",
             ));
         }

@@ -64,7 +64,8 @@ pub fn reduce(arguments: &ReduceArguments, console: &Console) -> Result<Reduced>
     warnings.extend(judge(&imported, asked)?);
     let chosen = choose(&imported, arguments)?;
     let read = describe(&imported, asked, &chosen);
-    let name = asked.name.clone().unwrap_or_else(|| default_name(arguments));
+    let name = name(arguments);
+    warnings.extend(radius_warning(&imported, &chosen));
     let mut model = imported.model;
     let clamped = (!chosen.clamped.is_empty()).then_some(CLAMPED);
     if let Some((mesh, _)) = model.mesh.as_mut().filter(|_| clamped.is_some()) {
@@ -183,6 +184,7 @@ fn cyclic(
 fn choose(imported: &Imported, arguments: &ReduceArguments) -> Result<Chosen> {
     let asked = &arguments.file;
     let contact_set = named_set(imported, asked.contact_set.as_deref(), "--contact-set")?;
+    let (contact_nodes, by_number) = nodes_of(imported, contact_set, "--contact-set")?;
     let clamped = clamped_nodes(imported, &asked.clamp_set)?;
     let faces = pair_faces(imported, asked)?;
     let mut fixed = clamped.clone();
@@ -190,8 +192,7 @@ fn choose(imported: &Imported, arguments: &ReduceArguments) -> Result<Chosen> {
         fixed.extend(boundary.pairs.iter().flatten());
         fixed.sort_unstable();
     }
-    let free: Vec<usize> =
-        set(imported, contact_set)?.iter().copied().filter(|node| fixed.binary_search(node).is_err()).collect();
+    let free: Vec<usize> = contact_nodes.into_iter().filter(|node| fixed.binary_search(node).is_err()).collect();
     if free.is_empty() {
         let problem = "all of its nodes are clamped or lie on the faces to the neighbours";
         return Err(Failure::new(format!("--contact-set {contact_set}"), problem, "Choose a set whose nodes can move"));
@@ -205,7 +206,9 @@ fn choose(imported: &Imported, arguments: &ReduceArguments) -> Result<Chosen> {
         let grid = GridNodes::chosen(mesh, &free, around, along, axial).map_err(failure)?;
         return Ok(Chosen { clamped, contact: grid.contact_points(), faces, grid: Some(grid) });
     }
-    let choice = ContactChoice { count: arguments.contact_nodes, names: asked.contact_names.clone() };
+    // Nodes given one by one are all meant.
+    let count = arguments.contact_nodes.or(by_number.then_some(free.len()));
+    let choice = ContactChoice { count, names: asked.contact_names.clone() };
     let contact = choose_contact_nodes(&imported.model.nodes, &free, &choice).map_err(failure)?;
     Ok(Chosen { clamped, contact, faces, grid: None })
 }
@@ -338,6 +341,23 @@ fn judge(imported: &Imported, asked: &FileArguments) -> Result<Vec<String>> {
     Ok(warnings)
 }
 
+/// Share of the largest radius of the model below which contact nodes are not its tips: shrouds and flared tips stay above.
+const TIPS: f64 = 0.9;
+
+/// Blades whose contact nodes lie inside: tip and root exchanged, or another axis.
+fn radius_warning(imported: &Imported, chosen: &Chosen) -> Option<String> {
+    let radius = |[x, y, _]: [f64; 3]| x.hypot(y);
+    let nodes = &imported.model.nodes;
+    let outermost = nodes.iter().copied().map(radius).fold(0.0, f64::max);
+    let contact = chosen.contact.iter().map(|point| radius(nodes[point.node])).fold(0.0, f64::max);
+    (chosen.grid.is_none() && contact < TIPS * outermost).then(|| {
+        format!(
+            "the contact nodes reach a radius of {contact:.6} m, the model one of {outermost:.6} m: are tip and root, and the \
+             axis of rotation, those that are meant?"
+        )
+    })
+}
+
 fn frequency_warning(rom: &Rom, free: bool) -> Option<String> {
     let first = *rom.checks.full_frequencies.get(if free { 6 } else { 0 })?;
     let [low, high] = USUAL_FREQUENCIES;
@@ -363,6 +383,26 @@ fn set<'a>(imported: &'a Imported, name: &str) -> Result<&'a [usize]> {
     imported.model.set(name).map_err(failure)
 }
 
+/// Nodes of a set, or those whose numbers in the file are listed (then true), ascending.
+fn nodes_of(imported: &Imported, text: &str, option: &str) -> Result<(Vec<usize>, bool)> {
+    let numbers: Result<Vec<u64>, _> = text.split(',').map(|part| part.trim().parse::<u64>()).collect();
+    let (Ok(numbers), false) = (numbers, imported.model.sets.contains_key(text)) else {
+        return Ok((set(imported, text)?.to_vec(), false));
+    };
+    let mut nodes = Vec::with_capacity(numbers.len());
+    for number in numbers {
+        let found = imported.node_numbers.iter().position(|own| *own == number);
+        nodes.push(found.ok_or_else(|| {
+            let remedy =
+                "Give the name of a set, or numbers of nodes of the file that belong to solid elements: 12,57,103";
+            Failure::new(format!("{option} {text}"), format!("the model has no node {number}"), remedy)
+        })?);
+    }
+    nodes.sort_unstable();
+    nodes.dedup();
+    Ok((nodes, true))
+}
+
 /// All nodes that are held, ascending.
 fn clamped_nodes(imported: &Imported, names: &[String]) -> Result<Vec<usize>> {
     let mut clamped = imported.absent.clone();
@@ -379,14 +419,19 @@ fn clamped_nodes(imported: &Imported, names: &[String]) -> Result<Vec<usize>> {
         return Err(Failure::usage("--clamp-set", "it is missing", remedy));
     }
     for name in names.iter().filter(|_| !free) {
-        clamped.extend(set(imported, name)?);
+        // Of matrices the set was left out when they were read.
+        clamped.extend(nodes_of(imported, name, "--clamp-set")?.0);
     }
     clamped.sort_unstable();
     clamped.dedup();
     Ok(clamped)
 }
 
-fn default_name(arguments: &ReduceArguments) -> String {
+/// Name of the model.
+pub fn name(arguments: &ReduceArguments) -> String {
+    if let Some(name) = &arguments.file.name {
+        return name.clone();
+    }
     let path = match &arguments.model {
         Some(Model::File(path)) => path,
         _ => arguments.file.stiffness.as_deref().unwrap_or(Path::new("model")),

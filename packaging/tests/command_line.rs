@@ -443,11 +443,22 @@ fn a_reduction_replaces_another_rom_only_by_force_and_warns_of_a_poor_one() {
     let project = Project::new();
     let coarse = ["reduce", "rotor37", "--mesh", "4x1x6", "-o", "blade.rom.safetensors", "--quiet"];
     project.succeed(&coarse);
-    project.succeed(&coarse);
     let before = fs::read(project.path("blade.rom.safetensors")).unwrap();
     let poor = [&coarse[..], &["--modes", "0"]].concat();
     let error = project.fail(&poor, 1);
     assert!(error.contains("blade.rom.safetensors") && error.contains("--force"), "{error}");
+    // Said before the work, which would refuse this mesh; of the file written by default and of others as well.
+    fs::write(project.path("rotor37.rom.safetensors"), "kept").unwrap();
+    for line in [
+        "reduce rotor37 --mesh 1x1x1 -o blade.rom.safetensors",
+        "reduce rotor37 --mesh 1x1x1",
+        "reduce rotor37 --mesh 1x1x1 -o new.rom.safetensors --inp scene.toml",
+        "reduce rotor37 --mesh 1x1x1 -o new.rom.safetensors --vtk scene.toml",
+    ] {
+        let error = project.fail(&line.split(' ').collect::<Vec<_>>(), 1);
+        assert!(error.contains("is there already") && error.contains("--force"), "{line}: {error}");
+    }
+    fs::remove_file(project.path("rotor37.rom.safetensors")).unwrap();
     assert_eq!(fs::read(project.path("blade.rom.safetensors")).unwrap(), before);
     let forced = project.run(&[&poor[..], &["--force", "--json"]].concat());
     let stderr = String::from_utf8(forced.stderr).unwrap();
@@ -477,7 +488,7 @@ fn a_casing_is_reduced_and_options_of_the_other_model_are_refused() {
     assert!(error.contains("describes a casing"), "{error}");
     let error = project.fail(&["reduce", "casing", "--contact-nodes", "3"], 2);
     assert!(error.contains("--contact-grid"), "{error}");
-    let error = project.fail(&["reduce", "casing", "--mesh", "30x1x8"], 1);
+    let error = project.fail(&["reduce", "casing", "--mesh", "30x1x8", "--force"], 1);
     assert!(error.contains("not a multiple of the 24 contact nodes"), "{error}");
 }
 
@@ -505,4 +516,110 @@ fn results_that_stdout_does_not_take_are_a_failure() {
     assert!(message.contains("stdout: cannot be written"), "{message}");
     let good = onto(fs::File::create(project.path("good.csv")).unwrap());
     assert_eq!(good.status.code(), Some(0));
+}
+
+#[test]
+fn a_command_line_that_is_not_understood_is_answered_in_json_too() {
+    let project = Project::new();
+    for line in ["run --json", "frobnicate --json", "--json run scene.toml --stop", "package scene.toml --fmi 4 --json"]
+    {
+        let output = project.run(&line.split(' ').collect::<Vec<_>>());
+        let json: serde_json::Value =
+            serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{line}: {error}"));
+        assert_eq!((output.status.code(), json["error"]["exit_code"].as_u64()), (Some(2), Some(2)), "{line}");
+        assert!(json["error"]["problem"].as_str().is_some_and(|text| !text.is_empty()), "{json}");
+        assert!(!output.stderr.is_empty());
+    }
+    // Help is no failure, and a file may be called --json.
+    assert!(String::from_utf8(project.run(&["--json", "--help"]).stdout).unwrap().contains("Usage"));
+    assert!(project.run(&["run", "--nothing", "--", "--json"]).stdout.is_empty());
+}
+
+#[test]
+fn a_run_is_warned_for_the_step_it_takes() {
+    let project = Project::new();
+    // 2/omega_max of the springs is 2 ms.
+    let scene =
+        SCENE.replace("step = 1e-4", "step = 3e-3").replace("lobes\", amplitude = 2e-3", "lobes\", amplitude = 2e-6");
+    fs::write(project.path("scene.toml"), scene).unwrap();
+    let warnings = |arguments: &[&str]| {
+        let output = project.run(&[&["run", "scene.toml", "--quiet"], arguments].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{stderr}");
+        stderr.lines().filter(|line| line.contains("not resolved")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(warnings(&[]), Vec::<String>::new());
+    let told = warnings(&["--step", "2.5e-3"]);
+    assert!(told.len() == 1 && told[0].contains("2.500e-3"), "{told:?}");
+}
+
+#[test]
+fn slips_are_asked_about_by_every_command() {
+    let project = Project::new();
+    fs::write(
+        project.path("scene.toml"),
+        SCENE
+            .replace("speed = 100.0", "speed = 17188.0")
+            .replace("step = 1e-4", "step = 1e-5")
+            .replace("amplitude = 2e-3", "amplitude = 2e-6"),
+    )
+    .unwrap();
+    for line in [
+        "run scene.toml --stop 1e-4 --step 1e-5",
+        "inspect scene.toml",
+        "package scene.toml -o x --library library.so",
+        "inspect x/small_fmi3.fmu",
+    ] {
+        let output = project.run(&line.split(' ').collect::<Vec<_>>());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        let told: Vec<_> = stderr.lines().filter(|text| text.contains("rpm")).collect();
+        assert!(output.status.success() && told.len() == 1 && told[0].contains("4297 m/s"), "{line}: {stderr}");
+    }
+    // A ROM by hand in millimetres.
+    let path = project.path("small.rom.safetensors");
+    let mut rom = tiprub_format::read_rom(&fs::read(&path).unwrap(), "small").unwrap();
+    rom.contact_nodes[0].position[0] = 250.0;
+    fs::write(&path, tiprub_format::write_rom(&rom)).unwrap();
+    for line in ["inspect small.rom.safetensors", "inspect scene.toml"] {
+        let output = project.run(&line.split(' ').collect::<Vec<_>>());
+        assert!(String::from_utf8(output.stderr).unwrap().contains("millimetres"), "{line}");
+    }
+}
+
+#[test]
+fn gaps_of_sectors_stand_for_the_gap_and_heat_needs_friction() {
+    let project = Project::new();
+    fs::write(project.path("scene.toml"), SCENE.replace("gap = 1e-3", "sector_gaps = [1e-3, 1e-3, 1.2e-3, 1e-3]"))
+        .unwrap();
+    let (names, rows) = columns(&project.succeed(&["run", "scene.toml", "--csv", "-", "--quiet"]));
+    let clearance = names.iter().position(|name| name == "clearance_minimum").unwrap();
+    assert!(rows.last().unwrap()[clearance] <= 1e-3);
+    assert!(project.succeed(&["inspect", "scene.toml", "--quiet"]).contains("gaps 0.001 m to 0.0012 m"));
+    fs::write(project.path("scene.toml"), SCENE.replace("friction = 0.1", "heat_to_slave = 0.5")).unwrap();
+    let error = project.fail(&["run", "scene.toml"], 1);
+    assert!(error.contains("heat_to_slave") && error.contains("friction"), "{error}");
+}
+
+#[test]
+fn step_limits_are_those_at_which_a_scene_is_refused() {
+    let project = Project::new();
+    let limits = |friction: &str| {
+        let scene = SCENE.replace("friction = 0.1", friction);
+        fs::write(project.path("scene.toml"), scene).unwrap();
+        let json: serde_json::Value =
+            serde_json::from_str(&project.succeed(&["inspect", "scene.toml", "--json", "--quiet"])).unwrap();
+        json["scene"]["roms"][0]["largest_stable_step"].clone()
+    };
+    let found = limits("friction = 0.1");
+    assert!((found["central-difference"].as_f64().unwrap() / 2e-3 - 1.0).abs() < 1e-3, "{found}");
+    assert_eq!(found["friction"], 0.1);
+    for (factor, accepted) in [(0.99, true), (1.01, false)] {
+        let step = factor * found["central-difference"].as_f64().unwrap();
+        let scene = SCENE
+            .replace("step = 1e-4", &format!("scheme = \"central-difference\"\nstep = {step:e}"))
+            .replace("communication_step = 1e-3", &format!("communication_step = {step:e}"))
+            .replace("amplitude = 2e-3", "amplitude = 2e-6");
+        fs::write(project.path("scene.toml"), scene).unwrap();
+        assert_eq!(project.run(&["run", "scene.toml", "--quiet"]).status.success(), accepted, "{step:e}");
+    }
 }

@@ -292,3 +292,29 @@ fn a_casing_of_ones_own_is_the_casing_that_ships() {
         assert!(words.iter().all(|word| text.contains(word)), "{line}: {text}");
     }
 }
+
+#[test]
+fn contact_nodes_are_given_by_number_and_slips_of_tip_and_axis_are_asked_about() {
+    let project = Project::new(&["blade_hex8.inp"]);
+    let line = "reduce blade_hex8.inp --clamp-set ROOT --sectors 36 --units mm-t-s --material steel --modes 4 --force";
+    let told = project.succeed(&format!("{line} --contact-set TIP -o set.rom.safetensors"));
+    let numbers: Vec<String> =
+        told["model"]["contact_nodes"].as_array().unwrap().iter().map(|node| node["node"].to_string()).collect();
+    project.succeed(&format!("{line} --contact-set {} -o numbers.rom.safetensors", numbers.join(",")));
+    let [by_set, by_number] = ["set", "numbers"].map(|name| project.rom(&format!("{name}.rom.safetensors")));
+    assert_eq!(by_set.contact_map, by_number.contact_map);
+    let places = |rom: &tiprub_core::Rom| rom.contact_nodes.iter().map(|node| node.position).collect::<Vec<_>>();
+    assert_eq!(places(&by_set), places(&by_number));
+    let error = project.fail(&format!("{line} --contact-set 1,999999999"), 1);
+    assert!(error.contains("no node 999999999"), "{error}");
+    // Held at the tip, touching with the root.
+    let line = "reduce blade_hex8.inp --sectors 36 --units mm-t-s --material steel --modes 4 --force";
+    let swapped = project.succeed(&format!("{line} --contact-set ROOT --clamp-set TIP"));
+    assert!(swapped["warnings"].to_string().contains("tip and root"), "{}", swapped["warnings"]);
+    let turned = project.succeed(
+        &format!("{line} --contact-set TIP --clamp-set ROOT --axis x --sectors 400").replacen("--sectors 36 ", "", 1),
+    );
+    assert!(turned["warnings"].to_string().contains("axis"), "{}", turned["warnings"]);
+    let right = project.succeed(&format!("{line} --contact-set TIP --clamp-set ROOT"));
+    assert!(!right["warnings"].to_string().contains("axis"), "{}", right["warnings"]);
+}

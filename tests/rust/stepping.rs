@@ -295,3 +295,87 @@ fn values_set_before_initialisation_are_start_values() {
     slave.expect(slave.step(0.0, H));
     assert_eq!(slave.reals(&[speed, friction]), [250.0, 0.2]);
 }
+
+#[test]
+fn steps_of_any_length_are_refused_or_leave_numbers_only() {
+    let path = shipped();
+    let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), Resources::new(false));
+    let references = all_reals(&simulation());
+    let lengths = [0.0, 5e-324, 1e-310, 1e-300, 1e-160, 1e-17, 9e-13, 1e-12, 1e-9, 2e-6, 1e-3, 1e7, 1e154, 1e300];
+    for start in [0.0, 1e-310, -0.37, 1e8] {
+        let (two, three) = (fmi2::Slave::new(&api2, &resources), fmi3::Slave::new(&api3, &resources));
+        [two.setup(start, None), two.enter(), two.exit()].into_iter().for_each(|status| two.expect(status));
+        [three.enter(start, None), three.exit()].into_iter().for_each(|status| three.expect(status));
+        let (mut times, mut taken) = ([start; 2], 0);
+        for length in lengths {
+            for (which, status) in
+                [two.step(times[0], length), three.step(times[1], length).status].into_iter().enumerate()
+            {
+                assert!(status == OK || status == ERROR, "H = {length:e}: {status}");
+                if status == OK {
+                    assert!(length >= 1e-12, "H = {length:e} from {start:e} s");
+                    times[which] += length;
+                    taken += 1;
+                }
+            }
+            let values = [two.reals(&references), three.reals(&references, references.len())].concat();
+            assert!(values.iter().all(|value| value.is_finite()), "H = {length:e} from {start:e} s");
+        }
+        assert!(taken >= 2, "no step from {start:e} s: {}", two.log());
+    }
+}
+
+/// As many modes as three contact nodes have directions: massless-boundary leaves none.
+#[test]
+fn a_scheme_that_leaves_no_mode_is_refused_without_a_panic_and_can_be_taken_back() {
+    let mut scene = scene();
+    scene.settings.contacts[0].friction = 0.0;
+    let rom = &mut scene.roms[0];
+    rom.mass = rom.mass.view((0, 0), (9, 9)).into_owned();
+    rom.stiffness = rom.stiffness.view((0, 0), (9, 9)).into_owned();
+    rom.contact_map = rom.contact_map.view((0, 0), (9, 9)).into_owned();
+    let resources = Resources::of(&scene, false);
+    let core = Simulation::new(&scene).expect("the scene is valid");
+    let (scheme, output) = (reference_of(&core, "scheme"), reference_of(&core, "clearance_minimum"));
+    let api = fmi2::load(&shipped());
+    let slave = fmi2::Slave::new(&api, &resources);
+    let choose = |choice: i32| {
+        // SAFETY: arrays of one element.
+        unsafe { (api.fmi2SetInteger)(slave.handle, &raw const scheme, 1, &raw const choice) }
+    };
+    let read = || {
+        let mut value = 0.0;
+        // SAFETY: arrays of one element.
+        unsafe { (api.fmi2GetReal)(slave.handle, &raw const output, 1, &raw mut value) }
+    };
+    assert_eq!((slave.setup(0.0, None), slave.enter(), choose(3)), (OK, OK, OK));
+    assert_eq!((read(), slave.exit(), read()), (ERROR, ERROR, ERROR));
+    let log = slave.log();
+    assert!(log.contains("none is left") && !log.contains("panic"), "{log}");
+    let state = slave.save();
+    assert_eq!((choose(2), read(), slave.restore(state), read()), (OK, OK, OK, ERROR), "{}", slave.log());
+    assert_eq!((slave.reset(), slave.setup(0.0, None), slave.enter()), (OK, OK, OK));
+    assert_eq!((choose(2), slave.exit(), slave.step(0.0, H)), (OK, OK, OK), "{}", slave.log());
+    assert!(!slave.log().contains("panic"), "{}", slave.log());
+}
+
+#[test]
+fn what_holds_for_the_step_taken_is_logged_once() {
+    let mut scene = scene();
+    // ω_max·h = 2 lies near 6e-5 s.
+    scene.settings.contacts[0].friction = 0.0;
+    scene.settings.time.step = 1.5e-4;
+    scene.settings.experiment.communication_step = 2e-5;
+    let api = fmi2::load(&shipped());
+    let resources = Resources::of(&scene, false);
+    let slave = fmi2::Slave::initialised(&api, &resources);
+    let told = || slave.log().matches("not resolved").count();
+    assert_eq!(told(), 0);
+    let mut time = 0.0;
+    let counts = [2e-5, 1.5e-4, 1.5e-4, 2e-5, 1.5e-4].map(|length| {
+        assert_eq!(slave.step(time, length), OK, "{}", slave.log());
+        time += length;
+        told()
+    });
+    assert_eq!(counts, [0, 1, 0, 0, 0]);
+}

@@ -255,6 +255,7 @@ impl Slave {
             }
             former.push((element, before));
         }
+        self.hear();
         Ok(())
     }
 

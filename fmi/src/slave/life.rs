@@ -55,8 +55,9 @@ impl Slave {
                 }
                 *before = Some(state);
             }
-            Phase::Updating { fresh: fresh @ false, .. } => {
+            Phase::Updating { fresh: fresh @ false, reached, .. } => {
                 self.simulation.update_outputs();
+                self.simulation.check_outputs(*reached)?;
                 *fresh = true;
             }
             _ => {}

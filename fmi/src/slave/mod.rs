@@ -158,6 +158,11 @@ impl Slave {
         std::mem::take(&mut self.notes)
     }
 
+    /// Hand on what the simulation has to say since it was last asked.
+    pub(super) fn hear(&mut self) {
+        self.notes.extend(self.simulation.take_notes().into_iter().map(|text| (Status::Warning, text)));
+    }
+
     /// Add a message to be handed to the importer after the call.
     pub fn note(&mut self, status: Status, message: impl Into<String>) {
         self.notes.push((status, message.into()));

@@ -34,6 +34,7 @@ impl Slave {
             }
         }
         self.simulation.begin_step(current_time, step_size)?;
+        self.hear();
         #[cfg(feature = "test-panic")]
         assert!(step_size.to_bits() != PANIC_STEP_SIZE.to_bits(), "panic asked for by the test of panics");
         self.phase = Phase::Updating { stop, reached: self.simulation.time(), fresh: false };

@@ -187,7 +187,10 @@ pub const OPTIONS: [Switch; 18] = [
     ("`load` of the casing", |scene| scene.settings.structures[1].load = None),
     ("`moving = true`", |scene| scene.settings.surfaces[0].moving = false),
     ("a shape other than `circular`", |scene| scene.settings.surfaces[0].shape = Shape::Circular {}),
-    ("`friction` > 0", |scene| scene.settings.contacts[0].friction = 0.0),
+    ("`friction` > 0", |scene| {
+        // Without friction there is no heat to share.
+        (scene.settings.contacts[0].friction, scene.settings.contacts[0].heat_to_slave) = (0.0, None);
+    }),
     ("`heat_to_slave`", |scene| scene.settings.contacts[0].heat_to_slave = None),
     ("`coating`", |scene| {
         scene.settings.contacts[0].coating = None;

@@ -90,7 +90,7 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
         let window = turn.min(schedule.stop - schedule.start);
         error_study::study(&scene, window, &task)
     })?;
-    let facts = scene.roms.iter().map(RomFacts::of).collect::<Result<Vec<_>>>()?;
+    let facts = scene.roms.iter().map(|rom| RomFacts::of(rom, None)).collect::<Result<Vec<_>>>()?;
     let demo = Demo { study, directory, scene, schedule, reduction, facts, native, imported, durations: watch.0 };
     demo.write_report()?;
     demo.outcome()

@@ -10,7 +10,7 @@ use std::{
 use serde_json::{Value, json};
 use tiprub_core::{
     Scene, Simulation,
-    settings::{Motion, SceneSettings},
+    settings::{ContactSettings, Motion, SceneSettings},
     variables::Causality,
 };
 
@@ -21,6 +21,7 @@ use crate::{
     importer::{UnpackedFmu, open_archive, read_entry},
     rom_facts::RomFacts,
     scene_features, scene_source,
+    step_limits::Sliding,
 };
 
 /// Kinds of files, told apart by name and, where that does not help, by their first bytes.
@@ -40,8 +41,11 @@ pub fn run(arguments: &InspectArguments, console: &Console) -> Result<Outcome> {
     match kind(path)? {
         FileKind::Fmu => inspect_fmu(path, console),
         FileKind::Rom => {
-            let facts = RomFacts::of(&scene_source::read_rom(path)?)?;
-            Ok(Outcome { text: facts.to_text(), json: json!({ "kind": "rom", "rom": facts.to_json() }) })
+            let facts = RomFacts::of(&scene_source::read_rom(path)?, None)?;
+            let warnings = facts.warnings();
+            console.warn(&warnings);
+            let json = json!({ "kind": "rom", "rom": facts.to_json(), "warnings": warnings });
+            Ok(Outcome { text: facts.to_text(), json })
         }
         FileKind::Scene => {
             let scene = scene_source::load(&path.display().to_string(), &arguments.cache.cache(), console)?;
@@ -151,6 +155,8 @@ fn inspect_resources(fmu: &UnpackedFmu, console: &Console) -> Result<Option<(Str
 fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
     let settings = &scene.settings;
     let in_scene = |error| Failure::from_core(format!("scene `{}`", settings.name), error);
+    // Of many coupled sectors it takes long.
+    let task = console.task(&format!("Checking limits of {}", settings.name), None);
     let mut simulation = Simulation::new(scene).map_err(in_scene)?;
     simulation.initialise(settings.experiment.start).map_err(in_scene)?;
     let table = simulation.table();
@@ -169,17 +175,24 @@ fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
         scalars(Causality::Parameter),
         scalars(Causality::Output)
     );
-    console.warn(simulation.warnings());
+    for reversed in simulation.if_reversed() {
+        let _ = writeln!(text, "  turned back   {reversed}");
+    }
     let mut roms = Vec::new();
-    for rom in &scene.roms {
-        let facts = RomFacts::of(rom)?;
+    for (rom, structure) in scene.roms.iter().zip(&settings.structures) {
+        let contact = settings.contacts.iter().find(|contact| contact.master == structure.name);
+        let sliding = contact.map(|contact| Sliding { friction: contact.friction, speed: structure.speed });
+        let facts = RomFacts::of(rom, sliding)?;
         let _ = write!(text, "\n{}", facts.to_text());
         roms.push(facts.to_json());
     }
+    drop(task);
+    console.warn(simulation.warnings());
     let json = json!({
         "settings": serde_json::to_value(settings).unwrap_or(Value::Null),
         "features": features,
         "warnings": simulation.warnings(),
+        "if_the_rotor_turned_the_other_way": simulation.if_reversed(),
         "variables": {
             "inputs": scalars(Causality::Input),
             "parameters": scalars(Causality::Parameter),
@@ -188,6 +201,17 @@ fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
         "roms": roms,
     });
     Ok((text, json))
+}
+
+fn gap_text(contact: &ContactSettings) -> String {
+    match contact.sector_gaps.as_slice() {
+        [] => format!("gap {} m", contact.gap),
+        gaps => {
+            let [low, high] =
+                gaps.iter().fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], gap| [low.min(*gap), high.max(*gap)]);
+            format!("gaps {low} m to {high} m")
+        }
+    }
 }
 
 fn scene_text(settings: &SceneSettings) -> String {
@@ -235,7 +259,7 @@ fn scene_text(settings: &SceneSettings) -> String {
             "  contact       {} against {}: {}, friction {}, solver {}",
             contact.master,
             contact.slave,
-            if free { nodes() } else { format!("gap {} m", contact.gap) },
+            if free { nodes() } else { gap_text(contact) },
             contact.friction,
             serde_json::to_value(contact.solver)
                 .ok()

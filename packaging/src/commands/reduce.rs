@@ -1,6 +1,9 @@
 //! `tiprub reduce`: from a blade or a casing to a ROM file, with its checks.
 
-use std::{fmt::Write as _, path::Path};
+use std::{
+    fmt::Write as _,
+    path::{Path, PathBuf},
+};
 
 use serde_json::{Value, json};
 use tiprub_model::{
@@ -30,21 +33,18 @@ use crate::{
 /// # Errors
 /// Counts that do not fit the mesh, wrong files, or files that cannot be written.
 pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
+    // What would fail after the work is said before it.
+    let output = &arguments.output.clone().map_or_else(|| expected_output(arguments), Ok)?;
+    let others = arguments.inp.iter().chain(&arguments.vtk);
+    std::iter::once(output).chain(others).try_for_each(|path| check_target(path, arguments))?;
     let reduced = reduced(arguments, console)?;
-    let default_output = format!("{}.rom.safetensors", reduced.rom.name);
-    let output = &arguments.output.clone().unwrap_or_else(|| default_output.into());
-    let facts = RomFacts::of(&reduced.rom)?;
+    let facts = RomFacts::of(&reduced.rom, None)?;
     let mut files = vec![(output, tiprub_format::write_rom(&reduced.rom))];
     if let Some(path) = &arguments.inp {
         files.push((path, reduced.calculix()?));
     }
     if let Some(path) = &arguments.vtk {
         files.push((path, reduced.vtk()?));
-    }
-    if !arguments.force {
-        for (path, bytes) in &files {
-            output_file::refuse_to_replace(path, bytes, "Choose another file, or replace it with --force")?;
-        }
     }
     for (path, bytes) in &files {
         output_file::write(path, bytes)?;
@@ -55,6 +55,36 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     console.warn(&warnings);
     let paths: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
     Ok(Outcome { text: text(&reduced, &facts, &paths), json: json(&reduced, &facts, arguments, output, &warnings) })
+}
+
+/// The file that is written where none is named: that of the name which the model will have.
+fn expected_output(arguments: &ReduceArguments) -> Result<PathBuf> {
+    let name = match &arguments.model {
+        Some(Model::Rotor37) => "rotor37".to_owned(),
+        Some(Model::Casing) => casing_arguments::options(arguments)?.name,
+        Some(Model::Stage) => builtin::stage(arguments.coarse).0.to_owned(),
+        Some(Model::StageCasing) => builtin::stage_casing(arguments.coarse).name,
+        Some(Model::Cube) => builtin::CUBE.to_owned(),
+        Some(Model::Ring(side)) => {
+            let [left, right] = builtin::RINGS;
+            (if *side == left.1 { left.0 } else { right.0 }).to_owned()
+        }
+        Some(Model::File(_)) | None => users_model::name(arguments),
+    };
+    Ok(format!("{name}.rom.safetensors").into())
+}
+
+/// Whether a file can be written there, and replaces none without being told to. Devices and pipes take whatever comes.
+fn check_target(path: &Path, arguments: &ReduceArguments) -> Result<()> {
+    if path.is_file() && !arguments.force {
+        let remedy = "Choose another file, or replace it with --force";
+        return Err(Failure::new(path.display(), "is there already", remedy));
+    }
+    if path.exists() {
+        return output_file::begin(path).map(drop);
+    }
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    output_file::try_directory(directory.unwrap_or(Path::new(".")))
 }
 
 /// For people.

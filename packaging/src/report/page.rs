@@ -148,6 +148,8 @@ fn rom_section(facts: &[RomFacts]) -> String {
         let rom = &fact.rom;
         let _ = write!(html, "<p>{}.</p>", escape(rom.origin.trim_end_matches('.')));
         let nodes: Vec<&str> = rom.contact_nodes.iter().map(|node| node.name.as_str()).collect();
+        let steps: Vec<String> =
+            fact.step_limits.iter().map(|limit| format!("{} {}", limit.scheme, escape(&limit.to_text()))).collect();
         let friction = fact.solvable_friction.map_or("-".into(), |value| format!("{value}"));
         html.push_str(&table(&[
             ("sectors", sectors_text(rom)),
@@ -157,13 +159,10 @@ fn rom_section(facts: &[RomFacts]) -> String {
                 "largest angular frequency ω<sub>max</sub>",
                 format!("{} rad/s", scientific(fact.largest_angular_frequency)),
             ),
+            ("all internal steps accepted below", format!("{}: {}", fact.steps_hold_for(), steps.join("; "))),
             (
-                "largest stable h, central differences",
+                "all modes resolved up to",
                 format!("{} s (2/ω<sub>max</sub>)", scientific(fact.central_difference_limit)),
-            ),
-            (
-                "largest stable h, modal-exact",
-                "no limit; contact on all modes is resolved up to the value above".into(),
             ),
             ("contact problem solvable up to µ", format!("{friction} (all nodes closed; tried up to 2)")),
         ]));

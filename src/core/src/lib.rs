@@ -13,6 +13,8 @@ pub mod dynamics;
 mod error;
 mod ledger;
 pub mod persist;
+pub mod plausibility;
+pub mod ranges;
 pub mod rom;
 pub mod settings;
 pub mod simulation;

@@ -10,7 +10,7 @@ mod grid;
 
 use nalgebra::DMatrix;
 
-use crate::{Error, Result, shown};
+use crate::{Error, Result, ranges, shown};
 pub use cyclic::Harmonic;
 pub(crate) use cyclic::cholesky;
 
@@ -210,14 +210,7 @@ impl Rom {
         }
         for (name, matrix) in [("mass", &self.mass), ("stiffness", &self.stiffness), ("contact_map", &self.contact_map)]
         {
-            if let Some(index) = matrix.iter().position(|value| !value.is_finite()) {
-                let (row, column) = (index % matrix.nrows(), index / matrix.nrows());
-                return Err(Error::invalid(
-                    format!("ROM array `{name}`"),
-                    format!("non-finite entry at ({row}, {column})"),
-                    remedy,
-                ));
-            }
+            entries(name, matrix, if name == "contact_map" { ranges::MAP } else { ranges::MATRIX }, remedy)?;
         }
         for (index, node) in self.contact_nodes.iter().enumerate() {
             let finite = node.position.iter().all(|value| value.is_finite()) && node.meridional_slope.is_finite();
@@ -229,12 +222,27 @@ impl Rom {
                     remedy,
                 ));
             }
+            self.validate_place(index, node)?;
         }
         self.validate_definiteness(remedy)?;
         self.validate_spin(remedy)?;
         self.validate_thermal(remedy)?;
         self.validate_grid()?;
         self.validate_harmonics(remedy)
+    }
+
+    /// Lengths in metres, of a machine.
+    fn validate_place(&self, index: usize, node: &ContactNode) -> Result<()> {
+        let what = format!("ROM array `contact_positions`, node {}", index + 1);
+        let mut lengths = &node.position[..];
+        if self.frame == Frame::Cylindrical {
+            ranges::within(&what, node.position[0], ranges::SMALLEST_RADIUS, ranges::POSITION)?;
+            ranges::at_most(&what, node.position[1], ranges::ANGLE)?;
+            lengths = &node.position[2..];
+        }
+        lengths.iter().try_for_each(|length| ranges::at_most(&what, *length, ranges::POSITION))?;
+        let what = format!("ROM array `contact_meridional_slopes`, node {}", index + 1);
+        ranges::at_most(&what, node.meridional_slope, ranges::SLOPE)
     }
 
     fn validate_spin(&self, remedy: &str) -> Result<()> {
@@ -251,6 +259,7 @@ impl Rom {
                 let problem = format!("shape {:?}, {order} x {order} finite values expected", matrix.shape());
                 return Err(Error::invalid(what, problem, remedy));
             }
+            entries(name, matrix, ranges::MATRIX, remedy)?;
             let asymmetry = (matrix - matrix.transpose() * sign).amax();
             if asymmetry > 1e-8 * matrix.amax() {
                 let kind = if sign > 0.0 { "symmetric" } else { "skew-symmetric" };
@@ -265,12 +274,14 @@ impl Rom {
                 let problem = format!("{} values, {order} finite ones expected", load.len());
                 return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
             }
+            load.iter()
+                .try_for_each(|value| ranges::at_most(&format!("ROM array `{name}`"), *value, ranges::MATRIX))?;
         }
         if !(spin.largest_speed.is_finite() && spin.largest_speed > 0.0) {
             let problem = format!("{} rad/s is not a finite speed > 0", shown(spin.largest_speed));
             return Err(Error::invalid("ROM metadata `largest_speed`", problem, remedy));
         }
-        Ok(())
+        ranges::at_most("ROM metadata `largest_speed`", spin.largest_speed, ranges::SPEED)
     }
 
     fn validate_thermal(&self, remedy: &str) -> Result<()> {
@@ -280,6 +291,7 @@ impl Rom {
             let problem = format!("shape {:?}, {expected:?} finite values expected", thermal.loads.shape());
             return Err(Error::invalid("ROM array `thermal_loads`", problem, remedy));
         }
+        entries("thermal_loads", &thermal.loads, ranges::THERMAL_LOAD, remedy)?;
         for (index, patch) in thermal.patches.iter().enumerate() {
             let finite = patch.angle.iter().chain(&patch.axial).all(|value| value.is_finite());
             let turn = patch.angle[1] - patch.angle[0];
@@ -292,6 +304,9 @@ impl Rom {
                     remedy,
                 ));
             }
+            let what = format!("ROM array `thermal_patches`, patch {}", index + 1);
+            patch.angle.iter().try_for_each(|value| ranges::at_most(&what, *value, ranges::ANGLE))?;
+            patch.axial.iter().try_for_each(|value| ranges::at_most(&what, *value, ranges::POSITION))?;
         }
         Ok(())
     }
@@ -312,4 +327,16 @@ impl Rom {
         }
         Ok(())
     }
+}
+
+/// Entries that are numbers, of a size that squares do not leave the range of double precision.
+fn entries(name: &str, matrix: &DMatrix<f64>, most: f64, remedy: &str) -> Result<()> {
+    let Some(index) = matrix.iter().position(|value| !(value.abs() <= most)) else { return Ok(()) };
+    let (row, column, value) = (index % matrix.nrows(), index / matrix.nrows(), matrix[index]);
+    let problem = if value.is_finite() {
+        format!("entry {} at ({row}, {column}) is beyond ±{}", shown(value), shown(most))
+    } else {
+        format!("non-finite entry at ({row}, {column})")
+    };
+    Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy))
 }

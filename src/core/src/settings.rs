@@ -5,7 +5,6 @@ mod validation;
 use serde::{Deserialize, Serialize};
 
 use crate::Rom;
-pub use validation::{LONGEST_STEP, MAX_DAMPING, MAX_FRICTION, SHORTEST_STEP};
 
 /// Time-stepping scheme of the modal equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -351,7 +350,7 @@ pub struct ContactSettings {
     /// the positions in both ROMs.
     #[serde(default, skip_serializing_if = "is_positive_zero")]
     pub gap: f64,
-    /// Clearance of each sector (m) where they differ; replaces `gap`, one value per sector.
+    /// Clearance of each sector (m) where they differ; replaces `gap`, which may be absent then. One value per sector.
     #[serde(default)]
     pub sector_gaps: Vec<f64>,
     /// Coulomb friction coefficient µ (-), 0 ≤ µ ≤ 2.
@@ -369,6 +368,18 @@ pub struct ContactSettings {
     /// Share of the friction heat that goes into the slave (-), 0 to 1; the patch outputs carry this share.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub heat_to_slave: Option<f64>,
+}
+
+impl ContactSettings {
+    /// Clearance that the law of two bumps refers to (m): `gap`, or the mean of `sector_gaps` where these replace it.
+    pub fn nominal_gap(&self) -> f64 {
+        if self.gap != 0.0 || self.sector_gaps.is_empty() {
+            return self.gap;
+        }
+        #[expect(clippy::cast_precision_loss, reason = "at most as many as sectors")]
+        let count = self.sector_gaps.len() as f64;
+        self.sector_gaps.iter().sum::<f64>() / count
+    }
 }
 
 /// Internal time stepping.

@@ -4,7 +4,15 @@ mod common;
 #[path = "common/features.rs"]
 mod features;
 
+#[path = "common/lattice.rs"]
+mod lattice;
+#[path = "common/wheel.rs"]
+mod wheel;
+
+use nalgebra::DMatrix;
+use proptest::prelude::*;
 use tiprub_core::settings::{LoadSettings, Scheme, Shape};
+use tiprub_core::variables::{Causality, Kind, Variability};
 use tiprub_core::{Scene, Simulation};
 
 fn reference(simulation: &Simulation, name: &str) -> u32 {
@@ -37,7 +45,7 @@ fn refusal(scene: &Scene) -> String {
 #[test]
 fn a_rotor_that_skips_over_the_lobes_is_refused_and_can_go_on_slower() {
     let mut scene = common::scene(12);
-    for speed in [1e6, -1e6, 1e300] {
+    for speed in [5e5, -1e6, 1e6] {
         scene.settings.structures[0].speed = speed;
         let message = refusal(&scene);
         assert!(message.contains("speed") && message.contains("internal_step_max"), "{message}");
@@ -55,7 +63,7 @@ fn a_rotor_that_skips_over_the_lobes_is_refused_and_can_go_on_slower() {
 #[test]
 fn casings_that_small_displacements_cannot_describe_are_refused() {
     let mut scene = common::scene(12);
-    for depth in [100.0, 1e6, 1e300] {
+    for depth in [100.0, 1e6, 1e12] {
         scene.settings.surfaces[0].shape = Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
         let message = refusal(&scene);
         assert!(message.contains("surface.shape") && message.contains("metres"), "{depth}: {message}");
@@ -81,7 +89,7 @@ fn casings_that_small_displacements_cannot_describe_are_refused() {
 fn a_load_that_is_too_large_at_the_start_is_named_and_not_the_surface_it_folds() {
     let mut scene = common::scene(12);
     features::flexible(&mut scene);
-    for amplitude in [1e9, 1e12, 1e100, 1e200, 1e308] {
+    for amplitude in [1e9, 1e12] {
         scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude, phase: 0.0 });
         let message = refusal(&scene);
         assert!(message.contains("initial state") && message.contains("loads"), "{amplitude:e}: {message}");
@@ -261,4 +269,215 @@ fn a_blade_keeps_its_energy_over_ten_million_undamped_steps() {
         println!("{scheme:?}: relative energy drift {drift:.1e} over 1e7 steps");
         assert!(before > 1e-3 && drift.abs() < 1e-11, "{scheme:?}: {drift:e} of {before} J");
     }
+}
+
+/// Small scenes of every kind: rigid, elastic and coated casings, coupled sectors, all schemes, a free body.
+fn kinds() -> Vec<Scene> {
+    let mut scenes = Vec::new();
+    for scheme in [Scheme::ModalExact, Scheme::CentralDifference, Scheme::MasslessBoundary] {
+        let mut scene = common::scene(4);
+        scene.roms[0] = common::rich_rom(4);
+        scene.settings.time.scheme = scheme;
+        scene.settings.time.step = 1e-7;
+        scene.settings.contacts[0].friction = 0.1;
+        scenes.push(scene);
+    }
+    let mut scene = common::scene(3);
+    features::flexible(&mut scene);
+    scene.settings.structures[1].thermal = true;
+    scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 1e3, phase: 0.2 });
+    scene.settings.contacts[0].heat_to_slave = Some(0.3);
+    scenes.push(scene);
+    let mut scene = common::scene(3);
+    features::coating(&mut scene);
+    scenes.push(scene);
+    scenes.push(wheel::rub(common::scene(6), wheel::Wheel::random(6, 2, 5, 0.2, 7).cyclic()));
+    scenes.push(lattice::squeezed_by(-1e-3, [-10.0, 1.0, 0.0]));
+    scenes
+}
+
+/// Outputs that are no numbers.
+fn unbounded(simulation: &Simulation) -> Vec<String> {
+    let outputs = simulation.table().variables().iter().filter(|row| row.causality == Causality::Output);
+    let mut found = Vec::new();
+    for row in outputs.filter(|row| row.kind == Kind::Real) {
+        for (element, reference) in (0..row.len()).zip(row.reference..) {
+            let continuous = row.variability == Variability::Continuous;
+            let derivative = if continuous { simulation.output_derivative(reference, 1).unwrap_or(0.0) } else { 0.0 };
+            if !(simulation.real(reference).unwrap().is_finite() && derivative.is_finite()) {
+                found.push(row.element_name(element));
+            }
+        }
+    }
+    found
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn no_output_is_ever_anything_but_a_number(
+        starts in prop::collection::vec((-320.0..15.0_f64, any::<bool>()), 2),
+        lengths in prop::collection::vec((-320.0..300.0_f64, any::<bool>()), 6),
+    ) {
+        for mut simulation in kinds().iter().map(|scene| Simulation::new(scene).unwrap()) {
+            let (mut taken, mut refused) = (0, 0);
+            for (exponent, negative) in &starts {
+                let start = 10_f64.powf(*exponent) * if *negative { -1.0 } else { 1.0 };
+                simulation.reset();
+                if simulation.initialise(start).is_err() {
+                    refused += 1;
+                    continue;
+                }
+                prop_assert!(unbounded(&simulation).is_empty(), "start {start:e}: {:?}", unbounded(&simulation));
+                for (exponent, usual) in &lengths {
+                    // Half of the steps have lengths that can be taken; none takes long.
+                    let length = if *usual { 10_f64.powf(-12.0 + exponent.abs() / 60.0) } else { 10_f64.powf(*exponent) };
+                    let long = length > 1e3 * simulation_step(&simulation) && length < 1e9 * simulation_step(&simulation);
+                    if long {
+                        continue;
+                    }
+                    let outcome = simulation.do_step(simulation.time(), length);
+                    if outcome.is_ok() {
+                        taken += 1;
+                        prop_assert!(length >= 1e-12, "H = {length:e}");
+                        let found = unbounded(&simulation);
+                        prop_assert!(found.is_empty(), "start {start:e}, H = {length:e}: {found:?}");
+                    } else {
+                        refused += 1;
+                    }
+                }
+            }
+            prop_assert!(taken + refused > 0);
+        }
+    }
+}
+
+fn simulation_step(simulation: &Simulation) -> f64 {
+    real(simulation, "internal_step_max")
+}
+
+#[test]
+fn steps_that_rounding_would_fill_are_refused_wherever_they_begin() {
+    for scene in kinds() {
+        for start in [0.0, -0.0, 1e-300, -3e-6] {
+            let mut simulation = Simulation::new(&scene).unwrap();
+            simulation.initialise(start).unwrap();
+            for length in [5e-324, 1e-310, 1e-200, 1e-40, 1e-17, 9.99e-13] {
+                let message = simulation.do_step(start, length).unwrap_err().to_string();
+                assert!(message.contains("communicationStepSize") && message.contains("1e-12"), "{message}");
+            }
+            simulation.do_step(start, 1e-12).unwrap();
+            assert!(unbounded(&simulation).is_empty(), "{:?}", unbounded(&simulation));
+        }
+        // Far from zero the time itself is too coarse.
+        let mut simulation = Simulation::new(&scene).unwrap();
+        simulation.initialise(1e6).unwrap();
+        let message = simulation.do_step(1e6, 1e-9).unwrap_err().to_string();
+        assert!(message.contains("double precision"), "{message}");
+        assert!(simulation.initialise(1e10).unwrap_err().to_string().contains("start time"));
+    }
+}
+
+/// Every number of a scene and its ROM, beyond the table of ranges.
+#[test]
+fn numbers_beyond_the_table_of_ranges_are_refused_by_name() {
+    type Change = fn(&mut Scene, f64);
+    let changes: [(&str, f64, Change); 22] = [
+        ("speed", 2e6, |scene, value| scene.settings.structures[0].speed = value),
+        ("damping_ratio", 1.0, |scene, value| scene.settings.structures[0].damping_ratio = Some(value)),
+        ("frequency_factors", 2.1, |scene, value| scene.settings.structures[0].frequency_factors = vec![value; 4]),
+        ("contact[1].gap", 1e-13, |scene, value| scene.settings.contacts[0].gap = value),
+        ("contact[1].gap", 2e3, |scene, value| scene.settings.contacts[0].gap = value),
+        ("contact[1].sector_gaps", 1e-310, |scene, value| scene.settings.contacts[0].sector_gaps = vec![value; 4]),
+        ("friction", 2.1, |scene, value| scene.settings.contacts[0].friction = value),
+        ("ramp_time", 2e9, |scene, value| scene.settings.surfaces[0].ramp_time = value),
+        ("time.step", 9e-13, |scene, value| scene.settings.time.step = value),
+        ("experiment.start", -2e9, |scene, value| scene.settings.experiment.start = value),
+        ("experiment.stop", 2e9, |scene, value| scene.settings.experiment.stop = value),
+        ("experiment.communication_step", 9e-13, |scene, value| scene.settings.experiment.communication_step = value),
+        ("experiment.communication_step", 2e9, |scene, value| scene.settings.experiment.communication_step = value),
+        ("shape.phase", 2e6, |scene, value| {
+            scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order: 2, phase: value };
+        }),
+        ("shape.order", 2e6, |scene, value| {
+            scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order: value as u32, phase: 0.0 };
+        }),
+        ("shape.depth", 2e12, |scene, value| {
+            scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: value, width: 0.15, phase: 0.0 };
+        }),
+        ("`mass`", 2e30, |scene, value| scene.roms[0].mass[(2, 2)] = value),
+        ("`stiffness`", 2e30, |scene, value| scene.roms[0].stiffness[(2, 2)] = value),
+        ("`contact_map`", -2e15, |scene, value| scene.roms[0].contact_map[(2, 2)] = value),
+        ("`contact_positions`, node 2", 2.5e199, |scene, value| scene.roms[0].contact_nodes[1].position[0] = value),
+        ("`contact_positions`, node 2", 1e-6, |scene, value| scene.roms[0].contact_nodes[1].position[0] = value),
+        ("`contact_meridional_slopes`, node 3", 2e3, |scene, value| {
+            scene.roms[0].contact_nodes[2].meridional_slope = value
+        }),
+    ];
+    for (named, value, change) in changes {
+        let mut scene = common::scene(4);
+        change(&mut scene, value);
+        let message = match scene.roms[0].validate() {
+            Err(refusal) => refusal.to_string(),
+            Ok(()) => refusal(&scene),
+        };
+        assert!(message.contains(named) && message.len() < 300, "{named} = {value:e}: {message}");
+    }
+}
+
+#[test]
+fn slips_of_units_and_axes_are_asked_about_and_change_nothing() {
+    type Change = fn(&mut Scene);
+    let slips: [(&str, Change); 6] = [
+        ("rpm", |scene| scene.settings.structures[0].speed = 17_188.0),
+        ("millimetres", |scene| {
+            scene.settings.contacts[0].gap = 0.356;
+            scene.roms[0].contact_nodes.iter_mut().for_each(|node| node.position[0] *= 1000.0);
+        }),
+        ("axis", |scene| {
+            scene.settings.contacts[0].gap = 5e-5;
+            scene.roms[0].contact_nodes.iter_mut().for_each(|node| node.position[0] = 0.9e-3);
+        }),
+        ("12 sectors", |scene| scene.roms[0].contact_nodes[2].position[1] = 1.6),
+        ("crosses", |scene| {
+            let mut nodes = scene.roms[0].contact_nodes.clone();
+            nodes.push(nodes[2].clone());
+            nodes.iter_mut().zip([[0.0, 0.0], [0.9, 0.01], [0.9, 0.0], [0.0, 0.01]]).for_each(|(node, [angle, z])| {
+                (node.position[1], node.position[2]) = (angle, z);
+            });
+            nodes[3].name = "fourth".into();
+            scene.roms[0].contact_map = DMatrix::from_fn(12, 8, |row, mode| 1.0 + (row * 8 + mode) as f64 % 5.0);
+            scene.roms[0].contact_nodes = nodes;
+        }),
+        ("Hz", |scene| scene.roms[0].stiffness *= 1e-10),
+    ];
+    let plain = started(&common::scene(12));
+    assert!(plain.warnings().iter().all(|text| !text.contains('?')), "{:?}", plain.warnings());
+    for (word, change) in slips {
+        let mut scene = common::scene(12);
+        scene.settings.contacts[0].friction = 0.0;
+        scene.settings.surfaces[0].shape = Shape::Circular {};
+        scene.settings.surfaces[0].moving = false;
+        change(&mut scene);
+        let mut simulation = Simulation::new(&scene).unwrap_or_else(|error| panic!("{word}: {error}"));
+        let outcome = simulation.initialise(0.0);
+        let told = simulation.warnings().join("; ");
+        assert!(told.contains(word) && told.contains('?'), "{word}: {told} {outcome:?}");
+    }
+}
+
+#[test]
+fn tips_that_become_too_fast_are_told_of_once() {
+    let mut scene = common::scene(4);
+    scene.settings.contacts[0].friction = 0.0;
+    scene.settings.surfaces[0].shape = Shape::Circular {};
+    let mut simulation = started(&scene);
+    assert!(simulation.take_notes().is_empty() && simulation.warnings().is_empty(), "{:?}", simulation.warnings());
+    let mut told = Vec::new();
+    for speed in [1300.0, 5990.0, 6010.0, 17_188.0, 1300.0, 17_188.0] {
+        simulation.set_real(reference(&simulation, "speed"), speed).unwrap();
+        simulation.do_step(simulation.time(), 1e-6).unwrap();
+        told.push(simulation.take_notes().len());
+    }
+    assert_eq!(told, [0, 0, 1, 0, 0, 0]);
 }

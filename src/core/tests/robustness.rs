@@ -3,6 +3,7 @@
 mod common;
 
 use nalgebra::DMatrix;
+use proptest::prelude::*;
 use tiprub_core::settings::{
     CoatingSettings, Motion, Scheme, Shape, Solver, SplineSettings, StructureSettings, TimeSettings,
 };
@@ -288,7 +289,7 @@ fn a_speed_given_within_a_communication_step_is_checked_as_well() {
     let speed = reference(&simulation, "speed");
     simulation.begin_step(0.0, 5e-5).unwrap();
     simulation.advance().unwrap();
-    for (value, slope) in [(1e7, 0.0), (1300.0, 1e12)] {
+    for (value, slope) in [(9e5, 0.0), (1300.0, 1e12)] {
         let outcome = simulation.set_real(speed, value).and_then(|()| simulation.set_input_derivative(speed, 1, slope));
         let message = outcome.unwrap_err().to_string();
         assert!(message.contains("internal_step_max"), "{message}");
@@ -296,4 +297,192 @@ fn a_speed_given_within_a_communication_step_is_checked_as_well() {
     while !simulation.advance().unwrap().finished {}
     let turned = real(&simulation, "rotor_angle");
     assert!((turned - 1300.0 * 5e-5).abs() < 1e-12, "{turned}");
+}
+
+/// What the FMU does when an output is asked for in Initialization Mode: on a refusal it goes back to the state before.
+fn tried(simulation: &mut Simulation) -> bool {
+    let mut state = vec![0; simulation.state_size()];
+    simulation.save_state(&mut state).unwrap();
+    let outcome = simulation.initialise(0.0);
+    if outcome.is_err() {
+        simulation.restore_state(&state).unwrap();
+    }
+    outcome.is_ok()
+}
+
+fn bits(simulation: &Simulation) -> Vec<u64> {
+    (0..u32::try_from(simulation.table().references()).unwrap())
+        .filter_map(|reference| simulation.real(reference).ok().map(f64::to_bits))
+        .collect()
+}
+
+/// Scenes with parameters that are refused in many ways.
+fn refusing() -> Vec<Scene> {
+    let small = common::scene(3);
+    let mut elastic = on_a_ring(common::scene(3));
+    elastic.settings.contacts[0].friction = 0.1;
+    let mut stiffened = stiffening(Scheme::ModalExact, 1e-6);
+    stiffened.roms[0].sectors = 3;
+    stiffened.settings.contacts[0].friction = 0.1;
+    [small, round(Scheme::ModalExact), elastic, stiffened]
+        .map(|mut scene| {
+            scene.settings.contacts[0].friction = scene.settings.contacts[0].friction.max(0.05);
+            scene
+        })
+        .into()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn what_is_refused_leaves_nothing_behind(
+        scene in 0..4_usize,
+        asked in prop::collection::vec((0..9_u8, 1..4_i32, 0.0..1.0_f64), 14),
+    ) {
+        let scene = &refusing()[scene];
+        let mut simulation = Simulation::new(scene).unwrap();
+        let mut states: Vec<Vec<u8>> = Vec::new();
+        let (mut started, mut history) = (false, Vec::new());
+        for (kind, choice, share) in asked {
+            let name = ["friction_coefficient", "damping_ratio", "internal_step_max", "speed"];
+            let value = [2.0 * share, 0.99 * share, 10_f64.powf(-8.0 + 5.0 * share), 2000.0 * (share - 0.5)];
+            match kind {
+                0..=2 => {
+                    let which = usize::try_from(choice).unwrap();
+                    let _ = simulation.set_real(reference(&simulation, name[which]), value[which]);
+                }
+                3 => {
+                    let _ = simulation.set_real(reference(&simulation, name[0]), value[0]);
+                }
+                4 => {
+                    let _ = simulation.set_integer(reference(&simulation, "scheme"), choice);
+                }
+                5 if !started => started = tried(&mut simulation),
+                5 | 6 if started => {
+                    let _ = simulation.do_step(simulation.time(), 10_f64.powf(-7.0 + 3.0 * share));
+                }
+                7 => {
+                    let mut state = vec![0; simulation.state_size()];
+                    simulation.save_state(&mut state).unwrap();
+                    states.push(state);
+                    history.push(started);
+                }
+                8 if !states.is_empty() => {
+                    let index = usize::try_from(choice).unwrap() % states.len();
+                    simulation.restore_state(&states[index]).unwrap();
+                    started = history[index];
+                }
+                _ => {
+                    simulation.reset();
+                    started = false;
+                }
+            }
+        }
+        // After a reset it is as good as new: with parameters that are refused, and with those of the scene.
+        for scheme in [3, 1, scene.settings.time.scheme as i32 + 1] {
+            simulation.reset();
+            let mut fresh = Simulation::new(scene).unwrap();
+            let mut outcomes = Vec::new();
+            for one in [&mut simulation, &mut fresh] {
+                one.set_integer(reference(one, "scheme"), scheme).unwrap();
+                let outcome = one.initialise(0.0);
+                let run = outcome.and_then(|()| {
+                    (0..20).try_for_each(|index| one.do_step(one.time(), [3e-6, 7e-7][index % 2]))
+                });
+                outcomes.push((run.map_err(|error| error.to_string()), one.warnings().to_vec()));
+            }
+            prop_assert_eq!(&outcomes[0], &outcomes[1]);
+            if outcomes[0].0.is_ok() {
+                prop_assert_eq!(bits(&simulation), bits(&fresh));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_scheme_that_leaves_no_mode_is_refused_and_the_instance_goes_on() {
+    // Eight modes, three contact nodes: massless-boundary would make all of them quasi-static.
+    let scene = common::scene(3);
+    let mut simulation = Simulation::new(&scene).unwrap();
+    let scheme = reference(&simulation, "scheme");
+    simulation.set_integer(scheme, 3).unwrap();
+    assert!(!tried(&mut simulation));
+    simulation.set_integer(scheme, 2).unwrap();
+    assert!(tried(&mut simulation));
+    simulation.do_step(0.0, 1e-6).unwrap();
+}
+
+#[test]
+fn a_refused_friction_leaves_the_limits_of_the_one_in_use() {
+    // Growth by friction forbids the longer step, at which central differences are stable otherwise.
+    let (short, long) = (1e-6, 5e-5 / 7.0);
+    let mut scene = common::scene(3);
+    scene.settings.time = TimeSettings { scheme: Scheme::CentralDifference, step: 1.0 };
+    scene.settings.experiment.communication_step = short;
+    let mut simulation = started(&scene).unwrap();
+    let mut twin = simulation.clone();
+    let friction = reference(&simulation, "friction_coefficient");
+    let refused =
+        [0.9, 1.4, 1.9, 2.0].into_iter().filter(|value| simulation.set_real(friction, *value).is_err()).count();
+    assert!(refused == 4, "a friction is accepted: the test would show nothing");
+    for length in [short, long, short, long, 0.5 * short] {
+        let outcomes = [&mut simulation, &mut twin].map(|one| one.do_step(one.time(), length));
+        assert_eq!(outcomes[0], outcomes[1]);
+        let grows = outcomes[1].as_ref().is_err_and(|error| error.to_string().contains("grows"));
+        assert_eq!(grows, length == long, "{:?}", outcomes[1]);
+    }
+    assert_eq!(bits(&simulation), bits(&twin));
+}
+
+#[test]
+fn warnings_hold_for_the_step_that_is_taken_and_are_told_once() {
+    let mut scene = with_step(common::scene(3), 8e-6);
+    scene.settings.contacts[0].friction = 0.0;
+    // ω_max·h = 2 lies at 7.96e-6 s.
+    scene.settings.experiment.communication_step = 5e-6;
+    let mut simulation = started(&scene).unwrap();
+    assert!(simulation.warnings().is_empty(), "{:?}", simulation.warnings());
+    let mut told = Vec::new();
+    for length in [5e-6, 7.9e-6, 8e-6, 8e-6, 4e-6, 1.6e-5] {
+        simulation.do_step(simulation.time(), length).unwrap();
+        told.push(simulation.take_notes().join("; "));
+    }
+    assert!(told[2].contains("8.000e-6"), "{told:?}");
+    assert_eq!(told.iter().filter(|text| !text.is_empty()).count(), 1, "{told:?}");
+    // Told at the start for the step to expect, it is told again when the step is materially longer.
+    let mut scene = with_step(scene, 2e-5);
+    scene.settings.experiment.communication_step = 1e-5;
+    let mut simulation = started(&scene).unwrap();
+    assert!(simulation.warnings().join(" ").contains("1.000e-5"), "{:?}", simulation.warnings());
+    let steps = [1e-5, 1.1e-5, 2e-5, 1e-5, 2e-5];
+    let told = steps.map(|length| {
+        simulation.do_step(simulation.time(), length).unwrap();
+        simulation.take_notes().len()
+    });
+    assert_eq!(told, [0, 0, 1, 0, 0]);
+}
+
+#[test]
+fn the_other_sense_is_told_of_when_the_rotor_turns_that_way() {
+    // Slip in one sense only makes this blade flutter.
+    let mut scene = with_step(common::scene(3), 1e-6);
+    let flutters = |scene: &Scene| {
+        let warnings = started(scene).unwrap().warnings().to_vec();
+        warnings.iter().filter(|text| text.contains("flutter")).count()
+    };
+    scene.settings.structures[0].speed = -1300.0;
+    let backwards = flutters(&scene);
+    scene.settings.structures[0].speed = 1300.0;
+    let forwards = flutters(&scene);
+    assert!(backwards > 0, "{backwards} {forwards}");
+    let mut simulation = started(&scene).unwrap();
+    let other = simulation.if_reversed();
+    assert_eq!(other.len(), backwards);
+    simulation.do_step(0.0, 1e-6).unwrap();
+    assert!(simulation.take_notes().is_empty());
+    for (speed, expected) in [(-1300.0, backwards), (1300.0, 0), (-1300.0, 0)] {
+        set(&mut simulation, "speed", speed);
+        simulation.do_step(simulation.time(), 1e-6).unwrap();
+        assert_eq!(simulation.take_notes().len(), expected, "{speed}");
+    }
 }

@@ -192,11 +192,11 @@ fn numbers_of_coatings_have_their_ranges() {
     let coating = |change: fn(&mut CoatingSettings)| {
         move |scene: &mut SceneSettings| change(scene.contacts[0].coating.as_mut().unwrap())
     };
-    refused(coating(|c| c.thickness = 0.0), &["contact[1].coating.thickness: 0 m", "finite value > 0"]);
+    refused(coating(|c| c.thickness = 0.0), &["contact[1].coating.thickness: 0", "between 1e-9 and 0.1"]);
     refused(coating(|c| c.thickness = 0.11), &["contact[1].coating.thickness: 0.11", "between 1e-9 and 0.1"]);
-    refused(coating(|c| c.modulus = -1.0), &["contact[1].coating.modulus: -1 Pa"]);
+    refused(coating(|c| c.modulus = -1.0), &["contact[1].coating.modulus: -1"]);
     refused(coating(|c| c.modulus = f64::INFINITY), &["contact[1].coating.modulus: inf"]);
-    refused(coating(|c| c.modulus = 2e13), &["contact[1].coating.modulus", "between 0 and 1e13"]);
+    refused(coating(|c| c.modulus = 2e13), &["contact[1].coating.modulus", "between 1 and 1e13"]);
     refused(coating(|c| c.yield_stress = -1.0), &["contact[1].coating.yield_stress: -1"]);
     refused(coating(|c| c.yield_stress = f64::NAN), &["contact[1].coating.yield_stress: NaN"]);
     refused(coating(|c| c.hardening = -1.0), &["contact[1].coating.hardening: -1"]);
@@ -242,7 +242,7 @@ fn outputs_of_what_the_scene_does_not_have_are_refused() {
 fn largest_and_smallest_values_are_accepted() {
     let mut scene = features::scene_with_every_feature();
     scene.structures[0].frequency_factors = vec![0.5, 2.0];
-    scene.structures[1].load = Some(LoadSettings { order: u32::MAX, amplitude: -1e300, phase: 1e3 });
+    scene.structures[1].load = Some(LoadSettings { order: u32::MAX, amplitude: -1e12, phase: 1e6 });
     scene.surfaces[0].spline = Some(SplineSettings { around: 2000, along: 200, ..SplineSettings::default() });
     scene.surfaces[0].patches = Some(PatchSettings { around: 100, along: 100 });
     scene.contacts[0].heat_to_slave = Some(1.0);

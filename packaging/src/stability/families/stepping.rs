@@ -63,17 +63,34 @@ fn communication() -> Vec<Case> {
                 Case::new(format!("communication/H={what}/{scheme_name}"), Expected::refused([word]), case).quick(true),
             );
         }
+        for length in [5e-324, 1e-310, 1e-17, 9e-13, 1e-12] {
+            let expected = if length < 1e-12 {
+                Expected::refused(["communicationStepSize", "1e-12"])
+            } else {
+                Expected::right("finite outputs")
+            };
+            let case = move |_: &_| Happened::of(from(0.0, scheme, length));
+            cases.push(
+                Case::new(format!("communication/from-0/H={length:e}/{scheme_name}"), expected, case).quick(true),
+            );
+        }
     }
     cases
 }
 
 /// A step after a start at 1 s, so that the shortest ones do not change the time.
 fn beyond(scheme: Scheme, length: f64) -> Result<Vec<Check>> {
+    from(1.0, scheme, length)
+}
+
+/// A step from `start` (s).
+fn from(start: f64, scheme: Scheme, length: f64) -> Result<Vec<Check>> {
     let scene = with_methods(with_step(round(Tower::default().rom()), 1e-6), scheme, Solver::Lcp);
     let mut simulation = Simulation::new(&scene)?;
-    simulation.initialise(1.0)?;
-    simulation.do_step(1.0, length)?;
-    Ok(vec![Check::so("it ran", true)])
+    simulation.initialise(start)?;
+    simulation.do_step(start, length)?;
+    let finite = super::super::observe::outputs(&simulation).iter().all(|value| value.is_finite());
+    Ok(vec![Check::so("all outputs finite", finite)])
 }
 
 fn rub(scheme: Scheme, solver: Solver, step: f64) -> Scene {
@@ -357,6 +374,10 @@ fn restore() -> Vec<Case> {
             cases.push(Case::new(format!("restore/other-parameters/{scheme_name}/{name}"), expected, work).quick(true));
         }
     }
+    let expected = Expected::right("refused, set back, and then the same bits as of a fresh instance");
+    cases.push(Case::new("restore/refused-scheme", expected, |_| Happened::of(after_refusal())).quick(true));
+    let expected = Expected::right("a warning for the step taken, once; none for the step proposed");
+    cases.push(Case::new("communication/other-step-than-proposed", expected, |_| Happened::of(told())).quick(true));
     let expected = Expected::refused(["another scene"]);
     cases.push(Case::new("restore/other-scene", expected, |_| Happened::of(other_scene())).quick(true));
     cases
@@ -399,6 +420,54 @@ fn elsewhere(scheme: Scheme, solver: Solver) -> Result<Vec<Check>> {
         same &= bits(&simulation) == bits(&other);
     }
     Ok(vec![Check::so("all outputs the same bit by bit over 40 steps", same)])
+}
+
+/// A scheme that leaves no mode, asked for and taken back as an FMU does in Initialization Mode.
+fn after_refusal() -> Result<Vec<Check>> {
+    // As many modes as three contact nodes have directions.
+    let mut scene = rub(Scheme::ModalExact, Solver::Lcp, STEP);
+    let rom = &mut scene.roms[0];
+    for matrix in [&mut rom.mass, &mut rom.stiffness, &mut rom.contact_map] {
+        *matrix = matrix.view((0, 0), (9, 9)).into_owned();
+    }
+    let [mut simulation, mut fresh] = [Simulation::new(&scene)?, Simulation::new(&scene)?];
+    let scheme = simulation.table().find("scheme").map_or(0, |row| row.reference);
+    let mut state = vec![0; simulation.state_size()];
+    simulation.set_integer(scheme, 3)?;
+    simulation.save_state(&mut state)?;
+    let refused = simulation.initialise(0.0).is_err();
+    simulation.restore_state(&state)?;
+    simulation.set_integer(scheme, 2)?;
+    for run in [&mut simulation, &mut fresh] {
+        run.initialise(0.0)?;
+        for _ in 0..40 {
+            run.do_step(run.time(), 3e-5)?;
+        }
+    }
+    Ok(vec![
+        Check::so("massless-boundary is refused", refused),
+        Check::so("the bits of a fresh instance", bits(&simulation) == bits(&fresh)),
+    ])
+}
+
+/// Steps longer than the scene proposes, across the step that resolves all modes.
+fn told() -> Result<Vec<Check>> {
+    let tower = Tower::default();
+    let resolved = 2.0 / tower.largest_frequency();
+    let mut scene = with_methods(with_step(round(tower.rom()), 1.6 * resolved), Scheme::ModalExact, Solver::Lcp);
+    scene.settings.experiment.communication_step = 0.9 * resolved;
+    let mut simulation = Simulation::new(&scene)?;
+    simulation.initialise(0.0)?;
+    let before = simulation.warnings().len();
+    let mut told = Vec::new();
+    for factor in [0.9, 1.3, 1.3, 0.9] {
+        simulation.do_step(simulation.time(), factor * resolved)?;
+        told.push(simulation.take_notes().len());
+    }
+    Ok(vec![
+        Check::so("no warning for the step proposed", before == 0),
+        Check::so("one for the first longer step", told == [0, 1, 0, 0]),
+    ])
 }
 
 fn other_scene() -> Result<Vec<Check>> {

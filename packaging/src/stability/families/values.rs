@@ -316,22 +316,36 @@ fn by_import(context: &Context, scene: &str, version: u8, variable: &str, value:
 /// How a finite but extreme value of a setting may be refused: the field, and what is wrong or what to do.
 fn refusals(field: &str) -> &'static [&'static [&'static str]] {
     match field {
-        "speed" => &[&["variable `speed`", "Use a lower speed"]],
+        "speed" => &[&["variable `speed`", "Use a lower speed"], &["structure[1].speed", "between -1e6 and 1e6"]],
         "damping_ratio" => &[&["structure[1].damping_ratio", "between 0 and 0.99"]],
         "frequency_factors" => &[&["structure[1].frequency_factors[4]", "between 0.5 and 2"]],
-        "gap" => &[&["contact[1].gap", "> 0"], &["contact.gap", "in metres"]],
-        "sector_gaps" => &[&["contact[1].sector_gaps", "> 0"], &["contact.gap", "in metres"]],
+        "gap" => &[&["contact[1].gap", "> 0"], &["contact[1].gap", "1e-12"], &["contact.gap", "in metres"]],
+        "sector_gaps" => {
+            &[&["contact[1].sector_gaps", "> 0"], &["contact[1].sector_gaps", "1e-12"], &["contact.gap", "in metres"]]
+        }
         "friction" => &[&["contact[1].friction", "between 0 and 2"]],
         "ramp_time" => &[
             &["surface[1].ramp_time", "between 0 and 1e9"],
             &["initial clearance", "start inside the casing", "ramp_time"],
         ],
         "time.step" => &[&["time.step", "between 1e-12 and 1"]],
-        "communication_step" => &[&["experiment.communication_step", "> 0"]],
-        "shape.depth" => &[&["surface.shape", "in metres"]],
+        "communication_step" => &[&["experiment.communication_step", "between 1e-12 and 1e9"]],
+        "start" => &[&["experiment.start", "between -1e9 and 1e9"], &["experiment.stop", "after"]],
+        "shape.depth" => &[&["surface.shape", "in metres"], &["surface[1].shape.depth", "between"]],
+        "shape.phase" => &[&["surface[1].shape.phase", "between -1e6 and 1e6"]],
+        "rom.radius" => &[&["`contact_positions`", "between 1e-5 and 1000"], &["`contact_positions`", "not positive"]],
+        "rom.axial" => &[&["`contact_positions`", "between -1000 and 1000"]],
+        "rom.angle" => &[&["`contact_positions`", "between -1e6 and 1e6"]],
+        "rom.slope" => &[&["`contact_meridional_slopes`", "between -1000 and 1000"]],
+        "rom.map" => &[&["`contact_map`", "beyond ±1e15"], &["µ"], &["small displacements"]],
         "shape.width" => &[&["surface[1].shape.width", "between 0.001 and 0.25"]],
-        "rom.mass" => &[&["`mass`", "not positive definite"], &["`mass` and `stiffness`", "orders of magnitude"]],
+        "rom.mass" => &[
+            &["`mass`", "beyond ±1e30"],
+            &["`mass`", "not positive definite"],
+            &["`mass` and `stiffness`", "orders of magnitude"],
+        ],
         "rom.stiffness" => &[
+            &["`stiffness`", "beyond ±1e30"],
             &["`mass` and `stiffness`", "orders of magnitude"],
             &["`stiffness`", "not positive semidefinite"],
             &["µ", "no unique solution", "Use no friction"],
@@ -343,7 +357,7 @@ fn refusals(field: &str) -> &'static [&'static [&'static str]] {
 /// Settings of a scene, which have no setter.
 fn settings() -> Vec<Case> {
     type Change = fn(&mut Scene, f64);
-    let fields: [(&str, &str, Change); 14] = [
+    let fields: [(&str, &str, Change); 20] = [
         ("speed", "speed", |scene, value| scene.settings.structures[0].speed = value),
         ("damping_ratio", "damping_ratio", |scene, value| scene.settings.structures[0].damping_ratio = Some(value)),
         ("frequency_factors", "frequency_factors", |scene, value| {
@@ -371,6 +385,12 @@ fn settings() -> Vec<Case> {
         }),
         ("rom.mass", "mass", |scene, value| scene.roms[0].mass[(2, 2)] = value),
         ("rom.stiffness", "stiffness", |scene, value| scene.roms[0].stiffness[(2, 2)] = value),
+        ("start", "experiment", |scene, value| scene.settings.experiment.start = value),
+        ("rom.radius", "contact_positions", |scene, value| scene.roms[0].contact_nodes[1].position[0] = value),
+        ("rom.angle", "contact_positions", |scene, value| scene.roms[0].contact_nodes[1].position[1] = value),
+        ("rom.axial", "contact_positions", |scene, value| scene.roms[0].contact_nodes[1].position[2] = value),
+        ("rom.slope", "contact_positions", |scene, value| scene.roms[0].contact_nodes[1].meridional_slope = value),
+        ("rom.map", "contact_map", |scene, value| scene.roms[0].contact_map[(2, 2)] = value),
     ];
     let mut cases = Vec::new();
     for (field, word, change) in fields {
@@ -384,6 +404,8 @@ fn settings() -> Vec<Case> {
                 let mut scene = scene("bumps");
                 change(&mut scene, value);
                 Happened::of((|| {
+                    // As the ROM file is read.
+                    scene.roms[0].validate()?;
                     let mut simulation = Simulation::new(&scene)?;
                     simulation.initialise(0.0)?;
                     go_on(&mut simulation)?;

@@ -13,7 +13,7 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::Rom;
-use crate::{Error, Result};
+use crate::{Error, Result, ranges, shown};
 
 /// Reduced matrices of one nodal diameter above 0 (those of 0 are the ROM's own).
 #[derive(Debug, Clone, PartialEq)]
@@ -88,6 +88,10 @@ impl Rom {
                 return refuse(name, format!("non-finite entry at ({row}, {column})"));
             }
             let largest = largest_entry(matrix);
+            let most = if name == "contact_map" { ranges::MAP } else { ranges::MATRIX };
+            if largest > most {
+                return refuse(name, format!("an entry of size {} is beyond {}", shown(largest), shown(most)));
+            }
             // With half a turn of phase from sector to sector nothing can travel.
             let imaginary = matrix.iter().fold(0.0, |most: f64, value| most.max(value.im.abs()));
             if 2 * nodal_diameter == self.sectors && imaginary > 1e-8 * largest {

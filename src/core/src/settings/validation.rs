@@ -6,6 +6,7 @@ use super::{
     CoatingSettings, ContactSettings, Motion, SceneSettings, Scheme, Shape, Solver, SplineSettings, StructureSettings,
     SurfaceSettings,
 };
+use crate::ranges::{self, at_most, within};
 use crate::{Error, Result, shown};
 
 impl SceneSettings {
@@ -48,9 +49,12 @@ impl SceneSettings {
         }
         self.validate_pairs()?;
         self.validate_scheme()?;
-        within("time.step", self.time.step, SHORTEST_STEP, LONGEST_STEP)?;
-        finite("experiment.start", self.experiment.start)?;
-        positive("experiment.communication_step", self.experiment.communication_step, "s")?;
+        within("time.step", self.time.step, ranges::SHORTEST_STEP, ranges::LONGEST_STEP)?;
+        let experiment = &self.experiment;
+        at_most("experiment.start", experiment.start, ranges::TIME)?;
+        at_most("experiment.stop", experiment.stop, ranges::TIME)?;
+        let length = experiment.communication_step;
+        within("experiment.communication_step", length, ranges::SHORTEST_STEP, ranges::TIME)?;
         if !(self.experiment.stop.is_finite() && self.experiment.stop > self.experiment.start) {
             return Err(Error::invalid(
                 "experiment.stop",
@@ -115,9 +119,9 @@ impl SceneSettings {
 
 impl StructureSettings {
     fn validate(&self, at: &str) -> Result<()> {
-        finite(&format!("{at}.speed"), self.speed)?;
+        at_most(&format!("{at}.speed"), self.speed, ranges::SPEED)?;
         if let Some(ratio) = self.damping_ratio {
-            within(&format!("{at}.damping_ratio"), ratio, 0.0, MAX_DAMPING)?;
+            within(&format!("{at}.damping_ratio"), ratio, 0.0, ranges::DAMPING)?;
         }
         let other = match self.motion {
             Motion::Rotating => None,
@@ -139,12 +143,12 @@ impl StructureSettings {
             ));
         }
         for (index, factor) in self.frequency_factors.iter().enumerate() {
-            let [low, high] = FREQUENCY_FACTORS;
+            let [low, high] = ranges::FREQUENCY_FACTORS;
             within(&format!("{at}.frequency_factors[{}]", index + 1), *factor, low, high)?;
         }
         if let Some(load) = &self.load {
-            finite(&format!("{at}.load.amplitude"), load.amplitude)?;
-            finite(&format!("{at}.load.phase"), load.phase)?;
+            at_most(&format!("{at}.load.amplitude"), load.amplitude, ranges::LINE_LOAD)?;
+            at_most(&format!("{at}.load.phase"), load.phase, ranges::ANGLE)?;
         }
         self.validate_motion(at)
     }
@@ -165,7 +169,8 @@ impl StructureSettings {
         ];
         let Some((field, _, owner)) = asked.into_iter().find(|(_, asked, owner)| *asked && *owner != self.motion)
         else {
-            return self.velocity.iter().try_for_each(|component| finite(&format!("{at}.velocity"), *component));
+            let field = format!("{at}.velocity");
+            return self.velocity.iter().try_for_each(|component| at_most(&field, *component, ranges::VELOCITY));
         };
         let who = |motion: Motion| match motion {
             Motion::Rotating => ("a rotating structure", "this one rotates", "rotating"),
@@ -183,17 +188,18 @@ impl StructureSettings {
 
 impl SurfaceSettings {
     fn validate(&self, scene: &SceneSettings, at: &str) -> Result<()> {
-        within(&format!("{at}.ramp_time"), self.ramp_time, 0.0, 1e9)?;
+        within(&format!("{at}.ramp_time"), self.ramp_time, 0.0, ranges::TIME)?;
         self.validate_carrier(scene, at)?;
         if let Some(SplineSettings { around, along, .. }) = self.spline {
-            let ([least_around, most_around], [least_along, most_along]) = (SPLINE_AROUND, SPLINE_ALONG);
+            let ([least_around, most_around], [least_along, most_along]) =
+                (ranges::SPLINE_AROUND, ranges::SPLINE_ALONG);
             count(&format!("{at}.spline.around"), around, least_around, most_around)?;
             count(&format!("{at}.spline.along"), along, least_along, most_along)?;
         }
         if let Some(patches) = self.patches {
-            count(&format!("{at}.patches.around"), patches.around, 1, MAX_PATCHES)?;
-            count(&format!("{at}.patches.along"), patches.along, 1, MAX_PATCHES)?;
-            product(&format!("{at}.patches"), "patches", patches.around, patches.along, MAX_PATCHES)?;
+            count(&format!("{at}.patches.around"), patches.around, 1, ranges::PATCHES)?;
+            count(&format!("{at}.patches.along"), patches.along, 1, ranges::PATCHES)?;
+            product(&format!("{at}.patches"), "patches", patches.around, patches.along, ranges::PATCHES)?;
         }
         self.validate_shape(at)
     }
@@ -225,17 +231,17 @@ impl SurfaceSettings {
         match &self.shape {
             Shape::Circular {} => Ok(()),
             Shape::Lobes { amplitude, order, phase } => {
-                finite(&format!("{at}.shape.amplitude"), *amplitude)?;
-                finite(&format!("{at}.shape.phase"), *phase)?;
+                at_most(&format!("{at}.shape.amplitude"), *amplitude, ranges::POSITION)?;
+                at_most(&format!("{at}.shape.phase"), *phase, ranges::ANGLE)?;
                 if *order == 0 {
                     let remedy = "Use order ≥ 1, or gap and radius change for a uniform clearance";
                     return Err(Error::invalid(format!("{at}.shape.order"), "0 lobes", remedy));
                 }
-                Ok(())
+                within(&format!("{at}.shape.order"), f64::from(*order), 1.0, ranges::LOBES)
             }
             Shape::TwoLobe { depth, width, phase } => {
-                finite(&format!("{at}.shape.depth"), *depth)?;
-                finite(&format!("{at}.shape.phase"), *phase)?;
+                at_most(&format!("{at}.shape.depth"), *depth, ranges::DEPTH)?;
+                at_most(&format!("{at}.shape.phase"), *phase, ranges::ANGLE)?;
                 within(&format!("{at}.shape.width"), *width, 1e-3, 0.25)
             }
             Shape::Table { radius_change } => {
@@ -278,15 +284,22 @@ impl ContactSettings {
             let remedy = "Remove the line; without `structure` the surface around a rotor is rigid";
             return Err(Error::invalid(format!("{at}.slave"), format!("surface `{}` is `rigid`", self.slave), remedy));
         }
-        if self.gap == 0.0 {
+        if self.gap == 0.0 && self.sector_gaps.is_empty() {
             let remedy = "Add the radial tip clearance to [[contact]]: number, m (> 0, up to a tenth of the radius); only a free master has none";
             return Err(Error::invalid(format!("{at}.gap"), "missing or 0", remedy));
         }
-        positive(&format!("{at}.gap"), self.gap, "m")?;
-        self.sector_gaps.iter().try_for_each(|gap| positive(&format!("{at}.sector_gaps"), *gap, "m"))?;
-        within(&format!("{at}.friction"), self.friction, 0.0, MAX_FRICTION)?;
+        if self.gap != 0.0 || self.sector_gaps.is_empty() {
+            gap(&format!("{at}.gap"), self.gap)?;
+        }
+        self.sector_gaps.iter().try_for_each(|value| gap(&format!("{at}.sector_gaps"), *value))?;
+        within(&format!("{at}.friction"), self.friction, 0.0, ranges::FRICTION)?;
         if let Some(share) = self.heat_to_slave {
-            within(&format!("{at}.heat_to_slave"), share, 0.0, 1.0)?;
+            let field = format!("{at}.heat_to_slave");
+            within(&field, share, 0.0, 1.0)?;
+            if self.friction == 0.0 {
+                let remedy = "Give the contact a friction coefficient (friction > 0), or remove the line";
+                return Err(Error::invalid(field, "without friction there is no heat to share", remedy));
+            }
         }
         let Some(coating) = &self.coating else { return Ok(()) };
         if self.solver != Solver::Lcp {
@@ -303,62 +316,23 @@ impl ContactSettings {
 
 impl CoatingSettings {
     fn validate(&self, at: &str) -> Result<()> {
-        positive(&format!("{at}.thickness"), self.thickness, "m")?;
-        within(&format!("{at}.thickness"), self.thickness, MIN_THICKNESS, MAX_THICKNESS)?;
-        positive(&format!("{at}.modulus"), self.modulus, "Pa")?;
-        within(&format!("{at}.modulus"), self.modulus, 0.0, MAX_STRESS)?;
-        within(&format!("{at}.yield_stress"), self.yield_stress, 0.0, MAX_STRESS)?;
-        within(&format!("{at}.hardening"), self.hardening, 0.0, MAX_STRESS)?;
-        count(&format!("{at}.cells_around"), self.cells_around, 2, MAX_CELLS)?;
-        count(&format!("{at}.cells_along"), self.cells_along, 1, MAX_CELLS)?;
-        product(at, "cells", self.cells_around, self.cells_along, MAX_CELLS)
+        let ([thinnest, thickest], [softest, stiffest]) = (ranges::THICKNESS, ranges::MODULUS);
+        within(&format!("{at}.thickness"), self.thickness, thinnest, thickest)?;
+        within(&format!("{at}.modulus"), self.modulus, softest, stiffest)?;
+        within(&format!("{at}.yield_stress"), self.yield_stress, 0.0, ranges::STRESS)?;
+        within(&format!("{at}.hardening"), self.hardening, 0.0, ranges::STRESS)?;
+        count(&format!("{at}.cells_around"), self.cells_around, 2, ranges::CELLS)?;
+        count(&format!("{at}.cells_along"), self.cells_along, 1, ranges::CELLS)?;
+        product(at, "cells", self.cells_around, self.cells_along, ranges::CELLS)
     }
 }
 
-/// Shortest internal step accepted (s): far below the period of any mode of a blade.
-pub const SHORTEST_STEP: f64 = 1e-12;
-/// Longest internal step accepted (s): far above it.
-pub const LONGEST_STEP: f64 = 1.0;
-/// Largest friction coefficient accepted.
-pub const MAX_FRICTION: f64 = 2.0;
-/// Largest damping ratio accepted.
-pub const MAX_DAMPING: f64 = 0.99;
-/// Mistuning beyond these factors is another blade.
-const FREQUENCY_FACTORS: [f64; 2] = [0.5, 2.0];
-/// Fewest data points that a closed cubic spline needs, and more than any mesh has.
-const SPLINE_AROUND: [usize; 2] = [4, 2000];
-/// Rings of data points.
-const SPLINE_ALONG: [usize; 2] = [2, 200];
-/// Each patch is an output.
-const MAX_PATCHES: usize = 10_000;
-/// Thinnest coating (m): a few atoms. What it does to blades that move by micrometres is lost in rounding.
-const MIN_THICKNESS: f64 = 1e-9;
-/// Thickest coating (m); real ones have millimetres.
-const MAX_THICKNESS: f64 = 0.1;
-/// Largest modulus, yield stress and hardening of a coating (Pa), beyond any solid.
-const MAX_STRESS: f64 = 1e13;
-/// Most cells of a coating: 80 megabytes of state.
-const MAX_CELLS: usize = 10_000_000;
-
-fn finite(field: &str, value: f64) -> Result<()> {
-    if value.is_finite() { Ok(()) } else { Err(Error::invalid(field, shown(value), "Give a finite number")) }
-}
-
-fn positive(field: &str, value: f64, unit: &str) -> Result<()> {
-    if value.is_finite() && value > 0.0 {
-        Ok(())
-    } else {
-        Err(Error::invalid(field, format!("{} {unit}", shown(value)), "Give a finite value > 0"))
+/// A clearance: positive, and no smaller than what can be told from none.
+fn gap(field: &str, value: f64) -> Result<()> {
+    if !(value.is_finite() && value > 0.0) {
+        return Err(Error::invalid(field, format!("{} m", shown(value)), "Give a finite value > 0"));
     }
-}
-
-fn within(field: &str, value: f64, low: f64, high: f64) -> Result<()> {
-    if (low..=high).contains(&value) {
-        Ok(())
-    } else {
-        let remedy = format!("Give a value between {} and {}", shown(low), shown(high));
-        Err(Error::invalid(field, shown(value), remedy))
-    }
+    within(field, value, ranges::SMALLEST_GAP, ranges::POSITION)
 }
 
 fn count(field: &str, value: usize, least: usize, most: usize) -> Result<()> {

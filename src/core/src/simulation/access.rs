@@ -90,7 +90,8 @@ impl Simulation {
         if quantity == Quantity::Friction && self.phase != Phase::Created {
             let mut parameters = self.parameters();
             parameters.friction = value;
-            self.check_limits(&parameters)?;
+            let warnings = self.check_limits(&parameters)?;
+            self.tell_of_friction(warnings);
             self.system.set_friction(value);
         }
         let offset = self.offset_now();
@@ -242,7 +243,12 @@ impl Simulation {
         if order != 1 {
             return Err(Error::invalid(what, format!("order {order}"), "Only derivatives of order 1 are provided"));
         }
-        Ok(self.derivative_of(variable, element, reference))
+        let derivative = self.derivative_of(variable, element, reference);
+        if derivative.is_finite() {
+            return Ok(derivative);
+        }
+        let problem = "it changes by more than numbers can tell over the communication step";
+        Err(Error::invalid(what, problem, "Use longer communication steps, and look at loads and inputs"))
     }
 }
 

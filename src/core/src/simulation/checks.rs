@@ -5,7 +5,8 @@ use super::compile::{Compiled, Roles};
 use crate::rom::Frame;
 use crate::settings::{Scheme, Solver, StructureSettings};
 use crate::system::StepFailure;
-use crate::{Error, Result, Rom, Scene};
+use crate::variables::Causality;
+use crate::{Error, Result, Rom, Scene, plausibility, shown};
 
 impl Compiled {
     /// Combinations of scheme and solver that this scene cannot be stepped with.
@@ -41,6 +42,29 @@ impl Compiled {
             return refuse("parameter `scheme`", problem, "Use more modes or fewer contact nodes, or modal-exact");
         }
         Ok(())
+    }
+}
+
+impl Compiled {
+    /// What is legal in the ROMs and at the start, and hardly meant.
+    pub fn doubts(&self) -> Vec<String> {
+        let (master, rom) = self.master();
+        let mut doubts = match &self.wheel {
+            Some(wheel) => {
+                plausibility::of_rom(rom, wheel.diameters.iter().flat_map(|one| one.frequencies.iter().copied()))
+            }
+            None => plausibility::of_rom(rom, self.model.frequencies.iter().copied()),
+        };
+        let flat = self.roles.carrier.into_iter().zip(&self.carrier);
+        let open = self.free.iter().flat_map(|free| {
+            let carried = free.pairs.iter().filter(|pair| pair.carrier.is_some());
+            carried.map(|pair| pair.structure).zip(&free.carriers)
+        });
+        for (index, model) in flat.chain(open) {
+            doubts.extend(plausibility::of_rom(&self.scene.roms[index], model.frequencies.iter().copied()));
+        }
+        doubts.extend(plausibility::of_velocity(master.velocity));
+        doubts
     }
 }
 
@@ -124,6 +148,23 @@ impl Simulation {
             ),
         };
         Err(Error::invalid("initial state", what, remedy))
+    }
+
+    /// No output is handed out that is no number: outputs at `time` (s).
+    ///
+    /// # Errors
+    /// Naming the output. The state is not to be gone on with.
+    pub fn check_outputs(&self, time: f64) -> Result<()> {
+        for variable in self.table.variables().iter().filter(|row| row.causality == Causality::Output) {
+            let start = variable.reference as usize;
+            let values = &self.values[start..start + variable.len()];
+            if let Some(element) = values.iter().position(|value| !value.is_finite()) {
+                let problem = format!("{} at t = {} s", values[element], shown(time));
+                let remedy = "Look at loads, inputs and internal step; restore a saved state or reset first";
+                return Err(Error::invalid(format!("output `{}`", variable.element_name(element)), problem, remedy));
+            }
+        }
+        Ok(())
     }
 
     /// A start in penetration would be an impact of arbitrary strength.

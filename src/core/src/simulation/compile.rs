@@ -196,7 +196,7 @@ impl Compiled {
         };
         let lowest = frequencies.into_iter().copied().filter(|value| *value > 0.0).fold(f64::INFINITY, f64::min);
         let radius = self.master().1.contact_nodes.iter().fold(0.0, |most: f64, node| most.max(node.position[0]));
-        if lowest.is_finite() { self.contact().gap * lowest / radius } else { 0.0 }
+        if lowest.is_finite() { self.contact().nominal_gap() * lowest / radius } else { 0.0 }
     }
 
     /// Whether modes or loads of the master depend on the speed.
@@ -301,7 +301,7 @@ impl Compiled {
         let (structure, rom) = self.master();
         let clearances =
             if contact.sector_gaps.is_empty() { vec![contact.gap; rom.sectors] } else { contact.sector_gaps.clone() };
-        let surface = Surface::new(&self.surface().shape, contact.gap)?;
+        let surface = Surface::new(&self.surface().shape, contact.nominal_gap())?;
         let smallest = rom.contact_nodes.iter().fold(f64::INFINITY, |low, node| low.min(node.position[0]));
         let largest_gap = clearances.iter().fold(0.0, |largest: f64, gap| largest.max(*gap));
         for (what, value) in [("contact.gap", largest_gap), ("surface.shape", surface.largest_change())] {

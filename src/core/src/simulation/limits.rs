@@ -1,6 +1,7 @@
 //! Stability and solvability of a scene at the step sizes it can be stepped with.
 
 mod free;
+mod told;
 
 use super::{Compiled, Simulation};
 use crate::contact::gap::{GapLaw, dot};
@@ -12,6 +13,7 @@ use crate::stability::{self, ContactDirections, Growth, massless};
 use crate::variables::Quantity;
 use crate::{Error, Result, shown};
 use nalgebra::DMatrix;
+pub(super) use told::Told;
 
 /// Contact nodes up to this number are looked at in every combination; beyond, alone, in neighbouring pairs, and all.
 const ALL_COMBINATIONS_UP_TO: usize = 3;
@@ -36,13 +38,36 @@ pub struct Parameters {
 /// What is known about the limits with some parameters.
 #[derive(Debug, Clone)]
 pub struct Limits {
+    /// Without the sense.
     parameters: Parameters,
-    /// Warnings for the step expected, or why these parameters are refused.
+    /// Warnings for the step expected, or why these parameters are refused, whatever the sense of slip.
+    outcome: Result<Vec<String>>,
+    /// Slip in +θ and in −θ; of a wheel, for which it takes long, only what was asked for.
+    senses: [Option<Sense>; 2],
+    /// Steps of massless-boundary; infinite for other schemes.
+    massless: MasslessLimit,
+    /// Largest step of each range of step sizes, descending, and what the casing does to solvability there.
+    casing: Vec<(f64, Option<String>)>,
+}
+
+/// Growth of sliding contact in one sense.
+#[derive(Debug, Clone)]
+struct Sense {
+    /// Warnings for the step expected, or why it is refused.
     outcome: Result<Vec<String>>,
     /// Largest step of each range of step sizes, descending, and why it is refused, if it is.
     ranges: Vec<(f64, Option<Error>)>,
-    /// Steps of massless-boundary; infinite for other schemes.
-    massless: MasslessLimit,
+}
+
+/// Senses of slip of a speed or of its sign: both where it is 0.
+fn senses_of(sense: f64) -> impl Iterator<Item = usize> {
+    [sense >= 0.0, sense <= 0.0].into_iter().enumerate().filter(|(_, slips)| *slips).map(|(index, _)| index)
+}
+
+/// What a range found says about a step: that of the smallest entry not below it.
+fn in_range<T>(ranges: &[(f64, Option<T>)], step: f64) -> Option<&T> {
+    let range = ranges.iter().rev().find(|(largest, _)| step <= largest * (1.0 + super::SAME_STEP));
+    range.and_then(|(_, found)| found.as_ref())
 }
 
 impl Simulation {
@@ -76,23 +101,23 @@ impl Simulation {
         slaves.map(|slave| self.value_of(Quantity::SlaveDampingRatio(slave))).collect()
     }
 
-    /// Check limits unless the same parameters were checked last.
-    pub(super) fn check_limits(&mut self, parameters: &Parameters) -> Result<()> {
-        if self.limits.as_ref().is_none_or(|limits| limits.parameters != *parameters) {
-            self.limits = Some(self.compiled.limits(parameters, self.system.law()));
+    /// Check limits unless the same parameters were checked last; returns warnings. A refusal leaves what was known before.
+    pub(super) fn check_limits(&mut self, parameters: &Parameters) -> Result<Vec<String>> {
+        if let Some(limits) = self.limits.as_ref().filter(|limits| limits.cover(parameters)) {
+            return limits.warnings(parameters.sense);
         }
-        self.warnings = match &self.limits {
-            Some(limits) => limits.outcome.clone()?,
-            None => Vec::new(),
-        };
-        Ok(())
+        let limits = self.compiled.limits(parameters, self.system.law());
+        let warnings = limits.warnings(parameters.sense)?;
+        self.limits = Some(limits);
+        Ok(warnings)
     }
 
-    /// After a state of other parameters was restored: what holds for these.
+    /// After a state of other parameters was restored: what holds for these. Before initialisation nothing has been
+    /// computed from parameters, and those that will be refused are not yet.
     pub(super) fn renew_limits(&mut self) {
         let parameters = self.parameters();
-        let known = |known: &Parameters| Parameters { sense: parameters.sense, ..known.clone() } == parameters;
-        if !self.limits.as_ref().is_some_and(|limits| known(&limits.parameters)) {
+        let known = self.limits.as_ref().is_some_and(|limits| limits.are_of(&parameters));
+        if self.phase != super::Phase::Created && !known {
             self.limits = Some(self.compiled.limits(&parameters, self.system.law()));
         }
     }
@@ -110,18 +135,17 @@ impl Simulation {
         if step >= limits.massless.usable {
             return Err(massless::refusal(step, limits.massless));
         }
-        // The range a step belongs to is that of the smallest entry not below it.
-        let range = limits.ranges.iter().rev().find(|(largest, _)| step <= largest * (1.0 + super::SAME_STEP));
-        match range {
-            Some((_, Some(refusal))) => Err(refusal.clone()),
-            _ => Ok(()),
+        for sense in speeds.into_iter().filter(|speed| *speed != 0.0).flat_map(senses_of) {
+            let refusal = limits.senses[sense].as_ref().and_then(|sense| in_range(&sense.ranges, step));
+            refusal.map_or(Ok(()), |refusal| Err(refusal.clone()))?;
         }
+        Ok(())
     }
 }
 
 impl Compiled {
     /// Internal step (s) to expect: what the proposed communication step is divided into.
-    fn expected_step(&self, largest: f64) -> f64 {
+    pub(super) fn expected_step(&self, largest: f64) -> f64 {
         let length = self.scene.settings.experiment.communication_step;
         length / (length / largest * (1.0 - super::SAME_STEP)).ceil().max(1.0)
     }
@@ -164,18 +188,41 @@ impl Compiled {
         let mut at =
             Checking { compiled: self, models, parameters: parameters.clone(), watched: [Vec::new(), Vec::new()] };
         let expected = self.expected_step(parameters.step);
+        let casing = at.casing(expected, law);
         let (outcome, massless) = match at.massless(expected, law) {
-            Ok((more, limit)) => (at.warnings(expected, law, more), limit),
+            Ok((more, limit)) => (at.warnings(expected, in_range(&casing, expected).cloned(), more), limit),
             Err(error) => (Err(error), MasslessLimit::NONE),
         };
-        let ranges = if parameters.friction == 0.0 {
-            Vec::new()
-        } else {
-            let senses = at.senses();
-            let steps = stability::growth_steps(at.largest_frequency(), parameters.step);
-            steps.map(|step| (step, senses.iter().find_map(|sense| at.growth(step, *sense, false).err()))).collect()
-        };
-        Limits { parameters, outcome, ranges: at.with_expected(ranges, expected), massless }
+        let mut senses = [None, None];
+        // Of a wheel the other sense takes as long again; without friction nothing slides.
+        let both = self.wheel.is_none() || parameters.friction == 0.0;
+        if outcome.is_ok() {
+            for sense in senses_of(if both { 0.0 } else { parameters.sense }) {
+                senses[sense] = Some(at.sense(sense, expected));
+            }
+        }
+        Limits { parameters, outcome, senses, massless, casing }
+    }
+}
+
+impl Limits {
+    /// Whether they are those of the parameters, whatever the sense.
+    fn are_of(&self, parameters: &Parameters) -> bool {
+        Parameters { sense: self.parameters.sense, ..parameters.clone() } == self.parameters
+    }
+
+    /// Whether they are, and the sense was looked at.
+    fn cover(&self, parameters: &Parameters) -> bool {
+        self.are_of(parameters) && senses_of(parameters.sense).all(|sense| self.senses[sense].is_some())
+    }
+
+    /// Warnings for the step expected where contact slides in the sense of this sign.
+    fn warnings(&self, sense: f64) -> Result<Vec<String>> {
+        let mut warnings = self.outcome.clone()?;
+        for sense in senses_of(sense).filter_map(|sense| self.senses[sense].as_ref()) {
+            warnings.extend(sense.outcome.clone()?);
+        }
+        Ok(warnings)
     }
 }
 
@@ -239,6 +286,14 @@ fn yielding_most<'a>(
     chosen
 }
 
+/// The step to expect was looked at by itself: it bounds a range of its own.
+fn with_expected<T>(mut ranges: Vec<(f64, Option<T>)>, expected: f64, found: Option<T>) -> Vec<(f64, Option<T>)> {
+    ranges.retain(|(step, _)| (step - expected).abs() > super::SAME_STEP * expected);
+    ranges.push((expected, found));
+    ranges.sort_by(|a, b| b.0.total_cmp(&a.0));
+    ranges
+}
+
 /// A scene with some parameters, about to be checked.
 struct Checking<'a> {
     compiled: &'a Compiled,
@@ -252,19 +307,34 @@ struct Checking<'a> {
 }
 
 impl Checking<'_> {
-    /// All warnings at the step to expect; `more` come last.
-    fn warnings(&mut self, step: f64, law: &GapLaw, more: Vec<String>) -> Result<Vec<String>> {
+    /// All warnings at the step to expect, whatever the sense of slip; `casing` and `more` come last.
+    fn warnings(&self, step: f64, casing: Option<String>, more: Vec<String>) -> Result<Vec<String>> {
         let mut warnings = self.expected(step)?;
-        warnings.extend(self.slave(step, law)?);
+        if let Some(model) = &self.compiled.carrier {
+            let warning = stability::check_step(model.largest_frequency(), self.parameters.scheme, step)?;
+            warnings.extend(warning.map(|warning| format!("casing: {warning}")));
+        }
+        warnings.extend(casing);
         warnings.extend(more);
         Ok(warnings)
     }
 
+    /// Growth of sliding contact at the step to expect and at all others, in one sense.
+    fn sense(&mut self, sense: usize, expected: f64) -> Sense {
+        if self.parameters.friction == 0.0 {
+            return Sense { outcome: Ok(Vec::new()), ranges: Vec::new() };
+        }
+        let sign = [1.0, -1.0][sense];
+        let outcome = self.growth(expected, sign, true);
+        let steps = stability::growth_steps(self.largest_frequency(), self.parameters.step);
+        let ranges = steps.map(|step| (step, self.growth(step, sign, false).err())).collect();
+        Sense { ranges: with_expected(ranges, expected, outcome.as_ref().err().cloned()), outcome }
+    }
+
     /// Everything about the rotor at the step to expect; returns warnings.
-    fn expected(&mut self, step: f64) -> Result<Vec<String>> {
+    fn expected(&self, step: f64) -> Result<Vec<String>> {
         let Parameters { friction, scheme, .. } = self.parameters;
-        let mut warnings: Vec<String> =
-            stability::check_step(self.largest_frequency(), scheme, step)?.into_iter().collect();
+        let warnings = stability::check_step(self.largest_frequency(), scheme, step)?.into_iter().collect();
         let senses: Vec<Vec<ContactDirections>> =
             self.models.iter().map(|model| [1.0, -1.0].map(|sense| self.directions(model, sense)).into()).collect();
         let largest = self.parameters.step;
@@ -273,55 +343,41 @@ impl Checking<'_> {
         } else {
             stability::check_solvable(&self.models[0], scheme, largest, friction, &senses[0])?;
         }
-        if friction > 0.0 {
-            let senses = self.senses();
-            for sense in &senses {
-                warnings.extend(self.growth(step, *sense, true)?);
-            }
-            // Of a wheel the other sense takes as long again.
-            if let ([sense], None) = (&senses[..], &self.compiled.wheel) {
-                let reversed = self.growth(step, -*sense, true).unwrap_or_else(|refusal| vec![refusal.to_string()]);
-                warnings.extend(
-                    reversed
-                        .into_iter()
-                        .map(|text| format!("should the rotor turn the other way (this run does not): {text}")),
-                );
-            }
-        }
         Ok(warnings)
     }
 
-    /// The structure that carries the surface: its own step limit, and whether its part of the contact problem can
-    /// spoil solvability.
-    fn slave(&self, step: f64, law: &GapLaw) -> Result<Vec<String>> {
-        let (Some(model), GapLaw::Spline(spline)) = (&self.compiled.carrier, law) else { return Ok(Vec::new()) };
+    /// Whether the part that the structure under the surface has in the contact problem can spoil solvability, at the step to
+    /// expect and at all others.
+    fn casing(&self, expected: f64, law: &GapLaw) -> Vec<(f64, Option<String>)> {
+        let (Some(model), GapLaw::Spline(spline)) = (&self.compiled.carrier, law) else { return Vec::new() };
         let Parameters { friction, scheme, .. } = self.parameters;
-        let mut warnings: Vec<String> =
-            stability::check_step(model.largest_frequency(), scheme, step)?.into_iter().collect();
-        for warning in &mut warnings {
-            *warning = format!("casing: {warning}");
+        if friction == 0.0 || self.parameters.solver == Solver::Coulomb {
+            return Vec::new();
         }
         let modes = self.compiled.slave_modes(spline);
-        let (mut worst, mut at) = (0.0, 0.0);
-        for place in 0..SLAVE_ANGLES {
-            let angle = slave_angle(place);
-            let seen = slave_at(spline, &modes, angle);
-            for sense in [1.0, -1.0] {
-                let ratio = lowest_ratio(&seen, &modes, scheme, step, sense * friction);
-                if ratio < worst {
-                    (worst, at) = (ratio, angle);
+        let places: Vec<_> = (0..SLAVE_ANGLES).map(|place| slave_at(spline, &modes, slave_angle(place))).collect();
+        let worst_at = |step: f64| {
+            let (mut worst, mut at) = (0.0, 0.0);
+            for (place, seen) in (0..).zip(&places) {
+                for sense in [1.0, -1.0] {
+                    let ratio = lowest_ratio(seen, &modes, scheme, step, sense * friction);
+                    if ratio < worst {
+                        (worst, at) = (ratio, slave_angle(place));
+                    }
                 }
             }
-        }
-        if worst < -1e-9 && self.parameters.solver != Solver::Coulomb {
-            warnings.push(format!(
-                "with µ = {friction} the casing's part of the Delassus matrix is not positive semidefinite (lowest eigenvalue \
-                 {worst:.2e} of the largest, at θ = {at:.2} rad): where the blades add less flexibility than that, a step \
-                 may have no unique solution and is then refused",
-                friction = shown(friction)
-            ));
-        }
-        Ok(warnings)
+            (worst < -1e-9).then(|| {
+                format!(
+                    "with µ = {friction} and an internal step of {step:.3e} s the casing's part of the Delassus matrix is not \
+                     positive semidefinite (lowest eigenvalue {worst:.2e} of the largest, at θ = {at:.2} rad): where the blades \
+                     add less flexibility than that, a step may have no unique solution and is then refused",
+                    friction = shown(friction)
+                )
+            })
+        };
+        let steps = stability::growth_steps(model.largest_frequency(), self.parameters.step);
+        let ranges = steps.map(|step| (step, worst_at(step))).collect();
+        with_expected(ranges, expected, worst_at(expected))
     }
 
     /// Largest step of massless-boundary, and a warning where many blades in contact at once may lower it.
@@ -371,19 +427,6 @@ impl Checking<'_> {
         let rows = self.models[diameter].contact_modes.nrows() / 3;
         let weight = wheel.weight(diameter);
         DMatrix::from_fn(rows, seen.ncols(), |i, j| if i < seen.nrows() { weight * seen[(i, j)] } else { 0.0 })
-    }
-
-    /// Senses of slip to expect.
-    fn senses(&self) -> Vec<f64> {
-        if self.parameters.sense == 0.0 { vec![1.0, -1.0] } else { vec![self.parameters.sense] }
-    }
-
-    /// The step to expect was looked at by itself: it bounds a range of its own.
-    fn with_expected(&self, mut ranges: Vec<(f64, Option<Error>)>, expected: f64) -> Vec<(f64, Option<Error>)> {
-        ranges.retain(|(step, _)| (step - expected).abs() > super::SAME_STEP * expected);
-        ranges.push((expected, None));
-        ranges.sort_by(|a, b| b.0.total_cmp(&a.0));
-        ranges
     }
 
     fn largest_frequency(&self) -> f64 {

@@ -20,7 +20,7 @@ use crate::contact::gap::Drive;
 use crate::settings::Solver;
 use crate::system::System;
 use crate::variables::{Quantity, Start, VariableTable};
-use crate::{Error, Result, Scene, shown};
+use crate::{Result, Scene, ranges, shown};
 use compile::Compiled;
 use drive::{Input, RotorAngle};
 use window::Window;
@@ -158,6 +158,10 @@ pub struct Simulation {
     initial_time: f64,
     phase: Phase,
     warnings: Vec<String>,
+    /// Warnings since the last [`Simulation::take_notes`].
+    notes: Vec<String>,
+    /// What was told since the start.
+    told: limits::Told,
     /// Limits found for the parameters checked last.
     limits: Option<limits::Limits>,
 }
@@ -190,6 +194,8 @@ impl Simulation {
             initial_time: 0.0,
             phase: Phase::Created,
             warnings: Vec::new(),
+            notes: Vec::new(),
+            told: limits::Told::default(),
             limits: None,
         };
         simulation.reset();
@@ -211,16 +217,18 @@ impl Simulation {
     /// # Errors
     /// Refusals with numbers and remedy; the instance can be given other parameters and asked again.
     pub fn initialise(&mut self, start_time: f64) -> Result<()> {
-        if !start_time.is_finite() {
-            return Err(Error::invalid("start time", shown(start_time), "Give a finite start time"));
-        }
+        ranges::at_most("start time", start_time, ranges::TIME)?;
         let parameters = self.parameters();
+        // A refusal leaves an instance that has to be initialised.
+        self.phase = Phase::Created;
         self.warnings.clear();
+        self.notes.clear();
         self.compiled.check_methods(parameters.scheme, parameters.solver)?;
         self.compiled.set_load_order(self.value_of(Quantity::LoadOrder))?;
         self.follow_reference_speed(self.inputs.speed.value)?;
-        self.check_limits(&parameters)?;
+        self.warnings = self.check_limits(&parameters)?;
         self.warn_of_sticking(&parameters);
+        self.begin_telling(parameters.step, parameters.sense);
         self.system.set_methods(parameters.scheme, parameters.solver);
         self.system.set_friction(parameters.friction);
         self.rest(&parameters);
@@ -240,8 +248,9 @@ impl Simulation {
         self.check_initial_state()?;
         self.check_initial_gaps()?;
         self.window.open(self.system.gaps());
-        self.phase = Phase::Ready;
         self.update_outputs();
+        self.check_outputs(start_time)?;
+        self.phase = Phase::Ready;
         self.previous.copy_from_slice(&self.values);
         Ok(())
     }
@@ -315,6 +324,12 @@ impl Simulation {
     /// Warnings collected by the last [`Simulation::initialise`] (unresolved modes and the like).
     pub fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+
+    /// Warnings that came up since the start or the last call, for the step taken: of another step size than the scene
+    /// proposes, of another sense of rotation, of tips too fast, of other friction. Each is told once.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
     }
 
     /// Current time (s): the end of the last finished (or early-returned) step.
@@ -393,6 +408,7 @@ impl Simulation {
         self.previous_length = 0.0;
         (self.time, self.initial_time) = (0.0, 0.0);
         self.warnings.clear();
+        self.notes.clear();
         self.phase = Phase::Created;
     }
 }

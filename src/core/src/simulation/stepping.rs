@@ -4,7 +4,7 @@ use super::{Communication, MOST_STEPS, Phase, Progress, SAME_STEP, Simulation, T
 use crate::contact::coating::Coating;
 use crate::system::StepFailure;
 use crate::variables::Causality;
-use crate::{Error, Result, shown};
+use crate::{Error, Result, ranges, shown};
 
 impl Simulation {
     /// Begin a communication step of length H from the current time, landing exactly on `current_time + step_size`.
@@ -48,6 +48,7 @@ impl Simulation {
         if self.compiled.spins() {
             self.system.set_speed(0.5 * (first + last));
         }
+        self.tell(step, [first, last]);
         self.previous.copy_from_slice(&self.values);
         self.previous_length = self.communication.length;
         self.communication = Communication { start: current_time, length: step_size, count, done: 0 };
@@ -71,11 +72,25 @@ impl Simulation {
                 "Continue from the end of the last step, or restore a saved state",
             ));
         }
-        if current_time + step_size <= current_time {
+        if step_size < ranges::SHORTEST_STEP {
             return Err(Error::invalid(
                 "communicationStepSize",
                 format!(
-                    "{} s does not change the time {} s in double precision",
+                    "{} s at t = {} s is below {} s, where rounding of positions is taken for motion",
+                    shown(step_size),
+                    shown(self.time),
+                    shown(ranges::SHORTEST_STEP)
+                ),
+                "Give a longer communication step; leave out what rounding leaves of a sum of steps",
+            ));
+        }
+        // What rounding of the time leaves of the step.
+        let rounded = (current_time + step_size) - current_time;
+        if (rounded - step_size).abs() > TIME_TOLERANCE * step_size {
+            return Err(Error::invalid(
+                "communicationStepSize",
+                format!(
+                    "{} s does not change the time {} s by as much in double precision",
                     shown(step_size),
                     shown(current_time)
                 ),
@@ -202,6 +217,7 @@ impl Simulation {
         }
         self.rotor.rebase(&self.inputs.speed, offset);
         self.update_outputs();
+        self.check_outputs(time).inspect_err(|_| self.phase = Phase::Failed)?;
         self.rotor.shift(offset);
         self.inputs.shift(offset);
         self.time = time;
@@ -322,7 +338,7 @@ impl Simulation {
 
     /// Growth that the initialisation warned of, as the likely cause of a failure.
     fn instability(&self) -> String {
-        let grows = |text: &&String| text.contains("physically unstable") && !text.contains("this run does not");
+        let grows = |text: &&String| text.contains("physically unstable");
         self.warnings.iter().find(grows).map_or_else(String::new, |text| format!(". {text}"))
     }
 

@@ -304,6 +304,10 @@ fn spectral_radius(matrix: DMatrix<f64>) -> Option<f64> {
 
 /// Eigenvalues of a general matrix; `None` where the iteration does not end (entries of extreme size).
 fn eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<nalgebra::Complex<f64>>> {
+    // Of nothing there are none; the iteration would look for its last row.
+    if matrix.is_empty() {
+        return Some(Vec::new());
+    }
     let iterations = 100 * matrix.nrows();
     let schur = nalgebra::Schur::try_new(matrix, f64::EPSILON, iterations)?;
     Some(schur.complex_eigenvalues().iter().copied().collect())

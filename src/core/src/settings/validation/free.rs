@@ -1,9 +1,8 @@
 //! Scenes with a free master, and how many contact pairs a scene may have.
 
-use super::{finite, within};
+use crate::ranges::{self, at_most, within};
 use crate::settings::{
-    Closure, ContactSettings, MAX_FRICTION, Meridian, Motion, SceneSettings, Scheme, Shape, StructureSettings,
-    SurfaceSettings,
+    Closure, ContactSettings, Meridian, Motion, SceneSettings, Scheme, Shape, StructureSettings, SurfaceSettings,
 };
 use crate::{Error, Result};
 
@@ -100,8 +99,8 @@ fn once(kind: &str, name: &str, count: usize, rule: &str, what: &str) -> Result<
 impl ContactSettings {
     /// A pair of a free master: gaps follow from positions, surfaces are open grids.
     pub(super) fn validate_free(&self, scene: &SceneSettings, at: &str) -> Result<()> {
-        finite(&format!("{at}.gap"), self.gap)?;
-        within(&format!("{at}.friction"), self.friction, 0.0, MAX_FRICTION)?;
+        at_most(&format!("{at}.gap"), self.gap, ranges::POSITION)?;
+        within(&format!("{at}.friction"), self.friction, 0.0, ranges::FRICTION)?;
         let asked = [
             ("gap", self.gap != 0.0),
             ("sector_gaps", !self.sector_gaps.is_empty()),

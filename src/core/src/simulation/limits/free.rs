@@ -8,7 +8,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Limits, Parameters};
+use super::{Limits, Parameters, Sense};
 use crate::contact::free_gap::{FreeGap, tangent};
 use crate::contact::gap::{GapLaw, Geometry, dot};
 use crate::contact::spline_gap::BEYOND_EDGE;
@@ -39,7 +39,14 @@ impl Compiled {
     pub(super) fn free_limits(&self, parameters: &Parameters, free: &FreeParts, law: &FreeGap) -> Limits {
         let step = self.expected_step(parameters.step);
         let outcome = self.free_warnings(parameters, free, law, step);
-        Limits { parameters: parameters.clone(), outcome, ranges: Vec::new(), massless: MasslessLimit::NONE }
+        let quiet = || Some(Sense { outcome: Ok(Vec::new()), ranges: Vec::new() });
+        Limits {
+            parameters: parameters.clone(),
+            outcome,
+            senses: [quiet(), quiet()],
+            massless: MasslessLimit::NONE,
+            casing: Vec::new(),
+        }
     }
 
     fn free_warnings(

@@ -2,7 +2,8 @@
 
 use super::units::{SCHEMES, SOLVERS, TIME};
 use crate::Result;
-use crate::settings::{ContactSettings, LONGEST_STEP, MAX_DAMPING, MAX_FRICTION, SHORTEST_STEP, SceneSettings};
+use crate::ranges::{DAMPING, FRICTION, LONGEST_STEP, SHORTEST_STEP};
+use crate::settings::{ContactSettings, SceneSettings};
 use crate::variables::{
     Causality, Enumeration, Kind, Quantity, Span, Start, Unit, Variability, Variable, VariableTable,
 };
@@ -105,13 +106,13 @@ impl Builder {
     /// Friction coefficient, which may change between communication steps.
     pub fn friction(&mut self, contact: &ContactSettings, text: &str) {
         let row = self.parameter(Quantity::Friction, "friction_coefficient", None, contact.friction, text);
-        (row.min, row.max, row.variability) = (Some(0.0), Some(MAX_FRICTION), Variability::Tunable);
+        (row.min, row.max, row.variability) = (Some(0.0), Some(FRICTION), Variability::Tunable);
     }
 
     /// A modal damping ratio.
     pub fn damping(&mut self, quantity: Quantity, name: &str, start: f64, text: &str) {
         let row = self.parameter(quantity, name, None, start, text);
-        (row.min, row.max) = (Some(0.0), Some(MAX_DAMPING));
+        (row.min, row.max) = (Some(0.0), Some(DAMPING));
     }
 
     /// Internal step, scheme and solver.

@@ -3,6 +3,7 @@
 use super::builder::Builder;
 use super::units::{ANGLE, ENERGY, LENGTH, LINE_LOAD, POWER, TEMPERATURE, VOLUME};
 use super::{Parts, has_friction, largest_length};
+use crate::ranges;
 use crate::variables::{Kind, Quantity, Span, Start, Variability};
 
 /// Temperatures beyond this are not what a linear expansion describes (K).
@@ -47,6 +48,7 @@ pub fn inputs(table: &mut Builder, scene: &Parts) {
         let text = "Amplitude of the radial line load with nodal diameters on the casing, outwards positive";
         let row = table.input(Quantity::LoadAmplitude, "casing_load_amplitude", Some(&LINE_LOAD), load.amplitude, text);
         row.nominal = Some(1e4);
+        (row.min, row.max) = (Some(-ranges::LINE_LOAD), Some(ranges::LINE_LOAD));
         let text = "Phase of the nodal-diameter load: amplitude cos(n theta - phase)";
         table.input(Quantity::LoadPhase, "casing_load_phase", Some(&ANGLE), load.phase, text).display = Some(0);
     }

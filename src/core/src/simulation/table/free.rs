@@ -5,6 +5,7 @@ use super::outputs::{CURVATURE, watched_rows};
 use super::units::{ENERGY, FORCE, IMPULSE, LENGTH, LINEAR_SPEED, POWER, TORQUE};
 use crate::Result;
 use crate::Rom;
+use crate::ranges;
 use crate::settings::{Scene, StructureSettings};
 use crate::simulation::compile::Roles;
 use crate::simulation::free::{Pair, pairs};
@@ -62,6 +63,7 @@ fn parameters(table: &mut Builder, parts: &Parts) {
             &format!("Velocity of {} as a whole along {name} at the start", master.name),
         );
         velocity.nominal = Some(100.0);
+        (velocity.min, velocity.max) = (Some(-ranges::VELOCITY), Some(ranges::VELOCITY));
     }
     if parts.has_friction() {
         table.friction(contact, "Coulomb friction coefficient of all contacts");

@@ -11,7 +11,7 @@ use super::patches::Patches;
 use crate::contact::surface::Surface;
 use crate::settings::{Motion, Scene, SceneSettings, Shape, StructureSettings, SurfaceSettings};
 use crate::variables::{Quantity, Variability, VariableTable};
-use crate::{Result, Rom};
+use crate::{Result, Rom, ranges};
 use builder::Builder;
 use units::{ANGLE, ANGULAR_SPEED, LENGTH, TIME};
 
@@ -82,6 +82,7 @@ fn inputs(table: &mut Builder, scene: &Parts) -> Result<()> {
             table.input(Quantity::Speed, "speed", Some(&ANGULAR_SPEED), structure.speed, "Speed of the rotor about +z");
         speed.display = Some(0);
         speed.nominal = Some(1000.0);
+        (speed.min, speed.max) = (Some(-ranges::SPEED), Some(ranges::SPEED));
     }
     let surface = scene.surface;
     if surface.moving {
@@ -102,7 +103,7 @@ fn inputs(table: &mut Builder, scene: &Parts) -> Result<()> {
                 1.0,
                 "Factor on the casing shape (0 = round, 1 = as in the scene)",
             );
-            let change = Surface::new(&surface.shape, scene.settings.contacts[0].gap)?.largest_change();
+            let change = Surface::new(&surface.shape, scene.settings.contacts[0].nominal_gap())?.largest_change();
             let largest = if change > 0.0 { largest_length(scene) / change } else { 1.0 };
             (factor.min, factor.max) = (Some(-largest), Some(largest));
             if scene.carrier.is_none() {
@@ -153,7 +154,7 @@ fn parameters(table: &mut Builder, scene: &Parts) {
             scene.surface.ramp_time,
             "Time over which the casing shape grows smoothly from round to full after the start",
         );
-        (ramp.min, ramp.max) = (Some(0.0), Some(1e9));
+        (ramp.min, ramp.max) = (Some(0.0), Some(ranges::TIME));
     }
     table.scene_name(settings);
 }

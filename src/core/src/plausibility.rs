@@ -1,0 +1,160 @@
+//! What is legal and hardly meant: slips of units, axes and sets, asked about with the number that looks wrong. A warning
+//! changes no result.
+
+use crate::rom::Frame;
+use crate::{Rom, shown};
+
+/// Fastest tips that are not asked about (m/s): fans and compressors reach 500, the last blades of steam turbines 800, and
+/// what turns faster than 1500 bursts, whatever it is made of. A speed in rpm taken for rad/s is 9.5 times too fast.
+pub const TIP_SPEED: f64 = 1500.0;
+/// Fastest flight of a free body that is not asked about (m/s): ten times a bird strike, the speed of space debris.
+pub const FLIGHT: f64 = 3000.0;
+/// Radii of contact nodes that are not asked about (m): from the smallest turbines on a chip to four times the largest steam
+/// turbines. A radius of 20 mm to 20 m in millimetres is 20 to 20 000.
+const RADII: [f64; 2] = [1e-3, 20.0];
+/// Lowest natural frequencies that are not asked about (Hz): slower than a wind turbine's, faster than a blade on a chip.
+const FREQUENCIES: [f64; 2] = [0.05, 1e6];
+/// Tips may overlap seen along the axis: of staggered blades by half a pitch, of inducers by one or two. Sectors whose
+/// contact nodes span more pitches than this are not sectors of this axis.
+const PITCHES: f64 = 3.0;
+/// Frequencies below this share of the highest are rounding of rigid modes.
+const RIGID: f64 = 1e-6;
+/// Contact nodes up to this number are looked at for blades that cross.
+const CROSSING_UP_TO: usize = 200;
+
+/// Tips that are too fast at `speed` (rad/s).
+pub fn of_speed(rom: &Rom, speed: f64) -> Option<String> {
+    let fastest = speed.abs() * radii(rom)[1];
+    (rom.frame == Frame::Cylindrical && fastest > TIP_SPEED).then(|| {
+        format!(
+            "at speed {} rad/s the tips move at {fastest:.0} m/s, faster than any rotor endures: is the speed in rpm? {} rpm \
+             are {:.6} rad/s",
+            shown(speed),
+            shown(speed),
+            speed * std::f64::consts::PI / 30.0
+        )
+    })
+}
+
+/// Speed up to which tips are not asked about (rad/s).
+pub fn fastest(rom: &Rom) -> f64 {
+    if rom.frame == Frame::Cylindrical { TIP_SPEED / radii(rom)[1] } else { f64::INFINITY }
+}
+
+/// A free body that is too fast at `velocity` (m/s).
+pub fn of_velocity(velocity: [f64; 3]) -> Option<String> {
+    let size = velocity.iter().map(|component| component * component).sum::<f64>().sqrt();
+    (size > FLIGHT).then(|| format!("the free structure starts at {size:.0} m/s: is its velocity in m/s?"))
+}
+
+/// Doubts about a ROM; `frequencies` are its angular frequencies (rad/s).
+pub fn of_rom(rom: &Rom, frequencies: impl Iterator<Item = f64> + Clone) -> Vec<String> {
+    let sectors = if rom.sectors > 1 && rom.extras.grid.is_none() { of_sectors(rom) } else { None };
+    [of_size(rom), sectors, of_frequencies(rom, frequencies)].into_iter().flatten().collect()
+}
+
+/// Smallest and largest radius of the contact nodes (m); of a Cartesian ROM the extents of its box.
+fn radii(rom: &Rom) -> [f64; 2] {
+    let along = |axis: usize| {
+        let values = rom.contact_nodes.iter().map(|node| node.position[axis]);
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+    };
+    if rom.frame == Frame::Cylindrical {
+        return along(0);
+    }
+    let sides = [0, 1, 2].map(|axis| along(axis)[1] - along(axis)[0]);
+    [f64::INFINITY, sides.into_iter().fold(0.0, f64::max)]
+}
+
+fn of_size(rom: &Rom) -> Option<String> {
+    let ([low, high], name) = (radii(rom), &rom.name);
+    let what = if rom.frame == Frame::Cylindrical { "stand at a radius of" } else { "are spread over" };
+    if high > RADII[1] {
+        return Some(format!(
+            "ROM `{name}`: its contact nodes {what} {} m: are its lengths in millimetres? A ROM is in m, kg and s",
+            shown(high)
+        ));
+    }
+    (low < RADII[0]).then(|| {
+        format!(
+            "ROM `{name}`: contact nodes stand at a radius of {} m: is the axis of rotation right, and the length in metres?",
+            shown(low)
+        )
+    })
+}
+
+fn of_frequencies(rom: &Rom, frequencies: impl Iterator<Item = f64> + Clone) -> Option<String> {
+    let highest = frequencies.clone().fold(0.0, f64::max);
+    let elastic = frequencies.filter(|frequency| *frequency > RIGID * highest);
+    let lowest = elastic.fold(f64::INFINITY, f64::min) / std::f64::consts::TAU;
+    (lowest.is_finite() && !(FREQUENCIES[0]..=FREQUENCIES[1]).contains(&lowest)).then(|| {
+        format!(
+            "ROM `{}`: its lowest natural frequency is {lowest:.3e} Hz: are units (m, kg, s), material and clamped nodes \
+             those that are meant?",
+            rom.name
+        )
+    })
+}
+
+/// Neighbouring sectors that lie within each other.
+fn of_sectors(rom: &Rom) -> Option<String> {
+    if rom.frame != Frame::Cylindrical {
+        return None;
+    }
+    #[expect(clippy::cast_precision_loss, reason = "at most 10 000 sectors")]
+    let pitch = std::f64::consts::TAU / rom.sectors as f64;
+    let line: Vec<[f64; 2]> = developed(rom);
+    let (low, high) =
+        line.iter().fold((0.0_f64, 0.0_f64), |(low, high), [angle, _]| (low.min(*angle), high.max(*angle)));
+    let how = if high - low > PITCHES * pitch {
+        format!("its contact nodes span {:.4} rad, {:.1} times", high - low, (high - low) / pitch)
+    } else if crosses_neighbour(&line, pitch) {
+        "the line through its contact nodes crosses that of the next sector,".to_owned()
+    } else {
+        return None;
+    };
+    Some(format!(
+        "ROM `{}`: {how} the {pitch:.4} rad of one of {} sectors: are the number of sectors, the axis of rotation and the \
+         contact nodes those that are meant?",
+        rom.name, rom.sectors
+    ))
+}
+
+/// Angle from the first contact node (rad), the short way, and axial position (m) of every node.
+fn developed(rom: &Rom) -> Vec<[f64; 2]> {
+    let first = rom.contact_nodes.first().map_or(0.0, |node| node.position[1]);
+    let turn = std::f64::consts::TAU;
+    let short = |angle: f64| angle - turn * (angle / turn).round();
+    rom.contact_nodes.iter().map(|node| [short(node.position[1] - first), node.position[2]]).collect()
+}
+
+/// Whether the line from node to node properly crosses itself, a pitch further.
+fn crosses_neighbour(line: &[[f64; 2]], pitch: f64) -> bool {
+    if line.len() > CROSSING_UP_TO {
+        return false;
+    }
+    let side = |[a, b]: [[f64; 2]; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    let apart = |first: f64, second: f64| first * second < 0.0;
+    let next = |[angle, z]: [f64; 2]| [angle + pitch, z];
+    line.windows(2).any(|own| {
+        let own = [own[0], own[1]];
+        line.windows(2).map(|other| [next(other[0]), next(other[1])]).any(|other| {
+            apart(side(own, other[0]), side(own, other[1])) && apart(side(other, own[0]), side(other, own[1]))
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_that_cross_are_told_from_lines_that_overlap() {
+        let straight = [[0.0, 0.0], [0.3, 0.1]];
+        assert!(!crosses_neighbour(&straight, 0.1));
+        let folded = [[0.0, 0.0], [0.3, 0.05], [0.0, 0.1]];
+        assert!(!crosses_neighbour(&folded, 0.1));
+        let loops = [[0.0, 0.0], [0.2, 0.1], [0.2, 0.0], [0.0, 0.1]];
+        assert!(crosses_neighbour(&loops, 0.05));
+    }
+}

@@ -1,0 +1,80 @@
+//! The range of every number that a scene or a ROM may hold, in one table: beyond it no machine is meant, and sums and
+//! squares of such numbers lose what the others say. What is within but hardly meant is asked about by
+//! [`crate::plausibility`].
+
+use crate::{Error, Result, shown};
+
+/// Largest coordinate of a contact node, and largest radius (m): eight times a wind turbine.
+pub const POSITION: f64 = 1e3;
+/// Smallest radius of a contact node (m): a hair's.
+pub const SMALLEST_RADIUS: f64 = 1e-5;
+/// Largest slope of a tip contour (-): 0.06° off a plane face.
+pub const SLOPE: f64 = 1e3;
+/// Largest entry of mass and stiffness, with spin or without, in any unit of the coordinates. Squares stay numbers.
+pub const MATRIX: f64 = 1e30;
+/// Largest entry of a contact map, in any unit of the coordinates: 1/√m of a mass of 1e-30 kg.
+pub const MAP: f64 = 1e15;
+/// Largest thermal load of a patch (N/K), in any unit of the coordinates.
+pub const THERMAL_LOAD: f64 = 1e15;
+/// Largest angular velocity (rad/s): eight times the fastest turbines, of dentists.
+pub const SPEED: f64 = 1e6;
+/// Largest velocity of a free body (m/s): ten times what leaves the solar system.
+pub const VELOCITY: f64 = 1e5;
+/// Largest angle (rad) of a phase: beyond, too few digits are left for its rest.
+pub const ANGLE: f64 = 1e6;
+/// Smallest radial clearance (m): a hundredth of an atom.
+pub const SMALLEST_GAP: f64 = 1e-12;
+/// Largest line load (N/m): a thousand times the strength of any casing.
+pub const LINE_LOAD: f64 = 1e12;
+/// Smallest and largest depth factor of bumps (-), whose heights are held against the radius.
+pub const DEPTH: f64 = 1e12;
+/// Most lobes around the circumference.
+pub const LOBES: f64 = 1e6;
+/// Largest start and stop time, and communication step (s): thirty years.
+pub const TIME: f64 = 1e9;
+/// Shortest step (s), internal or of communication. Positions of 1 m are rounded to 1e-16 m, which a step of 1e-12 s turns
+/// into velocities of 1e-4 m/s: a ten-thousandth of what rubbing blades have. Far shorter steps would make impacts of
+/// rounding.
+pub const SHORTEST_STEP: f64 = 1e-12;
+/// Longest internal step (s): far above the period of any mode of a blade.
+pub const LONGEST_STEP: f64 = 1.0;
+/// Largest friction coefficient.
+pub const FRICTION: f64 = 2.0;
+/// Largest damping ratio of a scene.
+pub const DAMPING: f64 = 0.99;
+/// Mistuning beyond these factors is another blade.
+pub const FREQUENCY_FACTORS: [f64; 2] = [0.5, 2.0];
+/// Fewest data points that a closed cubic spline needs, and more than any mesh has.
+pub const SPLINE_AROUND: [usize; 2] = [4, 2000];
+/// Rings of data points.
+pub const SPLINE_ALONG: [usize; 2] = [2, 200];
+/// Most patches: each is an output.
+pub const PATCHES: usize = 10_000;
+/// Coating thickness (m): from a few atoms, whose effect on blades that move by micrometres is lost in rounding, to a tenth
+/// of a metre; real ones have millimetres.
+pub const THICKNESS: [f64; 2] = [1e-9, 0.1];
+/// Modulus of a coating (Pa), from a jelly's to beyond any solid's.
+pub const MODULUS: [f64; 2] = [1.0, 1e13];
+/// Largest yield stress and hardening of a coating (Pa), beyond any solid.
+pub const STRESS: f64 = 1e13;
+/// Most cells of a coating: 80 megabytes of state.
+pub const CELLS: usize = 10_000_000;
+
+/// Refuse a number outside `low` to `high`.
+///
+/// # Errors
+/// Naming `field` and the range.
+pub fn within(field: &str, value: f64, low: f64, high: f64) -> Result<()> {
+    if (low..=high).contains(&value) {
+        return Ok(());
+    }
+    Err(Error::invalid(field, shown(value), format!("Give a value between {} and {}", shown(low), shown(high))))
+}
+
+/// Refuse a number that is not finite, or larger than `most` in size.
+///
+/// # Errors
+/// Naming `field` and the range.
+pub fn at_most(field: &str, value: f64, most: f64) -> Result<()> {
+    within(field, value, -most, most)
+}

@@ -1,0 +1,127 @@
+//! Warnings that hold for the step taken: told at the start for the step to expect, and once more where a run takes another
+//! step, turns the other way, or gets too fast for any machine.
+
+use super::{Limits, in_range, senses_of};
+use crate::plausibility;
+use crate::simulation::Simulation;
+use crate::stability::{self, massless};
+
+/// A step longer by this factor than the one told about is worth telling again.
+const MATERIAL: f64 = 1.5;
+
+/// What depends on the step: modes of the master and of carriers that are not resolved, contact of massless-boundary that gains
+/// energy, casings that spoil solvability.
+const KINDS: usize = 4;
+
+/// What was told since the start.
+#[derive(Debug, Clone, Default)]
+pub struct Told {
+    /// Longest step told about (s), per kind.
+    steps: [f64; KINDS],
+    /// Senses of slip, + and −.
+    senses: [bool; 2],
+    /// Speed beyond which tips are too fast (rad/s); infinite once that was told.
+    fastest: f64,
+    /// Most warnings at once of one friction coefficient.
+    friction: usize,
+}
+
+impl Simulation {
+    /// Warnings of the start are told; those of the step to expect among them.
+    pub(in crate::simulation) fn begin_telling(&mut self, largest: f64, sense: f64) {
+        let expected = self.compiled.expected_step(largest);
+        self.told = Told::default();
+        for kind in 0..KINDS {
+            self.told.steps[kind] = if self.doubt(kind, expected).is_some() { expected } else { 0.0 };
+        }
+        senses_of(sense).for_each(|sense| self.told.senses[sense] = true);
+        let limits = self.limits.as_ref();
+        self.told.friction = limits.and_then(|limits| limits.warnings(sense).ok()).map_or(0, |warnings| warnings.len());
+        let (rom, speed) = (self.compiled.master().1, self.inputs.speed.value);
+        let fast = plausibility::of_speed(rom, speed);
+        self.told.fastest = if fast.is_some() { f64::INFINITY } else { plausibility::fastest(rom) };
+        let doubts = self.compiled.doubts();
+        self.warnings.extend(doubts.into_iter().chain(fast));
+    }
+
+    /// Warnings of another friction coefficient, unless as many were told before.
+    pub(in crate::simulation) fn tell_of_friction(&mut self, warnings: Vec<String>) {
+        if warnings.len() > self.told.friction {
+            self.told.friction = warnings.len();
+            warnings.into_iter().for_each(|text| self.note(text));
+        }
+    }
+
+    /// Tell what holds for a step (s) and for speeds (rad/s) that were not told about. Allocates only to tell.
+    pub(in crate::simulation) fn tell(&mut self, step: f64, speeds: [f64; 2]) {
+        for kind in 0..KINDS {
+            if step > MATERIAL * self.told.steps[kind]
+                && let Some(text) = self.doubt(kind, step)
+            {
+                self.told.steps[kind] = step;
+                self.note(text);
+            }
+        }
+        for speed in speeds {
+            if speed.abs() > self.told.fastest
+                && let Some(text) = plausibility::of_speed(self.compiled.master().1, speed)
+            {
+                self.told.fastest = f64::INFINITY;
+                self.note(text);
+            }
+            for sense in senses_of(speed).filter(|_| speed != 0.0) {
+                if !std::mem::replace(&mut self.told.senses[sense], true) {
+                    let found = self.limits.as_ref().map_or(Vec::new(), |limits| limits.of_sense(sense));
+                    found.into_iter().for_each(|text| self.note(text));
+                }
+            }
+        }
+    }
+
+    /// A warning of one kind at a step (s).
+    fn doubt(&self, kind: usize, step: f64) -> Option<String> {
+        let limits = self.limits.as_ref()?;
+        let scheme = limits.parameters.scheme;
+        let unresolved = |frequency: f64| stability::check_step(frequency, scheme, step).ok().flatten();
+        match kind {
+            0 => unresolved(self.compiled.largest_frequency() * self.compiled.stiffest()),
+            1 => {
+                let highest = self.compiled.carriers().map(|model| model.largest_frequency()).fold(0.0, f64::max);
+                unresolved(highest).map(|text| format!("casing: {text}"))
+            }
+            2 => massless::warning(step, limits.massless),
+            _ => in_range(&limits.casing, step).cloned(),
+        }
+    }
+
+    /// A warning for who asks next, unless it was given.
+    pub(in crate::simulation) fn note(&mut self, text: String) {
+        if !self.warnings.contains(&text) {
+            self.warnings.push(text.clone());
+            self.notes.push(text);
+        }
+    }
+
+    /// What sliding contact would do should the rotor turn the other way, which the warnings of the start leave out. Empty
+    /// before [`Simulation::initialise`], and for coupled sectors, where looking takes as long again.
+    pub fn if_reversed(&self) -> Vec<String> {
+        let Some(limits) = &self.limits else { return Vec::new() };
+        let other = [0, 1].into_iter().filter(|sense| !self.told.senses[*sense] && limits.senses[*sense].is_some());
+        other.flat_map(|sense| limits.of_sense(sense)).collect()
+    }
+}
+
+impl Limits {
+    /// What contact that slides in a sense does at the step expected.
+    fn of_sense(&self, sense: usize) -> Vec<String> {
+        match self.senses[sense].as_ref().map(|sense| &sense.outcome) {
+            Some(Ok(warnings)) => warnings.clone(),
+            Some(Err(refusal)) => vec![refusal.to_string()],
+            None => vec![
+                "the rotor turns the other way than at the start: whether contact that slides that way grows was not looked at, \
+                 because of coupled sectors it takes long; a start with a speed of that sign looks"
+                    .to_owned(),
+            ],
+        }
+    }
+}
