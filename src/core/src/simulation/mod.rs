@@ -271,8 +271,10 @@ impl Simulation {
         if !self.compiled.spins() || self.compiled.reference_speed.to_bits() == speed.to_bits() {
             return Ok(());
         }
+        let before = self.compiled.reference_speed;
         self.compiled.set_reference_speed(speed)?;
-        self.system = self.compiled.system()?;
+        // The speed before was accepted before.
+        self.system = self.compiled.system().inspect_err(|_| drop(self.compiled.set_reference_speed(before)))?;
         self.limits = None;
         Ok(())
     }
