@@ -1,14 +1,21 @@
-//! Files appear whole or not at all: written to a hidden temporary file beside the target, then renamed. Symbolic links
-//! are followed. Devices and pipes (`/dev/stdout`, `/dev/null`, a FIFO) are written to, never replaced.
+//! Files appear whole or not at all. What is being written has no name yet where the system allows it (Linux: `O_TMPFILE`), so that
+//! nothing stays when the program is killed; elsewhere it is a hidden temporary file beside the target. Then it is renamed.
+//!
+//! New files get the permissions that the user's umask leaves, replaced ones keep theirs. Symbolic links are followed.
+//! Devices and pipes (`/dev/null`, a FIFO) are written to, never replaced.
 
 use std::{
-    fs,
+    fs::{self, File},
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
 use tempfile::NamedTempFile;
 
 use crate::{Failure, Result};
+
+/// Links followed one after the other before they are taken for a circle.
+const MOST_LINKS: usize = 40;
 
 /// Create the directory (and its parents) if it is not there.
 ///
@@ -26,15 +33,24 @@ pub fn create_directory(path: &Path) -> Result<()> {
 pub fn try_directory(path: &Path) -> Result<()> {
     let named = path.ancestors().filter(|ancestor| !ancestor.as_os_str().is_empty());
     let missing: Vec<&Path> = named.take_while(|ancestor| !ancestor.exists()).collect();
-    let trial = create_directory(path).and_then(|()| {
-        let file = tempfile::Builder::new().prefix(".tiprub-").suffix(".part").tempfile_in(path);
-        file.map(drop).map_err(|error| Failure::file(path, "cannot write there", &error))
-    });
+    let trial = create_directory(path)
+        .and_then(|()| Draft::new(path).map(drop).map_err(|error| Failure::file(path, "cannot write there", &error)));
     for made in missing {
         // Those that were not made are not there.
         let _ = fs::remove_dir(made);
     }
     trial
+}
+
+/// Whether a file can be written under this name, as far as that shows before it is. Nothing stays.
+///
+/// # Errors
+/// As [`begin`].
+pub fn try_target(target: &Path) -> Result<()> {
+    match place(target)? {
+        Place::File(path) => try_directory(&parent(&path)),
+        Place::Stream => Ok(()),
+    }
 }
 
 /// What already is under the name of a target.
@@ -46,52 +62,175 @@ enum Place {
 }
 
 fn place(target: &Path) -> Result<Place> {
-    let Ok(metadata) = fs::metadata(target) else { return Ok(Place::File(target.to_path_buf())) };
-    if metadata.is_dir() {
-        return Err(Failure::new(target.display(), "is a directory", "Name a file"));
+    let path = destination(target).map_err(|error| Failure::file(target, "cannot be written", &error))?;
+    let is_directory = || Failure::new(target.display(), "is a directory", "Name a file");
+    match fs::metadata(&path) {
+        Ok(metadata) if metadata.is_dir() => Err(is_directory()),
+        Ok(metadata) if metadata.is_file() => Ok(Place::File(path)),
+        Ok(_) => Ok(Place::Stream),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => match path.file_name() {
+            Some(_) if !target.as_os_str().as_encoded_bytes().ends_with(b"/") => Ok(Place::File(path)),
+            _ => Err(is_directory()),
+        },
+        // A file where a directory should be: said by whoever makes the directory.
+        Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(Place::File(path)),
+        Err(error) => Err(Failure::file(target, "cannot be written", &error)),
     }
-    if !metadata.is_file() {
-        return Ok(Place::Stream);
-    }
-    let real = fs::canonicalize(target).map_err(|error| Failure::file(target, "cannot be found", &error))?;
-    Ok(Place::File(real))
 }
 
-/// A hidden temporary file in the directory of `target` (which is created if missing). Nothing shows under the
-/// target's name before [`persist`].
+/// The path itself, or where symbolic links lead, whether something is there or not.
+pub(crate) fn destination(target: &Path) -> io::Result<PathBuf> {
+    if let Ok(real) = fs::canonicalize(target) {
+        return Ok(real);
+    }
+    let mut path = target.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        // What is open has a link in /proc/self/fd that leads nowhere, and is there all the same.
+        match fs::read_link(&path) {
+            Ok(link) if !path.exists() => path = parent(&path).join(link),
+            _ => return Ok(path),
+        }
+    }
+    Err(io::Error::other("symbolic links lead in a circle"))
+}
+
+/// A file in the making.
+#[derive(Debug)]
+pub struct Draft {
+    file: File,
+    /// Where it has a name already.
+    named: Option<NamedTempFile>,
+}
+
+impl Draft {
+    /// In this directory.
+    fn new(directory: &Path) -> io::Result<Self> {
+        if let Some(file) = unnamed(directory) {
+            return Ok(Self { file, named: None });
+        }
+        let named = temporary().tempfile_in(directory)?;
+        Ok(Self { file: named.reopen()?, named: Some(named) })
+    }
+
+    /// Hidden under a name of its own, ready to be renamed.
+    fn name(self, directory: &Path) -> io::Result<tempfile::TempPath> {
+        if let Some(named) = self.named {
+            return Ok(named.into_temp_path());
+        }
+        Ok(temporary().make_in(directory, |path| link(&self.file, path))?.into_temp_path())
+    }
+}
+
+impl Write for Draft {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+fn temporary<'a>() -> tempfile::Builder<'a, 'a> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".tiprub-").suffix(".part");
+    #[cfg(unix)]
+    builder.permissions(ordinary());
+    builder
+}
+
+/// What the umask leaves of this is what new files get.
+#[cfg(unix)]
+fn ordinary() -> fs::Permissions {
+    std::os::unix::fs::PermissionsExt::from_mode(0o666)
+}
+
+/// A file without a name; none where the file system knows none.
+#[cfg(target_os = "linux")]
+fn unnamed(directory: &Path) -> Option<File> {
+    use std::os::unix::fs::OpenOptionsExt;
+    fs::OpenOptions::new().read(true).write(true).custom_flags(libc::O_TMPFILE).mode(0o666).open(directory).ok()
+}
+
+#[cfg(not(target_os = "linux"))]
+fn unnamed(_directory: &Path) -> Option<File> {
+    None
+}
+
+/// Give a file without a name one.
+#[cfg(target_os = "linux")]
+fn link(file: &File, path: &Path) -> io::Result<()> {
+    use rustix::fs::{AtFlags, CWD};
+    use std::os::fd::AsRawFd;
+    let open = format!("/proc/self/fd/{}", file.as_raw_fd());
+    Ok(rustix::fs::linkat(CWD, open, CWD, path, AtFlags::SYMLINK_FOLLOW)?)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn link(_file: &File, _path: &Path) -> io::Result<()> {
+    Err(io::ErrorKind::Unsupported.into())
+}
+
+/// Begin a file in the directory of `target` (which is created if missing). Nothing shows under the target's name before
+/// [`persist`].
 ///
 /// # Errors
-/// The directory cannot be written to, or `target` is itself a directory.
-pub fn begin(target: &Path) -> Result<NamedTempFile> {
-    let directory = match place(target)? {
-        Place::File(path) => parent(&path),
+/// The directory cannot be written to, or `target` is itself a directory or no possible name.
+pub fn begin(target: &Path) -> Result<Draft> {
+    let place = place(target)?;
+    let directory = match &place {
+        Place::File(path) => parent(path),
         Place::Stream => std::env::temp_dir(),
     };
     create_directory(&directory)?;
-    tempfile::Builder::new()
-        .prefix(".tiprub-")
-        .suffix(".part")
-        .tempfile_in(&directory)
-        .map_err(|error| Failure::file(target, "cannot write there", &error))
+    let draft = Draft::new(&directory).and_then(|draft| match &place {
+        Place::File(path) => keep_permissions(&draft.file, path).map(|()| draft),
+        Place::Stream => Ok(draft),
+    });
+    draft.map_err(|error| Failure::file(target, "cannot write there", &error))
 }
 
-/// Give the finished temporary file its name, replacing an older file of that name.
+/// A file that replaces another is no more open to others than that one.
+fn keep_permissions(file: &File, target: &Path) -> io::Result<()> {
+    match fs::metadata(target) {
+        Ok(metadata) => file.set_permissions(metadata.permissions()),
+        Err(_) => Ok(()),
+    }
+}
+
+/// Give the finished file its name, replacing an older file of that name.
 ///
 /// # Errors
 /// The rename failed, and the temporary file is gone and an older target untouched; or a device or pipe took only a part.
-pub fn persist(file: NamedTempFile, target: &Path) -> Result<()> {
-    let Place::File(path) = place(target)? else { return copy_into_stream(&file, target) };
-    set_ordinary_permissions(&file, target)?;
-    file.persist(path).map_err(|error| Failure::file(target, "cannot be put in place", &error.error))?;
-    Ok(())
+pub fn persist(draft: Draft, target: &Path) -> Result<()> {
+    let Place::File(path) = place(target)? else { return copy_into_stream(draft, target) };
+    let named = draft.name(&parent(&path));
+    let renamed = named.and_then(|named| named.persist(path).map_err(|error| error.error));
+    renamed.map_err(|error| Failure::file(target, "cannot be put in place", &error))
 }
 
-fn copy_into_stream(file: &NamedTempFile, target: &Path) -> Result<()> {
-    let copied = file.reopen().and_then(|mut finished| {
-        let mut stream = fs::OpenOptions::new().write(true).open(target)?;
-        std::io::copy(&mut finished, &mut stream)
-    });
+fn copy_into_stream(draft: Draft, target: &Path) -> Result<()> {
+    let mut finished = draft.file;
+    let copied = io::Seek::rewind(&mut finished)
+        .and_then(|()| open_stream(target))
+        .and_then(|mut stream| io::copy(&mut finished, &mut stream));
     copied.map(drop).map_err(|error| Failure::file(target, "cannot be written", &error))
+}
+
+/// Open a device or a pipe to write. A pipe that nobody reads is waited for, and not in silence.
+fn open_stream(target: &Path) -> io::Result<File> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+        if fs::metadata(target)?.file_type().is_fifo() {
+            let asked = fs::OpenOptions::new().write(true).custom_flags(libc::O_NONBLOCK).open(target);
+            if asked.is_err_and(|error| error.raw_os_error() == Some(libc::ENXIO)) {
+                let name = crate::console::printable(&target.display().to_string()).into_owned();
+                // A closed stderr must not stop the work.
+                let _ = writeln!(io::stderr(), "{name} is a pipe that nobody reads: waiting for its reader");
+            }
+        }
+    }
+    fs::OpenOptions::new().write(true).open(target)
 }
 
 /// Write `bytes` to `target` in one piece.
@@ -99,21 +238,24 @@ fn copy_into_stream(file: &NamedTempFile, target: &Path) -> Result<()> {
 /// # Errors
 /// The file cannot be written.
 pub fn write(target: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
-    let mut file = begin(target)?;
-    std::io::Write::write_all(&mut file, bytes.as_ref())
-        .map_err(|error| Failure::file(target, "cannot be written", &error))?;
-    persist(file, target)
+    let mut draft = begin(target)?;
+    draft.write_all(bytes.as_ref()).map_err(|error| Failure::file(target, "cannot be written", &error))?;
+    persist(draft, target)
 }
 
-/// Refuse to replace a file that holds something else than `bytes`: what a user changed is not lost without notice.
+/// Refuse to replace a file that holds something else than `bytes`: what a user changed is not lost without notice. Devices
+/// and pipes are not read.
 ///
 /// # Errors
 /// The file is there and differs (or cannot be read); `remedy` says what to do.
 pub fn refuse_to_replace(target: &Path, bytes: impl AsRef<[u8]>, remedy: &str) -> Result<()> {
+    if fs::metadata(target).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir()) {
+        return Ok(());
+    }
     match fs::read(target) {
         Ok(present) if present == bytes.as_ref() => Ok(()),
         Ok(_) => Err(Failure::new(target.display(), "is there already and differs from what would be written", remedy)),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
         Err(error) => Err(Failure::file(target, "cannot be compared with what would be written", &error)),
     }
 }
@@ -123,20 +265,6 @@ fn parent(target: &Path) -> PathBuf {
         Some(directory) if !directory.as_os_str().is_empty() => directory.to_path_buf(),
         _ => PathBuf::from("."),
     }
-}
-
-/// Temporary files are private (0600); results are ordinary files (0644).
-#[cfg(unix)]
-fn set_ordinary_permissions(file: &NamedTempFile, target: &Path) -> Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.as_file()
-        .set_permissions(fs::Permissions::from_mode(0o644))
-        .map_err(|error| Failure::file(target, "permissions cannot be set", &error))
-}
-
-#[cfg(not(unix))]
-fn set_ordinary_permissions(_file: &NamedTempFile, _target: &Path) -> Result<()> {
-    Ok(())
 }
 
 #[cfg(test)]
@@ -180,6 +308,78 @@ mod tests {
         write(&link, "new").unwrap();
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(fs::read_to_string(&real).unwrap(), "new");
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn links_to_nothing_are_followed_and_circles_are_named() {
+        let root = tempfile::tempdir().unwrap();
+        let [link, chain, circle] = ["link.csv", "chain.csv", "circle"].map(|name| root.path().join(name));
+        std::os::unix::fs::symlink("new.csv", &link).unwrap();
+        std::os::unix::fs::symlink("link.csv", &chain).unwrap();
+        std::os::unix::fs::symlink("circle", &circle).unwrap();
+        write(&chain, "new").unwrap();
+        assert!([&link, &chain].iter().all(|link| fs::symlink_metadata(link).unwrap().is_symlink()));
+        assert_eq!(fs::read_to_string(root.path().join("new.csv")).unwrap(), "new");
+        assert!(write(&circle, "x").unwrap_err().problem.contains("circle"));
+    }
+
+    #[cfg(unix)]
+    fn mode(path: &Path) -> u32 {
+        use std::os::unix::fs::PermissionsExt;
+        fs::metadata(path).unwrap().permissions().mode() & 0o7777
+    }
+
+    /// The umask belongs to the whole process; a file that the system makes shows what it is.
+    #[test]
+    #[cfg(unix)]
+    fn new_files_follow_the_umask_and_replaced_ones_keep_their_permissions() {
+        use std::os::unix::fs::PermissionsExt;
+        let root = tempfile::tempdir().unwrap();
+        let [plain, target] = ["plain", "target"].map(|name| root.path().join(name));
+        fs::write(&plain, "").unwrap();
+        write(&target, "1").unwrap();
+        assert_eq!(mode(&target), mode(&plain));
+        for kept in [0o600, 0o640, 0o755] {
+            fs::set_permissions(&target, fs::Permissions::from_mode(kept)).unwrap();
+            write(&target, "2").unwrap();
+            assert_eq!(mode(&target), kept);
+        }
+    }
+
+    /// Where files without a name are not to be had, hidden ones do.
+    #[test]
+    #[cfg(unix)]
+    fn hidden_files_become_the_same_as_files_without_a_name() {
+        let root = tempfile::tempdir().unwrap();
+        let [plain, target] = ["plain", "target"].map(|name| root.path().join(name));
+        fs::write(&plain, "").unwrap();
+        let named = temporary().tempfile_in(root.path()).unwrap();
+        let mut draft = Draft { file: named.reopen().unwrap(), named: Some(named) };
+        draft.write_all(b"bytes").unwrap();
+        persist(draft, &target).unwrap();
+        assert_eq!((fs::read_to_string(&target).unwrap().as_str(), mode(&target)), ("bytes", mode(&plain)));
+        assert_eq!(names(root.path()).len(), 2);
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn an_unfinished_file_has_no_name() {
+        let root = tempfile::tempdir().unwrap();
+        let draft = begin(&root.path().join("x")).unwrap();
+        // Where the file system knows such files.
+        assert!(draft.named.is_some() || names(root.path()).is_empty());
+    }
+
+    #[test]
+    fn impossible_names_are_refused_before_any_work() {
+        let root = tempfile::tempdir().unwrap();
+        for name in ["", ".", "..", "missing/", &"l".repeat(300)] {
+            let target = if name.is_empty() { PathBuf::new() } else { root.path().join(name) };
+            assert!(try_target(&target).is_err() && begin(&target).is_err(), "{name}");
+        }
+        try_target(&root.path().join("a/b/c")).unwrap();
+        assert_eq!(names(root.path()).len(), 0);
     }
 
     /// Links stand for the devices here: replacing a real one would damage the machine that runs the tests.

@@ -15,10 +15,11 @@ use crate::{
     Failure, Result, builtin,
     casing_arguments::{self, CasingArguments, MaterialChoice},
     cli::{Model, ReduceArguments},
-    console::{Console, Outcome},
+    console::{Console, Outcome, shown_path},
     cube_models,
     file_arguments::FileArguments,
     output_file,
+    places::{self, Named},
     reduced::Reduced,
     reduction,
     rom_facts::RomFacts,
@@ -41,6 +42,14 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     if let Some(path) = &arguments.vtk {
         files.push((path, reduced.vtk()?));
     }
+    // The name of the ROM file may follow from the model.
+    let names = [
+        Some(("--output", output)),
+        arguments.inp.as_ref().map(|path| ("--inp", path)),
+        arguments.vtk.as_ref().map(|path| ("--vtk", path)),
+    ];
+    let names: Vec<Named> = names.into_iter().flatten().map(|(role, path)| Named::new(role, path)).collect();
+    places::apart(&places::model_files(arguments), &names)?;
     if !arguments.force {
         for (path, bytes) in &files {
             output_file::refuse_to_replace(path, bytes, "Choose another file, or replace it with --force")?;
@@ -106,7 +115,11 @@ fn json(reduced: &Reduced, facts: &RomFacts, arguments: &ReduceArguments, output
         })).collect::<Vec<_>>(),
         "seconds": reduced.seconds,
         "warnings": warnings,
-        "files": { "rom": output, "inp": arguments.inp, "vtk": arguments.vtk },
+        "files": {
+            "rom": shown_path(output),
+            "inp": arguments.inp.as_deref().map(shown_path),
+            "vtk": arguments.vtk.as_deref().map(shown_path),
+        },
     })
 }
 

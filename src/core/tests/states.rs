@@ -149,7 +149,7 @@ fn run_on(simulation: &mut Simulation, created: bool, length: f64) -> Result<(),
     while !simulation.advance()?.finished {}
     for reference in 0..u32::try_from(simulation.table().references()).unwrap() {
         let value = simulation.real(reference).unwrap_or(0.0);
-        assert!(value.is_finite(), "reference {reference} is {value}");
+        assert!(value.is_finite(), "{} is {value}", simulation.table().locate(reference).unwrap().0.name);
     }
     Ok(())
 }
@@ -216,6 +216,6 @@ fn timing() {
             twin.restore_state(&buffer).unwrap();
             best[1] = best[1].min(clock.elapsed().as_secs_f64());
         }
-        println!("{name}: {} bytes, save {:.1} us, restore {:.1} us", buffer.len(), best[0]*1e6, best[1]*1e6);
+        println!("{name}: {} bytes, save {:.1} us, restore {:.1} us", buffer.len(), best[0] * 1e6, best[1] * 1e6);
     }
 }

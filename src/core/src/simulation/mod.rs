@@ -160,6 +160,8 @@ pub struct Simulation {
     warnings: Vec<String>,
     /// Limits found for the parameters checked last.
     limits: Option<limits::Limits>,
+    /// Length of every saved state (bytes).
+    state_size: usize,
 }
 
 impl Simulation {
@@ -191,7 +193,9 @@ impl Simulation {
             phase: Phase::Created,
             warnings: Vec::new(),
             limits: None,
+            state_size: 0,
         };
+        simulation.state_size = simulation.measured_state();
         simulation.reset();
         Ok(simulation)
     }

@@ -4,6 +4,7 @@
 //! all before (u64).
 
 use super::access::check_range;
+use super::drive::RotorAngle;
 use super::{Communication, Inputs, MOST_STEPS, Phase, SAME_STEP, Simulation, TIME_TOLERANCE};
 use crate::persist::{Persist, Reader, Writer, fingerprint, persist_fields};
 use crate::variables::{Causality, Kind, Quantity, Variable};
@@ -60,6 +61,7 @@ struct Lead {
     time: f64,
     communication: Communication,
     inputs: Inputs,
+    rotor: RotorAngle,
     values: Vec<f64>,
     reference_speed: f64,
     /// Internal step (s).
@@ -73,6 +75,10 @@ fn damaged<T>(problem: &str) -> Result<T> {
 impl Simulation {
     /// Size of a saved state in bytes (constant for a given scene).
     pub fn state_size(&self) -> usize {
+        self.state_size
+    }
+
+    pub(super) fn measured_state(&self) -> usize {
         let mut writer = Writer::new(&mut []);
         self.write(&mut writer);
         writer.written() + CHECKSUM_BYTES
@@ -155,6 +161,7 @@ impl Simulation {
             time: 0.0,
             communication: Communication::default(),
             inputs: self.inputs.clone(),
+            rotor: self.rotor,
             values: self.values.clone(),
             reference_speed: 0.0,
             step: 0.0,
@@ -171,7 +178,7 @@ impl Simulation {
         let others = reader.infinite();
         take(&mut lead.inputs, reader);
         let infinite = reader.infinite() - others;
-        self.rotor.check(reader);
+        take(&mut lead.rotor, reader);
         reader.up_to(largest);
         let mut window = self.window.clone();
         take(&mut window, reader);
@@ -213,7 +220,11 @@ impl Simulation {
         let divided = (0.0..=f64::MAX).contains(&length)
             && (lead.step - internal).abs() <= 2.0 * SAME_STEP * internal
             && lead.step <= largest * (1.0 + 2.0 * SAME_STEP);
-        if counted && within && divided { Ok(()) } else { damaged("its times and its counts of steps contradict each other") }
+        if counted && within && divided {
+            Ok(())
+        } else {
+            damaged("its times and its counts of steps contradict each other")
+        }
     }
 
     /// Values that could have been set, and outputs that could have been read.
@@ -232,6 +243,10 @@ impl Simulation {
         let Communication { length, count, done, .. } = lead.communication;
         let stepping = lead.phase == Phase::Stepping && count > 0;
         let offsets = if stepping { [lead.communication.offset(done), length] } else { [0.0; 2] };
+        let angle = |offset: f64| lead.rotor.total(&lead.inputs.speed, offset);
+        if !offsets.into_iter().all(|offset| angle(offset).is_finite()) {
+            return damaged("its rotor has turned beyond all counting");
+        }
         for variable in self.table.variables().iter().filter(|variable| variable.causality == Causality::Input) {
             let (low, high) = (variable.min.unwrap_or(f64::MIN), variable.max.unwrap_or(f64::MAX));
             let rounding = SAME_STEP * low.abs().max(high.abs());
@@ -248,7 +263,8 @@ impl Simulation {
 
     /// Make ready for a state what follows from its parameters and can be refused.
     fn follow(&mut self, lead: Lead) -> Result<()> {
-        let before = (std::mem::replace(&mut self.values, lead.values), std::mem::replace(&mut self.inputs, lead.inputs));
+        let before =
+            (std::mem::replace(&mut self.values, lead.values), std::mem::replace(&mut self.inputs, lead.inputs));
         // Before initialisation nothing has been computed from them, and what does not fit together is not refused yet.
         let outcome = if lead.phase == Phase::Created { Ok(()) } else { self.adopt(lead.reference_speed) };
         if outcome.is_err() {
