@@ -315,6 +315,13 @@ fn take(value: &mut impl Persist, reader: &mut Reader) {
     value.restore(&mut bytes);
 }
 
+/// The integer that a value is.
+fn whole(value: f64) -> Option<i32> {
+    #[expect(clippy::cast_possible_truncation, reason = "compared with what it was")]
+    let number = value as i32;
+    ((f64::from(number) - value).abs() == 0.0).then_some(number)
+}
+
 /// Whether a variable can have the value.
 fn is_possible(variable: &Variable, value: f64) -> bool {
     let settable = variable.is_settable();
@@ -322,9 +329,12 @@ fn is_possible(variable: &Variable, value: f64) -> bool {
         // The range of inputs is looked at where they are now.
         Kind::Real if settable && variable.causality != Causality::Input => check_range(variable, value).is_ok(),
         Kind::Real => value.is_finite(),
-        Kind::Boolean => value == 0.0 || value == 1.0,
-        Kind::Enumeration(choices) if settable => (1..=choices.items.len()).any(|item| value == item as f64),
-        Kind::Integer | Kind::Enumeration(_) => value.trunc() == value && i32::try_from(value as i64).is_ok(),
+        Kind::Boolean => matches!(whole(value), Some(0 | 1)),
+        Kind::Enumeration(choices) if settable => {
+            let item = whole(value).and_then(|item| usize::try_from(item).ok());
+            item.is_some_and(|item| (1..=choices.items.len()).contains(&item))
+        }
+        Kind::Integer | Kind::Enumeration(_) => whole(value).is_some(),
         Kind::String => true,
     }
 }
