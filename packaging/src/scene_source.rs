@@ -211,8 +211,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("scene.toml");
         fs::write(&path, ROTOR37_SCENE.replace("gap = ", "gapp = ")).unwrap();
-        let text =
-            load(&path.display().to_string(), &RomCache::off(), &Console::new(true, false)).unwrap_err().to_string();
+        let text = load(&path, &RomCache::off(), &Console::new(true, false)).unwrap_err().to_string();
         assert!(text.contains("scene.toml:") && text.contains("gapp") && text.contains("`gap`"), "{text}");
     }
 }

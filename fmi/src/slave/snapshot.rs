@@ -63,7 +63,7 @@ fn encode_phase(phase: &Phase, out: &mut Snapshot) {
 }
 
 fn decode_phase(reader: &mut Reader<'_>) -> Result<Phase> {
-    let [tag, has_stop, unused @ ..] = reader.array()?;
+    let [tag, has_stop, unused @ ..] = reader.array::<4>()?;
     let [time, stop] = [f64::from_le_bytes(reader.array()?), f64::from_le_bytes(reader.array()?)];
     if has_stop > 1 || unused != [0; 2] || !time.is_finite() || !stop.is_finite() {
         return Err(damaged("its times or flags are none"));
