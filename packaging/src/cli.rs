@@ -261,7 +261,7 @@ pub struct StudyArguments {
     #[arg(long, value_name = "N")]
     pub revolutions: Option<std::num::NonZero<usize>>,
     /// Of `map`: revolutions that pass before [default: the casing's ramp and five decay times of the first mode, 20 to 400].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = transient)]
     pub transient: Option<usize>,
     /// Of `map`: start value of an input or parameter, such as friction_coefficient=0 or gap_offset=1e-5; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
@@ -468,6 +468,14 @@ fn model(text: &str) -> Result<Model, String> {
     }
 }
 
+/// More would not end in days.
+const MOST_TRANSIENT: usize = 1_000_000;
+
+fn transient(text: &str) -> Result<usize, String> {
+    let count = text.parse().ok().filter(|count| *count <= MOST_TRANSIENT);
+    count.ok_or_else(|| format!("give a number of revolutions, at most {MOST_TRANSIENT}"))
+}
+
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
@@ -503,6 +511,14 @@ mod tests {
     use clap::CommandFactory;
 
     use super::*;
+
+    #[test]
+    fn transients_that_never_end_are_refused() {
+        assert_eq!(transient("0"), Ok(0));
+        for wrong in ["1000001", "18446744073709551616", "-1", ""] {
+            assert!(transient(wrong).is_err(), "{wrong}");
+        }
+    }
 
     fn parse(line: &str) -> Result<Cli, clap::Error> {
         Cli::try_parse_from(std::iter::once("tiprub").chain(line.split_whitespace()))

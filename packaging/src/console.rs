@@ -1,6 +1,7 @@
 //! What the user sees while a command works: progress on stderr, one result on stdout.
 
 use std::{
+    borrow::Cow,
     io::{IsTerminal, Write},
     path::Path,
     time::Duration,
@@ -9,6 +10,35 @@ use std::{
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::{Failure, Result};
+
+/// Text without what a terminal would obey: control characters and marks of writing direction, which names and descriptions in
+/// files may hold, are shown as `\u{1b}` and the like. Lines stay lines.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    escaped(text, |character| format!("\\u{{{:x}}}", u32::from(character)))
+}
+
+/// The same for JSON, where nothing but strings can hold such characters.
+fn printable_json(text: &str) -> Cow<'_, str> {
+    escaped(text, |character| format!("\\u{:04x}", u32::from(character)))
+}
+
+/// A path for people and for JSON, both of which know text only: what is none in it is replaced.
+pub fn shown_path(path: &Path) -> String {
+    path.display().to_string()
+}
+
+fn escaped(text: &str, shown: impl Fn(char) -> String) -> Cow<'_, str> {
+    if !text.contains(is_obeyed) {
+        return Cow::Borrowed(text);
+    }
+    let each = |character: char| if is_obeyed(character) { shown(character) } else { character.to_string() };
+    Cow::Owned(text.chars().map(each).collect())
+}
+
+fn is_obeyed(character: char) -> bool {
+    let turns = matches!(character, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    turns || (character.is_control() && !matches!(character, '\n' | '\t'))
+}
 
 /// Result of a command, in both forms the user can ask for.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +72,7 @@ impl Console {
     pub fn say(&self, line: impl std::fmt::Display) {
         if !self.quiet {
             // A closed stderr must not stop the work.
-            let _ = writeln!(std::io::stderr(), "{line}");
+            let _ = writeln!(std::io::stderr(), "{}", printable(&line.to_string()));
         }
     }
 
@@ -50,7 +80,7 @@ impl Console {
     pub fn warn(&self, warnings: &[String]) {
         for warning in warnings {
             // A closed stderr must not stop the work.
-            let _ = writeln!(std::io::stderr(), "warning: {warning}");
+            let _ = writeln!(std::io::stderr(), "warning: {}", printable(warning));
         }
     }
 
@@ -71,7 +101,7 @@ impl Console {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style.progress_chars("=> "));
         }
-        bar.set_message(title.to_string());
+        bar.set_message(printable(title).into_owned());
         bar.enable_steady_tick(Duration::from_millis(120));
         Task { bar, lines: false }
     }
@@ -81,7 +111,8 @@ impl Console {
     /// # Errors
     /// Stdout takes it not or in part, such as a file on a full disk. A reader that closes it early (`| head`) is fine.
     pub fn deliver(&self, outcome: &Outcome) -> Result<()> {
-        let text = if self.json { format!("{:#}", outcome.json) } else { outcome.text.trim_end().to_string() };
+        let json = self.json.then(|| format!("{:#}", outcome.json));
+        let text = json.as_deref().map_or_else(|| printable(outcome.text.trim_end()), printable_json);
         let mut stdout = std::io::stdout().lock();
         match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
             Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
@@ -93,14 +124,14 @@ impl Console {
 
     /// Print a failure: text on stderr, and with `--json` the object on stdout.
     pub fn fail(&self, failure: &Failure) {
-        let _ = writeln!(std::io::stderr(), "error: {failure}");
+        let _ = writeln!(std::io::stderr(), "error: {}", printable(&failure.to_string()));
         self.answer(failure);
     }
 
     /// With `--json`, the object of a failure on stdout.
     pub fn answer(&self, failure: &Failure) {
         if self.json {
-            let _ = writeln!(std::io::stdout(), "{:#}", failure.to_json());
+            let _ = writeln!(std::io::stdout(), "{}", printable_json(&format!("{:#}", failure.to_json())));
         }
     }
 }
@@ -123,18 +154,34 @@ impl Task {
     pub fn line(&self, line: &str) {
         if self.lines {
             // A closed stderr must not stop the work.
-            let _ = writeln!(std::io::stderr(), "  {line}");
+            let _ = writeln!(std::io::stderr(), "  {}", printable(line));
         }
     }
 
     /// What it is doing now.
     pub fn now(&self, message: &str) {
-        self.bar.set_message(message.to_string());
+        self.bar.set_message(printable(message).into_owned());
     }
 }
 
 impl Drop for Task {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_terminal_would_obey_is_shown_instead() {
+        assert!(matches!(printable("36 Schaufeln, µ = 0.15\n\tso"), Cow::Borrowed(_)));
+        assert_eq!(printable("a\u{1b}[31m\u{7}b\rc\u{9b}d\u{202e}"), "a\\u{1b}[31m\\u{7}b\\u{d}c\\u{9b}d\\u{202e}");
+        let json = serde_json::json!({ "name": "a\u{1b}\u{7f}\u{9b}\u{202e}b\n" });
+        let text = format!("{json:#}");
+        let shown = printable_json(&text);
+        assert!(!shown.contains(is_obeyed), "{shown}");
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&shown).unwrap(), json);
     }
 }

@@ -51,6 +51,8 @@ impl Failure {
             std::io::ErrorKind::NotFound => "Check the path",
             std::io::ErrorKind::PermissionDenied => "Check the permissions, or choose another place with -o/--out",
             std::io::ErrorKind::StorageFull => "Free some space, or choose another place with -o/--out",
+            std::io::ErrorKind::InvalidInput => "Give a file",
+            std::io::ErrorKind::FileTooLarge => "Give the file that was meant",
             std::io::ErrorKind::IsADirectory => "Name a file, not a directory",
             _ => "Check the path and the disk",
         };
@@ -78,7 +80,8 @@ fn sentence(text: &str) -> String {
 
 impl fmt::Display for Failure {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "{}: {}", self.what, sentence(&self.problem))?;
+        // Names of files may hold line ends.
+        write!(out, "{}: {}", self.what.replace('\n', "\\n"), sentence(&self.problem))?;
         if self.remedy.is_empty() { Ok(()) } else { write!(out, " {}", sentence(&self.remedy)) }
     }
 }

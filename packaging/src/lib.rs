@@ -14,6 +14,7 @@
 //! - [`casing_arguments`], [`file_arguments`]: what can be asked for of a casing, of a model of one's own;
 //! - [`users_model`], [`mod@reduced`]: such a model read, judged, reduced; what is written and told of any reduced model;
 //! - [`stability`]: stiff and extreme cases, each in a child process, judged;
+//! - [`places`], [`output_file`]: what a command reads and writes, kept apart; files that appear whole or not at all;
 //! - [`report`]: the HTML report with its pictures and plots.
 
 pub mod archive;
@@ -32,6 +33,7 @@ pub mod importer;
 pub mod library;
 pub mod native;
 pub mod output_file;
+pub mod places;
 pub mod recording;
 pub mod reduced;
 pub mod reduction;

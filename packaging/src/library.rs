@@ -21,6 +21,9 @@ const WORKSPACE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 /// Names under which an installation may hold the library, relative to the directory of the executable.
 const INSTALLED: [&str; 3] = ["tiprub.so", "libtiprub_fmi.so", "../lib/tiprub/tiprub.so"];
 
+/// Largest library (bytes).
+const LARGEST: u64 = 1 << 30;
+
 /// Lines of cargo's stderr kept for the error message.
 const LINES_KEPT: usize = 30;
 
@@ -30,7 +33,8 @@ const LINES_KEPT: usize = 30;
 /// No library found, the build failed, or the file is not a shared library for Linux on x86-64.
 pub fn load(explicit: Option<&Path>, console: &Console) -> Result<Vec<u8>> {
     let path = find(explicit, console)?;
-    let bytes = std::fs::read(&path).map_err(|error| Failure::file(&path, "cannot be read", &error))?;
+    let bytes =
+        tiprub_format::read_file(&path, LARGEST).map_err(|error| Failure::file(&path, "cannot be read", &error))?;
     check_format(&path, &bytes)?;
     Ok(bytes)
 }

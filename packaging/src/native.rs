@@ -43,7 +43,7 @@ pub fn run(
     }
     simulation.initialise(schedule.start).map_err(in_scene)?;
     let outputs = Outputs::of(simulation.table());
-    let mut recording = Recording::with_columns(outputs.names.clone(), schedule.count + 1);
+    let mut recording = Recording::with_columns(outputs.names.clone(), schedule.count + 1)?;
     let (mut stepping, mut internal_steps) = (Duration::ZERO, 0);
     for index in 0..=schedule.count {
         let time = schedule.time(index);

@@ -1,8 +1,14 @@
 //! The table of results of a run, and its CSV form.
 
-use std::{fmt::Write as _, path::Path};
+use std::{
+    io::{BufWriter, Write},
+    path::Path,
+};
 
 use crate::{Failure, Result, output_file};
+
+/// Largest table (bytes); the demo holds three at a time.
+const MOST_BYTES: f64 = 4e9;
 
 /// Numbers of one run: one row per communication point, one column per recorded variable.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -39,9 +45,27 @@ impl Agreement {
 
 impl Recording {
     /// An empty table with these columns and room for `rows` rows.
-    pub fn with_columns(names: Vec<String>, rows: usize) -> Self {
-        let values = Vec::with_capacity(names.len() * rows);
-        Self { names, times: Vec::with_capacity(rows), values }
+    ///
+    /// # Errors
+    /// More than [`MOST_BYTES`], or than the memory has.
+    pub fn with_columns(names: Vec<String>, rows: usize) -> Result<Self> {
+        let bytes = 8.0 * rows as f64 * (names.len() + 1) as f64;
+        let refuse = || {
+            let size =
+                format!("{rows} communication points of {} outputs would take {:.1} GB", names.len(), 1e-9 * bytes);
+            let remedy =
+                "Choose a longer communication step (--step), an earlier stop (--stop), or fewer outputs in the scene";
+            Failure::usage("table of results", size, remedy)
+        };
+        if bytes > MOST_BYTES {
+            return Err(refuse());
+        }
+        let (mut times, mut values) = (Vec::new(), Vec::new());
+        times
+            .try_reserve_exact(rows)
+            .and_then(|()| values.try_reserve_exact(names.len() * rows))
+            .map_err(|_| refuse())?;
+        Ok(Self { names, times, values })
     }
 
     /// Number of rows.
@@ -98,21 +122,22 @@ impl Recording {
 
     /// CSV text: header `time,...`, numbers in the shortest form that reads back to the same bits.
     pub fn to_csv(&self) -> String {
-        let mut text = String::with_capacity(self.values.len() * 12 + 1024);
-        text.push_str("time");
-        for name in &self.names {
-            text.push(',');
-            text.push_str(&quoted(name));
+        let lines = (0..self.rows()).map(|row| self.line(row));
+        [self.header()].into_iter().chain(lines).collect()
+    }
+
+    fn header(&self) -> String {
+        let names = self.names.iter().map(|name| quoted(name));
+        ["time".to_owned()].into_iter().chain(names).collect::<Vec<_>>().join(",") + "\n"
+    }
+
+    fn line(&self, row: usize) -> String {
+        let mut line = shortest(self.times[row]);
+        for value in self.row(row) {
+            line.push(',');
+            line.push_str(&shortest(*value));
         }
-        text.push('\n');
-        for row in 0..self.rows() {
-            let _ = write!(text, "{}", shortest(self.times[row]));
-            for value in self.row(row) {
-                let _ = write!(text, ",{}", shortest(*value));
-            }
-            text.push('\n');
-        }
-        text
+        line + "\n"
     }
 
     /// Write the CSV text to a file, whole or not at all.
@@ -120,7 +145,15 @@ impl Recording {
     /// # Errors
     /// The file cannot be written.
     pub fn write_csv(&self, path: &Path) -> Result<()> {
-        output_file::write(path, self.to_csv())
+        let failed = |error: std::io::Error| Failure::file(path, "cannot be written", &error);
+        let mut file = BufWriter::new(output_file::begin(path)?);
+        let lines = (0..self.rows()).map(|row| self.line(row));
+        [self.header()]
+            .into_iter()
+            .chain(lines)
+            .try_for_each(|line| file.write_all(line.as_bytes()))
+            .map_err(failed)?;
+        output_file::persist(file.into_inner().map_err(|error| failed(error.into_error()))?, path)
     }
 }
 
@@ -192,6 +225,24 @@ mod tests {
         assert_eq!(agreement.first, Some(("blade[1].clearance[1]".to_string(), 0.0)));
         two.names.pop();
         assert!(one.compare(&two).is_err());
+    }
+
+    #[test]
+    fn a_table_beyond_the_memory_is_refused_with_its_size() {
+        let names = || vec!["clearance".to_owned(); 185];
+        for (rows, size) in [(50_000_001, "74.4 GB"), (usize::MAX, "GB")] {
+            let failure = Recording::with_columns(names(), rows).unwrap_err();
+            assert!(failure.usage && failure.problem.contains(size) && failure.remedy.contains("--step"), "{failure}");
+        }
+        assert!(Recording::with_columns(names(), 1000).is_ok());
+    }
+
+    #[test]
+    fn a_file_holds_the_same_text() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("x.csv");
+        sample().write_csv(&path).unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), sample().to_csv());
     }
 
     #[test]

@@ -24,6 +24,8 @@ const LAYOUT: &str = "1";
 const MARK: &str = "tiprub-cached-rom";
 /// Names the directory, or is empty to keep no files.
 const VARIABLE: &str = "TIPRUB_CACHE";
+/// Largest file (bytes).
+const LARGEST: u64 = 8 << 30;
 /// Versions of one model that are kept: other options and releases may be in use side by side.
 const KEPT: usize = 4;
 
@@ -125,7 +127,7 @@ fn read(path: &Path, key: &str) -> Result<Rom, Option<String>> {
     if !fs::metadata(path).map_err(unreadable)?.is_file() {
         return Err(Some("is no file".to_owned()));
     }
-    let bytes = fs::read(path).map_err(unreadable)?;
+    let bytes = tiprub_format::read_file(path, LARGEST).map_err(unreadable)?;
     let damaged = || Some("is not what was kept".to_owned());
     let end = bytes.iter().position(|byte| *byte == b'\n').ok_or_else(damaged)?;
     let (first, rom) = (&bytes[..end], &bytes[end + 1..]);

@@ -1,6 +1,10 @@
 //! A scene file with its ROMs, or a scene that ships with tiprub.
 
-use std::{cell::RefCell, fs, path::Path};
+use std::{
+    cell::RefCell,
+    ffi::OsStr,
+    path::{Path, PathBuf},
+};
 
 use tiprub_core::{Rom, Scene, settings::SceneSettings};
 
@@ -24,6 +28,9 @@ pub const BUILTIN_SCENES: [(&str, &str); 5] = [
     ("cube-between-rings", CUBE_SCENE),
 ];
 
+/// Largest ROM file (bytes).
+const LARGEST: u64 = 8 << 30;
+
 /// What names of embedded scenes and models begin with.
 pub const BUILTIN: &str = "builtin:";
 
@@ -32,10 +39,10 @@ pub const BUILTIN: &str = "builtin:";
 ///
 /// # Errors
 /// Missing or wrong files, naming file, line, field and remedy.
-pub fn load(argument: &str, cache: &RomCache, console: &Console) -> Result<Scene> {
+pub fn load(argument: impl AsRef<OsStr>, cache: &RomCache, console: &Console) -> Result<Scene> {
     let reduce = |name: &str| Some(builtin::rom(name, cache, console)?.map_err(|failure| failure.to_string()));
-    match source(argument)? {
-        Source::Embedded(text) => builtin_scene(argument, text, &reduce),
+    match source(argument.as_ref())? {
+        Source::Embedded(name, text) => builtin_scene(name, text, &reduce),
         Source::File(path) => tiprub_format::load_scene(path, &reduce).map_err(Failure::from),
     }
 }
@@ -44,32 +51,42 @@ pub fn load(argument: &str, cache: &RomCache, console: &Console) -> Result<Scene
 ///
 /// # Errors
 /// As [`load`], but for the models.
-pub fn settings(argument: &str) -> Result<SceneSettings> {
-    Ok(match source(argument)? {
-        Source::Embedded(text) => tiprub_format::parse_scene(text, argument)?,
+pub fn settings(argument: impl AsRef<OsStr>) -> Result<SceneSettings> {
+    Ok(match source(argument.as_ref())? {
+        Source::Embedded(name, text) => tiprub_format::parse_scene(text, name)?,
         Source::File(path) => tiprub_format::load_settings(path)?,
     })
+}
+
+/// The files that [`load`] would read: the scene and its ROMs; none of a scene that ships, or of one that is wrong.
+pub fn files(argument: &str) -> Vec<PathBuf> {
+    let Ok(Source::File(path)) = source(argument.as_ref()) else { return Vec::new() };
+    let structures = tiprub_format::load_settings(path).map(|settings| settings.structures).unwrap_or_default();
+    let roms = structures.iter().filter(|structure| !structure.rom.starts_with(BUILTIN));
+    let beside = |rom: &str| path.parent().unwrap_or(Path::new("")).join(rom);
+    [path.to_path_buf()].into_iter().chain(roms.map(|structure| beside(&structure.rom))).collect()
 }
 
 /// Where a scene is.
 enum Source<'a> {
     /// One of [`BUILTIN_SCENES`].
-    Embedded(&'static str),
+    Embedded(&'a str, &'static str),
     File(&'a Path),
 }
 
-fn source(argument: &str) -> Result<Source<'_>> {
-    if let Some(name) = argument.strip_prefix(BUILTIN) {
+fn source(argument: &OsStr) -> Result<Source<'_>> {
+    if let Some(argument) = argument.to_str().filter(|argument| argument.starts_with(BUILTIN)) {
+        let name = &argument[BUILTIN.len()..];
         let Some((_, text)) = BUILTIN_SCENES.iter().find(|(known, _)| *known == name) else {
             let names: Vec<String> = BUILTIN_SCENES.iter().map(|(known, _)| format!("{BUILTIN}{known}")).collect();
             let problem = format!("there is no built-in scene `{name}`");
             return Err(Failure::usage("SCENE", problem, format!("Give a scene file, or one of {}", names.join(", "))));
         };
-        return Ok(Source::Embedded(text));
+        return Ok(Source::Embedded(argument, text));
     }
     let path = Path::new(argument);
     if path.is_dir() {
-        return Err(Failure::usage(argument, "is a directory", "Give the scene file (TOML) in it"));
+        return Err(Failure::usage(path.display(), "is a directory", "Give the scene file (TOML) in it"));
     }
     let kind = path.extension().map(|extension| extension.to_ascii_lowercase()).unwrap_or_default();
     let other = match kind.to_str() {
@@ -80,7 +97,7 @@ fn source(argument: &str) -> Result<Source<'_>> {
     match other {
         Some(problem) => {
             let remedy = "Give a scene file (TOML); `tiprub inspect` shows what is in this one";
-            Err(Failure::usage(argument, problem, remedy))
+            Err(Failure::usage(path.display(), problem, remedy))
         }
         None => Ok(Source::File(path)),
     }
@@ -140,13 +157,15 @@ pub fn rotor37_text(rom_file: &str, stop: f64) -> String {
 /// # Errors
 /// Missing or damaged file, naming the array.
 pub fn read_rom(path: &Path) -> Result<Rom> {
-    let bytes = fs::read(path).map_err(|error| Failure::file(path, "cannot be read", &error))?;
+    let bytes =
+        tiprub_format::read_file(path, LARGEST).map_err(|error| Failure::file(path, "cannot be read", &error))?;
     Ok(tiprub_format::read_rom(&bytes, &path.display().to_string())?)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     #[test]
     fn the_embedded_scene_is_valid_and_its_file_form_differs_in_two_fields_only() {
@@ -192,8 +211,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("scene.toml");
         fs::write(&path, ROTOR37_SCENE.replace("gap = ", "gapp = ")).unwrap();
-        let text =
-            load(&path.display().to_string(), &RomCache::off(), &Console::new(true, false)).unwrap_err().to_string();
+        let text = load(&path, &RomCache::off(), &Console::new(true, false)).unwrap_err().to_string();
         assert!(text.contains("scene.toml:") && text.contains("gapp") && text.contains("`gap`"), "{text}");
     }
 }

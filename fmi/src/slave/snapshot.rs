@@ -63,9 +63,12 @@ fn encode_phase(phase: &Phase, out: &mut Snapshot) {
 }
 
 fn decode_phase(reader: &mut Reader<'_>) -> Result<Phase> {
-    let [tag, has_stop, _, _] = reader.array()?;
-    let time = f64::from_le_bytes(reader.array()?);
-    let stop = Some(f64::from_le_bytes(reader.array()?)).filter(|_| has_stop != 0);
+    let [tag, has_stop, unused @ ..] = reader.array::<4>()?;
+    let [time, stop] = [f64::from_le_bytes(reader.array()?), f64::from_le_bytes(reader.array()?)];
+    if has_stop > 1 || unused != [0; 2] || !time.is_finite() || !stop.is_finite() {
+        return Err(damaged("its times or flags are none"));
+    }
+    let stop = (has_stop == 1).then_some(stop);
     let experiment = Experiment { start: time, stop };
     match tag {
         0 => Ok(Phase::Instantiated { experiment }),
@@ -200,5 +203,30 @@ impl Slave {
         let phase = decode_phase(&mut reader)?;
         let state = reader.length()?;
         Ok((phase, reader.take(state)?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tag, flag of the stop time, two bytes of nothing, time, stop time.
+    fn bytes(head: [u8; 4], time: f64, stop: f64) -> Vec<u8> {
+        [&head[..], &time.to_le_bytes(), &stop.to_le_bytes()].concat()
+    }
+
+    #[test]
+    fn phases_that_were_never_written_are_refused() {
+        let read = |bytes: &[u8]| decode_phase(&mut Reader(bytes)).is_ok();
+        for tag in 0..5 {
+            assert!(read(&bytes([tag, 1, 0, 0], 0.25, 1.0)) && read(&bytes([tag, 0, 0, 0], 0.25, 0.0)), "{tag}");
+            for head in [[tag, 2, 0, 0], [tag, 0, 1, 0], [tag, 0, 0, 1], [tag + 5, 0, 0, 0]] {
+                assert!(!read(&bytes(head, 0.25, 0.0)), "{head:?}");
+            }
+            for wrong in [f64::NAN, f64::INFINITY] {
+                assert!(!read(&bytes([tag, 1, 0, 0], wrong, 1.0)) && !read(&bytes([tag, 1, 0, 0], 0.25, wrong)));
+            }
+        }
+        assert!(!read(&bytes([0; 4], 0.0, 0.0)[..19]));
     }
 }

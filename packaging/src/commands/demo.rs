@@ -12,7 +12,7 @@ use tiprub_model::{Reduction, Rotor37Options};
 use crate::{
     Failure, Result,
     cli::DemoArguments,
-    console::{Console, Outcome},
+    console::{Console, Outcome, shown_path},
     error_study::{self, ErrorStudy, METHODS},
     fmu::{FmiVersion, Package},
     importer::{ImportedRun, UnpackedFmu},
@@ -31,6 +31,12 @@ const ROM_FILE: &str = "rotor37.rom.safetensors";
 const SCENE_FILE: &str = "rotor37.toml";
 const REPORT_FILE: &str = "report.html";
 const CSV_FILE: &str = "results.csv";
+
+/// All of them, and the FMUs.
+pub const FILES: [&str; 6] = [ROM_FILE, SCENE_FILE, REPORT_FILE, CSV_FILE, "rotor37_fmi2.fmu", "rotor37_fmi3.fmu"];
+
+/// Beyond it (bytes), a scene is none that a demo wrote.
+const LARGEST_SCENE: u64 = 1 << 20;
 
 /// What to do about a scene in the directory that somebody changed.
 const KEEP: &str = "Give the demo another directory with --out, or copy your file elsewhere and delete it here";
@@ -110,7 +116,8 @@ fn scene_text(revolutions: Option<f64>) -> Result<String> {
 /// Refuse to lose a scene that the user changed. One that an earlier demo wrote, for whatever number of revolutions, is
 /// nobody's work.
 fn keep_changed_scene(path: &Path, text: &str) -> Result<()> {
-    let present = std::fs::read_to_string(path).unwrap_or_default();
+    let present = tiprub_format::read_file(path, LARGEST_SCENE).ok().and_then(|bytes| String::from_utf8(bytes).ok());
+    let present = present.unwrap_or_default();
     let stop = present.lines().find_map(|line| line.strip_prefix("stop = ")?.parse().ok());
     if stop.is_some_and(|stop| rotor37_text(ROM_FILE, stop) == present) {
         return Ok(());
@@ -124,7 +131,7 @@ fn write_inputs(directory: &Path, reduction: &Reduction, scene_text: &str) -> Re
     output_file::write(&directory.join(ROM_FILE), rom)?;
     let scene = directory.join(SCENE_FILE);
     output_file::write(&scene, scene_text)?;
-    scene_source::load(&scene.display().to_string(), &RomCache::off(), &Console::new(true, false))
+    scene_source::load(&scene, &RomCache::off(), &Console::new(true, false))
 }
 
 fn fmu_path(directory: &Path, version: FmiVersion) -> PathBuf {
@@ -237,7 +244,7 @@ impl Demo<'_> {
         );
         let json = json!({
             "model": self.scene.settings.name,
-            "report": report,
+            "report": shown_path(&report),
             "files": self.files().iter().map(|file| json!({
                 "name": file.name, "bytes": file.bytes, "meaning": file.meaning,
             })).collect::<Vec<_>>(),

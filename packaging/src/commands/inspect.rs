@@ -2,7 +2,6 @@
 
 use std::{
     fmt::Write as _,
-    fs,
     io::Read,
     path::{Path, PathBuf},
 };
@@ -18,7 +17,7 @@ use crate::{
     Failure, Result,
     cli::InspectArguments,
     console::{Console, Outcome},
-    importer::{UnpackedFmu, open_archive, read_entry},
+    importer::{UnpackedFmu, entries, open_archive},
     rom_facts::RomFacts,
     scene_features, scene_source,
     step_limits::Sliding,
@@ -48,7 +47,7 @@ pub fn run(arguments: &InspectArguments, console: &Console) -> Result<Outcome> {
             Ok(Outcome { text: facts.to_text(), json })
         }
         FileKind::Scene => {
-            let scene = scene_source::load(&path.display().to_string(), &arguments.cache.cache(), console)?;
+            let scene = scene_source::load(path, &arguments.cache.cache(), console)?;
             let (text, json) = describe_scene(&scene, console)?;
             Ok(Outcome { text, json: json!({ "kind": "scene", "scene": json }) })
         }
@@ -60,7 +59,7 @@ fn kind(path: &Path) -> Result<FileKind> {
         return Ok(FileKind::Scene);
     }
     let mut start = Vec::new();
-    fs::File::open(path)
+    tiprub_format::open_file(path)
         .and_then(|file| file.take(9).read_to_end(&mut start))
         .map_err(|error| Failure::file(path, "cannot be read", &error))?;
     let extension = path.extension().map(|extension| extension.to_ascii_lowercase()).unwrap_or_default();
@@ -80,14 +79,9 @@ fn kind(path: &Path) -> Result<FileKind> {
 }
 
 fn inspect_fmu(path: &Path, console: &Console) -> Result<Outcome> {
-    let mut archive = open_archive(path)?;
-    let mut files = Vec::new();
-    for index in 0..archive.len() {
-        let in_file = |failure: Failure| Failure { what: format!("{}: {}", path.display(), failure.what), ..failure };
-        let (name, bytes) = read_entry(&mut archive, index).map_err(in_file)?;
-        files.push((name, bytes.len()));
-    }
-    let fmu = UnpackedFmu::open(path)?;
+    let in_file = |failure: Failure| Failure { what: format!("{}: {}", path.display(), failure.what), ..failure };
+    let files = entries(&mut open_archive(path)?).map_err(in_file)?;
+    let fmu = UnpackedFmu::open_part(path, |name| name.starts_with("resources/"))?;
     let description = &fmu.description;
     let count = |causality: &str| description.variables.iter().filter(|row| row.causality == causality).count();
     let mut text = format!(
@@ -282,6 +276,8 @@ fn scene_text(settings: &SceneSettings) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use crate::cli::CacheArguments;
 

@@ -8,24 +8,56 @@ pub mod run;
 pub mod stability;
 pub mod study;
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
 use crate::{
-    Result,
+    Failure, Result,
     cli::Command,
     console::{Console, Outcome},
+    places,
 };
 
-/// Run the command.
+/// Run the command. Nothing is written, and no long work begins, where the command line alone shows that an output would replace
+/// an input or another output.
 ///
 /// # Errors
-/// What the command could not do.
+/// What the command could not do. A defect of this program is one of them.
 pub fn run(command: &Command, console: &Console) -> Result<Outcome> {
-    match command {
-        Command::Demo(arguments) => demo::run(arguments, console),
-        Command::Reduce(arguments) => reduce::run(arguments, console),
-        Command::Package(arguments) => package::run(arguments, console),
-        Command::Run(arguments) => run::run(arguments, console),
-        Command::Inspect(arguments) => inspect::run(arguments, console),
-        Command::Stability(arguments) => stability::run(arguments, console),
-        Command::Study(arguments) => study::run(arguments, console),
+    walled(|| {
+        places::check(command)?;
+        match command {
+            Command::Demo(arguments) => demo::run(arguments, console),
+            Command::Reduce(arguments) => reduce::run(arguments, console),
+            Command::Package(arguments) => package::run(arguments, console),
+            Command::Run(arguments) => run::run(arguments, console),
+            Command::Inspect(arguments) => inspect::run(arguments, console),
+            Command::Stability(arguments) => stability::run(arguments, console),
+            Command::Study(arguments) => study::run(arguments, console),
+        }
+    })
+}
+
+/// A panic ends in a failure like any other; where it began has been said on stderr.
+fn walled(work: impl FnOnce() -> Result<Outcome>) -> Result<Outcome> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
+        let problem = format!("a defect of this program stopped the work: {}", text.unwrap_or("no message"));
+        let remedy = "Report it to the developers, with the command line, its files and what is said above";
+        Err(Failure::new("tiprub", problem, remedy))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_a_failure_of_the_work() {
+        let said: [fn() -> Result<Outcome>; 2] = [|| panic!("index {} too large", 7), || panic!("plain")];
+        for (panics, words) in said.into_iter().zip(["index 7 too large", "plain"]) {
+            let failure = walled(panics).unwrap_err();
+            assert_eq!(failure.exit_code(), 1);
+            assert!(failure.problem.contains(words) && failure.remedy.contains("Report"), "{failure}");
+        }
     }
 }

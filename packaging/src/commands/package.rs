@@ -7,9 +7,11 @@ use serde_json::json;
 use crate::{
     Failure, Result,
     cli::{FmiChoice, PackageArguments},
-    console::{Console, Outcome},
+    console::{Console, Outcome, shown_path},
     fmu::{FmiVersion, Package},
-    library, scene_source,
+    library,
+    places::{self, Named},
+    scene_source,
 };
 
 /// Load the scene, find the library, zip.
@@ -21,6 +23,9 @@ pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
     targets(arguments, "model")?;
     let scene = scene_source::load(&arguments.scene, &arguments.cache.cache(), console)?;
     let targets = targets(arguments, &scene.settings.name)?;
+    let files: Vec<Named> = targets.iter().map(|(_, path)| Named::new("--output", path)).collect();
+    let library_file = arguments.library.iter().map(|path| Named::new("--library", path));
+    places::outputs(&places::scene(&arguments.scene).into_iter().chain(library_file).collect::<Vec<_>>(), &files)?;
     let library = library::load(arguments.library.as_deref(), console)?;
     let package = Package::new(&scene, &library)?;
     console.warn(package.warnings());
@@ -34,7 +39,7 @@ pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
         .collect();
     let files: Vec<_> = targets
         .iter()
-        .map(|(version, path)| json!({"fmi": version.digit().to_string(), "file": path, "bytes": size(path)}))
+        .map(|(version, path)| json!({"fmi": version.digit().to_string(), "file": shown_path(path), "bytes": size(path)}))
         .collect();
     let json = json!({ "model": scene.settings.name, "fmus": files, "warnings": package.warnings() });
     Ok(Outcome { text: text.join("\n"), json })

@@ -18,10 +18,11 @@ use crate::{
     Failure, Result, builtin,
     casing_arguments::{self, CasingArguments, MaterialChoice},
     cli::{Model, ReduceArguments},
-    console::{Console, Outcome},
+    console::{Console, Outcome, shown_path},
     cube_models,
     file_arguments::FileArguments,
     output_file,
+    places::{self, Named},
     reduced::Reduced,
     reduction,
     rom_facts::RomFacts,
@@ -36,6 +37,13 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     // What would fail after the work is said before it.
     let output = &arguments.output.clone().map_or_else(|| expected_output(arguments), Ok)?;
     let others = arguments.inp.iter().chain(&arguments.vtk);
+    let names = [
+        Some(("--output", output)),
+        arguments.inp.as_ref().map(|path| ("--inp", path)),
+        arguments.vtk.as_ref().map(|path| ("--vtk", path)),
+    ];
+    let names: Vec<Named> = names.into_iter().flatten().map(|(role, path)| Named::new(role, path)).collect();
+    places::apart(&places::model_files(arguments), &names)?;
     std::iter::once(output).chain(others).try_for_each(|path| check_target(path, arguments))?;
     let reduced = reduced(arguments, console)?;
     let facts = RomFacts::of(&reduced.rom, None)?;
@@ -136,7 +144,11 @@ fn json(reduced: &Reduced, facts: &RomFacts, arguments: &ReduceArguments, output
         })).collect::<Vec<_>>(),
         "seconds": reduced.seconds,
         "warnings": warnings,
-        "files": { "rom": output, "inp": arguments.inp, "vtk": arguments.vtk },
+        "files": {
+            "rom": shown_path(output),
+            "inp": arguments.inp.as_deref().map(shown_path),
+            "vtk": arguments.vtk.as_deref().map(shown_path),
+        },
     })
 }
 

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use crate::{
     Failure, Result,
     cli::RunArguments,
-    console::{Console, Outcome},
+    console::{Console, Outcome, shown_path},
     extremes::{Extreme, extremes},
     native,
     recording::shortest,
@@ -59,7 +59,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
         "microseconds_per_internal_step": 1e6 * stepping / run.internal_steps as f64,
         "real_time_factor": stepping / simulated,
         "warnings": run.warnings,
-        "csv": arguments.csv,
+        "csv": arguments.csv.as_deref().map(shown_path),
         "extremes": Extreme::json(&extremes),
         "last": last,
     });

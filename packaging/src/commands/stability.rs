@@ -109,8 +109,9 @@ fn above_table(path: &std::path::Path, arguments: &StabilityArguments) -> Result
             "Leave out one of the two; stability.md in the directory of --out holds the table of a few cases",
         ));
     }
-    let present =
-        std::fs::read_to_string(path).map_err(|error| Failure::file(path, "the chapter cannot be read", &error))?;
+    let unreadable = |error: std::io::Error| Failure::file(path, "the chapter cannot be read", &error);
+    let present = tiprub_format::read_file(path, LARGEST_CHAPTER).map_err(unreadable)?;
+    let present = String::from_utf8(present).map_err(|error| unreadable(std::io::Error::other(error)))?;
     let Some((above, _)) = present.split_once(MARK) else {
         let remedy = format!("Name the chapter, or put this line where the table shall begin: {MARK}");
         return Err(Failure::new(path.display(), "has no mark below which the table belongs", remedy));
@@ -119,6 +120,9 @@ fn above_table(path: &std::path::Path, arguments: &StabilityArguments) -> Result
     output_file::begin(path)?;
     Ok(above.to_owned())
 }
+
+/// Largest chapter (bytes).
+const LARGEST_CHAPTER: u64 = 64 << 20;
 
 /// The table begins below this line.
 const MARK: &str = "<!-- the table below is written by `tiprub stability --chapter` -->";

@@ -9,7 +9,7 @@ mod slave;
 
 use std::{
     fs,
-    io::Read,
+    io::{self, Read},
     path::{Component, Path, PathBuf},
     time::Duration,
 };
@@ -22,8 +22,12 @@ pub use session::Session;
 
 use crate::{Failure, Result, recording::Recording, schedule::Schedule};
 
-/// Largest uncompressed size accepted for one file of an archive: far beyond any FMU, far below a zip bomb.
-const LARGEST_FILE: u64 = 4 << 30;
+/// Largest size (bytes) of all files of an archive together, unpacked: far beyond any FMU, far below a zip bomb.
+const LARGEST_UNPACKED: u64 = 2 << 30;
+/// Describes the FMU, at the root of the archive.
+const DESCRIPTION: &str = "modelDescription.xml";
+/// Its largest size (bytes).
+const LARGEST_DESCRIPTION: u64 = 256 << 20;
 
 /// An FMU unpacked to a temporary directory, which lives as long as this value.
 #[derive(Debug)]
@@ -48,9 +52,9 @@ pub struct ImportedRun {
 ///
 /// # Errors
 /// The file cannot be opened or is not a whole zip.
-pub fn open_archive(path: &Path) -> Result<ZipArchive<std::io::BufReader<fs::File>>> {
-    let file = fs::File::open(path).map_err(|error| Failure::file(path, "cannot be opened", &error))?;
-    ZipArchive::new(std::io::BufReader::new(file)).map_err(|error| {
+pub fn open_archive(path: &Path) -> Result<ZipArchive<io::BufReader<fs::File>>> {
+    let file = tiprub_format::open_file(path).map_err(|error| Failure::file(path, "cannot be opened", &error))?;
+    ZipArchive::new(io::BufReader::new(file)).map_err(|error| {
         Failure::new(
             path.display(),
             format!("not a whole zip archive ({error})"),
@@ -59,27 +63,55 @@ pub fn open_archive(path: &Path) -> Result<ZipArchive<std::io::BufReader<fs::Fil
     })
 }
 
-/// Contents of entry `index`, checked against its CRC.
+/// Names and sizes of all entries, as the archive announces them.
 ///
 /// # Errors
-/// Damaged entry, illegal name, or absurd size.
-pub fn read_entry(archive: &mut ZipArchive<impl Read + std::io::Seek>, index: usize) -> Result<(String, Vec<u8>)> {
-    let damaged = |name: &str, error: &dyn std::fmt::Display| {
-        Failure::new(
-            format!("entry {name}"),
-            format!("damaged ({error})"),
-            "Copy the file again, or make it again with `tiprub package`",
-        )
-    };
-    let entry = archive.by_index(index).map_err(|error| damaged(&format!("{}", index + 1), &error))?;
-    let name = entry.name().map(std::borrow::Cow::into_owned);
-    let name = name.map_err(|error| damaged(&format!("{}", index + 1), &error))?;
-    if entry.size() > LARGEST_FILE {
-        return Err(damaged(&name, &format!("{} bytes announced", entry.size())));
+/// A damaged entry, or more than [`LARGEST_UNPACKED`] bytes in all.
+pub fn entries(archive: &mut ZipArchive<impl Read + io::Seek>) -> Result<Vec<(String, u64)>> {
+    let mut entries = Vec::new();
+    let mut total = 0_u64;
+    for index in 0..archive.len() {
+        let entry = archive.by_index_raw(index).map_err(|error| damaged(&format!("{}", index + 1), &error))?;
+        let name = entry.name().map_err(|error| damaged(&format!("{}", index + 1), &error))?.into_owned();
+        total = total.saturating_add(entry.size());
+        entries.push((name, entry.size()));
     }
-    let mut bytes = Vec::new();
-    entry.take(LARGEST_FILE).read_to_end(&mut bytes).map_err(|error| damaged(&name, &error))?;
-    Ok((name, bytes))
+    if total > LARGEST_UNPACKED {
+        let problem =
+            format!("its files would take {total} bytes unpacked, more than the {LARGEST_UNPACKED} that are unpacked");
+        return Err(Failure::new(
+            "archive",
+            problem,
+            "Do not trust this file; an FMU of this size needs a smaller ROM",
+        ));
+    }
+    Ok(entries)
+}
+
+/// Unpack entry `index` into `target`, checked against its CRC and the size that was announced; never writes more than that.
+///
+/// # Errors
+/// A damaged entry, or a target that takes no more.
+pub fn unpack_entry(
+    archive: &mut ZipArchive<impl Read + io::Seek>,
+    index: usize,
+    name: &str,
+    target: &mut impl io::Write,
+) -> Result<()> {
+    let mut entry = archive.by_index(index).map_err(|error| damaged(name, &error))?;
+    let size = entry.size();
+    let written = io::copy(&mut entry.by_ref().take(size), target).map_err(|error| damaged(name, &error))?;
+    // Past the end the checksum is compared.
+    let more = entry.read(&mut [0]).map_err(|error| damaged(name, &error))?;
+    if written != size || more != 0 {
+        return Err(damaged(name, &format!("its size is not the {size} bytes announced")));
+    }
+    Ok(())
+}
+
+fn damaged(name: &str, error: &dyn std::fmt::Display) -> Failure {
+    let remedy = "Copy the file again, or make it again with `tiprub package`";
+    Failure::new(format!("entry {name}"), format!("damaged ({error})"), remedy)
 }
 
 impl UnpackedFmu {
@@ -88,16 +120,31 @@ impl UnpackedFmu {
     /// # Errors
     /// Not a zip, a damaged entry, a name that leads out of the directory, or an unreadable description.
     pub fn open(path: &Path) -> Result<Self> {
+        Self::open_part(path, |_| true)
+    }
+
+    /// The same with those entries alone whose names are `wanted`, beside modelDescription.xml; the others are only read, to
+    /// check them.
+    ///
+    /// # Errors
+    /// As [`UnpackedFmu::open`].
+    pub fn open_part(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<Self> {
         let in_file = |failure: Failure| Failure { what: format!("{}: {}", path.display(), failure.what), ..failure };
         let mut archive = open_archive(path)?;
         let directory = TempDir::with_prefix("tiprub-fmu-")
             .map_err(|error| Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error))?;
-        for index in 0..archive.len() {
-            let (name, bytes) = read_entry(&mut archive, index).map_err(in_file)?;
-            unpack(directory.path(), &name, &bytes).map_err(in_file)?;
+        for (index, (name, _)) in entries(&mut archive).map_err(in_file)?.into_iter().enumerate() {
+            let unpacked = if wanted(&name) || name == DESCRIPTION {
+                unpack(&mut archive, index, &name, directory.path())
+            } else {
+                unpack_entry(&mut archive, index, &name, &mut io::sink())
+            };
+            unpacked.map_err(in_file)?;
         }
-        let description_path = directory.path().join("modelDescription.xml");
-        let text = fs::read_to_string(&description_path).map_err(|error| {
+        let description_path = directory.path().join(DESCRIPTION);
+        let text = tiprub_format::read_file(&description_path, LARGEST_DESCRIPTION)
+            .and_then(|bytes| String::from_utf8(bytes).map_err(io::Error::other));
+        let text = text.map_err(|error| {
             Failure::new(
                 path.display(),
                 format!("has no readable modelDescription.xml ({error})"),
@@ -143,19 +190,25 @@ impl UnpackedFmu {
     }
 }
 
-fn unpack(directory: &Path, name: &str, bytes: &[u8]) -> Result<()> {
+fn unpack(archive: &mut ZipArchive<impl Read + io::Seek>, index: usize, name: &str, directory: &Path) -> Result<()> {
     if name.ends_with('/') {
         return Ok(());
     }
-    let relative = Path::new(name);
-    if !relative.components().all(|component| matches!(component, Component::Normal(_))) {
-        return Err(Failure::new(name, "leads out of the archive", "Do not trust this file"));
-    }
-    let target = directory.join(relative);
+    let target = inside(directory, name)?;
     if let Some(parent) = target.parent() {
         fs::create_dir_all(parent).map_err(|error| Failure::file(parent, "cannot be made", &error))?;
     }
-    fs::write(&target, bytes).map_err(|error| Failure::file(&target, "cannot be written", &error))
+    let mut file = fs::File::create(&target).map_err(|error| Failure::file(&target, "cannot be written", &error))?;
+    unpack_entry(archive, index, name, &mut file)
+}
+
+/// Where an entry goes.
+fn inside(directory: &Path, name: &str) -> Result<PathBuf> {
+    let relative = Path::new(name);
+    if relative.components().all(|component| matches!(component, Component::Normal(_))) {
+        return Ok(directory.join(relative));
+    }
+    Err(Failure::new(name, "leads out of the archive", "Do not trust this file"))
 }
 
 #[cfg(test)]
@@ -204,9 +257,49 @@ mod tests {
     #[test]
     fn names_that_lead_out_are_refused() {
         let root = tempfile::tempdir().unwrap();
-        assert!(unpack(root.path(), "../evil", b"x").is_err());
-        assert!(unpack(root.path(), "/evil", b"x").is_err());
-        unpack(root.path(), "a/b", b"x").unwrap();
-        assert_eq!(fs::read(root.path().join("a/b")).unwrap(), b"x");
+        assert!(inside(root.path(), "../evil").is_err());
+        assert!(inside(root.path(), "/evil").is_err());
+        assert_eq!(inside(root.path(), "a/b").unwrap(), root.path().join("a/b"));
+    }
+
+    /// The size of an entry stands in its local header and in the directory; a liar changes both.
+    fn announce(path: &Path, size: u32) {
+        let mut bytes = fs::read(path).unwrap();
+        let mut change = |at: usize| bytes[at..at + 4].copy_from_slice(&size.to_le_bytes());
+        change(22);
+        let directory = fs::read(path).unwrap().windows(4).position(|four| four == b"PK\x01\x02").unwrap();
+        change(directory + 24);
+        fs::write(path, bytes).unwrap();
+    }
+
+    #[test]
+    fn a_bomb_is_refused_by_its_size_before_anything_is_unpacked() {
+        let (_root, path) = archive_with(&[Entry::new("resources/zeros", vec![0; 1 << 20])]);
+        announce(&path, 3 << 30);
+        let failure = UnpackedFmu::open(&path).unwrap_err();
+        assert!(failure.what.contains("x.fmu") && failure.problem.contains("3221225472 bytes"), "{failure}");
+        // One that announces less than it holds is unpacked no further.
+        for size in [0, 1, (1 << 20) - 1, (1 << 20) + 1] {
+            announce(&path, size);
+            let failure = UnpackedFmu::open(&path).unwrap_err();
+            assert!(
+                failure.what.contains("resources/zeros") && failure.problem.contains("damaged"),
+                "{size}: {failure}"
+            );
+        }
+    }
+
+    #[test]
+    fn only_what_is_wanted_is_unpacked_and_all_of_it_checked() {
+        let (_root, path) = archive_with(&[Entry::new("a", "x".repeat(100)), Entry::new(DESCRIPTION, "no XML")]);
+        let root = tempfile::tempdir().unwrap();
+        let mut archive = open_archive(&path).unwrap();
+        let mut sizes = entries(&mut archive).unwrap();
+        assert_eq!(sizes.remove(0), ("a".to_owned(), 100));
+        let mut few = Vec::new();
+        unpack_entry(&mut archive, 0, "a", &mut few).unwrap();
+        assert_eq!(few, "x".repeat(100).into_bytes());
+        unpack(&mut archive, 0, "a", root.path()).unwrap();
+        assert_eq!(fs::read(root.path().join("a")).unwrap(), few);
     }
 }

@@ -47,7 +47,7 @@ pub(super) fn drive(
 ) -> Result<ImportedRun> {
     let groups = group_outputs(description);
     let names = description.numeric_outputs().flat_map(super::ImportedVariable::scalar_names).collect();
-    let mut recording = Recording::with_columns(names, schedule.count + 1);
+    let mut recording = Recording::with_columns(names, schedule.count + 1)?;
     let mut stepping = Duration::ZERO;
     slave.initialise(schedule)?;
     for index in 0..=schedule.count {

@@ -27,16 +27,40 @@ impl<'a> Writer<'a> {
 }
 
 /// Takes little-endian values from a buffer; past its end it yields zeros (the length is checked beforehand).
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Reader<'a> {
     buffer: &'a [u8],
     at: usize,
+    fault: Option<&'static str>,
+    largest: f64,
+    infinite: usize,
 }
 
 impl<'a> Reader<'a> {
     /// Start at the beginning of `buffer`.
     pub fn new(buffer: &'a [u8]) -> Self {
-        Self { buffer, at: 0 }
+        Self { buffer, at: 0, fault: None, largest: f64::MAX, infinite: 0 }
+    }
+
+    /// From here on, [`Persist::check`] refuses real numbers beyond ±`largest`; with infinity none, not even one that is
+    /// not a number.
+    pub fn up_to(&mut self, largest: f64) {
+        self.largest = largest;
+    }
+
+    /// Note what is wrong with the bytes; the first fault counts.
+    pub fn refuse(&mut self, fault: &'static str) {
+        self.fault.get_or_insert(fault);
+    }
+
+    /// What is wrong with the bytes looked at so far.
+    pub fn fault(&self) -> Option<&'static str> {
+        self.fault
+    }
+
+    /// Infinite numbers looked at so far, which are for the caller to judge: gaps of padding lanes are infinite.
+    pub fn infinite(&self) -> usize {
+        self.infinite
     }
 
     fn take<const N: usize>(&mut self) -> [u8; N] {
@@ -55,7 +79,13 @@ pub trait Persist {
     fn save(&self, writer: &mut Writer);
     /// Read it back, in the same order.
     fn restore(&mut self, reader: &mut Reader);
+    /// Pass over its bytes and [`Reader::refuse`] what [`Persist::save`] never writes, so that nothing is changed before
+    /// all of a state is known to be one.
+    fn check(&self, reader: &mut Reader);
 }
+
+/// Counts of steps are far below; what is above is no count.
+const MOST_COUNTED: u64 = 1 << 53;
 
 impl Persist for f64 {
     fn save(&self, writer: &mut Writer) {
@@ -63,6 +93,14 @@ impl Persist for f64 {
     }
     fn restore(&mut self, reader: &mut Reader) {
         *self = Self::from_bits(u64::from_le_bytes(reader.take()));
+    }
+    fn check(&self, reader: &mut Reader) {
+        let value = Self::from_bits(u64::from_le_bytes(reader.take()));
+        if value.is_infinite() {
+            reader.infinite += 1;
+        } else if !(value.abs() <= reader.largest || reader.largest.is_infinite()) {
+            reader.refuse("it holds a number that no state holds");
+        }
     }
 }
 
@@ -73,6 +111,11 @@ impl Persist for u64 {
     fn restore(&mut self, reader: &mut Reader) {
         *self = Self::from_le_bytes(reader.take());
     }
+    fn check(&self, reader: &mut Reader) {
+        if Self::from_le_bytes(reader.take()) > MOST_COUNTED {
+            reader.refuse("it holds a count beyond all counting");
+        }
+    }
 }
 
 impl Persist for i32 {
@@ -81,6 +124,9 @@ impl Persist for i32 {
     }
     fn restore(&mut self, reader: &mut Reader) {
         *self = Self::from_le_bytes(reader.take());
+    }
+    fn check(&self, reader: &mut Reader) {
+        let _ = reader.take::<4>();
     }
 }
 
@@ -91,6 +137,12 @@ impl Persist for bool {
     fn restore(&mut self, reader: &mut Reader) {
         let [byte] = reader.take();
         *self = byte != 0;
+    }
+    fn check(&self, reader: &mut Reader) {
+        let [byte] = reader.take();
+        if byte > 1 {
+            reader.refuse("it holds a flag that is neither set nor cleared");
+        }
     }
 }
 
@@ -105,6 +157,11 @@ impl<T: Persist> Persist for [T] {
             value.restore(reader);
         }
     }
+    fn check(&self, reader: &mut Reader) {
+        for value in self {
+            value.check(reader);
+        }
+    }
 }
 
 impl<T: Persist> Persist for Vec<T> {
@@ -114,6 +171,9 @@ impl<T: Persist> Persist for Vec<T> {
     fn restore(&mut self, reader: &mut Reader) {
         self.as_mut_slice().restore(reader);
     }
+    fn check(&self, reader: &mut Reader) {
+        self.as_slice().check(reader);
+    }
 }
 
 impl<T: Persist, const N: usize> Persist for [T; N] {
@@ -122,6 +182,9 @@ impl<T: Persist, const N: usize> Persist for [T; N] {
     }
     fn restore(&mut self, reader: &mut Reader) {
         self.as_mut_slice().restore(reader);
+    }
+    fn check(&self, reader: &mut Reader) {
+        self.as_slice().check(reader);
     }
 }
 
@@ -136,6 +199,10 @@ macro_rules! persist_fields {
             fn restore(&mut self, reader: &mut $crate::persist::Reader) {
                 let Self { $($field),+ } = self;
                 $($crate::persist::Persist::restore($field, reader);)+
+            }
+            fn check(&self, reader: &mut $crate::persist::Reader) {
+                let Self { $($field),+ } = self;
+                $($crate::persist::Persist::check($field, reader);)+
             }
         }
     };

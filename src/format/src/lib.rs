@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 mod error;
+mod input;
 mod load;
 mod resources;
 mod rom_file;
@@ -17,6 +18,7 @@ mod scene_layout;
 mod suggestion;
 
 pub use error::Error;
+pub use input::{open_file, read_file};
 pub use load::{BUILTIN_PREFIX, load_scene, load_settings};
 pub use resources::{
     PACKAGE_FILE, RESOURCES_FORMAT_VERSION, Resources, SCENE_FILE, instantiation_token, load_resources, packed_roms,

@@ -1,15 +1,19 @@
 //! A scene file and the ROM files it names.
 
-use std::fs;
 use std::path::Path;
 
 use tiprub_core::settings::{SceneSettings, StructureSettings};
 use tiprub_core::{Rom, Scene};
 
-use crate::{Error, Result, parse_scene, read_rom};
+use crate::{Error, Result, parse_scene, read_file, read_rom};
 
 /// Start of a `rom` entry that names a model which comes with the program.
 pub const BUILTIN_PREFIX: &str = "builtin:";
+
+/// Largest file of a scene or ROM (bytes): far beyond any, far below what exhausts the machine.
+pub(crate) const LARGEST: u64 = 8 << 30;
+/// Largest file of text.
+const LARGEST_TEXT: u64 = 64 << 20;
 
 /// Read a scene file and its ROM files, which are named relative to it. Names after `builtin:` are handed to
 /// `builtin`, which answers `None` for a name it does not know, and otherwise a ROM or why there is none.
@@ -72,11 +76,15 @@ pub(crate) fn rom_file(path: &Path, remedy: &str) -> Result<Rom> {
 }
 
 pub(crate) fn read_bytes(path: &Path, remedy: &str) -> Result<Vec<u8>> {
-    fs::read(path).map_err(|error| Error::file(path, format!("cannot be read: {error}"), remedy))
+    read(path, LARGEST, remedy)
+}
+
+fn read(path: &Path, most: u64, remedy: &str) -> Result<Vec<u8>> {
+    read_file(path, most).map_err(|error| Error::file(path, format!("cannot be read: {error}"), remedy))
 }
 
 pub(crate) fn read_text(path: &Path, remedy: &str) -> Result<String> {
-    String::from_utf8(read_bytes(path, remedy)?).map_err(|error| text_error(path, &error))
+    String::from_utf8(read(path, LARGEST_TEXT, remedy)?).map_err(|error| text_error(path, &error))
 }
 
 pub(crate) fn text_error(path: &Path, error: &std::string::FromUtf8Error) -> Error {

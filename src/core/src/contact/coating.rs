@@ -204,6 +204,17 @@ impl Persist for Coating {
     fn restore(&mut self, reader: &mut Reader) {
         self.plastic.restore(reader);
     }
+    fn check(&self, reader: &mut Reader) {
+        let mut bytes = reader.clone();
+        self.plastic.check(reader);
+        for _ in &self.plastic {
+            let mut strain = 0.0_f64;
+            strain.restore(&mut bytes);
+            if strain < 0.0 {
+                reader.refuse("its coating is thicker than new");
+            }
+        }
+    }
 }
 
 /// Nodes in order of growing z, all at different places of a finite extent.

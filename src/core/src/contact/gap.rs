@@ -278,16 +278,22 @@ impl GapLaw {
         }
     }
 
-    /// The surface spline that a contact node meets, and which of the carriers may deform it.
-    pub fn spline_of(&self, node: usize) -> Option<(&SurfaceSpline, usize)> {
+    /// The surface spline that a contact node meets.
+    pub fn surface_of(&self, node: usize) -> Option<&SurfaceSpline> {
         match self {
             Self::Fixed(_) | Self::Revolution(_) => None,
-            Self::Spline(law) => Some((&law.surface, 0)),
-            Self::Free(law) => {
-                let surface = &law.surfaces[law.surface_of(node)?];
-                Some((&surface.surface, surface.carrier?))
-            }
+            Self::Spline(law) => Some(&law.surface),
+            Self::Free(law) => Some(&law.surfaces[law.surface_of(node)?].surface),
         }
+    }
+
+    /// The same, where one of the carriers may deform it, and which.
+    pub fn spline_of(&self, node: usize) -> Option<(&SurfaceSpline, usize)> {
+        let carrier = match self {
+            Self::Free(law) => law.surfaces[law.surface_of(node)?].carrier?,
+            _ => 0,
+        };
+        Some((self.surface_of(node)?, carrier))
     }
 
     /// Where the nodes stand around the axis, if there is one.

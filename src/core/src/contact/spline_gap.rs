@@ -9,6 +9,9 @@ use crate::persist::{Persist, Reader, Writer};
 /// Gap reported for a node that has left the surface at a free edge (m).
 pub const BEYOND_EDGE: f64 = 1.0;
 
+/// Parameters of places on a patch, with rounding at the edges.
+const WITHIN_PATCH: std::ops::RangeInclusive<f64> = -1e-6..=1.0 + 1e-6;
+
 /// Contact nodes of equally spaced sectors facing a surface spline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SplineGap {
@@ -238,5 +241,12 @@ impl Persist for Place {
         }
         self.s.restore(reader);
         self.t.restore(reader);
+    }
+    fn check(&self, reader: &mut Reader) {
+        let mut place = *self;
+        place.restore(reader);
+        if ![place.s, place.t].iter().all(|part| WITHIN_PATCH.contains(part)) {
+            reader.refuse("a contact node is nowhere on its surface");
+        }
     }
 }

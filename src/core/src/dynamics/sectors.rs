@@ -95,6 +95,8 @@ impl Sectors {
         is_finite[]() -> bool;
         /// Save the state (not the step size).
         save[](writer: &mut Writer);
+        /// Pass over a saved state and refuse what is none.
+        check[](reader: &mut Reader);
         /// Restore a saved state, after [`Sectors::set_step`].
         restore[mut](reader: &mut Reader);
     }

@@ -252,7 +252,7 @@ impl Simulation {
     }
 }
 
-fn check_range(variable: &Variable, value: f64) -> Result<()> {
+pub(super) fn check_range(variable: &Variable, value: f64) -> Result<()> {
     let (low, high) = (variable.min.unwrap_or(f64::MIN), variable.max.unwrap_or(f64::MAX));
     if (low..=high).contains(&value) {
         return Ok(());

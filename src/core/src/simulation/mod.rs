@@ -164,6 +164,8 @@ pub struct Simulation {
     told: limits::Told,
     /// Limits found for the parameters checked last.
     limits: Option<limits::Limits>,
+    /// Length of every saved state (bytes).
+    state_size: usize,
 }
 
 impl Simulation {
@@ -197,7 +199,9 @@ impl Simulation {
             notes: Vec::new(),
             told: limits::Told::default(),
             limits: None,
+            state_size: 0,
         };
+        simulation.state_size = simulation.measured_state();
         simulation.reset();
         Ok(simulation)
     }
@@ -280,8 +284,10 @@ impl Simulation {
         if !self.compiled.spins() || self.compiled.reference_speed.to_bits() == speed.to_bits() {
             return Ok(());
         }
+        let before = self.compiled.reference_speed;
         self.compiled.set_reference_speed(speed)?;
-        self.system = self.compiled.system()?;
+        // The speed before was accepted before.
+        self.system = self.compiled.system().inspect_err(|_| drop(self.compiled.set_reference_speed(before)))?;
         self.limits = None;
         Ok(())
     }

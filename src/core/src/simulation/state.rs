@@ -3,10 +3,12 @@
 //! Layout, little-endian: magic (8 bytes), format version (u64), scene fingerprint (u64), payload, FNV-1a checksum of
 //! all before (u64).
 
-use super::{Communication, Inputs, Phase, Simulation};
+use super::access::check_range;
+use super::drive::RotorAngle;
+use super::{Communication, Inputs, MOST_STEPS, Phase, SAME_STEP, Simulation, TIME_TOLERANCE};
 use crate::persist::{Persist, Reader, Writer, fingerprint, persist_fields};
-use crate::variables::Quantity;
-use crate::{Error, Result};
+use crate::variables::{Causality, Kind, Quantity, Variable};
+use crate::{Error, Result, shown};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
 const VERSION: u64 = 4;
@@ -41,14 +43,42 @@ impl Persist for Phase {
             0 => Self::Created,
             1 => Self::Ready,
             2 => Self::Stepping,
-            _ => Self::Failed,
+            3 => Self::Failed,
+            _ => return reader.refuse("it names a phase that does not exist"),
         };
     }
+    fn check(&self, reader: &mut Reader) {
+        (*self).clone().restore(reader);
+    }
+}
+
+/// Nothing in a structure or in its books is as large, in any unit; squares and products stay far from overflow.
+const LARGEST: f64 = 1e50;
+
+/// What the rest of a state follows from: read and checked before anything is changed.
+struct Lead {
+    phase: Phase,
+    time: f64,
+    communication: Communication,
+    inputs: Inputs,
+    rotor: RotorAngle,
+    values: Vec<f64>,
+    reference_speed: f64,
+    /// Internal step (s).
+    step: f64,
+}
+
+fn damaged<T>(problem: &str) -> Result<T> {
+    Err(Error::State { problem: problem.to_owned() })
 }
 
 impl Simulation {
     /// Size of a saved state in bytes (constant for a given scene).
     pub fn state_size(&self) -> usize {
+        self.state_size
+    }
+
+    pub(super) fn measured_state(&self) -> usize {
         let mut writer = Writer::new(&mut []);
         self.write(&mut writer);
         writer.written() + CHECKSUM_BYTES
@@ -70,11 +100,10 @@ impl Simulation {
     /// Restore a saved state; on error nothing is changed.
     ///
     /// # Errors
-    /// Wrong length, wrong scene, damaged (checksum).
+    /// Wrong length, wrong scene, damaged: a checksum that does not match, or content that no state has.
     pub fn restore_state(&mut self, buffer: &[u8]) -> Result<()> {
         self.check_size(buffer.len())?;
         let (content, checksum) = buffer.split_at(buffer.len() - CHECKSUM_BYTES);
-        let damaged = |problem: &str| Err(Error::State { problem: problem.to_owned() });
         if content[..MAGIC.len()] != MAGIC {
             return damaged("it is not a state of this software");
         }
@@ -91,7 +120,10 @@ impl Simulation {
         if fingerprint(content, 0).to_le_bytes() != checksum {
             return damaged("its checksum does not match: the bytes were changed");
         }
-        self.read(&mut reader)
+        let lead = self.lead(reader.clone())?;
+        self.follow(lead)?;
+        self.read(&mut reader);
+        Ok(())
     }
 
     fn check_size(&self, found: usize) -> Result<()> {
@@ -120,7 +152,138 @@ impl Simulation {
         self.system.save(writer);
     }
 
-    fn read(&mut self, reader: &mut Reader) -> Result<()> {
+    /// Look at all of a state. The checksum finds accidents; bytes with a right one may still hold what no simulation can
+    /// go on from. In the order of `write`.
+    fn lead(&self, mut reader: Reader) -> Result<Lead> {
+        let reader = &mut reader;
+        let mut lead = Lead {
+            phase: self.phase,
+            time: 0.0,
+            communication: Communication::default(),
+            inputs: self.inputs.clone(),
+            rotor: self.rotor,
+            values: self.values.clone(),
+            reference_speed: 0.0,
+            step: 0.0,
+        };
+        lead.phase.restore(reader);
+        // Before the start, and after a failure, a state may hold anything: nothing goes on from it.
+        let runs = matches!(lead.phase, Phase::Ready | Phase::Stepping);
+        let largest = if runs { LARGEST } else { f64::INFINITY };
+        take(&mut lead.time, reader);
+        self.initial_time.check(reader);
+        take(&mut lead.communication, reader);
+        self.previous_length.check(reader);
+        // What inputs may hold is looked at where they are read.
+        let others = reader.infinite();
+        take(&mut lead.inputs, reader);
+        let infinite = reader.infinite() - others;
+        take(&mut lead.rotor, reader);
+        reader.up_to(largest);
+        let mut window = self.window.clone();
+        take(&mut window, reader);
+        reader.up_to(f64::MAX);
+        take(&mut lead.values, reader);
+        self.previous.check(reader);
+        take(&mut lead.reference_speed, reader);
+        reader.up_to(largest);
+        lead.step = self.system.check(reader, runs);
+        if let Some(fault) = reader.fault() {
+            return damaged(fault);
+        }
+        // Those of three kinds of gaps: now, a step earlier, and the lowest.
+        let padded = 3 * self.system.padding();
+        if runs && !(reader.infinite() - infinite == padded && self.system.are_padded(&window.lowest)) {
+            return damaged("it holds a number that is not finite");
+        }
+        self.check_counts(&lead)?;
+        self.check_values(&lead.values)?;
+        self.check_inputs(&mut lead)?;
+        Ok(lead)
+    }
+
+    /// Times, step sizes and counts belong together.
+    fn check_counts(&self, lead: &Lead) -> Result<()> {
+        if lead.phase == Phase::Created {
+            return if lead.time.is_finite() { Ok(()) } else { damaged("its time is not finite") };
+        }
+        let Communication { start, length, count, done } = lead.communication;
+        #[expect(clippy::cast_precision_loss, reason = "checked to be at most 2^53")]
+        let number = count as f64;
+        let (ends, within) = match lead.phase {
+            Phase::Ready => (done == count, lead.time.to_bits() == lead.communication.time(count).to_bits()),
+            phase => (done < count || phase == Phase::Failed, (lead.time - start).abs() <= TIME_TOLERANCE * length),
+        };
+        let counted = lead.time.is_finite() && (1.0..=MOST_STEPS).contains(&number) && done <= count && ends;
+        let largest = lead.values[self.compiled.references.step_max];
+        let internal = if length > 0.0 { length / number } else { largest };
+        let divided = (0.0..=f64::MAX).contains(&length)
+            && (lead.step - internal).abs() <= 2.0 * SAME_STEP * internal
+            && lead.step <= largest * (1.0 + 2.0 * SAME_STEP);
+        if counted && within && divided {
+            Ok(())
+        } else {
+            damaged("its times and its counts of steps contradict each other")
+        }
+    }
+
+    /// Values that could have been set, and outputs that could have been read.
+    fn check_values(&self, values: &[f64]) -> Result<()> {
+        for variable in self.table.variables() {
+            let values = &values[variable.reference as usize..][..variable.len()];
+            if let Some(value) = values.iter().find(|value| !is_possible(variable, **value)) {
+                return damaged(&format!("it gives `{}` the value {}", variable.name, shown(*value)));
+            }
+        }
+        Ok(())
+    }
+
+    /// Inputs within their ranges, by more than rounding, now and at the end of the step under way.
+    fn check_inputs(&self, lead: &mut Lead) -> Result<()> {
+        let Communication { length, count, done, .. } = lead.communication;
+        let stepping = lead.phase == Phase::Stepping && count > 0;
+        let offsets = if stepping { [lead.communication.offset(done), length] } else { [0.0; 2] };
+        let angle = |offset: f64| lead.rotor.total(&lead.inputs.speed, offset);
+        if !offsets.into_iter().all(|offset| angle(offset).is_finite()) {
+            return damaged("its rotor has turned beyond all counting");
+        }
+        for variable in self.table.variables().iter().filter(|variable| variable.causality == Causality::Input) {
+            let (low, high) = (variable.min.unwrap_or(f64::MIN), variable.max.unwrap_or(f64::MAX));
+            let rounding = SAME_STEP * low.abs().max(high.abs());
+            for element in 0..variable.len() {
+                let Some(input) = lead.inputs.get_mut(variable.quantity, element) else { continue };
+                let beyond = |offset: f64| (low - input.at(offset)).max(input.at(offset) - high);
+                if !offsets.into_iter().all(|offset| input.at(offset).is_finite() && beyond(offset) <= rounding) {
+                    return damaged(&format!("it takes `{}` out of its range", variable.element_name(element)));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Make ready for a state what follows from its parameters and can be refused.
+    fn follow(&mut self, lead: Lead) -> Result<()> {
+        let before =
+            (std::mem::replace(&mut self.values, lead.values), std::mem::replace(&mut self.inputs, lead.inputs));
+        // Before initialisation nothing has been computed from them, and what does not fit together is not refused yet.
+        let outcome = if lead.phase == Phase::Created { Ok(()) } else { self.adopt(lead.reference_speed) };
+        if outcome.is_err() {
+            (self.values, self.inputs) = before;
+        }
+        outcome.or_else(|error| damaged(&error.to_string()))
+    }
+
+    fn adopt(&mut self, reference_speed: f64) -> Result<()> {
+        let parameters = self.parameters();
+        self.compiled.check_methods(parameters.scheme, parameters.solver)?;
+        let order = f64::from(self.compiled.load_order);
+        self.compiled.set_load_order(self.value_of(Quantity::LoadOrder))?;
+        // The order before was accepted before.
+        self.follow_reference_speed(reference_speed).inspect_err(|_| drop(self.compiled.set_load_order(order)))
+    }
+
+    /// Take over a state that was looked at.
+    fn read(&mut self, reader: &mut Reader) {
         self.phase.restore(reader);
         self.time.restore(reader);
         self.initial_time.restore(reader);
@@ -131,20 +294,47 @@ impl Simulation {
         self.window.restore(reader);
         self.values.restore(reader);
         self.previous.restore(reader);
+        // Followed already.
+        0.0_f64.restore(reader);
         // What the step takes from parameters follows from the restored values.
         let parameters = self.parameters();
-        let mut speed = 0.0_f64;
-        speed.restore(reader);
-        // Before initialisation nothing has been computed from them, and values out of range are not refused yet.
-        if self.phase != Phase::Created {
-            self.compiled.set_load_order(self.value_of(Quantity::LoadOrder))?;
-            self.follow_reference_speed(speed)?;
-        }
         self.system.set_methods(parameters.scheme, parameters.solver);
         self.system.set_friction(parameters.friction);
         self.rest(&parameters);
         self.system.restore(reader);
-        self.renew_limits();
-        Ok(())
+        if self.phase != Phase::Created {
+            self.renew_limits();
+        }
+    }
+}
+
+/// Check the bytes of a value and read them.
+fn take(value: &mut impl Persist, reader: &mut Reader) {
+    let mut bytes = reader.clone();
+    value.check(reader);
+    value.restore(&mut bytes);
+}
+
+/// The integer that a value is.
+fn whole(value: f64) -> Option<i32> {
+    #[expect(clippy::cast_possible_truncation, reason = "compared with what it was")]
+    let number = value as i32;
+    ((f64::from(number) - value).abs() == 0.0).then_some(number)
+}
+
+/// Whether a variable can have the value.
+fn is_possible(variable: &Variable, value: f64) -> bool {
+    let settable = variable.is_settable();
+    match variable.kind {
+        // The range of inputs is looked at where they are now.
+        Kind::Real if settable && variable.causality != Causality::Input => check_range(variable, value).is_ok(),
+        Kind::Real => value.is_finite(),
+        Kind::Boolean => matches!(whole(value), Some(0 | 1)),
+        Kind::Enumeration(choices) if settable => {
+            let item = whole(value).and_then(|item| usize::try_from(item).ok());
+            item.is_some_and(|item| (1..=choices.items.len()).contains(&item))
+        }
+        Kind::Integer | Kind::Enumeration(_) => whole(value).is_some(),
+        Kind::String => true,
     }
 }

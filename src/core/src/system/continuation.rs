@@ -2,6 +2,7 @@
 
 use super::{ContactEvent, Member, Slave, StepFailure, System, frame_of};
 use crate::contact::gap::{GapLaw, dot};
+use crate::contact::spline::Place;
 use crate::contact::spline_gap::BEYOND_EDGE;
 use crate::contact::wrench::At;
 use crate::persist::{Persist, Reader, Writer};
@@ -153,6 +154,44 @@ impl System {
             coating.save(writer);
         }
         self.state.save(writer);
+    }
+
+    /// Pass over a saved state and refuse what is none; returns its step size (s). Before the start, gaps are not known.
+    pub fn check(&self, reader: &mut Reader, started: bool) -> f64 {
+        let mut step = 0.0_f64;
+        step.restore(reader);
+        if !(0.0..=f64::MAX).contains(&step) {
+            reader.refuse("its internal step is no length of time");
+        }
+        self.bank.check(reader);
+        self.slaves.iter().for_each(|slave| slave.check(reader));
+        if let Some((coating, _)) = &self.coating {
+            coating.check(reader);
+        }
+        let mut saved = self.state.clone();
+        saved.restore(&mut reader.clone());
+        self.state.check(reader);
+        let exists = |(index, place): (usize, &Place)| {
+            self.law.surface_of(index / self.lanes).is_none_or(|surface| surface.has_patch(*place))
+        };
+        if !saved.geometry.places.iter().enumerate().all(exists) {
+            reader.refuse("a contact node is on a patch that its surface does not have");
+        }
+        if started && ![&saved.gap, &saved.gap_before].into_iter().all(|gaps| self.are_padded(gaps)) {
+            reader.refuse("a gap is not finite");
+        }
+        step
+    }
+
+    /// Number of gaps in padding lanes.
+    pub fn padding(&self) -> usize {
+        self.law.nodes() * (self.lanes - self.bank.sectors())
+    }
+
+    /// Whether gaps, `[node · lanes + lane]`, are infinite in padding lanes and nowhere else.
+    pub fn are_padded(&self, gaps: &[f64]) -> bool {
+        let sectors = self.bank.sectors();
+        gaps.iter().enumerate().all(|(index, gap)| gap.is_infinite() == (index % self.lanes >= sectors))
     }
 
     /// Restore a saved state; coefficients are recomputed from the saved step size.

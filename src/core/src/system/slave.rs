@@ -246,6 +246,12 @@ impl Slave {
         self.delayed.save(writer);
     }
 
+    /// Pass over a saved state and refuse what is none.
+    pub fn check(&self, reader: &mut Reader) {
+        self.bank.check(reader);
+        self.delayed.check(reader);
+    }
+
     /// Restore a saved state, after the step size is set.
     pub fn restore(&mut self, reader: &mut Reader) {
         self.bank.restore(reader);

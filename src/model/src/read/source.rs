@@ -1,8 +1,8 @@
 //! Files as lines that know where they came from.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::{fmt, io};
 
 use crate::{Error, Result};
 
@@ -31,9 +31,19 @@ impl Place {
 /// How files are opened; tests keep theirs in memory.
 pub(super) type Open<'a> = &'a dyn Fn(&Path) -> Result<Vec<u8>>;
 
-/// Read a whole file from disk.
+/// Largest file that is read (bytes): far beyond any mesh, far below what exhausts the machine.
+const LARGEST: u64 = 32 << 30;
+
+/// Read a whole file from disk. Pipes and devices are refused: they may have no end, or never begin.
 pub(super) fn open_file(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|source| Error::File { path: path.to_path_buf(), source })
+    let refuse = |problem: &str| Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
+    let read = std::fs::metadata(path).and_then(|metadata| {
+        if !(metadata.is_file() || metadata.is_dir()) {
+            return refuse("it is a pipe or a device, not a file");
+        }
+        if metadata.len() > LARGEST { refuse("it has more than 32 GiB") } else { std::fs::read(path) }
+    });
+    read.map_err(|source| Error::File { path: path.to_path_buf(), source })
 }
 
 /// An error about a whole file.

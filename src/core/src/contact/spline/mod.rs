@@ -240,6 +240,11 @@ impl SurfaceSpline {
         if self.ends == Ends::Open { self.around - 1 } else { self.around }
     }
 
+    /// Whether a place is on a patch that exists.
+    pub fn has_patch(&self, place: Place) -> bool {
+        place.patch[0] < self.columns() && place.patch[1] < self.along - 1
+    }
+
     /// Place at about the angle and the axial position of a point (m), on the edge for points beyond it, or the nearest
     /// data point of an open surface: the start for [`SurfaceSpline::project`] when there is none from the last step.
     pub fn locate(&self, point: [f64; 3]) -> Place {

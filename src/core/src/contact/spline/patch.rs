@@ -113,7 +113,7 @@ impl SurfaceSpline {
 
     #[inline(always)]
     fn assert_exists(&self, place: Place) {
-        assert!(place.patch[0] < self.columns() && place.patch[1] < self.along - 1, "no such patch");
+        assert!(self.has_patch(place), "no such patch");
     }
 
     /// Without `SECOND` the second derivatives are left zero.

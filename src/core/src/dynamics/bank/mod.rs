@@ -401,6 +401,11 @@ impl ModalBank {
         self.state.save(writer);
     }
 
+    /// Pass over a saved state and refuse what is none.
+    pub fn check(&self, reader: &mut Reader) {
+        self.state.check(reader);
+    }
+
     /// Restore a saved state, after [`ModalBank::set_step`].
     pub fn restore(&mut self, reader: &mut Reader) {
         self.state.restore(reader);

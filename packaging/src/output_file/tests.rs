@@ -1,0 +1,177 @@
+//! Names, permissions, links, devices.
+
+use super::*;
+
+fn names(directory: &Path) -> Vec<String> {
+    let entries = fs::read_dir(directory).unwrap();
+    entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+}
+
+#[test]
+fn missing_directories_are_created_and_only_the_target_stays() {
+    let root = tempfile::tempdir().unwrap();
+    let target = root.path().join("a/b/result.csv");
+    write(&target, "1\n").unwrap();
+    write(&target, "2\n").unwrap();
+    assert_eq!(fs::read_to_string(&target).unwrap(), "2\n");
+    assert_eq!(names(&root.path().join("a/b")), ["result.csv"]);
+}
+
+#[test]
+fn an_abandoned_file_leaves_nothing_and_keeps_the_old_one() {
+    let root = tempfile::tempdir().unwrap();
+    let target = root.path().join("rom.safetensors");
+    write(&target, "old").unwrap();
+    let file = begin(&target).unwrap();
+    assert!(names(root.path()).iter().all(|name| name.starts_with('.') || name == "rom.safetensors"));
+    drop(file);
+    assert_eq!(names(root.path()), ["rom.safetensors"]);
+    assert_eq!(fs::read_to_string(&target).unwrap(), "old");
+}
+
+#[test]
+#[cfg(unix)]
+fn links_are_followed_and_stay_links() {
+    let root = tempfile::tempdir().unwrap();
+    let (real, link) = (root.path().join("elsewhere/real.csv"), root.path().join("link.csv"));
+    write(&real, "old").unwrap();
+    std::os::unix::fs::symlink(&real, &link).unwrap();
+    write(&link, "new").unwrap();
+    assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+    assert_eq!(fs::read_to_string(&real).unwrap(), "new");
+}
+
+#[test]
+#[cfg(unix)]
+fn links_to_nothing_are_followed_and_circles_are_named() {
+    let root = tempfile::tempdir().unwrap();
+    let [link, chain, circle] = ["link.csv", "chain.csv", "circle"].map(|name| root.path().join(name));
+    std::os::unix::fs::symlink("new.csv", &link).unwrap();
+    std::os::unix::fs::symlink("link.csv", &chain).unwrap();
+    std::os::unix::fs::symlink("circle", &circle).unwrap();
+    write(&chain, "new").unwrap();
+    assert!([&link, &chain].iter().all(|link| fs::symlink_metadata(link).unwrap().is_symlink()));
+    assert_eq!(fs::read_to_string(root.path().join("new.csv")).unwrap(), "new");
+    assert!(write(&circle, "x").unwrap_err().problem.contains("circle"));
+}
+
+#[cfg(unix)]
+fn mode(path: &Path) -> u32 {
+    use std::os::unix::fs::PermissionsExt;
+    fs::metadata(path).unwrap().permissions().mode() & 0o7777
+}
+
+/// The umask belongs to the whole process; a file that the system makes shows what it is.
+#[test]
+#[cfg(unix)]
+fn new_files_follow_the_umask_and_replaced_ones_keep_their_permissions() {
+    use std::os::unix::fs::PermissionsExt;
+    let root = tempfile::tempdir().unwrap();
+    let [plain, target] = ["plain", "target"].map(|name| root.path().join(name));
+    fs::write(&plain, "").unwrap();
+    write(&target, "1").unwrap();
+    assert_eq!(mode(&target), mode(&plain));
+    for kept in [0o600, 0o640, 0o755] {
+        fs::set_permissions(&target, fs::Permissions::from_mode(kept)).unwrap();
+        write(&target, "2").unwrap();
+        assert_eq!(mode(&target), kept);
+    }
+}
+
+/// Where files without a name are not to be had, hidden ones do.
+#[test]
+#[cfg(unix)]
+fn hidden_files_become_the_same_as_files_without_a_name() {
+    let root = tempfile::tempdir().unwrap();
+    let [plain, target] = ["plain", "target"].map(|name| root.path().join(name));
+    fs::write(&plain, "").unwrap();
+    let named = temporary().tempfile_in(root.path()).unwrap();
+    let mut draft = Draft { file: named.reopen().unwrap(), named: Some(named) };
+    draft.write_all(b"bytes").unwrap();
+    persist(draft, &target).unwrap();
+    assert_eq!((fs::read_to_string(&target).unwrap().as_str(), mode(&target)), ("bytes", mode(&plain)));
+    assert_eq!(names(root.path()).len(), 2);
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn an_unfinished_file_has_no_name() {
+    let root = tempfile::tempdir().unwrap();
+    let draft = begin(&root.path().join("x")).unwrap();
+    // Where the file system knows such files.
+    assert!(draft.named.is_some() || names(root.path()).is_empty());
+}
+
+#[test]
+fn impossible_names_are_refused_before_any_work() {
+    let root = tempfile::tempdir().unwrap();
+    for name in ["", ".", "..", "missing/", &"l".repeat(300)] {
+        let target = if name.is_empty() { PathBuf::new() } else { root.path().join(name) };
+        assert!(try_target(&target).is_err() && begin(&target).is_err(), "{name}");
+    }
+    try_target(&root.path().join("a/b/c")).unwrap();
+    assert_eq!(names(root.path()).len(), 0);
+}
+
+/// Links stand for the devices here: replacing a real one would damage the machine that runs the tests.
+#[test]
+#[cfg(target_os = "linux")]
+fn devices_are_written_to_and_never_replaced() {
+    let root = tempfile::tempdir().unwrap();
+    for (device, works) in [("/dev/null", true), ("/dev/full", false)] {
+        let link = root.path().join("device");
+        std::os::unix::fs::symlink(device, &link).unwrap();
+        let outcome = write(&link, "bytes");
+        assert_eq!(outcome.is_ok(), works, "{device}");
+        assert!(outcome.err().is_none_or(|failure| failure.problem.contains("cannot be written")), "{device}");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink(), "{device} was replaced");
+        assert_eq!(names(root.path()), ["device"]);
+        fs::remove_file(&link).unwrap();
+    }
+}
+
+#[test]
+fn a_directory_is_not_a_target() {
+    let root = tempfile::tempdir().unwrap();
+    let failure = write(root.path(), "x").unwrap_err();
+    assert!(failure.problem.contains("is a directory"), "{failure}");
+    assert_eq!(names(root.path()).len(), 0);
+}
+
+#[test]
+fn only_a_file_with_other_contents_is_protected() {
+    let root = tempfile::tempdir().unwrap();
+    let target = root.path().join("scene.toml");
+    refuse_to_replace(&target, "old", "Move it").unwrap();
+    write(&target, "old").unwrap();
+    refuse_to_replace(&target, "old", "Move it").unwrap();
+    let failure = refuse_to_replace(&target, "new", "Move it").unwrap_err();
+    assert!(failure.what.ends_with("scene.toml") && failure.remedy == "Move it", "{failure}");
+}
+
+#[test]
+fn a_directory_is_tried_and_nothing_stays() {
+    let root = tempfile::tempdir().unwrap();
+    try_directory(&root.path().join("a/b")).unwrap();
+    assert_eq!(names(root.path()).len(), 0);
+    fs::create_dir(root.path().join("there")).unwrap();
+    try_directory(&root.path().join("there")).unwrap();
+    assert_eq!(names(root.path()), ["there"]);
+    assert_eq!(names(&root.path().join("there")).len(), 0);
+    fs::write(root.path().join("file"), "").unwrap();
+    for bad in ["file", "file/inside"] {
+        let failure = try_directory(&root.path().join(bad)).unwrap_err();
+        assert!(failure.problem.contains("cannot create the directory"), "{failure}");
+    }
+    // Made, but not to be written into: no file system takes files there.
+    #[cfg(target_os = "linux")]
+    assert!(try_directory(Path::new("/proc/self")).unwrap_err().problem.contains("cannot write there"));
+}
+
+#[test]
+fn a_target_that_cannot_be_written_says_so() {
+    let root = tempfile::tempdir().unwrap();
+    fs::write(root.path().join("file"), "").unwrap();
+    let failure = write(&root.path().join("file/inside.csv"), "x").unwrap_err();
+    assert!(failure.problem.contains("cannot create the directory"), "{failure}");
+}

@@ -1,0 +1,253 @@
+//! What a command reads and what it writes, kept apart: no output is an input, another output, or where the summary goes.
+
+use std::{
+    fs::{self, Metadata},
+    io,
+    path::{Component, Path, PathBuf},
+};
+
+use crate::{
+    Failure, Result,
+    cli::{Command, Model, ReduceArguments, StudyArguments},
+    commands::demo,
+    output_file, scene_source,
+};
+
+/// A file, with the words of the command line for it.
+#[derive(Debug, Clone)]
+pub struct Named {
+    role: String,
+    path: PathBuf,
+}
+
+impl Named {
+    /// What `role` says is at `path`.
+    pub fn new(role: impl Into<String>, path: impl Into<PathBuf>) -> Self {
+        Self { role: role.into(), path: path.into() }
+    }
+
+    fn option(role: &str, path: &Option<PathBuf>) -> Option<Self> {
+        path.as_ref().map(|path| Self::new(role, path))
+    }
+}
+
+/// Extensions of what a study writes.
+const STUDY_FILES: [&str; 5] = ["csv", "html", "json", "md", "svg"];
+
+/// Look at everything that a command line names, before any work.
+///
+/// # Errors
+/// Two names for one file of which one is written, or a file that cannot be written.
+pub fn check(command: &Command) -> Result<()> {
+    match command {
+        Command::Run(arguments) => {
+            let csv = arguments.csv.clone().filter(|path| path != Path::new("-"));
+            outputs(&scene(&arguments.scene), &Vec::from_iter(Named::option("--csv", &csv)))
+        }
+        Command::Reduce(arguments) => outputs(&model_files(arguments), &reduce_outputs(arguments)),
+        Command::Demo(arguments) => {
+            let files: Vec<Named> = demo::FILES.map(|name| Named::new("--out", arguments.out.join(name))).to_vec();
+            apart(&Vec::from_iter(Named::option("--library", &arguments.library)), &files)?;
+            output_file::try_directory(&arguments.out)
+        }
+        Command::Stability(arguments) if arguments.child.is_none() => {
+            let files = ["index.html", "results.json", "stability.csv", "stability.md"];
+            let files = files.map(|name| Named::new("--out", arguments.out.join(name))).to_vec();
+            let all = [files, Vec::from_iter(Named::option("--chapter", &arguments.chapter))].concat();
+            apart(&Vec::from_iter(Named::option("--library", &arguments.library)), &all)
+        }
+        Command::Study(arguments) => study(arguments),
+        // Names follow from the scene: see the command.
+        Command::Package(_) | Command::Inspect(_) | Command::Stability(_) => Ok(()),
+    }
+}
+
+/// The files of a scene.
+pub fn scene(argument: &str) -> Vec<Named> {
+    let files = scene_source::files(argument).into_iter();
+    files
+        .enumerate()
+        .map(|(index, path)| Named::new(if index == 0 { "SCENE" } else { "a ROM of SCENE" }, path))
+        .collect()
+}
+
+/// The files that describe a model of one's own.
+pub fn model_files(arguments: &ReduceArguments) -> Vec<Named> {
+    let mesh = match &arguments.model {
+        Some(Model::File(path)) => Some(Named::new("MODEL", path)),
+        _ => None,
+    };
+    let file = &arguments.file;
+    let options =
+        [("--stiffness", &file.stiffness), ("--mass", &file.mass), ("--nodes", &file.nodes), ("--dofs", &file.dofs)];
+    mesh.into_iter().chain(options.into_iter().filter_map(|(role, path)| Named::option(role, path))).collect()
+}
+
+/// The files that `reduce` was told to write.
+fn reduce_outputs(arguments: &ReduceArguments) -> Vec<Named> {
+    let options = [("--output", &arguments.output), ("--inp", &arguments.inp), ("--vtk", &arguments.vtk)];
+    options.into_iter().filter_map(|(role, path)| Named::option(role, path)).collect()
+}
+
+/// A study names its files itself, in one directory: what is read must not be there under a name of that kind.
+fn study(arguments: &StudyArguments) -> Result<()> {
+    let Some(out) = &arguments.out else { return Ok(()) };
+    let directory = identity(out);
+    for input in arguments.scene.as_deref().map(scene).unwrap_or_default() {
+        let kind = input.path.extension().and_then(|kind| kind.to_str()).unwrap_or_default().to_ascii_lowercase();
+        let real = output_file::destination(&input.path).unwrap_or_else(|_| input.path.clone());
+        let inside = directory.is_some() && identity(real.parent().unwrap_or(Path::new("."))) == directory;
+        if inside && STUDY_FILES.contains(&kind.as_str()) {
+            let problem =
+                format!("holds {}, {}, which a file of the study may replace", input.role, input.path.display());
+            return Err(Failure::usage(format!("--out {}", out.display()), problem, "Give another directory"));
+        }
+    }
+    Ok(())
+}
+
+/// [`apart`], and every output can be written as far as that shows.
+///
+/// # Errors
+/// As said there.
+pub fn outputs(inputs: &[Named], outputs: &[Named]) -> Result<()> {
+    apart(inputs, outputs)?;
+    outputs.iter().try_for_each(|output| output_file::try_target(&output.path))
+}
+
+/// No output is one of the inputs, another output, or the file or pipe that stdout or stderr goes to.
+///
+/// # Errors
+/// Two names for one file, whatever they look like: links of both kinds, open files, directories that do not exist yet.
+pub fn apart(inputs: &[Named], outputs: &[Named]) -> Result<()> {
+    let mut known: Vec<(&str, String, Identity)> = Vec::new();
+    let streams = [("stdout", stream(io::stdout())), ("stderr", stream(io::stderr()))];
+    known.extend(streams.into_iter().filter_map(|(name, place)| Some((name, String::new(), place?))));
+    for input in inputs {
+        known.extend(
+            identity(&input.path).map(|place| (input.role.as_str(), format!(" {}", input.path.display()), place)),
+        );
+    }
+    for output in outputs {
+        let Some(place) = identity(&output.path) else { continue };
+        if let Some((role, path, _)) = known.iter().find(|(.., other)| *other == place) {
+            let what = format!("{} {}", output.role, output.path.display());
+            return Err(Failure::usage(what, format!("is the same file as {role}{path}"), "Give a file of its own"));
+        }
+        known.push((&output.role, format!(" {}", output.path.display()), place));
+    }
+    Ok(())
+}
+
+/// What a path stands for: what is there, and the names below it of what is not there yet.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Identity {
+    there: Key,
+    below: PathBuf,
+}
+
+#[cfg(unix)]
+type Key = (u64, u64);
+#[cfg(not(unix))]
+type Key = PathBuf;
+
+#[cfg(unix)]
+fn key(_path: &Path, metadata: &Metadata) -> Option<Key> {
+    use std::os::unix::fs::{FileTypeExt, MetadataExt};
+    // Terminals and /dev/null may be named twice.
+    (!metadata.file_type().is_char_device()).then(|| (metadata.dev(), metadata.ino()))
+}
+
+#[cfg(not(unix))]
+fn key(path: &Path, _metadata: &Metadata) -> Option<Key> {
+    fs::canonicalize(path).ok()
+}
+
+/// `None` for what may be named twice, and for what is no possible name.
+fn identity(path: &Path) -> Option<Identity> {
+    let path = output_file::destination(path).ok()?;
+    let path = if path.is_absolute() { path } else { std::env::current_dir().ok()?.join(path) };
+    let mut there = PathBuf::new();
+    let mut below = PathBuf::new();
+    for part in path.components() {
+        match part {
+            // Nothing is there whose parent could be asked for: what is not made yet will be a plain directory.
+            Component::ParentDir if below.as_os_str().is_empty() => there.push(part),
+            Component::ParentDir => drop(below.pop()),
+            Component::CurDir => {}
+            _ if below.as_os_str().is_empty() && fs::metadata(there.join(part)).is_ok() => there.push(part),
+            _ => below.push(part),
+        }
+    }
+    let metadata = fs::metadata(&there).ok()?;
+    Some(Identity { there: key(&there, &metadata)?, below })
+}
+
+/// Where a stream of this process goes.
+#[cfg(unix)]
+fn stream(stream: impl std::os::fd::AsFd) -> Option<Identity> {
+    let metadata = fs::File::from(stream.as_fd().try_clone_to_owned().ok()?).metadata().ok()?;
+    Some(Identity { there: key(Path::new(""), &metadata)?, below: PathBuf::new() })
+}
+
+#[cfg(not(unix))]
+fn stream<T>(_stream: T) -> Option<Identity> {
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn same(root: &Path, one: &str, two: &str) -> bool {
+        let named = |name: &str| Named::new("x", root.join(name));
+        let [input, both] = [apart(&[named(one)], &[named(two)]), apart(&[], &[named(one), named(two)])];
+        assert_eq!(input.is_err(), both.is_err(), "{one} {two}");
+        assert!(input.err().is_none_or(|failure| failure.exit_code() == 2 && failure.problem.contains("same file")));
+        both.is_err()
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn one_file_under_two_names_is_found_whatever_the_names() {
+        let root = tempfile::tempdir().unwrap();
+        let root = root.path();
+        fs::create_dir(root.join("a")).unwrap();
+        for name in ["file", "a/other"] {
+            fs::write(root.join(name), "").unwrap();
+        }
+        fs::hard_link(root.join("file"), root.join("hard")).unwrap();
+        for (link, target) in [("soft", "file"), ("b", "a"), ("dangling", "a/new"), ("again", "dangling")] {
+            std::os::unix::fs::symlink(target, root.join(link)).unwrap();
+        }
+        for (one, two) in [
+            ("file", "file"),
+            ("file", "a/../file"),
+            ("file", "hard"),
+            ("file", "soft"),
+            ("hard", "soft"),
+            ("a/other", "b/other"),
+            ("a/new", "b/new"),
+            ("a/new", "dangling"),
+            ("again", "b/./new"),
+            ("new/x/y", "new/z/../x/y"),
+            ("new/../n", "n"),
+        ] {
+            assert!(same(root, one, two), "{one} {two}");
+        }
+        for (one, two) in [("file", "a/other"), ("a/new", "new"), ("new/x", "new/y"), ("a/x/y", "b/x/z")] {
+            assert!(!same(root, one, two), "{one} {two}");
+        }
+        // A device takes whatever comes.
+        assert!(!same(root, "/dev/null", "/dev/null"));
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn an_open_file_is_the_file() {
+        use std::os::fd::AsRawFd;
+        let root = tempfile::tempdir().unwrap();
+        let file = fs::File::create(root.path().join("x")).unwrap();
+        assert!(same(root.path(), "x", &format!("/proc/self/fd/{}", file.as_raw_fd())));
+    }
+}

@@ -1,0 +1,199 @@
+//! States whose checksum is right and whose content is not: refused with nothing changed, or run on to an end.
+
+mod common;
+#[path = "common/features.rs"]
+mod common_features;
+#[path = "common/lattice.rs"]
+mod lattice;
+#[path = "common/wheel.rs"]
+mod wheel;
+
+use common_features::{coating, flexible};
+use tiprub_core::persist::fingerprint;
+use tiprub_core::settings::{LoadSettings, Scheme, Solver, SplineSettings};
+use tiprub_core::{Error, Scene, Simulation};
+
+/// Magic, format version and fingerprint of the scene, in front of what is damaged here.
+const HEADER: usize = 24;
+
+fn scenes() -> Vec<(&'static str, Scene)> {
+    let rotor = |change: fn(&mut Scene)| {
+        let mut scene = common::scene(12);
+        scene.roms[0] = common::rich_rom(12);
+        change(&mut scene);
+        scene
+    };
+    let wheel = wheel::Wheel::random(6, 2, 9, 0.25, 5).cyclic();
+    let mut coupled = wheel::rub(common::scene(wheel.sectors), wheel);
+    flexible(&mut coupled);
+    coupled.settings.contacts[0].solver = Solver::Coulomb;
+    vec![
+        ("revolution", rotor(|scene| scene.settings.contacts[0].solver = Solver::Film)),
+        ("spline", rotor(|scene| scene.settings.surfaces[0].spline = Some(SplineSettings::default()))),
+        (
+            "coating on a loaded ring",
+            rotor(|scene| {
+                flexible(scene);
+                coating(scene);
+                scene.settings.structures[1].thermal = true;
+                scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 3e3, phase: 0.2 });
+            }),
+        ),
+        (
+            "coulomb, stiffening",
+            rotor(|scene| {
+                flexible(scene);
+                scene.settings.contacts[0].solver = Solver::Coulomb;
+                scene.roms[0].extras.spin = Some(common::spin(scene.roms[0].order()));
+                scene.settings.structures[0].spin.stiffening = true;
+            }),
+        ),
+        ("coupled sectors", coupled),
+        ("free", lattice::with(lattice::squeezed(), 0.15, Solver::Coulomb, Scheme::ModalExact)),
+    ]
+}
+
+fn saved(simulation: &Simulation) -> Vec<u8> {
+    let mut state = vec![0; simulation.state_size()];
+    simulation.save_state(&mut state).unwrap();
+    state
+}
+
+fn sealed(mut state: Vec<u8>) -> Vec<u8> {
+    let end = state.len() - 8;
+    let checksum = fingerprint(&state[..end], 0);
+    state[end..].copy_from_slice(&checksum.to_le_bytes());
+    state
+}
+
+/// Before the start, at the start, in contact between two steps, and within one.
+fn moments(scene: &Scene, length: f64) -> Vec<Vec<u8>> {
+    let mut simulation = Simulation::new(scene).unwrap();
+    let mut states = vec![saved(&simulation)];
+    simulation.initialise(0.0).unwrap();
+    states.push(saved(&simulation));
+    let mut contacts = 0;
+    for _ in 0..400 {
+        simulation.do_step(simulation.time(), length).unwrap();
+        contacts += simulation.system().events().len();
+        if contacts > 20 && !simulation.system().events().is_empty() {
+            break;
+        }
+    }
+    assert!(contacts > 0, "never touched");
+    states.push(saved(&simulation));
+    simulation.begin_step(simulation.time(), length).unwrap();
+    simulation.advance().unwrap();
+    states.push(saved(&simulation));
+    states
+}
+
+/// A small generator of its own, so that every run tries the same.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        usize::try_from(self.0 >> 11).unwrap() % limit
+    }
+}
+
+/// One to three bits, bytes or words changed behind the header.
+fn damage(state: &[u8], dice: &mut Dice) -> Vec<u8> {
+    let words: [u64; 12] = [
+        0,
+        1,
+        u64::MAX,
+        1 << 40,
+        1 << 63,
+        f64::NAN.to_bits(),
+        f64::INFINITY.to_bits(),
+        1e300_f64.to_bits(),
+        (-1.0_f64).to_bits(),
+        1e-300_f64.to_bits(),
+        1e20_f64.to_bits(),
+        1.0_f64.to_bits(),
+    ];
+    let mut damaged = state.to_vec();
+    // What the rest follows from stands in front and is short.
+    let end = if dice.below(3) == 0 { (HEADER + 400).min(state.len() - 16) } else { state.len() - 16 };
+    for _ in 0..=dice.below(3) {
+        let at = HEADER + dice.below(end - HEADER);
+        match dice.below(3) {
+            0 => damaged[at] ^= 1 << dice.below(8),
+            1 => damaged[at] = u8::try_from(dice.below(256)).unwrap(),
+            _ => {
+                let at = HEADER + 8 * ((at - HEADER) / 8);
+                damaged[at..at + 8].copy_from_slice(&words[dice.below(words.len())].to_le_bytes());
+            }
+        }
+    }
+    sealed(damaged)
+}
+
+/// Ends in an error or with outputs that are numbers.
+fn run_on(simulation: &mut Simulation, created: bool, length: f64) -> Result<(), Error> {
+    if created {
+        simulation.initialise(0.0)?;
+    }
+    // Within a communication step already, or not.
+    simulation.advance().map(drop).or_else(|_| simulation.begin_step(simulation.time(), length))?;
+    // The step begun may have been ended by its first internal one.
+    let under_way = |simulation: &mut Simulation| while simulation.advance().is_ok_and(|now| !now.finished) {};
+    for _ in 0..3 {
+        under_way(simulation);
+        simulation.begin_step(simulation.time(), length)?;
+    }
+    while !simulation.advance()?.finished {}
+    for reference in 0..u32::try_from(simulation.table().references()).unwrap() {
+        let value = simulation.real(reference).unwrap_or(0.0);
+        assert!(value.is_finite(), "{} is {value}", simulation.table().locate(reference).unwrap().0.name);
+    }
+    Ok(())
+}
+
+#[test]
+fn damaged_content_under_a_right_checksum_is_refused_with_nothing_changed_or_runs_on() {
+    let tries = 12;
+    for (name, scene) in scenes() {
+        let length = scene.settings.experiment.communication_step;
+        let states = moments(&scene, length);
+        let mut twin = Simulation::new(&scene).unwrap();
+        let (mut dice, mut counts) = (Dice(0x9e37_79b9_7f4a_7c15), [0; 3]);
+        for (moment, state) in states.iter().enumerate() {
+            for attempt in 0..tries {
+                twin.restore_state(&states[attempt % states.len()]).unwrap();
+                let before = saved(&twin);
+                match twin.restore_state(&damage(state, &mut dice)) {
+                    Err(error) => {
+                        assert!(matches!(error, Error::State { .. }), "{name}, moment {moment}: {error}");
+                        assert!(saved(&twin) == before, "{name}, moment {moment}: {error}, and changed all the same");
+                        counts[0] += 1;
+                    }
+                    Ok(()) => counts[1 + usize::from(run_on(&mut twin, moment == 0, length).is_ok())] += 1,
+                }
+            }
+        }
+        println!("{name}: {} refused, {} ended with an error, {} ran on", counts[0], counts[1], counts[2]);
+        assert!(counts[0] > 0 && counts[2] > 0, "{name}: {counts:?}");
+    }
+}
+
+/// Every undamaged moment of every scene is taken, by any other moment.
+#[test]
+fn what_was_saved_is_restored_whatever_was_there() {
+    for (name, scene) in scenes() {
+        let states = moments(&scene, scene.settings.experiment.communication_step);
+        let mut twin = Simulation::new(&scene).unwrap();
+        for (from, first) in states.iter().enumerate() {
+            for (to, second) in states.iter().enumerate() {
+                twin.restore_state(first).unwrap_or_else(|error| panic!("{name}, {from}: {error}"));
+                assert!(saved(&twin)[HEADER..HEADER + 64] == first[HEADER..HEADER + 64], "{name}, {from}");
+                twin.restore_state(second).unwrap_or_else(|error| panic!("{name}, {from} to {to}: {error}"));
+                assert!(to == 0 || saved(&twin) == *second, "{name}, {from} to {to}");
+            }
+        }
+    }
+}

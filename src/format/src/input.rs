@@ -1,0 +1,59 @@
+//! Files that are read: whole, and nothing but files.
+
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Read};
+use std::path::Path;
+
+/// Open a file to read. Directories are refused, and so are pipes and devices, which may have no end or never begin.
+///
+/// # Errors
+/// No file, or one that cannot be opened.
+pub fn open_file(path: &Path) -> io::Result<File> {
+    let metadata = fs::metadata(path)?;
+    if metadata.is_dir() {
+        return Err(io::Error::new(ErrorKind::IsADirectory, "it is a directory"));
+    }
+    if !metadata.is_file() {
+        return Err(io::Error::new(ErrorKind::InvalidInput, "it is a pipe or a device, not a file"));
+    }
+    File::open(path)
+}
+
+/// Contents of a file of at most `most` bytes.
+///
+/// # Errors
+/// As [`open_file`]; more bytes, or ones that cannot be read.
+pub fn read_file(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let file = open_file(path)?;
+    let length = file.metadata()?.len();
+    let too_large =
+        || io::Error::new(ErrorKind::FileTooLarge, format!("it has more than the {most} bytes that are read"));
+    if length > most {
+        return Err(too_large());
+    }
+    let mut bytes = Vec::new();
+    bytes.try_reserve_exact(usize::try_from(length).unwrap_or(usize::MAX))?;
+    file.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most { Err(too_large()) } else { Ok(bytes) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_files_are_read_and_only_up_to_a_size() {
+        let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let manifest = here.join("Cargo.toml");
+        let bytes = read_file(&manifest, 1 << 20).unwrap();
+        assert_eq!(read_file(&manifest, bytes.len() as u64).unwrap(), bytes);
+        assert_eq!(read_file(&manifest, bytes.len() as u64 - 1).unwrap_err().kind(), ErrorKind::FileTooLarge);
+        assert_eq!(read_file(here, 1).unwrap_err().kind(), ErrorKind::IsADirectory);
+        #[cfg(target_os = "linux")]
+        {
+            assert!(read_file(Path::new("/dev/zero"), 1).unwrap_err().to_string().contains("device"));
+            // Its length shows as zero.
+            assert_eq!(read_file(Path::new("/proc/self/status"), 9).unwrap_err().kind(), ErrorKind::FileTooLarge);
+        }
+    }
+}
