@@ -328,6 +328,8 @@ pub enum StudyChoice {
     Map,
     /// Error against run time of every scheme and solver, beside independent methods.
     Error,
+    /// What the communication step does to a whirling shaft and other inputs that move, ramped, with derivatives, and held.
+    Inputs,
 }
 
 /// A range of angular velocities (rad/s).

@@ -3,7 +3,8 @@
 use tiprub_core::{
     Rom, Scene,
     settings::{
-        CoatingSettings, ContactSettings, Motion, SceneSettings, Scheme, Solver, StructureSettings, SurfaceSettings,
+        CoatingSettings, ContactSettings, InputInterpolation, Motion, SceneSettings, Scheme, Solver, StructureSettings,
+        SurfaceSettings,
     },
 };
 
@@ -22,6 +23,9 @@ pub fn features(scene: &Scene) -> Vec<String> {
     }
     if settings.time.scheme == Scheme::MasslessBoundary {
         found.push("highest modes quasi-static: contact nodes have no mass (massless-boundary)".into());
+    }
+    if settings.time.input_interpolation == InputInterpolation::Hold {
+        found.push("inputs act at once and hit like hammers where they jump (input_interpolation = \"hold\")".into());
     }
     found
 }

@@ -10,7 +10,7 @@ use crate::{
     cli::{StudyArguments, StudyChoice},
     console::{Console, Outcome},
     output_file,
-    study::{self, convergence, cube, error, map, modes, stage},
+    study::{self, convergence, cube, error, inputs, map, modes, stage},
 };
 
 /// Study, write, sum up.
@@ -35,6 +35,7 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
         StudyChoice::Stage => stage::study(arguments, console)?,
         StudyChoice::Map => map::study(arguments, console)?,
         StudyChoice::Error => error::study(arguments, console)?,
+        StudyChoice::Inputs => inputs::study(arguments, console)?,
     };
     study::output::write(&study, &directory)
 }

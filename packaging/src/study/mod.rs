@@ -7,6 +7,7 @@
 pub mod convergence;
 pub mod cube;
 pub mod error;
+pub mod inputs;
 pub mod machine;
 pub mod map;
 pub mod modes;

@@ -3,26 +3,16 @@
 //! Layout, little-endian: magic (8 bytes), format version (u64), scene fingerprint (u64), payload, FNV-1a checksum of
 //! all before (u64).
 
-use super::{Communication, Inputs, Phase, Simulation};
+use super::{Communication, Phase, Simulation};
 use crate::persist::{Persist, Reader, Writer, fingerprint, persist_fields};
 use crate::variables::Quantity;
 use crate::{Error, Result};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 3;
+const VERSION: u64 = 4;
 const CHECKSUM_BYTES: usize = 8;
 
 persist_fields!(Communication { start, length, count, done });
-persist_fields!(Inputs {
-    speed,
-    shape_factor,
-    shape_rotation,
-    radius_change,
-    shaft,
-    load_amplitude,
-    load_phase,
-    temperatures
-});
 
 impl Persist for Phase {
     fn save(&self, writer: &mut Writer) {
