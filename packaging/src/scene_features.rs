@@ -198,6 +198,8 @@ mod tests {
     fn a_plain_scene_has_no_features_and_seven_limits() {
         let plain = scene(|_| {});
         assert_eq!(features(&plain), Vec::<String>::new());
+        let held = features(&scene(|scene| scene.settings.time.input_interpolation = InputInterpolation::Hold));
+        assert!(held.len() == 1 && held[0].contains("act at once"), "{held:?}");
         assert_eq!(limits(&plain).len(), 7);
         let text = limits(&plain).concat();
         assert!(text.contains("sticking is not modelled") && text.contains("a rigid surface"), "{text}");

@@ -176,7 +176,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// One input between two offsets (s): its range at the end, no more than half a turn at once, and a finite rate.
+    /// One input between two offsets (s): its range at the end, and where it does not act at once its way there.
     pub(super) fn check_course(
         &self,
         variable: &Variable,
@@ -185,49 +185,38 @@ impl Simulation {
         at_once: bool,
         [start, until]: [f64; 2],
     ) -> Result<()> {
-        let refuse = |problem: String, remedy: &str| {
-            Err(Error::invalid(format!("variable `{}`", variable.element_name(element)), problem, remedy))
-        };
         let (low, high) = (variable.min.unwrap_or(f64::MIN), variable.max.unwrap_or(f64::MAX));
         let (reached, end) = (input.at(start), input.asked(until));
         let beyond = (low - end).max(end - high);
-        let time = || shown(self.time + until);
+        let what = || format!("variable `{}`", variable.element_name(element));
         if input.slope != 0.0 && !(end.is_finite() && beyond <= SAME_STEP * low.abs().max(high.abs())) {
-            return refuse(
-                format!(
-                    "its derivative {} takes it to {} by t = {} s, outside {} … {}",
-                    shown(input.slope),
-                    shown(end),
-                    time(),
-                    shown(low),
-                    shown(high)
-                ),
-                "Give a smaller derivative or none, or a shorter communication step",
+            let problem = format!(
+                "its derivative {} takes it to {} by t = {} s, outside {} … {}",
+                shown(input.slope),
+                shown(end),
+                shown(self.time + until),
+                shown(low),
+                shown(high)
             );
+            let remedy = "Give a smaller derivative or none, or a shorter communication step";
+            return Err(Error::invalid(what(), problem, remedy));
         }
-        if at_once {
+        let rate = (end - reached) / (until - start);
+        let angle = matches!(variable.quantity, Quantity::ShapeRotation | Quantity::LoadPhase);
+        let turned = if angle { (input.asked(start) - reached).abs() } else { 0.0 };
+        if at_once || (rate.is_finite() && turned <= std::f64::consts::PI) {
             return Ok(());
         }
-        let angle = matches!(variable.quantity, Quantity::ShapeRotation | Quantity::LoadPhase);
-        if angle && (input.asked(start) - reached).abs() > std::f64::consts::PI {
-            return refuse(
-                format!(
-                    "goes from {} rad to {} rad by t = {} s, more than half a turn: an angle wrapped to one turn would be \
-                     turned back all the way",
-                    shown(reached),
-                    shown(end),
-                    time()
-                ),
+        let way = format!("goes from {} to {} by t = {} s", shown(reached), shown(end), shown(self.time + until));
+        Err(if turned > std::f64::consts::PI {
+            Error::invalid(
+                what(),
+                format!("{way}, more than half a turn: an angle wrapped to one turn would be turned back all the way"),
                 "Give the angle without wrapping it; if so fast a turn is meant, give its derivative or shorter \
                  communication steps",
-            );
-        }
-        if !((end - reached) / (until - start)).is_finite() {
-            return refuse(
-                format!("goes from {} to {} by t = {} s, too fast for a number", shown(reached), shown(end), time()),
-                "Use smaller values or a longer communication step",
-            );
-        }
-        Ok(())
+            )
+        } else {
+            Error::invalid(what(), format!("{way}, too fast for a number"), "Use smaller values or a longer step")
+        })
     }
 }
