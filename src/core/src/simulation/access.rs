@@ -79,7 +79,8 @@ impl Simulation {
     }
 
     /// Set one element of a real input or parameter. Value must be finite and within min and max. Clears a
-    /// derivative given for the same input.
+    /// derivative given for the same input. What moves or loads something reaches the value at the end of the
+    /// communication step under way or next, from where it is; with `input_interpolation` = hold it is there at once.
     ///
     /// # Errors
     /// Unknown reference, wrong kind, not settable, non-finite, out of range; nothing is changed then.
@@ -160,7 +161,8 @@ impl Simulation {
         Err(Error::invalid(format!("variable `{name}`"), "cannot be set", "Leave it as it is"))
     }
 
-    /// First time derivative of a continuous real input, valid from now until the input is set again.
+    /// First time derivative of a continuous real input, valid from now until the input is set again: with the value it
+    /// says where a ramp is at the end of the communication step.
     ///
     /// # Errors
     /// Unknown reference, not a continuous real input, order other than 1, non-finite.
