@@ -342,6 +342,8 @@ pub enum StudyChoice {
     Error,
     /// Forces and moments on both sides of contacts, torque against the work of the shaft, and the ledger, over all features.
     Conjugacy,
+    /// What the communication step does to a whirling shaft and other inputs that move, ramped, with derivatives, and held.
+    Inputs,
 }
 
 /// A range of angular velocities (rad/s).

@@ -3,7 +3,8 @@
 use tiprub_core::{
     Rom, Scene,
     settings::{
-        CoatingSettings, ContactSettings, Motion, SceneSettings, Scheme, Solver, StructureSettings, SurfaceSettings,
+        CoatingSettings, ContactSettings, InputInterpolation, Motion, SceneSettings, Scheme, Solver, StructureSettings,
+        SurfaceSettings,
     },
 };
 
@@ -22,6 +23,9 @@ pub fn features(scene: &Scene) -> Vec<String> {
     }
     if settings.time.scheme == Scheme::MasslessBoundary {
         found.push("highest modes quasi-static: contact nodes have no mass (massless-boundary)".into());
+    }
+    if settings.time.input_interpolation == InputInterpolation::Hold {
+        found.push("inputs act at once and hit like hammers where they jump (input_interpolation = \"hold\")".into());
     }
     found
 }
@@ -194,6 +198,8 @@ mod tests {
     fn a_plain_scene_has_no_features_and_seven_limits() {
         let plain = scene(|_| {});
         assert_eq!(features(&plain), Vec::<String>::new());
+        let held = features(&scene(|scene| scene.settings.time.input_interpolation = InputInterpolation::Hold));
+        assert!(held.len() == 1 && held[0].contains("act at once"), "{held:?}");
         assert_eq!(limits(&plain).len(), 7);
         let text = limits(&plain).concat();
         assert!(text.contains("sticking is not modelled") && text.contains("a rigid surface"), "{text}");

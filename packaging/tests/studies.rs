@@ -139,6 +139,26 @@ fn the_quick_study_of_conjugacy_finds_forces_moments_and_work_that_agree() {
     assert_eq!(table.lines().count(), 27, "{table}");
 }
 
+/// Ways and steps of all four inputs; the table of the guide has a row of each run.
+#[test]
+fn the_quick_study_of_inputs_tells_ramps_from_hammers() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "inputs", &[]);
+    let force = |input: &str, way: &str, step: usize| {
+        json["results"][input][way][step]["force"].as_f64().unwrap_or_else(|| panic!("{input} {way}: {json:#}"))
+    };
+    for input in ["whirl", "gap-offset", "shape-factor", "temperature"] {
+        let fine = json["results"][input]["fine"]["force"].as_f64().unwrap();
+        assert!(fine > 1.0, "no contact: {input} {fine}");
+        assert_eq!(force(input, "derivatives given", 0).to_bits(), fine.to_bits(), "{input}");
+    }
+    for input in ["whirl", "gap-offset", "shape-factor"] {
+        assert!(force(input, "hold", 2) > 3.0 * force(input, "ramp (default)", 2), "{input}");
+    }
+    let table = fs::read_to_string(root.path().join("out/inputs.md")).unwrap();
+    assert_eq!(table.lines().count(), 2 + 4 * 10, "{table}");
+}
+
 /// The branch of engine order 4 leans far above its crossing with the first mode. Linear theory does not place it, and the motion
 /// is not all multiples of the casing's two lobes: these two statements are answered with no, and all others hold.
 #[test]
@@ -201,7 +221,7 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1, "something stays");
         told
     };
-    for name in ["convergence", "modes", "cube", "stage", "map", "error"] {
+    for name in ["convergence", "modes", "cube", "stage", "map", "error", "inputs"] {
         let told = refuse(&["study", name, "--quick", "--out", "file/out"], 1);
         assert!(told.contains("file/out: cannot create the directory"), "{told}");
     }

@@ -6,6 +6,7 @@ The command line is `target/release/tiprub` of the workspace, or what the enviro
 import csv
 import json
 import os
+import re
 import subprocess
 from pathlib import Path
 from types import SimpleNamespace
@@ -55,6 +56,20 @@ def fmus(tiprub, scene, work):
     tiprub("package", scene, "--fmi", "2", "-o", files.two, *library)
     tiprub("package", scene, "--fmi", "3", "-o", files.three, *library)
     tiprub("package", scene, "--fmi", "3", "--scalars", "-o", files.scalars, *library)
+    return files
+
+
+@pytest.fixture(scope="session")
+def whirling(tiprub, scene, work):
+    """FMUs of the same rotor in a round casing, with a shaft that whirls."""
+    library = ["--library", os.environ["TIPRUB_LIBRARY"]] if "TIPRUB_LIBRARY" in os.environ else []
+    shape = re.compile(r"\[surface\.shape\][^\[]*")
+    text = shape.sub("", scene.read_text()).replace('name = "rotor"', 'name = "rotor"\nwhirl = true')
+    path = work / "whirling.toml"
+    path.write_text(text)
+    files = SimpleNamespace(two=work / "whirling2.fmu", three=work / "whirling3.fmu")
+    tiprub("package", path, "--fmi", "2", "-o", files.two, *library)
+    tiprub("package", path, "--fmi", "3", "-o", files.three, *library)
     return files
 
 

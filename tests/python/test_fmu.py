@@ -335,3 +335,37 @@ def test_fmpy_drives_the_speed_with_a_signal(fmus):
         lag = 0.5 * ramp * size * end
         assert result["speed"][0] == 1800.0
         assert result["rotor_angle"][-1] == pytest.approx(1800.0 * end + 0.5 * ramp * end * end - lag, abs=1e-9)
+
+
+def whirl(times):
+    """A circle of 0.39 mm at 600 rad/s that grows in 2 ms, in a clearance of 0.356 mm."""
+    radius = 0.195e-3 * (1.0 - numpy.cos(numpy.pi * numpy.minimum(times / 2e-3, 1.0)))
+    return radius * numpy.cos(600.0 * times), radius * numpy.sin(600.0 * times)
+
+
+@pytest.mark.parametrize("kind", ["two", "three"])
+def test_a_staircase_of_fmpy_does_not_hit(whirling, kind):
+    """FMPy holds its signal over each communication step; the FMU makes ramps of that."""
+    end = 3e-3
+    times = numpy.linspace(0.0, end, 3001)
+    signal = numpy.array(
+        list(zip(times, *whirl(times))), dtype=[("time", float), ("whirl_x", float), ("whirl_y", float)]
+    )
+
+    # Derivatives of FMPy 0.3.32 (set_input_derivatives) fail unless there are nine inputs.
+    def peak(size, **options):
+        result = simulate_fmu(
+            str(getattr(whirling, kind)),
+            stop_time=end,
+            output_interval=size,
+            input=signal,
+            output=["normal_force_peak", "energy_residual_relative"],
+            **options,
+        )
+        assert numpy.abs(result["energy_residual_relative"]).max() < 1e-9
+        return result["normal_force_peak"].max()
+
+    fine = peak(1e-6)
+    ramp, hold = peak(1e-4), peak(1e-4, start_values={"input_interpolation": 2})
+    print(f"largest node force: H = 1 us {fine:.0f} N, 0.1 ms ramped {ramp:.0f} N, held {hold:.0f} N")
+    assert fine > 10.0 and ramp < 2.0 * fine and hold > 3.0 * ramp

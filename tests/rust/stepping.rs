@@ -379,3 +379,58 @@ fn what_holds_for_the_step_taken_is_logged_once() {
     });
     assert_eq!(counts, [0, 1, 0, 0, 0]);
 }
+
+/// Tries, after every internal step, to set a good value together with a speed that nothing can follow.
+unsafe extern "C" fn overreach(
+    environment: *mut c_void,
+    _time: f64,
+    set_requested: bool,
+    _get_allowed: bool,
+    _finished: bool,
+    _can_return: bool,
+    _requested: *mut bool,
+    _at: *mut f64,
+) {
+    if !set_requested {
+        return;
+    }
+    // SAFETY: the environment is the importer's context, which nobody else touches during a step.
+    let context = unsafe { &mut *environment.cast::<fmi3::Context>() };
+    // SAFETY: the functions outlive the instance.
+    let api: &Fmi3Api = unsafe { &*context.api };
+    let core = Simulation::new(&whirling()).expect("the scene is valid");
+    let (references, values) = ([reference_of(&core, "whirl_x"), reference_of(&core, "speed")], [1e-5, 1e9]);
+    // SAFETY: arrays of two elements, on the instance that is calling.
+    let status = unsafe { (api.fmi3SetFloat64)(context.handle, references.as_ptr(), 2, values.as_ptr(), 2) };
+    assert_eq!(status, ERROR);
+    context.notes.push(0.0);
+}
+
+fn whirling() -> tiprub_core::Scene {
+    let mut scene = scene();
+    scene.settings.structures[0].whirl = true;
+    scene
+}
+
+#[test]
+fn values_refused_together_within_a_step_leave_the_ramps_as_they_were() {
+    let path = shipped();
+    let (api, resources) = (fmi3::load(&path), Resources::of(&whirling(), true));
+    let core = Simulation::new(&whirling()).expect("the scene is valid");
+    let whirl = [reference_of(&core, "whirl_x"), reference_of(&core, "whirl_y")];
+    let clearance = reference_of(&core, "clearance_minimum");
+    let plain = fmi3::Slave::new(&api, &resources);
+    let arguments = fmi3::Arguments { update: Some(overreach), ..fmi3::Arguments::new(&resources) };
+    let asked = fmi3::Slave::try_new(&api, &arguments).unwrap_or_else(|log| panic!("{log}"));
+    for slave in [&plain, &asked] {
+        slave.initialise();
+        for step in 0..20_u32 {
+            let angle = 0.1 * f64::from(step);
+            slave.expect(slave.set_reals(&whirl, &[1e-4 * angle.sin(), 1e-4 * (1.0 - angle.cos())]));
+            assert_eq!(slave.step(f64::from(step) * H, H).status, OK);
+        }
+    }
+    assert!(asked.notes().len() > 20, "nothing was refused");
+    assert_eq!(bits(&plain.reals(&[clearance], 1)), bits(&asked.reals(&[clearance], 1)));
+    assert_eq!(plain.reals(&whirl, 2), asked.reals(&whirl, 2));
+}

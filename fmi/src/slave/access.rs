@@ -244,13 +244,15 @@ impl Slave {
 
     /// The core has the last word; what was written before its refusal is taken back.
     fn apply<T: Value>(&mut self, elements: &[u32], values: &[T]) -> Result<()> {
-        let mut former = Vec::with_capacity(elements.len());
+        let (courses, mut former) = (self.simulation.courses(), Vec::with_capacity(elements.len()));
         for (&element, value) in elements.iter().zip(values) {
             let before = T::get(&self.simulation, element)?;
             if let Err(error) = value.set(&mut self.simulation, element) {
                 for (element, before) in former.into_iter().rev() {
                     T::set(&before, &mut self.simulation, element)?;
                 }
+                // Derivatives and ramps under way, which setting a value ends.
+                self.simulation.restore_courses(courses);
                 return Err(error.into());
             }
             former.push((element, before));
@@ -290,8 +292,12 @@ impl Slave {
             }
         }
         self.invalidate()?;
+        let courses = self.simulation.courses();
         for ((&reference, &order), &value) in references.iter().zip(orders).zip(values) {
-            self.simulation.set_input_derivative(reference, order, value)?;
+            if let Err(error) = self.simulation.set_input_derivative(reference, order, value) {
+                self.simulation.restore_courses(courses);
+                return Err(error.into());
+            }
         }
         Ok(())
     }

@@ -151,7 +151,7 @@ pub fn rigid() -> Scene {
             meridian: Meridian::Contour,
             ..ContactSettings::default()
         }],
-        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6 },
+        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6, ..TimeSettings::default() },
         outputs: OutputSettings {
             watched_sectors: vec![1],
             all_sectors: true,

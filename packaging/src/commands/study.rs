@@ -10,7 +10,7 @@ use crate::{
     cli::{StudyArguments, StudyChoice},
     console::{Console, Outcome},
     output_file,
-    study::{self, conjugacy, convergence, cube, error, map, modes, stage},
+    study::{self, conjugacy, convergence, cube, error, inputs, map, modes, stage},
 };
 
 /// Study, write, sum up.
@@ -36,6 +36,7 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
         StudyChoice::Map => map::study(arguments, console)?,
         StudyChoice::Error => error::study(arguments, console)?,
         StudyChoice::Conjugacy => conjugacy::study(quick)?,
+        StudyChoice::Inputs => inputs::study(arguments, console)?,
     };
     study::output::write(&study, &directory)
 }

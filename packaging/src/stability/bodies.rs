@@ -213,7 +213,7 @@ impl Throw {
             structures,
             surfaces: self.plates.iter().map(surface).collect(),
             contacts: self.plates.iter().map(contact).collect(),
-            time: TimeSettings { scheme: self.scheme, step: self.step },
+            time: TimeSettings { scheme: self.scheme, step: self.step, ..TimeSettings::default() },
             outputs: OutputSettings::default(),
             experiment: ExperimentSettings { start: 0.0, stop: 1.0, communication_step: self.step },
         };

@@ -248,7 +248,7 @@ pub fn round(rom: Rom) -> Scene {
             meridian: Meridian::Contour,
             ..ContactSettings::default()
         }],
-        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6 },
+        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6, ..TimeSettings::default() },
         outputs: OutputSettings { all_sectors: true, ..OutputSettings::default() },
         experiment: ExperimentSettings { start: 0.0, stop: 0.01, communication_step: 5e-5 },
     };

@@ -8,6 +8,7 @@ pub mod conjugacy;
 pub mod convergence;
 pub mod cube;
 pub mod error;
+pub mod inputs;
 pub mod machine;
 pub mod map;
 pub mod modes;

@@ -156,8 +156,9 @@ impl Setup {
             if index == self.schedule.count {
                 break;
             }
+            // What is set is reached at the end of the step.
             for one in &load {
-                simulation.set_real(*one, self.load(time))?;
+                simulation.set_real(*one, self.load(self.schedule.time(index + 1)))?;
             }
             let clock = std::time::Instant::now();
             simulation.begin_step(time, self.schedule.time(index + 1) - time)?;

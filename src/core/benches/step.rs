@@ -85,7 +85,7 @@ fn scene(shape: Shape, energies: bool) -> Scene {
             meridian: Meridian::Contour,
             ..ContactSettings::default()
         }],
-        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6 },
+        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6, ..TimeSettings::default() },
         outputs: OutputSettings { energies, ..OutputSettings::default() },
         experiment: ExperimentSettings { start: 0.0, stop: 1.0, communication_step: 1e-4 },
     };

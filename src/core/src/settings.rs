@@ -382,8 +382,19 @@ impl ContactSettings {
     }
 }
 
+/// How inputs that move or load something run between communication points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum InputInterpolation {
+    /// From the value reached to the one set, which is reached at the end of the step (default).
+    #[default]
+    Ramp,
+    /// The value set acts at once: a jump within one internal step.
+    Hold,
+}
+
 /// Internal time stepping.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TimeSettings {
     /// Scheme.
@@ -391,6 +402,9 @@ pub struct TimeSettings {
     pub scheme: Scheme,
     /// Largest internal step h (s); the step used divides the communication step evenly.
     pub step: f64,
+    /// Inputs between communication points.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub input_interpolation: InputInterpolation,
 }
 
 /// What the FMU exposes beside the totals.

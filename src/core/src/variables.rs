@@ -175,6 +175,8 @@ pub enum Quantity {
     SchemeChoice,
     /// Solver, parameter.
     SolverChoice,
+    /// How inputs run between communication points, parameter.
+    InputInterpolation,
     /// θ_r at the start, parameter.
     InitialAngle,
     /// Ramp time of the casing shape, parameter.

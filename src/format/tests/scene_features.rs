@@ -53,13 +53,15 @@ fn slips_of_free_masters_are_located() {
     told("rigid = true", "rigid = 1", &["surface[2].rigid: integer `1` found, true or false expected"]);
     told("rigid = true", "rigit = true", &["surface[2].rigit: unknown key", "Did you mean `rigid`?"]);
     told("friction = 0.15", "friction = 0.2", &["Give all pairs the same friction and solver"]);
+    let parts = ["time.input_interpolation: a scene with a free master has no inputs"];
+    told("[time]", "[time]\ninput_interpolation = \"hold\"", &parts);
 }
 
 #[test]
 fn features_that_are_off_are_not_written() {
     let text = write_scene(&common::complete_scene());
     let off = "velocity rigid nodes spin whirl axial_shift frequency_factors thermal load structure spline patches coating heat_to_slave wear \
-               slave_displacement";
+               slave_displacement input_interpolation";
     for key in off.split(' ') {
         assert!(!text.lines().any(|line| line.starts_with(&format!("{key} ="))), "{key} in:\n{text}");
         assert!(!text.contains(&format!(".{key}]")), "{key} in:\n{text}");

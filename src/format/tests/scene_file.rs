@@ -63,6 +63,8 @@ fn wrong_words_get_a_suggestion() {
     let list = ["surface[1].shape.kind", "\"lobs\" is not one of its values", "Did you mean `lobes`?", "`two-lobe`"];
     refused("\"lobes\"", "\"lobs\"", ":7:18", &list);
     refused("step = 1e-6", "scheme = \"modal_exact\"\nstep = 1", ":13:10", &["time.scheme", "`modal-exact`?"]);
+    let list = ["time.input_interpolation", "Did you mean `hold`?", "`ramp`"];
+    refused("step = 1e-6", "input_interpolation = \"held\"\nstep = 1", ":13:23", &list);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Complex, DMatrix, DVector};
 use tiprub_core::{
     Result, Simulation,
-    settings::{LoadSettings, Scheme, Solver},
+    settings::{InputInterpolation, LoadSettings, Scheme, Solver},
 };
 
 use super::super::{
@@ -201,6 +201,8 @@ pub fn ring(scheme: Scheme, order: u32, ratio: f64, told: f64) -> Result<Vec<Che
     scene.settings.structures[1].load = Some(LoadSettings { order, amplitude: 1e4, phase: 0.0 });
     scene.settings.outputs.slave_displacement = true;
     scene.settings.contacts[0].gap = 0.02;
+    // The load is taken off at once.
+    scene.settings.time.input_interpolation = InputInterpolation::Hold;
     let mut simulation = Simulation::new(&with_step(scene, step))?;
     simulation.initialise(0.0)?;
     let omega = TAU * [9000.0, 900.0, 400.0, 1100.0, 2100.0][order as usize];

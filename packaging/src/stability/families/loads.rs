@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use tiprub_core::{
     Result, Scene, Simulation,
-    settings::{CoatingSettings, LoadSettings, Shape, Solver},
+    settings::{CoatingSettings, InputInterpolation, LoadSettings, Shape, Solver},
 };
 
 use super::super::{
@@ -131,6 +131,7 @@ fn heated(temperature: f64) -> Result<Vec<Check>> {
 
 /// A load put on at once: without damping the ring swings to twice its static place and back.
 fn sudden(mut scene: Scene, what: &str) -> Result<Vec<Check>> {
+    scene.settings.time.input_interpolation = InputInterpolation::Hold;
     scene.settings.structures[1].damping_ratio = Some(0.0);
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(0.0)?;

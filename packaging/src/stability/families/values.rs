@@ -84,7 +84,7 @@ fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64)
     let name = variable.name.clone();
     let word = match name.as_str() {
         "speed" => "speed",
-        "casing_load_amplitude" => "loads",
+        "casing_load_amplitude" => "load",
         _ => "casing",
     };
     let expected = || {

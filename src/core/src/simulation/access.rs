@@ -79,14 +79,14 @@ impl Simulation {
     }
 
     /// Set one element of a real input or parameter. Value must be finite and within min and max. Clears a
-    /// derivative given for the same input.
+    /// derivative given for the same input. What moves or loads something reaches the value at the end of the
+    /// communication step under way or next, from where it is; with `input_interpolation` = hold it is there at once.
     ///
     /// # Errors
     /// Unknown reference, wrong kind, not settable, non-finite, out of range; nothing is changed then.
     pub fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
         self.check_real(reference, value)?;
-        let (variable, element) = self.table.locate(reference)?;
-        let quantity = variable.quantity;
+        let quantity = self.table.locate(reference)?.0.quantity;
         if quantity == Quantity::Friction && self.phase != Phase::Created {
             let mut parameters = self.parameters();
             parameters.friction = value;
@@ -95,10 +95,7 @@ impl Simulation {
             self.system.set_friction(value);
         }
         let offset = self.offset_now();
-        if quantity == Quantity::Speed {
-            self.rotor.rebase(&self.inputs.speed, offset);
-        }
-        self.change_input(quantity, element, |input| input.set(value, offset))?;
+        self.change_input(reference, |input| input.ask(value, offset))?;
         self.values[reference as usize] = value;
         Ok(())
     }
@@ -165,41 +162,60 @@ impl Simulation {
         Err(Error::invalid(format!("variable `{name}`"), "cannot be set", "Leave it as it is"))
     }
 
-    /// First time derivative of a continuous real input, valid from now until the input is set again.
+    /// First time derivative of a continuous real input, valid from now until the input is set again: with the value it
+    /// says where a ramp is at the end of the communication step.
     ///
     /// # Errors
     /// Unknown reference, not a continuous real input, order other than 1, non-finite.
     pub fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()> {
         self.check_input_derivative(reference, order, value)?;
+        let offset = self.offset_now();
+        self.change_input(reference, |input| input.ask_slope(value, offset))
+    }
+
+    /// Change an input. Within a communication step it turns to its new aim at once, which must be one that it may reach
+    /// by the end and that the internal step can follow; nothing is changed otherwise.
+    fn change_input(&mut self, reference: u32, change: impl FnOnce(&mut Input)) -> Result<()> {
         let (variable, element) = self.table.locate(reference)?;
         let quantity = variable.quantity;
-        let offset = self.offset_now();
+        let Some(mut input) = self.inputs.get(quantity, element).copied() else { return Ok(()) };
+        let (offset, length) = (self.offset_now(), self.communication.length);
+        let (stepping, at_once) = (self.phase == Phase::Stepping, self.acts_at_once(quantity));
+        change(&mut input);
+        if stepping {
+            self.check_course(variable, element, &input, at_once, [offset, length])?;
+        }
+        if at_once || self.phase == Phase::Created {
+            input.take();
+        } else if stepping {
+            input.aim(offset, length);
+        }
+        if stepping {
+            self.check_motion(quantity, &input)?;
+        }
         if quantity == Quantity::Speed {
             self.rotor.rebase(&self.inputs.speed, offset);
         }
-        self.change_input(quantity, element, |input| input.set_slope(value, offset))
+        if let Some(place) = self.inputs.get_mut(quantity, element) {
+            *place = input;
+        }
+        if stepping && quantity == Quantity::Speed {
+            self.inputs.lead_spin(offset, length, self.holds());
+        }
+        Ok(())
     }
 
-    /// Change an input; within a communication step the speed must stay one that the internal step can follow.
-    fn change_input(&mut self, quantity: Quantity, element: usize, change: impl FnOnce(&mut Input)) -> Result<()> {
-        let Some(input) = self.inputs.get_mut(quantity, element) else { return Ok(()) };
-        let before = *input;
-        change(input);
-        let turns = matches!(quantity, Quantity::Speed | Quantity::ShapeRotation);
-        if !turns || self.phase != Phase::Stepping {
-            return Ok(());
-        }
+    /// Whether the internal step under way can follow a new course of the speed or of the shape's rotation.
+    fn check_motion(&self, quantity: Quantity, input: &Input) -> Result<()> {
         let (step, length) = (self.system.bank().step(), self.communication.length);
-        let ends = [0.0, length].map(|offset| self.inputs.speed.at(offset));
-        let checked = self
-            .check_turning(step, length)
-            .and_then(|()| ends.into_iter().try_for_each(|speed| self.compiled.check_speed(speed)));
-        if checked.is_err()
-            && let Some(input) = self.inputs.get_mut(quantity, element)
-        {
-            *input = before;
+        match quantity {
+            Quantity::Speed => {
+                self.check_turning(step, length, input, self.inputs.shape_rotation.rate())?;
+                [0.0, length].into_iter().try_for_each(|offset| self.compiled.check_speed(input.at(offset)))
+            }
+            Quantity::ShapeRotation => self.check_turning(step, length, &self.inputs.speed, input.rate()),
+            _ => Ok(()),
         }
-        checked
     }
 
     /// Whether [`Simulation::set_input_derivative`] would accept the value.

@@ -31,8 +31,8 @@ pub const MOST_COUPLED: usize = 2000;
 #[derive(Debug, Clone, Copy)]
 pub struct References {
     pub step_max: usize,
-    pub gap_offset: Option<usize>,
     pub ramp_time: Option<usize>,
+    pub input_interpolation: Option<usize>,
 }
 
 /// Which parts of a scene meet; of a free master (see [`super::free`]) the first pair, without its carrier.
@@ -143,8 +143,8 @@ impl Compiled {
         let place = |quantity| table.with_quantity(quantity).map(|variable| variable.reference as usize);
         let references = References {
             step_max: place(Quantity::StepMax).unwrap_or(0),
-            gap_offset: place(Quantity::GapOffset),
             ramp_time: place(Quantity::RampTime),
+            input_interpolation: place(Quantity::InputInterpolation),
         };
         let mut compiled = Self {
             fingerprint: super::fingerprint::of_scene(scene),

@@ -1,39 +1,91 @@
-//! Inputs over time: held, or linear where the importer gave derivatives, and the rotor angle as their integral.
+//! One input over time, and the rotor angle as the integral of another.
 
 use crate::persist::persist_fields;
 
-/// One real input: value at `since` and first derivative from there on.
+/// One real input: the line that the importer asked for, and the line that acts.
+///
+/// Both are the same where a value acts at once. Else the one that acts goes from the value reached to where the one
+/// asked for is at the end of the communication step: it is continuous, whatever is asked for. Times are offsets from the
+/// start of the communication step (s).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Input {
-    /// Value at the time `since`.
+    /// Value asked for at the time `since`.
     pub value: f64,
-    /// First time derivative.
+    /// First time derivative asked for.
     pub slope: f64,
-    /// Time of the value, as an offset from the start of the communication step (s).
+    /// Time of the value asked for.
     pub since: f64,
+    /// Value that acts at the time `from`.
+    reached: f64,
+    /// Its first time derivative from there on.
+    rate: f64,
+    from: f64,
+    /// Value that acts at the time `until`, to the last bit.
+    end: f64,
+    until: f64,
 }
 
-persist_fields!(Input { value, slope, since });
+persist_fields!(Input { value, slope, since, reached, rate, from, end, until });
 
 impl Input {
-    /// Value at the offset `offset` from the start of the communication step (s).
-    pub fn at(&self, offset: f64) -> f64 {
+    /// Ask for a value at `offset`; a derivative asked for earlier ends.
+    pub fn ask(&mut self, value: f64, offset: f64) {
+        (self.value, self.slope, self.since) = (value, 0.0, offset);
+    }
+
+    /// Ask for a derivative from `offset` on.
+    pub fn ask_slope(&mut self, slope: f64, offset: f64) {
+        (self.value, self.slope, self.since) = (self.asked(offset), slope, offset);
+    }
+
+    /// Ask for what another input asks for.
+    pub fn follow(&mut self, other: &Self) {
+        (self.value, self.slope, self.since) = (other.value, other.slope, other.since);
+    }
+
+    /// Value asked for at `offset`.
+    pub fn asked(&self, offset: f64) -> f64 {
         if self.slope == 0.0 { self.value } else { self.value + self.slope * (offset - self.since) }
     }
 
-    /// Give a new value from `offset` on; a derivative given earlier ends.
-    pub fn set(&mut self, value: f64, offset: f64) {
-        *self = Self { value, slope: 0.0, since: offset };
+    /// Let the line asked for act at once.
+    pub fn take(&mut self) {
+        (self.reached, self.rate, self.from) = (self.value, self.slope, self.since);
+        self.until = f64::INFINITY;
     }
 
-    /// Give a derivative from `offset` on.
-    pub fn set_slope(&mut self, slope: f64, offset: f64) {
-        *self = Self { value: self.at(offset), slope, since: offset };
+    /// From `offset` on go from the value reached to where the line asked for is at `until`.
+    pub fn aim(&mut self, offset: f64, until: f64) {
+        let (reached, end) = (self.at(offset), self.asked(until));
+        (self.reached, self.from) = (reached, offset);
+        (self.end, self.until) = (end, until);
+        self.rate = (end - reached) / (until - offset);
     }
 
-    /// The communication step of length `length` is over: offsets count from its end now.
+    /// Value that acts at `offset`.
+    pub fn at(&self, offset: f64) -> f64 {
+        if offset >= self.until {
+            self.end
+        } else if self.rate == 0.0 {
+            self.reached
+        } else {
+            self.reached + self.rate * (offset - self.from)
+        }
+    }
+
+    /// First time derivative of what acts.
+    pub fn rate(&self) -> f64 {
+        self.rate
+    }
+
+    /// The communication step of length `length` is over: times count from its end now, where an aim ends.
     pub fn shift(&mut self, length: f64) {
+        if self.until < f64::INFINITY {
+            (self.reached, self.rate, self.from) = (self.at(length), 0.0, length);
+            self.until = f64::INFINITY;
+        }
         self.since -= length;
+        self.from -= length;
     }
 }
 
@@ -70,7 +122,7 @@ impl RotorAngle {
     /// Angle at `offset`, less whole turns at the last rebase (rad): the phase for trigonometry.
     pub fn phase(&self, speed: &Input, offset: f64) -> f64 {
         let elapsed = offset - self.since;
-        self.angle + elapsed * (speed.at(self.since) + 0.5 * speed.slope * elapsed)
+        self.angle + elapsed * (speed.at(self.since) + 0.5 * speed.rate() * elapsed)
     }
 
     /// Total angle at `offset` (rad).
@@ -95,13 +147,76 @@ impl RotorAngle {
 mod tests {
     use super::*;
 
+    fn held(value: f64) -> Input {
+        let mut input = Input::default();
+        input.ask(value, 0.0);
+        input.take();
+        input
+    }
+
+    /// The same numbers to the last bit.
+    #[track_caller]
+    fn same<const N: usize>(found: [f64; N], expected: [f64; N]) {
+        assert_eq!(found.map(f64::to_bits), expected.map(f64::to_bits), "{found:?} {expected:?}");
+    }
+
+    #[test]
+    fn a_ramp_starts_where_it_is_and_ends_at_the_value_asked_for_to_the_bit() {
+        let mut input = held(0.1);
+        for (value, length) in [(0.7, 1e-3), (-1.0 / 3.0, 3e-7), (-1.0 / 3.0, 1e-4), (0.2, 7.0)] {
+            let before = input.at(0.0);
+            input.ask(value, 0.0);
+            assert_eq!(input.at(0.0).to_bits(), before.to_bits(), "nothing jumps");
+            input.aim(0.0, length);
+            assert_eq!(input.at(0.0).to_bits(), before.to_bits(), "nothing jumps");
+            assert!((input.at(0.5 * length) - 0.5 * (before + value)).abs() < 1e-15);
+            assert_eq!(input.at(length).to_bits(), value.to_bits());
+            input.shift(length);
+            same([input.at(0.0), input.rate()], [value, 0.0]);
+        }
+    }
+
+    #[test]
+    fn a_derivative_that_fits_gives_the_line() {
+        let (mut input, slope, length) = (held(1.0), 2.5, 0.125);
+        for step in 0..4 {
+            let start = 1.0 + slope * length * f64::from(step);
+            input.ask(start, 0.0);
+            input.ask_slope(slope, 0.0);
+            input.aim(0.0, length);
+            same([input.at(0.0), input.at(0.0625), input.rate()], [start, start + slope * 0.0625, slope]);
+            input.shift(length);
+        }
+        // It goes on along that line until something else is asked for, also after a step that ended early.
+        input.aim(0.0, length);
+        input.shift(0.0625);
+        input.aim(0.0, 0.0625);
+        same([input.at(0.0625)], [1.0 + slope * length * 5.0]);
+    }
+
+    #[test]
+    fn a_value_set_within_a_ramp_turns_it_where_it_is() {
+        let mut input = held(0.0);
+        input.ask(1.0, 0.0);
+        input.aim(0.0, 1.0);
+        input.ask(-1.0, 0.25);
+        input.aim(0.25, 1.0);
+        same([input.at(0.25), input.at(0.625), input.at(1.0)], [0.25, -0.375, -1.0]);
+        // Ended early: what is left to go takes the whole of the next step.
+        input.shift(0.625);
+        same([input.at(0.0)], [-0.375]);
+        input.aim(0.0, 2.0);
+        same([input.at(1.0), input.at(2.0)], [-0.6875, -1.0]);
+    }
+
     #[test]
     fn the_angle_of_a_ramp_is_exact_over_many_steps() {
         let (start, slope, length) = (100.0, 2000.0, 1e-3);
-        let mut speed = Input { value: start, slope: 0.0, since: 0.0 };
+        let mut speed = held(start);
         let mut rotor = RotorAngle::new(7.0);
         for _ in 0..1000 {
-            speed.set_slope(slope, 0.0);
+            speed.ask_slope(slope, 0.0);
+            speed.take();
             rotor.rebase(&speed, length);
             rotor.shift(length);
             speed.shift(length);
@@ -113,7 +228,7 @@ mod tests {
 
     #[test]
     fn an_angle_of_many_turns_keeps_its_phase() {
-        let speed = Input { value: 10.0, slope: 0.0, since: 0.0 };
+        let speed = held(10.0);
         for angle in [1e9, -1e9, 1e20, -1e154, 1e308] {
             let rotor = RotorAngle::new(angle);
             let (phase, rest) = (rotor.phase(&speed, 0.0), angle % std::f64::consts::TAU);
@@ -127,10 +242,11 @@ mod tests {
 
     #[test]
     fn a_speed_change_within_the_step_counts_from_there() {
-        let mut speed = Input { value: 10.0, slope: 0.0, since: 0.0 };
+        let mut speed = held(10.0);
         let mut rotor = RotorAngle::new(0.0);
         rotor.rebase(&speed, 0.25);
-        speed.set(-2.0, 0.25);
+        speed.ask(-2.0, 0.25);
+        speed.take();
         assert!((rotor.total(&speed, 1.0) - (2.5 - 1.5)).abs() < 1e-14);
     }
 }

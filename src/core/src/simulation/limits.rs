@@ -123,7 +123,7 @@ impl Simulation {
     }
 
     /// Refuse a step size (s) whose range was found unstable, or that stiffening at one of the `speeds` (rad/s) forbids. Only looks up, so that a step does not allocate.
-    pub(super) fn check_step_size(&self, step: f64, speeds: [f64; 2]) -> Result<()> {
+    pub(super) fn check_step_size(&self, step: f64, speeds: [f64; 3]) -> Result<()> {
         let Some(limits) = &self.limits else { return Ok(()) };
         let scheme = limits.parameters.scheme;
         let stiffened = speeds.into_iter().fold(1.0, |most: f64, speed| most.max(self.compiled.stiffened(speed)));

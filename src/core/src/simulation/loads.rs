@@ -1,6 +1,6 @@
 //! Loads beside contact, in modal coordinates: centrifugal growth, heat, nodal-diameter loads.
 
-use super::Inputs;
+use super::inputs::Inputs;
 use crate::Rom;
 use crate::dynamics::modal::ModalModel;
 use crate::settings::StructureSettings;

@@ -6,6 +6,7 @@ mod compile;
 mod drive;
 mod fingerprint;
 mod free;
+mod inputs;
 mod limits;
 mod loads;
 mod outputs;
@@ -23,6 +24,8 @@ use crate::variables::{Quantity, Start, VariableTable};
 use crate::{Result, Scene, ranges, shown};
 use compile::Compiled;
 use drive::{Input, RotorAngle};
+pub use inputs::Courses;
+use inputs::Inputs;
 use window::Window;
 
 /// Communication points may differ from the simulation's own time by this fraction of H (rounding in the importer).
@@ -78,59 +81,6 @@ impl Communication {
     /// Time of the internal point `index` (s); the last one is start + H exactly.
     fn time(&self, index: u64) -> f64 {
         if index == self.count { self.start + self.length } else { self.start + self.offset(index) }
-    }
-}
-
-/// The real inputs, each with its derivative.
-#[derive(Debug, Clone, PartialEq, Default)]
-struct Inputs {
-    speed: Input,
-    shape_factor: Input,
-    shape_rotation: Input,
-    radius_change: Input,
-    /// Whirl x, whirl y, axial shift.
-    shaft: [Input; 3],
-    load_amplitude: Input,
-    load_phase: Input,
-    /// One per patch.
-    temperatures: Vec<Input>,
-}
-
-impl Inputs {
-    fn get_mut(&mut self, quantity: Quantity, element: usize) -> Option<&mut Input> {
-        match quantity {
-            Quantity::Speed => Some(&mut self.speed),
-            Quantity::ShapeFactor => Some(&mut self.shape_factor),
-            Quantity::ShapeRotation => Some(&mut self.shape_rotation),
-            Quantity::RadiusChange => Some(&mut self.radius_change),
-            Quantity::ShaftDisplacement(component) => self.shaft.get_mut(component),
-            Quantity::LoadAmplitude => Some(&mut self.load_amplitude),
-            Quantity::LoadPhase => Some(&mut self.load_phase),
-            Quantity::CasingTemperature => self.temperatures.get_mut(element),
-            _ => None,
-        }
-    }
-
-    fn all_mut(&mut self) -> impl Iterator<Item = &mut Input> {
-        let single = [
-            &mut self.speed,
-            &mut self.shape_factor,
-            &mut self.shape_rotation,
-            &mut self.radius_change,
-            &mut self.load_amplitude,
-            &mut self.load_phase,
-        ];
-        single.into_iter().chain(&mut self.shaft).chain(&mut self.temperatures)
-    }
-
-    fn shift(&mut self, length: f64) {
-        self.all_mut().for_each(|input| input.shift(length));
-    }
-
-    /// Start values everywhere.
-    fn clear(&mut self) {
-        self.all_mut().for_each(|input| *input = Input::default());
-        self.shape_factor.value = 1.0;
     }
 }
 
@@ -246,6 +196,7 @@ impl Simulation {
         for slave in self.system.slaves_mut() {
             slave.bank.set_step(parameters.scheme, parameters.step);
         }
+        self.inputs.spin = self.inputs.speed;
         self.settle(drive.speed);
         self.launch();
         self.system.start(&drive);
@@ -360,13 +311,13 @@ impl Simulation {
         Drive {
             rotor_angle: self.rotor.phase(speed, offset),
             speed: speed.at(offset),
-            gap_offset: self.values_gap_offset(),
+            gap_offset: self.inputs.gap_offset.at(offset),
             shape_factor: self.inputs.shape_factor.at(offset) * self.ramp(time),
             // Exact, so that a rotation by many turns does not swallow the rotor's own.
             shape_rotation: self.inputs.shape_rotation.at(offset) % std::f64::consts::TAU,
             radius_change: self.inputs.radius_change.at(offset),
             shaft: self.inputs.shaft.map(|input| input.at(offset)),
-            shaft_velocity: self.inputs.shaft.map(|input| input.slope),
+            shaft_velocity: self.inputs.shaft.map(|input| input.rate()),
         }
     }
 
@@ -374,10 +325,6 @@ impl Simulation {
     pub fn shape_factor(&self) -> f64 {
         let (offset, done) = (self.offset_now(), self.communication.done);
         self.inputs.shape_factor.at(offset) * self.ramp(self.communication.time(done))
-    }
-
-    fn values_gap_offset(&self) -> f64 {
-        self.compiled.references.gap_offset.map_or(0.0, |reference| self.values[reference])
     }
 
     /// Share of the casing shape that has grown in: ½(1 − cos(πt/T)) until T.
@@ -399,7 +346,8 @@ impl Simulation {
                     self.values[reference..][..values.len()].copy_from_slice(values);
                     for (element, value) in values.iter().enumerate() {
                         if let Some(input) = self.inputs.get_mut(variable.quantity, element) {
-                            input.set(*value, 0.0);
+                            input.ask(*value, 0.0);
+                            input.take();
                         }
                     }
                 }

@@ -11,20 +11,10 @@ use crate::variables::{Causality, Kind, Quantity, Variable};
 use crate::{Error, Result, shown};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 4;
+const VERSION: u64 = 5;
 const CHECKSUM_BYTES: usize = 8;
 
 persist_fields!(Communication { start, length, count, done });
-persist_fields!(Inputs {
-    speed,
-    shape_factor,
-    shape_rotation,
-    radius_change,
-    shaft,
-    load_amplitude,
-    load_phase,
-    temperatures
-});
 
 impl Persist for Phase {
     fn save(&self, writer: &mut Writer) {

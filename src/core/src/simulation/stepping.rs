@@ -1,9 +1,9 @@
 //! One communication step: begun, marched, ended.
 
+use super::drive::Input;
 use super::{Communication, MOST_STEPS, Phase, Progress, SAME_STEP, Simulation, TIME_TOLERANCE};
 use crate::contact::coating::Coating;
 use crate::system::StepFailure;
-use crate::variables::Causality;
 use crate::{Error, Result, ranges, shown};
 
 impl Simulation {
@@ -24,16 +24,21 @@ impl Simulation {
             }
         }
         self.check_step(current_time, step_size)?;
-        self.check_slopes(step_size)?;
+        self.check_courses(step_size)?;
         let limit = self.values[self.compiled.references.step_max];
         let ratio = step_size / limit;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 ≤ value ≤ 1e9")]
         let count = (ratio * (1.0 - SAME_STEP)).ceil().max(1.0) as u64;
         #[expect(clippy::cast_precision_loss, reason = "count ≤ 1e9")]
         let step = step_size / count as f64;
-        self.check_turning(step, step_size)?;
+        let hold = self.holds();
+        let mut rotation = self.inputs.shape_rotation;
+        if !hold {
+            rotation.aim(0.0, step_size);
+        }
+        self.check_turning(step, step_size, &self.inputs.speed, rotation.rate())?;
         let (first, last) = (self.inputs.speed.at(0.0), self.inputs.speed.at(step_size));
-        self.check_step_size(step, [first, last])?;
+        self.check_step_size(step, [first, last, self.inputs.spin.at(0.0)])?;
         if self.compiled.spins() {
             self.compiled.check_speed(if first.abs() > last.abs() { first } else { last })?;
         }
@@ -45,7 +50,8 @@ impl Simulation {
                 self.launch();
             }
         }
-        if self.compiled.spins() {
+        self.inputs.begin(step_size, hold);
+        if self.compiled.spins() && hold {
             self.system.set_speed(0.5 * (first + last));
         }
         self.tell(step, [first, last]);
@@ -108,46 +114,13 @@ impl Simulation {
         Ok(())
     }
 
-    /// Inputs with derivatives must not leave their ranges, by more than rounding, before the end of the step. Allocates only to
-    /// refuse.
-    fn check_slopes(&mut self, step_size: f64) -> Result<()> {
-        if self.inputs.all_mut().all(|input| input.slope == 0.0) {
-            return Ok(());
-        }
-        for variable in self.table.variables().iter().filter(|variable| variable.causality == Causality::Input) {
-            let range = variable.min.unwrap_or(f64::MIN)..=variable.max.unwrap_or(f64::MAX);
-            for element in 0..variable.len() {
-                let Some(input) = self.inputs.get_mut(variable.quantity, element) else { continue };
-                let end = input.at(step_size);
-                let beyond = (range.start() - end).max(end - range.end());
-                let rounding = SAME_STEP * range.start().abs().max(range.end().abs());
-                if input.slope != 0.0 && !(end.is_finite() && beyond <= rounding) {
-                    return Err(Error::invalid(
-                        format!("variable `{}`", variable.element_name(element)),
-                        format!(
-                            "its derivative {} takes it to {} by t = {} s, outside {} … {}",
-                            shown(input.slope),
-                            shown(end),
-                            shown(self.time + step_size),
-                            shown(*range.start()),
-                            shown(*range.end())
-                        ),
-                        "Give a smaller derivative or none, or a shorter communication step",
-                    ));
-                }
-            }
-        }
-        Ok(())
-    }
-
     /// The rotor must not skip over features of the casing shape or cells of the coating. Inputs are linear in time: the ends decide.
-    pub(super) fn check_turning(&self, step: f64, step_size: f64) -> Result<()> {
+    pub(super) fn check_turning(&self, step: f64, step_size: f64, speed: &Input, rotation: f64) -> Result<()> {
         let (scale, cell) = (self.system.law().angular_scale(), self.system.coating().map(Coating::width));
-        let speed = |offset: f64| self.inputs.speed.at(offset) - self.inputs.shape_rotation.slope;
-        let turned = step * speed(0.0).abs().max(speed(step_size).abs());
+        let relative = |offset: f64| (speed.at(offset) - rotation).abs();
+        let turned = step * relative(0.0).max(relative(step_size));
         // The coating does not turn with the shape.
-        let own = |offset: f64| self.inputs.speed.at(offset).abs();
-        let passed = step * own(0.0).max(own(step_size));
+        let passed = step * speed.at(0.0).abs().max(speed.at(step_size).abs());
         if let Some(cell) = cell.filter(|cell| passed > *cell) {
             return Err(Error::invalid(
                 "contact.coating.cells_around",
@@ -162,14 +135,19 @@ impl Simulation {
         if turned <= scale {
             return Ok(());
         }
+        let (what, remedy) = if rotation != 0.0 && passed <= scale {
+            ("variable `casing_shape_rotation`", "Turn the shape more slowly, or use a smaller internal_step_max")
+        } else {
+            ("variable `speed`", "Use a lower speed or a smaller internal_step_max")
+        };
         Err(Error::invalid(
-            "variable `speed`",
+            what,
             format!(
                 "the rotor turns {turned:.3e} rad in one internal step of {step:.3e} s at t = {} s, past features of the casing \
                  shape {scale:.3e} rad wide",
                 shown(self.time)
             ),
-            "Use a lower speed or a smaller internal_step_max",
+            remedy,
         ))
     }
 
@@ -184,7 +162,11 @@ impl Simulation {
         let next = self.communication.done + 1;
         let (offset, time) = (self.communication.offset(next), self.communication.time(next));
         let drive = self.drive(offset, time);
-        self.load(self.communication.offset(self.communication.done));
+        let before = self.communication.offset(self.communication.done);
+        self.load(before);
+        if self.compiled.spins() && !self.holds() {
+            self.system.set_speed(self.inputs.spin.at(before));
+        }
         if let Err(failure) = self.system.step(&drive) {
             return Err(self.fail(failure, time));
         }
@@ -199,7 +181,7 @@ impl Simulation {
 
     /// Loads beside contact for the step that begins at `offset`: q⁺ = a q + b q⁻ + c f takes the force at the time of q.
     fn load(&mut self, offset: f64) {
-        let (loads, speed) = (&self.compiled.loads, self.inputs.speed.at(offset));
+        let (loads, speed) = (&self.compiled.loads, self.inputs.spin.at(offset));
         if !loads.centrifugal.is_empty() {
             loads.fill_master(speed, self.system.bank_mut().loads_mut());
         }

@@ -180,7 +180,7 @@ pub fn scene(block: Rom, plates: &[(Side, f64)], curved: bool, velocity: [f64; 3
         structures,
         surfaces: plates.iter().map(surface).collect(),
         contacts: plates.iter().map(contact).collect(),
-        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6 },
+        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6, ..TimeSettings::default() },
         outputs: OutputSettings::default(),
         experiment: ExperimentSettings { start: 0.0, stop: 0.01, communication_step: 1e-5 },
     };

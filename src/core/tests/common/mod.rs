@@ -74,7 +74,7 @@ pub fn scene(sectors: usize) -> Scene {
             meridian: Meridian::Contour,
             ..ContactSettings::default()
         }],
-        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6 },
+        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6, ..TimeSettings::default() },
         outputs: OutputSettings {
             watched_sectors: vec![1, 2],
             all_sectors: true,

@@ -13,7 +13,7 @@ const fn field(
 }
 
 /// Every key, in file order.
-pub const FIELDS: [SceneField; 69] = [
+pub const FIELDS: [SceneField; 70] = [
     field("name", "text", None, "letters, digits, underscore; starts with a letter", "Name of the model."),
     field("description", "text", Some("empty"), "any", "One or a few sentences for the importer's catalogue."),
     field("structure.name", "text", None, "as `name` of the scene", "Name by which contacts refer to it."),
@@ -361,6 +361,14 @@ pub const FIELDS: [SceneField; 69] = [
         None,
         "1e-12 to 1",
         "Largest internal step; the step used divides the communication step evenly.",
+    ),
+    field(
+        "time.input_interpolation",
+        "text",
+        Some("`ramp`"),
+        "`ramp`, `hold`; not with a free master",
+        "How inputs that move or load something run within a communication step: to the value set, which is reached at its \
+         end, or held at it from its start.",
     ),
     field(
         "outputs.watched_sectors",

@@ -32,7 +32,7 @@ pub fn complete_scene() -> SceneSettings {
             meridian: Meridian::Contour,
             ..ContactSettings::default()
         }],
-        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6 },
+        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6, ..TimeSettings::default() },
         outputs: OutputSettings { nodal_diameters: Some(4), ..OutputSettings::default() },
         experiment: ExperimentSettings { start: 0.0, stop: 0.1, communication_step: 1e-4 },
     }

@@ -2,7 +2,8 @@
 
 use crate::ranges::{self, at_most, within};
 use crate::settings::{
-    Closure, ContactSettings, Meridian, Motion, SceneSettings, Scheme, Shape, StructureSettings, SurfaceSettings,
+    Closure, ContactSettings, InputInterpolation, Meridian, Motion, SceneSettings, Scheme, Shape, StructureSettings,
+    SurfaceSettings,
 };
 use crate::{Error, Result};
 
@@ -79,6 +80,10 @@ impl SceneSettings {
         if self.time.scheme == Scheme::MasslessBoundary {
             let problem = "\"massless-boundary\" is not made for a master that flies freely";
             return Err(Error::invalid("time.scheme", problem, "Use \"modal-exact\" or \"central-difference\""));
+        }
+        if self.time.input_interpolation != InputInterpolation::default() {
+            let problem = "a scene with a free master has no inputs";
+            return Err(Error::invalid("time.input_interpolation", problem, "Remove the line"));
         }
         Ok(())
     }

@@ -1,12 +1,17 @@
 //! Rows of the variable table, and those that every scene has.
 
-use super::units::{SCHEMES, SOLVERS, TIME};
+use super::units::{ANGLE, INPUT_INTERPOLATIONS, SCHEMES, SOLVERS, TIME};
 use crate::Result;
 use crate::ranges::{DAMPING, FRICTION, LONGEST_STEP, SHORTEST_STEP};
 use crate::settings::{ContactSettings, SceneSettings};
 use crate::variables::{
     Causality, Enumeration, Kind, Quantity, Span, Start, Unit, Variability, Variable, VariableTable,
 };
+
+/// How inputs run that would hit or shake something if they jumped.
+pub const RAMPED: &str = "; reached at the end of the step (input_interpolation)";
+/// The same of angles.
+const RAMPED_ANGLE: &str = "; reached at the end of the step (input_interpolation), so never to be wrapped to one turn";
 
 /// Collects rows and hands out references.
 #[derive(Default)]
@@ -63,6 +68,20 @@ impl Builder {
         variable.causality = Causality::Input;
         variable.unit = unit;
         variable.start = Some(Start::Real(vec![start]));
+        variable
+    }
+
+    /// An input that moves or loads something, and has no jumps therefore.
+    pub fn moving_input(
+        &mut self,
+        quantity: Quantity,
+        name: &str,
+        unit: Option<&'static Unit>,
+        start: f64,
+        text: &str,
+    ) -> &mut Variable {
+        let variable = self.input(quantity, name, unit, start, text);
+        variable.description += if unit == Some(&ANGLE) { RAMPED_ANGLE } else { RAMPED };
         variable
     }
 
@@ -129,6 +148,14 @@ impl Builder {
         let (scheme, solver) = (settings.time.scheme as i32 + 1, settings.contacts[0].solver as i32 + 1);
         self.choice(Quantity::SchemeChoice, "scheme", &SCHEMES, scheme, "Time-stepping scheme");
         self.choice(Quantity::SolverChoice, "solver", &SOLVERS, solver, "Contact solver");
+    }
+
+    /// How inputs run between communication points.
+    pub fn input_interpolation(&mut self, settings: &SceneSettings) {
+        let start = settings.time.input_interpolation as i32 + 1;
+        let text =
+            "Inputs that move or load something, and gap_offset, between communication points; speed is always held";
+        self.choice(Quantity::InputInterpolation, "input_interpolation", &INPUT_INTERPOLATIONS, start, text);
     }
 
     /// Name of the scene.

@@ -18,7 +18,7 @@ pub fn is_loaded(scene: &Parts) -> bool {
 pub fn inputs(table: &mut Builder, scene: &Parts) {
     let largest = largest_length(scene);
     let mut shaft = |component: usize, name: &str, text: &str| {
-        let row = table.input(Quantity::ShaftDisplacement(component), name, Some(&LENGTH), 0.0, text);
+        let row = table.moving_input(Quantity::ShaftDisplacement(component), name, Some(&LENGTH), 0.0, text);
         (row.nominal, row.display) = (Some(1e-4), Some(1));
         (row.min, row.max) = (Some(-largest), Some(largest));
     };
@@ -31,7 +31,7 @@ pub fn inputs(table: &mut Builder, scene: &Parts) {
     }
     let Some((carrier, rom)) = scene.carrier else { return };
     if let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| carrier.thermal) {
-        let row = table.input(
+        let row = table.moving_input(
             Quantity::CasingTemperature,
             "casing_temperature",
             Some(&TEMPERATURE),
@@ -46,11 +46,17 @@ pub fn inputs(table: &mut Builder, scene: &Parts) {
     }
     if let Some(load) = carrier.load {
         let text = "Amplitude of the radial line load with nodal diameters on the casing, outwards positive";
-        let row = table.input(Quantity::LoadAmplitude, "casing_load_amplitude", Some(&LINE_LOAD), load.amplitude, text);
+        let row = table.moving_input(
+            Quantity::LoadAmplitude,
+            "casing_load_amplitude",
+            Some(&LINE_LOAD),
+            load.amplitude,
+            text,
+        );
         row.nominal = Some(1e4);
         (row.min, row.max) = (Some(-ranges::LINE_LOAD), Some(ranges::LINE_LOAD));
         let text = "Phase of the nodal-diameter load: amplitude cos(n theta - phase)";
-        table.input(Quantity::LoadPhase, "casing_load_phase", Some(&ANGLE), load.phase, text).display = Some(0);
+        table.moving_input(Quantity::LoadPhase, "casing_load_phase", Some(&ANGLE), load.phase, text).display = Some(0);
     }
 }
 

@@ -12,7 +12,7 @@ use crate::contact::surface::Surface;
 use crate::settings::{Motion, Scene, SceneSettings, Shape, StructureSettings, SurfaceSettings};
 use crate::variables::{Quantity, Variability, VariableTable};
 use crate::{Result, Rom, ranges};
-use builder::Builder;
+use builder::{Builder, RAMPED};
 use units::{ANGLE, ANGULAR_SPEED, LENGTH, TIME};
 
 /// What of a scene the variables depend on.
@@ -78,15 +78,20 @@ fn largest_length(scene: &Parts) -> f64 {
 fn inputs(table: &mut Builder, scene: &Parts) -> Result<()> {
     let structure = scene.master;
     if structure.motion == Motion::Rotating {
-        let speed =
-            table.input(Quantity::Speed, "speed", Some(&ANGULAR_SPEED), structure.speed, "Speed of the rotor about +z");
+        let speed = table.input(
+            Quantity::Speed,
+            "speed",
+            Some(&ANGULAR_SPEED),
+            structure.speed,
+            "Speed of the rotor about +z; held over a step, or linear with a derivative",
+        );
         speed.display = Some(0);
         speed.nominal = Some(1000.0);
         (speed.min, speed.max) = (Some(-ranges::SPEED), Some(ranges::SPEED));
     }
     let surface = scene.surface;
     if surface.moving {
-        let change = table.input(
+        let change = table.moving_input(
             Quantity::RadiusChange,
             "casing_radius_change",
             Some(&LENGTH),
@@ -96,7 +101,7 @@ fn inputs(table: &mut Builder, scene: &Parts) -> Result<()> {
         (change.nominal, change.display) = (Some(1e-4), Some(1));
         (change.min, change.max) = (Some(-largest_length(scene)), Some(largest_length(scene)));
         if surface.shape != (Shape::Circular {}) {
-            let factor = table.input(
+            let factor = table.moving_input(
                 Quantity::ShapeFactor,
                 "casing_shape_factor",
                 None,
@@ -107,7 +112,7 @@ fn inputs(table: &mut Builder, scene: &Parts) -> Result<()> {
             let largest = if change > 0.0 { largest_length(scene) / change } else { 1.0 };
             (factor.min, factor.max) = (Some(-largest), Some(largest));
             if scene.carrier.is_none() {
-                table.input(
+                table.moving_input(
                     Quantity::ShapeRotation,
                     "casing_shape_rotation",
                     Some(&ANGLE),
@@ -133,11 +138,13 @@ fn parameters(table: &mut Builder, scene: &Parts) {
         0.0,
         "Added to the radial clearance of every sector",
     );
+    offset.description += RAMPED;
     (offset.display, offset.nominal, offset.variability) = (Some(1), Some(1e-4), Variability::Tunable);
     (offset.min, offset.max) = (Some(-largest_length(scene)), Some(largest_length(scene)));
     let ratio = scene.master.damping_ratio.unwrap_or(scene.rom.damping_ratio);
     table.damping(Quantity::DampingRatio, "damping_ratio", ratio, "Modal damping ratio of the rotor");
     table.methods(settings);
+    table.input_interpolation(settings);
     let angle = table.parameter(
         Quantity::InitialAngle,
         "initial_rotor_angle",

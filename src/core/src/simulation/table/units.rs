@@ -48,6 +48,15 @@ pub static SOLVERS: Enumeration = Enumeration {
     ],
 };
 
+pub static INPUT_INTERPOLATIONS: Enumeration = Enumeration {
+    name: "InputInterpolation",
+    description: "Inputs between communication points",
+    items: &[
+        ("ramp", "From the value reached to the one set, which is reached at the end of the step"),
+        ("hold", "The value set acts at once: a jump within one internal step"),
+    ],
+};
+
 /// K; temperatures are differences from the reference, so that there is no degC.
 pub static TEMPERATURE: Unit = Unit { name: "K", exponents: [0, 0, 0, 0, 1], display: &[] };
 /// N/m.

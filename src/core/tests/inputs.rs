@@ -1,0 +1,423 @@
+//! Inputs between communication points: nothing that moves or loads something jumps, unless the scene asks for it.
+
+mod common;
+
+use tiprub_core::settings::{InputInterpolation, LoadSettings, Motion, Shape, StructureSettings};
+use tiprub_core::{Rom, Scene, Simulation};
+
+const STEP: f64 = 1e-6;
+
+fn reference(simulation: &Simulation, name: &str) -> u32 {
+    simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
+}
+
+fn real(simulation: &Simulation, name: &str) -> f64 {
+    simulation.real(reference(simulation, name)).unwrap()
+}
+
+fn set(simulation: &mut Simulation, name: &str, value: f64) {
+    simulation.set_real(reference(simulation, name), value).unwrap();
+}
+
+fn slope(simulation: &mut Simulation, name: &str, value: f64) {
+    simulation.set_input_derivative(reference(simulation, name), 1, value).unwrap();
+}
+
+fn started_at(scene: &Scene, time: f64) -> Simulation {
+    let mut simulation = Simulation::new(scene).unwrap();
+    simulation.initialise(time).unwrap();
+    simulation
+}
+
+fn started(scene: &Scene) -> Simulation {
+    started_at(scene, 0.0)
+}
+
+fn state(simulation: &Simulation) -> Vec<u8> {
+    let mut bytes = vec![0; simulation.state_size()];
+    simulation.save_state(&mut bytes).unwrap();
+    bytes
+}
+
+fn outputs(simulation: &Simulation) -> Vec<u64> {
+    let rows = simulation.table().variables().iter().filter(|row| row.start.is_none());
+    let references = rows.flat_map(|row| (row.reference..).take(row.len()));
+    references.filter_map(|reference| simulation.real(reference).ok()).map(f64::to_bits).collect()
+}
+
+/// Factor on the shape that acts now, to the last bit.
+#[track_caller]
+fn acts(simulation: &Simulation, expected: f64) {
+    let found = simulation.shape_factor();
+    assert_eq!(found.to_bits(), expected.to_bits(), "{found} {expected}");
+}
+
+/// Blades in bumps whose size is an input, at once; no contact as long as the factor is small.
+fn bumps() -> Scene {
+    let mut scene = common::scene(6);
+    (scene.settings.time.step, scene.settings.surfaces[0].ramp_time) = (STEP, 0.0);
+    scene
+}
+
+fn held(mut scene: Scene) -> Scene {
+    scene.settings.time.input_interpolation = InputInterpolation::Hold;
+    scene
+}
+
+/// A round casing around a shaft that whirls.
+fn whirling() -> Scene {
+    let mut scene = bumps();
+    scene.settings.surfaces[0].shape = Shape::Circular {};
+    scene.settings.structures[0].whirl = true;
+    scene
+}
+
+fn spinning_rom() -> Rom {
+    let mut rom = common::rich_rom(6);
+    rom.extras.spin = Some(common::spin(rom.order()));
+    rom
+}
+
+/// The same with everything else that an importer can move: an elastic ring with patches and a load, and spin.
+fn rich() -> Scene {
+    let mut scene = whirling();
+    scene.roms[0] = spinning_rom();
+    scene.settings.structures[0].axial_shift = true;
+    (scene.settings.structures[0].spin.growth, scene.settings.structures[0].spin.stiffening) = (true, true);
+    scene.settings.structures.push(StructureSettings {
+        name: "ring".into(),
+        rom: "ring.safetensors".into(),
+        motion: Motion::Still,
+        damping_ratio: Some(0.03),
+        thermal: true,
+        load: Some(LoadSettings { order: 2, amplitude: 100.0, phase: 0.1 }),
+        ..StructureSettings::default()
+    });
+    scene.roms.push(common::casing(24, 3));
+    scene.settings.surfaces[0].structure = Some("ring".into());
+    scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 0.3, width: 0.15, phase: 0.0 };
+    scene
+}
+
+/// Radius grows smoothly to 0.39 mm, beyond the clearance of 0.356 mm.
+fn whirl(time: f64) -> [f64; 2] {
+    let radius = 0.195e-3 * (1.0 - (std::f64::consts::PI * (time / 1e-3).min(1.0)).cos());
+    [radius * (600.0 * time).cos(), radius * (600.0 * time).sin()]
+}
+
+/// Give a whirl at `now` (s) in one of three ways.
+fn give(simulation: &mut Simulation, derivatives: bool, [now, next]: [f64; 2]) {
+    let (from, to) = (whirl(now), whirl(next));
+    for (axis, name) in ["whirl_x", "whirl_y"].into_iter().enumerate() {
+        set(simulation, name, from[axis]);
+        if derivatives {
+            slope(simulation, name, (to[axis] - from[axis]) / (next - now));
+        }
+    }
+}
+
+/// Largest node force over two milliseconds by steps of `length`.
+fn peak(scene: &Scene, derivatives: bool, length: f64) -> f64 {
+    let mut simulation = started(scene);
+    let mut most = 0.0_f64;
+    for index in 0..(2e-3 / length).round() as u32 {
+        let times = [index, index + 1].map(|index| f64::from(index) * length);
+        give(&mut simulation, derivatives, times);
+        simulation.do_step(times[0], length).unwrap();
+        most = most.max(real(&simulation, "normal_force_peak"));
+    }
+    most
+}
+
+#[test]
+fn a_whirl_given_as_a_staircase_does_not_hit() {
+    let fine = peak(&whirling(), true, STEP);
+    for length in [1e-5, 1e-4] {
+        let [ramp, line, hold] =
+            [(whirling(), false), (whirling(), true), (held(whirling()), false)].map(|(s, d)| peak(&s, d, length));
+        println!("H = {length:e}: ramp {ramp:.1} N, derivatives {line:.1} N, hold {hold:.1} N, fine {fine:.1} N");
+        assert!(fine > 10.0 && ramp < 1.7 * fine && line < 1.7 * fine, "{ramp} {line} {fine}");
+        assert!(hold > 2.0 * fine && hold > 2.0 * ramp, "what the ramp is for: {hold} {ramp} {fine}");
+    }
+}
+
+#[test]
+fn a_ramp_is_the_line_that_derivatives_would_give_one_step_later() {
+    let (mut ramp, mut line) = (started(&whirling()), started(&whirling()));
+    let length = 2e-5;
+    for index in 0..100 {
+        let times = [index, index + 1].map(|index| f64::from(index) * length);
+        give(&mut ramp, false, times);
+        give(&mut line, true, [(times[0] - length).max(0.0), times[1] - length + f64::MIN_POSITIVE]);
+        for simulation in [&mut ramp, &mut line] {
+            simulation.do_step(times[0], length).unwrap();
+        }
+    }
+    // Slip and books see the same velocity of the shaft.
+    for name in ["friction_loss", "external_work", "force_x", "torque", "clearance_minimum", "kinetic_energy"] {
+        let [a, b] = [real(&ramp, name), real(&line, name)];
+        assert!((a - b).abs() <= 1e-6 * a.abs().max(b.abs()), "{name}: {a} {b}");
+    }
+    assert!(real(&ramp, "friction_loss") > 1e-3);
+    assert!(real(&ramp, "energy_residual_relative").abs() < 1e-9);
+}
+
+#[test]
+fn a_value_is_reached_at_the_end_of_the_step_to_the_bit_and_read_as_it_was_set() {
+    let mut simulation = started_at(&bumps(), 3.25);
+    let factor = |simulation: &Simulation| simulation.shape_factor();
+    // Start values are reached at the start.
+    acts(&simulation, 1.0);
+    let mut before = 1.0_f64;
+    // Steps of every length, one of them a single internal step; the same value again.
+    for (value, length) in [(0.3, 1e-5), (0.7, STEP), (0.7, 3.3e-5), (-1.0 / 3.0, 1e-4), (0.1, 2.5e-6)] {
+        // Set several times the last one counts.
+        for value in [9.0, -2.0, value] {
+            set(&mut simulation, "casing_shape_factor", value);
+        }
+        assert_eq!(factor(&simulation).to_bits(), before.to_bits(), "nothing jumps");
+        assert_eq!(real(&simulation, "casing_shape_factor").to_bits(), value.to_bits(), "read as set");
+        simulation.begin_step(simulation.time(), length).unwrap();
+        let (start, mut last): (f64, f64) = (simulation.time(), before);
+        while let Ok(progress) = simulation.advance() {
+            if progress.finished {
+                break;
+            }
+            let expected = before + (value - before) * (progress.time - start) / length;
+            assert!((factor(&simulation) - expected).abs() < 1e-9, "{} {expected}", factor(&simulation));
+            assert!((factor(&simulation) - last).abs() <= (value - before).abs() * 1.001 * STEP / length + 1e-15);
+            last = factor(&simulation);
+        }
+        assert_eq!(factor(&simulation).to_bits(), value.to_bits(), "reached to the bit");
+        before = value;
+    }
+}
+
+#[test]
+fn held_inputs_act_at_once() {
+    let mut simulation = started(&held(bumps()));
+    set(&mut simulation, "casing_shape_factor", 0.25);
+    acts(&simulation, 0.25);
+    slope(&mut simulation, "casing_shape_factor", 1000.0);
+    simulation.begin_step(0.0, 1e-5).unwrap();
+    simulation.advance().unwrap();
+    assert!((simulation.shape_factor() - 0.251).abs() < 1e-15);
+    // Chosen by the parameter too, before the start and not after.
+    let mut chosen = Simulation::new(&bumps()).unwrap();
+    let row = reference(&chosen, "input_interpolation");
+    assert_eq!(chosen.integer(row).unwrap(), 1);
+    chosen.set_integer(row, 2).unwrap();
+    chosen.initialise(0.0).unwrap();
+    assert!(chosen.set_integer(row, 1).unwrap_err().to_string().contains("fixed"));
+    set(&mut chosen, "casing_shape_factor", 0.25);
+    acts(&chosen, 0.25);
+}
+
+#[test]
+fn derivatives_say_where_the_step_ends_and_do_not_make_it_jump() {
+    let (mut simulation, length) = (started(&bumps()), 1e-5);
+    // Consistent ones give the line itself.
+    for index in 0..5 {
+        let value = 1.0 - 0.1 * f64::from(index);
+        set(&mut simulation, "casing_shape_factor", value);
+        slope(&mut simulation, "casing_shape_factor", -0.1 / length);
+        simulation.begin_step(simulation.time(), length).unwrap();
+        for part in 1..=10 {
+            simulation.advance().unwrap();
+            assert!((simulation.shape_factor() - (value - 0.01 * f64::from(part))).abs() < 1e-14);
+        }
+    }
+    // Others start from the value reached, and a step without news goes on along the line.
+    set(&mut simulation, "casing_shape_factor", 0.2);
+    slope(&mut simulation, "casing_shape_factor", 0.1 / length);
+    assert!((simulation.shape_factor() - 0.5).abs() < 1e-14);
+    for end in [0.3, 0.4, 0.5] {
+        simulation.do_step(simulation.time(), length).unwrap();
+        assert!((simulation.shape_factor() - end).abs() < 1e-14, "{}", simulation.shape_factor());
+    }
+}
+
+#[test]
+fn a_value_set_within_a_step_turns_the_ramp_where_it_is_and_an_early_return_keeps_it() {
+    let mut simulation = started(&bumps());
+    set(&mut simulation, "casing_shape_factor", 0.0);
+    simulation.begin_step(0.0, 1e-5).unwrap();
+    for _ in 0..5 {
+        simulation.advance().unwrap();
+    }
+    assert!((simulation.shape_factor() - 0.5).abs() < 1e-14);
+    set(&mut simulation, "casing_shape_factor", 1.0);
+    assert!((simulation.shape_factor() - 0.5).abs() < 1e-14, "nothing jumps");
+    simulation.advance().unwrap();
+    assert!((simulation.shape_factor() - 0.6).abs() < 1e-14);
+    simulation.end_step_early().unwrap();
+    assert!((simulation.shape_factor() - 0.6).abs() < 1e-14, "the value reached is the state");
+    // What is left to go takes the whole next step.
+    simulation.begin_step(simulation.time(), 2e-6).unwrap();
+    simulation.advance().unwrap();
+    assert!((simulation.shape_factor() - 0.8).abs() < 1e-14);
+    simulation.advance().unwrap();
+    acts(&simulation, 1.0);
+}
+
+/// Everything moves; every element of an array alike.
+fn disturb(simulation: &mut Simulation, index: u32) {
+    let x = f64::from(index);
+    let inputs = [
+        ("speed", 1300.0 + 40.0 * x.sin()),
+        ("gap_offset", 1e-5 * x.sin()),
+        ("whirl_x", 2e-5 * x.cos()),
+        ("whirl_y", 2e-5 * x.sin()),
+        ("axial_shift", 1e-5 * (2.0 * x).sin()),
+        ("casing_radius_change", 1e-5 * (3.0 * x).sin()),
+        ("casing_shape_factor", 1.0 + 0.3 * x.sin()),
+        ("casing_load_amplitude", 2e3 * x.cos()),
+        ("casing_load_phase", 0.1 * x),
+        ("casing_temperature", 3.0 * x.sin()),
+    ];
+    for (name, value) in inputs {
+        let row = simulation.table().find(name).map(|row| (row.reference, row.len())).unwrap();
+        for reference in (row.0..).take(row.1) {
+            simulation.set_real(reference, value).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_state_saved_within_a_ramp_goes_on_bit_by_bit_elsewhere() {
+    let scene = rich();
+    let mut simulation = started(&scene);
+    for index in 0..5 {
+        disturb(&mut simulation, index);
+        simulation.do_step(simulation.time(), 1e-5).unwrap();
+    }
+    let mut other = Simulation::new(&scene).unwrap();
+    // At a communication point with values that wait for the next step, within it, and with a ramp turned there.
+    disturb(&mut simulation, 17);
+    other.restore_state(&state(&simulation)).unwrap();
+    for part in 0..12 {
+        for one in [&mut simulation, &mut other] {
+            if part == 0 {
+                one.begin_step(one.time(), 1.2e-5).unwrap();
+            }
+            if part == 6 {
+                disturb(one, 3);
+            }
+            one.advance().unwrap();
+        }
+        assert_eq!(state(&simulation), state(&other), "{part}");
+        other = Simulation::new(&scene).unwrap();
+        other.restore_state(&state(&simulation)).unwrap();
+    }
+    for one in [&mut simulation, &mut other] {
+        one.do_step(one.time(), 3e-5).unwrap();
+    }
+    assert_eq!(outputs(&simulation), outputs(&other));
+}
+
+#[test]
+fn a_thousand_resets_within_a_ramp_leave_nothing() {
+    let mut scene = bumps();
+    scene.settings.structures[0].whirl = true;
+    let mut simulation = Simulation::new(&scene).unwrap();
+    let mut first = None;
+    for _ in 0..1000 {
+        simulation.initialise(0.0).unwrap();
+        set(&mut simulation, "whirl_x", 1e-4);
+        set(&mut simulation, "casing_shape_factor", 0.5);
+        simulation.do_step(0.0, 3e-6).unwrap();
+        set(&mut simulation, "gap_offset", 1e-5);
+        simulation.begin_step(simulation.time(), 4e-6).unwrap();
+        simulation.advance().unwrap();
+        let now = state(&simulation);
+        assert_eq!(*first.get_or_insert_with(|| now.clone()), now);
+        simulation.reset();
+    }
+}
+
+/// What a refused step must leave alone.
+#[track_caller]
+fn refused(simulation: &mut Simulation, length: f64, words: &[&str]) {
+    let before = state(simulation);
+    let message = simulation.begin_step(simulation.time(), length).unwrap_err().to_string();
+    assert!(words.iter().all(|word| message.contains(word)), "{message}");
+    assert_eq!(state(simulation), before, "a refused step changes something");
+}
+
+#[test]
+fn refused_steps_name_the_input_and_change_nothing() {
+    let mut simulation = started(&bumps());
+    set(&mut simulation, "casing_radius_change", 0.02);
+    slope(&mut simulation, "casing_radius_change", 100.0);
+    refused(&mut simulation, 1e-4, &["`casing_radius_change`", "takes it to 0.03", "outside"]);
+    // The value may be where the derivative alone would not lead from the value reached.
+    slope(&mut simulation, "casing_radius_change", 1.0);
+    set(&mut simulation, "casing_radius_change", 0.0);
+    // The shape's own rotation counts: the rotor stands by its side.
+    set(&mut simulation, "casing_shape_rotation", 3.0);
+    refused(&mut simulation, 3e-6, &["`casing_shape_rotation`", "features of the casing shape"]);
+    // An angle wrapped to one turn.
+    set(&mut simulation, "casing_shape_rotation", 0.1);
+    simulation.do_step(0.0, 1e-4).unwrap();
+    set(&mut simulation, "casing_shape_rotation", 0.2 - std::f64::consts::TAU);
+    refused(&mut simulation, 1e-2, &["`casing_shape_rotation`", "half a turn", "without wrapping"]);
+    set(&mut simulation, "casing_shape_rotation", 0.2);
+    // A fast turn is no wrap where the derivative says it.
+    slope(&mut simulation, "casing_shape_rotation", 1300.0);
+    simulation.do_step(simulation.time(), 1e-2).unwrap();
+}
+
+#[test]
+fn refused_values_within_a_step_change_nothing() {
+    let mut simulation = started(&bumps());
+    set(&mut simulation, "casing_shape_rotation", 0.001);
+    simulation.begin_step(0.0, 3e-6).unwrap();
+    simulation.advance().unwrap();
+    let before = state(&simulation);
+    let rotation = reference(&simulation, "casing_shape_rotation");
+    let radius = reference(&simulation, "casing_radius_change");
+    let wrapped = simulation.set_real(rotation, -6.28).unwrap_err().to_string();
+    let fast = simulation.set_real(rotation, 3.0).unwrap_err().to_string();
+    let beyond = simulation.set_input_derivative(radius, 1, 1e6).unwrap_err().to_string();
+    assert!(wrapped.contains("half a turn") && fast.contains("`casing_shape_rotation`") && beyond.contains("outside"));
+    assert_eq!(state(&simulation), before);
+}
+
+/// Growth: one blade under Ω²c, as a speed that jumps and as the same speed ramped.
+#[test]
+fn growth_and_stiffening_follow_a_speed_without_its_jumps() {
+    let mut scene = whirling();
+    scene.roms[0] = spinning_rom();
+    (scene.settings.structures[0].spin.growth, scene.settings.structures[0].spin.stiffening) = (true, true);
+    scene.settings.contacts[0].friction = 0.0;
+    let shaken = |scene: &Scene, line: bool| {
+        let (mut simulation, length, mut most) = (started(scene), 4e-3, 0.0_f64);
+        for index in 0..3 {
+            let speed = 1300.0 + 100.0 * f64::from(index);
+            set(&mut simulation, "speed", speed);
+            if line {
+                slope(&mut simulation, "speed", 100.0 / length);
+            }
+            simulation.begin_step(simulation.time(), length).unwrap();
+            while !simulation.advance().unwrap().finished {
+                most = most.max(simulation.system().energies().0);
+            }
+        }
+        (most, real(&simulation, "energy_residual_relative").abs())
+    };
+    let [(ramp, closed), (line, _), (hold, _)] =
+        [(&scene, false), (&scene, true), (&held(scene.clone()), false)].map(|(scene, line)| shaken(scene, line));
+    println!("kinetic energy of the blades: ramp {ramp:.3e} J, derivatives {line:.3e} J, hold {hold:.3e} J");
+    assert!(ramp < 0.1 * hold && (ramp / line - 1.0).abs() < 0.5 && closed < 1e-9, "{ramp} {line} {hold} {closed}");
+}
+
+#[test]
+fn a_scene_without_such_inputs_has_no_choice_of_them() {
+    let scene = common::scene(6);
+    assert!(Simulation::new(&scene).unwrap().table().find("input_interpolation").is_some());
+    for row in Simulation::new(&rich()).unwrap().table().variables() {
+        let moves = row.causality == tiprub_core::variables::Causality::Input || row.name == "gap_offset";
+        let says = row.description.contains("reached at the end of the step") || row.description.contains("held over");
+        assert_eq!(moves, says, "{}: {}", row.name, row.description);
+    }
+}
