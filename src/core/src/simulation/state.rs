@@ -256,11 +256,30 @@ impl Simulation {
         let before =
             (std::mem::replace(&mut self.values, lead.values), std::mem::replace(&mut self.inputs, lead.inputs));
         // Before initialisation nothing has been computed from them, and what does not fit together is not refused yet.
-        let outcome = if lead.phase == Phase::Created { Ok(()) } else { self.adopt(lead.reference_speed) };
+        let moves = self.is_moved_within_reason(lead.communication.length, lead.time);
+        let outcome = match lead.phase {
+            Phase::Ready | Phase::Stepping if !moves => damaged("an input moves something beyond all bounds"),
+            Phase::Created => Ok(()),
+            // Looked at when a step begins and when a speed is given, not at every internal step.
+            Phase::Stepping => {
+                self.check_turning(lead.step, lead.communication.length).and_then(|()| self.adopt(lead.reference_speed))
+            }
+            Phase::Ready | Phase::Failed => self.adopt(lead.reference_speed),
+        };
         if outcome.is_err() {
             (self.values, self.inputs) = before;
         }
         outcome.or_else(|error| damaged(&error.to_string()))
+    }
+
+    /// What inputs make of the motion, also those that this scene does not list.
+    fn is_moved_within_reason(&self, length: f64, time: f64) -> bool {
+        [0.0, length].into_iter().all(|offset| {
+            let drive = self.drive(offset, time);
+            let single = [drive.speed, drive.gap_offset, drive.shape_factor, drive.shape_rotation, drive.radius_change];
+            let mut all = single.into_iter().chain(drive.shaft).chain(drive.shaft_velocity);
+            all.all(|value| value.abs() <= LARGEST)
+        })
     }
 
     fn adopt(&mut self, reference_speed: f64) -> Result<()> {
