@@ -332,7 +332,7 @@ fn gap(field: &str, value: f64) -> Result<()> {
     if !(value.is_finite() && value > 0.0) {
         return Err(Error::invalid(field, format!("{} m", shown(value)), "Give a finite value > 0"));
     }
-    at_most(field, value, ranges::POSITION)
+    within(field, value, 0.0, ranges::POSITION)
 }
 
 fn count(field: &str, value: usize, least: usize, most: usize) -> Result<()> {
