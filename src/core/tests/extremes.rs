@@ -382,13 +382,12 @@ fn steps_that_rounding_would_fill_are_refused_wherever_they_begin() {
 #[test]
 fn numbers_beyond_the_table_of_ranges_are_refused_by_name() {
     type Change = fn(&mut Scene, f64);
-    let changes: [(&str, f64, Change); 22] = [
+    let changes: [(&str, f64, Change); 21] = [
         ("speed", 2e6, |scene, value| scene.settings.structures[0].speed = value),
         ("damping_ratio", 1.0, |scene, value| scene.settings.structures[0].damping_ratio = Some(value)),
         ("frequency_factors", 2.1, |scene, value| scene.settings.structures[0].frequency_factors = vec![value; 4]),
-        ("contact[1].gap", 1e-13, |scene, value| scene.settings.contacts[0].gap = value),
         ("contact[1].gap", 2e3, |scene, value| scene.settings.contacts[0].gap = value),
-        ("contact[1].sector_gaps", 1e-310, |scene, value| scene.settings.contacts[0].sector_gaps = vec![value; 4]),
+        ("contact[1].sector_gaps", 2e3, |scene, value| scene.settings.contacts[0].sector_gaps = vec![value; 4]),
         ("friction", 2.1, |scene, value| scene.settings.contacts[0].friction = value),
         ("ramp_time", 2e9, |scene, value| scene.settings.surfaces[0].ramp_time = value),
         ("time.step", 9e-13, |scene, value| scene.settings.time.step = value),

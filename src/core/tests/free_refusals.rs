@@ -111,7 +111,7 @@ fn friction_that_may_leave_the_flight_without_one_solution_is_warned_of() {
 #[test]
 fn a_body_too_fast_for_the_step_is_refused_and_passes_nothing_unseen() {
     // Obliquely through the plate within one step: beyond its edge before and after.
-    for velocity in [[-1e6, 1e6, 0.0], [-1e6, 0.0, 0.0], [0.0, 0.0, -1e300], [5000.0, 0.0, 0.0]] {
+    for velocity in [[-1e5, 1e5, 0.0], [-1e5, 0.0, 0.0], [0.0, 0.0, -5e4], [5000.0, 0.0, 0.0]] {
         let scene = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.06)], false, velocity);
         let mut simulation = started(&with(scene, 0.0, Solver::Lcp, Scheme::ModalExact));
         let error = simulation.do_step(0.0, 1e-5).unwrap_err().to_string();

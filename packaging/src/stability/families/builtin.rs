@@ -159,6 +159,8 @@ fn stage() -> Vec<Case> {
                 &["initial state", "start values of", "loads"],
                 &["casing is displaced", "Check its loads"],
                 &["initial clearance", "start inside the casing", "load"],
+                &["casing_load_amplitude", "within"],
+                &["load.amplitude", "between"],
             ]);
             let work = move |_: &_| Happened::of(on_stage(solver, 0.15, load));
             cases.push(Case::new(format!("stage/load={load:e}/{name}"), expected, work).within(600.0));

@@ -95,8 +95,12 @@ fn flight(scheme: Scheme, speed: f64, mass: f64) -> Result<Vec<Check>> {
 fn tunnels() -> Vec<Case> {
     let mut cases = Vec::new();
     for (way, direction) in [("at-it", [-1.0, 0.0, 0.0]), ("along", [0.0, -1.0, 0.0]), ("oblique", [-1.0, 0.7, 0.7])] {
-        for speed in [1.001 * FURTHEST / STEP, 1e5, 1e6, 1e30, 1e100, 1e200, 1e300, 1e308] {
-            let expected = Expected::refused(["in one internal step", "smaller internal step"]);
+        for speed in [1.001 * FURTHEST / STEP, 1e4, 1e5, 1e6, 1e100, 1e308] {
+            let expected = if speed > 1e5 {
+                Expected::refused(["velocity", "between -100000 and 100000"])
+            } else {
+                Expected::refused(["in one internal step", "smaller internal step"])
+            };
             let work = move |_: &_| {
                 let body = Body::rigid(1.0);
                 let velocity = direction.map(|component| component * speed);

@@ -327,12 +327,12 @@ impl CoatingSettings {
     }
 }
 
-/// A clearance: positive, and no smaller than what can be told from none.
+/// A clearance. Smaller than an atom it is as good as none, and right.
 fn gap(field: &str, value: f64) -> Result<()> {
     if !(value.is_finite() && value > 0.0) {
         return Err(Error::invalid(field, format!("{} m", shown(value)), "Give a finite value > 0"));
     }
-    within(field, value, ranges::SMALLEST_GAP, ranges::POSITION)
+    within(field, value, 0.0, ranges::POSITION)
 }
 
 fn count(field: &str, value: usize, least: usize, most: usize) -> Result<()> {

@@ -262,7 +262,9 @@ impl Simulation {
             Phase::Created => Ok(()),
             // Looked at when a step begins and when a speed is given, not at every internal step.
             Phase::Stepping => {
-                self.check_turning(lead.step, lead.communication.length).and_then(|()| self.adopt(lead.reference_speed))
+                let rotation = self.inputs.shape_rotation.rate();
+                self.check_turning(lead.step, lead.communication.length, &self.inputs.speed, rotation)
+                    .and_then(|()| self.adopt(lead.reference_speed))
             }
             Phase::Ready | Phase::Failed => self.adopt(lead.reference_speed),
         };
