@@ -91,17 +91,19 @@ impl Ledger {
     /// Work of all inputs but loads (J): shaft, whirl, axial shift, moving casing.
     pub fn external_work(&self) -> f64 {
         let mut sum = Sum::default();
-        for work in [self.shaft_work, self.stiffening_work, self.whirl_work, self.shift_work, self.casing_work] {
-            sum.add(work.value());
-        }
+        self.inputs().into_iter().for_each(|work| sum.add(work.value()));
         sum.value()
+    }
+
+    fn inputs(&self) -> [Sum; 5] {
+        [self.shaft_work, self.stiffening_work, self.whirl_work, self.shift_work, self.casing_work]
     }
 
     /// Energy that should be there minus what is (J), given kinetic + strain energy now.
     pub fn residual(&self, mechanical: f64) -> f64 {
         let mut balance = Sum::default();
         balance.add(self.initial);
-        balance.add(self.external_work());
+        self.inputs().into_iter().for_each(|work| balance.add(work.value()));
         balance.add(self.curvature_work.value());
         balance.add(self.step_change.value());
         balance.add(-self.damping_loss.value());

@@ -280,7 +280,8 @@ fn energy_that_no_input_brings_ends_the_run() {
         let mut simulation = Simulation::new(&scene).unwrap();
         simulation.initialise(0.0).unwrap();
         while simulation.time() < 4e-3 {
-            set(&mut simulation, "casing_radius_change", -0.05 * simulation.time(), -0.05);
+            let time = simulation.time();
+            set(&mut simulation, "casing_radius_change", -0.05 * time, -0.05);
             let time = simulation.time();
             if let Err(error) = simulation.do_step(time, 2e-4) {
                 // As after any failure only a reset helps.

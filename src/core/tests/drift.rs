@@ -163,9 +163,14 @@ type Term = (fn(&mut Ledger) -> &mut Sum, f64);
 /// Every term has its sign, and large work in and out leaves the small rest that is in the books.
 #[test]
 fn the_residual_is_the_balance_of_all_terms_without_cancellation() {
-    let terms: [Term; 7] = [
-        (|ledger| &mut ledger.external_work, 1.0),
+    let terms: [Term; 12] = [
+        (|ledger| &mut ledger.shaft_work, 1.0),
         (|ledger| &mut ledger.friction_loss, -1.0),
+        (|ledger| &mut ledger.stiffening_work, 1.0),
+        (|ledger| &mut ledger.whirl_work, 1.0),
+        (|ledger| &mut ledger.shift_work, 1.0),
+        (|ledger| &mut ledger.casing_work, 1.0),
+        (|ledger| &mut ledger.curvature_work, 1.0),
         (|ledger| &mut ledger.load_work, 1.0),
         (|ledger| &mut ledger.step_change, 1.0),
         (|ledger| &mut ledger.damping_loss, -1.0),
@@ -175,7 +180,7 @@ fn the_residual_is_the_balance_of_all_terms_without_cancellation() {
     for (index, (term, sign)) in terms.into_iter().enumerate() {
         let mut ledger = Ledger { initial: 3.0, ..Ledger::default() };
         let large = if index < 2 { 0.0 } else { 1e16 };
-        ledger.external_work.add(large);
+        ledger.shaft_work.add(large);
         ledger.friction_loss.add(large);
         term(&mut ledger).add(0.25);
         assert_eq!(ledger.residual(2.0).to_bits(), (1.0 + 0.25 * sign).to_bits(), "term {index}");
