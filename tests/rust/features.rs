@@ -107,7 +107,7 @@ fn each_element_of_an_array_input_has_its_derivative() {
 }
 
 /// Names that only some scenes have.
-const OF_FEATURES: [&str; 19] = [
+const OF_FEATURES: [&str; 25] = [
     "whirl_x",
     "whirl_y",
     "axial_shift",
@@ -127,6 +127,12 @@ const OF_FEATURES: [&str; 19] = [
     "casing_radius_change",
     "casing_shape_factor",
     "casing_shape_rotation",
+    "moment_x",
+    "moment_y",
+    "stiffening_work",
+    "whirl_work",
+    "shift_work",
+    "casing_motion_work",
 ];
 
 #[test]

@@ -60,8 +60,8 @@ pub struct Ledger {
     /// What lies between the work of contact forces in the scheme and all that has a name: normals turn and surfaces curve
     /// within a step. It vanishes with the step.
     pub curvature_work: Sum,
-    /// Sum of the magnitudes of its terms.
-    pub curvature_turnover: Sum,
+    /// The same of nodes that were on the surface before: what comes back over an edge has another cause.
+    pub inner_curvature_work: Sum,
     /// Energy added (or removed) by carrying the state to another step size.
     pub step_change: Sum,
     /// Sum of the magnitudes of all external work: the scale of the residual.
@@ -82,7 +82,7 @@ persist_fields!(Ledger {
     shift_work,
     casing_work,
     curvature_work,
-    curvature_turnover,
+    inner_curvature_work,
     step_change,
     turnover
 });

@@ -119,7 +119,7 @@ pub fn study(quick: bool) -> Result<Study> {
             ("largest internal step".into(), format!("{STEP:e} s")),
         ],
         statements: statements(&rows),
-        results: json!({ "rows": rows.iter().map(Row::to_json).collect::<Vec<_>>() }),
+        results: json!({ "rows": rows.iter().copied().map(Row::to_json).collect::<Vec<_>>() }),
         files: vec![(TABLE.into(), "the table".into(), table(&rows).into_bytes())],
         figures: vec![figure],
     })
@@ -175,7 +175,7 @@ fn statements(rows: &[Row]) -> Vec<Statement> {
 }
 
 impl Row {
-    fn to_json(&self) -> serde_json::Value {
+    fn to_json(self) -> serde_json::Value {
         let Case { feature, scheme, solver, friction } = self.case;
         let [first, second] = self.seen;
         json!({

@@ -43,6 +43,7 @@ impl System {
     fn book(&mut self, event: &ContactEvent, motion: &Motion, before: bool) -> f64 {
         let work = self.work_of(event, motion, before);
         let (curvature, worn) = (work.curvature(), event.coating * self.approach(event));
+        let returned = self.has_returned(event);
         let ledger = &mut self.state.ledger;
         ledger.wear_work.add(worn);
         ledger.impact_loss.add(work.closing - worn);
@@ -52,7 +53,7 @@ impl System {
         ledger.shift_work.add(work.shift);
         ledger.casing_work.add(work.casing);
         ledger.curvature_work.add(curvature);
-        ledger.curvature_turnover.add(curvature.abs());
+        ledger.inner_curvature_work.add(if returned { 0.0 } else { curvature });
         ledger.turnover.add(work.shaft.abs() + work.whirl.abs() + work.shift.abs() + work.casing.abs());
         work.heat
     }
@@ -89,7 +90,13 @@ impl System {
         let index = event.node * self.lanes + event.sector;
         // A node that comes back from beyond a free edge had no gap to close.
         let (now, oldest) = (self.state.gap[index], self.gap_oldest[index]);
-        if now.max(oldest) >= BEYOND_EDGE { 0.0 } else { -0.5 * (now - oldest) }
+        if self.has_returned(event) { 0.0 } else { -0.5 * (now - oldest) }
+    }
+
+    /// Whether the node was beyond a free edge before, or is now.
+    fn has_returned(&self, event: &ContactEvent) -> bool {
+        let index = event.node * self.lanes + event.sector;
+        self.state.gap[index].max(self.gap_oldest[index]) >= BEYOND_EDGE
     }
 
     /// Half the displacement of a node relative to the slave over the last two steps (m), in its own directions.

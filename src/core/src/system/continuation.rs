@@ -13,7 +13,7 @@ const FORCE_REACH: f64 = 4.0;
 /// may bend, and of the largest displacement that counts as small.
 const BEHIND_EDGE: [f64; 2] = [1e-3, 1e-6];
 /// Curvature work beyond this share of all energy exchanged is more than an error of truncation.
-const MOST_CURVATURE: f64 = 0.1;
+const MOST_CURVATURE: f64 = 0.5;
 
 impl System {
     /// Use step size `step` (s) from here. A running state is carried over by resampling the modal motion under
@@ -115,7 +115,7 @@ impl System {
     /// It is not: [`StepFailure::Curved`].
     pub fn check_books(&self) -> Result<(), StepFailure> {
         let ledger = &self.state.ledger;
-        let curved = ledger.curvature_work.value();
+        let curved = ledger.inner_curvature_work.value();
         if curved.abs() > MOST_CURVATURE * ledger.exchanged() {
             return Err(StepFailure::Curved { work: curved, exchanged: ledger.exchanged() });
         }
