@@ -1,9 +1,12 @@
 //! Observed orders of convergence of the schemes, against what theory gives: free flight, forced vibration, contact that stays
 //! closed, impacts.
 
+#[path = "../../../tests/guide.rs"]
+mod guide;
 #[path = "common/rods.rs"]
 mod rods;
 
+use guide::told;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rods::{SCHEMES, SOLVERS, against_plane, orders, set_samples, single};
 use tiprub_core::contact::gap::Drive;
@@ -17,7 +20,7 @@ const FAR: f64 = 1e9;
 fn row(phase: &str, scheme: Scheme, solver: Solver, quantity: &str, errors: &[f64], theory: &str) -> f64 {
     let orders = orders(errors);
     let list = |values: Vec<String>| values.join(", ");
-    println!(
+    told!(
         "| {phase} | {scheme:?} | {solver:?} | {quantity} | {} | {} | {theory} |",
         list(errors.iter().map(|error| format!("{error:.1e}")).collect()),
         list(orders.iter().map(|order| format!("{order:.2}")).collect())
@@ -26,8 +29,8 @@ fn row(phase: &str, scheme: Scheme, solver: Solver, quantity: &str, errors: &[f6
 }
 
 fn head() {
-    println!("| phase | scheme | solver | quantity | errors, h halved | orders | theory |");
-    println!("|---|---|---|---|---|---|---|");
+    told!("| phase | scheme | solver | quantity | errors, h halved | orders | theory |");
+    told!("|---|---|---|---|---|---|---|");
 }
 
 /// Modes seen by one node: (ω, shape).
@@ -93,6 +96,7 @@ fn free_flight_and_forced_vibration() {
         let order = row("forced vibration", scheme, solver, "displacement", &errors, "2");
         assert!((1.95..2.05).contains(&order), "{errors:?}");
     }
+    guide::hold("cargo test -p tiprub-core --test orders free_flight");
 }
 
 /// A chain of masses between two walls; the node of the last presses on the plane of the contact and never leaves it.
@@ -284,6 +288,7 @@ fn contact_that_stays_closed() {
             }
         }
     }
+    guide::hold("cargo test -p tiprub-core --test orders contact_that_stays");
 }
 
 /// Root mean square over starts, of what `error` gives for a shift of time (s) by shares of a step and a factor on the amplitude:
@@ -351,4 +356,5 @@ fn through_impacts() {
             assert!((1.7..2.3).contains(&order), "{errors:?}");
         }
     }
+    guide::hold("cargo test -p tiprub-core --test orders through_impacts");
 }

@@ -56,7 +56,7 @@ fn the_ledger_closes_for_every_scheme_and_solver() {
                     simulation.do_step(time, length).unwrap();
                     touched += real(&simulation, "normal_impulse");
                     let residual = real(&simulation, "energy_residual_relative");
-                    assert!(residual.abs() < 1e-9, "{scheme:?} {solver:?} µ {friction}: residual {residual:e}");
+                    assert!(residual.abs() < 1e-13, "{scheme:?} {solver:?} µ {friction}: residual {residual:e}");
                 }
                 assert!(touched > 0.0, "no contact: the test would prove nothing");
                 // Without friction its variables do not exist.
@@ -110,12 +110,12 @@ fn friction_heat_is_force_times_sliding() {
 #[test]
 fn shaft_power_is_torque_times_speed() {
     // Without friction the power comes from the slope of the lobes alone.
-    for friction in [0.0, 0.15] {
-        shaft_power(friction);
+    for (friction, bound) in [(0.0, 1e-3), (0.15, 1e-5)] {
+        shaft_power(friction, bound);
     }
 }
 
-fn shaft_power(friction: f64) {
+fn shaft_power(friction: f64, bound: f64) {
     let mut scene = common::scene(12);
     scene.settings.time.step = 1e-7;
     scene.settings.contacts[0].friction = friction;
@@ -131,7 +131,7 @@ fn shaft_power(friction: f64) {
     }
     let by_ledger = real(&simulation, "external_work") - before;
     println!("µ {friction}: shaft work {by_torque} J by torque, {by_ledger} J by ledger");
-    assert!((by_torque / by_ledger - 1.0).abs() < 5e-3, "{by_torque} vs {by_ledger}");
+    assert!((by_torque / by_ledger - 1.0).abs() < bound, "{by_torque} vs {by_ledger}");
 }
 
 #[test]
