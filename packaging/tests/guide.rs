@@ -104,7 +104,7 @@ fn a_figure_that_differs_is_seen() {
         assert!(!seen(wrong), "{wrong}");
     }
     assert!(seen("5e-14") && !seen("1e-14"), "rounding is about as small as shown, not of the same digits");
-    assert_eq!(missing("| a | 200 |\n| b | 7 |\nwords", &[found]), ["| b | 7 |"]);
+    assert_eq!(missing("| 7 |\n|---|\n| a | 200 |\n| b | 7 |\nwords", &[found]), ["| b | 7 |"]);
 }
 
 /// What the README's sample prints: torque and largest force of the demo's scene at 1700 rad/s with µ = 0.1.

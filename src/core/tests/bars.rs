@@ -97,8 +97,9 @@ fn two_bars_meet_and_part_as_plane_waves_say() {
     );
     told!("|---|---|---|---|---|---|---|---|---|---|");
     for scheme in SCHEMES {
-        for solver in SOLVERS {
-            for elements in [20, 40, 80, 200] {
+        // With one contact node all solvers have one problem to solve: the others are looked at on the coarsest mesh.
+        for (solver, meshes) in SOLVERS.map(|solver| (solver, if solver == Solver::Lcp { 4 } else { 1 })) {
+            for elements in [20, 40, 80, 200].into_iter().take(meshes) {
                 let found = collide(elements, scheme, solver);
                 let Outcome { force, touch, release, impulse, energy_loss, residual, momentum } = found;
                 told!(

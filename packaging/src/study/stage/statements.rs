@@ -98,7 +98,10 @@ pub fn prevails(shares: &[(f64, f64)], critical: f64) -> Statement {
     );
     let fast: Vec<(f64, f64)> = shares.iter().copied().filter(|(speed, _)| *speed >= critical).collect();
     if fast.is_empty() {
-        return Statement::remark(expected, format!("undecided: no run at or above {critical:.1} rad/s, or some end early"));
+        return Statement::remark(
+            expected,
+            format!("undecided: no run at or above {critical:.1} rad/s, or some end early"),
+        );
     }
     let found = format!("effective amplitude of 4 relative to that of 2 (rad/s): {}", listed(&fast));
     Statement::tested(expected, fast.iter().all(|(_, share)| *share < 1.0), found)
