@@ -93,7 +93,7 @@ fn listed(shares: &[(f64, f64)]) -> String {
 /// Above the resonance of nodal diameter 2 alone: undecided where there is no run.
 pub fn prevails(shares: &[(f64, f64)], critical: f64) -> Statement {
     let expected = format!(
-        "Nodal diameter {}, that of the oval, prevails over nodal diameter {} at every angular velocity from the critical one on",
+        "Nodal diameter {}, that of the oval, prevails over nodal diameter {} in every run from the critical speed on",
         SHOWN[0], SHOWN[1]
     );
     let fast: Vec<(f64, f64)> = shares.iter().copied().filter(|(speed, _)| *speed >= critical).collect();
