@@ -28,6 +28,11 @@ fn row(phase: &str, scheme: Scheme, solver: Solver, quantity: &str, errors: &[f6
     orders.iter().sum::<f64>() / orders.len() as f64
 }
 
+/// With one contact node all solvers have one problem to solve: the others are looked at with one scheme.
+fn solvers(scheme: Scheme) -> Vec<Solver> {
+    if scheme == Scheme::ModalExact { SOLVERS.to_vec() } else { vec![Solver::Lcp] }
+}
+
 fn head() {
     told!("| phase | scheme | solver | quantity | errors, h halved | orders | theory |");
     told!("|---|---|---|---|---|---|---|");
@@ -273,7 +278,7 @@ fn contact_that_stays_closed() {
     let steps = [4e-4, 2e-4, 1e-4, 5e-5];
     let (pressed, massless) = (Pressed::new(), PressedMassless::new());
     for scheme in SCHEMES {
-        for solver in SOLVERS {
+        for solver in solvers(scheme) {
             let errors = steps.map(|step| match scheme {
                 Scheme::MasslessBoundary => massless.errors(solver, step),
                 _ => pressed.errors(scheme, solver, step),
@@ -340,14 +345,14 @@ fn elastic_error(solver: Solver, step: f64, shift: f64, factor: f64) -> [f64; 2]
 fn through_impacts() {
     head();
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
-        for solver in SOLVERS {
+        for solver in solvers(scheme) {
             let errors = [2e-4, 1e-4, 5e-5, 2.5e-5]
                 .map(|step| over_starts(step, |shift, factor| dead_error(scheme, solver, step, shift, factor)));
             let order = row("rigid stop", scheme, solver, "displacement", &errors, "1");
             assert!((0.85..1.15).contains(&order), "{errors:?}");
         }
     }
-    for solver in SOLVERS {
+    for solver in [Solver::Lcp] {
         let steps = [4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5];
         for (i, quantity) in ["displacement", "energy"].into_iter().enumerate() {
             let errors =

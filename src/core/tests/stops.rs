@@ -175,7 +175,6 @@ fn a_ball_bounces_on_a_spring_for_ever() {
         told!("{solver:?}: order {order:.2}");
         assert!(order > 1.3 && errors[2] < 1e-3, "{errors:?}");
     }
-    guide::hold("cargo test -p tiprub-core --test stops ball");
 }
 
 /// Period (s) over `turns` turns and largest force of a mass that meets an elastic stop.
