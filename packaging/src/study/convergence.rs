@@ -206,7 +206,7 @@ fn monotone(rows: &[ConvergenceRow]) -> Statement {
         few.iter()
             .zip(many)
             .take(MODES)
-            .map(|(few, many)| if few == many { 0.0 } else { many - few })
+            .map(|(few, many)| if few.is_infinite() && many.is_infinite() { 0.0 } else { many - few })
             .collect::<Vec<_>>()
     });
     let worst = changes.fold(0.0, |worst: f64, rise| if rise.is_nan() { f64::NAN } else { worst.max(rise) });
