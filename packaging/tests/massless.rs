@@ -1,5 +1,9 @@
 //! Rotor 37 with massless contact nodes against contact nodes with mass.
 
+#[path = "../../tests/guide.rs"]
+mod guide;
+
+use guide::told;
 use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::settings::Scheme;
 use tiprub_core::stability::{central_difference_limit, massless::MasslessCheck};
@@ -40,14 +44,20 @@ fn massless_contact_nodes_agree_and_take_longer_steps() {
     });
     let check = MasslessCheck { model: &model, normals: normals.collect(), slave: None };
     let (limit, central) = (check.limit(1e-3).unwrap().closed, central_difference_limit(&model));
-    println!(
-        "largest step: massless-boundary {limit:.3e} s, central differences {central:.3e} s, ratio {:.2}",
-        limit / central
-    );
+    told!("| limit of massless-boundary in closed contact | {:.2} |", 1e6 * limit);
+    told!("| of which 0.8 is accepted | {:.2} |", 0.8e6 * limit);
+    told!("| limit of central differences | {:.4} |", 1e6 * central);
     assert!(limit > central);
 
     let mut scene = tiprub_packaging::scene_source::rotor37_scene_with(rom).unwrap();
     scene.settings.contacts[0].friction = 0.1;
+    for (share, accepted) in [(0.79, true), (0.81, false)] {
+        let mut scene = scene.clone();
+        (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::MasslessBoundary, share * limit);
+        scene.settings.experiment.communication_step = share * limit;
+        let started = Simulation::new(&scene).and_then(|mut simulation| simulation.initialise(0.0));
+        assert_eq!(started.is_ok(), accepted, "{share} of the limit: {started:?}");
+    }
     let fine = run(&scene, Scheme::ModalExact, 1e-7);
     for (scheme, step) in [
         (Scheme::ModalExact, 1e-6),
@@ -56,13 +66,15 @@ fn massless_contact_nodes_agree_and_take_longer_steps() {
         (Scheme::MasslessBoundary, 1.5e-5),
     ] {
         let found = run(&scene, scheme, step);
-        println!(
-            "{scheme:?} h = {step:.2e} s: displacements {:.2e}, impulse {:.2e} off; impact loss {:.2e} J (with mass {:.2e} J)",
-            apart(&fine.0, &found.0),
-            found.1 / fine.1 - 1.0,
-            found.2,
-            fine.2
+        told!(
+            "| {scheme:?} | {} | {:.2} % | {:+.2} % | {:.3} mJ, of {:.1} mJ with mass |",
+            1e6 * step,
+            100.0 * apart(&fine.0, &found.0),
+            100.0 * (found.1 / fine.1 - 1.0),
+            1e3 * found.2,
+            1e3 * fine.2
         );
         assert!(apart(&fine.0, &found.0) < 0.05);
     }
+    guide::hold("cargo test -p tiprub --test massless");
 }

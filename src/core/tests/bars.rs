@@ -1,8 +1,11 @@
 //! Carpenter's two bars through the core: force, release, impulse and energy loss against the exact ones.
 
+#[path = "../../../tests/guide.rs"]
+mod guide;
 #[path = "common/rods.rs"]
 mod rods;
 
+use guide::told;
 use rods::{NEARLY_NONE, Rod, SCHEMES, SOLVERS, ascending, quiet_step};
 use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw};
 use tiprub_core::dynamics::modal::{ModalModel, NodePair};
@@ -87,19 +90,24 @@ fn collide(elements: usize, scheme: Scheme, solver: Solver) -> Outcome {
 #[test]
 fn two_bars_meet_and_part_as_plane_waves_say() {
     let exact = carpenter::exact();
-    println!("exact: {exact:?}");
-    println!("| scheme | solver | elements | force | touch (µs) | release (µs) | impulse (N·s) | loss (%) | ledger |");
-    println!("|---|---|---|---|---|---|---|---|---|");
+    let [touch, release] = [exact.touch, exact.release].map(|time| 1e6 * time);
+    told!("| exact | | {:.1} | {touch:.2} | {release:.2} | {:.4} | 0 |", exact.force, exact.impulse);
+    told!(
+        "| scheme | solver | elements | force | touch (µs) | release (µs) | impulse (N·s) | loss (%) | loss · 2n | ledger |"
+    );
+    told!("|---|---|---|---|---|---|---|---|---|---|");
     for scheme in SCHEMES {
-        for solver in SOLVERS {
-            for elements in [20, 40, 80, 200] {
+        // With one contact node all solvers have one problem to solve: the others are looked at on the coarsest mesh.
+        for (solver, meshes) in SOLVERS.map(|solver| (solver, if solver == Solver::Lcp { 4 } else { 1 })) {
+            for elements in [20, 40, 80, 200].into_iter().take(meshes) {
                 let found = collide(elements, scheme, solver);
                 let Outcome { force, touch, release, impulse, energy_loss, residual, momentum } = found;
-                println!(
-                    "| {scheme:?} | {solver:?} | {elements} | {force:.1} | {:.2} | {:.2} | {impulse:.4} | {:.4} | {residual:.1e} |",
+                told!(
+                    "| {scheme:?} | {solver:?} | {elements} | {force:.1} | {:.2} | {:.2} | {impulse:.4} | {:.4} | {:.2} | {residual:.1e} |",
                     touch * 1e6,
                     release * 1e6,
-                    100.0 * energy_loss
+                    100.0 * energy_loss,
+                    2.0 * elements as f64 * energy_loss
                 );
                 let size = 1.0 / elements as f64;
                 assert!((force / exact.force - 1.0).abs() < 0.01, "force");
@@ -120,4 +128,5 @@ fn two_bars_meet_and_part_as_plane_waves_say() {
             }
         }
     }
+    guide::hold("cargo test -p tiprub-core --test bars");
 }

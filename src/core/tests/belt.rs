@@ -4,6 +4,10 @@
 //! x = F_k/k + a cos ωt + (v/ω) sin ωt, a = (F_s − F_k)/k, until it has the belt's velocity v again after
 //! (2π − 2 atan(aω/v))/ω; it then sticks for 2a/v. Amplitude √(a² + v²/ω²).
 
+#[path = "../../../tests/guide.rs"]
+mod guide;
+
+use guide::told;
 use nalgebra::DMatrix;
 use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw};
 use tiprub_core::dynamics::bank::BankOptions;
@@ -95,8 +99,9 @@ fn stick_slip_has_the_amplitude_and_the_times_of_the_closed_form() {
                 (at(4) - at(2) - slide_time - stick_time) / (slide_time + stick_time),
                 (largest - amplitude) / amplitude,
             ];
-            println!(
-                "{scheme:?} h = {step:e}: first slip, slide, stick, period, amplitude off by {}; ledger {:.1e}",
+            told!(
+                "{scheme:?} h = {} µs: first slip, slide, stick, period, amplitude off by {}; ledger {:.1e}",
+                1e6 * step,
                 found.map(|error| format!("{error:.1e}")).join(", "),
                 record.residual
             );
@@ -106,6 +111,7 @@ fn stick_slip_has_the_amplitude_and_the_times_of_the_closed_form() {
         // Times are known to a step: first order.
         assert!(errors[0] < 3e-3 && errors[2] < 0.3 * errors[0], "{errors:?}");
     }
+    guide::hold("cargo test -p tiprub-core --test belt");
 }
 
 #[test]
@@ -119,7 +125,7 @@ fn with_one_coefficient_the_block_swings_about_the_friction_force() {
     let (low, high) =
         record.position[steps / 2..].iter().fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(*x), b.max(*x)));
     let (middle, swing) = (0.5 * (low + high), 0.5 * (high - low));
-    println!("middle off by {:.1e}, swing by {:.1e}", middle / rest - 1.0, swing / (BELT / OMEGA) - 1.0);
+    told!("middle off by {:.1e}, swing by {:.1e}", middle / rest - 1.0, swing / (BELT / OMEGA) - 1.0);
     assert!((middle / rest - 1.0).abs() < 1e-3);
     assert!((swing / (BELT / OMEGA) - 1.0).abs() < 5e-3);
 }

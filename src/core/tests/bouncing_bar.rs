@@ -2,9 +2,12 @@
 //!
 //! D. Doyen, A. Ern, S. Piperno, SIAM J. Sci. Comput. 33 (2011): period 16/3 s, contacts on [1, 5/3] and [11/3, 13/3].
 
+#[path = "../../../tests/guide.rs"]
+mod guide;
 #[path = "common/rods.rs"]
 mod rods;
 
+use guide::told;
 use rods::{NEARLY_NONE, Rod, SCHEMES, SOLVERS, against_plane, orders, quiet_step, set_samples};
 use tiprub_core::contact::gap::Drive;
 use tiprub_core::settings::{Scheme, Solver};
@@ -121,7 +124,7 @@ fn print(scheme: Scheme, solver: Solver, elements: usize, outcome: &Outcome) {
     let Outcome { step, bottom, force, contacts, losses, residual } = outcome;
     let times = contacts[..2].iter().flatten().map(|time| format!("{time:.4}")).collect::<Vec<_>>().join(", ");
     let losses = losses.iter().map(|loss| format!("{:.3}", 100.0 * loss)).collect::<Vec<_>>().join(", ");
-    println!(
+    told!(
         "| {scheme:?} | {solver:?} | {elements} | {:.2} | {:.3} | {:.2e} | {:.2e} | {:+.1e} | {:.2e} | {times} | {losses} | {residual:.0e} |",
         step * 1e3,
         bottom[0],
@@ -134,11 +137,11 @@ fn print(scheme: Scheme, solver: Solver, elements: usize, outcome: &Outcome) {
 
 #[test]
 fn the_bar_bounces_as_the_series_says() {
-    println!("exact: contacts {CONTACTS:?}, period {PERIOD}");
-    println!(
+    told!("exact: contacts {CONTACTS:.4?}, period {PERIOD:.4}, loss 0");
+    told!(
         "| scheme | solver | elements | h (ms) | bottom, largest error (m) | L2, period 1 | L2, period 3 | impulse | force L2 | contacts (s) | loss after each period (%) | ledger |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
+    told!("|---|---|---|---|---|---|---|---|---|---|---|---|");
     for scheme in SCHEMES {
         let mut errors = Vec::new();
         for elements in [25, 50, 100, 200] {
@@ -147,7 +150,7 @@ fn the_bar_bounces_as_the_series_says() {
             check(scheme, elements, &found);
             errors.push(found.bottom[1]);
             // With one contact node all solvers have one problem to solve.
-            for solver in SOLVERS.into_iter().filter(|solver| *solver != Solver::Lcp && elements < 200) {
+            for solver in SOLVERS.into_iter().filter(|solver| *solver != Solver::Lcp && elements == 25) {
                 let other = bounce(elements, scheme, solver, 0.9);
                 print(scheme, solver, elements, &other);
                 assert!((other.bottom[1] / found.bottom[1] - 1.0).abs() < 1e-6, "{solver:?}");
@@ -155,11 +158,12 @@ fn the_bar_bounces_as_the_series_says() {
             }
         }
         let orders = orders(&errors);
-        println!("{scheme:?}: orders of L2 {orders:.2?}");
+        told!("{scheme:?}: orders of L2 {orders:.2?}");
         // A displacement whose velocity jumps is met with order 2/3 · 3/2 = 1 by methods of second order; the loss is of order 1.
         let mean = orders.iter().sum::<f64>() / 3.0;
         assert!((0.65..1.15).contains(&mean), "order {mean}");
     }
+    guide::hold("cargo test -p tiprub-core --test bouncing_bar");
 }
 
 fn check(scheme: Scheme, elements: usize, found: &Outcome) {

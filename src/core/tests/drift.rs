@@ -3,9 +3,12 @@
 //!
 //! 1e5 steps here; 1e7 by `cargo test --release -p tiprub-core --test drift -- --ignored --nocapture`.
 
+#[path = "../../../tests/guide.rs"]
+mod guide;
 #[path = "common/rods.rs"]
 mod rods;
 
+use guide::told;
 use rods::{NEARLY_NONE, Rod, SCHEMES, against_plane, quiet_step, set_samples, single};
 use tiprub_core::contact::gap::Drive;
 use tiprub_core::dynamics::modal::ModalModel;
@@ -106,11 +109,11 @@ fn impacts(steps: u64, step: f64) -> [f64; 2] {
 }
 
 fn measure(steps: u64) {
-    println!("| energy over {steps} steps | scheme | largest change | change at the end |");
-    println!("|---|---|---|---|");
+    told!("| energy over {steps} steps | scheme | largest change | change at the end |");
+    told!("|---|---|---|---|");
     for scheme in SCHEMES {
         for (name, [most, end]) in [("free flight", free(scheme, steps)), ("closed contact", closed(scheme, steps))] {
-            println!("| {name} | {scheme:?} | {most:.1e} | {end:+.1e} |");
+            told!("| {name} | {scheme:?} | {most:.1e} | {end:+.1e} |");
             // Rounding walks with the root of the number of steps.
             let bound = 1e-13 * (steps as f64).sqrt();
             assert!(most < bound, "{name}, {scheme:?}: {most:e}");
@@ -118,7 +121,7 @@ fn measure(steps: u64) {
     }
     for step in [2e-4, 1e-4, 5e-5] {
         let [most, end] = impacts(steps, step);
-        println!("| elastic impacts, h = {} µs | MasslessBoundary | {most:.1e} | {end:+.1e} |", step * 1e6);
+        told!("| elastic impacts, h = {} µs | MasslessBoundary | {most:.1e} | {end:+.1e} |", step * 1e6);
         assert!(most < 0.05, "{most:e}");
     }
 }
@@ -126,6 +129,7 @@ fn measure(steps: u64) {
 #[test]
 fn a_hundred_thousand_undamped_steps_keep_the_energy() {
     measure(100_000);
+    guide::hold("cargo test -p tiprub-core --test drift");
 }
 
 #[test]

@@ -142,7 +142,7 @@ fn the_energy_ledger_closes_for_every_combination() {
                 let residual = real(&simulation, "energy_residual_relative");
                 println!("| {} | {scheme:?} | {solver:?} | {contact} | {residual:.1e} |", feature.0);
                 assert!(contact > 0, "{} {scheme:?} {solver:?} never touched", feature.0);
-                assert!(residual.abs() < 1e-9, "{} {scheme:?} {solver:?}: {residual:e}", feature.0);
+                assert!(residual.abs() < 1e-13, "{} {scheme:?} {solver:?}: {residual:e}", feature.0);
                 worst = worst.max(residual.abs());
             }
         }

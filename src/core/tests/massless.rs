@@ -1,8 +1,11 @@
 //! Massless boundary: no impact loss, and the step limit that closed contact sets.
 
+#[path = "../../../tests/guide.rs"]
+mod guide;
 #[path = "common/rods.rs"]
 mod rods;
 
+use guide::told;
 use nalgebra::DMatrix;
 use rods::{NEARLY_NONE, Rod};
 use tiprub_core::Rom;
@@ -12,6 +15,7 @@ use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::stability::massless::MasslessCheck;
 use tiprub_core::system::{System, SystemSettings};
+use tiprub_reference::carpenter;
 
 /// The bars of N. J. Carpenter, R. L. Taylor, M. G. Katona, Int. J. Numer. Methods Eng. 32 (1991): half of the
 /// symmetric problem, a bar that hits a rigid wall.
@@ -37,6 +41,8 @@ fn system(model: &ModalModel, scheme: Scheme, step: f64) -> System {
 
 #[test]
 fn a_bar_bounces_off_without_impact_loss() {
+    let exact = carpenter::exact();
+    told!("exact: {:.2} to {:.2} us, {:.4} N.s, loss 0", 1e6 * exact.touch, 1e6 * exact.release, exact.impulse);
     // With 1e-4 of its mass one mode stands for the flexibility of the end node alone.
     for (scheme, end_mass, losses) in
         [(Scheme::MasslessBoundary, NEARLY_NONE, [0.0, 1e-3]), (Scheme::ModalExact, 1.0, [5e-3, 0.02])]
@@ -62,8 +68,8 @@ fn a_bar_bounces_off_without_impact_loss() {
         }
         let (kinetic, strain) = system.energies();
         let loss = 1.0 - (kinetic + strain) / (before.0 + before.1);
-        println!(
-            "{scheme:?}: impulse {impulse:.4} N.s, contact {:.2} to {:.2} us, loss {loss:.2e}, booked {:.2e}, ledger {:.1e}",
+        told!(
+            "{scheme:?}: contact {:.2} to {:.2} us, impulse {impulse:.4} N.s, loss {loss:.2e}, booked {:.2e}, ledger {:.1e}",
             touched * 1e6,
             released * 1e6,
             system.ledger().impact_loss.value() / (before.0 + before.1),
@@ -75,6 +81,7 @@ fn a_bar_bounces_off_without_impact_loss() {
         assert!((losses[0]..losses[1]).contains(&loss), "{loss:e}");
         assert!((system.ledger().residual(kinetic + strain) / (before.0 + before.1)).abs() < 1e-12);
     }
+    guide::hold("cargo test -p tiprub-core --test massless");
 }
 
 /// A bar pressed onto a wall for good: its largest energy (J) over 4000 steps of a share of the limit that is computed, and how
@@ -84,7 +91,7 @@ fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
     model.damping_ratios.fill(damping_ratio);
     let check = MasslessCheck { model: &model, normals: vec![[-1.0, 0.0, 0.0]], slave: None };
     let limit = check.limit(1.0).unwrap().closed;
-    println!("ξ = {damping_ratio}: limit {limit:.3e} s, {:.2} of 2/ω_max", limit * model.largest_frequency() / 2.0);
+    told!("ξ = {damping_ratio}: limit {limit:.3e} s, {:.2} of 2/ω_max", limit * model.largest_frequency() / 2.0);
     let law = FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![-1e-4], sliding: vec![[0.0; 3]] };
     let settings =
         SystemSettings { scheme: Scheme::MasslessBoundary, solver: Solver::Lcp, friction: 0.0, ledger: true };
@@ -109,7 +116,7 @@ fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
 #[test]
 fn closed_contact_is_stable_up_to_the_limit_and_not_beyond() {
     let (stable, unstable) = (pressed(0.0, 0.8).0, pressed(0.0, 1.1).0);
-    println!("largest energy {stable:.1e} J below, {unstable:.1e} J above");
+    told!("largest energy {stable:.1e} J below, {unstable:.1e} J above");
     assert!(unstable > 1e3 * stable && pressed(0.05, 0.7).1 < 1e-9 && pressed(0.05, 1.05).1 > 1e-3);
 }
 
@@ -135,7 +142,7 @@ fn damping_is_part_of_the_limit() {
             if root < 0.0 { mode.beta.sqrt() } else { 0.5 * (sum.abs() + root.sqrt()) }
         };
         let (below, above) = (radius(0.99 * limit), radius(1.01 * limit));
-        println!("ξ = {damping_ratio}: limit {limit:.3e} s, largest root {below:.4} below, {above:.4} above");
+        told!("ξ = {damping_ratio}: limit {limit:.3e} s, largest root {below:.4} below, {above:.4} above");
         assert!(below < 1.0 + 1e-12 && above > 1.0, "ξ = {damping_ratio}");
     }
 }
@@ -189,7 +196,7 @@ fn friction_opposes_sliding_however_short_the_step_is() {
             }
             system.bank().row(1, 0)
         });
-        println!("{solver:?}: {ends:?}");
+        told!("{solver:?}: {ends:?}");
         assert!(ends[0].abs() > 1e-6 && (ends[1] - ends[2]).abs() < 0.2 * (ends[0] - ends[2]).abs(), "{ends:?}");
     }
 }

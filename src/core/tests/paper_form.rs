@@ -103,5 +103,5 @@ fn a_thousand_contact_steps_agree_to_rounding() {
         assert!(steps < 200_000, "only {contact_steps} contact steps");
     }
     println!("{steps} steps, {contact_steps} in contact: largest difference {:.2e} relative", worst / scale);
-    assert!(worst / scale < 1e-11, "{:.3e}", worst / scale);
+    assert!(worst / scale < 1e-12, "{:.3e}", worst / scale);
 }

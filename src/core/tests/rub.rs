@@ -56,7 +56,7 @@ fn the_ledger_closes_for_every_scheme_and_solver() {
                     simulation.do_step(time, length).unwrap();
                     touched += real(&simulation, "normal_impulse");
                     let residual = real(&simulation, "energy_residual_relative");
-                    assert!(residual.abs() < 1e-9, "{scheme:?} {solver:?} µ {friction}: residual {residual:e}");
+                    assert!(residual.abs() < 1e-13, "{scheme:?} {solver:?} µ {friction}: residual {residual:e}");
                 }
                 assert!(touched > 0.0, "no contact: the test would prove nothing");
                 // Without friction its variables do not exist.

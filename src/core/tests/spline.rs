@@ -4,10 +4,13 @@
 
 #[path = "common/casings.rs"]
 mod casings;
+#[path = "../../../tests/guide.rs"]
+mod guide;
 
 use std::f64::consts::TAU;
 
 use casings::*;
+use guide::told;
 use tiprub_core::contact::gap::dot;
 use tiprub_core::contact::spline::{Evaluation, Place, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
@@ -261,12 +264,14 @@ fn a_round_casing_is_met_to_fourth_order() {
     let error = |around| off_the_circle(around, Closure::Smooth, Interpolation::Spline);
     let errors: Vec<f64> = [24, 36, 72, 144, 288].into_iter().map(error).collect();
     for (count, error) in [24, 36, 72, 144, 288].into_iter().zip(&errors) {
-        println!("  {count:>3} points: {:.3e} m = {:.3e} R", error, error / RADIUS);
+        let facets = off_the_circle(count, Closure::Smooth, Interpolation::Facets);
+        told!("| {count} | {:.3e} | {:.3e} |", 1e6 * error, 1e6 * facets);
     }
     let rates = [(0, 1, 1.5_f64), (1, 2, 2.0), (2, 3, 2.0), (3, 4, 2.0)]
         .map(|(a, b, ratio)| (errors[a] / errors[b]).ln() / ratio.ln());
     println!("  rates {rates:.3?}");
     assert!(rates.iter().all(|rate| (rate - 4.0).abs() < 0.05), "{rates:?}");
+    guide::hold("cargo test -p tiprub-core --test spline");
 }
 
 /// Largest distance from the circle, of all patches.

@@ -1,8 +1,11 @@
 //! Oscillators and balls against stops, through the core, against closed forms: exact times, losses, grazing, long sequences.
 
+#[path = "../../../tests/guide.rs"]
+mod guide;
 #[path = "common/rods.rs"]
 mod rods;
 
+use guide::told;
 use rods::{SOLVERS, against_plane, set_samples, single};
 use tiprub_core::contact::gap::Drive;
 use tiprub_core::dynamics::modal::ModalModel;
@@ -50,8 +53,8 @@ fn dead_stop(case: DeadStop, methods: (Scheme, Solver), step: f64, turns: f64) -
 
 #[test]
 fn what_touches_a_rigid_stop_stays_and_the_spring_takes_it_back() {
-    println!("| scheme | solver | d/A | h (µs) | position | touch (steps) | loss | exact | ledger |");
-    println!("|---|---|---|---|---|---|---|---|---|");
+    told!("| scheme | solver | d/A | h (µs) | position | touch (steps) | loss | exact | ledger |");
+    told!("|---|---|---|---|---|---|---|---|---|");
     for scheme in RIGID {
         for solver in SOLVERS {
             for share in [0.2, 0.9] {
@@ -59,7 +62,7 @@ fn what_touches_a_rigid_stop_stays_and_the_spring_takes_it_back() {
                 let mut last = f64::INFINITY;
                 for step in [1e-5, 1e-6] {
                     let [position, touch, loss, ledger] = dead_stop(case, (scheme, solver), step, 3.4);
-                    println!(
+                    told!(
                         "| {scheme:?} | {solver:?} | {share} | {} | {position:.1e} | {touch:.2} | {loss:.6} | {:.6} | {ledger:.0e} |",
                         step * 1e6,
                         case.loss()
@@ -83,7 +86,7 @@ fn after_one_impact_an_oscillator_only_grazes() {
         for excess in [1e-2, 1e-4, 1e-6] {
             let case = DeadStop { omega: OMEGA, amplitude: 1e-3 * (1.0 + excess), distance: 1e-3 };
             let [position, touch, loss, ledger] = dead_stop(case, (scheme, Solver::Lcp), 1e-5, 20.0);
-            println!(
+            told!(
                 "{scheme:?}, A = (1 + {excess:e})d: position {position:.1e}, touch {touch:.2} steps late, loss {loss:.3e} of {:.3e}",
                 case.loss()
             );
@@ -125,8 +128,8 @@ fn on_a_spring(omega: f64, compliance: f64) -> ModalModel {
 
 #[test]
 fn a_ball_bounces_on_a_spring_for_ever() {
-    println!("| solver | h (µs) | height, 20 bounces | time of touch 20 (s) | largest force | energy | ledger |");
-    println!("|---|---|---|---|---|---|---|");
+    told!("| solver | h (µs) | height, 20 bounces | time of touch 20 (s) | largest force | energy | ledger |");
+    told!("|---|---|---|---|---|---|---|");
     let ball = Ball { omega: 200.0, gravity: 9.81, height: 0.05 };
     for solver in SOLVERS {
         let mut errors = Vec::new();
@@ -159,7 +162,7 @@ fn a_ball_bounces_on_a_spring_for_ever() {
             };
             let (touch, force) = (touches[19] - expected, force / ball.gravity / ball.force_over_weight() - 1.0);
             let energy = energy / (ball.gravity * ball.height);
-            println!(
+            told!(
                 "| {solver:?} | {} | {:.1e} | {touch:+.1e} | {force:+.1e} | {energy:+.1e} | {:.0e} |",
                 step * 1e6,
                 worst / ball.height,
@@ -169,7 +172,7 @@ fn a_ball_bounces_on_a_spring_for_ever() {
             errors.push(worst / ball.height);
         }
         let order = 0.5 * (errors[0] / errors[2]).log2();
-        println!("{solver:?}: order {order:.2}");
+        told!("{solver:?}: order {order:.2}");
         assert!(order > 1.3 && errors[2] < 1e-3, "{errors:?}");
     }
 }
@@ -202,15 +205,15 @@ fn bilinear(case: Bilinear, solver: Solver, step: f64, turns: u32) -> [f64; 3] {
 
 #[test]
 fn the_period_of_an_impact_oscillator_from_grazing_to_hard_impacts() {
-    println!("| solver | A/d | period (s) | period, h = 200, 100, 50 µs | order | force at 50 µs | energy |");
-    println!("|---|---|---|---|---|---|---|");
+    told!("| solver | A/d | period (s) | period, h = 200, 100, 50 µs | order | force at 50 µs | energy |");
+    told!("|---|---|---|---|---|---|---|");
     for solver in SOLVERS {
         for share in [1.000_1, 1.01, 1.5, 10.0] {
             let case = Bilinear { omega: OMEGA, ratio: 25.0, distance: 1e-3, amplitude: share * 1e-3 };
             let found = [2e-4, 1e-4, 5e-5].map(|step| bilinear(case, solver, step, 40));
             let errors = found.map(|found| found[0].abs());
             let order = 0.5 * (errors[0] / errors[2]).log2();
-            println!(
+            told!(
                 "| {solver:?} | {share} | {:.6} | {:.1e}, {:.1e}, {:.1e} | {order:.2} | {:+.1e} | {:+.1e} |",
                 case.period(),
                 errors[0],
@@ -223,4 +226,5 @@ fn the_period_of_an_impact_oscillator_from_grazing_to_hard_impacts() {
             assert!(found.iter().all(|found| found[2].abs() < 1e-3), "{found:?}");
         }
     }
+    guide::hold("cargo test -p tiprub-core --test stops impact_oscillator");
 }

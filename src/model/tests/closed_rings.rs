@@ -1,5 +1,9 @@
 //! Free rings through the casing reduction against the closed forms of thin rings: modes of the ROM by their number of waves.
 
+#[path = "../../../tests/guide.rs"]
+mod guide;
+
+use guide::told;
 use std::f64::consts::TAU;
 
 use tiprub_core::Rom;
@@ -69,9 +73,9 @@ fn pair(rom: &Rom, n: u32, component: usize) -> [f64; 2] {
 #[test]
 fn free_rings_of_a_reduction_bend_in_and_out_of_their_plane_as_in_the_books() {
     let Material { young_modulus, density, poisson_ratio, .. } = CasingOptions::default().material;
-    println!("| n | plane | side/R | ROM (Hz) | thin ring (Hz) | deviation | pair split |");
-    println!("|---|---|---|---|---|---|---|");
-    let mut deviations = Vec::new();
+    told!("| n | plane | side/R | ROM (Hz) | thin ring (Hz) | deviation | pair split |");
+    told!("|---|---|---|---|---|---|---|");
+    let (mut deviations, mut rows) = (Vec::new(), Vec::new());
     for side in [0.03, 0.015] {
         let rom = ring(side);
         let rigid = (0..rom.order()).filter(|mode| rom.stiffness[(*mode, *mode)] == 0.0).count();
@@ -88,7 +92,7 @@ fn free_rings_of_a_reduction_bend_in_and_out_of_their_plane_as_in_the_books() {
                 };
                 let found = pair(&rom, n, component);
                 let (deviation, split) = (found[0] / exact - 1.0, found[1] / found[0] - 1.0);
-                println!(
+                told!(
                     "| {n} | {plane} | {:.2} | {:.3} | {:.3} | {:+.3} % | {split:.0e} |",
                     side / RADIUS,
                     found[0] / TAU,
@@ -97,6 +101,7 @@ fn free_rings_of_a_reduction_bend_in_and_out_of_their_plane_as_in_the_books() {
                 );
                 assert!(split.abs() < 1e-6, "a double mode splits by {split:e}");
                 list.push(deviation);
+                rows.push(format!("{:.3} | {:.3} | {:+.3} %", found[0] / TAU, exact / TAU, 100.0 * deviation));
             }
         }
         deviations.push(list);
@@ -105,8 +110,11 @@ fn free_rings_of_a_reduction_bend_in_and_out_of_their_plane_as_in_the_books() {
         let [thick, thin] = [0, 1].map(|k| deviations[k][i]);
         // Shear and rotatory inertia make it softer, with the square of n side/R; what is left is mesh and reduction.
         let limit = (4.0 * thin - thick) / 3.0;
-        println!("number {i}: extrapolated to a thin ring {:+.3} %", 100.0 * limit);
+        told!("number {i}: extrapolated to a thin ring {:+.3} %", 100.0 * limit);
         assert!(thick < 0.0 && (3.2..6.0).contains(&(thick / thin)), "number {i}: {thick} {thin}");
         assert!(limit.abs() < 1.5e-3, "number {i}: {limit}");
+        let [a, b] = [&rows[i], &rows[i + deviations[0].len()]];
+        told!("| {} | {a} | {b} | {:+.2} % |", 2 + i / 2, 100.0 * limit);
     }
+    guide::hold("cargo test -p tiprub-model --test closed_rings");
 }

@@ -1,6 +1,10 @@
 //! H. Hertz's contact of a rigid sphere with an elastic half-space: a quarter of a large block, reduced to the nodes of its surface
 //! and met by the contact solvers of the core, at rest and in an impact.
 
+#[path = "../../../tests/guide.rs"]
+mod guide;
+
+use guide::told;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
 use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw};
@@ -186,10 +190,10 @@ fn at_rest(block: &Block, model: &ModalModel, solver: Solver, approach: f64) -> 
 
 /// Errors of the force, of the contact radius and of the pressure profile, root mean square over approaches that put the
 /// edge of the contact at every place within an element.
-fn refine(per_radius: usize) -> [f64; 3] {
+fn refine(per_radius: usize) -> ([f64; 3], String) {
     let (theory, block) = (hertz(), block(per_radius));
     let model = ModalModel::from_rom(&block.rom, 0.8).unwrap();
-    let (count, mut squares) = (12, [0.0; 3]);
+    let (count, mut squares, mut middle) = (12, [0.0; 3], 0.0);
     for index in 0..count {
         let radius = CONTACT * (0.75 + 0.25 * f64::from(index + 1) / f64::from(count));
         let approach = radius * radius / RADIUS;
@@ -201,11 +205,12 @@ fn refine(per_radius: usize) -> [f64; 3] {
         let errors = [found.force / theory.force(approach) - 1.0, found.radius[0] / radius - 1.0, found.pressure[1]];
         squares = [0, 1, 2].map(|i| squares[i] + errors[i] * errors[i] / f64::from(count));
         if index + 1 == count {
+            middle = found.pressure[0];
             for solver in [Solver::Coulomb, Solver::Film] {
                 let other = at_rest(&block, &model, solver, approach);
                 let off = other.force / theory.force(approach) - 1.0;
                 let [deep, negative] = other.violation;
-                println!(
+                told!(
                     "| {per_radius}, δ = 20 µm | {} | {solver:?} | {off:+.2e} | {:+.2e} | {:.2e} | {:.4} | penetration {deep:.0e} δ, adhesion {negative:.0e} F |",
                     block.elements,
                     other.radius[0] / radius - 1.0,
@@ -214,24 +219,30 @@ fn refine(per_radius: usize) -> [f64; 3] {
                 );
                 assert!(solver == Solver::Film || (other.force / found.force - 1.0).abs() < 1e-9, "{solver:?}");
             }
-            println!(
+            told!(
                 "| {per_radius}, δ = 20 µm | {} | Lcp | {:+.2e} | {:+.2e} | {:.2e} | {:.4} | |",
-                block.elements, errors[0], errors[1], errors[2], found.pressure[0]
+                block.elements,
+                errors[0],
+                errors[1],
+                errors[2],
+                found.pressure[0]
             );
         }
     }
-    squares.map(f64::sqrt)
+    let means = squares.map(f64::sqrt);
+    let [force, radius, pressure] = means.map(|mean| 100.0 * mean);
+    (
+        means,
+        format!("| {per_radius} | {} | {force:.2} % | {radius:.1} % | {pressure:.1} % | {middle:.3} |", block.elements),
+    )
 }
 
 fn table(meshes: &[usize]) -> Vec<[f64; 3]> {
-    println!("| elements per radius | elements | solver | force | contact radius | pressure, L2 | p(0)/p0 | |");
-    println!("|---|---|---|---|---|---|---|---|");
-    let errors: Vec<[f64; 3]> = meshes.iter().map(|per_radius| refine(*per_radius)).collect();
-    for (per_radius, [force, radius, pressure]) in meshes.iter().zip(&errors) {
-        println!(
-            "{per_radius} elements per radius, mean over 12 approaches: F {force:.2e}, a {radius:.2e}, p {pressure:.2e}"
-        );
-    }
+    told!("| elements per radius | elements | solver | force | contact radius | pressure, L2 | p(0)/p0 | |");
+    told!("|---|---|---|---|---|---|---|---|");
+    let found = meshes.iter().map(|per_radius| refine(*per_radius));
+    let (errors, rows): (Vec<[f64; 3]>, Vec<String>) = found.unzip();
+    rows.iter().for_each(|row| told!("{row}"));
     errors
 }
 
@@ -242,13 +253,14 @@ fn a_sphere_pressed_on_a_block_meets_hertz() {
     // At least of first order in the size of elements.
     assert!(force > 1.8 && radius > 1.8 && pressure > 1.8, "{errors:?}");
     assert!(errors[2][0] < 0.005 && errors[2][1] < 0.02 && errors[2][2] < 0.04, "{errors:?}");
+    guide::hold("cargo test -p tiprub-model --test hertz pressed");
 }
 
 /// A heavy sphere that hits the block slowly: the block follows at rest, which is what Hertz's impact supposes.
 #[test]
 fn a_sphere_that_hits_a_block_meets_hertz() {
-    println!("| scheme | h (µs) | duration | largest force | deepest | impulse | energy left in the sphere | ledger |");
-    println!("|---|---|---|---|---|---|---|---|");
+    told!("| scheme | h (µs) | duration | largest force | deepest | impulse | energy left in the sphere | ledger |");
+    told!("|---|---|---|---|---|---|---|---|");
     let (theory, block) = (hertz(), block(3));
     // Waves cross the block in 0.07 ms; the impact takes 20 ms.
     let duration = 20e-3;
@@ -288,7 +300,7 @@ fn a_sphere_that_hits_a_block_meets_hertz() {
         let left = (system.bank().modal_state(last, 0).1 / step).powi(2) / (0.25 * mass * speed * speed);
         let off = [release / exact.duration, force / exact.force, deepest / exact.depth, impulse / exact.impulse, left]
             .map(|value| value - 1.0);
-        println!(
+        told!(
             "| {scheme:?} | {:.0} | {:+.2e} | {:+.2e} | {:+.2e} | {:+.2e} | {:+.2e} | {ledger:.0e} |",
             step * 1e6,
             off[0],

@@ -245,7 +245,8 @@ fn default_blade_agrees_with_calculix_and_its_reduction_with_it() {
     for (k, (full, reference)) in checks.full_frequencies.iter().zip(&reference).enumerate() {
         let deviation = (full / reference - 1.0) * 100.0;
         println!("mode {}: {full:.4} Hz, CalculiX {reference} Hz, deviation {deviation:.2e} %", k + 1);
-        assert!(deviation.abs() <= 0.01);
+        // Seven digits are what CalculiX prints.
+        assert!(deviation.abs() <= 5e-5, "{deviation:e} %");
     }
     for k in 0..checks.full_frequencies.len() {
         let (deviation, residual) = (checks.frequency_deviation[k], checks.residual_criterion[k]);

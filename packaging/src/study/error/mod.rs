@@ -207,18 +207,16 @@ fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> Stri
 fn statements(case: &dyn Case, found: &Measured) -> Vec<Statement> {
     let title = case.title();
     let lcp = SCHEMES.map(|scheme| Competitor::Core(scheme, Solver::Lcp));
-    let (mut deepest, mut least) = (0.0_f64, 0.0_f64);
-    for row in found.rows.iter().filter(|row| lcp.contains(&row.competitor)) {
-        if let Ok(figures) = &row.outcome {
-            (deepest, least) = (deepest.max(figures.penetration), least.min(figures.adhesion));
-        }
-    }
+    let ran = found.rows.iter().filter(|row| lcp.contains(&row.competitor));
+    let ran: Vec<_> = ran.filter_map(|row| row.outcome.as_ref().ok()).collect();
+    let deepest = ran.iter().map(|figures| figures.penetration).fold(0.0, f64::max);
+    let least = ran.iter().map(|figures| figures.adhesion).fold(0.0, f64::min);
     let mut all = meeting(case, found);
     all.extend(limits(case, found));
     all.push(Statement::tested(
-        format!("{title}: lcp neither penetrates nor pulls"),
-        deepest <= 0.0 && least >= 0.0,
-        format!("deepest {deepest:.1e} m, least force {least:.1e} N"),
+        format!("{title}: lcp neither penetrates nor pulls at any internal step of any run"),
+        !ran.is_empty() && ran.iter().all(|figures| figures.penetration <= 0.0 && figures.adhesion >= 0.0),
+        format!("deepest {deepest:.1e} m, least force {least:.1e} N in {} runs", ran.len()),
     ));
     all.extend(ranking::floor(case, found));
     all.extend(window::statement(case));
@@ -231,7 +229,7 @@ fn meeting(case: &dyn Case, found: &Measured) -> Vec<Statement> {
     let (size, apart) = (case.sizes()[case.standard()], found.references[case.standard()].apart[0]);
     let Some((full, who)) = case.meeting() else {
         return vec![Statement::tested(
-            format!("{title}: the two references, which share no code, meet"),
+            format!("{title}: the two references, which share no code, meet to {MEET:e}"),
             apart < MEET,
             format!("displacements {apart:.1e} apart at {size} {}", case.size_name()),
         )];
@@ -241,38 +239,50 @@ fn meeting(case: &dyn Case, found: &Measured) -> Vec<Statement> {
         .collect();
     vec![
         Statement::tested(
-            format!("{title}: two references that share neither stepping nor contact code meet"),
+            format!("{title}: two references that share neither stepping nor contact code meet to {MEET:e}"),
             full < MEET,
             format!("displacements {full:.1e} apart: {who}"),
         ),
         Statement::tested(
             format!("{title}: the product comes nearer to them with the number of {}", case.size_name()),
-            found.truncation.windows(2).all(|pair| pair[1] < pair[0]),
+            found.truncation.len() > 1 && found.truncation.windows(2).all(|pair| pair[1] < pair[0]),
             truncation.join(", "),
         ),
     ]
+}
+
+/// Whether at every size every step refused is longer than every step that ran, and at the standard size there are both. Tried are
+/// size, step (s) and whether it ran.
+fn bounded(tried: &[(usize, f64, bool)], standard: usize) -> bool {
+    let of = |size: usize, ran: bool| tried.iter().filter(move |one| one.0 == size && one.2 == ran).map(|one| one.1);
+    let apart = |size: usize| of(size, true).fold(0.0, f64::max) < of(size, false).fold(f64::INFINITY, f64::min);
+    let both = [true, false].iter().all(|ran| of(standard, *ran).next().is_some());
+    both && tried.iter().all(|one| apart(one.0))
 }
 
 /// What central differences refuse, and how long the steps of modal-exact may be.
 fn limits(case: &dyn Case, found: &Measured) -> [Statement; 2] {
     let own = |scheme: Scheme| {
         let competitor = Competitor::Core(scheme, Solver::Lcp);
-        found.rows.iter().filter(move |row| row.size == case.standard() && row.competitor == competitor)
+        found.rows.iter().filter(move |row| row.competitor == competitor)
     };
+    let standard = |row: &&Row| row.size == case.standard();
     let longest = |scheme: Scheme| -> f64 {
-        own(scheme).filter(|row| row.outcome.is_ok()).map(|row| row.step).fold(0.0, f64::max)
+        own(scheme).filter(standard).filter(|row| row.outcome.is_ok()).map(|row| row.step).fold(0.0, f64::max)
     };
-    let central = longest(Scheme::CentralDifference);
-    let paper = Competitor::Core(Scheme::CentralDifference, Solver::Lcp);
-    let refused = |row: &&Row| row.competitor == paper && row.outcome.is_err();
-    let refused = found.rows.iter().filter(refused).count();
-    let exact = longest(Scheme::ModalExact);
+    let (central, exact) = (longest(Scheme::CentralDifference), longest(Scheme::ModalExact));
+    let tried: Vec<(usize, f64, bool)> =
+        own(Scheme::CentralDifference).map(|row| (row.size, row.step, row.outcome.is_ok())).collect();
     [
         Statement::tested(
-            format!("{}: steps beyond the limit of central differences are refused", case.title()),
-            refused > 0 && central > 0.0,
             format!(
-                "{refused} refused over all sizes, the longest that ran with {} {} is {:.3} µs",
+                "{}: central differences have a limit at every size, all steps tried beyond it are refused and none below it",
+                case.title()
+            ),
+            bounded(&tried, case.standard()),
+            format!(
+                "{} refused over all sizes, the longest that ran with {} {} is {:.3} µs",
+                tried.iter().filter(|(.., ran)| !ran).count(),
                 case.sizes()[case.standard()],
                 case.size_name(),
                 1e6 * central
@@ -283,4 +293,18 @@ fn limits(case: &dyn Case, found: &Measured) -> [Statement; 2] {
             format!("{:.3} µs, {:.1} times that of central differences", 1e6 * exact, exact / central),
         ),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_limit_parts_what_is_refused_from_what_runs() {
+        let tried = [(0, 4.0, false), (0, 2.0, true), (1, 2.0, false), (1, 1.0, true)];
+        assert!(super::bounded(&tried, 1));
+        // Beyond a step that ran there is one refused at another size only, or a shorter one.
+        assert!(!super::bounded(&tried[..3], 1), "nothing ran");
+        assert!(!super::bounded(&[&tried[..], &[(1, 8.0, true)]].concat(), 1), "a longer step ran");
+        assert!(!super::bounded(&[&tried[..], &[(0, 1.0, false)]].concat(), 1), "a shorter step was refused");
+        assert!(!super::bounded(&tried, 2), "nothing was tried at the standard size");
+    }
 }

@@ -1,0 +1,128 @@
+//! Figures of the user guide: every table of figures says where it comes from, and what a command of the program says is what
+//! the guide shows. Blocks from tests are held by these tests ([`guide::hold`]).
+
+#[path = "../../tests/guide.rs"]
+mod guide;
+
+use std::{collections::BTreeSet, fs, path::Path, process::Command};
+
+use guide::{blocks, holds, missing, numbers, pages};
+
+/// Output of `tiprub ...`, line by line.
+fn run(command: &str) -> Vec<String> {
+    let mut words = command.split(' ').skip(1);
+    let root = tempfile::tempdir().unwrap();
+    let mut tiprub = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+    tiprub.current_dir(root.path()).env("TIPRUB_CACHE", env!("CARGO_TARGET_TMPDIR")).args(&mut words).arg("--quiet");
+    let output = tiprub.output().unwrap();
+    assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap().lines().map(String::from).collect()
+}
+
+#[test]
+fn what_commands_say_is_what_the_guide_shows() {
+    let of_program: Vec<_> = blocks().into_iter().filter(|block| block.1.starts_with("tiprub ")).collect();
+    let commands: BTreeSet<&str> = of_program.iter().map(|block| block.1.as_str()).collect();
+    assert!(!commands.is_empty());
+    for command in commands {
+        let output = run(command);
+        for (page, _, block) in of_program.iter().filter(|block| block.1 == command) {
+            let missing = missing(block, &output);
+            assert!(
+                missing.is_empty(),
+                "{page}: `{command}` does not say\n{}\nbut\n{}",
+                missing.join("\n"),
+                output.join("\n")
+            );
+        }
+    }
+}
+
+/// A block whose test does not look at it would hold nothing.
+#[test]
+fn every_block_from_a_test_is_held_by_it() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let folders = [("tiprub-core", "src/core"), ("tiprub-model", "src/model"), ("tiprub", "packaging")];
+    for (page, command, block) in blocks() {
+        assert!(block.lines().any(|line| !numbers(line).is_empty()), "{page}: nothing in the block of `{command}`");
+        let Some(test) = command.strip_prefix("cargo test -p ") else {
+            assert!(command.starts_with("tiprub "), "{page}: {command}");
+            continue;
+        };
+        let mut words = test.split(' ');
+        let (package, file) = (words.next().unwrap(), words.nth(1).unwrap());
+        let folder = folders.iter().find(|folder| folder.0 == package).unwrap_or_else(|| panic!("{page}: {command}")).1;
+        let source = fs::read_to_string(root.join(folder).join("tests").join(format!("{file}.rs"))).unwrap();
+        assert!(source.contains(&format!("guide::hold(\"{command}\")")), "{page}: {command}");
+    }
+}
+
+/// Tables with decimals stand in a block, in a part that is generated, or behind a mark that says who wrote them and when, or
+/// that they are given.
+#[test]
+fn every_table_of_figures_says_where_it_comes_from() {
+    let marks =
+        ["<!-- from: ", "<!-- generated: ", "<!-- written: ", "<!-- given -->", "<!-- the table below is written by"];
+    for (page, text) in pages() {
+        let mut marked = false;
+        for (line, number) in text.lines().zip(1..) {
+            let mark = line.trim_start();
+            if mark.starts_with("<!-- end") {
+                marked = false;
+            } else if marks.iter().any(|known| mark.starts_with(known)) {
+                marked = true;
+                let dated = mark.contains("20") && mark.contains('.');
+                assert!(!mark.starts_with("<!-- written: ") || dated, "{page}, line {number}: no date or version");
+            }
+            let figures = line.split('|').filter(|cell| decimal(cell)).count();
+            let table = line.trim_start().starts_with('|');
+            assert!(marked || !table || figures < 2, "{page}, line {number} does not say where it comes from: {line}");
+        }
+    }
+}
+
+/// Whether a cell shows a number with decimals or an exponent.
+fn decimal(cell: &str) -> bool {
+    let digit = |c: Option<&char>| c.is_some_and(char::is_ascii_digit);
+    let all: Vec<char> = cell.chars().collect();
+    (1..all.len()).any(|at| {
+        digit(all.get(at - 1))
+            && (all[at] == '.' || all[at] == 'e')
+            && all.get(at + 1).is_some_and(|c| c.is_ascii_digit() || *c == '-')
+    })
+}
+
+/// The comparison sees a last digit that differs, a sign, an order and a number that is missing.
+#[test]
+fn a_figure_that_differs_is_seen() {
+    let found = "| ModalExact | Lcp | 200 | 133452.84 | 49.42 | -1.0e-3, 2.0e-13 |".to_owned();
+    let seen = |shown: &str| holds(&found, &numbers(shown));
+    for right in ["| | 200 | 133,452.8 | 49.42 |", "200, 49.4, 0.0010", "−0.0010", "−1e-3", "2e-13"] {
+        assert!(seen(right), "{right}");
+    }
+    for wrong in ["133,452.9", "49.41", "+0.0010", "49.42, 133,452.8", "200, 200", "3e-3", "201"] {
+        assert!(!seen(wrong), "{wrong}");
+    }
+    assert!(seen("5e-14") && !seen("1e-14"), "rounding is about as small as shown, not of the same digits");
+    assert_eq!(missing("| 7 |\n|---|\n| a | 200 |\n| b | 7 |\nwords", &[found]), ["| b | 7 |"]);
+}
+
+/// What the README's sample prints: torque and largest force of the demo's scene at 1700 rad/s with µ = 0.1.
+#[test]
+fn the_sample_of_the_readme_prints_what_it_says() {
+    let readme = pages().into_iter().find(|page| page.0 == "README.md").unwrap().1;
+    let line = readme.lines().find(|line| line.starts_with("print(result[\"torque\"]")).unwrap();
+    let [torque, force] = numbers(line.split('#').nth(1).unwrap())[..] else { panic!("{line}") };
+    let values = ["--set", "speed=1700", "--set", "friction_coefficient=0.1", "--stop", "0.0074", "--step", "1e-5"];
+    let rows = run(&format!("tiprub run builtin:rotor37 --csv - {}", values.join(" ")));
+    let names: Vec<&str> = rows[0].split(',').collect();
+    let column = |name: &str| -> Vec<f64> {
+        let at = names.iter().position(|known| *known == name).unwrap_or_else(|| panic!("{name} of {names:?}"));
+        rows[1..].iter().map(|row| row.split(',').nth(at).unwrap().parse().unwrap()).collect()
+    };
+    let torques = column("torque");
+    let mean = torques.iter().sum::<f64>() / torques.len() as f64;
+    let largest = names.iter().filter(|name| name.starts_with("blade[1].normal_force[")).flat_map(|name| column(name));
+    let largest = largest.fold(0.0, f64::max);
+    assert!(torque.is(mean) && force.is(largest), "{line}: {mean} N.m, {largest} N");
+}
