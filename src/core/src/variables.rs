@@ -6,6 +6,10 @@
 
 use crate::{Error, Result};
 
+/// What a clearance output says where no node has anything to touch (m): finite, as FMI wants it, and no distance in any
+/// engine. Its time derivative is 0 then.
+pub const NO_CLEARANCE: f64 = 1e9;
+
 /// Role of a variable, as in the FMI standards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Causality {

@@ -4,7 +4,23 @@ use super::{Phase, Simulation};
 use crate::contact::coating::Coating;
 use crate::contact::gap::sector_angle;
 use crate::dynamics::sectors::Sectors;
-use crate::variables::{Causality, Quantity, Span, Variable};
+use crate::variables::{Causality, NO_CLEARANCE, Quantity, Span, Variable};
+
+/// A clearance as an output tells it (m): finite.
+fn told(gap: f64) -> f64 {
+    gap.min(NO_CLEARANCE)
+}
+
+fn is_clearance(quantity: Quantity) -> bool {
+    matches!(
+        quantity,
+        Quantity::Clearance(_)
+            | Quantity::ClearanceMinimum
+            | Quantity::NodeClearanceMinimum
+            | Quantity::SectorClearanceMinimum
+            | Quantity::WatchedClearanceMinimum(_)
+    )
+}
 
 /// What all outputs of one instant share.
 struct Instant {
@@ -48,15 +64,15 @@ impl Simulation {
         let sectors = system.bank().sectors();
         let smallest = |values: &[f64]| values.iter().fold(f64::INFINITY, |low: f64, value| low.min(*value));
         match quantity {
-            Quantity::ClearanceMinimum => out[0] = smallest(&window.lowest),
+            Quantity::ClearanceMinimum => out[0] = told(smallest(&window.lowest)),
             Quantity::NodeClearanceMinimum => {
                 for (node, value) in out.iter_mut().enumerate() {
-                    *value = smallest(&window.lowest[node * lanes..][..sectors]);
+                    *value = told(smallest(&window.lowest[node * lanes..][..sectors]));
                 }
             }
             Quantity::SectorClearanceMinimum => {
                 for (sector, value) in out.iter_mut().enumerate() {
-                    *value = window.lowest.chunks(lanes).fold(f64::INFINITY, |low, row| low.min(row[sector]));
+                    *value = told(window.lowest.chunks(lanes).fold(f64::INFINITY, |low, row| low.min(row[sector])));
                 }
             }
             Quantity::SectorNormalForce => {
@@ -96,8 +112,8 @@ impl Simulation {
         for (node, value) in out.iter_mut().enumerate() {
             let index = |sector: usize| node * lanes + sector;
             *value = match quantity {
-                Quantity::Clearance(sector) => self.system.gaps()[index(sector)],
-                Quantity::WatchedClearanceMinimum(sector) => self.window.lowest[index(sector)],
+                Quantity::Clearance(sector) => told(self.system.gaps()[index(sector)]),
+                Quantity::WatchedClearanceMinimum(sector) => told(self.window.lowest[index(sector)]),
                 Quantity::NormalForce(sector) => mean * self.window.normal_impulse[index(sector)],
                 Quantity::TangentialForce(sector) => mean * self.window.tangential_impulse[index(sector)],
                 Quantity::NormalForceNow(sector) => self.system.multiplier(node, sector),
@@ -192,6 +208,8 @@ impl Simulation {
         let length = self.communication.length;
         match (variable.quantity, variable.span) {
             _ if self.phase == Phase::Created || length == 0.0 => 0.0,
+            // From nothing to touch to a clearance, and back, there is no rate.
+            _ if is_clearance(variable.quantity) && now.max(before) >= NO_CLEARANCE => 0.0,
             (Quantity::Clearance(sector), _) => self.system.gap_rate(element, sector),
             (Quantity::RotorAngle, _) => self.inputs.speed.at(0.0),
             (_, Span::Mean) if self.previous_length == 0.0 => 0.0,

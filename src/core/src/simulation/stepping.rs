@@ -1,5 +1,6 @@
 //! One communication step: begun, marched, ended.
 
+use super::checks::{OUT_OF_REACH, OUT_OF_REACH_REMEDY};
 use super::{Communication, MOST_STEPS, Phase, Progress, SAME_STEP, Simulation, TIME_TOLERANCE};
 use crate::contact::coating::Coating;
 use crate::system::StepFailure;
@@ -232,6 +233,21 @@ impl Simulation {
                          saved state or reset first"
                         .to_owned(),
             },
+            StepFailure::OutOfReach { node, sector } => Error::Unstable {
+                problem: format!(
+                    "at t = {} s (last good time {} s) contact node {} of sector {} has left the surface of the casing in z: it is \
+                     beyond the first or last ring by more than {}",
+                    shown(time),
+                    shown(self.time),
+                    self.node_name(node),
+                    sector + 1,
+                    OUT_OF_REACH
+                ),
+                remedy: format!("{OUT_OF_REACH_REMEDY}. Restore a saved state or reset first"),
+            },
+            StepFailure::Unexplained { node, sector, jump, explained } => {
+                self.unexplained(node, sector, jump, explained, time)
+            }
             // Of free masters only, dealt with above.
             StepFailure::TooFast | StepFailure::BehindEdge { .. } => Error::Unstable {
                 problem: format!("a contact node moves too far in one internal step at t = {} s", shown(time)),
@@ -260,12 +276,32 @@ impl Simulation {
         }
     }
 
+    fn node_name(&self, node: usize) -> &str {
+        &self.compiled.master().1.contact_nodes[node].name
+    }
+
+    fn unexplained(&self, node: usize, sector: usize, jump: f64, explained: f64, time: f64) -> Error {
+        Error::Unstable {
+            problem: format!(
+                "at t = {} s (last good time {} s) the gap of contact node {} of sector {} has changed by {jump:.3e} m in two steps, \
+                 where motion of node and casing explains {explained:.3e} m: the work of this contact cannot be told",
+                shown(time),
+                shown(self.time),
+                self.node_name(node),
+                sector + 1
+            ),
+            remedy: "Use a smaller internal step; if that does not help, the surface is folded or has more than one closest point \
+                     there. Restore a saved state or reset first"
+                .to_owned(),
+        }
+    }
+
     /// What only means something else for a free master.
     fn free_failure(&self, failure: StepFailure, time: f64) -> Option<Error> {
         self.compiled.free.as_ref()?;
         let behind;
         let problem = match failure {
-            StepFailure::NonFinite => return None,
+            StepFailure::NonFinite | StepFailure::Unexplained { .. } | StepFailure::OutOfReach { .. } => return None,
             StepFailure::TooFast => {
                 "contact nodes of the free structure move by more than a tenth of the extent of the contact nodes in one internal \
                  step, and could pass a surface unseen"

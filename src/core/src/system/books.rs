@@ -3,7 +3,7 @@
 use super::slave::carrier_of;
 use super::{ContactEvent, System, frame_of};
 use crate::contact::gap::{Drive, Geometry, dot};
-use crate::contact::spline_gap::{BEYOND_EDGE, Frame};
+use crate::contact::spline_gap::Frame;
 
 impl System {
     /// Enter the work of all contacts that acted over the step just done.
@@ -36,9 +36,9 @@ impl System {
         let angle = if before { self.state.angle_before } else { self.state.angle };
         let moved = self.relative_motion(event, index, geometry, angle);
         let tangential: [f64; 3] = std::array::from_fn(|i| event.force[i] - event.normal * normal[i]);
-        // A node that comes back from beyond a free edge had no gap to close.
+        // A node of a free master that comes over an edge had no gap to close: its motion is the approach.
         let (now, oldest) = (self.state.gap[index], self.gap_oldest[index]);
-        let approach = if now.max(oldest) >= BEYOND_EDGE { 0.0 } else { -0.5 * (now - oldest) };
+        let approach = if oldest.is_finite() { -0.5 * (now - oldest) } else { -dot(normal, moved) };
         let closing = event.normal * approach;
         let pushed = event.normal * dot(normal, moved) + closing;
         let supplied = -dot(tangential, self.law.sliding_velocity(event.node, index, drive)) * self.bank.step();
@@ -55,7 +55,13 @@ impl System {
 
     /// Half the displacement of a node relative to the slave over the last two steps (m), in its own directions.
     #[inline(always)]
-    fn relative_motion(&self, event: &ContactEvent, index: usize, geometry: &Geometry, angle: f64) -> [f64; 3] {
+    pub(super) fn relative_motion(
+        &self,
+        event: &ContactEvent,
+        index: usize,
+        geometry: &Geometry,
+        angle: f64,
+    ) -> [f64; 3] {
         let (lanes, now) = (self.lanes, self.bank.displacement());
         let (node, sector) = (event.node, event.sector);
         let mut moved: [f64; 3] = std::array::from_fn(|component| {

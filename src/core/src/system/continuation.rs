@@ -2,7 +2,6 @@
 
 use super::{ContactEvent, Member, Slave, StepFailure, System, frame_of};
 use crate::contact::gap::{GapLaw, dot};
-use crate::contact::spline_gap::BEYOND_EDGE;
 use crate::persist::{Persist, Reader, Writer};
 
 /// A contact force is continued over steps at most this many times as long as the one it was found in.
@@ -25,6 +24,8 @@ impl System {
             self.lasting_force(old, step);
             self.bank.resample(self.settings.scheme, step, &self.displacement_oldest);
             self.resample_slaves(step);
+            // The gap of the step before is continued along its own slope, not along the motion of the modes.
+            self.state.witnessed = self.state.steps + 2;
             let ratio = step / old;
             for (before, now) in self.state.gap_before.iter_mut().zip(&self.state.gap) {
                 if now.is_finite() {
@@ -88,10 +89,15 @@ impl System {
 
     /// A node that comes over a free edge was in front of the surface, continued beyond the edge; else it is a start in
     /// penetration, an impact of arbitrary strength.
+    ///
+    /// A surface around an axis goes on beyond its edge, and a node further out ends the run.
     pub(super) fn check_edges(&self) -> Result<(), StepFailure> {
+        if let Some(index) = self.law.out_of_reach() {
+            return Err(StepFailure::OutOfReach { node: index / self.lanes, sector: index % self.lanes });
+        }
         let GapLaw::Free(law) = &self.law else { return Ok(()) };
         for (node, (gap, before)) in self.state.gap.iter().zip(&self.state.gap_before).enumerate() {
-            if *gap < 0.0 && *before >= BEYOND_EDGE {
+            if *gap < 0.0 && before.is_infinite() {
                 let moved = self.slip_of_deformation(Member { node, sector: 0, index: node });
                 let approach = dot(moved, self.state.geometry.normal_at(node));
                 let travel = dot(moved, moved).sqrt();

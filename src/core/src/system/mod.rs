@@ -4,6 +4,7 @@ mod books;
 mod continuation;
 mod group;
 mod slave;
+mod witness;
 
 use crate::contact::coating::{CoatedProblem, Coating};
 use crate::contact::coulomb::CoulombSolver;
@@ -18,6 +19,7 @@ use crate::persist::persist_fields;
 use crate::settings::{Scheme, Solver};
 pub use group::{Member, Solution};
 pub use slave::Slave;
+use witness::Prescribed;
 
 /// Denormals are flushed every this many steps.
 const FLUSH_EVERY: u64 = 512;
@@ -66,7 +68,7 @@ pub struct SystemParts {
 }
 
 /// Why a step failed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepFailure {
     /// A displacement or gap became infinite or NaN.
     NonFinite,
@@ -84,6 +86,24 @@ pub enum StepFailure {
     BehindEdge {
         /// Contact node (0-based).
         node: usize,
+    },
+    /// A node has left a surface around an axis over its edge, further than the surface goes on.
+    OutOfReach {
+        /// Contact node (0-based).
+        node: usize,
+        /// Sector (0-based).
+        sector: usize,
+    },
+    /// A gap has changed by more than the motion of node and surface explains: it is not a distance.
+    Unexplained {
+        /// Contact node (0-based).
+        node: usize,
+        /// Sector (0-based).
+        sector: usize,
+        /// Change of the gap over two steps (m).
+        jump: f64,
+        /// What motion can explain of it (m).
+        explained: f64,
     },
     /// The contact problem of a sector has no solution within the pivoting limit.
     Unsolved {
@@ -127,6 +147,10 @@ struct SystemState {
     /// Rotor angle of the last step and of the one before (rad).
     angle: f64,
     angle_before: f64,
+    /// Prescribed motion of the last two steps.
+    prescribed: [Prescribed; 2],
+    /// Steps done when the gap two steps back was first one of steps of this size.
+    witnessed: u64,
     ledger: Ledger,
 }
 
@@ -142,6 +166,8 @@ persist_fields!(SystemState {
     geometry,
     angle,
     angle_before,
+    prescribed,
+    witnessed,
     ledger
 });
 
@@ -249,6 +275,8 @@ impl System {
                 geometry: law.geometry(lanes),
                 angle: 0.0,
                 angle_before: 0.0,
+                prescribed: [Prescribed::default(); 2],
+                witnessed: 0,
                 ledger: Ledger::default(),
             },
             bank,
@@ -326,10 +354,11 @@ impl System {
         self.state.gap[node * self.lanes + sector]
     }
 
-    /// Rate of that gap over the last step (m/s).
+    /// Rate of that gap over the last step (m/s); 0 where there was or is nothing to touch.
     pub fn gap_rate(&self, node: usize, sector: usize) -> f64 {
         let index = node * self.lanes + sector;
-        (self.state.gap[index] - self.state.gap_before[index]) / self.bank.step()
+        let change = self.state.gap[index] - self.state.gap_before[index];
+        if change.is_finite() { change / self.bank.step() } else { 0.0 }
     }
 
     /// λ of one node of one sector in the last step (N).
@@ -386,6 +415,8 @@ impl System {
         (self.state.angle, self.state.angle_before) = (drive.rotor_angle, drive.rotor_angle);
         self.evaluate_gaps(drive, false);
         self.state.gap_before.copy_from_slice(&self.state.gap);
+        self.state.prescribed = [Prescribed::of(drive); 2];
+        self.state.witnessed = 0;
         self.state.predicted.copy_from_slice(self.bank.displacement());
         self.state.ledger = Ledger { initial: self.mechanical_energy(), ..Ledger::default() };
     }
@@ -447,6 +478,7 @@ impl System {
         } else {
             self.solve_sectors(drive)?;
         }
+        self.witness(drive)?;
         self.book_all(drive);
         self.finish_loads();
         self.state.steps += 1;

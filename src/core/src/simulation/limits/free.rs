@@ -11,7 +11,6 @@ use nalgebra::DMatrix;
 use super::{Limits, Parameters};
 use crate::contact::free_gap::{FreeGap, tangent};
 use crate::contact::gap::{GapLaw, Geometry, dot};
-use crate::contact::spline_gap::BEYOND_EDGE;
 use crate::dynamics::modal::ModalModel;
 use crate::settings::Solver;
 use crate::simulation::compile::Compiled;
@@ -135,7 +134,7 @@ fn flight(law: &FreeGap, velocity: [f64; 3]) -> Vec<Met> {
         law.evaluate(&displacement, None, &mut geometry, &mut gap);
         // Beyond small displacements the master does not get there undeformed.
         let inside: Vec<usize> = (0..nodes).filter(|node| gap[*node] <= 0.0).collect();
-        if inside.is_empty() || gap.iter().all(|gap| *gap >= BEYOND_EDGE) {
+        if inside.is_empty() {
             continue;
         }
         let direction = |node: &usize| {
