@@ -59,7 +59,8 @@ pub fn run(
             stepping += clock.elapsed();
         }
     }
-    let warnings = [simulation.warnings(), &schedule.warnings()].concat();
+    let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
+    warnings.extend(simulation.late_warning());
     Ok(NativeRun { recording, stepping, internal_steps, warnings })
 }
 

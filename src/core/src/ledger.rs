@@ -84,6 +84,13 @@ impl Ledger {
         balance.value()
     }
 
+    /// Energy put into vibration since the start by forces times speeds (J): work of inputs and loads and changes of step, less
+    /// heat of friction and damping and work on the coating. Impacts, which only take, are left out.
+    pub fn supplied(&self) -> f64 {
+        let put_in = self.external_work.value() + self.load_work.value() + self.step_change.value();
+        put_in - self.friction_loss.value() - self.damping_loss.value() - self.wear_work.value()
+    }
+
     /// What the residual is compared with (J): initial energy plus all work exchanged.
     pub fn scale(&self) -> f64 {
         self.initial.abs() + self.turnover.value()

@@ -247,6 +247,8 @@ pub enum Quantity {
     KineticEnergy,
     /// Strain energy.
     StrainEnergy,
+    /// Energy that the scheme conserves (J).
+    SchemeEnergy,
     /// Damping loss.
     DampingLoss,
     /// Friction loss.

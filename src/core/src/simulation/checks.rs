@@ -122,6 +122,11 @@ impl Simulation {
                 "the displacements at the start are not finite",
                 "Check the start values of loads, temperatures and speed",
             ),
+            StepFailure::Curved(_) => (
+                "blades are displaced at the start so far around the axis that u²/2r, which linear gaps miss, is as large as the \
+                 clearance",
+                "Check the start value of the speed and the loads of the ROM; small displacements cannot describe this",
+            ),
             _ => (
                 "blades are displaced at the start by more than a tenth of the radius of the contact nodes",
                 "Check the start value of the speed and the centrifugal loads of the ROM; small displacements cannot \

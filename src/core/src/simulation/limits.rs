@@ -43,6 +43,8 @@ pub struct Limits {
     ranges: Vec<(f64, Option<Error>)>,
     /// Steps of massless-boundary; infinite for other schemes.
     massless: MasslessLimit,
+    /// Smallest step of modal-exact that passes over what contact acts on; infinite for other schemes.
+    unresolved: f64,
 }
 
 impl Simulation {
@@ -107,6 +109,7 @@ impl Simulation {
         for carrier in self.compiled.carriers() {
             stability::check_step_allowed(carrier.largest_frequency(), scheme, step)?;
         }
+        stability::unresolved::check(step, limits.unresolved, self.compiled.largest_frequency())?;
         if step >= limits.massless.usable {
             return Err(massless::refusal(step, limits.massless));
         }
@@ -164,7 +167,9 @@ impl Compiled {
         let mut at =
             Checking { compiled: self, models, parameters: parameters.clone(), watched: [Vec::new(), Vec::new()] };
         let expected = self.expected_step(parameters.step);
-        let (outcome, massless) = match at.massless(expected, law) {
+        let unresolved = self.unresolved(&at.models, parameters.scheme, |model| at.normals(model));
+        let resolved = stability::unresolved::check(expected, unresolved, at.largest_frequency());
+        let (outcome, massless) = match resolved.and_then(|()| at.massless(expected, law)) {
             Ok((more, limit)) => (at.warnings(expected, law, more), limit),
             Err(error) => (Err(error), MasslessLimit::NONE),
         };
@@ -175,7 +180,16 @@ impl Compiled {
             let steps = stability::growth_steps(at.largest_frequency(), parameters.step);
             steps.map(|step| (step, senses.iter().find_map(|sense| at.growth(step, *sense, false).err()))).collect()
         };
-        Limits { parameters, outcome, ranges: at.with_expected(ranges, expected), massless }
+        Limits { parameters, outcome, ranges: at.with_expected(ranges, expected), massless, unresolved }
+    }
+
+    /// Smallest step of modal-exact that passes over what contact acts on, of the master as `models` and of carriers.
+    fn unresolved(&self, models: &[ModalModel], scheme: Scheme, normals: impl Fn(&ModalModel) -> Vec<[f64; 3]>) -> f64 {
+        if scheme != Scheme::ModalExact {
+            return f64::INFINITY;
+        }
+        let masters = models.iter().map(|model| stability::unresolved::limit(model, &normals(model)));
+        masters.chain(self.carriers().map(stability::unresolved::limit_along_axes)).fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -336,7 +350,7 @@ impl Checking<'_> {
         let largest = 1.01 * self.parameters.step.max(step) / massless::USABLE_STIFF;
         let (mut limit, mut worst) = (MasslessLimit::NONE, (0.0, 0.0));
         for (diameter, model) in self.models.iter().enumerate() {
-            let normals = self.directions(model, 1.0).into_iter().map(|(normal, _)| normal).collect();
+            let normals = self.normals(model);
             let mut check = massless::MasslessCheck { model, normals, slave: None };
             if let Some((modes, spline)) = &modes {
                 let place = |place| self.seen_by(diameter, slave_at(spline, modes, slave_angle(place)).0);
@@ -404,6 +418,10 @@ impl Checking<'_> {
                 ([-1.0 / length, 0.0, slope / length], [0.0, sense, 0.0])
             })
             .collect()
+    }
+
+    fn normals(&self, model: &ModalModel) -> Vec<[f64; 3]> {
+        self.directions(model, 1.0).into_iter().map(|(normal, _)| normal).collect()
     }
 
     /// Sets of closed contact nodes: all combinations of a few; of many every one alone, neighbours, and all; of a wheel,

@@ -18,7 +18,7 @@ mod window;
 
 use crate::contact::gap::Drive;
 use crate::settings::Solver;
-use crate::system::System;
+use crate::system::{Curved, System};
 use crate::variables::{Quantity, Start, VariableTable};
 use crate::{Error, Result, Scene, shown};
 use compile::Compiled;
@@ -160,6 +160,15 @@ pub struct Simulation {
     warnings: Vec<String>,
     /// Limits found for the parameters checked last.
     limits: Option<limits::Limits>,
+    /// Kinetic plus strain energy of the instant, what the scheme conserves, and the first at the start (J); where the ledger is
+    /// kept.
+    energy: f64,
+    conserved: f64,
+    initial_energy: f64,
+    /// The first displacement of the run that linear kinematics describes badly, and when (s).
+    curved: Option<(Curved, f64)>,
+    /// It has been told.
+    told: bool,
 }
 
 impl Simulation {
@@ -191,6 +200,11 @@ impl Simulation {
             phase: Phase::Created,
             warnings: Vec::new(),
             limits: None,
+            energy: 0.0,
+            conserved: 0.0,
+            initial_energy: 0.0,
+            curved: None,
+            told: false,
         };
         simulation.reset();
         Ok(simulation)
@@ -216,6 +230,7 @@ impl Simulation {
         }
         let parameters = self.parameters();
         self.warnings.clear();
+        (self.curved, self.told) = (None, false);
         self.compiled.check_methods(parameters.scheme, parameters.solver)?;
         self.compiled.set_load_order(self.value_of(Quantity::LoadOrder))?;
         self.follow_reference_speed(self.inputs.speed.value)?;
@@ -242,6 +257,7 @@ impl Simulation {
         self.window.open(self.system.gaps());
         self.phase = Phase::Ready;
         self.update_outputs();
+        self.initial_energy = self.energy;
         self.previous.copy_from_slice(&self.values);
         Ok(())
     }
@@ -315,6 +331,31 @@ impl Simulation {
     /// Warnings collected by the last [`Simulation::initialise`] (unresolved modes and the like).
     pub fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+
+    /// Warning of the run so far, which could not be given at its start: displacements that linear kinematics describes badly.
+    pub fn late_warning(&self) -> Option<String> {
+        let (curved, time) = self.curved?;
+        Some(format!(
+            "at t = {} s contact node {} of sector {} is displaced by {:.3e} m around the axis: gaps are linear in displacements, which \
+             misses u²/2r = {:.2e} m, {:.0} % of the clearance; further on it grows with the square, and at 100 % the run ends",
+            shown(time),
+            self.compiled.master().1.contact_nodes[curved.node].name,
+            curved.sector + 1,
+            curved.moved,
+            curved.error,
+            100.0 * curved.share()
+        ))
+    }
+
+    /// The same, once per run.
+    pub fn take_late_warning(&mut self) -> Option<String> {
+        if self.told {
+            return None;
+        }
+        let warning = self.late_warning();
+        self.told = warning.is_some();
+        warning
     }
 
     /// Current time (s): the end of the last finished (or early-returned) step.

@@ -28,8 +28,10 @@ struct Instant {
     mean: f64,
     /// That time (s).
     elapsed: f64,
-    /// Kinetic and strain energy (J), if the ledger is kept.
+    /// Kinetic and strain energy of the instant (J), if the ledger is kept.
     energies: (f64, f64),
+    /// Energy that the scheme conserves (J), if the ledger is kept.
+    conserved: f64,
     /// Share of the friction heat that goes into the slave; all of it where the scene does not say.
     slave_share: f64,
 }
@@ -41,10 +43,15 @@ impl Simulation {
         let elapsed = self.communication.offset(self.communication.done);
         let mean = if elapsed > 0.0 && self.communication.length > 0.0 { 1.0 / elapsed } else { 0.0 };
         self.system.close_books();
-        let energies = if self.system.settings().ledger { self.system.energies() } else { (0.0, 0.0) };
+        let (mut energies, mut conserved) = ((0.0, 0.0), 0.0);
+        if self.system.settings().ledger {
+            let (kinetic, strain) = self.system.energies();
+            (energies, conserved) = (self.system.energies_now(), kinetic + strain);
+        }
+        (self.energy, self.conserved) = (energies.0 + energies.1, conserved);
         let slave_share = self.table.with_quantity(Quantity::HeatToSlave);
         let slave_share = slave_share.map_or(1.0, |variable| self.values[variable.reference as usize]);
-        let instant = Instant { mean, elapsed, energies, slave_share };
+        let instant = Instant { mean, elapsed, energies, conserved, slave_share };
         let mut values = std::mem::take(&mut self.values);
         for variable in self.table.variables() {
             if variable.causality == Causality::Output {
@@ -129,7 +136,7 @@ impl Simulation {
     fn scalar(&self, quantity: Quantity, instant: &Instant) -> f64 {
         let (system, window) = (&self.system, &self.window);
         let ledger = system.ledger();
-        let Instant { mean, elapsed, energies: (kinetic, strain), .. } = *instant;
+        let Instant { mean, elapsed, energies: (kinetic, strain), conserved, .. } = *instant;
         #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
         match quantity {
             Quantity::RotorAngle => self.rotor.total(&self.inputs.speed, elapsed),
@@ -148,6 +155,7 @@ impl Simulation {
             Quantity::InContact => f64::from(u8::from(!system.events().is_empty())),
             Quantity::KineticEnergy => kinetic,
             Quantity::StrainEnergy => strain,
+            Quantity::SchemeEnergy => conserved,
             Quantity::DampingLoss => ledger.damping_loss.value(),
             Quantity::FrictionLoss => ledger.friction_loss.value(),
             Quantity::ImpactLoss => ledger.impact_loss.value(),
@@ -156,9 +164,9 @@ impl Simulation {
             Quantity::LoadWork => ledger.load_work.value(),
             Quantity::ExternalWork => ledger.external_work.value(),
             Quantity::StepChangeEnergy => ledger.step_change.value(),
-            Quantity::EnergyResidual => ledger.residual(kinetic + strain),
+            Quantity::EnergyResidual => ledger.residual(conserved),
             Quantity::EnergyResidualRelative => {
-                let residual = ledger.residual(kinetic + strain);
+                let residual = ledger.residual(conserved);
                 if ledger.scale() > 0.0 { residual / ledger.scale() } else { 0.0 }
             }
             Quantity::InternalStep => system.bank().step(),

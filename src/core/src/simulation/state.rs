@@ -9,7 +9,7 @@ use crate::variables::Quantity;
 use crate::{Error, Result};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 3;
+const VERSION: u64 = 4;
 const CHECKSUM_BYTES: usize = 8;
 
 persist_fields!(Communication { start, length, count, done });
@@ -109,6 +109,7 @@ impl Simulation {
         self.phase.save(writer);
         self.time.save(writer);
         self.initial_time.save(writer);
+        self.initial_energy.save(writer);
         self.communication.save(writer);
         self.previous_length.save(writer);
         self.inputs.save(writer);
@@ -124,6 +125,7 @@ impl Simulation {
         self.phase.restore(reader);
         self.time.restore(reader);
         self.initial_time.restore(reader);
+        self.initial_energy.restore(reader);
         self.communication.restore(reader);
         self.previous_length.restore(reader);
         self.inputs.restore(reader);

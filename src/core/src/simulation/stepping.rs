@@ -3,9 +3,18 @@
 use super::checks::{OUT_OF_REACH, OUT_OF_REACH_REMEDY};
 use super::{Communication, MOST_STEPS, Phase, Progress, SAME_STEP, Simulation, TIME_TOLERANCE};
 use crate::contact::coating::Coating;
+use crate::settings::Scheme;
 use crate::system::StepFailure;
 use crate::variables::Causality;
 use crate::{Error, Result, shown};
+
+/// A run is warned of once u_θ²/2r is this share of the clearance.
+const CURVED_SHARE: f64 = 0.05;
+/// Energy of the instant may be so many times what was put in: the scheme's own is cos²(ωh/2) of it, one half at ωh = π/2. What is
+/// beyond is in modes that the step passes over.
+const ENERGY_FACTOR: f64 = 2.0;
+/// And a share of all work exchanged, for rounding.
+const ENERGY_SLACK: f64 = 0.01;
 
 impl Simulation {
     /// Begin a communication step of length H from the current time, landing exactly on `current_time + step_size`.
@@ -199,13 +208,49 @@ impl Simulation {
         if let Err(failure) = self.system.check_state() {
             return Err(self.fail(failure, time));
         }
+        self.note_curved(time);
         self.rotor.rebase(&self.inputs.speed, offset);
         self.update_outputs();
+        self.check_energy(time)?;
         self.rotor.shift(offset);
         self.inputs.shift(offset);
         self.time = time;
         self.phase = Phase::Ready;
         Ok(())
+    }
+
+    /// Keep the first displacement of the run that linear kinematics describes badly.
+    fn note_curved(&mut self, time: f64) {
+        if self.curved.is_none() {
+            let most = self.system.most_curved().filter(|most| most.share() >= CURVED_SHARE);
+            self.curved = most.map(|most| (most, time));
+        }
+    }
+
+    /// Vibration has no more energy than forces times speeds put in: what the scheme conserves leaves out what modes beyond the step
+    /// hold. With massless-boundary quasi-static modes hold energy one step before its work is known; its own limit keeps it.
+    fn check_energy(&mut self, time: f64) -> Result<()> {
+        let (settings, ledger) = (self.system.settings(), self.system.ledger());
+        let supplied = ledger.supplied().max(self.conserved - ledger.initial).max(0.0);
+        let bound = self.initial_energy + ENERGY_FACTOR * supplied + ENERGY_SLACK * ledger.scale();
+        if !settings.ledger || settings.scheme == Scheme::MasslessBoundary || self.energy <= bound {
+            return Ok(());
+        }
+        self.phase = Phase::Failed;
+        Err(Error::Unstable {
+            problem: format!(
+                "at t = {} s (last good time {} s) the structures hold {:.4e} J of kinetic and strain energy, where they had {:.4e} J \
+                 at the start and work less friction and damping supplied {:.4e} J: modes that the internal step of {:.3e} s does not \
+                 resolve have taken energy that is not there",
+                shown(time),
+                shown(self.time),
+                self.energy,
+                self.initial_energy,
+                supplied,
+                self.system.bank().step()
+            ),
+            remedy: "Use a smaller internal step (internal_step_max). Restore a saved state or reset first".to_owned(),
+        })
     }
 
     fn fail(&mut self, failure: StepFailure, time: f64) -> Error {
@@ -232,6 +277,23 @@ impl Simulation {
                     "Check gap, casing shape, loads and inputs; small displacements cannot describe this. Restore a \
                          saved state or reset first"
                         .to_owned(),
+            },
+            StepFailure::Curved(curved) => Error::Unstable {
+                problem: format!(
+                    "at t = {} s (last good time {} s) contact node {} of sector {} is displaced by {:.3e} m around the axis: gaps are \
+                     linear in displacements, which misses u²/2r = {:.2e} m, as much as the clearance of {:.2e} m{}",
+                    shown(time),
+                    shown(self.time),
+                    self.node_name(curved.node),
+                    curved.sector + 1,
+                    curved.moved,
+                    curved.error,
+                    curved.clearance,
+                    self.instability()
+                ),
+                remedy: "Small displacements cannot describe this: check casing shape, friction, loads and inputs. Restore a saved \
+                         state or reset first"
+                    .to_owned(),
             },
             StepFailure::OutOfReach { node, sector } => Error::Unstable {
                 problem: format!(
@@ -301,7 +363,10 @@ impl Simulation {
         self.compiled.free.as_ref()?;
         let behind;
         let problem = match failure {
-            StepFailure::NonFinite | StepFailure::Unexplained { .. } | StepFailure::OutOfReach { .. } => return None,
+            StepFailure::NonFinite
+            | StepFailure::Unexplained { .. }
+            | StepFailure::OutOfReach { .. }
+            | StepFailure::Curved(_) => return None,
             StepFailure::TooFast => {
                 "contact nodes of the free structure move by more than a tenth of the extent of the contact nodes in one internal \
                  step, and could pass a surface unseen"

@@ -1,4 +1,4 @@
-//! What carries a running state on: another step size, saving and restoring, and whether it still makes sense.
+//! What carries a running state on: another step size, saving and restoring, and ways over an edge.
 
 use super::{ContactEvent, Member, Slave, StepFailure, System, frame_of};
 use crate::contact::gap::{GapLaw, dot};
@@ -41,8 +41,24 @@ impl System {
         }
     }
 
-    /// The same forces act on the slaves, where the last step found them.
+    /// Kinetic and strain energy of all structures at this instant (J): ½q̇ᵀMq̇ with the velocity of the instant, ½qᵀKq. Between
+    /// steps only.
+    pub fn energies_now(&mut self) -> (f64, f64) {
+        let step = self.bank.step();
+        self.lasting_force(step, step);
+        self.spread_lasting();
+        let own = self.bank.energies_now(&self.displacement_oldest);
+        let slaves = self.slaves.iter_mut().map(Slave::energies_now);
+        slaves.fold(own, |sum, slave| (sum.0 + slave.0, sum.1 + slave.1))
+    }
+
     fn resample_slaves(&mut self, step: f64) {
+        self.spread_lasting();
+        self.slaves.iter_mut().for_each(|slave| slave.carry_over(self.settings.scheme, step));
+    }
+
+    /// The same forces act on the slaves, where the last step found them.
+    fn spread_lasting(&mut self) {
         if self.slaves.is_empty() {
             return;
         }
@@ -58,7 +74,6 @@ impl System {
                 self.slaves[carrier].add_lasting(surface, self.state.geometry.places[index], frame, force);
             }
         }
-        self.slaves.iter_mut().for_each(|slave| slave.carry_over(self.settings.scheme, step));
     }
 
     /// Leaves in `displacement_oldest` (scratch between steps) the contact forces without those of impacts.
@@ -107,29 +122,6 @@ impl System {
             }
         }
         Ok(())
-    }
-
-    /// Whether the state is still what the model describes.
-    ///
-    /// # Errors
-    /// Coordinates that are not finite; displacements beyond a tenth of the radius, or those of the nodes of a free master
-    /// against each other beyond a tenth of their extent.
-    pub fn check_state(&self) -> Result<(), StepFailure> {
-        if !self.bank.is_finite() || self.slaves.iter().any(|slave| !slave.bank.is_finite()) {
-            return Err(StepFailure::NonFinite);
-        }
-        let limit = self.law.largest_displacement();
-        let mut moved = self.slaves.iter().flat_map(|slave| slave.bank.displacement());
-        if moved.any(|displacement| displacement.abs() > limit) {
-            return Err(StepFailure::CasingImplausible);
-        }
-        if let GapLaw::Free(law) = &self.law {
-            let distorted = law.is_distorted(self.bank.displacement());
-            return if distorted { Err(StepFailure::Implausible { sector: 0 }) } else { Ok(()) };
-        }
-        let beyond = self.bank.displacement().iter().position(|displacement| displacement.abs() > limit);
-        let sector = beyond.map(|index| index % self.lanes);
-        sector.map_or(Ok(()), |sector| Err(StepFailure::Implausible { sector }))
     }
 
     /// Write everything that determines the future, the step size included.

@@ -4,6 +4,7 @@ mod books;
 mod continuation;
 mod group;
 mod slave;
+mod small;
 mod witness;
 
 use crate::contact::coating::{CoatedProblem, Coating};
@@ -19,6 +20,7 @@ use crate::persist::persist_fields;
 use crate::settings::{Scheme, Solver};
 pub use group::{Member, Solution};
 pub use slave::Slave;
+pub use small::Curved;
 use witness::Prescribed;
 
 /// Denormals are flushed every this many steps.
@@ -87,6 +89,8 @@ pub enum StepFailure {
         /// Contact node (0-based).
         node: usize,
     },
+    /// A node moves so far around the axis that what linear kinematics misses is as large as its clearance.
+    Curved(Curved),
     /// A node has left a surface around an axis over its edge, further than the surface goes on.
     OutOfReach {
         /// Contact node (0-based).
@@ -426,7 +430,7 @@ impl System {
         kinetic + strain
     }
 
-    /// Kinetic and strain energy of all structures (J).
+    /// Kinetic and strain energy of all structures (J), in the quantity the scheme conserves and the ledger closes with.
     pub fn energies(&self) -> (f64, f64) {
         let slaves = self.slaves.iter().map(|slave| slave.bank.energies());
         slaves.fold(self.bank.energies(), |sum, slave| (sum.0 + slave.0, sum.1 + slave.1))

@@ -140,29 +140,24 @@ mod tests {
     #[test]
     fn a_distance_that_motion_does_not_explain_ends_the_step() {
         let mut system = flying();
-        let mut impacts = 0;
-        for _ in 0..200 {
-            let honest = system.clone();
+        let mut honest = system.clone();
+        while system.events().is_empty() {
+            honest = system.clone();
             system.step(&Drive::default()).unwrap();
-            if system.events().is_empty() {
-                continue;
-            }
-            impacts += 1;
-            // It came 2 µm closer; a metre, or 10 µm, is not what it came.
-            for (off, passes) in [(0.0, true), (1e-7, true), (1e-5, false), (1.0, false), (f64::NAN, false)] {
-                let mut spoilt = honest.clone();
-                spoilt.state.gap_before[0] += off;
-                let outcome = spoilt.step(&Drive::default());
-                assert_eq!(outcome.is_ok(), passes, "{off}: {outcome:?}");
-                if let (Err(failure), false) = (outcome, off.is_nan()) {
-                    let StepFailure::Unexplained { node: 0, sector: 0, jump, explained } = failure else {
-                        panic!("{failure:?}")
-                    };
-                    assert!(jump > off && explained < 1e-5, "{jump:e}, {explained:e}");
-                }
+        }
+        // It came a micrometre closer; a metre, or ten micrometres, is not what it came.
+        for (off, passes) in [(0.0, true), (1e-7, true), (1e-5, false), (1.0, false), (f64::NAN, false)] {
+            let mut spoilt = honest.clone();
+            spoilt.state.gap_before[0] += off;
+            let outcome = spoilt.step(&Drive::default());
+            assert_eq!(outcome.is_ok(), passes, "{off}: {outcome:?}");
+            if let (Err(failure), false) = (outcome, off.is_nan()) {
+                let StepFailure::Unexplained { node: 0, sector: 0, jump, explained } = failure else {
+                    panic!("{failure:?}")
+                };
+                assert!(jump > off && explained < 1e-5, "{jump:e}, {explained:e}");
             }
         }
-        assert_eq!(impacts, 1);
     }
 
     #[test]

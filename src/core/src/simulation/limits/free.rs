@@ -12,7 +12,7 @@ use super::{Limits, Parameters};
 use crate::contact::free_gap::{FreeGap, tangent};
 use crate::contact::gap::{GapLaw, Geometry, dot};
 use crate::dynamics::modal::ModalModel;
-use crate::settings::Solver;
+use crate::settings::{Scheme, Solver};
 use crate::simulation::compile::Compiled;
 use crate::simulation::free::FreeParts;
 use crate::stability::massless::MasslessLimit;
@@ -37,8 +37,24 @@ struct Met {
 impl Compiled {
     pub(super) fn free_limits(&self, parameters: &Parameters, free: &FreeParts, law: &FreeGap) -> Limits {
         let step = self.expected_step(parameters.step);
-        let outcome = self.free_warnings(parameters, free, law, step);
-        Limits { parameters: parameters.clone(), outcome, ranges: Vec::new(), massless: MasslessLimit::NONE }
+        // Contacts of a free master may act along any direction.
+        let unresolved = match parameters.scheme {
+            Scheme::ModalExact => stability::unresolved::limit_along_axes(&self.model).min(self.unresolved(
+                &[],
+                parameters.scheme,
+                |_| Vec::new(),
+            )),
+            _ => f64::INFINITY,
+        };
+        let resolved = stability::unresolved::check(step, unresolved, self.model.largest_frequency());
+        let outcome = resolved.and_then(|()| self.free_warnings(parameters, free, law, step));
+        Limits {
+            parameters: parameters.clone(),
+            outcome,
+            ranges: Vec::new(),
+            massless: MasslessLimit::NONE,
+            unresolved,
+        }
     }
 
     fn free_warnings(

@@ -188,6 +188,13 @@ fn energies(table: &mut Builder, parts: &Parts) {
     let rows = [
         (Quantity::KineticEnergy, "kinetic_energy", Span::Point, "Kinetic energy of all structures, flight included"),
         (Quantity::StrainEnergy, "strain_energy", Span::Point, "Strain energy of all structures"),
+        (
+            Quantity::SchemeEnergy,
+            "scheme_energy",
+            Span::Point,
+            "Energy that the time scheme conserves and the ledger closes with: kinetic plus strain energy up to the second order of \
+             the step",
+        ),
         (Quantity::DampingLoss, "damping_loss", Span::Total, "Energy lost by modal damping since the start"),
         (Quantity::FrictionLoss, "friction_loss", Span::Total, "Friction heat since the start"),
         (
