@@ -140,8 +140,5 @@ fn dragged(share: f64) -> Result<Vec<Check>> {
     }
     let (told, far) = (simulation.late_warning().is_some(), moved(&simulation));
     let error = far * far / (2.0 * RADIUS * GAP);
-    Ok(vec![
-        Check::so("it is told from 5 % on", told == (error >= 0.05)),
-        Check::so("it came so far", far >= wanted),
-    ])
+    Ok(vec![Check::so("it is told from 5 % on", told == (error >= 0.05)), Check::so("it came so far", far >= wanted)])
 }

@@ -10,9 +10,9 @@ use crate::{Error, Result, shown};
 
 /// A run is warned of once u_θ²/2r is this share of the clearance.
 const CURVED_SHARE: f64 = 0.05;
-/// Energy of the instant may be so many times what was put in: the scheme's own is cos²(ωh/2) of it, one half at ωh = π/2. What is
-/// beyond is in modes that the step passes over.
-const ENERGY_FACTOR: f64 = 2.0;
+/// Energy of the instant may be so many times what was put in: the scheme's own is cos²(ωh/2) of it, a fourth at ωh = 2π/3, the end of
+/// what a step resolves. What is beyond is in modes that the step passes over.
+const ENERGY_FACTOR: f64 = 4.0;
 /// And a share of all work exchanged, for rounding.
 const ENERGY_SLACK: f64 = 0.01;
 

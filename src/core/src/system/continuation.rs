@@ -6,6 +6,8 @@ use crate::persist::{Persist, Reader, Writer};
 
 /// A contact force is continued over steps at most this many times as long as the one it was found in.
 const FORCE_REACH: f64 = 4.0;
+/// Gaps are closed up to this share of what says nothing ([`GapLaw::indifferent`]).
+const CLOSED: f64 = 1e-9;
 /// How far behind a surface, continued beyond its edge, a node may have been: share of its way in the step, since the surface
 /// may bend, and of the largest displacement that counts as small.
 const BEHIND_EDGE: [f64; 2] = [1e-3, 1e-6];
@@ -84,7 +86,9 @@ impl System {
             *lasting = reach * reach * force;
         }
         for (index, gap) in self.state.gap_before.iter().enumerate() {
-            let lasts = *gap <= 0.0 && self.state.gap[index] <= 0.0;
+            // `film` closes gaps up to rounding.
+            let closed = CLOSED * self.law.indifferent(index / lanes);
+            let lasts = *gap <= closed && self.state.gap[index] <= closed;
             if !lasts {
                 let (node, sector) = (index / lanes, index % lanes);
                 for component in 0..3 {

@@ -474,7 +474,8 @@ mod tests {
         let push = [0.0, 30.0, 4e3, 1e4];
         bank.settle(&push);
         bank.loads_mut().copy_from_slice(&push);
-        let terms = push.iter().zip(&model.frequencies).skip(1).map(|(load, frequency)| 0.5 * (load / frequency).powi(2));
+        let terms =
+            push.iter().zip(&model.frequencies).skip(1).map(|(load, frequency)| 0.5 * (load / frequency).powi(2));
         let at_rest: f64 = terms.sum();
         bank.predict(false);
         let (kinetic, strain) = bank.energies_now(&[]);
