@@ -232,7 +232,7 @@ impl Simulation {
     fn check_energy(&mut self, time: f64) -> Result<()> {
         let (settings, ledger) = (self.system.settings(), self.system.ledger());
         let supplied = ledger.supplied().max(self.conserved - ledger.initial).max(0.0);
-        let bound = self.initial_energy + ENERGY_FACTOR * supplied + ENERGY_SLACK * ledger.scale();
+        let bound = ENERGY_FACTOR * (self.initial_energy + supplied) + ENERGY_SLACK * ledger.scale();
         if !settings.ledger || settings.scheme == Scheme::MasslessBoundary || self.energy <= bound {
             return Ok(());
         }
@@ -291,7 +291,7 @@ impl Simulation {
                     curved.clearance,
                     self.instability()
                 ),
-                remedy: "Small displacements cannot describe this: check casing shape, friction, loads and inputs. Restore a saved \
+                remedy: "Check casing shape, friction, loads and inputs: small displacements cannot describe this. Restore a saved \
                          state or reset first"
                     .to_owned(),
             },
