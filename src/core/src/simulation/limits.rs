@@ -167,7 +167,9 @@ impl Compiled {
         let mut at =
             Checking { compiled: self, models, parameters: parameters.clone(), watched: [Vec::new(), Vec::new()] };
         let expected = self.expected_step(parameters.step);
-        let unresolved = self.unresolved(&at.models, parameters.scheme, |model| at.normals(model));
+        // Radially: along an inclined normal the bending of the blade would hide what the tip itself yields.
+        let radial = |model: &ModalModel| vec![[-1.0, 0.0, 0.0]; model.contact_modes.nrows() / 3];
+        let unresolved = self.unresolved(&at.models, parameters.scheme, radial);
         let resolved = stability::unresolved::check(expected, unresolved, at.largest_frequency());
         let (outcome, massless) = match resolved.and_then(|()| at.massless(expected, law)) {
             Ok((more, limit)) => (at.warnings(expected, law, more), limit),
@@ -188,7 +190,7 @@ impl Compiled {
         if scheme != Scheme::ModalExact {
             return f64::INFINITY;
         }
-        let masters = models.iter().map(|model| stability::unresolved::limit(model, &normals(model)));
+        let masters = models.iter().map(|model| stability::unresolved::limit(model, &directions(model)));
         masters.chain(self.carriers().map(stability::unresolved::limit_along_axes)).fold(f64::INFINITY, f64::min)
     }
 }
