@@ -186,7 +186,12 @@ impl Compiled {
     }
 
     /// Smallest step of modal-exact that passes over what contact acts on, of the master as `models` and of carriers.
-    fn unresolved(&self, models: &[ModalModel], scheme: Scheme, normals: impl Fn(&ModalModel) -> Vec<[f64; 3]>) -> f64 {
+    fn unresolved(
+        &self,
+        models: &[ModalModel],
+        scheme: Scheme,
+        directions: impl Fn(&ModalModel) -> Vec<[f64; 3]>,
+    ) -> f64 {
         if scheme != Scheme::ModalExact {
             return f64::INFINITY;
         }
