@@ -62,7 +62,8 @@ pub fn run(
             stepping += clock.elapsed();
         }
     }
-    let warnings = [simulation.warnings(), &schedule.warnings()].concat();
+    let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
+    warnings.extend(simulation.take_notes());
     Ok(NativeRun { recording, stepping, internal_steps, warnings })
 }
 

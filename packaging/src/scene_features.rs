@@ -120,8 +120,8 @@ pub fn limits(scene: &Scene) -> Vec<String> {
         choose(
             flexible,
             "The casing is laid parallel to the contour of the blade tips at the given clearance, whatever radius its mesh \
-             has, and bends with the modes of its reduced model; a blade tip that leaves its rings over an edge has no \
-             contact.",
+             has, and bends with the modes of its reduced model; beyond its rings it goes on along its tangents for a \
+             quarter of its axial extent.",
             "The casing is a rigid surface of the given shape, parallel to the contour of the blade tips.",
         ),
         blades(coupled, stiffens),

@@ -60,8 +60,6 @@ pub struct Ledger {
     /// What lies between the work of contact forces in the scheme and all that has a name: normals turn and surfaces curve
     /// within a step. It vanishes with the step.
     pub curvature_work: Sum,
-    /// The same of nodes that were on the surface before: what comes back over an edge has another cause.
-    pub inner_curvature_work: Sum,
     /// Energy added (or removed) by carrying the state to another step size.
     pub step_change: Sum,
     /// Sum of the magnitudes of all external work: the scale of the residual.
@@ -82,7 +80,6 @@ persist_fields!(Ledger {
     shift_work,
     casing_work,
     curvature_work,
-    inner_curvature_work,
     step_change,
     turnover
 });
@@ -119,6 +116,13 @@ impl Ledger {
     pub fn exchanged(&self) -> f64 {
         let losses = [self.damping_loss, self.friction_loss, self.impact_loss, self.wear_work];
         self.scale() + losses.iter().map(|loss| loss.value().abs()).sum::<f64>()
+    }
+
+    /// Energy put into vibration since the start by forces times speeds (J): work of inputs and loads and changes of step, less
+    /// heat of friction and damping and work on the coating. Impacts, which only take, are left out.
+    pub fn supplied(&self) -> f64 {
+        let put_in = self.external_work() + self.load_work.value() + self.step_change.value();
+        put_in - self.friction_loss.value() - self.damping_loss.value() - self.wear_work.value()
     }
 
     /// What the residual is compared with (J): initial energy plus all work exchanged.

@@ -6,6 +6,10 @@
 
 use crate::{Error, Result};
 
+/// What a clearance output says where no node has anything to touch (m): finite, as FMI wants it, and no distance in any
+/// engine. Its time derivative is 0 then.
+pub const NO_CLEARANCE: f64 = 1e9;
+
 /// Role of a variable, as in the FMI standards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Causality {
@@ -248,6 +252,8 @@ pub enum Quantity {
     KineticEnergy,
     /// Strain energy.
     StrainEnergy,
+    /// Energy that the scheme conserves (J).
+    SchemeEnergy,
     /// Damping loss.
     DampingLoss,
     /// Friction loss.

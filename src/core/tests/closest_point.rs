@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 
 use casings::*;
 use tiprub_core::contact::gap::dot;
-use tiprub_core::contact::spline::{Evaluation, Place, Projection, SurfaceSpline};
+use tiprub_core::contact::spline::{Evaluation, Place, Projection, REACH, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
 
 /// A node at a signed distance inside a place, with its closest point known by construction.
@@ -185,7 +185,7 @@ fn a_corner_on_an_inner_ring_of_facets_is_no_edge() {
 }
 
 #[test]
-fn a_node_on_the_edge_is_in_and_one_beyond_it_is_out() {
+fn a_node_finds_the_surface_beyond_its_edge_and_not_beyond_its_reach() {
     for (closure, interpolation) in KINDS {
         let points = data(36, 3, conical);
         let surface = SurfaceSpline::new(&points, 36, 3, closure, interpolation).unwrap();
@@ -198,14 +198,27 @@ fn a_node_on_the_edge_is_in_and_one_beyond_it_is_out() {
                 let guess = Place { t: random.next(), patch: [p, random.below(2)], s: random.next() };
                 let (at, _, _, value) = found(surface.project(x, guess));
                 assert!((value - gap).abs() < 4e-16 && (at.t - t).abs() < 1e-9, "{at:?} for {edge:?}");
-                let tangent = surface.evaluate(edge).d_t;
-                let beyond: [f64; 3] = std::array::from_fn(|i| x[i] + outwards * 1e-6 * tangent[i]);
-                let Projection::BeyondEdge { place: last } = surface.project(beyond, guess) else {
-                    panic!("{:?} is beyond the edge", surface.project(beyond, guess));
+                // Anywhere on what goes on, at its distance, on either side of it.
+                let reach = 2.0 * REACH;
+                let out = t + outwards * reach * random.within(0.0, 0.999);
+                let beyond = Place { t: out, ..edge };
+                for gap in [gap, -gap] {
+                    let (at, _, _, value) = found(surface.project(node(&surface, beyond, gap), guess));
+                    assert!((value - gap).abs() < 4e-16, "{value} for {gap} at {at:?}");
+                    assert!((at.t - out).abs() < 1e-9 && at.patch == [p, q], "{at:?} for {beyond:?}");
+                }
+                // It goes on along the tangent of the edge.
+                let (first, last) = (surface.evaluate(edge), surface.evaluate(beyond));
+                let tangent: [f64; 3] = std::array::from_fn(|i| first.point[i] + (out - t) * first.d_t[i]);
+                assert!(distance(tangent, last.point) < 4e-16 && distance(first.d_t, last.d_t) < 4e-16);
+                // Further out it is lost, and found again from the last place.
+                let tangent = last.d_t;
+                let gone: [f64; 3] = std::array::from_fn(|i| x[i] + outwards * (reach + 1e-6) * tangent[i]);
+                let Projection::BeyondEdge { place: last } = surface.project(gone, guess) else {
+                    panic!("{:?} is out of reach", surface.project(gone, guess));
                 };
-                assert!((last.t - t).abs() < 1e-8 && last.patch == [p, q], "{last:?} for {edge:?}");
-                let inside: [f64; 3] = std::array::from_fn(|i| x[i] - outwards * 1e-6 * tangent[i]);
-                found(surface.project(inside, last));
+                assert!((last.t - t - outwards * reach).abs() < 1e-8 && last.patch == [p, q], "{last:?} for {edge:?}");
+                found(surface.project(x, last));
             }
         }
     }

@@ -82,7 +82,8 @@ fn casings_that_small_displacements_cannot_describe_are_refused() {
     // Teeth: 4 mm high, 0.9 mm apart.
     let mut scene = common::scene(12);
     scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 4e-3, order: 300, phase: 0.0 };
-    assert!(refusal(&scene).contains("45°"));
+    let message = refusal(&scene);
+    assert!(message.contains("45°") || message.contains("displaced by"), "{message}");
 }
 
 #[test]
@@ -259,7 +260,7 @@ fn a_blade_keeps_its_energy_over_ten_million_undamped_steps() {
         let (factor, offset) = (reference(&simulation, "casing_shape_factor"), reference(&simulation, "gap_offset"));
         simulation.set_real(factor, 0.0).unwrap();
         simulation.set_real(offset, 1e-2).unwrap();
-        let energy = |simulation: &Simulation| real(simulation, "kinetic_energy") + real(simulation, "strain_energy");
+        let energy = |simulation: &Simulation| real(simulation, "scheme_energy");
         simulation.do_step(simulation.time(), 5e-5).unwrap();
         let before = energy(&simulation);
         for _ in 0..100 {

@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 use casings::*;
 use guide::told;
 use tiprub_core::contact::gap::dot;
-use tiprub_core::contact::spline::{Evaluation, Place, SurfaceSpline};
+use tiprub_core::contact::spline::{Evaluation, Place, REACH, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
 
 #[test]
@@ -148,6 +148,11 @@ fn edges_and_free_ends_have_no_second_derivative_and_the_seam_of_free_ends_kinks
         }
     }
     assert_below("S_tt at the free edges, relative", edge, 8.0 * EPS);
+    let (beyond, weights) = beyond_the_edges();
+    for (order, error) in beyond.into_iter().enumerate() {
+        assert_below(&format!("jump of derivatives of order {order} over the edge, relative"), error, 16.0 * EPS);
+    }
+    assert_below("weights of what goes on, against its points, relative", weights, 16.0 * EPS);
     let points = data(36, 5, lobed);
     let surface = SurfaceSpline::new(&points, 36, 5, Closure::FreeEnds, Interpolation::Spline).unwrap();
     let mut kink: f64 = 0.0;
@@ -164,6 +169,28 @@ fn edges_and_free_ends_have_no_second_derivative_and_the_seam_of_free_ends_kinks
     assert_below("gap of the seam and S_ss there, free ends, relative", seam, 8.0 * EPS);
     println!("kink of the seam with free ends, 36 points: {:.3}°", kink.to_degrees());
     assert!(kink > 0.01, "free ends do not join smoothly");
+}
+
+/// Largest jumps of derivatives over the edges, and difference of Σ weight · control point and the point of what goes on.
+fn beyond_the_edges() -> ([f64; 3], f64) {
+    let (mut worst, mut weights) = ([0.0_f64; 3], 0.0_f64);
+    for (surface, _) in every_surface() {
+        let last = surface.along() - 2;
+        for p in 0..surface.around() {
+            for (q, t, outwards) in [(0, 0.0, -1.0), (last, 1.0, 1.0)] {
+                let found = jumps(&surface, place(p, q, 0.4, t), place(p, q, 0.4, t + 1e-17_f64.copysign(outwards)));
+                let over = jumps(&surface, place(p, q, 0.4, t), place(p, q, 0.4, t + 1e-15 * outwards));
+                worst = std::array::from_fn(|i| worst[i].max(found[i]).max(over[i]));
+                let out = place(p, q, 0.4, t + outwards * REACH * (surface.along() - 1) as f64);
+                let points = surface.control_points();
+                let terms = surface.weights(out);
+                let sum = |i: usize| terms.iter().map(|(index, weight)| weight * points[index][i]).sum::<f64>();
+                let sum = std::array::from_fn(sum);
+                weights = weights.max(distance(sum, surface.evaluate(out).point) / RADIUS);
+            }
+        }
+    }
+    (worst, weights)
 }
 
 #[test]
@@ -218,8 +245,12 @@ fn virtual_work_is_the_same_on_the_surface_and_on_the_data() {
             let mut moved = surface.clone();
             moved.set_control_points(&control);
             let (mut forces, mut work, mut size) = (vec![[0.0; 3]; count], 0.0, 0.0);
-            for _ in 0..30 {
-                let (place, force) = (random.place(&surface), random.vector(1.0));
+            for index in 0..30 {
+                let (mut place, force) = (random.place(&surface), random.vector(1.0));
+                if index % 3 == 0 && place.patch[1] == 0 {
+                    // Before the first ring.
+                    place.t *= -REACH * (surface.along() - 1) as f64;
+                }
                 let done = dot(force, moved.evaluate(place).point);
                 work += done;
                 size += done.abs();

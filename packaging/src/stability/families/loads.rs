@@ -151,7 +151,7 @@ fn sudden(mut scene: Scene, what: &str) -> Result<Vec<Check>> {
         work = work.max(real(&simulation, "load_work"));
     }
     let mut checks = watch.books();
-    let energy = real(&simulation, "kinetic_energy") + real(&simulation, "strain_energy");
+    let energy = real(&simulation, "scheme_energy");
     checks.push(Check::relative("energy is the work of the load", energy, real(&simulation, "load_work"), 1e-9));
     checks.push(Check::so("the load did work", work > 0.0));
     if what == "load" {

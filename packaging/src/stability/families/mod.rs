@@ -12,6 +12,7 @@ pub mod plates;
 pub mod proof;
 pub mod random;
 pub mod stepping;
+pub mod surfaces;
 pub mod turning;
 pub mod values;
 pub mod wheel;
@@ -35,6 +36,7 @@ pub fn all() -> Vec<Case> {
         builtin::cases(),
         random::cases(),
         values::cases(),
+        surfaces::cases(),
     ];
     families.into_iter().flatten().collect()
 }

@@ -22,6 +22,7 @@ pub fn cases() -> Vec<Case> {
             against,
             &[
                 &["displaced by more than a tenth", "Check gap, casing shape"],
+                &["is displaced by", "u²/2r", "Check casing shape"],
                 &["µ", "Use"],
                 &["internal step", "below"],
             ],

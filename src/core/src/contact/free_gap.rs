@@ -1,11 +1,12 @@
 //! Gaps of a free master: every contact node against the open surface of its pair, all in the fixed frame.
 //!
 //! A node stands at x = X + u, rigid flight included, and meets the closest point of its surface: g = (x − S)·n with
-//! n = S_t × S_s/|S_t × S_s|. A node beyond a free edge has nothing to touch, and so has one that belongs to no pair.
+//! n = S_t × S_s/|S_t × S_s|. A node beyond a free edge has nothing to touch, and so has one that belongs to no pair: their
+//! gap is infinite and their normal zero.
 
 use super::gap::{Geometry, dot};
 use super::spline::{Place, Projection, SurfaceSpline};
-use super::spline_gap::BEYOND_EDGE;
+use super::spline_gap::NOTHING_TO_TOUCH;
 
 /// Displacements and penetrations beyond this share of the extent of the contact nodes are not small.
 const SMALL_FRACTION: f64 = 0.1;
@@ -93,7 +94,7 @@ impl FreeGap {
     pub fn evaluate(&self, displacement: &[f64], guess: Option<&[Place]>, geometry: &mut Geometry, gap: &mut [f64]) {
         for (node, gap) in gap.iter_mut().enumerate() {
             let Some(index) = self.surface_of[node] else {
-                *gap = BEYOND_EDGE;
+                *gap = NOTHING_TO_TOUCH;
                 continue;
             };
             let surface = &self.surfaces[index].surface;
@@ -105,7 +106,7 @@ impl FreeGap {
             }
             let (value, place, normal) = match found {
                 Projection::Found { place, normal, gap, .. } => (gap, place, normal),
-                Projection::BeyondEdge { place } => (BEYOND_EDGE, place, [0.0; 3]),
+                Projection::BeyondEdge { place } => (NOTHING_TO_TOUCH, place, [0.0; 3]),
                 // Found out by the caller: the state is not what the model describes any more.
                 Projection::Lost => (f64::NAN, start, [0.0; 3]),
             };

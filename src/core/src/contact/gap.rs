@@ -332,7 +332,7 @@ impl GapLaw {
     /// Gaps (m) and normals at an instant, for the displacements `[row · lanes + lane]` of the contact rows (m) and
     /// `moved` of the control points of a surface around an axis that is carried by a structure (open surfaces have been
     /// displaced by [`super::free_gap::OpenSurface::follow`]). `before` is the geometry of the step
-    /// before, from which closest points are sought. Gaps of padding lanes are infinite.
+    /// before, from which closest points are sought. Gaps are infinite in padding lanes and where there is nothing to touch.
     pub fn evaluate(
         &mut self,
         drive: &Drive,
@@ -362,6 +362,42 @@ impl GapLaw {
         if let Self::Spline(law) = self {
             law.turned = angle / std::f64::consts::TAU;
         }
+    }
+
+    /// Largest change of the surface by its shape at factor 1 (m).
+    pub fn shape_size(&self) -> f64 {
+        match self {
+            Self::Fixed(_) | Self::Free(_) => 0.0,
+            Self::Revolution(law) => law.surface.largest_change(),
+            Self::Spline(law) => law.shape_size,
+        }
+    }
+
+    /// What turning by `angle` (rad) can do to a gap (m): under the shape at `factor`, and under a surface laid through
+    /// points that are displaced by up to `moved` (m).
+    pub fn turned_under(&self, angle: f64, factor: f64, moved: f64) -> f64 {
+        // From one end of the range of a change to the other at most.
+        let part = |scale: f64| 2.0 * (angle / scale).min(1.0);
+        let shape = if factor == 0.0 { 0.0 } else { factor * self.shape_size() * part(self.angular_scale()) };
+        let Self::Spline(law) = self else { return shape };
+        shape + (law.ripple + moved) * part(law.surface.spacing())
+    }
+
+    /// Changes of a gap below this (m) say nothing: a share of the radius, or of the extent of open surfaces, for the
+    /// curvature that a linear gap leaves out; rounding of fixed gaps.
+    pub fn indifferent(&self, node: usize) -> f64 {
+        const CURVED: f64 = 1e-5;
+        match self {
+            Self::Fixed(law) => 1e-9 * law.gaps[node].abs(),
+            Self::Revolution(RevolutionGap { layout, .. }) => CURVED * layout.radii[node],
+            Self::Spline(law) => CURVED * law.layout.radii[node],
+            Self::Free(law) => CURVED * law.largest(),
+        }
+    }
+
+    /// The first node, `node · lanes + lane`, that has left a surface around an axis for good.
+    pub fn out_of_reach(&self) -> Option<usize> {
+        if let Self::Spline(law) = self { law.out_of_reach } else { None }
     }
 
     /// Largest displacement (m) that counts as small: a tenth of the smallest radius, or of the extent of open surfaces and

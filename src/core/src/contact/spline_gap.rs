@@ -6,8 +6,8 @@ use super::spline::{Place, Projection, SurfaceSpline};
 use super::wrench::{At, Motion};
 use crate::persist::{Persist, Reader, Writer};
 
-/// Gap reported for a node that has left the surface at a free edge (m).
-pub const BEYOND_EDGE: f64 = 1.0;
+/// Gap of a node that has nothing to touch: infinite, so that no distance can be made of it.
+pub const NOTHING_TO_TOUCH: f64 = f64::INFINITY;
 
 /// Parameters of places on a patch, with rounding at the edges.
 const WITHIN_PATCH: std::ops::RangeInclusive<f64> = -1e-6..=1.0 + 1e-6;
@@ -27,11 +27,18 @@ pub struct SplineGap {
     pub shape: Vec<[f64; 3]>,
     /// Angle over which the shape changes noticeably (rad).
     pub angular_scale: f64,
+    /// Largest change of a control point by the shape at factor 1 (m).
+    pub shape_size: f64,
+    /// By how much a ring through so many points is less round than a circle (m).
+    pub ripple: f64,
     /// Control points in use.
     control: Vec<[f64; 3]>,
     factor: f64,
     /// Revolutions of the rotor over the step under way.
     pub turned: f64,
+    /// The first node, `node · lanes + lane`, that is further beyond the edge than the surface goes on
+    /// ([`super::spline::REACH`]).
+    pub out_of_reach: Option<usize>,
 }
 
 impl SplineGap {
@@ -44,7 +51,12 @@ impl SplineGap {
         angular_scale: f64,
     ) -> Self {
         let round = surface.control_points().to_vec();
+        let largest = shape.iter().fold(0.0, |most: f64, change| most.max(dot(*change, *change)));
+        let radius = layout.radii.iter().fold(0.0, |most: f64, radius| most.max(*radius));
         Self {
+            shape_size: largest.sqrt(),
+            // The sagitta of a facet.
+            ripple: 0.125 * radius * surface.spacing() * surface.spacing(),
             layout,
             nominal_clearance,
             surface,
@@ -54,6 +66,7 @@ impl SplineGap {
             angular_scale,
             factor: 0.0,
             turned: 0.0,
+            out_of_reach: None,
         }
     }
 
@@ -80,6 +93,7 @@ impl SplineGap {
 
     /// Gaps (m), normals and places of all nodes, for the displacements of the contact rows (m) and of the control
     /// points. `guess` holds the places of the step before; without one (`None`) the search starts from the angle.
+    /// Nodes out of reach have nothing to touch, and are told of in [`SplineGap::out_of_reach`].
     pub fn evaluate(
         &mut self,
         drive: &Drive,
@@ -90,6 +104,7 @@ impl SplineGap {
         gap: &mut [f64],
     ) {
         self.follow(drive.shape_factor, moved);
+        self.out_of_reach = None;
         let lanes = self.layout.lanes;
         for (index, gap) in gap.iter_mut().enumerate() {
             let (node, lane) = (index / lanes, index % lanes);
@@ -115,11 +130,9 @@ impl SplineGap {
                     geometry.places[index] = place;
                 }
                 Projection::BeyondEdge { place } => {
-                    *gap = BEYOND_EDGE;
-                    for (component, value) in [-1.0, 0.0, 0.0].into_iter().enumerate() {
-                        geometry.normal[component][index] = value;
-                    }
+                    *gap = NOTHING_TO_TOUCH;
                     geometry.places[index] = place;
+                    self.out_of_reach = self.out_of_reach.or(Some(index));
                 }
                 // Found out by the caller: the state is not what the model describes any more.
                 Projection::Lost => *gap = f64::NAN,

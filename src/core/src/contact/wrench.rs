@@ -73,6 +73,18 @@ impl Motion {
         }
     }
 
+    /// This step and the one before together.
+    pub fn since(&self, before: &Self) -> Self {
+        Self {
+            step: self.step + before.step,
+            turn: self.turn + before.turn,
+            shaft: std::array::from_fn(|i| self.shaft[i] + before.shaft[i]),
+            opening: self.opening + before.opening,
+            shape_factor: self.shape_factor + before.shape_factor,
+            shape_rotation: self.shape_rotation + before.shape_rotation,
+        }
+    }
+
     /// Whether no input moves the casing.
     pub fn casing_rests(&self) -> bool {
         self.opening == 0.0 && self.shape_factor == 0.0 && self.shape_rotation == 0.0

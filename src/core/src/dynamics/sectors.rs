@@ -85,6 +85,9 @@ impl Sectors {
         predict[mut](with_loss: bool);
         /// Kinetic and strain energy of all sectors (J), in the quantity the scheme conserves.
         energies[]() -> (f64, f64);
+        /// Kinetic and strain energy of all sectors at this instant (J), under the contact forces that last
+        /// (`forces[row · lanes + sector]`, N) and the modal loads.
+        energies_now[mut](forces: &[f64]) -> (f64, f64);
         /// Damping loss since the last call (J).
         collect_loss[mut]() -> f64;
         /// Work of the modal loads over the step just done (J), once contact has corrected it.

@@ -8,6 +8,11 @@ use crate::system::StepFailure;
 use crate::variables::Causality;
 use crate::{Error, Result, Rom, Scene, plausibility, shown};
 
+/// How far a surface around an axis goes on ([`crate::contact::spline::REACH`]), and what to do about a node further out.
+pub const OUT_OF_REACH: &str = "a quarter of its axial extent, as far as it goes on along its tangents";
+pub const OUT_OF_REACH_REMEDY: &str = "Give a casing whose contact grid covers the blade tips wherever they go, or check axial \
+                                       shift, loads and speed";
+
 impl Compiled {
     /// Combinations of scheme and solver that this scene cannot be stepped with.
     ///
@@ -141,6 +146,11 @@ impl Simulation {
                 "the displacements at the start are not finite",
                 "Check the start values of loads, temperatures and speed",
             ),
+            StepFailure::Curved(_) => (
+                "blades are displaced at the start so far around the axis that u²/2r, which linear gaps miss, is as large as the \
+                 clearance",
+                "Check the start value of the speed and the loads of the ROM; small displacements cannot describe this",
+            ),
             _ => (
                 "blades are displaced at the start by more than a tenth of the radius of the contact nodes",
                 "Check the start value of the speed and the centrifugal loads of the ROM; small displacements cannot \
@@ -183,6 +193,17 @@ impl Simulation {
                 format!("{node} finds no closest point of its surface"),
                 "Check start values of loads and temperatures, which may deform the surface beyond all bounds, and its contact grid: \
                  it must not be folded, or flattened to a line",
+            ));
+        }
+        if let Some(index) = self.system.law().out_of_reach() {
+            let node = &self.compiled.master().1.contact_nodes[index / lanes].name;
+            return Err(Error::invalid(
+                "initial clearance",
+                format!(
+                    "{node} of sector {} starts beyond the first or last ring of the casing's surface by more than {OUT_OF_REACH}",
+                    index % lanes + 1
+                ),
+                OUT_OF_REACH_REMEDY,
             ));
         }
         if deepest.1 >= 0.0 {

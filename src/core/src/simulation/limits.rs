@@ -48,6 +48,8 @@ pub struct Limits {
     massless: MasslessLimit,
     /// Largest step of each range of step sizes, descending, and what the casing does to solvability there.
     casing: Vec<(f64, Option<String>)>,
+    /// Smallest step of modal-exact that passes over what contact acts on; infinite for other schemes.
+    unresolved: f64,
 }
 
 /// Growth of sliding contact in one sense.
@@ -132,6 +134,7 @@ impl Simulation {
         for carrier in self.compiled.carriers() {
             stability::check_step_allowed(carrier.largest_frequency(), scheme, step)?;
         }
+        stability::unresolved::check(step, limits.unresolved, self.compiled.largest_frequency())?;
         if step >= limits.massless.usable {
             return Err(massless::refusal(step, limits.massless));
         }
@@ -189,7 +192,11 @@ impl Compiled {
             Checking { compiled: self, models, parameters: parameters.clone(), watched: [Vec::new(), Vec::new()] };
         let expected = self.expected_step(parameters.step);
         let casing = at.casing(expected, law);
-        let (outcome, massless) = match at.massless(expected, law) {
+        // Radially: along an inclined normal the bending of the blade would hide what the tip itself yields.
+        let radial = |model: &ModalModel| vec![[-1.0, 0.0, 0.0]; model.contact_modes.nrows() / 3];
+        let unresolved = self.unresolved(&at.models, parameters.scheme, radial);
+        let resolved = stability::unresolved::check(expected, unresolved, at.largest_frequency());
+        let (outcome, massless) = match resolved.and_then(|()| at.massless(expected, law)) {
             Ok((more, limit)) => (at.warnings(expected, in_range(&casing, expected).cloned(), more), limit),
             Err(error) => (Err(error), MasslessLimit::NONE),
         };
@@ -201,7 +208,21 @@ impl Compiled {
                 senses[sense] = Some(at.sense(sense, expected));
             }
         }
-        Limits { parameters, outcome, senses, massless, casing }
+        Limits { parameters, outcome, senses, massless, casing, unresolved }
+    }
+
+    /// Smallest step of modal-exact that passes over what contact acts on, of the master as `models` and of carriers.
+    fn unresolved(
+        &self,
+        models: &[ModalModel],
+        scheme: Scheme,
+        directions: impl Fn(&ModalModel) -> Vec<[f64; 3]>,
+    ) -> f64 {
+        if scheme != Scheme::ModalExact {
+            return f64::INFINITY;
+        }
+        let masters = models.iter().map(|model| stability::unresolved::limit(model, &directions(model)));
+        masters.chain(self.carriers().map(stability::unresolved::limit_along_axes)).fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -392,7 +413,7 @@ impl Checking<'_> {
         let largest = 1.01 * self.parameters.step.max(step) / massless::USABLE_STIFF;
         let (mut limit, mut worst) = (MasslessLimit::NONE, (0.0, 0.0));
         for (diameter, model) in self.models.iter().enumerate() {
-            let normals = self.directions(model, 1.0).into_iter().map(|(normal, _)| normal).collect();
+            let normals = self.normals(model);
             let mut check = massless::MasslessCheck { model, normals, slave: None };
             if let Some((modes, spline)) = &modes {
                 let place = |place| self.seen_by(diameter, slave_at(spline, modes, slave_angle(place)).0);
@@ -447,6 +468,10 @@ impl Checking<'_> {
                 ([-1.0 / length, 0.0, slope / length], [0.0, sense, 0.0])
             })
             .collect()
+    }
+
+    fn normals(&self, model: &ModalModel) -> Vec<[f64; 3]> {
+        self.directions(model, 1.0).into_iter().map(|(normal, _)| normal).collect()
     }
 
     /// Sets of closed contact nodes: all combinations of a few; of many every one alone, neighbours, and all; of a wheel,

@@ -116,6 +116,11 @@ pub struct Simulation {
     limits: Option<limits::Limits>,
     /// Length of every saved state (bytes).
     state_size: usize,
+    /// Kinetic plus strain energy of the instant, what the scheme conserves, and the first at the start (J); where the ledger is
+    /// kept.
+    energy: f64,
+    conserved: f64,
+    initial_energy: f64,
 }
 
 impl Simulation {
@@ -150,6 +155,9 @@ impl Simulation {
             told: limits::Told::default(),
             limits: None,
             state_size: 0,
+            energy: 0.0,
+            conserved: 0.0,
+            initial_energy: 0.0,
         };
         simulation.state_size = simulation.measured_state();
         simulation.reset();
@@ -204,6 +212,7 @@ impl Simulation {
         self.check_initial_gaps()?;
         self.window.open(self.system.gaps());
         self.update_outputs();
+        self.initial_energy = self.energy;
         self.check_outputs(start_time)?;
         self.phase = Phase::Ready;
         self.previous.copy_from_slice(&self.values);

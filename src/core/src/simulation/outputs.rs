@@ -4,7 +4,23 @@ use super::{Phase, Simulation};
 use crate::contact::coating::Coating;
 use crate::contact::gap::sector_angle;
 use crate::dynamics::sectors::Sectors;
-use crate::variables::{Causality, Quantity, Span, Variable};
+use crate::variables::{Causality, NO_CLEARANCE, Quantity, Span, Variable};
+
+/// A clearance as an output tells it (m): finite.
+fn told(gap: f64) -> f64 {
+    gap.min(NO_CLEARANCE)
+}
+
+fn is_clearance(quantity: Quantity) -> bool {
+    matches!(
+        quantity,
+        Quantity::Clearance(_)
+            | Quantity::ClearanceMinimum
+            | Quantity::NodeClearanceMinimum
+            | Quantity::SectorClearanceMinimum
+            | Quantity::WatchedClearanceMinimum(_)
+    )
+}
 
 /// What all outputs of one instant share.
 struct Instant {
@@ -12,8 +28,10 @@ struct Instant {
     mean: f64,
     /// That time (s).
     elapsed: f64,
-    /// Kinetic and strain energy (J), if the ledger is kept.
+    /// Kinetic and strain energy of the instant (J), if the ledger is kept.
     energies: (f64, f64),
+    /// Energy that the scheme conserves (J), if the ledger is kept.
+    conserved: f64,
     /// Share of the friction heat that goes into the slave; all of it where the scene does not say.
     slave_share: f64,
 }
@@ -25,10 +43,15 @@ impl Simulation {
         let elapsed = self.communication.offset(self.communication.done);
         let mean = if elapsed > 0.0 && self.communication.length > 0.0 { 1.0 / elapsed } else { 0.0 };
         self.system.close_books();
-        let energies = if self.system.settings().ledger { self.system.energies() } else { (0.0, 0.0) };
+        let (mut energies, mut conserved) = ((0.0, 0.0), 0.0);
+        if self.system.settings().ledger {
+            let (kinetic, strain) = self.system.energies();
+            (energies, conserved) = (self.system.energies_now(), kinetic + strain);
+        }
+        (self.energy, self.conserved) = (energies.0 + energies.1, conserved);
         let slave_share = self.table.with_quantity(Quantity::HeatToSlave);
         let slave_share = slave_share.map_or(1.0, |variable| self.values[variable.reference as usize]);
-        let instant = Instant { mean, elapsed, energies, slave_share };
+        let instant = Instant { mean, elapsed, energies, conserved, slave_share };
         let mut values = std::mem::take(&mut self.values);
         for variable in self.table.variables() {
             if variable.causality == Causality::Output {
@@ -48,15 +71,15 @@ impl Simulation {
         let sectors = system.bank().sectors();
         let smallest = |values: &[f64]| values.iter().fold(f64::INFINITY, |low: f64, value| low.min(*value));
         match quantity {
-            Quantity::ClearanceMinimum => out[0] = smallest(&window.lowest),
+            Quantity::ClearanceMinimum => out[0] = told(smallest(&window.lowest)),
             Quantity::NodeClearanceMinimum => {
                 for (node, value) in out.iter_mut().enumerate() {
-                    *value = smallest(&window.lowest[node * lanes..][..sectors]);
+                    *value = told(smallest(&window.lowest[node * lanes..][..sectors]));
                 }
             }
             Quantity::SectorClearanceMinimum => {
                 for (sector, value) in out.iter_mut().enumerate() {
-                    *value = window.lowest.chunks(lanes).fold(f64::INFINITY, |low, row| low.min(row[sector]));
+                    *value = told(window.lowest.chunks(lanes).fold(f64::INFINITY, |low, row| low.min(row[sector])));
                 }
             }
             Quantity::SectorNormalForce => {
@@ -96,8 +119,8 @@ impl Simulation {
         for (node, value) in out.iter_mut().enumerate() {
             let index = |sector: usize| node * lanes + sector;
             *value = match quantity {
-                Quantity::Clearance(sector) => self.system.gaps()[index(sector)],
-                Quantity::WatchedClearanceMinimum(sector) => self.window.lowest[index(sector)],
+                Quantity::Clearance(sector) => told(self.system.gaps()[index(sector)]),
+                Quantity::WatchedClearanceMinimum(sector) => told(self.window.lowest[index(sector)]),
                 Quantity::NormalForce(sector) => mean * self.window.normal_impulse[index(sector)],
                 Quantity::TangentialForce(sector) => mean * self.window.tangential_impulse[index(sector)],
                 Quantity::NormalForceNow(sector) => self.system.multiplier(node, sector),
@@ -113,7 +136,7 @@ impl Simulation {
     fn scalar(&self, quantity: Quantity, instant: &Instant) -> f64 {
         let (system, window) = (&self.system, &self.window);
         let ledger = system.ledger();
-        let Instant { mean, elapsed, energies: (kinetic, strain), .. } = *instant;
+        let Instant { mean, elapsed, energies: (kinetic, strain), conserved, .. } = *instant;
         #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
         match quantity {
             Quantity::RotorAngle => self.rotor.total(&self.inputs.speed, elapsed),
@@ -133,6 +156,7 @@ impl Simulation {
             Quantity::InContact => f64::from(u8::from(!system.events().is_empty())),
             Quantity::KineticEnergy => kinetic,
             Quantity::StrainEnergy => strain,
+            Quantity::SchemeEnergy => conserved,
             Quantity::DampingLoss => ledger.damping_loss.value(),
             Quantity::FrictionLoss => ledger.friction_loss.value(),
             Quantity::ImpactLoss => ledger.impact_loss.value(),
@@ -147,9 +171,9 @@ impl Simulation {
             Quantity::CasingWork => ledger.casing_work.value(),
             Quantity::CurvatureWork => ledger.curvature_work.value(),
             Quantity::StepChangeEnergy => ledger.step_change.value(),
-            Quantity::EnergyResidual => ledger.residual(kinetic + strain),
+            Quantity::EnergyResidual => ledger.residual(conserved),
             Quantity::EnergyResidualRelative => {
-                let residual = ledger.residual(kinetic + strain);
+                let residual = ledger.residual(conserved);
                 if ledger.scale() > 0.0 { residual / ledger.scale() } else { 0.0 }
             }
             Quantity::InternalStep => system.bank().step(),
@@ -199,6 +223,8 @@ impl Simulation {
         let length = self.communication.length;
         match (variable.quantity, variable.span) {
             _ if self.phase == Phase::Created || length == 0.0 => 0.0,
+            // From nothing to touch to a clearance, and back, there is no rate.
+            _ if is_clearance(variable.quantity) && now.max(before) >= NO_CLEARANCE => 0.0,
             (Quantity::Clearance(sector), _) => self.system.gap_rate(element, sector),
             (Quantity::RotorAngle, _) => self.inputs.speed.at(0.0),
             (_, Span::Mean) if self.previous_length == 0.0 => 0.0,

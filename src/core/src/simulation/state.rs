@@ -11,7 +11,7 @@ use crate::variables::{Causality, Kind, Quantity, Variable};
 use crate::{Error, Result, shown};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 5;
+const VERSION: u64 = 6;
 const CHECKSUM_BYTES: usize = 8;
 
 persist_fields!(Communication { start, length, count, done });
@@ -131,6 +131,7 @@ impl Simulation {
         self.phase.save(writer);
         self.time.save(writer);
         self.initial_time.save(writer);
+        self.initial_energy.save(writer);
         self.communication.save(writer);
         self.previous_length.save(writer);
         self.inputs.save(writer);
@@ -298,6 +299,7 @@ impl Simulation {
         self.phase.restore(reader);
         self.time.restore(reader);
         self.initial_time.restore(reader);
+        self.initial_energy.restore(reader);
         self.communication.restore(reader);
         self.previous_length.restore(reader);
         self.inputs.restore(reader);

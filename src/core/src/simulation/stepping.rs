@@ -1,10 +1,20 @@
 //! One communication step: begun, marched, ended.
 
+use super::checks::{OUT_OF_REACH, OUT_OF_REACH_REMEDY};
 use super::drive::Input;
 use super::{Communication, MOST_STEPS, Phase, Progress, SAME_STEP, Simulation, TIME_TOLERANCE};
 use crate::contact::coating::Coating;
+use crate::settings::Scheme;
 use crate::system::StepFailure;
 use crate::{Error, Result, ranges, shown};
+
+/// A run is warned of once u_θ²/2r is this share of the clearance.
+const CURVED_SHARE: f64 = 0.05;
+/// Energy of the instant may be so many times what was put in: the scheme's own is cos²(ωh/2) of it, a fourth at ωh = 2π/3, the end of
+/// what a step resolves. What is beyond is in modes that the step passes over.
+const ENERGY_FACTOR: f64 = 4.0;
+/// And a share of all work exchanged, for rounding.
+const ENERGY_SLACK: f64 = 0.01;
 
 impl Simulation {
     /// Begin a communication step of length H from the current time, landing exactly on `current_time + step_size`.
@@ -197,9 +207,11 @@ impl Simulation {
         if let Err(failure) = self.system.check_books() {
             return Err(self.fail(failure, time));
         }
+        self.note_curved(time);
         self.rotor.rebase(&self.inputs.speed, offset);
         self.update_outputs();
         self.check_outputs(time).inspect_err(|_| self.phase = Phase::Failed)?;
+        self.check_energy(time)?;
         self.rotor.shift(offset);
         self.inputs.shift(offset);
         self.time = time;
@@ -207,10 +219,55 @@ impl Simulation {
         Ok(())
     }
 
+    /// Tell of the first displacement of the run that linear kinematics describes badly.
+    fn note_curved(&mut self, time: f64) {
+        if self.told.curved {
+            return;
+        }
+        let Some(most) = self.system.most_curved().filter(|most| most.share() >= CURVED_SHARE) else { return };
+        self.told.curved = true;
+        self.notes.push(format!(
+            "at t = {} s contact node {} of sector {} is displaced by {:.3e} m around the axis: gaps are linear in displacements, which \
+             misses u²/2r = {:.2e} m, {:.0} % of the clearance; further on it grows with the square, and at 100 % the run ends",
+            shown(time),
+            self.node_name(most.node),
+            most.sector + 1,
+            most.moved,
+            most.error,
+            100.0 * most.share()
+        ));
+    }
+
+    /// Vibration has no more energy than forces times speeds put in: what the scheme conserves leaves out what modes beyond the step
+    /// hold. With massless-boundary quasi-static modes hold energy one step before its work is known; its own limit keeps it.
+    fn check_energy(&mut self, time: f64) -> Result<()> {
+        let (settings, ledger) = (self.system.settings(), self.system.ledger());
+        let supplied = ledger.supplied().max(self.conserved - ledger.initial).max(0.0);
+        let bound = ENERGY_FACTOR * (self.initial_energy + supplied) + ENERGY_SLACK * ledger.scale();
+        if !settings.ledger || settings.scheme == Scheme::MasslessBoundary || self.energy <= bound {
+            return Ok(());
+        }
+        self.phase = Phase::Failed;
+        Err(Error::Unstable {
+            problem: format!(
+                "at t = {} s (last good time {} s) the structures hold {:.4e} J of kinetic and strain energy, where they had {:.4e} J \
+                 at the start and work less friction and damping supplied {:.4e} J: modes that the internal step of {:.3e} s does not \
+                 resolve have taken energy that is not there",
+                shown(time),
+                shown(self.time),
+                self.energy,
+                self.initial_energy,
+                supplied,
+                self.system.bank().step()
+            ),
+            remedy: "Use a smaller internal step (internal_step_max). Restore a saved state or reset first".to_owned(),
+        })
+    }
+
     fn fail(&mut self, failure: StepFailure, time: f64) -> Error {
         self.phase = Phase::Failed;
-        if let StepFailure::Curved { work, exchanged } = failure {
-            return self.curved(work, exchanged, time);
+        if let StepFailure::Unbalanced { work, exchanged } = failure {
+            return self.unbalanced(work, exchanged, time);
         }
         if let Some(error) = self.free_failure(failure, time) {
             return error;
@@ -235,8 +292,40 @@ impl Simulation {
                          saved state or reset first"
                         .to_owned(),
             },
+            StepFailure::Curved(curved) => Error::Unstable {
+                problem: format!(
+                    "at t = {} s (last good time {} s) contact node {} of sector {} is displaced by {:.3e} m around the axis: gaps are \
+                     linear in displacements, which misses u²/2r = {:.2e} m, as much as the clearance of {:.2e} m{}",
+                    shown(time),
+                    shown(self.time),
+                    self.node_name(curved.node),
+                    curved.sector + 1,
+                    curved.moved,
+                    curved.error,
+                    curved.clearance,
+                    self.instability()
+                ),
+                remedy: "Check casing shape, friction, loads and inputs: small displacements cannot describe this. Restore a saved \
+                         state or reset first"
+                    .to_owned(),
+            },
+            StepFailure::OutOfReach { node, sector } => Error::Unstable {
+                problem: format!(
+                    "at t = {} s (last good time {} s) contact node {} of sector {} has left the surface of the casing in z: it is \
+                     beyond the first or last ring by more than {}",
+                    shown(time),
+                    shown(self.time),
+                    self.node_name(node),
+                    sector + 1,
+                    OUT_OF_REACH
+                ),
+                remedy: format!("{OUT_OF_REACH_REMEDY}. Restore a saved state or reset first"),
+            },
+            StepFailure::Unexplained { node, sector, jump, explained } => {
+                self.unexplained(node, sector, jump, explained, time)
+            }
             // Of free masters only, dealt with above.
-            StepFailure::TooFast | StepFailure::BehindEdge { .. } | StepFailure::Curved { .. } => Error::Unstable {
+            StepFailure::TooFast | StepFailure::BehindEdge { .. } | StepFailure::Unbalanced { .. } => Error::Unstable {
                 problem: format!("a contact node moves too far in one internal step at t = {} s", shown(time)),
                 remedy: "Use a smaller internal step; restore a saved state or reset first".to_owned(),
             },
@@ -264,7 +353,7 @@ impl Simulation {
     }
 
     /// Energy that no input brings.
-    fn curved(&self, work: f64, exchanged: f64, time: f64) -> Error {
+    fn unbalanced(&self, work: f64, exchanged: f64, time: f64) -> Error {
         Error::Unstable {
             problem: format!(
                 "by t = {} s (last good time {} s) contact forces have added {work:.3e} J that no input brings, of {exchanged:.3e} J \
@@ -276,12 +365,36 @@ impl Simulation {
         }
     }
 
+    fn node_name(&self, node: usize) -> &str {
+        &self.compiled.master().1.contact_nodes[node].name
+    }
+
+    fn unexplained(&self, node: usize, sector: usize, jump: f64, explained: f64, time: f64) -> Error {
+        Error::Unstable {
+            problem: format!(
+                "at t = {} s (last good time {} s) the gap of contact node {} of sector {} has changed by {jump:.3e} m in two steps, \
+                 where motion of node and casing explains {explained:.3e} m: the work of this contact cannot be told",
+                shown(time),
+                shown(self.time),
+                self.node_name(node),
+                sector + 1
+            ),
+            remedy: "Use a smaller internal step; if that does not help, the surface is folded or has more than one closest point \
+                     there. Restore a saved state or reset first"
+                .to_owned(),
+        }
+    }
+
     /// What only means something else for a free master.
     fn free_failure(&self, failure: StepFailure, time: f64) -> Option<Error> {
         self.compiled.free.as_ref()?;
         let behind;
         let problem = match failure {
-            StepFailure::NonFinite | StepFailure::Curved { .. } => return None,
+            StepFailure::NonFinite
+            | StepFailure::Unbalanced { .. }
+            | StepFailure::Unexplained { .. }
+            | StepFailure::OutOfReach { .. }
+            | StepFailure::Curved(_) => return None,
             StepFailure::TooFast => {
                 "contact nodes of the free structure move by more than a tenth of the extent of the contact nodes in one internal \
                  step, and could pass a surface unseen"

@@ -1,6 +1,7 @@
 //! Limits checked before a scene is stepped: refuse with numbers rather than return nonsense.
 //!
 //! * Central differences need ω_max h < 2; frictionless closed contact never lowers that limit.
+//! * Modal-exact is stable for any step; its contact answers go wrong all the same: see [`unresolved`].
 //! * The contact problem of a step has one solution for every gap exactly when the Delassus matrix
 //!   W = C_Nᵀ A⁻¹ C_NT is a P-matrix; a positive definite symmetric part is sufficient.
 //! * With contacts closed and sliding, the equations themselves may flutter. What must not happen is that the
@@ -8,6 +9,7 @@
 //!   constrained differential equation.
 
 pub mod massless;
+pub mod unresolved;
 
 use nalgebra::DMatrix;
 

@@ -3,7 +3,7 @@
 use super::slave::carrier_of;
 use super::{ContactEvent, System, frame_of};
 use crate::contact::gap::{Drive, Geometry, dot};
-use crate::contact::spline_gap::{BEYOND_EDGE, Frame};
+use crate::contact::spline_gap::Frame;
 use crate::contact::wrench::{At, Motion};
 
 /// What one contact did over a step (J).
@@ -14,6 +14,8 @@ struct Work {
     shift: f64,
     casing: f64,
     heat: f64,
+    /// Half of what the gap has closed by over two steps (m).
+    approach: f64,
     /// Of the node that stops at the surface.
     closing: f64,
     /// By the scheme, on both structures.
@@ -42,8 +44,7 @@ impl System {
     /// Enter one contact's work into the ledger; returns its friction heat (J).
     fn book(&mut self, event: &ContactEvent, motion: &Motion, before: bool) -> f64 {
         let work = self.work_of(event, motion, before);
-        let (curvature, worn) = (work.curvature(), event.coating * self.approach(event));
-        let returned = self.has_returned(event);
+        let (curvature, worn) = (work.curvature(), event.coating * work.approach);
         let ledger = &mut self.state.ledger;
         ledger.wear_work.add(worn);
         ledger.impact_loss.add(work.closing - worn);
@@ -53,7 +54,6 @@ impl System {
         ledger.shift_work.add(work.shift);
         ledger.casing_work.add(work.casing);
         ledger.curvature_work.add(curvature);
-        ledger.inner_curvature_work.add(if returned { 0.0 } else { curvature });
         ledger.turnover.add(work.shaft.abs() + work.whirl.abs() + work.shift.abs() + work.casing.abs());
         work.heat
     }
@@ -73,6 +73,9 @@ impl System {
         let shaft = self.law.shaft_motion(at, event.point, motion);
         let surface = self.law.surface_motion(at, event.point, normal, &geometry.places, motion);
         let slip: [f64; 3] = std::array::from_fn(|i| moved[i] + spin[i] + shaft[i]);
+        // A node of a free master that comes over an edge had no gap to close: its motion is the approach.
+        let (now, oldest) = (self.state.gap[index], self.gap_oldest[index]);
+        let approach = if oldest.is_finite() { -0.5 * (now - oldest) } else { -dot(normal, moved) };
         let [x, y, z] = event.wrench.force;
         Work {
             shaft: -dot(event.force, spin),
@@ -80,28 +83,15 @@ impl System {
             shift: -z * motion.shaft[2],
             casing: event.normal * surface,
             heat: -dot(tangential, slip),
-            closing: event.normal * self.approach(event),
+            approach,
+            closing: event.normal * approach,
             exact: dot(event.force, moved),
         }
     }
 
-    /// Half of what the gap has closed by over two steps (m).
-    fn approach(&self, event: &ContactEvent) -> f64 {
-        let index = event.node * self.lanes + event.sector;
-        // A node that comes back from beyond a free edge had no gap to close.
-        let (now, oldest) = (self.state.gap[index], self.gap_oldest[index]);
-        if self.has_returned(event) { 0.0 } else { -0.5 * (now - oldest) }
-    }
-
-    /// Whether the node was beyond a free edge before, or is now.
-    fn has_returned(&self, event: &ContactEvent) -> bool {
-        let index = event.node * self.lanes + event.sector;
-        self.state.gap[index].max(self.gap_oldest[index]) >= BEYOND_EDGE
-    }
-
     /// Half the displacement of a node relative to the slave over the last two steps (m), in its own directions.
     #[inline(always)]
-    fn relative_motion(&self, event: &ContactEvent, index: usize, geometry: &Geometry, drive: &Drive) -> [f64; 3] {
+    pub(super) fn relative_motion(&self, event: &ContactEvent, index: usize, geometry: &Geometry, drive: &Drive) -> [f64; 3] {
         let (lanes, now) = (self.lanes, self.bank.displacement());
         let (node, sector) = (event.node, event.sector);
         let mut moved: [f64; 3] = std::array::from_fn(|component| {

@@ -1,14 +1,15 @@
-//! What carries a running state on: another step size, saving and restoring, and whether it still makes sense.
+//! What carries a running state on: another step size, saving and restoring, and ways over an edge.
 
 use super::{ContactEvent, Member, Slave, StepFailure, System, frame_of};
 use crate::contact::gap::{GapLaw, dot};
 use crate::contact::spline::Place;
-use crate::contact::spline_gap::BEYOND_EDGE;
 use crate::contact::wrench::At;
 use crate::persist::{Persist, Reader, Writer};
 
 /// A contact force is continued over steps at most this many times as long as the one it was found in.
 const FORCE_REACH: f64 = 4.0;
+/// Gaps are closed up to this share of what says nothing ([`GapLaw::indifferent`]).
+const CLOSED: f64 = 1e-9;
 /// How far behind a surface, continued beyond its edge, a node may have been: share of its way in the step, since the surface
 /// may bend, and of the largest displacement that counts as small.
 const BEHIND_EDGE: [f64; 2] = [1e-3, 1e-6];
@@ -29,6 +30,8 @@ impl System {
             self.lasting_force(old, step);
             self.bank.resample(self.settings.scheme, step, &self.displacement_oldest);
             self.resample_slaves(step);
+            // The gap of the step before is continued along its own slope, not along the motion of the modes.
+            self.state.witnessed = self.state.steps + 2;
             let ratio = step / old;
             self.state.motion = self.state.motion.over(ratio);
             for (before, now) in self.state.gap_before.iter_mut().zip(&self.state.gap) {
@@ -45,8 +48,24 @@ impl System {
         }
     }
 
-    /// The same forces act on the slaves, where the last step found them.
+    /// Kinetic and strain energy of all structures at this instant (J): ½q̇ᵀMq̇ with the velocity of the instant, ½qᵀKq. Between
+    /// steps only.
+    pub fn energies_now(&mut self) -> (f64, f64) {
+        let step = self.bank.step();
+        self.lasting_force(step, step);
+        self.spread_lasting();
+        let own = self.bank.energies_now(&self.displacement_oldest);
+        let slaves = self.slaves.iter_mut().map(Slave::energies_now);
+        slaves.fold(own, |sum, slave| (sum.0 + slave.0, sum.1 + slave.1))
+    }
+
     fn resample_slaves(&mut self, step: f64) {
+        self.spread_lasting();
+        self.slaves.iter_mut().for_each(|slave| slave.carry_over(self.settings.scheme, step));
+    }
+
+    /// The same forces act on the slaves, where the last step found them.
+    fn spread_lasting(&mut self) {
         if self.slaves.is_empty() {
             return;
         }
@@ -62,7 +81,6 @@ impl System {
                 self.slaves[carrier].add_lasting(surface, self.state.geometry.places[index], frame, force);
             }
         }
-        self.slaves.iter_mut().for_each(|slave| slave.carry_over(self.settings.scheme, step));
     }
 
     /// Leaves in `displacement_oldest` (scratch between steps) the contact forces without those of impacts.
@@ -73,7 +91,9 @@ impl System {
             *lasting = reach * reach * force;
         }
         for (index, gap) in self.state.gap_before.iter().enumerate() {
-            let lasts = *gap <= 0.0 && self.state.gap[index] <= 0.0;
+            // `film` closes gaps up to rounding.
+            let closed = CLOSED * self.law.indifferent(index / lanes);
+            let lasts = *gap <= closed && self.state.gap[index] <= closed;
             if !lasts {
                 let (node, sector) = (index / lanes, index % lanes);
                 for component in 0..3 {
@@ -93,10 +113,15 @@ impl System {
 
     /// A node that comes over a free edge was in front of the surface, continued beyond the edge; else it is a start in
     /// penetration, an impact of arbitrary strength.
+    ///
+    /// A surface around an axis goes on beyond its edge, and a node further out ends the run.
     pub(super) fn check_edges(&self) -> Result<(), StepFailure> {
+        if let Some(index) = self.law.out_of_reach() {
+            return Err(StepFailure::OutOfReach { node: index / self.lanes, sector: index % self.lanes });
+        }
         let GapLaw::Free(law) = &self.law else { return Ok(()) };
         for (node, (gap, before)) in self.state.gap.iter().zip(&self.state.gap_before).enumerate() {
-            if *gap < 0.0 && *before >= BEYOND_EDGE {
+            if *gap < 0.0 && before.is_infinite() {
                 let moved = self.slip_of_deformation(Member { node, sector: 0, index: node });
                 let approach = dot(moved, self.state.geometry.normal_at(node));
                 let travel = dot(moved, moved).sqrt();
@@ -112,37 +137,14 @@ impl System {
     /// step.
     ///
     /// # Errors
-    /// It is not: [`StepFailure::Curved`].
+    /// It is not: [`StepFailure::Unbalanced`].
     pub fn check_books(&self) -> Result<(), StepFailure> {
         let ledger = &self.state.ledger;
-        let curved = ledger.inner_curvature_work.value();
+        let curved = ledger.curvature_work.value();
         if curved.abs() > MOST_CURVATURE * ledger.exchanged() {
-            return Err(StepFailure::Curved { work: curved, exchanged: ledger.exchanged() });
+            return Err(StepFailure::Unbalanced { work: curved, exchanged: ledger.exchanged() });
         }
         Ok(())
-    }
-
-    /// Whether the state is still what the model describes.
-    ///
-    /// # Errors
-    /// Coordinates that are not finite; displacements beyond a tenth of the radius, or those of the nodes of a free master
-    /// against each other beyond a tenth of their extent.
-    pub fn check_state(&self) -> Result<(), StepFailure> {
-        if !self.bank.is_finite() || self.slaves.iter().any(|slave| !slave.bank.is_finite()) {
-            return Err(StepFailure::NonFinite);
-        }
-        let limit = self.law.largest_displacement();
-        let mut moved = self.slaves.iter().flat_map(|slave| slave.bank.displacement());
-        if moved.any(|displacement| displacement.abs() > limit) {
-            return Err(StepFailure::CasingImplausible);
-        }
-        if let GapLaw::Free(law) = &self.law {
-            let distorted = law.is_distorted(self.bank.displacement());
-            return if distorted { Err(StepFailure::Implausible { sector: 0 }) } else { Ok(()) };
-        }
-        let beyond = self.bank.displacement().iter().position(|displacement| displacement.abs() > limit);
-        let sector = beyond.map(|index| index % self.lanes);
-        sector.map_or(Ok(()), |sector| Err(StepFailure::Implausible { sector }))
     }
 
     /// Write everything that determines the future, the step size included.

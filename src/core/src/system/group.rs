@@ -80,8 +80,10 @@ impl System {
         let lanes = self.lanes;
         self.chosen.fill(false);
         for index in 0..self.chosen.len() {
-            let touched = self.state.gap_before[index] <= 0.0 && !film;
-            if self.state.gap[index] < 0.0 || self.state.gap[index].is_nan() || touched {
+            let gap = self.state.gap[index];
+            // What touched and is beyond an edge now has nothing to touch.
+            let touched = self.state.gap_before[index] <= 0.0 && gap.is_finite() && !film;
+            if gap < 0.0 || gap.is_nan() || touched {
                 self.choose(index);
             }
         }

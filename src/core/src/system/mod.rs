@@ -4,6 +4,8 @@ mod books;
 mod continuation;
 mod group;
 mod slave;
+mod small;
+mod witness;
 
 use crate::contact::coating::{CoatedProblem, Coating};
 use crate::contact::coulomb::CoulombSolver;
@@ -19,6 +21,7 @@ use crate::persist::persist_fields;
 use crate::settings::{Scheme, Solver};
 pub use group::{Member, Solution};
 pub use slave::Slave;
+pub use small::Curved;
 
 /// Denormals are flushed every this many steps.
 const FLUSH_EVERY: u64 = 512;
@@ -97,11 +100,31 @@ pub enum StepFailure {
         node: usize,
     },
     /// Normals turn and surfaces curve so far within steps that this adds energy which no input brings.
-    Curved {
+    Unbalanced {
         /// What it has added (J).
         work: f64,
         /// All energy exchanged (J).
         exchanged: f64,
+    },
+    /// A node moves so far around the axis that what linear kinematics misses is as large as its clearance.
+    Curved(Curved),
+    /// A node has left a surface around an axis over its edge, further than the surface goes on.
+    OutOfReach {
+        /// Contact node (0-based).
+        node: usize,
+        /// Sector (0-based).
+        sector: usize,
+    },
+    /// A gap has changed by more than the motion of node and surface explains: it is not a distance.
+    Unexplained {
+        /// Contact node (0-based).
+        node: usize,
+        /// Sector (0-based).
+        sector: usize,
+        /// Change of the gap over two steps (m).
+        jump: f64,
+        /// What motion can explain of it (m).
+        explained: f64,
     },
     /// The contact problem of a sector has no solution within the pivoting limit.
     Unsolved {
@@ -147,6 +170,8 @@ struct SystemState {
     /// Prescribed motion at the last step, and over it.
     drive: Drive,
     motion: Motion,
+    /// Steps done when the gap two steps back was first one of steps of this size.
+    witnessed: u64,
     ledger: Ledger,
 }
 
@@ -163,6 +188,7 @@ persist_fields!(SystemState {
     points,
     drive,
     motion,
+    witnessed,
     ledger
 });
 
@@ -273,6 +299,7 @@ impl System {
                 points: vec![0.0; 3 * contacts],
                 drive: Drive::default(),
                 motion: Motion::default(),
+                witnessed: 0,
                 ledger: Ledger::default(),
             },
             bank,
@@ -355,10 +382,11 @@ impl System {
         self.state.gap[node * self.lanes + sector]
     }
 
-    /// Rate of that gap over the last step (m/s).
+    /// Rate of that gap over the last step (m/s); 0 where there was or is nothing to touch.
     pub fn gap_rate(&self, node: usize, sector: usize) -> f64 {
         let index = node * self.lanes + sector;
-        (self.state.gap[index] - self.state.gap_before[index]) / self.bank.step()
+        let change = self.state.gap[index] - self.state.gap_before[index];
+        if change.is_finite() { change / self.bank.step() } else { 0.0 }
     }
 
     /// λ of one node of one sector in the last step (N).
@@ -416,6 +444,7 @@ impl System {
         (self.state.drive, self.state.motion) = (*drive, Motion::default());
         self.evaluate_gaps(drive, false);
         self.state.gap_before.copy_from_slice(&self.state.gap);
+        self.state.witnessed = 0;
         self.state.predicted.copy_from_slice(self.bank.displacement());
         self.state.ledger = Ledger { initial: self.mechanical_energy(), ..Ledger::default() };
     }
@@ -425,7 +454,7 @@ impl System {
         kinetic + strain
     }
 
-    /// Kinetic and strain energy of all structures (J).
+    /// Kinetic and strain energy of all structures (J), in the quantity the scheme conserves and the ledger closes with.
     pub fn energies(&self) -> (f64, f64) {
         let slaves = self.slaves.iter().map(|slave| slave.bank.energies());
         slaves.fold(self.bank.energies(), |sum, slave| (sum.0 + slave.0, sum.1 + slave.1))
@@ -477,6 +506,7 @@ impl System {
         } else {
             self.solve_sectors(drive)?;
         }
+        self.witness(drive, &motion)?;
         self.book_all(&motion);
         self.state.motion = motion;
         self.finish_loads();

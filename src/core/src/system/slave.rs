@@ -116,6 +116,11 @@ impl Slave {
         self.bank.resample(scheme, step, &self.response);
     }
 
+    /// Kinetic and strain energy at this instant under the lasting contact forces added (J).
+    pub fn energies_now(&mut self) -> (f64, f64) {
+        self.bank.energies_now(&self.response)
+    }
+
     /// Half the displacement of a place over the last two steps, in the directions of `frame` (m).
     pub fn moved(&self, surface: &SurfaceSpline, place: Place, frame: Frame) -> [f64; 3] {
         let (now, oldest) = (self.bank.displacement(), &self.oldest);

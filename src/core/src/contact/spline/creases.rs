@@ -63,7 +63,7 @@ impl SurfaceSpline {
             1 if self.interpolation == Interpolation::Facets && q + 2 < self.along => (q + 1, 0.0),
             _ => return None,
         };
-        Some(Place { patch: [column, ring], s, t: if sides[0] == 0 { t } else { t.clamp(0.0, 1.0) } })
+        Some(Place { patch: [column, ring], s, t: if sides[0] == 0 { t } else { t.clamp(room[1][0], room[1][1]) } })
     }
 
     /// On a crease, the sheet whose normal is nearest to the direction of the node.

@@ -15,6 +15,11 @@
 //! control points by [`SurfaceSpline::interpolate`], and forces at a place become forces on the data points by
 //! [`SurfaceSpline::weights`] and [`SurfaceSpline::transfer`], the transposes of the same two maps: virtual work is
 //! exact.
+//!
+//! A surface around the axis does not end at its first and last ring: it goes on along its tangents,
+//! S(s, t) = S(s, 1) + (t − 1) S_t(s, 1), for [`REACH`] of its axial extent. Since S_tt = 0 at the edge this is as smooth as
+//! the rest, points, derivatives and weights alike. A node that wanders over the last ring and back thus has a distance all
+//! the time. An open surface, which stands alone in space, ends at its edges.
 
 mod creases;
 mod foot;
@@ -33,6 +38,13 @@ use interpolation::Line;
 pub const FEWEST_AROUND: usize = 4;
 /// Fewest rings of data points along the axis, and of data points in either direction of an open surface.
 pub const FEWEST_ALONG: usize = 2;
+
+/// How far a surface around the axis goes on beyond its first and last ring, as a share of its axial extent (counted in
+/// rings: exact where they are equally spaced). It does not depend on how fine the grid is.
+pub const REACH: f64 = 0.25;
+/// A node this far (in patches) beyond an edge of an open surface is still on it, so that rounding does not decide for nodes
+/// that stand exactly on it.
+const EDGE_TOLERANCE: f64 = 1e-9;
 
 /// The two ends of a row of data points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,7 +65,8 @@ pub struct Place {
     pub patch: [usize; 2],
     /// Parameter around, 0 at data point p and 1 at p + 1; beyond that by rounding at the edges of an open surface.
     pub s: f64,
-    /// Parameter along the axis, 0 at ring q and 1 at ring q + 1; beyond that by rounding at the two edges.
+    /// Parameter along the axis, 0 at ring q and 1 at ring q + 1; beyond that where the surface goes on beyond its first and
+    /// last ring, and by rounding at the edges of an open one.
     pub t: f64,
 }
 
@@ -65,6 +78,8 @@ pub struct SurfaceSpline {
     around: usize,
     along: usize,
     ends: Ends,
+    /// How far it goes on beyond the first and last ring (patches).
+    reach: f64,
     interpolation: Interpolation,
     /// Interpolation problems around and along.
     lines: [Line; 2],
@@ -144,6 +159,7 @@ impl SurfaceSpline {
             around,
             along,
             ends,
+            reach: if ends == Ends::Open { EDGE_TOLERANCE } else { REACH * real(along - 1) },
             interpolation,
             lines,
             control: vec![[0.0; 3]; around * along],
@@ -233,6 +249,11 @@ impl SurfaceSpline {
     /// Rings of data points along the axis.
     pub fn along(&self) -> usize {
         self.along
+    }
+
+    /// Angle between data points around an axis (rad).
+    pub fn spacing(&self) -> f64 {
+        std::f64::consts::TAU / real(self.around)
     }
 
     /// Patches around.

@@ -55,6 +55,19 @@ fn cubic(s: f64) -> Basis {
     ]
 }
 
+/// [`cubic`] along the axis: beyond t = 0 and 1 the tangent goes on, S(s, t) = S(s, 1) + (t − 1) S_t(s, 1). At a free edge,
+/// the only place where a patch ends so, S_tt = 0: the surface stays twice continuously differentiable.
+#[inline(always)]
+fn cubic_and_beyond(t: f64) -> Basis {
+    let edge = t.clamp(0.0, 1.0);
+    let mut basis = cubic(edge);
+    let [values, slopes, _] = &mut basis;
+    for (value, slope) in values.iter_mut().zip(slopes) {
+        *value += (t - edge) * *slope;
+    }
+    basis
+}
+
 /// Σ weight · point.
 #[inline(always)]
 fn combine(weights: &[f64; 4], points: &[[f64; 4]; 4]) -> [f64; 4] {
@@ -121,7 +134,7 @@ impl SurfaceSpline {
     pub(super) fn evaluate_bicubic<const SECOND: bool>(&self, place: Place) -> Evaluation {
         let ([p, q], width) = (place.patch, self.around + 3);
         self.assert_exists(place);
-        let (around, along) = (cubic(place.s), cubic(place.t));
+        let (around, along) = (cubic(place.s), cubic_and_beyond(place.t));
         let orders = if SECOND { 3 } else { 2 };
         let mut rows = [[[0.0; 4]; 4]; 3];
         for ring in 0..4 {
@@ -199,7 +212,7 @@ impl SurfaceSpline {
     }
 
     fn fold_along(&self, place: Place) -> Fold {
-        let (count, q, values) = (self.along, place.patch[1], cubic(place.t)[0]);
+        let (count, q, values) = (self.along, place.patch[1], cubic_and_beyond(place.t)[0]);
         let mut fold = Fold::new();
         for (offset, value) in values.into_iter().enumerate() {
             match q + offset {

@@ -7,7 +7,7 @@
 //! searched for a closer point.
 
 use super::foot::{CONVEX, DEGENERATE, Foot, Held, Room, noise, solve};
-use super::{Ends, Place, SurfaceSpline};
+use super::{EDGE_TOLERANCE, Ends, Place, SurfaceSpline};
 use crate::contact::gap::dot;
 use crate::settings::Interpolation;
 
@@ -26,7 +26,8 @@ pub enum Projection {
         /// (x − S)·n (m), negative outside the casing.
         gap: f64,
     },
-    /// The node has left the surface over a free edge: in z, or any of the four of an open surface.
+    /// The node has left the surface: in z further than the surface goes on beyond its last ring, or over any of the four
+    /// edges of an open surface.
     BeyondEdge {
         /// The closest point of the edge; start of the next projection of this node.
         place: Place,
@@ -35,9 +36,6 @@ pub enum Projection {
     Lost,
 }
 
-/// A node this far (in patches) beyond a free edge is still on the surface, so that rounding does not decide for nodes
-/// that stand exactly on it.
-const EDGE_TOLERANCE: f64 = 1e-9;
 /// Newton steps below this (in patches) end the iteration.
 const STEP_TOLERANCE: f64 = 1e-11;
 /// Rounding of the coordinates of x − S, relative to |x| (and |x − S|).
@@ -63,8 +61,11 @@ impl SurfaceSpline {
             return Projection::Lost;
         }
         let loose = |value: f64| value.clamp(-EDGE_TOLERANCE, 1.0 + EDGE_TOLERANCE);
-        let (s, t) = (if self.ends == Ends::Open { loose(guess.s) } else { guess.s.clamp(0.0, 1.0) }, loose(guess.t));
-        let Some(mut foot) = self.descend(x, Place { s, t, ..guess }) else { return Projection::Lost };
+        let s = if self.ends == Ends::Open { loose(guess.s) } else { guess.s.clamp(0.0, 1.0) };
+        let [low, high] = self.span(guess.patch[1]);
+        let Some(mut foot) = self.descend(x, Place { s, t: guess.t.clamp(low, high), ..guess }) else {
+            return Projection::Lost;
+        };
         if self.has_creases() {
             match self.search_sheets(x, foot) {
                 Some(closest) => foot = closest,
@@ -92,16 +93,17 @@ impl SurfaceSpline {
             return None;
         }
         let inverse = 1.0 / determinant;
+        let [low, high] = self.span(guess.patch[1]);
         for _ in 0..MAX_CORRECTIONS {
             let step = solve(hessian, inverse, foot.gradient());
             let is_within = |limit: f64| step[0].abs() <= limit && step[1].abs() <= limit;
             if is_within(STEP_TOLERANCE) {
-                let is_inside = (0.0..=1.0).contains(&foot.place.t)
+                let is_inside = (low..=high).contains(&foot.place.t)
                     && (self.ends != Ends::Open || (0.0..=1.0).contains(&foot.place.s));
                 return (is_inside && self.is_far_from_seam(&foot, metric[0])).then(|| foot.found());
             }
             let place = Place { s: foot.place.s + step[0], t: foot.place.t + step[1], ..guess };
-            let stays = (0.0..1.0).contains(&place.s) && (0.0..1.0).contains(&place.t);
+            let stays = (0.0..1.0).contains(&place.s) && (low..high).contains(&place.t);
             if !(stays && is_within(0.1)) {
                 return None;
             }
@@ -131,6 +133,13 @@ impl SurfaceSpline {
             || (self.ends == Ends::Open && over(foot.held[0], column == 0, column + 2 == self.around))
     }
 
+    /// Range of t in the patches of a ring, with what goes on beyond the first and the last one.
+    #[inline]
+    fn span(&self, ring: usize) -> [f64; 2] {
+        let low = if ring == 0 { -self.reach } else { 0.0 };
+        [low, if ring + 2 == self.along { 1.0 + self.reach } else { 1.0 }]
+    }
+
     /// The sheet around a place: a facet, or everything up to the edges and the seam.
     #[inline]
     pub(super) fn room(&self, place: Place) -> Room {
@@ -140,15 +149,15 @@ impl SurfaceSpline {
                 let low = if patch == 0 { -EDGE_TOLERANCE } else { 0.0 };
                 [low, if patch + 2 == count { 1.0 + EDGE_TOLERANCE } else { 1.0 }]
             };
-            let along = side(place.patch[1], self.along);
-            return [if self.ends == Ends::Open { side(place.patch[0], self.around) } else { [0.0, 1.0] }, along];
+            let around = if self.ends == Ends::Open { side(place.patch[0], self.around) } else { [0.0, 1.0] };
+            return [around, self.span(place.patch[1])];
         }
         let around = match self.ends {
             Ends::Smooth => [f64::NEG_INFINITY, f64::INFINITY],
             Ends::Meeting => [-p, super::real(self.around) - p],
             Ends::Open => [-p - EDGE_TOLERANCE, super::real(self.around - 1) - p + EDGE_TOLERANCE],
         };
-        [around, [-q - EDGE_TOLERANCE, super::real(self.along - 1) - q + EDGE_TOLERANCE]]
+        [around, [-q - self.reach, super::real(self.along - 1) - q + self.reach]]
     }
 
     /// A place with parameters beyond its patch, expressed in the patch where it lies.

@@ -1,7 +1,7 @@
 //! What depends on step size, scheme, damping and speed, and the state carried from one of them to the next.
 
 use super::{LaneCoefficients, ModalBank};
-use crate::dynamics::scheme::resample;
+use crate::dynamics::scheme::{Velocity, resample};
 use crate::settings::Scheme;
 
 impl ModalBank {
@@ -12,6 +12,10 @@ impl ModalBank {
         for (index, coefficients) in self.coefficients.iter_mut().enumerate() {
             let factor = self.options.frequency_factors.get(index / modes).copied().unwrap_or(1.0);
             *coefficients = self.model.coefficient(index % modes, factor, scheme, step);
+            let (frequency, ratio) = (self.model.frequencies[index % modes], self.model.damping_ratios[index % modes]);
+            let dynamic = index % modes < self.model.dynamic_modes(scheme);
+            self.velocities[index] =
+                if dynamic { Velocity::new(factor * frequency, ratio, step) } else { Velocity::default() };
         }
         if !self.lane_coefficients.is_empty() {
             self.spread_coefficients();
@@ -94,19 +98,27 @@ impl ModalBank {
         self.model.damping_ratios.fill(damping_ratio);
     }
 
+    /// Modal forces on one sector that last over the step: of contact (`forces[row · lanes + sector]`, N; none for an empty
+    /// slice), of the modal loads, of spin.
+    pub(super) fn gather_forces(&mut self, sector: usize, forces: &[f64]) {
+        let lanes = self.lanes();
+        let of_row = |row: usize| forces.get(row * lanes + sector).copied().unwrap_or(0.0);
+        let touched = (0..self.rows).any(|row| of_row(row) != 0.0);
+        for mode in 0..self.modes() {
+            let shapes = &self.contact_modes[mode * self.rows..][..self.rows];
+            let contact: f64 =
+                if touched { shapes.iter().enumerate().map(|(row, shape)| shape * of_row(row)).sum() } else { 0.0 };
+            self.modal_force[mode] = contact + self.state.push_before.get(mode).copied().unwrap_or(0.0);
+        }
+        self.add_coupling_force(sector);
+    }
+
     /// Carry the state from the step size in use to `new_step`, each sector under its last contact force
     /// (`forces[row · lanes + sector]`, N; none for an empty slice) and the modal loads, then use the new coefficients.
     pub fn resample(&mut self, scheme: Scheme, new_step: f64, forces: &[f64]) {
-        let lanes = self.lanes();
         let dynamic = self.model.dynamic_modes(self.scheme);
         for sector in 0..self.sectors {
-            for mode in 0..self.modes() {
-                let shapes = &self.contact_modes[mode * self.rows..][..self.rows];
-                let rows = shapes.iter().enumerate().filter(|(row, _)| row * lanes + sector < forces.len());
-                let contact: f64 = rows.map(|(row, shape)| shape * forces[row * lanes + sector]).sum();
-                self.modal_force[mode] = contact + self.state.push_before.get(mode).copied().unwrap_or(0.0);
-            }
-            self.add_coupling_force(sector);
+            self.gather_forces(sector, forces);
             for mode in 0..dynamic {
                 let (force, index) = (self.modal_force[mode], self.index(mode, sector));
                 self.state.increment[index] = resample(

@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 
 use super::dispatch::InstructionSet;
 use super::modal::{ModalModel, ModalSpin};
-use super::scheme::{ModeCoefficients, free_increment};
+use super::scheme::{ModeCoefficients, Velocity, free_increment};
 use crate::persist::{Persist, Reader, Writer, persist_fields};
 use crate::settings::Scheme;
 use coupling::Coupling;
@@ -97,6 +97,8 @@ pub struct ModalBank {
     contact_rows: Vec<f64>,
     /// `[set][mode]`: one set for all sectors, or one each where they are mistuned.
     coefficients: Vec<ModeCoefficients>,
+    /// Velocities, the same; quasi-static modes have none.
+    velocities: Vec<Velocity>,
     lane_coefficients: Vec<LaneCoefficients>,
     /// G per set: displacement of the contact rows per unit force held for one step (m/N), rows × rows.
     flexibility: Vec<DMatrix<f64>>,
@@ -145,6 +147,7 @@ impl ModalBank {
             contact_modes: model.contact_modes.as_slice().to_vec(),
             contact_rows: model.contact_modes.transpose().as_slice().to_vec(),
             coefficients: vec![ModeCoefficients::default(); sets * modes],
+            velocities: vec![Velocity::default(); sets * modes],
             lane_coefficients: vec![LaneCoefficients::default(); if special { state_len } else { 0 }],
             flexibility: vec![DMatrix::zeros(rows, rows); if options.flexibility { sets } else { 0 }],
             scheme: Scheme::default(),
@@ -375,6 +378,28 @@ impl ModalBank {
         (kinetic, strain)
     }
 
+    /// Kinetic and strain energy of all sectors at this instant (J), ½q̇² and ½ω²q² of every mode, each sector under the
+    /// contact forces that last (`forces[row · lanes + sector]`, N) and the modal loads.
+    pub fn energies_now(&mut self, forces: &[f64]) -> (f64, f64) {
+        let (mut kinetic, mut strain) = (0.0, 0.0);
+        for sector in 0..self.sectors {
+            self.gather_forces(sector, forces);
+            let velocities = &self.velocities[self.set_of(sector) * self.modes()..];
+            let modes = self.coefficients(sector).iter().zip(velocities).zip(&self.modal_force);
+            for (mode, ((k, velocity), force)) in modes.enumerate() {
+                let (position, increment) = self.modal_state(mode, sector);
+                let velocity = velocity.of(position, increment, *force);
+                kinetic += 0.5 * velocity * velocity;
+                strain += k.spring * (position * position);
+            }
+            if let Some(coupling) = &self.coupling {
+                let position = |mode| self.modal_state(mode, sector).0;
+                strain += coupling.strain(position, position);
+            }
+        }
+        (kinetic, strain)
+    }
+
     /// Damping loss since the last call (J).
     pub fn collect_loss(&mut self) -> f64 {
         let loss = self.state.loss[..self.sectors].iter().sum();
@@ -418,6 +443,68 @@ impl ModalBank {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Free motion keeps ½q̇² + ½ω²q² exactly, far beyond where the scheme's own energy is half of it; rest under load has none
+    /// of the first, with the load as with a contact force that lasts.
+    #[test]
+    fn the_energy_of_the_instant_is_that_of_the_motion() {
+        let frequencies = vec![0.0, 1e3, 4e4, 1.2e5];
+        let model = ModalModel {
+            damping_ratios: vec![0.0; 4],
+            contact_modes: DMatrix::from_fn(3, 4, |row, mode| 1.0 + row as f64 - 0.3 * mode as f64),
+            shapes: DMatrix::identity(4, 4),
+            quasi_static: 0,
+            frequencies,
+        };
+        let mut bank = ModalBank::new(&model, 3);
+        bank.set_step(Scheme::ModalExact, 2e-5);
+        let mut expected = 0.0;
+        for sector in 0..3 {
+            for (mode, frequency) in model.frequencies.iter().enumerate() {
+                let (q, v) = (1e-4 * (1.0 + sector as f64), 0.3 - 0.1 * mode as f64);
+                bank.set_modal_state(mode, sector, q, v);
+                expected += 0.5 * v * v + 0.5 * frequency * frequency * q * q;
+            }
+        }
+        for _ in 0..500 {
+            bank.predict(false);
+            let (kinetic, strain) = bank.energies_now(&[]);
+            assert!((kinetic + strain - expected).abs() < 1e-10 * expected && kinetic >= 0.0 && strain >= 0.0);
+        }
+        let (kinetic, strain) = bank.energies();
+        assert!(kinetic + strain < 0.6 * expected, "the energy that is conserved leaves out modes beyond the step");
+
+        let mut bank = ModalBank::with_options(&model, 1, BankOptions { loads: true, ..BankOptions::default() });
+        bank.set_step(Scheme::ModalExact, 2e-5);
+        let push = [0.0, 30.0, 4e3, 1e4];
+        bank.settle(&push);
+        bank.loads_mut().copy_from_slice(&push);
+        let terms =
+            push.iter().zip(&model.frequencies).skip(1).map(|(load, frequency)| 0.5 * (load / frequency).powi(2));
+        let at_rest: f64 = terms.sum();
+        bank.predict(false);
+        let (kinetic, strain) = bank.energies_now(&[]);
+        assert!(kinetic < 1e-20 * at_rest && (strain - at_rest).abs() < 1e-12 * at_rest, "{kinetic:e}, {strain:e}");
+
+        // A contact force on the rows that holds the vibrating modes where they are.
+        let held = ModalModel {
+            frequencies: vec![1.2e5; 3],
+            damping_ratios: vec![0.01; 3],
+            contact_modes: model.contact_modes.columns(0, 3).into_owned(),
+            shapes: DMatrix::identity(3, 3),
+            quasi_static: 0,
+        };
+        let mut bank = ModalBank::new(&held, 1);
+        bank.set_step(Scheme::ModalExact, 2e-5);
+        let force = [3.0, -2.0, 5.0];
+        for mode in 0..3 {
+            let load: f64 = (0..3).map(|row| held.contact_modes[(row, mode)] * force[row]).sum();
+            let index = bank.index(mode, 0);
+            bank.state.position[index] = load / 1.44e10;
+        }
+        let (kinetic, strain) = bank.energies_now(&force);
+        assert!(kinetic < 1e-20 * strain && strain > 0.0, "{kinetic:e}, {strain:e}");
+    }
 
     /// The widest set against the baseline; a processor without wider registers compares the baseline with itself.
     #[test]

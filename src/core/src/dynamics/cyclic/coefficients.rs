@@ -3,7 +3,7 @@
 use super::fourier::Synthesis;
 use super::pass::{Gather, modal_force};
 use super::{Complexes, CyclicBank, LANES, LaneCoefficients, NOTHING};
-use crate::dynamics::scheme::resample;
+use crate::dynamics::scheme::{Velocity, resample};
 use crate::settings::Scheme;
 
 impl CyclicBank {
@@ -17,6 +17,10 @@ impl CyclicBank {
             for mode in 0..diameter.len() {
                 let k = diameter.coefficient(mode, scheme, step);
                 self.coefficients[n * self.modes + mode] = k;
+                let (frequency, ratio) = (diameter.frequencies[mode], diameter.damping_ratios[mode]);
+                let dynamic = mode < diameter.dynamic_modes(scheme);
+                self.velocities[n * self.modes + mode] =
+                    if dynamic { Velocity::new(frequency, ratio, step) } else { Velocity::default() };
                 let (lane, lanes) = (n % LANES, &mut self.lane_coefficients[n / LANES * self.modes + mode]);
                 (lanes.beta[lane], lanes.kappa[lane], lanes.loss[lane]) = (k.beta, k.kappa, k.loss);
                 (lanes.compliance[lane], lanes.delayed[lane]) = (k.compliance, k.delayed);
@@ -68,6 +72,18 @@ impl CyclicBank {
     /// Carry the state from the step size in use to `new_step` under the last contact forces (`forces[row · lanes +
     /// sector]`, N) and the modal loads, then use the new coefficients.
     pub fn resample(&mut self, scheme: Scheme, new_step: f64, forces: &[f64]) {
+        self.gather_forces(forces);
+        for nodal_diameter in 0..self.model.diameters.len() {
+            for mode in 0..self.model.diameters[nodal_diameter].dynamic_modes(self.scheme) {
+                self.resample_mode(nodal_diameter, mode, new_step);
+            }
+        }
+        self.set_step(scheme, new_step);
+        self.recover();
+    }
+
+    /// Spectrum of the contact forces that last (`forces[row · lanes + sector]`, N), once those of the last step have acted.
+    pub(super) fn gather_forces(&mut self, forces: &[f64]) {
         self.finish();
         self.asked.clear();
         let (lanes, nodes) = (self.lanes, self.rows / 3);
@@ -80,16 +96,10 @@ impl CyclicBank {
         let (fourier, rows, forces) = (&self.fourier, self.rows, &self.asked[..]);
         self.instruction_set.run(Gather { fourier, rows, forces, spectrum: &mut self.asked_force });
         self.asked_nodes.fill(true);
-        for nodal_diameter in 0..self.model.diameters.len() {
-            for mode in 0..self.model.diameters[nodal_diameter].dynamic_modes(self.scheme) {
-                self.resample_mode(nodal_diameter, mode, new_step);
-            }
-        }
-        self.set_step(scheme, new_step);
-        self.recover();
     }
 
-    fn resample_mode(&mut self, nodal_diameter: usize, mode: usize, new_step: f64) {
+    /// Modal force of what was gathered, and of the loads, on a mode (re, im).
+    pub(super) fn gathered_force(&self, nodal_diameter: usize, mode: usize) -> [f64; 2] {
         let (index, lane) = self.index(nodal_diameter, mode);
         let force = &self.asked_force[nodal_diameter / LANES * self.rows..][..self.rows];
         let shapes = &self.shapes[index * self.rows..][..self.rows];
@@ -97,6 +107,12 @@ impl CyclicBank {
         if nodal_diameter == 0 {
             force[0] += self.state.push_before.get(mode).copied().unwrap_or(0.0);
         }
+        force
+    }
+
+    fn resample_mode(&mut self, nodal_diameter: usize, mode: usize, new_step: f64) {
+        let (index, lane) = self.index(nodal_diameter, mode);
+        let force = self.gathered_force(nodal_diameter, mode);
         let diameter = &self.model.diameters[nodal_diameter];
         let (frequency, ratio, step) = (diameter.frequencies[mode], diameter.damping_ratios[mode], self.step);
         for part in 0..2 {

@@ -14,7 +14,7 @@ mod pass;
 
 use super::bank::{FLUSH_BELOW, LANES, lanes};
 use super::dispatch::InstructionSet;
-use super::scheme::{ModeCoefficients, free_increment};
+use super::scheme::{ModeCoefficients, Velocity, free_increment};
 use crate::persist::{Persist, Reader, Writer, persist_fields};
 use crate::settings::Scheme;
 use fourier::{Fourier, Synthesis};
@@ -83,6 +83,8 @@ pub struct CyclicBank {
     lane_coefficients: Vec<LaneCoefficients>,
     /// `[n · modes + mode]`; the default where there is no such mode.
     coefficients: Vec<ModeCoefficients>,
+    /// Velocities, the same; quasi-static modes have none.
+    velocities: Vec<Velocity>,
     /// Ĝ, `[block][column][row]`.
     spectral_flexibility: Vec<Complexes>,
     /// G(s − s'), `[difference][column node][row node][component of the force][component of the displacement]`, the last
@@ -129,6 +131,7 @@ impl CyclicBank {
             instruction_set: InstructionSet::detect(),
             lane_coefficients: vec![LaneCoefficients::NONE; blocks * modes],
             coefficients: vec![ModeCoefficients::default(); model.diameters.len() * modes],
+            velocities: vec![Velocity::default(); model.diameters.len() * modes],
             spectral_flexibility: vec![NOTHING; blocks * rows * rows],
             flexibility: vec![[[0.0; 4]; 3]; sectors * rows / 3 * rows / 3],
             scheme: Scheme::default(),
@@ -363,6 +366,26 @@ impl CyclicBank {
         (kinetic, strain)
     }
 
+    /// Kinetic and strain energy of the wheel at this instant (J), ½q̇² and ½ω²q² of every mode, under the contact forces
+    /// that last (`forces[row · lanes + sector]`, N) and the modal loads.
+    pub fn energies_now(&mut self, forces: &[f64]) -> (f64, f64) {
+        self.gather_forces(forces);
+        let (mut kinetic, mut strain) = (0.0, 0.0);
+        for nodal_diameter in 0..self.model.diameters.len() {
+            for mode in 0..self.model.diameters[nodal_diameter].len() {
+                let force = self.gathered_force(nodal_diameter, mode);
+                let (position, increment) = self.modal_state(nodal_diameter, mode);
+                let index = nodal_diameter * self.modes + mode;
+                for part in 0..2 {
+                    let velocity = self.velocities[index].of(position[part], increment[part], force[part]);
+                    kinetic += 0.5 * velocity * velocity;
+                    strain += self.coefficients[index].spring * (position[part] * position[part]);
+                }
+            }
+        }
+        (kinetic, strain)
+    }
+
     /// Kinetic and strain energy of the modes of one nodal diameter (J).
     pub fn diameter_energies(&self, nodal_diameter: usize) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
@@ -441,6 +464,32 @@ mod tests {
             }
         };
         CyclicModel { sectors, diameters: (0..=sectors / 2).map(diameter).collect() }
+    }
+
+    /// Free motion keeps ½q̇² + ½ω²q² of every nodal diameter, which the energy that is conserved does not tell.
+    #[test]
+    fn the_energy_of_the_instant_is_that_of_the_motion() {
+        let mut undamped = model(11, 2);
+        undamped.set_damping_ratio(0.0);
+        let mut bank = CyclicBank::new(&undamped, false);
+        bank.set_step(Scheme::ModalExact, 2e-5);
+        let mut expected = 0.0;
+        for (n, diameter) in undamped.diameters.iter().enumerate() {
+            for (mode, frequency) in diameter.frequencies.iter().enumerate() {
+                let (q, v) = (1e-4 / (1.0 + mode as f64), 0.3 - 0.1 * n as f64);
+                bank.set_modal_state(n, mode, [q, -0.5 * q], [v, 0.2 * v]);
+                let parts = if undamped.is_real(n) { [1.0, 0.0] } else { [1.0, 1.0] };
+                let square = |a: f64, b: f64| parts[0] * a * a + parts[1] * b * b;
+                expected += 0.5 * square(v, 0.2 * v) + 0.5 * frequency * frequency * square(q, 0.5 * q);
+            }
+        }
+        let none = vec![0.0; bank.rows() * bank.lanes()];
+        for _ in 0..200 {
+            bank.predict(false);
+            let (kinetic, strain) = bank.energies_now(&none);
+            let off = (kinetic + strain - expected).abs() / expected;
+            assert!(off < 1e-9 && kinetic >= 0.0 && strain >= 0.0, "{off:e}");
+        }
     }
 
     /// The widest set against the baseline; a processor without wider registers compares the baseline with itself.

@@ -11,9 +11,8 @@ use nalgebra::DMatrix;
 use super::{Limits, Parameters, Sense};
 use crate::contact::free_gap::{FreeGap, tangent};
 use crate::contact::gap::{GapLaw, Geometry, dot};
-use crate::contact::spline_gap::BEYOND_EDGE;
 use crate::dynamics::modal::ModalModel;
-use crate::settings::Solver;
+use crate::settings::{Scheme, Solver};
 use crate::simulation::compile::Compiled;
 use crate::simulation::free::FreeParts;
 use crate::stability::massless::MasslessLimit;
@@ -38,7 +37,17 @@ struct Met {
 impl Compiled {
     pub(super) fn free_limits(&self, parameters: &Parameters, free: &FreeParts, law: &FreeGap) -> Limits {
         let step = self.expected_step(parameters.step);
-        let outcome = self.free_warnings(parameters, free, law, step);
+        // Contacts of a free master may act along any direction.
+        let unresolved = match parameters.scheme {
+            Scheme::ModalExact => stability::unresolved::limit_along_axes(&self.model).min(self.unresolved(
+                &[],
+                parameters.scheme,
+                |_| Vec::new(),
+            )),
+            _ => f64::INFINITY,
+        };
+        let resolved = stability::unresolved::check(step, unresolved, self.model.largest_frequency());
+        let outcome = resolved.and_then(|()| self.free_warnings(parameters, free, law, step));
         let quiet = || Some(Sense { outcome: Ok(Vec::new()), ranges: Vec::new() });
         Limits {
             parameters: parameters.clone(),
@@ -46,6 +55,7 @@ impl Compiled {
             senses: [quiet(), quiet()],
             massless: MasslessLimit::NONE,
             casing: Vec::new(),
+            unresolved,
         }
     }
 
@@ -142,7 +152,7 @@ fn flight(law: &FreeGap, velocity: [f64; 3]) -> Vec<Met> {
         law.evaluate(&displacement, None, &mut geometry, &mut gap);
         // Beyond small displacements the master does not get there undeformed.
         let inside: Vec<usize> = (0..nodes).filter(|node| gap[*node] <= 0.0).collect();
-        if inside.is_empty() || gap.iter().all(|gap| *gap >= BEYOND_EDGE) {
+        if inside.is_empty() {
             continue;
         }
         let direction = |node: &usize| {

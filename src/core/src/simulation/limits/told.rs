@@ -24,6 +24,8 @@ pub struct Told {
     fastest: f64,
     /// Most warnings at once of one friction coefficient.
     friction: usize,
+    /// A displacement that linear kinematics describes badly.
+    pub(in crate::simulation) curved: bool,
 }
 
 impl Simulation {

@@ -89,8 +89,8 @@ fn totals(table: &mut Builder, parts: &Parts) {
             "clearance_minimum",
             Span::Window,
             Some((&LENGTH, 1e-3)),
-            "Smallest clearance of all contact nodes within the communication step, normal to their surfaces; 1 m where all \
-             of them are beyond the edges",
+            "Smallest clearance of all contact nodes within the communication step, normal to their surfaces; 1e9 m where \
+             none of them has a surface to touch, beyond the edges",
         )
         .display = Some(1);
     for (component, axis) in AXES.into_iter().enumerate() {
@@ -171,7 +171,8 @@ fn nodes(table: &mut Builder, parts: &Parts) {
     for (quantity, name, span, unit, _) in rows {
         let text = match quantity {
             Quantity::Clearance(_) => {
-                "Clearance normal to the surface at the communication point; 1 m beyond an edge and for nodes of no pair"
+                "Clearance normal to the surface at the communication point; 1e9 m where there is nothing to touch, beyond an \
+                 edge and for nodes of no pair"
             }
             Quantity::WatchedClearanceMinimum(_) => "Smallest clearance within the communication step",
             Quantity::NormalForce(_) => "Normal contact force, mean over the communication step",
@@ -204,6 +205,13 @@ fn energies(table: &mut Builder, parts: &Parts) {
     let rows = [
         (Quantity::KineticEnergy, "kinetic_energy", Span::Point, "Kinetic energy of all structures, flight included"),
         (Quantity::StrainEnergy, "strain_energy", Span::Point, "Strain energy of all structures"),
+        (
+            Quantity::SchemeEnergy,
+            "scheme_energy",
+            Span::Point,
+            "Energy that the time scheme conserves and the ledger closes with: kinetic plus strain energy up to the second order of \
+             the step",
+        ),
         (Quantity::DampingLoss, "damping_loss", Span::Total, "Energy lost by modal damping since the start"),
         (Quantity::FrictionLoss, "friction_loss", Span::Total, "Friction heat since the start"),
         (

@@ -241,9 +241,16 @@ pub fn energies(table: &mut Builder, scene: &Parts) {
             Quantity::KineticEnergy,
             "kinetic_energy",
             Span::Point,
-            "Kinetic energy of the vibration in the rotating frame",
+            "Kinetic energy of the vibration in the rotating frame, of the instant",
         ),
-        (Quantity::StrainEnergy, "strain_energy", Span::Point, "Strain energy"),
+        (Quantity::StrainEnergy, "strain_energy", Span::Point, "Strain energy of the instant"),
+        (
+            Quantity::SchemeEnergy,
+            "scheme_energy",
+            Span::Point,
+            "Energy that the time scheme conserves and the ledger closes with: kinetic plus strain energy up to the second order of \
+             the step",
+        ),
         (Quantity::DampingLoss, "damping_loss", Span::Total, "Energy lost by modal damping since the start"),
         (Quantity::FrictionLoss, "friction_loss", Span::Total, "Friction heat since the start"),
         (

@@ -1,0 +1,140 @@
+//! Blade tips beyond the edge of their casing, steps that pass over what contact acts on, and displacements that are not small.
+
+use tiprub_core::{
+    Result, Scene, Simulation,
+    settings::{Scheme, Solver, SplineSettings},
+};
+
+use super::super::{
+    Case, Check, Expected, Happened,
+    models::{GAP, RADIUS, Tower, blade, round, with_methods, with_step},
+    observe::{Watch, real, set},
+};
+
+/// All of them.
+pub fn cases() -> Vec<Case> {
+    [edges(), resolution(), curved()].into_iter().flatten().collect()
+}
+
+fn rubbing(scheme: Scheme) -> Scene {
+    let mut scene = with_methods(round(blade(4)), scheme, Solver::Lcp);
+    scene.roms[0].contact_nodes.iter_mut().for_each(|node| node.meridional_slope = 0.0);
+    scene.settings.structures[0].axial_shift = true;
+    with_step(scene, 1e-6)
+}
+
+/// A cylinder: beyond the edge the spline goes on as what has no edge, a surface of revolution.
+fn edges() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (scheme, name) in [(Scheme::ModalExact, "exact"), (Scheme::CentralDifference, "central")] {
+        // Rings reach 7.5 mm beyond the contact nodes, and the surface goes on for 11.25 mm.
+        for (shift, expected) in [
+            (0.005, Expected::right("a surface of revolution, signs of the ledger")),
+            (0.017, Expected::right("a surface of revolution, signs of the ledger")),
+            (0.024, Expected::refused(["has left the surface of the casing in z", "of sector", "axial extent"])),
+        ] {
+            let work = move |_: &_| Happened::of(over_the_edge(scheme, shift));
+            let quick = scheme == Scheme::ModalExact;
+            cases.push(Case::new(format!("edge/{name}/shift={shift}"), expected, work).quick(quick));
+        }
+    }
+    cases
+}
+
+fn over_the_edge(scheme: Scheme, shift: f64) -> Result<Vec<Check>> {
+    let run = |spline: Option<SplineSettings>| {
+        let mut scene = rubbing(scheme);
+        scene.settings.surfaces[0].spline = spline;
+        let mut simulation = Simulation::new(&scene)?;
+        simulation.initialise(0.0)?;
+        let mut watch = Watch::new(&scene);
+        for index in 0..2000 {
+            let x = f64::from(index);
+            set(&mut simulation, "casing_radius_change", -1.02 * GAP * (x / 1000.0).min(1.0))?;
+            set(&mut simulation, "axial_shift", shift * (x / 300.0).sin())?;
+            watch.step(&mut simulation, 1e-6)?;
+        }
+        Ok((watch.impulse, real(&simulation, "impact_loss"), watch))
+    };
+    let (impulse, loss, watch) = run(Some(SplineSettings::default()))?;
+    let (expected, expected_loss, _) = run(None)?;
+    let mut checks = vec![Check::so("it touched", impulse > 0.0), watch.ledger()];
+    checks.push(Check::relative("impulse", impulse, expected, 0.05));
+    checks.push(Check::at_most("impact loss", (loss - expected_loss).abs() / expected_loss, 0.1));
+    Ok(checks)
+}
+
+/// A step is refused once it passes over modes that carry the contact; not one that passes over a stiff node alone.
+fn resolution() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for product in [1.0, 3.0, 9.0, 11.0, 30.0, 116.0, 1e4] {
+        for friction in [0.0, 0.15] {
+            let expected = if product < 10.0 {
+                Expected::either_as("signs of the ledger and of energies", &[&["grows"], &["energy that is not there"]])
+            } else {
+                Expected::refused(["modal-exact", "ω_max·h", "flexibility"])
+            };
+            let work = move |_: &_| Happened::of(at_product(product, friction));
+            let name = format!("resolution/exact/µ={friction}/ω_max·h={product}");
+            cases.push(Case::new(name, expected, work).quick(true));
+        }
+    }
+    cases
+}
+
+/// Blades of one mass and spring, met by a casing that closes in: their only mode carries everything.
+fn at_product(product: f64, friction: f64) -> Result<Vec<Check>> {
+    let mut scene = with_methods(round(blade(4)), Scheme::ModalExact, Solver::Lcp);
+    let fastest = scene.roms[0].stiffness.diagonal().max();
+    // All modes at one frequency.
+    scene.roms[0].stiffness.fill_diagonal(fastest);
+    scene.settings.contacts[0].friction = friction;
+    let step = product / fastest.sqrt();
+    let mut simulation = Simulation::new(&with_step(scene.clone(), step))?;
+    simulation.initialise(0.0)?;
+    let mut watch = Watch::new(&scene);
+    let mut negative = 0.0_f64;
+    for index in 0..400 {
+        set(&mut simulation, "casing_radius_change", -1.05 * GAP * (f64::from(index) / 200.0).min(1.0))?;
+        watch.step(&mut simulation, step)?;
+        negative = negative.min(real(&simulation, "strain_energy")).min(real(&simulation, "kinetic_energy"));
+    }
+    Ok(vec![watch.ledger(), Check::so("energies are not negative", negative >= 0.0)])
+}
+
+/// Blades dragged around by friction: told from 5 % of the clearance on, refused at 100 %.
+fn curved() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (what, share) in [("small", 0.02), ("told", 0.2), ("refused", 1.5)] {
+        let expected = if share < 1.0 {
+            Expected::right("u²/2r against the clearance")
+        } else {
+            Expected::refused(["around the axis", "u²/2r", "clearance"])
+        };
+        let work = move |_: &_| Happened::of(dragged(share));
+        cases.push(Case::new(format!("curved/{what}"), expected, work).quick(true));
+    }
+    cases
+}
+
+/// A blade whose root is soft around the axis, pressed until friction has moved it by so much.
+fn dragged(share: f64) -> Result<Vec<Check>> {
+    let mut scene = with_methods(round(Tower::default().rom()), Scheme::ModalExact, Solver::Lcp);
+    scene.settings.contacts[0].friction = 0.3;
+    let mut simulation = Simulation::new(&with_step(scene.clone(), 2e-6))?;
+    simulation.initialise(0.0)?;
+    let wanted = (2.0 * RADIUS * share * GAP).sqrt();
+    let moved = |simulation: &Simulation| {
+        let bank = simulation.system().bank();
+        (0..bank.rows() / 3).map(|node| bank.row(3 * node + 1, 0).abs()).fold(0.0, f64::max)
+    };
+    let mut depth = 1.0;
+    while moved(&simulation) < wanted && depth < 60.0 {
+        depth += 2e-3;
+        set(&mut simulation, "casing_radius_change", (-depth * GAP).max(-0.099 * RADIUS))?;
+        simulation.do_step(simulation.time(), 2e-6)?;
+    }
+    let (told, far) = (!simulation.take_notes().is_empty(), moved(&simulation));
+    let error = far * far / (2.0 * RADIUS * GAP);
+    Ok(vec![Check::so("it is told from 5 % on", told == (error >= 0.05)), Check::so("it came so far", far >= wanted)])
+}

@@ -1,0 +1,85 @@
+//! Whether the state is still what small displacements describe.
+
+use super::{StepFailure, System};
+use crate::contact::gap::GapLaw;
+
+/// Clearances below this share of the radius are those of a press fit, in which errors as small do not matter.
+pub const LEAST_CLEARANCE: f64 = 1e-4;
+
+/// What linear kinematics misses at a node that moves far around the axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Curved {
+    /// Sector (0-based).
+    pub sector: usize,
+    /// Contact node (0-based).
+    pub node: usize,
+    /// Displacement around the axis u_θ (m).
+    pub moved: f64,
+    /// What it puts the node further out by, u_θ²/2r (m).
+    pub error: f64,
+    /// Clearance that the sector was given, or [`LEAST_CLEARANCE`] of the radius if that is more (m).
+    pub clearance: f64,
+}
+
+impl Curved {
+    /// The error, as a share of the clearance.
+    pub fn share(&self) -> f64 {
+        self.error / self.clearance
+    }
+}
+
+impl System {
+    /// Whether the state is still what the model describes.
+    ///
+    /// # Errors
+    /// Coordinates that are not finite; displacements beyond a tenth of the radius, or those of the nodes of a free master
+    /// against each other beyond a tenth of their extent; displacements around the axis whose u_θ²/2r is the clearance
+    /// ([`System::most_curved`]).
+    pub fn check_state(&self) -> Result<(), StepFailure> {
+        if !self.bank.is_finite() || self.slaves.iter().any(|slave| !slave.bank.is_finite()) {
+            return Err(StepFailure::NonFinite);
+        }
+        let limit = self.law.largest_displacement();
+        let mut moved = self.slaves.iter().flat_map(|slave| slave.bank.displacement());
+        if moved.any(|displacement| displacement.abs() > limit) {
+            return Err(StepFailure::CasingImplausible);
+        }
+        if let GapLaw::Free(law) = &self.law {
+            let distorted = law.is_distorted(self.bank.displacement());
+            return if distorted { Err(StepFailure::Implausible { sector: 0 }) } else { Ok(()) };
+        }
+        let beyond = self.bank.displacement().iter().position(|displacement| displacement.abs() > limit);
+        if let Some(index) = beyond {
+            return Err(StepFailure::Implausible { sector: index % self.lanes });
+        }
+        match self.most_curved() {
+            Some(curved) if curved.share() >= 1.0 => Err(StepFailure::Curved(curved)),
+            _ => Ok(()),
+        }
+    }
+
+    /// The node whose displacement around the axis misleads most: a node that moves by u_θ along its tangent is u_θ²/2r further
+    /// from the axis, which a gap linear in the displacements does not see. On a spline positions are taken as they are,
+    /// yet what turns is a blade, which draws its tip in by as much and more, and modes are straight lines: the same
+    /// measure. `None` where nothing turns around an axis.
+    pub fn most_curved(&self) -> Option<Curved> {
+        let layout = self.law.layout()?;
+        let mut most: Option<Curved> = None;
+        for (node, per_radius) in layout.per_radius.iter().enumerate() {
+            let row = &self.bank.displacement()[(3 * node + 1) * self.lanes..][..self.bank.sectors()];
+            for (sector, (moved, clearance)) in row.iter().zip(&layout.clearances).enumerate() {
+                let found = Curved {
+                    sector,
+                    node,
+                    moved: moved.abs(),
+                    error: 0.5 * moved * moved * per_radius,
+                    clearance: clearance.max(LEAST_CLEARANCE / per_radius),
+                };
+                if most.is_none_or(|most| found.share() > most.share()) {
+                    most = Some(found);
+                }
+            }
+        }
+        most
+    }
+}
