@@ -2,7 +2,7 @@
 
 use tiprub_core::simulation::Progress;
 
-use super::{Phase, Refusal, Result, Slave, Status};
+use super::{Phase, Refusal, Result, Slave};
 
 /// How far beyond the stop time a step may end, as a fraction of the step: importers add up their communication points,
 /// and the sum of many steps misses the stop time by rounding.

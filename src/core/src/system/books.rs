@@ -91,7 +91,13 @@ impl System {
 
     /// Half the displacement of a node relative to the slave over the last two steps (m), in its own directions.
     #[inline(always)]
-    pub(super) fn relative_motion(&self, event: &ContactEvent, index: usize, geometry: &Geometry, drive: &Drive) -> [f64; 3] {
+    pub(super) fn relative_motion(
+        &self,
+        event: &ContactEvent,
+        index: usize,
+        geometry: &Geometry,
+        drive: &Drive,
+    ) -> [f64; 3] {
         let (lanes, now) = (self.lanes, self.bank.displacement());
         let (node, sector) = (event.node, event.sector);
         let mut moved: [f64; 3] = std::array::from_fn(|component| {
