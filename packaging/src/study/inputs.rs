@@ -158,6 +158,7 @@ impl Course {
         self.march(&scene, way, step, length).map_err(|error| Failure::from_core(place(), error))
     }
 
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "constants: at most 8000 steps")]
     fn march(&self, scene: &Scene, way: Way, step: f64, length: f64) -> tiprub_core::Result<Found> {
         let mut simulation = Simulation::new(scene)?;
         self.give(&mut simulation, way, [0.0, step], length)?;

@@ -117,6 +117,7 @@ fn give(simulation: &mut Simulation, derivatives: bool, [now, next]: [f64; 2]) {
 }
 
 /// Largest node force over two milliseconds by steps of `length`.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most two thousand steps")]
 fn peak(scene: &Scene, derivatives: bool, length: f64) -> f64 {
     let mut simulation = started(scene);
     let mut most = 0.0_f64;
@@ -376,7 +377,7 @@ fn refused_values_within_a_step_change_nothing() {
     let before = state(&simulation);
     let rotation = reference(&simulation, "casing_shape_rotation");
     let radius = reference(&simulation, "casing_radius_change");
-    let wrapped = simulation.set_real(rotation, -6.28).unwrap_err().to_string();
+    let wrapped = simulation.set_real(rotation, -6.2).unwrap_err().to_string();
     let fast = simulation.set_real(rotation, 3.0).unwrap_err().to_string();
     let beyond = simulation.set_input_derivative(radius, 1, 1e6).unwrap_err().to_string();
     assert!(wrapped.contains("half a turn") && fast.contains("`casing_shape_rotation`") && beyond.contains("outside"));
