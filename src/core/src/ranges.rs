@@ -51,8 +51,8 @@ pub const PATCHES: usize = 10_000;
 /// Coating thickness (m): from a few atoms, whose effect on blades that move by micrometres is lost in rounding, to a tenth
 /// of a metre; real ones have millimetres.
 pub const THICKNESS: [f64; 2] = [1e-9, 0.1];
-/// Modulus of a coating (Pa), from a jelly's to beyond any solid's.
-pub const MODULUS: [f64; 2] = [1.0, 1e13];
+/// Modulus of a coating (Pa): positive, as soft as may be, which only does nothing, to beyond any solid's.
+pub const MODULUS: [f64; 2] = [5e-324, 1e13];
 /// Largest yield stress and hardening of a coating (Pa), beyond any solid.
 pub const STRESS: f64 = 1e13;
 /// Most cells of a coating: 80 megabytes of state.
@@ -66,7 +66,8 @@ pub fn within(field: &str, value: f64, low: f64, high: f64) -> Result<()> {
     if (low..=high).contains(&value) {
         return Ok(());
     }
-    Err(Error::invalid(field, shown(value), format!("Give a value between {} and {}", shown(low), shown(high))))
+    let kind = if value.is_finite() { "value" } else { "finite value" };
+    Err(Error::invalid(field, shown(value), format!("Give a {kind} between {} and {}", shown(low), shown(high))))
 }
 
 /// Refuse a number that is not finite, or larger than `most` in size.

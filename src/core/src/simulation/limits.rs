@@ -168,6 +168,13 @@ impl Compiled {
         (1.0 + added.max(0.0) / (largest * largest)).sqrt()
     }
 
+    /// Largest ω h of all structures, stiffening aside, below 2.
+    pub(super) fn largest_product(&self, step: f64) -> f64 {
+        let carriers = self.carriers().map(ModalModel::largest_frequency);
+        let largest = carriers.fold(self.largest_frequency() * self.stiffest(), f64::max);
+        (largest * step).min(2.0 * (1.0 - 1e-9))
+    }
+
     /// Modes of the structures that carry surfaces.
     fn carriers(&self) -> impl Iterator<Item = &ModalModel> {
         self.carrier.iter().chain(self.free.iter().flat_map(|free| &free.carriers))

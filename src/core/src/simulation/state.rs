@@ -163,6 +163,7 @@ impl Simulation {
         let largest = if runs { LARGEST } else { f64::INFINITY };
         take(&mut lead.time, reader);
         self.initial_time.check(reader);
+        self.initial_energy.check(reader);
         take(&mut lead.communication, reader);
         self.previous_length.check(reader);
         // What inputs may hold is looked at where they are read.
@@ -178,13 +179,14 @@ impl Simulation {
         self.previous.check(reader);
         take(&mut lead.reference_speed, reader);
         reader.up_to(largest);
-        lead.step = self.system.check(reader, runs);
+        let endless;
+        (lead.step, endless) = self.system.check(reader, runs);
         if let Some(fault) = reader.fault() {
             return damaged(fault);
         }
         // Those of three kinds of gaps: now, a step earlier, and the lowest.
-        let padded = 3 * self.system.padding();
-        if runs && !(reader.infinite() - infinite == padded && self.system.are_padded(&window.lowest)) {
+        let endless = self.system.endless(&window.lowest).map(|lowest| lowest + endless);
+        if runs && endless != Some(reader.infinite() - infinite) {
             return damaged("it holds a number that is not finite");
         }
         self.check_counts(&lead)?;

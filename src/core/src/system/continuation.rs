@@ -158,8 +158,9 @@ impl System {
         self.state.save(writer);
     }
 
-    /// Pass over a saved state and refuse what is none; returns its step size (s). Before the start, gaps are not known.
-    pub fn check(&self, reader: &mut Reader, started: bool) -> f64 {
+    /// Pass over a saved state and refuse what is none; returns its step size (s) and how many of its gaps are infinite. Before
+    /// the start, gaps are not known.
+    pub fn check(&self, reader: &mut Reader, started: bool) -> (f64, usize) {
         let mut step = 0.0_f64;
         step.restore(reader);
         if !(0.0..=f64::MAX).contains(&step) {
@@ -179,21 +180,23 @@ impl System {
         if !saved.geometry.places.iter().enumerate().all(exists) {
             reader.refuse("a contact node is on a patch that its surface does not have");
         }
-        if started && ![&saved.gap, &saved.gap_before].into_iter().all(|gaps| self.are_padded(gaps)) {
+        let endless = self.endless(&saved.gap).zip(self.endless(&saved.gap_before));
+        if started && endless.is_none() {
             reader.refuse("a gap is not finite");
         }
-        step
+        (step, endless.map_or(0, |(now, before)| now + before))
     }
 
-    /// Number of gaps in padding lanes.
-    pub fn padding(&self) -> usize {
-        self.law.nodes() * (self.lanes - self.bank.sectors())
-    }
-
-    /// Whether gaps, `[node · lanes + lane]`, are infinite in padding lanes and nowhere else.
-    pub fn are_padded(&self, gaps: &[f64]) -> bool {
-        let sectors = self.bank.sectors();
-        gaps.iter().enumerate().all(|(index, gap)| gap.is_infinite() == (index % self.lanes >= sectors))
+    /// How many gaps, `[node · lanes + lane]`, are infinite: those of padding lanes, and of nodes of a free master that have
+    /// nothing to touch; `None` where others are, or one is negative.
+    pub fn endless(&self, gaps: &[f64]) -> Option<usize> {
+        let (sectors, free) = (self.bank.sectors(), matches!(self.law, GapLaw::Free(_)));
+        let sound = |(index, gap): (usize, &f64)| {
+            let padding = index % self.lanes >= sectors;
+            if padding || free && gap.is_infinite() { *gap == f64::INFINITY } else { gap.is_finite() }
+        };
+        let all = gaps.iter().enumerate().all(sound);
+        all.then(|| gaps.iter().filter(|gap| gap.is_infinite()).count())
     }
 
     /// Restore a saved state; coefficients are recomputed from the saved step size.
