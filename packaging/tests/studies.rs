@@ -83,16 +83,13 @@ fn the_quick_study_of_modes_draws_folded_engine_orders() {
     assert!(root.path().join("out/shapes.vtu").is_file());
 }
 
-/// Three casings. The rigid oval closes all nodes; with friction contact on it flutters, and one run is refused on its way. The elastic
-/// casing is held at one end and gives way: the leading edge does not touch.
+/// Three casings. The rigid oval closes all nodes; with friction contact on it flutters, and presses harder than without. The
+/// elastic casing is held at one end and gives way: the leading edge does not touch.
 #[test]
 fn the_quick_study_of_the_stage_tells_rigid_and_flexible_casings_apart() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), "stage", &["--speeds", "900:1300:2"]);
-    let node = "The clearance of each of the three nodes";
-    let no =
-        ["Rigid casing: Every run".to_owned(), format!("Rigid casing: {node}"), format!("Flexible casing: {node}")];
-    only_no(&json, &no.each_ref().map(String::as_str));
+    only_no(&json, &["Flexible casing: The clearance of each of the three nodes"]);
     let out = root.path().join("out");
     for name in ["clearances-smooth.csv", "clearances-rigid.csv", "clearances-flexible.csv"] {
         let (names, rows) = columns(&out.join(name));
@@ -103,8 +100,11 @@ fn the_quick_study_of_the_stage_tells_rigid_and_flexible_casings_apart() {
     let least = |name: &str| columns(&out.join(name)).1.iter().map(|row| row[12..15].to_vec()).collect::<Vec<_>>();
     assert!(least("amplitudes-smooth.csv").iter().flatten().all(|clearance| *clearance == 0.0));
     assert!(least("amplitudes-flexible.csv").iter().all(|nodes| nodes[0] > 1e-6 && nodes[1] == 0.0));
-    let (_, rows) = columns(&out.join("amplitudes-rigid.csv"));
-    assert_eq!(rows.iter().map(|row| row[18]).collect::<Vec<_>>(), [0.0, 1.0], "reaches its end");
+    let [rigid, smooth] = ["rigid", "smooth"].map(|casing| columns(&out.join(format!("amplitudes-{casing}.csv"))).1);
+    for (rigid, smooth) in rigid.iter().zip(&smooth) {
+        assert_eq!([rigid[18], smooth[18]], [1.0, 1.0], "reaches its end");
+        assert!(rigid[10] > 1.3 * smooth[10], "flutter presses harder: {} N, {} N", rigid[10], smooth[10]);
+    }
 }
 
 /// The first 0.2 ms: two rows of nodes touch. Statements hold, and the numbers are those of methods that are near and not equal.
