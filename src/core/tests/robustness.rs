@@ -101,7 +101,10 @@ fn stiffening_does_not_make_unresolved_modes_grow() {
     let highest = std::f64::consts::TAU * 40_000.0;
     for turns in [1.0, 1.001, 3.0] {
         let step = turns * std::f64::consts::PI / highest;
-        let mut simulation = started(&stiffening(Scheme::ModalExact, step)).unwrap();
+        let mut scene = stiffening(Scheme::ModalExact, step);
+        // Here a resonance of the step, not the bound on energies, is looked at.
+        scene.settings.outputs.energies = false;
+        let mut simulation = started(&scene).unwrap();
         run_up(&mut simulation, step).unwrap();
         let left = simulation.system().bank().modal_state(7, 0).0.abs();
         println!("ωh = {turns} π: highest mode left at {left:.1e} m·√kg");
@@ -348,7 +351,7 @@ fn a_speed_given_within_a_communication_step_is_checked_as_well() {
     let speed = reference(&simulation, "speed");
     simulation.begin_step(0.0, 5e-5).unwrap();
     simulation.advance().unwrap();
-    for (value, slope) in [(9e5, 0.0), (1300.0, 1e12)] {
+    for (value, slope) in [(9e5, 0.0), (1300.0, 1e10)] {
         let outcome = simulation.set_real(speed, value).and_then(|()| simulation.set_input_derivative(speed, 1, slope));
         let message = outcome.unwrap_err().to_string();
         assert!(message.contains("internal_step_max"), "{message}");

@@ -8,6 +8,8 @@ use super::{ContactEvent, StepFailure, System};
 use crate::contact::gap::{Drive, dot};
 use crate::contact::wrench::Motion;
 
+/// Changes below this are rounding, whatever the model (m): no length that means anything is as short.
+const ROUNDING: f64 = 1e-15;
 /// Gaps may change by this factor on what motion explains: they are linear in the correction of a step, along one normal.
 const FACTOR: f64 = 2.0;
 
@@ -64,7 +66,7 @@ impl System {
         let drive = if delayed { &self.drive_before } else { &self.state.drive };
         // Half of the motion over two steps.
         let moved = self.relative_motion(event, index, geometry, drive);
-        2.0 * FACTOR * dot(moved, moved).sqrt() + self.law.indifferent(event.node)
+        2.0 * FACTOR * dot(moved, moved).sqrt() + self.law.indifferent(event.node) + ROUNDING
     }
 }
 

@@ -311,7 +311,7 @@ pub const FIELDS: [SceneField; 70] = [
         "1e-9 to 0.1",
         "Thickness; the hard surface lies this far behind the unworn one.",
     ),
-    field("contact.coating.modulus", "number, Pa", None, "1 to 1e13", "Modulus of elasticity."),
+    field("contact.coating.modulus", "number, Pa", None, "5e-324 to 1e13", "Modulus of elasticity."),
     field(
         "contact.coating.yield_stress",
         "number, Pa",
