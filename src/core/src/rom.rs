@@ -331,7 +331,7 @@ impl Rom {
 
 /// Entries that are numbers, of a size that squares do not leave the range of double precision.
 fn entries(name: &str, matrix: &DMatrix<f64>, most: f64, remedy: &str) -> Result<()> {
-    let Some(index) = matrix.iter().position(|value| !(value.abs() <= most)) else { return Ok(()) };
+    let Some(index) = matrix.iter().position(|value| value.is_nan() || value.abs() > most) else { return Ok(()) };
     let (row, column, value) = (index % matrix.nrows(), index / matrix.nrows(), matrix[index]);
     let problem = if value.is_finite() {
         format!("entry {} at ({row}, {column}) is beyond ±{}", shown(value), shown(most))

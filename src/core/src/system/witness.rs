@@ -32,7 +32,7 @@ impl System {
                 continue;
             }
             let (jump, explained) = ((gap - oldest).abs(), rigid + self.explained_by_motion(event, index));
-            if !(jump <= explained) {
+            if jump.is_nan() || explained.is_nan() || jump > explained {
                 let (node, sector) = (event.node, event.sector);
                 return Err(StepFailure::Unexplained { node, sector, jump, explained });
             }
