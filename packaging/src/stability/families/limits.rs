@@ -43,6 +43,10 @@ fn step_limit() -> Vec<Case> {
                             Expected::refused(["massless-boundary", "internal step"])
                         }
                         _ if friction > 0.0 && model == "blade" => Expected::either(against, ["grows"]),
+                        // A mode near ωh = π may come to hold energy that nobody supplied.
+                        Scheme::ModalExact if factor > 1.0 => {
+                            Expected::either(against, ["kinetic and strain energy", "does not resolve"])
+                        }
                         _ => Expected::right(against),
                     };
                     let quick = model == "tower" && friction > 0.0 && solver != Solver::Film;
