@@ -47,7 +47,7 @@ impl Recording {
     /// An empty table with these columns and room for `rows` rows.
     ///
     /// # Errors
-    /// More than [`MOST_BYTES`], or than the memory has.
+    /// More than 4 GB, or than the memory has.
     pub fn with_columns(names: Vec<String>, rows: usize) -> Result<Self> {
         let bytes = 8.0 * rows as f64 * (names.len() + 1) as f64;
         let refuse = || {

@@ -102,7 +102,7 @@ impl Seeker<'_> {
     fn limit(&self, scheme: Scheme) -> Limit {
         let [low, high] = TRIED.map(|product| product / self.highest());
         let usable = match self.massless(scheme, high) {
-            Ok(usable) => usable,
+            Ok(usable) => usable.min(self.resolved(scheme)),
             Err(why) => return Limit::Refused(why),
         };
         let accepted = |step: f64| step < usable && self.accepts(scheme, step);
@@ -127,6 +127,20 @@ impl Seeker<'_> {
             *(if accepted(middle) { &mut good } else { &mut bad }) = middle;
         }
         Limit::Below(good)
+    }
+
+    /// Steps of modal-exact below which it does not pass over what contact acts on (s); infinite for other schemes.
+    fn resolved(&self, scheme: Scheme) -> f64 {
+        if scheme != Scheme::ModalExact {
+            return f64::INFINITY;
+        }
+        let limit = |model: &ModalModel| match self.rom.frame {
+            Frame::Cartesian => stability::unresolved::limit_along_axes(model),
+            Frame::Cylindrical => {
+                stability::unresolved::limit(model, &vec![[-1.0, 0.0, 0.0]; model.contact_modes.nrows() / 3])
+            }
+        };
+        self.models.iter().map(limit).fold(f64::INFINITY, f64::min)
     }
 
     /// Usable step of massless-boundary (s); infinite for other schemes.

@@ -1,4 +1,4 @@
-//! One module per command; each turns its arguments into an [`Outcome`] or a [`Failure`](crate::Failure).
+//! One module per command; each turns its arguments into an [`Outcome`] or a [`Failure`].
 
 pub mod demo;
 pub mod inspect;

@@ -66,7 +66,7 @@ pub fn open_archive(path: &Path) -> Result<ZipArchive<io::BufReader<fs::File>>> 
 /// Names and sizes of all entries, as the archive announces them.
 ///
 /// # Errors
-/// A damaged entry, or more than [`LARGEST_UNPACKED`] bytes in all.
+/// A damaged entry, or more than 2 GiB in all.
 pub fn entries(archive: &mut ZipArchive<impl Read + io::Seek>) -> Result<Vec<(String, u64)>> {
     let mut entries = Vec::new();
     let mut total = 0_u64;

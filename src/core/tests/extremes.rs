@@ -400,7 +400,9 @@ fn numbers_beyond_the_table_of_ranges_are_refused_by_name() {
             scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order: 2, phase: value };
         }),
         ("shape.order", 2e6, |scene, value| {
-            scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order: value as u32, phase: 0.0 };
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "two million")]
+            let order = value as u32;
+            scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order, phase: 0.0 };
         }),
         ("shape.depth", 2e12, |scene, value| {
             scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: value, width: 0.15, phase: 0.0 };

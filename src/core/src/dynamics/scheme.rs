@@ -289,7 +289,9 @@ mod tests {
             let k = ModeCoefficients::new(Scheme::CentralDifference, frequency, ratio, step);
             let (mut q, mut d) = (1e-4, free_increment(frequency, ratio, 1e-4, 0.3, step));
             let steps = (1e-3 / step).round();
-            for _ in 0..steps as usize {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some thousands")]
+            let count = steps as u32;
+            for _ in 0..count {
                 d = k.beta * d - k.kappa * q;
                 q += d;
             }

@@ -17,7 +17,7 @@ pub struct Curved {
     pub moved: f64,
     /// What it puts the node further out by, u_θ²/2r (m).
     pub error: f64,
-    /// Clearance that the sector was given, or [`LEAST_CLEARANCE`] of the radius if that is more (m).
+    /// Clearance that the sector was given, or 1e-4 of the radius if that is more (m).
     pub clearance: f64,
 }
 
