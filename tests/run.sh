@@ -14,16 +14,26 @@ section() {
 
 cd "$root" || exit 1
 
+section "FMU library, as it ships and with a panic on request: cargo build"
+. packaging/remap.sh
+library() {
+    CARGO_ENCODED_RUSTFLAGS=$library_flags \
+        cargo build -p tiprub-fmi --profile fmu --target-dir target/product "$@" || exit 1
+}
+library --features test-panic
+cp target/product/fmu/libtiprub_fmi.so target/product/test_panic.so || exit 1
+library
+TIPRUB_LIBRARY=$root/target/product/fmu/libtiprub_fmi.so
+TIPRUB_LIBRARY_TEST_PANIC=$root/target/product/test_panic.so
+export TIPRUB_LIBRARY TIPRUB_LIBRARY_TEST_PANIC
+
 section "Rust: cargo test --workspace --release"
 cargo test --workspace --release || failed=1
 
-section "Command line and FMU library: cargo build"
+section "Command line: cargo build"
 cargo build --release || exit 1
-. packaging/remap.sh
-CARGO_ENCODED_RUSTFLAGS=$library_flags cargo build -p tiprub-fmi --profile fmu --target-dir target/product || exit 1
 TIPRUB=$root/target/release/tiprub
-TIPRUB_LIBRARY=$root/target/product/fmu/libtiprub_fmi.so
-export TIPRUB TIPRUB_LIBRARY
+export TIPRUB
 
 section "Python environment: $venv"
 stamp=$venv/requirements.txt

@@ -5,7 +5,7 @@ mod common;
 mod wheel;
 
 use tiprub_core::dynamics::cyclic::CyclicModel;
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::settings::{InputInterpolation, Scheme, Solver};
 use tiprub_core::{Scene, Simulation};
 use wheel::{Wheel, rub};
 
@@ -31,6 +31,8 @@ fn pair(wheel: &Wheel, scheme: Scheme, solver: Solver, friction: f64) -> [Simula
         scene.settings.contacts[0].solver = solver;
         scene.settings.contacts[0].friction = friction;
         scene.settings.structures[0].damping_ratio = Some(0.2);
+        // Values act in steps of every length alike.
+        scene.settings.time.input_interpolation = InputInterpolation::Hold;
         started(&scene)
     })
 }

@@ -125,6 +125,8 @@ impl Released {
         let tower = Tower { sectors: 1, turned: self.turned, ..Tower::default() };
         let mut scene = with_step(with_methods(round(tower.rom()), self.scheme, self.solver), step);
         scene.settings.structures[0].damping_ratio = Some(self.ratio);
+        // The casing is taken away at once.
+        scene.settings.time.input_interpolation = InputInterpolation::Hold;
         let rom = &scene.roms[0];
         let (frequencies, shapes) = modes(&rom.mass, &rom.stiffness);
         let seen = &rom.contact_map * &shapes;

@@ -188,7 +188,7 @@ impl Simulation {
         if at_once || self.phase == Phase::Created {
             input.take();
         } else if stepping {
-            input.aim(offset, length);
+            input.aim(offset, self.inputs.until);
         }
         if stepping {
             self.check_motion(quantity, &input)?;
@@ -200,7 +200,7 @@ impl Simulation {
             *place = input;
         }
         if stepping && quantity == Quantity::Speed {
-            self.inputs.lead_spin(offset, length, self.holds());
+            self.inputs.lead_spin(offset, self.inputs.until, self.holds());
         }
         Ok(())
     }

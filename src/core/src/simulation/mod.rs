@@ -204,7 +204,7 @@ impl Simulation {
         for slave in self.system.slaves_mut() {
             slave.bank.set_step(parameters.scheme, parameters.step);
         }
-        self.inputs.spin = self.inputs.speed;
+        self.inputs.start();
         self.settle(drive.speed);
         self.launch();
         self.system.start(&drive);

@@ -44,7 +44,7 @@ impl Simulation {
         let hold = self.holds();
         let mut rotation = self.inputs.shape_rotation;
         if !hold {
-            rotation.aim(0.0, step_size);
+            rotation.aim(0.0, self.inputs.reach(step_size));
         }
         self.check_turning(step, step_size, &self.inputs.speed, rotation.rate())?;
         let (first, last) = (self.inputs.speed.at(0.0), self.inputs.speed.at(step_size));

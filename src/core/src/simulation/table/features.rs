@@ -14,6 +14,17 @@ pub fn is_loaded(scene: &Parts) -> bool {
     scene.master.spin.growth || scene.carrier.is_some_and(|(carrier, _)| carrier.thermal || carrier.load.is_some())
 }
 
+/// Whether inputs move or load something; growth and stiffening follow the speed as such an input.
+pub fn has_moving_inputs(scene: &Parts) -> bool {
+    let Parts { master, surface, .. } = scene;
+    surface.moving
+        || master.whirl
+        || master.axial_shift
+        || master.spin.stiffening
+        || master.spin.coriolis
+        || is_loaded(scene)
+}
+
 /// Whirl, axial shift, temperatures, nodal-diameter load.
 pub fn inputs(table: &mut Builder, scene: &Parts) {
     let largest = largest_length(scene);

@@ -9,7 +9,7 @@ mod units;
 use super::compile::{Roles, SMALL_FRACTION};
 use super::patches::Patches;
 use crate::contact::surface::Surface;
-use crate::settings::{Motion, Scene, SceneSettings, Shape, StructureSettings, SurfaceSettings};
+use crate::settings::{InputInterpolation, Motion, Scene, SceneSettings, Shape, StructureSettings, SurfaceSettings};
 use crate::variables::{Quantity, Variability, VariableTable};
 use crate::{Result, Rom, ranges};
 use builder::{Builder, RAMPED};
@@ -144,7 +144,9 @@ fn parameters(table: &mut Builder, scene: &Parts) {
     let ratio = scene.master.damping_ratio.unwrap_or(scene.rom.damping_ratio);
     table.damping(Quantity::DampingRatio, "damping_ratio", ratio, "Modal damping ratio of the rotor");
     table.methods(settings);
-    table.input_interpolation(settings);
+    if features::has_moving_inputs(scene) || settings.time.input_interpolation == InputInterpolation::Hold {
+        table.input_interpolation(settings);
+    }
     let angle = table.parameter(
         Quantity::InitialAngle,
         "initial_rotor_angle",

@@ -1,0 +1,201 @@
+//! Golden bits: outputs of scenes that together have every feature, scheme, solver and gap law, to the last bit, from
+//! the core and from both faces of the library.
+//!
+//! `GOLDEN=write cargo test -p tiprub-tests --release --test golden` renews the table. What changes is then on purpose, and the
+//! commit says why. Where the digest differs and the numbers beside it hardly do, only rounding has changed.
+
+#[path = "../../src/core/tests/common/mod.rs"]
+mod common;
+#[path = "golden/scenes.rs"]
+mod scenes;
+
+use std::fmt::Write as _;
+use std::fs;
+
+use tiprub_core::variables::{Causality, Kind, Variable};
+use tiprub_core::{Scene, Simulation};
+use tiprub_tests::scene::Resources;
+use tiprub_tests::{OK, fmi2, fmi3, root, shipped};
+
+/// Lengths of the communication steps (s): internal steps of one and two lengths, and back.
+fn lengths() -> impl Iterator<Item = f64> {
+    let times = |count, length| std::iter::repeat_n(length, count);
+    times(60, 2.5e-5).chain(times(30, 1.03e-5)).chain(times(40, 2.5e-5))
+}
+
+/// Value and slope of an input of a scene at `time` (s).
+fn course(name: &str, time: f64) -> (f64, f64) {
+    let (rate, speed) = (700.0, 1300.0);
+    let (sine, cosine) = (rate * time).sin_cos();
+    match name {
+        "speed" => (speed + 3e4 * time, 3e4),
+        "whirl_x" => (6e-5 * sine, 6e-5 * rate * cosine),
+        "whirl_y" => (6e-5 * (1.0 - cosine), 6e-5 * rate * sine),
+        "axial_shift" => (2e-5 * sine, 2e-5 * rate * cosine),
+        "casing_radius_change" => (-0.03 * time, -0.03),
+        "casing_shape_factor" => (1.0 + 0.1 * sine, 0.1 * rate * cosine),
+        "casing_shape_rotation" => (20.0 * time, 20.0),
+        "casing_temperature" => (-4e3 * time, -4e3),
+        "casing_load_amplitude" => (2e4 * time, 2e4),
+        "casing_load_phase" => (50.0 * time, 50.0),
+        other => panic!("no course for the input {other}"),
+    }
+}
+
+/// One input: its name, and reference of each element.
+fn inputs(simulation: &Simulation) -> Vec<(String, Vec<u32>)> {
+    let rows = simulation.table().variables().iter().filter(|row| row.causality == Causality::Input);
+    rows.map(|row| (row.name.clone(), elements(row).collect())).collect()
+}
+
+fn elements(row: &Variable) -> impl Iterator<Item = u32> + use<> {
+    row.reference..row.reference + u32::try_from(row.len()).unwrap()
+}
+
+fn outputs(simulation: &Simulation) -> Vec<u32> {
+    let rows = simulation.table().variables().iter();
+    rows.filter(|row| row.causality == Causality::Output && row.kind == Kind::Real).flat_map(elements).collect()
+}
+
+/// What a scene can be stepped by.
+trait Face {
+    fn set(&mut self, reference: u32, value: f64, slope: Option<f64>);
+    fn step(&mut self, time: f64, length: f64);
+    fn get(&self, references: &[u32]) -> Vec<f64>;
+}
+
+impl Face for Simulation {
+    fn set(&mut self, reference: u32, value: f64, slope: Option<f64>) {
+        self.set_real(reference, value).unwrap();
+        if let Some(slope) = slope {
+            self.set_input_derivative(reference, 1, slope).unwrap();
+        }
+    }
+
+    fn step(&mut self, time: f64, length: f64) {
+        self.do_step(time, length).unwrap_or_else(|error| panic!("{error}"));
+    }
+
+    fn get(&self, references: &[u32]) -> Vec<f64> {
+        references.iter().map(|reference| self.real(*reference).unwrap()).collect()
+    }
+}
+
+impl Face for fmi2::Slave<'_> {
+    fn set(&mut self, reference: u32, value: f64, slope: Option<f64>) {
+        self.expect(self.set_reals(&[reference], &[value]));
+        if let Some(slope) = slope {
+            self.expect(self.set_derivatives(&[reference], 1, &[slope]));
+        }
+    }
+
+    fn step(&mut self, time: f64, length: f64) {
+        let status = fmi2::Slave::step(self, time, length);
+        assert_eq!(status, OK, "{}", self.log());
+    }
+
+    fn get(&self, references: &[u32]) -> Vec<f64> {
+        self.reals(references)
+    }
+}
+
+impl Face for fmi3::Slave<'_> {
+    /// FMI 3.0 has no derivatives of inputs.
+    fn set(&mut self, reference: u32, value: f64, _slope: Option<f64>) {
+        self.expect(self.set_reals(&[reference], &[value]));
+    }
+
+    fn step(&mut self, time: f64, length: f64) {
+        let step = fmi3::Slave::step(self, time, length);
+        assert_eq!(step.status, OK, "{}", self.log());
+    }
+
+    fn get(&self, references: &[u32]) -> Vec<f64> {
+        self.reals(references, references.len())
+    }
+}
+
+/// Digest of all real outputs at all communication points (FNV-1a, 64 bit), and those of the last one.
+fn run(scene: &Scene, face: &mut impl Face, derivatives: bool) -> (u64, Vec<f64>) {
+    let table = Simulation::new(scene).unwrap();
+    let (inputs, outputs) = (inputs(&table), outputs(&table));
+    let (mut time, mut digest, mut last) = (0.0, 0xcbf2_9ce4_8422_2325_u64, Vec::new());
+    for length in lengths() {
+        for (name, references) in &inputs {
+            let (value, slope) = course(name, time);
+            for reference in references {
+                face.set(*reference, value, derivatives.then_some(slope));
+            }
+        }
+        face.step(time, length);
+        time += length;
+        last = face.get(&outputs);
+        for byte in last.iter().flat_map(|value| value.to_bits().to_le_bytes()) {
+            digest = (digest ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    }
+    (digest, last)
+}
+
+fn native(scene: &Scene, derivatives: bool) -> (u64, Vec<f64>) {
+    let mut simulation = Simulation::new(scene).unwrap_or_else(|error| panic!("{}: {error}", scene.settings.name));
+    simulation.initialise(0.0).unwrap_or_else(|error| panic!("{}: {error}", scene.settings.name));
+    run(scene, &mut simulation, derivatives)
+}
+
+/// A line of the table: name, digests without and with derivatives, and some numbers at the end of the first.
+fn line(scene: &Scene) -> String {
+    let ((ramped, last), (led, _)) = (native(scene, false), native(scene, true));
+    let table = Simulation::new(scene).unwrap();
+    let references = outputs(&table);
+    let mut text = format!("{}: {ramped:016x} {led:016x}", scene.settings.name);
+    for name in ["external_work", "friction_loss", "strain_energy"] {
+        if let Some(row) = table.table().find(name) {
+            let place = references.iter().position(|reference| *reference == row.reference).unwrap();
+            write!(text, " {name} {:.12e}", last[place]).unwrap();
+        }
+    }
+    text
+}
+
+#[test]
+fn every_scene_gives_the_bits_it_gave() {
+    let path = root().join("tests/data/golden.txt");
+    let found: String = scenes::all().iter().map(|scene| line(scene) + "\n").collect();
+    if std::env::var_os("GOLDEN").is_some_and(|value| value == "write") {
+        fs::write(&path, &found).unwrap();
+    }
+    let expected = fs::read_to_string(&path).unwrap();
+    for (found, expected) in found.lines().zip(expected.lines()) {
+        assert_eq!(found, expected, "see the head of this file");
+    }
+    assert_eq!(found.lines().count(), expected.lines().count());
+}
+
+#[test]
+fn both_faces_of_the_library_give_the_bits_of_the_core() {
+    let path = shipped();
+    let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
+    for scene in scenes::all() {
+        let resources = Resources::of(&scene, false);
+        let mut two = fmi2::Slave::initialised(&api2, &resources);
+        assert_eq!(run(&scene, &mut two, true).0, native(&scene, true).0, "FMI 2.0, {}", scene.settings.name);
+        let mut three = fmi3::Slave::new(&api3, &resources);
+        three.initialise();
+        assert_eq!(run(&scene, &mut three, false).0, native(&scene, false).0, "FMI 3.0, {}", scene.settings.name);
+    }
+}
+
+#[test]
+fn something_happens_in_every_scene() {
+    for scene in scenes::all() {
+        let table = Simulation::new(&scene).unwrap();
+        let (_, last) = native(&scene, false);
+        let place = |name: &str| {
+            let row = table.table().find(name).unwrap().reference;
+            outputs(&table).iter().position(|reference| *reference == row).unwrap()
+        };
+        let impact = last[place("impact_loss")] + last.get(place("curvature_work")).copied().unwrap_or_default().abs();
+        assert!(impact > 0.0, "{}", scene.settings.name);
+    }
+}

@@ -1,0 +1,173 @@
+//! Scenes that together have every feature, scheme, solver, gap law and shape.
+
+#[path = "../../../src/core/tests/common/features.rs"]
+mod features;
+#[path = "../../../src/core/tests/common/lattice.rs"]
+mod lattice;
+#[path = "../../../src/core/tests/common/wheel.rs"]
+mod wheel;
+
+use features::{coating, flexible};
+use lattice::Side;
+use tiprub_core::Scene;
+use tiprub_core::settings::{
+    Closure, InputInterpolation, Interpolation, LoadSettings, Meridian, PatchSettings, Scheme, Shape, Solver,
+    SplineSettings,
+};
+
+use crate::common;
+
+const SECTORS: usize = 12;
+
+/// Twelve uncoupled blades in a rigid casing of two bumps.
+fn rotor(name: &str, scheme: Scheme, solver: Solver, change: impl Fn(&mut Scene)) -> Scene {
+    let mut scene = common::scene(SECTORS);
+    scene.roms[0] = common::rich_rom(SECTORS);
+    scene.settings.name = name.into();
+    (scene.settings.time.scheme, scene.settings.contacts[0].solver) = (scheme, solver);
+    scene.settings.outputs.nodal_diameters = Some(SECTORS / 2);
+    change(&mut scene);
+    scene
+}
+
+fn spline(scene: &mut Scene) {
+    scene.settings.surfaces[0].spline = Some(SplineSettings::default());
+}
+
+fn shaft(scene: &mut Scene) {
+    let rotor = &mut scene.settings.structures[0];
+    (rotor.whirl, rotor.axial_shift) = (true, true);
+}
+
+/// The ring with temperatures, a load, and heat shared with the blades.
+fn warm(scene: &mut Scene) {
+    flexible(scene);
+    let ring = &mut scene.settings.structures[1];
+    (ring.thermal, ring.load) = (true, Some(LoadSettings { order: 2, amplitude: 100.0, phase: 0.1 }));
+    scene.settings.contacts[0].heat_to_slave = Some(0.4);
+    scene.settings.outputs.slave_displacement = true;
+}
+
+fn patches(scene: &mut Scene) {
+    scene.settings.surfaces[0].patches = Some(PatchSettings { around: 4, along: 2 });
+}
+
+fn mistuned(scene: &mut Scene) {
+    let factor = |sector: usize| 1.0 + 0.01 * ((5 * sector % SECTORS) as f64 - 5.0);
+    scene.settings.structures[0].frequency_factors = (0..SECTORS).map(factor).collect();
+    scene.settings.contacts[0].sector_gaps = (0..SECTORS).map(|sector| 3.56e-4 * factor(sector)).collect();
+}
+
+fn spinning(scene: &mut Scene) {
+    let order = scene.roms[0].order();
+    scene.roms[0].extras.spin = Some(common::spin(order));
+    let spin = &mut scene.settings.structures[0].spin;
+    (spin.stiffening, spin.growth, spin.coriolis) = (true, true, true);
+}
+
+/// The same blades coupled to their neighbours.
+fn coupled(scene: &mut Scene) {
+    scene.roms[0] = wheel::Wheel::random(SECTORS, 3, 12, 0.1, 7).cyclic();
+}
+
+fn shape(shape: Shape) -> impl Fn(&mut Scene) {
+    move |scene| scene.settings.surfaces[0].shape = shape.clone()
+}
+
+fn lobes(scene: &mut Scene) {
+    shape(Shape::Lobes { amplitude: 4.5e-4, order: 3, phase: 0.2 })(scene);
+    scene.settings.surfaces[0].ramp_time = 5e-4;
+}
+
+fn table(scene: &mut Scene) {
+    let change = |place: i32| -5e-4 * (0.5 * f64::from(place)).sin().powi(2);
+    shape(Shape::Table { radius_change: (0..32).map(change).collect() })(scene);
+}
+
+/// Several changes at once.
+fn all_of(changes: &[fn(&mut Scene)]) -> impl Fn(&mut Scene) {
+    let changes = changes.to_vec();
+    move |scene| changes.iter().for_each(|change| change(scene))
+}
+
+fn rotors() -> Vec<Scene> {
+    use Scheme::{CentralDifference, MasslessBoundary, ModalExact};
+    use Solver::{Coulomb, Film, Lcp};
+    vec![
+        rotor("revolution_film", CentralDifference, Film, |_| {}),
+        rotor("revolution_lcp_mistuned", CentralDifference, Lcp, mistuned),
+        rotor("revolution_coulomb_patches", ModalExact, Coulomb, patches),
+        rotor("revolution_no_friction", ModalExact, Lcp, |scene| scene.settings.contacts[0].friction = 0.0),
+        rotor("cylinder_massless_lobes", MasslessBoundary, Lcp, |scene| {
+            lobes(scene);
+            scene.settings.contacts[0].meridian = Meridian::Cylinder;
+        }),
+        rotor("massless_coulomb_mistuned", MasslessBoundary, Coulomb, mistuned),
+        rotor("whirl_table_film", ModalExact, Film, all_of(&[shaft, table])),
+        rotor("whirl_held", ModalExact, Lcp, |scene| {
+            shaft(scene);
+            scene.settings.time.input_interpolation = InputInterpolation::Hold;
+        }),
+        rotor("spin", ModalExact, Lcp, spinning),
+        rotor("spin_whirl_massless", MasslessBoundary, Lcp, |scene| {
+            spinning(scene);
+            shaft(scene);
+            scene.settings.structures[0].spin.coriolis = false;
+        }),
+        rotor("spline_whirl_film", CentralDifference, Film, all_of(&[spline, shaft])),
+        rotor("spline_coulomb", ModalExact, Coulomb, spline),
+        rotor("spline_free_ends", ModalExact, Lcp, |scene| {
+            let settings = SplineSettings { around: 60, closure: Closure::FreeEnds, ..SplineSettings::default() };
+            scene.settings.surfaces[0].spline = Some(settings);
+        }),
+        rotor("coating_whirl", ModalExact, Lcp, all_of(&[coating, shaft])),
+        rotor("flexible_film", CentralDifference, Film, flexible),
+        rotor("flexible_warm", ModalExact, Lcp, all_of(&[warm, shaft])),
+        rotor("flexible_coulomb", ModalExact, Coulomb, all_of(&[flexible, patches])),
+        rotor("flexible_massless", MasslessBoundary, Lcp, flexible),
+        rotor("flexible_coating_wear", ModalExact, Lcp, |scene| {
+            flexible(scene);
+            coating(scene);
+            scene.settings.outputs.wear = true;
+        }),
+        rotor("coupled_lcp", ModalExact, Lcp, coupled),
+        rotor("coupled_flexible_film", CentralDifference, Film, all_of(&[coupled, flexible, shaft])),
+        rotor("coupled_massless", MasslessBoundary, Lcp, coupled),
+        rotor("coupled_spline_coulomb", ModalExact, Coulomb, all_of(&[coupled, spline, mistuned_gaps])),
+    ]
+}
+
+fn mistuned_gaps(scene: &mut Scene) {
+    mistuned(scene);
+    scene.settings.structures[0].frequency_factors.clear();
+}
+
+/// A free body between elastic or rigid surfaces.
+fn bodies() -> Vec<Scene> {
+    let named = |name: &str, mut scene: Scene| {
+        scene.settings.name = name.into();
+        (scene.settings.outputs.watched_sectors, scene.settings.outputs.energies) = (vec![1], true);
+        scene
+    };
+    let with = |scene, solver, scheme| lattice::with(scene, 0.2, solver, scheme);
+    let between = [(Side::Left, 0.0203), (Side::Right, 0.021)];
+    let thrown = lattice::scene(lattice::block([0.0; 3], 3e6), &between, false, [-12.0, 6.0, 1.0]);
+    let mut rigid = lattice::squeezed_by(1e-4, [0.0, -40.0, 1.0]);
+    rigid.settings.surfaces[1].rigid = true;
+    let mut facets = lattice::squeezed();
+    for surface in &mut facets.settings.surfaces {
+        surface.spline = Some(SplineSettings { interpolation: Interpolation::Facets, ..SplineSettings::default() });
+    }
+    vec![
+        named("body_film", with(thrown.clone(), Solver::Film, Scheme::CentralDifference)),
+        named("body_coulomb", with(thrown, Solver::Coulomb, Scheme::ModalExact)),
+        named("body_between_rings", with(lattice::squeezed(), Solver::Lcp, Scheme::ModalExact)),
+        named("body_one_side_rigid", with(rigid, Solver::Lcp, Scheme::CentralDifference)),
+        named("body_facets", with(facets, Solver::Lcp, Scheme::ModalExact)),
+    ]
+}
+
+/// All of them.
+pub fn all() -> Vec<Scene> {
+    rotors().into_iter().chain(bodies()).collect()
+}
