@@ -24,7 +24,7 @@ pub fn usage_failure(error: &clap::Error, mut arguments: impl Iterator<Item = st
 #[command(
     name = "tiprub",
     version,
-    about = "Blade-tip/casing contact (rub) as an FMU: reduce, package, run, inspect, study, stability, demo",
+    about = "Blade-tip/casing contact (rub) as an FMU: reduce, package, run, inspect, study, demo",
     long_about = "Marches the contact of a bladed disk (a reduced-order model) with its casing in time, rigid or \
                   flexible, and ships that as an FMU for any FMI 2.0 or FMI 3.0 importer.\n\nSI units everywhere (m, kg, s, N, rad).",
     after_help = "Examples:\n  tiprub demo\n  tiprub run builtin:rotor37 --csv rub.csv\n  \
@@ -89,20 +89,20 @@ pub enum Command {
                             tiprub inspect scene.toml --json\n  tiprub inspect builtin:flexible-casing"
     )]
     Inspect(InspectArguments),
-    /// Studies of the models that ship, or of a scene: pictures, numbers, and whether they show what they should.
-    #[command(after_help = "Examples:\n  tiprub study stage --quick\n  tiprub study convergence --out convergence\n  \
-                            tiprub study modes --speed 1500\n  tiprub study stage --speeds 400:1600:25 --out stage\n  \
-                            tiprub study map scene.toml --speeds 1200:1500:61\n  tiprub study error --scene carpenter\n\n\
-                            DIR then holds index.html (opens offline), an SVG and a CSV per figure, and results.json.")]
-    Study(StudyArguments),
-    /// Stiff and extreme cases: each must end in a right answer or in a refusal that says why.
+    /// Studies of a scene: pictures, numbers, and whether they show what they should.
     #[command(
-        after_help = "Examples:\n  tiprub stability --quick\n  tiprub stability --case friction/ --out friction\n  \
-                            tiprub stability --out stability --chapter docs/stability-table.md\n\n\
-                            Every case runs in a process of its own with a time limit. DIR then holds index.html, \
-                            stability.csv, stability.md and results.json."
+        after_help = "Examples:\n  tiprub study error scene.toml\n  tiprub study map scene.toml --speeds 1200:1500:61\n  \
+                            tiprub study error --help\n\n\
+                            DIR then holds index.html (opens offline), an SVG and a CSV per figure, and results.json."
     )]
-    Stability(StabilityArguments),
+    Study(StudyArguments),
+    /// What moved to the laboratory of the sources.
+    #[command(hide = true, trailing_var_arg = true)]
+    Stability {
+        /// Anything.
+        #[arg(allow_hyphen_values = true)]
+        rest: Vec<String>,
+    },
 }
 
 /// Arguments of `tiprub demo`.
@@ -233,117 +233,87 @@ pub struct InspectArguments {
 #[derive(Debug, Args)]
 pub struct StudyArguments {
     /// What to study.
-    #[arg(value_name = "STUDY", value_enum)]
-    pub study: StudyChoice,
-    /// Of `map`: scene file (TOML), or one that ships [default: builtin:rotor37].
-    #[arg(value_name = "SCENE")]
-    pub scene: Option<String>,
+    #[command(subcommand)]
+    pub study: StudyCommand,
+}
+
+/// Studies of a scene.
+#[derive(Debug, Subcommand)]
+pub enum StudyCommand {
+    /// Amplitudes of rubbing blades over angular velocity and frequency, with engine orders and natural frequencies.
+    #[command(after_help = "Examples:\n  tiprub study map\n  tiprub study map scene.toml --speeds 1200:1500:61\n  \
+                            tiprub study map --set friction_coefficient=0 --set gap_offset=6e-5")]
+    Map(MapArguments),
+    /// Error against run time of every scheme and solver on a scene, and the cheapest for an error of 1e-2, 1e-3 and 1e-4.
+    #[command(
+        after_help = "Examples:\n  tiprub study error scene.toml\n  tiprub study error builtin:flexible-casing --quick\n  \
+                            tiprub study error scene.toml --window 2e-3 --set speed=1700\n\n\
+                            The errors are those of the steps, against two fine runs by different schemes that must meet."
+    )]
+    Error(ErrorArguments),
+    /// What was a study of the models that ship.
+    #[command(external_subcommand)]
+    Other(Vec<String>),
+}
+
+/// What all studies take.
+#[derive(Debug, Args)]
+pub struct StudyCommon {
     /// Directory for everything the study writes; made if missing [default: study-STUDY].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Coarse meshes and few runs: seconds instead of minutes, for a first look.
+    /// Few and short runs: seconds instead of minutes, for a first look.
     #[arg(long)]
     pub quick: bool,
-    /// Of `modes`: speed of the engine orders (rad/s) [default: where an oval casing meets the first mode of nodal diameter
-    /// 2].
-    #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true)]
-    pub speed: Option<f64>,
-    /// Of `stage` and `map`: angular velocities (rad/s), from, to and how many [default: of `stage` 0.5 to 1.5 times the one
-    /// where an oval casing meets the first mode of nodal diameter 2; of `map` 141 from 0.8 to 1.5 times the one where twice the
-    /// casing's lowest engine order meets the first mode, where the model holds].
-    #[arg(long, value_name = "FROM:TO:COUNT", value_parser = speeds)]
-    pub speeds: Option<Speeds>,
-    /// Of `stage` and `map`: runs at the same time [default: one per processor].
-    #[arg(long, value_name = "N")]
-    pub threads: Option<std::num::NonZero<usize>>,
-    /// Of `map`: revolutions whose motion is transformed; the bins of the spectra are the N-th part of the rotational
-    /// frequency apart [default: 64].
-    #[arg(long, value_name = "N")]
-    pub revolutions: Option<std::num::NonZero<usize>>,
-    /// Of `map`: revolutions that pass before [default: the casing's ramp and five decay times of the first mode, 20 to 400].
-    #[arg(long, value_name = "N", value_parser = transient)]
-    pub transient: Option<usize>,
-    /// Of `map`: start value of an input or parameter, such as friction_coefficient=0 or gap_offset=1e-5; may be repeated.
-    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
-    pub set: Vec<(String, String)>,
-    /// Of `error`: only this scene; may be given several times.
-    #[arg(long = "scene", value_name = "SCENE", value_enum)]
-    pub scenes: Vec<ErrorScene>,
     /// Where built-in models are kept.
     #[command(flatten)]
     pub cache: CacheArguments,
 }
 
-/// Scenes of the study of errors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ErrorScene {
-    /// Carpenter's two bars.
-    Carpenter,
-    /// The bouncing bar.
-    BouncingBar,
-    /// The cube between two rings.
-    Cube,
-    /// Rotor 37 touching lightly.
-    #[value(name = "rotor37-light")]
-    Rotor37Light,
-    /// Rotor 37 rubbing by the whole gap.
-    #[value(name = "rotor37-heavy")]
-    Rotor37Heavy,
-    /// The stage of 56 coupled sectors in its elastic casing.
-    Stage,
-}
-
-impl ErrorScene {
-    /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Carpenter, Self::BouncingBar, Self::Cube, Self::Rotor37Light, Self::Rotor37Heavy, Self::Stage];
-}
-
-/// Arguments of `tiprub stability`.
+/// Arguments of `tiprub study map`.
 #[derive(Debug, Args)]
-pub struct StabilityArguments {
-    /// Directory for the table; made if missing.
-    #[arg(long, value_name = "DIR", default_value = "stability")]
-    pub out: PathBuf,
-    /// Fewer and shorter cases: a minute.
-    #[arg(long)]
-    pub quick: bool,
-    /// Only cases whose name begins so.
-    #[arg(long, value_name = "NAME")]
-    pub case: Option<String>,
-    /// Cases at the same time [default: one per processor].
+pub struct MapArguments {
+    /// Scene file (TOML), or one that ships.
+    #[arg(value_name = "SCENE", default_value = "builtin:rotor37")]
+    pub scene: String,
+    /// Angular velocities (rad/s), from, to and how many [default: 141 from 0.8 to 1.5 times the one where twice the casing's
+    /// lowest engine order meets the first mode, where the model holds].
+    #[arg(long, value_name = "FROM:TO:COUNT", value_parser = speeds)]
+    pub speeds: Option<Speeds>,
+    /// Runs at the same time [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
-    /// Also write the table into this chapter of the guide, below the line that marks its place; not with --case.
-    #[arg(long, value_name = "FILE")]
-    pub chapter: Option<PathBuf>,
-    /// FMU library for the cases that import FMUs, instead of the one found or built.
-    #[arg(long, value_name = "FILE")]
-    pub library: Option<PathBuf>,
-    /// Run one case in this process and print what happened.
-    #[arg(long, value_name = "NAME", hide = true)]
-    pub child: Option<String>,
+    /// Revolutions whose motion is transformed; the bins of the spectra are the N-th part of the rotational frequency
+    /// apart [default: 64].
+    #[arg(long, value_name = "N")]
+    pub revolutions: Option<std::num::NonZero<usize>>,
+    /// Revolutions that pass before [default: the casing's ramp and five decay times of the first mode, 20 to 400].
+    #[arg(long, value_name = "N", value_parser = transient)]
+    pub transient: Option<usize>,
+    /// Start value of an input or parameter, such as friction_coefficient=0 or gap_offset=1e-5; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
+    pub set: Vec<(String, String)>,
+    /// What all studies take.
+    #[command(flatten)]
+    pub common: StudyCommon,
 }
 
-/// Studies by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum StudyChoice {
-    /// Frequency deviation and residual criterion of the reduced disk against the number of component modes.
-    Convergence,
-    /// Natural frequencies against nodal diameter with engine orders, and mode shapes.
-    Modes,
-    /// Blades against an oval flexible casing over a range of speeds.
-    Stage,
-    /// The cube between two rings: the product against independent methods on the full model.
-    Cube,
-    /// Amplitudes of rubbing blades over angular velocity and frequency, with engine orders and natural frequencies.
-    Map,
-    /// Error against run time of every scheme and solver, beside independent methods.
-    Error,
-    /// Forces and moments on both sides of contacts, torque against the work of the shaft, and the ledger, over all features.
-    Conjugacy,
-    /// What the communication step does to a whirling shaft and other inputs that move, ramped, with derivatives, and held.
-    Inputs,
+/// Arguments of `tiprub study error`.
+#[derive(Debug, Args)]
+pub struct ErrorArguments {
+    /// Scene file (TOML), or one that ships, such as `builtin:rotor37`.
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// Time from the start of the experiment over which errors are taken (s), at most until runs that differ by almost
+    /// nothing part [default: 400 communication steps beyond the first contact].
+    #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
+    pub window: Option<f64>,
+    /// Start value of an input or parameter; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
+    pub set: Vec<(String, String)>,
+    /// What all studies take.
+    #[command(flatten)]
+    pub common: StudyCommon,
 }
 
 /// A range of angular velocities (rad/s).
@@ -478,14 +448,22 @@ fn transient(text: &str) -> Result<usize, String> {
     count.ok_or_else(|| format!("give a number of revolutions, at most {MOST_TRANSIENT}"))
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+/// A positive number.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
         _ => Err("give a positive number".into()),
     }
 }
 
-fn speeds(text: &str) -> Result<Speeds, String> {
+/// `FROM:TO:COUNT`.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn speeds(text: &str) -> Result<Speeds, String> {
     let parts: Vec<&str> = text.split(':').collect();
     let read = || match parts.as_slice() {
         [from, to, count] => {
@@ -535,7 +513,7 @@ mod tests {
     fn every_command_explains_itself_with_an_example() {
         let mut cli = Cli::command();
         cli.build();
-        for command in cli.get_subcommands().filter(|command| command.get_name() != "help") {
+        for command in cli.get_subcommands().filter(|command| command.get_name() != "help" && !command.is_hide_set()) {
             assert!(command.get_about().is_some(), "{}", command.get_name());
             let example = format!("tiprub {}", command.get_name());
             let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
@@ -573,9 +551,11 @@ mod tests {
             ("reduce casing --low-flange 5", "TxH"),
             ("reduce casing --contact-grid 24", "AROUNDxALONG"),
             ("reduce casing --contact-axial 0.1:0.1", "FROM:TO"),
-            ("study stage --speeds 100:50:4", "FROM:TO:COUNT"),
-            ("study stage --speeds 100:500", "FROM:TO:COUNT"),
-            ("study tip", "possible values: convergence, modes, stage, cube"),
+            ("study map --speeds 100:50:4", "FROM:TO:COUNT"),
+            ("study map --speeds 100:500", "FROM:TO:COUNT"),
+            ("study error", "<SCENE>"),
+            ("study error a.toml --window 0", "positive number"),
+            ("study error a.toml --speeds 1:2:3", "unexpected argument"),
             ("reduce casing --support left", "possible values: low, high, both, free"),
         ] {
             let error = parse(line).unwrap_err();

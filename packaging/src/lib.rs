@@ -13,7 +13,6 @@
 //! - [`importer`]: a packaged FMU driven through its C ABI the way any importer would;
 //! - [`casing_arguments`], [`file_arguments`]: what can be asked for of a casing, of a model of one's own;
 //! - [`users_model`], [`mod@reduced`]: such a model read, judged, reduced; what is written and told of any reduced model;
-//! - [`stability`]: stiff and extreme cases, each in a child process, judged;
 //! - [`places`], [`output_file`]: what a command reads and writes, kept apart; files that appear whole or not at all;
 //! - [`report`]: the HTML report with its pictures and plots.
 
@@ -43,7 +42,6 @@ pub mod rom_facts;
 pub mod scene_features;
 pub mod scene_source;
 pub mod schedule;
-pub mod stability;
 pub mod step_limits;
 pub mod study;
 pub mod users_model;

@@ -8,7 +8,7 @@ use std::{
 
 use crate::{
     Failure, Result,
-    cli::{Command, Model, ReduceArguments, StudyArguments},
+    cli::{Command, Model, ReduceArguments, StudyCommand},
     commands::demo,
     output_file, scene_source,
 };
@@ -26,7 +26,8 @@ impl Named {
         Self { role: role.into(), path: path.into() }
     }
 
-    fn option(role: &str, path: &Option<PathBuf>) -> Option<Self> {
+    /// The same of an option that may be left out.
+    pub fn option(role: &str, path: &Option<PathBuf>) -> Option<Self> {
         path.as_ref().map(|path| Self::new(role, path))
     }
 }
@@ -50,15 +51,13 @@ pub fn check(command: &Command) -> Result<()> {
             apart(&Vec::from_iter(Named::option("--library", &arguments.library)), &files)?;
             output_file::try_directory(&arguments.out)
         }
-        Command::Stability(arguments) if arguments.child.is_none() => {
-            let files = ["index.html", "results.json", "stability.csv", "stability.md"];
-            let files = files.map(|name| Named::new("--out", arguments.out.join(name))).to_vec();
-            let all = [files, Vec::from_iter(Named::option("--chapter", &arguments.chapter))].concat();
-            apart(&Vec::from_iter(Named::option("--library", &arguments.library)), &all)
-        }
-        Command::Study(arguments) => study(arguments),
+        Command::Study(arguments) => match &arguments.study {
+            StudyCommand::Map(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
+            StudyCommand::Error(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
+            StudyCommand::Other(_) => Ok(()),
+        },
         // Names follow from the scene: see the command.
-        Command::Package(_) | Command::Inspect(_) | Command::Stability(_) => Ok(()),
+        Command::Package(_) | Command::Inspect(_) | Command::Stability { .. } => Ok(()),
     }
 }
 
@@ -90,10 +89,10 @@ fn reduce_outputs(arguments: &ReduceArguments) -> Vec<Named> {
 }
 
 /// A study names its files itself, in one directory: what is read must not be there under a name of that kind.
-fn study(arguments: &StudyArguments) -> Result<()> {
-    let Some(out) = &arguments.out else { return Ok(()) };
+pub fn study(argument: &str, out: Option<&Path>) -> Result<()> {
+    let Some(out) = out else { return Ok(()) };
     let directory = identity(out);
-    for input in arguments.scene.as_deref().map(scene).unwrap_or_default() {
+    for input in scene(argument) {
         let kind = input.path.extension().and_then(|kind| kind.to_str()).unwrap_or_default().to_ascii_lowercase();
         let real = output_file::destination(&input.path).unwrap_or_else(|_| input.path.clone());
         let inside = directory.is_some() && identity(real.parent().unwrap_or(Path::new("."))) == directory;

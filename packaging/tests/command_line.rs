@@ -732,7 +732,6 @@ fn no_output_is_an_input_or_another_output() {
         &["reduce", "rotor37", "-o", "new/x", "--inp", "new/y/../x"],
         &["reduce", "small.msh", "-o", "y", "--vtk", "small.msh", "--force"],
         &["package", "scene.toml", "--fmi", "2", "--library", "library.fmu", "-o", "library.fmu"],
-        &["stability", "--out", "out", "--chapter", "out/stability.md"],
         &["demo", "--out", "out", "--library", "out/report.html"],
     ] {
         fs::write(project.path("small.msh"), "").unwrap();

@@ -12,26 +12,6 @@ fn tiprub(directory: &Path, cache: &str, arguments: &[&str]) -> (String, String)
     (stdout, stderr)
 }
 
-/// The results of a quick study, with all files there and each figure's numbers whole.
-#[track_caller]
-fn study(root: &Path, name: &str, more: &[&str]) -> Value {
-    let arguments = [&["study", name, "--quick", "--json", "--quiet", "--out", "out"], more].concat();
-    let (stdout, _) = tiprub(root, env!("CARGO_TARGET_TMPDIR"), &arguments);
-    let json: Value = serde_json::from_str(&stdout).unwrap();
-    let out = root.join("out");
-    let page = fs::read_to_string(out.join("index.html")).unwrap();
-    assert!(!page.contains("http://") || page.matches("http://").count() == page.matches("http://www.w3.org").count());
-    for figure in json["figures"].as_array().unwrap() {
-        let svg = fs::read_to_string(out.join(figure["svg"].as_str().unwrap())).unwrap();
-        assert!(svg.starts_with("<svg") && svg.ends_with("</svg>") || svg.trim_end().ends_with("</svg>"), "{figure}");
-        let csv = fs::read_to_string(out.join(figure["csv"].as_str().unwrap())).unwrap();
-        assert!(csv.lines().count() >= 3, "{figure}");
-    }
-    let written: Value = serde_json::from_str(&fs::read_to_string(out.join("results.json")).unwrap()).unwrap();
-    assert_eq!(written["results"], json["results"]);
-    json
-}
-
 /// These statements are answered with no, and no other is.
 #[track_caller]
 fn only_no(json: &Value, no: &[&str]) {
@@ -49,135 +29,6 @@ fn columns(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
     let mut lines = text.lines();
     let names = lines.next().unwrap().split(',').map(String::from).collect();
     (names, lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect())
-}
-
-#[test]
-fn the_quick_study_of_convergence_reaches_the_limits() {
-    let root = tempfile::tempdir().unwrap();
-    let json = study(root.path(), "convergence", &[]);
-    only_no(&json, &[]);
-    let enough = json["results"]["enough"]["deviation"]["per_nodal_diameter"].as_u64().unwrap();
-    let (_, rows) = columns(&root.path().join("out/deviation.csv"));
-    for row in &rows {
-        assert!(row[0] < enough as f64 || row[3].abs() < 0.3, "{row:?}");
-    }
-    assert!(
-        rows.iter().any(|row| (row[0] - enough as f64 + 1.0).abs() < 0.5 && row[3].abs() >= 0.3),
-        "one fewer is not enough"
-    );
-}
-
-#[test]
-fn the_quick_study_of_modes_draws_folded_engine_orders() {
-    let root = tempfile::tempdir().unwrap();
-    let json = study(root.path(), "modes", &["--speed", "1000"]);
-    only_no(&json, &[]);
-    assert_eq!(json["results"]["frequencies_hz"].as_array().unwrap().len(), 29);
-    let (_, rows) = columns(&root.path().join("out/interference.csv"));
-    for row in rows {
-        let [number, frequency, order] = [row[0], row[2], row[4]];
-        let rest = order % 56.0;
-        assert_eq!(rest.min(56.0 - rest).to_bits(), number.to_bits(), "{row:?}");
-        assert!((row[6] * order / std::f64::consts::TAU / frequency - 1.0).abs() < 1e-12);
-    }
-    assert!(root.path().join("out/shapes.vtu").is_file());
-}
-
-/// Three casings. The rigid oval closes all nodes; with friction contact on it flutters, and presses harder than without. The
-/// elastic casing is held at one end and gives way: the leading edge does not touch.
-#[test]
-fn the_quick_study_of_the_stage_tells_rigid_and_flexible_casings_apart() {
-    let root = tempfile::tempdir().unwrap();
-    let json = study(root.path(), "stage", &["--speeds", "900:1300:2"]);
-    only_no(&json, &["Flexible casing: The clearance of each of the three nodes"]);
-    let out = root.path().join("out");
-    for name in ["clearances-smooth.csv", "clearances-rigid.csv", "clearances-flexible.csv"] {
-        let (names, rows) = columns(&out.join(name));
-        assert_eq!(&names[2..], ["leading_edge (m)", "mid_chord (m)", "trailing_edge (m)", "nodes in contact"]);
-        assert!(rows.iter().any(|row| row[2..5].contains(&0.0)), "no contact of blade 1");
-        assert!(rows.iter().all(|row| row[2..5].iter().all(|clearance| *clearance >= -1e-12)));
-    }
-    let least = |name: &str| columns(&out.join(name)).1.iter().map(|row| row[12..15].to_vec()).collect::<Vec<_>>();
-    assert!(least("amplitudes-smooth.csv").iter().flatten().all(|clearance| *clearance == 0.0));
-    assert!(least("amplitudes-flexible.csv").iter().all(|nodes| nodes[0] > 1e-6 && nodes[1] == 0.0));
-    let [rigid, smooth] = ["rigid", "smooth"].map(|casing| columns(&out.join(format!("amplitudes-{casing}.csv"))).1);
-    for (rigid, smooth) in rigid.iter().zip(&smooth) {
-        assert!(rigid[18] > 0.5 && smooth[18] > 0.5, "reaches its end");
-        assert!(rigid[10] > 1.3 * smooth[10], "flutter presses harder: {} N, {} N", rigid[10], smooth[10]);
-    }
-}
-
-/// The first 0.2 ms: two rows of nodes touch. Statements hold, and the numbers are those of methods that are near and not equal.
-#[test]
-fn the_quick_study_of_the_cube_meets_independent_methods() {
-    let root = tempfile::tempdir().unwrap();
-    let json = study(root.path(), "cube", &[]);
-    only_no(&json, &[]);
-    let flights = json["results"]["flights"].as_array().unwrap();
-    assert_eq!(flights.len(), 1);
-    let runs = flights[0]["runs"].as_array().unwrap();
-    assert_eq!(runs.len(), 4);
-    for run in runs {
-        assert!(run["failed"].is_null(), "{run}");
-        let exit = run["exit_speed"].as_f64().unwrap();
-        assert!((93.0..99.5).contains(&exit), "friction slows the cube: {run}");
-    }
-    let pairs = flights[0]["pairs"].as_array().unwrap();
-    assert_eq!(pairs.len(), 6);
-    for pair in pairs {
-        let shares: Vec<f64> = pair["shares"].as_array().unwrap().iter().map(|share| share.as_f64().unwrap()).collect();
-        assert!(shares[0] > 1e-6 && shares[0] < 0.005 && shares[1] < 0.02 && shares[2] < 0.01, "{pair}");
-    }
-    let (names, rows) = columns(&root.path().join("out/fig4a-u1x.csv"));
-    // Names hold commas of their own; numbers do not.
-    assert_eq!(names[0], "time (ms)");
-    assert!(rows.iter().all(|row| row.len() == 5), "time and four methods");
-    // 1 mm of interference is shared by the cube and the rings.
-    let crest = rows.iter().map(|row| row[4]).fold(0.0, f64::max);
-    assert!((0.5..1.0).contains(&crest), "{crest} mm");
-    let tables = fs::read_to_string(root.path().join("out/tables.md")).unwrap();
-    assert!(tables.contains("| product, lcp, modal-exact / a, film |"), "{tables}");
-}
-
-#[test]
-fn the_quick_study_of_conjugacy_finds_forces_moments_and_work_that_agree() {
-    let root = tempfile::tempdir().unwrap();
-    let json = study(root.path(), "conjugacy", &[]);
-    for statement in json["statements"].as_array().unwrap() {
-        assert_eq!(statement["holds"], true, "{statement}");
-    }
-    let rows = json["results"]["rows"].as_array().unwrap();
-    assert_eq!(rows.len(), 25);
-    // Whirl turns: a moment that is not zero about the shaft is about the axis of the casing.
-    for row in rows {
-        assert!(row["contacts"].as_u64().unwrap() > 300, "{row}");
-        assert!(row["shaft"].as_f64().unwrap() < 1e-12 && row["ledger"].as_f64().unwrap() < 1e-12, "{row}");
-    }
-    let table = fs::read_to_string(root.path().join("out/table.md")).unwrap();
-    assert_eq!(table.lines().count(), 27, "{table}");
-}
-
-/// Ways and steps of all four inputs; the table of the guide has a row of each run.
-#[test]
-fn the_quick_study_of_inputs_tells_ramps_from_hammers() {
-    let root = tempfile::tempdir().unwrap();
-    let json = study(root.path(), "inputs", &[]);
-    let force = |input: &str, way: &str, step: usize| {
-        json["results"][input][way][step]["force"].as_f64().unwrap_or_else(|| panic!("{input} {way}: {json:#}"))
-    };
-    for input in ["whirl", "gap-offset", "shape-factor", "temperature"] {
-        let fine = json["results"][input]["fine"]["force"].as_f64().unwrap();
-        assert!(fine > 1.0, "no contact: {input} {fine}");
-        assert_eq!(force(input, "derivatives given", 0).to_bits(), fine.to_bits(), "{input}");
-    }
-    // What the longest communication step does to the force of the fine run: nothing much with the ramp, blows if held.
-    for input in ["whirl", "gap-offset", "shape-factor"] {
-        let fine = json["results"][input]["fine"]["force"].as_f64().unwrap();
-        let [ramp, hold] = ["ramp (default)", "hold"].map(|way| (force(input, way, 2) - fine) / fine);
-        assert!(ramp.abs() < 0.15 && hold > 0.5 && hold > 20.0 * ramp.abs(), "{input}: {ramp} {hold}");
-    }
-    let table = fs::read_to_string(root.path().join("out/inputs.md")).unwrap();
-    assert_eq!(table.lines().count(), 2 + 4 * 10, "{table}");
 }
 
 /// The branch of engine order 4 leans far above its crossing with the first mode. Linear theory does not place it, the motion
@@ -225,6 +76,32 @@ fn the_quick_interaction_map_sees_the_branch_lean() {
     }
 }
 
+/// The cheapest of a scene, and two schemes that meet.
+#[test]
+fn the_quick_study_of_errors_takes_any_scene() {
+    let root = tempfile::tempdir().unwrap();
+    for (scene, more) in
+        [("builtin:rotor37", ["--window", "2e-3"]), ("builtin:abradable", ["--set", "friction_coefficient=0.1"])]
+    {
+        let arguments = ["study", "error", scene, "--quick", "--json", "--quiet", "--out", "out"];
+        let (stdout, _) = tiprub(root.path(), env!("CARGO_TARGET_TMPDIR"), &[&arguments[..], &more].concat());
+        let json: Value = serde_json::from_str(&stdout).unwrap();
+        only_no(&json, &[]);
+        let found = &json["results"]["scenes"][0];
+        let rows = found["rows"].as_array().unwrap();
+        assert_eq!(rows.len(), 9 * 4, "every scheme and solver at every step");
+        // Half the step, and about half the error or less.
+        let errors: Vec<f64> = rows
+            .iter()
+            .filter(|row| row["competitor"] == "modal-exact + lcp")
+            .map(|row| row["error_of_steps"].as_f64().unwrap())
+            .collect();
+        assert!(errors.len() == 4 && errors[3] < 0.6 * errors[1], "{errors:?}");
+        let table = fs::read_to_string(root.path().join("out/tables.md")).unwrap();
+        assert!(table.contains("| 1e-2 |") && table.contains("| modal-exact + lcp |"), "{table}");
+    }
+}
+
 /// Told at once: nothing is reduced for it, and no directory stays.
 #[test]
 fn what_a_study_cannot_do_is_told_before_the_work() {
@@ -239,12 +116,20 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1, "something stays");
         told
     };
-    for name in ["convergence", "modes", "cube", "stage", "map", "error", "inputs"] {
-        let told = refuse(&["study", name, "--quick", "--out", "file/out"], 1);
+    for name in ["map", "error"] {
+        let told = refuse(&["study", name, "builtin:rotor37", "--quick", "--out", "file/out"], 1);
         assert!(told.contains("file/out: cannot create the directory"), "{told}");
     }
     let told = refuse(&["study", "map", "builtin:cube-between-rings"], 2);
     assert!(told.contains("`cube`, flies freely") && told.contains("rotating master"), "{told}");
+    for name in ["stage", "convergence", "modes", "cube", "conjugacy", "inputs"] {
+        let told = refuse(&["study", name, "--quick"], 2);
+        assert!(told.contains("the laboratory") && told.contains(&format!("-p tiprub-lab -- {name}")), "{told}");
+    }
+    assert!(refuse(&["stability", "--case", "friction/"], 2).contains("-p tiprub-lab -- stability"));
+    assert!(refuse(&["study", "tip"], 2).contains("Choose `map` or `error`"));
+    let told = refuse(&["study", "error", "builtin:rotor37", "--set", "scheme=film"], 2);
+    assert!(told.contains("--set scheme: the study compares all of them"), "{told}");
 }
 
 #[test]

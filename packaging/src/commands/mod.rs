@@ -5,7 +5,6 @@ pub mod inspect;
 pub mod package;
 pub mod reduce;
 pub mod run;
-pub mod stability;
 pub mod study;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -31,7 +30,7 @@ pub fn run(command: &Command, console: &Console) -> Result<Outcome> {
             Command::Package(arguments) => package::run(arguments, console),
             Command::Run(arguments) => run::run(arguments, console),
             Command::Inspect(arguments) => inspect::run(arguments, console),
-            Command::Stability(arguments) => stability::run(arguments, console),
+            Command::Stability { .. } => Err(study::moved("stability")),
             Command::Study(arguments) => study::run(arguments, console),
         }
     })

@@ -4,16 +4,10 @@
 //! was found. [`output`] writes it, always in the same way: one HTML page that opens offline, an SVG and a CSV per
 //! figure, and `results.json`. Runs that do not depend on each other go through [`sweep`].
 
-pub mod conjugacy;
-pub mod convergence;
-pub mod cube;
 pub mod error;
-pub mod inputs;
 pub mod machine;
 pub mod map;
-pub mod modes;
 pub mod output;
-pub mod stage;
 pub mod sweep;
 
 use serde_json::{Value, json};

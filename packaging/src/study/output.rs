@@ -5,7 +5,8 @@ use std::{fmt::Write as _, path::Path};
 use super::Study;
 use crate::{Result, console::Outcome, output_file, report::page::escape};
 
-const STYLE: &str = include_str!("../../assets/report.css");
+/// Style sheet of the pages.
+pub const STYLE: &str = include_str!("../../assets/report.css");
 /// The page.
 pub const PAGE: &str = "index.html";
 /// Facts, statements and results for programs.

@@ -1,4 +1,4 @@
-//! Independent methods and closed forms that the product is compared with, by tests and by `tiprub study error`. Nothing here
+//! Independent methods and closed forms that the product is compared with, by tests and by `lab error`. Nothing here
 //! goes into the FMU, and nothing here uses the product's stepping or contact code; meshes, element matrices and sparse factors are those of `tiprub-model`.
 
 pub mod carpenter;

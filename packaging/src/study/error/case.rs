@@ -14,7 +14,7 @@ pub trait Case {
     fn figures(&self) -> [&'static str; 2];
 
     /// For headings.
-    fn title(&self) -> &'static str;
+    fn title(&self) -> &str;
 
     /// What the scene is, in a sentence or two, with what bounds the reading of its figures.
     fn description(&self) -> String;
@@ -53,6 +53,11 @@ pub trait Case {
     /// The second reference, and the competitors at a size.
     fn second(&self) -> Competitor {
         Competitor::Moreau
+    }
+
+    /// What the second reference has to do with the first.
+    fn relation(&self) -> &'static str {
+        "which shares no code with it"
     }
 
     /// The second reference where it is the same at all sizes.
@@ -108,6 +113,11 @@ pub trait Case {
     /// What is changed by almost nothing for that.
     fn perturbed(&self) -> &'static str {
         "a gap"
+    }
+
+    /// Whether a coating gives way.
+    fn is_coated(&self) -> bool {
+        false
     }
 
     /// Whether contact nodes act on each other, so that solvers differ.

@@ -1,24 +1,19 @@
-//! Error against run time: every scheme, solver, step and number of modes of the product, and methods that share nothing with it.
+//! Error against run time: every scheme, solver and step of the product on a scene, against fine runs that must meet.
 //!
-//! A [`case::Case`] is a scene in several sizes; [`competitor::Competitor`] is who steps it; [`measure`] holds every configuration
-//! against two references that share no code, and [`ranking`] says who is cheapest. Refusals and failures are rows like all others.
+//! A [`case::Case`] is a scene in one or several sizes; [`competitor::Competitor`] is who steps it; [`measure`] holds every
+//! configuration against two references, and [`ranking`] says who is cheapest. Refusals and failures are rows like all others.
+//! [`own::Own`] makes a case of any scene.
 
-pub mod bars;
 pub mod case;
 pub mod chart;
 pub mod clock;
 pub mod competitor;
-pub mod cube;
-pub mod full;
 pub mod measure;
-pub mod outside;
+pub mod own;
 pub mod ranking;
-pub mod rods;
-pub mod rotor;
 pub mod run;
 pub mod scene;
 pub mod sheets;
-pub mod stage;
 pub mod table;
 pub mod window;
 
@@ -27,40 +22,45 @@ use std::iter::zip;
 use serde_json::{Value, json};
 
 use super::{Figure, Picture, Statement, Study};
-use crate::{
-    Failure, Result,
-    cli::{ErrorScene, StudyArguments},
-    console::Console,
-    rom_cache::RomCache,
-};
-use bars::Bars;
+use crate::{Result, cli::ErrorArguments, console::Console};
 use case::Case;
 use chart::Chart;
 use competitor::{Competitor, Family, SCHEMES};
-use cube::Cube;
 use measure::{Measured, Row};
 use ranking::Kind;
-use rotor::Rotor;
-use stage::Wheel;
 use table::Table;
 use tiprub_core::settings::{Scheme, Solver};
 
 /// How far apart the two references of a scene may be.
 const MEET: f64 = 2e-3;
 
-/// The study.
+/// The study of a scene of one's own.
 ///
 /// # Errors
-/// A reference fails; never with the scenes that ship.
-pub fn study(arguments: &StudyArguments, console: &Console) -> Result<Study> {
-    let scenes = if arguments.scenes.is_empty() { ErrorScene::ALL.to_vec() } else { arguments.scenes.clone() };
-    let quick = arguments.quick;
+/// The scene cannot be read or stepped, or a reference fails.
+pub fn study(arguments: &ErrorArguments, console: &Console) -> Result<Study> {
+    let case = own::Own::new(arguments, console)?;
+    let summary = format!(
+        "Every time scheme and contact solver on {}, at steps on both sides of the one it asks for.",
+        arguments.scene
+    );
+    of_cases(vec![Box::new(case)], &[], (arguments.common.quick, summary), console)
+}
+
+/// The study of several cases; `smooth` are further ones, of which only orders are told.
+///
+/// # Errors
+/// A reference fails.
+pub fn of_cases(
+    cases: Vec<Box<dyn Case>>,
+    smooth: &[&dyn Case],
+    (quick, summary): (bool, String),
+    console: &Console,
+) -> Result<Study> {
     let mut study = Study {
         name: "error",
         title: "Error against run time".into(),
-        summary: "Every time scheme and contact solver, at steps on both sides of the stability limit and with several numbers of modes, beside \
-                  methods that share no code with them."
-            .into(),
+        summary,
         facts: super::machine::facts(),
         statements: Vec::new(),
         figures: Vec::new(),
@@ -71,13 +71,12 @@ pub fn study(arguments: &StudyArguments, console: &Console) -> Result<Study> {
     let time = format!("{}, median of {repetitions} runs or more, one run at a time", clock::MEANING);
     study.facts.push(("time".into(), time));
     let mut measured = Vec::new();
-    for scene in scenes {
-        let case = case_of(scene, quick, &arguments.cache.cache(), console)?;
+    for case in cases {
         let task = console.task(case.title(), Some(measure::count(case.as_ref())));
         let found = measure::measure(case.as_ref(), repetitions, &task)?;
         measured.push((case, found));
     }
-    let orders = orders(&measured, console)?;
+    let orders = orders(smooth, &measured, console)?;
     let mut text = guide_page(&study.facts);
     let mut results = Vec::new();
     for (case, found) in &measured {
@@ -113,27 +112,11 @@ fn section(case: &dyn Case, tables: &[Table]) -> String {
     format!("\n## {title}\n\n{pictures}{}", tables.iter().map(own).collect::<Vec<_>>().join("\n"))
 }
 
-/// The scene of this name, reduced where it has to be.
-fn case_of(scene: ErrorScene, quick: bool, cache: &RomCache, console: &Console) -> Result<Box<dyn Case>> {
-    let never = |problem: String| Failure::new("error study", problem, "Report this to the developers");
-    Ok(match scene {
-        ErrorScene::Carpenter => Box::new(Bars::carpenter(quick).map_err(never)?),
-        ErrorScene::BouncingBar => Box::new(Bars::bouncing(quick).map_err(never)?),
-        ErrorScene::Rotor37Light => Box::new(Rotor::new(false, quick, cache, console)?),
-        ErrorScene::Rotor37Heavy => Box::new(Rotor::new(true, quick, cache, console)?),
-        ErrorScene::Cube => Box::new(Cube::new(quick, cache, console)?),
-        ErrorScene::Stage => Box::new(Wheel::new(quick, cache, console)?),
-    })
-}
-
 /// Orders while nothing changes its contact, and in the scenes that were measured.
-fn orders(measured: &[(Box<dyn Case>, Measured)], console: &Console) -> Result<Table> {
-    let never = |problem: String| Failure::new("error study", problem, "Report this to the developers");
-    let shaken = [Bars::shaken(false).map_err(never)?, Bars::shaken(true).map_err(never)?];
+fn orders(smooth: &[&dyn Case], measured: &[(Box<dyn Case>, Measured)], console: &Console) -> Result<Table> {
     let task = console.task("Orders of convergence", None);
-    let smooth = shaken.iter().map(|case| measure::measure(case, 1, &task)).collect::<Result<Vec<_>>>()?;
-    let mut all: Vec<(&dyn Case, &Measured)> =
-        zip(&shaken, &smooth).map(|(case, found)| (case as &dyn Case, found)).collect();
+    let found = smooth.iter().map(|case| measure::measure(*case, 1, &task)).collect::<Result<Vec<_>>>()?;
+    let mut all: Vec<(&dyn Case, &Measured)> = zip(smooth.iter().copied(), &found).collect();
     all.extend(measured.iter().map(|(case, found)| (case.as_ref(), found)));
     Ok(ranking::orders(&all))
 }
@@ -175,14 +158,15 @@ fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> Stri
     let size = case.sizes()[standard];
     let what = match kind {
         Kind::OfTime => format!(
-            "{}: error of the steps alone at {size} {}: relative L2 of the displacements against {} at h = {:.2e} s. {} at h = {:.2e} s, which \
-             shares no code with it, is {:.1e} away.",
+            "{}: error of the steps alone at {size} {}: relative L2 of the displacements against {} at h = {:.2e} s. {} at h = {:.2e} s, {}, is \
+             {:.1e} away.",
             case.title(),
             case.size_name(),
             competitor::DEFAULT.name(),
             case.interval() / f64::from(case.reference_divisions(standard).0),
             case.second().name(),
             case.interval() / f64::from(case.reference_divisions(standard).1),
+            case.relation(),
             own.apart[0]
         ),
         Kind::Total => {
@@ -213,11 +197,13 @@ fn statements(case: &dyn Case, found: &Measured) -> Vec<Statement> {
     let least = ran.iter().map(|figures| figures.adhesion).fold(0.0, f64::min);
     let mut all = meeting(case, found);
     all.extend(limits(case, found));
-    all.push(Statement::tested(
-        format!("{title}: lcp neither penetrates nor pulls at any internal step of any run"),
-        !ran.is_empty() && ran.iter().all(|figures| figures.penetration <= 0.0 && figures.adhesion >= 0.0),
-        format!("deepest {deepest:.1e} m, least force {least:.1e} N in {} runs", ran.len()),
-    ));
+    all.push(Statement {
+        expected: format!("{title}: lcp neither penetrates nor pulls at any internal step of any run"),
+        found: format!("deepest {deepest:.1e} m, least force {least:.1e} N in {} runs", ran.len()),
+        // The surface of a coating is there to be penetrated.
+        holds: (!case.is_coated())
+            .then(|| !ran.is_empty() && ran.iter().all(|one| one.penetration <= 0.0 && one.adhesion >= 0.0)),
+    });
     all.extend(ranking::floor(case, found));
     all.extend(window::statement(case));
     all
@@ -229,7 +215,7 @@ fn meeting(case: &dyn Case, found: &Measured) -> Vec<Statement> {
     let (size, apart) = (case.sizes()[case.standard()], found.references[case.standard()].apart[0]);
     let Some((full, who)) = case.meeting() else {
         return vec![Statement::tested(
-            format!("{title}: the two references, which share no code, meet to {MEET:e}"),
+            format!("{title}: the two references, the second {}, meet to {MEET:e}", case.relation()),
             apart < MEET,
             format!("displacements {apart:.1e} apart at {size} {}", case.size_name()),
         )];
@@ -321,14 +307,15 @@ fn limits(case: &dyn Case, found: &Measured) -> [Statement; 2] {
         .map(|row| Tried { size: row.size, step: row.step, outcome: Outcome::of(row) })
         .collect();
     [
-        Statement::tested(
-            format!(
+        Statement {
+            expected: format!(
                 "{}: central differences refuse steps, for ω_max·h ≥ 2 alone, and at every size all that run are shorter",
                 case.title()
             ),
-            bounded(&tried),
-            bounds(case, &tried),
-        ),
+            found: bounds(case, &tried),
+            // Steps that all run say nothing about the limit.
+            holds: tried.iter().any(|one| one.outcome != Outcome::Ran).then(|| bounded(&tried)),
+        },
         Statement::remark(
             format!("{}: longest step of modal-exact that ran", case.title()),
             format!("{:.3} µs, {:.1} times that of central differences", 1e6 * exact, exact / central),

@@ -6,6 +6,7 @@ use tiprub_core::{
 };
 
 use super::run::{Run, Seen};
+use crate::native;
 
 /// A run of a scene.
 pub struct SceneRun {
@@ -17,7 +18,7 @@ pub struct SceneRun {
 }
 
 impl SceneRun {
-    /// Compile and initialise; `perturbation` is a relative change of the clearance.
+    /// Compile and initialise; `perturbation` is a relative change of clearances and velocities.
     ///
     /// # Errors
     /// The refusal of the core.
@@ -28,15 +29,41 @@ impl SceneRun {
         division: u32,
         perturbation: f64,
     ) -> Result<Self, String> {
+        let scene = Self::changed(scene, (scheme, solver), interval / f64::from(division), perturbation);
+        Self::with_start_values(&scene, interval, division, &[])
+    }
+
+    /// The scene with another method and internal step (s), and a relative change of clearances and velocities.
+    pub fn changed(scene: &Scene, (scheme, solver): (Scheme, Solver), step: f64, perturbation: f64) -> Scene {
         let mut scene = scene.clone();
         scene.settings.time.scheme = scheme;
-        scene.settings.time.step = interval / f64::from(division);
+        scene.settings.time.step = step;
         for contact in &mut scene.settings.contacts {
             contact.solver = solver;
             contact.gap *= 1.0 + perturbation;
+            contact.sector_gaps.iter_mut().for_each(|gap| *gap *= 1.0 + perturbation);
         }
+        // The gaps of free bodies are in their ROMs.
+        let velocities = scene.settings.structures.iter_mut().flat_map(|structure| &mut structure.velocity);
+        velocities.for_each(|velocity| *velocity *= 1.0 + perturbation);
+        scene
+    }
+
+    /// As the scene says, with start values replaced (name, value as text).
+    ///
+    /// # Errors
+    /// As [`Self::new`], or a value that is refused.
+    pub fn with_start_values(
+        scene: &Scene,
+        interval: f64,
+        division: u32,
+        values: &[(String, String)],
+    ) -> Result<Self, String> {
         let start = scene.settings.experiment.start;
-        let mut simulation = Simulation::new(&scene).map_err(|error| error.to_string())?;
+        let mut simulation = Simulation::new(scene).map_err(|error| error.to_string())?;
+        for (name, value) in values {
+            native::set(&mut simulation, name, value).map_err(|failure| failure.to_string())?;
+        }
         simulation.initialise(start).map_err(|error| error.to_string())?;
         Ok(Self { simulation, start, interval, division, samples: 0 })
     }

@@ -16,7 +16,7 @@ use tiprub_core::{Scene, settings::SpinSettings};
 use super::{Statement, Study, sweep};
 use crate::{
     Failure, Result,
-    cli::{Speeds, StudyArguments},
+    cli::{MapArguments, Speeds},
     console::Console,
     scene_source,
 };
@@ -25,8 +25,6 @@ use prediction::{Crossing, Prediction};
 pub use run::{Response, Run, Setup};
 use start::Start;
 
-/// The scene where none is named.
-const SCENE: &str = "builtin:rotor37";
 /// Angular velocities, relative to the one at which the second harmonic of the casing meets the first mode: a fifth to both
 /// sides, and above it room for what leans to higher speeds (see [`LEAN`]).
 const RANGE: [f64; 2] = [0.8, 1.2 * LEAN];
@@ -74,13 +72,13 @@ struct Map {
 ///
 /// # Errors
 /// A scene that cannot be loaded, or that is refused at every speed.
-pub fn study(arguments: &StudyArguments, console: &Console) -> Result<Study> {
-    let name = arguments.scene.as_deref().unwrap_or(SCENE);
+pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
+    let name = arguments.scene.as_str();
     // Before models are reduced for nothing.
     prediction::master(&scene_source::settings(name)?)?;
-    let scene = scene_source::load(name, &arguments.cache.cache(), console)?;
+    let scene = scene_source::load(name, &arguments.common.cache.cache(), console)?;
     let request = Request {
-        quick: arguments.quick,
+        quick: arguments.common.quick,
         speeds: arguments.speeds,
         revolutions: arguments.revolutions.map(std::num::NonZero::get),
         transient: arguments.transient,

@@ -8,8 +8,17 @@ use tiprub_core::{
     settings::{Motion, SceneSettings},
 };
 
-use super::{super::modes::folded, start::Start};
+use super::start::Start;
 use crate::{Failure, Result};
+
+/// The nodal diameter that an engine order excites among `sectors` blades, and whether the wave runs backwards.
+///
+/// What stands still and has k waves around is seen by blade s of N with the phase 2πks/N: k and k ± N are the same to
+/// the blades, and k beyond N/2 is a wave of N − k diameters the other way.
+pub fn folded(order: usize, sectors: usize) -> (usize, bool) {
+    let rest = order % sectors;
+    if 2 * rest > sectors { (sectors - rest, true) } else { (rest, false) }
+}
 
 /// Speeds at which modes that stiffen are computed; linear in between.
 const GRID: usize = 33;

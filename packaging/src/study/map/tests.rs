@@ -427,3 +427,13 @@ fn a_maximum_stays_in_its_window() {
     let second = found.iter().find(|one| one.crossing.order == 4 && one.crossing.speed > 1.1 * CROSSING).unwrap();
     assert!(second.response.is_some(), "{found:?}");
 }
+
+#[test]
+fn engine_orders_fold_at_half_the_number_of_sectors() {
+    let folds =
+        [(2, (2, false)), (28, (28, false)), (29, (27, true)), (54, (2, true)), (56, (0, false)), (58, (2, false))];
+    for (order, expected) in folds {
+        assert_eq!(prediction::folded(order, 56), expected, "order {order}");
+    }
+    assert_eq!([3, 4, 5].map(|order| prediction::folded(order, 7)), [(3, false), (3, true), (2, true)]);
+}

@@ -1,0 +1,217 @@
+//! What can be asked of the laboratory.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use tiprub_packaging::{
+    Result,
+    builtin::DiskModel,
+    cli::{Speeds, StudyCommon, positive, speeds},
+    commands,
+    console::{Console, Outcome},
+    output_file, study,
+};
+
+use crate::{conjugacy, convergence, cube, error, inputs, modes, stability, stage};
+
+/// Evidence for tiprub: studies of the models that ship and of standard problems.
+#[derive(Debug, Parser)]
+#[command(
+    name = "lab",
+    version,
+    after_help = "Examples:\n  lab stage --quick\n  lab error --scene carpenter\n  lab stability --case friction/\n\n\
+                  In the sources: cargo run --release -p tiprub-lab -- stage --quick"
+)]
+pub struct Cli {
+    /// Print one JSON object with the result on stdout (errors too); progress stays on stderr.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// No progress on stderr; results, warnings and errors are still printed.
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// Studies by name.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Error against run time of every scheme and solver on standard problems, beside independent methods.
+    Error(ErrorArguments),
+    /// Stiff and extreme cases: each must end in a right answer or in a refusal that says why.
+    #[command(
+        after_help = "Every case runs in a process of its own with a time limit. DIR then holds index.html, stability.csv, \
+                      stability.md and results.json."
+    )]
+    Stability(StabilityArguments),
+    /// Frequency deviation and residual criterion of the reduced disk against the number of component modes.
+    Convergence(StudyCommon),
+    /// Natural frequencies against nodal diameter with engine orders, and mode shapes.
+    Modes(ModesArguments),
+    /// Blades against an oval casing, rigid and flexible, over a range of speeds.
+    Stage(StageArguments),
+    /// The cube between two rings: the product against independent methods on the full model.
+    Cube(StudyCommon),
+    /// Forces and moments on both sides of contacts, torque against the work of the shaft, and the ledger, over all features.
+    Conjugacy(StudyCommon),
+    /// What the communication step does to a whirling shaft and other inputs that move, ramped, with derivatives, and held.
+    Inputs(StudyCommon),
+}
+
+/// Arguments of `lab error`.
+#[derive(Debug, Args)]
+pub struct ErrorArguments {
+    /// Only this scene; may be given several times.
+    #[arg(long = "scene", value_name = "SCENE", value_enum)]
+    pub scenes: Vec<ErrorScene>,
+    /// What all studies take.
+    #[command(flatten)]
+    pub common: StudyCommon,
+}
+
+/// Scenes of the study of errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ErrorScene {
+    /// Carpenter's two bars.
+    Carpenter,
+    /// The bouncing bar.
+    BouncingBar,
+    /// The cube between two rings.
+    Cube,
+    /// Rotor 37 touching lightly.
+    #[value(name = "rotor37-light")]
+    Rotor37Light,
+    /// Rotor 37 rubbing by the whole gap.
+    #[value(name = "rotor37-heavy")]
+    Rotor37Heavy,
+    /// The stage of 56 coupled sectors in its elastic casing.
+    Stage,
+}
+
+impl ErrorScene {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Carpenter, Self::BouncingBar, Self::Cube, Self::Rotor37Light, Self::Rotor37Heavy, Self::Stage];
+}
+
+/// Arguments of `lab modes`.
+#[derive(Debug, Args)]
+pub struct ModesArguments {
+    /// Speed of the engine orders (rad/s) [default: where an oval casing meets the first mode of nodal diameter 2].
+    #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true)]
+    pub speed: Option<f64>,
+    /// What all studies take.
+    #[command(flatten)]
+    pub common: StudyCommon,
+}
+
+/// Arguments of `lab stage`.
+#[derive(Debug, Args)]
+pub struct StageArguments {
+    /// Angular velocities (rad/s), from, to and how many [default: 0.5 to 1.5 times the one where an oval casing meets the
+    /// first mode of nodal diameter 2].
+    #[arg(long, value_name = "FROM:TO:COUNT", value_parser = speeds)]
+    pub speeds: Option<Speeds>,
+    /// Runs at the same time [default: one per processor].
+    #[arg(long, value_name = "N")]
+    pub threads: Option<std::num::NonZero<usize>>,
+    /// What all studies take.
+    #[command(flatten)]
+    pub common: StudyCommon,
+}
+
+/// Arguments of `lab stability`.
+#[derive(Debug, Args)]
+pub struct StabilityArguments {
+    /// Directory for the table; made if missing.
+    #[arg(long, value_name = "DIR", default_value = "stability")]
+    pub out: PathBuf,
+    /// Fewer and shorter cases: a minute.
+    #[arg(long)]
+    pub quick: bool,
+    /// Only cases whose name begins so.
+    #[arg(long, value_name = "NAME")]
+    pub case: Option<String>,
+    /// Cases at the same time [default: one per processor].
+    #[arg(long, value_name = "N")]
+    pub threads: Option<std::num::NonZero<usize>>,
+    /// Also write the table into this chapter of the guide, below the line that marks its place; not with --case.
+    #[arg(long, value_name = "FILE")]
+    pub chapter: Option<PathBuf>,
+    /// FMU library for the cases that import FMUs, instead of the one found or built.
+    #[arg(long, value_name = "FILE")]
+    pub library: Option<PathBuf>,
+    /// Run one case in this process and print what happened.
+    #[arg(long, value_name = "NAME", hide = true)]
+    pub child: Option<String>,
+}
+
+impl Cli {
+    /// Do what is asked for.
+    ///
+    /// # Errors
+    /// A study that fails, or files that cannot be written.
+    pub fn run(&self, console: &Console) -> Result<Outcome> {
+        let (name, common) = match &self.command {
+            Command::Stability(arguments) => return stability::command::run(arguments, console),
+            Command::Error(arguments) => ("error", &arguments.common),
+            Command::Convergence(common) => ("convergence", common),
+            Command::Modes(arguments) => ("modes", &arguments.common),
+            Command::Stage(arguments) => ("stage", &arguments.common),
+            Command::Cube(common) => ("cube", common),
+            Command::Conjugacy(common) => ("conjugacy", common),
+            Command::Inputs(common) => ("inputs", common),
+        };
+        let directory = commands::study::directory(name, common);
+        output_file::try_directory(&directory)?;
+        study::output::write(&self.study(console)?, &directory)
+    }
+
+    fn study(&self, console: &Console) -> Result<study::Study> {
+        match &self.command {
+            Command::Error(arguments) => error::study(arguments, console),
+            Command::Convergence(common) => {
+                let (reduction, _) = DiskModel::new(common.quick).reduce(console)?;
+                convergence::study(&reduction, common.quick)
+            }
+            Command::Modes(arguments) => {
+                let (reduction, mesh) = DiskModel::new(arguments.common.quick).reduce(console)?;
+                modes::study(&reduction, &mesh, arguments.speed, arguments.common.quick)
+            }
+            Command::Stage(arguments) => stage::study(arguments, console),
+            Command::Cube(common) => cube::study(common, console),
+            Command::Conjugacy(common) => conjugacy::study(common.quick),
+            Command::Inputs(common) => inputs::study(common, console),
+            Command::Stability(_) => unreachable!("`run` has answered it"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn options_of_another_study_are_refused() {
+        for (line, right) in [
+            ("modes --speed 900", true),
+            ("stage --speeds 400:900:3 --threads 1", true),
+            ("modes --speeds 400:900:3", false),
+            ("stage --speed 900", false),
+            ("error --scene carpenter --scene rotor37-light", true),
+            ("modes --scene carpenter", false),
+            ("convergence --threads 2", false),
+            ("stage scene.toml", false),
+        ] {
+            assert_eq!(Cli::try_parse_from(["lab"].into_iter().chain(line.split(' '))).is_ok(), right, "{line}");
+        }
+    }
+}

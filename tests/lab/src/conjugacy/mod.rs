@@ -1,0 +1,249 @@
+//! Forces, moments and work: whether the torque is conjugate to the rotor angle, master and slave get equal and opposite
+//! forces and moments, and every input has its work, over all features, schemes and solvers.
+
+mod run;
+
+use std::fmt::Write as _;
+
+pub use run::{Feature, Seen, Side, run};
+use serde_json::json;
+use tiprub_core::{
+    Scene,
+    settings::{Scheme, Solver},
+};
+
+use crate::stability::models::{SCHEMES, SOLVERS};
+use tiprub_packaging::study::{Figure, Picture, Sheet, Statement, Study, sweep};
+use tiprub_packaging::{
+    Failure, Result,
+    report::plots::{Plot, Series},
+};
+
+/// Largest internal step of the table (s).
+const STEP: f64 = 1e-6;
+/// Halvings of the figure.
+const HALVINGS: i32 = 4;
+/// The table as a file.
+pub const TABLE: &str = "table.md";
+
+/// One row of the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Case {
+    feature: Feature,
+    scheme: (Scheme, &'static str),
+    solver: (Solver, &'static str),
+    friction: f64,
+}
+
+/// What its runs showed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Row {
+    case: Case,
+    /// With steps h and h/2.
+    seen: [Seen; 2],
+    /// Without friction in a round rigid casing.
+    round: Option<f64>,
+}
+
+impl Case {
+    fn exists(&self, quick: bool) -> bool {
+        let massless = self.scheme.0 == Scheme::MasslessBoundary;
+        let refused = (self.feature == Feature::Coating && self.solver.0 != Solver::Lcp)
+            || (self.feature == Feature::Free && massless)
+            || (self.friction == 0.0 && self.solver.0 == Solver::Coulomb);
+        let shown = match self.scheme.0 {
+            Scheme::CentralDifference => self.solver.0 == Solver::Film,
+            Scheme::ModalExact => self.solver.0 == Solver::Lcp || self.solver.0 == Solver::Coulomb,
+            Scheme::MasslessBoundary => self.solver.0 == Solver::Lcp,
+        };
+        !refused && (!quick || (shown && self.friction > 0.0))
+    }
+
+    fn scene(&self, friction: f64, round: bool) -> Scene {
+        let mut scene = self.feature.scene(friction, true, round);
+        scene.settings.time.scheme = self.scheme.0;
+        scene.settings.contacts.iter_mut().for_each(|contact| contact.solver = self.solver.0);
+        scene
+    }
+
+    fn row(&self) -> Result<Row> {
+        let named = |error: tiprub_core::Error| {
+            Failure::new(
+                format!("{}, {}, {}, µ = {}", self.feature.name(), self.scheme.1, self.solver.1, self.friction),
+                error.to_string(),
+                "Report this to the developers",
+            )
+        };
+        let scene = self.scene(self.friction, false);
+        let seen = [run(&scene, STEP).map_err(named)?, run(&scene, 0.5 * STEP).map_err(named)?];
+        let stays_round =
+            matches!(self.feature, Feature::Revolution | Feature::Spline | Feature::Wheel | Feature::Coating);
+        let free_of_friction = self.solver.0 != Solver::Coulomb && stays_round;
+        let round = free_of_friction.then(|| run(&self.scene(0.0, true), STEP).map_err(named)).transpose()?;
+        Ok(Row { case: *self, seen, round: round.map(|seen| seen.axis_moment) })
+    }
+}
+
+fn cases(quick: bool) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for feature in Feature::ALL {
+        for scheme in SCHEMES {
+            for solver in SOLVERS {
+                for friction in [0.0, 0.15] {
+                    cases.push(Case { feature, scheme, solver, friction });
+                }
+            }
+        }
+    }
+    cases.retain(|case| case.exists(quick));
+    cases
+}
+
+/// Run all and judge.
+///
+/// # Errors
+/// A run is refused or fails.
+pub fn study(quick: bool) -> Result<Study> {
+    let rows = sweep::sweep(&cases(quick), sweep::processors(), Case::row, |_| ())?;
+    let figure = curvature(if quick { 2 } else { HALVINGS })?;
+    Ok(Study {
+        name: "conjugacy",
+        title: "Forces, moments and work that agree".into(),
+        summary: "Rotors that speed up, whirl and shift in casings that close, turn and change shape, and a free body between \
+                  plates, with every scheme and solver: forces and moments on both sides of the contacts, the torque against \
+                  the work of the shaft, and what the ledger cannot name."
+            .into(),
+        facts: vec![
+            ("runs".into(), rows.len().to_string()),
+            ("contacts".into(), rows.iter().map(|row| row.seen[0].contacts).sum::<usize>().to_string()),
+            ("largest internal step".into(), format!("{STEP:e} s")),
+        ],
+        statements: statements(&rows),
+        results: json!({ "rows": rows.iter().copied().map(Row::to_json).collect::<Vec<_>>() }),
+        files: vec![(TABLE.into(), "the table".into(), table(&rows).into_bytes())],
+        figures: vec![figure],
+    })
+}
+
+/// Largest of something over the rows.
+fn worst(rows: &[Row], value: impl Fn(&Row) -> f64) -> f64 {
+    rows.iter().map(value).fold(0.0, |worst, value| if value > worst || value.is_nan() { value } else { worst })
+}
+
+fn statements(rows: &[Row]) -> Vec<Statement> {
+    let below = |expected: &str, bound: f64, found: f64| {
+        Statement::tested(format!("{expected}, at most {bound:.0e}"), found <= bound, format!("{found:.1e}"))
+    };
+    let is_spline = |row: &Row| row.case.feature == Feature::Spline;
+    let round = |spline: bool| worst(rows, |row| if is_spline(row) == spline { row.round.unwrap_or(0.0) } else { 0.0 });
+    let touching = rows.iter().map(|row| row.seen[0].contacts).min().unwrap_or(0);
+    let of = |side: Side| worst(rows, |row| if row.case.feature.side() == side { row.seen[0].moment } else { 0.0 });
+    let massless = |row: &Row| row.case.scheme.0 == Scheme::MasslessBoundary;
+    let curved = |step: usize| worst(rows, |row| if massless(row) { 0.0 } else { row.seen[step].curvature.abs() });
+    vec![
+        Statement::tested("every run has contacts", touching > 0, format!("{touching} in the run with the fewest")),
+        below("moment about the axis of a round casing of revolution without friction, of |F| r", 1e-13, round(false)),
+        below("the same of a spline through 60 points of a circle", 1e-5, round(true)),
+        below(
+            "integral of torque times speed plus work of the shaft, of all work",
+            1e-12,
+            worst(rows, |row| row.seen[0].shaft),
+        ),
+        below("closure of the ledger, of all work", 1e-12, worst(rows, |row| row.seen[0].balance)),
+        below("forces on master and slave, of |F|", 1e-13, worst(rows, |row| row.seen[0].force)),
+        below(
+            "moments on master and slave about one point where the slave has control points, of |F| r",
+            1e-13,
+            of(Side::ControlPoints),
+        ),
+        below(
+            "the same on surfaces of revolution, whose nodes stand off by the penetration of a step",
+            1e-4,
+            of(Side::Surface),
+        ),
+        below(
+            "modal forces on carriers from the forces on control points",
+            1e-12,
+            worst(rows, |row| row.seen[0].modal),
+        ),
+        Statement::tested(
+            "curvature work vanishes with the step (schemes with node mass)",
+            curved(1) < 0.7 * curved(0),
+            format!("at most {:.1e} of all work with h, {:.1e} with h/2", curved(0), curved(1)),
+        ),
+    ]
+}
+
+impl Row {
+    fn to_json(self) -> serde_json::Value {
+        let Case { feature, scheme, solver, friction } = self.case;
+        let [first, second] = self.seen;
+        json!({
+            "feature": feature.name(), "scheme": scheme.1, "solver": solver.1, "friction": friction,
+            "contacts": first.contacts, "axis_moment_round": self.round, "shaft": first.shaft, "ledger": first.balance,
+            "force": first.force, "moment": first.moment, "modal": first.modal,
+            "curvature": first.curvature, "curvature_half_step": second.curvature,
+        })
+    }
+}
+
+/// The table in Markdown.
+fn table(rows: &[Row]) -> String {
+    let mut text = String::from(
+        "| scene | scheme | solver | µ | contacts | moment about the axis, µ = 0, round | torque·speed + shaft work | ledger | force \
+         | moment | curvature work, h | h/2 |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for Row { case, seen: [first, second], round } in rows {
+        let Case { feature, scheme, solver, friction } = case;
+        let told = |there: bool, value: f64| if there { format!("{value:.0e}") } else { "-".to_owned() };
+        let round = told(round.is_some(), round.unwrap_or_default());
+        let shaft = told(*feature != Feature::Free, first.shaft);
+        let force = told(feature.side() == Side::ControlPoints, first.force);
+        let moment = told(feature.side() != Side::Dented, first.moment);
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} | {friction} | {} | {round} | {shaft} | {:.0e} | {force} | {moment} | {:.1e} | {:.1e} |",
+            feature.name(),
+            scheme.1,
+            solver.1,
+            first.contacts,
+            first.balance,
+            first.curvature,
+            second.curvature
+        );
+    }
+    text
+}
+
+/// Curvature work over the step.
+fn curvature(halvings: i32) -> Result<Figure> {
+    let features = [Feature::Revolution, Feature::Spline, Feature::Casing];
+    let steps: Vec<f64> = (0..halvings).rev().map(|halving| STEP * 0.5_f64.powi(halving)).collect();
+    let mut sheet = Sheet::new(["step (s)", "surface of revolution (-)", "rigid spline (-)", "flexible casing (-)"]);
+    let tasks: Vec<(f64, Feature)> = steps.iter().flat_map(|step| features.map(|feature| (*step, feature))).collect();
+    let run = |(step, feature): &(f64, Feature)| {
+        run(&feature.scene(0.15, true, false), *step)
+            .map_err(|error| Failure::new("study conjugacy", error.to_string(), ""))
+    };
+    let seen = sweep::sweep(&tasks, sweep::processors(), run, |_| ())?;
+    for (step, seen) in steps.iter().zip(seen.chunks(features.len())) {
+        sheet.rows.push(std::iter::once(*step).chain(seen.iter().map(|seen| seen.curvature.abs())).collect());
+    }
+    let series = (1..=features.len()).map(|column| {
+        Series::line(features[column - 1].name(), sheet.rows.iter().map(|row| (row[0], row[column])).collect())
+    });
+    let plot = Plot {
+        logarithmic: true,
+        logarithmic_x: true,
+        marked: true,
+        ..Plot::new("internal step (s)", "curvature work, of all work", series.collect())
+    };
+    Ok(Figure {
+        name: "curvature",
+        caption:
+            "Work of normals that turn and surfaces that curve within an internal step (modal-exact, lcp, µ = 0.15)."
+                .into(),
+        picture: Picture::plot(&plot)?,
+        sheet,
+    })
+}

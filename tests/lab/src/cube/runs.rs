@@ -1,0 +1,144 @@
+//! Who runs what: the product with its schemes and solvers, the reference methods, four flights.
+
+use tiprub_core::{
+    Scene,
+    settings::{Interpolation, Scheme, Solver},
+};
+use tiprub_reference::{
+    cube::{
+        history::History,
+        scene::{Mass, Scene as FullScene, Setting},
+    },
+    methods::{Method, Run},
+    surface::SurfaceKind,
+};
+
+use super::product::{Product, ProductRun};
+use tiprub_packaging::{Failure, Result};
+
+/// How the cube flies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flight {
+    /// Speed along −y (m/s).
+    pub speed: f64,
+    pub friction: f64,
+}
+
+/// A method of either kind.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Competitor {
+    Product(Product),
+    Reference { method: Method, surface: SurfaceKind, step: f64, stride: usize },
+}
+
+/// One run; failures are results.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    pub name: &'static str,
+    pub competitor: Competitor,
+    pub result: std::result::Result<ProductRun, String>,
+}
+
+impl Outcome {
+    pub fn history(&self) -> Option<&History> {
+        self.result.as_ref().ok().map(|run| &run.history)
+    }
+
+    pub fn is_product(&self) -> bool {
+        matches!(self.competitor, Competitor::Product(_))
+    }
+}
+
+const fn product(solver: Solver, scheme: Scheme) -> Competitor {
+    Competitor::Product(Product { solver, scheme, step: 5e-7, interpolation: Interpolation::Spline })
+}
+
+fn reference(method: Method, surface: SurfaceKind, step: f64, stride: usize) -> Competitor {
+    Competitor::Reference { method, surface, step, stride }
+}
+
+/// Names of the product's runs that statements are about.
+pub const PAPER: &str = "product, film, central differences";
+pub const BEST: &str = "product, lcp, modal-exact";
+pub const STICKING: &str = "product, coulomb, modal-exact";
+/// Names of the reference methods on the same surface.
+pub const A: &str = "a, film";
+pub const B: &str = "b, bi-potential";
+pub const C: &str = "c, augmented Lagrangian";
+
+/// All methods of a flight; on facets as well where `facets`.
+pub fn competitors(flight: &Flight, quick: bool, facets: bool) -> Vec<(&'static str, Competitor)> {
+    let (film, augmented, spline) =
+        (Method::Film(Default::default()), Method::Augmented(Default::default()), SurfaceKind::Spline);
+    let mut list = vec![
+        (A, reference(film, spline, 5e-7, 2)),
+        (B, reference(Method::Bipotential, spline, 1e-6, 1)),
+        (PAPER, product(Solver::Film, Scheme::CentralDifference)),
+        (BEST, product(Solver::Lcp, Scheme::ModalExact)),
+    ];
+    if quick {
+        return list;
+    }
+    list.push(("product, lcp, central differences", product(Solver::Lcp, Scheme::CentralDifference)));
+    if flight.friction > 0.0 {
+        list.push((STICKING, product(Solver::Coulomb, Scheme::ModalExact)));
+    }
+    list.push((C, reference(augmented, spline, 1e-6, 1)));
+    list.push(("d, penalty", reference(Method::Penalty(Default::default()), spline, 1e-7, 10)));
+    if facets {
+        let flat = Product {
+            solver: Solver::Lcp,
+            scheme: Scheme::ModalExact,
+            step: 5e-7,
+            interpolation: Interpolation::Facets,
+        };
+        list.push(("b, facets", reference(Method::Bipotential, SurfaceKind::Facets, 1e-6, 1)));
+        list.push(("c, facets", reference(augmented, SurfaceKind::Facets, 1e-6, 1)));
+        list.push(("product, lcp, modal-exact, facets", Competitor::Product(flat)));
+    }
+    list
+}
+
+/// Interval of the records (s), the same for all.
+pub const RECORD: f64 = 1e-6;
+
+/// One run to `end` (s), alone, so that processor time is its own.
+///
+/// # Errors
+/// The full model cannot be assembled.
+pub fn run(
+    (name, competitor): (&'static str, Competitor),
+    scene: &Scene,
+    flight: &Flight,
+    end: f64,
+) -> Result<Outcome> {
+    let result = match competitor {
+        Competitor::Product(product) => product.run(scene, flight, end, RECORD).map_err(|error| error.to_string()),
+        Competitor::Reference { method, surface, step, stride } => {
+            let setting = Setting { speed: flight.speed, friction: flight.friction, surface, mass: Mass::Lumped };
+            let full = FullScene::new(setting).map_err(|error| Failure::from_below("study cube", error))?;
+            let history = method.run(&full, &Run { step, end, stride, snapshots: Vec::new() });
+            history.map_err(|error| error.to_string()).map(|history| ProductRun {
+                internal_steps: (history.times.len() * stride) as u64,
+                history,
+                curvature: Vec::new(),
+                residual: 0.0,
+                stepping: std::time::Duration::ZERO,
+            })
+        }
+    };
+    Ok(Outcome { name, competitor, result })
+}
+
+/// Last time of contact of node 1 (s), as far as it has one contact: until it is free for 50 µs.
+pub fn released(history: &History) -> f64 {
+    let mut last = None;
+    for (time, force) in history.times.iter().zip(history.first_force()) {
+        if force > 0.0 {
+            last = Some(*time);
+        } else if last.is_some_and(|last| time - last > 5e-5) {
+            break;
+        }
+    }
+    last.unwrap_or(0.0)
+}

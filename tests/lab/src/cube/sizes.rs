@@ -1,0 +1,162 @@
+//! What modes the bodies need: cube and rings reduced further and less far than those that ship.
+
+use serde_json::{Value, json};
+use tiprub_core::{Rom, Scene, settings::Interpolation, settings::Scheme, settings::Solver};
+use tiprub_model::cube::{CubeOptions, RingOptions, Side};
+use tiprub_reference::{compare::agreement, cube::history::History};
+
+use super::{
+    product::{Product, ProductRun},
+    runs::{Flight, RECORD, released},
+};
+use tiprub_packaging::{Failure, Result, console::Console, reduction, rom_cache::RomCache};
+
+/// Modes and static responses of the rings.
+const RINGS: [[usize; 2]; 7] = [[20, 0], [40, 0], [60, 60], [100, 0], [300, 0], [200, 400], [200, 1000]];
+const QUICK_RINGS: [[usize; 2]; 2] = [[20, 0], [100, 0]];
+/// Fixed-interface modes of the cube; the last are all.
+const CUBE: [usize; 5] = [30, 60, 120, 240, 432];
+/// End of the runs (s): while node 1 touches, and the windows of its force.
+const END: f64 = 4.5e-4;
+/// The paper's method on reduced models.
+const PRODUCT: Product = Product {
+    solver: Solver::Film,
+    scheme: Scheme::CentralDifference,
+    step: 5e-7,
+    interpolation: Interpolation::Spline,
+};
+
+/// A run with one body reduced otherwise.
+#[derive(Debug, Clone)]
+pub struct Size {
+    pub modes: usize,
+    pub static_responses: usize,
+    /// Size of the ROM file (bytes).
+    pub bytes: usize,
+    /// Relative L2 differences of u1x, slowing, u1z while node 1 touches, and of the windows of its force.
+    pub apart: [f64; 4],
+    /// Processor time of the steps (s).
+    pub seconds: f64,
+}
+
+/// Rings against method a, and the cube against all its modes.
+#[derive(Debug, Clone)]
+pub struct Sizes {
+    pub rings: Vec<Size>,
+    pub cube: Vec<Size>,
+}
+
+impl Sizes {
+    /// Reduce (or take from the cache), run, compare; `a` is the flight of method a.
+    ///
+    /// # Errors
+    /// A reduction or a run that is refused; never with what ships.
+    pub fn new(scene: &Scene, flight: &Flight, a: &History, quick: bool, tools: (&RomCache, &Console)) -> Result<Self> {
+        let last = a.times.last().copied().unwrap_or(0.0);
+        let work = Work { scene, flight, end: END.min(last), touching: released(a), tools };
+        let mut rings = Vec::new();
+        for [modes, static_responses] in if quick { &QUICK_RINGS[..] } else { &RINGS[..] } {
+            rings.push(work.rings(*modes, *static_responses, a)?);
+        }
+        Ok(Self { rings, cube: if quick { Vec::new() } else { work.cubes()? } })
+    }
+
+    /// For programs.
+    pub fn json(&self) -> Value {
+        let rows = |sizes: &[Size]| -> Vec<Value> {
+            let row = |size: &Size| {
+                json!({
+                    "modes": size.modes, "static_responses": size.static_responses, "rom_bytes": size.bytes,
+                    "apart": size.apart, "processor_seconds": size.seconds,
+                })
+            };
+            sizes.iter().map(row).collect()
+        };
+        json!({ "rings": rows(&self.rings), "cube": rows(&self.cube) })
+    }
+
+    /// Both tables.
+    pub fn markdown(&self) -> String {
+        let percent = |share: f64| format!("{:.3} %", 100.0 * share);
+        let mut text = String::from(
+            "## Reduced models\n\nRings against method a:\n\n| modes | static responses | ROM file (MB) | u1x | slowing | u1z | λ1, windows | \
+             steps (CPU s) |\n|---|---|---|---|---|---|---|---|\n",
+        );
+        for Size { modes, static_responses, bytes, apart, seconds } in &self.rings {
+            let shares = apart.map(percent).join(" | ");
+            let megabytes = *bytes as f64 / 1e6;
+            text.push_str(&format!("| {modes} | {static_responses} | {megabytes:.1} | {shares} | {seconds:.2} |\n"));
+        }
+        if !self.cube.is_empty() {
+            text.push_str(
+                "\nThe cube against all its modes:\n\n| fixed-interface modes | u1x | slowing | u1z | λ1, windows |\n|---|---|---|---|---|\n",
+            );
+        }
+        for size in &self.cube {
+            text.push_str(&format!("| {} | {} |\n", size.modes, size.apart.map(percent).join(" | ")));
+        }
+        text
+    }
+}
+
+struct Work<'a> {
+    scene: &'a Scene,
+    flight: &'a Flight,
+    end: f64,
+    /// While node 1 touches (s).
+    touching: f64,
+    tools: (&'a RomCache, &'a Console),
+}
+
+impl Work<'_> {
+    fn rings(&self, modes: usize, static_responses: usize, a: &History) -> Result<Size> {
+        let (cache, console) = self.tools;
+        let mut scene = self.scene.clone();
+        let mut bytes = 0;
+        for (side, name) in [(Side::Left, "left"), (Side::Right, "right")] {
+            let options = RingOptions { modes, static_responses, ..RingOptions::new(side) };
+            let file = format!("ring-{name}-study-{modes}-{static_responses}");
+            let rom = cache.get(&file, &options, console, &|| Ok(reduction::cube_ring(&options, console)?.rom))?;
+            bytes = tiprub_format::write_rom(&rom).len();
+            self.replace(&mut scene, rom)?;
+        }
+        let run = self.run(&scene)?;
+        Ok(self.size([modes, static_responses], bytes, &run, a))
+    }
+
+    fn cubes(&self) -> Result<Vec<Size>> {
+        let (cache, console) = self.tools;
+        let mut runs = Vec::new();
+        for modes in CUBE {
+            let options = CubeOptions { modes: Some(modes), ..CubeOptions::default() };
+            let file = format!("cube-study-{modes}");
+            let rom = cache.get(&file, &options, console, &|| Ok(reduction::cube(&options, console)?.rom))?;
+            let bytes = tiprub_format::write_rom(&rom).len();
+            let mut scene = self.scene.clone();
+            self.replace(&mut scene, rom)?;
+            runs.push((modes, bytes, self.run(&scene)?));
+        }
+        let Some((.., all)) = runs.last() else { return Ok(Vec::new()) };
+        Ok(runs.iter().map(|(modes, bytes, run)| self.size([*modes, 0], *bytes, run, &all.history)).collect())
+    }
+
+    /// Put a ROM in the place of that of the same name.
+    fn replace(&self, scene: &mut Scene, rom: Rom) -> Result<()> {
+        let missing = || Failure::new("study cube", format!("the scene has no structure `{}`", rom.name), "");
+        let place = scene.roms.iter().position(|old| old.name == rom.name).ok_or_else(missing)?;
+        scene.roms[place] = rom;
+        Ok(())
+    }
+
+    fn run(&self, scene: &Scene) -> Result<ProductRun> {
+        let run = PRODUCT.run(scene, self.flight, self.end, RECORD);
+        run.map_err(|error| Failure::from_below("study cube", error))
+    }
+
+    fn size(&self, [modes, static_responses]: [usize; 2], bytes: usize, run: &ProductRun, other: &History) -> Size {
+        let found = agreement(&run.history, other, self.flight.speed, self.touching, self.end);
+        let [x, slowing, z] = found.touching;
+        let seconds = run.history.processor_time;
+        Size { modes, static_responses, bytes, apart: [x, slowing, z, found.windows], seconds }
+    }
+}

@@ -1,0 +1,187 @@
+//! Scenes 4 and 5: the blades of rotor 37 rubbing against a casing with two bumps, lightly and heavily.
+
+use tiprub_core::{Rom, Scene, settings::Shape};
+use tiprub_model::{Rotor37Options, rotor37::MeshCounts};
+use tiprub_reference::reduced::rub::{BladeScene, Blades, Tip};
+
+use super::{
+    case::{Case, without_finest},
+    competitor::{Competitor, Family},
+    outside::{OutsideRun, Softness},
+    run::Run,
+    scene::SceneRun,
+    window,
+};
+use tiprub_packaging::{Failure, Result, console::Console, reduction, rom_cache::RomCache, scene_source};
+
+/// Component modes kept beside the contact nodes' own.
+const MODES: [usize; 3] = [8, 20, 40];
+const QUICK_MODES: [usize; 2] = [4, 12];
+/// Depth of the bumps: they intrude by 2·depth − 1 of the gap.
+const LIGHT: f64 = 0.6;
+const HEAVY: f64 = 1.0;
+/// Time between samples (s): a fiftieth of what the first bending mode takes to swing.
+const INTERVAL: f64 = 1e-5;
+/// Samples of the window: a revolution.
+const SAMPLES: usize = 349;
+const QUICK_SAMPLES: usize = 150;
+/// Runs are followed for so many windows to see whether they part, with so many internal steps per sample.
+const LONG: usize = 3;
+const PARTING_DIVISION: u32 = 20;
+/// Internal steps per sample; the limit of central differences is at 5.8.
+const DIVISIONS: [u32; 8] = [1, 2, 5, 6, 10, 20, 40, 80];
+const QUICK_DIVISIONS: [u32; 5] = [2, 5, 10, 20, 40];
+/// The same of the references, the product's and Moreau-Jean's.
+const REFERENCES: (u32, u32) = (1280, 640);
+const QUICK_REFERENCES: (u32, u32) = (320, 160);
+/// Contact stiffness of soft methods (N/m) per node, the penetration they may leave and how near a node takes part (m).
+const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 5e-6, margin: 2e-5 };
+
+/// A rub of rotor 37.
+pub struct Rotor {
+    heavy: bool,
+    sizes: Vec<(usize, Scene, BladeScene)>,
+    divisions: Vec<u32>,
+    references: (u32, u32),
+    samples: usize,
+    parting: Vec<f64>,
+}
+
+impl Rotor {
+    /// Reduce the blade (or take it from the cache) with several numbers of modes.
+    ///
+    /// # Errors
+    /// The reduction refuses; never with what ships.
+    pub fn new(heavy: bool, quick: bool, cache: &RomCache, console: &Console) -> Result<Self> {
+        let mut sizes = Vec::new();
+        for &modes in if quick { &QUICK_MODES[..] } else { &MODES[..] } {
+            let rom = blade(modes, quick, cache, console)?;
+            let mut scene = scene_source::rotor37_scene_with(rom)?;
+            if let Shape::TwoLobe { depth, .. } = &mut scene.settings.surfaces[0].shape {
+                *depth = if heavy { HEAVY } else { LIGHT };
+            }
+            let outside = outside(&scene).ok_or_else(|| Failure::new("rotor 37", "the blade has no mass", ""))?;
+            sizes.push((modes, scene, outside));
+        }
+        let divisions = if quick { QUICK_DIVISIONS.to_vec() } else { DIVISIONS.to_vec() };
+        let (references, samples) = if quick { (QUICK_REFERENCES, QUICK_SAMPLES) } else { (REFERENCES, SAMPLES) };
+        let mut rotor = Self { heavy, sizes, divisions, references, samples, parting: Vec::new() };
+        rotor.parting = window::parting(&rotor, PARTING_DIVISION, LONG * samples)
+            .map_err(|problem| Failure::new("rotor 37", problem, "Report this to the developers"))?;
+        rotor.samples = window::samples(&rotor.parting, samples);
+        Ok(rotor)
+    }
+}
+
+fn blade(modes: usize, quick: bool, cache: &RomCache, console: &Console) -> Result<Rom> {
+    let defaults = Rotor37Options::default();
+    let mesh = if quick { MeshCounts { chord: 4, thickness: 1, span: 4 } } else { defaults.mesh };
+    let options = Rotor37Options { fixed_interface_modes: modes, mesh, ..defaults };
+    let name = if quick { "rotor37-study-coarse" } else { "rotor37-study" };
+    cache.get(&format!("{name}-{modes}"), &options, console, &|| Ok(reduction::rotor37(&options, console)?.rom))
+}
+
+/// The scene's data for the reference crate; what it does not know of (spin, whirl, mistuning) is off in this scene.
+fn outside(scene: &Scene) -> Option<BladeScene> {
+    let (rom, settings) = (&scene.roms[0], &scene.settings);
+    let (rotor, surface, contact) = (&settings.structures[0], &settings.surfaces[0], &settings.contacts[0]);
+    let Shape::TwoLobe { depth, width, .. } = surface.shape else { return None };
+    let tips = rom.contact_nodes.iter().map(|node| Tip {
+        radius: node.position[0],
+        angle: node.position[1],
+        slope: node.meridional_slope,
+    });
+    BladeScene::new(Blades {
+        mass: rom.mass.clone(),
+        stiffness: rom.stiffness.clone(),
+        contact_map: rom.contact_map.clone(),
+        tips: tips.collect(),
+        sectors: rom.sectors,
+        damping: rotor.damping_ratio.unwrap_or(rom.damping_ratio),
+        clearance: contact.gap,
+        speed: rotor.speed,
+        friction: contact.friction,
+        bumps: [2.0 * contact.gap * depth, width, surface.ramp_time],
+    })
+}
+
+impl Case for Rotor {
+    fn name(&self) -> &'static str {
+        if self.heavy { "rotor37-heavy" } else { "rotor37-light" }
+    }
+
+    fn figures(&self) -> [&'static str; 2] {
+        match self.heavy {
+            false => ["rotor37-light-steps", "rotor37-light-total"],
+            true => ["rotor37-heavy-steps", "rotor37-heavy-total"],
+        }
+    }
+
+    fn title(&self) -> &'static str {
+        if self.heavy { "Rotor 37, heavy rub" } else { "Rotor 37, light rub" }
+    }
+
+    fn description(&self) -> String {
+        let gap = if self.heavy { "the whole gap" } else { "a fifth of the gap" };
+        format!(
+            "36 blades of rotor 37 at design speed rub with µ = 0.15 against a rigid casing whose two bumps intrude by {gap}. The truth \
+             is the reference with most component modes."
+        )
+    }
+
+    fn size_name(&self) -> &'static str {
+        "component modes"
+    }
+
+    fn sizes(&self) -> Vec<usize> {
+        self.sizes.iter().map(|size| size.0).collect()
+    }
+
+    fn interval(&self) -> f64 {
+        INTERVAL
+    }
+
+    fn samples(&self) -> usize {
+        self.samples
+    }
+
+    fn impulse_window(&self) -> usize {
+        10
+    }
+
+    /// Steps are compared at the standard size; the others leave the finest out.
+    fn divisions(&self, size: usize) -> Vec<u32> {
+        without_finest(&self.divisions, size == self.standard())
+    }
+
+    fn reference_divisions(&self, size: usize) -> (u32, u32) {
+        let (own, outside) = self.references;
+        // Only where steps are compared must the outside reference be as fine.
+        (own, if size == self.standard() { outside } else { outside / 4 })
+    }
+
+    fn families(&self, size: usize) -> Vec<Family> {
+        let all = vec![Family::MASSLESS, Family::STICKING, Family::BOTH];
+        if size == self.standard() { all } else { vec![Family::MASSLESS] }
+    }
+
+    fn parting(&self) -> &[f64] {
+        &self.parting
+    }
+
+    fn start<'a>(
+        &'a self,
+        size: usize,
+        competitor: Competitor,
+        division: u32,
+        perturbation: f64,
+    ) -> Result<Box<dyn Run + 'a>, String> {
+        let (_, scene, outside) = &self.sizes[size];
+        Ok(match competitor {
+            Competitor::Core(scheme, solver) => {
+                Box::new(SceneRun::new(scene, (scheme, solver), INTERVAL, division, perturbation)?)
+            }
+            _ => Box::new(OutsideRun::new(outside, competitor, INTERVAL, division, SOFTNESS)?),
+        })
+    }
+}

@@ -1,0 +1,200 @@
+//! Scene 6: the stage of coupled sectors in its flexible casing.
+
+use nalgebra::Complex;
+use tiprub_core::{Rom, Scene, settings::Shape};
+use tiprub_model::cyclic::ModeSelection;
+use tiprub_model::stage::StageOptions;
+use tiprub_reference::reduced::wheel::{Casing, Pencil, Stage, StageScene};
+
+use super::{
+    case::{Case, without_finest},
+    competitor::{Competitor, Family},
+    outside::{OutsideRun, Softness},
+    run::Run,
+    scene::SceneRun,
+    window,
+};
+use tiprub_packaging::{Failure, Result, builtin::DiskModel, console::Console, rom_cache::RomCache, scene_source};
+
+/// Component modes per nodal diameter.
+const MODES: [usize; 3] = [4, 8, 16];
+const QUICK_MODES: [usize; 2] = [2, 4];
+/// Time between samples (s).
+const INTERVAL: f64 = 2e-5;
+/// Time over which the lobes grow (s), sooner than in the scene that ships; the casing touches from about half of it on.
+const RAMP: f64 = 1.5e-3;
+/// Samples of the window.
+const SAMPLES: usize = 125;
+const QUICK_SAMPLES: usize = 75;
+/// Runs are followed for so many windows to see whether they part.
+const LONG: usize = 2;
+const PARTING_DIVISION: u32 = 16;
+const DIVISIONS: [u32; 6] = [4, 8, 12, 16, 32, 64];
+const QUICK_DIVISIONS: [u32; 3] = [2, 8, 16];
+const REFERENCES: (u32, u32) = (256, 128);
+const QUICK_REFERENCES: (u32, u32) = (64, 64);
+/// Internal steps per sample of the outside methods, whose steps take ten times as long.
+const OUTSIDE_DIVISIONS: [u32; 3] = [8, 16, 32];
+/// Contact stiffness of soft methods (N/m) per node, the penetration they may leave and how near a node takes part (m).
+const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 5e-6, margin: 2e-5 };
+
+/// The stage with several numbers of component modes.
+pub struct Wheel {
+    sizes: Vec<(usize, Scene, StageScene)>,
+    divisions: Vec<u32>,
+    references: (u32, u32),
+    samples: usize,
+    parting: Vec<f64>,
+}
+
+impl Wheel {
+    /// Reduce the disk on its coarse mesh with several numbers of modes (or take it from the cache).
+    ///
+    /// # Errors
+    /// The reduction refuses; never with what ships.
+    pub fn new(quick: bool, cache: &RomCache, console: &Console) -> Result<Self> {
+        let coarse = scene_source::stage_scene(true, cache, console)?;
+        let mut sizes = Vec::new();
+        for &modes in if quick { &QUICK_MODES[..] } else { &MODES[..] } {
+            let mut scene = coarse.clone();
+            scene.roms[0] = disk(modes, cache, console)?;
+            scene.settings.surfaces[0].ramp_time = RAMP;
+            let outside = outside(&scene).ok_or_else(|| Failure::new("stage", "the disk has no mass", ""))?;
+            sizes.push((modes, scene, outside));
+        }
+        let divisions = if quick { QUICK_DIVISIONS.to_vec() } else { DIVISIONS.to_vec() };
+        let (references, samples) = if quick { (QUICK_REFERENCES, QUICK_SAMPLES) } else { (REFERENCES, SAMPLES) };
+        let mut wheel = Self { sizes, divisions, references, samples, parting: Vec::new() };
+        wheel.parting = window::parting(&wheel, PARTING_DIVISION, LONG * samples)
+            .map_err(|problem| Failure::new("stage", problem, "Report this to the developers"))?;
+        wheel.samples = window::samples(&wheel.parting, samples);
+        Ok(wheel)
+    }
+}
+
+fn disk(modes: usize, cache: &RomCache, console: &Console) -> Result<Rom> {
+    let options = StageOptions { modes: ModeSelection::Count(modes), ..StageOptions::coarse() };
+    let model = DiskModel::with_options("stage-study", options);
+    cache.get(&format!("stage-study-{modes}"), &model, console, &|| Ok(model.reduce(console)?.0.rom))
+}
+
+/// The scene's data for the reference crate; what it does not know of (spin, whirl, mistuning, heat) is off in this scene.
+fn outside(scene: &Scene) -> Option<StageScene> {
+    let (disk, ring, settings) = (&scene.roms[0], &scene.roms[1], &scene.settings);
+    let (surface, contact) = (&settings.surfaces[0], &settings.contacts[0]);
+    let Shape::Lobes { amplitude, order, phase } = surface.shape else { return None };
+    let complex = |matrix: &nalgebra::DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0));
+    let zero = Pencil {
+        mass: complex(&disk.mass),
+        stiffness: complex(&disk.stiffness),
+        contact_map: complex(&disk.contact_map),
+    };
+    let others = disk.extras.harmonics.iter().map(|harmonic| Pencil {
+        mass: harmonic.mass.clone(),
+        stiffness: harmonic.stiffness.clone(),
+        contact_map: harmonic.contact_map.clone(),
+    });
+    let load = settings.structures[1].load?;
+    StageScene::new(Stage {
+        pencils: std::iter::once(zero).chain(others).collect(),
+        tips: disk.contact_nodes.iter().map(|node| node.position).collect(),
+        sectors: disk.sectors,
+        damping: settings.structures[0].damping_ratio.unwrap_or(disk.damping_ratio),
+        casing: Casing {
+            mass: ring.mass.clone(),
+            stiffness: ring.stiffness.clone(),
+            contact_map: ring.contact_map.clone(),
+            positions: ring.contact_nodes.iter().map(|node| node.position).collect(),
+            around: ring.extras.grid?.around,
+            damping: settings.structures[1].damping_ratio.unwrap_or(ring.damping_ratio),
+            load: [load.amplitude, f64::from(load.order), load.phase],
+        },
+        clearance: contact.gap,
+        speed: settings.structures[0].speed,
+        friction: contact.friction,
+        lobes: [amplitude, f64::from(order), phase, surface.ramp_time],
+    })
+}
+
+impl Case for Wheel {
+    fn name(&self) -> &'static str {
+        "stage"
+    }
+
+    fn figures(&self) -> [&'static str; 2] {
+        ["stage-steps", "stage-total"]
+    }
+
+    fn title(&self) -> &'static str {
+        "Stage, coupled sectors"
+    }
+
+    fn description(&self) -> String {
+        "56 coupled sectors (coarse mesh) in an elastic casing that goes oval until it touches, µ = 0.15. The truth is the reference with most \
+         component modes."
+            .into()
+    }
+
+    fn size_name(&self) -> &'static str {
+        "modes per nodal diameter"
+    }
+
+    fn sizes(&self) -> Vec<usize> {
+        self.sizes.iter().map(|size| size.0).collect()
+    }
+
+    fn interval(&self) -> f64 {
+        INTERVAL
+    }
+
+    fn samples(&self) -> usize {
+        self.samples
+    }
+
+    fn impulse_window(&self) -> usize {
+        5
+    }
+
+    /// Steps are compared at the standard size; the others leave the finest out.
+    fn divisions(&self, size: usize) -> Vec<u32> {
+        without_finest(&self.divisions, size == self.standard())
+    }
+
+    fn divisions_of(&self, size: usize, competitor: Competitor) -> Vec<u32> {
+        if competitor.is_core() || self.divisions.len() == QUICK_DIVISIONS.len() {
+            self.divisions(size)
+        } else {
+            OUTSIDE_DIVISIONS.to_vec()
+        }
+    }
+
+    fn reference_divisions(&self, size: usize) -> (u32, u32) {
+        let (own, outside) = self.references;
+        (own, if size == self.standard() { outside } else { outside / 4 })
+    }
+
+    fn families(&self, size: usize) -> Vec<Family> {
+        let all = vec![Family::MASSLESS, Family::STICKING];
+        if size == self.standard() { all } else { Vec::new() }
+    }
+
+    fn parting(&self) -> &[f64] {
+        &self.parting
+    }
+
+    fn start<'a>(
+        &'a self,
+        size: usize,
+        competitor: Competitor,
+        division: u32,
+        perturbation: f64,
+    ) -> Result<Box<dyn Run + 'a>, String> {
+        let (_, scene, outside) = &self.sizes[size];
+        Ok(match competitor {
+            Competitor::Core(scheme, solver) => {
+                Box::new(SceneRun::new(scene, (scheme, solver), INTERVAL, division, perturbation)?)
+            }
+            _ => Box::new(OutsideRun::new(outside, competitor, INTERVAL, division, SOFTNESS)?.without_potential()),
+        })
+    }
+}

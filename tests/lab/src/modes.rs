@@ -1,0 +1,329 @@
+//! Natural frequencies against nodal diameter, with the engine orders of a speed: the interference (SAFE) diagram; and
+//! the first mode shapes.
+
+use serde_json::json;
+use tiprub_model::{
+    Mesh,
+    cyclic::{CyclicReduction, NodalDiameter},
+    vtk::Field,
+};
+
+use tiprub_packaging::study::map::prediction::folded;
+use tiprub_packaging::study::{Figure, Picture, Sheet, Statement, Study};
+use tiprub_packaging::{
+    Failure, Result,
+    report::{
+        picture::{self, Frame, Surface, View},
+        plots::{Form, Plot, Series},
+        sections::surface_of,
+    },
+};
+
+/// Azimuth and elevation of the pictures of a sector (rad).
+const AZIMUTH: f64 = 1.0;
+const ELEVATION: f64 = 0.3;
+/// Displacements are drawn so that the largest is this share of the sector's height.
+const DRAWN_DISPLACEMENT: f64 = 0.08;
+/// Families of frequencies in the diagram.
+const FAMILIES: usize = 8;
+/// Nodal diameters and modes whose shapes are drawn.
+const SHAPES: [(usize, usize); 8] = [(0, 0), (2, 0), (2, 1), (2, 2), (4, 0), (4, 1), (28, 0), (28, 1)];
+/// Relative fall of a frequency from one nodal diameter to the next that still counts as flat.
+const FLAT: f64 = 1e-3;
+/// Spread of a flat family (%).
+const FLAT_SPREAD: f64 = 5.0;
+/// Relative distance below which an engine order is said to meet a mode.
+const NEAR: f64 = 0.05;
+
+/// The engine order that meets a mode of a nodal diameter at the nearest frequency, among those up to `most`.
+fn nearest_order(number: usize, frequency: f64, turns: f64, sectors: usize) -> Option<usize> {
+    let most = (1.5 * frequency / turns).ceil().max(2.0 * sectors as f64);
+    let orders = (1_u32..).take_while(|order| f64::from(*order) <= most).map(|order| order as usize);
+    let distance = |order: &usize| (frequency - *order as f64 * turns).abs();
+    orders.filter(|order| folded(*order, sectors).0 == number).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+}
+
+/// What is drawn: where modes and engine orders are.
+fn diagram(diameters: &[NodalDiameter], sectors: usize, speed: f64) -> Result<Figure> {
+    let turns = speed / std::f64::consts::TAU;
+    let kept = |diameter: &NodalDiameter| diameter.full_frequencies.iter().take(FAMILIES).copied().collect::<Vec<_>>();
+    let top = diameters.iter().flat_map(kept).fold(0.0, f64::max) * 1.05;
+    let drawn = diameters.iter().map(|diameter| kept(diameter).len()).max().unwrap_or(0);
+    let mut series = Vec::new();
+    for family in 0..drawn {
+        let points = diameters
+            .iter()
+            .filter_map(|diameter| Some((diameter.number as f64, *diameter.full_frequencies.get(family)?)));
+        let label = if family == 0 { "modes of the wheel" } else { "" };
+        let points: Vec<_> = points.collect();
+        series.push(Series::line("", points.clone()).drawn(Form::Thin, 0));
+        series.push(Series::line(label, points).drawn(Form::Dots, 0));
+    }
+    let orders = (0..).map_while(|order: u32| (f64::from(order) * turns <= top).then_some(order as usize));
+    let points: Vec<_> = orders.map(|order| (folded(order, sectors).0 as f64, order as f64 * turns)).collect();
+    series.push(Series::line("", points.clone()).drawn(Form::Thin, 1));
+    let label = format!("engine orders at {speed:.0} rad/s");
+    series.push(Series::line(label, points).drawn(Form::Dots, 1));
+    let plot = Plot { height: 480, ..Plot::new("nodal diameter (-)", "frequency (Hz)", series) };
+    let mut sheet = Sheet::new([
+        "nodal diameter",
+        "mode",
+        "full model (Hz)",
+        "reduced model (Hz)",
+        "nearest engine order",
+        "its frequency (Hz)",
+        "speed at which it meets the mode (rad/s)",
+    ]);
+    for diameter in diameters {
+        for ((full, reduced), mode) in diameter.full_frequencies.iter().zip(&diameter.reduced_frequencies).zip(1_u32..)
+        {
+            let order = nearest_order(diameter.number, *full, turns, sectors).unwrap_or(0) as f64;
+            let meeting = if order > 0.0 { std::f64::consts::TAU * full / order } else { f64::NAN };
+            sheet.rows.push(vec![
+                diameter.number as f64,
+                f64::from(mode),
+                *full,
+                *reduced,
+                order,
+                order * turns,
+                meeting,
+            ]);
+        }
+    }
+    Ok(Figure {
+        name: "interference",
+        caption: format!(
+            "Natural frequencies at rest against nodal diameter, first {drawn} at each, and the engine orders at {speed:.1} \
+             rad/s. What stands still and has k waves around shakes the blades at k times the speed, in the nodal diameter k; \
+             beyond half the number of sectors the line is folded back. A mode on the line is resonant. The frequencies are \
+             those of the disk turning without centrifugal and gyroscopic effects, in its own frame."
+        ),
+        picture: Picture::plot(&plot)?,
+        sheet,
+    })
+}
+
+/// Pictures of mode shapes of one sector, at the phase of largest displacement.
+fn shapes(mesh: &Mesh, diameters: &[NodalDiameter]) -> Figure {
+    let surface: Surface = surface_of(mesh);
+    let view = View::of_blade(&surface, AZIMUTH, ELEVATION);
+    let frame = Frame::around(&surface, &view, 0.1);
+    let radii = surface.points.iter().map(|point| point[0].hypot(point[1]));
+    let (low, high) = radii.fold((f64::INFINITY, 0.0_f64), |(low, high), radius| (low.min(radius), high.max(radius)));
+    let last = diameters.len().saturating_sub(1);
+    let mut html = String::from("<div class=\"shapes\">");
+    let mut sheet = Sheet::new(["nodal diameter", "mode", "frequency (Hz)"]);
+    let mut single = String::new();
+    for (number, mode) in SHAPES.map(|(number, mode)| (number.min(last), mode)) {
+        let Some(shape) = diameters.get(number).and_then(|diameter| diameter.shapes.get(mode)) else { continue };
+        let frequency = diameters[number].full_frequencies[mode];
+        let real = at_largest(shape);
+        let largest = real.iter().map(|vector| length(*vector)).fold(f64::MIN_POSITIVE, f64::max);
+        let scale = DRAWN_DISPLACEMENT * (high - low) / largest;
+        let drawn = picture::draw(&surface, Some((&real, scale)), &[], &frame, &view);
+        html.push_str(&format!("<div>{drawn}<span>n = {number}, mode {}: {frequency:.1} Hz</span></div>", mode + 1));
+        if single.is_empty() {
+            single = drawn;
+        }
+        sheet.rows.push(vec![number as f64, mode as f64 + 1.0, frequency]);
+    }
+    html.push_str(&format!("</div><div class=\"scale\">{}</div>", picture::color_scale("0", "largest")));
+    Figure {
+        name: "shapes",
+        caption:
+            "Mode shapes of one sector at the moment of its largest displacement; the next sector does the same with a \
+                  phase of 2πn/N. Colour is the magnitude of displacement. The file holds the first picture."
+                .into(),
+        picture: Picture { svg: single, html },
+        sheet,
+    }
+}
+
+/// Real displacements of a complex shape at the phase in which its largest node is farthest out.
+fn at_largest(shape: &[[nalgebra::Complex<f64>; 3]]) -> Vec<[f64; 3]> {
+    let square = |vector: &[nalgebra::Complex<f64>; 3]| vector.iter().map(nalgebra::Complex::norm_sqr).sum::<f64>();
+    let largest = shape.iter().max_by(|a, b| square(a).total_cmp(&square(b)));
+    // |Re(v e^(iφ))|² is largest at φ = −arg(v·v)/2.
+    let turn = largest.map_or(0.0, |vector| {
+        let dot: nalgebra::Complex<f64> = vector.iter().map(|component| component * component).sum();
+        -0.5 * dot.im.atan2(dot.re)
+    });
+    let (sine, cosine) = turn.sin_cos();
+    shape.iter().map(|vector| vector.map(|component| component.re * cosine - component.im * sine)).collect()
+}
+
+fn length(vector: [f64; 3]) -> f64 {
+    vector.iter().map(|component| component * component).sum::<f64>().sqrt()
+}
+
+/// Disk and blades take turns: a family of blades is flat over the nodal diameters, the disk stiffens with their number.
+fn flat_families(diameters: &[NodalDiameter]) -> Statement {
+    let half = &diameters[diameters.len() / 2..];
+    let first = |diameter: &NodalDiameter| diameter.full_frequencies.first().copied().unwrap_or(f64::NAN);
+    let (low, high) = half.iter().map(first).fold((f64::INFINITY, 0.0_f64), |(low, high), f| (low.min(f), high.max(f)));
+    let spread = 100.0 * (high / low - 1.0);
+    Statement::tested(
+        format!(
+            "In the upper half of the nodal diameters the first frequency is flat, within {FLAT_SPREAD} %, as that of blades on a stiff disk"
+        ),
+        half.len() > 1 && spread < FLAT_SPREAD,
+        format!(
+            "first frequency from {low:.1} to {high:.1} Hz ({spread:.2} %) at nodal diameters {} to {}",
+            diameters.len() / 2,
+            diameters.len() - 1
+        ),
+    )
+}
+
+fn disk_stiffens(diameters: &[NodalDiameter]) -> Statement {
+    let first: Vec<f64> = diameters.iter().filter_map(|diameter| diameter.full_frequencies.first().copied()).collect();
+    // A family of blades is flat: mesh and curvature of the diagram leave it falling by a trace.
+    let fall = first.windows(2).skip(1).map(|pair| 1.0 - pair[1] / pair[0]).fold(0.0, f64::max);
+    let [zero, low, high] = [first.first(), first.get(1), first.last()].map(|one| one.copied().unwrap_or(f64::NAN));
+    Statement::tested(
+        format!(
+            "From nodal diameter 1 on the lowest frequency rises with it (falls from none to the next by {} %), from the disk's \
+             flexibility to the blades'",
+            100.0 * FLAT
+        ),
+        fall < FLAT && high > low,
+        format!(
+            "{low:.1} Hz at nodal diameter 1, {high:.1} Hz at {}; largest fall from one to the next {:.1e} %. At nodal diameter 0 the \
+             disk bends as an umbrella: {zero:.1} Hz",
+            first.len().saturating_sub(1),
+            100.0 * fall
+        ),
+    )
+}
+
+/// Modes that an engine order meets within [`NEAR`] at this speed, lowest orders first.
+fn resonances(sheet: &Sheet) -> Statement {
+    let near = sheet.rows.iter().filter(|row| (row[5] / row[2] - 1.0).abs() < NEAR && row[1] <= 3.0);
+    let mut near: Vec<&Vec<f64>> = near.collect();
+    near.sort_by(|a, b| a[4].total_cmp(&b[4]));
+    let texts = near.iter().take(6).map(|row| {
+        format!("engine order {} (n = {}, mode {}, {:.0} Hz, at {:.0} rad/s)", row[4], row[0], row[1], row[2], row[6])
+    });
+    let texts: Vec<String> = texts.collect();
+    let found = if texts.is_empty() { "none".into() } else { texts.join("; ") };
+    Statement::remark(
+        format!("Engine orders within {:.0} % of one of the first three modes at this speed", 100.0 * NEAR),
+        found,
+    )
+}
+
+/// The modes drawn, as a VTK file of the sector for ParaView and others.
+fn vtk(mesh: &Mesh, diameters: &[NodalDiameter]) -> Result<Vec<u8>> {
+    let mut fields = Vec::new();
+    for (number, mode) in SHAPES {
+        if let Some(shape) = diameters.get(number).and_then(|diameter| diameter.shapes.get(mode)) {
+            fields.extend(Field::mode(&format!("n{number}_mode{}", mode + 1), shape));
+        }
+    }
+    tiprub_model::vtk::write(mesh, &fields).map_err(|error| Failure::from_below("VTK file", error))
+}
+
+/// The study of a reduction of the sector `mesh`, with the engine orders of `speed` (rad/s); without one, of the speed at
+/// which an oval casing meets the first mode of nodal diameter 2.
+///
+/// # Errors
+/// A plot cannot be drawn.
+pub fn study(reduction: &CyclicReduction, mesh: &Mesh, speed: Option<f64>, quick: bool) -> Result<Study> {
+    let diameters = &reduction.nodal_diameters;
+    let sectors = reduction.rom.sectors;
+    let oval = diameters.get(2).and_then(|diameter| diameter.full_frequencies.first()).copied();
+    let critical = oval.map(|frequency| std::f64::consts::PI * frequency);
+    let speed = speed.or(critical).unwrap_or(1.0);
+    let diagram = diagram(diameters, sectors, speed)?;
+    let mut statements = vec![flat_families(diameters), disk_stiffens(diameters), resonances(&diagram.sheet)];
+    if let Some(critical) = critical {
+        statements.push(Statement::remark(
+            "An oval casing (engine order 2) meets the first mode of nodal diameter 2",
+            format!("at {critical:.1} rad/s ({:.0} rpm)", critical * 30.0 / std::f64::consts::PI),
+        ));
+    }
+    let families =
+        |diameter: &NodalDiameter| diameter.full_frequencies.iter().take(FAMILIES).copied().collect::<Vec<_>>();
+    let rom = &reduction.rom;
+    Ok(Study {
+        name: "modes",
+        title: "Modes of the bladed disk".into(),
+        summary: format!(
+            "Natural frequencies and mode shapes of {} for every nodal diameter.{}",
+            rom.name,
+            if quick { " Quick form: a coarse mesh, for a first look only." } else { "" }
+        ),
+        facts: vec![
+            ("model".into(), rom.origin.clone()),
+            ("sectors".into(), sectors.to_string()),
+            ("nodes and elements of one sector".into(), format!("{}, {}", mesh.nodes.len(), mesh.elements.len())),
+            (
+                "speed of the engine orders".into(),
+                format!("{speed:.2} rad/s ({:.0} rpm)", speed * 30.0 / std::f64::consts::PI),
+            ),
+        ],
+        statements,
+        results: json!({
+            "speed": speed,
+            "critical_speed_of_an_oval_casing": critical,
+            "frequencies_hz": diameters.iter().map(families).collect::<Vec<_>>(),
+        }),
+        figures: vec![diagram, shapes(mesh, diameters)],
+        files: vec![("shapes.vtu".into(), "the mode shapes of one sector, for ParaView".into(), vtk(mesh, diameters)?)],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Frequencies of a chain of equal blades coupled through their feet.
+    fn chain(number: usize, sectors: usize) -> NodalDiameter {
+        let sine = (std::f64::consts::PI * number as f64 / sectors as f64).sin();
+        let frequencies: Vec<f64> = [100.0, 250.0].map(|f: f64| (f * f + 4.0 * 300.0 * sine * sine).sqrt()).to_vec();
+        NodalDiameter {
+            number,
+            reduced_frequencies: frequencies.clone(),
+            frequency_deviation: vec![0.0; 2],
+            residual_criterion: vec![0.0; 2],
+            fixed_interface_frequencies: Vec::new(),
+            shapes: Vec::new(),
+            full_frequencies: frequencies,
+        }
+    }
+
+    #[test]
+    fn the_nearest_order_of_a_nodal_diameter_is_found() {
+        // 10 turns a second, 12 sectors: n = 2 is excited by the orders 2, 10, 14, 22 ...
+        assert_eq!(nearest_order(2, 95.0, 10.0, 12), Some(10));
+        assert_eq!(nearest_order(2, 130.0, 10.0, 12), Some(14));
+        assert_eq!(nearest_order(0, 5.0, 10.0, 12), Some(12));
+    }
+
+    #[test]
+    fn the_diagram_holds_all_modes_and_both_kinds_of_dots() {
+        let diameters: Vec<_> = (0..=6).map(|number| chain(number, 12)).collect();
+        let figure = diagram(&diameters, 12, 62.831_853_071_795_86).unwrap();
+        assert_eq!(figure.sheet.rows.len(), 14);
+        let row = &figure.sheet.rows[4];
+        assert_eq!((row[0], row[1], row[4]), (2.0, 1.0, 10.0));
+        assert!((row[6] - std::f64::consts::TAU * row[2] / 10.0).abs() < 1e-12);
+        assert!(figure.picture.svg.contains("engine orders at 63 rad/s"));
+        assert_eq!(disk_stiffens(&diameters).holds, Some(true));
+        assert_eq!(flat_families(&diameters).holds, Some(true));
+        let falling: Vec<_> = (0..=6).map(|number| chain(6 - number, 12)).collect();
+        assert_eq!(disk_stiffens(&falling).holds, Some(false));
+        // Falling to the last but one and rising by one step is not rising.
+        let valley: Vec<_> = (0..=6).map(|number: usize| chain(if number == 6 { 1 } else { 5 - number }, 12)).collect();
+        assert_eq!(disk_stiffens(&valley).holds, Some(false));
+    }
+
+    #[test]
+    fn a_shape_is_shown_at_its_largest() {
+        let complex = nalgebra::Complex::new;
+        let zero = complex(0.0, 0.0);
+        let shape = [[complex(0.0, 2.0), zero, zero], [complex(1.0, 0.0), zero, zero]];
+        let real = at_largest(&shape);
+        assert!((real[0][0].abs() - 2.0).abs() < 1e-12 && real[1][0].abs() < 1e-12);
+    }
+}

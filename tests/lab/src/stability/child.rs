@@ -1,0 +1,117 @@
+//! A case in a process of its own: what it wrote, or how it ended.
+
+use std::{
+    env,
+    io::Read,
+    path::PathBuf,
+    process::{Child, Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use super::{Case, Context, Happened, Verdict, judge};
+use tiprub_packaging::{Failure, Result};
+
+/// Between two looks at a child.
+const PATIENCE: Duration = Duration::from_millis(4);
+/// Names the directory of packaged FMUs for a child.
+const FMUS: &str = "TIPRUB_STABILITY_FMUS";
+/// Last characters of what a crashed child said.
+const LAST_WORDS: usize = 300;
+
+/// One row of the table, filled in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Name of the case.
+    pub name: String,
+    /// What was expected.
+    pub expected: String,
+    /// What happened.
+    pub happened: String,
+    /// What that is worth.
+    pub verdict: Verdict,
+    /// Wall-clock time (s).
+    pub seconds: f64,
+}
+
+/// This program, also where its file was replaced since it began (Linux).
+fn program() -> std::io::Result<PathBuf> {
+    let running = PathBuf::from("/proc/self/exe");
+    if running.exists() { Ok(running) } else { env::current_exe() }
+}
+
+/// Run a case in a child process and judge it.
+///
+/// # Errors
+/// No child process can be started.
+pub fn run(case: &Case, context: &Context) -> Result<Row> {
+    let clock = Instant::now();
+    let lost = |error: std::io::Error| Failure::new("child process", error, "Free memory and try again");
+    let mut command = Command::new(program().map_err(lost)?);
+    command.args(["--quiet", "stability", "--child", &case.name]);
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    if let Some(fmus) = &context.fmus {
+        command.env(FMUS, fmus);
+    }
+    let mut child = command.spawn().map_err(lost)?;
+    // Both pipes are emptied while it runs, so that it never waits for us.
+    let stdout = drain(child.stdout.take());
+    let stderr = drain(child.stderr.take());
+    let code = wait(&mut child, Duration::from_secs_f64(case.limit)).map_err(lost)?;
+    let [stdout, stderr] = [stdout, stderr].map(|thread| thread.join().unwrap_or_default());
+    let (verdict, happened) = match code {
+        None => (Verdict::Hung, format!("did not end within {} s", case.limit)),
+        Some(ended) => read(case, &ended, &stdout, &stderr),
+    };
+    let seconds = clock.elapsed().as_secs_f64();
+    Ok(Row { name: case.name.clone(), expected: case.expected.to_text(), happened, verdict, seconds })
+}
+
+fn read(case: &Case, ended: &str, stdout: &str, stderr: &str) -> (Verdict, String) {
+    let written = stdout.lines().last().and_then(|line| serde_json::from_str(line).ok());
+    match written.as_ref().and_then(Happened::from_json).filter(|_| ended.is_empty()) {
+        Some(happened) => judge(&case.expected, &happened),
+        None => {
+            let words: Vec<char> = stderr.trim().chars().collect();
+            let words: String = words[words.len().saturating_sub(LAST_WORDS)..].iter().collect();
+            let ended = if ended.is_empty() { "ended without an answer" } else { ended };
+            (Verdict::Crashed, format!("{ended}: {}", words.replace('\n', " ")))
+        }
+    }
+}
+
+fn drain(pipe: Option<impl Read + Send + 'static>) -> thread::JoinHandle<String> {
+    thread::spawn(move || {
+        let mut bytes = Vec::new();
+        // A pipe that breaks shows up as a missing answer.
+        let _ = pipe.map(|mut pipe| pipe.read_to_end(&mut bytes));
+        String::from_utf8_lossy(&bytes).into_owned()
+    })
+}
+
+/// How it ended, empty if well; `None` if it had to be killed.
+fn wait(child: &mut Child, limit: Duration) -> std::io::Result<Option<String>> {
+    let clock = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(if status.success() { String::new() } else { format!("{status}") }));
+        }
+        if clock.elapsed() > limit {
+            child.kill()?;
+            child.wait()?;
+            return Ok(None);
+        }
+        thread::sleep(PATIENCE);
+    }
+}
+
+/// In the child: run the case of this name and return what goes to stdout.
+///
+/// # Errors
+/// There is no such case.
+pub fn answer(name: &str) -> Result<serde_json::Value> {
+    let case = super::named(name, false).into_iter().find(|case| case.name == name);
+    let case = case.ok_or_else(|| Failure::usage("--child", format!("there is no case {name}"), ""))?;
+    let context = Context { fmus: env::var_os(FMUS).map(Into::into) };
+    Ok(case.run(&context).to_json())
+}

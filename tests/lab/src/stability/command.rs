@@ -1,0 +1,134 @@
+//! `lab stability`: stiff and extreme cases, each in a process of its own, judged.
+
+use crate::{
+    cli::StabilityArguments,
+    stability::{self, Case, Context, child, families::values, table::Table},
+};
+use tiprub_packaging::{
+    Failure, Result,
+    console::{Console, Outcome},
+    fmu::{FmiVersion, Package},
+    library, output_file,
+    places::{self, Named},
+    study::sweep,
+};
+
+/// Run the cases asked for and write the table.
+///
+/// # Errors
+/// No case of that name, files that cannot be written, or a case that is neither right nor refused as it should be.
+pub fn run(arguments: &StabilityArguments, console: &Console) -> Result<Outcome> {
+    if let Some(name) = &arguments.child {
+        let json = child::answer(name)?;
+        return Ok(Outcome { text: json.to_string(), json });
+    }
+    let cases = chosen(arguments)?;
+    let files = Table::FILES.map(|name| Named::new("--out", arguments.out.join(name))).to_vec();
+    let written = [files, Vec::from_iter(Named::option("--chapter", &arguments.chapter))].concat();
+    places::apart(&Vec::from_iter(Named::option("--library", &arguments.library)), &written)?;
+    // Before the long work: what would fail after it.
+    output_file::try_directory(&arguments.out)?;
+    let above = arguments.chapter.as_deref().map(|path| above_table(path, arguments)).transpose()?;
+    // Lives as long as the cases run.
+    let fmus = if cases.iter().any(|case| case.imports) { Some(package(arguments, console)?) } else { None };
+    let context = Context { fmus: fmus.as_ref().map(|directory| directory.path().to_owned()) };
+    let task = console.task("Stability", Some(cases.len() as u64));
+    let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
+    let rows = sweep::sweep(
+        &cases,
+        threads,
+        |case| {
+            let row = child::run(case, &context)?;
+            if !matches!(row.verdict, stability::Verdict::Right | stability::Verdict::Refused) {
+                task.line(&format!("{} {}: {}", row.verdict.name(), row.name, row.happened));
+            }
+            Ok(row)
+        },
+        |done| task.at(done as u64),
+    )?;
+    drop(task);
+    let table = Table { rows };
+    let outcome = table.write(&arguments.out)?;
+    if let (Some(path), Some(above)) = (&arguments.chapter, above) {
+        output_file::write(path, format!("{above}{MARK}\n\n{}", table.to_markdown()))?;
+    }
+    verdict(&table, &arguments.out).map_or(Ok(outcome), Err)
+}
+
+/// Names at most this many unsound cases.
+const NAMED: usize = 5;
+
+/// The failure of a table with cases that are neither right nor refused as they should be.
+fn verdict(table: &Table, directory: &std::path::Path) -> Option<Failure> {
+    let unsound: Vec<String> = table.unsound().map(|row| format!("{} {}", row.verdict.name(), row.name)).collect();
+    if unsound.is_empty() {
+        return None;
+    }
+    let named = unsound[..unsound.len().min(NAMED)].join(", ");
+    let more = if unsound.len() > NAMED { format!(" and {} more", unsound.len() - NAMED) } else { String::new() };
+    let problem = format!(
+        "{} of {} cases are neither right nor refused as they should be: {named}{more}",
+        unsound.len(),
+        table.rows.len()
+    );
+    let remedy = format!("See {}", directory.join("index.html").display());
+    Some(Failure::new("stability", problem, remedy))
+}
+
+/// The scenes whose variables are walked, as FMUs of both versions in a temporary directory.
+fn package(arguments: &StabilityArguments, console: &Console) -> Result<tempfile::TempDir> {
+    let library = library::load(arguments.library.as_deref(), console)?;
+    let directory = tempfile::tempdir()
+        .map_err(|error| Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error))?;
+    for name in values::SCENES {
+        let scene = values::scene(name);
+        let package = Package::new(&scene, &library)?;
+        for version in [FmiVersion::Two, FmiVersion::Three] {
+            let path = directory.path().join(format!("{name}-{}.fmu", version.digit()));
+            package.write(&path, version, false)?;
+        }
+    }
+    Ok(directory)
+}
+
+fn chosen(arguments: &StabilityArguments) -> Result<Vec<Case>> {
+    let Some(prefix) = &arguments.case else { return Ok(stability::cases(arguments.quick)) };
+    let cases = stability::named(prefix, arguments.quick);
+    if cases.is_empty() {
+        let cases = stability::cases(arguments.quick);
+        let mut families: Vec<&str> = cases.iter().map(Case::family).chain(["judge"]).collect();
+        families.sort_unstable();
+        families.dedup();
+        let of = if arguments.quick { " of the quick form" } else { "" };
+        let problem = format!("no case{of} begins with `{prefix}`");
+        return Err(Failure::usage("--case", problem, format!("Begin with one of {}", families.join(", "))));
+    }
+    Ok(cases)
+}
+
+/// What stands above the table of the guide, which is kept.
+fn above_table(path: &std::path::Path, arguments: &StabilityArguments) -> Result<String> {
+    if arguments.case.is_some() {
+        return Err(Failure::usage(
+            "--chapter",
+            format!("with --case a few cases would replace the whole table of {}", path.display()),
+            "Leave out one of the two; stability.md in the directory of --out holds the table of a few cases",
+        ));
+    }
+    let unreadable = |error: std::io::Error| Failure::file(path, "the chapter cannot be read", &error);
+    let present = tiprub_format::read_file(path, LARGEST_CHAPTER).map_err(unreadable)?;
+    let present = String::from_utf8(present).map_err(|error| unreadable(std::io::Error::other(error)))?;
+    let Some((above, _)) = present.split_once(MARK) else {
+        let remedy = format!("Name the chapter, or put this line where the table shall begin: {MARK}");
+        return Err(Failure::new(path.display(), "has no mark below which the table belongs", remedy));
+    };
+    // Where the file would be replaced, so that it is known to be possible.
+    output_file::begin(path)?;
+    Ok(above.to_owned())
+}
+
+/// Largest chapter (bytes).
+const LARGEST_CHAPTER: u64 = 64 << 20;
+
+/// The table begins below this line.
+const MARK: &str = "<!-- the table below is written by `lab stability --chapter` -->";

@@ -1,0 +1,229 @@
+//! The models that ship: rotor 37 and the coupled stage in its elastic casing, and ROMs that are not what they say.
+
+use tiprub_core::{
+    Result, Rom, Scene, Simulation,
+    settings::{Scheme, Solver},
+};
+
+use super::{
+    super::{
+        Case, Check, Expected, Happened,
+        models::{SCHEMES, SOLVERS, Tower, round, with_methods, with_step},
+        observe::{Watch, apart, displacements, set},
+        press::Press,
+    },
+    limits::massless_step,
+};
+use tiprub_packaging::{builtin, console::Console, rom_cache::RomCache, scene_source};
+
+/// All of them.
+pub fn cases() -> Vec<Case> {
+    [rotor37(), stage(), exchanged()].into_iter().flatten().collect()
+}
+
+/// Models that cases of the full table load; made before the children need them.
+pub const MODELS: [&str; 3] = ["rotor37", builtin::STAGE_COARSE, builtin::STAGE_CASING_COARSE];
+
+fn model(name: &str) -> Option<Rom> {
+    builtin::rom(name, &RomCache::of_user(), &Console::new(true, false))?.ok()
+}
+
+fn rotor37() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (scheme, scheme_name) in SCHEMES {
+        for (solver, solver_name) in SOLVERS {
+            for factor in [0.9, 0.999, 1.001, 1.5, 10.0] {
+                let name = format!("rotor37/step-limit/{scheme_name}/{solver_name}/h={factor}");
+                let against = "static contact of all 36 blades, signs of the ledger";
+                let expected = match scheme {
+                    Scheme::CentralDifference if factor > 1.0 => Expected::refused(["central-difference", "ω_max"]),
+                    Scheme::MasslessBoundary if factor > 1.0 => Expected::refused(["massless-boundary"]),
+                    Scheme::ModalExact if factor > 5.0 => {
+                        Expected::refused(["modal-exact", "flexibility that contact sees"])
+                    }
+                    _ => Expected::right(against),
+                };
+                let work = move |_: &_| at_limit(scheme, solver, factor);
+                cases.push(Case::new(name, expected, work).within(300.0));
+            }
+        }
+    }
+    for share in [0.1, 0.2, 0.24, 0.3, 0.39, 0.5, 0.6, 0.79] {
+        for damping in [0.005, 0.05, 0.3] {
+            let name = format!("rotor37/massless/{share}-of-limit/ξ={damping}");
+            let expected = Expected::either("static contact", ["massless-boundary", "internal step"]);
+            let work = move |_: &_| share_of_limit(share, damping);
+            cases.push(Case::new(name, expected, work).within(300.0));
+        }
+    }
+    for (solver, solver_name) in SOLVERS {
+        for friction in [0.0, 0.15, 0.5, 1.0, 1.5, 2.0] {
+            for sense in [1.0, -1.0] {
+                let name =
+                    format!("rotor37/friction/µ={friction}/{solver_name}/{}Ω", if sense > 0.0 { '+' } else { '−' });
+                let expected = Expected::either("the same with a fourth of the step, complementarity", ["µ"]);
+                let work = move |_: &_| Happened::of(rubbed(solver, friction, sense));
+                cases.push(Case::new(name, expected, work).within(300.0));
+            }
+        }
+    }
+    cases
+}
+
+fn at_limit(scheme: Scheme, solver: Solver, factor: f64) -> Happened {
+    let Some(rom) = model("rotor37") else { return Happened::refused("there is no rotor 37") };
+    let fastest = tiprub_core::dynamics::modal::ModalModel::from_rom(&rom, 0.0)
+        .map_or(f64::NAN, |model| model.largest_frequency());
+    let mut scene = with_methods(round(rom), scheme, solver);
+    scene.settings.structures[0].damping_ratio = Some(0.3);
+    let limit = match scheme {
+        Scheme::MasslessBoundary => massless_step(&scene),
+        _ => Some(2.0 / fastest),
+    };
+    let Some(limit) = limit else { return Happened::refused("no limit was named") };
+    let press = Press { depth: 2e-5, ..Press::new(with_step(scene, factor * limit)) };
+    Happened::of(press.run())
+}
+
+/// At a share of the limit of closed contact that a refusal tells.
+fn share_of_limit(share: f64, damping: f64) -> Happened {
+    let Some(rom) = model("rotor37") else { return Happened::refused("there is no rotor 37") };
+    let mut scene = with_methods(round(rom), Scheme::MasslessBoundary, Solver::Lcp);
+    scene.settings.structures[0].damping_ratio = Some(damping);
+    let long = with_step(scene.clone(), 1e-2);
+    let refusal = Simulation::new(&long)
+        .and_then(|mut simulation| simulation.initialise(0.0))
+        .err()
+        .map(|error| error.to_string());
+    let limit =
+        refusal.as_deref().and_then(|text| text.split("stable below ").nth(1)?.split(' ').next()?.parse::<f64>().ok());
+    let Some(limit) = limit else { return Happened::refused("no limit was named") };
+    let press = Press {
+        depth: 2e-5,
+        hold: 12e-3 * (0.3 / damping).max(1.0),
+        tolerance: 1e-4,
+        ..Press::new(with_step(scene, share * limit))
+    };
+    Happened::of(press.run())
+}
+
+fn rubbed(solver: Solver, friction: f64, sense: f64) -> Result<Vec<Check>> {
+    let Some(rom) = model("rotor37") else { return Ok(Vec::new()) };
+    let mut scene = super::super::models::bumps(rom);
+    scene.settings.contacts[0].friction = friction;
+    scene.settings.structures[0].speed = 1800.0 * sense;
+    against_finer(&with_methods(scene, Scheme::ModalExact, solver), 5e-7, 150, 0.1)
+}
+
+/// A scene against itself with a fourth of the step.
+fn against_finer(scene: &Scene, step: f64, count: usize, bound: f64) -> Result<Vec<Check>> {
+    let run = |step: f64| -> Result<(Vec<f64>, Watch)> {
+        let mut scene = scene.clone();
+        scene.settings.time.step = step;
+        scene.settings.experiment.communication_step = 1e-5;
+        let mut simulation = Simulation::new(&scene)?;
+        simulation.initialise(0.0)?;
+        let mut watch = Watch::new(&scene);
+        let mut history = Vec::new();
+        for _ in 0..count {
+            watch.step(&mut simulation, 1e-5)?;
+            history.extend(displacements(&simulation));
+        }
+        Ok((history, watch))
+    };
+    let (coarse, watch) = run(step)?;
+    let (fine, finer) = run(0.25 * step)?;
+    let mut checks = vec![
+        Check::at_most("displacements from a fourth of the step", apart(&coarse, &fine), bound),
+        Check::so("blades touched", watch.contacts > 0 && finer.contacts > 0),
+        watch.ledger(),
+        finer.ledger(),
+        Check::so("all outputs finite", watch.finite),
+    ];
+    let contact = &scene.settings.contacts[0];
+    if contact.solver != Solver::Film {
+        checks.extend(watch.complementarity());
+        let massless = scene.settings.time.scheme == Scheme::MasslessBoundary;
+        checks.push(Check::at_most("impact loss falls by", watch.impact_drop(), if massless { 2e-2 } else { 1e-9 }));
+    }
+    Ok(checks)
+}
+
+fn stage() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (solver, name) in SOLVERS {
+        for friction in [0.0, 0.15, 1.0, 2.0] {
+            let expected = Expected::either("the same with a fourth of the step, complementarity", ["µ"]);
+            let work = move |_: &_| Happened::of(on_stage(solver, friction, 1.35e5));
+            cases.push(Case::new(format!("stage/oval/µ={friction}/{name}"), expected, work).within(600.0));
+        }
+        for load in [1e7, 1e9, 1e12, 1e300] {
+            let expected = Expected::refused_as(&[
+                &["initial state", "start values of", "loads"],
+                &["casing is displaced", "Check its loads"],
+                &["initial clearance", "start inside the casing", "load"],
+                &["casing_load_amplitude", "within"],
+                &["load.amplitude", "between"],
+            ]);
+            let work = move |_: &_| Happened::of(on_stage(solver, 0.15, load));
+            cases.push(Case::new(format!("stage/load={load:e}/{name}"), expected, work).within(600.0));
+        }
+    }
+    cases
+}
+
+fn on_stage(solver: Solver, friction: f64, load: f64) -> Result<Vec<Check>> {
+    let mut scene = scene_source::stage_scene(true, &RomCache::of_user(), &Console::new(true, false))
+        .map_err(|failure| tiprub_core::Error::invalid("builtin:stage", failure.to_string(), ""))?;
+    scene.settings.contacts[0].friction = friction;
+    scene.settings.contacts[0].solver = solver;
+    scene.settings.surfaces[0].ramp_time = 1e-3;
+    if load > 1e6 {
+        scene.settings.structures[1].load =
+            scene.settings.structures[1].load.map(|old| tiprub_core::settings::LoadSettings { amplitude: load, ..old });
+    }
+    // Much friction makes contact that grows by itself: small steps, before they part.
+    let (step, count) = if friction > 0.5 { (2.5e-7, 60) } else { (2e-6, 120) };
+    against_finer(&scene, step, count, 0.1)
+}
+
+fn exchanged() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (name, swap) in [("exchanged", true), ("as-they-are", false)] {
+        let expected = if swap {
+            Expected::refused(["harmonics", "nodal diameter"])
+        } else {
+            Expected::right("it starts, and steps")
+        };
+        let work = move |_: &_| Happened::of(harmonics(swap));
+        cases.push(Case::new(format!("rom/harmonics-{name}"), expected, work).quick(true));
+    }
+    cases
+}
+
+/// A wheel whose checks hold the frequencies of each nodal diameter, with two of its harmonics exchanged.
+fn harmonics(swap: bool) -> Result<Vec<Check>> {
+    let tower = Tower { sectors: 8, neighbour: 1e6, ..Tower::default() };
+    let mut rom = tower.rom();
+    let wheel = tiprub_core::dynamics::cyclic::CyclicModel::from_rom(&rom, 0.0)?;
+    let mut all: Vec<(f64, u32)> = Vec::new();
+    for (diameter, number) in wheel.diameters.iter().zip(0_u32..) {
+        all.extend(diameter.frequencies.iter().take(2).map(|omega| (omega / std::f64::consts::TAU, number)));
+    }
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    rom.checks.reduced_frequencies = all.iter().map(|(frequency, _)| *frequency).collect();
+    rom.checks.full_frequencies.clone_from(&rom.checks.reduced_frequencies);
+    rom.checks.nodal_diameters = all.iter().map(|(_, diameter)| *diameter).collect();
+    if swap {
+        rom.extras.harmonics.swap(0, 2);
+    }
+    let scene = with_step(round(rom), 2e-6);
+    let mut simulation = Simulation::new(&scene)?;
+    simulation.initialise(0.0)?;
+    let mut watch = Watch::new(&scene);
+    for _ in 0..200 {
+        set(&mut simulation, "casing_radius_change", -1e-5)?;
+        watch.step(&mut simulation, 2e-6)?;
+    }
+    Ok(watch.books())
+}

@@ -1,0 +1,28 @@
+//! Numerical stability on stiff and extreme cases: each ends in a right answer or in a refusal that says why.
+//!
+//! A [`Case`] says what is expected, and by what independent property an answer counts as right; [`judge`] turns what
+//! happened into a [`Verdict`]. Every case runs in a child process of this program with a time limit ([`child`]), so that a
+//! crash, an abort or a hang is seen as what it is. [`families`] holds the cases, [`table`] writes them down.
+
+pub mod bodies;
+pub mod case;
+pub mod child;
+pub mod command;
+pub mod families;
+pub mod models;
+pub mod observe;
+pub mod press;
+pub mod table;
+
+pub use case::{Case, Check, Context, Expected, Happened, Verdict, judge};
+
+/// All cases of the full table, or of the quick one; those that prove the judge itself come with their family's name only.
+pub fn cases(quick: bool) -> Vec<Case> {
+    families::all().into_iter().filter(|case| case.quick || !quick).collect()
+}
+
+/// Cases whose name begins with `prefix`; those of the judge's own proof are among them only here.
+pub fn named(prefix: &str, quick: bool) -> Vec<Case> {
+    let proof = families::proof::cases();
+    cases(quick).into_iter().chain(proof).filter(|case| case.name.starts_with(prefix)).collect()
+}

@@ -1,0 +1,193 @@
+//! The table of all cases: text, HTML, CSV, JSON and Markdown.
+
+use std::{fmt::Write as _, path::Path};
+
+use serde_json::{Value, json};
+
+use super::{Verdict, child::Row};
+use tiprub_packaging::{Result, console::Outcome, output_file, report::page::escape, study::output::STYLE};
+
+/// All rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// One row per case, in the order of the cases.
+    pub rows: Vec<Row>,
+}
+
+impl Table {
+    /// What [`Table::write`] writes.
+    pub const FILES: [&str; 4] = ["index.html", "results.json", "stability.csv", "stability.md"];
+
+    /// Number of rows of a verdict.
+    pub fn count(&self, verdict: Verdict) -> usize {
+        self.rows.iter().filter(|row| row.verdict == verdict).count()
+    }
+
+    /// Whether every case ended in a right answer or in the refusal expected.
+    pub fn is_sound(&self) -> bool {
+        self.rows.iter().all(|row| matches!(row.verdict, Verdict::Right | Verdict::Refused))
+    }
+
+    fn families(&self) -> Vec<&str> {
+        let mut families: Vec<&str> = Vec::new();
+        for row in &self.rows {
+            let family = family(row);
+            if !families.contains(&family) {
+                families.push(family);
+            }
+        }
+        families
+    }
+
+    /// Rows that are neither right nor refused.
+    pub fn unsound(&self) -> impl Iterator<Item = &Row> {
+        self.rows.iter().filter(|row| !matches!(row.verdict, Verdict::Right | Verdict::Refused))
+    }
+
+    fn summary(&self) -> String {
+        let counts = Verdict::ALL.map(|verdict| format!("{} {}", self.count(verdict), verdict.name()));
+        format!("{} cases: {}", self.rows.len(), counts.join(", "))
+    }
+
+    fn to_text(&self) -> String {
+        let mut text = format!("Stability on stiff and extreme cases\n{}\n\n", self.summary());
+        let _ = writeln!(text, "  {:<16}{}", "family", Verdict::ALL.map(|v| format!("{:>9}", v.name())).concat());
+        for family in self.families() {
+            let counts = Verdict::ALL.map(|verdict| format!("{:>9}", self.of(family, verdict)));
+            let _ = writeln!(text, "  {family:<16}{}", counts.concat());
+        }
+        for row in self.unsound() {
+            let _ = write!(
+                text,
+                "\n{} {}\n  expected: {}\n  happened: {}\n",
+                row.verdict.name(),
+                row.name,
+                row.expected,
+                row.happened
+            );
+        }
+        text
+    }
+
+    fn of(&self, asked: &str, verdict: Verdict) -> usize {
+        self.rows.iter().filter(|row| family(row) == asked && row.verdict == verdict).count()
+    }
+
+    /// For programs.
+    pub fn to_json(&self) -> Value {
+        let counts: serde_json::Map<_, _> =
+            Verdict::ALL.iter().map(|verdict| (verdict.name().to_lowercase(), json!(self.count(*verdict)))).collect();
+        json!({
+            "cases": self.rows.len(),
+            "counts": counts,
+            "rows": self.rows.iter().map(|row| json!({
+                "case": row.name, "expected": row.expected, "happened": row.happened,
+                "verdict": row.verdict.name(), "seconds": row.seconds,
+            })).collect::<Vec<_>>(),
+        })
+    }
+
+    fn to_csv(&self) -> String {
+        let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+        let mut csv = String::from("case,expected,happened,verdict,seconds\n");
+        for row in &self.rows {
+            let cells = [&row.name, &row.expected, &row.happened].map(|text| quoted(text));
+            let _ = writeln!(csv, "{},{},{:.3}", cells.join(","), row.verdict.name(), row.seconds);
+        }
+        csv
+    }
+
+    /// The chapter of the guide, below its fixed introduction. No times: the same sources give the same text.
+    pub fn to_markdown(&self) -> String {
+        let mut text = format!("{}\n\n| family | {} |\n", self.summary(), Verdict::ALL.map(Verdict::name).join(" | "));
+        text.push_str("|---|---|---|---|---|---|\n");
+        for family in self.families() {
+            let counts = Verdict::ALL.map(|verdict| self.of(family, verdict).to_string());
+            let _ = writeln!(text, "| {family} | {} |", counts.join(" | "));
+        }
+        for family in self.families() {
+            let _ = write!(text, "\n### {family}\n\n| case | expected | happened | verdict |\n|---|---|---|---|\n");
+            let rows: Vec<&Row> = self.rows.iter().filter(|row| self::family(row) == family).collect();
+            for (name, group) in groups(&rows) {
+                let counts = Verdict::ALL.map(|verdict| group.iter().filter(|row| row.verdict == verdict).count());
+                let verdicts = Verdict::ALL.iter().zip(counts).filter(|(_, count)| *count > 0);
+                let verdicts: Vec<String> = match group.len() {
+                    1 => verdicts.map(|(verdict, _)| verdict.name().to_owned()).collect(),
+                    _ => verdicts.map(|(verdict, count)| format!("{count} {}", verdict.name())).collect(),
+                };
+                let cells =
+                    [&name, &group[0].expected, &shortened(&group[0].happened)].map(|cell| cell.replace('|', "\\|"));
+                let _ = writeln!(text, "| {} | {} |", cells.join(" | "), verdicts.join(", "));
+            }
+        }
+        text
+    }
+
+    fn to_html(&self) -> String {
+        let mut page = format!(
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <title>Stability - tiprub</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n\
+             <header><h1>Stability on stiff and extreme cases</h1><p>{}</p></header>\n<section><table><thead><tr>\
+             <th>case</th><th>expected</th><th>happened</th><th>verdict</th></tr></thead><tbody>\n",
+            escape(&self.summary())
+        );
+        for row in &self.rows {
+            let cells = [&row.name, &row.expected, &row.happened].map(|text| format!("<td>{}</td>", escape(text)));
+            let _ = writeln!(page, "<tr>{}<td>{}</td></tr>", cells.concat(), row.verdict.name());
+        }
+        page.push_str("</tbody></table></section>\n</main>\n</body>\n</html>\n");
+        page
+    }
+
+    /// Write page, CSV and JSON into a directory, and sum up.
+    ///
+    /// # Errors
+    /// Files cannot be written.
+    pub fn write(&self, directory: &Path) -> Result<Outcome> {
+        output_file::create_directory(directory)?;
+        let page = directory.join("index.html");
+        output_file::write(&page, self.to_html())?;
+        output_file::write(&directory.join("stability.csv"), self.to_csv())?;
+        output_file::write(&directory.join("stability.md"), self.to_markdown())?;
+        let json = self.to_json();
+        output_file::write(&directory.join("results.json"), format!("{json:#}\n"))?;
+        Ok(Outcome { text: format!("{}\nopen {}", self.to_text(), page.display()), json })
+    }
+}
+
+fn family(row: &Row) -> &str {
+    row.name.split('/').next().unwrap_or(&row.name)
+}
+
+/// Families of more cases than this have one line per group in the guide.
+const LISTED: usize = 60;
+/// Characters of what happened that the guide shows.
+const SHOWN: usize = 160;
+
+/// Rows of a family with the names they go by: each by itself, or those that differ in the last part of the name together,
+/// the first of them as an example.
+fn groups<'a>(rows: &[&'a Row]) -> Vec<(String, Vec<&'a Row>)> {
+    let own = |row: &Row| row.name.split_once('/').map_or(row.name.clone(), |(_, rest)| rest.to_owned());
+    if rows.len() <= LISTED {
+        return rows.iter().map(|row| (own(row), vec![*row])).collect();
+    }
+    let mut groups: Vec<(String, Vec<&Row>)> = Vec::new();
+    for row in rows {
+        let name = own(row);
+        let name = name.rsplit_once('/').map_or(name.clone(), |(before, _)| format!("{before}/…"));
+        match groups.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, group)) => group.push(row),
+            None => groups.push((name, vec![row])),
+        }
+    }
+    groups
+}
+
+fn shortened(text: &str) -> String {
+    if text.chars().count() <= SHOWN {
+        return text.to_owned();
+    }
+    let short: String = text.chars().take(SHOWN).collect();
+    format!("{short}…")
+}

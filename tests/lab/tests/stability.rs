@@ -1,0 +1,119 @@
+//! `lab stability --quick`: every case right or refused as it should be; and the proof that the judge sees what is not.
+
+use std::{path::Path, process::Command};
+
+use serde_json::Value;
+
+/// What a run that ends with `code` writes on stdout.
+fn stability(root: &Path, arguments: &[&str], code: i32) -> Value {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lab"));
+    command.current_dir(root).args(["--json", "--quiet", "stability", "--out", "out"]).args(arguments);
+    // A library built elsewhere is tested where one is named; else the program builds one.
+    if let Some(library) = std::env::var_os("TIPRUB_LIBRARY") {
+        command.arg("--library").arg(library);
+    }
+    let output = command.env("TIPRUB_CACHE", env!("CARGO_TARGET_TMPDIR")).output().unwrap();
+    assert_eq!(output.status.code(), Some(code), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn every_quick_case_is_right_or_refused() {
+    let root = tempfile::tempdir().unwrap();
+    let json = stability(root.path(), &["--quick"], 0);
+    for row in json["rows"].as_array().unwrap() {
+        assert!(["right", "refused"].contains(&row["verdict"].as_str().unwrap()), "{row:#}");
+    }
+    let count = |verdict: &str| json["counts"][verdict].as_u64().unwrap();
+    let total = json["cases"].as_u64().unwrap();
+    assert_eq!((count("wrong"), count("crashed"), count("hung")), (0, 0, 0));
+    assert_eq!(count("right") + count("refused"), total);
+    assert!(total > 1000 && count("right") > 580 && count("refused") > 420, "{}", json["counts"]);
+    for name in ["index.html", "stability.csv", "stability.md", "results.json"] {
+        assert!(root.path().join("out").join(name).metadata().unwrap().len() > 10_000, "{name}");
+    }
+}
+
+#[test]
+fn the_judge_sees_every_way_to_fail() {
+    let root = tempfile::tempdir().unwrap();
+    // What is not sound is a failure of the command, with the table written all the same.
+    let failure = stability(root.path(), &["--case", "judge/"], 1);
+    let told = failure.to_string();
+    assert!(
+        told.contains("21 of 21 cases are neither right nor refused") && told.contains("WRONG judge/wrong"),
+        "{told}"
+    );
+    let written = std::fs::read_to_string(root.path().join("out").join("results.json")).unwrap();
+    let json: Value = serde_json::from_str(&written).unwrap();
+    let verdict = |name: &str| {
+        let rows = json["rows"].as_array().unwrap();
+        let row = rows.iter().find(|row| row["case"] == format!("judge/{name}")).unwrap();
+        row["verdict"].as_str().unwrap().to_owned()
+    };
+    for (name, expected) in [
+        ("wrong", "WRONG"),
+        ("refused", "WRONG"),
+        ("not-refused", "WRONG"),
+        ("unnamed", "WRONG"),
+        ("panic", "CRASHED"),
+        ("abort", "CRASHED"),
+        ("overflow", "CRASHED"),
+        ("exit", "CRASHED"),
+        ("hang", "HUNG"),
+    ] {
+        assert_eq!(verdict(name), expected, "{name}");
+    }
+    // Small faults of mechanics are seen by the check that is there for them, and are no refusals.
+    let happened = |name: &str| {
+        let rows = json["rows"].as_array().unwrap();
+        let row = rows.iter().find(|row| row["case"] == format!("judge/{name}")).unwrap();
+        row["happened"].as_str().unwrap().to_owned()
+    };
+    for (name, check) in [
+        ("damping-of-blades-10%", "displacement from the decay of the modes"),
+        ("damping-of-blades-0.1%", "displacement from the decay of the modes"),
+        ("damping-of-a-ring-10%", "amplitude from the decay of the mode"),
+        ("speed-1%", "λ from the dynamic stiffness of the blade"),
+        ("rotor-a-step-early", "λ from the blade without any scheme"),
+        ("load-a-step-early", "wave from that of the oscillator"),
+        ("slope-of-a-lobe-1%", "tangential force from λ n_t"),
+        ("coupling-of-sectors-1%", "place of any blade from the static one"),
+        ("wheel-not-mirrored", "displacements from the mirrored ones"),
+        ("heat-1%", "friction loss from ∫ µ λ |v| dt"),
+        ("impact-loses-momentum-1%", "impulse from m v and µ m v"),
+        ("momentum-1e-9", "change of momentum from the impulse"),
+    ] {
+        assert_eq!(verdict(name), "WRONG", "{name}");
+        let told = happened(name);
+        assert!(told.contains(check) && !told.contains("refused") && !told.contains("not so"), "{name}: {told}");
+    }
+}
+
+/// Whatever would fail after an hour of cases fails before the first, and leaves nothing.
+#[test]
+fn wrong_places_for_results_are_told_before_the_first_case() {
+    let root = tempfile::tempdir().unwrap();
+    let path = |name: &str| root.path().join(name);
+    std::fs::write(path("file"), "").unwrap();
+    std::fs::write(path("chapter.md"), "# Chapter\n").unwrap();
+    let refuse = |arguments: &[&str], code: i32| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lab"));
+        let output = command.current_dir(root.path()).arg("stability").args(arguments).output().unwrap();
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{told}");
+        assert!(!path("out").exists() && !told.contains("Stability"), "{told}");
+        told
+    };
+    let told = refuse(&["--case", "judge/hang", "--out", "file/out"], 1);
+    assert!(told.contains("file/out: cannot create the directory"), "{told}");
+    let told = refuse(&["--chapter", "none.md", "--out", "out"], 1);
+    assert!(told.contains("none.md: the chapter cannot be read"), "{told}");
+    let told = refuse(&["--chapter", "chapter.md", "--out", "out"], 1);
+    assert!(told.contains("has no mark") && told.contains("<!-- the table below is written by"), "{told}");
+    let told = refuse(&["--chapter", "chapter.md", "--case", "judge/", "--out", "out"], 2);
+    assert!(told.contains("--chapter: with --case") && told.contains("Leave out one of the two"), "{told}");
+    assert_eq!(std::fs::read_to_string(path("chapter.md")).unwrap(), "# Chapter\n");
+    let told = refuse(&["--chapter", "out/stability.md", "--out", "out"], 2);
+    assert!(told.contains("is the same file as"), "{told}");
+}
