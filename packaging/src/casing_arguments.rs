@@ -6,8 +6,9 @@ use tiprub_model::{
     casing::{ContactRings, Contour, Flange, RingCounts, Support},
     element::ElementKind,
 };
+use tiprub_shell::{Failure, Result};
 
-use crate::{Failure, Result, cli::ReduceArguments};
+use crate::cli::ReduceArguments;
 
 /// Share of a casing's length before the first and behind the last contact ring, where no positions are given.
 const MARGIN: f64 = 0.1;

@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use tiprub_model::cube::{MassMatrix, Side};
+use tiprub_shell::Failure;
+use tiprub_study::arguments::{CacheArguments, ErrorArguments, MapArguments, assignment, positive};
 
-use crate::{Failure, casing_arguments::CasingArguments, file_arguments::FileArguments, rom_cache::RomCache};
+use crate::{casing_arguments::CasingArguments, file_arguments::FileArguments};
 
 /// A command line that is not understood, for programs: where `--json` is among the `arguments`, and it asks for no help.
 pub fn usage_failure(error: &clap::Error, mut arguments: impl Iterator<Item = std::ffi::OsString>) -> Option<Failure> {
@@ -256,101 +258,6 @@ pub enum StudyCommand {
     Other(Vec<String>),
 }
 
-/// What all studies take.
-#[derive(Debug, Args)]
-pub struct StudyCommon {
-    /// Directory for everything the study writes; made if missing [default: study-STUDY].
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Few and short runs: seconds instead of minutes, for a first look.
-    #[arg(long)]
-    pub quick: bool,
-    /// Where built-in models are kept.
-    #[command(flatten)]
-    pub cache: CacheArguments,
-}
-
-/// Arguments of `tiprub study map`.
-#[derive(Debug, Args)]
-pub struct MapArguments {
-    /// Scene file (TOML), or one that ships.
-    #[arg(value_name = "SCENE", default_value = "builtin:rotor37")]
-    pub scene: String,
-    /// Angular velocities (rad/s), from, to and how many [default: 141 from 0.8 to 1.5 times the one where twice the casing's
-    /// lowest engine order meets the first mode, where the model holds].
-    #[arg(long, value_name = "FROM:TO:COUNT", value_parser = speeds)]
-    pub speeds: Option<Speeds>,
-    /// Runs at the same time [default: one per processor].
-    #[arg(long, value_name = "N")]
-    pub threads: Option<std::num::NonZero<usize>>,
-    /// Revolutions whose motion is transformed; the bins of the spectra are the N-th part of the rotational frequency
-    /// apart [default: 64].
-    #[arg(long, value_name = "N")]
-    pub revolutions: Option<std::num::NonZero<usize>>,
-    /// Revolutions that pass before [default: the casing's ramp and five decay times of the first mode, 20 to 400].
-    #[arg(long, value_name = "N", value_parser = transient)]
-    pub transient: Option<usize>,
-    /// Start value of an input or parameter, such as friction_coefficient=0 or gap_offset=1e-5; may be repeated.
-    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
-    pub set: Vec<(String, String)>,
-    /// What all studies take.
-    #[command(flatten)]
-    pub common: StudyCommon,
-}
-
-/// Arguments of `tiprub study error`.
-#[derive(Debug, Args)]
-pub struct ErrorArguments {
-    /// Scene file (TOML), or one that ships, such as `builtin:rotor37`.
-    #[arg(value_name = "SCENE")]
-    pub scene: String,
-    /// Time from the start of the experiment over which errors are taken (s), at most until runs that differ by almost
-    /// nothing part [default: 400 communication steps beyond the first contact].
-    #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
-    pub window: Option<f64>,
-    /// Start value of an input or parameter; may be repeated.
-    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
-    pub set: Vec<(String, String)>,
-    /// What all studies take.
-    #[command(flatten)]
-    pub common: StudyCommon,
-}
-
-/// A range of angular velocities (rad/s).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Speeds {
-    /// First.
-    pub from: f64,
-    /// Last.
-    pub to: f64,
-    /// How many, ends included.
-    pub count: usize,
-}
-
-impl Speeds {
-    /// All of them, ascending.
-    pub fn values(&self) -> Vec<f64> {
-        let last = self.count.saturating_sub(1).max(1) as f64;
-        (0..self.count).map(|index| self.from + (self.to - self.from) * index as f64 / last).collect()
-    }
-}
-
-/// Whether built-in models are kept from one command to the next.
-#[derive(Debug, Clone, Default, Args)]
-pub struct CacheArguments {
-    /// Reduce built-in models anew, and keep them for no other command. Otherwise they are kept in the directory that the
-    /// environment variable TIPRUB_CACHE names, or in `tiprub` in the user's cache directory.
-    #[arg(long)]
-    pub no_cache: bool,
-}
-
-impl CacheArguments {
-    /// The cache to use.
-    pub fn cache(&self) -> RomCache {
-        if self.no_cache { RomCache::off() } else { RomCache::of_user() }
-    }
-}
-
 /// What can be reduced.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Model {
@@ -440,65 +347,11 @@ fn model(text: &str) -> Result<Model, String> {
     }
 }
 
-/// More would not end in days.
-const MOST_TRANSIENT: usize = 1_000_000;
-
-fn transient(text: &str) -> Result<usize, String> {
-    let count = text.parse().ok().filter(|count| *count <= MOST_TRANSIENT);
-    count.ok_or_else(|| format!("give a number of revolutions, at most {MOST_TRANSIENT}"))
-}
-
-/// A positive number.
-///
-/// # Errors
-/// What is wrong with the text.
-pub fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err("give a positive number".into()),
-    }
-}
-
-/// `FROM:TO:COUNT`.
-///
-/// # Errors
-/// What is wrong with the text.
-pub fn speeds(text: &str) -> Result<Speeds, String> {
-    let parts: Vec<&str> = text.split(':').collect();
-    let read = || match parts.as_slice() {
-        [from, to, count] => {
-            Some(Speeds { from: from.parse().ok()?, to: to.parse().ok()?, count: count.parse().ok()? })
-        }
-        _ => None,
-    };
-    let sound = |speeds: &Speeds| speeds.from > 0.0 && speeds.from < speeds.to && speeds.to.is_finite();
-    read().filter(|speeds| sound(speeds) && (2..=1000).contains(&speeds.count)).ok_or_else(|| {
-        "give growing positive angular velocities in rad/s and a count from 2 to 1000 as FROM:TO:COUNT, for example 400:1600:25".into()
-    })
-}
-
-fn assignment(text: &str) -> Result<(String, String), String> {
-    match text.split_once('=') {
-        Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
-            Ok((name.trim().to_string(), value.trim().to_string()))
-        }
-        _ => Err("give NAME=VALUE, for example speed=1700".into()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use clap::CommandFactory;
 
     use super::*;
-
-    #[test]
-    fn transients_that_never_end_are_refused() {
-        assert_eq!(transient("0"), Ok(0));
-        for wrong in ["1000001", "18446744073709551616", "-1", ""] {
-            assert!(transient(wrong).is_err(), "{wrong}");
-        }
-    }
 
     fn parse(line: &str) -> Result<Cli, clap::Error> {
         Cli::try_parse_from(std::iter::once("tiprub").chain(line.split_whitespace()))
@@ -518,6 +371,14 @@ mod tests {
             let example = format!("tiprub {}", command.get_name());
             let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
             assert!(help.contains(&example), "{help}");
+        }
+    }
+
+    #[test]
+    fn every_embedded_scene_is_named_in_the_help() {
+        let help = Cli::command().render_help().to_string();
+        for (name, _) in tiprub_gallery::scene_source::BUILTIN_SCENES {
+            assert!(help.contains(&format!("builtin:{name}")), "{name} is not in:\n{help}");
         }
     }
 

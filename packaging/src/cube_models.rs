@@ -1,15 +1,14 @@
 //! The bodies of the cube between two rings, as `tiprub reduce` makes them.
 
+use tiprub_gallery::reduction;
 use tiprub_model::cube::{CubeOptions, MassMatrix, RingOptions, Side};
+use tiprub_shell::{Failure, Result, console::Console};
 
 use crate::{
-    Failure, Result,
     casing_arguments::CasingArguments,
     cli::{Model, ReduceArguments},
-    console::Console,
     file_arguments::FileArguments,
     reduced::Reduced,
-    reduction,
 };
 
 /// Set of the clamped nodes of a ring, for exported files.

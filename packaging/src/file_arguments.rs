@@ -7,8 +7,9 @@ use tiprub_model::{
     Material,
     read::{Axis, Units},
 };
+use tiprub_shell::{Failure, Result};
 
-use crate::{Failure, Result, casing_arguments::MaterialChoice};
+use crate::casing_arguments::MaterialChoice;
 
 /// What describes a model of one's own.
 #[derive(Debug, Clone, PartialEq, Default, Args)]

@@ -3,14 +3,11 @@
 use std::{env, path::Path};
 
 use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_fmi_host::archive::{self, Entry};
 use tiprub_model_description::{Description, Experiment, fmi2_xml, fmi3_xml, html};
+use tiprub_shell::{Failure, Result, native, schedule::Schedule};
 
-use crate::{
-    Failure, Result,
-    archive::{self, Entry},
-    native, scene_features,
-    schedule::Schedule,
-};
+use crate::scene_features;
 
 /// File name of the library inside the FMU, without extension, and `modelIdentifier` of both versions.
 pub const MODEL_IDENTIFIER: &str = "tiprub";

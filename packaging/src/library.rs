@@ -13,7 +13,7 @@ use std::{
     thread,
 };
 
-use crate::{Failure, Result, console::Console};
+use tiprub_shell::{Failure, Result, console::Console};
 
 /// The workspace this program was compiled from; it need not exist where it runs.
 const WORKSPACE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");

@@ -6,8 +6,8 @@ use clap::Parser;
 use tiprub_packaging::{
     cli::{self, Cli},
     commands,
-    console::Console,
 };
+use tiprub_shell::console::Console;
 
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {

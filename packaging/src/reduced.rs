@@ -9,8 +9,7 @@ use tiprub_model::{
     spin::SpinCheck,
     vtk::{self, Field},
 };
-
-use crate::{Failure, Result};
+use tiprub_shell::{Failure, Result};
 
 /// Frequencies asked for in the exported finite-element model.
 const EXPORTED_FREQUENCIES: usize = 10;

@@ -11,11 +11,9 @@ use tiprub_core::{
     settings::Scheme,
     stability::{self, ContactDirections},
 };
+use tiprub_shell::{Failure, Result};
 
-use crate::{
-    Failure, Result,
-    step_limits::{Sliding, StepLimit, step_limits},
-};
+use crate::step_limits::{Sliding, StepLimit, step_limits};
 
 /// Friction coefficients for which solvability is tried, ascending.
 const FRICTION_STEPS: u32 = 40;

@@ -185,7 +185,7 @@ mod tests {
     use tiprub_core::rom::{Frame, Harmonic, RomChecks, RomExtras};
 
     use super::*;
-    use crate::scene_source::ROTOR37_SCENE;
+    use tiprub_gallery::scene_source::ROTOR37_SCENE;
 
     fn scene(change: impl FnOnce(&mut Scene)) -> Scene {
         let settings = tiprub_format::parse_scene(ROTOR37_SCENE, "scene").unwrap();
@@ -207,7 +207,7 @@ mod tests {
 
     #[test]
     fn a_free_master_is_told_with_limits_of_its_own() {
-        let settings = tiprub_format::parse_scene(crate::scene_source::CUBE_SCENE, "scene").unwrap();
+        let settings = tiprub_format::parse_scene(tiprub_gallery::scene_source::CUBE_SCENE, "scene").unwrap();
         let mut scene = Scene { settings, roms: vec![two_sectors(false); 3] };
         scene.settings.surfaces[1].rigid = true;
         let text = features(&scene).join("\n");

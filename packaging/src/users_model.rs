@@ -4,6 +4,7 @@ use std::{cell::RefCell, fmt::Write as _, path::Path};
 
 use serde_json::{Value, json};
 use tiprub_core::{Rom, rom::Frame};
+use tiprub_gallery::reduction::{self, with_progress};
 use tiprub_model::{
     CasingOptions, FeModel, Material, Reduction,
     casing::{self, CasingReductionOptions, GridNodes},
@@ -17,15 +18,13 @@ use tiprub_model::{
     reduce_casing, reduce_model,
     thermal::equal_patches,
 };
+use tiprub_shell::{Failure, Result, console::Console};
 
 use crate::{
-    Failure, Result,
     casing_arguments::CasingArguments,
     cli::{Model, ReduceArguments},
-    console::Console,
     file_arguments::{FileArguments, UnitChoice},
     reduced::Reduced,
-    reduction::{self, with_progress},
 };
 
 /// Fixed-interface modes, modes compared with the full model, and damping ratio where none are given.

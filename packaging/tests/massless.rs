@@ -4,10 +4,12 @@
 mod guide;
 
 use guide::told;
-use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::settings::Scheme;
-use tiprub_core::stability::{central_difference_limit, massless::MasslessCheck};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{
+    Scene, Simulation,
+    dynamics::modal::ModalModel,
+    settings::Scheme,
+    stability::{central_difference_limit, massless::MasslessCheck},
+};
 use tiprub_model::{Rotor37Options, reduce_rotor37};
 
 /// Displacements (m) of all contact rows at common times, the total normal impulse (N.s), and the impact loss (J).
@@ -49,7 +51,7 @@ fn massless_contact_nodes_agree_and_take_longer_steps() {
     told!("| limit of central differences | {:.4} |", 1e6 * central);
     assert!(limit > central);
 
-    let mut scene = tiprub_packaging::scene_source::rotor37_scene_with(rom).unwrap();
+    let mut scene = tiprub_gallery::scene_source::rotor37_scene_with(rom).unwrap();
     scene.settings.contacts[0].friction = 0.1;
     for (share, accepted) in [(0.79, true), (0.81, false)] {
         let mut scene = scene.clone();

@@ -4,16 +4,14 @@ use tiprub_core::{
     Simulation,
     settings::{Scheme, Solver},
 };
+use tiprub_gallery::{reduction, scene_source::rotor37_scene_with};
 use tiprub_model::{Rotor37Options, rotor37::MeshCounts};
 use tiprub_packaging::{
-    console::Console,
-    error_study::{self, ErrorStudy, METHODS},
-    native, reduction,
     report::page::{ImportedSummary, ReportFile, ReportInput, render},
     rom_facts::RomFacts,
-    scene_source::rotor37_scene_with,
-    schedule::Schedule,
 };
+use tiprub_shell::{console::Console, native, schedule::Schedule};
+use tiprub_study::error_study::{self, ErrorStudy, METHODS};
 
 /// The references meet, errors fall with h, and what is refused is a row.
 fn check(study: &ErrorStudy) {

@@ -1,10 +1,9 @@
 //! Rotor 37 at speed through the whole simulation, against CalculiX 2.20 (nonlinear static step with centrifugal load,
 //! same mesh; the numbers and how they were made are with the tests of the reduction).
 
-use tiprub_core::settings::Shape;
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{Scene, Simulation, settings::Shape};
+use tiprub_gallery::scene_source::rotor37_scene_with;
 use tiprub_model::{Rotor37Options, reduce_rotor37};
-use tiprub_packaging::scene_source::rotor37_scene_with;
 
 /// Growth at the leading edge at 1800 rad/s (m): radial, tangential, axial.
 const LEADING_EDGE: [f64; 3] = [58.088e-6, -192.490e-6, -353.188e-6];

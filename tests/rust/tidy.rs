@@ -35,7 +35,14 @@ fn imports_run_one_way() {
     let above_model = ["tiprub-fmi", "tiprub", "tiprub-model-description", "tiprub-reference"];
     free_of("tiprub-model", &[&above_model[..], &["quick-xml", "zip", "clap", "toml", "safetensors"]].concat());
     free_of("tiprub-model-description", &["faer", "tiprub-model", "tiprub-fmi", "tiprub", "toml", "safetensors"]);
-    free_of("tiprub", &["tiprub-fmi"]);
+    let above_shell = ["tiprub-gallery", "tiprub-figure", "tiprub-study", "tiprub-fmi-host", "tiprub", "tiprub-lab"];
+    free_of("tiprub-shell", &[&above_shell[..], &["tiprub-model", "faer", "clap", "plotters", "zip"]].concat());
+    free_of("tiprub-fmi-host", &["tiprub-fmi", "tiprub-model", "tiprub-gallery", "tiprub-figure", "clap", "faer"]);
+    free_of("tiprub-figure", &["tiprub-gallery", "tiprub-study", "tiprub-fmi-host", "clap"]);
+    free_of("tiprub-gallery", &["tiprub-figure", "tiprub-study", "tiprub-fmi-host", "clap", "plotters"]);
+    let evidence = ["tiprub-reference", "tiprub-lab", "tiprub-fmi"];
+    free_of("tiprub-study", &[&evidence[..], &["tiprub", "tiprub-fmi-host", "zip", "libloading"]].concat());
+    free_of("tiprub", &evidence);
 }
 
 fn sources(directory: &Path, found: &mut Vec<PathBuf>) {

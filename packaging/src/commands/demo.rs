@@ -7,23 +7,28 @@ use std::{
 
 use serde_json::json;
 use tiprub_core::{Scene, Simulation};
+use tiprub_fmi_host::{ImportedRun, UnpackedFmu};
+use tiprub_gallery::{
+    reduction,
+    rom_cache::RomCache,
+    scene_source::{self, ROTOR37_SCENE, rotor37_text},
+};
 use tiprub_model::{Reduction, Rotor37Options};
+use tiprub_shell::{
+    Failure, Result,
+    console::{Console, Outcome, shown_path},
+    native::{self, NativeRun},
+    output_file,
+    schedule::Schedule,
+};
+use tiprub_study::error_study::{self, ErrorStudy, METHODS};
 
 use crate::{
-    Failure, Result,
     cli::DemoArguments,
-    console::{Console, Outcome, shown_path},
-    error_study::{self, ErrorStudy, METHODS},
     fmu::{FmiVersion, Package},
-    importer::{ImportedRun, UnpackedFmu},
     library,
-    native::{self, NativeRun},
-    output_file, reduction,
     report::page::{self, ImportedSummary, ReportFile, ReportInput},
-    rom_cache::RomCache,
     rom_facts::RomFacts,
-    scene_source::{self, ROTOR37_SCENE, rotor37_text},
-    schedule::Schedule,
 };
 
 /// Files the demo writes into its directory.

@@ -12,16 +12,14 @@ use tiprub_core::{
     settings::{ContactSettings, Motion, SceneSettings},
     variables::Causality,
 };
-
-use crate::{
+use tiprub_fmi_host::{UnpackedFmu, entries, open_archive};
+use tiprub_gallery::scene_source;
+use tiprub_shell::{
     Failure, Result,
-    cli::InspectArguments,
     console::{Console, Outcome},
-    importer::{UnpackedFmu, entries, open_archive},
-    rom_facts::RomFacts,
-    scene_features, scene_source,
-    step_limits::Sliding,
 };
+
+use crate::{cli::InspectArguments, rom_facts::RomFacts, scene_features, step_limits::Sliding};
 
 /// Kinds of files, told apart by name and, where that does not help, by their first bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -279,7 +277,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::cli::CacheArguments;
+    use tiprub_study::arguments::CacheArguments;
 
     fn inspect(name: &str, contents: impl AsRef<[u8]>) -> Result<Outcome> {
         let root = tempfile::tempdir().unwrap();

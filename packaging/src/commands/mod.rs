@@ -9,12 +9,12 @@ pub mod study;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::{
+use tiprub_shell::{
     Failure, Result,
-    cli::Command,
     console::{Console, Outcome},
-    places,
 };
+
+use crate::{cli::Command, command_files};
 
 /// Run the command. Nothing is written, and no long work begins, where the command line alone shows that an output would replace
 /// an input or another output.
@@ -23,7 +23,7 @@ use crate::{
 /// What the command could not do. A defect of this program is one of them.
 pub fn run(command: &Command, console: &Console) -> Result<Outcome> {
     walled(|| {
-        places::check(command)?;
+        command_files::check(command)?;
         match command {
             Command::Demo(arguments) => demo::run(arguments, console),
             Command::Reduce(arguments) => reduce::run(arguments, console),

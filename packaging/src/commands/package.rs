@@ -3,15 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
+use tiprub_gallery::scene_source;
+use tiprub_shell::{
+    Failure, Result,
+    console::{Console, Outcome, shown_path},
+    places::{self, Named},
+};
 
 use crate::{
-    Failure, Result,
     cli::{FmiChoice, PackageArguments},
-    console::{Console, Outcome, shown_path},
+    command_files,
     fmu::{FmiVersion, Package},
     library,
-    places::{self, Named},
-    scene_source,
 };
 
 /// Load the scene, find the library, zip.
@@ -25,7 +28,10 @@ pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
     let targets = targets(arguments, &scene.settings.name)?;
     let files: Vec<Named> = targets.iter().map(|(_, path)| Named::new("--output", path)).collect();
     let library_file = arguments.library.iter().map(|path| Named::new("--library", path));
-    places::outputs(&places::scene(&arguments.scene).into_iter().chain(library_file).collect::<Vec<_>>(), &files)?;
+    places::outputs(
+        &command_files::scene(&arguments.scene).into_iter().chain(library_file).collect::<Vec<_>>(),
+        &files,
+    )?;
     let library = library::load(arguments.library.as_deref(), console)?;
     let package = Package::new(&scene, &library)?;
     console.warn(package.warnings());
@@ -75,7 +81,7 @@ fn targets(arguments: &PackageArguments, name: &str) -> Result<Vec<(FmiVersion, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::CacheArguments;
+    use tiprub_study::arguments::CacheArguments;
 
     fn arguments(fmi: FmiChoice, output: &str) -> PackageArguments {
         PackageArguments {

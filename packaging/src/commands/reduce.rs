@@ -6,6 +6,7 @@ use std::{
 };
 
 use serde_json::{Value, json};
+use tiprub_gallery::{builtin, reduction};
 use tiprub_model::{
     Rotor37Options,
     casing::{CLAMPED, Support},
@@ -13,18 +14,19 @@ use tiprub_model::{
     rotor37::MeshCounts,
     stage::sector_mesh,
 };
-
-use crate::{
-    Failure, Result, builtin,
-    casing_arguments::{self, CasingArguments, MaterialChoice},
-    cli::{Model, ReduceArguments},
+use tiprub_shell::{
+    Failure, Result,
     console::{Console, Outcome, shown_path},
-    cube_models,
-    file_arguments::FileArguments,
     output_file,
     places::{self, Named},
+};
+
+use crate::{
+    casing_arguments::{self, CasingArguments, MaterialChoice},
+    cli::{Model, ReduceArguments},
+    command_files, cube_models,
+    file_arguments::FileArguments,
     reduced::Reduced,
-    reduction,
     rom_facts::RomFacts,
     users_model,
 };
@@ -43,7 +45,7 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
         arguments.vtk.as_ref().map(|path| ("--vtk", path)),
     ];
     let names: Vec<Named> = names.into_iter().flatten().map(|(role, path)| Named::new(role, path)).collect();
-    places::apart(&places::model_files(arguments), &names)?;
+    places::apart(&command_files::model_files(arguments), &names)?;
     std::iter::once(output).chain(others).try_for_each(|path| check_target(path, arguments))?;
     let reduced = reduced(arguments, console)?;
     let facts = RomFacts::of(&reduced.rom, None)?;

@@ -3,17 +3,17 @@
 use std::{path::Path, time::Instant};
 
 use serde_json::{Map, Value, json};
-
-use crate::{
+use tiprub_gallery::scene_source;
+use tiprub_shell::{
     Failure, Result,
-    cli::RunArguments,
     console::{Console, Outcome, shown_path},
     extremes::{Extreme, extremes},
     native,
     recording::shortest,
-    scene_source,
     schedule::Schedule,
 };
+
+use crate::cli::RunArguments;
 
 /// Load, run, write the CSV, sum up.
 ///

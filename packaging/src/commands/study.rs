@@ -2,13 +2,15 @@
 
 use std::path::PathBuf;
 
-use crate::{
+use tiprub_shell::{
     Failure, Result,
-    cli::{StudyArguments, StudyCommand, StudyCommon},
     console::{Console, Outcome},
     output_file,
-    study::{self, error, map},
 };
+use tiprub_study as study;
+use tiprub_study::{arguments::StudyCommon, error, map};
+
+use crate::cli::{StudyArguments, StudyCommand};
 
 /// Study, write, sum up.
 ///

@@ -3,17 +3,13 @@
 use std::fmt::Write as _;
 
 use tiprub_core::{Scene, VariableTable, variables::Quantity};
+use tiprub_figure::{STYLE, escape};
 use tiprub_model::Reduction;
+use tiprub_shell::{Result, native::NativeRun, recording::Agreement, schedule::Schedule};
+use tiprub_study::error_study::ErrorStudy;
 
 use super::sections::{Results, figures};
-use crate::{
-    Result,
-    error_study::ErrorStudy,
-    native::NativeRun,
-    recording::Agreement,
-    rom_facts::{CheckRow, ROWS_SHOWN, RomFacts, Worst, order_text, sectors_text},
-    schedule::Schedule,
-};
+use crate::rom_facts::{CheckRow, ROWS_SHOWN, RomFacts, Worst, order_text, sectors_text};
 
 /// What an imported run has to say in the report.
 #[derive(Debug, Clone)]
@@ -61,8 +57,6 @@ pub struct ReportInput<'a> {
     pub durations: &'a [(String, f64)],
 }
 
-const STYLE: &str = include_str!("../../assets/report.css");
-
 /// The whole page.
 ///
 /// # Errors
@@ -89,11 +83,6 @@ pub fn render(input: &ReportInput<'_>) -> Result<String> {
     page.push_str(&files_section(input.files));
     let _ = write!(page, "<footer>tiprub {}</footer>\n</main>\n</body>\n</html>\n", env!("CARGO_PKG_VERSION"));
     Ok(page)
-}
-
-/// Text for HTML.
-pub fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 fn header(input: &ReportInput<'_>) -> String {

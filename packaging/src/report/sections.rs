@@ -3,18 +3,16 @@
 use std::fmt::Write as _;
 
 use tiprub_core::{VariableTable, settings::Shape, variables::Quantity};
-use tiprub_model::{Mesh, Reduction, surface_quads};
-
-use super::{
-    page::{ReportInput, escape},
-    picture::{self, Frame, Surface, View},
+use tiprub_figure::{
+    escape,
+    picture::{self, Frame, Surface, View, surface_of},
     plots::{Plot, Series},
 };
-use crate::{
-    Failure, Result,
-    error_study::{self, ErrorStudy, METHODS},
-    recording::Recording,
-};
+use tiprub_model::Reduction;
+use tiprub_shell::{Failure, Result, recording::Recording};
+use tiprub_study::error_study::{self, ErrorStudy, METHODS};
+
+use super::page::ReportInput;
 
 /// Azimuth and elevation of the blade pictures (rad): suction side, leading edge to the left, a little from above.
 const AZIMUTH: f64 = 1.1;
@@ -362,16 +360,6 @@ fn mode_shapes(reduction: &Reduction) -> Figure {
         reduction.modes.len().min(MODES_SHOWN)
     );
     Figure { body, caption }
-}
-
-/// The outer surface of a mesh.
-pub fn surface_of(mesh: &Mesh) -> Surface {
-    let corner = |face: &[usize], index: usize| face[index.min(face.len() - 1)];
-    let faces = surface_quads(mesh);
-    Surface {
-        points: mesh.nodes.clone(),
-        faces: faces.iter().map(|face| std::array::from_fn(|index| corner(face, index))).collect(),
-    }
 }
 
 fn cartesian([radius, angle, z]: [f64; 3]) -> [f64; 3] {

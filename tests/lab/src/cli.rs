@@ -3,14 +3,15 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use tiprub_packaging::{
+use tiprub_gallery::builtin::DiskModel;
+use tiprub_packaging::commands;
+use tiprub_shell::{
     Result,
-    builtin::DiskModel,
-    cli::{Speeds, StudyCommon, positive, speeds},
-    commands,
     console::{Console, Outcome},
-    output_file, study,
+    output_file,
 };
+use tiprub_study as study;
+use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
 use crate::{conjugacy, convergence, cube, error, inputs, modes, stability, stage};
 

@@ -2,16 +2,13 @@
 //! (eq. 12) of the lowest modes of the wheel against the number kept, as figs 9 and 10 of the paper.
 
 use serde_json::json;
-use tiprub_model::cyclic::{ConvergenceRow, CyclicReduction, NodalDiameter};
-
-use tiprub_packaging::study::{Figure, Picture, Sheet, Statement, Study};
-use tiprub_packaging::{
-    Result,
-    report::{
-        plots::{Form, Plot, Series},
-        waterfall::{Axis, Waterfall},
-    },
+use tiprub_figure::{
+    plots::{Form, Plot, Series},
+    waterfall::{Axis, Waterfall},
 };
+use tiprub_model::cyclic::{ConvergenceRow, CyclicReduction, NodalDiameter};
+use tiprub_shell::Result;
+use tiprub_study::{Figure, Picture, Sheet, Statement, Study};
 
 /// What the paper calls satisfactory, in %.
 const DEVIATION_LIMIT: f64 = 0.3;

@@ -9,16 +9,12 @@ use tiprub_core::{
     settings::{InputInterpolation, Shape},
     variables::Quantity,
 };
+use tiprub_figure::plots::{Plot, Series};
+use tiprub_gallery::scene_source;
+use tiprub_shell::{Failure, Result, console::Console, sweep};
+use tiprub_study::{Figure, Picture, Sheet, Statement, Study, arguments::StudyCommon};
 
 use crate::stability::models;
-use tiprub_packaging::study::{Figure, Picture, Sheet, Statement, Study, sweep};
-use tiprub_packaging::{
-    Failure, Result,
-    cli::StudyCommon,
-    console::Console,
-    report::plots::{Plot, Series},
-    scene_source,
-};
 
 /// Communication steps (s); the first is the internal step.
 const STEPS: [f64; 3] = [1e-6, 1e-5, 1e-4];

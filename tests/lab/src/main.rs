@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use tiprub_lab::cli::Cli;
-use tiprub_packaging::console::Console;
+use tiprub_shell::console::Console;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();

@@ -2,22 +2,17 @@
 //! the first mode shapes.
 
 use serde_json::json;
+use tiprub_figure::{
+    picture::{self, Frame, Surface, View, surface_of},
+    plots::{Form, Plot, Series},
+};
 use tiprub_model::{
     Mesh,
     cyclic::{CyclicReduction, NodalDiameter},
     vtk::Field,
 };
-
-use tiprub_packaging::study::map::prediction::folded;
-use tiprub_packaging::study::{Figure, Picture, Sheet, Statement, Study};
-use tiprub_packaging::{
-    Failure, Result,
-    report::{
-        picture::{self, Frame, Surface, View},
-        plots::{Form, Plot, Series},
-        sections::surface_of,
-    },
-};
+use tiprub_shell::{Failure, Result};
+use tiprub_study::{Figure, Picture, Sheet, Statement, Study, map::prediction::folded};
 
 /// Azimuth and elevation of the pictures of a sector (rad).
 const AZIMUTH: f64 = 1.0;

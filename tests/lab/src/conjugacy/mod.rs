@@ -11,13 +11,11 @@ use tiprub_core::{
     Scene,
     settings::{Scheme, Solver},
 };
+use tiprub_figure::plots::{Plot, Series};
+use tiprub_shell::{Failure, Result, sweep};
+use tiprub_study::{Figure, Picture, Sheet, Statement, Study};
 
 use crate::stability::models::{SCHEMES, SOLVERS};
-use tiprub_packaging::study::{Figure, Picture, Sheet, Statement, Study, sweep};
-use tiprub_packaging::{
-    Failure, Result,
-    report::plots::{Plot, Series},
-};
 
 /// Largest internal step of the table (s).
 const STEP: f64 = 1e-6;

@@ -7,9 +7,10 @@ use tiprub_core::{
     Scene,
     settings::{Interpolation, Scheme, Solver},
 };
+use tiprub_shell::{Failure, Result};
+use tiprub_study::Statement;
 
 use super::{END, FRICTIONLESS, PAPER_LOSS, product::Product};
-use tiprub_packaging::{Failure, Result, study::Statement};
 
 /// Internal step that ships (s), and what it is divided by.
 const STEP: f64 = 5e-7;

@@ -1,20 +1,17 @@
 //! The paper's figures 1 and 3 to 6 with the curves of all methods.
 
+use tiprub_figure::{
+    picture::{self, Frame, Surface, View, surface_of},
+    plots::{Form, Plot, Series},
+};
 use tiprub_model::cube::{Side, cube_mesh, ring_mesh};
 use tiprub_reference::{compare::windowed, cube::history::History};
+use tiprub_shell::{Failure, Result};
+use tiprub_study::{Figure, Picture, Sheet};
 
 use super::{
     pairs::{self, Pair},
     runs::Outcome,
-};
-use tiprub_packaging::{
-    Failure, Result,
-    report::{
-        picture::{self, Frame, Surface, View},
-        plots::{Form, Plot, Series},
-        sections::surface_of,
-    },
-    study::{Figure, Picture, Sheet},
 };
 
 /// Forces are drawn as means over this time (s): the impact of a node with mass takes one step.

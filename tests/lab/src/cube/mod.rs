@@ -8,21 +8,18 @@ mod product;
 mod runs;
 mod sizes;
 
-use serde_json::json;
-use tiprub_core::Scene;
-use tiprub_reference::compare::{asymmetry, exit_speed};
-
 use pairs::Pair;
 use runs::{A, B, BEST, C, Flight, Outcome, PAPER, STICKING, competitors, released};
-use tiprub_packaging::study::{Statement, Study, machine};
-use tiprub_packaging::{
-    Failure, Result,
-    cli::StudyCommon,
-    console::{Console, Task},
-    scene_source,
-};
-
+use serde_json::json;
 use sizes::Sizes;
+use tiprub_core::Scene;
+use tiprub_gallery::scene_source;
+use tiprub_reference::compare::{asymmetry, exit_speed};
+use tiprub_shell::{
+    Failure, Result,
+    console::{Console, Task},
+};
+use tiprub_study::{Statement, Study, arguments::StudyCommon, machine};
 
 /// The paper's flight, and the slower one of its energies.
 const FAST: f64 = 100.0;

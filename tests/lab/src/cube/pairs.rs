@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
+use tiprub_figure::escape;
 use tiprub_reference::compare::{Agreement, WINDOW, agreement, asymmetry, exit_speed, windowed};
 
 use super::runs::{Flight, Outcome, released};
-use tiprub_packaging::report::page::escape;
 
 /// Headings of the pairs.
 const PAIR: [&str; 10] = [

@@ -12,9 +12,9 @@ use tiprub_reference::{
     methods::{Method, Run},
     surface::SurfaceKind,
 };
+use tiprub_shell::{Failure, Result};
 
 use super::product::{Product, ProductRun};
-use tiprub_packaging::{Failure, Result};
 
 /// How the cube flies.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,14 +2,15 @@
 
 use serde_json::{Value, json};
 use tiprub_core::{Rom, Scene, settings::Interpolation, settings::Scheme, settings::Solver};
+use tiprub_gallery::{reduction, rom_cache::RomCache};
 use tiprub_model::cube::{CubeOptions, RingOptions, Side};
 use tiprub_reference::{compare::agreement, cube::history::History};
+use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
     product::{Product, ProductRun},
     runs::{Flight, RECORD, released},
 };
-use tiprub_packaging::{Failure, Result, console::Console, reduction, rom_cache::RomCache};
 
 /// Modes and static responses of the rings.
 const RINGS: [[usize; 2]; 7] = [[20, 0], [40, 0], [60, 60], [100, 0], [300, 0], [200, 400], [200, 1000]];

@@ -1,11 +1,13 @@
 //! Scene 3: the cube between two rings; four methods on the full finite-element model take part.
 
 use tiprub_core::Scene;
+use tiprub_gallery::{reduction, rom_cache::RomCache, scene_source};
 use tiprub_model::cube::{RingOptions, Side};
 use tiprub_reference::{
     cube::scene::{Mass, Scene as FullScene, Setting},
     surface::SurfaceKind,
 };
+use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
     case::Case,
@@ -16,7 +18,6 @@ use super::{
     scene::SceneRun,
     window,
 };
-use tiprub_packaging::{Failure, Result, console::Console, reduction, rom_cache::RomCache, scene_source};
 
 /// Modes of each ring; the middle one is what ships.
 const MODES: [usize; 3] = [20, 100, 300];

@@ -8,22 +8,19 @@ pub mod rods;
 pub mod rotor;
 pub mod stage;
 
-use tiprub_packaging::{
-    Failure, Result,
-    console::Console,
-    rom_cache::RomCache,
-    study::{
-        Study,
-        error::{case, competitor, measure, of_cases, run, scene, window},
-    },
-};
-
-use crate::cli::{ErrorArguments, ErrorScene};
 use bars::Bars;
 use case::Case;
 use cube::Cube;
 use rotor::Rotor;
 use stage::Wheel;
+use tiprub_gallery::rom_cache::RomCache;
+use tiprub_shell::{Failure, Result, console::Console};
+use tiprub_study::{
+    Study,
+    error::{case, competitor, measure, of_cases, run, scene, window},
+};
+
+use crate::cli::{ErrorArguments, ErrorScene};
 
 /// The study.
 ///

@@ -1,8 +1,10 @@
 //! Scenes 4 and 5: the blades of rotor 37 rubbing against a casing with two bumps, lightly and heavily.
 
 use tiprub_core::{Rom, Scene, settings::Shape};
+use tiprub_gallery::{reduction, rom_cache::RomCache, scene_source};
 use tiprub_model::{Rotor37Options, rotor37::MeshCounts};
 use tiprub_reference::reduced::rub::{BladeScene, Blades, Tip};
+use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
     case::{Case, without_finest},
@@ -12,7 +14,6 @@ use super::{
     scene::SceneRun,
     window,
 };
-use tiprub_packaging::{Failure, Result, console::Console, reduction, rom_cache::RomCache, scene_source};
 
 /// Component modes kept beside the contact nodes' own.
 const MODES: [usize; 3] = [8, 20, 40];

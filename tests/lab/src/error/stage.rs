@@ -2,9 +2,10 @@
 
 use nalgebra::Complex;
 use tiprub_core::{Rom, Scene, settings::Shape};
-use tiprub_model::cyclic::ModeSelection;
-use tiprub_model::stage::StageOptions;
+use tiprub_gallery::{builtin::DiskModel, rom_cache::RomCache, scene_source};
+use tiprub_model::{cyclic::ModeSelection, stage::StageOptions};
 use tiprub_reference::reduced::wheel::{Casing, Pencil, Stage, StageScene};
+use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
     case::{Case, without_finest},
@@ -14,7 +15,6 @@ use super::{
     scene::SceneRun,
     window,
 };
-use tiprub_packaging::{Failure, Result, builtin::DiskModel, console::Console, rom_cache::RomCache, scene_source};
 
 /// Component modes per nodal diameter.
 const MODES: [usize; 3] = [4, 8, 16];

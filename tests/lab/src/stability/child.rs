@@ -9,8 +9,9 @@ use std::{
     time::{Duration, Instant},
 };
 
+use tiprub_shell::{Failure, Result};
+
 use super::{Case, Context, Happened, Verdict, judge};
-use tiprub_packaging::{Failure, Result};
 
 /// Between two looks at a child.
 const PATIENCE: Duration = Duration::from_millis(4);

@@ -1,16 +1,20 @@
 //! `lab stability`: stiff and extreme cases, each in a process of its own, judged.
 
+use tiprub_packaging::{
+    fmu::{FmiVersion, Package},
+    library,
+};
+use tiprub_shell::{
+    Failure, Result,
+    console::{Console, Outcome},
+    output_file,
+    places::{self, Named},
+    sweep,
+};
+
 use crate::{
     cli::StabilityArguments,
     stability::{self, Case, Context, child, families::values, table::Table},
-};
-use tiprub_packaging::{
-    Failure, Result,
-    console::{Console, Outcome},
-    fmu::{FmiVersion, Package},
-    library, output_file,
-    places::{self, Named},
-    study::sweep,
 };
 
 /// Run the cases asked for and write the table.

@@ -3,9 +3,10 @@
 use std::{fmt::Write as _, path::Path};
 
 use serde_json::{Value, json};
+use tiprub_figure::{STYLE, escape};
+use tiprub_shell::{Result, console::Outcome, output_file};
 
 use super::{Verdict, child::Row};
-use tiprub_packaging::{Result, console::Outcome, output_file, report::page::escape, study::output::STYLE};
 
 /// All rows.
 #[derive(Debug, Clone, PartialEq)]

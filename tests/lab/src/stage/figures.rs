@@ -1,14 +1,13 @@
 //! Pictures of the stage.
 
-use super::{CASINGS, Casing, RAMP_PERIODS, Run, SHOWN, Setup, nearest};
-use tiprub_packaging::{
-    Result,
-    report::{
-        plots::{Plot, Series},
-        waterfall::{Axis, Waterfall},
-    },
-    study::{Figure, Picture, Sheet},
+use tiprub_figure::{
+    plots::{Plot, Series},
+    waterfall::{Axis, Waterfall},
 };
+use tiprub_shell::Result;
+use tiprub_study::{Figure, Picture, Sheet};
+
+use super::{CASINGS, Casing, RAMP_PERIODS, Run, SHOWN, Setup, nearest};
 
 /// Nodal diameters below this share of the largest amplitude are not drawn.
 const SILENT: f64 = 1e-4;

@@ -15,10 +15,11 @@ use tiprub_core::{
     settings::{Shape, SplineSettings},
     variables::Quantity,
 };
+use tiprub_gallery::scene_source;
+use tiprub_shell::{Failure, Result, console::Console, schedule::Schedule, sweep};
+use tiprub_study::{Study, arguments::Speeds};
 
 use self::run::Run;
-use tiprub_packaging::study::{Study, sweep};
-use tiprub_packaging::{Failure, Result, cli::Speeds, console::Console, scene_source, schedule::Schedule};
 
 /// By how much the oval casing would reach beyond the tips at rest, as a share of the clearance.
 const OVERLAP: f64 = 0.15;

@@ -1,7 +1,9 @@
 //! Whether the stage shows what the paper's figures 11 and 12 do.
 
+use tiprub_shell::Result;
+use tiprub_study::Statement;
+
 use super::{Casing, RAMP_PERIODS, Run, SHOWN, Setup, nearest, warnings};
-use tiprub_packaging::{Result, study::Statement};
 
 /// Ratio of nodal diameter 4 to 2 from which on its share counts as negligible.
 const NEGLIGIBLE: f64 = 0.1;

@@ -4,6 +4,8 @@ use tiprub_core::{
     Result, Rom, Scene, Simulation,
     settings::{Scheme, Solver},
 };
+use tiprub_gallery::{builtin, rom_cache::RomCache, scene_source};
+use tiprub_shell::console::Console;
 
 use super::{
     super::{
@@ -14,7 +16,6 @@ use super::{
     },
     limits::massless_step,
 };
-use tiprub_packaging::{builtin, console::Console, rom_cache::RomCache, scene_source};
 
 /// All of them.
 pub fn cases() -> Vec<Case> {

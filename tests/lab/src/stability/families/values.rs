@@ -6,13 +6,13 @@ use tiprub_core::{
     settings::{LoadSettings, Scheme, Solver},
     variables::{Causality, Kind, Quantity, Variable},
 };
+use tiprub_fmi_host::{Session, UnpackedFmu};
 
 use super::super::{
     Case, Check, Context, Expected, Happened,
     models::{Tower, blade, bumps, on_ring, round, with_methods},
     observe::{bits, outputs},
 };
-use tiprub_packaging::importer::{Session, UnpackedFmu};
 
 /// What is tried on every variable.
 pub const VALUES: [(&str, f64); 12] = [
@@ -282,7 +282,7 @@ fn by_slope(name: &str, variable: &str, value: f64) -> Happened {
 /// Through a packaged FMU: set after the start, step, read everything.
 fn by_import(context: &Context, scene: &str, version: u8, variable: &str, value: f64) -> Happened {
     let Some(directory) = &context.fmus else { return Happened::refused("no FMUs were packaged") };
-    let outcome = (|| -> tiprub_packaging::Result<Happened> {
+    let outcome = (|| -> tiprub_shell::Result<Happened> {
         let fmu = UnpackedFmu::open(&directory.join(format!("{scene}-{version}.fmu")))?;
         let mut session = Session::new(&fmu)?;
         let set = session.set_real(variable, value);
@@ -299,12 +299,12 @@ fn by_import(context: &Context, scene: &str, version: u8, variable: &str, value:
         let values = session.outputs()?;
         let mut checks = vec![Check::so("all outputs finite", values.iter().all(|value| value.is_finite()))];
         // The same without FMI, bit by bit.
-        let mut native = Simulation::new(&self::scene(scene))
-            .map_err(|error| tiprub_packaging::Failure::from_core("scene", error))?;
+        let mut native =
+            Simulation::new(&self::scene(scene)).map_err(|error| tiprub_shell::Failure::from_core("scene", error))?;
         let run = native.table().find(variable).map_or(0, |row| row.reference);
         let ran = native.set_real(run, value).and_then(|()| native.initialise(0.0)).and_then(|()| go_on(&mut native));
         checks.push(Check::so("runs without FMI as well", ran.is_ok()));
-        let expected = tiprub_packaging::native::numeric_outputs(&native);
+        let expected = tiprub_shell::native::numeric_outputs(&native);
         let same =
             expected.len() == values.len() && expected.iter().zip(&values).all(|(a, b)| a.to_bits() == b.to_bits());
         checks.push(Check::so("the bits of the run without FMI", same));

@@ -1,0 +1,198 @@
+//! The zip of an FMU: strict, small and reproducible.
+//!
+//! Rules kept here, since importers differ in what they can read: entries are stored or deflated, need no more
+//! than zip 2.0, have no zip64 fields, no data descriptors, no directories and no "./"; names are ASCII with
+//! forward slashes; the first entry is the first given. The same entries give the same bytes: time stamps are
+//! 1980-01-01 00:00:00 (the zip epoch) and permissions are fixed.
+
+use std::{
+    collections::BTreeSet,
+    io::{Seek, Write},
+    path::Path,
+};
+
+use tiprub_shell::{Failure, Result, output_file};
+use zip::{CompressionMethod, DateTime, ZipWriter, write::SimpleFileOptions};
+
+/// One file inside the archive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Entry {
+    /// Name with forward slashes, relative to the root of the archive.
+    pub name: String,
+    /// Contents.
+    pub bytes: Vec<u8>,
+}
+
+impl Entry {
+    /// An entry with these contents.
+    pub fn new(name: impl Into<String>, bytes: impl Into<Vec<u8>>) -> Self {
+        Self { name: name.into(), bytes: bytes.into() }
+    }
+}
+
+/// Write the archive to `target`, whole or not at all. It is made in memory: the zip library prints a message of its own
+/// when an unfinished archive cannot go on being written.
+///
+/// # Errors
+/// A name that breaks the rules above, a file that is too large, or a disk that does not take it.
+pub fn write(target: &Path, entries: &[Entry]) -> Result<()> {
+    let mut archive = std::io::Cursor::new(Vec::new());
+    write_into(&mut archive, entries).map_err(|failure| Failure { what: target.display().to_string(), ..failure })?;
+    output_file::write(target, archive.into_inner())
+}
+
+/// Write the archive into anything seekable.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_into(target: impl Write + Seek, entries: &[Entry]) -> Result<()> {
+    check_names(entries)?;
+    let mut writer = ZipWriter::new(target);
+    for entry in entries {
+        writer
+            .start_file(entry.name.as_str(), options(entry))
+            .map_err(|error| Failure::new(&entry.name, format!("cannot be added: {error}"), ""))?;
+        writer.write_all(&entry.bytes).map_err(|error| {
+            Failure::new(&entry.name, format!("cannot be written: {error}"), "Check the space on the disk")
+        })?;
+    }
+    writer.finish().map_err(|error| Failure::new("archive", format!("cannot be finished: {error}"), ""))?;
+    Ok(())
+}
+
+fn options(entry: &Entry) -> SimpleFileOptions {
+    // Deflating a picture or an empty file only makes it longer.
+    let stored = entry.bytes.is_empty() || entry.name.ends_with(".png");
+    let shared_library = entry.name.ends_with(".so");
+    SimpleFileOptions::default()
+        .compression_method(if stored { CompressionMethod::Stored } else { CompressionMethod::Deflated })
+        .compression_level(if stored { None } else { Some(9) })
+        .last_modified_time(DateTime::default())
+        .large_file(false)
+        .unix_permissions(if shared_library { 0o755 } else { 0o644 })
+}
+
+fn check_names(entries: &[Entry]) -> Result<()> {
+    let mut seen = BTreeSet::new();
+    for entry in entries {
+        let name = entry.name.as_str();
+        let parts_legal = name.split('/').all(|part| !matches!(part, "" | "." | ".."));
+        let characters_legal = name.bytes().all(|byte| matches!(byte, 0x20..0x7f) && byte != b'\\' && byte != b':');
+        if !parts_legal || !characters_legal {
+            return Err(Failure::new(
+                name,
+                "not a name for a file in an FMU",
+                "Use ASCII letters and digits, relative paths and forward slashes",
+            ));
+        }
+        if u32::try_from(entry.bytes.len()).is_err() {
+            return Err(Failure::new(name, "4 GiB or more", "An FMU cannot hold such a file; reduce the model"));
+        }
+        if !seen.insert(name) {
+            return Err(Failure::new(name, "twice in the same archive", "Give the files different names"));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::*;
+
+    fn sample() -> Vec<Entry> {
+        let noise: Vec<u8> =
+            (0..5000_u32).map(|i| u8::try_from(i.wrapping_mul(2_654_435_761) >> 24).unwrap()).collect();
+        vec![
+            Entry::new("modelDescription.xml", "<fmiModelDescription/>".repeat(50)),
+            Entry::new("binaries/linux64/tiprub.so", noise),
+            Entry::new("resources/empty", ""),
+            Entry::new("model.png", [1, 2, 3]),
+        ]
+    }
+
+    fn bytes(entries: &[Entry]) -> Vec<u8> {
+        let mut buffer = Cursor::new(Vec::new());
+        write_into(&mut buffer, entries).unwrap();
+        buffer.into_inner()
+    }
+
+    fn u16_at(bytes: &[u8], at: usize) -> u16 {
+        u16::from_le_bytes(bytes[at..at + 2].try_into().unwrap())
+    }
+
+    fn u32_at(bytes: &[u8], at: usize) -> usize {
+        usize::try_from(u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())).unwrap()
+    }
+
+    /// Every header field, read by the layout of PKWARE's APPNOTE 4.3.7, 4.3.12 and 4.3.16 and nothing else.
+    #[test]
+    fn every_header_byte_keeps_the_rules() {
+        let entries = sample();
+        let archive = bytes(&entries);
+        let mut at = 0;
+        let mut offsets = Vec::new();
+        for entry in &entries {
+            offsets.push(at);
+            assert_eq!(&archive[at..at + 4], b"PK\x03\x04", "local header of {}", entry.name);
+            let stored = entry.name.ends_with("empty") || entry.name.ends_with(".png");
+            assert!(u16_at(&archive, at + 4) <= 20, "version needed of {}", entry.name);
+            assert_eq!(u16_at(&archive, at + 6), 0, "flags of {}: no data descriptor, no encryption", entry.name);
+            assert_eq!(u16_at(&archive, at + 8), if stored { 0 } else { 8 }, "method of {}", entry.name);
+            assert_eq!((u16_at(&archive, at + 10), u16_at(&archive, at + 12)), (0, 0x21), "time of {}", entry.name);
+            let (packed, unpacked) = (u32_at(&archive, at + 18), u32_at(&archive, at + 22));
+            assert_eq!(unpacked, entry.bytes.len());
+            let name_length = usize::from(u16_at(&archive, at + 26));
+            assert_eq!(u16_at(&archive, at + 28), 0, "extra field of {}", entry.name);
+            assert_eq!(&archive[at + 30..at + 30 + name_length], entry.name.as_bytes());
+            at += 30 + name_length + packed;
+        }
+        let directory = at;
+        for (entry, offset) in entries.iter().zip(&offsets) {
+            assert_eq!(&archive[at..at + 4], b"PK\x01\x02", "central header of {}", entry.name);
+            assert!(u16_at(&archive, at + 6) <= 20, "version needed of {}", entry.name);
+            assert_eq!(u16_at(&archive, at + 8), 0, "flags of {}", entry.name);
+            assert_eq!((u16_at(&archive, at + 12), u16_at(&archive, at + 14)), (0, 0x21), "time of {}", entry.name);
+            assert_eq!((u16_at(&archive, at + 30), u16_at(&archive, at + 32)), (0, 0), "extra, comment");
+            assert_eq!(u32_at(&archive, at + 42), *offset);
+            at += 46 + usize::from(u16_at(&archive, at + 28));
+        }
+        assert_eq!(&archive[at..at + 4], b"PK\x05\x06", "no zip64 record between directory and end");
+        assert_eq!(usize::from(u16_at(&archive, at + 10)), entries.len());
+        assert_eq!((u32_at(&archive, at + 12), u32_at(&archive, at + 16)), (at - directory, directory));
+        assert_eq!(at + 22, archive.len(), "no comment, nothing behind the end");
+    }
+
+    #[test]
+    fn the_same_entries_give_the_same_bytes_and_read_back() {
+        let entries = sample();
+        let archive = bytes(&entries);
+        assert_eq!(archive, bytes(&entries));
+        let mut reader = zip::ZipArchive::new(Cursor::new(archive)).unwrap();
+        for (index, entry) in entries.iter().enumerate() {
+            let mut file = reader.by_index(index).unwrap();
+            let mut contents = Vec::new();
+            std::io::Read::read_to_end(&mut file, &mut contents).unwrap();
+            assert_eq!(file.name().unwrap(), entry.name);
+            assert_eq!(contents, entry.bytes);
+        }
+    }
+
+    #[test]
+    fn names_that_importers_trip_over_are_refused() {
+        for name in ["./a", "a//b", "/a", "a\\b", "../a", "", "a/", "ä", "c:a"] {
+            let failure = write_into(Cursor::new(Vec::new()), &[Entry::new(name, "x")]).unwrap_err();
+            assert_eq!(failure.what, name);
+        }
+        let twice = [Entry::new("a", "x"), Entry::new("a", "y")];
+        assert!(write_into(Cursor::new(Vec::new()), &twice).unwrap_err().problem.contains("twice"));
+    }
+
+    #[test]
+    fn a_refused_archive_leaves_no_file() {
+        let root = tempfile::tempdir().unwrap();
+        assert!(write(&root.path().join("x.fmu"), &[Entry::new("./a", "x")]).is_err());
+        assert_eq!(std::fs::read_dir(root.path()).unwrap().count(), 0);
+    }
+}

@@ -1,0 +1,271 @@
+//! The FMI 2.0 co-simulation call sequence, function by function, over the C ABI.
+
+use std::ffi::{CStr, c_char, c_void};
+
+use libloading::Library;
+use tiprub_shell::{Failure, Result, schedule::Schedule};
+
+use super::{
+    UnpackedFmu, VariableType,
+    slave::{MessageList, OutputGroup, Slave, c_text, check, symbol},
+};
+
+type Component = *mut c_void;
+type Status = i32;
+type Reference = u32;
+
+type Allocate = extern "C" fn(usize, usize) -> *mut c_void;
+type Free = extern "C" fn(*mut c_void);
+/// The logger of the standard is variadic; see [`log_message`].
+type Logger = unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, ...);
+
+/// fmi2CallbackFunctions.
+#[repr(C)]
+struct Callbacks {
+    logger: Option<Logger>,
+    allocate_memory: Option<Allocate>,
+    free_memory: Option<Free>,
+    step_finished: Option<extern "C" fn(*mut c_void, Status)>,
+    component_environment: *mut c_void,
+}
+
+type Instantiate =
+    unsafe extern "C" fn(*const c_char, i32, *const c_char, *const c_char, *const Callbacks, i32, i32) -> Component;
+type SetupExperiment = unsafe extern "C" fn(Component, i32, f64, f64, i32, f64) -> Status;
+type PhaseChange = unsafe extern "C" fn(Component) -> Status;
+type DoStep = unsafe extern "C" fn(Component, f64, f64, i32) -> Status;
+type GetReal = unsafe extern "C" fn(Component, *const Reference, usize, *mut f64) -> Status;
+type SetReal = unsafe extern "C" fn(Component, *const Reference, usize, *const f64) -> Status;
+type GetInteger = unsafe extern "C" fn(Component, *const Reference, usize, *mut i32) -> Status;
+type FreeInstance = unsafe extern "C" fn(Component);
+
+/// Co-simulation slave of fmi2Type.
+const CO_SIMULATION: i32 = 1;
+
+extern "C" fn allocate(count: usize, size: usize) -> *mut c_void {
+    // SAFETY: calloc has no preconditions; the FMU gives the block back through `release`.
+    unsafe { libc::calloc(count, size) }
+}
+
+extern "C" fn release(block: *mut c_void) {
+    // SAFETY: the block came from `allocate`, by the contract of the standard.
+    unsafe { libc::free(block) }
+}
+
+/// The logger, as seen by a caller that passes the format "%s" and one string.
+///
+/// Rust cannot define variadic functions. On the two Linux ABIs for which FMUs are made here (System V x86-64 and
+/// AAPCS64) the first six pointer-sized arguments are passed in the same registers whether or not the callee is
+/// variadic, so a plain function can stand in. Any other format is shown as it is.
+#[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
+unsafe extern "C" fn log_message(
+    environment: *mut c_void,
+    _instance: *const c_char,
+    _status: Status,
+    _category: *const c_char,
+    format: *const c_char,
+    argument: *const c_char,
+) {
+    if format.is_null() || environment.is_null() {
+        return;
+    }
+    // SAFETY: strings are zero-terminated by the standard; `argument` is read only for "%s"; the environment is
+    // the message list of the slave, which outlives the instance.
+    unsafe {
+        let format = CStr::from_ptr(format);
+        let text = if format.to_bytes() == b"%s" && !argument.is_null() { CStr::from_ptr(argument) } else { format };
+        (*environment.cast::<MessageList>()).push(text);
+    }
+}
+
+#[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
+fn logger() -> Option<Logger> {
+    type Plain = unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, *const c_char);
+    // SAFETY: same registers for the first six arguments, as said at `log_message`.
+    Some(unsafe { std::mem::transmute::<Plain, Logger>(log_message) })
+}
+
+#[cfg(not(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64"))))]
+fn logger() -> Option<Logger> {
+    None
+}
+
+/// The functions in use, looked up once; plain pointers, valid as long as the library is loaded.
+struct Functions {
+    instantiate: Instantiate,
+    setup_experiment: SetupExperiment,
+    enter_initialization: PhaseChange,
+    exit_initialization: PhaseChange,
+    do_step: DoStep,
+    get_real: GetReal,
+    set_real: SetReal,
+    get_integer: GetInteger,
+    get_boolean: GetInteger,
+    terminate: PhaseChange,
+    free_instance: FreeInstance,
+}
+
+impl Functions {
+    fn load(library: &Library) -> Result<Self> {
+        // SAFETY: the signatures are those of fmi2FunctionTypes.h, and the library is kept as long as this value.
+        unsafe {
+            Ok(Self {
+                instantiate: symbol(library, "fmi2Instantiate")?,
+                setup_experiment: symbol(library, "fmi2SetupExperiment")?,
+                enter_initialization: symbol(library, "fmi2EnterInitializationMode")?,
+                exit_initialization: symbol(library, "fmi2ExitInitializationMode")?,
+                do_step: symbol(library, "fmi2DoStep")?,
+                get_real: symbol(library, "fmi2GetReal")?,
+                set_real: symbol(library, "fmi2SetReal")?,
+                get_integer: symbol(library, "fmi2GetInteger")?,
+                get_boolean: symbol(library, "fmi2GetBoolean")?,
+                terminate: symbol(library, "fmi2Terminate")?,
+                free_instance: symbol(library, "fmi2FreeInstance")?,
+            })
+        }
+    }
+}
+
+/// One FMI 2.0 co-simulation instance; freed when dropped.
+pub(super) struct Fmi2Slave {
+    component: Component,
+    functions: Functions,
+    messages: Box<MessageList>,
+    /// The FMU may keep the pointer it was given.
+    _callbacks: Box<Callbacks>,
+    /// Last, so that the code is unloaded after everything else.
+    _library: Library,
+}
+
+impl Fmi2Slave {
+    /// Load the library and instantiate.
+    pub(super) fn new(fmu: &UnpackedFmu, library: Library) -> Result<Self> {
+        let functions = Functions::load(&library)?;
+        let messages = Box::new(MessageList::default());
+        let callbacks = Box::new(Callbacks {
+            logger: logger(),
+            allocate_memory: Some(allocate),
+            free_memory: Some(release),
+            step_finished: None,
+            component_environment: std::ptr::from_ref(messages.as_ref()).cast_mut().cast(),
+        });
+        let name = c_text(&fmu.description.model_name)?;
+        let token = c_text(&fmu.description.token)?;
+        let resources = c_text(&file_uri(&fmu.resources()))?;
+        // SAFETY: all strings live through the call, the callbacks as long as the instance.
+        let component = unsafe {
+            (functions.instantiate)(name.as_ptr(), CO_SIMULATION, token.as_ptr(), resources.as_ptr(), &*callbacks, 0, 0)
+        };
+        if component.is_null() {
+            return Err(Failure::new("FMU", format!("fmi2Instantiate failed{}", messages.last_words()), ""));
+        }
+        Ok(Self { component, functions, messages, _callbacks: callbacks, _library: library })
+    }
+}
+
+impl Drop for Fmi2Slave {
+    fn drop(&mut self) {
+        // SAFETY: the component is alive until here and not used afterwards.
+        unsafe { (self.functions.free_instance)(self.component) }
+    }
+}
+
+impl Slave for Fmi2Slave {
+    fn initialise(&mut self, schedule: &Schedule) -> Result<()> {
+        // SAFETY: a live component, in the order the standard wants.
+        let (setup, enter, exit) = unsafe {
+            (
+                (self.functions.setup_experiment)(self.component, 0, 0.0, schedule.start, 1, schedule.stop),
+                (self.functions.enter_initialization)(self.component),
+                (self.functions.exit_initialization)(self.component),
+            )
+        };
+        check("fmi2SetupExperiment", None, setup, &self.messages)?;
+        check("fmi2EnterInitializationMode", None, enter, &self.messages)?;
+        check("fmi2ExitInitializationMode", None, exit, &self.messages)
+    }
+
+    fn do_step(&mut self, time: f64, step: f64) -> Result<()> {
+        // SAFETY: a live component in step mode.
+        let status = unsafe { (self.functions.do_step)(self.component, time, step, 1) };
+        check("fmi2DoStep", Some(time), status, &self.messages)
+    }
+
+    fn read(&mut self, group: &OutputGroup, values: &mut Vec<f64>) -> Result<()> {
+        let (references, count) = (group.references.as_ptr(), group.references.len());
+        match group.kind {
+            VariableType::Float64 => {
+                let at = values.len();
+                values.resize(at + count, 0.0);
+                // SAFETY: `count` references and `count` values behind the pointers.
+                let status =
+                    unsafe { (self.functions.get_real)(self.component, references, count, values[at..].as_mut_ptr()) };
+                check("fmi2GetReal", None, status, &self.messages)
+            }
+            _ => {
+                let boolean = group.kind == VariableType::Boolean;
+                let get = if boolean { self.functions.get_boolean } else { self.functions.get_integer };
+                let mut integers = vec![0_i32; count];
+                // SAFETY: `count` references and `count` values behind the pointers.
+                let status = unsafe { get(self.component, references, count, integers.as_mut_ptr()) };
+                check(if boolean { "fmi2GetBoolean" } else { "fmi2GetInteger" }, None, status, &self.messages)?;
+                values.extend(integers.into_iter().map(f64::from));
+                Ok(())
+            }
+        }
+    }
+
+    fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
+        // SAFETY: one reference and one value behind the pointers.
+        let status = unsafe { (self.functions.set_real)(self.component, &raw const reference, 1, &raw const value) };
+        check("fmi2SetReal", None, status, &self.messages)
+    }
+
+    fn terminate(&mut self) -> Result<()> {
+        // SAFETY: a live component in step mode.
+        let status = unsafe { (self.functions.terminate)(self.component) };
+        check("fmi2Terminate", None, status, &self.messages)
+    }
+
+    fn messages(&self) -> Vec<String> {
+        self.messages.all()
+    }
+}
+
+/// A file URI as in RFC 8089, with everything but unreserved characters percent-encoded.
+fn file_uri(path: &std::path::Path) -> String {
+    use std::fmt::Write as _;
+    let mut uri = String::from("file://");
+    for byte in path.to_string_lossy().bytes() {
+        if byte.is_ascii_alphanumeric() || b"/-._~".contains(&byte) {
+            uri.push(char::from(byte));
+        } else {
+            let _ = write!(uri, "%{byte:02X}");
+        }
+    }
+    uri
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn uris_are_encoded() {
+        assert_eq!(file_uri(std::path::Path::new("/tmp/a b/ü")), "file:///tmp/a%20b/%C3%BC");
+    }
+
+    #[test]
+    fn the_logger_reads_format_and_argument() {
+        let messages = MessageList::default();
+        let environment: *mut c_void = std::ptr::from_ref(&messages).cast_mut().cast();
+        let log = logger().expect("this platform has a logger");
+        // SAFETY: a variadic call as an FMU makes it, with live strings.
+        unsafe {
+            log(environment, c"i".as_ptr(), 3, c"error".as_ptr(), c"%s".as_ptr(), c"100 % wrong".as_ptr());
+            log(environment, std::ptr::null(), 0, std::ptr::null(), c"plain".as_ptr());
+            log(environment, std::ptr::null(), 0, std::ptr::null(), std::ptr::null());
+        }
+        assert_eq!(messages.all(), ["100 % wrong", "plain"]);
+    }
+}

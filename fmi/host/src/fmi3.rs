@@ -1,0 +1,228 @@
+//! The FMI 3.0 co-simulation call sequence, function by function, over the C ABI.
+
+use std::ffi::{CStr, c_char, c_void};
+
+use libloading::Library;
+use tiprub_shell::{Failure, Result, schedule::Schedule};
+
+use super::{
+    UnpackedFmu, VariableType,
+    slave::{MessageList, OutputGroup, Slave, c_text, check, symbol},
+};
+
+type Instance = *mut c_void;
+type Status = i32;
+type Reference = u32;
+
+type LogMessage = unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char);
+type IntermediateUpdate = Option<unsafe extern "C" fn()>;
+
+type Instantiate = unsafe extern "C" fn(
+    *const c_char,      // instanceName
+    *const c_char,      // instantiationToken
+    *const c_char,      // resourcePath
+    bool,               // visible
+    bool,               // loggingOn
+    bool,               // eventModeUsed
+    bool,               // earlyReturnAllowed
+    *const Reference,   // requiredIntermediateVariables
+    usize,              // nRequiredIntermediateVariables
+    *mut c_void,        // instanceEnvironment
+    Option<LogMessage>, // logMessage
+    IntermediateUpdate, // intermediateUpdate
+) -> Instance;
+type EnterInitialization = unsafe extern "C" fn(Instance, bool, f64, f64, bool, f64) -> Status;
+type PhaseChange = unsafe extern "C" fn(Instance) -> Status;
+type DoStep = unsafe extern "C" fn(Instance, f64, f64, bool, *mut bool, *mut bool, *mut bool, *mut f64) -> Status;
+type Get<T> = unsafe extern "C" fn(Instance, *const Reference, usize, *mut T, usize) -> Status;
+type SetFloat64 = unsafe extern "C" fn(Instance, *const Reference, usize, *const f64, usize) -> Status;
+type FreeInstance = unsafe extern "C" fn(Instance);
+
+/// The logger: the environment is the message list of the slave.
+unsafe extern "C" fn log_message(
+    environment: *mut c_void,
+    _status: Status,
+    _category: *const c_char,
+    message: *const c_char,
+) {
+    if environment.is_null() || message.is_null() {
+        return;
+    }
+    // SAFETY: a zero-terminated string by the standard; the list outlives the instance.
+    unsafe { (*environment.cast::<MessageList>()).push(CStr::from_ptr(message)) }
+}
+
+/// The functions in use, looked up once; plain pointers, valid as long as the library is loaded.
+struct Functions {
+    instantiate: Instantiate,
+    enter_initialization: EnterInitialization,
+    exit_initialization: PhaseChange,
+    do_step: DoStep,
+    get_float64: Get<f64>,
+    set_float64: SetFloat64,
+    get_int32: Get<i32>,
+    get_int64: Get<i64>,
+    get_boolean: Get<u8>,
+    terminate: PhaseChange,
+    free_instance: FreeInstance,
+}
+
+impl Functions {
+    fn load(library: &Library) -> Result<Self> {
+        // SAFETY: the signatures are those of fmi3FunctionTypes.h, and the library is kept as long as this value.
+        unsafe {
+            Ok(Self {
+                instantiate: symbol(library, "fmi3InstantiateCoSimulation")?,
+                enter_initialization: symbol(library, "fmi3EnterInitializationMode")?,
+                exit_initialization: symbol(library, "fmi3ExitInitializationMode")?,
+                do_step: symbol(library, "fmi3DoStep")?,
+                get_float64: symbol(library, "fmi3GetFloat64")?,
+                set_float64: symbol(library, "fmi3SetFloat64")?,
+                get_int32: symbol(library, "fmi3GetInt32")?,
+                get_int64: symbol(library, "fmi3GetInt64")?,
+                get_boolean: symbol(library, "fmi3GetBoolean")?,
+                terminate: symbol(library, "fmi3Terminate")?,
+                free_instance: symbol(library, "fmi3FreeInstance")?,
+            })
+        }
+    }
+}
+
+/// One FMI 3.0 co-simulation instance; freed when dropped.
+pub(super) struct Fmi3Slave {
+    instance: Instance,
+    functions: Functions,
+    messages: Box<MessageList>,
+    /// Last, so that the code is unloaded after everything else.
+    _library: Library,
+}
+
+impl Fmi3Slave {
+    /// Load the library and instantiate.
+    pub(super) fn new(fmu: &UnpackedFmu, library: Library) -> Result<Self> {
+        let functions = Functions::load(&library)?;
+        let messages = Box::new(MessageList::default());
+        let name = c_text(&fmu.description.model_name)?;
+        let token = c_text(&fmu.description.token)?;
+        // FMI 3.0 wants an absolute native path with a trailing separator.
+        let resources = c_text(&format!("{}/", fmu.resources().display()))?;
+        // SAFETY: all strings live through the call, the message list as long as the instance.
+        let instance = unsafe {
+            (functions.instantiate)(
+                name.as_ptr(),
+                token.as_ptr(),
+                resources.as_ptr(),
+                false,
+                false,
+                false,
+                false,
+                std::ptr::null(),
+                0,
+                std::ptr::from_ref(messages.as_ref()).cast_mut().cast(),
+                Some(log_message),
+                None,
+            )
+        };
+        if instance.is_null() {
+            let problem = format!("fmi3InstantiateCoSimulation failed{}", messages.last_words());
+            return Err(Failure::new("FMU", problem, ""));
+        }
+        Ok(Self { instance, functions, messages, _library: library })
+    }
+
+    /// Read `group.values` numbers with one getter.
+    fn get<T: Copy + Default>(&self, function: &str, get: Get<T>, group: &OutputGroup) -> Result<Vec<T>> {
+        let mut values = vec![T::default(); group.values];
+        let references = &group.references;
+        // SAFETY: the two counts say how much is behind the two pointers.
+        let status =
+            unsafe { get(self.instance, references.as_ptr(), references.len(), values.as_mut_ptr(), values.len()) };
+        check(function, None, status, &self.messages)?;
+        Ok(values)
+    }
+}
+
+impl Drop for Fmi3Slave {
+    fn drop(&mut self) {
+        // SAFETY: the instance is alive until here and not used afterwards.
+        unsafe { (self.functions.free_instance)(self.instance) }
+    }
+}
+
+impl Slave for Fmi3Slave {
+    fn initialise(&mut self, schedule: &Schedule) -> Result<()> {
+        // SAFETY: a live instance, in the order the standard wants.
+        let (enter, exit) = unsafe {
+            (
+                (self.functions.enter_initialization)(self.instance, false, 0.0, schedule.start, true, schedule.stop),
+                (self.functions.exit_initialization)(self.instance),
+            )
+        };
+        check("fmi3EnterInitializationMode", None, enter, &self.messages)?;
+        check("fmi3ExitInitializationMode", None, exit, &self.messages)
+    }
+
+    fn do_step(&mut self, time: f64, step: f64) -> Result<()> {
+        let (mut event, mut terminate, mut early) = (false, false, false);
+        let mut last_time = f64::NAN;
+        // SAFETY: a live instance in step mode, four valid places to write to.
+        let status = unsafe {
+            (self.functions.do_step)(
+                self.instance,
+                time,
+                step,
+                true,
+                &raw mut event,
+                &raw mut terminate,
+                &raw mut early,
+                &raw mut last_time,
+            )
+        };
+        check("fmi3DoStep", Some(time), status, &self.messages)?;
+        if terminate || early || last_time.to_bits() != (time + step).to_bits() {
+            return Err(Failure::new(
+                "FMU",
+                format!("fmi3DoStep from {time} s by {step} s ended at {last_time} s"),
+                "Neither early return nor event mode was asked for",
+            ));
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, group: &OutputGroup, values: &mut Vec<f64>) -> Result<()> {
+        match group.kind {
+            VariableType::Float64 => values.extend(self.get("fmi3GetFloat64", self.functions.get_float64, group)?),
+            VariableType::Int32 => {
+                values.extend(self.get("fmi3GetInt32", self.functions.get_int32, group)?.into_iter().map(f64::from));
+            }
+            VariableType::Int64 => {
+                let numbers = self.get("fmi3GetInt64", self.functions.get_int64, group)?;
+                values.extend(numbers.into_iter().map(|number| number as f64));
+            }
+            // One byte each; anything but 0 is true.
+            VariableType::Boolean => {
+                let bytes = self.get("fmi3GetBoolean", self.functions.get_boolean, group)?;
+                values.extend(bytes.into_iter().map(|byte| f64::from(u8::from(byte != 0))));
+            }
+            VariableType::Text => {}
+        }
+        Ok(())
+    }
+
+    fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
+        // SAFETY: one reference and one value behind the pointers.
+        let status =
+            unsafe { (self.functions.set_float64)(self.instance, &raw const reference, 1, &raw const value, 1) };
+        check("fmi3SetFloat64", None, status, &self.messages)
+    }
+
+    fn terminate(&mut self) -> Result<()> {
+        // SAFETY: a live instance in step mode.
+        let status = unsafe { (self.functions.terminate)(self.instance) };
+        check("fmi3Terminate", None, status, &self.messages)
+    }
+
+    fn messages(&self) -> Vec<String> {
+        self.messages.all()
+    }
+}

@@ -1,0 +1,306 @@
+//! A packaged FMU driven the way any importer would: unzip, read modelDescription.xml, load the shared library,
+//! and go through the standard's call sequence. It knows nothing of the scene or of the core behind the ABI.
+
+pub mod archive;
+mod description;
+mod fmi2;
+mod fmi3;
+mod session;
+mod slave;
+
+use std::{
+    fs,
+    io::{self, Read},
+    path::{Component, Path, PathBuf},
+    time::Duration,
+};
+
+use tempfile::TempDir;
+use zip::ZipArchive;
+
+pub use description::{ImportedDescription, ImportedVariable, VariableType, parse};
+pub use session::Session;
+
+use tiprub_shell::{Failure, Result, recording::Recording, schedule::Schedule};
+
+/// Largest size (bytes) of all files of an archive together, unpacked: far beyond any FMU, far below a zip bomb.
+const LARGEST_UNPACKED: u64 = 2 << 30;
+/// Describes the FMU, at the root of the archive.
+const DESCRIPTION: &str = "modelDescription.xml";
+/// Its largest size (bytes).
+const LARGEST_DESCRIPTION: u64 = 256 << 20;
+
+/// An FMU unpacked to a temporary directory, which lives as long as this value.
+#[derive(Debug)]
+pub struct UnpackedFmu {
+    directory: TempDir,
+    /// What modelDescription.xml says.
+    pub description: ImportedDescription,
+}
+
+/// Results of a run through the C ABI.
+#[derive(Debug, Clone)]
+pub struct ImportedRun {
+    /// All outputs at all communication points.
+    pub recording: Recording,
+    /// Time spent inside doStep.
+    pub stepping: Duration,
+    /// What the FMU logged.
+    pub messages: Vec<String>,
+}
+
+/// Open a zip for reading, with messages for the ways in which a file can fail to be one.
+///
+/// # Errors
+/// The file cannot be opened or is not a whole zip.
+pub fn open_archive(path: &Path) -> Result<ZipArchive<io::BufReader<fs::File>>> {
+    let file = tiprub_format::open_file(path).map_err(|error| Failure::file(path, "cannot be opened", &error))?;
+    ZipArchive::new(io::BufReader::new(file)).map_err(|error| {
+        Failure::new(
+            path.display(),
+            format!("not a whole zip archive ({error})"),
+            "The file is truncated or no FMU. Copy it again, or make it again with `tiprub package`",
+        )
+    })
+}
+
+/// Names and sizes of all entries, as the archive announces them.
+///
+/// # Errors
+/// A damaged entry, or more than 2 GiB in all.
+pub fn entries(archive: &mut ZipArchive<impl Read + io::Seek>) -> Result<Vec<(String, u64)>> {
+    let mut entries = Vec::new();
+    let mut total = 0_u64;
+    for index in 0..archive.len() {
+        let entry = archive.by_index_raw(index).map_err(|error| damaged(&format!("{}", index + 1), &error))?;
+        let name = entry.name().map_err(|error| damaged(&format!("{}", index + 1), &error))?.into_owned();
+        total = total.saturating_add(entry.size());
+        entries.push((name, entry.size()));
+    }
+    if total > LARGEST_UNPACKED {
+        let problem =
+            format!("its files would take {total} bytes unpacked, more than the {LARGEST_UNPACKED} that are unpacked");
+        return Err(Failure::new(
+            "archive",
+            problem,
+            "Do not trust this file; an FMU of this size needs a smaller ROM",
+        ));
+    }
+    Ok(entries)
+}
+
+/// Unpack entry `index` into `target`, checked against its CRC and the size that was announced; never writes more than that.
+///
+/// # Errors
+/// A damaged entry, or a target that takes no more.
+pub fn unpack_entry(
+    archive: &mut ZipArchive<impl Read + io::Seek>,
+    index: usize,
+    name: &str,
+    target: &mut impl io::Write,
+) -> Result<()> {
+    let mut entry = archive.by_index(index).map_err(|error| damaged(name, &error))?;
+    let size = entry.size();
+    let written = io::copy(&mut entry.by_ref().take(size), target).map_err(|error| damaged(name, &error))?;
+    // Past the end the checksum is compared.
+    let more = entry.read(&mut [0]).map_err(|error| damaged(name, &error))?;
+    if written != size || more != 0 {
+        return Err(damaged(name, &format!("its size is not the {size} bytes announced")));
+    }
+    Ok(())
+}
+
+fn damaged(name: &str, error: &dyn std::fmt::Display) -> Failure {
+    let remedy = "Copy the file again, or make it again with `tiprub package`";
+    Failure::new(format!("entry {name}"), format!("damaged ({error})"), remedy)
+}
+
+impl UnpackedFmu {
+    /// Unzip to a temporary directory and read modelDescription.xml.
+    ///
+    /// # Errors
+    /// Not a zip, a damaged entry, a name that leads out of the directory, or an unreadable description.
+    pub fn open(path: &Path) -> Result<Self> {
+        Self::open_part(path, |_| true)
+    }
+
+    /// The same with those entries alone whose names are `wanted`, beside modelDescription.xml; the others are only read, to
+    /// check them.
+    ///
+    /// # Errors
+    /// As [`UnpackedFmu::open`].
+    pub fn open_part(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<Self> {
+        let in_file = |failure: Failure| Failure { what: format!("{}: {}", path.display(), failure.what), ..failure };
+        let mut archive = open_archive(path)?;
+        let directory = TempDir::with_prefix("tiprub-fmu-")
+            .map_err(|error| Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error))?;
+        for (index, (name, _)) in entries(&mut archive).map_err(in_file)?.into_iter().enumerate() {
+            let unpacked = if wanted(&name) || name == DESCRIPTION {
+                unpack(&mut archive, index, &name, directory.path())
+            } else {
+                unpack_entry(&mut archive, index, &name, &mut io::sink())
+            };
+            unpacked.map_err(in_file)?;
+        }
+        let description_path = directory.path().join(DESCRIPTION);
+        let text = tiprub_format::read_file(&description_path, LARGEST_DESCRIPTION)
+            .and_then(|bytes| String::from_utf8(bytes).map_err(io::Error::other));
+        let text = text.map_err(|error| {
+            Failure::new(
+                path.display(),
+                format!("has no readable modelDescription.xml ({error})"),
+                "An FMU has this file at its root; is this one?",
+            )
+        })?;
+        let description = parse(&text).map_err(in_file)?;
+        Ok(Self { directory, description })
+    }
+
+    /// The shared library for this machine.
+    ///
+    /// # Errors
+    /// The FMU has none.
+    pub fn library(&self) -> Result<PathBuf> {
+        let platform = if self.description.fmi_version.starts_with('2') { "linux64" } else { "x86_64-linux" };
+        let name = format!("binaries/{platform}/{}.so", self.description.model_identifier);
+        let path = self.directory.path().join(&name);
+        if path.is_file() {
+            Ok(path)
+        } else {
+            Err(Failure::new("FMU", format!("has no {name}"), "It was not made for this platform"))
+        }
+    }
+
+    /// Directory of the unpacked resources.
+    pub fn resources(&self) -> PathBuf {
+        self.directory.path().join("resources")
+    }
+
+    /// Co-simulate over the schedule and record all outputs.
+    ///
+    /// # Errors
+    /// The library cannot be loaded, or a call answers worse than Warning; the FMU's own messages are included.
+    pub fn simulate(&self, schedule: &Schedule, progress: &dyn Fn(usize)) -> Result<ImportedRun> {
+        let library = slave::load(&self.library()?)?;
+        let run = |slave: &mut dyn slave::Slave| slave::drive(slave, &self.description, schedule, progress);
+        match self.description.fmi_version.as_str() {
+            "2.0" => run(&mut fmi2::Fmi2Slave::new(self, library)?),
+            "3.0" => run(&mut fmi3::Fmi3Slave::new(self, library)?),
+            other => Err(Failure::new("FMU", format!("FMI version {other}"), "Only 2.0 and 3.0 can be imported")),
+        }
+    }
+}
+
+fn unpack(archive: &mut ZipArchive<impl Read + io::Seek>, index: usize, name: &str, directory: &Path) -> Result<()> {
+    if name.ends_with('/') {
+        return Ok(());
+    }
+    let target = inside(directory, name)?;
+    if let Some(parent) = target.parent() {
+        fs::create_dir_all(parent).map_err(|error| Failure::file(parent, "cannot be made", &error))?;
+    }
+    let mut file = fs::File::create(&target).map_err(|error| Failure::file(&target, "cannot be written", &error))?;
+    unpack_entry(archive, index, name, &mut file)
+}
+
+/// Where an entry goes.
+fn inside(directory: &Path, name: &str) -> Result<PathBuf> {
+    let relative = Path::new(name);
+    if relative.components().all(|component| matches!(component, Component::Normal(_))) {
+        return Ok(directory.join(relative));
+    }
+    Err(Failure::new(name, "leads out of the archive", "Do not trust this file"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::archive::{self, Entry};
+
+    fn archive_with(entries: &[Entry]) -> (TempDir, PathBuf) {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("x.fmu");
+        archive::write(&path, entries).unwrap();
+        (root, path)
+    }
+
+    #[test]
+    fn a_truncated_zip_is_named_with_a_remedy() {
+        let (_root, path) = archive_with(&[Entry::new("modelDescription.xml", "x".repeat(1000))]);
+        let bytes = fs::read(&path).unwrap();
+        for length in [0, 1, 30, bytes.len() / 2, bytes.len() - 1] {
+            fs::write(&path, &bytes[..length]).unwrap();
+            let failure = UnpackedFmu::open(&path).unwrap_err();
+            assert!(failure.what.ends_with("x.fmu"), "{failure}");
+            assert!(failure.problem.contains("not a whole zip") && failure.remedy.contains("again"), "{failure}");
+        }
+    }
+
+    #[test]
+    fn flipped_bits_anywhere_never_panic() {
+        let (_root, path) =
+            archive_with(&[Entry::new("modelDescription.xml", "<a/>".repeat(50)), Entry::new("b", "c")]);
+        let bytes = fs::read(&path).unwrap();
+        for at in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 0x41;
+            fs::write(&path, damaged).unwrap();
+            assert!(UnpackedFmu::open(&path).is_err(), "no FMU to begin with");
+        }
+    }
+
+    #[test]
+    fn a_zip_that_is_no_fmu_is_named() {
+        let (_root, path) = archive_with(&[Entry::new("a.txt", "hello")]);
+        assert!(UnpackedFmu::open(&path).unwrap_err().problem.contains("modelDescription.xml"));
+    }
+
+    #[test]
+    fn names_that_lead_out_are_refused() {
+        let root = tempfile::tempdir().unwrap();
+        assert!(inside(root.path(), "../evil").is_err());
+        assert!(inside(root.path(), "/evil").is_err());
+        assert_eq!(inside(root.path(), "a/b").unwrap(), root.path().join("a/b"));
+    }
+
+    /// The size of an entry stands in its local header and in the directory; a liar changes both.
+    fn announce(path: &Path, size: u32) {
+        let mut bytes = fs::read(path).unwrap();
+        let mut change = |at: usize| bytes[at..at + 4].copy_from_slice(&size.to_le_bytes());
+        change(22);
+        let directory = fs::read(path).unwrap().windows(4).position(|four| four == b"PK\x01\x02").unwrap();
+        change(directory + 24);
+        fs::write(path, bytes).unwrap();
+    }
+
+    #[test]
+    fn a_bomb_is_refused_by_its_size_before_anything_is_unpacked() {
+        let (_root, path) = archive_with(&[Entry::new("resources/zeros", vec![0; 1 << 20])]);
+        announce(&path, 3 << 30);
+        let failure = UnpackedFmu::open(&path).unwrap_err();
+        assert!(failure.what.contains("x.fmu") && failure.problem.contains("3221225472 bytes"), "{failure}");
+        // One that announces less than it holds is unpacked no further.
+        for size in [0, 1, (1 << 20) - 1, (1 << 20) + 1] {
+            announce(&path, size);
+            let failure = UnpackedFmu::open(&path).unwrap_err();
+            assert!(
+                failure.what.contains("resources/zeros") && failure.problem.contains("damaged"),
+                "{size}: {failure}"
+            );
+        }
+    }
+
+    #[test]
+    fn only_what_is_wanted_is_unpacked_and_all_of_it_checked() {
+        let (_root, path) = archive_with(&[Entry::new("a", "x".repeat(100)), Entry::new(DESCRIPTION, "no XML")]);
+        let root = tempfile::tempdir().unwrap();
+        let mut archive = open_archive(&path).unwrap();
+        let mut sizes = entries(&mut archive).unwrap();
+        assert_eq!(sizes.remove(0), ("a".to_owned(), 100));
+        let mut few = Vec::new();
+        unpack_entry(&mut archive, 0, "a", &mut few).unwrap();
+        assert_eq!(few, "x".repeat(100).into_bytes());
+        unpack(&mut archive, 0, "a", root.path()).unwrap();
+        assert_eq!(fs::read(root.path().join("a")).unwrap(), few);
+    }
+}

@@ -1,0 +1,81 @@
+//! One instance of an imported FMU, driven call by call.
+
+use tiprub_core::settings::ExperimentSettings;
+use tiprub_shell::{Failure, Result, schedule::Schedule};
+
+use super::{
+    UnpackedFmu, fmi2, fmi3,
+    slave::{self, OutputGroup, Slave},
+};
+
+/// A co-simulation instance; freed when dropped. A call that answers worse than Warning is a failure with the FMU's words.
+pub struct Session<'a> {
+    fmu: &'a UnpackedFmu,
+    slave: Box<dyn Slave>,
+    groups: Vec<OutputGroup>,
+}
+
+impl std::fmt::Debug for Session<'_> {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(out, "instance of {}", self.fmu.description.model_name)
+    }
+}
+
+impl<'a> Session<'a> {
+    /// Load the library and instantiate.
+    ///
+    /// # Errors
+    /// As [`UnpackedFmu::simulate`].
+    pub fn new(fmu: &'a UnpackedFmu) -> Result<Self> {
+        let library = slave::load(&fmu.library()?)?;
+        let slave: Box<dyn Slave> = match fmu.description.fmi_version.as_str() {
+            "2.0" => Box::new(fmi2::Fmi2Slave::new(fmu, library)?),
+            "3.0" => Box::new(fmi3::Fmi3Slave::new(fmu, library)?),
+            other => {
+                return Err(Failure::new("FMU", format!("FMI version {other}"), "Only 2.0 and 3.0 can be imported"));
+            }
+        };
+        Ok(Self { fmu, slave, groups: slave::group_outputs(&fmu.description) })
+    }
+
+    /// Set a scalar, or the first element of an array written as scalars.
+    ///
+    /// # Errors
+    /// No variable of this name, or the FMU refuses.
+    pub fn set_real(&mut self, name: &str, value: f64) -> Result<()> {
+        let first = format!("{name}[1]");
+        let found =
+            self.fmu.description.variables.iter().find(|variable| variable.name == name || variable.name == first);
+        let missing = || Failure::new("FMU", format!("has no variable {name}"), "");
+        self.slave.set_real(found.ok_or_else(missing)?.reference, value)
+    }
+
+    /// From instantiated to step mode.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn initialise(&mut self, start: f64) -> Result<()> {
+        let experiment = ExperimentSettings { start, stop: start + 1.0, communication_step: 1.0 };
+        self.slave.initialise(&Schedule::new(&experiment, None, None)?)
+    }
+
+    /// One communication step (s).
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn do_step(&mut self, time: f64, step: f64) -> Result<()> {
+        self.slave.do_step(time, step)
+    }
+
+    /// All numeric outputs, in file order.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn outputs(&mut self) -> Result<Vec<f64>> {
+        let mut values = Vec::new();
+        for group in &self.groups {
+            self.slave.read(group, &mut values)?;
+        }
+        Ok(values)
+    }
+}

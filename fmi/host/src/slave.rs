@@ -1,0 +1,161 @@
+//! What the two FMI versions have in common for an importer: the run over communication points.
+
+use std::{
+    cell::RefCell,
+    ffi::{CStr, CString},
+    path::Path,
+    time::{Duration, Instant},
+};
+
+use libloading::Library;
+use tiprub_shell::{Failure, Result, recording::Recording, schedule::Schedule};
+
+use super::{ImportedDescription, ImportedRun, VariableType};
+
+/// Neighbouring outputs of one type, read in one call.
+pub(super) struct OutputGroup {
+    /// Data type.
+    pub(super) kind: VariableType,
+    /// Value references.
+    pub(super) references: Vec<u32>,
+    /// Number of scalar values: arrays count with all elements.
+    pub(super) values: usize,
+}
+
+/// A co-simulation instance of either FMI version.
+pub(super) trait Slave {
+    /// From instantiated to step mode.
+    fn initialise(&mut self, schedule: &Schedule) -> Result<()>;
+    /// One communication step.
+    fn do_step(&mut self, time: f64, step: f64) -> Result<()>;
+    /// Append the values of a group.
+    fn read(&mut self, group: &OutputGroup, values: &mut Vec<f64>) -> Result<()>;
+    /// Set one real value.
+    fn set_real(&mut self, reference: u32, value: f64) -> Result<()>;
+    /// End of the run.
+    fn terminate(&mut self) -> Result<()>;
+    /// Everything the FMU logged.
+    fn messages(&self) -> Vec<String>;
+}
+
+/// Initialise, step over the schedule, record all numeric outputs at every communication point, terminate.
+pub(super) fn drive(
+    slave: &mut dyn Slave,
+    description: &ImportedDescription,
+    schedule: &Schedule,
+    progress: &dyn Fn(usize),
+) -> Result<ImportedRun> {
+    let groups = group_outputs(description);
+    let names = description.numeric_outputs().flat_map(super::ImportedVariable::scalar_names).collect();
+    let mut recording = Recording::with_columns(names, schedule.count + 1)?;
+    let mut stepping = Duration::ZERO;
+    slave.initialise(schedule)?;
+    for index in 0..=schedule.count {
+        let time = schedule.time(index);
+        recording.times.push(time);
+        for group in &groups {
+            slave.read(group, &mut recording.values)?;
+        }
+        progress(index);
+        if index < schedule.count {
+            let clock = Instant::now();
+            slave.do_step(time, schedule.time(index + 1) - time)?;
+            stepping += clock.elapsed();
+        }
+    }
+    slave.terminate()?;
+    Ok(ImportedRun { recording, stepping, messages: slave.messages() })
+}
+
+pub(super) fn group_outputs(description: &ImportedDescription) -> Vec<OutputGroup> {
+    let mut groups: Vec<OutputGroup> = Vec::new();
+    for output in description.numeric_outputs() {
+        if groups.last().is_none_or(|group| group.kind != output.kind) {
+            groups.push(OutputGroup { kind: output.kind, references: Vec::new(), values: 0 });
+        }
+        if let Some(group) = groups.last_mut() {
+            group.references.push(output.reference);
+            group.values += output.elements.unwrap_or(1);
+        }
+    }
+    groups
+}
+
+/// What the FMU logged; reached from its logger through a pointer to this value.
+#[derive(Debug, Default)]
+pub(super) struct MessageList(RefCell<Vec<String>>);
+
+impl MessageList {
+    pub(super) fn push(&self, text: &CStr) {
+        self.0.borrow_mut().push(text.to_string_lossy().into_owned());
+    }
+
+    pub(super) fn all(&self) -> Vec<String> {
+        self.0.borrow().clone()
+    }
+
+    /// The last message as the end of a sentence.
+    pub(super) fn last_words(&self) -> String {
+        self.0.borrow().last().map_or_else(|| " without a message".into(), |message| format!(" and said: {message}"))
+    }
+}
+
+/// OK and Warning pass; anything else is a failure with the FMU's own words.
+pub(super) fn check(function: &str, time: Option<f64>, status: i32, messages: &MessageList) -> Result<()> {
+    let status_name = match status {
+        0 | 1 => return Ok(()),
+        2 => "Discard",
+        3 => "Error",
+        4 => "Fatal",
+        5 => "Pending",
+        _ => "an unknown status",
+    };
+    let at = time.map(|time| format!(" at t = {time} s")).unwrap_or_default();
+    Err(Failure::new("FMU", format!("{function}{at} answered {status_name}{}", messages.last_words()), ""))
+}
+
+/// Load a shared library.
+pub(super) fn load(path: &Path) -> Result<Library> {
+    // SAFETY: loading runs the library's initialisers; that is what importing an FMU means, and the user named it.
+    unsafe { Library::new(path) }
+        .map_err(|error| Failure::new(path.display(), format!("cannot be loaded: {error}"), "Is it for this machine?"))
+}
+
+/// A function of the library as a plain pointer.
+///
+/// # Safety
+/// `F` must be the signature of that function, and the library must stay loaded while the pointer is used.
+pub(super) unsafe fn symbol<F: Copy>(library: &Library, name: &str) -> Result<F> {
+    // SAFETY: the caller vouches for the signature.
+    unsafe { library.get::<F>(name) }
+        .map(|symbol| *symbol)
+        .map_err(|error| Failure::new("FMU library", format!("does not export {name}: {error}"), ""))
+}
+
+/// A string for the C side.
+pub(super) fn c_text(text: &str) -> Result<CString> {
+    CString::new(text).map_err(|_| Failure::new(format!("{text:?}"), "contains a zero byte", "Remove it"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn statuses_worse_than_warning_stop_with_the_last_message() {
+        let messages = MessageList::default();
+        messages.push(c"first");
+        messages.push(c"speed is NaN");
+        assert!(check("f", None, 0, &messages).is_ok() && check("f", None, 1, &messages).is_ok());
+        let failure = check("fmi3DoStep", Some(0.5), 3, &messages).unwrap_err();
+        assert_eq!(failure.problem, "fmi3DoStep at t = 0.5 s answered Error and said: speed is NaN");
+    }
+
+    #[test]
+    fn a_file_that_is_no_library_is_refused() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("tiprub.so");
+        std::fs::write(&path, "text").unwrap();
+        assert!(load(&path).unwrap_err().problem.contains("cannot be loaded"));
+    }
+}

@@ -1,0 +1,87 @@
+//! What each command reads and writes, looked at before any work.
+
+use std::path::Path;
+
+use tiprub_gallery::scene_source;
+use tiprub_shell::{
+    Failure, Result, output_file,
+    places::{Named, apart, identity, outputs},
+};
+
+use crate::{
+    cli::{Command, Model, ReduceArguments, StudyCommand},
+    commands::demo,
+};
+
+/// Extensions of what a study writes.
+const STUDY_FILES: [&str; 5] = ["csv", "html", "json", "md", "svg"];
+
+/// Look at everything that a command line names, before any work.
+///
+/// # Errors
+/// Two names for one file of which one is written, or a file that cannot be written.
+pub fn check(command: &Command) -> Result<()> {
+    match command {
+        Command::Run(arguments) => {
+            let csv = arguments.csv.clone().filter(|path| path != Path::new("-"));
+            outputs(&scene(&arguments.scene), &Vec::from_iter(Named::option("--csv", &csv)))
+        }
+        Command::Reduce(arguments) => outputs(&model_files(arguments), &reduce_outputs(arguments)),
+        Command::Demo(arguments) => {
+            let files: Vec<Named> = demo::FILES.map(|name| Named::new("--out", arguments.out.join(name))).to_vec();
+            apart(&Vec::from_iter(Named::option("--library", &arguments.library)), &files)?;
+            output_file::try_directory(&arguments.out)
+        }
+        Command::Study(arguments) => match &arguments.study {
+            StudyCommand::Map(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
+            StudyCommand::Error(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
+            StudyCommand::Other(_) => Ok(()),
+        },
+        // Names follow from the scene: see the command.
+        Command::Package(_) | Command::Inspect(_) | Command::Stability { .. } => Ok(()),
+    }
+}
+
+/// The files of a scene.
+pub fn scene(argument: &str) -> Vec<Named> {
+    let files = scene_source::files(argument).into_iter();
+    files
+        .enumerate()
+        .map(|(index, path)| Named::new(if index == 0 { "SCENE" } else { "a ROM of SCENE" }, path))
+        .collect()
+}
+
+/// The files that describe a model of one's own.
+pub fn model_files(arguments: &ReduceArguments) -> Vec<Named> {
+    let mesh = match &arguments.model {
+        Some(Model::File(path)) => Some(Named::new("MODEL", path)),
+        _ => None,
+    };
+    let file = &arguments.file;
+    let options =
+        [("--stiffness", &file.stiffness), ("--mass", &file.mass), ("--nodes", &file.nodes), ("--dofs", &file.dofs)];
+    mesh.into_iter().chain(options.into_iter().filter_map(|(role, path)| Named::option(role, path))).collect()
+}
+
+/// The files that `reduce` was told to write.
+fn reduce_outputs(arguments: &ReduceArguments) -> Vec<Named> {
+    let options = [("--output", &arguments.output), ("--inp", &arguments.inp), ("--vtk", &arguments.vtk)];
+    options.into_iter().filter_map(|(role, path)| Named::option(role, path)).collect()
+}
+
+/// A study names its files itself, in one directory: what is read must not be there under a name of that kind.
+pub fn study(argument: &str, out: Option<&Path>) -> Result<()> {
+    let Some(out) = out else { return Ok(()) };
+    let directory = identity(out);
+    for input in scene(argument) {
+        let kind = input.path.extension().and_then(|kind| kind.to_str()).unwrap_or_default().to_ascii_lowercase();
+        let real = output_file::destination(&input.path).unwrap_or_else(|_| input.path.clone());
+        let inside = directory.is_some() && identity(real.parent().unwrap_or(Path::new("."))) == directory;
+        if inside && STUDY_FILES.contains(&kind.as_str()) {
+            let problem =
+                format!("holds {}, {}, which a file of the study may replace", input.role, input.path.display());
+            return Err(Failure::usage(format!("--out {}", out.display()), problem, "Give another directory"));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,395 @@
+//! Line plots as SVG: axes with units, light colours, series shortened without losing peaks.
+
+use std::fmt::Write as _;
+
+use plotters::{
+    coord::{Shift, types::RangedCoordf64},
+    prelude::*,
+    style::text_anchor::{HPos, Pos, VPos},
+};
+use tiprub_shell::{Failure, Result};
+
+use crate::{decimate::decimate, escape};
+
+/// Plots are drawn at twice the size they are shown at: the SVG backend rounds to whole units.
+const SCALE: u32 = 2;
+const WIDTH: u32 = 920 * SCALE;
+/// Height of a line of a legend above the plot, and of the room around it, in CSS pixels.
+const LEGEND_LINE: u32 = 22;
+const LEGEND_ROOM: u32 = 6;
+/// Where the lines of a legend begin, in CSS pixels.
+const LEGEND_LEFT: u32 = 86;
+const BUCKETS: usize = 700;
+const INK: RGBColor = RGBColor(52, 58, 66);
+const GRID: RGBColor = RGBColor(232, 235, 239);
+
+/// Line colours, distinguishable with colour-vision deficiency and on grey paper.
+pub const COLORS: [RGBColor; 11] = [
+    RGBColor(31, 93, 160),
+    RGBColor(214, 112, 24),
+    RGBColor(36, 140, 118),
+    RGBColor(170, 52, 116),
+    RGBColor(110, 116, 124),
+    RGBColor(92, 172, 222),
+    RGBColor(120, 82, 28),
+    RGBColor(152, 178, 40),
+    RGBColor(226, 132, 172),
+    RGBColor(20, 22, 26),
+    RGBColor(116, 78, 178),
+];
+
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+/// One line of a plot.
+#[derive(Debug, Clone)]
+pub struct Series {
+    /// Legend text; empty keeps the line out of the legend.
+    pub label: String,
+    /// Points, x ascending.
+    pub points: Vec<(f64, f64)>,
+    /// Index into [`COLORS`], instead of one after the other.
+    pub color: Option<usize>,
+    /// How it is drawn.
+    pub form: Form,
+}
+
+/// How a series is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// A line, peaks kept where there are too many points.
+    Line,
+    /// A thin line through few points.
+    Thin,
+    /// A dot at every point.
+    Dots,
+}
+
+impl Series {
+    /// A line.
+    pub fn line(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self { label: label.into(), points, color: None, form: Form::Line }
+    }
+
+    /// The same in another form and colour.
+    pub fn drawn(self, form: Form, color: usize) -> Self {
+        Self { form, color: Some(color), ..self }
+    }
+
+    fn color(&self, index: usize) -> RGBColor {
+        COLORS[self.color.unwrap_or(index) % COLORS.len()]
+    }
+}
+
+/// One plot.
+#[derive(Debug, Clone)]
+pub struct Plot {
+    /// Axis label with unit.
+    pub x_label: String,
+    /// Axis label with unit.
+    pub y_label: String,
+    /// Lines; colours repeat beyond [`COLORS`].
+    pub series: Vec<Series>,
+    /// Height in CSS pixels at a width of 920.
+    pub height: u32,
+    /// Horizontal lines with a meaning (value, text); for linear axes.
+    pub levels: Vec<(f64, String)>,
+    /// Logarithmic y axis; values ≤ 0 are left out.
+    pub logarithmic: bool,
+    /// Logarithmic x axis; values ≤ 0 are left out.
+    pub logarithmic_x: bool,
+    /// Mark the points.
+    pub marked: bool,
+}
+
+impl Plot {
+    /// An empty plot with linear axes.
+    pub fn new(x_label: impl Into<String>, y_label: impl Into<String>, series: Vec<Series>) -> Self {
+        Self {
+            x_label: x_label.into(),
+            y_label: y_label.into(),
+            series,
+            height: 260,
+            levels: Vec::new(),
+            logarithmic: false,
+            logarithmic_x: false,
+            marked: false,
+        }
+    }
+
+    /// Legend (where there is more than one line) and SVG element, as HTML.
+    ///
+    /// # Errors
+    /// As [`Plot::to_svg`].
+    pub fn to_html(&self) -> Result<String> {
+        let mut html = String::new();
+        if self.series.len() > 1 {
+            html.push_str("<div class=\"legend\">");
+            for (series, RGBColor(red, green, blue)) in self.legend() {
+                let color = format!("rgb({red},{green},{blue})");
+                let _ = write!(html, "<span><i style=\"background:{color}\"></i>{}</span>", escape(&series.label));
+            }
+            html.push_str("</div>");
+        }
+        html.push_str(&self.to_svg()?);
+        Ok(html)
+    }
+
+    /// Series that have a label, with their colours.
+    fn legend(&self) -> impl Iterator<Item = (&Series, RGBColor)> {
+        let colored = self.series.iter().enumerate().map(|(index, series)| (series, series.color(index)));
+        colored.filter(|(series, _)| !series.label.is_empty())
+    }
+
+    /// The SVG element.
+    ///
+    /// # Errors
+    /// The plotting library refuses (never seen with finite data).
+    pub fn to_svg(&self) -> Result<String> {
+        self.svg(0)
+    }
+
+    /// The SVG element with the legend in it, for a file of its own.
+    ///
+    /// # Errors
+    /// As [`Plot::to_svg`].
+    pub fn to_whole_svg(&self) -> Result<String> {
+        let lines = self.legend_places().iter().map(|(_, line)| line + 1).max().unwrap_or(0);
+        self.svg(if self.series.len() > 1 { LEGEND_LINE * lines + LEGEND_ROOM } else { 0 })
+    }
+
+    /// Left edge (CSS pixels) and line of every entry of the legend.
+    fn legend_places(&self) -> Vec<(u32, u32)> {
+        let (mut left, mut line) = (LEGEND_LEFT, 0);
+        let mut places = Vec::new();
+        for (series, _) in self.legend() {
+            // Widths of letters are not known here: a little more than a usual one each.
+            let width = 44 + 8 * u32::try_from(series.label.chars().count()).unwrap_or(0);
+            if left + width > WIDTH / SCALE && left > LEGEND_LEFT {
+                (left, line) = (LEGEND_LEFT, line + 1);
+            }
+            places.push((left, line));
+            left += width;
+        }
+        places
+    }
+
+    /// With so much room for a legend above the plot.
+    fn svg(&self, legend: u32) -> Result<String> {
+        let mut svg = String::new();
+        {
+            let whole = SVGBackend::with_string(&mut svg, (WIDTH, (self.height + legend) * SCALE)).into_drawing_area();
+            let (top, area) = whole.split_vertically(legend * SCALE);
+            if legend > 0 {
+                self.draw_legend(&top).map_err(|error| Failure::new("report plot", error, ""))?;
+            }
+            self.draw(&area).map_err(|error| Failure::new("report plot", error, ""))?;
+            area.present().map_err(|error| Failure::new("report plot", error, ""))?;
+        }
+        Ok(svg)
+    }
+
+    fn draw_legend(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), String> {
+        let font = ("sans-serif", 14 * SCALE).into_font().color(&INK);
+        let pixels = |value: u32| i32::try_from(value * SCALE).unwrap_or(i32::MAX);
+        for ((series, color), (left, line)) in self.legend().zip(self.legend_places()) {
+            let top = line * LEGEND_LINE;
+            let corners = [(pixels(left), pixels(top + 12)), (pixels(left + 20), pixels(top + 15))];
+            area.draw(&Rectangle::new(corners, color.filled())).map_err(|error| error.to_string())?;
+            let text = Text::new(series.label.clone(), (pixels(left + 26), pixels(top + 6)), font.clone());
+            area.draw(&text).map_err(|error| error.to_string())?;
+        }
+        Ok(())
+    }
+
+    fn draw(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), String> {
+        let x_range = self.x_range();
+        let levels = self.levels.iter().map(|level| level.0);
+        let y_range = padded(self.finite_points().map(|point| point.1).chain(levels), 0.06);
+        let y_range = if self.logarithmic { y_range.start.floor()..y_range.end.ceil() } else { y_range };
+        let mut builder = ChartBuilder::on(area);
+        builder.margin(8 * SCALE).x_label_area_size(42 * SCALE).y_label_area_size(78 * SCALE);
+        let mut chart = builder.build_cartesian_2d(x_range, y_range).map_err(|error| error.to_string())?;
+        self.draw_axes(&mut chart)?;
+        self.draw_levels(&mut chart)?;
+        self.draw_series(&mut chart)
+    }
+
+    fn draw_axes(&self, chart: &mut Chart<'_, '_>) -> Result<(), String> {
+        let y_label = |value: &f64| match self.logarithmic {
+            false => tick(*value),
+            true if value.fract().abs() < 1e-9 => format!("1e{}", value.round()),
+            true => String::new(),
+        };
+        let x_label = |value: &f64| match self.logarithmic_x {
+            false => tick(*value),
+            true => tick(10_f64.powf(*value)),
+        };
+        chart
+            .configure_mesh()
+            .x_desc(&self.x_label)
+            .y_desc(&self.y_label)
+            .axis_desc_style(("sans-serif", 15 * SCALE).into_font().color(&INK))
+            .label_style(("sans-serif", 14 * SCALE).into_font().color(&INK))
+            .x_labels(10)
+            .y_labels(6)
+            .max_light_lines(1)
+            .bold_line_style(GRID.stroke_width(SCALE))
+            .light_line_style(TRANSPARENT)
+            .axis_style(INK.mix(0.5).stroke_width(SCALE))
+            .y_label_formatter(&y_label)
+            .x_label_formatter(&x_label)
+            .draw()
+            .map_err(|error| error.to_string())
+    }
+
+    /// Dashed horizontal lines with their meaning at the right end.
+    fn draw_levels(&self, chart: &mut Chart<'_, '_>) -> Result<(), String> {
+        let x_range = self.x_range();
+        for (level, label) in &self.levels {
+            let ends = [(x_range.start, *level), (x_range.end, *level)];
+            let style = INK.mix(0.55).stroke_width(SCALE);
+            chart.draw_series(DashedLineSeries::new(ends, 10, 8, style)).map_err(|error| error.to_string())?;
+            let font = ("sans-serif", 13 * SCALE).into_font().color(&INK.mix(0.8));
+            let text = Text::new(label.clone(), (-6, -6), font.pos(Pos::new(HPos::Right, VPos::Bottom)));
+            let element = EmptyElement::at((x_range.end, *level)) + text;
+            chart.draw_series(std::iter::once(element)).map_err(|error| error.to_string())?;
+        }
+        Ok(())
+    }
+
+    fn draw_series(&self, chart: &mut Chart<'_, '_>) -> Result<(), String> {
+        for (index, series) in self.series.iter().enumerate() {
+            let (finite, color): (Vec<_>, _) = (self.finite_points_of(series).collect(), series.color(index));
+            let width = if series.form == Form::Line { SCALE + SCALE / 2 } else { SCALE / 2 };
+            if series.form != Form::Dots {
+                let line = LineSeries::new(decimate(&finite, BUCKETS), color.stroke_width(width));
+                chart.draw_series(line).map_err(|error| error.to_string())?;
+            }
+            if self.marked || series.form == Form::Dots {
+                let circle = |point: &(f64, f64)| Circle::new(*point, 4 * SCALE, color.filled());
+                chart.draw_series(finite.iter().map(circle)).map_err(|error| error.to_string())?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Points that can be drawn; the logarithm of y where the axis is logarithmic.
+    fn finite_points_of<'s>(&self, series: &'s Series) -> impl Iterator<Item = (f64, f64)> + use<'s> {
+        let (x_logarithmic, y_logarithmic) = (self.logarithmic_x, self.logarithmic);
+        let scaled = |value: f64, logarithmic: bool| if logarithmic { value.log10() } else { value };
+        let points = series.points.iter().map(move |(x, y)| (scaled(*x, x_logarithmic), scaled(*y, y_logarithmic)));
+        points.filter(|(x, y)| x.is_finite() && y.is_finite())
+    }
+
+    /// From the first to the last x of all series, drawable or not, so that plots of one run share their axis.
+    fn x_range(&self) -> std::ops::Range<f64> {
+        if self.logarithmic_x {
+            return padded(self.finite_points().map(|point| point.0), 0.05);
+        }
+        let all = self.series.iter().flat_map(|series| series.points.iter().map(|point| point.0));
+        padded(all.filter(|x| x.is_finite()), 0.0)
+    }
+
+    fn finite_points(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.series.iter().flat_map(|series| self.finite_points_of(series))
+    }
+}
+
+/// Smallest range that holds the values, with a margin; never empty.
+fn padded(values: impl Iterator<Item = f64>, margin: f64) -> std::ops::Range<f64> {
+    let (low, high) =
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    if !(low.is_finite() && high.is_finite()) {
+        return 0.0..1.0;
+    }
+    let span = high - low;
+    if span > 1e-12 * high.abs().max(low.abs()) {
+        low - margin * span..high + margin * span
+    } else {
+        let half = if high == 0.0 { 1.0 } else { 0.1 * high.abs() };
+        low - half..high + half
+    }
+}
+
+/// Axis number without trailing zeros or round-off digits.
+fn tick(value: f64) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    if !(1e-3..1e5).contains(&value.abs()) {
+        let text = format!("{value:.2e}");
+        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
+        return format!("{mantissa}e{exponent}");
+    }
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_short() {
+        let ticks = [0.0, 0.30000000000000004, -1500.0, 2e-7, 1e6, -0.25].map(tick);
+        assert_eq!(ticks, ["0", "0.3", "-1500", "2e-7", "1e6", "-0.25"]);
+    }
+
+    #[test]
+    fn a_plot_shows_its_labels_and_stays_small() {
+        let points: Vec<(f64, f64)> = (0..200_000).map(|i| (f64::from(i), f64::from(i % 977))).collect();
+        let mut plot = Plot::new("time (ms)", "gap (µm)", vec![Series::line("leading edge", points)]);
+        plot.levels.push((500.0, "nominal".into()));
+        plot.series.push(Series::line("empty", Vec::new()));
+        let svg = plot.to_html().unwrap();
+        for text in ["time (ms)", "gap (µm)", "leading edge", "nominal"] {
+            assert!(svg.contains(text), "{text}");
+        }
+        assert!(svg.len() < 60_000, "{} bytes", svg.len());
+    }
+
+    #[test]
+    fn a_file_of_its_own_holds_the_legend_and_unlabelled_lines_stay_out_of_it() {
+        let line = |label: &str| Series::line(label, vec![(0.0, 1.0), (1.0, 2.0)]);
+        let series = vec![line("first"), line("").drawn(Form::Thin, 4), line("third").drawn(Form::Dots, 7)];
+        let plot = Plot::new("x", "y", series);
+        let svg = plot.to_whole_svg().unwrap();
+        assert!(svg.contains("first") && svg.contains("third"));
+        assert!(!plot.to_svg().unwrap().contains("first"), "a page has it beside the picture");
+        assert_eq!(svg.matches("<circle").count(), 2);
+        assert_eq!(plot.to_html().unwrap().matches("<i style").count(), 2);
+    }
+
+    #[test]
+    fn a_long_legend_takes_several_lines_within_the_picture() {
+        let line =
+            |index: u32| Series::line(format!("a method with a long name {index}"), vec![(0.0, 1.0), (1.0, 2.0)]);
+        let plot = Plot::new("x", "y", (0..7).map(line).collect());
+        let places = plot.legend_places();
+        assert!(places.iter().all(|(left, _)| left + 44 + 8 * 27 <= WIDTH / SCALE), "{places:?}");
+        assert!(places.windows(2).all(|pair| pair[1] > pair[0] || pair[1].1 > pair[0].1));
+        assert_eq!(places.last().unwrap().1, 2);
+        let height =
+            |svg: String| svg.split("height=\"").nth(1).unwrap().split('"').next().unwrap().parse::<u32>().unwrap();
+        assert_eq!(height(plot.to_whole_svg().unwrap()) - height(plot.to_svg().unwrap()), (3 * 22 + 6) * SCALE);
+    }
+
+    #[test]
+    fn powers_of_ten_are_labelled_on_a_logarithmic_axis() {
+        let points = vec![(0.0, 1e-17), (1.0, 3e-15), (2.0, 0.0)];
+        let plot = Plot { logarithmic: true, ..Plot::new("x", "y", vec![Series::line("a", points)]) };
+        let svg = plot.to_svg().unwrap();
+        assert!(svg.contains("1e-16") && svg.contains("1e-15"), "{svg}");
+    }
+
+    #[test]
+    fn degenerate_data_are_drawn_too() {
+        for points in [vec![], vec![(0.0, 0.0)], vec![(1.0, f64::NAN), (2.0, 3.0)], vec![(0.0, 7.0), (1.0, 7.0)]] {
+            for logarithmic in [false, true] {
+                let plot = Plot { logarithmic, ..Plot::new("x", "y", vec![Series::line("a", points.clone())]) };
+                assert!(plot.to_svg().unwrap().starts_with("<svg"));
+            }
+        }
+    }
+}

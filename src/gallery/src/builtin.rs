@@ -1,0 +1,145 @@
+//! Models that ship with tiprub, by the name after `builtin:` in a scene; reduced when first asked for.
+
+use tiprub_core::Rom;
+use tiprub_model::{
+    CasingOptions, Mesh, Rotor37Options,
+    casing::CASING37,
+    cube::{CubeOptions, RingOptions, Side},
+    cyclic::{CyclicOptions, CyclicReduction, ModeSelection, reduce_cyclic},
+    rotor37::DESIGN_SPEED,
+    stage::{
+        StageOptions,
+        casing::{StageCasingOptions, reduce_stage_casing},
+        stage_model,
+    },
+};
+use tiprub_shell::{Result, console::Console};
+
+use crate::{
+    reduction::{self, with_progress},
+    rom_cache::RomCache,
+};
+
+/// The bladed disk of the stage.
+pub const STAGE: &str = "stage";
+/// The casing of the stage.
+pub const STAGE_CASING: &str = "stage-casing";
+/// The same two on coarse meshes, for tests and first looks: shapes alike, frequencies some percent off.
+pub const STAGE_COARSE: &str = "stage-coarse";
+/// See [`STAGE_COARSE`].
+pub const STAGE_CASING_COARSE: &str = "stage-casing-coarse";
+
+/// The cube of the cube between two rings.
+pub const CUBE: &str = "cube";
+/// Its rings.
+pub const RINGS: [(&str, Side); 2] = [("ring-left", Side::Left), ("ring-right", Side::Right)];
+
+/// Every name that [`rom`] knows.
+pub const NAMES: [&str; 10] = [
+    "rotor37",
+    "rotor37-spin",
+    CASING37,
+    STAGE,
+    STAGE_CASING,
+    STAGE_COARSE,
+    STAGE_CASING_COARSE,
+    CUBE,
+    RINGS[0].0,
+    RINGS[1].0,
+];
+
+/// The model of this name; `None` where there is no such model.
+pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom>> {
+    let blade = |spin| {
+        let options = Rotor37Options { spin, ..Rotor37Options::default() };
+        cache.get(name, &options, console, &|| Ok(reduction::rotor37(&options, console)?.rom))
+    };
+    let disk = |coarse| {
+        let model = DiskModel::new(coarse);
+        cache.get(name, &model, console, &|| Ok(model.reduce(console)?.0.rom))
+    };
+    Some(match name {
+        "rotor37" => blade(None),
+        "rotor37-spin" => blade(Some(DESIGN_SPEED)),
+        CASING37 => {
+            let options = CasingOptions::default();
+            cache.get(name, &options, console, &|| Ok(reduction::casing(&options, console)?.rom))
+        }
+        STAGE => disk(false),
+        STAGE_COARSE => disk(true),
+        STAGE_CASING | STAGE_CASING_COARSE => {
+            let options = stage_casing(name == STAGE_CASING_COARSE);
+            let title = "Reducing the casing of the stage";
+            let reduce = || with_progress(title, console, &|listener| reduce_stage_casing(&options, listener));
+            cache.get(name, &options, console, &|| Ok(reduce()?.rom))
+        }
+        CUBE => {
+            let options = CubeOptions::default();
+            cache.get(name, &options, console, &|| Ok(reduction::cube(&options, console)?.rom))
+        }
+        _ => {
+            let (_, side) = RINGS.iter().find(|(ring, _)| *ring == name)?;
+            let options = RingOptions::new(*side);
+            cache.get(name, &options, console, &|| Ok(reduction::cube_ring(&options, console)?.rom))
+        }
+    })
+}
+
+/// Name and options of the bladed disk of the stage, of the paper's size or coarse.
+pub fn stage(coarse: bool) -> (&'static str, StageOptions) {
+    if coarse {
+        (STAGE_COARSE, StageOptions { modes: ModeSelection::Families(12), ..StageOptions::coarse() })
+    } else {
+        (STAGE, StageOptions::default())
+    }
+}
+
+/// The bladed disk of the stage, of the paper's size or coarse.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DiskModel {
+    name: &'static str,
+    options: StageOptions,
+}
+
+impl DiskModel {
+    /// What is reduced; nothing is done yet.
+    pub fn new(coarse: bool) -> Self {
+        let (name, options) = stage(coarse);
+        Self { name, options }
+    }
+
+    /// The disk with options of one's own.
+    pub fn with_options(name: &'static str, options: StageOptions) -> Self {
+        Self { name, options }
+    }
+
+    /// The reduction, and the mesh of one sector.
+    ///
+    /// # Errors
+    /// Never with the options that ship.
+    pub fn reduce(&self, console: &Console) -> Result<(CyclicReduction, Mesh)> {
+        with_progress("Reducing the bladed disk", console, &|listener| {
+            let stage = stage_model(&self.options, listener)?;
+            let options = CyclicOptions {
+                name: self.name.to_owned(),
+                modes: self.options.modes,
+                checked_modes: self.options.checked_modes,
+                damping_ratio: self.options.damping_ratio,
+            };
+            let (contact, boundary) = (&stage.contact, &stage.boundary);
+            let reduction = reduce_cyclic(&stage.model, &stage.clamped, contact, boundary, &options, listener)?;
+            let mesh = stage.model.mesh.map(|(mesh, _)| mesh).unwrap_or_default();
+            Ok((reduction, mesh))
+        })
+    }
+}
+
+/// The casing of the stage, of the paper's size or with an eighth of the elements around.
+pub fn stage_casing(coarse: bool) -> StageCasingOptions {
+    let defaults = StageCasingOptions::default();
+    if coarse {
+        StageCasingOptions { name: STAGE_CASING_COARSE.into(), around: defaults.around / 8, ..defaults }
+    } else {
+        StageCasingOptions { name: STAGE_CASING.into(), ..defaults }
+    }
+}

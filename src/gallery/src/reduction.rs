@@ -1,0 +1,107 @@
+//! The blade that ships and casings, reduced with progress on the way.
+
+use tiprub_model::{
+    CasingOptions, Reduction, Rotor37Options,
+    cube::{CubeOptions, RingOptions, reduce_cube, reduce_cube_ring},
+    cyclic::CyclicReduction,
+    progress::{Listener, Progress, Stage},
+    reduce_ring, reduce_rotor37,
+    stage::{
+        StageOptions,
+        casing::{StageCasingOptions, reduce_stage_casing},
+        reduce_stage,
+    },
+};
+use tiprub_shell::{Failure, Result, console::Console};
+
+const STAGES: [Stage; 7] = [
+    Stage::Mesh,
+    Stage::Assembly,
+    Stage::FullModes,
+    Stage::FixedInterfaceModes,
+    Stage::ConstraintModes,
+    Stage::Checks,
+    Stage::Spin,
+];
+
+/// Reduce rotor 37, showing stage and share done.
+///
+/// # Errors
+/// Counts that the mesh cannot serve, and whatever the reduction refuses.
+pub fn rotor37(options: &Rotor37Options, console: &Console) -> Result<Reduction> {
+    with_progress("Reducing rotor 37", console, &|listener| reduce_rotor37(options, listener))
+}
+
+/// Reduce a casing, showing stage and share done.
+///
+/// # Errors
+/// Lengths, counts and contact rings that do not fit each other, and whatever the reduction refuses.
+pub fn casing(options: &CasingOptions, console: &Console) -> Result<Reduction> {
+    with_progress("Reducing the casing", console, &|listener| reduce_ring(options, listener))
+}
+
+/// Reduce the bladed disk of the stage, showing stage and share done.
+///
+/// # Errors
+/// Counts that do not fit each other, and whatever the reduction refuses.
+pub fn stage(options: &StageOptions, console: &Console) -> Result<CyclicReduction> {
+    with_progress("Reducing the stage", console, &|listener| reduce_stage(options, listener))
+}
+
+/// Reduce the casing of the stage, showing stage and share done.
+///
+/// # Errors
+/// Counts that do not fit each other, and whatever the reduction refuses.
+pub fn stage_casing(options: &StageCasingOptions, console: &Console) -> Result<Reduction> {
+    with_progress("Reducing the casing of the stage", console, &|listener| reduce_stage_casing(options, listener))
+}
+
+/// Reduce the cube that flies between two rings, showing stage and share done.
+///
+/// # Errors
+/// More modes than degrees of freedom.
+pub fn cube(options: &CubeOptions, console: &Console) -> Result<Reduction> {
+    with_progress("Reducing the cube", console, &|listener| reduce_cube(options, listener))
+}
+
+/// Reduce one of these rings, showing stage and share done.
+///
+/// # Errors
+/// More modes than degrees of freedom, or more static responses than contact forces.
+pub fn cube_ring(options: &RingOptions, console: &Console) -> Result<Reduction> {
+    let title = format!("Reducing {}", options.name.replace('_', "-"));
+    with_progress(&title, console, &|listener| reduce_cube_ring(options, listener))
+}
+
+/// Work that tells where it stands, shown as a task; `title` says what is done.
+///
+/// # Errors
+/// Those of the work.
+pub fn with_progress<T>(
+    title: &str,
+    console: &Console,
+    work: &dyn Fn(Listener<'_>) -> tiprub_model::Result<T>,
+) -> Result<T> {
+    let task = console.task(title, Some(100 * STAGES.len() as u64));
+    let listener = |progress: Progress| {
+        let stage = STAGES.iter().position(|stage| *stage == progress.stage).unwrap_or(0);
+        task.now(&format!("{title}: {}", progress.stage));
+        task.at(percent(stage as f64 + progress.fraction));
+    };
+    work(&listener).map_err(|error| failure(title, error))
+}
+
+/// An error of the model floor, met at the work called `title`.
+pub fn failure(title: &str, error: tiprub_model::Error) -> Failure {
+    match error {
+        tiprub_model::Error::Invalid { what, problem, remedy } => Failure::new(what, problem, remedy),
+        tiprub_model::Error::Read { place, problem, remedy } => Failure::new(place, problem, remedy),
+        tiprub_model::Error::File { path, source } => Failure::file(&path, "cannot be read", &source),
+        other => Failure::from_below(title, other),
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=100 per stage")]
+fn percent(stages: f64) -> u64 {
+    (100.0 * stages.clamp(0.0, STAGES.len() as f64)) as u64
+}

@@ -1,0 +1,291 @@
+//! Built-in models that were reduced before, kept in the user's cache directory.
+//!
+//! A file is found by everything that decides its content: the options of the model, the sources it was made by, the
+//! release and the file format. It is never trusted: its first line repeats the key and states the SHA-256 of the ROM file
+//! that follows, and whatever does not fit is made anew. Files appear whole or not at all, so that two processes may
+//! fill the cache at once. A cache that cannot be written is no reason to stop.
+
+use std::{
+    fmt::Debug,
+    fs,
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
+
+use etcetera::BaseStrategy;
+use sha2::{Digest, Sha256};
+use tiprub_core::Rom;
+use tiprub_shell::{Result, console::Console, output_file};
+
+/// Version of the layout of cached files.
+const LAYOUT: &str = "1";
+/// First word of a cached file.
+const MARK: &str = "tiprub-cached-rom";
+/// Names the directory, or is empty to keep no files.
+const VARIABLE: &str = "TIPRUB_CACHE";
+/// Largest file (bytes).
+const LARGEST: u64 = 8 << 30;
+/// Versions of one model that are kept: other options and releases may be in use side by side.
+const KEPT: usize = 4;
+
+/// Where models are kept, if anywhere.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RomCache {
+    directory: Option<PathBuf>,
+}
+
+impl RomCache {
+    /// Keep nothing, and look nothing up.
+    pub fn off() -> Self {
+        Self { directory: None }
+    }
+
+    /// Keep models in this directory.
+    pub fn at(directory: impl Into<PathBuf>) -> Self {
+        Self { directory: Some(directory.into()) }
+    }
+
+    /// The directory that the environment variable TIPRUB_CACHE names (off where it is empty), else `tiprub` in the user's
+    /// cache directory (XDG_CACHE_HOME, ~/.cache, or what the system has in its place).
+    pub fn of_user() -> Self {
+        match std::env::var_os(VARIABLE) {
+            Some(directory) if directory.is_empty() => Self::off(),
+            Some(directory) => Self::at(directory),
+            None => {
+                Self { directory: etcetera::choose_base_strategy().ok().map(|base| base.cache_dir().join("tiprub")) }
+            }
+        }
+    }
+
+    /// The model `name` with these options: as kept, or as `make` makes it, which is then kept.
+    ///
+    /// # Errors
+    /// Those of `make`.
+    pub fn get(
+        &self,
+        name: &str,
+        options: &dyn Debug,
+        console: &Console,
+        make: &dyn Fn() -> Result<Rom>,
+    ) -> Result<Rom> {
+        let Some(directory) = &self.directory else { return make() };
+        let key = key(name, options);
+        let path = directory.join(format!("{name}-{}.rom", &key[..32]));
+        match read(&path, &key) {
+            Ok(rom) => {
+                console.say(format_args!(
+                    "Model {name} as made before, from {} (--no-cache makes it anew)",
+                    path.display()
+                ));
+                return Ok(rom);
+            }
+            Err(Some(problem)) => console.say(format_args!("{}: {problem}; making it anew", path.display())),
+            Err(None) => {}
+        }
+        let rom = make()?;
+        if let Err(failure) = output_file::write(&path, content(&rom, &key)) {
+            console.say(format_args!("Model {name} is not kept for the next time: {failure}"));
+        }
+        prune(directory, name);
+        Ok(rom)
+    }
+}
+
+/// Everything that decides what a model is. The debug form of options is complete, and writes numbers so that they read
+/// back to the same bits.
+fn key(name: &str, options: &dyn Debug) -> String {
+    let versions = [LAYOUT, env!("CARGO_PKG_VERSION"), env!("TIPRUB_MODEL_SOURCES"), std::env::consts::ARCH];
+    let mut hash = Sha256::new();
+    for item in versions.into_iter().chain([name, &format!("{options:?}")]) {
+        hash.update((item.len() as u64).to_le_bytes());
+        hash.update(item);
+    }
+    hexadecimal(hash)
+}
+
+fn hexadecimal(hash: Sha256) -> String {
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn digest(bytes: &[u8]) -> String {
+    hexadecimal(Sha256::new_with_prefix(bytes))
+}
+
+fn content(rom: &Rom, key: &str) -> Vec<u8> {
+    let bytes = tiprub_format::write_rom(rom);
+    let first = format!("{MARK} {LAYOUT} {key} {}\n", digest(&bytes));
+    [first.as_bytes(), &bytes].concat()
+}
+
+/// The ROM in the file; `Err(None)` where there is no file, else what is wrong with it.
+fn read(path: &Path, key: &str) -> Result<Rom, Option<String>> {
+    let unreadable = |error: std::io::Error| {
+        (error.kind() != std::io::ErrorKind::NotFound).then(|| format!("cannot be read ({error})"))
+    };
+    // A pipe would be waited for without end.
+    if !fs::metadata(path).map_err(unreadable)?.is_file() {
+        return Err(Some("is no file".to_owned()));
+    }
+    let bytes = tiprub_format::read_file(path, LARGEST).map_err(unreadable)?;
+    let damaged = || Some("is not what was kept".to_owned());
+    let end = bytes.iter().position(|byte| *byte == b'\n').ok_or_else(damaged)?;
+    let (first, rom) = (&bytes[..end], &bytes[end + 1..]);
+    if first != format!("{MARK} {LAYOUT} {key} {}", digest(rom)).as_bytes() {
+        return Err(damaged());
+    }
+    tiprub_format::read_rom(rom, &path.display().to_string()).map_err(|error| Some(error.to_string()))
+}
+
+/// Remove the oldest versions of a model beyond [`KEPT`]. Files that cannot be removed stay.
+fn prune(directory: &Path, name: &str) {
+    let Ok(entries) = fs::read_dir(directory) else { return };
+    let is_version = |path: &Path| {
+        let file = path.file_name().and_then(|file| file.to_str()).unwrap_or_default();
+        let key = file.strip_prefix(name).and_then(|rest| rest.strip_prefix('-')?.strip_suffix(".rom"));
+        key.is_some_and(|key| key.len() == 32 && key.bytes().all(|byte| byte.is_ascii_hexdigit()))
+    };
+    let mut versions: Vec<(SystemTime, PathBuf)> = entries
+        .flatten()
+        .filter(|entry| is_version(&entry.path()))
+        .filter_map(|entry| Some((entry.metadata().ok()?.modified().ok()?, entry.path())))
+        .collect();
+    versions.sort();
+    for (_, path) in versions.iter().rev().skip(KEPT) {
+        let _ = fs::remove_file(path);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use nalgebra::DMatrix;
+    use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
+
+    use super::*;
+    use tiprub_shell::Failure;
+
+    fn rom(stiffness: f64) -> Rom {
+        Rom {
+            name: "spring".into(),
+            origin: String::new(),
+            sectors: 3,
+            frame: Frame::Cylindrical,
+            mass: DMatrix::identity(3, 3),
+            stiffness: DMatrix::identity(3, 3) * stiffness,
+            damping_ratio: 0.0,
+            contact_map: DMatrix::identity(3, 3),
+            contact_nodes: vec![ContactNode { name: "tip".into(), position: [0.2, 0.0, 0.0], meridional_slope: 0.0 }],
+            checks: RomChecks::default(),
+            extras: RomExtras::default(),
+        }
+    }
+
+    /// A cache in a directory of its own that counts how often a model is made; its options are the stiffness.
+    struct Bench {
+        root: tempfile::TempDir,
+        made: Cell<usize>,
+    }
+
+    impl Bench {
+        fn new() -> Self {
+            Self { root: tempfile::tempdir().unwrap(), made: Cell::new(0) }
+        }
+
+        #[track_caller]
+        fn get(&self, name: &str, stiffness: f64) {
+            let make = || {
+                self.made.set(self.made.get() + 1);
+                Ok(rom(stiffness))
+            };
+            let cache = RomCache::at(self.root.path());
+            assert_eq!(cache.get(name, &stiffness, &Console::new(true, false), &make), Ok(rom(stiffness)));
+        }
+
+        fn files(&self) -> Vec<PathBuf> {
+            let mut files: Vec<_> =
+                fs::read_dir(self.root.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
+            files.sort();
+            files
+        }
+    }
+
+    #[test]
+    fn a_model_is_made_once_per_name_and_options() {
+        let bench = Bench::new();
+        for (name, stiffness, made) in
+            [("a", 1.0, 1), ("a", 1.0, 1), ("a", 1.0 + f64::EPSILON, 2), ("b", 1.0, 3), ("a", 1.0, 3), ("b", 1.0, 3)]
+        {
+            bench.get(name, stiffness);
+            assert_eq!(bench.made.get(), made, "{name} {stiffness}");
+        }
+        assert_eq!(bench.files().len(), 3);
+    }
+
+    #[test]
+    fn whatever_happened_to_a_file_the_model_is_right() {
+        let bench = Bench::new();
+        bench.get("a", 1.0);
+        let path = &bench.files()[0];
+        let good = fs::read(path).unwrap();
+        let line = good.iter().position(|byte| *byte == b'\n').unwrap();
+        // Whole and sound, but of other options.
+        let other = content(&rom(9.0), &key("a", &9.0));
+        let mut damaged = vec![good[..good.len() / 2].to_vec(), Vec::new(), b"hello".to_vec(), other];
+        damaged.push([&good[..line], &tiprub_format::write_rom(&rom(9.0))].concat());
+        damaged.push(tiprub_format::write_rom(&rom(9.0)));
+        for index in (0..good.len()).step_by(37) {
+            let mut bytes = good.clone();
+            bytes[index] ^= 1;
+            damaged.push(bytes);
+        }
+        for (bytes, count) in damaged.iter().zip(2..) {
+            fs::write(path, bytes).unwrap();
+            bench.get("a", 1.0);
+            assert_eq!(bench.made.get(), count);
+            assert_eq!(fs::read(path).unwrap(), good, "the file is made good again");
+        }
+    }
+
+    #[test]
+    fn failures_are_not_kept_and_a_cache_that_cannot_be_is_no_failure() {
+        let root = tempfile::tempdir().unwrap();
+        let console = Console::new(true, false);
+        let failure = || Err(Failure::new("a", "b", "c"));
+        assert_eq!(RomCache::at(root.path()).get("a", &1, &console, &failure), failure());
+        assert_eq!(fs::read_dir(root.path()).unwrap().count(), 0);
+        let file = root.path().join("file");
+        fs::write(&file, "").unwrap();
+        let made = RomCache::at(file.join("below")).get("a", &1, &console, &|| Ok(rom(1.0)));
+        assert_eq!(made, Ok(rom(1.0)));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_in_place_of_a_kept_model_is_not_waited_for() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join(format!("a-{}.rom", &key("a", &1)[..32]));
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        let (done, answer) = std::sync::mpsc::channel();
+        std::thread::spawn(move || done.send(read(&path, &key("a", &1)).unwrap_err()));
+        let answer = answer.recv_timeout(std::time::Duration::from_secs(20)).expect("an answer");
+        assert_eq!(answer.as_deref(), Some("is no file"));
+    }
+
+    #[test]
+    fn old_versions_go_and_other_models_stay() {
+        let bench = Bench::new();
+        bench.get("a-fine", 0.5);
+        for version in 0..KEPT + 3 {
+            bench.get("a", version as f64);
+        }
+        assert_eq!(bench.files().len(), KEPT + 1);
+        assert!(bench.files()[KEPT].file_name().unwrap().to_str().unwrap().starts_with("a-fine"));
+    }
+
+    #[test]
+    fn off_keeps_nothing() {
+        let made = RomCache::off().get("a", &1, &Console::new(true, false), &|| Ok(rom(1.0)));
+        assert_eq!(made, Ok(rom(1.0)));
+    }
+}

@@ -1,0 +1,216 @@
+//! A scene file with its ROMs, or a scene that ships with tiprub.
+
+use std::{
+    cell::RefCell,
+    ffi::OsStr,
+    path::{Path, PathBuf},
+};
+
+use tiprub_core::{Rom, Scene, settings::SceneSettings};
+use tiprub_shell::{Failure, Result, console::Console};
+
+use crate::{builtin, rom_cache::RomCache};
+
+/// The scene of the demo, as a user would write it.
+pub const ROTOR37_SCENE: &str = include_str!("../scenes/rotor37.toml");
+
+/// Coupled blades in an oval flexible casing.
+pub const STAGE_SCENE: &str = include_str!("../scenes/stage.toml");
+
+/// A cube that flies between two rings.
+pub const CUBE_SCENE: &str = include_str!("../scenes/cube-between-rings.toml");
+
+/// Scenes that ship with tiprub: what stands behind `builtin:`, and the text.
+pub const BUILTIN_SCENES: [(&str, &str); 5] = [
+    ("rotor37", ROTOR37_SCENE),
+    ("flexible-casing", include_str!("../scenes/flexible-casing.toml")),
+    ("abradable", include_str!("../scenes/abradable.toml")),
+    ("stage", STAGE_SCENE),
+    ("cube-between-rings", CUBE_SCENE),
+];
+
+/// Largest ROM file (bytes).
+const LARGEST: u64 = 8 << 30;
+
+/// What names of embedded scenes and models begin with.
+pub const BUILTIN: &str = "builtin:";
+
+/// Load a scene: a path, or `builtin:` and the name of one of [`BUILTIN_SCENES`]. Built-in models come from `cache`, or
+/// are reduced on the way, with progress.
+///
+/// # Errors
+/// Missing or wrong files, naming file, line, field and remedy.
+pub fn load(argument: impl AsRef<OsStr>, cache: &RomCache, console: &Console) -> Result<Scene> {
+    let reduce = |name: &str| Some(builtin::rom(name, cache, console)?.map_err(|failure| failure.to_string()));
+    match source(argument.as_ref())? {
+        Source::Embedded(name, text) => builtin_scene(name, text, &reduce),
+        Source::File(path) => tiprub_format::load_scene(path, &reduce).map_err(Failure::from),
+    }
+}
+
+/// What [`load`] would load, without its models: nothing is reduced.
+///
+/// # Errors
+/// As [`load`], but for the models.
+pub fn settings(argument: impl AsRef<OsStr>) -> Result<SceneSettings> {
+    Ok(match source(argument.as_ref())? {
+        Source::Embedded(name, text) => tiprub_format::parse_scene(text, name)?,
+        Source::File(path) => tiprub_format::load_settings(path)?,
+    })
+}
+
+/// The files that [`load`] would read: the scene and its ROMs; none of a scene that ships, or of one that is wrong.
+pub fn files(argument: &str) -> Vec<PathBuf> {
+    let Ok(Source::File(path)) = source(argument.as_ref()) else { return Vec::new() };
+    let structures = tiprub_format::load_settings(path).map(|settings| settings.structures).unwrap_or_default();
+    let roms = structures.iter().filter(|structure| !structure.rom.starts_with(BUILTIN));
+    let beside = |rom: &str| path.parent().unwrap_or(Path::new("")).join(rom);
+    [path.to_path_buf()].into_iter().chain(roms.map(|structure| beside(&structure.rom))).collect()
+}
+
+/// Where a scene is.
+enum Source<'a> {
+    /// One of [`BUILTIN_SCENES`].
+    Embedded(&'a str, &'static str),
+    File(&'a Path),
+}
+
+fn source(argument: &OsStr) -> Result<Source<'_>> {
+    if let Some(argument) = argument.to_str().filter(|argument| argument.starts_with(BUILTIN)) {
+        let name = &argument[BUILTIN.len()..];
+        let Some((_, text)) = BUILTIN_SCENES.iter().find(|(known, _)| *known == name) else {
+            let names: Vec<String> = BUILTIN_SCENES.iter().map(|(known, _)| format!("{BUILTIN}{known}")).collect();
+            let problem = format!("there is no built-in scene `{name}`");
+            return Err(Failure::usage("SCENE", problem, format!("Give a scene file, or one of {}", names.join(", "))));
+        };
+        return Ok(Source::Embedded(argument, text));
+    }
+    let path = Path::new(argument);
+    if path.is_dir() {
+        return Err(Failure::usage(path.display(), "is a directory", "Give the scene file (TOML) in it"));
+    }
+    let kind = path.extension().map(|extension| extension.to_ascii_lowercase()).unwrap_or_default();
+    let other = match kind.to_str() {
+        Some("fmu") => Some("is an FMU, not a scene file"),
+        Some("safetensors") => Some("is a ROM, not a scene file"),
+        _ => None,
+    };
+    match other {
+        Some(problem) => {
+            let remedy = "Give a scene file (TOML); `tiprub inspect` shows what is in this one";
+            Err(Failure::usage(path.display(), problem, remedy))
+        }
+        None => Ok(Source::File(path)),
+    }
+}
+
+/// An embedded scene with embedded models from `reduce`.
+fn builtin_scene(name: &str, text: &str, reduce: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
+    let settings = tiprub_format::parse_scene(text, name)?;
+    let mut roms = Vec::new();
+    for structure in &settings.structures {
+        let model = structure.rom.strip_prefix(BUILTIN).and_then(reduce).unwrap_or_else(|| Err("not known".into()));
+        roms.push(model.map_err(|problem| Failure::new(&structure.rom, problem, ""))?);
+    }
+    Ok(Scene { settings, roms })
+}
+
+/// The scene of the demo around a blade reduced before.
+///
+/// # Errors
+/// Never with the scene that ships.
+pub fn rotor37_scene_with(rom: Rom) -> Result<Scene> {
+    let rom = RefCell::new(Some(rom));
+    builtin_scene("builtin:rotor37", ROTOR37_SCENE, &|_| rom.borrow_mut().take().map(Ok))
+}
+
+/// The scene of the stage, or the same with coarse models.
+///
+/// # Errors
+/// Never with what ships.
+pub fn stage_scene(coarse: bool, cache: &RomCache, console: &Console) -> Result<Scene> {
+    let suffix = if coarse { "-coarse" } else { "" };
+    let reduce = |name: &str| {
+        let model = builtin::rom(&format!("{name}{suffix}"), cache, console)?;
+        Some(model.map_err(|failure| failure.to_string()))
+    };
+    builtin_scene("builtin:stage", STAGE_SCENE, &reduce)
+}
+
+/// The embedded scene as text, with its ROM read from `rom_file` and the stop time replaced.
+pub fn rotor37_text(rom_file: &str, stop: f64) -> String {
+    let mut text = String::new();
+    for line in ROTOR37_SCENE.lines() {
+        if line.starts_with("rom = ") {
+            text.push_str(&format!("rom = \"{rom_file}\""));
+        } else if line.starts_with("stop = ") {
+            text.push_str(&format!("stop = {stop:?}"));
+        } else {
+            text.push_str(line);
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Read a ROM file.
+///
+/// # Errors
+/// Missing or damaged file, naming the array.
+pub fn read_rom(path: &Path) -> Result<Rom> {
+    let bytes =
+        tiprub_format::read_file(path, LARGEST).map_err(|error| Failure::file(path, "cannot be read", &error))?;
+    Ok(tiprub_format::read_rom(&bytes, &path.display().to_string())?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn the_embedded_scene_is_valid_and_its_file_form_differs_in_two_fields_only() {
+        let embedded = tiprub_format::parse_scene(ROTOR37_SCENE, "embedded").unwrap();
+        let written = tiprub_format::parse_scene(&rotor37_text("blade.rom.safetensors", 0.25), "written").unwrap();
+        assert_eq!(written.structures[0].rom, "blade.rom.safetensors");
+        assert_eq!(written.experiment.stop.to_bits(), 0.25_f64.to_bits());
+        let mut restored = written;
+        restored.structures[0].rom.clone_from(&embedded.structures[0].rom);
+        restored.experiment.stop = embedded.experiment.stop;
+        assert_eq!(restored, embedded);
+    }
+
+    #[test]
+    fn every_embedded_scene_is_valid_and_made_of_embedded_models() {
+        for (name, text) in BUILTIN_SCENES {
+            let settings = tiprub_format::parse_scene(text, name).unwrap();
+            assert!(settings.structures.iter().all(|structure| structure.rom.starts_with(BUILTIN)), "{name}");
+            let models = settings.structures.iter().map(|structure| &structure.rom[BUILTIN.len()..]);
+            assert!(models.clone().all(|model| builtin::NAMES.contains(&model)), "{name}");
+        }
+    }
+
+    #[test]
+    fn missing_files_and_unknown_builtins_are_named() {
+        let console = Console::new(true, false);
+        let load = |argument: &str, console: &Console| load(argument, &RomCache::off(), console);
+        let missing = load("/nowhere/scene.toml", &console).unwrap_err();
+        assert!(missing.what.contains("/nowhere/scene.toml"), "{missing}");
+        let failure = load("builtin:rotor38", &console).unwrap_err();
+        assert!(failure.problem.contains("rotor38") && failure.remedy.contains("builtin:abradable"), "{failure}");
+        for (name, kind) in [("rub.fmu", "an FMU"), ("blade.rom.safetensors", "a ROM")] {
+            let failure = load(name, &console).unwrap_err();
+            assert!(failure.problem.contains(kind) && failure.remedy.contains("inspect"), "{failure}");
+        }
+        assert!(load("/", &console).unwrap_err().problem.contains("directory"));
+    }
+
+    #[test]
+    fn a_wrong_scene_names_line_and_field() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("scene.toml");
+        fs::write(&path, ROTOR37_SCENE.replace("gap = ", "gapp = ")).unwrap();
+        let text = load(&path, &RomCache::off(), &Console::new(true, false)).unwrap_err().to_string();
+        assert!(text.contains("scene.toml:") && text.contains("gapp") && text.contains("`gap`"), "{text}");
+    }
+}

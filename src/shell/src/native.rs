@@ -1,0 +1,200 @@
+//! A scene run without FMI: the same core, the same communication points, the same outputs.
+
+use std::time::{Duration, Instant};
+
+use tiprub_core::{
+    Scene, Simulation, VariableTable,
+    variables::{Causality, Kind, Variable},
+};
+
+use crate::{Failure, Result, recording::Recording, schedule::Schedule};
+
+/// Results of a native run.
+#[derive(Debug, Clone)]
+pub struct NativeRun {
+    /// All outputs at all communication points.
+    pub recording: Recording,
+    /// Time spent stepping (not in initialisation or recording).
+    pub stepping: Duration,
+    /// Internal steps done.
+    pub internal_steps: u64,
+    /// Warnings of the initialisation, of the run and of the schedule.
+    pub warnings: Vec<String>,
+}
+
+/// Run `scene` over the schedule with start values replaced by `settings` (name, value as text).
+///
+/// # Errors
+/// Unknown or wrong settings, refused scenes, a state that became non-finite.
+pub fn run(
+    scene: &Scene,
+    schedule: &Schedule,
+    settings: &[(String, String)],
+    progress: &dyn Fn(usize),
+) -> Result<NativeRun> {
+    let name = scene.settings.name.clone();
+    let in_scene = |error: tiprub_core::Error| Failure::from_core(format!("scene `{name}`"), error);
+    // Checks and warnings are for the step that is taken.
+    let mut scene = scene.clone();
+    scene.settings.experiment.communication_step = schedule.time(1) - schedule.time(0);
+    let mut simulation = Simulation::new(&scene).map_err(in_scene)?;
+    for (variable, value) in settings {
+        set(&mut simulation, variable, value)?;
+    }
+    simulation.initialise(schedule.start).map_err(in_scene)?;
+    let outputs = Outputs::of(simulation.table());
+    let mut recording = Recording::with_columns(outputs.names.clone(), schedule.count + 1)?;
+    let (mut stepping, mut internal_steps) = (Duration::ZERO, 0);
+    for index in 0..=schedule.count {
+        let time = schedule.time(index);
+        recording.times.push(time);
+        outputs.read(&simulation, &mut recording.values).map_err(in_scene)?;
+        progress(index);
+        if index < schedule.count {
+            let clock = Instant::now();
+            simulation.begin_step(time, schedule.time(index + 1) - time).map_err(in_scene)?;
+            loop {
+                internal_steps += 1;
+                if simulation.advance().map_err(in_scene)?.finished {
+                    break;
+                }
+            }
+            stepping += clock.elapsed();
+        }
+    }
+    let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
+    warnings.extend(simulation.take_notes());
+    Ok(NativeRun { recording, stepping, internal_steps, warnings })
+}
+
+/// All numeric outputs as they are now, in the order of the table.
+pub fn numeric_outputs(simulation: &Simulation) -> Vec<f64> {
+    let mut values = Vec::new();
+    // Every reference comes from the table that it is read from.
+    let _ = Outputs::of(simulation.table()).read(simulation, &mut values);
+    values
+}
+
+/// The numeric outputs of a table, element by element.
+struct Outputs {
+    names: Vec<String>,
+    elements: Vec<(Kind, u32)>,
+}
+
+impl Outputs {
+    fn of(table: &VariableTable) -> Self {
+        let is_numeric_output =
+            |variable: &&Variable| variable.causality == Causality::Output && variable.kind != Kind::String;
+        let mut outputs = Self { names: Vec::new(), elements: Vec::new() };
+        for variable in table.variables().iter().filter(is_numeric_output) {
+            for (index, reference) in (0..variable.len()).zip(variable.reference..) {
+                outputs.names.push(variable.element_name(index));
+                outputs.elements.push((variable.kind, reference));
+            }
+        }
+        outputs
+    }
+
+    fn read(&self, simulation: &Simulation, values: &mut Vec<f64>) -> tiprub_core::Result<()> {
+        for &(kind, reference) in &self.elements {
+            values.push(match kind {
+                Kind::Real => simulation.real(reference)?,
+                Kind::Boolean => f64::from(u8::from(simulation.boolean(reference)?)),
+                _ => f64::from(simulation.integer(reference)?),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Set a start value by name: a scalar, one element `name[i]`, or all elements of an array at once.
+pub fn set(simulation: &mut Simulation, name: &str, text: &str) -> Result<()> {
+    let (kind, references) = locate(simulation.table(), name)?;
+    let option = format!("--set {name}={text}");
+    for reference in references {
+        let outcome = match kind {
+            Kind::Real => simulation.set_real(reference, number(&option, text)?),
+            Kind::Integer => simulation.set_integer(reference, number(&option, text)?),
+            Kind::Boolean => simulation.set_boolean(reference, number(&option, text)?),
+            Kind::String => simulation.set_string(reference, text),
+            Kind::Enumeration(enumeration) => {
+                let items = enumeration.items.iter().map(|(item, _)| *item).collect::<Vec<_>>();
+                let item = items.iter().zip(1..).find(|(item, _)| **item == text).map(|(_, value)| value);
+                let unknown =
+                    || Failure::usage(&option, "no such choice", format!("Choose one of {}", items.join(", ")));
+                simulation.set_integer(reference, item.or_else(|| text.parse().ok()).ok_or_else(unknown)?)
+            }
+        };
+        outcome.map_err(|error| Failure { usage: true, ..Failure::from_core(&option, error) })?;
+    }
+    Ok(())
+}
+
+fn number<T: std::str::FromStr>(option: &str, text: &str) -> Result<T> {
+    let kind = std::any::type_name::<T>();
+    let wanted = match kind {
+        "f64" => "a number",
+        "bool" => "true or false",
+        _ => "a whole number",
+    };
+    text.parse().map_err(|_| {
+        Failure::usage(option, format!("{text:?} is not {wanted}"), format!("Give {wanted}{}", example(kind)))
+    })
+}
+
+fn example(kind: &str) -> &'static str {
+    if kind == "f64" { ", for example 1.5e-3" } else { "" }
+}
+
+/// Kind and value references of a variable or of one of its elements.
+fn locate(table: &VariableTable, name: &str) -> Result<(Kind, Vec<u32>)> {
+    if let Some(variable) = table.find(name) {
+        let count = variable.len();
+        return Ok((variable.kind, (variable.reference..).take(count).collect()));
+    }
+    for variable in table.variables() {
+        let element =
+            (0..variable.len()).zip(variable.reference..).find(|(index, _)| variable.element_name(*index) == name);
+        if let Some((_, reference)) = element {
+            return Ok((variable.kind, vec![reference]));
+        }
+    }
+    let settable: Vec<&str> = table
+        .variables()
+        .iter()
+        .filter(|variable| variable.is_settable())
+        .map(|variable| variable.name.as_str())
+        .collect();
+    Err(Failure::usage(format!("--set {name}"), "no such variable", suggestion(name, &settable)))
+}
+
+fn suggestion(name: &str, candidates: &[&str]) -> String {
+    let scored = candidates.iter().map(|candidate| (strsim::jaro_winkler(name, candidate), *candidate));
+    match scored.max_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((score, candidate)) if score > 0.8 => format!("Did you mean `{candidate}`?"),
+        _ => format!("Inputs and parameters are: {}", candidates.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_near_miss_is_suggested_and_a_far_one_lists_all() {
+        let names = ["speed", "friction_coefficient"];
+        assert_eq!(suggestion("sped", &names), "Did you mean `speed`?");
+        assert_eq!(suggestion("xyz", &names), "Inputs and parameters are: speed, friction_coefficient");
+    }
+
+    #[test]
+    fn wrong_values_say_what_is_wanted() {
+        let failure = number::<f64>("--set speed=fast", "fast").unwrap_err();
+        assert_eq!(
+            failure.to_string(),
+            "--set speed=fast: \"fast\" is not a number. Give a number, for example 1.5e-3."
+        );
+        assert!(number::<bool>("--set a=1", "1").unwrap_err().remedy.contains("true or false"));
+        assert!(number::<i32>("--set a=1.5", "1.5").unwrap_err().remedy.contains("whole number"));
+    }
+}

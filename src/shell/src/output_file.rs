@@ -1,0 +1,271 @@
+//! Files appear whole or not at all. What is being written has no name yet where the system allows it (Linux: `O_TMPFILE`), so that
+//! nothing stays when the program is killed; elsewhere it is a hidden temporary file beside the target. Then it is renamed.
+//!
+//! New files get the permissions that the user's umask leaves, replaced ones keep theirs. Symbolic links are followed.
+//! Devices and pipes (`/dev/null`, a FIFO) are written to, never replaced.
+
+use std::{
+    fs::{self, File},
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+use tempfile::NamedTempFile;
+
+use crate::{Failure, Result};
+
+/// Links followed one after the other before they are taken for a circle.
+const MOST_LINKS: usize = 40;
+
+/// Create the directory (and its parents) if it is not there.
+///
+/// # Errors
+/// The directory cannot be made.
+pub fn create_directory(path: &Path) -> Result<()> {
+    fs::create_dir_all(path).map_err(|error| Failure::file(path, "cannot create the directory", &error))
+}
+
+/// Whether files can be written into the directory, made for the trial if it is not there: so that long work does not end at a
+/// wrong path. Nothing stays.
+///
+/// # Errors
+/// The directory cannot be made, or not be written to.
+pub fn try_directory(path: &Path) -> Result<()> {
+    let named = path.ancestors().filter(|ancestor| !ancestor.as_os_str().is_empty());
+    let missing: Vec<&Path> = named.take_while(|ancestor| !ancestor.exists()).collect();
+    let trial = create_directory(path)
+        .and_then(|()| Draft::new(path).map(drop).map_err(|error| Failure::file(path, "cannot write there", &error)));
+    for made in missing {
+        // Those that were not made are not there.
+        let _ = fs::remove_dir(made);
+    }
+    trial
+}
+
+/// Whether a file can be written under this name, as far as that shows before it is. Nothing stays.
+///
+/// # Errors
+/// As [`begin`].
+pub fn try_target(target: &Path) -> Result<()> {
+    match place(target)? {
+        Place::File(path) => try_directory(&parent(&path)),
+        Place::Stream => Ok(()),
+    }
+}
+
+/// What already is under the name of a target.
+enum Place {
+    /// Nothing, or a file to replace, at this path (symbolic links resolved).
+    File(PathBuf),
+    /// Something that takes bytes but is no file: a device or a pipe.
+    Stream,
+}
+
+fn place(target: &Path) -> Result<Place> {
+    let path = destination(target).map_err(|error| Failure::file(target, "cannot be written", &error))?;
+    let is_directory = || Failure::new(target.display(), "is a directory", "Name a file");
+    match fs::metadata(&path) {
+        Ok(metadata) if metadata.is_dir() => Err(is_directory()),
+        Ok(metadata) if metadata.is_file() => Ok(Place::File(path)),
+        Ok(_) => Ok(Place::Stream),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => match path.file_name() {
+            Some(_) if !target.as_os_str().as_encoded_bytes().ends_with(b"/") => Ok(Place::File(path)),
+            _ => Err(is_directory()),
+        },
+        // A file where a directory should be: said by whoever makes the directory.
+        Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(Place::File(path)),
+        Err(error) => Err(Failure::file(target, "cannot be written", &error)),
+    }
+}
+
+/// The path itself, or where symbolic links lead, whether something is there or not.
+pub fn destination(target: &Path) -> io::Result<PathBuf> {
+    if let Ok(real) = fs::canonicalize(target) {
+        return Ok(real);
+    }
+    let mut path = target.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        // What is open has a link in /proc/self/fd that leads nowhere, and is there all the same.
+        match fs::read_link(&path) {
+            Ok(link) if !path.exists() => path = parent(&path).join(link),
+            _ => return Ok(path),
+        }
+    }
+    Err(io::Error::other("symbolic links lead in a circle"))
+}
+
+/// A file in the making.
+#[derive(Debug)]
+pub struct Draft {
+    file: File,
+    /// Where it has a name already.
+    named: Option<NamedTempFile>,
+}
+
+impl Draft {
+    /// In this directory.
+    fn new(directory: &Path) -> io::Result<Self> {
+        if let Some(file) = unnamed(directory) {
+            return Ok(Self { file, named: None });
+        }
+        let named = temporary().tempfile_in(directory)?;
+        Ok(Self { file: named.reopen()?, named: Some(named) })
+    }
+
+    /// Hidden under a name of its own, ready to be renamed.
+    fn name(self, directory: &Path) -> io::Result<tempfile::TempPath> {
+        if let Some(named) = self.named {
+            return Ok(named.into_temp_path());
+        }
+        Ok(temporary().make_in(directory, |path| link(&self.file, path))?.into_temp_path())
+    }
+}
+
+impl Write for Draft {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+fn temporary<'a>() -> tempfile::Builder<'a, 'a> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".tiprub-").suffix(".part");
+    #[cfg(unix)]
+    builder.permissions(ordinary());
+    builder
+}
+
+/// What the umask leaves of this is what new files get.
+#[cfg(unix)]
+fn ordinary() -> fs::Permissions {
+    std::os::unix::fs::PermissionsExt::from_mode(0o666)
+}
+
+/// A file without a name; none where the file system knows none.
+#[cfg(target_os = "linux")]
+fn unnamed(directory: &Path) -> Option<File> {
+    use std::os::unix::fs::OpenOptionsExt;
+    fs::OpenOptions::new().read(true).write(true).custom_flags(libc::O_TMPFILE).mode(0o666).open(directory).ok()
+}
+
+#[cfg(not(target_os = "linux"))]
+fn unnamed(_directory: &Path) -> Option<File> {
+    None
+}
+
+/// Give a file without a name one.
+#[cfg(target_os = "linux")]
+fn link(file: &File, path: &Path) -> io::Result<()> {
+    use rustix::fs::{AtFlags, CWD};
+    use std::os::fd::AsRawFd;
+    let open = format!("/proc/self/fd/{}", file.as_raw_fd());
+    Ok(rustix::fs::linkat(CWD, open, CWD, path, AtFlags::SYMLINK_FOLLOW)?)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn link(_file: &File, _path: &Path) -> io::Result<()> {
+    Err(io::ErrorKind::Unsupported.into())
+}
+
+/// Begin a file in the directory of `target` (which is created if missing). Nothing shows under the target's name before
+/// [`persist`].
+///
+/// # Errors
+/// The directory cannot be written to, or `target` is itself a directory or no possible name.
+pub fn begin(target: &Path) -> Result<Draft> {
+    let place = place(target)?;
+    let directory = match &place {
+        Place::File(path) => parent(path),
+        Place::Stream => std::env::temp_dir(),
+    };
+    create_directory(&directory)?;
+    let draft = Draft::new(&directory).and_then(|draft| match &place {
+        Place::File(path) => keep_permissions(&draft.file, path).map(|()| draft),
+        Place::Stream => Ok(draft),
+    });
+    draft.map_err(|error| Failure::file(target, "cannot write there", &error))
+}
+
+/// A file that replaces another is no more open to others than that one.
+fn keep_permissions(file: &File, target: &Path) -> io::Result<()> {
+    match fs::metadata(target) {
+        Ok(metadata) => file.set_permissions(metadata.permissions()),
+        Err(_) => Ok(()),
+    }
+}
+
+/// Give the finished file its name, replacing an older file of that name.
+///
+/// # Errors
+/// The rename failed, and the temporary file is gone and an older target untouched; or a device or pipe took only a part.
+pub fn persist(draft: Draft, target: &Path) -> Result<()> {
+    let Place::File(path) = place(target)? else { return copy_into_stream(draft, target) };
+    let named = draft.name(&parent(&path));
+    let renamed = named.and_then(|named| named.persist(path).map_err(|error| error.error));
+    renamed.map_err(|error| Failure::file(target, "cannot be put in place", &error))
+}
+
+fn copy_into_stream(draft: Draft, target: &Path) -> Result<()> {
+    let mut finished = draft.file;
+    let copied = io::Seek::rewind(&mut finished)
+        .and_then(|()| open_stream(target))
+        .and_then(|mut stream| io::copy(&mut finished, &mut stream));
+    copied.map(drop).map_err(|error| Failure::file(target, "cannot be written", &error))
+}
+
+/// Open a device or a pipe to write. A pipe that nobody reads is waited for, and not in silence.
+fn open_stream(target: &Path) -> io::Result<File> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+        if fs::metadata(target)?.file_type().is_fifo() {
+            let asked = fs::OpenOptions::new().write(true).custom_flags(libc::O_NONBLOCK).open(target);
+            if asked.is_err_and(|error| error.raw_os_error() == Some(libc::ENXIO)) {
+                let name = crate::console::printable(&target.display().to_string()).into_owned();
+                // A closed stderr must not stop the work.
+                let _ = writeln!(io::stderr(), "{name} is a pipe that nobody reads: waiting for its reader");
+            }
+        }
+    }
+    fs::OpenOptions::new().write(true).open(target)
+}
+
+/// Write `bytes` to `target` in one piece.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write(target: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
+    let mut draft = begin(target)?;
+    draft.write_all(bytes.as_ref()).map_err(|error| Failure::file(target, "cannot be written", &error))?;
+    persist(draft, target)
+}
+
+/// Refuse to replace a file that holds something else than `bytes`: what a user changed is not lost without notice. Devices
+/// and pipes are not read.
+///
+/// # Errors
+/// The file is there and differs (or cannot be read); `remedy` says what to do.
+pub fn refuse_to_replace(target: &Path, bytes: impl AsRef<[u8]>, remedy: &str) -> Result<()> {
+    if fs::metadata(target).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir()) {
+        return Ok(());
+    }
+    match fs::read(target) {
+        Ok(present) if present == bytes.as_ref() => Ok(()),
+        Ok(_) => Err(Failure::new(target.display(), "is there already and differs from what would be written", remedy)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(Failure::file(target, "cannot be compared with what would be written", &error)),
+    }
+}
+
+fn parent(target: &Path) -> PathBuf {
+    match target.parent() {
+        Some(directory) if !directory.as_os_str().is_empty() => directory.to_path_buf(),
+        _ => PathBuf::from("."),
+    }
+}
+
+#[cfg(test)]
+mod tests;

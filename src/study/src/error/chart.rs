@@ -1,0 +1,237 @@
+//! Error against time as a picture: logarithmic axes, a colour per scheme, a marker per solver, the Pareto front drawn.
+
+use std::fmt::Write as _;
+
+use tiprub_figure::escape;
+
+use super::competitor::Competitor;
+
+/// Size of the picture and of the plot in it (SVG units).
+const WIDTH: f64 = 920.0;
+const HEIGHT: f64 = 470.0;
+const LEFT: f64 = 70.0;
+const RIGHT: f64 = 660.0;
+const TOP: f64 = 16.0;
+const BOTTOM: f64 = 420.0;
+/// By colour index; distinguishable with colour-vision deficiency.
+const COLORS: [&str; 7] = ["#d67018", "#1f5da0", "#248c76", "#aa3474", "#6e747c", "#b9a12a", "#5b3a1e"];
+/// Errors outside of this are drawn at its edge.
+const ERRORS: [f64; 2] = [1e-7, 3.0];
+
+/// Points of one competitor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Points {
+    /// Who.
+    pub competitor: Competitor,
+    /// Seconds and errors, in the order of the steps.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// A chart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chart {
+    /// Text of the vertical axis.
+    pub error_label: String,
+    /// The competitors.
+    pub all: Vec<Points>,
+    /// Join the points of a competitor by lines.
+    pub joined: bool,
+    /// Below this error the references do not tell any more.
+    pub readable: Option<f64>,
+}
+
+/// The points that no other point beats in time and error, by time.
+pub fn front(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut sorted: Vec<_> = points.iter().copied().filter(|(time, error)| *time > 0.0 && error.is_finite()).collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let mut best = f64::INFINITY;
+    sorted.retain(|(_, error)| {
+        let better = *error < best;
+        best = best.min(*error);
+        better
+    });
+    sorted
+}
+
+/// Whole decades around values.
+fn decades(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let extend = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
+    let [low, high] = values.filter(|value| *value > 0.0).fold([f64::INFINITY, 0.0], extend);
+    if high <= 0.0 {
+        return [0.0, 1.0];
+    }
+    let (low, high) = (low.log10().floor(), high.log10().ceil());
+    [low, if high > low { high } else { low + 1.0 }]
+}
+
+/// Places on the page.
+struct Frame {
+    time: [f64; 2],
+    error: [f64; 2],
+}
+
+impl Frame {
+    fn x(&self, time: f64) -> f64 {
+        tenth(LEFT + (RIGHT - LEFT) * (time.log10() - self.time[0]) / (self.time[1] - self.time[0]))
+    }
+
+    fn y(&self, error: f64) -> f64 {
+        let error = error.clamp(10_f64.powf(self.error[0]), 10_f64.powf(self.error[1]));
+        tenth(BOTTOM - (BOTTOM - TOP) * (error.log10() - self.error[0]) / (self.error[1] - self.error[0]))
+    }
+}
+
+fn tenth(value: f64) -> f64 {
+    (value * 10.0).round() / 10.0
+}
+
+impl Chart {
+    /// A whole SVG file.
+    pub fn to_svg(&self) -> String {
+        let points = || self.all.iter().flat_map(|each| each.points.iter());
+        let clamped = points().map(|point| point.1.clamp(ERRORS[0], ERRORS[1]));
+        let frame = Frame { time: decades(points().map(|point| point.0)), error: decades(clamped) };
+        let mut svg = format!(
+            r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" font-size="13" fill="#343a42"><rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>"##
+        );
+        self.draw_axes(&frame, &mut svg);
+        self.draw_front(&frame, &mut svg);
+        for each in &self.all {
+            self.draw_points(&frame, each, &mut svg);
+        }
+        self.draw_legend(&mut svg);
+        svg.push_str("</svg>\n");
+        svg
+    }
+
+    fn draw_axes(&self, frame: &Frame, svg: &mut String) {
+        let line = |svg: &mut String, [x, y]: [f64; 2], [u, v]: [f64; 2], color: &str| {
+            let _ = write!(svg, r#"<path d="M{x} {y}L{u} {v}" stroke="{color}" fill="none"/>"#);
+        };
+        for power in whole(frame.time) {
+            let x = frame.x(10_f64.powi(power));
+            line(svg, [x, TOP], [x, BOTTOM], "#e8ebef");
+            let _ = write!(svg, r#"<text x="{x}" y="{}" text-anchor="middle">1e{power}</text>"#, BOTTOM + 18.0);
+        }
+        for power in whole(frame.error) {
+            let y = frame.y(10_f64.powi(power));
+            line(svg, [LEFT, y], [RIGHT, y], "#e8ebef");
+            let _ = write!(svg, r#"<text x="{}" y="{}" text-anchor="end">1e{power}</text>"#, LEFT - 8.0, y + 4.0);
+        }
+        line(svg, [LEFT, TOP], [LEFT, BOTTOM], "#99a0a8");
+        line(svg, [LEFT, BOTTOM], [RIGHT, BOTTOM], "#99a0a8");
+        let (across, up) = (0.5 * (LEFT + RIGHT), 0.5 * (TOP + BOTTOM));
+        let _ = write!(
+            svg,
+            r#"<text x="{across}" y="{}" text-anchor="middle">time of stepping (s)</text><text transform="translate(18 {up}) rotate(-90)" text-anchor="middle">{}</text>"#,
+            BOTTOM + 40.0,
+            escape(&self.error_label)
+        );
+        if let Some(readable) = self.readable.filter(|error| error.log10() > frame.error[0]) {
+            let y = frame.y(readable);
+            let _ = write!(
+                svg,
+                r##"<path d="M{LEFT} {y}L{RIGHT} {y}" stroke="#343a42" stroke-dasharray="6 5" fill="none"/><text x="{}" y="{}" text-anchor="end" font-size="12">distance of the two references</text>"##,
+                RIGHT - 4.0,
+                y - 5.0
+            );
+        }
+    }
+
+    fn draw_front(&self, frame: &Frame, svg: &mut String) {
+        let points: Vec<_> = self.all.iter().flat_map(|each| each.points.iter().copied()).collect();
+        let mut path = String::new();
+        for (index, (time, error)) in front(&points).into_iter().enumerate() {
+            let (x, y) = (frame.x(time), frame.y(error));
+            let _ = if index == 0 { write!(path, "M{x} {y}") } else { write!(path, "H{x}V{y}") };
+        }
+        let _ = write!(svg, r##"<path d="{path}" stroke="#c9ced5" stroke-width="7" fill="none"/>"##);
+    }
+
+    fn draw_points(&self, frame: &Frame, each: &Points, svg: &mut String) {
+        let color = COLORS[each.competitor.color() % COLORS.len()];
+        let places: Vec<_> = each.points.iter().map(|(time, error)| (frame.x(*time), frame.y(*error))).collect();
+        if self.joined && places.len() > 1 {
+            let path: Vec<String> = places.iter().map(|(x, y)| format!("{x} {y}")).collect();
+            let _ = write!(
+                svg,
+                r#"<path d="M{}" stroke="{color}" stroke-width="1.2" stroke-opacity="0.7" fill="none"/>"#,
+                path.join("L")
+            );
+        }
+        for (x, y) in places {
+            mark(svg, each.competitor.marker(), color, x, y);
+        }
+    }
+
+    fn draw_legend(&self, svg: &mut String) {
+        let (x, mut y) = (RIGHT + 18.0, TOP + 10.0);
+        for each in &self.all {
+            mark(svg, each.competitor.marker(), COLORS[each.competitor.color() % COLORS.len()], x, y - 4.0);
+            let _ = write!(
+                svg,
+                r#"<text x="{}" y="{y}" font-size="12">{}</text>"#,
+                x + 12.0,
+                escape(&each.competitor.name())
+            );
+            y += 20.0;
+        }
+        let _ = write!(
+            svg,
+            r##"<path d="M{} {}h16" stroke="#c9ced5" stroke-width="7"/><text x="{}" y="{y}" font-size="12">Pareto front</text>"##,
+            x - 8.0,
+            y - 4.0,
+            x + 12.0
+        );
+    }
+}
+
+/// The powers of ten in a range.
+#[expect(clippy::cast_possible_truncation, reason = "powers of ten of seconds and errors")]
+fn whole([low, high]: [f64; 2]) -> std::ops::RangeInclusive<i32> {
+    low as i32..=high as i32
+}
+
+/// Square, disc, triangle, cross, plus.
+fn mark(svg: &mut String, marker: usize, color: &str, x: f64, y: f64) {
+    let at = |dx: f64, dy: f64| format!("{} {}", tenth(x + dx), tenth(y + dy));
+    let _ = match marker {
+        0 => write!(svg, r#"<path d="M{}h8v8h-8z" fill="{color}"/>"#, at(-4.0, -4.0)),
+        1 => write!(svg, r#"<circle cx="{x}" cy="{y}" r="4.4" fill="{color}"/>"#),
+        2 => write!(svg, r#"<path d="M{}l5 9h-10z" fill="none" stroke="{color}" stroke-width="1.6"/>"#, at(0.0, -5.0)),
+        3 => write!(
+            svg,
+            r#"<path d="M{}l8 8m0 -8l-8 8" stroke="{color}" stroke-width="2.2" fill="none"/>"#,
+            at(-4.0, -4.0)
+        ),
+        _ => {
+            write!(svg, r#"<path d="M{}h10m-5 -5v10" stroke="{color}" stroke-width="2.2" fill="none"/>"#, at(-5.0, 0.0))
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_front_holds_what_nothing_beats() {
+        let points = [(3.0, 1e-3), (1.0, 1e-1), (2.0, 2e-1), (2.0, 1e-2), (4.0, 1e-3), (0.5, f64::NAN)];
+        assert_eq!(front(&points), [(1.0, 1e-1), (2.0, 1e-2), (3.0, 1e-3)]);
+    }
+
+    #[test]
+    fn a_chart_marks_every_point_and_names_every_competitor() {
+        let all: Vec<Points> = Competitor::all()
+            .into_iter()
+            .map(|competitor| Points { competitor, points: vec![(1e-3, 1e-2), (1e-1, 1e-4)] })
+            .collect();
+        let svg = Chart { error_label: "error".into(), all, joined: true, readable: Some(1e-3) }.to_svg();
+        for competitor in Competitor::all() {
+            assert!(svg.contains(&escape(&competitor.name())), "{}", competitor.name());
+        }
+        // Two points and the legend, for each of the three schemes with lcp and for the bi-potential on the full model.
+        assert_eq!(svg.matches("<circle").count(), 12);
+        assert!(svg.contains("1e-4") && svg.contains("distance of the two references") && !svg.contains("NaN"));
+    }
+}

@@ -1,0 +1,349 @@
+//! Error against run time: every scheme, solver and step of the product on a scene, against fine runs that must meet.
+//!
+//! A [`case::Case`] is a scene in one or several sizes; [`competitor::Competitor`] is who steps it; [`measure`] holds every
+//! configuration against two references, and [`ranking`] says who is cheapest. Refusals and failures are rows like all others.
+//! [`own::Own`] makes a case of any scene.
+
+pub mod case;
+pub mod chart;
+pub mod clock;
+pub mod competitor;
+pub mod measure;
+pub mod own;
+pub mod ranking;
+pub mod run;
+pub mod scene;
+pub mod sheets;
+pub mod window;
+
+use std::iter::zip;
+
+use case::Case;
+use chart::Chart;
+use competitor::{Competitor, Family, SCHEMES};
+use measure::{Measured, Row};
+use ranking::Kind;
+use serde_json::{Value, json};
+use tiprub_core::settings::{Scheme, Solver};
+use tiprub_figure::table::Table;
+use tiprub_shell::{Result, console::Console};
+
+use super::{Figure, Picture, Statement, Study};
+use crate::arguments::ErrorArguments;
+
+/// How far apart the two references of a scene may be.
+const MEET: f64 = 2e-3;
+
+/// The study of a scene of one's own.
+///
+/// # Errors
+/// The scene cannot be read or stepped, or a reference fails.
+pub fn study(arguments: &ErrorArguments, console: &Console) -> Result<Study> {
+    let case = own::Own::new(arguments, console)?;
+    let summary = format!(
+        "Every time scheme and contact solver on {}, at steps on both sides of the one it asks for.",
+        arguments.scene
+    );
+    of_cases(vec![Box::new(case)], &[], (arguments.common.quick, summary), console)
+}
+
+/// The study of several cases; `smooth` are further ones, of which only orders are told.
+///
+/// # Errors
+/// A reference fails.
+pub fn of_cases(
+    cases: Vec<Box<dyn Case>>,
+    smooth: &[&dyn Case],
+    (quick, summary): (bool, String),
+    console: &Console,
+) -> Result<Study> {
+    let mut study = Study {
+        name: "error",
+        title: "Error against run time".into(),
+        summary,
+        facts: super::machine::facts(),
+        statements: Vec::new(),
+        figures: Vec::new(),
+        results: Value::Null,
+        files: Vec::new(),
+    };
+    let repetitions = if quick { 1 } else { run::REPETITIONS };
+    let time = format!("{}, median of {repetitions} runs or more, one run at a time", clock::MEANING);
+    study.facts.push(("time".into(), time));
+    let mut measured = Vec::new();
+    for case in cases {
+        let task = console.task(case.title(), Some(measure::count(case.as_ref())));
+        let found = measure::measure(case.as_ref(), repetitions, &task)?;
+        measured.push((case, found));
+    }
+    let orders = orders(smooth, &measured, console)?;
+    let mut text = guide_page(&study.facts);
+    let mut results = Vec::new();
+    for (case, found) in &measured {
+        let tables = add(&mut study, case.as_ref(), found);
+        text.push_str(&section(case.as_ref(), &tables));
+        results.push(sheets::to_json(case.as_ref(), found));
+    }
+    if let Some(last) = study.figures.last_mut() {
+        last.picture.html.push_str(&orders.to_html(false));
+    }
+    text.push_str(&format!("\n## Orders\n\n{}", orders.to_markdown()));
+    study.files.push(("tables.md".into(), "pictures and tables as Markdown".into(), text.into_bytes()));
+    study.results = json!({ "scenes": results, "quick": quick });
+    Ok(study)
+}
+
+/// Head of the page of the guide.
+fn guide_page(facts: &[(String, String)]) -> String {
+    let facts: String = facts.iter().map(|(name, value)| format!("* {name}: {value}\n")).collect();
+    format!("# Error against run time: pictures and tables\n\n{facts}")
+}
+
+/// A scene's part of it.
+fn section(case: &dyn Case, tables: &[Table]) -> String {
+    let title = case.title();
+    let pictures = case.figures().map(|figure| format!("![{title}]({figure}.svg)\n\n")).concat();
+    // Captions on the page of all scenes begin with the scene.
+    let own = |table: &Table| {
+        let caption =
+            table.caption.strip_prefix(title).map_or(table.caption.as_str(), |rest| rest.trim_start_matches(": "));
+        Table { caption: format!("**{caption}**"), ..table.clone() }.to_markdown()
+    };
+    format!("\n## {title}\n\n{pictures}{}", tables.iter().map(own).collect::<Vec<_>>().join("\n"))
+}
+
+/// Orders while nothing changes its contact, and in the scenes that were measured.
+fn orders(smooth: &[&dyn Case], measured: &[(Box<dyn Case>, Measured)], console: &Console) -> Result<Table> {
+    let task = console.task("Orders of convergence", None);
+    let found = smooth.iter().map(|case| measure::measure(*case, 1, &task)).collect::<Result<Vec<_>>>()?;
+    let mut all: Vec<(&dyn Case, &Measured)> = zip(smooth.iter().copied(), &found).collect();
+    all.extend(measured.iter().map(|(case, found)| (case.as_ref(), found)));
+    Ok(ranking::orders(&all))
+}
+
+/// Figures, statements and files of one scene; its tables are returned.
+fn add(study: &mut Study, case: &dyn Case, found: &Measured) -> Vec<Table> {
+    let about = sheets::references(case, found);
+    let mut all = vec![about.clone()];
+    for (kind, name) in zip([Kind::OfTime, Kind::Total], case.figures()) {
+        let (chart, sheet) = sheets::chart(case, found, kind);
+        let (winners, costs) = (ranking::winners(case, found, kind), ranking::costs(case, found, kind));
+        let mut html = chart.to_svg();
+        html.push_str(&winners.to_html(false));
+        html.push_str(&costs.to_html(false));
+        if kind == Kind::Total {
+            html.push_str(&about.to_html(false));
+            if let Some(statistics) = window::statistics(case) {
+                html.push_str(&statistics.to_html(false));
+                all.push(statistics);
+            }
+            html.push_str(&sheets::rows(case, found).to_html(true));
+        }
+        let picture = Picture { svg: chart.to_svg(), html };
+        study.figures.push(Figure { name, caption: caption(case, found, kind, &chart), picture, sheet });
+        all.extend([winners, costs]);
+    }
+    study.statements.extend(statements(case, found));
+    study.files.push((
+        format!("{}.csv", case.name()),
+        format!("every configuration of {}", case.title()),
+        sheets::csv(case, found).into_bytes(),
+    ));
+    all
+}
+
+fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> String {
+    let standard = case.standard();
+    let own = &found.references[standard];
+    let size = case.sizes()[standard];
+    let what = match kind {
+        Kind::OfTime => format!(
+            "{}: error of the steps alone at {size} {}: relative L2 of the displacements against {} at h = {:.2e} s. {} at h = {:.2e} s, {}, is \
+             {:.1e} away.",
+            case.title(),
+            case.size_name(),
+            competitor::DEFAULT.name(),
+            case.interval() / f64::from(case.reference_divisions(standard).0),
+            case.second().name(),
+            case.interval() / f64::from(case.reference_divisions(standard).1),
+            case.relation(),
+            own.apart[0]
+        ),
+        Kind::Total => {
+            format!("{}: total error of the displacements, all numbers of {}.", case.title(), case.size_name())
+        }
+    };
+    let away = |family: Family, what: &str| {
+        own.away(family)
+            .map_or_else(String::new, |away| format!(" {what} tends to a limit of its own, {away:.1e} away."))
+    };
+    let limits = away(Family::MASSLESS, "massless-boundary") + &away(Family::STICKING, "coulomb");
+    let refused = found.rows.iter().filter(|row| row.outcome.is_err()).count();
+    let shown: usize = chart.all.iter().map(|each| each.points.len()).sum();
+    format!(
+        "{what}{} {} {shown} configurations; {refused} of this scene were refused or failed and stand in the table of all runs.",
+        if kind == Kind::OfTime { limits.as_str() } else { "" },
+        if kind == Kind::OfTime { case.description() } else { String::new() }
+    )
+}
+
+/// What every scene should show.
+fn statements(case: &dyn Case, found: &Measured) -> Vec<Statement> {
+    let title = case.title();
+    let lcp = SCHEMES.map(|scheme| Competitor::Core(scheme, Solver::Lcp));
+    let ran = found.rows.iter().filter(|row| lcp.contains(&row.competitor));
+    let ran: Vec<_> = ran.filter_map(|row| row.outcome.as_ref().ok()).collect();
+    let deepest = ran.iter().map(|figures| figures.penetration).fold(0.0, f64::max);
+    let least = ran.iter().map(|figures| figures.adhesion).fold(0.0, f64::min);
+    let mut all = meeting(case, found);
+    all.extend(limits(case, found));
+    all.push(Statement {
+        expected: format!("{title}: lcp neither penetrates nor pulls at any internal step of any run"),
+        found: format!("deepest {deepest:.1e} m, least force {least:.1e} N in {} runs", ran.len()),
+        // The surface of a coating is there to be penetrated.
+        holds: (!case.is_coated())
+            .then(|| !ran.is_empty() && ran.iter().all(|one| one.penetration <= 0.0 && one.adhesion >= 0.0)),
+    });
+    all.extend(ranking::floor(case, found));
+    all.extend(window::statement(case));
+    all
+}
+
+/// Two references that share no code meet.
+fn meeting(case: &dyn Case, found: &Measured) -> Vec<Statement> {
+    let title = case.title();
+    let (size, apart) = (case.sizes()[case.standard()], found.references[case.standard()].apart[0]);
+    let Some((full, who)) = case.meeting() else {
+        return vec![Statement::tested(
+            format!("{title}: the two references, the second {}, meet to {MEET:e}", case.relation()),
+            apart < MEET,
+            format!("displacements {apart:.1e} apart at {size} {}", case.size_name()),
+        )];
+    };
+    let truncation: Vec<String> = zip(case.sizes(), &found.truncation)
+        .map(|(size, apart)| format!("{apart:.1e} with {size} {}", case.size_name()))
+        .collect();
+    vec![
+        Statement::tested(
+            format!("{title}: two references that share neither stepping nor contact code meet to {MEET:e}"),
+            full < MEET,
+            format!("displacements {full:.1e} apart: {who}"),
+        ),
+        Statement::tested(
+            format!("{title}: the product comes nearer to them with the number of {}", case.size_name()),
+            found.truncation.len() > 1 && found.truncation.windows(2).all(|pair| pair[1] < pair[0]),
+            truncation.join(", "),
+        ),
+    ]
+}
+
+/// What became of one step of central differences.
+struct Tried {
+    size: usize,
+    /// s
+    step: f64,
+    /// Whether it ran, was refused for its stability, or failed otherwise.
+    outcome: Outcome,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    Ran,
+    /// ω_max·h ≥ 2.
+    Unstable,
+    Failed,
+}
+
+impl Outcome {
+    fn of(row: &Row) -> Self {
+        match &row.outcome {
+            Ok(_) => Self::Ran,
+            Err(reason) if reason.contains("≥ 2") => Self::Unstable,
+            Err(_) => Self::Failed,
+        }
+    }
+}
+
+/// Whether steps were refused, all for ω_max·h ≥ 2, and at every size some ran, all of them shorter than those refused.
+fn bounded(tried: &[Tried]) -> bool {
+    let steps = |size: usize, outcome: Outcome| {
+        tried.iter().filter(move |one| one.size == size && one.outcome == outcome).map(|one| one.step)
+    };
+    let parted = |size: usize| {
+        let longest = steps(size, Outcome::Ran).fold(0.0, f64::max);
+        longest > 0.0 && longest < steps(size, Outcome::Unstable).fold(f64::INFINITY, f64::min)
+    };
+    let has = |outcome: Outcome| tried.iter().any(|one| one.outcome == outcome);
+    has(Outcome::Unstable) && !has(Outcome::Failed) && tried.iter().all(|one| parted(one.size))
+}
+
+/// The longest step that ran and the shortest that did not, at each size.
+fn bounds(case: &dyn Case, tried: &[Tried]) -> String {
+    let of = |at: usize, size: usize| {
+        let steps = |ran: bool| {
+            let own = tried.iter().filter(move |one| one.size == at && (one.outcome == Outcome::Ran) == ran);
+            own.map(|one| 1e6 * one.step)
+        };
+        let longest = steps(true).fold(0.0, f64::max);
+        let shortest = steps(false).fold(f64::INFINITY, f64::min);
+        let refused = if shortest.is_finite() { format!("{shortest:.3} µs refused") } else { "none refused".into() };
+        format!("with {size} {} {longest:.3} µs ran, {refused}", case.size_name())
+    };
+    case.sizes().into_iter().enumerate().map(|(at, size)| of(at, size)).collect::<Vec<_>>().join("; ")
+}
+
+/// What central differences refuse, and how long the steps of modal-exact may be.
+fn limits(case: &dyn Case, found: &Measured) -> [Statement; 2] {
+    let own = |scheme: Scheme| {
+        let competitor = Competitor::Core(scheme, Solver::Lcp);
+        found.rows.iter().filter(move |row| row.competitor == competitor)
+    };
+    let standard = |row: &&Row| row.size == case.standard();
+    let longest = |scheme: Scheme| -> f64 {
+        own(scheme).filter(standard).filter(|row| row.outcome.is_ok()).map(|row| row.step).fold(0.0, f64::max)
+    };
+    let (central, exact) = (longest(Scheme::CentralDifference), longest(Scheme::ModalExact));
+    let tried: Vec<Tried> = own(Scheme::CentralDifference)
+        .map(|row| Tried { size: row.size, step: row.step, outcome: Outcome::of(row) })
+        .collect();
+    [
+        Statement {
+            expected: format!(
+                "{}: central differences refuse steps, for ω_max·h ≥ 2 alone, and at every size all that run are shorter",
+                case.title()
+            ),
+            found: bounds(case, &tried),
+            // Steps that all run say nothing about the limit.
+            holds: tried.iter().any(|one| one.outcome != Outcome::Ran).then(|| bounded(&tried)),
+        },
+        Statement::remark(
+            format!("{}: longest step of modal-exact that ran", case.title()),
+            format!("{:.3} µs, {:.1} times that of central differences", 1e6 * exact, exact / central),
+        ),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Outcome, Tried, bounded};
+
+    fn holds(tried: &[(usize, f64, Outcome)]) -> bool {
+        let tried: Vec<Tried> = tried.iter().map(|&(size, step, outcome)| Tried { size, step, outcome }).collect();
+        bounded(&tried)
+    }
+
+    #[test]
+    fn a_limit_parts_what_is_refused_from_what_runs() {
+        use Outcome::{Failed, Ran, Unstable};
+        let tried = [(0, 4.0, Unstable), (0, 2.0, Ran), (1, 2.0, Unstable), (1, 1.0, Ran)];
+        let with = |more: (usize, f64, Outcome)| [&tried[..], &[more]].concat();
+        assert!(holds(&tried));
+        assert!(holds(&with((2, 1.0, Ran))), "a size at which no step was long enough");
+        assert!(!holds(&tried[..3]), "nothing ran at the second size");
+        assert!(!holds(&[tried[1], tried[3]]), "nothing was refused");
+        assert!(!holds(&with((1, 8.0, Ran))), "a longer step ran");
+        assert!(!holds(&with((0, 1.0, Unstable))), "a shorter step was refused");
+        assert!(!holds(&with((0, 8.0, Failed))), "a step failed for another reason");
+        assert!(!holds(&[]), "nothing was tried");
+    }
+}

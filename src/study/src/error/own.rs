@@ -1,0 +1,205 @@
+//! Any scene as a case: all schemes and solvers of the product at steps around the one the scene asks for.
+
+use tiprub_core::{
+    Scene,
+    settings::{Scheme, Solver},
+    shown,
+};
+use tiprub_gallery::scene_source;
+use tiprub_shell::{Failure, Result, console::Console, schedule::Schedule};
+
+use super::{
+    case::Case,
+    competitor::{Competitor, DEFAULT, Family, SCHEMES, SOLVERS},
+    run::{Run, Seen},
+    scene::SceneRun,
+    window,
+};
+use crate::arguments::ErrorArguments;
+
+/// Internal steps tried, as multiples of the number that the scene asks for.
+const SHARES: [f64; 7] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
+const QUICK_SHARES: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
+/// Internal steps of the references, in multiples of the most that are tried.
+const FINER: u32 = 8;
+/// Samples of the window where none is asked for.
+const SAMPLES: usize = 400;
+const QUICK_SAMPLES: usize = 100;
+
+/// What no start value may replace.
+const COMPARED: [&str; 3] = ["scheme", "solver", "internal_step_max"];
+
+/// A scene of one's own.
+pub struct Own {
+    title: String,
+    scene: Scene,
+    settings: Vec<(String, String)>,
+    interval: f64,
+    samples: usize,
+    divisions: Vec<u32>,
+    parting: Vec<f64>,
+}
+
+impl Own {
+    /// Read the scene, and see how long it can be followed.
+    ///
+    /// # Errors
+    /// The scene cannot be read or does not run; nothing touches within the window.
+    pub fn new(arguments: &ErrorArguments, console: &Console) -> Result<Self> {
+        for (name, _) in &arguments.set {
+            if COMPARED.contains(&name.as_str()) {
+                let problem = "the study compares all of them";
+                return Err(Failure::usage(format!("--set {name}"), problem, "Leave it out"));
+            }
+        }
+        let quick = arguments.common.quick;
+        let scene = scene_source::load(&arguments.scene, &arguments.common.cache.cache(), console)?;
+        let schedule = Schedule::new(&scene.settings.experiment, None, None)?;
+        let (interval, step) = (scene.settings.experiment.communication_step, scene.settings.time.step);
+        let own = (interval / step).ceil().max(1.0);
+        let shares = if quick { &QUICK_SHARES[..] } else { &SHARES[..] };
+        let mut divisions: Vec<u32> = shares.iter().map(|share| count(share * own)).collect();
+        divisions.dedup();
+        let most = if quick { QUICK_SAMPLES } else { SAMPLES };
+        let title = scene.settings.name.clone();
+        let mut case = Self {
+            title,
+            scene,
+            settings: arguments.set.clone(),
+            interval,
+            samples: 0,
+            divisions,
+            parting: Vec::new(),
+        };
+        let refused = |problem| Failure::new(&arguments.scene, problem, "");
+        let task = console.task("How long the scene can be followed", None);
+        let touch = case.first_touch(count(own), schedule.count).map_err(refused)?;
+        let asked = arguments.window.map_or(touch + most, |window| count(window / interval) as usize);
+        let samples = asked.clamp(1, schedule.count);
+        if touch >= samples {
+            let when = if touch < schedule.count { shown(interval * touch as f64) + " s" } else { "never".into() };
+            let problem = format!("nothing touches within the window: first contact after the start is at {when}");
+            return Err(Failure::new(&arguments.scene, problem, "Give a longer --window, or a scene that rubs"));
+        }
+        case.parting = window::parting(&case, count(2.0 * own), samples).map_err(refused)?;
+        drop(task);
+        case.samples = window::samples(&case.parting, samples);
+        if case.samples == 0 {
+            let problem = "runs that differ by almost nothing part within the first communication step".into();
+            return Err(refused(problem));
+        }
+        Ok(case)
+    }
+}
+
+impl Own {
+    /// Communication steps before the first contact, at most `most`.
+    fn first_touch(&self, division: u32, most: usize) -> Result<usize, String> {
+        let mut run = self.start(0, DEFAULT, division, 0.0)?;
+        let mut seen = Seen::nothing();
+        for sample in 0..most {
+            run.watch(&mut seen)?;
+            if seen.impulse > 0.0 {
+                return Ok(sample);
+            }
+        }
+        Ok(most)
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+fn count(value: f64) -> u32 {
+    value.round().clamp(1.0, 1e8) as u32
+}
+
+impl Case for Own {
+    fn name(&self) -> &'static str {
+        "scene"
+    }
+
+    fn figures(&self) -> [&'static str; 2] {
+        ["scene-steps", "scene-total"]
+    }
+
+    fn title(&self) -> &str {
+        &self.title
+    }
+
+    fn description(&self) -> String {
+        let settings = &self.scene.settings;
+        format!(
+            "{} Inputs keep their start values; errors are those of the steps, of modes and contact nodes nothing is said here.",
+            settings.description
+        )
+    }
+
+    fn size_name(&self) -> &'static str {
+        "coordinates of the first ROM"
+    }
+
+    fn sizes(&self) -> Vec<usize> {
+        vec![self.scene.roms[0].order()]
+    }
+
+    fn interval(&self) -> f64 {
+        self.interval
+    }
+
+    fn samples(&self) -> usize {
+        self.samples
+    }
+
+    fn impulse_window(&self) -> usize {
+        (self.samples / 20).max(1)
+    }
+
+    fn divisions(&self, _: usize) -> Vec<u32> {
+        self.divisions.clone()
+    }
+
+    fn reference_divisions(&self, _: usize) -> (u32, u32) {
+        let most = self.divisions.last().copied().unwrap_or(1);
+        (FINER.saturating_mul(most), FINER.saturating_mul(most))
+    }
+
+    fn second(&self) -> Competitor {
+        Competitor::Core(Scheme::CentralDifference, Solver::Lcp)
+    }
+
+    fn relation(&self) -> &'static str {
+        "another scheme"
+    }
+
+    fn competitors(&self, _: usize) -> Vec<Competitor> {
+        SCHEMES.into_iter().flat_map(|scheme| SOLVERS.map(|solver| Competitor::Core(scheme, solver))).collect()
+    }
+
+    fn parting(&self) -> &[f64] {
+        &self.parting
+    }
+
+    fn is_coated(&self) -> bool {
+        self.scene.settings.contacts.iter().any(|contact| contact.coating.is_some())
+    }
+
+    fn perturbed(&self) -> &'static str {
+        "clearance or velocity"
+    }
+
+    fn families(&self, _: usize) -> Vec<Family> {
+        vec![Family::MASSLESS, Family::STICKING, Family::BOTH]
+    }
+
+    fn start<'a>(
+        &'a self,
+        _: usize,
+        competitor: Competitor,
+        division: u32,
+        perturbation: f64,
+    ) -> Result<Box<dyn Run + 'a>, String> {
+        let Competitor::Core(scheme, solver) = competitor else { return Err("not on a scene of one's own".into()) };
+        let step = self.interval / f64::from(division);
+        let scene = SceneRun::changed(&self.scene, (scheme, solver), step, perturbation);
+        Ok(Box::new(SceneRun::with_start_values(&scene, self.interval, division, &self.settings)?))
+    }
+}

@@ -1,0 +1,257 @@
+//! Who is cheapest for an error, and orders of convergence.
+
+use tiprub_core::settings::{Scheme, Solver};
+use tiprub_figure::table::Table;
+
+use super::{
+    case::Case,
+    competitor::{Competitor, PAPER},
+    measure::{Figures, Measured, Row},
+};
+use crate::Statement;
+
+/// Errors that are asked for.
+pub const TARGETS: [f64; 3] = [1e-2, 1e-3, 1e-4];
+/// Points of which an order is fitted.
+const FITTED: usize = 3;
+/// Errors below this are rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// Which error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Of the steps alone, at the standard size.
+    OfTime,
+    /// Against the truth, over all sizes.
+    Total,
+}
+
+impl Kind {
+    /// The error of this kind.
+    pub fn of(self, figures: &Figures) -> f64 {
+        match self {
+            Self::OfTime => figures.of_time,
+            Self::Total => figures.total,
+        }
+    }
+
+    /// The rows it is about.
+    pub fn rows<'a>(self, case: &dyn Case, measured: &'a Measured) -> Vec<&'a Row> {
+        let standard = case.standard();
+        measured.rows.iter().filter(|row| self == Self::Total || row.size == standard).collect()
+    }
+}
+
+/// Errors below this cannot be read: how far two references that share no code are apart where the truth is one of them.
+pub fn readable(case: &dyn Case, measured: &Measured, kind: Kind) -> f64 {
+    let apart = |size: usize| measured.references.get(size).map_or(0.0, |references| references.apart[0]);
+    match (case.meeting(), kind) {
+        (Some((distance, _)), _) => distance,
+        (None, Kind::OfTime) => apart(case.standard()),
+        (None, Kind::Total) if case.exact().is_some() => 0.0,
+        (None, Kind::Total) => apart(measured.references.len().saturating_sub(1)),
+    }
+}
+
+/// The row of least time with at most this error, among those of a competitor or of all.
+pub fn cheapest<'a>(
+    rows: &[&'a Row],
+    kind: Kind,
+    only: Option<Competitor>,
+    error: f64,
+) -> Option<(&'a Row, &'a Figures)> {
+    let asked = rows.iter().filter(|row| only.is_none_or(|competitor| row.competitor == competitor));
+    let done = asked.filter_map(|row| row.outcome.as_ref().ok().map(|figures| (*row, figures)));
+    let good = done.filter(|(_, figures)| kind.of(figures) <= error);
+    good.min_by(|a, b| a.1.seconds.total_cmp(&b.1.seconds))
+}
+
+/// A duration in words.
+pub fn seconds(time: f64) -> String {
+    match time {
+        time if time < 1e-3 => format!("{:.3} ms", 1e3 * time),
+        time if time < 1.0 => format!("{:.1} ms", 1e3 * time),
+        _ => format!("{time:.2} s"),
+    }
+}
+
+/// Cheapest configuration for every target, and what the paper's method needs.
+pub fn winners(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
+    let rows = kind.rows(case, measured);
+    let sizes = case.sizes();
+    let what = match kind {
+        Kind::OfTime => format!(
+            "{}: cheapest for an error of the steps alone, at {} {}",
+            case.title(),
+            sizes[case.standard()],
+            case.size_name()
+        ),
+        Kind::Total => {
+            format!("{}: cheapest for a total error, over all numbers of {}", case.title(), case.size_name())
+        }
+    };
+    let columns = ["error", "cheapest", case.size_name(), "h (µs)", "time", "the paper's method", "factor"];
+    let mut table = Table::new(what, columns);
+    let readable = readable(case, measured, kind);
+    for target in TARGETS {
+        if target < readable && cheapest(&rows, kind, None, target).is_some() {
+            let why = format!("not to be read: the references are {readable:.1e} apart");
+            let empty = std::iter::repeat_n(String::new(), table.columns.len() - 2);
+            table.rows.push([format!("{target:.0e}"), why].into_iter().chain(empty).collect());
+            continue;
+        }
+        let paper = cheapest(&rows, kind, Some(PAPER), target);
+        let text = |(row, figures): (&Row, &Figures)| {
+            let size =
+                if kind == Kind::Total { format!("{} {}, ", sizes[row.size], case.size_name()) } else { String::new() };
+            format!("{} ({size}h = {:.3} µs)", seconds(figures.seconds), 1e6 * row.step)
+        };
+        let paper_text = paper.map_or_else(|| "does not reach it".into(), text);
+        let mut cells = vec![format!("{target:.0e}")];
+        cells.extend(match cheapest(&rows, kind, None, target) {
+            None => ["nobody", "", "", ""].map(String::from).into_iter().chain([paper_text, String::new()]).collect(),
+            Some((row, figures)) => vec![
+                row.competitor.name(),
+                sizes[row.size].to_string(),
+                format!("{:.3}", 1e6 * row.step),
+                seconds(figures.seconds),
+                paper_text,
+                paper.map_or_else(|| "-".into(), |(_, paper)| format!("{:.1}", paper.seconds / figures.seconds)),
+            ],
+        });
+        table.rows.push(cells);
+    }
+    table
+}
+
+/// What every competitor needs for every target.
+pub fn costs(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
+    let rows = kind.rows(case, measured);
+    let of = if kind == Kind::OfTime { "the steps alone" } else { "all, modes included" };
+    let caption = format!("{}: time that every competitor needs for an error of {of}", case.title());
+    let mut table =
+        Table::new(caption, ["competitor", "1e-2", "1e-3", "1e-4", "least error", "largest h that ran (µs)"]);
+    let readable = readable(case, measured, kind);
+    for competitor in Competitor::all() {
+        let own: Vec<&Row> = rows.iter().copied().filter(|row| row.competitor == competitor).collect();
+        let done = || own.iter().filter_map(|row| row.outcome.as_ref().ok().map(|figures| (row, figures)));
+        if own.is_empty() {
+            continue;
+        }
+        let mut cells = vec![competitor.name()];
+        cells.extend(TARGETS.map(|target| match cheapest(&own, kind, None, target) {
+            None => "-".into(),
+            Some(_) if target < readable => "not to be read".into(),
+            Some((_, figures)) => seconds(figures.seconds),
+        }));
+        if done().next().is_none() {
+            cells.extend(["none", "none"].map(String::from));
+            table.rows.push(cells);
+            continue;
+        }
+        let least = done().map(|(_, figures)| kind.of(figures)).fold(f64::INFINITY, f64::min);
+        let largest = done().map(|(row, _)| row.step).fold(0.0, f64::max);
+        cells.extend([format!("{least:.1e}"), format!("{:.3}", 1e6 * largest)]);
+        table.rows.push(cells);
+    }
+    table
+}
+
+/// How far film stays behind lcp; only where several nodes are coupled.
+pub fn floor(case: &dyn Case, found: &Measured) -> Option<Statement> {
+    let errors = |solver: Solver| -> Vec<f64> {
+        let competitor = Competitor::Core(Scheme::ModalExact, solver);
+        let own = found.rows.iter().filter(|row| row.size == case.standard() && row.competitor == competitor);
+        own.filter_map(|row| row.outcome.as_ref().ok().map(|figures| figures.of_time)).collect()
+    };
+    let (film, lcp) = (*errors(Solver::Film).last()?, *errors(Solver::Lcp).last()?);
+    case.several_nodes().then(|| {
+        Statement::remark(
+            format!("{}: film behind lcp", case.title()),
+            format!(
+                "modal-exact at the finest step: {film:.1e} with film, {lcp:.1e} with lcp, {:.1} times",
+                film / lcp
+            ),
+        )
+    })
+}
+
+/// What an order is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Order {
+    /// The error goes with this power of h.
+    Power(f64),
+    /// There is no error but rounding.
+    Exact,
+    /// The error falls no more: it does not tend to this limit.
+    Floor(f64),
+    /// Too few runs.
+    Unknown,
+}
+
+impl Order {
+    /// As in a table.
+    pub fn text(self) -> String {
+        match self {
+            Self::Power(power) => format!("{power:.1}"),
+            Self::Exact => "exact".into(),
+            Self::Floor(error) => format!("stays at {error:.0e}"),
+            Self::Unknown => "-".into(),
+        }
+    }
+}
+
+/// Order of a competitor at the standard size, from its finest steps, against the limit of its own equations.
+pub fn order(case: &dyn Case, measured: &Measured, competitor: Competitor) -> Order {
+    let rows = measured.rows.iter().filter(|row| row.size == case.standard() && row.competitor == competitor);
+    let points: Vec<(f64, f64)> =
+        rows.filter_map(|row| row.outcome.as_ref().ok().map(|figures| (row.step, figures.of_own))).collect();
+    if points.len() < FITTED {
+        return Order::Unknown;
+    }
+    let fine = &points[points.len() - FITTED..];
+    if fine.iter().all(|point| point.1 < ROUNDING) {
+        return Order::Exact;
+    }
+    let power = slope(fine);
+    if power < 0.3 { Order::Floor(fine[FITTED - 1].1) } else { Order::Power(power) }
+}
+
+/// Slope of a straight line through the logarithms.
+fn slope(points: &[(f64, f64)]) -> f64 {
+    let count = points.len() as f64;
+    let logs: Vec<(f64, f64)> = points.iter().map(|(h, e)| (h.ln(), e.max(f64::MIN_POSITIVE).ln())).collect();
+    let mean = |part: fn(&(f64, f64)) -> f64| logs.iter().map(part).sum::<f64>() / count;
+    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+    let above: f64 = logs.iter().map(|(a, b)| (a - x) * (b - y)).sum();
+    above / logs.iter().map(|(a, _)| (a - x) * (a - x)).sum::<f64>()
+}
+
+/// Orders of all competitors in several scenes.
+pub fn orders(scenes: &[(&dyn Case, &Measured)]) -> Table {
+    let caption = format!(
+        "Observed orders: power of h with which displacements tend to the limit of their own equations, from the finest {FITTED} steps"
+    );
+    let mut columns = vec!["competitor".to_owned()];
+    columns.extend(scenes.iter().map(|(case, _)| case.title().to_owned()));
+    let mut table = Table { caption, columns, rows: Vec::new() };
+    for competitor in Competitor::all() {
+        let mut cells = vec![competitor.name()];
+        cells.extend(scenes.iter().map(|(case, measured)| order(*case, measured, competitor).text()));
+        if cells[1..].iter().any(|cell| cell != "-") {
+            table.rows.push(cells);
+        }
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_power_law_is_found_again() {
+        let points: Vec<(f64, f64)> = [1.0, 0.5, 0.2].iter().map(|h: &f64| (*h, 3.0 * h.powf(1.7))).collect();
+        assert!((slope(&points) - 1.7).abs() < 1e-12);
+    }
+}

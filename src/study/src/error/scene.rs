@@ -1,0 +1,115 @@
+//! Runs of whole scenes through [`Simulation`], as an FMU would step them.
+
+use tiprub_core::{
+    Scene, Simulation,
+    settings::{Scheme, Solver},
+};
+use tiprub_shell::native;
+
+use super::run::{Run, Seen};
+
+/// A run of a scene.
+pub struct SceneRun {
+    simulation: Simulation,
+    start: f64,
+    interval: f64,
+    division: u32,
+    samples: u32,
+}
+
+impl SceneRun {
+    /// Compile and initialise; `perturbation` is a relative change of clearances and velocities.
+    ///
+    /// # Errors
+    /// The refusal of the core.
+    pub fn new(
+        scene: &Scene,
+        (scheme, solver): (Scheme, Solver),
+        interval: f64,
+        division: u32,
+        perturbation: f64,
+    ) -> Result<Self, String> {
+        let scene = Self::changed(scene, (scheme, solver), interval / f64::from(division), perturbation);
+        Self::with_start_values(&scene, interval, division, &[])
+    }
+
+    /// The scene with another method and internal step (s), and a relative change of clearances and velocities.
+    pub fn changed(scene: &Scene, (scheme, solver): (Scheme, Solver), step: f64, perturbation: f64) -> Scene {
+        let mut scene = scene.clone();
+        scene.settings.time.scheme = scheme;
+        scene.settings.time.step = step;
+        for contact in &mut scene.settings.contacts {
+            contact.solver = solver;
+            contact.gap *= 1.0 + perturbation;
+            contact.sector_gaps.iter_mut().for_each(|gap| *gap *= 1.0 + perturbation);
+        }
+        // The gaps of free bodies are in their ROMs.
+        let velocities = scene.settings.structures.iter_mut().flat_map(|structure| &mut structure.velocity);
+        velocities.for_each(|velocity| *velocity *= 1.0 + perturbation);
+        scene
+    }
+
+    /// As the scene says, with start values replaced (name, value as text).
+    ///
+    /// # Errors
+    /// As [`Self::new`], or a value that is refused.
+    pub fn with_start_values(
+        scene: &Scene,
+        interval: f64,
+        division: u32,
+        values: &[(String, String)],
+    ) -> Result<Self, String> {
+        let start = scene.settings.experiment.start;
+        let mut simulation = Simulation::new(scene).map_err(|error| error.to_string())?;
+        for (name, value) in values {
+            native::set(&mut simulation, name, value).map_err(|failure| failure.to_string())?;
+        }
+        simulation.initialise(start).map_err(|error| error.to_string())?;
+        Ok(Self { simulation, start, interval, division, samples: 0 })
+    }
+
+    /// Time reached (s).
+    pub fn time(&self) -> f64 {
+        self.start + f64::from(self.samples) * self.interval
+    }
+}
+
+impl Run for SceneRun {
+    fn advance(&mut self) -> Result<(), String> {
+        let time = self.time();
+        self.samples += 1;
+        self.simulation.do_step(time, self.interval).map_err(|error| error.to_string())
+    }
+
+    fn watch(&mut self, seen: &mut Seen) -> Result<(), String> {
+        let time = self.time();
+        self.samples += 1;
+        self.simulation.begin_step(time, self.interval).map_err(|error| error.to_string())?;
+        let step = self.interval / f64::from(self.division);
+        loop {
+            let progress = self.simulation.advance().map_err(|error| error.to_string())?;
+            let system = self.simulation.system();
+            let least = system.gaps().iter().fold(f64::INFINITY, |least: f64, gap| least.min(*gap));
+            seen.add(progress.time, step, system.events().iter().map(|event| event.normal), least);
+            if progress.finished {
+                return Ok(());
+            }
+        }
+    }
+
+    fn displacements(&self) -> Vec<f64> {
+        let bank = self.simulation.system().bank();
+        (0..bank.rows()).flat_map(|row| (0..bank.sectors()).map(move |sector| bank.row(row, sector))).collect()
+    }
+
+    fn energy(&self) -> f64 {
+        let (kinetic, strain) = self.simulation.system().energies();
+        kinetic + strain
+    }
+
+    fn residual(&self) -> Option<f64> {
+        let system = self.simulation.system();
+        let scale = system.ledger().scale();
+        (scale > 0.0).then(|| system.ledger().residual(self.energy()) / scale)
+    }
+}

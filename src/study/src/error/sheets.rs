@@ -1,0 +1,204 @@
+//! Everything measured of a scene: chart, CSV, JSON, table of all runs.
+
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+use tiprub_figure::table::Table;
+use tiprub_shell::recording::shortest;
+
+use super::{
+    case::Case,
+    chart::{Chart, Points},
+    competitor::{Competitor, Family},
+    measure::{Figures, Measured, Row},
+    ranking::{Kind, seconds},
+};
+use crate::Sheet;
+
+/// Chart of one kind of error, and its numbers: a row per configuration, its error in the column of the competitor.
+pub fn chart(case: &dyn Case, found: &Measured, kind: Kind) -> (Chart, Sheet) {
+    let rows = kind.rows(case, found);
+    let mut chart = Chart {
+        error_label: match kind {
+            Kind::OfTime => "error of the steps, displacements (relative L2)".into(),
+            Kind::Total => "total error, displacements (relative L2)".into(),
+        },
+        all: Vec::new(),
+        joined: kind == Kind::OfTime,
+        readable: (kind == Kind::OfTime).then(|| found.references[case.standard()].apart[0]),
+    };
+    let competitors: Vec<Competitor> = Competitor::all()
+        .into_iter()
+        .filter(|competitor| rows.iter().any(|row| row.competitor == *competitor))
+        .collect();
+    let mut sheet = Sheet::default();
+    sheet.columns.extend(["time (s)".to_owned(), case.size_name().to_owned(), "h (s)".to_owned()]);
+    sheet.columns.extend(competitors.iter().map(|competitor| competitor.name()));
+    for (column, &competitor) in competitors.iter().enumerate() {
+        let mut points = Vec::new();
+        for row in rows.iter().filter(|row| row.competitor == competitor) {
+            let Ok(figures) = &row.outcome else { continue };
+            points.push((figures.seconds, kind.of(figures)));
+            #[expect(clippy::cast_precision_loss, reason = "numbers of elements and modes")]
+            let mut cells = vec![figures.seconds, case.sizes()[row.size] as f64, row.step];
+            cells.extend((0..competitors.len()).map(|i| if i == column { kind.of(figures) } else { f64::NAN }));
+            sheet.rows.push(cells);
+        }
+        chart.all.push(Points { competitor, points });
+    }
+    (chart, sheet)
+}
+
+/// Names of the figures of a run, and what they are.
+const NAMES: [&str; 12] = [
+    "time (s)",
+    "error of the steps",
+    "error against the own limit",
+    "total error",
+    "impulse of the steps",
+    "total impulse",
+    "energy",
+    "ledger",
+    "penetration (m)",
+    "least force (N)",
+    "release",
+    "remark",
+];
+
+fn values(figures: &Figures) -> [Option<f64>; 11] {
+    [
+        Some(figures.seconds),
+        Some(figures.of_time),
+        Some(figures.of_own),
+        Some(figures.total),
+        Some(figures.impulse),
+        Some(figures.impulse_total),
+        Some(figures.energy),
+        figures.residual,
+        Some(figures.penetration),
+        Some(figures.adhesion),
+        figures.release,
+    ]
+}
+
+/// Every configuration as comma-separated values; refusals with their reason.
+pub fn csv(case: &dyn Case, found: &Measured) -> String {
+    let mut text = format!("competitor,{},h (s),{}\n", case.size_name(), NAMES.join(","));
+    for row in &found.rows {
+        let _ = write!(text, "\"{}\",{},{}", row.competitor.name(), case.sizes()[row.size], shortest(row.step));
+        let _ = match &row.outcome {
+            Ok(figures) => {
+                for value in values(figures) {
+                    let _ = write!(text, ",{}", value.map_or_else(String::new, |value| format!("{value:.4e}")));
+                }
+                writeln!(text, ",")
+            }
+            Err(problem) => writeln!(text, ",,,,,,,,,,,,\"{}\"", problem.replace('"', "'")),
+        };
+    }
+    text
+}
+
+/// Every configuration, for the page.
+pub fn rows(case: &dyn Case, found: &Measured) -> Table {
+    let mut columns = vec!["competitor".to_owned(), case.size_name().to_owned(), "h (µs)".to_owned()];
+    columns.extend(NAMES.map(String::from));
+    let mut table = Table { caption: format!("All runs of {}", case.title()), columns, rows: Vec::new() };
+    for row in &found.rows {
+        table.rows.push(cells(case, row));
+    }
+    table
+}
+
+fn cells(case: &dyn Case, row: &Row) -> Vec<String> {
+    let mut cells = vec![row.competitor.name(), case.sizes()[row.size].to_string(), format!("{:.4}", 1e6 * row.step)];
+    match &row.outcome {
+        Ok(figures) => {
+            let [time, rest @ ..] = values(figures);
+            cells.push(time.map_or_else(String::new, seconds));
+            cells.extend(rest.map(|value| value.map_or_else(String::new, |value| format!("{value:.1e}"))));
+            cells.push(String::new());
+        }
+        Err(problem) => {
+            cells.extend(std::iter::repeat_n(String::new(), NAMES.len() - 1));
+            cells.push(problem.clone());
+        }
+    }
+    cells
+}
+
+/// How far the references are apart, size by size.
+pub fn references(case: &dyn Case, found: &Measured) -> Table {
+    let caption = format!(
+        "{}: references, {} and {}, and what the number of {} leaves out",
+        case.title(),
+        super::competitor::DEFAULT.name(),
+        case.second().name(),
+        case.size_name()
+    );
+    let columns = [
+        case.size_name(),
+        "displacements apart",
+        "impulses apart",
+        "massless-boundary away",
+        "coulomb away",
+        "reference from the truth",
+    ];
+    let mut table = Table::new(caption, columns);
+    for ((size, own), truncation) in case.sizes().iter().zip(&found.references).zip(&found.truncation) {
+        let away = |family| own.away(family).map_or_else(|| "-".into(), |away: f64| format!("{away:.1e}"));
+        let truncation = if *truncation == 0.0 { "is the truth".into() } else { format!("{truncation:.1e}") };
+        let [displacements, impulses] = own.apart.map(|apart| format!("{apart:.1e}"));
+        table.rows.push(vec![
+            size.to_string(),
+            displacements,
+            impulses,
+            away(Family::MASSLESS),
+            away(Family::STICKING),
+            truncation,
+        ]);
+    }
+    table
+}
+
+/// For programs.
+pub fn to_json(case: &dyn Case, found: &Measured) -> Value {
+    let rows = found.rows.iter().map(|row| {
+        let mut object = json!({
+            "competitor": row.competitor.name(), "size": case.sizes()[row.size], "internal_step": row.step,
+        });
+        match &row.outcome {
+            Ok(figures) => {
+                let keys = [
+                    "seconds",
+                    "error_of_steps",
+                    "error_of_own_limit",
+                    "total_error",
+                    "impulse_error_of_steps",
+                    "total_impulse_error",
+                    "energy_error",
+                    "ledger_residual",
+                    "penetration",
+                    "least_force",
+                    "release_error",
+                ];
+                for (key, value) in keys.into_iter().zip(values(figures)) {
+                    object[key] = json!(value);
+                }
+            }
+            Err(problem) => object["refused"] = json!(problem),
+        }
+        object
+    });
+    json!({
+        "scene": case.name(),
+        "size_is": case.size_name(),
+        "standard_size": case.sizes()[case.standard()],
+        "window": case.interval() * case.samples() as f64,
+        "references_apart": found.references.iter().map(|own| own.apart).collect::<Vec<_>>(),
+        "massless_boundary_away": found.references.iter().map(|own| own.away(Family::MASSLESS)).collect::<Vec<_>>(),
+        "coulomb_away": found.references.iter().map(|own| own.away(Family::STICKING)).collect::<Vec<_>>(),
+        "reference_from_truth": found.truncation,
+        "rows": rows.collect::<Vec<_>>(),
+    })
+}

@@ -1,0 +1,143 @@
+//! How long a scene can be followed: runs from starts that differ by almost nothing part when contact is chaotic.
+
+use std::iter::zip;
+
+use tiprub_figure::table::Table;
+
+use super::{
+    case::Case,
+    competitor::{Competitor, DEFAULT},
+    measure::apart,
+    run::{self, Trace},
+};
+use crate::Statement;
+
+/// Relative change of the initial gap of the run that is compared.
+pub const PERTURBATION: f64 = 1e-9;
+
+/// Runs that differ by more than this have parted: what a scheme does wrong is then enlarged as much.
+pub const PARTED: f64 = 1e-6;
+/// Internal steps per sample of the runs that statistics are taken of, and of the run they are held against.
+const DIVISION: u32 = 20;
+const FINE: u32 = 160;
+
+/// Difference of two runs at every sample, relative to the largest displacements, over `samples` samples.
+///
+/// # Errors
+/// A run fails.
+pub fn parting(case: &dyn Case, division: u32, samples: usize) -> Result<Vec<f64>, String> {
+    let trace = |perturbation: f64| {
+        let mut run = case.start(case.standard(), DEFAULT, division, perturbation)?;
+        run::trace(run.as_mut(), samples)
+    };
+    let (plain, perturbed) = (trace(0.0)?, trace(PERTURBATION)?);
+    let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>().sqrt();
+    let sizes = plain.displacements.iter().map(|all| norm(&mut all.iter().copied()));
+    let largest = sizes.fold(f64::MIN_POSITIVE, f64::max);
+    Ok(zip(&plain.displacements, &perturbed.displacements)
+        .map(|(a, b)| norm(&mut zip(a, b).map(|(a, b)| a - b)) / largest)
+        .collect())
+}
+
+/// Samples before the runs of [`parting`] have parted, at most `most`.
+pub fn samples(parting: &[f64], most: usize) -> usize {
+    parting.iter().position(|apart| *apart > PARTED).unwrap_or(most).min(most)
+}
+
+/// Whether the window of a scene ends before its runs part.
+pub fn statement(case: &dyn Case) -> Option<Statement> {
+    let parting = case.parting();
+    let end = *parting.get(case.samples().checked_sub(1)?)?;
+    let last = parting.last()?;
+    let long = case.interval() * parting.len() as f64;
+    Some(Statement::tested(
+        format!(
+            "{}: the window of {:.2} ms ends before trajectories part",
+            case.title(),
+            1e3 * case.interval() * case.samples() as f64
+        ),
+        end <= PARTED,
+        format!(
+            "{} changed by {PERTURBATION:.0e} has moved the nodes by {end:.1e} at the end of the window, by {last:.1e} after {:.1} ms",
+            case.perturbed(),
+            1e3 * long
+        ),
+    ))
+}
+
+/// Effective displacement and mean force from the end of the window on, of every competitor at one step, against the
+/// product at a fine one; `None` for scenes that end with their window.
+pub fn statistics(case: &dyn Case) -> Option<Table> {
+    let samples = case.parting().len();
+    if samples <= case.samples() {
+        return None;
+    }
+    let traced = |competitor: Competitor, division: u32| {
+        let mut run = case.start(case.standard(), competitor, division, 0.0)?;
+        run::trace(run.as_mut(), samples)
+    };
+    let fine = traced(DEFAULT, FINE).ok()?;
+    let of = |trace: &Trace| {
+        let late = &trace.displacements[case.samples()..];
+        let squares: f64 = late.iter().flatten().map(|u| u * u).sum();
+        let count = late.iter().map(Vec::len).sum::<usize>();
+        let impulse: f64 = trace.impulses[case.samples()..].iter().sum();
+        [(squares / count as f64).sqrt(), impulse / (case.interval() * late.len() as f64)]
+    };
+    let [amplitude, force] = of(&fine);
+    let step = 1e6 * case.interval() / f64::from(DIVISION);
+    let caption = format!(
+        "{}: from {:.2} to {:.2} ms at h = {step:.2} µs against {} at h = {:.3} µs (effective displacement {:.3e} m, mean of all normal forces {force:.4e} N)",
+        case.title(),
+        1e3 * case.interval() * case.samples() as f64,
+        1e3 * case.interval() * samples as f64,
+        DEFAULT.name(),
+        1e6 * case.interval() / f64::from(FINE),
+        amplitude
+    );
+    let mut table =
+        Table::new(caption, ["competitor", "effective displacement", "mean force", "trajectory (relative L2)"]);
+    for competitor in case.competitors(case.standard()) {
+        let mut cells = vec![competitor.name()];
+        cells.extend(match traced(competitor, DIVISION) {
+            Ok(found) => {
+                let [own_amplitude, own_force] = of(&found);
+                let late = |trace: &Trace| trace.displacements[case.samples()..].to_vec();
+                [
+                    format!("{:+.2} %", 100.0 * (own_amplitude / amplitude - 1.0)),
+                    format!("{:+.2} %", 100.0 * (own_force / force - 1.0)),
+                    format!("{:.1e}", apart(&late(&found), &late(&fine))),
+                ]
+            }
+            Err(problem) => [shortened(&problem), String::new(), String::new()],
+        });
+        table.rows.push(cells);
+    }
+    Some(table)
+}
+
+/// The beginning of a reason, which stands whole beside the run in the table of all runs where this step was tried.
+fn shortened(problem: &str) -> String {
+    const MOST: usize = 80;
+    match problem.char_indices().nth(MOST) {
+        None => problem.to_owned(),
+        Some((end, _)) => format!("{} …", problem[..end].rsplit_once(' ').map_or(&problem[..end], |(start, _)| start)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn long_reasons_end_between_words() {
+        let long = "refused: µ ".repeat(20);
+        let short = super::shortened(&long);
+        assert!(short.chars().count() <= 82 && short.ends_with(" µ …"), "{short}");
+        assert_eq!(super::shortened("refused"), "refused");
+    }
+
+    #[test]
+    fn a_window_ends_where_runs_part() {
+        assert_eq!(super::samples(&[1e-9, 1e-8, 1e-7, 1e-5, 1e-8], 10), 3);
+        assert_eq!(super::samples(&[1e-9; 5], 4), 4);
+    }
+}

@@ -1,0 +1,198 @@
+//! Studies: what a question about a model needs of runs, pictures and figures, and whether they show what they should.
+//!
+//! A study is a function that returns a [`Study`]: facts, figures with the numbers behind them, and statements with what
+//! was found. [`output`] writes it, always in the same way: one HTML page that opens offline, an SVG and a CSV per
+//! figure, and `results.json`. Runs that do not depend on each other go through `tiprub_shell::sweep`.
+
+pub mod arguments;
+pub mod error;
+pub mod error_study;
+pub mod machine;
+pub mod map;
+pub mod output;
+
+use serde_json::{Value, json};
+use tiprub_figure::{plots::Plot, waterfall::Waterfall};
+use tiprub_shell::{Failure, Result, recording::shortest};
+
+/// A finished study.
+#[derive(Debug, Clone)]
+pub struct Study {
+    /// Short name, for file names: `stage`.
+    pub name: &'static str,
+    /// Title of the page.
+    pub title: String,
+    /// What was done, in one or a few sentences.
+    pub summary: String,
+    /// What was studied: names and values with units.
+    pub facts: Vec<(String, String)>,
+    /// What the figures should show and whether they do.
+    pub statements: Vec<Statement>,
+    /// The figures.
+    pub figures: Vec<Figure>,
+    /// Numbers for programs, beside those of the figures.
+    pub results: Value,
+    /// Further files to write: name, meaning, bytes.
+    pub files: Vec<(String, String, Vec<u8>)>,
+}
+
+/// Something that a study should show.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Statement {
+    /// What should be seen.
+    pub expected: String,
+    /// What was found, with numbers.
+    pub found: String,
+    /// Whether it is so; `None` where it cannot be decided here.
+    pub holds: Option<bool>,
+}
+
+impl Statement {
+    /// A statement that was tested.
+    pub fn tested(expected: impl Into<String>, holds: bool, found: impl Into<String>) -> Self {
+        Self { expected: expected.into(), found: found.into(), holds: Some(holds) }
+    }
+
+    /// Something to know that is neither right nor wrong.
+    pub fn remark(expected: impl Into<String>, found: impl Into<String>) -> Self {
+        Self { expected: expected.into(), found: found.into(), holds: None }
+    }
+
+    /// The verdict in a word.
+    pub fn verdict(&self) -> &'static str {
+        match self.holds {
+            Some(true) => "yes",
+            Some(false) => "no",
+            None => "-",
+        }
+    }
+}
+
+/// A picture, its numbers and its caption.
+#[derive(Debug, Clone)]
+pub struct Figure {
+    /// For file names: `clearances`.
+    pub name: &'static str,
+    /// Caption, plain text.
+    pub caption: String,
+    /// SVG and what goes into the page.
+    pub picture: Picture,
+    /// The numbers shown.
+    pub sheet: Sheet,
+}
+
+/// SVG for a file of its own, and HTML for the page.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// A whole SVG file.
+    pub svg: String,
+    /// The same for the page.
+    pub html: String,
+}
+
+impl Picture {
+    /// A line plot.
+    ///
+    /// # Errors
+    /// The plotting library refuses.
+    pub fn plot(plot: &Plot) -> Result<Self> {
+        Ok(Self { svg: plot.to_whole_svg()?, html: plot.to_html()? })
+    }
+
+    /// A waterfall.
+    pub fn waterfall(waterfall: &Waterfall) -> Self {
+        let svg = waterfall.to_svg();
+        Self { html: svg.clone(), svg }
+    }
+}
+
+/// Numbers with named columns.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Sheet {
+    /// Column names with units: `time (s)`.
+    pub columns: Vec<String>,
+    /// Rows, each as long as `columns`.
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl Sheet {
+    /// An empty sheet.
+    pub fn new<const N: usize>(columns: [&str; N]) -> Self {
+        Self { columns: columns.map(String::from).to_vec(), rows: Vec::new() }
+    }
+
+    /// Comma-separated values; numbers read back to the same bits.
+    pub fn to_csv(&self) -> String {
+        let quoted = |name: &String| if name.contains([',', '"']) { format!("{name:?}") } else { name.clone() };
+        let mut text = self.columns.iter().map(quoted).collect::<Vec<_>>().join(",");
+        for row in &self.rows {
+            text.push('\n');
+            text.push_str(&row.iter().map(|value| shortest(*value)).collect::<Vec<_>>().join(","));
+        }
+        text.push('\n');
+        text
+    }
+}
+
+impl Study {
+    /// Facts, statements and results for programs; the numbers of the figures are in their CSV files.
+    pub fn to_json(&self) -> Value {
+        json!({
+            "study": self.name,
+            "title": self.title,
+            "facts": self.facts.iter().map(|(name, value)| (name.clone(), json!(value))).collect::<serde_json::Map<_, _>>(),
+            "statements": self.statements.iter().map(|statement| json!({
+                "expected": statement.expected, "found": statement.found, "holds": statement.holds,
+            })).collect::<Vec<_>>(),
+            "figures": self.figures.iter().map(|figure| json!({
+                "name": figure.name, "caption": figure.caption,
+                "svg": format!("{}.svg", figure.name), "csv": format!("{}.csv", figure.name),
+            })).collect::<Vec<_>>(),
+            "results": self.results,
+        })
+    }
+
+    /// For people.
+    pub fn to_text(&self) -> String {
+        let mut text = format!("{}\n{}\n\n", self.title, self.summary);
+        let width = self.facts.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+        for (name, value) in &self.facts {
+            text.push_str(&format!("  {name:<width$}  {value}\n"));
+        }
+        text.push_str("\nwhat the figures should show, and whether they do:\n");
+        for statement in &self.statements {
+            text.push_str(&format!("  {:<4}{}\n      {}\n", statement.verdict(), statement.expected, statement.found));
+        }
+        text
+    }
+
+    /// A figure by its name.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn figure(&self, name: &str) -> Result<&Figure> {
+        let missing = || Failure::new(format!("study {}", self.name), format!("no figure {name}"), "");
+        self.figures.iter().find(|figure| figure.name == name).ok_or_else(missing)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sheets_are_csv_with_numbers_that_read_back() {
+        let mut sheet = Sheet::new(["time (s)", "a, b"]);
+        sheet.rows.push(vec![0.1, -1.0 / 3.0]);
+        assert_eq!(sheet.to_csv(), "time (s),\"a, b\"\n0.1,-0.3333333333333333\n");
+    }
+
+    #[test]
+    fn verdicts_are_told() {
+        let yes = Statement::tested("a", true, "b");
+        assert_eq!(
+            [yes.verdict(), Statement::tested("a", false, "b").verdict(), Statement::remark("a", "b").verdict()],
+            ["yes", "no", "-"]
+        );
+    }
+}

@@ -1,0 +1,226 @@
+//! What the map shows: peaks, and coincidences with predicted resonances.
+
+use serde_json::{Value, json};
+use tiprub_core::{Scene, dynamics::modal::ModalModel};
+use tiprub_shell::{Failure, Result};
+
+use super::{
+    prediction::{self, Crossing, Prediction},
+    run::Run,
+    spectrum,
+};
+use crate::Sheet;
+
+/// Peaks below this share of the largest amplitude of the map are not listed; side lobes of the window are below it, too.
+const LEAST_PEAK: f64 = 1e-2;
+/// A response counts as lying at a coincidence within this relative distance of its speed; further below one it is that of
+/// the crossing before.
+pub const NEAR: f64 = 0.05;
+
+/// A peak of the map, at the leading edge of the blade that swings most.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MapPeak {
+    /// Angular velocity (rad/s).
+    pub speed: f64,
+    /// Frequency in the rotating frame (Hz).
+    pub frequency: f64,
+    /// Amplitude (m).
+    pub amplitude: f64,
+    /// Frequency in multiples of the rotational one.
+    pub order: f64,
+    /// Distance of the bins, in the same.
+    pub bin: f64,
+}
+
+/// A crossing of the casing's engine orders with a mode, and the largest response to that order around it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coincidence {
+    /// The crossing predicted.
+    pub crossing: Crossing,
+    /// Angular velocities (rad/s) between which the response is that of this crossing and of no neighbour.
+    pub window: [f64; 2],
+    /// Angular velocity (rad/s) and amplitude (m) of the response's maximum in the window; none where it has none.
+    pub response: Option<(f64, f64)>,
+    /// The same at that end of the range of speeds where the response is larger still, if it is.
+    pub beyond: Option<(f64, f64)>,
+}
+
+impl MapPeak {
+    /// For programs.
+    pub fn json(&self) -> Value {
+        json!({ "speed": self.speed, "frequency": self.frequency, "amplitude": self.amplitude, "engine_order": self.order })
+    }
+
+    /// Whether it lies on an engine order that the casing excites, to within a bin.
+    pub fn on_order(&self, prediction: &Prediction) -> bool {
+        let nearest = self.order.round();
+        let excited = prediction.base_order > 0 && (nearest / prediction.base_order as f64).fract() == 0.0;
+        excited && nearest > 0.0 && (self.order - nearest).abs() <= self.bin
+    }
+}
+
+impl Coincidence {
+    /// By how much the response lies above the prediction, relative to it.
+    pub fn shift(&self) -> Option<f64> {
+        Some(self.response?.0 / self.crossing.speed - 1.0)
+    }
+
+    /// For programs.
+    pub fn json(&self) -> Value {
+        json!({
+            "engine_order": self.crossing.order,
+            "mode": self.crossing.mode + 1,
+            "predicted_speed": self.crossing.speed,
+            "predicted_frequency": self.crossing.frequency,
+            "response_speed": self.response.map(|response| response.0),
+            "response_amplitude": self.response.map(|response| response.1),
+            "relative_shift": self.shift(),
+            "sought_from": self.window[0],
+            "sought_to": self.window[1],
+            "larger_at_the_end": self.beyond.map(|end| end.0),
+        })
+    }
+}
+
+/// All peaks, speed by speed.
+pub fn peaks(runs: &[Run]) -> Vec<MapPeak> {
+    let responses = || runs.iter().filter_map(|run| Some((run.speed, run.outcome.as_ref().ok()?)));
+    let spectra = responses().flat_map(|(_, response)| response.largest_blade[0].iter().skip(spectrum::FIRST_BIN));
+    let least = LEAST_PEAK * spectra.copied().fold(0.0, f64::max);
+    let mut all = Vec::new();
+    for (speed, response) in responses() {
+        let turns = speed / std::f64::consts::TAU;
+        let bin = response.resolution / turns;
+        all.extend(spectrum::peaks(&response.largest_blade[0], least).into_iter().map(|peak| MapPeak {
+            speed,
+            frequency: peak.bin * response.resolution,
+            amplitude: peak.amplitude,
+            order: peak.bin * bin,
+            bin,
+        }));
+    }
+    all
+}
+
+/// Amplitude of one engine order at every speed (m), at the leading edge of the blade that swings most.
+pub fn order_curve(runs: &[Run], order: usize, revolutions: usize) -> Vec<(f64, f64)> {
+    let amplitude = |run: &Run| run.outcome.as_ref().ok()?.largest_blade[0].get(order * revolutions).copied();
+    runs.iter().filter_map(|run| Some((run.speed, amplitude(run)?))).collect()
+}
+
+/// The excited crossings with the response found between those of the same engine order beside them.
+pub fn coincidences(
+    runs: &[Run],
+    prediction: &Prediction,
+    crossings: &[Crossing],
+    revolutions: usize,
+) -> Vec<Coincidence> {
+    let excited = crossings.iter().filter(|crossing| crossing.excited);
+    let found = |crossing: &Crossing| {
+        let curve = order_curve(runs, crossing.order, revolutions);
+        let ends: Vec<(f64, f64)> = [curve.first(), curve.last()].into_iter().flatten().copied().collect();
+        let [low, high] = window(prediction, crossing);
+        let range = [0, 1].map(|end| ends.get(end).map_or(crossing.speed, |end| end.0));
+        let window = [low.max(range[0]), high.min(range[1])];
+        let response = resonance(&curve, window);
+        let most = response.map_or(0.0, |response| response.1);
+        let larger = ends.into_iter().filter(|end| (low..=high).contains(&end.0) && end.1 > most);
+        let beyond = larger.max_by(|a, b| a.1.total_cmp(&b.1));
+        Coincidence { crossing: *crossing, window, response, beyond }
+    };
+    excited.map(found).collect()
+}
+
+/// Speeds (rad/s) at which the response to an engine order is that of this crossing. Contact stiffens, so that it leans
+/// upwards from the crossing, maybe far: it ends only where that of the next crossing of the same order may begin.
+fn window(prediction: &Prediction, crossing: &Crossing) -> [f64; 2] {
+    let Crossing { order, speed, .. } = *crossing;
+    let all = || (0..prediction.modes(order, speed).len()).filter_map(|mode| prediction.meeting(order, mode));
+    let below = all().filter(|other| *other < speed && *other > 0.0).max_by(f64::total_cmp);
+    let above = all().filter(|other| *other > speed).min_by(f64::total_cmp);
+    let border = |low: f64, high: f64| low.midpoint(high).max((1.0 - NEAR) * high);
+    [below.map_or(0.0, |below| border(below, speed)), above.map_or(f64::INFINITY, |above| border(speed, above))]
+}
+
+/// The largest local maximum of a curve within a window of speeds, refined by a parabola; the ends of the curve are none.
+fn resonance(curve: &[(f64, f64)], window: [f64; 2]) -> Option<(f64, f64)> {
+    let within = |point: &(f64, f64)| (window[0]..=window[1]).contains(&point.0);
+    let tops =
+        curve.windows(3).filter(|three| three[1].1 > three[0].1 && three[1].1 >= three[2].1 && within(&three[1]));
+    let top = tops.max_by(|a, b| a[1].1.total_cmp(&b[1].1))?;
+    let (offset, height) = spectrum::parabola([0, 1, 2].map(|index| top[index].1.ln()));
+    let speed = top[1].0 + offset * 0.5 * (top[2].0 - top[0].0);
+    Some((speed.clamp(window[0], window[1]), height.exp()))
+}
+
+/// Length of the displacement of the leading edge when a contact pushes it inwards by `depth` (m), slowly; none of
+/// coupled sectors.
+///
+/// # Errors
+/// A ROM whose eigenproblem cannot be solved.
+pub fn static_displacement(scene: &Scene, depth: f64) -> Result<Option<f64>> {
+    let rom = &scene.roms[prediction::master(&scene.settings)?];
+    if rom.is_cyclic() || depth <= 0.0 {
+        return Ok(None);
+    }
+    let model = ModalModel::from_rom(rom, rom.damping_ratio).map_err(|error| Failure::from_core("ROM", error))?;
+    let modes = &model.contact_modes;
+    let flexibility = |row: usize| -> f64 {
+        let squares = model.frequencies.iter().map(|frequency| frequency * frequency);
+        squares
+            .enumerate()
+            .filter(|(_, square)| *square > 0.0)
+            .map(|(mode, square)| modes[(row, mode)] * modes[(0, mode)] / square)
+            .sum()
+    };
+    let column = [0, 1, 2].map(flexibility);
+    let length = column.iter().map(|value| value * value).sum::<f64>().sqrt();
+    Ok((column[0] > 0.0).then(|| depth * length / column[0]))
+}
+
+/// The list of peaks as a table.
+pub fn peak_sheet(peaks: &[MapPeak], prediction: &Prediction) -> Sheet {
+    let mut sheet = Sheet::new([
+        "speed (rad/s)",
+        "frequency (Hz)",
+        "amplitude (m)",
+        "frequency / rotational frequency",
+        "on an excited engine order (1 yes; 0 no)",
+    ]);
+    sheet.rows = peaks
+        .iter()
+        .map(|peak| {
+            let on_order = f64::from(u8::from(peak.on_order(prediction)));
+            vec![peak.speed, peak.frequency, peak.amplitude, peak.order, on_order]
+        })
+        .collect();
+    sheet
+}
+
+/// Predicted and found resonances as a table.
+pub fn coincidence_sheet(coincidences: &[Coincidence]) -> Sheet {
+    let mut sheet = Sheet::new([
+        "engine order",
+        "mode",
+        "predicted speed (rad/s)",
+        "predicted frequency (Hz)",
+        "speed of the largest response to that order (rad/s)",
+        "its amplitude (m)",
+        "relative shift",
+        "sought from (rad/s)",
+        "sought to (rad/s)",
+        "larger still at the end of the range (rad/s)",
+    ]);
+    sheet.rows = coincidences
+        .iter()
+        .map(|one| {
+            let (speed, amplitude) = one.response.unwrap_or((f64::NAN, f64::NAN));
+            let Crossing { order, mode, speed: predicted, frequency, .. } = one.crossing;
+            let shift = one.shift().unwrap_or(f64::NAN);
+            let beyond = one.beyond.map_or(f64::NAN, |end| end.0);
+            let [from, to] = one.window;
+            vec![order as f64, mode as f64 + 1.0, predicted, frequency, speed, amplitude, shift, from, to, beyond]
+        })
+        .collect();
+    sheet
+}

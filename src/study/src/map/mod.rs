@@ -1,0 +1,377 @@
+//! The interaction map: how large the tips swing over angular velocity and frequency when blades rub a casing out of round,
+//! and whether they do so where engine orders of the casing meet natural frequencies.
+
+mod figures;
+mod findings;
+mod picture;
+pub mod prediction;
+mod run;
+mod spectrum;
+mod start;
+mod statements;
+
+use findings::{Coincidence, MapPeak};
+use prediction::{Crossing, Prediction};
+use serde_json::json;
+use tiprub_core::{Scene, settings::SpinSettings};
+use tiprub_gallery::scene_source;
+use tiprub_shell::{Failure, Result, console::Console, sweep};
+
+use super::{Statement, Study};
+use crate::arguments::{MapArguments, Speeds};
+pub use run::{Response, Run, Setup};
+use start::Start;
+
+/// Angular velocities, relative to the one at which the second harmonic of the casing meets the first mode: a fifth to both
+/// sides, and above it room for what leans to higher speeds (see [`LEAN`]).
+const RANGE: [f64; 2] = [0.8, 1.2 * LEAN];
+/// Every crossing up to a fifth above the middle has this much of its own speed above it, which is as far as rotor 37 was seen to
+/// lean; the middle itself has more.
+const LEAN: f64 = 1.25;
+const COUNT: usize = 141;
+const QUICK_COUNT: usize = 8;
+/// Revolutions of the window: a bin is as wide as the speed divided by this.
+const REVOLUTIONS: usize = 64;
+const QUICK_REVOLUTIONS: usize = 16;
+/// The start-up passes for so many decay times of the first mode: 0.7 % of it are left.
+const DECAY_TIMES: f64 = 5.0;
+const LEAST_TRANSIENT: usize = 20;
+const MOST_TRANSIENT: usize = 400;
+const QUICK_TRANSIENT: usize = 40;
+/// Modes in the map, and room above the last one: a response that leans to higher speeds leans to higher frequencies.
+const MODES: usize = 3;
+const ABOVE: f64 = LEAN;
+/// Sampling rate relative to the highest frequency of the map; see [`spectrum::Decimator`].
+const OVERSAMPLING: f64 = 8.0;
+/// Most samples in a revolution.
+const MOST_PER_REVOLUTION: f64 = 1e6;
+/// Order of the casing's base order at whose resonance the range of speeds lies.
+const HARMONIC: usize = 2;
+
+/// What was asked, and everything found.
+struct Map {
+    setup: Setup,
+    prediction: Prediction,
+    crossings: Vec<Crossing>,
+    runs: Vec<Run>,
+    peaks: Vec<MapPeak>,
+    coincidences: Vec<Coincidence>,
+    /// How far the casing reaches beyond the tips at rest (m).
+    intrusion: f64,
+    /// Difference between the casing's largest and smallest radius (m).
+    depth: f64,
+    /// Displacement of the leading edge when it is pushed back slowly by that much (m).
+    static_displacement: Option<f64>,
+    start: Start,
+}
+
+/// The study: run all speeds, transform, draw, compare.
+///
+/// # Errors
+/// A scene that cannot be loaded, or that is refused at every speed.
+pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
+    let name = arguments.scene.as_str();
+    // Before models are reduced for nothing.
+    prediction::master(&scene_source::settings(name)?)?;
+    let scene = scene_source::load(name, &arguments.common.cache.cache(), console)?;
+    let request = Request {
+        quick: arguments.common.quick,
+        speeds: arguments.speeds,
+        revolutions: arguments.revolutions.map(std::num::NonZero::get),
+        transient: arguments.transient,
+        settings: arguments.set.clone(),
+    };
+    let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
+    let (study, warnings) = {
+        let task = console.task("Running the interaction map", None);
+        of_scene(scene, &request, threads, |done, all, steps| {
+            task.now(&format!("Running the interaction map: {done} of {all} ({steps:.1e} internal steps in all)"));
+            task.line(&format!("{done} of {all} angular velocities, {steps:.1e} internal steps in all"));
+        })?
+    };
+    console.warn(&warnings);
+    Ok(study)
+}
+
+/// What is asked of a scene; `None` is the default of the study.
+#[derive(Debug, Clone, Default)]
+pub struct Request {
+    /// Few short runs.
+    pub quick: bool,
+    /// Angular velocities.
+    pub speeds: Option<Speeds>,
+    /// Revolutions of the window.
+    pub revolutions: Option<usize>,
+    /// Revolutions before it.
+    pub transient: Option<usize>,
+    /// Start values replaced.
+    pub settings: Vec<(String, String)>,
+}
+
+/// The study of a scene, and the warnings of its runs; `progress` is told the runs done and all, first before any is, and
+/// the internal steps of all.
+///
+/// # Errors
+/// As [`study`].
+pub fn of_scene(
+    scene: Scene,
+    request: &Request,
+    threads: usize,
+    progress: impl Fn(usize, usize, f64),
+) -> Result<(Study, Vec<String>)> {
+    let (mut map, speeds) = Map::prepare(scene, request)?;
+    let steps = map.internal_steps(&speeds);
+    let told = |done| progress(done, speeds.len(), steps);
+    told(0);
+    map.runs = sweep::sweep(&speeds, threads, |speed| map.setup.run(*speed), told)?;
+    if let (true, Some(Err(refusal))) =
+        (map.answered().next().is_none(), map.runs.first().map(|run| run.outcome.as_ref().map(|_| ())))
+    {
+        return Err(Failure::new(
+            "study map",
+            format!("every angular velocity is refused, the first one: {refusal}"),
+            "",
+        ));
+    }
+    map.peaks = findings::peaks(&map.runs);
+    map.coincidences = findings::coincidences(&map.runs, &map.prediction, &map.crossings, map.setup.revolutions);
+    let warnings = map.warnings();
+    Ok((map.report(request.quick)?, warnings))
+}
+
+impl Map {
+    /// Everything before the runs, and the speeds to run.
+    fn prepare(scene: Scene, request: &Request) -> Result<(Self, Vec<f64>)> {
+        if request.settings.iter().any(|(name, _)| name == "speed") {
+            return Err(Failure::usage("--set speed", "the study sets the speed", "Use --speeds FROM:TO:COUNT"));
+        }
+        let mut setup =
+            Setup { scene, settings: request.settings.clone(), samples: 0, transient: 0, revolutions: 0, top: 0.0 };
+        let master = prediction::master(&setup.scene.settings)?;
+        let fastest = setup.scene.roms[master].extras.spin.as_ref().map_or(0.0, |spin| spin.largest_speed);
+        // At its own speed: those of the study may be refused.
+        let probe = setup.simulation(setup.scene.settings.structures[master].speed.abs())?;
+        let start = Start::of(&setup.scene, &probe)?;
+        let prediction = Prediction::new(&setup.scene, &start, fastest)?;
+        let turns = setup.scene.settings.structures[master].spin != SpinSettings::default();
+        let speeds = speeds(&prediction, request, if turns { fastest } else { f64::INFINITY })?;
+        let range = [speeds[0], speeds[speeds.len() - 1]];
+        let elastic: Vec<f64> =
+            prediction.modes(prediction.base_order.max(1), range[1]).into_iter().filter(|mode| *mode > 0.0).collect();
+        let first = *elastic.first().ok_or_else(|| Failure::new("study map", "the master has no elastic mode", ""))?;
+        setup.top = ABOVE * elastic[(MODES - 1).min(elastic.len() - 1)];
+        setup.samples = samples(setup.top, range[0])?;
+        setup.revolutions = request.revolutions.unwrap_or(if request.quick { QUICK_REVOLUTIONS } else { REVOLUTIONS });
+        let decay = DECAY_TIMES / (start.damping_ratio * std::f64::consts::TAU * first);
+        let patience = whole((start.ramp_time + decay) * range[1] / std::f64::consts::TAU);
+        let most = if request.quick { QUICK_TRANSIENT } else { MOST_TRANSIENT };
+        setup.transient = request.transient.unwrap_or(patience.clamp(LEAST_TRANSIENT, most));
+        setup.check_size(speeds.len())?;
+        let crossings = prediction.crossings(range, setup.top);
+        let shape = prediction::shape(&setup.scene, start.shape_factor)?;
+        let lowest = shape.iter().copied().fold(f64::INFINITY, f64::min);
+        let highest = shape.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let intrusion = -(start.clearance[0] + lowest);
+        let static_displacement = findings::static_displacement(&setup.scene, highest - lowest)?;
+        let map = Self {
+            setup,
+            prediction,
+            crossings,
+            runs: Vec::new(),
+            peaks: Vec::new(),
+            coincidences: Vec::new(),
+            intrusion,
+            depth: highest - lowest,
+            static_displacement,
+            start,
+        };
+        Ok((map, speeds))
+    }
+
+    /// How many internal steps the runs at these speeds (rad/s) will make.
+    fn internal_steps(&self, speeds: &[f64]) -> f64 {
+        let Setup { samples, transient, revolutions, .. } = self.setup;
+        let count = (transient as f64 + revolutions as f64) * samples as f64;
+        let per_sample = |speed: &f64| std::f64::consts::TAU / (speed * samples as f64 * self.start.longest_step);
+        speeds.iter().map(|speed| count * per_sample(speed).ceil().max(1.0)).sum()
+    }
+
+    /// The runs that were not refused.
+    fn answered(&self) -> impl Iterator<Item = (f64, &Response)> {
+        self.runs.iter().filter_map(|run| Some((run.speed, run.outcome.as_ref().ok()?)))
+    }
+
+    /// Every warning once, whichever run it came from.
+    fn warnings(&self) -> Vec<String> {
+        let mut all: Vec<String> = self.answered().flat_map(|(_, response)| response.warnings.clone()).collect();
+        all.sort();
+        all.dedup();
+        all
+    }
+
+    fn report(&self, quick: bool) -> Result<Study> {
+        let steps: u64 = self.answered().map(|(_, response)| response.internal_steps).sum();
+        let stepping: f64 = self.answered().map(|(_, response)| response.stepping.as_secs_f64()).sum();
+        let refusals: Vec<_> =
+            self.runs.iter().filter_map(|run| Some((run.speed, run.outcome.as_ref().err()?))).collect();
+        Ok(Study {
+            name: "map",
+            title: "Interaction map".into(),
+            summary: format!(
+                "How large the blade tips of the scene `{}` swing over angular velocity and frequency, from {} runs, and where \
+                 engine orders of the casing meet natural frequencies.{}",
+                self.setup.scene.settings.name,
+                self.runs.len(),
+                if quick { " Quick form: few short runs, for a first look only." } else { "" }
+            ),
+            facts: self.facts(steps, stepping)?,
+            statements: self.statements(),
+            figures: figures::figures(self)?,
+            results: json!({
+                "speeds": self.runs.iter().map(|run| run.speed).collect::<Vec<_>>(),
+                "refused": refusals,
+                "base_engine_order": self.prediction.base_order,
+                "peaks": self.peaks.iter().map(MapPeak::json).collect::<Vec<_>>(),
+                "coincidences": self.coincidences.iter().map(Coincidence::json).collect::<Vec<_>>(),
+                "intrusion": self.intrusion,
+                "depth": self.depth,
+                "static_displacement": self.static_displacement,
+                "internal_steps": steps,
+                "stepping_seconds": stepping,
+                "warnings": self.warnings(),
+            }),
+            files: vec![
+                (
+                    "peaks.csv".into(),
+                    "peaks of the map: angular velocity, frequency, amplitude".into(),
+                    findings::peak_sheet(&self.peaks, &self.prediction).to_csv().into_bytes(),
+                ),
+                (
+                    "coincidences.csv".into(),
+                    "where engine orders meet modes, and where the response to that order is largest".into(),
+                    findings::coincidence_sheet(&self.coincidences).to_csv().into_bytes(),
+                ),
+            ],
+        })
+    }
+
+    fn facts(&self, steps: u64, stepping: f64) -> Result<Vec<(String, String)>> {
+        let (setup, settings) = (&self.setup, &self.setup.scene.settings);
+        let rom = &setup.scene.roms[prediction::master(&setup.scene.settings)?];
+        let ([low, high], without) = (self.start.clearance, self.start.without());
+        let middle = self.runs[self.runs.len() / 2].speed;
+        let modes = self.prediction.modes(self.prediction.base_order.max(1), middle);
+        let shown: Vec<String> = modes.iter().take(MODES).map(|mode| format!("{mode:.2}")).collect();
+        let factors: Vec<usize> = self.answered().map(|(_, response)| response.factor).collect();
+        let periods = setup.top * std::f64::consts::TAU / (self.runs[0].speed * setup.samples as f64);
+        let factor = factors.iter().copied().min().unwrap_or(1);
+        let folded = 100.0 * spectrum::gain(1.0 - periods, factor) / spectrum::gain(periods, factor);
+        let changed: Vec<String> = setup.settings.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+        Ok(vec![
+            ("scene".into(), format!("{}: {}", settings.name, settings.description)),
+            ("start values changed".into(), if changed.is_empty() { "none".into() } else { changed.join(", ") }),
+            ("rotor".into(), format!("{} blades; {}", rom.sectors, rom.origin)),
+            (
+                format!(
+                    "natural frequencies{}",
+                    if self.prediction.stiffening { format!(" at {middle:.1} rad/s") } else { " at rest".into() }
+                ),
+                format!("{} Hz", shown.join(", ")),
+            ),
+            (
+                format!("clearance at rest{without}"),
+                if low < high { format!("{low:.4e} to {high:.4e} m") } else { format!("{low:.4e} m") },
+            ),
+            (format!("the casing reaches beyond the tips by{without}"), format!("{:.4e} m", self.intrusion)),
+            ("friction coefficient".into(), self.start.friction.to_string()),
+            ("damping ratio".into(), self.start.damping_ratio.to_string()),
+            (
+                "angular velocities".into(),
+                format!(
+                    "{} from {:.3} to {:.3} rad/s, in the {} sense about +z",
+                    self.runs.len(),
+                    self.runs[0].speed,
+                    self.runs[self.runs.len() - 1].speed,
+                    if setup.sense() < 0.0 { "negative" } else { "positive" }
+                ),
+            ),
+            (
+                "one run".into(),
+                format!("{} revolutions pass, {} are transformed (Hann window)", setup.transient, setup.revolutions),
+            ),
+            (
+                "frequency resolution".into(),
+                format!(
+                    "{:.3} to {:.3} Hz from bin to bin: 1/{} of the rotational frequency",
+                    self.runs[0].speed / std::f64::consts::TAU / setup.revolutions as f64,
+                    self.runs[self.runs.len() - 1].speed / std::f64::consts::TAU / setup.revolutions as f64,
+                    setup.revolutions
+                ),
+            ),
+            (
+                "sampling".into(),
+                format!(
+                    "{} samples per revolution from {} to {} internal steps each, by four boxcars of one sample's length; what \
+                     lies beyond the sampling rate folds into the map with at most {folded:.3} % of its amplitude",
+                    setup.samples,
+                    factor,
+                    factors.iter().copied().max().unwrap_or(1)
+                ),
+            ),
+            (
+                "stepping".into(),
+                format!(
+                    "{:.2} µs per internal step, {stepping:.1} s in all on one processor",
+                    1e6 * stepping / steps.max(1) as f64
+                ),
+            ),
+        ])
+    }
+
+    fn statements(&self) -> Vec<Statement> {
+        statements::statements(self)
+    }
+}
+
+/// The angular velocities asked for, or those around the resonance of the second harmonic of the casing, up to the `fastest`
+/// one (rad/s) that the model holds for.
+fn speeds(prediction: &Prediction, request: &Request, fastest: f64) -> Result<Vec<f64>> {
+    if let Some(speeds) = request.speeds {
+        return Ok(speeds.values());
+    }
+    let order = HARMONIC * if prediction.base_order > 0 { prediction.base_order } else { 2 };
+    let rigid = prediction.modes(order, 0.0).iter().take_while(|mode| **mode <= 0.0).count();
+    let middle = prediction.meeting(order, rigid).filter(|speed| *speed > 0.0);
+    let middle = middle.ok_or_else(|| {
+        Failure::new("study map", format!("no mode meets engine order {order}"), "Give --speeds FROM:TO:COUNT")
+    })?;
+    let count = if request.quick { QUICK_COUNT } else { COUNT };
+    let [from, to] = RANGE.map(|share| share * middle);
+    // Where not even the resonance is in reach, the refusals of the runs say so.
+    let to = if fastest > middle { to.min(fastest) } else { to };
+    Ok(Speeds { from, to, count }.values())
+}
+
+/// Samples per revolution, a power of two, so that even at the slowest speed (rad/s) the rate is [`OVERSAMPLING`] times the
+/// top frequency (Hz).
+fn samples(top: f64, slowest: f64) -> Result<usize> {
+    let least = OVERSAMPLING * top * std::f64::consts::TAU / slowest;
+    if least <= MOST_PER_REVOLUTION {
+        return Ok(whole(least).next_power_of_two());
+    }
+    // Two digits are shown: rounded down they would be refused again.
+    let lowest = 1.05 * OVERSAMPLING * top * std::f64::consts::TAU / MOST_PER_REVOLUTION;
+    Err(Failure::usage(
+        "--speeds",
+        format!("at {slowest} rad/s a revolution would need {least:.1e} samples to show frequencies up to {top:.0} Hz"),
+        format!("Begin at {lowest:.1e} rad/s or above"),
+    ))
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped before")]
+fn whole(value: f64) -> usize {
+    value.ceil().clamp(1.0, 1e6) as usize
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,357 @@
+//! One run of the interaction map: the start-up passes, then a window is recorded and transformed.
+
+use std::time::{Duration, Instant};
+
+use tiprub_core::{Scene, Simulation, shown, system::System, variables::Quantity};
+use tiprub_shell::{Failure, Result, native};
+
+use super::{
+    prediction,
+    spectrum::{Analyser, Decimator},
+};
+
+/// Most numbers of recorded displacements in memory per run; beyond it not every blade is recorded.
+const MOST_SAMPLES: usize = 16_000_000;
+/// Numbers recorded of a blade at a time: two nodes, three components each.
+const ROWS: usize = 6;
+/// Most memory for the spectra of all runs together, and what one bin of them takes: numbers, their table and its text.
+const MOST_BYTES: usize = 2 << 30;
+const BYTES_PER_BIN: usize = 256;
+/// At most one bin for so many samples is kept: the sampling rate is [`super::OVERSAMPLING`] times the highest frequency.
+const BIN_SHARE: usize = 8;
+/// What happens between samples is filtered by [`Decimator`] only where there is something between them.
+const LEAST_FACTOR: f64 = 4.0;
+
+/// What all runs share.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// The scene, but for the size of its speed.
+    pub scene: Scene,
+    /// Start values replaced (name, value as text).
+    pub settings: Vec<(String, String)>,
+    /// Samples per revolution; a power of two.
+    pub samples: usize,
+    /// Revolutions that pass before the window.
+    pub transient: usize,
+    /// Revolutions of the window.
+    pub revolutions: usize,
+    /// Highest frequency kept (Hz).
+    pub top: f64,
+}
+
+/// What came of one speed.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// Angular velocity (rad/s).
+    pub speed: f64,
+    /// The response, or why there is none.
+    pub outcome: Result<Response, String>,
+}
+
+/// Response in the window at one speed. Of the two ends of a blade tip the leading edge comes first; a structure with one
+/// contact node has it twice.
+#[derive(Debug, Clone)]
+pub struct Response {
+    /// Distance of the bins (Hz).
+    pub resolution: f64,
+    /// Amplitude of the displacement vector per bin, first blade (m).
+    pub first_blade: [Vec<f64>; 2],
+    /// The largest of all blades per bin (m).
+    pub largest_blade: [Vec<f64>; 2],
+    /// Largest distance of a tip node from its mean position, over all blades (m).
+    pub deflection: [f64; 2],
+    /// Mean over all blades of the share of time in contact.
+    pub contact_share: f64,
+    /// Mean over time of the sum of all normal forces (N).
+    pub normal_force: f64,
+    /// Largest normal force of one node (N).
+    pub largest_force: f64,
+    /// Deepest penetration of any node at any internal step (m).
+    pub penetration: f64,
+    /// Effective displacement of the leading edges in the second half of the window relative to the first, less one.
+    pub drift: f64,
+    /// Closure residual of the energy ledger, relative; 0 where the scene keeps none.
+    pub energy_residual: f64,
+    /// Internal steps per sample.
+    pub factor: usize,
+    /// All internal steps.
+    pub internal_steps: u64,
+    /// Time spent stepping.
+    pub stepping: Duration,
+    /// What the simulation warned of.
+    pub warnings: Vec<String>,
+}
+
+/// Sums over the window.
+#[derive(Debug, Default)]
+struct Tally {
+    steps: u64,
+    touching: u64,
+    force: f64,
+    largest_force: f64,
+    penetration: f64,
+}
+
+impl Tally {
+    fn add(&mut self, system: &System, touched: &mut [bool]) {
+        touched.fill(false);
+        for event in system.events() {
+            touched[event.sector] = true;
+            self.force += event.normal;
+            self.largest_force = self.largest_force.max(event.normal);
+        }
+        self.touching += touched.iter().filter(|touched| **touched).count() as u64;
+        self.penetration = system.gaps().iter().fold(self.penetration, |deepest, gap| deepest.max(-gap));
+        self.steps += 1;
+    }
+}
+
+impl Setup {
+    /// A simulation with its start values, not yet initialised, that turns with `speed` (rad/s) in the sense of the scene.
+    ///
+    /// # Errors
+    /// A refused scene, unknown or wrong settings.
+    pub fn simulation(&self, speed: f64) -> Result<Simulation> {
+        let mut scene = self.scene.clone();
+        let master = prediction::master(&scene.settings)?;
+        scene.settings.structures[master].speed = self.sense() * speed;
+        let mut simulation = Simulation::new(&scene).map_err(|error| self.at(speed, error))?;
+        for (name, value) in &self.settings {
+            native::set(&mut simulation, name, value)?;
+        }
+        Ok(simulation)
+    }
+
+    /// −1 where the scene's own speed is negative, else 1.
+    pub fn sense(&self) -> f64 {
+        let master = prediction::master(&self.scene.settings);
+        if master.is_ok_and(|master| self.scene.settings.structures[master].speed < 0.0) { -1.0 } else { 1.0 }
+    }
+
+    /// What would not fit into memory is refused: samples of one blade in one run, and the spectra of all `runs`.
+    ///
+    /// # Errors
+    /// Naming the most revolutions that would fit.
+    pub fn check_size(&self, runs: usize) -> Result<()> {
+        let per_blade = ROWS * self.samples;
+        let spectra = runs.saturating_mul(self.samples.div_ceil(BIN_SHARE)).saturating_mul(BYTES_PER_BIN);
+        let most = (MOST_SAMPLES / per_blade).min(MOST_BYTES / spectra.max(1));
+        if self.revolutions <= most {
+            return Ok(());
+        }
+        Err(Failure::usage(
+            format!("--revolutions {}", self.revolutions),
+            format!(
+                "with {} samples per revolution and {runs} angular velocities that is more than {MOST_SAMPLES} recorded numbers \
+                 per blade, or more than 2 GiB for the spectra of all runs",
+                self.samples
+            ),
+            if most > 0 {
+                format!("Give at most {most} revolutions, or fewer or higher --speeds")
+            } else {
+                "Give fewer or higher --speeds".into()
+            },
+        ))
+    }
+
+    fn at(&self, speed: f64, error: tiprub_core::Error) -> Failure {
+        Failure::from_core(format!("scene `{}` at {} rad/s", self.scene.settings.name, shown(speed)), error)
+    }
+
+    /// Run at one speed (rad/s). A refusal is an outcome, not a failure.
+    ///
+    /// # Errors
+    /// None but those of programming.
+    pub fn run(&self, speed: f64) -> Result<Run> {
+        let outcome = self.response(speed).map_err(|failure| failure.to_string());
+        Ok(Run { speed, outcome })
+    }
+
+    fn response(&self, speed: f64) -> Result<Response> {
+        let mut simulation = self.simulation(speed)?;
+        let start = self.scene.settings.experiment.start;
+        simulation.initialise(start).map_err(|error| self.at(speed, error))?;
+        // A whole number of samples per revolution: engine orders then lie in the middle of bins.
+        let step = std::f64::consts::TAU / (speed * self.samples as f64);
+        // Each sample is made of several internal steps, so that there is something to filter.
+        if let Some(variable) = simulation.table().with_quantity(Quantity::StepMax) {
+            let (reference, coarsest) = (variable.reference, step / LEAST_FACTOR);
+            if simulation.real(reference).is_ok_and(|longest| longest > coarsest) {
+                return Err(Failure::new(
+                    format!("scene `{}` at {} rad/s", self.scene.settings.name, shown(speed)),
+                    format!("its internal step is longer than a quarter of the {step:.3e} s from sample to sample"),
+                    format!(
+                        "Use an internal step of at most {coarsest:.3e} s (--set internal_step_max={coarsest:.1e})"
+                    ),
+                ));
+            }
+        }
+        let mut march = March { setup: self, speed, start, step, simulation, internal_steps: 0, index: 0 };
+        let clock = Instant::now();
+        march.skip(self.transient.saturating_mul(self.samples))?;
+        let recording = march.record()?;
+        march.finish(recording, clock)
+    }
+}
+
+/// A simulation on its way.
+struct March<'a> {
+    setup: &'a Setup,
+    speed: f64,
+    start: f64,
+    /// Communication step (s).
+    step: f64,
+    simulation: Simulation,
+    internal_steps: u64,
+    /// Communication steps done.
+    index: usize,
+}
+
+/// What the window leaves.
+struct Recording {
+    decimator: Decimator,
+    /// Contact rows recorded per blade: two nodes, three components each.
+    blades: Vec<usize>,
+    tally: Tally,
+    factor: usize,
+}
+
+impl March<'_> {
+    fn time(&self, index: usize) -> f64 {
+        self.start + index as f64 * self.step
+    }
+
+    /// One communication step; `seen` is called after every internal step.
+    fn advance(&mut self, mut seen: impl FnMut(&System)) -> Result<()> {
+        let time = self.time(self.index);
+        let next = self.time(self.index + 1) - time;
+        let mut march = || -> tiprub_core::Result<()> {
+            self.simulation.begin_step(time, next)?;
+            loop {
+                self.internal_steps += 1;
+                let finished = self.simulation.advance()?.finished;
+                seen(self.simulation.system());
+                if finished {
+                    return Ok(());
+                }
+            }
+        };
+        march().map_err(|error| self.setup.at(self.speed, error))?;
+        self.index += 1;
+        Ok(())
+    }
+
+    fn skip(&mut self, count: usize) -> Result<()> {
+        (0..count).try_for_each(|_| self.advance(|_| {}))
+    }
+
+    fn record(&mut self) -> Result<Recording> {
+        let bank = self.simulation.system().bank();
+        let (sectors, nodes, count) = (bank.sectors(), bank.rows() / 3, self.setup.revolutions * self.setup.samples);
+        let rows: Vec<usize> = [0, nodes - 1].into_iter().flat_map(|node| 3 * node..3 * node + 3).collect();
+        let stride = (sectors * rows.len() * count).div_ceil(MOST_SAMPLES).max(1);
+        let blades: Vec<usize> = (0..sectors).step_by(stride).collect();
+        let factor = self.factor()?;
+        let before = self.internal_steps;
+        let mut decimator = Decimator::new(factor, blades.len() * rows.len(), count);
+        let (mut values, mut touched, mut tally) = (Vec::new(), vec![false; sectors], Tally::default());
+        for _ in 0..count + Decimator::TAIL {
+            self.advance(|system| {
+                values.clear();
+                let bank = system.bank();
+                values.extend(blades.iter().flat_map(|blade| rows.iter().map(|row| bank.row(*row, *blade))));
+                decimator.push(&values);
+                tally.add(system, &mut touched);
+            })?;
+        }
+        let steps = usize::try_from(self.internal_steps - before).unwrap_or(usize::MAX);
+        if steps != factor * (count + Decimator::TAIL) {
+            let problem = format!("{steps} internal steps in {count} samples of {factor}");
+            return Err(Failure::new("sampling", problem, "Report this to the developers"));
+        }
+        Ok(Recording { decimator, blades, tally, factor })
+    }
+
+    /// Internal steps of one communication step.
+    fn factor(&mut self) -> Result<usize> {
+        let before = self.internal_steps;
+        self.advance(|_| {})?;
+        Ok(usize::try_from(self.internal_steps - before).unwrap_or(usize::MAX))
+    }
+
+    fn finish(self, recording: Recording, clock: Instant) -> Result<Response> {
+        let stepping = clock.elapsed();
+        let Recording { decimator, blades, tally, factor } = recording;
+        let setup = self.setup;
+        let count = setup.revolutions * setup.samples;
+        let resolution = self.speed / (std::f64::consts::TAU * setup.revolutions as f64);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "far below the number of samples")]
+        let bins = (setup.top / resolution).floor() as usize + 2;
+        let analyser = Analyser::new(count, bins);
+        let mut first_blade = [Vec::new(), Vec::new()];
+        let mut largest_blade = [vec![0.0; bins], vec![0.0; bins]];
+        let mut deflection = [0.0_f64; 2];
+        let mut halves = [0.0; 2];
+        for (index, _) in blades.iter().enumerate() {
+            for node in 0..2 {
+                let channels = [0, 1, 2].map(|component| 6 * index + 3 * node + component);
+                let amplitudes = vector_spectrum(&analyser, &decimator, channels, count)?;
+                largest_blade[node]
+                    .iter_mut()
+                    .zip(&amplitudes)
+                    .for_each(|(most, value)| *most = f64::max(*most, *value));
+                let distances = distances(&decimator, channels, count);
+                deflection[node] = distances.iter().copied().fold(deflection[node], f64::max);
+                if node == 0 {
+                    let (early, late) = distances.split_at(count / 2);
+                    let sum = |part: &[f64]| part.iter().map(|value| value * value).sum::<f64>();
+                    halves = [halves[0] + sum(early), halves[1] + sum(late)];
+                }
+                if index == 0 {
+                    first_blade[node] = amplitudes;
+                }
+            }
+        }
+        let residual = self.simulation.table().with_quantity(Quantity::EnergyResidualRelative);
+        let residual = residual.map_or(Ok(0.0), |variable| self.simulation.real(variable.reference));
+        let steps = tally.steps as f64;
+        Ok(Response {
+            resolution,
+            first_blade,
+            largest_blade,
+            deflection,
+            contact_share: tally.touching as f64 / (steps * self.simulation.system().bank().sectors() as f64),
+            normal_force: tally.force / steps,
+            largest_force: tally.largest_force,
+            penetration: tally.penetration,
+            drift: if halves[0] > 0.0 { (halves[1] / halves[0]).sqrt() - 1.0 } else { 0.0 },
+            energy_residual: residual.map_err(|error| setup.at(self.speed, error))?.abs(),
+            factor,
+            internal_steps: self.internal_steps,
+            stepping,
+            warnings: self.simulation.warnings().to_vec(),
+        })
+    }
+}
+
+/// Root of the sum of the squared amplitudes of three components: for a motion along a line the amplitude of the vector.
+fn vector_spectrum(analyser: &Analyser, decimator: &Decimator, channels: [usize; 3], count: usize) -> Result<Vec<f64>> {
+    let mut sum: Vec<f64> = Vec::new();
+    for channel in channels {
+        let squares = analyser.squares(decimator.channel(channel))?;
+        sum.resize(squares.len(), 0.0);
+        sum.iter_mut().zip(squares).for_each(|(sum, square)| *sum += square);
+    }
+    let gain = |bin: usize| decimator.gain(bin as f64 / count as f64);
+    Ok(sum.iter().enumerate().map(|(bin, square)| square.sqrt() / gain(bin)).collect())
+}
+
+/// Distance from the mean position, sample by sample.
+fn distances(decimator: &Decimator, channels: [usize; 3], count: usize) -> Vec<f64> {
+    let mut squares = vec![0.0; count];
+    for channel in channels {
+        let mean = decimator.channel(channel).sum::<f64>() / count as f64;
+        squares.iter_mut().zip(decimator.channel(channel)).for_each(|(sum, value)| *sum += (value - mean).powi(2));
+    }
+    squares.iter().map(|square: &f64| square.sqrt()).collect()
+}

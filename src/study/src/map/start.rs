@@ -1,0 +1,125 @@
+//! What the runs start with, after the start values that were changed: clearances, the casing's shape, and what else acts.
+
+use tiprub_core::{Scene, Simulation, variables::Quantity};
+use tiprub_shell::Result;
+
+use super::prediction;
+
+/// Start values that the prediction and the facts depend on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Start {
+    /// Smallest and largest clearance of the tips from the round casing (m).
+    pub clearance: [f64; 2],
+    /// Factor on the casing's shape.
+    pub shape_factor: f64,
+    /// Orders around the circumference of what acts beside the shape.
+    pub orders: Vec<usize>,
+    /// What moves tips or casing beside contact, which clearances at rest do not know.
+    pub acting: Vec<&'static str>,
+    /// ξ of the rotor.
+    pub damping_ratio: f64,
+    /// µ.
+    pub friction: f64,
+    /// Time in which the casing's shape grows (s).
+    pub ramp_time: f64,
+    /// Largest internal step (s).
+    pub longest_step: f64,
+}
+
+impl Default for Start {
+    fn default() -> Self {
+        Self {
+            clearance: [0.0; 2],
+            shape_factor: 1.0,
+            orders: Vec::new(),
+            acting: Vec::new(),
+            damping_ratio: 0.0,
+            friction: 0.0,
+            ramp_time: 0.0,
+            longest_step: f64::INFINITY,
+        }
+    }
+}
+
+impl Start {
+    /// Of a simulation that has its start values.
+    ///
+    /// # Errors
+    /// A scene whose master cannot turn.
+    pub fn of(scene: &Scene, simulation: &Simulation) -> Result<Self> {
+        let value = |quantity| values(simulation, quantity).first().copied();
+        let or_nothing = |quantity| value(quantity).unwrap_or(0.0);
+        let contact = &scene.settings.contacts[0];
+        let opened = or_nothing(Quantity::GapOffset) + or_nothing(Quantity::RadiusChange);
+        let gaps =
+            if contact.sector_gaps.is_empty() { std::slice::from_ref(&contact.gap) } else { &contact.sector_gaps };
+        let smallest = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+        let largest = gaps.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let amplitude = or_nothing(Quantity::LoadAmplitude);
+        let order = simulation.table().with_quantity(Quantity::LoadOrder);
+        let order = order.and_then(|variable| usize::try_from(simulation.integer(variable.reference).ok()?).ok());
+        let whirls = [0, 1].iter().any(|component| or_nothing(Quantity::ShaftDisplacement(*component)) != 0.0);
+        let temperatures = values(simulation, Quantity::CasingTemperature);
+        let growth = scene.settings.structures[prediction::master(&scene.settings)?].spin.growth;
+        let acting = [
+            ("load", amplitude != 0.0),
+            ("heat", temperatures.iter().any(|temperature| *temperature != 0.0)),
+            ("growth", growth),
+            ("whirl", whirls),
+            ("axial shift", or_nothing(Quantity::ShaftDisplacement(2)) != 0.0),
+        ];
+        Ok(Self {
+            clearance: [smallest + opened, largest + opened],
+            shape_factor: value(Quantity::ShapeFactor).unwrap_or(1.0),
+            orders: orders(order.filter(|_| amplitude != 0.0), whirls, &temperatures),
+            acting: acting.into_iter().filter(|(_, acts)| *acts).map(|(name, _)| name).collect(),
+            damping_ratio: or_nothing(Quantity::DampingRatio),
+            friction: or_nothing(Quantity::Friction),
+            ramp_time: or_nothing(Quantity::RampTime),
+            longest_step: value(Quantity::StepMax).unwrap_or(f64::INFINITY),
+        })
+    }
+
+    /// `", without load and heat"`, where they act.
+    pub fn without(&self) -> String {
+        match self.acting.split_last() {
+            None => String::new(),
+            Some((only, [])) => format!(", without {only}"),
+            Some((last, others)) => format!(", without {} and {last}", others.join(", ")),
+        }
+    }
+}
+
+/// All elements of a real variable; none where the scene does not have it.
+fn values(simulation: &Simulation, quantity: Quantity) -> Vec<f64> {
+    let Some(variable) = simulation.table().with_quantity(quantity) else { return Vec::new() };
+    let references = (0..variable.len()).zip(variable.reference..);
+    references.filter_map(|(_, reference)| simulation.real(reference).ok()).collect()
+}
+
+/// Orders of a load, of a shaft that is not in the middle (1), and of uneven temperatures, which may have any.
+fn orders(load: Option<usize>, whirls: bool, temperatures: &[f64]) -> Vec<usize> {
+    let even = temperatures.windows(2).all(|two| two[0].to_bits() == two[1].to_bits());
+    load.into_iter().chain(whirls.then_some(1)).chain((!even).then_some(1)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn loads_whirl_and_uneven_heat_have_orders() {
+        assert_eq!(orders(None, false, &[]), [0; 0]);
+        assert_eq!(orders(Some(6), false, &[20.0; 8]), [6]);
+        assert_eq!(orders(Some(6), true, &[]), [6, 1]);
+        assert_eq!(orders(None, false, &[20.0, 20.0, 21.0]), [1]);
+    }
+
+    #[test]
+    fn what_acts_is_told() {
+        let of = |acting: &[&'static str]| Start { acting: acting.to_vec(), ..Start::default() }.without();
+        assert_eq!(of(&[]), "");
+        assert_eq!(of(&["heat"]), ", without heat");
+        assert_eq!(of(&["load", "heat", "growth"]), ", without load, heat and growth");
+    }
+}

@@ -1,0 +1,439 @@
+use tiprub_core::{Scene, rom::Spin};
+
+use super::prediction::tests::scene;
+use super::*;
+
+/// First mode of the test blade (Hz), and where engine order 4 meets it (rad/s).
+const FIRST: f64 = 100.0;
+const CROSSING: f64 = FIRST * std::f64::consts::TAU / 4.0;
+/// How far the bumps of the scene reach beyond the tips (m).
+const BUMP: f64 = 0.2 * 3.56e-4;
+
+/// Damped enough for the free vibration to die out soon, without friction, and only `intrusion` (m) of the bumps.
+fn request(intrusion: f64, speeds: Speeds) -> Request {
+    let settings = [
+        ("damping_ratio", 0.02),
+        ("friction_coefficient", 0.0),
+        ("gap_offset", BUMP - intrusion),
+        ("internal_step_max", 1e-5),
+    ];
+    Request {
+        speeds: Some(speeds),
+        revolutions: Some(32),
+        settings: settings.map(|(name, value)| (name.to_owned(), format!("{value:e}"))).to_vec(),
+        ..Request::default()
+    }
+}
+
+fn around(crossing: f64, half: f64, count: usize) -> Speeds {
+    Speeds { from: (1.0 - half) * crossing, to: (1.0 + half) * crossing, count }
+}
+
+#[track_caller]
+fn run(scene: Scene, request: &Request, threads: usize) -> Study {
+    of_scene(scene, request, threads, |_, _, _| {}).unwrap().0
+}
+
+/// One blade of rotor 37, damped enough for the free vibration to die out soon, without friction.
+fn blade37() -> Scene {
+    let (options, console) = (tiprub_model::Rotor37Options::default(), Console::new(true, false));
+    let mut rom = tiprub_gallery::reduction::rotor37(&options, &console).unwrap().rom;
+    rom.sectors = 1;
+    let mut scene = scene_source::rotor37_scene_with(rom).unwrap();
+    scene.settings.structures[0].damping_ratio = Some(0.01);
+    scene.settings.contacts[0].friction = 0.0;
+    scene
+}
+
+fn meeting(scene: &Scene) -> f64 {
+    Prediction::new(scene, &Start::default(), 0.0).unwrap().meeting(4, 0).unwrap()
+}
+
+/// A casing as soft as nothing pushes without holding: the response is linear, and resonance where linear theory has it.
+#[test]
+fn the_softest_contact_leaves_resonance_where_linear_theory_has_it() {
+    let mut scene = blade37();
+    scene.settings.contacts[0].coating = Some(tiprub_core::settings::CoatingSettings {
+        thickness: 2e-3,
+        modulus: 1e3,
+        yield_stress: 1e12,
+        hardening: 0.0,
+        cells_around: 720,
+        cells_along: 3,
+    });
+    let crossing = meeting(&scene);
+    let request = Request { speeds: Some(around(crossing, 0.02, 9)), revolutions: Some(32), ..Request::default() };
+    let study = run(scene, &request, 2);
+    let coincidences = study.results["coincidences"].as_array().unwrap();
+    let one = coincidences.iter().find(|one| one["engine_order"] == 4 && one["mode"] == 1).unwrap();
+    assert!((one["predicted_speed"].as_f64().unwrap() / crossing - 1.0).abs() < 1e-12, "{one}");
+    assert!(
+        study.statements.iter().all(|one| !one.expected.starts_with("No node penetrates")),
+        "gaps of an unworn coating"
+    );
+    let unworn = study.statements.iter().find(|one| one.expected.contains("unworn surface")).unwrap();
+    assert_eq!(unworn.holds, None);
+    // A tenth of the half-power width, a fifth of the distance of the speeds.
+    assert!(one["relative_shift"].as_f64().unwrap().abs() < 1e-3, "{one}");
+    let value = |peak: &serde_json::Value, name: &str| peak[name].as_f64().unwrap();
+    let peaks = study.results["peaks"].as_array().unwrap();
+    let largest = peaks.iter().max_by(|a, b| value(a, "amplitude").total_cmp(&value(b, "amplitude"))).unwrap();
+    let rotation = crossing / std::f64::consts::TAU;
+    assert!((value(largest, "frequency") - 4.0 * rotation).abs() < rotation / 32.0, "{largest}");
+    assert!((value(largest, "speed") / crossing - 1.0).abs() < 1e-9, "{largest}");
+}
+
+/// The same casing rigid, and with hardly any intrusion, holds the blade back: the large response lies above the crossing.
+#[test]
+fn rigid_contact_moves_the_response_above_the_crossing() {
+    let scene = blade37();
+    let crossing = meeting(&scene);
+    let request = Request {
+        speeds: Some(around(crossing, 0.03, 2)),
+        revolutions: Some(16),
+        settings: vec![("gap_offset".into(), "7.1e-5".into())],
+        ..Request::default()
+    };
+    let study = run(scene, &request, 2);
+    let rows = &study.figure("amplitudes").unwrap().sheet.rows;
+    assert!(rows[1][1] > 100.0 * rows[0][1], "{rows:?}");
+    assert!(rows.iter().all(|row| row[6].abs() < 1.0), "{rows:?}");
+}
+
+/// Runs in which only one engine order moves, by `amplitude` (m) at a speed.
+fn runs_of_order(order: usize, speeds: &[f64], amplitude: impl Fn(f64) -> f64) -> Vec<Run> {
+    let response = |speed: f64| {
+        let mut spectrum = vec![0.0; order + 2];
+        spectrum[order] = amplitude(speed);
+        Response {
+            resolution: speed / std::f64::consts::TAU,
+            first_blade: [spectrum.clone(), spectrum.clone()],
+            largest_blade: [spectrum.clone(), spectrum],
+            deflection: [0.0; 2],
+            contact_share: 0.0,
+            normal_force: 0.0,
+            largest_force: 0.0,
+            penetration: 0.0,
+            drift: 0.0,
+            energy_residual: 0.0,
+            factor: 1,
+            internal_steps: 0,
+            stepping: std::time::Duration::ZERO,
+            warnings: Vec::new(),
+        }
+    };
+    speeds.iter().map(|&speed| Run { speed, outcome: Ok(response(speed)) }).collect()
+}
+
+/// A bell of this height around a speed.
+fn bell(speed: f64, middle: f64, height: f64) -> f64 {
+    height / (1.0 + (40.0 * (speed / middle - 1.0)).powi(2))
+}
+
+/// A branch that leans to +18 %, with a small maximum on the way, and another beyond the range.
+#[test]
+fn a_resonance_is_followed_as_far_as_it_leans() {
+    let prediction = Prediction::new(&scene(FIRST, 4), &Start::default(), 0.0).unwrap();
+    let speeds = around(CROSSING, 0.3, 61).values();
+    let [low, high] = [speeds[0], speeds[60]];
+    let crossings = prediction.crossings([low, high], 1.5 * FIRST);
+    let lean = |speed: f64| bell(speed, 1.18 * CROSSING, 3e-3) + bell(speed, 1.08 * CROSSING, 1e-3);
+    let found = findings::coincidences(&runs_of_order(4, &speeds, lean), &prediction, &crossings, 1);
+    let one = found.iter().find(|one| one.crossing.order == 4).unwrap();
+    assert!((one.shift().unwrap() - 0.18).abs() < 1e-3, "{one:?}");
+    assert_eq!((one.window, one.beyond), ([low, high], None));
+    // The second mode, ten times as high, meets the order far above.
+    let more = |speed: f64| lean(speed) + bell(speed, 1.6 * CROSSING, 1.0);
+    let found = findings::coincidences(&runs_of_order(4, &speeds, more), &prediction, &crossings, 1);
+    let one = found.iter().find(|one| one.crossing.order == 4).unwrap();
+    assert!((one.shift().unwrap() - 0.18).abs() < 0.01, "{one:?}");
+    let (end, amplitude) = one.beyond.unwrap();
+    assert!(end.to_bits() == high.to_bits() && amplitude > one.response.unwrap().1, "{one:?}");
+}
+
+/// Two modes a tenth apart, the lower one responding more: each crossing keeps its own maximum.
+#[test]
+fn neighbouring_resonances_are_told_apart() {
+    let mut scene = scene(FIRST, 4);
+    let rom = &mut scene.roms[0];
+    rom.stiffness[(1, 1)] = rom.stiffness[(0, 0)] * 1.1_f64.powi(2);
+    let prediction = Prediction::new(&scene, &Start::default(), 0.0).unwrap();
+    let speeds = around(CROSSING, 0.3, 121).values();
+    let crossings = prediction.crossings([speeds[0], speeds[120]], 1.5 * FIRST);
+    // Half a percent below its own crossing the second one is still that of it.
+    for second in [1.095, 1.13] {
+        let two = |speed: f64| bell(speed, 1.03 * CROSSING, 2e-3) + bell(speed, second * CROSSING, 1e-3);
+        let found = findings::coincidences(&runs_of_order(4, &speeds, two), &prediction, &crossings, 1);
+        let of_order = found.iter().filter(|one| one.crossing.order == 4);
+        let tops: Vec<f64> = of_order.map(|one| one.response.unwrap().0 / CROSSING).collect();
+        assert_eq!(tops.len(), 2, "{found:?}");
+        assert!((tops[0] - 1.03).abs() < 5e-3 && (tops[1] - second).abs() < 5e-3, "{tops:?}");
+    }
+}
+
+/// Whatever the scene: a fifth above the resonance sought, there is room for a branch that leans by another fifth.
+#[test]
+fn the_speeds_chosen_leave_room_above_the_resonance() {
+    let mut scene = scene(FIRST, 4);
+    let chosen = |scene: &Scene, quick| {
+        let request = Request { quick, ..Request::default() };
+        let (map, speeds) = Map::prepare(scene.clone(), &request).unwrap();
+        let crossing = map.prediction.meeting(4, 0).unwrap();
+        (speeds.iter().map(|speed| speed / crossing).collect::<Vec<_>>(), crossing)
+    };
+    for (quick, distance) in [(false, 0.005), (true, 0.1)] {
+        let (speeds, _) = chosen(&scene, quick);
+        assert!(speeds[0] <= 0.8 + 1e-9 && *speeds.last().unwrap() >= 1.2 * 1.2, "{speeds:?}");
+        assert!(speeds.windows(2).all(|two| (two[1] - two[0] - distance).abs() < 1e-9), "{speeds:?}");
+    }
+    // A model that holds up to some speed is not asked beyond it.
+    let rom = &mut scene.roms[0];
+    rom.extras.spin = Some(Spin {
+        stiffness_speed2: rom.mass.clone() * 0.1,
+        stiffness_speed4: rom.mass.clone() * 0.0,
+        coriolis: rom.mass.clone() * 0.0,
+        centrifugal_load: vec![0.0; 2],
+        centrifugal_load_speed4: vec![0.0; 2],
+        largest_speed: 1.3 * CROSSING,
+    });
+    scene.settings.structures[0].speed = CROSSING;
+    assert!((chosen(&scene, false).0.last().unwrap() - 1.5).abs() < 1e-9, "spin is not asked for");
+    scene.settings.structures[0].spin.stiffening = true;
+    let (speeds, crossing) = chosen(&scene, false);
+    assert!((speeds.last().unwrap() * crossing / CROSSING - 1.3).abs() < 1e-9, "{speeds:?}");
+}
+
+#[test]
+fn a_master_that_does_not_turn_is_refused_before_anything_is_reduced() {
+    let settings = scene_source::settings("builtin:cube-between-rings").unwrap();
+    let failure = prediction::master(&settings).unwrap_err();
+    assert!(failure.usage && failure.problem.contains("`cube`, flies freely"), "{failure}");
+    assert!(failure.remedy.contains("builtin:rotor37"), "{failure}");
+    let without = Scene { settings, roms: Vec::new() };
+    assert_eq!(of_scene(without, &Request::default(), 1, |_, _, _| {}).unwrap_err(), failure);
+}
+
+#[test]
+fn numbers_do_not_depend_on_threads() {
+    let request = Request { revolutions: Some(4), transient: Some(3), ..request(BUMP, around(CROSSING, 0.1, 5)) };
+    let [one, three] = [1, 3].map(|threads| run(scene(FIRST, 4), &request, threads));
+    assert_eq!(one.figures.len(), 5);
+    // One unit on each axis.
+    for (name, unit) in [("contact", "share of time in contact (%)"), ("normal-force", "mean normal force (N)")] {
+        assert_eq!(one.figure(name).unwrap().picture.svg.matches(unit).count(), 1, "{name}");
+    }
+    for (a, b) in one.figures.iter().zip(&three.figures) {
+        assert_eq!((a.sheet.to_csv(), &a.picture), (b.sheet.to_csv(), &b.picture), "{}", a.name);
+    }
+    assert_eq!((&one.statements, &one.files), (&three.statements, &three.files));
+}
+
+#[test]
+fn refused_speeds_are_marked_and_all_refused_is_a_failure() {
+    let mut scene = scene(FIRST, 2);
+    let rom = &mut scene.roms[0];
+    rom.extras.spin = Some(Spin {
+        stiffness_speed2: rom.mass.clone(),
+        stiffness_speed4: rom.mass.clone() * 0.0,
+        coriolis: rom.mass.clone() * 0.0,
+        centrifugal_load: vec![0.0; 2],
+        centrifugal_load_speed4: vec![0.0; 2],
+        largest_speed: 160.0,
+    });
+    scene.settings.structures[0].spin.stiffening = true;
+    scene.settings.structures[0].speed = 150.0;
+    let speeds = |from, to| Speeds { from, to, count: 3 };
+    let request = |speeds| Request { revolutions: Some(4), transient: Some(3), ..request(BUMP, speeds) };
+    let study = run(scene.clone(), &request(speeds(150.0, 190.0)), 2);
+    let refused = study.results["refused"].as_array().unwrap();
+    assert_eq!(refused.len(), 2, "{refused:?}");
+    assert!(refused[0][1].as_str().unwrap().contains("beyond the 160 rad/s"), "{refused:?}");
+    assert_eq!(study.statements[0].holds, Some(false), "{:?}", study.statements[0]);
+    let map = study.figure("map").unwrap();
+    assert_eq!(map.picture.svg.matches("refused").count(), 2);
+    assert_eq!(
+        map.sheet.rows.iter().filter(|row| row[1].is_nan()).map(|row| row[0]).collect::<Vec<_>>(),
+        [170.0, 190.0]
+    );
+    let failure = of_scene(scene, &request(speeds(170.0, 190.0)), 1, |_, _, _| {}).unwrap_err();
+    assert!(failure.problem.contains("every angular velocity is refused"), "{failure}");
+}
+
+#[test]
+fn steps_too_coarse_for_the_filter_and_a_speed_set_are_refused() {
+    let mut coarse = request(BUMP, around(CROSSING, 0.1, 2));
+    coarse.settings.retain(|(name, _)| name != "internal_step_max");
+    coarse.settings.push(("internal_step_max".into(), "1e-4".into()));
+    let failure = of_scene(scene(FIRST, 2), &coarse, 1, |_, _, _| {}).unwrap_err();
+    assert!(failure.problem.contains("internal_step_max="), "{failure}");
+    let request = Request { settings: vec![("speed".into(), "1".into())], ..Request::default() };
+    assert!(of_scene(scene(FIRST, 2), &request, 1, |_, _, _| {}).unwrap_err().usage);
+}
+
+/// With friction the sense matters; a blade mirrored about its middle, turning the other way, is the same in a mirror.
+#[test]
+fn the_rotor_turns_in_the_sense_of_the_scene() {
+    let speeds = around(CROSSING, 0.1, 2);
+    let request = Request { revolutions: Some(2), transient: Some(1), ..request(BUMP, speeds) };
+    let request = Request {
+        settings: request.settings.iter().filter(|(name, _)| name != "friction_coefficient").cloned().collect(),
+        ..request
+    };
+    let forces = |sense: f64, mirrored: bool| {
+        let mut scene = scene(FIRST, 1);
+        scene.settings.contacts[0].friction = 0.4;
+        scene.settings.structures[0].speed = sense;
+        if mirrored {
+            [1, 4].iter().for_each(|row| scene.roms[0].contact_map.row_mut(*row).neg_mut());
+        }
+        let study = run(scene, &request, 1);
+        let told = study.facts.iter().find(|(name, _)| name == "angular velocities").unwrap().1.clone();
+        assert!(told.contains(if sense < 0.0 { "negative sense" } else { "positive sense" }), "{told}");
+        let rows = &study.figure("normal-force").unwrap().sheet.rows;
+        assert!(rows.iter().all(|row| row[1] > 1.0), "{rows:?}");
+        [rows[0][1], rows[1][1]]
+    };
+    let [forward, zero, backward, mirrored] =
+        [(100.0, false), (0.0, false), (-100.0, false), (-100.0, true)].map(|(sense, mirror)| forces(sense, mirror));
+    for (index, force) in forward.iter().enumerate() {
+        assert_eq!(force.to_bits(), zero[index].to_bits());
+        assert!((mirrored[index] / force - 1.0).abs() < 1e-6, "{forward:?} {mirrored:?}");
+        assert!((backward[index] / force - 1.0).abs() > 1e-3, "{forward:?} {backward:?}");
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused_before_the_work() {
+    let refused = |request: &Request| Map::prepare(scene(FIRST, 36), request).map(|_| ()).unwrap_err();
+    for revolutions in [100_000_000, usize::MAX] {
+        let request = Request { revolutions: Some(revolutions), ..request(BUMP, around(CROSSING, 0.1, 5)) };
+        let failure = refused(&request);
+        assert!(failure.usage && failure.what.contains(&format!("--revolutions {revolutions}")), "{failure}");
+        // As many as the remedy names do fit, one more does not.
+        let most: usize = failure.remedy.split(' ').find_map(|word| word.parse().ok()).unwrap();
+        let with = |revolutions| Request { revolutions: Some(revolutions), ..request.clone() };
+        assert!(Map::prepare(scene(FIRST, 36), &with(most)).is_ok(), "{failure}");
+        assert!(refused(&with(most + 1)).usage, "{failure}");
+        assert!(most > 1000, "{failure}");
+    }
+    // Spectra of many runs are what does not fit.
+    let many = |count| Request { revolutions: Some(2000), ..request(BUMP, around(CROSSING, 0.1, count)) };
+    assert!(Map::prepare(scene(FIRST, 36), &many(5)).is_ok());
+    assert!(refused(&many(1000)).what.contains("--revolutions 2000"));
+    let slow = request(BUMP, Speeds { from: 1e-3, to: 1.0, count: 5 });
+    let failure = refused(&slow);
+    assert!(failure.usage && failure.what == "--speeds" && failure.problem.contains("0.001 rad/s"), "{failure}");
+    let least: f64 = failure.remedy.split(' ').find_map(|word| word.parse().ok()).unwrap();
+    let from = |from| Request { revolutions: Some(1), ..request(BUMP, Speeds { from, to: 1.0, count: 5 }) };
+    assert!(Map::prepare(scene(FIRST, 36), &from(least)).is_ok(), "{failure}");
+    assert!(refused(&from(0.9 * least)).usage, "{failure}");
+}
+
+#[test]
+fn the_cost_told_is_what_is_done() {
+    let request = Request { revolutions: Some(4), transient: Some(3), ..request(BUMP, around(CROSSING, 0.1, 2)) };
+    let told = std::cell::RefCell::new(Vec::new());
+    let tell = |done: usize, all: usize, steps: f64| told.borrow_mut().push((done, all, steps));
+    let (study, _) = of_scene(scene(FIRST, 4), &request, 1, tell).unwrap();
+    let done = study.results["internal_steps"].as_f64().unwrap();
+    assert_eq!(told.borrow().iter().map(|told| (told.0, told.1)).collect::<Vec<_>>(), [(0, 2), (1, 2), (2, 2)]);
+    assert!((told.borrow()[0].2 / done - 1.0).abs() < 0.02, "{told:?} {done}");
+}
+
+#[test]
+fn start_values_count_in_orders_and_facts() {
+    let prepared = |change: fn(&mut Scene), set: &[(&str, &str)]| {
+        let mut scene = scene(FIRST, 2);
+        scene.settings.surfaces[0].moving = true;
+        change(&mut scene);
+        let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
+        let request = Request { settings: set, speeds: Some(around(CROSSING, 0.1, 2)), ..Request::default() };
+        Map::prepare(scene, &request).unwrap().0
+    };
+    let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} {b}");
+    let plain = prepared(|_| {}, &[]);
+    assert_eq!((plain.prediction.base_order, plain.start.without()), (2, String::new()));
+    near(plain.intrusion, BUMP);
+    let gap = plain.start.clearance[0];
+    let moved = [("gap_offset", "1e-5"), ("casing_radius_change", "2e-5"), ("casing_shape_factor", "0.5")];
+    let moved = prepared(|scene| scene.settings.contacts[0].sector_gaps = vec![3e-4, 5e-4], &moved);
+    near(moved.start.clearance[0], 3.3e-4);
+    near(moved.start.clearance[1], 5.3e-4);
+    near(moved.depth, 0.5 * plain.depth);
+    near(moved.intrusion, 0.5 * (gap + BUMP) - 3.3e-4);
+    let round = prepared(|_| {}, &[("casing_shape_factor", "0")]);
+    assert_eq!((round.prediction.base_order, round.static_displacement), (0, None));
+    let whirl = |scene: &mut Scene| scene.settings.structures[0].whirl = true;
+    assert_eq!(prepared(whirl, &[]).prediction.base_order, 2, "a shaft in the middle has no order");
+    let whirling = prepared(whirl, &[("whirl_y", "-1e-5")]);
+    assert_eq!((whirling.prediction.base_order, whirling.start.without()), (1, ", without whirl".into()));
+}
+
+/// Where nothing touches nothing is said about the response.
+#[test]
+fn nothing_that_moves_is_no_verdict() {
+    let request = Request { revolutions: Some(4), transient: Some(3), ..request(-1e-4, around(CROSSING, 0.1, 2)) };
+    let study = run(scene(FIRST, 2), &request, 1);
+    let holds = |start: &str| study.statements.iter().find(|one| one.expected.starts_with(start)).unwrap().holds;
+    assert_eq!(holds("The tips touch"), Some(false));
+    assert_eq!([holds("The scale of the response"), holds("Response is a repetition")], [None, None]);
+}
+
+#[test]
+fn stiffening_is_decided_only_where_it_shows() {
+    let crossing = |order, speed| Crossing { order, mode: 0, speed, frequency: 100.0, excited: true };
+    let one = |order, response, beyond| Coincidence {
+        crossing: crossing(order, 100.0),
+        window: [90.0, 150.0],
+        response,
+        beyond,
+    };
+    let verdict =
+        |all: &[Coincidence]| statements::stiffens(all, 2.0).map(|statement| (statement.holds, statement.found));
+    assert_eq!(verdict(&[one(4, None, None)]), None);
+    let above = one(4, Some((110.0, 3e-3)), None);
+    assert_eq!(verdict(&[above]).unwrap().0, Some(true));
+    assert_eq!(verdict(&[one(4, Some((95.0, 3e-3)), None), one(6, Some((120.0, 1e-3)), None)]).unwrap().0, Some(false));
+    for shift in [-1.9, 1.9] {
+        let (holds, found) = verdict(&[one(4, Some((100.0 + shift, 3e-3)), None)]).unwrap();
+        assert!(holds.is_none() && found.contains("below the distance of the speeds"), "{found}");
+    }
+    // Another crossing runs out of the range: smaller there it does not matter, larger it may be the strongest.
+    assert_eq!(verdict(&[above, one(6, Some((104.0, 1e-3)), Some((150.0, 2e-3)))]).unwrap().0, Some(true));
+    for response in [None, Some((104.0, 1e-3))] {
+        let (holds, found) = verdict(&[above, one(6, response, Some((150.0, 4e-3)))]).unwrap();
+        assert!(holds.is_none() && found.starts_with("undecided: the response of engine order 6 on mode 1"), "{found}");
+    }
+}
+
+/// Two runs beside a border of the window: the parabola's top lies beyond it.
+#[test]
+fn a_maximum_stays_in_its_window() {
+    let mut scene = scene(FIRST, 4);
+    let rom = &mut scene.roms[0];
+    rom.stiffness[(1, 1)] = rom.stiffness[(0, 0)] * 1.25_f64.powi(2);
+    let prediction = Prediction::new(&scene, &Start::default(), 0.0).unwrap();
+    let speeds = [0.9, 1.0, 1.1, 1.2, 1.3].map(|share| share * CROSSING);
+    let crossings = prediction.crossings([speeds[0], speeds[4]], 1.5 * FIRST);
+    // The second mode's window begins at 1.1875 times the crossing of the first one, the top of the parabola is at 1.15.
+    let two = |speed: f64| {
+        if speed < 1.15 * CROSSING && speed > 1.05 * CROSSING { 0.999e-3 } else { bell(speed, 1.2 * CROSSING, 1e-3) }
+    };
+    let found = findings::coincidences(&runs_of_order(4, &speeds, two), &prediction, &crossings, 1);
+    for one in found.iter().filter(|one| one.crossing.order == 4) {
+        let Some((speed, _)) = one.response else { continue };
+        assert!((one.window[0]..=one.window[1]).contains(&speed), "{one:?}");
+    }
+    let second = found.iter().find(|one| one.crossing.order == 4 && one.crossing.speed > 1.1 * CROSSING).unwrap();
+    assert!(second.response.is_some(), "{found:?}");
+}
+
+#[test]
+fn engine_orders_fold_at_half_the_number_of_sectors() {
+    let folds =
+        [(2, (2, false)), (28, (28, false)), (29, (27, true)), (54, (2, true)), (56, (0, false)), (58, (2, false))];
+    for (order, expected) in folds {
+        assert_eq!(prediction::folded(order, 56), expected, "order {order}");
+    }
+    assert_eq!([3, 4, 5].map(|order| prediction::folded(order, 7)), [(3, false), (3, true), (2, true)]);
+}
