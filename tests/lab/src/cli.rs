@@ -137,9 +137,6 @@ pub struct StabilityArguments {
     /// Cases at the same time [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
-    /// Also write the table into this chapter of the guide, below the line that marks its place; not with --case.
-    #[arg(long, value_name = "FILE")]
-    pub chapter: Option<PathBuf>,
     /// FMU library for the cases that import FMUs, instead of the one found or built.
     #[arg(long, value_name = "FILE")]
     pub library: Option<PathBuf>,

@@ -27,12 +27,10 @@ pub fn run(arguments: &StabilityArguments, console: &Console) -> Result<Outcome>
         return Ok(Outcome { text: json.to_string(), json });
     }
     let cases = chosen(arguments)?;
-    let files = Table::FILES.map(|name| Named::new("--out", arguments.out.join(name))).to_vec();
-    let written = [files, Vec::from_iter(Named::option("--chapter", &arguments.chapter))].concat();
+    let written = Table::FILES.map(|name| Named::new("--out", arguments.out.join(name)));
     places::apart(&Vec::from_iter(Named::option("--library", &arguments.library)), &written)?;
     // Before the long work: what would fail after it.
     output_file::try_directory(&arguments.out)?;
-    let above = arguments.chapter.as_deref().map(|path| above_table(path, arguments)).transpose()?;
     // Lives as long as the cases run.
     let fmus = if cases.iter().any(|case| case.imports) { Some(package(arguments, console)?) } else { None };
     let context = Context { fmus: fmus.as_ref().map(|directory| directory.path().to_owned()) };
@@ -53,9 +51,6 @@ pub fn run(arguments: &StabilityArguments, console: &Console) -> Result<Outcome>
     drop(task);
     let table = Table { rows };
     let outcome = table.write(&arguments.out)?;
-    if let (Some(path), Some(above)) = (&arguments.chapter, above) {
-        output_file::write(path, format!("{above}{MARK}\n\n{}", table.to_markdown()))?;
-    }
     verdict(&table, &arguments.out).map_or(Ok(outcome), Err)
 }
 
@@ -109,30 +104,3 @@ fn chosen(arguments: &StabilityArguments) -> Result<Vec<Case>> {
     }
     Ok(cases)
 }
-
-/// What stands above the table of the guide, which is kept.
-fn above_table(path: &std::path::Path, arguments: &StabilityArguments) -> Result<String> {
-    if arguments.case.is_some() {
-        return Err(Failure::usage(
-            "--chapter",
-            format!("with --case a few cases would replace the whole table of {}", path.display()),
-            "Leave out one of the two; stability.md in the directory of --out holds the table of a few cases",
-        ));
-    }
-    let unreadable = |error: std::io::Error| Failure::file(path, "the chapter cannot be read", &error);
-    let present = tiprub_format::read_file(path, LARGEST_CHAPTER).map_err(unreadable)?;
-    let present = String::from_utf8(present).map_err(|error| unreadable(std::io::Error::other(error)))?;
-    let Some((above, _)) = present.split_once(MARK) else {
-        let remedy = format!("Name the chapter, or put this line where the table shall begin: {MARK}");
-        return Err(Failure::new(path.display(), "has no mark below which the table belongs", remedy));
-    };
-    // Where the file would be replaced, so that it is known to be possible.
-    output_file::begin(path)?;
-    Ok(above.to_owned())
-}
-
-/// Largest chapter (bytes).
-const LARGEST_CHAPTER: u64 = 64 << 20;
-
-/// The table begins below this line.
-const MARK: &str = "<!-- the table below is written by `lab stability --chapter` -->";
