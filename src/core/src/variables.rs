@@ -138,7 +138,7 @@ pub struct Variable {
     pub quantity: Quantity,
 }
 
-/// What a variable stands for inside the simulation (the only link between table and state).
+/// What a variable stands for, where code other than the reader of an output asks for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Simulated time.
@@ -189,10 +189,6 @@ pub enum Quantity {
     SceneName,
     /// θ_r.
     RotorAngle,
-    /// Smallest gap of the whole disk within the step.
-    ClearanceMinimum,
-    /// Smallest gap per contact node within the step.
-    NodeClearanceMinimum,
     /// Gaps of a watched sector (0-based) at the communication point.
     Clearance(usize),
     /// Smallest gaps of a watched sector within the step.
@@ -201,95 +197,41 @@ pub enum Quantity {
     NormalForce(usize),
     /// Mean friction forces of a watched sector.
     TangentialForce(usize),
-    /// Normal forces of a watched sector in the last internal step.
-    NormalForceNow(usize),
-    /// Friction forces of a watched sector in the last internal step.
-    TangentialForceNow(usize),
-    /// Mean contact force on the rotor along fixed x, y, z (component 0, 1, 2).
-    Force(usize),
-    /// Mean contact force on a free master from the surface of one pair (0-based) along x, y, z.
-    PairForce(usize, usize),
     /// Velocity of the centre of mass of a free master along x, y, z.
     CentreVelocity(usize),
-    /// Its displacement.
-    CentreDisplacement(usize),
     /// Displacements of all contact nodes of a free master along x, y, z.
     NodeDisplacement(usize),
     /// Mean moment of the contact forces about fixed x, y, z: on the rotor about the shaft's centre (z: the torque), on a
     /// free master about the origin.
     Moment(usize),
-    /// Mean moment of the contact forces on a free master from the surface of one pair (0-based) about x, y, z.
-    PairMoment(usize, usize),
     /// Largest λ of any node within the step.
     NormalForcePeak,
-    /// ∫Σλ dt within the step.
-    NormalImpulse,
-    /// Mean friction power.
-    FrictionPower,
-    /// Mean friction power into each patch of the slave.
-    PatchFrictionPower,
-    /// Mean friction power into the master.
-    MasterFrictionPower,
-    /// Wear depth of each coating cell.
-    WearDepth,
-    /// Largest wear depth.
-    WearDepthMaximum,
-    /// Volume worn off the coating.
-    WornVolume,
     /// Radial displacement of the contact grid of the flexible slave.
     SlaveDisplacement,
     /// Nodes in contact at the communication point.
     ContactCount,
-    /// Any node in contact at the communication point.
-    InContact,
-    /// Smallest gap of each sector within the step.
-    SectorClearanceMinimum,
-    /// Mean normal force of each sector.
-    SectorNormalForce,
     /// Amplitude of the radial tip displacement per nodal diameter.
     NodalDiameterAmplitude,
     /// Kinetic energy.
     KineticEnergy,
     /// Strain energy.
     StrainEnergy,
-    /// Energy that the scheme conserves (J).
-    SchemeEnergy,
     /// Damping loss.
     DampingLoss,
     /// Friction loss.
     FrictionLoss,
     /// Impact loss.
     ImpactLoss,
-    /// Work of the coating's normal force on the blades.
-    WearWork,
-    /// Energy that wearing the coating takes.
-    WearEnergy,
-    /// Work of centrifugal, thermal and nodal-diameter loads.
-    LoadWork,
     /// Work of all inputs but loads.
     ExternalWork,
-    /// Work of the shaft through the contacts.
-    ShaftWork,
-    /// Work of the shaft on rotors that stiffen with the speed.
-    StiffeningWork,
-    /// Work of whirl.
-    WhirlWork,
-    /// Work of axial shift.
-    ShiftWork,
-    /// Work of prescribed motion of the casing.
-    CasingWork,
     /// What turning normals and curving surfaces add within steps.
     CurvatureWork,
-    /// Energy added by changes of the internal step.
-    StepChangeEnergy,
-    /// Closure residual.
-    EnergyResidual,
     /// Closure residual relative to initial energy and all work exchanged.
     EnergyResidualRelative,
     /// Internal step in use.
     InternalStep,
-    /// Internal steps done.
-    InternalSteps,
+    /// An output that nothing but its reader knows.
+    Output,
 }
 
 impl Variable {

@@ -139,7 +139,7 @@ impl Compiled {
             (modes(scene, roles.master, 0.0)?, None)
         };
         let carrier = roles.carrier.map(|index| modes(scene, index, 0.0)).transpose()?;
-        let table = super::table::build(scene)?;
+        let (table, _) = super::table::build(scene)?;
         let place = |quantity| table.with_quantity(quantity).map(|variable| variable.reference as usize);
         let references = References {
             step_max: place(Quantity::StepMax).unwrap_or(0),

@@ -92,6 +92,8 @@ impl Communication {
 #[derive(Debug, Clone)]
 pub struct Simulation {
     table: VariableTable,
+    /// What fills the outputs, in the order of the table.
+    readers: Vec<outputs::Reader>,
     compiled: Compiled,
     system: System,
     /// Current value of every reference; strings live in the table.
@@ -130,13 +132,14 @@ impl Simulation {
     /// Invalid settings or ROM, refused combinations.
     pub fn new(scene: &Scene) -> Result<Self> {
         let compiled = Compiled::new(scene)?;
-        let table = table::build(scene)?;
+        let (table, readers) = table::build(scene)?;
         let system = compiled.system()?;
         let patches = compiled.patches.as_ref().map_or(0, patches::Patches::len);
         let pairs = compiled.free.as_ref().map_or(0, |free| free.pairs.len());
         let window = Window::new(system.gaps().len(), patches, pairs);
         let temperatures = vec![Input::default(); compiled.loads.thermal.len()];
         let mut simulation = Self {
+            readers,
             values: vec![0.0; table.references()],
             previous: vec![0.0; table.references()],
             table,

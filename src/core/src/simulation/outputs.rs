@@ -1,39 +1,60 @@
-//! Outputs from state and window.
+//! Outputs from state and window: what a row of the table fills itself from.
 
+use std::fmt;
+use std::sync::Arc;
+
+use super::table::LENGTH;
+use super::window::Window;
 use super::{Phase, Simulation};
 use crate::contact::coating::Coating;
 use crate::contact::gap::sector_angle;
 use crate::dynamics::sectors::Sectors;
+use crate::ledger::Ledger;
+use crate::system::System;
 use crate::variables::{Causality, NO_CLEARANCE, Quantity, Span, Variable};
 
-/// A clearance as an output tells it (m): finite.
-fn told(gap: f64) -> f64 {
-    gap.min(NO_CLEARANCE)
+/// What fills the elements of an output.
+#[derive(Clone)]
+pub struct Reader(Arc<dyn Fn(&View, &mut [f64]) + Send + Sync>);
+
+impl fmt::Debug for Reader {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("Reader")
+    }
 }
 
-fn is_clearance(quantity: Quantity) -> bool {
-    matches!(
-        quantity,
-        Quantity::Clearance(_)
-            | Quantity::ClearanceMinimum
-            | Quantity::NodeClearanceMinimum
-            | Quantity::SectorClearanceMinimum
-            | Quantity::WatchedClearanceMinimum(_)
-    )
+/// Of a scalar.
+pub fn scalar(read: impl Fn(&View) -> f64 + Send + Sync + 'static) -> Reader {
+    Reader(Arc::new(move |view, out| out[0] = read(view)))
 }
 
-/// What all outputs of one instant share.
-struct Instant {
+/// Of an array, element by element.
+pub fn each(read: impl Fn(&View, usize) -> f64 + Send + Sync + 'static) -> Reader {
+    Reader(Arc::new(move |view, out| {
+        out.iter_mut().enumerate().for_each(|(index, value)| *value = read(view, index));
+    }))
+}
+
+/// Of an array as a whole.
+pub fn whole(read: impl Fn(&View, &mut [f64]) + Send + Sync + 'static) -> Reader {
+    Reader(Arc::new(read))
+}
+
+/// What outputs are read from, and what all of them share at one instant.
+pub struct View<'a> {
+    simulation: &'a Simulation,
+    pub system: &'a System,
+    pub window: &'a Window,
     /// 1/time since the communication step began, 0 if none has passed (1/s).
-    mean: f64,
+    pub mean: f64,
     /// That time (s).
     elapsed: f64,
-    /// Kinetic and strain energy of the instant (J), if the ledger is kept.
-    energies: (f64, f64),
-    /// Energy that the scheme conserves (J), if the ledger is kept.
-    conserved: f64,
     /// Share of the friction heat that goes into the slave; all of it where the scene does not say.
     slave_share: f64,
+    /// Kinetic and strain energy of the instant (J), if the ledger is kept.
+    pub energies: (f64, f64),
+    /// Energy that the scheme conserves (J), if the ledger is kept.
+    pub conserved: f64,
 }
 
 impl Simulation {
@@ -51,146 +72,108 @@ impl Simulation {
         (self.energy, self.conserved) = (energies.0 + energies.1, conserved);
         let slave_share = self.table.with_quantity(Quantity::HeatToSlave);
         let slave_share = slave_share.map_or(1.0, |variable| self.values[variable.reference as usize]);
-        let instant = Instant { mean, elapsed, energies, conserved, slave_share };
         let mut values = std::mem::take(&mut self.values);
-        for variable in self.table.variables() {
-            if variable.causality == Causality::Output {
-                let start = variable.reference as usize;
-                self.fill(variable.quantity, &instant, &mut values[start..start + variable.len()]);
-            } else if variable.causality == Causality::Independent {
-                values[variable.reference as usize] = self.communication.time(self.communication.done);
-            }
+        let (system, window) = (&self.system, &self.window);
+        let view = View { simulation: self, system, window, mean, elapsed, slave_share, energies, conserved };
+        let outputs = self.table.variables().iter().filter(|variable| variable.causality == Causality::Output);
+        for (variable, read) in outputs.zip(&self.readers) {
+            let start = variable.reference as usize;
+            (read.0)(&view, &mut values[start..start + variable.len()]);
+        }
+        let time = self.communication.time(self.communication.done);
+        for variable in self.table.variables().iter().filter(|row| row.causality == Causality::Independent) {
+            values[variable.reference as usize] = time;
         }
         self.values = values;
     }
+}
 
-    /// Elements of one output.
-    fn fill(&self, quantity: Quantity, instant: &Instant, out: &mut [f64]) {
-        let (system, window, mean) = (&self.system, &self.window, instant.mean);
-        let lanes = system.bank().lanes();
-        let sectors = system.bank().sectors();
-        let smallest = |values: &[f64]| values.iter().fold(f64::INFINITY, |low: f64, value| low.min(*value));
-        match quantity {
-            Quantity::ClearanceMinimum => out[0] = told(smallest(&window.lowest)),
-            Quantity::NodeClearanceMinimum => {
-                for (node, value) in out.iter_mut().enumerate() {
-                    *value = told(smallest(&window.lowest[node * lanes..][..sectors]));
-                }
-            }
-            Quantity::SectorClearanceMinimum => {
-                for (sector, value) in out.iter_mut().enumerate() {
-                    *value = told(window.lowest.chunks(lanes).fold(f64::INFINITY, |low, row| low.min(row[sector])));
-                }
-            }
-            Quantity::SectorNormalForce => {
-                for (sector, value) in out.iter_mut().enumerate() {
-                    *value = mean * window.normal_impulse.chunks(lanes).map(|row| row[sector]).sum::<f64>();
-                }
-            }
-            Quantity::NodalDiameterAmplitude => self.fill_nodal_diameters(out),
-            Quantity::PatchFrictionPower => {
-                for (value, heat) in out.iter_mut().zip(&window.patch_heat) {
-                    *value = mean * instant.slave_share * heat;
-                }
-            }
-            Quantity::WearDepth => {
-                for (cell, value) in out.iter_mut().enumerate() {
-                    *value = system.coating().map_or(0.0, |coating| coating.wear_depth(cell));
-                }
-            }
-            Quantity::SlaveDisplacement => self.fill_slave_displacement(out),
-            Quantity::NodeDisplacement(axis) => {
-                for (node, value) in out.iter_mut().enumerate() {
-                    *value = system.bank().displacement()[3 * node + axis];
-                }
-            }
-            Quantity::Clearance(_)
-            | Quantity::WatchedClearanceMinimum(_)
-            | Quantity::NormalForce(_)
-            | Quantity::TangentialForce(_)
-            | Quantity::NormalForceNow(_)
-            | Quantity::TangentialForceNow(_) => self.fill_watched(quantity, mean, out),
-            _ => out[0] = self.scalar(quantity, instant),
-        }
+impl View<'_> {
+    pub fn rotor_angle(&self) -> f64 {
+        self.simulation.rotor.total(&self.simulation.inputs.speed, self.elapsed)
     }
 
-    fn fill_watched(&self, quantity: Quantity, mean: f64, out: &mut [f64]) {
-        let lanes = self.system.bank().lanes();
-        for (node, value) in out.iter_mut().enumerate() {
-            let index = |sector: usize| node * lanes + sector;
-            *value = match quantity {
-                Quantity::Clearance(sector) => told(self.system.gaps()[index(sector)]),
-                Quantity::WatchedClearanceMinimum(sector) => told(self.window.lowest[index(sector)]),
-                Quantity::NormalForce(sector) => mean * self.window.normal_impulse[index(sector)],
-                Quantity::TangentialForce(sector) => mean * self.window.tangential_impulse[index(sector)],
-                Quantity::NormalForceNow(sector) => self.system.multiplier(node, sector),
-                Quantity::TangentialForceNow(sector) => {
-                    let event = self.system.events().iter().find(|event| (event.sector, event.node) == (sector, node));
-                    event.map_or(0.0, |event| event.tangential)
-                }
-                _ => 0.0,
-            };
-        }
+    pub fn slave_share(&self) -> f64 {
+        self.slave_share
     }
 
-    fn scalar(&self, quantity: Quantity, instant: &Instant) -> f64 {
-        let (system, window) = (&self.system, &self.window);
-        let ledger = system.ledger();
-        let Instant { mean, elapsed, energies: (kinetic, strain), conserved, .. } = *instant;
-        #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
-        match quantity {
-            Quantity::RotorAngle => self.rotor.total(&self.inputs.speed, elapsed),
-            Quantity::Force(component) => mean * window.force_impulse[component],
-            Quantity::PairForce(pair, axis) => mean * window.pair_impulse[pair][axis],
-            Quantity::CentreVelocity(axis) => self.centre(axis, |(_, increment)| increment / system.bank().step()),
-            Quantity::CentreDisplacement(axis) => self.centre(axis, |(position, _)| position),
-            Quantity::PairMoment(pair, axis) => mean * window.pair_moment[pair][axis],
-            Quantity::Moment(axis) => mean * window.moment_impulse[axis],
-            Quantity::NormalForcePeak => window.normal_peak,
-            Quantity::NormalImpulse => window.normal_impulse.iter().sum(),
-            Quantity::FrictionPower => mean * window.friction_heat,
-            Quantity::MasterFrictionPower => mean * (1.0 - instant.slave_share) * window.friction_heat,
-            Quantity::WearDepthMaximum => system.coating().map_or(0.0, Coating::largest_wear_depth),
-            Quantity::WornVolume => system.coating().map_or(0.0, Coating::worn_volume),
-            Quantity::ContactCount => system.events().len() as f64,
-            Quantity::InContact => f64::from(u8::from(!system.events().is_empty())),
-            Quantity::KineticEnergy => kinetic,
-            Quantity::StrainEnergy => strain,
-            Quantity::SchemeEnergy => conserved,
-            Quantity::DampingLoss => ledger.damping_loss.value(),
-            Quantity::FrictionLoss => ledger.friction_loss.value(),
-            Quantity::ImpactLoss => ledger.impact_loss.value(),
-            Quantity::WearWork => ledger.wear_work.value(),
-            Quantity::WearEnergy => ledger.wear_energy.value(),
-            Quantity::LoadWork => ledger.load_work.value(),
-            Quantity::ExternalWork => ledger.external_work(),
-            Quantity::ShaftWork => ledger.shaft_work.value(),
-            Quantity::StiffeningWork => ledger.stiffening_work.value(),
-            Quantity::WhirlWork => ledger.whirl_work.value(),
-            Quantity::ShiftWork => ledger.shift_work.value(),
-            Quantity::CasingWork => ledger.casing_work.value(),
-            Quantity::CurvatureWork => ledger.curvature_work.value(),
-            Quantity::StepChangeEnergy => ledger.step_change.value(),
-            Quantity::EnergyResidual => ledger.residual(conserved),
-            Quantity::EnergyResidualRelative => {
-                let residual = ledger.residual(conserved);
-                if ledger.scale() > 0.0 { residual / ledger.scale() } else { 0.0 }
-            }
-            Quantity::InternalStep => system.bank().step(),
-            Quantity::InternalSteps => system.steps() as f64,
-            _ => 0.0,
-        }
+    pub fn ledger(&self) -> &Ledger {
+        self.system.ledger()
+    }
+
+    pub fn relative_residual(&self) -> f64 {
+        let (residual, scale) = (self.ledger().residual(self.conserved), self.ledger().scale());
+        if scale > 0.0 { residual / scale } else { 0.0 }
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
+    pub fn contacts(&self) -> f64 {
+        self.system.events().len() as f64
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
+    pub fn internal_steps(&self) -> f64 {
+        self.system.steps() as f64
+    }
+
+    /// What a coating tells; nothing without one.
+    pub fn coating(&self, read: impl Fn(&Coating) -> f64) -> f64 {
+        self.system.coating().map_or(0.0, read)
+    }
+
+    pub fn sectors(&self) -> impl Iterator<Item = usize> + use<> {
+        0..self.system.bank().sectors()
+    }
+
+    pub fn nodes(&self) -> impl Iterator<Item = usize> + use<> {
+        0..self.window.lowest.len() / self.system.bank().lanes()
+    }
+
+    /// All contact nodes of all sectors.
+    pub fn all(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let sectors = self.system.bank().sectors();
+        self.nodes().flat_map(move |node| (0..sectors).map(move |sector| (node, sector)))
+    }
+
+    fn index(&self, node: usize, sector: usize) -> usize {
+        node * self.system.bank().lanes() + sector
+    }
+
+    /// Smallest clearance of nodes within the communication step (m), as an output tells it: finite.
+    pub fn lowest(&self, nodes: impl IntoIterator<Item = (usize, usize)>) -> f64 {
+        let gaps = nodes.into_iter().map(|(node, sector)| self.window.lowest[self.index(node, sector)]);
+        gaps.fold(f64::INFINITY, f64::min).min(NO_CLEARANCE)
+    }
+
+    pub fn clearance(&self, node: usize, sector: usize) -> f64 {
+        self.system.gaps()[self.index(node, sector)].min(NO_CLEARANCE)
+    }
+
+    pub fn normal_impulse(&self, node: usize, sector: usize) -> f64 {
+        self.window.normal_impulse[self.index(node, sector)]
+    }
+
+    pub fn tangential_impulse(&self, node: usize, sector: usize) -> f64 {
+        self.window.tangential_impulse[self.index(node, sector)]
+    }
+
+    /// Friction force of the last internal step (N).
+    pub fn tangential_now(&self, node: usize, sector: usize) -> f64 {
+        let event = self.system.events().iter().find(|event| (event.sector, event.node) == (sector, node));
+        event.map_or(0.0, |event| event.tangential)
     }
 
     /// Value of the centre of mass of a free master along an axis, from the modal (position, increment) of its translations.
-    fn centre(&self, axis: usize, value: impl Fn((f64, f64)) -> f64) -> f64 {
-        let (Some(free), Sectors::Uncoupled(bank)) = (&self.compiled.free, self.system.bank()) else { return 0.0 };
+    pub fn centre(&self, axis: usize, value: impl Fn((f64, f64)) -> f64) -> f64 {
+        let (Some(free), Sectors::Uncoupled(bank)) = (&self.simulation.compiled.free, self.system.bank()) else {
+            return 0.0;
+        };
         free.translations.centre(axis, [0, 1, 2].map(|mode| value(bank.modal_state(mode, 0))))
     }
 
     /// Radial displacement of the contact grid of the carrier.
-    fn fill_slave_displacement(&self, out: &mut [f64]) {
-        let (Some(slave), Some(model)) = (self.system.slave(), &self.compiled.carrier) else { return };
+    pub fn slave_displacement(&self, out: &mut [f64]) {
+        let (Some(slave), Some(model)) = (self.system.slave(), &self.simulation.compiled.carrier) else { return };
         out.fill(0.0);
         for mode in 0..model.len() {
             let position = slave.bank.modal_state(mode, 0).0;
@@ -201,7 +184,7 @@ impl Simulation {
     }
 
     /// |(2/N) Σ_b u_b e^(−i n θ_b)| (1/N for n = 0 and n = N/2) of the radial displacement of the middle node.
-    fn fill_nodal_diameters(&self, out: &mut [f64]) {
+    pub fn nodal_diameters(&self, out: &mut [f64]) {
         let bank = self.system.bank();
         let sectors = bank.sectors();
         let row = 3 * (bank.rows() / 6);
@@ -217,14 +200,16 @@ impl Simulation {
             *value = weight / sectors as f64 * libm::hypot(real, imaginary);
         }
     }
+}
 
+impl Simulation {
     pub(super) fn derivative_of(&self, variable: &Variable, element: usize, reference: u32) -> f64 {
         let (now, before) = (self.values[reference as usize], self.previous[reference as usize]);
         let length = self.communication.length;
         match (variable.quantity, variable.span) {
             _ if self.phase == Phase::Created || length == 0.0 => 0.0,
             // From nothing to touch to a clearance, and back, there is no rate.
-            _ if is_clearance(variable.quantity) && now.max(before) >= NO_CLEARANCE => 0.0,
+            _ if variable.unit == Some(&LENGTH) && now.max(before) >= NO_CLEARANCE => 0.0,
             (Quantity::Clearance(sector), _) => self.system.gap_rate(element, sector),
             (Quantity::RotorAngle, _) => self.inputs.speed.at(0.0),
             (_, Span::Mean) if self.previous_length == 0.0 => 0.0,

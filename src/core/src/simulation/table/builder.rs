@@ -4,6 +4,7 @@ use super::units::{ANGLE, INPUT_INTERPOLATIONS, SCHEMES, SOLVERS, TIME};
 use crate::Result;
 use crate::ranges::{DAMPING, FRICTION, LONGEST_STEP, SHORTEST_STEP};
 use crate::settings::{ContactSettings, SceneSettings};
+use crate::simulation::outputs::Reader;
 use crate::variables::{
     Causality, Enumeration, Kind, Quantity, Span, Start, Unit, Variability, Variable, VariableTable,
 };
@@ -17,6 +18,8 @@ const RAMPED_ANGLE: &str = "; reached at the end of the step (input_interpolatio
 #[derive(Default)]
 pub struct Builder {
     variables: Vec<Variable>,
+    /// Of the outputs, in their order.
+    readers: Vec<Reader>,
     next: u32,
 }
 
@@ -105,15 +108,17 @@ impl Builder {
         variable.start = Some(Start::Integer(start));
     }
 
+    /// An output with what fills it.
     pub fn output(
         &mut self,
-        quantity: Quantity,
         name: impl Into<String>,
         span: Span,
         unit: Option<(&'static Unit, f64)>,
         text: impl Into<String>,
+        read: Reader,
     ) -> &mut Variable {
-        let variable = self.push(quantity, name, text);
+        self.readers.push(read);
+        let variable = self.push(Quantity::Output, name, text);
         variable.span = span;
         if let Some((unit, nominal)) = unit {
             variable.unit = Some(unit);
@@ -172,31 +177,11 @@ impl Builder {
         time.unit = Some(&TIME);
     }
 
-    /// Internal step in use and number of steps.
-    pub fn internal_steps(&mut self, settings: &SceneSettings) {
-        let internal = self.output(
-            Quantity::InternalStep,
-            "internal_step",
-            Span::Point,
-            Some((&TIME, settings.time.step)),
-            "Internal time step in use",
-        );
-        internal.variability = Variability::Discrete;
-        let steps = self.output(
-            Quantity::InternalSteps,
-            "internal_steps",
-            Span::Total,
-            None,
-            "Internal steps done since the start",
-        );
-        steps.variability = Variability::Discrete;
-    }
-
-    /// The table of all rows.
+    /// The table of all rows, and what fills its outputs, in their order.
     ///
     /// # Errors
     /// Names given twice.
-    pub fn finish(self) -> Result<VariableTable> {
-        VariableTable::new(self.variables)
+    pub fn finish(self) -> Result<(VariableTable, Vec<Reader>)> {
+        Ok((VariableTable::new(self.variables)?, self.readers))
     }
 }

@@ -3,7 +3,9 @@
 use super::builder::Builder;
 use super::units::{ANGLE, ENERGY, LENGTH, LINE_LOAD, POWER, TEMPERATURE, VOLUME};
 use super::{Parts, has_friction, largest_length};
+use crate::contact::coating::Coating;
 use crate::ranges;
+use crate::simulation::outputs::{each, scalar, whole};
 use crate::variables::{Kind, Quantity, Span, Start, Variability};
 
 /// Temperatures beyond this are not what a linear expansion describes (K).
@@ -94,42 +96,42 @@ pub fn parameters(table: &mut Builder, scene: &Parts) {
 /// Heat, wear, casing displacement.
 pub fn outputs(table: &mut Builder, scene: &Parts) {
     let contact = &scene.settings.contacts[0];
+    let power = Some((&POWER, 100.0));
     if has_friction(scene) && scene.patches > 0 {
         let text = "Friction power into each casing patch, mean over the communication step";
-        let row = table.output(
-            Quantity::PatchFrictionPower,
-            "casing_friction_power",
-            Span::Mean,
-            Some((&POWER, 100.0)),
-            text,
-        );
-        row.dimension = Some(scene.patches);
+        let read = each(|view, patch| view.mean * view.slave_share() * view.window.patch_heat[patch]);
+        table.output("casing_friction_power", Span::Mean, power, text, read).dimension = Some(scene.patches);
     }
     if has_friction(scene) && contact.heat_to_slave.is_some() {
         let text = "Friction power into the blades, mean over the communication step";
-        table.output(Quantity::MasterFrictionPower, "blade_friction_power", Span::Mean, Some((&POWER, 100.0)), text);
+        let read = scalar(|view| view.mean * (1.0 - view.slave_share()) * view.window.friction_heat);
+        table.output("blade_friction_power", Span::Mean, power, text, read);
     }
     if let Some(coating) = &contact.coating {
         let depth = Some((&LENGTH, coating.thickness));
         let text = "Largest wear depth of the coating";
-        table.output(Quantity::WearDepthMaximum, "wear_depth_maximum", Span::Total, depth, text).display = Some(1);
-        let volume = Some((&VOLUME, 1e-9));
-        table.output(Quantity::WornVolume, "worn_volume", Span::Total, volume, "Volume worn off the coating");
+        let read = scalar(|view| view.coating(Coating::largest_wear_depth));
+        table.output("wear_depth_maximum", Span::Total, depth, text, read).display = Some(1);
+        let read = scalar(|view| view.coating(Coating::worn_volume));
+        table.output("worn_volume", Span::Total, Some((&VOLUME, 1e-9)), "Volume worn off the coating", read);
         let text = "Energy that wearing the coating takes since the start; no cutting force or torque carries it";
-        table.output(Quantity::WearEnergy, "wear_energy", Span::Total, Some((&ENERGY, 1.0)), text);
+        let read = scalar(|view| view.ledger().wear_energy.value());
+        table.output("wear_energy", Span::Total, Some((&ENERGY, 1.0)), text, read);
         if scene.settings.outputs.wear {
             let text = format!(
                 "Wear depth of each coating cell: {} around from theta = 0, row after row along z ({} rows)",
                 coating.cells_around, coating.cells_along
             );
-            let row = table.output(Quantity::WearDepth, "wear_depth", Span::Total, depth, text);
+            let read = each(|view, cell| view.coating(|coating| coating.wear_depth(cell)));
+            let row = table.output("wear_depth", Span::Total, depth, text, read);
             (row.dimension, row.display) = (Some(coating.cells_around * coating.cells_along), Some(1));
         }
     }
     if let Some((_, rom)) = scene.carrier.filter(|_| scene.settings.outputs.slave_displacement) {
         let text = "Radial displacement of the contact grid of the casing, ring after ring along z, outwards positive";
-        let row =
-            table.output(Quantity::SlaveDisplacement, "casing_displacement", Span::Point, Some((&LENGTH, 1e-4)), text);
+        let read = whole(|view, out| view.slave_displacement(out));
+        let row = table.output("casing_displacement", Span::Point, Some((&LENGTH, 1e-4)), text, read);
         (row.dimension, row.display) = (Some(rom.contact_nodes.len()), Some(1));
+        row.quantity = Quantity::SlaveDisplacement;
     }
 }

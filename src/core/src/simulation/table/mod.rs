@@ -1,19 +1,22 @@
 //! The variable table of a scene: one row per thing an importer can see. Features that are off have no row.
 
 mod builder;
+mod contacts;
 mod features;
 mod free;
 mod outputs;
 mod units;
 
 use super::compile::{Roles, SMALL_FRACTION};
+use super::outputs::Reader;
 use super::patches::Patches;
 use crate::contact::surface::Surface;
 use crate::settings::{InputInterpolation, Motion, Scene, SceneSettings, Shape, StructureSettings, SurfaceSettings};
 use crate::variables::{Quantity, Variability, VariableTable};
 use crate::{Result, Rom, ranges};
 use builder::{Builder, RAMPED};
-use units::{ANGLE, ANGULAR_SPEED, LENGTH, TIME};
+pub use units::LENGTH;
+use units::{ANGLE, ANGULAR_SPEED, TIME};
 
 /// What of a scene the variables depend on.
 struct Parts<'a> {
@@ -43,11 +46,11 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// Build the table of a validated scene.
+/// Build the table of a validated scene, and what fills its outputs, in their order.
 ///
 /// # Errors
 /// A watched sector or nodal diameter the ROM does not have.
-pub fn build(scene: &Scene) -> Result<VariableTable> {
+pub fn build(scene: &Scene) -> Result<(VariableTable, Vec<Reader>)> {
     if scene.settings.free_master().is_some() {
         return free::build(scene);
     }
@@ -65,7 +68,7 @@ pub fn build(scene: &Scene) -> Result<VariableTable> {
     if scene.settings.outputs.energies {
         outputs::energies(&mut table, scene);
     }
-    table.internal_steps(scene.settings);
+    contacts::internal_steps(&mut table, scene.settings);
     table.finish()
 }
 

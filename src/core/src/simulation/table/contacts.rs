@@ -1,0 +1,185 @@
+//! Outputs that every scene has.
+
+use super::builder::Builder;
+use super::units::{ENERGY, FORCE, IMPULSE, POWER, TIME};
+use crate::settings::SceneSettings;
+use crate::simulation::outputs::{View, scalar};
+use crate::variables::{Kind, Quantity, Span, Unit, Variability};
+
+pub fn smallest_clearance(table: &mut Builder, unit: Option<(&'static Unit, f64)>, text: &str) {
+    let read = scalar(|view| view.lowest(view.all()));
+    table.output("clearance_minimum", Span::Window, unit, text, read).display = Some(1);
+}
+
+/// Forces and contacts as a whole.
+pub fn totals(table: &mut Builder, friction: bool) {
+    let peak = table.output(
+        "normal_force_peak",
+        Span::Window,
+        Some((&FORCE, 100.0)),
+        "Largest normal force of any contact node in any internal step of the communication step (grows as 1/h for impacts)",
+        scalar(|view| view.window.normal_peak),
+    );
+    peak.quantity = Quantity::NormalForcePeak;
+    table.output(
+        "normal_impulse",
+        Span::Window,
+        Some((&IMPULSE, 1e-3)),
+        "Sum of the normal impulses of all contact nodes within the communication step",
+        scalar(|view| view.window.normal_impulse.iter().sum()),
+    );
+    if friction {
+        table.output(
+            "friction_power",
+            Span::Mean,
+            Some((&POWER, 100.0)),
+            "Friction heat per time, mean over the communication step",
+            scalar(|view| view.mean * view.window.friction_heat),
+        );
+    }
+    let count = table.output(
+        "contact_count",
+        Span::Point,
+        None,
+        "Contact nodes touching at the communication point",
+        scalar(|view| view.contacts()),
+    );
+    (count.kind, count.variability, count.quantity) = (Kind::Integer, Variability::Discrete, Quantity::ContactCount);
+    let touching = table.output(
+        "in_contact",
+        Span::Point,
+        None,
+        "Whether any contact node touches at the communication point",
+        scalar(|view| f64::from(u8::from(!view.system.events().is_empty()))),
+    );
+    (touching.kind, touching.variability) = (Kind::Boolean, Variability::Discrete);
+}
+
+/// Name, span, quantity where other code looks for it, text, and the term of the ledger or of the instant.
+type Energy = (&'static str, Span, Quantity, &'static str, fn(&View) -> f64);
+
+/// The ledger's rows that exist; `words` tell of kinetic energy, strain energy and impacts.
+pub fn energies(table: &mut Builder, words: [&'static str; 3], exists: impl Fn(&str) -> bool) {
+    use Quantity::Output;
+    let [kinetic, strain, impact] = words;
+    let rows: [Energy; 17] = [
+        ("kinetic_energy", Span::Point, Quantity::KineticEnergy, kinetic, |view| view.energies.0),
+        ("strain_energy", Span::Point, Quantity::StrainEnergy, strain, |view| view.energies.1),
+        (
+            "scheme_energy",
+            Span::Point,
+            Output,
+            "Energy that the time scheme conserves and the ledger closes with: kinetic plus strain energy up to the second order of \
+             the step",
+            |view| view.conserved,
+        ),
+        ("damping_loss", Span::Total, Quantity::DampingLoss, "Energy lost by modal damping since the start", |view| {
+            view.ledger().damping_loss.value()
+        }),
+        ("friction_loss", Span::Total, Quantity::FrictionLoss, "Friction heat since the start", |view| {
+            view.ledger().friction_loss.value()
+        }),
+        ("impact_loss", Span::Total, Quantity::ImpactLoss, impact, |view| view.ledger().impact_loss.value()),
+        (
+            "wear_work",
+            Span::Total,
+            Output,
+            "Work of the coating's normal force against the approach of the blades since the start",
+            |view| view.ledger().wear_work.value(),
+        ),
+        (
+            "load_work",
+            Span::Total,
+            Output,
+            "Work of centrifugal, thermal and nodal-diameter loads since the start",
+            |view| view.ledger().load_work.value(),
+        ),
+        (
+            "external_work",
+            Span::Total,
+            Quantity::ExternalWork,
+            "Work of all inputs but loads since the start: shaft, whirl, axial shift, moving casing",
+            |view| view.ledger().external_work(),
+        ),
+        (
+            "shaft_work",
+            Span::Total,
+            Output,
+            "Work of the shaft through the contacts since the start: minus the integral of torque times speed",
+            |view| view.ledger().shaft_work.value(),
+        ),
+        (
+            "stiffening_work",
+            Span::Total,
+            Output,
+            "Strain energy that changes of the speed add by stiffening since the start",
+            |view| view.ledger().stiffening_work.value(),
+        ),
+        (
+            "whirl_work",
+            Span::Total,
+            Output,
+            "Work of the whirling shaft since the start: minus the integral of force times velocity of its centre",
+            |view| view.ledger().whirl_work.value(),
+        ),
+        ("shift_work", Span::Total, Output, "Work of the axial shift of the rotor since the start", |view| {
+            view.ledger().shift_work.value()
+        }),
+        (
+            "casing_motion_work",
+            Span::Total,
+            Output,
+            "Work of prescribed motion of the casing (radius, gap offset, shape) since the start",
+            |view| view.ledger().casing_work.value(),
+        ),
+        (
+            "curvature_work",
+            Span::Total,
+            Quantity::CurvatureWork,
+            "Energy that contact forces add since the start because normals turn and surfaces curve within an internal step \
+             (vanishes with the step)",
+            |view| view.ledger().curvature_work.value(),
+        ),
+        (
+            "step_change_energy",
+            Span::Total,
+            Output,
+            "Energy added by changes of the internal step since the start",
+            |view| view.ledger().step_change.value(),
+        ),
+        ("energy_residual", Span::Point, Output, "Closure residual of the energy ledger", |view| {
+            view.ledger().residual(view.conserved)
+        }),
+    ];
+    for (name, span, quantity, text, read) in rows.into_iter().filter(|row| exists(row.0)) {
+        table.output(name, span, Some((&ENERGY, 1.0)), text, scalar(read)).quantity = quantity;
+    }
+    let relative = table.output(
+        "energy_residual_relative",
+        Span::Point,
+        None,
+        "Closure residual relative to the initial energy plus all work exchanged",
+        scalar(|view| view.relative_residual()),
+    );
+    relative.quantity = Quantity::EnergyResidualRelative;
+}
+
+/// Internal step in use and number of steps.
+pub fn internal_steps(table: &mut Builder, settings: &SceneSettings) {
+    let internal = table.output(
+        "internal_step",
+        Span::Point,
+        Some((&TIME, settings.time.step)),
+        "Internal time step in use",
+        scalar(|view| view.system.bank().step()),
+    );
+    (internal.variability, internal.quantity) = (Variability::Discrete, Quantity::InternalStep);
+    let steps = table.output(
+        "internal_steps",
+        Span::Total,
+        None,
+        "Internal steps done since the start",
+        scalar(|view| view.internal_steps()),
+    );
+    steps.variability = Variability::Discrete;
+}
