@@ -10,12 +10,6 @@ use tiprub_core::{
     stability::{self, ContactDirections, massless::MasslessCheck},
 };
 
-/// All schemes and their names.
-const SCHEMES: [(Scheme, &str); 3] = [
-    (Scheme::CentralDifference, "central-difference"),
-    (Scheme::ModalExact, "modal-exact"),
-    (Scheme::MasslessBoundary, "massless-boundary"),
-];
 /// Steps tried, times the highest angular frequency: from where every mode is resolved well to far beyond.
 const TRIED: [f64; 2] = [0.1, 1e3];
 /// Halvings of the interval between a step that is accepted and one that is not.
@@ -83,8 +77,9 @@ pub fn step_limits(
     let sliding = sliding.unwrap_or(Sliding { friction: 0.0, speed: 0.0 });
     let seeker = Seeker { rom, models, sliding, closed };
     // A Cartesian ROM flies freely or stands still, where massless-boundary is not made or not asked for.
-    let schemes = SCHEMES.iter().take(if rom.frame == Frame::Cartesian { 2 } else { 3 });
-    schemes.map(|(scheme, name)| StepLimit { scheme: name, limit: seeker.limit(*scheme) }).collect()
+    let massless = rom.frame != Frame::Cartesian;
+    let schemes = Scheme::ALL.into_iter().filter(|scheme| massless || *scheme != Scheme::MasslessBoundary);
+    schemes.map(|scheme| StepLimit { scheme: scheme.name(), limit: seeker.limit(scheme) }).collect()
 }
 
 struct Seeker<'a> {

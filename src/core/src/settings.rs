@@ -20,6 +20,16 @@ pub enum Scheme {
     MasslessBoundary,
 }
 
+impl Scheme {
+    /// All of them, in the order of the FMU's enumeration.
+    pub const ALL: [Self; 3] = [Self::CentralDifference, Self::ModalExact, Self::MasslessBoundary];
+
+    /// As in scene files and in the FMU's enumeration.
+    pub fn name(self) -> &'static str {
+        crate::simulation::SCHEMES.items[self as usize].0
+    }
+}
+
 /// Solver of the unilateral contact problem of one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -31,6 +41,16 @@ pub enum Solver {
     Lcp,
     /// Coulomb friction with sticking: De Saxcé's form by Gauss-Seidel with exact local solutions.
     Coulomb,
+}
+
+impl Solver {
+    /// All of them, in the order of the FMU's enumeration.
+    pub const ALL: [Self; 3] = [Self::Film, Self::Lcp, Self::Coulomb];
+
+    /// As in scene files and in the FMU's enumeration.
+    pub fn name(self) -> &'static str {
+        crate::simulation::SOLVERS.items[self as usize].0
+    }
 }
 
 /// Shape of a rigid surface of revolution: radial clearance change around the circumference.

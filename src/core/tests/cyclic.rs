@@ -14,8 +14,8 @@ fn real(simulation: &Simulation, name: &str) -> f64 {
     simulation.real(reference).unwrap()
 }
 
-const SCHEMES: [Scheme; 3] = [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary];
-const SOLVERS: [Solver; 3] = [Solver::Film, Solver::Lcp, Solver::Coulomb];
+const SCHEMES: [Scheme; 3] = Scheme::ALL;
+const SOLVERS: [Solver; 3] = Solver::ALL;
 
 fn started(scene: &Scene) -> Simulation {
     let mut simulation = Simulation::new(scene).unwrap_or_else(|error| panic!("{error}"));

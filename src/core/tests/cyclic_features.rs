@@ -16,8 +16,8 @@ use tiprub_core::settings::{LoadSettings, PatchSettings, Scheme, Shape, Solver, 
 use tiprub_core::{Scene, Simulation};
 use wheel::{Wheel, rub};
 
-const SCHEMES: [Scheme; 3] = [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary];
-const SOLVERS: [Solver; 3] = [Solver::Film, Solver::Lcp, Solver::Coulomb];
+const SCHEMES: [Scheme; 3] = Scheme::ALL;
+const SOLVERS: [Solver; 3] = Solver::ALL;
 
 fn real(simulation: &Simulation, name: &str) -> f64 {
     let reference = simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference;

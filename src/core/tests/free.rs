@@ -10,7 +10,7 @@ use tiprub_core::settings::*;
 use tiprub_core::{Scene, Simulation};
 
 const SCHEMES: [Scheme; 2] = [Scheme::CentralDifference, Scheme::ModalExact];
-const SOLVERS: [Solver; 3] = [Solver::Film, Solver::Lcp, Solver::Coulomb];
+const SOLVERS: [Solver; 3] = Solver::ALL;
 
 fn total_mass() -> f64 {
     places().map(node_mass).sum()

@@ -72,27 +72,22 @@ fn in_range<T>(ranges: &[(f64, Option<T>)], step: f64) -> Option<&T> {
     range.and_then(|(_, found)| found.as_ref())
 }
 
+/// The item of an enumeration, whose items count from 1.
+fn chosen<T: Copy>(all: &[T], value: f64) -> T {
+    let found = all.iter().zip(1_u32..).find(|(_, number)| (value - f64::from(*number)).abs() < 0.5);
+    found.map_or(all[0], |(item, _)| *item)
+}
+
 impl Simulation {
     pub(super) fn parameters(&self) -> Parameters {
-        let chosen = |quantity| self.value_of(quantity);
-        let scheme = match chosen(Quantity::SchemeChoice) {
-            ..1.5 => Scheme::CentralDifference,
-            1.5..2.5 => Scheme::ModalExact,
-            _ => Scheme::MasslessBoundary,
-        };
-        let solver = match chosen(Quantity::SolverChoice) {
-            ..1.5 => Solver::Film,
-            1.5..2.5 => Solver::Lcp,
-            _ => Solver::Coulomb,
-        };
         let speed = self.inputs.speed.value;
         Parameters {
             friction: self.value_of(Quantity::Friction),
             damping_ratio: self.value_of(Quantity::DampingRatio),
             slave_damping_ratios: self.slave_damping_ratios(),
             step: self.value_of(Quantity::StepMax),
-            scheme,
-            solver,
+            scheme: chosen(&Scheme::ALL, self.value_of(Quantity::SchemeChoice)),
+            solver: chosen(&Solver::ALL, self.value_of(Quantity::SolverChoice)),
             sense: if speed == 0.0 { 0.0 } else { speed.signum() },
             velocity: [0, 1, 2].map(|axis| self.value_of(Quantity::InitialVelocity(axis))),
         }

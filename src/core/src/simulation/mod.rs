@@ -15,6 +15,7 @@ mod slave_surface;
 mod state;
 mod stepping;
 mod table;
+pub(crate) use table::{SCHEMES, SOLVERS};
 mod window;
 
 use crate::contact::gap::Drive;

@@ -13,8 +13,8 @@ use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::stability::massless::{MasslessCheck, QUIET};
 use tiprub_core::system::{System, SystemParts, SystemSettings};
 
-pub const SCHEMES: [Scheme; 3] = [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary];
-pub const SOLVERS: [Solver; 3] = [Solver::Film, Solver::Lcp, Solver::Coulomb];
+pub const SCHEMES: [Scheme; 3] = Scheme::ALL;
+pub const SOLVERS: [Solver; 3] = Solver::ALL;
 
 /// Share of its mass that the contact node of a rod keeps where it is to be massless; the matrix must stay invertible.
 pub const NEARLY_NONE: f64 = 1e-4;

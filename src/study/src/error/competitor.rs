@@ -35,11 +35,6 @@ impl Full {
     pub const ALL: [Self; 4] = [Self::Film, Self::Bipotential, Self::Augmented, Self::Penalty];
 }
 
-/// Schemes of the product.
-pub const SCHEMES: [Scheme; 3] = [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary];
-/// Solvers of the product.
-pub const SOLVERS: [Solver; 3] = [Solver::Film, Solver::Lcp, Solver::Coulomb];
-
 /// The method of the paper.
 pub const PAPER: Competitor = Competitor::Core(Scheme::CentralDifference, Solver::Film);
 /// The first reference and default of the product.
@@ -78,7 +73,7 @@ impl Competitor {
 
     /// Everyone who steps a reduced model, the product's own first.
     pub fn reduced() -> Vec<Self> {
-        let own = SCHEMES.into_iter().flat_map(|scheme| SOLVERS.map(|solver| Self::Core(scheme, solver)));
+        let own = Scheme::ALL.into_iter().flat_map(|scheme| Solver::ALL.map(|solver| Self::Core(scheme, solver)));
         own.chain([Self::Moreau, Self::Augmented, Self::Penalty(1), Self::Penalty(10)]).collect()
     }
 
@@ -101,7 +96,7 @@ impl Competitor {
     /// As in scene files, or in words.
     pub fn name(self) -> String {
         match self {
-            Self::Core(scheme, solver) => format!("{} + {}", scheme_name(scheme), solver_name(solver)),
+            Self::Core(scheme, solver) => format!("{} + {}", scheme.name(), solver.name()),
             Self::Moreau => "Moreau-Jean, implicit".into(),
             Self::Augmented => "Newmark, augmented Lagrangian".into(),
             Self::Penalty(1) => "central differences, penalty".into(),
@@ -136,23 +131,5 @@ impl Competitor {
             Self::Full(Full::Penalty) => 4,
             _ => 3,
         }
-    }
-}
-
-/// Name of a scheme in scene files.
-pub fn scheme_name(scheme: Scheme) -> &'static str {
-    match scheme {
-        Scheme::ModalExact => "modal-exact",
-        Scheme::CentralDifference => "central-difference",
-        Scheme::MasslessBoundary => "massless-boundary",
-    }
-}
-
-/// Name of a solver in scene files.
-pub fn solver_name(solver: Solver) -> &'static str {
-    match solver {
-        Solver::Lcp => "lcp",
-        Solver::Film => "film",
-        Solver::Coulomb => "coulomb",
     }
 }

@@ -10,7 +10,7 @@ use tiprub_shell::{Failure, Result, console::Console, schedule::Schedule};
 
 use super::{
     case::Case,
-    competitor::{Competitor, DEFAULT, Family, SCHEMES, SOLVERS},
+    competitor::{Competitor, DEFAULT, Family},
     run::{Run, Seen},
     scene::SceneRun,
     window,
@@ -171,7 +171,7 @@ impl Case for Own {
     }
 
     fn competitors(&self, _: usize) -> Vec<Competitor> {
-        SCHEMES.into_iter().flat_map(|scheme| SOLVERS.map(|solver| Competitor::Core(scheme, solver))).collect()
+        Scheme::ALL.into_iter().flat_map(|scheme| Solver::ALL.map(|solver| Competitor::Core(scheme, solver))).collect()
     }
 
     fn parting(&self) -> &[f64] {

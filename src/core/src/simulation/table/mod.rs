@@ -15,8 +15,8 @@ use crate::settings::{InputInterpolation, Motion, Scene, SceneSettings, Shape, S
 use crate::variables::{Quantity, Variability, VariableTable};
 use crate::{Result, Rom, ranges};
 use builder::{Builder, RAMPED};
-pub use units::LENGTH;
 use units::{ANGLE, ANGULAR_SPEED, TIME};
+pub use units::{LENGTH, SCHEMES, SOLVERS};
 
 /// What of a scene the variables depend on.
 struct Parts<'a> {
