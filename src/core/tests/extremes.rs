@@ -11,7 +11,7 @@ mod wheel;
 
 use nalgebra::DMatrix;
 use proptest::prelude::*;
-use tiprub_core::settings::{LoadSettings, Scheme, Shape};
+use tiprub_core::settings::{LoadSettings, Scheme, Shape, SplineSettings};
 use tiprub_core::variables::{Causality, Kind, Variability};
 use tiprub_core::{Scene, Simulation};
 
@@ -440,7 +440,7 @@ fn what_does_not_belong_to_the_sectors_is_refused_by_name() {
         (&["sector_gaps", "3 values for 4"], |scene| scene.settings.contacts[0].sector_gaps = vec![3e-4; 3]),
         (&["watched_sectors", "twice"], |scene| scene.settings.outputs.watched_sectors = vec![2, 1, 2]),
         (&["watched_sectors", "twice"], |scene| scene.settings.outputs.watched_sectors = vec![4, 4]),
-        (&["watched_sectors", "sector 0"], |scene| scene.settings.outputs.watched_sectors = vec![1, 0]),
+        (&["watched_sectors", "counted from 1"], |scene| scene.settings.outputs.watched_sectors = vec![1, 0]),
         (&["watched_sectors", "5"], |scene| scene.settings.outputs.watched_sectors = vec![1, 5]),
     ];
     for (words, change) in changes {
@@ -513,15 +513,20 @@ fn units_are_what_their_names_say() {
 #[test]
 fn flanks_steeper_than_45_degrees_are_refused() {
     let mut scene = common::scene(4);
-    let round = started(&scene);
-    let law = round.system().law();
-    for (degrees, answered) in [(0.0_f64, true), (44.9, true), (45.1, false), (80.0, false), (100.0, false)] {
-        for sense in [1.0, -1.0] {
-            let (sine, cosine) = degrees.to_radians().sin_cos();
-            assert_eq!(law.is_plausible(0, -1e-6, [-cosine, sense * sine, 0.0]), answered, "{degrees}°");
+    let mut through_points = scene.clone();
+    through_points.settings.surfaces[0].spline = Some(SplineSettings::default());
+    for (simulation, kind) in [(started(&scene), "revolution"), (started(&through_points), "spline")] {
+        let law = simulation.system().law();
+        for (degrees, answered) in [(0.0_f64, true), (44.9, true), (45.1, false), (80.0, false), (100.0, false)] {
+            for sense in [1.0, -1.0] {
+                let (sine, cosine) = degrees.to_radians().sin_cos();
+                assert_eq!(law.is_plausible(0, -1e-6, [-cosine, sense * sine, 0.0]), answered, "{kind}, {degrees}°");
+            }
         }
+        // A tenth of the radius deep.
+        let normal = [-1.0, 0.0, 0.0];
+        assert!(law.is_plausible(0, -0.0249, normal) && !law.is_plausible(0, -0.0251, normal), "{kind}");
     }
-    assert!(law.is_plausible(0, -0.0249, [-1.0, 0.0, 0.0]) && !law.is_plausible(0, -0.0251, [-1.0, 0.0, 0.0]));
     // A node comes along the circumference and meets a tooth where its height is the clearance, 0.356 mm: 60 % of the height,
     // where the slope is 0.8 of the largest.
     scene.settings.contacts[0].friction = 0.0;
