@@ -33,6 +33,20 @@ fn loggers() {
         assert_eq!(slave.exit(), ERROR);
         assert!(slave.log().contains("fmi2ExitInitializationMode"), "without a choice, errors are explained");
     }
+    // "#r3#" would stand for the variable of value reference 3; an importer shows "##" as the character it is.
+    let named = CString::new("a#r3# of mine").expect("no NUL");
+    let api3 = fmi3::load(&path);
+    let third = fmi3::Slave::new(&api3, &resources);
+    // SAFETY: one text each.
+    unsafe {
+        let list = named.as_ptr();
+        refused((api.fmi2SetDebugLogging)(slave.handle, 1, 1, &raw const list), &slave.log(), "\"a##r3## of mine\"");
+        refused(
+            (api3.fmi3SetDebugLogging)(third.handle, true, 1, &raw const list),
+            &third.log(),
+            "\"a##r3## of mine\"",
+        );
+    }
     // No callbacks at all, and callbacks without a logger: everything works in silence.
     let good = fmi2::Arguments::new(&resources);
     let (name, token, place) = (good.name.expect("set"), good.token.expect("set"), good.location.expect("set"));

@@ -208,6 +208,31 @@ fn wrong_damaged_and_foreign_states_are_refused() {
     slave.expect(slave.step(H, H));
 }
 
+/// To read outputs in Initialization Mode changes nothing that a saved state holds: what is set after it is restored is where the
+/// run starts, at once.
+#[test]
+fn a_state_saved_after_reading_in_initialization_mode_is_that_of_before() {
+    let api = fmi3::load(&shipped());
+    let resources = Resources::new(true);
+    let slave = fmi3::Slave::new(&api, &resources);
+    let [clearance, offset] = ["clearance_minimum", "gap_offset"].map(tiprub_tests::scene::reference);
+    slave.expect(slave.enter(0.0, None));
+    let unread = slave.serialise(slave.save());
+    let at_first = slave.reals(&[clearance], 1)[0];
+    let read = slave.save();
+    assert!(slave.serialise(read) == unread, "reading is not a change");
+    for opened in [1.5e-4, -5e-5] {
+        slave.expect(slave.restore(read));
+        slave.expect(slave.set_reals(&[offset], &[opened]));
+        let found = slave.reals(&[clearance], 1)[0] - at_first;
+        // But for the flanks of the shape, 1.5e-5 of it.
+        assert!((found / opened - 1.0).abs() < 1e-4, "{found} m for {opened} m");
+    }
+    slave.expect(slave.restore(read));
+    slave.expect(slave.exit());
+    assert_eq!(slave.reals(&[clearance], 1)[0].to_bits(), at_first.to_bits());
+}
+
 #[test]
 fn derivatives_of_inputs_are_part_of_the_state() {
     let api = fmi2::load(&shipped());

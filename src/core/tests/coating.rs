@@ -64,6 +64,30 @@ fn rub(coating: &mut Coating, problem: &mut CoatedProblem, angle: f64, gap: f64)
     coating.commit(problem)
 }
 
+/// All around a steep cone, evenly deep: 2π r̄ L of the mean radius, times the depth, and its work.
+#[test]
+fn what_is_worn_off_a_cone_has_the_volume_of_the_cone() {
+    let radii = AXIAL.map(|z| 0.1 + 4.0 * z);
+    let mut coating = Coating::new(&settings(), &AXIAL, &radii, 1).unwrap();
+    let (mut problem, mut work) = (coating.problem(1), 0.0);
+    for cell in 0..360 {
+        problem.clear();
+        coating.locate(&mut problem, &[(f64::from(cell) + 0.5) * TAU / 360.0; 3]);
+        // Nodes that do not yield.
+        problem.gaps.fill(-4e-4);
+        assert!(problem.solve().solved);
+        work += coating.commit(&problem);
+    }
+    // On the hardening line σ = Y + Kε_p = E(ε − ε_p).
+    let plastic = (MODULUS * 4e-4 / THICKNESS - YIELD) / (MODULUS + HARDENING);
+    let area = TAU * (0.1 + 4.0 * 0.5 * 0.045) * 0.045;
+    let (depth, stored) = (plastic * THICKNESS, YIELD * plastic + 0.5 * HARDENING * plastic * plastic);
+    let (volume, energy) = (depth * area, stored * area * THICKNESS);
+    assert!((coating.largest_wear_depth() / depth - 1.0).abs() < 1e-12);
+    assert!((coating.worn_volume() / volume - 1.0).abs() < 1e-12, "{:e} of {volume:e} m3", coating.worn_volume());
+    assert!((work / energy - 1.0).abs() < 1e-12, "{work} of {energy} J");
+}
+
 #[test]
 fn a_blade_cuts_a_groove_and_then_runs_free_in_it() {
     let mut coating = Coating::new(&settings(), &AXIAL, &[RADIUS; 3], 1).unwrap();

@@ -11,7 +11,7 @@ mod wheel;
 
 use nalgebra::DMatrix;
 use proptest::prelude::*;
-use tiprub_core::settings::{LoadSettings, Scheme, Shape};
+use tiprub_core::settings::{LoadSettings, Scheme, Shape, SplineSettings};
 use tiprub_core::variables::{Causality, Kind, Variability};
 use tiprub_core::{Scene, Simulation};
 
@@ -424,6 +424,134 @@ fn numbers_beyond_the_table_of_ranges_are_refused_by_name() {
             Ok(()) => refusal(&scene),
         };
         assert!(message.contains(named) && message.len() < 300, "{named} = {value:e}: {message}");
+    }
+}
+
+#[test]
+fn what_does_not_belong_to_the_sectors_is_refused_by_name() {
+    type Change = fn(&mut Scene);
+    let changes: [(&[&str], Change); 7] = [
+        (&["frequency_factors", "3 values for 4"], |scene| {
+            scene.settings.structures[0].frequency_factors = vec![1.0; 3]
+        }),
+        (&["frequency_factors", "5 values for 4"], |scene| {
+            scene.settings.structures[0].frequency_factors = vec![1.0; 5]
+        }),
+        (&["sector_gaps", "3 values for 4"], |scene| scene.settings.contacts[0].sector_gaps = vec![3e-4; 3]),
+        (&["watched_sectors", "twice"], |scene| scene.settings.outputs.watched_sectors = vec![2, 1, 2]),
+        (&["watched_sectors", "twice"], |scene| scene.settings.outputs.watched_sectors = vec![4, 4]),
+        (&["watched_sectors", "counted from 1"], |scene| scene.settings.outputs.watched_sectors = vec![1, 0]),
+        (&["watched_sectors", "5"], |scene| scene.settings.outputs.watched_sectors = vec![1, 5]),
+    ];
+    for (words, change) in changes {
+        let mut scene = common::scene(4);
+        change(&mut scene);
+        let message = refusal(&scene);
+        assert!(words.iter().all(|word| message.contains(word)), "{words:?}: {message}");
+    }
+    let mut scene = common::scene(4);
+    scene.settings.structures[0].frequency_factors = vec![1.0, 0.99, 1.01, 1.0];
+    scene.settings.outputs.watched_sectors = vec![4, 1, 3];
+    started(&scene);
+}
+
+/// SI value of one of a unit, and its exponents of kg, m, s, rad, K: products of powers of prefixed units.
+fn in_si(name: &str) -> (f64, [i32; 5]) {
+    const UNITS: [(&str, f64, [i32; 5]); 11] = [
+        ("kg", 1.0, [1, 0, 0, 0, 0]),
+        ("m", 1.0, [0, 1, 0, 0, 0]),
+        ("s", 1.0, [0, 0, 1, 0, 0]),
+        ("rad", 1.0, [0, 0, 0, 1, 0]),
+        ("K", 1.0, [0, 0, 0, 0, 1]),
+        ("N", 1.0, [1, 1, -2, 0, 0]),
+        ("J", 1.0, [1, 2, -2, 0, 0]),
+        ("W", 1.0, [1, 2, -3, 0, 0]),
+        ("deg", std::f64::consts::PI / 180.0, [0, 0, 0, 1, 0]),
+        ("rev", std::f64::consts::TAU, [0, 0, 0, 1, 0]),
+        ("rpm", std::f64::consts::TAU / 60.0, [0, 0, -1, 1, 0]),
+    ];
+    let (mut value, mut exponents, mut sign) = (1.0, [0; 5], 1);
+    for part in name.split_inclusive(['.', '/']) {
+        let word = part.trim_end_matches(['.', '/']);
+        let unit = word.trim_end_matches(char::is_numeric);
+        let power = sign * word[unit.len()..].parse().unwrap_or(1);
+        let known = |unit: &str| UNITS.into_iter().find(|known| known.0 == unit);
+        let prefixed = || {
+            let prefix = [('k', 1e3), ('m', 1e-3), ('u', 1e-6), ('M', 1e6)]
+                .into_iter()
+                .find(|known| unit.starts_with(known.0))?;
+            known(&unit[1..]).map(|known| (known.0, prefix.1 * known.1, known.2))
+        };
+        let (_, size, own) = known(unit).or_else(prefixed).unwrap_or_else(|| panic!("unit {unit} of {name}"));
+        value *= size.powi(power);
+        (0..5).for_each(|i| exponents[i] += power * own[i]);
+        sign = if part.ends_with('/') { -1 } else { 1 };
+    }
+    (value, exponents)
+}
+
+#[test]
+fn units_are_what_their_names_say() {
+    let mut seen = std::collections::BTreeSet::new();
+    for scene in kinds() {
+        for row in Simulation::new(&scene).unwrap().table().variables() {
+            let Some(unit) = row.unit else { continue };
+            assert_eq!(in_si(unit.name), (1.0, unit.exponents), "{}", unit.name);
+            for (name, factor) in unit.display {
+                let (value, exponents) = in_si(name);
+                assert!((factor * value - 1.0).abs() < 1e-15, "1 {} = {factor} {name}", unit.name);
+                assert_eq!(exponents, unit.exponents, "{name}");
+                seen.insert(*name);
+            }
+        }
+    }
+    let all = ["deg", "kN", "kN/m", "kW", "mJ", "mm", "mm3", "ms", "rev", "rpm", "um", "us"];
+    assert!(seen.iter().eq(&all), "{seen:?}");
+}
+
+/// Flanks of teeth by their slope: 44° is rubbed on, 46° is refused, by its angle in a step, and by itself as a contact.
+#[test]
+fn flanks_steeper_than_45_degrees_are_refused() {
+    let mut scene = common::scene(4);
+    let mut through_points = scene.clone();
+    through_points.settings.surfaces[0].spline = Some(SplineSettings::default());
+    for (simulation, kind) in [(started(&scene), "revolution"), (started(&through_points), "spline")] {
+        let law = simulation.system().law();
+        for (degrees, answered) in [(0.0_f64, true), (44.9, true), (45.1, false), (80.0, false), (100.0, false)] {
+            for sense in [1.0, -1.0] {
+                let (sine, cosine) = degrees.to_radians().sin_cos();
+                assert_eq!(law.is_plausible(0, -1e-6, [-cosine, sense * sine, 0.0]), answered, "{kind}, {degrees}°");
+            }
+        }
+        // A tenth of the radius deep.
+        let normal = [-1.0, 0.0, 0.0];
+        assert!(law.is_plausible(0, -0.0249, normal) && !law.is_plausible(0, -0.0251, normal), "{kind}");
+    }
+    // A node comes along the circumference and meets a tooth where its height is the clearance, 0.356 mm: 60 % of the height,
+    // where the slope is 0.8 of the largest.
+    scene.settings.contacts[0].friction = 0.0;
+    scene.roms[0].contact_nodes.iter_mut().for_each(|node| node.position[1] = 0.0);
+    scene.settings.structures[0].speed = 5.0;
+    for (slope, answered) in [(0.9_f64, true), (1.2, false)] {
+        let height = 3.56e-4 / 0.6;
+        let order = (slope / 0.8 * 0.25 / height).round();
+        // The rotor starts between two teeth.
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some hundreds")]
+        let shape =
+            Shape::Lobes { amplitude: height, order: 4 * (order / 4.0).round() as u32, phase: std::f64::consts::PI };
+        scene.settings.surfaces[0].shape = shape;
+        scene.settings.surfaces[0].ramp_time = 0.0;
+        let mut simulation = started(&scene);
+        let outcome = (0..2000).try_for_each(|_| {
+            let touching = !simulation.system().events().is_empty();
+            if touching { Ok(()) } else { simulation.do_step(simulation.time(), 1e-6) }
+        });
+        if answered {
+            assert!(outcome.is_ok() && !simulation.system().events().is_empty(), "{slope}: {outcome:?}");
+        } else {
+            let message = outcome.unwrap_err().to_string();
+            assert!(message.contains("steeper than 45°"), "{slope}: {message}");
+        }
     }
 }
 

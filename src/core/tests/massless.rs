@@ -147,6 +147,52 @@ fn damping_is_part_of_the_limit() {
     }
 }
 
+/// Largest amplitude of two undamped oscillators, of `frequencies`, after 3000 steps of their exact motion. A spring between them
+/// takes the forces: of stiffness K = 1, displaced by `seen` per amplitude, held for a step.
+fn joined(frequencies: [f64; 2], seen: [f64; 2], step: f64) -> f64 {
+    let (mut now, mut before) = ([1.0, 0.4], [0.9, 0.5]);
+    for _ in 0..3000 {
+        let force = -(seen[0] * now[0] + seen[1] * now[1]);
+        let next: [f64; 2] = std::array::from_fn(|i| {
+            let (cosine, sine) = ((frequencies[i] * step).cos(), (0.5 * frequencies[i] * step).sin());
+            let impulse = (2.0 * sine / frequencies[i]).powi(2) * seen[i] * force;
+            2.0 * cosine * now[i] - before[i] + impulse
+        });
+        (before, now) = (now, next);
+    }
+    now[0].hypot(before[0]).max(now[1].hypot(before[1]))
+}
+
+/// Soft or stiff against the master, hardly seen or more than it: below the limit no step is unstable, and a little above one is.
+#[test]
+fn a_flexible_slave_is_part_of_the_limit() {
+    for (own, slave) in [(0.3, 0.05), (0.5, 1e-3), (0.5, 0.5), (0.7, 1.5), (0.3, 4.0), (0.3, 20.0)] {
+        for seen in [0.03, 0.3, 1.0, 3.0] {
+            let model = |frequencies: Vec<f64>, shapes: [f64; 4], quasi_static: usize| ModalModel {
+                damping_ratios: vec![0.0; frequencies.len()],
+                contact_modes: DMatrix::from_fn(3, frequencies.len(), |row, mode| {
+                    if mode == 0 { shapes[row] } else { f64::from(u8::from(mode == row + 1)) * 1e3 }
+                }),
+                shapes: DMatrix::identity(frequencies.len(), frequencies.len()),
+                quasi_static,
+                frequencies,
+            };
+            // Residual flexibility along the normal: (1000/1000)² = 1.
+            let master = model(vec![own, 1e3, 1e3, 1e3], [1.0, 0.0, 0.0, 0.0], 3);
+            let other = model(vec![slave], [seen, 0.0, 0.0, 0.0], 0);
+            let check = |slave| MasslessCheck { model: &master, normals: vec![[-1.0, 0.0, 0.0]], slave };
+            let flexible = check(Some((DMatrix::from_element(1, 1, seen), &other)));
+            let (limit, alone) = (flexible.limit(100.0).unwrap().closed, check(None).limit(100.0).unwrap().closed);
+            let first = (1..).map(|i| 1e-3 * f64::from(i)).find(|step| joined([own, slave], [1.0, seen], *step) > 1e3);
+            let first = first.unwrap();
+            told!(
+                "ω = {own} against {slave}, seen {seen}: limit {limit:.3} s, unstable from {first:.3} s, {alone:.3} s alone"
+            );
+            assert!(limit < alone && limit < first + 1e-3 && limit > 0.95 * first, "{limit} of {first}");
+        }
+    }
+}
+
 /// Two bodies behind a light end node, stiff along x and along y: pressed against a wall at x and dragged along +y at 1 m/s.
 fn dragged(step: f64, solver: Solver) -> (System, f64) {
     let (outer, inner, light) = (1e6, 1e4, 1e-6);

@@ -156,6 +156,33 @@ fn pressed_blades_gain_no_energy_at_the_largest_step_of_massless_boundary() {
     }
 }
 
+/// One blade presses on a ring whose modes are raised up to where the step that the blade allows passes over them: they count.
+#[test]
+fn a_stiff_casing_gains_no_energy_at_the_largest_step_of_massless_boundary() {
+    for (raised, seen) in [(1.0, 1.0), (10.0, 1.0), (10.0, 4.0), (60.0, 10.0)] {
+        let mut scene = on_a_ring(round(Scheme::MasslessBoundary));
+        scene.settings.contacts[0].sector_gaps = vec![2e-3; 12];
+        scene.settings.contacts[0].sector_gaps[0] = 3.56e-4;
+        scene.settings.structures.iter_mut().for_each(|structure| structure.damping_ratio = Some(1e-3));
+        scene.roms[1].stiffness *= raised * raised;
+        scene.roms[1].contact_map *= seen;
+        let step = 0.999 * usable_step(scene.clone());
+        let mut simulation = started(&with_step(scene, step)).unwrap();
+        let (mut most, mut supplied) = (0.0_f64, 0.0_f64);
+        for index in 0..5000 {
+            set(&mut simulation, "casing_radius_change", -4.2e-4 * (f64::from(index) * step / 2e-3).min(1.0));
+            simulation.do_step(simulation.time(), step).unwrap();
+            most = most.max(energy(&simulation));
+            supplied = supplied.max(real(&simulation, "external_work"));
+        }
+        let gained = -real(&simulation, "impact_loss");
+        println!(
+            "{raised}, {seen}: h = {step:.3e} s, {most:.3} J at most, {supplied:.3} J supplied, {gained:.1e} J by impacts"
+        );
+        assert!(gained < 0.01 * supplied && most < 1.01 * supplied, "{raised}, {seen}");
+    }
+}
+
 #[test]
 fn flutter_is_told_with_massless_boundary_as_with_modal_exact() {
     let rate = |scheme| {

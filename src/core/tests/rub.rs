@@ -289,6 +289,48 @@ fn a_restored_state_gives_the_derivatives_of_its_own_steps() {
     assert_eq!(derivatives(&fresh), at_save);
 }
 
+/// Clearances in a round casing that opens, and above lobes that pass: their rates by the closed form and by differences.
+#[test]
+fn rates_of_clearances_and_of_the_angle_are_those_of_the_motion() {
+    let rate = |simulation: &Simulation, reference| simulation.output_derivative(reference, 1).unwrap();
+    let mut scene = common::scene(4);
+    scene.settings.surfaces[0].shape = Shape::Circular {};
+    let mut simulation = started(&scene);
+    let (clearance, angle) = (reference(&simulation, "blade[1].clearance"), reference(&simulation, "rotor_angle"));
+    // Across the contour, whose slope is -0.2 at every node.
+    let per_opening = 1.0 / 1.04_f64.sqrt();
+    let (radius, mut opened) = (reference(&simulation, "casing_radius_change"), 0.0);
+    for (opening, length) in [(0.03, 5e-5), (0.03, 1e-6), (-0.02, 1e-6), (0.05, 3e-7), (-0.01, 5e-5)] {
+        simulation.set_real(radius, opened).unwrap();
+        simulation.set_input_derivative(radius, 1, opening).unwrap();
+        run(&mut simulation, 1, length);
+        for node in 0..3 {
+            let found = rate(&simulation, clearance + node);
+            assert!((found / (opening * per_opening) - 1.0).abs() < 1e-6, "node {node}, H = {length}: {found} m/s");
+        }
+        assert_eq!(rate(&simulation, angle).to_bits(), 1300.0_f64.to_bits());
+        // Nor does the beginning of a step of another length change how fast they are.
+        let before = rate(&simulation, clearance);
+        simulation.begin_step(simulation.time(), 0.37 * length).unwrap();
+        assert!((rate(&simulation, clearance) / before - 1.0).abs() < 1e-9);
+        while !simulation.advance().unwrap().finished {}
+        opened += 1.37 * opening * length;
+    }
+    let mut simulation = started(&common::scene(4));
+    run(&mut simulation, 20, 5e-5);
+    let clearance = reference(&simulation, "blade[1].clearance");
+    let (mut fastest, read) = (0.0_f64, |simulation: &Simulation| simulation.real(clearance).unwrap());
+    for index in 0..400 {
+        // A communication step is one internal step.
+        let (length, before) = ([1e-6, 4e-7][index % 2], read(&simulation));
+        run(&mut simulation, 1, length);
+        let (exact, found) = ((read(&simulation) - before) / length, rate(&simulation, clearance));
+        assert!((found - exact).abs() < 1e-9 * exact.abs() + 1e-9, "{found}, by the difference {exact} m/s");
+        fastest = fastest.max(exact.abs());
+    }
+    assert!(fastest > 0.1, "{fastest} m/s");
+}
+
 /// Outputs over a communication step, gathered a second time from what can be seen between its internal steps.
 #[test]
 fn outputs_over_a_communication_step_are_those_of_its_internal_steps() {

@@ -120,6 +120,35 @@ fn a_preloaded_mass_stays_on_its_stop() {
     }
 }
 
+/// A unit mass that flies into a stop in the first step of another length: the stop takes ½v², and nothing turns or curves.
+#[test]
+fn an_impact_after_a_change_of_step_is_booked_as_an_impact() {
+    let (step, speed) = (1e-5, 2.0);
+    for methods in RIGID.into_iter().flat_map(|scheme| SOLVERS.map(|solver| (scheme, solver))) {
+        for ratio in [0.1, 0.9, 1.7, 12.0] {
+            let model = single(&[(0.0, 1.0)], 0);
+            // Five steps in flight, the stop in the middle of the sixth.
+            let mut system = against_plane(&model, methods, 1.0, speed * step * (5.0 + 0.5 * ratio), false);
+            system.set_step(step);
+            system.bank_mut().set_modal_state(0, 0, 0.0, -speed);
+            system.start(&Drive::default());
+            (0..5).for_each(|_| system.step(&Drive::default()).unwrap());
+            assert!(system.events().is_empty());
+            system.set_step(ratio * step);
+            assert!((system.gap_rate(0, 0) / -speed - 1.0).abs() < 1e-9, "{} m/s", system.gap_rate(0, 0));
+            system.step(&Drive::default()).unwrap();
+            assert_eq!(system.events().len(), 1);
+            (0..20).for_each(|_| system.step(&Drive::default()).unwrap());
+            let ledger = system.ledger();
+            let (lost, curved) = (ledger.impact_loss.value(), ledger.curvature_work.value());
+            let exact = 0.5 * speed * speed;
+            assert!((lost / exact - 1.0).abs() < 1e-9, "{methods:?}, {ratio}: {lost} J of {exact} J");
+            assert!(curved.abs() < 1e-9 * exact && ledger.step_change.value().abs() < 1e-9 * exact, "{curved:e} J");
+            assert!(residual(&system).abs() < 1e-12);
+        }
+    }
+}
+
 /// A mode of `omega` and the flexibility `compliance` (m/N) of the contact node, one quasi-static mode; unit mass.
 fn on_a_spring(omega: f64, compliance: f64) -> ModalModel {
     let high = 1e5;

@@ -2,7 +2,14 @@
 //!
 //! Closed contact makes the residual flexibility G of the quasi-static modes a spring on the modes with inertia:
 //! K_c = Φ_nᵀ G_nn⁻¹ Φ_n. Their step q⁺ − (1 + β)q + βq⁻ = −C(Λ + K_c)q, C = diag(c), is that of the masses ½(1 + β) with
-//! dashpots, and stable while the largest eigenvalue of 2(1 + β)⁻¹C(Λ + K_c) is below 4. A flexible slave adds the largest eigenvalue of G_nn⁻¹ Ψ_n C_s Ψ_nᵀ per blade in contact.
+//! dashpots, and stable while the largest eigenvalue µ of D + X½ K_c X½ is below 4, with X = 2(1 + β)⁻¹C and D = XΛ.
+//!
+//! A flexible slave has its own D_s < 4 and X_s. With the modes of both, and U = L⁻¹[Φ_n X½, Ψ_n X_s½], G_nn = L Lᵀ, all
+//! eigenvalues are below 4 while those of the sum over modes U(4 − D)⁻¹Uᵀ are below 1. The part of the master has none above
+//! µ/4, so that the slave adds the largest eigenvalue of G_nn⁻¹ Ψ_n X_s(1 − D_s/4)⁻¹ Ψ_nᵀ to µ, per blade in contact.
+//!
+//! Steps may be of any length up to the limit, and a mode comes closest to D = 4 at ω_d h = π: each counts with the worst it does
+//! at steps up to h. Of that alone 4 is not reached, since what contact does not see it does not drive.
 
 use nalgebra::DMatrix;
 
@@ -11,7 +18,7 @@ use super::{
 };
 use crate::contact::gap::dot;
 use crate::dynamics::modal::ModalModel;
-use crate::dynamics::scheme::ModeCoefficients;
+use crate::dynamics::scheme::{ModeCoefficients, damped_frequency};
 use crate::settings::Scheme;
 use crate::{Error, Result};
 
@@ -58,8 +65,8 @@ pub struct MasslessCheck<'a> {
 }
 
 impl MasslessCheck<'_> {
-    /// Largest eigenvalue of the closed contact's step at h (s): (master, slave per blade); stable while the sum is
-    /// below 4. `None` where the residual flexibility is singular.
+    /// Bound on the eigenvalues of the closed contact's step at all h up to `step` (s): (master, slave per blade); stable while
+    /// the sum is below 4. `None` where the residual flexibility is singular.
     pub fn eigenvalues(&self, step: f64) -> Option<(f64, f64)> {
         let coefficients = self.model.coefficients(Scheme::MasslessBoundary, step);
         let dynamic = self.model.dynamic_modes(Scheme::MasslessBoundary);
@@ -76,20 +83,20 @@ impl MasslessCheck<'_> {
         let scaled = |count: usize, entry: &dyn Fn(usize, usize) -> f64| {
             lower.solve_lower_triangular(&DMatrix::from_fn(nodes, count, entry))
         };
-        // C½(Λ + K_c)C½ with K_c = (L⁻¹Φ)ᵀ(L⁻¹Φ), C per mass ½(1 + β) of the recurrence.
-        let root = |mode: usize| per_mass(&coefficients[mode], coefficients[mode].delayed).sqrt();
-        let half = scaled(dynamic, &|node, mode| seen[(node, mode)] * root(mode))?;
+        // D + X½ K_c X½ with K_c = (L⁻¹Φ)ᵀ(L⁻¹Φ).
+        let own: Vec<[f64; 2]> = (0..dynamic).map(|mode| worst(self.model, mode, step)).collect();
+        let half = scaled(dynamic, &|node, mode| seen[(node, mode)] * own[mode][1].sqrt())?;
         let mut matrix = half.transpose() * &half;
-        for mode in 0..dynamic {
-            matrix[(mode, mode)] += per_mass(&coefficients[mode], coefficients[mode].kappa);
+        for (mode, [kept, _]) in own.iter().enumerate() {
+            matrix[(mode, mode)] += kept;
         }
         let master = if dynamic == 0 { 0.0 } else { matrix.symmetric_eigenvalues().max() };
         let slave = match &self.slave {
             None => 0.0,
             Some((seen, model)) => {
-                let coefficients = model.coefficients(Scheme::MasslessBoundary, step);
-                let root = |mode: usize| per_mass(&coefficients[mode], coefficients[mode].delayed).sqrt();
-                let half = scaled(model.len(), &|node, mode| seen[(node, mode)] * root(mode))?;
+                let own: Vec<[f64; 2]> = (0..model.len()).map(|mode| worst(model, mode, step)).collect();
+                let raised = |[kept, moved]: [f64; 2]| (moved / (1.0 - 0.25 * kept)).sqrt();
+                let half = scaled(model.len(), &|node, mode| seen[(node, mode)] * raised(own[mode]))?;
                 (&half * half.transpose()).symmetric_eigenvalues().max()
             }
         };
@@ -155,6 +162,13 @@ impl MasslessCheck<'_> {
         }
         Ok(high)
     }
+}
+
+/// D and X of a mode with inertia, as they are worst at steps up to `step` (s): at ω_d h = π beyond it.
+fn worst(model: &ModalModel, mode: usize, step: f64) -> [f64; 2] {
+    let damped = damped_frequency(model.frequencies[mode], model.damping_ratios[mode]);
+    let at = model.coefficient(mode, 1.0, Scheme::MasslessBoundary, step.min(std::f64::consts::PI / damped));
+    [per_mass(&at, at.kappa).min(4.0 * (1.0 - 2.0 * MARGIN)), per_mass(&at, at.delayed)]
 }
 
 /// A coefficient of the recurrence over its mass ½(1 + β), which damping makes smaller than 1.

@@ -388,6 +388,48 @@ mod tests {
         assert!(refusal.to_string().contains("µ below 0.5000"), "{refusal}");
     }
 
+    /// Pressing node 1 pushes the tip of node 2 along its slip: W = c(I + µτ e₂e₁ᵀ), whose symmetric part is definite for
+    /// µτ < 2. Few contacts are solvable beyond, as the minors of a triangular matrix are those of its diagonal; of many that is
+    /// not shown, nor of the nodal diameters of a wheel.
+    #[test]
+    fn many_contacts_and_wheels_need_a_definite_symmetric_part() {
+        let (turned, step) = (2.5, 1e-5);
+        let pressed = |nodes: usize| ModalModel {
+            frequencies: vec![1000.0; nodes],
+            damping_ratios: vec![0.0; nodes],
+            contact_modes: DMatrix::from_fn(3 * nodes, nodes, |row, mode| match (row / 3, row % 3) {
+                (node, 0) if node == mode => -1.0,
+                (0, 1) if mode == 1 => turned,
+                _ => 0.0,
+            }),
+            shapes: DMatrix::identity(nodes, nodes),
+            quasi_static: 0,
+        };
+        let closed = |nodes: usize| vec![vec![([-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]); nodes]];
+        let alone = |nodes: usize, friction: f64| {
+            check_solvable(&pressed(nodes), Scheme::ModalExact, step, friction, &closed(nodes))
+        };
+        let wheel = |nodes: usize, friction: f64| {
+            check_solvable_together(&[pressed(nodes)], Scheme::ModalExact, step, friction, &[closed(nodes)])
+        };
+        let bound = 2.0 / turned;
+        for outcome in
+            [alone(MINORS_UP_TO + 1, 1.01 * bound), wheel(2, 1.01 * bound), wheel(MINORS_UP_TO + 1, 1.01 * bound)]
+        {
+            let refusal = outcome.unwrap_err().to_string();
+            assert!(refusal.contains("µ below 0.8000") && refusal.contains("positive definite"), "{refusal}");
+        }
+        assert!(alone(MINORS_UP_TO, 10.0 * bound).is_ok());
+        for friction in [0.0, 0.99 * bound] {
+            assert!(alone(MINORS_UP_TO + 1, friction).is_ok() && wheel(2, friction).is_ok());
+        }
+        // Redundant contacts, two nodes that move as one, are no loss: W is singular.
+        let mut twice = pressed(MINORS_UP_TO + 1);
+        twice.contact_modes.fill_row(0, -1.0);
+        twice.contact_modes.fill_row(3, -1.0);
+        assert!(check_solvable(&twice, Scheme::ModalExact, step, 0.0, &closed(MINORS_UP_TO + 1)).is_ok());
+    }
+
     #[test]
     fn steps_below_the_largest_are_looked_at() {
         // At h = 1e-3 the stiff mode is static and Grt ≈ 0; at small h it moves freely and turns the tip inwards.

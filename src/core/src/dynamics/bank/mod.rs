@@ -506,6 +506,75 @@ mod tests {
         assert!(kinetic < 1e-20 * strain && strain > 0.0, "{kinetic:e}, {strain:e}");
     }
 
+    /// Three modes with inertia, one quasi-static under massless-boundary.
+    fn small(damping: f64) -> ModalModel {
+        ModalModel {
+            frequencies: vec![0.0, 1e3, 4e3, 2e4],
+            damping_ratios: vec![damping; 4],
+            contact_modes: DMatrix::from_fn(3, 4, |row, mode| 1.0 + row as f64 - 0.3 * mode as f64),
+            shapes: DMatrix::identity(4, 4),
+            quasi_static: 1,
+        }
+    }
+
+    #[test]
+    fn at_rest_nothing_of_the_run_before_acts() {
+        let model = small(0.01);
+        let spin = ModalSpin {
+            reference_speed: 0.0,
+            stiffness_speed2: DMatrix::identity(4, 4) * 3.0,
+            stiffness_speed4: DMatrix::zeros(4, 4),
+            coriolis: DMatrix::zeros(4, 4),
+        };
+        let coupling = Some((spin, true, false));
+        for (scheme, sectors) in [
+            (Scheme::ModalExact, 1),
+            (Scheme::ModalExact, 3),
+            (Scheme::CentralDifference, 3),
+            (Scheme::MasslessBoundary, 1),
+        ] {
+            let options = BankOptions { loads: true, coupling: coupling.clone(), ..BankOptions::default() };
+            let mut bank = ModalBank::with_options(&model, sectors, options);
+            bank.set_step(scheme, 2e-5);
+            bank.set_speed(500.0);
+            for _ in 0..5 {
+                bank.loads_mut().copy_from_slice(&[1.0, -2.0, 30.0, 4e3]);
+                bank.predict(true);
+                bank.correct(sectors - 1, &[3.0, -2.0, 5.0], true);
+                assert!(bank.finish_loads() != 0.0);
+            }
+            bank.rest();
+            bank.set_step(scheme, 2e-5);
+            assert_eq!((bank.energies_now(&[]), bank.energies(), bank.collect_loss()), ((0.0, 0.0), (0.0, 0.0), 0.0));
+            assert!(bank.displacement().iter().chain(bank.displacement_before()).all(|value| *value == 0.0));
+            // Neither a step of another length nor a load moves what is not loaded.
+            bank.resample(scheme, 7e-6, &[]);
+            bank.predict(true);
+            assert_eq!((bank.finish_loads(), bank.energies_now(&[])), (0.0, (0.0, 0.0)), "{scheme:?}");
+            // As stiff as at the reference speed again: a mode of 1000 rad/s.
+            bank.set_modal_state(1, 0, 1.0, 0.0);
+            assert_eq!(bank.energies_now(&[]).1.to_bits(), 5e5_f64.to_bits());
+        }
+    }
+
+    #[test]
+    fn quasi_static_modes_have_no_motion_to_start_with() {
+        let model = small(0.0);
+        let mut bank = ModalBank::new(&model, 3);
+        bank.set_step(Scheme::MasslessBoundary, 2e-5);
+        let mut expected = 0.0;
+        for (mode, frequency) in model.frequencies.iter().enumerate() {
+            bank.set_modal_state(mode, 2, 1e-4, 0.3);
+            expected += if mode < 3 { 0.5 * (0.09 + (1e-4 * frequency).powi(2)) } else { 0.0 };
+        }
+        let sum = |(kinetic, strain): (f64, f64)| kinetic + strain;
+        assert!((sum(bank.energies_now(&[])) / expected - 1.0).abs() < 1e-12, "{expected} J");
+        // What the undamped scheme keeps it keeps from the start on.
+        let at_first = sum(bank.energies());
+        bank.predict(true);
+        assert!((sum(bank.energies()) / at_first - 1.0).abs() < 1e-12);
+    }
+
     /// The widest set against the baseline; a processor without wider registers compares the baseline with itself.
     #[test]
     fn every_instruction_set_gives_the_same_bits() {

@@ -492,6 +492,50 @@ mod tests {
         }
     }
 
+    #[test]
+    fn at_rest_nothing_of_the_run_before_acts() {
+        for scheme in [Scheme::ModalExact, Scheme::CentralDifference, Scheme::MasslessBoundary] {
+            let mut bank = CyclicBank::new(&model(11, 2), true);
+            bank.set_step(scheme, 1e-6);
+            for step in 0..5 {
+                bank.loads_mut()[1] = 1e3;
+                bank.predict(true);
+                bank.ask([(3, 0, [1.0, 0.3, -0.2]), (step, 1, [-2.0, 0.0, 0.5])].into_iter());
+                bank.act();
+                assert!(bank.finish_loads() != 0.0);
+            }
+            bank.rest();
+            let none = vec![0.0; bank.rows() * bank.lanes()];
+            assert_eq!((bank.energies_now(&none), bank.collect_loss()), ((0.0, 0.0), 0.0), "{scheme:?}");
+            bank.resample(scheme, 7e-7, &none);
+            for _ in 0..2 {
+                bank.predict(true);
+                assert_eq!((bank.finish_loads(), bank.energies_now(&none)), (0.0, (0.0, 0.0)), "{scheme:?}");
+                assert!(bank.displacement().iter().chain(bank.displacement_before()).all(|value| *value == 0.0));
+            }
+            assert_eq!(bank.collect_loss().to_bits(), 0.0_f64.to_bits());
+        }
+    }
+
+    #[test]
+    fn quasi_static_modes_have_no_motion_to_start_with() {
+        let mut undamped = model(8, 1);
+        undamped.set_damping_ratio(0.0);
+        let mut bank = CyclicBank::new(&undamped, false);
+        bank.set_step(Scheme::MasslessBoundary, 1e-6);
+        let mut expected = 0.0;
+        for (n, diameter) in undamped.diameters.iter().enumerate() {
+            for (mode, frequency) in diameter.frequencies.iter().enumerate() {
+                bank.set_modal_state(n, mode, [1e-4, 0.0], [0.3, 0.0]);
+                let dynamic = mode + diameter.quasi_static < diameter.len();
+                expected += if dynamic { 0.5 * (0.09 + (1e-4 * frequency).powi(2)) } else { 0.0 };
+            }
+        }
+        let none = vec![0.0; bank.rows() * bank.lanes()];
+        let (kinetic, strain) = bank.energies_now(&none);
+        assert!(((kinetic + strain) / expected - 1.0).abs() < 1e-12, "{kinetic} + {strain} of {expected} J");
+    }
+
     /// The widest set against the baseline; a processor without wider registers compares the baseline with itself.
     #[test]
     fn every_instruction_set_gives_the_same_bits() {
