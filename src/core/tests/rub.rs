@@ -631,3 +631,35 @@ fn round_casing_never_touches_an_undisturbed_disk() {
     assert!((real(&simulation, "clearance_minimum") - clearance).abs() < 1e-18);
     assert!(real(&simulation, "kinetic_energy").abs() < 1e-30);
 }
+
+/// An importer takes lengths as differences of times, which late ones round: to 1e-5 of H here.
+#[test]
+fn a_rub_that_begins_late_is_that_of_one_that_begins_at_zero() {
+    let (scene, length) = (common::scene(6), 1e-5);
+    let run = |begin: f64| {
+        let mut simulation = Simulation::new(&scene).unwrap();
+        simulation.initialise(begin).unwrap();
+        let (mut peak, mut impulse) = (0.0_f64, 0.0);
+        for index in 0..300 {
+            let [now, next] = [index, index + 1].map(|index| begin + f64::from(index) * length);
+            simulation.do_step(now, next - now).unwrap();
+            peak = peak.max(real(&simulation, "normal_force_peak"));
+            impulse += real(&simulation, "normal_impulse");
+            assert_eq!(real(&simulation, "internal_step").to_bits(), 1e-6_f64.to_bits());
+            if index % 7 == 0 {
+                let mut state = vec![0; simulation.state_size()];
+                simulation.save_state(&mut state).unwrap();
+                simulation.restore_state(&state).unwrap();
+            }
+        }
+        [peak, impulse, real(&simulation, "internal_steps"), real(&simulation, "rotor_angle")]
+    };
+    let early = run(0.0);
+    for begin in [1e3, 1e6, -1e6] {
+        let late = run(begin);
+        println!("from {begin:e} s: {late:?} of {early:?}");
+        // Time itself is known to 1e-10 s.
+        let apart = early.iter().zip(late).map(|(early, late)| (late / early - 1.0).abs()).fold(0.0, f64::max);
+        assert!(apart < 1e-3, "from {begin:e} s: {late:?} of {early:?}");
+    }
+}

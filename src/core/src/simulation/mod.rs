@@ -33,6 +33,15 @@ use window::Window;
 const TIME_TOLERANCE: f64 = 1e-3;
 /// Step sizes within this fraction of each other are the same step (1/60 computed in several ways).
 const SAME_STEP: f64 = 1e-9;
+/// Roundings of a time that may be in the difference of two.
+const TIME_ROUNDINGS: f64 = 4.0;
+
+/// The same for internal steps of a communication step of length `length` (s) at `time` (s): late times leave a length no better
+/// known than they are themselves.
+fn same_step(time: f64, length: f64) -> f64 {
+    SAME_STEP.max(TIME_ROUNDINGS * f64::EPSILON * time.abs() / length)
+}
+
 /// Most internal steps of one communication step.
 const MOST_STEPS: f64 = 1e9;
 

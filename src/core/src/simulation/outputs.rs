@@ -13,9 +13,11 @@ use crate::ledger::Ledger;
 use crate::system::System;
 use crate::variables::{Causality, NO_CLEARANCE, Quantity, Span, Variable};
 
+type Fill = dyn Fn(&View, &mut [f64]) + Send + Sync;
+
 /// What fills the elements of an output.
 #[derive(Clone)]
-pub struct Reader(Arc<dyn Fn(&View, &mut [f64]) + Send + Sync>);
+pub struct Reader(Arc<Fill>);
 
 impl fmt::Debug for Reader {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -5,7 +5,7 @@
 
 use super::access::check_range;
 use super::drive::RotorAngle;
-use super::{Communication, Inputs, MOST_STEPS, Phase, SAME_STEP, Simulation, TIME_TOLERANCE};
+use super::{Communication, Inputs, MOST_STEPS, Phase, SAME_STEP, Simulation, TIME_TOLERANCE, same_step};
 use crate::persist::{Persist, Reader, Writer, fingerprint, persist_fields};
 use crate::variables::{Causality, Kind, Quantity, Variable};
 use crate::{Error, Result, shown};
@@ -210,9 +210,10 @@ impl Simulation {
         let counted = lead.time.is_finite() && (1.0..=MOST_STEPS).contains(&number) && done <= count && ends;
         let largest = lead.values[self.compiled.references.step_max];
         let internal = if length > 0.0 { length / number } else { largest };
+        let same = if length > 0.0 { same_step(start, length) } else { SAME_STEP };
         let divided = (0.0..=f64::MAX).contains(&length)
-            && (lead.step - internal).abs() <= 2.0 * SAME_STEP * internal
-            && lead.step <= largest * (1.0 + 2.0 * SAME_STEP);
+            && (lead.step - internal).abs() <= 2.0 * same * internal
+            && lead.step <= largest * (1.0 + 2.0 * same);
         if counted && within && divided {
             Ok(())
         } else {

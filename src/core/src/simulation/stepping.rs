@@ -2,7 +2,7 @@
 
 use super::checks::{OUT_OF_REACH, OUT_OF_REACH_REMEDY};
 use super::drive::Input;
-use super::{Communication, MOST_STEPS, Phase, Progress, SAME_STEP, Simulation, TIME_TOLERANCE};
+use super::{Communication, MOST_STEPS, Phase, Progress, Simulation, TIME_TOLERANCE, same_step};
 use crate::contact::coating::Coating;
 use crate::settings::Scheme;
 use crate::system::StepFailure;
@@ -37,10 +37,13 @@ impl Simulation {
         self.check_courses(step_size)?;
         let limit = self.values[self.compiled.references.step_max];
         let ratio = step_size / limit;
+        let same = same_step(current_time, step_size);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 ≤ value ≤ 1e9")]
-        let count = (ratio * (1.0 - SAME_STEP)).ceil().max(1.0) as u64;
+        let count = (ratio * (1.0 - same)).ceil().max(1.0) as u64;
         #[expect(clippy::cast_precision_loss, reason = "count ≤ 1e9")]
         let step = step_size / count as f64;
+        let keeps = (step - self.system.bank().step()).abs() <= same * step;
+        let step = if keeps { self.system.bank().step() } else { step };
         let hold = self.holds();
         let mut rotation = self.inputs.shape_rotation;
         if !hold {
@@ -53,7 +56,7 @@ impl Simulation {
             self.compiled.check_speed(if first.abs() > last.abs() { first } else { last })?;
         }
         // Nothing is refused from here on.
-        if (step - self.system.bank().step()).abs() > SAME_STEP * step {
+        if !keeps {
             self.system.set_step(step);
             if self.system.steps() == 0 {
                 // Increments of the first step are the velocity times its length.
