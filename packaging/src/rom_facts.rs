@@ -20,7 +20,7 @@ const FRICTION_STEPS: u32 = 40;
 const FRICTION_STEPS_PER_UNIT: f64 = 20.0;
 
 /// Modes that a warning of the checks is about: those that blade-tip contact excites most. Of coupled sectors the first
-/// family: as many modes of the wheel as there are sectors.
+/// family: as many modes of the disk as there are sectors.
 const FIRST_MODES: usize = 6;
 /// Contact nodes that are listed.
 const LISTED_NODES: usize = 24;
@@ -81,9 +81,9 @@ impl RomFacts {
         let hertz = |frequencies: &[f64]| frequencies.iter().map(|omega| omega / std::f64::consts::TAU).collect();
         let mut by_nodal_diameter: Vec<Vec<f64>> = Vec::new();
         let models = if rom.is_cyclic() {
-            let wheel = CyclicModel::from_rom(rom, rom.damping_ratio).map_err(in_rom)?;
-            by_nodal_diameter.extend(wheel.diameters.iter().map(|diameter| hertz(&diameter.frequencies)));
-            (0..wheel.diameters.len()).map(|number| wheel.paired(number)).collect()
+            let disk = CyclicModel::from_rom(rom, rom.damping_ratio).map_err(in_rom)?;
+            by_nodal_diameter.extend(disk.diameters.iter().map(|diameter| hertz(&diameter.frequencies)));
+            (0..disk.diameters.len()).map(|number| disk.paired(number)).collect()
         } else {
             vec![ModalModel::from_rom(rom, rom.damping_ratio).map_err(in_rom)?]
         };
@@ -128,9 +128,9 @@ impl RomFacts {
         if numbers.is_empty() {
             return FIRST_MODES;
         }
-        let of_wheel = |number: &u32| if *number == 0 || 2 * *number as usize == sectors { 1 } else { 2 };
+        let of_disk = |number: &u32| if *number == 0 || 2 * *number as usize == sectors { 1 } else { 2 };
         let before = numbers.iter().scan(0, |sum, number| {
-            *sum += of_wheel(number);
+            *sum += of_disk(number);
             Some(*sum)
         });
         before.take_while(|sum| *sum <= sectors).count()
@@ -210,9 +210,7 @@ impl RomFacts {
                 let sense = if speed == 0.0 { "either sense" } else { sense };
                 format!("of one sector, with µ = {friction} and sliding in {sense}")
             }
-            Some(sliding) if sliding.friction > 0.0 => {
-                "of the wheel; with friction a scene may ask for less".to_owned()
-            }
+            Some(sliding) if sliding.friction > 0.0 => "of the disk; with friction a scene may ask for less".to_owned(),
             Some(_) => "without friction".to_owned(),
             None => "without friction; with it a scene may ask for less".to_owned(),
         }
@@ -361,7 +359,7 @@ pub(crate) fn order_text(rom: &Rom) -> String {
     let orders = rom.extras.harmonics.iter().map(|harmonic| harmonic.mass.nrows()).chain([rom.order()]);
     let (low, high) = orders.fold((usize::MAX, 0), |(low, high), order| (low.min(order), high.max(order)));
     let each = if low == high { format!("{low}") } else { format!("{low} to {high}") };
-    format!("{each} per nodal diameter, {} of the whole wheel", rom.total_order())
+    format!("{each} per nodal diameter, {} of the whole disk", rom.total_order())
 }
 
 /// Spin and heat, for people; nothing for a ROM without.

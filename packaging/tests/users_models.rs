@@ -139,7 +139,7 @@ fn matrices_of_calculix_give_the_rom_of_the_mesh() {
 }
 
 #[test]
-fn a_sector_of_gmsh_becomes_a_wheel_with_the_frequencies_of_calculix() {
+fn a_sector_of_gmsh_becomes_a_disk_with_the_frequencies_of_calculix() {
     let project = Project::new(&["sector.msh"]);
     let line = "reduce sector.msh --contact-set TIP --clamp-set BORE --sectors 12 --cyclic-low LOW --cyclic-high HIGH \
                 --units mm-t-s --young 210e9 --poisson 0.3 --density 7850 --contact-nodes 3 --modes 12 \
@@ -251,7 +251,7 @@ fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
 }
 
 #[test]
-fn rigid_body_modes_of_a_free_wheel_are_no_reason_to_warn() {
+fn rigid_body_modes_of_a_free_disk_are_no_reason_to_warn() {
     let project = Project::new(&["sector.msh"]);
     let line = "reduce sector.msh --contact-set TIP --clamp-set none --sectors 12 --cyclic-low LOW --cyclic-high HIGH \
                 --units mm-t-s --material steel --contact-nodes 2 --modes 25";

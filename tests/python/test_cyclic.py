@@ -1,4 +1,4 @@
-"""Coupled sectors in FMPy: the stage that ships (on coarse meshes), and a wheel written from Python as the guide says."""
+"""Coupled sectors in FMPy: the stage that ships (on coarse meshes), and a disk written from Python as the guide says."""
 
 import csv
 import os
@@ -23,7 +23,7 @@ LIBRARY = ["--library", os.environ["TIPRUB_LIBRARY"]] if "TIPRUB_LIBRARY" in os.
 
 def coarse_scene():
     """The stage that ships, with coarse models, sooner in contact and sooner over."""
-    text = (ROOT / "packaging" / "scenes" / "stage.toml").read_text()
+    text = (ROOT / "src" / "gallery" / "scenes" / "stage.toml").read_text()
     for name in ("stage-casing", "stage"):
         text = text.replace(f'"builtin:{name}"', f'"builtin:{name}-coarse"')
     text = text.replace("ramp_time = 5.0e-3", "ramp_time = 1.0e-3").replace("stop = 0.05 ", f"stop = {STOP} ")
@@ -128,7 +128,7 @@ def test_the_examples_of_the_rom_chapter_run_and_are_read(tiprub, tmp_path, monk
     monkeypatch.chdir(tmp_path)
     for example in examples:
         exec(compile(example, "rom-file.md", "exec"), {})  # noqa: S102 - the guide's own words
-    rom = tiprub("inspect", tmp_path / "wheel.rom.safetensors")["rom"]
+    rom = tiprub("inspect", tmp_path / "disk.rom.safetensors")["rom"]
     assert rom["sectors"] == 24 and rom["nodal_diameters"]["total_order"] == 72
     first = numpy.array([frequencies[0] for frequencies in rom["nodal_diameters"]["frequencies_hz"]])
     assert len(first) == 13 and (numpy.diff(first) > 0).all()

@@ -77,7 +77,7 @@ impl<T> In<T> {
 }
 
 impl<T: Copy> Out<T> {
-    /// Place for `count` values; nothing is touched if that is zero.
+    /// ClosestPoint for `count` values; nothing is touched if that is zero.
     ///
     /// # Errors
     /// NULL or misaligned.
@@ -88,7 +88,7 @@ impl<T: Copy> Out<T> {
         Ok(Window { pointer: self.0, length: count })
     }
 
-    /// Place for one value.
+    /// ClosestPoint for one value.
     ///
     /// # Errors
     /// NULL or misaligned.

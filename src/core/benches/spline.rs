@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::time::Instant;
 
-use tiprub_core::contact::spline::{Place, Projection, SurfaceSpline};
+use tiprub_core::contact::spline::{ClosestPoint, Projection, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
 
 const RADIUS: f64 = 0.25;
@@ -41,7 +41,7 @@ fn projections(surface: &SurfaceSpline, h: f64, advanced: bool) -> f64 {
         [r * angle.cos(), r * angle.sin(), z]
     };
     let turns = if advanced { SPEED * h / TAU } else { 0.0 };
-    let mut places: Vec<Place> = (0..NODES).map(|index| surface.locate(node(index, 0))).collect();
+    let mut places: Vec<ClosestPoint> = (0..NODES).map(|index| surface.locate(node(index, 0))).collect();
     let mut points = vec![[0.0; 3]; NODES];
     let mut times = Vec::new();
     for step in 0..STEPS {
@@ -90,7 +90,7 @@ fn main() {
     println!("project, free ends: {time:.0} ns per node");
     let time = projections(&of(Closure::Smooth, Interpolation::Facets), 1e-7, true);
     println!("project, facets: {time:.0} ns per node");
-    let places: Vec<Place> = (0..NODES).map(|index| spline.locate(points[(index * 7) % points.len()])).collect();
+    let places: Vec<ClosestPoint> = (0..NODES).map(|index| spline.locate(points[(index * 7) % points.len()])).collect();
     let time = per_call(NODES, |index| {
         black_box(spline.evaluate(black_box(places[index])));
     });

@@ -145,7 +145,7 @@ fn stepping(scene: &Scene) -> (f64, f64) {
 
 /// A disk of coupled sectors of the reference size: 56 sectors, 34 modes per nodal diameter, 3 contact nodes. Frequencies of
 /// the disk's own modes rise with the nodal diameter, shapes turn with it.
-fn wheel(depth: f64) -> Scene {
+fn disk(depth: f64) -> Scene {
     let mut scene = scene(Shape::TwoLobe { depth, width: 0.15, phase: 0.0 }, true);
     let rom = &mut scene.roms[0];
     rom.sectors = WHEEL_SECTORS;
@@ -229,14 +229,14 @@ fn main() {
     };
     let title = format!("{SECTORS} blades x {MODES} modes, {} contact nodes", 3 * SECTORS);
     table(&title, SECTORS * MODES, chosen(rows.into()));
-    let wheels = vec![
-        ("coupled sectors, no contact", wheel(0.3)),
-        ("coupled sectors, light rub", wheel(LIGHT)),
-        ("coupled sectors, heavy rub", wheel(HEAVY)),
+    let disks = vec![
+        ("coupled sectors, no contact", disk(0.3)),
+        ("coupled sectors, light rub", disk(LIGHT)),
+        ("coupled sectors, heavy rub", disk(HEAVY)),
     ];
     let title = format!(
         "{WHEEL_SECTORS} coupled sectors x {WHEEL_MODES} modes per nodal diameter, {} contact nodes",
         3 * WHEEL_SECTORS
     );
-    table(&title, WHEEL_SECTORS * WHEEL_MODES, chosen(wheels));
+    table(&title, WHEEL_SECTORS * WHEEL_MODES, chosen(disks));
 }

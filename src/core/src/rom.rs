@@ -50,7 +50,7 @@ pub struct RomChecks {
     /// Residual convergence criterion per mode (%), eq. 12 of the paper.
     pub residual_criterion: Vec<f64>,
     /// Nodal diameter of each mode of a structure with coupled sectors, else empty. A mode with 0 < 2n < sectors stands
-    /// for two of the whole wheel.
+    /// for two of the whole disk.
     pub nodal_diameters: Vec<u32>,
 }
 

@@ -73,7 +73,7 @@ fn collide(elements: usize, scheme: Scheme, solver: Solver) -> Outcome {
             count += 1;
         }
     }
-    system.close_books();
+    system.close_ledger();
     let (kinetic, strain) = system.energies();
     let energy = kinetic + strain;
     Outcome {

@@ -71,7 +71,7 @@ fn run(scheme: Scheme, step: f64, sticking: f64, sliding: f64, steps: usize) -> 
         record.position.push(now);
         record.stuck.push(stuck);
     }
-    system.close_books();
+    system.close_ledger();
     let (kinetic, strain) = system.energies();
     record.residual = system.ledger().residual(kinetic + strain) / system.ledger().scale();
     record

@@ -96,7 +96,7 @@ fn bounce(elements: usize, scheme: Scheme, solver: Solver, fraction: f64) -> Out
             outcome.losses.push(1.0 - (kinetic + strain + potential) / energy());
         }
     }
-    system.close_books();
+    system.close_ledger();
     let (kinetic, strain) = system.energies();
     outcome.residual = system.ledger().residual(kinetic + strain) / energy();
     outcome.bottom[1] = squares[0].relative();

@@ -13,11 +13,11 @@ use std::f64::consts::TAU;
 
 use casings::*;
 use tiprub_core::contact::gap::dot;
-use tiprub_core::contact::spline::{Evaluation, Place, Projection, REACH, SurfaceSpline};
+use tiprub_core::contact::spline::{ClosestPoint, Evaluation, Projection, REACH, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
 
 /// A node at a signed distance inside a place, with its closest point known by construction.
-fn node(surface: &SurfaceSpline, at: Place, gap: f64) -> [f64; 3] {
+fn node(surface: &SurfaceSpline, at: ClosestPoint, gap: f64) -> [f64; 3] {
     let Evaluation { point, d_s, d_t, .. } = surface.evaluate(at);
     let cross =
         [d_t[1] * d_s[2] - d_t[2] * d_s[1], d_t[2] * d_s[0] - d_t[0] * d_s[2], d_t[0] * d_s[1] - d_t[1] * d_s[0]];
@@ -26,7 +26,7 @@ fn node(surface: &SurfaceSpline, at: Place, gap: f64) -> [f64; 3] {
 }
 
 #[track_caller]
-fn found(projection: Projection) -> (Place, [f64; 3], [f64; 3], f64) {
+fn found(projection: Projection) -> (ClosestPoint, [f64; 3], [f64; 3], f64) {
     match projection {
         Projection::Found { place, point, normal, gap } => (place, point, normal, gap),
         other => panic!("{other:?}"),
@@ -41,7 +41,7 @@ fn the_closest_point_is_found_from_anywhere_around() {
             let surface = spline(&data(around, along, casing), around, along);
             let (mut offset, mut gradient, mut away): (f64, f64, f64) = (0.0, 0.0, 0.0);
             for _ in 0..100 {
-                let at = Place { t: random.within(0.05, 0.95), ..random.place(&surface) };
+                let at = ClosestPoint { t: random.within(0.05, 0.95), ..random.place(&surface) };
                 let gap = random.within(-5e-3, 5e-3);
                 let x = node(&surface, at, gap);
                 for _ in 0..20 {
@@ -91,13 +91,13 @@ fn no_sampled_point_is_closer() {
             let (mut closer, mut farther): (f64, f64) = (0.0, 0.0);
             let samples = 1500 / around;
             for index in 0..40 {
-                let mut at = Place { t: random.within(0.05, 0.95), ..random.place(&surface) };
+                let mut at = ClosestPoint { t: random.within(0.05, 0.95), ..random.place(&surface) };
                 // Half of the nodes stand next to a border of patches, where facets and free ends kink.
                 if index % 2 == 0 {
                     (at.patch[0], at.s) = (if index % 4 == 0 { 0 } else { at.patch[0] }, 1e-3 * random.next());
                 }
                 let x = node(&surface, at, random.within(-3e-3, 3e-3));
-                let guess = Place { t: 0.5, ..random.place(&surface) };
+                let guess = ClosestPoint { t: 0.5, ..random.place(&surface) };
                 let (_, point, _, _) = found(surface.project(x, guess));
                 let (least, found) = (brute_force(&surface, x, samples), distance(point, x));
                 closer = closer.max(found - least);
@@ -195,13 +195,13 @@ fn a_node_finds_the_surface_beyond_its_edge_and_not_beyond_its_reach() {
             for (q, t, outwards) in [(0, 0.0, -1.0), (1, 1.0, 1.0)] {
                 let edge = place(p, q, s, t);
                 let x = node(&surface, edge, gap);
-                let guess = Place { t: random.next(), patch: [p, random.below(2)], s: random.next() };
+                let guess = ClosestPoint { t: random.next(), patch: [p, random.below(2)], s: random.next() };
                 let (at, _, _, value) = found(surface.project(x, guess));
                 assert!((value - gap).abs() < 4e-16 && (at.t - t).abs() < 1e-9, "{at:?} for {edge:?}");
                 // Anywhere on what goes on, at its distance, on either side of it.
                 let reach = 2.0 * REACH;
                 let out = t + outwards * reach * random.within(0.0, 0.999);
-                let beyond = Place { t: out, ..edge };
+                let beyond = ClosestPoint { t: out, ..edge };
                 for gap in [gap, -gap] {
                     let (at, _, _, value) = found(surface.project(node(&surface, beyond, gap), guess));
                     assert!((value - gap).abs() < 4e-16, "{value} for {gap} at {at:?}");
@@ -276,7 +276,7 @@ fn places_from_angle_and_axial_position_are_near() {
             let [found, expected] = [guess, at].map(|place| place.patch[0] as f64 + place.s);
             let apart = (found - expected).rem_euclid(far as f64);
             assert!(apart.min(far as f64 - apart) < 0.3, "{guess:?} for {at:?}");
-            let axial = |place: Place| surface.evaluate(place).point[2];
+            let axial = |place: ClosestPoint| surface.evaluate(place).point[2];
             assert!((axial(guess) - axial(at)).abs() < 0.3 * 0.06 / (surface.along() - 1) as f64);
             let turned = surface.advance(at, 1.25);
             let expected = (expected + 0.25 * far as f64).rem_euclid(far as f64);
@@ -328,7 +328,7 @@ fn a_start_from_the_last_step_ends_where_a_start_from_elsewhere_does() {
             let x = [r * angle.cos(), r * angle.sin(), z];
             let warm = found(surface.project(x, surface.advance(guess, turn)));
             let located = found(surface.project(x, surface.locate(x)));
-            let cold = found(surface.project(x, Place { t: 0.5, ..random.place(&surface) }));
+            let cold = found(surface.project(x, ClosestPoint { t: 0.5, ..random.place(&surface) }));
             for other in [located, cold] {
                 gaps = gaps.max((warm.3 - other.3).abs());
                 // Two facets or two sides of the seam may be equally far away.
@@ -375,7 +375,7 @@ fn nothing_but_construction_allocates() {
     for (mut surface, points) in every_surface() {
         let mut values = points.clone();
         let mut random = Random(12);
-        let starts: Vec<Place> = (0..50).map(|_| random.place(&surface)).collect();
+        let starts: Vec<ClosestPoint> = (0..50).map(|_| random.place(&surface)).collect();
         let allocations = counting::allocations_of(|| {
             surface.interpolate(&mut values);
             surface.set_control_points(&values);

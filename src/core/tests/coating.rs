@@ -1,4 +1,4 @@
-//! A blade that rubs a coating turn after turn, through the public interface: the groove, its books, no allocation.
+//! A blade that rubs a coating turn after turn, through the public interface: the groove, its ledger, no allocation.
 
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::cell::Cell;

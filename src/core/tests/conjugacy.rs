@@ -4,8 +4,8 @@
 mod common;
 #[path = "common/features.rs"]
 mod common_features;
-#[path = "common/wheel.rs"]
-mod wheel;
+#[path = "common/disk.rs"]
+mod disk;
 
 use common_features::{coating, flexible};
 use tiprub_core::contact::gap::{Drive, GapLaw};
@@ -52,8 +52,8 @@ const FEATURES: [Feature; 8] = [
         coating(scene);
         whirl(scene);
     }),
-    ("wheel, whirl", |scene| {
-        scene.roms[0] = wheel::Wheel::random(12, 3, 12, 0.1, 7).cyclic();
+    ("disk, whirl", |scene| {
+        scene.roms[0] = disk::Disk::random(12, 3, 12, 0.1, 7).cyclic();
         whirl(scene);
     }),
 ];
@@ -173,7 +173,7 @@ fn looked(
     lanes: usize,
     drive: &Drive,
     displacement: &[f64],
-) -> (f64, [f64; 3], Vec<tiprub_core::contact::spline::Place>) {
+) -> (f64, [f64; 3], Vec<tiprub_core::contact::spline::ClosestPoint>) {
     let mut geometry = law.geometry(lanes);
     let mut gap = vec![f64::INFINITY; law.nodes() * lanes];
     law.evaluate(drive, displacement, &[], None, &mut geometry, &mut gap);

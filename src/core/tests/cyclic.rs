@@ -1,13 +1,13 @@
-//! A wheel of coupled sectors stepped by nodal diameters against the same wheel as one general structure.
+//! A disk of coupled sectors stepped by nodal diameters against the same disk as one general structure.
 
 mod common;
-#[path = "common/wheel.rs"]
-mod wheel;
+#[path = "common/disk.rs"]
+mod disk;
 
+use disk::{Disk, rub};
 use tiprub_core::dynamics::cyclic::CyclicModel;
 use tiprub_core::settings::{InputInterpolation, Scheme, Solver};
 use tiprub_core::{Scene, Simulation};
-use wheel::{Wheel, rub};
 
 fn real(simulation: &Simulation, name: &str) -> f64 {
     let reference = simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference;
@@ -23,10 +23,10 @@ fn started(scene: &Scene) -> Simulation {
     simulation
 }
 
-/// Both forms of one wheel with the same settings.
-fn pair(wheel: &Wheel, scheme: Scheme, solver: Solver, friction: f64) -> [Simulation; 2] {
-    [wheel.cyclic(), wheel.whole()].map(|rom| {
-        let mut scene = rub(common::scene(wheel.sectors), rom);
+/// Both forms of one disk with the same settings.
+fn pair(disk: &Disk, scheme: Scheme, solver: Solver, friction: f64) -> [Simulation; 2] {
+    [disk.cyclic(), disk.whole()].map(|rom| {
+        let mut scene = rub(common::scene(disk.sectors), rom);
         scene.settings.time.scheme = scheme;
         scene.settings.contacts[0].solver = solver;
         scene.settings.contacts[0].friction = friction;
@@ -58,7 +58,7 @@ impl Differences {
 /// Step both until `contact_steps` internal steps had contact; the casing closes by up to `closing`, with `nudge` added on
 /// the second. Returns the differences and the most contacts at once.
 fn compare(
-    wheel: &Wheel,
+    disk: &Disk,
     [one, two]: &mut [Simulation; 2],
     contact_steps: usize,
     closing: f64,
@@ -75,15 +75,15 @@ fn compare(
             simulation.set_real(reference, radius).unwrap();
             simulation.begin_step(time, length).unwrap();
         }
-        // Nodes of all sectors in a row where the other wheel is one structure.
-        let copies = wheel.sectors / two.system().bank().sectors();
+        // Nodes of all sectors in a row where the other disk is one structure.
+        let copies = disk.sectors / two.system().bank().sectors();
         loop {
             let finished = one.advance().unwrap().finished;
             two.advance().unwrap();
             let (a, b) = (one.system(), two.system());
-            for sector in 0..wheel.sectors {
-                for node in 0..wheel.nodes {
-                    let other = if copies == 1 { (node, sector) } else { (sector * wheel.nodes + node, 0) };
+            for sector in 0..disk.sectors {
+                for node in 0..disk.nodes {
+                    let other = if copies == 1 { (node, sector) } else { (sector * disk.nodes + node, 0) };
                     differences.add(1, a.multiplier(node, sector), b.multiplier(other.0, other.1));
                     for i in 0..3 {
                         let moved = b.bank().row(3 * other.0 + i, other.1);
@@ -110,19 +110,15 @@ fn compare(
     (differences.relative(), most)
 }
 
-/// All wheels with every scheme and solver, without and with friction.
-fn every_pair(mut check: impl FnMut(&Wheel, [Simulation; 2], String)) {
+/// All disks with every scheme and solver, without and with friction.
+fn every_pair(mut check: impl FnMut(&Disk, [Simulation; 2], String)) {
     for (sectors, nodes, order) in [(5, 1, 5), (6, 1, 5), (8, 1, 5), (6, 2, 8), (3, 1, 5), (2, 2, 8)] {
         for scheme in SCHEMES {
             for solver in SOLVERS {
                 for friction in [0.0, 0.15] {
-                    let wheel = Wheel::random(sectors, nodes, order, 0.2, 3 + sectors as u64);
-                    let both = pair(&wheel, scheme, solver, friction);
-                    check(
-                        &wheel,
-                        both,
-                        format!("{sectors} x {nodes} x {order} | {scheme:?} | {solver:?} | {friction}"),
-                    );
+                    let disk = Disk::random(sectors, nodes, order, 0.2, 3 + sectors as u64);
+                    let both = pair(&disk, scheme, solver, friction);
+                    check(&disk, both, format!("{sectors} x {nodes} x {order} | {scheme:?} | {solver:?} | {friction}"));
                 }
             }
         }
@@ -130,11 +126,11 @@ fn every_pair(mut check: impl FnMut(&Wheel, [Simulation; 2], String)) {
 }
 
 #[test]
-fn a_thousand_contact_steps_equal_those_of_the_whole_wheel_as_one_structure() {
+fn a_thousand_contact_steps_equal_those_of_the_whole_disk_as_one_structure() {
     println!("| sectors x nodes x coordinates | scheme | solver | µ | most contacts | displacement | λ | energies |");
     println!("|---|---|---|---|---|---|---|---|");
-    every_pair(|wheel, mut both, name| {
-        let ([moved, multiplier, energy], most) = compare(wheel, &mut both, 1000, 1e-4, 0.0);
+    every_pair(|disk, mut both, name| {
+        let ([moved, multiplier, energy], most) = compare(disk, &mut both, 1000, 1e-4, 0.0);
         println!("| {name} | {most} | {moved:.1e} | {multiplier:.1e} | {energy:.1e} |");
         assert!(moved <= 1e-12 && energy <= 1e-12, "{name}: {moved:e}, {energy:e}");
         // A multiplier is a displacement over h²/m: rounding of displacements is that much larger in it.
@@ -142,20 +138,20 @@ fn a_thousand_contact_steps_equal_those_of_the_whole_wheel_as_one_structure() {
     });
 }
 
-/// Blades that bounce between each other amplify rounding with every impact, whoever computes it: the same wheel
+/// Blades that bounce between each other amplify rounding with every impact, whoever computes it: the same disk
 /// stepped by the same code with the casing 1e-19 m away is the measure.
 #[test]
-fn a_wheel_that_bounces_all_around_differs_no_more_than_from_itself_nudged_by_rounding() {
+fn a_disk_that_bounces_all_around_differs_no_more_than_from_itself_nudged_by_rounding() {
     println!(
         "| sectors x nodes x coordinates | scheme | solver | µ | most contacts | displacement | energies | nudged |"
     );
     println!("|---|---|---|---|---|---|---|---|");
-    every_pair(|wheel, mut both, name| {
+    every_pair(|disk, mut both, name| {
         let mut twins = [both[0].clone(), both[0].clone()];
-        let ([moved, _, energy], most) = compare(wheel, &mut both, 1000, 5e-4, 0.0);
-        let ([nudged, ..], _) = compare(wheel, &mut twins, 1000, 5e-4, 1e-19);
+        let ([moved, _, energy], most) = compare(disk, &mut both, 1000, 5e-4, 0.0);
+        let ([nudged, ..], _) = compare(disk, &mut twins, 1000, 5e-4, 1e-19);
         println!("| {name} | {most} | {moved:.1e} | {energy:.1e} | {nudged:.1e} |");
-        assert!(most * 2 >= wheel.sectors, "{name}: {most}");
+        assert!(most * 2 >= disk.sectors, "{name}: {most}");
         assert!(moved <= 1e-12 + 100.0 * nudged && energy <= 1e-12 + 100.0 * nudged, "{name}: {moved:e}, {nudged:e}");
     });
 }
@@ -166,10 +162,10 @@ fn frequencies_of_a_chain_are_the_closed_form() {
     for sectors in [2, 3, 5, 8, 56] {
         let (mass, ground, between) = (0.3, 2e6, 7e5);
         let diagonal = |value: f64| nalgebra::DMatrix::from_element(1, 1, value);
-        let mut wheel = Wheel::random(sectors, 1, 1, 0.0, 1);
-        wheel.mass = [diagonal(mass), diagonal(0.0)];
-        wheel.stiffness = [diagonal(ground + 2.0 * between), diagonal(-between)];
-        let model = CyclicModel::from_rom(&wheel.cyclic(), 0.0).unwrap();
+        let mut disk = Disk::random(sectors, 1, 1, 0.0, 1);
+        disk.mass = [diagonal(mass), diagonal(0.0)];
+        disk.stiffness = [diagonal(ground + 2.0 * between), diagonal(-between)];
+        let model = CyclicModel::from_rom(&disk.cyclic(), 0.0).unwrap();
         for (n, diameter) in model.diameters.iter().enumerate() {
             let sine = (std::f64::consts::PI * n as f64 / sectors as f64).sin();
             let expected = ((ground + 4.0 * between * sine * sine) / mass).sqrt();

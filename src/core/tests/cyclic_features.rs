@@ -1,20 +1,20 @@
-//! Everything a wheel of coupled sectors can be combined with: against uncoupled sectors in the limit, books, states, refusals.
+//! Everything a disk of coupled sectors can be combined with: against uncoupled sectors in the limit, the ledger, states, refusals.
 
 mod common;
 #[path = "common/features.rs"]
 mod common_features;
 #[path = "common/counting.rs"]
 mod counting;
-#[path = "common/wheel.rs"]
-mod wheel;
+#[path = "common/disk.rs"]
+mod disk;
 
 use common_features::{coating, flexible};
+use disk::{Disk, rub};
 use nalgebra::Complex;
 use proptest::prelude::*;
 use tiprub_core::rom::{Harmonic, Rom};
 use tiprub_core::settings::{LoadSettings, PatchSettings, Scheme, Shape, Solver, SplineSettings};
 use tiprub_core::{Scene, Simulation};
-use wheel::{Wheel, rub};
 
 const SCHEMES: [Scheme; 3] = Scheme::ALL;
 const SOLVERS: [Solver; 3] = Solver::ALL;
@@ -107,7 +107,7 @@ fn without_coupling(rom: &Rom) -> Rom {
 }
 
 #[test]
-fn without_coupling_a_wheel_is_its_sectors() {
+fn without_coupling_a_disk_is_its_sectors() {
     println!(
         "| feature | scheme | solver | N | contact steps | displacement | energies |\n|---|---|---|---|---|---|---|"
     );
@@ -134,13 +134,13 @@ fn without_coupling_a_wheel_is_its_sectors() {
                         let (time, step) = (simulation.time(), if index % 7 == 0 { 6.3e-5 } else { 5e-5 });
                         simulation.do_step(time, step).unwrap();
                     }
-                    let [wheel, sectors] = &both;
-                    let displacements = [wheel, sectors].map(|simulation| simulation.system().bank().displacement());
+                    let [disk, sectors] = &both;
+                    let displacements = [disk, sectors].map(|simulation| simulation.system().bank().displacement());
                     for (a, b) in displacements[0].iter().zip(displacements[1]) {
                         apart = apart.max((a - b).abs());
                         size = size.max(b.abs());
                     }
-                    contact += wheel.system().events().len();
+                    contact += disk.system().events().len();
                 }
                 let energy = |name: &str| {
                     let [a, b] = both.each_ref().map(|simulation| real(simulation, name));
@@ -168,8 +168,8 @@ fn the_energy_ledger_closes_for_every_combination() {
     for feature in FEATURES {
         for scheme in SCHEMES {
             for solver in SOLVERS {
-                let wheel = Wheel::random(7, 2, 9, 0.25, 5);
-                let scene = scene_with(wheel.cyclic(), feature, scheme, solver);
+                let disk = Disk::random(7, 2, 9, 0.25, 5);
+                let scene = scene_with(disk.cyclic(), feature, scheme, solver);
                 if is_refused(&scene) {
                     let refused = Simulation::new(&scene).and_then(|mut simulation| simulation.initialise(0.0));
                     assert!(refused.is_err(), "{} {scheme:?} {solver:?} was not refused", feature.0);
@@ -199,9 +199,9 @@ fn the_energy_ledger_closes_for_every_combination() {
 #[test]
 fn a_casing_turned_by_sectors_turns_the_answer() {
     for (sectors, shift) in [(5, 2), (8, 3), (2, 1), (56, 11)] {
-        let wheel = Wheel::random(sectors, 1, 5, 0.2, 11);
+        let disk = Disk::random(sectors, 1, 5, 0.2, 11);
         let run = |shift: usize| {
-            let mut scene = scene_with(wheel.cyclic(), ("plain", |_| {}), Scheme::ModalExact, Solver::Lcp);
+            let mut scene = scene_with(disk.cyclic(), ("plain", |_| {}), Scheme::ModalExact, Solver::Lcp);
             let phase = std::f64::consts::TAU * shift as f64 / sectors as f64;
             scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 6e-4, order: 1, phase };
             scene.settings.structures[0].damping_ratio = Some(0.1);
@@ -234,8 +234,8 @@ fn a_saved_state_continues_with_identical_bits() {
     for feature in FEATURES {
         for scheme in SCHEMES {
             let solver = if feature.0 == "flexible casing" { Solver::Coulomb } else { Solver::Lcp };
-            let wheel = Wheel::random(6, 2, 9, 0.25, 5);
-            let mut simulation = started(&scene_with(wheel.cyclic(), feature, scheme, solver));
+            let disk = Disk::random(6, 2, 9, 0.25, 5);
+            let mut simulation = started(&scene_with(disk.cyclic(), feature, scheme, solver));
             // In the middle of a communication step and of a contact.
             let mut touching = false;
             for index in 0..60 {
@@ -252,7 +252,7 @@ fn a_saved_state_continues_with_identical_bits() {
             assert!(touching, "{} {scheme:?} never touched", feature.0);
             let mut bytes = vec![0; simulation.state_size()];
             simulation.save_state(&mut bytes).unwrap();
-            let mut other = started(&scene_with(wheel.cyclic(), feature, scheme, solver));
+            let mut other = started(&scene_with(disk.cyclic(), feature, scheme, solver));
             other.restore_state(&bytes).unwrap();
             let finish = |simulation: &mut Simulation| {
                 while !simulation.advance().unwrap().finished {}
@@ -272,9 +272,9 @@ fn a_saved_state_continues_with_identical_bits() {
 
 #[test]
 fn looking_at_outputs_inside_a_step_changes_no_bit() {
-    let wheel = Wheel::random(6, 1, 5, 0.25, 5);
+    let disk = Disk::random(6, 1, 5, 0.25, 5);
     let run = |look: bool| {
-        let mut simulation = started(&scene_with(wheel.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp));
+        let mut simulation = started(&scene_with(disk.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp));
         for _ in 0..60 {
             simulation.begin_step(simulation.time(), 5e-5).unwrap();
             while !simulation.advance().unwrap().finished {
@@ -292,8 +292,8 @@ fn looking_at_outputs_inside_a_step_changes_no_bit() {
 fn a_step_allocates_nothing() {
     for feature in FEATURES {
         for scheme in SCHEMES {
-            let wheel = Wheel::random(7, 2, 9, 0.25, 5);
-            let mut simulation = started(&scene_with(wheel.cyclic(), feature, scheme, Solver::Lcp));
+            let disk = Disk::random(7, 2, 9, 0.25, 5);
+            let mut simulation = started(&scene_with(disk.cyclic(), feature, scheme, Solver::Lcp));
             let mut contact = 0;
             let count = counting::allocations_of(|| {
                 for index in 0..60 {
@@ -310,9 +310,9 @@ fn a_step_allocates_nothing() {
 #[test]
 fn a_change_of_step_keeps_the_order_of_the_scheme() {
     // Free vibration of all nodal diameters after the casing has gone: modal-exact is exact at every step size.
-    let wheel = Wheel::random(7, 1, 5, 0.25, 5);
+    let disk = Disk::random(7, 1, 5, 0.25, 5);
     let run = |steps: &[f64]| {
-        let mut scene = scene_with(wheel.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp);
+        let mut scene = scene_with(disk.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp);
         scene.settings.contacts[0].gap = 5e-3;
         scene.settings.contacts[0].friction = 0.0;
         scene.settings.surfaces[0].shape = Shape::Circular {};
@@ -347,9 +347,9 @@ fn a_change_of_step_keeps_the_order_of_the_scheme() {
 
 #[test]
 fn what_coupled_sectors_do_not_take_is_refused() {
-    let wheel = Wheel::random(6, 1, 5, 0.2, 3);
+    let disk = Disk::random(6, 1, 5, 0.2, 3);
     let refusal = |change: fn(&mut Scene)| {
-        let mut scene = scene_with(wheel.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp);
+        let mut scene = scene_with(disk.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp);
         change(&mut scene);
         let started = Simulation::new(&scene).and_then(|mut simulation| simulation.initialise(0.0));
         started.err().map_or_else(|| "accepted".to_owned(), |error| error.to_string())
@@ -392,9 +392,9 @@ type Damage = (&'static str, fn(&mut Rom));
 
 #[test]
 fn bad_harmonics_are_refused_by_name() {
-    let wheel = Wheel::random(6, 1, 5, 0.2, 3);
+    let disk = Disk::random(6, 1, 5, 0.2, 3);
     let refusal = |change: fn(&mut Rom)| {
-        let mut rom = wheel.cyclic();
+        let mut rom = disk.cyclic();
         change(&mut rom);
         let made = Simulation::new(&scene_with(rom, FEATURES[0], Scheme::ModalExact, Solver::Lcp));
         made.err().map_or_else(|| "accepted".to_owned(), |error| error.to_string())
@@ -418,18 +418,18 @@ fn bad_harmonics_are_refused_by_name() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
-    /// Random wheels, frictionless and undamped: books close, gaps and multipliers keep their sign, and the reaction on
+    /// Random disks, frictionless and undamped: ledgers close, gaps and multipliers keep their sign, and the reaction on
     /// one sector moves the others as the reciprocal one moves it.
     #[test]
-    fn random_wheels_obey_the_laws(
+    fn random_disks_obey_the_laws(
         sectors in 2..=23_usize,
         nodes in 1..=2_usize,
         more in 1..=5_usize,
         coupling in 0.0..0.3_f64,
         seed in any::<u64>(),
     ) {
-        let wheel = Wheel::random(sectors, nodes, 3 * nodes + more, coupling, seed);
-        let mut scene = scene_with(wheel.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp);
+        let disk = Disk::random(sectors, nodes, 3 * nodes + more, coupling, seed);
+        let mut scene = scene_with(disk.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp);
         scene.settings.contacts[0].friction = 0.0;
         scene.settings.structures[0].damping_ratio = Some(0.0);
         let mut simulation = started(&scene);

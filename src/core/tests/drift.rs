@@ -164,7 +164,7 @@ fn sums_keep_what_rounding_would_drop() {
 /// A term of the balance and its sign.
 type Term = (fn(&mut Ledger) -> &mut Sum, f64);
 
-/// Every term has its sign, and large work in and out leaves the small rest that is in the books.
+/// Every term has its sign, and large work in and out leaves the small rest that is in the ledger.
 #[test]
 fn the_residual_is_the_balance_of_all_terms_without_cancellation() {
     let terms: [Term; 12] = [

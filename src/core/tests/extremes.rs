@@ -4,10 +4,10 @@ mod common;
 #[path = "common/features.rs"]
 mod features;
 
+#[path = "common/disk.rs"]
+mod disk;
 #[path = "common/lattice.rs"]
 mod lattice;
-#[path = "common/wheel.rs"]
-mod wheel;
 
 use nalgebra::DMatrix;
 use proptest::prelude::*;
@@ -292,7 +292,7 @@ fn kinds() -> Vec<Scene> {
     let mut scene = common::scene(3);
     features::coating(&mut scene);
     scenes.push(scene);
-    scenes.push(wheel::rub(common::scene(6), wheel::Wheel::random(6, 2, 5, 0.2, 7).cyclic()));
+    scenes.push(disk::rub(common::scene(6), disk::Disk::random(6, 2, 5, 0.2, 7).cyclic()));
     scenes.push(lattice::squeezed_by(-1e-3, [-10.0, 1.0, 0.0]));
     scenes
 }

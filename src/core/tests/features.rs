@@ -1,4 +1,4 @@
-//! Everything that is off unless a scene asks for it: books that close, states that continue, laws of mechanics.
+//! Everything that is off unless a scene asks for it: a ledger that closes, states that continue, laws of mechanics.
 
 mod common;
 #[path = "common/features.rs"]

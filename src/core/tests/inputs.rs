@@ -159,7 +159,7 @@ fn a_ramp_is_the_line_that_derivatives_would_give_one_step_later() {
             simulation.do_step(times[0], length).unwrap();
         }
     }
-    // Slip and books see the same velocity of the shaft.
+    // Slip and ledger see the same velocity of the shaft.
     for name in ["friction_loss", "external_work", "force_x", "torque", "clearance_minimum", "kinetic_energy"] {
         let [a, b] = [real(&ramp, name), real(&line, name)];
         assert!((a - b).abs() <= 1e-6 * a.abs().max(b.abs()), "{name}: {a} {b}");

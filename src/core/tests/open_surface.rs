@@ -7,7 +7,7 @@ mod casings;
 
 use casings::{Random, assert_below, distance};
 use tiprub_core::contact::gap::dot;
-use tiprub_core::contact::spline::{Place, Projection, SurfaceSpline};
+use tiprub_core::contact::spline::{ClosestPoint, Projection, SurfaceSpline};
 use tiprub_core::settings::Interpolation;
 use tiprub_reference::surface::{Surface, SurfaceKind};
 
@@ -34,12 +34,12 @@ fn open(around: usize, along: usize, kind: Interpolation) -> (SurfaceSpline, Vec
     (SurfaceSpline::open(&points, around, along, kind).unwrap(), points)
 }
 
-fn place(p: usize, q: usize, s: f64, t: f64) -> Place {
-    Place { patch: [p, q], s, t }
+fn place(p: usize, q: usize, s: f64, t: f64) -> ClosestPoint {
+    ClosestPoint { patch: [p, q], s, t }
 }
 
-/// Place of a data point.
-fn at(index: usize, around: usize, along: usize) -> Place {
+/// ClosestPoint of a data point.
+fn at(index: usize, around: usize, along: usize) -> ClosestPoint {
     let (i, j) = (index % around, index / around);
     let (p, q) = (i.min(around - 2), j.min(along - 2));
     place(p, q, (i - p) as f64, (j - q) as f64)
@@ -127,7 +127,7 @@ fn patches_join_with_two_continuous_derivatives() {
 }
 
 /// Parameters of a place over the whole grid.
-fn parameters(place: Place) -> [f64; 2] {
+fn parameters(place: ClosestPoint) -> [f64; 2] {
     [place.patch[0] as f64 + place.s, place.patch[1] as f64 + place.t]
 }
 
@@ -189,7 +189,8 @@ fn nodes_beyond_any_of_the_four_edges_have_left() {
     let points: Vec<[f64; 3]> = (0..12).map(|index| [f64::from(index % 4), f64::from(index / 4), 0.0]).collect();
     for kind in KINDS {
         let surface = SurfaceSpline::open(&points, 4, 3, kind).unwrap();
-        let beyond = |x: [f64; 3], start: Place| matches!(surface.project(x, start), Projection::BeyondEdge { .. });
+        let beyond =
+            |x: [f64; 3], start: ClosestPoint| matches!(surface.project(x, start), Projection::BeyondEdge { .. });
         for (x, y) in
             [(-0.1, 1.0), (3.1, 1.0), (1.5, -0.1), (1.5, 2.1), (-0.1, -0.1), (3.2, 2.2), (40.0, 1.0), (1.0, -70.0)]
         {

@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 use casings::*;
 use guide::told;
 use tiprub_core::contact::gap::dot;
-use tiprub_core::contact::spline::{Evaluation, Place, REACH, SurfaceSpline};
+use tiprub_core::contact::spline::{ClosestPoint, Evaluation, REACH, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
 
 #[test]
@@ -103,7 +103,7 @@ fn derivatives(evaluation: &Evaluation) -> [[f64; 3]; 6] {
 }
 
 /// Largest difference of point, first and second derivatives between two places, relative to the radius.
-fn jumps(surface: &SurfaceSpline, a: Place, b: Place) -> [f64; 3] {
+fn jumps(surface: &SurfaceSpline, a: ClosestPoint, b: ClosestPoint) -> [f64; 3] {
     let (a, b) = (derivatives(&surface.evaluate(a)), derivatives(&surface.evaluate(b)));
     let jump = |from: usize, to: usize| (from..to).map(|i| distance(a[i], b[i])).fold(0.0, f64::max) / RADIUS;
     [jump(0, 1), jump(1, 3), jump(3, 6)]
@@ -200,8 +200,9 @@ fn derivatives_are_those_of_the_point() {
         let step = 1e-3;
         let mut worst: f64 = 0.0;
         for _ in 0..100 {
-            let at = Place { s: random.within(0.1, 0.9), t: random.within(0.1, 0.9), ..random.place(&surface) };
-            let point = |i: f64, j: f64| surface.evaluate(Place { s: at.s + i * step, t: at.t + j * step, ..at }).point;
+            let at = ClosestPoint { s: random.within(0.1, 0.9), t: random.within(0.1, 0.9), ..random.place(&surface) };
+            let point =
+                |i: f64, j: f64| surface.evaluate(ClosestPoint { s: at.s + i * step, t: at.t + j * step, ..at }).point;
             // Third derivatives are constant along a parameter: two step sizes leave no truncation error.
             let first = |one: [f64; 3], other: [f64; 3], two: [f64; 3], opposite: [f64; 3]| -> [f64; 3] {
                 std::array::from_fn(|c| (8.0 * (one[c] - other[c]) - (two[c] - opposite[c])) / (12.0 * step))

@@ -3,10 +3,10 @@
 mod common;
 #[path = "common/features.rs"]
 mod common_features;
+#[path = "common/disk.rs"]
+mod disk;
 #[path = "common/lattice.rs"]
 mod lattice;
-#[path = "common/wheel.rs"]
-mod wheel;
 
 use common_features::{coating, flexible};
 use tiprub_core::persist::fingerprint;
@@ -23,8 +23,8 @@ fn scenes() -> Vec<(&'static str, Scene)> {
         change(&mut scene);
         scene
     };
-    let wheel = wheel::Wheel::random(6, 2, 9, 0.25, 5).cyclic();
-    let mut coupled = wheel::rub(common::scene(wheel.sectors), wheel);
+    let disk = disk::Disk::random(6, 2, 9, 0.25, 5).cyclic();
+    let mut coupled = disk::rub(common::scene(disk.sectors), disk);
     flexible(&mut coupled);
     coupled.settings.contacts[0].solver = Solver::Coulomb;
     vec![

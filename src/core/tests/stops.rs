@@ -23,7 +23,7 @@ fn march(system: &mut System, end: f64, mut each: impl FnMut(&System, f64)) {
         system.step(&Drive::default()).unwrap();
         each(system, system.steps() as f64 * step);
     }
-    system.close_books();
+    system.close_ledger();
 }
 
 fn residual(system: &System) -> f64 {
@@ -181,7 +181,7 @@ fn a_ball_bounces_on_a_spring_for_ever() {
                 }
                 (open, force) = (now <= 0.0, force.max(now));
             }
-            system.close_books();
+            system.close_ledger();
             let expected = ball.fall() + 19.0 * ball.period();
             assert_eq!(touches.len(), 20);
             let energy = {

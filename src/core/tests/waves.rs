@@ -1,20 +1,20 @@
 //! Waves around the circumference against closed forms: a cyclic chain pressed at rest, pressed by a casing of lobes and by
 //! whirl that travel around it, and a flexible ring under a travelling load.
 
+#[path = "common/disk.rs"]
+mod disk;
 #[path = "common/features.rs"]
 mod features;
-#[path = "common/wheel.rs"]
-mod wheel;
 
 mod common;
 
 use std::f64::consts::TAU;
 
+use disk::{Disk, rub};
 use nalgebra::{DMatrix, Matrix2, Vector2};
 use tiprub_core::settings::{LoadSettings, Meridian, Scheme, Shape, Solver};
 use tiprub_core::{Scene, Simulation};
 use tiprub_reference::closed::chain::Chain;
-use wheel::{Wheel, rub};
 
 const CHAIN: Chain = Chain { sectors: 12, mass: 0.3, spring: 2e6, coupling: 7e5, damping_ratio: 0.05 };
 /// Schemes that a chain without local flexibility can be stepped with.
@@ -29,14 +29,14 @@ fn set(simulation: &mut Simulation, name: &str, value: f64, rate: f64) {
 /// One radial degree of freedom per sector in a casing whose normal is radial; nothing turns.
 fn chain(chain: Chain, scheme: Scheme, solver: Solver, step: f64) -> Scene {
     let one = |value: f64| DMatrix::from_element(1, 1, value);
-    let wheel = Wheel {
+    let disk = Disk {
         sectors: chain.sectors,
         nodes: 1,
         mass: [one(chain.mass), one(0.0)],
         stiffness: [one(chain.spring + 2.0 * chain.coupling), one(-chain.coupling)],
         contact_map: DMatrix::from_column_slice(3, 1, &[1.0, 0.0, 0.0]),
     };
-    let mut scene = rub(common::scene(chain.sectors), wheel.cyclic());
+    let mut scene = rub(common::scene(chain.sectors), disk.cyclic());
     scene.settings.time.scheme = scheme;
     scene.settings.time.step = step;
     scene.settings.structures[0].speed = 0.0;

@@ -27,7 +27,7 @@ pub fn position(text: &str, offset: usize) -> (usize, usize) {
 }
 
 /// A key, table or value of the document. `fields` is the path without indices, as in [`FIELDS`].
-struct Place<'a> {
+struct ClosestPoint<'a> {
     path: String,
     fields: String,
     span: Range<usize>,
@@ -65,32 +65,37 @@ impl<'a> Document<'a> {
         }
     }
 
-    fn places(&self) -> Vec<Place<'a>> {
+    fn places(&self) -> Vec<ClosestPoint<'a>> {
         let mut places = Vec::new();
         collect_table(self.root, "", "", &mut places);
         places
     }
 
     /// The narrowest place that covers `span`; of equals the deepest.
-    fn covering(&self, span: &Range<usize>) -> Option<Place<'a>> {
-        let covers = |place: &Place| place.span.start <= span.start && span.end <= place.span.end;
+    fn covering(&self, span: &Range<usize>) -> Option<ClosestPoint<'a>> {
+        let covers = |place: &ClosestPoint| place.span.start <= span.start && span.end <= place.span.end;
         let candidates = self.places().into_iter().filter(covers);
         candidates.min_by_key(|place| (place.span.len(), std::cmp::Reverse(place.path.matches(['.', '[']).count())))
     }
 }
 
-fn collect_table<'a>(table: &'a DeTable<'a>, path: &str, fields: &str, places: &mut Vec<Place<'a>>) {
+fn collect_table<'a>(table: &'a DeTable<'a>, path: &str, fields: &str, places: &mut Vec<ClosestPoint<'a>>) {
     for (key, value) in table {
         let name: &str = key.get_ref();
         let join = |head: &str| if head.is_empty() { name.to_owned() } else { format!("{head}.{name}") };
         let (path, fields) = (join(path), join(fields));
-        places.push(Place { path: path.clone(), fields: fields.clone(), span: key.span(), value: value.get_ref() });
+        places.push(ClosestPoint {
+            path: path.clone(),
+            fields: fields.clone(),
+            span: key.span(),
+            value: value.get_ref(),
+        });
         collect_value(value, &path, &fields, places);
     }
 }
 
-fn collect_value<'a>(value: &'a Spanned<DeValue<'a>>, path: &str, fields: &str, places: &mut Vec<Place<'a>>) {
-    places.push(Place { path: path.into(), fields: fields.into(), span: value.span(), value: value.get_ref() });
+fn collect_value<'a>(value: &'a Spanned<DeValue<'a>>, path: &str, fields: &str, places: &mut Vec<ClosestPoint<'a>>) {
+    places.push(ClosestPoint { path: path.into(), fields: fields.into(), span: value.span(), value: value.get_ref() });
     match value.get_ref() {
         DeValue::Table(table) => collect_table(table, path, fields, places),
         DeValue::Array(array) => {
@@ -123,7 +128,7 @@ pub fn diagnose(document: &Document, error: &toml::de::Error) -> Error {
     wrong_value(document, place, message)
 }
 
-fn missing(document: &Document, place: Option<Place>, name: &str) -> Error {
+fn missing(document: &Document, place: Option<ClosestPoint>, name: &str) -> Error {
     let (path, fields) = place.as_ref().map_or(("", ""), |place| (&place.path, &place.fields));
     let join = |head: &str| if head.is_empty() { name.to_owned() } else { format!("{head}.{name}") };
     let remedy = match FIELDS.iter().find(|field| field.path == join(fields)) {
@@ -133,7 +138,7 @@ fn missing(document: &Document, place: Option<Place>, name: &str) -> Error {
     document.error(place.as_ref().map(|place| place.span.clone()), &join(path), "missing".into(), remedy)
 }
 
-fn unknown_key(document: &Document, place: &Place, name: &str, accepted: &[&str]) -> Error {
+fn unknown_key(document: &Document, place: &ClosestPoint, name: &str, accepted: &[&str]) -> Error {
     // The span is that of the key itself, or (in `shape`) that of the table which holds it.
     let is_key = place.path.rsplit('.').next() == Some(name);
     let path = if is_key { place.path.clone() } else { format!("{}.{name}", place.path) };
@@ -145,7 +150,7 @@ fn unknown_key(document: &Document, place: &Place, name: &str, accepted: &[&str]
     document.error(span.or(Some(place.span.clone())), &path, "unknown key".into(), remedy)
 }
 
-fn wrong_value(document: &Document, place: Place, message: &str) -> Error {
+fn wrong_value(document: &Document, place: ClosestPoint, message: &str) -> Error {
     let rest = message.strip_prefix("invalid type: ").or(message.strip_prefix("invalid value: "));
     let (found, expected) = rest.and_then(|rest| rest.rsplit_once(", expected ")).unzip();
     let place = match found {
@@ -181,7 +186,8 @@ pub fn check_brackets(document: &Document) -> Result<(), Error> {
         let problem = format!("{} found, {problem}", value.get_ref().type_str());
         return Err(document.error(Some(key.span()), name, problem, format!("Write {}", header(name))));
     }
-    let example = |place: &Place| INNER_TABLES.iter().find(|(table, _)| place.fields == *table).map(|(_, text)| *text);
+    let example =
+        |place: &ClosestPoint| INNER_TABLES.iter().find(|(table, _)| place.fields == *table).map(|(_, text)| *text);
     match document.places().into_iter().find(|place| example(place).is_some() && !place.value.is_table()) {
         Some(place) => {
             let problem = format!("{} found, a table expected", place.value.type_str());
@@ -193,7 +199,7 @@ pub fn check_brackets(document: &Document) -> Result<(), Error> {
 }
 
 /// The first value below `path` that the library would describe as `found`.
-fn culprit<'a>(document: &Document<'a>, path: &str, found: &str) -> Option<Place<'a>> {
+fn culprit<'a>(document: &Document<'a>, path: &str, found: &str) -> Option<ClosestPoint<'a>> {
     let below = format!("{path}.");
     document
         .places()

@@ -34,8 +34,8 @@ fn hermitian(order: usize, real: bool, value: &mut dyn FnMut() -> f64) -> DMatri
     DMatrix::from_fn(order, order, |i, j| if i <= j { upper[(i, j)] } else { upper[(j, i)].conj() })
 }
 
-/// A wheel whose nodal diameters have different numbers of coordinates.
-fn wheel(seed: u64, sectors: usize, nodes: usize, order: impl Fn(usize) -> usize) -> Rom {
+/// A disk whose nodal diameters have different numbers of coordinates.
+fn disk(seed: u64, sectors: usize, nodes: usize, order: impl Fn(usize) -> usize) -> Rom {
     let mut value = numbers(seed);
     let harmonic = |number: usize, value: &mut dyn FnMut() -> f64| {
         let real = 2 * number == sectors;
@@ -54,7 +54,7 @@ fn wheel(seed: u64, sectors: usize, nodes: usize, order: impl Fn(usize) -> usize
     let modes = if harmonics.is_empty() { 0 } else { 4 };
     let frequencies: Vec<f64> = (0..modes).map(|_| 100.0 + value()).collect();
     Rom {
-        name: "wheel".into(),
+        name: "disk".into(),
         origin: "by hand".into(),
         sectors,
         frame: Frame::Cylindrical,
@@ -78,7 +78,7 @@ proptest! {
     fn coupled_sectors_survive_writing_and_reading_bit_for_bit(
         seed in 0..u64::MAX / 2, sectors in 1..9usize, nodes in 1..4usize, orders in prop::collection::vec(1..5usize, 5),
     ) {
-        let rom = wheel(seed, sectors, nodes, |number| orders[number]);
+        let rom = disk(seed, sectors, nodes, |number| orders[number]);
         let bytes = write_rom(&rom);
         let again = read_rom(&bytes, "rom").unwrap();
         prop_assert_eq!(&again, &rom);
@@ -89,7 +89,7 @@ proptest! {
     fn any_changed_byte_is_refused_or_harmless(
         seed in 0..u64::MAX / 2, at in any::<prop::sample::Index>(), change in 1..=255u8,
     ) {
-        let rom = wheel(seed, 5, 1, |_| 2);
+        let rom = disk(seed, 5, 1, |_| 2);
         let mut bytes = write_rom(&rom);
         let index = at.index(bytes.len());
         bytes[index] ^= change;
@@ -100,7 +100,7 @@ proptest! {
 
     #[test]
     fn any_truncation_is_refused(seed in 0..u64::MAX / 2, at in any::<prop::sample::Index>()) {
-        let bytes = write_rom(&wheel(seed, 6, 2, |number| 1 + number));
+        let bytes = write_rom(&disk(seed, 6, 2, |number| 1 + number));
         prop_assert!(read_rom(&bytes[..at.index(bytes.len())], "rom").is_err());
     }
 }
@@ -108,7 +108,7 @@ proptest! {
 /// Real and imaginary part lie beside each other, last; rows before columns.
 #[test]
 fn the_layout_is_that_of_numpy_with_a_last_axis_for_the_parts() {
-    let rom = wheel(7, 4, 1, |number| 2 + number);
+    let rom = disk(7, 4, 1, |number| 2 + number);
     let file = Loose::of(&rom);
     let (shape, values) = &file.arrays["mass_1"];
     assert_eq!(shape, &[3, 3, 2]);
@@ -133,8 +133,8 @@ impl MapBits for [f64] {
 
 /// 34 coordinates at 29 nodal diameters, three contact nodes: the matrices of all nodal diameters, and little besides.
 #[test]
-fn a_wheel_of_the_reference_size_takes_a_few_megabytes() {
-    let size = write_rom(&wheel(2, 56, 3, |_| 34)).len();
+fn a_disk_of_the_reference_size_takes_a_few_megabytes() {
+    let size = write_rom(&disk(2, 56, 3, |_| 34)).len();
     let matrices = 28 * 2 * 8 * (2 * 34 * 34 + 9 * 34);
     assert!((matrices..matrices + 40_000).contains(&size), "{size} bytes, matrices above 0 take {matrices}");
 }
@@ -142,11 +142,11 @@ fn a_wheel_of_the_reference_size_takes_a_few_megabytes() {
 #[test]
 fn units_of_the_arrays_are_told_once_for_all_nodal_diameters() {
     let units = |rom: &Rom| Loose::of(rom).entries["units"].clone();
-    let coupled = units(&wheel(3, 6, 1, |_| 2));
+    let coupled = units(&disk(3, 6, 1, |_| 2));
     assert!(coupled.contains("\nmass_<n> [m, m, 2]: kg\n"), "{coupled}");
     assert!(coupled.contains("\ncontact_map_<n> [nodes, 3, m, 2]: m per unit coordinate\n"), "{coupled}");
     assert!(coupled.ends_with("\nnodal_diameters [modes]: 1"), "{coupled}");
-    let mut rom = wheel(3, 6, 1, |_| 2);
+    let mut rom = disk(3, 6, 1, |_| 2);
     rom.extras.harmonics.clear();
     rom.checks.nodal_diameters.clear();
     assert!(!units(&rom).contains("_<n>") && !units(&rom).contains("nodal_diameters"));
@@ -154,12 +154,12 @@ fn units_of_the_arrays_are_told_once_for_all_nodal_diameters() {
 
 #[track_caller]
 fn refused(sectors: usize, change: impl FnOnce(&mut Loose), parts: &[&str]) {
-    let rom = wheel(9, sectors, 1, |_| 2);
+    let rom = disk(9, sectors, 1, |_| 2);
     let mut file = Loose::of(&rom);
-    assert_eq!(read_rom(&file.bytes(), "wheel.rom").unwrap(), rom);
+    assert_eq!(read_rom(&file.bytes(), "disk.rom").unwrap(), rom);
     change(&mut file);
-    let message = read_rom(&file.bytes(), "wheel.rom").unwrap_err().to_string();
-    for part in ["wheel.rom: "].iter().chain(parts) {
+    let message = read_rom(&file.bytes(), "disk.rom").unwrap_err().to_string();
+    for part in ["disk.rom: "].iter().chain(parts) {
         assert!(message.contains(part), "{part:?} is not in {message:?}");
     }
 }
@@ -241,7 +241,7 @@ fn nodal_diameters_of_the_checks_fit_sectors_and_checks() {
 /// Taken from the file: what does not belong to nodal diameters reads as it did.
 #[test]
 fn without_the_arrays_of_nodal_diameters_sectors_are_uncoupled() {
-    let mut file = Loose::of(&wheel(9, 6, 1, |_| 2));
+    let mut file = Loose::of(&disk(9, 6, 1, |_| 2));
     let coupled: BTreeMap<_, _> = std::mem::take(&mut file.arrays);
     let kept = coupled.into_iter().filter(|(name, _)| !name.ends_with(|c: char| c.is_ascii_digit()));
     file.arrays = kept.filter(|(name, _)| name != "nodal_diameters").collect();

@@ -50,7 +50,7 @@ fn main() -> tiprub_model::Result<()> {
     for row in &reduction.convergence {
         let worst = |list: &[f64]| list.iter().copied().fold(0.0, f64::max);
         println!(
-            "eta = {:2}: {} modes of the wheel, deviation <= {:.3e} %, RCC <= {:.3e} %",
+            "eta = {:2}: {} modes of the disk, deviation <= {:.3e} %, RCC <= {:.3e} %",
             row.modes,
             row.frequency_deviation.len(),
             worst(&row.frequency_deviation),

@@ -28,7 +28,7 @@ fn main() -> Result<()> {
     }
     let (nodes, faces, sectors) = (sector.nodes.len(), sector.set("CYCLIC_LOW")?.len(), options.geometry.sectors);
     println!(
-        "wheel: {} dofs sector by sector, {} dofs in one piece",
+        "disk: {} dofs sector by sector, {} dofs in one piece",
         3 * sectors * nodes,
         3 * sectors * (nodes - faces)
     );

@@ -3,7 +3,7 @@
 //!
 //!     cargo run --release -p tiprub-model --example stage_reduction [-- default|coarse [MODES [FILE.vtu]]]
 //!
-//! With a file name, the first modes of two nodal diameters are written on the whole wheel.
+//! With a file name, the first modes of two nodal diameters are written on the whole disk.
 
 use std::path::Path;
 
@@ -32,11 +32,11 @@ fn main() -> Result<()> {
     println!("{:?}, total {:.2} s", reduction.timings, reduction.timings.total());
     if let Some(path) = arguments.get(3) {
         let sectors = options.sector.geometry.sectors;
-        let wheel = vtk::wheel(&sector_mesh(&options.sector)?.mesh, sectors);
+        let disk = vtk::disk(&sector_mesh(&options.sector)?.mesh, sectors);
         let shapes = &reduction.nodal_diameters[2].shapes;
-        let field = |k: usize| Field::vectors(format!("n2_mode{}", k + 1), vtk::on_wheel(&shapes[k], 2, sectors));
+        let field = |k: usize| Field::vectors(format!("n2_mode{}", k + 1), vtk::on_disk(&shapes[k], 2, sectors));
         let fields: Vec<Field> = (0..shapes.len().min(4)).map(field).collect();
-        vtk::write_file(Path::new(path), &wheel, &fields)?;
+        vtk::write_file(Path::new(path), &disk, &fields)?;
     }
     Ok(())
 }
@@ -50,7 +50,7 @@ fn print_frequencies(reduction: &CyclicReduction) {
 }
 
 fn print_convergence(reduction: &CyclicReduction) {
-    println!("modes per nodal diameter, of the wheel; largest deviation and criterion of its first modes (%)");
+    println!("modes per nodal diameter, of the disk; largest deviation and criterion of its first modes (%)");
     for row in &reduction.convergence {
         let largest = |list: &[f64]| list.iter().copied().fold(0.0, f64::max);
         let (deviation, criterion) = (largest(&row.frequency_deviation), largest(&row.residual_criterion));

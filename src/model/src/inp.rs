@@ -6,12 +6,12 @@ use std::path::Path;
 use crate::file::write_whole;
 use crate::{Error, Result, element::ElementKind, material::Material, mesh::Mesh};
 
-/// A sector of a wheel, for [`calculix_cyclic_input`].
+/// A sector of a disk, for [`calculix_cyclic_input`].
 #[derive(Debug, Clone, Copy)]
 pub struct CyclicSymmetry<'a> {
     /// Node sets of the two faces, the second one turned by +2π/sectors about z.
     pub faces: [&'a str; 2],
-    /// Number of sectors of the wheel.
+    /// Number of sectors of the disk.
     pub sectors: usize,
     /// Nodal diameters, a step for each.
     pub nodal_diameters: &'a [usize],
@@ -29,7 +29,7 @@ pub fn calculix_input(mesh: &Mesh, material: &Material, clamped: Option<&str>, f
     Ok(text)
 }
 
-/// As [`calculix_input`] for a sector of a wheel (`*CYCLIC SYMMETRY MODEL`): a frequency step per nodal diameter.
+/// As [`calculix_input`] for a sector of a disk (`*CYCLIC SYMMETRY MODEL`): a frequency step per nodal diameter.
 ///
 /// CalculiX lists every frequency twice, also where the mode is single (no or half as many diameters as sectors); so
 /// twice as many are asked for. Clamped nodes are left out of the faces: CalculiX refuses to tie them.

@@ -108,27 +108,27 @@ pub fn write_file(path: &Path, mesh: &Mesh, fields: &[Field]) -> Result<()> {
     write_whole(path, &write(mesh, fields)?)
 }
 
-/// The mesh of a whole wheel: copies of a sector turned about z, sector by sector; nodes on the faces are there twice.
-pub fn wheel(sector: &Mesh, sectors: usize) -> Mesh {
+/// The mesh of a whole disk: copies of a sector turned about z, sector by sector; nodes on the faces are there twice.
+pub fn disk(sector: &Mesh, sectors: usize) -> Mesh {
     let count = sector.nodes.len();
-    let mut wheel = Mesh::default();
+    let mut disk = Mesh::default();
     for copy in 0..sectors {
-        wheel.nodes.extend(sector.nodes.iter().map(|node| turned(*node, copy, sectors)));
+        disk.nodes.extend(sector.nodes.iter().map(|node| turned(*node, copy, sectors)));
         for element in &sector.elements {
             let mut element = element.clone();
             element.nodes.iter_mut().for_each(|node| *node += copy * count);
-            wheel.elements.push(element);
+            disk.elements.push(element);
         }
         for (name, nodes) in &sector.sets {
-            wheel.sets.entry(name.clone()).or_default().extend(nodes.iter().map(|node| node + copy * count));
+            disk.sets.entry(name.clone()).or_default().extend(nodes.iter().map(|node| node + copy * count));
         }
     }
-    wheel
+    disk
 }
 
-/// A mode of n nodal diameters on [`wheel`]: Re(u e^(2πi n s/N)) on sector s, turned with it.
+/// A mode of n nodal diameters on [`disk`]: Re(u e^(2πi n s/N)) on sector s, turned with it.
 #[expect(clippy::cast_precision_loss, reason = "numbers of sectors are small")]
-pub fn on_wheel(shape: &[[Complex<f64>; 3]], nodal_diameters: usize, sectors: usize) -> Vec<[f64; 3]> {
+pub fn on_disk(shape: &[[Complex<f64>; 3]], nodal_diameters: usize, sectors: usize) -> Vec<[f64; 3]> {
     let copy = |sector: usize| {
         // The remainder keeps the angle small, and its cosine exact where it can be.
         let phase = TAU * ((nodal_diameters * sector) % sectors) as f64 / sectors as f64;

@@ -1,15 +1,15 @@
-//! Cyclic-symmetric reduction against the whole wheel.
+//! Cyclic-symmetric reduction against the whole disk.
 
 mod common;
 
 use core::f64::consts::TAU;
 
-use common::wheel::{COARSE, Counts, boundary, copies, model, pencils, sector, tips};
+use common::disk::{COARSE, Counts, boundary, copies, model, pencils, sector, tips};
 use faer::Mat;
 use nalgebra::{Complex, DMatrix, DVector};
 use tiprub_model::assembly::free_dofs;
 use tiprub_model::craig_bampton::{craig_bampton, dense_modes};
-use tiprub_model::cyclic::{CyclicOptions, CyclicReduction, ModeSelection, reduce_cyclic, whole_wheel};
+use tiprub_model::cyclic::{CyclicOptions, CyclicReduction, ModeSelection, reduce_cyclic, whole_disk};
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Mesh;
 use tiprub_model::progress::silent;
@@ -17,7 +17,7 @@ use tiprub_model::reduce::full_modes;
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 
 fn options(modes: ModeSelection, checked_modes: usize) -> CyclicOptions {
-    CyclicOptions { name: "wheel".into(), modes, checked_modes, damping_ratio: 0.005 }
+    CyclicOptions { name: "disk".into(), modes, checked_modes, damping_ratio: 0.005 }
 }
 
 fn reduced(mesh: &Mesh, sectors: usize, contact: usize, options: &CyclicOptions) -> CyclicReduction {
@@ -26,7 +26,7 @@ fn reduced(mesh: &Mesh, sectors: usize, contact: usize, options: &CyclicOptions)
     reduce_cyclic(&model(mesh.clone()), mesh.set("BORE").unwrap(), &contact, &boundary, options, &silent).unwrap()
 }
 
-/// K and M of the whole wheel with its bore clamped, the free dofs, and the node of the wheel for sector and node.
+/// K and M of the whole disk with its bore clamped, the free dofs, and the node of the disk for sector and node.
 struct Whole {
     stiffness: SparseMatrix,
     mass: SparseMatrix,
@@ -36,15 +36,15 @@ struct Whole {
 }
 
 fn whole(mesh: &Mesh, sectors: usize) -> Whole {
-    let wheel = whole_wheel(mesh, &boundary(mesh, sectors)).unwrap();
-    let free = free_dofs(wheel.mesh.nodes.len(), wheel.mesh.set("BORE").unwrap());
-    let all = model(wheel.mesh.clone());
+    let disk = whole_disk(mesh, &boundary(mesh, sectors)).unwrap();
+    let free = free_dofs(disk.mesh.nodes.len(), disk.mesh.set("BORE").unwrap());
+    let all = model(disk.mesh.clone());
     let (stiffness, mass) = principal_pair(&all.stiffness, &all.mass, &free);
-    Whole { stiffness, mass, free, nodes: wheel.nodes, mesh: wheel.mesh }
+    Whole { stiffness, mass, free, nodes: disk.nodes, mesh: disk.mesh }
 }
 
-/// Frequencies of all nodal diameters as often as the wheel has them, up to where every nodal diameter's list reaches.
-fn wheel_frequencies(reduction: &CyclicReduction, sectors: usize) -> Vec<f64> {
+/// Frequencies of all nodal diameters as often as the disk has them, up to where every nodal diameter's list reaches.
+fn disk_frequencies(reduction: &CyclicReduction, sectors: usize) -> Vec<f64> {
     let lists = reduction.nodal_diameters.iter().map(|one| one.full_frequencies.as_slice());
     let ceiling = lists.map(|list| *list.last().unwrap()).fold(f64::INFINITY, f64::min);
     let mut all: Vec<f64> = reduction
@@ -61,7 +61,7 @@ fn wheel_frequencies(reduction: &CyclicReduction, sectors: usize) -> Vec<f64> {
 fn assert_same_frequencies(kind: ElementKind, sectors: usize, counts: Counts) {
     let mesh = sector(kind, sectors, counts);
     let reduction = reduced(&mesh, sectors, 2, &options(ModeSelection::Count(4), 6));
-    let cyclic = wheel_frequencies(&reduction, sectors);
+    let cyclic = disk_frequencies(&reduction, sectors);
     assert!(cyclic.len() >= 2 * sectors, "{} modes are too few to compare", cyclic.len());
     let whole = whole(&mesh, sectors);
     let full = full_modes(&whole.stiffness, &whole.mass, false, cyclic.len(), &silent).unwrap().modes.frequencies();
@@ -71,31 +71,31 @@ fn assert_same_frequencies(kind: ElementKind, sectors: usize, counts: Counts) {
 }
 
 #[test]
-fn frequencies_of_twelve_sectors_are_those_of_the_wheel() {
+fn frequencies_of_twelve_sectors_are_those_of_the_disk() {
     for kind in [ElementKind::Hex8, ElementKind::Penta6, ElementKind::Tet4] {
         assert_same_frequencies(kind, 12, COARSE);
     }
 }
 
 #[test]
-fn frequencies_of_quadratic_elements_are_those_of_the_wheel() {
+fn frequencies_of_quadratic_elements_are_those_of_the_disk() {
     assert_same_frequencies(ElementKind::Penta15, 5, COARSE);
 }
 
 #[test]
-fn frequencies_of_seven_sectors_are_those_of_the_wheel() {
+fn frequencies_of_seven_sectors_are_those_of_the_disk() {
     assert_same_frequencies(ElementKind::Hex8, 7, COARSE);
 }
 
 #[test]
-fn frequencies_of_two_and_three_sectors_are_those_of_the_wheel() {
+fn frequencies_of_two_and_three_sectors_are_those_of_the_disk() {
     let counts = Counts { around: 5, ..COARSE };
     assert_same_frequencies(ElementKind::Hex8, 2, counts);
     assert_same_frequencies(ElementKind::Hex8, 3, counts);
 }
 
 #[test]
-fn frequencies_of_fifty_six_sectors_are_those_of_the_wheel() {
+fn frequencies_of_fifty_six_sectors_are_those_of_the_disk() {
     assert_same_frequencies(ElementKind::Hex8, 56, Counts { hub: 1, along: 1, ..COARSE });
 }
 
@@ -113,7 +113,7 @@ fn squares([mass, stiffness, _]: &[DMatrix<Complex<f64>>; 3]) -> Vec<f64> {
 }
 
 #[test]
-fn craig_bampton_of_the_sector_is_that_of_the_wheel() {
+fn craig_bampton_of_the_sector_is_that_of_the_disk() {
     let sectors = 12;
     let mesh = sector(ElementKind::Hex8, sectors, COARSE);
     let (contact, limit) = (tips(&mesh, 2), 14_000.0);
@@ -136,17 +136,17 @@ fn craig_bampton_of_the_sector_is_that_of_the_wheel() {
     let kept = cyclic.len() - interface.len();
     assert!(kept > 3 * sectors, "{kept} fixed-interface modes");
     assert_eq!(reduction.rom.total_order(), cyclic.len());
-    let wheel = craig_bampton(&whole.stiffness, &whole.mass, &interface, kept, &silent).unwrap();
-    let highest = *wheel.fixed_interface_frequencies.last().unwrap();
+    let disk = craig_bampton(&whole.stiffness, &whole.mass, &interface, kept, &silent).unwrap();
+    let highest = *disk.fixed_interface_frequencies.last().unwrap();
     assert!(highest <= limit, "the limit splits the modes: {highest} Hz");
-    let full = dense_modes(&wheel.stiffness, &wheel.mass).unwrap().0;
+    let full = dense_modes(&disk.stiffness, &disk.mass).unwrap().0;
     let worst = cyclic.iter().zip(&full).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
     println!("Craig-Bampton, {} dofs: {worst:.2e}", full.len());
     assert!(worst < 1e-8, "reduced eigenvalues differ by {worst:.3e}");
 }
 
 #[test]
-fn a_force_on_one_blade_bends_the_wheel_as_in_the_full_model() {
+fn a_force_on_one_blade_bends_the_disk_as_in_the_full_model() {
     for sectors in [7, 12] {
         let mesh = sector(ElementKind::Penta6, sectors, COARSE);
         let contact = tips(&mesh, 2);

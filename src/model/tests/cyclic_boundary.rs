@@ -2,8 +2,8 @@
 
 mod common;
 
-use common::wheel::{COARSE, Counts, boundary, model, sector, tips};
-use tiprub_model::cyclic::{CyclicBoundary, CyclicOptions, ModeSelection, PairingReport, reduce_cyclic, whole_wheel};
+use common::disk::{COARSE, Counts, boundary, model, sector, tips};
+use tiprub_model::cyclic::{CyclicBoundary, CyclicOptions, ModeSelection, PairingReport, reduce_cyclic, whole_disk};
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Mesh;
 use tiprub_model::progress::silent;
@@ -150,17 +150,17 @@ fn clamping_one_face_node_clamps_its_partner() {
 }
 
 #[test]
-fn the_wheel_is_closed() {
+fn the_disk_is_closed() {
     let mesh = coarse();
-    let wheel = whole_wheel(&mesh, &boundary(&mesh, SECTORS)).unwrap();
+    let disk = whole_disk(&mesh, &boundary(&mesh, SECTORS)).unwrap();
     let per_sector = mesh.nodes.len() - mesh.set("LOW").unwrap().len();
-    assert_eq!(wheel.mesh.nodes.len(), SECTORS * per_sector);
-    assert_eq!(wheel.mesh.elements.len(), SECTORS * mesh.elements.len());
+    assert_eq!(disk.mesh.nodes.len(), SECTORS * per_sector);
+    assert_eq!(disk.mesh.elements.len(), SECTORS * mesh.elements.len());
     // Every node is where the sector's own, turned, is: also those that belong to the next sector.
-    for (s, numbers) in wheel.nodes.iter().enumerate() {
+    for (s, numbers) in disk.nodes.iter().enumerate() {
         let (sin, cos) = (core::f64::consts::TAU * s as f64 / SECTORS as f64).sin_cos();
         for (own, &number) in numbers.iter().enumerate() {
-            let ([x, y, z], [a, b, c]) = (mesh.nodes[own], wheel.mesh.nodes[number]);
+            let ([x, y, z], [a, b, c]) = (mesh.nodes[own], disk.mesh.nodes[number]);
             assert!((cos * x - sin * y - a).abs() + (sin * x + cos * y - b).abs() + (z - c).abs() < 1e-14);
         }
     }

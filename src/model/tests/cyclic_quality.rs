@@ -2,11 +2,11 @@
 
 mod common;
 
-use common::wheel::{COARSE, Counts, boundary, copies, model, pencils, sector, tips};
+use common::disk::{COARSE, Counts, boundary, copies, model, pencils, sector, tips};
 use tiprub_core::rom::{Frame, RomChecks};
 use tiprub_model::Material;
 use tiprub_model::cyclic::{
-    CyclicOptions, CyclicReduction, ModeSelection, SMALLEST_GAP, WHEEL_MODES, reduce_cyclic, whole_wheel,
+    CyclicOptions, CyclicReduction, ModeSelection, SMALLEST_GAP, WHEEL_MODES, reduce_cyclic, whole_disk,
 };
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Mesh;
@@ -14,7 +14,7 @@ use tiprub_model::progress::{Progress, silent};
 use tiprub_model::reduce::{ContactPoint, ReductionOptions, reduce};
 
 fn options(modes: ModeSelection, checked_modes: usize) -> CyclicOptions {
-    CyclicOptions { name: "wheel".into(), modes, checked_modes, damping_ratio: 0.005 }
+    CyclicOptions { name: "disk".into(), modes, checked_modes, damping_ratio: 0.005 }
 }
 
 fn reduced(mesh: &Mesh, sectors: usize, clamped: bool, options: &CyclicOptions) -> CyclicReduction {
@@ -23,16 +23,16 @@ fn reduced(mesh: &Mesh, sectors: usize, clamped: bool, options: &CyclicOptions) 
     reduce_cyclic(&model(mesh.clone()), clamped, &contact, &boundary(mesh, sectors), options, &silent).unwrap()
 }
 
-/// Values of the checks as often as the wheel has the modes.
-fn of_the_wheel(checks: &RomChecks, sectors: usize, values: &[f64]) -> Vec<f64> {
+/// Values of the checks as often as the disk has the modes.
+fn of_the_disk(checks: &RomChecks, sectors: usize, values: &[f64]) -> Vec<f64> {
     let repeated = |(&n, &value): (&u32, &f64)| vec![value; copies(n as usize, sectors)];
     checks.nodal_diameters.iter().zip(values).flat_map(repeated).collect()
 }
 
-/// The same wheel reduced as one structure, with contact at all blades.
+/// The same disk reduced as one structure, with contact at all blades.
 fn reduced_whole(mesh: &Mesh, sectors: usize, modes: usize, checked_modes: usize) -> RomChecks {
-    let wheel = whole_wheel(mesh, &boundary(mesh, sectors)).unwrap();
-    let contact: Vec<ContactPoint> = wheel
+    let disk = whole_disk(mesh, &boundary(mesh, sectors)).unwrap();
+    let contact: Vec<ContactPoint> = disk
         .nodes
         .iter()
         .enumerate()
@@ -52,8 +52,8 @@ fn reduced_whole(mesh: &Mesh, sectors: usize, modes: usize, checked_modes: usize
         frame: Frame::Cylindrical,
         damping_ratio: 0.005,
     };
-    let clamped = wheel.mesh.set("BORE").unwrap().to_vec();
-    reduce(wheel.mesh, &Material::steel(), &clamped, &contact, &options, &silent).unwrap().rom.checks
+    let clamped = disk.mesh.set("BORE").unwrap().to_vec();
+    reduce(disk.mesh, &Material::steel(), &clamped, &contact, &options, &silent).unwrap().rom.checks
 }
 
 #[track_caller]
@@ -65,7 +65,7 @@ fn assert_close(name: &str, one: &[f64], other: &[f64], relative: f64, absolute:
 }
 
 #[test]
-fn criteria_are_those_of_the_whole_wheel() {
+fn criteria_are_those_of_the_whole_disk() {
     let sectors = 5;
     let mesh = sector(ElementKind::Hex8, sectors, COARSE);
     let reduction = reduced(&mesh, sectors, true, &options(ModeSelection::UpTo(21_000.0), 4));
@@ -76,13 +76,13 @@ fn criteria_are_those_of_the_whole_wheel() {
         .map(|one| copies(one.number, sectors) * one.fixed_interface_frequencies.len())
         .sum();
     assert!(kept > 0);
-    let wheel = reduced_whole(&mesh, sectors, kept, 12);
-    let first = |values: &[f64]| of_the_wheel(checks, sectors, values)[..12].to_vec();
-    assert_close("full frequency", &first(&checks.full_frequencies), &wheel.full_frequencies, 1e-8, 0.0);
-    assert_close("reduced frequency", &first(&checks.reduced_frequencies), &wheel.reduced_frequencies, 1e-8, 0.0);
-    assert_close("deviation", &first(&checks.frequency_deviation), &wheel.frequency_deviation, 1e-4, 1e-9);
-    assert_close("criterion", &first(&checks.residual_criterion), &wheel.residual_criterion, 1e-4, 1e-9);
-    assert!(wheel.residual_criterion.iter().any(|&value| value > 1e-3), "nothing to compare");
+    let disk = reduced_whole(&mesh, sectors, kept, 12);
+    let first = |values: &[f64]| of_the_disk(checks, sectors, values)[..12].to_vec();
+    assert_close("full frequency", &first(&checks.full_frequencies), &disk.full_frequencies, 1e-8, 0.0);
+    assert_close("reduced frequency", &first(&checks.reduced_frequencies), &disk.reduced_frequencies, 1e-8, 0.0);
+    assert_close("deviation", &first(&checks.frequency_deviation), &disk.frequency_deviation, 1e-4, 1e-9);
+    assert_close("criterion", &first(&checks.residual_criterion), &disk.residual_criterion, 1e-4, 1e-9);
+    assert!(disk.residual_criterion.iter().any(|&value| value > 1e-3), "nothing to compare");
     // Without any fixed-interface mode.
     let bare = reduced_whole(&mesh, sectors, 0, 12);
     let row = &reduction.convergence[0];
@@ -102,7 +102,7 @@ fn a_row_of_the_convergence_is_a_reduction_with_that_many_modes() {
         assert_eq!((row.modes, row.total_modes), (modes, modes * sectors));
         assert_close("deviation", &row.frequency_deviation, &last.frequency_deviation, 1e-6, 1e-9);
         assert_close("criterion", &row.residual_criterion, &last.residual_criterion, 1e-6, 1e-9);
-        let all = of_the_wheel(&fewer.rom.checks, sectors, &fewer.rom.checks.residual_criterion);
+        let all = of_the_disk(&fewer.rom.checks, sectors, &fewer.rom.checks.residual_criterion);
         let count = row.residual_criterion.len();
         assert!((20..=WHEEL_MODES).contains(&count));
         assert_close("criterion of the ROM", &row.residual_criterion, &all[..count], 1e-6, 1e-9);
@@ -126,7 +126,7 @@ fn matrices_are_hermitian_and_real_where_nothing_travels() {
             if copies(n, sectors) == 1 {
                 assert!(imaginary.to_bits() == 0, "{imaginary:e} at {n}");
             } else {
-                assert!(imaginary > 1e-3, "a sheared wheel has travelling waves");
+                assert!(imaginary > 1e-3, "a sheared disk has travelling waves");
             }
             assert!((map.map(|v| v.re) - nalgebra::DMatrix::identity(9, 14)).amax() < f64::MIN_POSITIVE);
         }
@@ -150,7 +150,7 @@ fn in_the_mirror_waves_travel_the_other_way() {
     let mesh = sector(ElementKind::Hex8, sectors, COARSE);
     let one = reduced(&mesh, sectors, true, &options(ModeSelection::Count(5), 5));
     let other = reduced(&mirrored(&mesh), sectors, true, &options(ModeSelection::Count(5), 5));
-    // A wave n of the mirrored wheel is a wave -n, that is N - n, of the wheel: conjugate, with tangential components reversed.
+    // A wave n of the mirrored disk is a wave -n, that is N - n, of the disk: conjugate, with tangential components reversed.
     let sign = |i: usize| if i < 9 && i % 3 == 1 { -1.0 } else { 1.0 };
     for (n, (a, b)) in pencils(&one.rom).iter().zip(&pencils(&other.rom)).enumerate() {
         assert_close(
@@ -191,7 +191,7 @@ fn bits_do_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn a_free_wheel_has_six_rigid_body_modes() {
+fn a_free_disk_has_six_rigid_body_modes() {
     let sectors = 8;
     let mesh = sector(ElementKind::Hex8, sectors, Counts { hub: 1, ..COARSE });
     let reduction = reduced(&mesh, sectors, false, &options(ModeSelection::Count(6), 6));

@@ -175,12 +175,12 @@ fn fields_that_do_not_fit_are_refused() {
 
 /// A wave of n diameters known everywhere: what its first sector gives must come out on all of them.
 #[test]
-fn a_mode_is_expanded_to_the_wheel() {
+fn a_mode_is_expanded_to_the_disk() {
     let (mesh, sectors) = (coarse(), 56);
-    let wheel = vtk::wheel(&mesh, sectors);
-    wheel.validate().unwrap();
-    assert_eq!((wheel.nodes.len(), wheel.elements.len()), (56 * 294, 56 * 60));
-    assert_eq!(wheel.set("CONTACT").unwrap().len(), 168);
+    let disk = vtk::disk(&mesh, sectors);
+    disk.validate().unwrap();
+    assert_eq!((disk.nodes.len(), disk.elements.len()), (56 * 294, 56 * 60));
+    assert_eq!(disk.set("CONTACT").unwrap().len(), 168);
     for n in [0, 1, 5, 28] {
         let wave = |[x, y, _]: [f64; 3]| {
             let (angle, radius) = (y.atan2(x), x.hypot(y));
@@ -190,8 +190,8 @@ fn a_mode_is_expanded_to_the_wheel() {
             [cos * radial - sin * around, sin * radial + cos * around, along].map(|part| part * factor)
         };
         let shape: Vec<[Complex<f64>; 3]> = mesh.nodes.iter().map(|node| wave(*node)).collect();
-        let expanded = vtk::on_wheel(&shape, n, sectors);
-        for (node, found) in wheel.nodes.iter().zip(&expanded) {
+        let expanded = vtk::on_disk(&shape, n, sectors);
+        for (node, found) in disk.nodes.iter().zip(&expanded) {
             let expected = wave(*node).map(|part| part.re);
             assert!((0..3).all(|d| (found[d] - expected[d]).abs() < 1e-13), "{n}: {found:?} {expected:?}");
         }

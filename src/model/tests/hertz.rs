@@ -294,7 +294,7 @@ fn a_sphere_that_hits_a_block_meets_hertz() {
             impulse += now * step;
             deepest = deepest.max(-system.bank().modal_state(last, 0).0 / (0.25 * mass).sqrt());
         }
-        system.close_books();
+        system.close_ledger();
         let (kinetic, strain) = system.energies();
         let ledger = system.ledger().residual(kinetic + strain) / system.ledger().initial;
         let left = (system.bank().modal_state(last, 0).1 / step).powi(2) / (0.25 * mass * speed * speed);

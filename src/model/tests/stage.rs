@@ -35,7 +35,7 @@ fn counts_are_those_of_the_guide() {
         let size = |set: &str| mesh.set(set).unwrap().len();
         let (apart, whole) = (3 * SECTORS * mesh.nodes.len(), 3 * SECTORS * (mesh.nodes.len() - size("CYCLIC_LOW")));
         println!(
-            "{name}: {} nodes, {} elements, wheel {apart} dofs, in one piece {whole}",
+            "{name}: {} nodes, {} elements, disk {apart} dofs, in one piece {whole}",
             mesh.nodes.len(),
             mesh.elements.len()
         );
@@ -178,8 +178,8 @@ fn refinement_keeps_the_mass_and_the_stage_is_of_a_sensible_size() {
     let blade = mass(&blade_mesh(&SectorOptions::default()).unwrap().mesh);
     println!("sector {default:.6} kg, finer mesh {fine:.6} kg, coarse {coarse:.6} kg, blade {blade:.6} kg");
     assert!((default / fine - 1.0).abs() < 1e-4);
-    let wheel = 56.0 * default;
-    assert!((22.0..22.5).contains(&wheel) && (0.069..0.071).contains(&blade), "{wheel} kg, {blade} kg");
+    let disk = 56.0 * default;
+    assert!((22.0..22.5).contains(&disk) && (0.069..0.071).contains(&blade), "{disk} kg, {blade} kg");
 }
 
 fn frequencies(mesh: &Mesh, count: usize) -> Vec<f64> {

@@ -1,4 +1,4 @@
-//! The four methods on the cube between two rings, kept short: they must agree with each other, be symmetric and keep the books.
+//! The four methods on the cube between two rings, kept short: they must agree with each other, be symmetric and keep the ledger.
 
 use tiprub_reference::compare::{agreement, asymmetry};
 use tiprub_reference::cube::history::History;

@@ -48,32 +48,32 @@ pub fn try_directory(path: &Path) -> Result<()> {
 /// As [`begin`].
 pub fn try_target(target: &Path) -> Result<()> {
     match place(target)? {
-        Place::File(path) => try_directory(&parent(&path)),
-        Place::Stream => Ok(()),
+        ClosestPoint::File(path) => try_directory(&parent(&path)),
+        ClosestPoint::Stream => Ok(()),
     }
 }
 
 /// What already is under the name of a target.
-enum Place {
+enum ClosestPoint {
     /// Nothing, or a file to replace, at this path (symbolic links resolved).
     File(PathBuf),
     /// Something that takes bytes but is no file: a device or a pipe.
     Stream,
 }
 
-fn place(target: &Path) -> Result<Place> {
+fn place(target: &Path) -> Result<ClosestPoint> {
     let path = destination(target).map_err(|error| Failure::file(target, "cannot be written", &error))?;
     let is_directory = || Failure::new(target.display(), "is a directory", "Name a file");
     match fs::metadata(&path) {
         Ok(metadata) if metadata.is_dir() => Err(is_directory()),
-        Ok(metadata) if metadata.is_file() => Ok(Place::File(path)),
-        Ok(_) => Ok(Place::Stream),
+        Ok(metadata) if metadata.is_file() => Ok(ClosestPoint::File(path)),
+        Ok(_) => Ok(ClosestPoint::Stream),
         Err(error) if error.kind() == io::ErrorKind::NotFound => match path.file_name() {
-            Some(_) if !target.as_os_str().as_encoded_bytes().ends_with(b"/") => Ok(Place::File(path)),
+            Some(_) if !target.as_os_str().as_encoded_bytes().ends_with(b"/") => Ok(ClosestPoint::File(path)),
             _ => Err(is_directory()),
         },
         // A file where a directory should be: said by whoever makes the directory.
-        Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(Place::File(path)),
+        Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(ClosestPoint::File(path)),
         Err(error) => Err(Failure::file(target, "cannot be written", &error)),
     }
 }
@@ -178,13 +178,13 @@ fn link(_file: &File, _path: &Path) -> io::Result<()> {
 pub fn begin(target: &Path) -> Result<Draft> {
     let place = place(target)?;
     let directory = match &place {
-        Place::File(path) => parent(path),
-        Place::Stream => std::env::temp_dir(),
+        ClosestPoint::File(path) => parent(path),
+        ClosestPoint::Stream => std::env::temp_dir(),
     };
     create_directory(&directory)?;
     let draft = Draft::new(&directory).and_then(|draft| match &place {
-        Place::File(path) => keep_permissions(&draft.file, path).map(|()| draft),
-        Place::Stream => Ok(draft),
+        ClosestPoint::File(path) => keep_permissions(&draft.file, path).map(|()| draft),
+        ClosestPoint::Stream => Ok(draft),
     });
     draft.map_err(|error| Failure::file(target, "cannot write there", &error))
 }
@@ -202,7 +202,7 @@ fn keep_permissions(file: &File, target: &Path) -> io::Result<()> {
 /// # Errors
 /// The rename failed, and the temporary file is gone and an older target untouched; or a device or pipe took only a part.
 pub fn persist(draft: Draft, target: &Path) -> Result<()> {
-    let Place::File(path) = place(target)? else { return copy_into_stream(draft, target) };
+    let ClosestPoint::File(path) = place(target)? else { return copy_into_stream(draft, target) };
     let named = draft.name(&parent(&path));
     let renamed = named.and_then(|named| named.persist(path).map_err(|error| error.error));
     renamed.map_err(|error| Failure::file(target, "cannot be put in place", &error))

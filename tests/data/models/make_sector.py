@@ -1,4 +1,4 @@
-"""A sector of a wheel of 12 with a blade, by Gmsh; its frequencies by CalculiX. See README.md."""
+"""A sector of a disk of 12 with a blade, by Gmsh; its frequencies by CalculiX. See README.md."""
 import math, re, subprocess, tempfile
 import gmsh
 
@@ -88,7 +88,7 @@ for line in dat.splitlines():
     if seen and len(w) == 6 and w[0].isdigit():
         rows.setdefault(int(w[0]), []).append(float(w[4]))
 with open("sector_calculix.csv", "w") as f:
-    f.write("# Natural frequencies (Hz) of sector.msh in a wheel of 12 by nodal diameter, BORE held: CalculiX 2.20,\n# *SELECT CYCLIC SYMMETRY MODES, which lists every frequency twice: one of each pair is kept\nnodal_diameter,f1,f2,f3,f4\n")
+    f.write("# Natural frequencies (Hz) of sector.msh in a disk of 12 by nodal diameter, BORE held: CalculiX 2.20,\n# *SELECT CYCLIC SYMMETRY MODES, which lists every frequency twice: one of each pair is kept\nnodal_diameter,f1,f2,f3,f4\n")
     for n, fr in sorted(rows.items()):
         f.write(f"{n}," + ",".join(f"{x:.7E}" for x in sorted(fr)[0:8:2]) + "\n")
 print(run.stdout[-400:], dat[:1500])

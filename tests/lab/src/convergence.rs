@@ -1,5 +1,5 @@
 //! How many component modes the reduced disk needs: frequency deviation (eq. 13) and residual convergence criterion
-//! (eq. 12) of the lowest modes of the wheel against the number kept, as figs 9 and 10 of the paper.
+//! (eq. 12) of the lowest modes of the disk against the number kept, as figs 9 and 10 of the paper.
 
 use serde_json::json;
 use tiprub_figure::{
@@ -16,7 +16,7 @@ const RESIDUAL_LIMIT: f64 = 1.0;
 /// Where the paper's figures end, in %.
 const DEVIATION_SHOWN: f64 = 3.0;
 const RESIDUAL_SHOWN: f64 = 5.0;
-/// Modes of the wheel that the paper asks for.
+/// Modes of the disk that the paper asks for.
 const MODES: usize = 56;
 /// Changes of a frequency deviation below this are rounding of the eigenvalues (%).
 const ROUNDING: f64 = 1e-6;
@@ -71,7 +71,7 @@ impl Criterion {
             (row.total_modes as f64, modes.map(|(value, mode)| (f64::from(mode), value.abs())).collect())
         };
         Waterfall {
-            x: Axis::over("mode of the wheel (-)", [1.0, MODES as f64].into_iter()),
+            x: Axis::over("mode of the disk (-)", [1.0, MODES as f64].into_iter()),
             depth: Axis::over("component modes (-)", rows.iter().map(|row| row.total_modes as f64)).reversed(),
             value: Axis::over(self.label, [0.0, self.shown].into_iter()),
             curves: rows.iter().map(curve).collect(),
@@ -80,7 +80,7 @@ impl Criterion {
 
     fn sheet(&self, rows: &[ConvergenceRow]) -> Sheet {
         let mut sheet =
-            Sheet::new(["component modes per nodal diameter", "component modes of the wheel", "mode", self.label]);
+            Sheet::new(["component modes per nodal diameter", "component modes of the disk", "mode", self.label]);
         for row in rows {
             for (value, mode) in (self.values)(row).iter().take(MODES).zip(1_u32..) {
                 sheet.rows.push(vec![row.modes as f64, row.total_modes as f64, f64::from(mode), *value]);
@@ -93,7 +93,7 @@ impl Criterion {
         Figure {
             name: self.name,
             caption: format!(
-                "{} of the {MODES} lowest modes of the wheel against the number of component modes in the reduced model. \
+                "{} of the {MODES} lowest modes of the disk against the number of component modes in the reduced model. \
                  Values above {} % are cut off, as in the paper's figure; the numbers are whole.",
                 self.title, self.shown
             ),
@@ -106,7 +106,7 @@ impl Criterion {
         let last = rows.last().map_or(f64::NAN, |row| self.worst(row));
         let found = match self.enough(rows) {
             Some(row) => format!(
-                "below from {} per nodal diameter on ({} component modes of the wheel); at most {last:.2e} % with all of them",
+                "below from {} per nodal diameter on ({} component modes of the disk); at most {last:.2e} % with all of them",
                 row.modes, row.total_modes
             ),
             None => format!("still {last:.3} % with the most component modes"),
@@ -134,7 +134,7 @@ fn worst_figure(rows: &[ConvergenceRow]) -> Result<Figure> {
     };
     let mut sheet = Sheet::new([
         "component modes per nodal diameter",
-        "component modes of the wheel",
+        "component modes of the disk",
         CRITERIA[0].label,
         CRITERIA[1].label,
     ]);
@@ -143,13 +143,13 @@ fn worst_figure(rows: &[ConvergenceRow]) -> Result<Figure> {
     }
     Ok(Figure {
         name: "worst",
-        caption: format!("The largest value over the {MODES} lowest modes of the wheel, with the limits."),
+        caption: format!("The largest value over the {MODES} lowest modes of the disk, with the limits."),
         picture: Picture::plot(&plot)?,
         sheet,
     })
 }
 
-/// Whether modes appear by pairs: apart from those with n = 0 and n = N/2 every mode of a wheel is double. `order` holds the nodal
+/// Whether modes appear by pairs: apart from those with n = 0 and n = N/2 every mode of a disk is double. `order` holds the nodal
 /// diameters of the lowest modes, double ones twice.
 fn pairs(rows: &[ConvergenceRow], order: &[usize], sectors: usize) -> Statement {
     let values =
@@ -181,8 +181,8 @@ fn pairs(rows: &[ConvergenceRow], order: &[usize], sectors: usize) -> Statement 
     )
 }
 
-/// Nodal diameters of the lowest modes of the wheel, double ones twice, as the rows have them.
-fn wheel_order(diameters: &[NodalDiameter], sectors: usize) -> Vec<usize> {
+/// Nodal diameters of the lowest modes of the disk, double ones twice, as the rows have them.
+fn disk_order(diameters: &[NodalDiameter], sectors: usize) -> Vec<usize> {
     let copies = |number: usize| if number == 0 || 2 * number == sectors { 1 } else { 2 };
     let mut modes: Vec<(f64, usize)> = diameters
         .iter()
@@ -228,10 +228,10 @@ pub fn study(reduction: &CyclicReduction, quick: bool) -> Result<Study> {
     let rom = &reduction.rom;
     let order = rom.order();
     let mut statements: Vec<Statement> = CRITERIA.iter().map(|criterion| criterion.statement(rows)).collect();
-    let lowest = wheel_order(&reduction.nodal_diameters, rom.sectors);
+    let lowest = disk_order(&reduction.nodal_diameters, rom.sectors);
     statements.extend([pairs(rows, &lowest, rom.sectors), monotone(rows)]);
     statements.push(Statement::remark(
-        "The paper has RCC < 1 % for its 56 lowest modes from 56 component modes of the wheel on",
+        "The paper has RCC < 1 % for its 56 lowest modes from 56 component modes of the disk on",
         match CRITERIA[1].enough(rows) {
             Some(row) => format!(
                 "here from {} on. Geometry, mesh and choice of contact nodes of the paper's industrial disk are not published: \
@@ -256,7 +256,7 @@ pub fn study(reduction: &CyclicReduction, quick: bool) -> Result<Study> {
             ("sectors".into(), rom.sectors.to_string()),
             ("free degrees of freedom of one sector".into(), reduction.free_dofs.to_string()),
             ("reduced coordinates per nodal diameter".into(), format!("{order} at nodal diameter 0")),
-            ("degrees of freedom of the reduced wheel".into(), rom.total_order().to_string()),
+            ("degrees of freedom of the reduced disk".into(), rom.total_order().to_string()),
             ("largest angular frequency".into(), format!("{:.4e} rad/s", reduction.largest_angular_frequency)),
             ("time to reduce".into(), format!("{:.1} s", reduction.timings.total())),
         ],
@@ -264,7 +264,7 @@ pub fn study(reduction: &CyclicReduction, quick: bool) -> Result<Study> {
         figures,
         results: json!({
             "enough": CRITERIA.iter().map(|criterion| (criterion.name.to_string(), match criterion.enough(rows) {
-                Some(row) => json!({ "per_nodal_diameter": row.modes, "wheel": row.total_modes }),
+                Some(row) => json!({ "per_nodal_diameter": row.modes, "disk": row.total_modes }),
                 None => json!(null),
             })).collect::<serde_json::Map<_, _>>(),
             "sectors": rom.sectors,

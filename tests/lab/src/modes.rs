@@ -49,7 +49,7 @@ fn diagram(diameters: &[NodalDiameter], sectors: usize, speed: f64) -> Result<Fi
         let points = diameters
             .iter()
             .filter_map(|diameter| Some((diameter.number as f64, *diameter.full_frequencies.get(family)?)));
-        let label = if family == 0 { "modes of the wheel" } else { "" };
+        let label = if family == 0 { "modes of the disk" } else { "" };
         let points: Vec<_> = points.collect();
         series.push(Series::line("", points.clone()).drawn(Form::Thin, 0));
         series.push(Series::line(label, points).drawn(Form::Dots, 0));

@@ -79,7 +79,7 @@ fn the_judge_sees_every_way_to_fail() {
         ("load-a-step-early", "wave from that of the oscillator"),
         ("slope-of-a-lobe-1%", "tangential force from λ n_t"),
         ("coupling-of-sectors-1%", "place of any blade from the static one"),
-        ("wheel-not-mirrored", "displacements from the mirrored ones"),
+        ("disk-not-mirrored", "displacements from the mirrored ones"),
         ("heat-1%", "friction loss from ∫ µ λ |v| dt"),
         ("impact-loses-momentum-1%", "impulse from m v and µ m v"),
         ("momentum-1e-9", "change of momentum from the impulse"),

@@ -1,11 +1,11 @@
 //! Scenes that together have every feature, scheme, solver, gap law and shape.
 
+#[path = "../../../src/core/tests/common/disk.rs"]
+mod disk;
 #[path = "../../../src/core/tests/common/features.rs"]
 mod features;
 #[path = "../../../src/core/tests/common/lattice.rs"]
 mod lattice;
-#[path = "../../../src/core/tests/common/wheel.rs"]
-mod wheel;
 
 use features::{coating, flexible};
 use lattice::Side;
@@ -67,7 +67,7 @@ fn spinning(scene: &mut Scene) {
 
 /// The same blades coupled to their neighbours.
 fn coupled(scene: &mut Scene) {
-    scene.roms[0] = wheel::Wheel::random(SECTORS, 3, 12, 0.1, 7).cyclic();
+    scene.roms[0] = disk::Disk::random(SECTORS, 3, 12, 0.1, 7).cyclic();
 }
 
 fn shape(shape: Shape) -> impl Fn(&mut Scene) {

@@ -5,7 +5,7 @@
 //! gap is infinite and their normal zero.
 
 use super::gap::{Geometry, dot};
-use super::spline::{Place, Projection, SurfaceSpline};
+use super::spline::{ClosestPoint, Projection, SurfaceSpline};
 use super::spline_gap::NOTHING_TO_TOUCH;
 
 /// Displacements and penetrations beyond this share of the extent of the contact nodes are not small.
@@ -84,14 +84,20 @@ impl FreeGap {
     }
 
     /// The point of the surface at the place that a node meets (m); the node itself if it belongs to no pair.
-    pub fn contact_point(&self, node: usize, place: Place) -> [f64; 3] {
+    pub fn contact_point(&self, node: usize, place: ClosestPoint) -> [f64; 3] {
         let surface = self.surface_of[node].map(|index| &self.surfaces[index].surface);
         surface.map_or(self.positions[node], |surface| surface.evaluate(place).point)
     }
 
     /// Gaps (m), normals and places of all nodes for the displacements of the contact rows (m); closest points are sought
     /// from `guess`, or from the nearest data point.
-    pub fn evaluate(&self, displacement: &[f64], guess: Option<&[Place]>, geometry: &mut Geometry, gap: &mut [f64]) {
+    pub fn evaluate(
+        &self,
+        displacement: &[f64],
+        guess: Option<&[ClosestPoint]>,
+        geometry: &mut Geometry,
+        gap: &mut [f64],
+    ) {
         for (node, gap) in gap.iter_mut().enumerate() {
             let Some(index) = self.surface_of[node] else {
                 *gap = NOTHING_TO_TOUCH;

@@ -16,7 +16,7 @@
 use super::free_gap::{FreeGap, tangent};
 use super::layout::Layout;
 pub use super::layout::sector_angle;
-use super::spline::{Place, SurfaceSpline};
+use super::spline::{ClosestPoint, SurfaceSpline};
 use super::spline_gap::{Frame, SplineGap, faces_inwards};
 use super::surface::Surface;
 use super::wrench::{At, Motion};
@@ -63,14 +63,14 @@ pub struct Geometry {
     /// Components of the unit normal, pointing from the slave to the master.
     pub normal: [Vec<f64>; 3],
     /// Closest places on a surface spline; empty for other surfaces.
-    pub places: Vec<Place>,
+    pub places: Vec<ClosestPoint>,
 }
 
 persist_fields!(Geometry { normal, places });
 
 impl Geometry {
     fn new(len: usize, places: usize) -> Self {
-        Self { normal: [vec![0.0; len], vec![0.0; len], vec![0.0; len]], places: vec![Place::default(); places] }
+        Self { normal: [vec![0.0; len], vec![0.0; len], vec![0.0; len]], places: vec![ClosestPoint::default(); places] }
     }
 
     /// Unit normal of one node of one lane.
@@ -119,7 +119,7 @@ pub struct RevolutionGap {
 }
 
 impl RevolutionGap {
-    /// Place `rom.sectors` sectors around the axis; `clearances` holds one radial clearance (m) per sector.
+    /// ClosestPoint `rom.sectors` sectors around the axis; `clearances` holds one radial clearance (m) per sector.
     ///
     /// # Errors
     /// Wrong number of clearances.

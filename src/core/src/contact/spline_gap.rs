@@ -2,7 +2,7 @@
 
 use super::gap::{Drive, Geometry, dot};
 use super::layout::Layout;
-use super::spline::{Place, Projection, SurfaceSpline};
+use super::spline::{ClosestPoint, Projection, SurfaceSpline};
 use super::wrench::{At, Motion};
 use crate::persist::{Persist, Reader, Writer};
 
@@ -99,7 +99,7 @@ impl SplineGap {
         drive: &Drive,
         displacement: &[f64],
         moved: &[f64],
-        guess: Option<&[Place]>,
+        guess: Option<&[ClosestPoint]>,
         geometry: &mut Geometry,
         gap: &mut [f64],
     ) {
@@ -164,7 +164,7 @@ impl SplineGap {
     }
 
     /// The contact point at `place` from the shaft's centre (m), in the directions of the node.
-    pub fn contact_arm(&self, index: usize, drive: &Drive, place: Place) -> [f64; 3] {
+    pub fn contact_arm(&self, index: usize, drive: &Drive, place: ClosestPoint) -> [f64; 3] {
         let angle = self.layout.angles[index] + drive.rotor_angle - drive.shape_rotation;
         let point = Frame::new(angle).local(self.surface.evaluate(place).point);
         let shaft = self.shaft_offset(angle, drive);
@@ -173,7 +173,14 @@ impl SplineGap {
 
     /// How far prescribed motion of the surface has taken it along `normal` at a contact point, `arm` from the shaft's
     /// centre (m, directions of the node).
-    pub fn surface_motion(&self, at: At<'_>, arm: [f64; 3], normal: [f64; 3], place: Place, motion: &Motion) -> f64 {
+    pub fn surface_motion(
+        &self,
+        at: At<'_>,
+        arm: [f64; 3],
+        normal: [f64; 3],
+        place: ClosestPoint,
+        motion: &Motion,
+    ) -> f64 {
         if motion.casing_rests() {
             return 0.0;
         }
@@ -238,7 +245,7 @@ pub fn faces_inwards(normal: [f64; 3]) -> bool {
     sideways <= -normal[0]
 }
 
-impl Persist for Place {
+impl Persist for ClosestPoint {
     fn save(&self, writer: &mut Writer) {
         for part in self.patch {
             u64::try_from(part).unwrap_or(u64::MAX).save(writer);

@@ -10,7 +10,7 @@
 //! through data points x is the contact point on the surface, where the force is handed to its control points.
 
 use super::gap::{Drive, GapLaw};
-use super::spline::Place;
+use super::spline::ClosestPoint;
 use super::spline_gap::Frame;
 
 /// A contact force on the master in fixed directions.
@@ -118,7 +118,7 @@ impl GapLaw {
     /// What tells the contact point of a node displaced by `moved` (m, own directions) whose closest point is `place`: the
     /// displacement itself on surfaces of revolution, else the point from the shaft's centre or the origin (m).
     #[inline(always)]
-    pub fn contact_point(&self, at: At<'_>, moved: [f64; 3], places: &[Place]) -> [f64; 3] {
+    pub fn contact_point(&self, at: At<'_>, moved: [f64; 3], places: &[ClosestPoint]) -> [f64; 3] {
         match self {
             Self::Fixed(_) | Self::Revolution(_) => moved,
             Self::Spline(law) => law.contact_arm(at.index, at.drive, places[at.index]),
@@ -176,7 +176,7 @@ impl GapLaw {
         at: At<'_>,
         point: [f64; 3],
         normal: [f64; 3],
-        places: &[Place],
+        places: &[ClosestPoint],
         motion: &Motion,
     ) -> f64 {
         match self {

@@ -1,4 +1,4 @@
-//! The two kinds of sectors a step can be made of: uncoupled ones, and a wheel of coupled ones.
+//! The two kinds of sectors a step can be made of: uncoupled ones, and a disk of coupled ones.
 
 use super::bank::{BankOptions, ModalBank};
 use super::cyclic::{CyclicBank, CyclicModel};
@@ -11,7 +11,7 @@ use crate::settings::Scheme;
 pub enum SectorModel<'a> {
     /// Those of one uncoupled sector, and the number of sectors.
     Uncoupled(&'a ModalModel, usize),
-    /// Those of the whole wheel.
+    /// Those of the whole disk.
     Coupled(&'a CyclicModel),
 }
 
@@ -21,7 +21,7 @@ pub enum SectorModel<'a> {
 pub enum Sectors {
     /// Sectors that do not know of each other.
     Uncoupled(ModalBank),
-    /// Sectors of one elastic wheel.
+    /// Sectors of one elastic disk.
     Coupled(CyclicBank),
 }
 
@@ -74,7 +74,7 @@ impl Sectors {
         /// modal loads.
         resample[mut](scheme: Scheme, new_step: f64, forces: &[f64]);
         /// Static equilibrium under modal loads: of every sector, or of nodal diameter 0.
-        settle[mut](push: &[f64]);
+        settle[mut](modal_load: &[f64]);
         /// Recompute the contact displacements from the modal state (after setting it).
         recover[mut]();
         /// Everything at rest and undeformed.
@@ -109,12 +109,12 @@ impl Sectors {
         if let Self::Uncoupled(bank) = self { Some(bank) } else { None }
     }
 
-    /// The wheel of coupled sectors.
+    /// The disk of coupled sectors.
     pub fn coupled(&self) -> Option<&CyclicBank> {
         if let Self::Coupled(bank) = self { Some(bank) } else { None }
     }
 
-    /// The wheel of coupled sectors, to set initial conditions.
+    /// The disk of coupled sectors, to set initial conditions.
     pub fn coupled_mut(&mut self) -> Option<&mut CyclicBank> {
         if let Self::Coupled(bank) = self { Some(bank) } else { None }
     }

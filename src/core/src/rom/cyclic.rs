@@ -7,7 +7,7 @@
 //! ```
 //!
 //! with C_n the contact map and M_n, K_n the Hermitian matrices of one sector. The factors w_n make the transformation
-//! unitary: kinetic and strain energy of the whole wheel are the sums of ½ żᴴM_nż and ½ zᴴK_nz (D. L. Thomas, Int. J. Num.
+//! unitary: kinetic and strain energy of the whole disk are the sums of ½ żᴴM_nż and ½ zᴴK_nz (D. L. Thomas, Int. J. Num.
 //! Meth. Eng. 14, 1979). Sector s + 1 is sector s turned by +2π/N about z; n > 0 is a wave e^(i n 2π s/N).
 
 use nalgebra::{Complex, DMatrix};

@@ -37,9 +37,9 @@ impl Compiled {
             return refuse("parameter `scheme`", "`massless-boundary` does not take the Coriolis force", remedy);
         }
         let left = |modes: usize| modes == 0;
-        let none_left = self.wheel.as_ref().map_or_else(
+        let none_left = self.disk.as_ref().map_or_else(
             || left(self.model.dynamic_modes(scheme)),
-            |wheel| wheel.diameters.iter().any(|diameter| left(diameter.dynamic_modes(scheme))),
+            |disk| disk.diameters.iter().any(|diameter| left(diameter.dynamic_modes(scheme))),
         );
         if scheme == Scheme::MasslessBoundary && none_left {
             let problem =
@@ -54,9 +54,9 @@ impl Compiled {
     /// What is legal in the ROMs and at the start, and hardly meant.
     pub fn doubts(&self) -> Vec<String> {
         let (master, rom) = self.master();
-        let mut doubts = match &self.wheel {
-            Some(wheel) => {
-                plausibility::of_rom(rom, wheel.diameters.iter().flat_map(|one| one.frequencies.iter().copied()))
+        let mut doubts = match &self.disk {
+            Some(disk) => {
+                plausibility::of_rom(rom, disk.diameters.iter().flat_map(|one| one.frequencies.iter().copied()))
             }
             None => plausibility::of_rom(rom, self.model.frequencies.iter().copied()),
         };

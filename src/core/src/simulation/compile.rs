@@ -24,7 +24,7 @@ use super::slave_surface::{Carrier, spline_law};
 
 /// Gaps, casing shapes and displacements beyond this share of the radius are not what the model describes.
 pub const SMALL_FRACTION: f64 = 0.1;
-/// Most contact nodes of all sectors together that a flexible slave or the wheel couples: their Delassus matrix is dense.
+/// Most contact nodes of all sectors together that a flexible slave or the disk couples: their Delassus matrix is dense.
 pub const MOST_COUPLED: usize = 2000;
 
 /// Places of values that the step reads.
@@ -96,7 +96,7 @@ pub struct Compiled {
     /// Modes of the master, at the reference speed where spin stiffens it; of coupled sectors those of nodal diameter 0.
     pub model: ModalModel,
     /// Modes of the master where its sectors are coupled.
-    pub wheel: Option<CyclicModel>,
+    pub disk: Option<CyclicModel>,
     /// Speed whose stiffness `model` has (rad/s).
     pub reference_speed: f64,
     /// Lowest and highest eigenvalue of the modal stiffness per Ω² and per Ω⁴, where spin stiffens the master.
@@ -152,7 +152,7 @@ impl Compiled {
             roles,
             model,
             free,
-            wheel: wheel(scene, roles.master)?,
+            disk: disk(scene, roles.master)?,
             reference_speed: 0.0,
             stiffness_range: None,
             carrier,
@@ -185,13 +185,13 @@ impl Compiled {
 
     /// Largest angular frequency of the master (rad/s), of all nodal diameters where its sectors are coupled.
     pub fn largest_frequency(&self) -> f64 {
-        self.wheel.as_ref().map_or_else(|| self.model.largest_frequency(), CyclicModel::largest_frequency)
+        self.disk.as_ref().map_or_else(|| self.model.largest_frequency(), CyclicModel::largest_frequency)
     }
 
     /// Speed (rad/s) below which tips that vibrate by their clearance in the lowest mode move faster than they slide.
     pub fn slow_sliding(&self) -> f64 {
-        let frequencies = match &self.wheel {
-            Some(wheel) => wheel.diameters.iter().flat_map(|diameter| &diameter.frequencies).collect(),
+        let frequencies = match &self.disk {
+            Some(disk) => disk.diameters.iter().flat_map(|diameter| &diameter.frequencies).collect(),
             None => self.model.frequencies.iter().collect::<Vec<_>>(),
         };
         let lowest = frequencies.into_iter().copied().filter(|value| *value > 0.0).fold(f64::INFINITY, f64::min);
@@ -315,9 +315,9 @@ impl Compiled {
         }
         let lanes = crate::dynamics::bank::lanes(rom.sectors);
         let contacts = rom.sectors * rom.contact_nodes.len();
-        if (self.wheel.is_some() || self.roles.carrier.is_some()) && contacts > MOST_COUPLED {
+        if (self.disk.is_some() || self.roles.carrier.is_some()) && contacts > MOST_COUPLED {
             return Err(Error::invalid(
-                if self.wheel.is_some() { "ROM metadata `sectors`" } else { "surface.structure" },
+                if self.disk.is_some() { "ROM metadata `sectors`" } else { "surface.structure" },
                 format!("{contacts} contact nodes of all sectors together, coupled, more than {MOST_COUPLED}"),
                 "Use fewer contact nodes or sectors, or uncoupled sectors on a rigid surface",
             ));
@@ -330,7 +330,7 @@ impl Compiled {
             sticking: self.may_stick(),
         };
         let uncoupled = SectorModel::Uncoupled(&self.model, rom.sectors);
-        let model = self.wheel.as_ref().map_or(uncoupled, SectorModel::Coupled);
+        let model = self.disk.as_ref().map_or(uncoupled, SectorModel::Coupled);
         Ok(System::with_parts(model, law, self.system_settings(), parts))
     }
 
@@ -408,7 +408,7 @@ impl Compiled {
     /// Whether `coulomb` can be chosen: a coupled problem of all sectors has room for it only if the scene says so.
     pub fn may_stick(&self) -> bool {
         let contact = self.contact();
-        let small = self.roles.carrier.is_none() && self.wheel.is_none() && self.free.is_none();
+        let small = self.roles.carrier.is_none() && self.disk.is_none() && self.free.is_none();
         contact.solver == Solver::Coulomb || (small && contact.friction > 0.0 && contact.coating.is_none())
     }
 }
@@ -420,7 +420,7 @@ fn modes(scene: &Scene, index: usize, speed: f64) -> Result<ModalModel> {
 }
 
 /// Modes of coupled sectors.
-fn wheel(scene: &Scene, index: usize) -> Result<Option<CyclicModel>> {
+fn disk(scene: &Scene, index: usize) -> Result<Option<CyclicModel>> {
     let (structure, rom) = (&scene.settings.structures[index], &scene.roms[index]);
     let ratio = structure.damping_ratio.unwrap_or(rom.damping_ratio);
     rom.is_cyclic().then(|| CyclicModel::from_rom(rom, ratio)).transpose()

@@ -42,7 +42,7 @@ pub struct Limits {
     parameters: Parameters,
     /// Warnings for the step expected, or why these parameters are refused, whatever the sense of slip.
     outcome: Result<Vec<String>>,
-    /// Slip in +θ and in −θ; of a wheel, for which it takes long, only what was asked for.
+    /// Slip in +θ and in −θ; of a disk, for which it takes long, only what was asked for.
     senses: [Option<Sense>; 2],
     /// Steps of massless-boundary; infinite for other schemes.
     massless: MasslessLimit,
@@ -180,8 +180,8 @@ impl Compiled {
             return self.free_limits(parameters, free, law);
         }
         let parameters = parameters.clone();
-        let mut models = match &self.wheel {
-            Some(wheel) => (0..wheel.diameters.len()).map(|diameter| wheel.paired(diameter)).collect(),
+        let mut models = match &self.disk {
+            Some(disk) => (0..disk.diameters.len()).map(|diameter| disk.paired(diameter)).collect(),
             None => vec![self.model.clone()],
         };
         // Of mistuned blades the stiffest has the tightest limits.
@@ -203,8 +203,8 @@ impl Compiled {
             Err(error) => (Err(error), MasslessLimit::NONE),
         };
         let mut senses = [None, None];
-        // Of a wheel the other sense takes as long again; without friction nothing slides.
-        let both = self.wheel.is_none() || parameters.friction == 0.0;
+        // Of a disk the other sense takes as long again; without friction nothing slides.
+        let both = self.disk.is_none() || parameters.friction == 0.0;
         if outcome.is_ok() {
             for sense in senses_of(if both { 0.0 } else { parameters.sense }) {
                 senses[sense] = Some(at.sense(sense, expected));
@@ -325,7 +325,7 @@ struct Checking<'a> {
     models: Vec<ModalModel>,
     parameters: Parameters,
     /// Per sense of slip (+, −) and combination of nodes the model that grows most at the step to expect. At other steps
-    /// only this one is looked at: with all nodal diameters of a wheel at all steps the check would take a minute.
+    /// only this one is looked at: with all nodal diameters of a disk at all steps the check would take a minute.
     watched: [Vec<usize>; 2],
 }
 
@@ -361,7 +361,7 @@ impl Checking<'_> {
         let senses: Vec<Vec<ContactDirections>> =
             self.models.iter().map(|model| [1.0, -1.0].map(|sense| self.directions(model, sense)).into()).collect();
         let largest = self.parameters.step;
-        if self.compiled.wheel.is_some() {
+        if self.compiled.disk.is_some() {
             stability::check_solvable_together(&self.models, scheme, largest, friction, &senses)?;
         } else {
             stability::check_solvable(&self.models[0], scheme, largest, friction, &senses[0])?;
@@ -446,9 +446,9 @@ impl Checking<'_> {
     /// The slave's modes as the real part of a nodal diameter sees them. One blade in contact has an equal share of all
     /// nodal diameters, so that the softest of them bounds what the slave adds.
     fn seen_by(&self, diameter: usize, seen: DMatrix<f64>) -> DMatrix<f64> {
-        let Some(wheel) = &self.compiled.wheel else { return seen };
+        let Some(disk) = &self.compiled.disk else { return seen };
         let rows = self.models[diameter].contact_modes.nrows() / 3;
-        let weight = wheel.weight(diameter);
+        let weight = disk.weight(diameter);
         DMatrix::from_fn(rows, seen.ncols(), |i, j| if i < seen.nrows() { weight * seen[(i, j)] } else { 0.0 })
     }
 
@@ -476,11 +476,11 @@ impl Checking<'_> {
         self.directions(model, 1.0).into_iter().map(|(normal, _)| normal).collect()
     }
 
-    /// Sets of closed contact nodes: all combinations of a few; of many every one alone, neighbours, and all; of a wheel,
+    /// Sets of closed contact nodes: all combinations of a few; of many every one alone, neighbours, and all; of a disk,
     /// on all sectors, every one alone and all.
     fn combinations(&self) -> Vec<Vec<usize>> {
         let nodes = self.compiled.master().1.contact_nodes.len();
-        if self.compiled.wheel.is_some() {
+        if self.compiled.disk.is_some() {
             return (0..nodes).map(|node| vec![node]).chain([(0..nodes).collect()]).collect();
         }
         if nodes <= ALL_COMBINATIONS_UP_TO {
@@ -541,7 +541,7 @@ impl Checking<'_> {
         let names: Vec<&str> =
             nodes.iter().map(|node| self.compiled.master().1.contact_nodes[*node].name.as_str()).collect();
         let direction = if sense > 0.0 { "+θ" } else { "−θ" };
-        let where_closed = if self.compiled.wheel.is_some() { " of all sectors" } else { "" };
+        let where_closed = if self.compiled.disk.is_some() { " of all sectors" } else { "" };
         format!(
             "with µ = {}, contact closed at {}{where_closed} and sliding in {direction}",
             shown(self.parameters.friction),

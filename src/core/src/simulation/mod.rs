@@ -289,14 +289,14 @@ impl Simulation {
     fn settle(&mut self, speed: f64) {
         let loads = &self.compiled.loads;
         if !loads.centrifugal.is_empty() {
-            let mut push = vec![0.0; loads.centrifugal.len()];
-            loads.fill_master(speed, &mut push);
-            self.system.bank_mut().settle(&push);
+            let mut load = vec![0.0; loads.centrifugal.len()];
+            loads.fill_master(speed, &mut load);
+            self.system.bank_mut().settle(&load);
         }
         if let (true, [slave, ..]) = (loads.on_slave(), self.system.slaves_mut()) {
-            let mut push = vec![0.0; slave.bank.modes()];
-            loads.fill_slave(&self.inputs, 0.0, &mut push);
-            slave.bank.settle(&push);
+            let mut load = vec![0.0; slave.bank.modes()];
+            loads.fill_slave(&self.inputs, 0.0, &mut load);
+            slave.bank.settle(&load);
         }
     }
 

@@ -65,7 +65,7 @@ impl Simulation {
     pub fn update_outputs(&mut self) {
         let elapsed = self.communication.offset(self.communication.done);
         let mean = if elapsed > 0.0 && self.communication.length > 0.0 { 1.0 / elapsed } else { 0.0 };
-        self.system.close_books();
+        self.system.close_ledger();
         let (mut energies, mut conserved) = ((0.0, 0.0), 0.0);
         if self.system.settings().ledger {
             let (kinetic, strain) = self.system.energies();

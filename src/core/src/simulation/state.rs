@@ -42,7 +42,7 @@ impl Persist for Phase {
     }
 }
 
-/// Nothing in a structure or in its books is as large, in any unit; squares and products stay far from overflow.
+/// Nothing in a structure or in its ledger is as large, in any unit; squares and products stay far from overflow.
 const LARGEST: f64 = 1e50;
 
 /// What the rest of a state follows from: read and checked before anything is changed.

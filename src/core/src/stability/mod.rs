@@ -390,9 +390,9 @@ mod tests {
 
     /// Pressing node 1 pushes the tip of node 2 along its slip: W = c(I + µτ e₂e₁ᵀ), whose symmetric part is definite for
     /// µτ < 2. Few contacts are solvable beyond, as the minors of a triangular matrix are those of its diagonal; of many that is
-    /// not shown, nor of the nodal diameters of a wheel.
+    /// not shown, nor of the nodal diameters of a disk.
     #[test]
-    fn many_contacts_and_wheels_need_a_definite_symmetric_part() {
+    fn many_contacts_and_disks_need_a_definite_symmetric_part() {
         let (turned, step) = (2.5, 1e-5);
         let pressed = |nodes: usize| ModalModel {
             frequencies: vec![1000.0; nodes],
@@ -409,19 +409,19 @@ mod tests {
         let alone = |nodes: usize, friction: f64| {
             check_solvable(&pressed(nodes), Scheme::ModalExact, step, friction, &closed(nodes))
         };
-        let wheel = |nodes: usize, friction: f64| {
+        let disk = |nodes: usize, friction: f64| {
             check_solvable_together(&[pressed(nodes)], Scheme::ModalExact, step, friction, &[closed(nodes)])
         };
         let bound = 2.0 / turned;
         for outcome in
-            [alone(MINORS_UP_TO + 1, 1.01 * bound), wheel(2, 1.01 * bound), wheel(MINORS_UP_TO + 1, 1.01 * bound)]
+            [alone(MINORS_UP_TO + 1, 1.01 * bound), disk(2, 1.01 * bound), disk(MINORS_UP_TO + 1, 1.01 * bound)]
         {
             let refusal = outcome.unwrap_err().to_string();
             assert!(refusal.contains("µ below 0.8000") && refusal.contains("positive definite"), "{refusal}");
         }
         assert!(alone(MINORS_UP_TO, 10.0 * bound).is_ok());
         for friction in [0.0, 0.99 * bound] {
-            assert!(alone(MINORS_UP_TO + 1, friction).is_ok() && wheel(2, friction).is_ok());
+            assert!(alone(MINORS_UP_TO + 1, friction).is_ok() && disk(2, friction).is_ok());
         }
         // Redundant contacts, two nodes that move as one, are no loss: W is singular.
         let mut twice = pressed(MINORS_UP_TO + 1);

@@ -2,7 +2,7 @@
 
 use super::{ContactEvent, Member, Slave, StepFailure, System, frame_of};
 use crate::contact::gap::{GapLaw, dot};
-use crate::contact::spline::Place;
+use crate::contact::spline::ClosestPoint;
 use crate::contact::wrench::At;
 use crate::persist::{Persist, Reader, Writer};
 
@@ -174,7 +174,7 @@ impl System {
         let mut saved = self.state.clone();
         saved.restore(&mut reader.clone());
         self.state.check(reader);
-        let exists = |(index, place): (usize, &Place)| {
+        let exists = |(index, place): (usize, &ClosestPoint)| {
             self.law.surface_of(index / self.lanes).is_none_or(|surface| surface.has_patch(*place))
         };
         if !saved.geometry.places.iter().enumerate().all(exists) {

@@ -70,7 +70,7 @@ impl System {
         Ok(())
     }
 
-    /// Sectors coupled through the slave or as a wheel: the nodes that penetrate or touched last, then those that their solution
+    /// Sectors coupled through the slave or as a disk: the nodes that penetrate or touched last, then those that their solution
     /// makes penetrate, until there are none.
     pub(super) fn solve_coupled(&mut self, drive: &Drive) -> Result<(), StepFailure> {
         if self.lowest.iter().all(|gap| *gap >= -LEAST_PENETRATION) {
@@ -240,7 +240,7 @@ impl System {
                 return;
             }
             Sectors::Uncoupled(bank) => fill_sectors(matrix, bank, members, rows, columns, per),
-            Sectors::Coupled(wheel) => fill_wheel(matrix, wheel, members, rows, columns, per),
+            Sectors::Coupled(disk) => fill_disk(matrix, disk, members, rows, columns, per),
         }
         for (carrier, slave) in self.slaves.iter_mut().enumerate() {
             slave.clear_members();
@@ -384,17 +384,17 @@ impl System {
         }
     }
 
-    /// Change of the gaps of a wheel: every force moves every sector.
+    /// Change of the gaps of a disk: every force moves every sector.
     #[inline(never)]
     fn respond_together(&mut self) {
         for member in 0..self.members.len() {
             self.member_forces[member] = self.force_on(member);
         }
-        let Sectors::Coupled(wheel) = &mut self.bank else { return };
+        let Sectors::Coupled(disk) = &mut self.bank else { return };
         let forces = self.members.iter().zip(&self.member_forces);
-        wheel.ask(forces.map(|(member, force)| (member.sector, member.node, *force)));
-        let (sectors, lanes, [across, around, along]) = (wheel.sectors(), wheel.lanes(), &self.state.geometry.normal);
-        let nodes = wheel.moved().chunks_exact(3 * lanes).zip(self.response.chunks_exact_mut(lanes));
+        disk.ask(forces.map(|(member, force)| (member.sector, member.node, *force)));
+        let (sectors, lanes, [across, around, along]) = (disk.sectors(), disk.lanes(), &self.state.geometry.normal);
+        let nodes = disk.moved().chunks_exact(3 * lanes).zip(self.response.chunks_exact_mut(lanes));
         let normals = across.chunks_exact(lanes).zip(around.chunks_exact(lanes)).zip(along.chunks_exact(lanes));
         for ((moved, response), ((across, around), along)) in nodes.zip(normals) {
             for lane in 0..sectors {
@@ -422,15 +422,15 @@ impl System {
         }
     }
 
-    /// Let the solution that was responded to last act on a wheel.
+    /// Let the solution that was responded to last act on a disk.
     #[inline(never)]
     fn apply_together(&mut self) {
         for member in 0..self.members.len() {
             self.state.gap[self.members[member].index] = self.corrected[member];
             self.record(member, self.member_forces[member]);
         }
-        if let Sectors::Coupled(wheel) = &mut self.bank {
-            wheel.act();
+        if let Sectors::Coupled(disk) = &mut self.bank {
+            disk.act();
         }
     }
 
@@ -509,42 +509,42 @@ fn fill_sectors(
     }
 }
 
-/// W of nodes of a wheel of coupled sectors with `per` directions each.
+/// W of nodes of a disk of coupled sectors with `per` directions each.
 #[inline(never)]
-fn fill_wheel(
+fn fill_disk(
     matrix: &mut DMatrix<f64>,
-    wheel: &CyclicBank,
+    disk: &CyclicBank,
     members: &[Member],
     rows: &[[f64; 3]],
     columns: &[[f64; 3]],
     per: usize,
 ) {
     match per {
-        1 => wheel.instruction_set().run(FillWheel::<1> { matrix, wheel, members, rows, columns }),
-        _ => wheel.instruction_set().run(FillWheel::<3> { matrix, wheel, members, rows, columns }),
+        1 => disk.instruction_set().run(FillDisk::<1> { matrix, disk, members, rows, columns }),
+        _ => disk.instruction_set().run(FillDisk::<3> { matrix, disk, members, rows, columns }),
     }
 }
 
 /// The same as a kernel.
-struct FillWheel<'a, const PER: usize> {
+struct FillDisk<'a, const PER: usize> {
     matrix: &'a mut DMatrix<f64>,
-    wheel: &'a CyclicBank,
+    disk: &'a CyclicBank,
     members: &'a [Member],
     rows: &'a [[f64; 3]],
     columns: &'a [[f64; 3]],
 }
 
-impl<const PER: usize> Kernel for FillWheel<'_, PER> {
+impl<const PER: usize> Kernel for FillDisk<'_, PER> {
     #[inline(always)]
     fn run(self) {
-        let Self { matrix, wheel, members, rows, columns } = self;
-        let (sectors, leading) = (wheel.sectors(), matrix.nrows());
+        let Self { matrix, disk, members, rows, columns } = self;
+        let (sectors, leading) = (disk.sectors(), matrix.nrows());
         let targets = matrix.as_mut_slice().chunks_exact_mut(PER * leading);
         let columns = columns.as_chunks::<PER>().0;
         for ((column, directions), targets) in members.iter().zip(columns).zip(targets) {
             for ((other, row), across) in members.iter().enumerate().zip(rows.as_chunks::<PER>().0) {
                 let difference = row.sector + if row.sector < column.sector { sectors } else { 0 } - column.sector;
-                let [first, second, third] = wheel.flexibility(difference, column.node, row.node);
+                let [first, second, third] = disk.flexibility(difference, column.node, row.node);
                 for (along, direction) in directions.iter().enumerate() {
                     let mut moved = [0.0; 4];
                     for i in 0..4 {

@@ -1,11 +1,11 @@
-//! One internal step: prediction, gaps, correction (section 4.3 of the paper), and the books kept on the way.
+//! One internal step: prediction, gaps, correction (section 4.3 of the paper), and the ledger kept on the way.
 
-mod books;
 mod continuation;
 mod group;
 mod slave;
 mod small;
 mod witness;
+mod work;
 
 use crate::contact::coating::{CoatedProblem, Coating};
 use crate::contact::coulomb::CoulombSolver;
@@ -198,7 +198,7 @@ pub struct System {
     bank: Sectors,
     /// Lanes of a row of the sectors.
     lanes: usize,
-    /// All contacts form one group: through slaves, the wheel, or as those of one free structure.
+    /// All contacts form one group: through slaves, the disk, or as those of one free structure.
     coupled: bool,
     slaves: Vec<Slave>,
     law: GapLaw,
@@ -219,7 +219,7 @@ pub struct System {
     coating_share: Vec<f64>,
     /// Change of all gaps by the solution of a coupled group.
     response: Vec<f64>,
-    /// Forces on the members of a group of a wheel.
+    /// Forces on the members of a group of a disk.
     member_forces: Vec<[f64; 3]>,
     /// Contact force on the rows of one sector.
     force: Vec<f64>,
@@ -425,7 +425,7 @@ impl System {
         self.settings.solver = solver;
     }
 
-    /// Clear history and books, take the present modal state as initial, and evaluate the gaps at `drive`.
+    /// Clear history and ledger, take the present modal state as initial, and evaluate the gaps at `drive`.
     pub fn start(&mut self, drive: &Drive) {
         self.bank.recover();
         self.bank.collect_loss();
@@ -469,7 +469,7 @@ impl System {
     }
 
     /// Move the damping loss gathered in the step kernel to the ledger.
-    pub fn close_books(&mut self) {
+    pub fn close_ledger(&mut self) {
         let loss = self.bank.collect_loss();
         self.state.ledger.damping_loss.add(loss);
         for slave in &mut self.slaves {
@@ -520,7 +520,7 @@ impl System {
 
     /// Contact forces of the last step act on the modes with inertia.
     fn act_delayed(&mut self) {
-        // A wheel of coupled sectors keeps its forces until it predicts.
+        // A disk of coupled sectors keeps its forces until it predicts.
         let Sectors::Uncoupled(bank) = &mut self.bank else { return };
         let lanes = bank.lanes();
         for sector in 0..bank.sectors() {

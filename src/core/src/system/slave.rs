@@ -2,7 +2,7 @@
 
 use super::Solution;
 use crate::contact::gap::GapLaw;
-use crate::contact::spline::{Place, SurfaceSpline};
+use crate::contact::spline::{ClosestPoint, SurfaceSpline};
 use crate::contact::spline_gap::Frame;
 use crate::dynamics::bank::{BankOptions, ModalBank};
 use crate::dynamics::modal::ModalModel;
@@ -102,7 +102,7 @@ impl Slave {
     }
 
     /// Add a lasting contact force on the master (N, in the directions of `frame`) whose reaction acts on a place.
-    pub fn add_lasting(&mut self, surface: &SurfaceSpline, place: Place, frame: Frame, force: [f64; 3]) {
+    pub fn add_lasting(&mut self, surface: &SurfaceSpline, place: ClosestPoint, frame: Frame, force: [f64; 3]) {
         let force = frame.fixed(force);
         for (index, weight) in surface.weights(place).iter() {
             for (component, value) in force.iter().enumerate() {
@@ -122,23 +122,23 @@ impl Slave {
     }
 
     /// Half the displacement of a place over the last two steps, in the directions of `frame` (m).
-    pub fn moved(&self, surface: &SurfaceSpline, place: Place, frame: Frame) -> [f64; 3] {
+    pub fn moved(&self, surface: &SurfaceSpline, place: ClosestPoint, frame: Frame) -> [f64; 3] {
         let (now, oldest) = (self.bank.displacement(), &self.oldest);
         frame.local(self.at(surface, place, |row| 0.5 * (now[row] - oldest[row])))
     }
 
     /// Displacement of a place over the last step, in the directions of `frame` (m).
-    pub fn moved_last(&self, surface: &SurfaceSpline, place: Place, frame: Frame) -> [f64; 3] {
+    pub fn moved_last(&self, surface: &SurfaceSpline, place: ClosestPoint, frame: Frame) -> [f64; 3] {
         let (now, before) = (self.bank.displacement(), self.bank.displacement_before());
         frame.local(self.at(surface, place, |row| now[row] - before[row]))
     }
 
     /// Displacement of a place by the last [`Slave::respond`], in the directions of `frame` (m).
-    pub fn responded(&self, surface: &SurfaceSpline, place: Place, frame: Frame) -> [f64; 3] {
+    pub fn responded(&self, surface: &SurfaceSpline, place: ClosestPoint, frame: Frame) -> [f64; 3] {
         frame.local(self.at(surface, place, |row| self.response[row]))
     }
 
-    fn at(&self, surface: &SurfaceSpline, place: Place, value: impl Fn(usize) -> f64) -> [f64; 3] {
+    fn at(&self, surface: &SurfaceSpline, place: ClosestPoint, value: impl Fn(usize) -> f64) -> [f64; 3] {
         let mut sum = [0.0; 3];
         for (index, weight) in surface.weights(place).iter() {
             for (component, sum) in sum.iter_mut().enumerate() {
@@ -158,7 +158,7 @@ impl Slave {
         &mut self,
         member: usize,
         surface: &SurfaceSpline,
-        place: Place,
+        place: ClosestPoint,
         frame: Frame,
         rows: &[[f64; 3]],
         columns: &[[f64; 3]],

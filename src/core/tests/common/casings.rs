@@ -5,7 +5,7 @@
 use std::f64::consts::TAU;
 
 use tiprub_core::contact::gap::dot;
-use tiprub_core::contact::spline::{Place, SurfaceSpline};
+use tiprub_core::contact::spline::{ClosestPoint, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
 
 pub const RADIUS: f64 = 0.25;
@@ -32,8 +32,12 @@ impl Random {
         ((self.next() * count as f64) as usize).min(count - 1)
     }
 
-    pub fn place(&mut self, surface: &SurfaceSpline) -> Place {
-        Place { patch: [self.below(surface.around()), self.below(surface.along() - 1)], s: self.next(), t: self.next() }
+    pub fn place(&mut self, surface: &SurfaceSpline) -> ClosestPoint {
+        ClosestPoint {
+            patch: [self.below(surface.around()), self.below(surface.along() - 1)],
+            s: self.next(),
+            t: self.next(),
+        }
     }
 }
 
@@ -104,8 +108,8 @@ pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     dot(apart, apart).sqrt()
 }
 
-pub fn place(p: usize, q: usize, s: f64, t: f64) -> Place {
-    Place { patch: [p, q], s, t }
+pub fn place(p: usize, q: usize, s: f64, t: f64) -> ClosestPoint {
+    ClosestPoint { patch: [p, q], s, t }
 }
 
 /// The larger of two errors and an absolute bound on it, reported when it fails.

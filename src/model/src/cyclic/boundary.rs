@@ -167,7 +167,7 @@ fn check_sectors(sectors: usize) -> Result<()> {
         return Ok(());
     }
     let problem = format!("{sectors} sectors, 2 to {MAX_SECTORS} are possible");
-    refuse(problem, "Give the number of sectors of the whole wheel")
+    refuse(problem, "Give the number of sectors of the whole disk")
 }
 
 fn check_indices<'a>(count: usize, face_nodes: impl Iterator<Item = &'a usize>) -> Result<()> {

@@ -3,6 +3,7 @@
 mod boundary;
 mod component;
 mod condense;
+mod disk;
 mod families;
 mod lanczos;
 mod operator;
@@ -10,16 +11,15 @@ mod parallel;
 mod quality;
 mod reduction;
 mod sector;
-mod wheel;
 
 use nalgebra::Complex;
 use tiprub_core::Rom;
 
 pub use boundary::PairingReport;
+pub use disk::{WholeDisk, whole_disk};
 pub use families::SMALLEST_GAP;
 pub use quality::WHEEL_MODES;
 pub use reduction::reduce_cyclic;
-pub use wheel::{WholeWheel, whole_wheel};
 
 use crate::reduce::Timings;
 
@@ -64,7 +64,7 @@ pub struct CyclicOptions {
 pub struct NodalDiameter {
     /// Its number n.
     pub number: usize,
-    /// Frequencies of the full model (Hz), ascending. With 0 < 2n < sectors each stands for two modes of the wheel.
+    /// Frequencies of the full model (Hz), ascending. With 0 < 2n < sectors each stands for two modes of the disk.
     pub full_frequencies: Vec<f64>,
     /// Frequencies of the reduced model (Hz), as many.
     pub reduced_frequencies: Vec<f64>,
@@ -78,14 +78,14 @@ pub struct NodalDiameter {
     pub shapes: Vec<Vec<[Complex<f64>; 3]>>,
 }
 
-/// Quality of one number of fixed-interface modes per nodal diameter, over the lowest modes of the whole wheel.
+/// Quality of one number of fixed-interface modes per nodal diameter, over the lowest modes of the whole disk.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConvergenceRow {
     /// Fixed-interface modes per nodal diameter η.
     pub modes: usize,
-    /// Of the whole wheel.
+    /// Of the whole disk.
     pub total_modes: usize,
-    /// Frequency deviation (%) of each of the lowest modes of the wheel, double ones twice, ascending in frequency.
+    /// Frequency deviation (%) of each of the lowest modes of the disk, double ones twice, ascending in frequency.
     pub frequency_deviation: Vec<f64>,
     /// Residual convergence criterion (%) of the same modes.
     pub residual_criterion: Vec<f64>,

@@ -7,7 +7,7 @@ use super::reduction::sorted_checks;
 use super::{ConvergenceRow, NodalDiameter};
 use crate::Result;
 
-/// Modes of the whole wheel whose convergence is followed (figs 9 and 10 of the paper).
+/// Modes of the whole disk whose convergence is followed (figs 9 and 10 of the paper).
 pub const WHEEL_MODES: usize = 56;
 
 /// Eq. 13 (%). A rigid-body mode has no frequency to deviate from.
@@ -32,24 +32,24 @@ pub(super) fn merged(diameters: &[NodalDiameter]) -> RomChecks {
     sorted_checks(list.collect())
 }
 
-/// One of the lowest modes of the wheel: its nodal diameter and its place there.
+/// One of the lowest modes of the disk: its nodal diameter and its place there.
 #[derive(Debug, Clone, Copy)]
-struct WheelMode {
+struct DiskMode {
     square: f64,
     nodal_diameter: usize,
     place: usize,
 }
 
-/// The lowest modes of the wheel, double ones twice. Beyond the lowest of the last computed ones of the nodal diameters
+/// The lowest modes of the disk, double ones twice. Beyond the lowest of the last computed ones of the nodal diameters
 /// the list would have holes, and ends.
-fn wheel_modes(full: &[&[f64]], sectors: usize) -> Vec<WheelMode> {
+fn disk_modes(full: &[&[f64]], sectors: usize) -> Vec<DiskMode> {
     let ceiling =
         full.iter().map(|list| list.last().copied().unwrap_or(f64::NEG_INFINITY)).fold(f64::INFINITY, f64::min);
-    let mut modes: Vec<WheelMode> = Vec::new();
+    let mut modes: Vec<DiskMode> = Vec::new();
     for (nodal_diameter, list) in full.iter().enumerate() {
         let copies = if nodal_diameter == 0 || 2 * nodal_diameter == sectors { 1 } else { 2 };
         for (place, &square) in list.iter().enumerate().filter(|&(_, &square)| square <= ceiling) {
-            modes.extend(core::iter::repeat_n(WheelMode { square, nodal_diameter, place }, copies));
+            modes.extend(core::iter::repeat_n(DiskMode { square, nodal_diameter, place }, copies));
         }
     }
     modes.sort_by(|a, b| a.square.total_cmp(&b.square).then(a.nodal_diameter.cmp(&b.nodal_diameter)));
@@ -57,9 +57,9 @@ fn wheel_modes(full: &[&[f64]], sectors: usize) -> Vec<WheelMode> {
     modes
 }
 
-/// Eqs 12 and 13 of the lowest modes of the wheel for 0, 1, 2 ... fixed-interface modes per nodal diameter.
+/// Eqs 12 and 13 of the lowest modes of the disk for 0, 1, 2 ... fixed-interface modes per nodal diameter.
 pub(super) fn convergence(components: &[&Component], full: &[&[f64]], sectors: usize) -> Result<Vec<ConvergenceRow>> {
-    let modes = wheel_modes(full, sectors);
+    let modes = disk_modes(full, sectors);
     let most = components.iter().map(|component| component.squares.len()).min().unwrap_or(0);
     let hertz = |square: f64| square.max(0.0).sqrt() / core::f64::consts::TAU;
     let row = |count: usize| {

@@ -1,4 +1,4 @@
-//! From the model of one sector to a checked reduced-order model of the wheel.
+//! From the model of one sector to a checked reduced-order model of the disk.
 
 use std::time::Instant;
 
@@ -26,11 +26,11 @@ struct Found {
     seconds: [f64; 2],
 }
 
-/// Reduce one sector of a wheel to its contact nodes and fixed-interface modes, for every nodal diameter.
+/// Reduce one sector of a disk to its contact nodes and fixed-interface modes, for every nodal diameter.
 ///
 /// The reduced coordinates of nodal diameter n are the radial, tangential and axial displacements of the contact nodes, node by node, then the
 /// fixed-interface modes, so `contact_map` is \[I 0\]; see [`tiprub_core::rom::Harmonic`] for how they make the
-/// displacements of sector s. A wheel without clamped nodes keeps its rigid-body modes, in nodal diameters 0 and 1. The bits of the
+/// displacements of sector s. A disk without clamped nodes keeps its rigid-body modes, in nodal diameters 0 and 1. The bits of the
 /// result do not depend on the number of threads.
 ///
 /// # Errors

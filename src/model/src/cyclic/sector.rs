@@ -90,7 +90,7 @@ impl Sector {
     }
 }
 
-/// Clamped nodes; a face node whose partner is clamped is so, too, since both are one node of the wheel.
+/// Clamped nodes; a face node whose partner is clamped is so, too, since both are one node of the disk.
 fn held_nodes(count: usize, clamped: &[usize], boundary: &CyclicBoundary) -> Vec<bool> {
     let mut held = vec![false; count];
     for &node in clamped {

@@ -52,7 +52,7 @@ pub struct DiskGeometry {
 /// One sector of a bladed disk.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SectorGeometry {
-    /// Number of sectors of the wheel.
+    /// Number of sectors of the disk.
     pub sectors: usize,
     /// The blade.
     pub blade: BladeGeometry,

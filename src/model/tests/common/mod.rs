@@ -2,7 +2,7 @@
 #![allow(dead_code)] // Every test binary uses its own part of these helpers.
 
 pub mod casing;
-pub mod wheel;
+pub mod disk;
 
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::{Element, Mesh};

@@ -13,12 +13,12 @@
 pub mod augmented;
 pub mod bars;
 pub mod complementarity;
+pub mod disk;
 pub mod modes;
 pub mod moreau;
 pub mod penalty;
 pub mod ring;
 pub mod rub;
-pub mod wheel;
 
 use modes::Modes;
 

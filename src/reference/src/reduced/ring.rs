@@ -18,7 +18,7 @@ fn basis(x: f64) -> [f64; 3] {
 }
 
 /// Point, derivatives along ξ and η, and ξξ, ξη, ηη of a place.
-pub type Place = [Vector3<f64>; 6];
+pub type ClosestPoint = [Vector3<f64>; 6];
 
 /// The interpolation problem of a grid.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +54,7 @@ impl Ring {
         (&self.interpolation * columns).row_iter().map(|row| Vector3::new(row[0], row[1], row[2])).collect()
     }
 
-    /// Control points that meet at a place in grid steps, with value and derivatives of their weight as in [`Place`].
+    /// Control points that meet at a place in grid steps, with value and derivatives of their weight as in [`ClosestPoint`].
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_possible_wrap,
@@ -86,7 +86,7 @@ impl Ring {
     }
 
     /// The surface at a place in grid steps.
-    pub fn at(&self, control: &[Vector3<f64>], xi: f64, eta: f64) -> Place {
+    pub fn at(&self, control: &[Vector3<f64>], xi: f64, eta: f64) -> ClosestPoint {
         let mut place = [Vector3::zeros(); 6];
         for (index, weights) in self.local(xi, eta) {
             for (part, weight) in place.iter_mut().zip(weights) {
@@ -106,7 +106,12 @@ impl Ring {
     }
 
     /// Closest place to a point by Newton's method from a guess; `None` where it does not settle.
-    pub fn closest(&self, control: &[Vector3<f64>], point: Vector3<f64>, guess: [f64; 2]) -> Option<([f64; 2], Place)> {
+    pub fn closest(
+        &self,
+        control: &[Vector3<f64>],
+        point: Vector3<f64>,
+        guess: [f64; 2],
+    ) -> Option<([f64; 2], ClosestPoint)> {
         let [mut xi, mut eta] = guess;
         for _ in 0..30 {
             let place = self.at(control, xi, eta);

@@ -70,8 +70,8 @@ impl Prediction {
         let stiffening = structure.spin.stiffening && !rom.is_cyclic();
         let (mut speeds, mut frequencies) = (vec![0.0], Vec::new());
         if rom.is_cyclic() {
-            let wheel = CyclicModel::from_rom(rom, rom.damping_ratio).map_err(in_rom)?;
-            frequencies.push(wheel.diameters.iter().map(|diameter| hertz(&diameter.frequencies)).collect());
+            let disk = CyclicModel::from_rom(rom, rom.damping_ratio).map_err(in_rom)?;
+            frequencies.push(disk.diameters.iter().map(|diameter| hertz(&diameter.frequencies)).collect());
         } else if stiffening {
             speeds = (0..GRID).map(|index| fastest * index as f64 / (GRID - 1) as f64).collect();
             for speed in &speeds {

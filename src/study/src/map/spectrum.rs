@@ -114,7 +114,7 @@ impl Analyser {
 /// A local maximum of a spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
-    /// Place in bins, refined between them.
+    /// ClosestPoint in bins, refined between them.
     pub bin: f64,
     /// Amplitude there.
     pub amplitude: f64,
@@ -147,7 +147,7 @@ fn lobe(distance: f64) -> f64 {
     if angle.abs() < 1e-9 { 1.0 } else { angle.sin() / (angle * (1.0 - distance * distance)) }
 }
 
-/// Place (in spacings from the middle) and height of the top of the parabola through three equidistant values, of which the
+/// ClosestPoint (in spacings from the middle) and height of the top of the parabola through three equidistant values, of which the
 /// middle one is the largest; the middle itself where there is no such parabola.
 pub fn parabola([before, here, after]: [f64; 3]) -> (f64, f64) {
     let bend = before - 2.0 * here + after;

@@ -75,7 +75,7 @@ impl Case {
         let scene = self.scene(self.friction, false);
         let seen = [run(&scene, STEP).map_err(named)?, run(&scene, 0.5 * STEP).map_err(named)?];
         let stays_round =
-            matches!(self.feature, Feature::Revolution | Feature::Spline | Feature::Wheel | Feature::Coating);
+            matches!(self.feature, Feature::Revolution | Feature::Spline | Feature::Disk | Feature::Coating);
         let free_of_friction = self.solver.0 != Solver::Coulomb && stays_round;
         let round = free_of_friction.then(|| run(&self.scene(0.0, true), STEP).map_err(named)).transpose()?;
         Ok(Row { case: *self, seen, round: round.map(|seen| seen.axis_moment) })

@@ -31,9 +31,9 @@ pub enum Feature {
     /// Flexible casing.
     Casing,
     /// Coupled sectors in a rigid casing.
-    Wheel,
+    Disk,
     /// Coupled sectors in a flexible casing.
-    WheelInCasing,
+    DiskInCasing,
     /// Coating on a rigid casing.
     Coating,
     /// A free body between an elastic and a rigid plate.
@@ -43,7 +43,7 @@ pub enum Feature {
 impl Feature {
     /// All of them.
     pub const ALL: [Self; 7] =
-        [Self::Revolution, Self::Spline, Self::Casing, Self::Wheel, Self::WheelInCasing, Self::Coating, Self::Free];
+        [Self::Revolution, Self::Spline, Self::Casing, Self::Disk, Self::DiskInCasing, Self::Coating, Self::Free];
 
     /// For the table.
     pub fn name(self) -> &'static str {
@@ -51,8 +51,8 @@ impl Feature {
             Self::Revolution => "surface of revolution",
             Self::Spline => "rigid spline",
             Self::Casing => "flexible casing",
-            Self::Wheel => "coupled sectors",
-            Self::WheelInCasing => "coupled sectors, flexible casing",
+            Self::Disk => "coupled sectors",
+            Self::DiskInCasing => "coupled sectors, flexible casing",
             Self::Coating => "coating",
             Self::Free => "free body",
         }
@@ -61,7 +61,7 @@ impl Feature {
     /// What is known of the other side.
     pub fn side(self) -> Side {
         match self {
-            Self::Revolution | Self::Wheel => Side::Surface,
+            Self::Revolution | Self::Disk => Side::Surface,
             Self::Coating => Side::Dented,
             _ => Side::ControlPoints,
         }
@@ -69,15 +69,15 @@ impl Feature {
 
     /// The rotor's scene; `None` for the free body.
     fn rotor(self) -> Option<Scene> {
-        let wheel = || Tower { neighbour: 1e6, ..Tower::default() }.rom();
+        let disk = || Tower { neighbour: 1e6, ..Tower::default() }.rom();
         let mut scene = match self {
-            Self::Wheel | Self::WheelInCasing => bumps(wheel()),
+            Self::Disk | Self::DiskInCasing => bumps(disk()),
             Self::Free => return None,
             _ => bumps(blade(12)),
         };
         match self {
             Self::Spline => scene.settings.surfaces[0].spline = Some(SplineSettings::default()),
-            Self::Casing | Self::WheelInCasing => on_ring(&mut scene, 0.01),
+            Self::Casing | Self::DiskInCasing => on_ring(&mut scene, 0.01),
             Self::Coating => {
                 scene.settings.contacts[0].coating = Some(CoatingSettings {
                     thickness: 1.5e-4,
@@ -283,7 +283,7 @@ fn modal_residual(system: &System, expected: &[Vec<f64>]) -> f64 {
 fn surface_of<'a>(
     simulation: &'a Simulation,
     event: &ContactEvent,
-) -> Option<(&'a SurfaceSpline, tiprub_core::contact::spline::Place, f64)> {
+) -> Option<(&'a SurfaceSpline, tiprub_core::contact::spline::ClosestPoint, f64)> {
     let system = simulation.system();
     let place = *system.geometry().places.get(event.node * system.bank().lanes() + event.sector)?;
     match system.law() {

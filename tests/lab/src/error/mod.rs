@@ -12,7 +12,7 @@ use bars::Bars;
 use case::Case;
 use cube::Cube;
 use rotor::Rotor;
-use stage::Wheel;
+use stage::Disk;
 use tiprub_gallery::rom_cache::RomCache;
 use tiprub_shell::{Failure, Result, console::Console};
 use tiprub_study::{
@@ -51,6 +51,6 @@ fn case_of(scene: ErrorScene, quick: bool, cache: &RomCache, console: &Console) 
         ErrorScene::Rotor37Light => Box::new(Rotor::new(false, quick, cache, console)?),
         ErrorScene::Rotor37Heavy => Box::new(Rotor::new(true, quick, cache, console)?),
         ErrorScene::Cube => Box::new(Cube::new(quick, cache, console)?),
-        ErrorScene::Stage => Box::new(Wheel::new(quick, cache, console)?),
+        ErrorScene::Stage => Box::new(Disk::new(quick, cache, console)?),
     })
 }

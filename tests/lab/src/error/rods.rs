@@ -142,7 +142,7 @@ impl Run for RodRun<'_> {
             let forces = self.system.events().iter().map(|event| event.normal);
             seen.add(self.system.steps() as f64 * self.step, self.step, forces, self.system.gap(0, 0));
         }
-        self.system.close_books();
+        self.system.close_ledger();
         Ok(())
     }
 

@@ -4,7 +4,7 @@ use nalgebra::Complex;
 use tiprub_core::{Rom, Scene, settings::Shape};
 use tiprub_gallery::{builtin::DiskModel, rom_cache::RomCache, scene_source};
 use tiprub_model::{cyclic::ModeSelection, stage::StageOptions};
-use tiprub_reference::reduced::wheel::{Casing, Pencil, Stage, StageScene};
+use tiprub_reference::reduced::disk::{Casing, Pencil, Stage, StageScene};
 use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
@@ -39,7 +39,7 @@ const OUTSIDE_DIVISIONS: [u32; 3] = [8, 16, 32];
 const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 5e-6, margin: 2e-5 };
 
 /// The stage with several numbers of component modes.
-pub struct Wheel {
+pub struct Disk {
     sizes: Vec<(usize, Scene, StageScene)>,
     divisions: Vec<u32>,
     references: (u32, u32),
@@ -47,7 +47,7 @@ pub struct Wheel {
     parting: Vec<f64>,
 }
 
-impl Wheel {
+impl Disk {
     /// Reduce the disk on its coarse mesh with several numbers of modes (or take it from the cache).
     ///
     /// # Errors
@@ -64,11 +64,11 @@ impl Wheel {
         }
         let divisions = if quick { QUICK_DIVISIONS.to_vec() } else { DIVISIONS.to_vec() };
         let (references, samples) = if quick { (QUICK_REFERENCES, QUICK_SAMPLES) } else { (REFERENCES, SAMPLES) };
-        let mut wheel = Self { sizes, divisions, references, samples, parting: Vec::new() };
-        wheel.parting = window::parting(&wheel, PARTING_DIVISION, LONG * samples)
+        let mut disk = Self { sizes, divisions, references, samples, parting: Vec::new() };
+        disk.parting = window::parting(&disk, PARTING_DIVISION, LONG * samples)
             .map_err(|problem| Failure::new("stage", problem, "Report this to the developers"))?;
-        wheel.samples = window::samples(&wheel.parting, samples);
-        Ok(wheel)
+        disk.samples = window::samples(&disk.parting, samples);
+        Ok(disk)
     }
 }
 
@@ -116,7 +116,7 @@ fn outside(scene: &Scene) -> Option<StageScene> {
     })
 }
 
-impl Case for Wheel {
+impl Case for Disk {
     fn name(&self) -> &'static str {
         "stage"
     }

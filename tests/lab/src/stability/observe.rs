@@ -189,7 +189,7 @@ impl Watch {
     }
 
     /// Books that close, and entries that have their physical signs: contact takes energy, friction heats.
-    pub fn books(&self) -> Vec<Check> {
+    pub fn laws(&self) -> Vec<Check> {
         vec![
             Check::so("all outputs finite", self.finite),
             Check::at_most("ledger residual", self.residual, 1e-9),
@@ -200,7 +200,7 @@ impl Watch {
 
     /// The same for a scheme: massless-boundary takes contact forces a step late, and gives back a little of what it took.
     pub fn books_of(&self, scheme: Scheme) -> Vec<Check> {
-        let mut checks = self.books();
+        let mut checks = self.laws();
         if scheme == Scheme::MasslessBoundary {
             checks[2].bound = MASSLESS_RETURN;
         }

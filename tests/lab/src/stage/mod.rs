@@ -79,9 +79,9 @@ impl Setup {
     fn new(mut scene: Scene, quick: bool) -> Result<Self> {
         let disk = &scene.roms[0];
         let in_scene = |error| Failure::from_core("scene `stage`", error);
-        let wheel = CyclicModel::from_rom(disk, disk.damping_ratio).map_err(in_scene)?;
-        let frequency = wheel.diameters[2].frequencies[0] / std::f64::consts::TAU;
-        let second_resonance = wheel.diameters.get(SHOWN[1]).map_or(f64::NAN, |modes| modes.frequencies[0] / 4.0);
+        let disk = CyclicModel::from_rom(disk, disk.damping_ratio).map_err(in_scene)?;
+        let frequency = disk.diameters[2].frequencies[0] / std::f64::consts::TAU;
+        let second_resonance = disk.diameters.get(SHOWN[1]).map_or(f64::NAN, |modes| modes.frequencies[0] / 4.0);
         // The load alone makes the casing oval here; the scene that ships adds a shape, which importers need not drive.
         scene.settings.surfaces[0].shape = Shape::Circular {};
         let amplitude = (1.0 + OVERLAP) * scene.settings.contacts[0].gap / flexibility(&scene)?;

@@ -3,7 +3,7 @@
 //! Between its creases the surface is a smooth sheet with its own closest point, which may lie on a crease.
 
 use super::foot::{Foot, Held, noise};
-use super::{Ends, Place, SurfaceSpline};
+use super::{ClosestPoint, Ends, SurfaceSpline};
 use crate::contact::gap::dot;
 use crate::settings::Interpolation;
 
@@ -36,9 +36,9 @@ impl SurfaceSpline {
     }
 
     /// The place across the creases on these sides, where they are near.
-    fn across(&self, foot: &Foot, sides: [i8; 2]) -> Option<Place> {
+    fn across(&self, foot: &Foot, sides: [i8; 2]) -> Option<ClosestPoint> {
         let (room, [length_s, _, length_t]) = (self.room(foot.place), foot.metric());
-        let Place { patch: [p, q], s, t } = foot.place;
+        let ClosestPoint { patch: [p, q], s, t } = foot.place;
         let near = |side: i8, position: f64, [low, high]: [f64; 2], length: f64| {
             let distance = if side < 0 { position - low } else { high - position };
             side == 0 || distance * distance * length <= 8.0 * foot.half_square || distance <= 0.0
@@ -63,7 +63,11 @@ impl SurfaceSpline {
             1 if self.interpolation == Interpolation::Facets && q + 2 < self.along => (q + 1, 0.0),
             _ => return None,
         };
-        Some(Place { patch: [column, ring], s, t: if sides[0] == 0 { t } else { t.clamp(room[1][0], room[1][1]) } })
+        Some(ClosestPoint {
+            patch: [column, ring],
+            s,
+            t: if sides[0] == 0 { t } else { t.clamp(room[1][0], room[1][1]) },
+        })
     }
 
     /// On a crease, the sheet whose normal is nearest to the direction of the node.

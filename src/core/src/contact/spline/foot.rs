@@ -2,7 +2,7 @@
 //!
 //! f = ½|x − S|², r = x − S: gradient −(S_s·r, S_t·r), Hessian [S_s·S_s − r·S_ss, S_s·S_t − r·S_st; …].
 
-use super::{Evaluation, Place, Projection, SurfaceSpline};
+use super::{ClosestPoint, Evaluation, Projection, SurfaceSpline};
 use crate::contact::gap::dot;
 
 /// Tangents closer to parallel than this (squared sine) are no surface.
@@ -24,7 +24,7 @@ pub(super) enum Held {
 /// A point of the surface as seen from the node.
 #[derive(Clone, Copy)]
 pub(super) struct Foot {
-    pub place: Place,
+    pub place: ClosestPoint,
     pub evaluation: Evaluation,
     /// x − S.
     pub residual: [f64; 3],
@@ -37,12 +37,12 @@ pub(super) struct Foot {
 pub(super) type Room = [[f64; 2]; 2];
 
 impl Foot {
-    pub fn at(surface: &SurfaceSpline, x: [f64; 3], place: Place) -> Self {
+    pub fn at(surface: &SurfaceSpline, x: [f64; 3], place: ClosestPoint) -> Self {
         Self::seen(x, place, surface.evaluate(place))
     }
 
     #[inline(always)]
-    pub fn seen(x: [f64; 3], place: Place, evaluation: Evaluation) -> Self {
+    pub fn seen(x: [f64; 3], place: ClosestPoint, evaluation: Evaluation) -> Self {
         let residual: [f64; 3] = std::array::from_fn(|i| x[i] - evaluation.point[i]);
         Self { place, evaluation, residual, half_square: 0.5 * dot(residual, residual), held: [Held::No; 2] }
     }

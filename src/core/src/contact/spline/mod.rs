@@ -59,7 +59,7 @@ enum Ends {
 
 /// A place on the surface: a patch and the parameters in it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Place {
+pub struct ClosestPoint {
     /// Patch (p, q): p < around (around − 1 of an open surface) counts around from the first data point, q < along − 1
     /// along the axis.
     pub patch: [usize; 2],
@@ -262,13 +262,13 @@ impl SurfaceSpline {
     }
 
     /// Whether a place is on a patch that exists.
-    pub fn has_patch(&self, place: Place) -> bool {
+    pub fn has_patch(&self, place: ClosestPoint) -> bool {
         place.patch[0] < self.columns() && place.patch[1] < self.along - 1
     }
 
-    /// Place at about the angle and the axial position of a point (m), on the edge for points beyond it, or the nearest
+    /// ClosestPoint at about the angle and the axial position of a point (m), on the edge for points beyond it, or the nearest
     /// data point of an open surface: the start for [`SurfaceSpline::project`] when there is none from the last step.
-    pub fn locate(&self, point: [f64; 3]) -> Place {
+    pub fn locate(&self, point: [f64; 3]) -> ClosestPoint {
         if self.ends == Ends::Open {
             return self.nearest_data_point(point);
         }
@@ -276,28 +276,28 @@ impl SurfaceSpline {
         let (p, s) = split((turns - turns.floor()) * real(self.around), self.around);
         let q = self.rings[1..self.along - 1].iter().filter(|axial| **axial <= point[2]).count();
         let t = (point[2] - self.rings[q]) / (self.rings[q + 1] - self.rings[q]);
-        Place { patch: [p, q], s, t: if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 } }
+        ClosestPoint { patch: [p, q], s, t: if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 } }
     }
 
-    fn nearest_data_point(&self, point: [f64; 3]) -> Place {
+    fn nearest_data_point(&self, point: [f64; 3]) -> ClosestPoint {
         let square = |data: &[f64; 3]| (0..3).map(|i| (point[i] - data[i]) * (point[i] - data[i])).sum::<f64>();
         let nearest = self.data.iter().map(square).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
         let index = nearest.map_or(0, |(index, _)| index);
         let (p, q) = (index % self.around, index / self.around);
         let patch = [p.min(self.around - 2), q.min(self.along - 2)];
-        Place { patch, s: real(p - patch[0]), t: real(q - patch[1]) }
+        ClosestPoint { patch, s: real(p - patch[0]), t: real(q - patch[1]) }
     }
 
     /// The place `turns` revolutions about z further, to start from when the rotor has turned; on closed surfaces only.
-    pub fn advance(&self, place: Place, turns: f64) -> Place {
+    pub fn advance(&self, place: ClosestPoint, turns: f64) -> ClosestPoint {
         let whole = real(self.around);
         let s = place.s + turns * whole;
         if (0.0..1.0).contains(&s) {
-            return Place { s, ..place };
+            return ClosestPoint { s, ..place };
         }
         let moved = (real(place.patch[0]) + place.s + turns * whole) / whole;
         let (p, s) = split((moved - moved.floor()) * whole, self.around);
-        Place { patch: [p, place.patch[1]], s, t: place.t }
+        ClosestPoint { patch: [p, place.patch[1]], s, t: place.t }
     }
 
     /// Write phantoms and repetitions around the control points.

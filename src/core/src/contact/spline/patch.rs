@@ -1,6 +1,6 @@
 //! One patch: point, derivatives, and the weights of the control points.
 
-use super::{Ends, Place, SurfaceSpline};
+use super::{ClosestPoint, Ends, SurfaceSpline};
 use crate::settings::Interpolation;
 
 /// Point and derivatives with respect to the parameters of the patch (all in m).
@@ -117,7 +117,7 @@ impl SurfaceSpline {
     /// # Panics
     /// A patch that does not exist.
     #[inline]
-    pub fn evaluate(&self, place: Place) -> Evaluation {
+    pub fn evaluate(&self, place: ClosestPoint) -> Evaluation {
         match self.interpolation {
             Interpolation::Spline => self.evaluate_bicubic::<true>(place),
             Interpolation::Facets => self.evaluate_bilinear(place),
@@ -125,13 +125,13 @@ impl SurfaceSpline {
     }
 
     #[inline(always)]
-    fn assert_exists(&self, place: Place) {
+    fn assert_exists(&self, place: ClosestPoint) {
         assert!(self.has_patch(place), "no such patch");
     }
 
     /// Without `SECOND` the second derivatives are left zero.
     #[inline(always)]
-    pub(super) fn evaluate_bicubic<const SECOND: bool>(&self, place: Place) -> Evaluation {
+    pub(super) fn evaluate_bicubic<const SECOND: bool>(&self, place: ClosestPoint) -> Evaluation {
         let ([p, q], width) = (place.patch, self.around + 3);
         self.assert_exists(place);
         let (around, along) = (cubic(place.s), cubic_and_beyond(place.t));
@@ -156,7 +156,7 @@ impl SurfaceSpline {
         }
     }
 
-    fn evaluate_bilinear(&self, place: Place) -> Evaluation {
+    fn evaluate_bilinear(&self, place: ClosestPoint) -> Evaluation {
         let (width, s, t) = (self.around + 3, place.s, place.t);
         self.assert_exists(place);
         let start = (place.patch[1] + 1) * width + place.patch[0] + 1;
@@ -177,7 +177,7 @@ impl SurfaceSpline {
     ///
     /// # Panics
     /// A patch that does not exist.
-    pub fn weights(&self, place: Place) -> Weights {
+    pub fn weights(&self, place: ClosestPoint) -> Weights {
         self.assert_exists(place);
         let (around, along) = match self.interpolation {
             Interpolation::Spline => (self.fold_around(place), self.fold_along(place)),
@@ -196,7 +196,7 @@ impl SurfaceSpline {
         weights
     }
 
-    fn fold_around(&self, place: Place) -> Fold {
+    fn fold_around(&self, place: ClosestPoint) -> Fold {
         let (count, p, values) = (self.around, place.patch[0], cubic(place.s)[0]);
         let mut fold = Fold::new();
         for (offset, value) in values.into_iter().enumerate() {
@@ -211,7 +211,7 @@ impl SurfaceSpline {
         fold
     }
 
-    fn fold_along(&self, place: Place) -> Fold {
+    fn fold_along(&self, place: ClosestPoint) -> Fold {
         let (count, q, values) = (self.along, place.patch[1], cubic_and_beyond(place.t)[0]);
         let mut fold = Fold::new();
         for (offset, value) in values.into_iter().enumerate() {
@@ -224,7 +224,7 @@ impl SurfaceSpline {
         fold
     }
 
-    fn fold_facet(&self, place: Place) -> (Fold, Fold) {
+    fn fold_facet(&self, place: ClosestPoint) -> (Fold, Fold) {
         let [p, q] = place.patch;
         let (mut around, mut along) = (Fold::new(), Fold::new());
         around.add(p, 1.0 - place.s);

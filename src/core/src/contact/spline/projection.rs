@@ -7,7 +7,7 @@
 //! searched for a closer point.
 
 use super::foot::{CONVEX, DEGENERATE, Foot, Held, Room, noise, solve};
-use super::{EDGE_TOLERANCE, Ends, Place, SurfaceSpline};
+use super::{ClosestPoint, EDGE_TOLERANCE, Ends, SurfaceSpline};
 use crate::contact::gap::dot;
 use crate::settings::Interpolation;
 
@@ -17,7 +17,7 @@ pub enum Projection {
     /// The closest point lies on the surface.
     Found {
         /// Where it is; start of the next projection of this node.
-        place: Place,
+        place: ClosestPoint,
         /// The closest point S (m).
         point: [f64; 3],
         /// Unit normal from the casing towards the axis. On a crease it is that of the facet which faces the node
@@ -30,7 +30,7 @@ pub enum Projection {
     /// edges of an open surface.
     BeyondEdge {
         /// The closest point of the edge; start of the next projection of this node.
-        place: Place,
+        place: ClosestPoint,
     },
     /// No closest point: the coordinates are not finite, or the surface is folded beyond use.
     Lost,
@@ -53,7 +53,7 @@ impl SurfaceSpline {
     ///
     /// # Panics
     /// A guess on a patch that does not exist.
-    pub fn project(&self, x: [f64; 3], guess: Place) -> Projection {
+    pub fn project(&self, x: [f64; 3], guess: ClosestPoint) -> Projection {
         if let Some(projection) = self.project_nearby(x, guess) {
             return projection;
         }
@@ -63,7 +63,7 @@ impl SurfaceSpline {
         let loose = |value: f64| value.clamp(-EDGE_TOLERANCE, 1.0 + EDGE_TOLERANCE);
         let s = if self.ends == Ends::Open { loose(guess.s) } else { guess.s.clamp(0.0, 1.0) };
         let [low, high] = self.span(guess.patch[1]);
-        let Some(mut foot) = self.descend(x, Place { s, t: guess.t.clamp(low, high), ..guess }) else {
+        let Some(mut foot) = self.descend(x, ClosestPoint { s, t: guess.t.clamp(low, high), ..guess }) else {
             return Projection::Lost;
         };
         if self.has_creases() {
@@ -81,7 +81,7 @@ impl SurfaceSpline {
     /// A Newton step that stays in its patch, then corrections with the same Hessian until the next one is within the
     /// tolerance: nearly every projection of a run. None where anything is out of the ordinary.
     #[inline]
-    fn project_nearby(&self, x: [f64; 3], guess: Place) -> Option<Projection> {
+    fn project_nearby(&self, x: [f64; 3], guess: ClosestPoint) -> Option<Projection> {
         if self.interpolation == Interpolation::Facets {
             return None;
         }
@@ -102,7 +102,7 @@ impl SurfaceSpline {
                     && (self.ends != Ends::Open || (0.0..=1.0).contains(&foot.place.s));
                 return (is_inside && self.is_far_from_seam(&foot, metric[0])).then(|| foot.found());
             }
-            let place = Place { s: foot.place.s + step[0], t: foot.place.t + step[1], ..guess };
+            let place = ClosestPoint { s: foot.place.s + step[0], t: foot.place.t + step[1], ..guess };
             let stays = (0.0..1.0).contains(&place.s) && (low..high).contains(&place.t);
             if !(stays && is_within(0.1)) {
                 return None;
@@ -142,7 +142,7 @@ impl SurfaceSpline {
 
     /// The sheet around a place: a facet, or everything up to the edges and the seam.
     #[inline]
-    pub(super) fn room(&self, place: Place) -> Room {
+    pub(super) fn room(&self, place: ClosestPoint) -> Room {
         let [p, q] = place.patch.map(super::real);
         if self.interpolation == Interpolation::Facets {
             let side = |patch: usize, count: usize| {
@@ -162,9 +162,9 @@ impl SurfaceSpline {
 
     /// A place with parameters beyond its patch, expressed in the patch where it lies.
     #[inline]
-    fn settle(&self, patch: [usize; 2], s: f64, t: f64) -> Place {
+    fn settle(&self, patch: [usize; 2], s: f64, t: f64) -> ClosestPoint {
         if self.interpolation == Interpolation::Facets || ((0.0..1.0).contains(&s) && (0.0..1.0).contains(&t)) {
-            return Place { patch, s, t };
+            return ClosestPoint { patch, s, t };
         }
         let [p, q] = patch.map(super::real);
         let whole = super::real(self.around);
@@ -180,7 +180,7 @@ impl SurfaceSpline {
         };
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the patches")]
         let patch = [column as usize, ring as usize];
-        Place { patch, s, t: t - (ring - q) }
+        ClosestPoint { patch, s, t: t - (ring - q) }
     }
 
     /// Rounding of the coordinates of x − S (m), and of the place of S. A node inside a casing is near the surface and as
@@ -196,7 +196,7 @@ impl SurfaceSpline {
     }
 
     /// Minimum of f on the sheet of `start`.
-    pub(super) fn descend(&self, x: [f64; 3], start: Place) -> Option<Foot> {
+    pub(super) fn descend(&self, x: [f64; 3], start: ClosestPoint) -> Option<Foot> {
         let longest = (0.125 * super::real(self.around)).max(1.0);
         let mut foot = Foot::at(self, x, start);
         let rounding = self.rounding(x, &foot);

@@ -108,7 +108,7 @@ impl ModalBank {
             let shapes = &self.contact_modes[mode * self.rows..][..self.rows];
             let contact: f64 =
                 if touched { shapes.iter().enumerate().map(|(row, shape)| shape * of_row(row)).sum() } else { 0.0 };
-            self.modal_force[mode] = contact + self.state.push_before.get(mode).copied().unwrap_or(0.0);
+            self.modal_force[mode] = contact + self.state.modal_load_before.get(mode).copied().unwrap_or(0.0);
         }
         self.add_coupling_force(sector);
     }

@@ -153,7 +153,7 @@ impl ModalBank {
         let mut work = 0.0;
         for mode in 0..self.modes() {
             let dynamic = mode < self.model.dynamic_modes(self.scheme);
-            let load = if dynamic { self.push[mode] } else { self.state.push_before[mode] };
+            let load = if dynamic { self.modal_load[mode] } else { self.state.modal_load_before[mode] };
             if load != 0.0 {
                 let twice: f64 = (0..self.sectors)
                     .map(|sector| self.index(mode, sector))
@@ -162,7 +162,7 @@ impl ModalBank {
                 work += 0.5 * load * twice;
             }
         }
-        self.state.push_before.copy_from_slice(&self.push);
+        self.state.modal_load_before.copy_from_slice(&self.modal_load);
         work
     }
 }

@@ -64,12 +64,12 @@ struct BankState {
     /// Damping loss per lane since the last collection (J).
     loss: Vec<f64>,
     /// Modal loads of the step before; empty without loads.
-    push_before: Vec<f64>,
+    modal_load_before: Vec<f64>,
     /// Speed of the coupling (rad/s).
     speed: f64,
 }
 
-persist_fields!(BankState { position, increment, displacement, displacement_before, loss, push_before, speed });
+persist_fields!(BankState { position, increment, displacement, displacement_before, loss, modal_load_before, speed });
 
 /// What the special pass needs per mode and lane.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -107,7 +107,7 @@ pub struct ModalBank {
     step: f64,
     state: BankState,
     /// Modal loads of the step under way.
-    push: Vec<f64>,
+    modal_load: Vec<f64>,
     /// Scratch: increments of the step before.
     increment_before: Vec<f64>,
     /// Scratch: φᵀf of the sector being corrected.
@@ -158,10 +158,10 @@ impl ModalBank {
                 displacement: vec![0.0; rows * lanes],
                 displacement_before: vec![0.0; rows * lanes],
                 loss: vec![0.0; lanes],
-                push_before: vec![0.0; if options.loads { modes } else { 0 }],
+                modal_load_before: vec![0.0; if options.loads { modes } else { 0 }],
                 speed: coupling.as_ref().map_or(0.0, Coupling::speed),
             },
-            push: vec![0.0; if special { modes } else { 0 }],
+            modal_load: vec![0.0; if special { modes } else { 0 }],
             increment_before: vec![0.0; state_len],
             modal_force: vec![0.0; modes],
             correction: vec![0.0; modes],
@@ -268,12 +268,12 @@ impl ModalBank {
         self.state.increment[index] = free_increment(frequency, ratio, position, velocity, step);
     }
 
-    /// Static equilibrium under the modal loads `push` for every sector: q = L/ω², rigid modes at 0.
-    pub fn settle(&mut self, push: &[f64]) {
+    /// Static equilibrium under the modal loads `modal_load` for every sector: q = L/ω², rigid modes at 0.
+    pub fn settle(&mut self, modal_load: &[f64]) {
         self.rest();
-        self.state.push_before.copy_from_slice(push);
+        self.state.modal_load_before.copy_from_slice(modal_load);
         for sector in 0..self.sectors {
-            for (mode, load) in push.iter().enumerate() {
+            for (mode, load) in modal_load.iter().enumerate() {
                 let (frequency, index) = (self.frequency(mode, sector), self.index(mode, sector));
                 self.state.position[index] = if frequency > 0.0 { load / (frequency * frequency) } else { 0.0 };
             }
@@ -306,8 +306,8 @@ impl ModalBank {
             &mut self.state.displacement,
             &mut self.state.displacement_before,
             &mut self.state.loss,
-            &mut self.state.push_before,
-            &mut self.push,
+            &mut self.state.modal_load_before,
+            &mut self.modal_load,
         ] {
             values.fill(0.0);
         }
@@ -318,7 +318,7 @@ impl ModalBank {
 
     /// Modal loads of the next step (for every sector), to be set before [`ModalBank::predict`].
     pub fn loads_mut(&mut self) -> &mut [f64] {
-        &mut self.push
+        &mut self.modal_load
     }
 
     /// Predict one step without contact (eq. 9 of the paper) and recover the contact displacements.
@@ -476,11 +476,11 @@ mod tests {
 
         let mut bank = ModalBank::with_options(&model, 1, BankOptions { loads: true, ..BankOptions::default() });
         bank.set_step(Scheme::ModalExact, 2e-5);
-        let push = [0.0, 30.0, 4e3, 1e4];
-        bank.settle(&push);
-        bank.loads_mut().copy_from_slice(&push);
+        let modal_load = [0.0, 30.0, 4e3, 1e4];
+        bank.settle(&modal_load);
+        bank.loads_mut().copy_from_slice(&modal_load);
         let terms =
-            push.iter().zip(&model.frequencies).skip(1).map(|(load, frequency)| 0.5 * (load / frequency).powi(2));
+            modal_load.iter().zip(&model.frequencies).skip(1).map(|(load, frequency)| 0.5 * (load / frequency).powi(2));
         let at_rest: f64 = terms.sum();
         bank.predict(false);
         let (kinetic, strain) = bank.energies_now(&[]);

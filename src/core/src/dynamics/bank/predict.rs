@@ -43,7 +43,7 @@ impl<const WIDTH: usize, const LOSS: bool, const SPECIAL: bool> Kernel for Predi
             let modes = Modes {
                 coefficients: &bank.coefficients,
                 lane_coefficients: if SPECIAL { &bank.lane_coefficients[chunk * block..][..block] } else { &[] },
-                push: &bank.push,
+                modal_load: &bank.modal_load,
                 shapes,
                 rows,
                 lanes,
@@ -80,7 +80,7 @@ struct Modes<'a> {
     /// `[mode · WIDTH + lane]` where the pass is special.
     lane_coefficients: &'a [LaneCoefficients],
     /// Modal loads where the pass is special.
-    push: &'a [f64],
+    modal_load: &'a [f64],
     shapes: &'a [f64],
     rows: usize,
     lanes: usize,
@@ -111,9 +111,9 @@ impl Modes<'_> {
             let (mut new, mut moved) = ([0.0; WIDTH], [0.0; WIDTH]);
             if SPECIAL {
                 let own = &self.lane_coefficients[mode * WIDTH..][..WIDTH];
-                let push = self.push[mode];
+                let modal_load = self.modal_load[mode];
                 for lane in 0..WIDTH {
-                    new[lane] = own[lane].beta * d[lane] - own[lane].kappa * old[lane] + own[lane].load * push;
+                    new[lane] = own[lane].beta * d[lane] - own[lane].kappa * old[lane] + own[lane].load * modal_load;
                     factor[lane] = own[lane].loss;
                 }
             } else {

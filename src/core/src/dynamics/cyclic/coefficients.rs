@@ -105,7 +105,7 @@ impl CyclicBank {
         let shapes = &self.shapes[index * self.rows..][..self.rows];
         let mut force = modal_force(&self.asked_nodes, shapes, force).map(|part| part[lane]);
         if nodal_diameter == 0 {
-            force[0] += self.state.push_before.get(mode).copied().unwrap_or(0.0);
+            force[0] += self.state.modal_load_before.get(mode).copied().unwrap_or(0.0);
         }
         force
     }

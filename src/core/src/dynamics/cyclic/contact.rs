@@ -60,14 +60,14 @@ impl CyclicBank {
             return 0.0;
         }
         let (mut work, dynamic) = (0.0, self.model.diameters[0].dynamic_modes(self.scheme));
-        for mode in 0..self.push.len() {
-            let load = if mode < dynamic { self.push[mode] } else { self.state.push_before[mode] };
+        for mode in 0..self.modal_load.len() {
+            let load = if mode < dynamic { self.modal_load[mode] } else { self.state.modal_load_before[mode] };
             if load != 0.0 {
                 let (_, increment) = self.modal_state(0, mode);
                 work += 0.5 * load * (increment[0] + self.state.older[mode][0][0]);
             }
         }
-        self.state.push_before.copy_from_slice(&self.push);
+        self.state.modal_load_before.copy_from_slice(&self.modal_load);
         work
     }
 }

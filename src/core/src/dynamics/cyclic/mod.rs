@@ -1,4 +1,4 @@
-//! A wheel of coupled sectors in modal coordinates, stepped together.
+//! A disk of coupled sectors in modal coordinates, stepped together.
 //!
 //! Nodal diameters are SIMD lanes in blocks of [`LANES`], complex amplitudes are pairs of real and imaginary parts:
 //! `state[block · modes + mode][re, im][lane]`. A nodal diameter with fewer modes than others, and the padding of the last
@@ -39,7 +39,7 @@ struct CyclicState {
     /// Damping loss per nodal diameter since the last collection (J).
     loss: Vec<f64>,
     /// Modal loads of the step before; empty without loads.
-    push_before: Vec<f64>,
+    modal_load_before: Vec<f64>,
     /// Spectrum of the contact forces of the last step (N).
     force: Vec<Complexes>,
     /// Contact nodes, of any sector, that carry one.
@@ -59,7 +59,7 @@ persist_fields!(CyclicState {
     displacement,
     displacement_before,
     loss,
-    push_before,
+    modal_load_before,
     force,
     touched,
     unapplied,
@@ -95,9 +95,9 @@ pub struct CyclicBank {
     loads: bool,
     state: CyclicState,
     /// Modal loads of nodal diameter 0 for the step under way.
-    push: Vec<f64>,
-    /// Displacements caused by `push`, per mode.
-    pushed: Vec<f64>,
+    modal_load: Vec<f64>,
+    /// Displacements caused by `modal_load`, per mode.
+    load_response: Vec<f64>,
     /// Scratch: spectrum of displacements.
     spectrum: Vec<Complexes>,
     /// Forces that an answer was asked for: (sector, node, force).
@@ -143,15 +143,15 @@ impl CyclicBank {
                 displacement: vec![0.0; rows * lanes],
                 displacement_before: vec![0.0; rows * lanes],
                 loss: vec![0.0; blocks * LANES],
-                push_before: vec![0.0; load_count],
+                modal_load_before: vec![0.0; load_count],
                 force: vec![NOTHING; blocks * rows],
                 touched: vec![false; rows / 3],
                 unapplied: false,
                 acting: false,
                 loss_due: false,
             },
-            push: vec![0.0; load_count],
-            pushed: vec![0.0; load_count],
+            modal_load: vec![0.0; load_count],
+            load_response: vec![0.0; load_count],
             spectrum: vec![NOTHING; blocks * rows],
             asked: Vec::with_capacity(sectors * rows / 3),
             asked_force: vec![NOTHING; blocks * rows],
@@ -243,11 +243,11 @@ impl CyclicBank {
         }
     }
 
-    /// Static equilibrium under the modal loads `push` of nodal diameter 0: q = L/ω², rigid modes at 0.
-    pub fn settle(&mut self, push: &[f64]) {
+    /// Static equilibrium under the modal loads `modal_load` of nodal diameter 0: q = L/ω², rigid modes at 0.
+    pub fn settle(&mut self, modal_load: &[f64]) {
         self.rest();
-        self.state.push_before.copy_from_slice(push);
-        for (mode, load) in push.iter().enumerate() {
+        self.state.modal_load_before.copy_from_slice(modal_load);
+        for (mode, load) in modal_load.iter().enumerate() {
             let frequency = self.model.diameters[0].frequencies[mode];
             let rest = if frequency > 0.0 { load / (frequency * frequency) } else { 0.0 };
             self.state.position[mode][0][0] = rest;
@@ -265,8 +265,8 @@ impl CyclicBank {
             &mut state.displacement,
             &mut state.displacement_before,
             &mut state.loss,
-            &mut state.push_before,
-            &mut self.push,
+            &mut state.modal_load_before,
+            &mut self.modal_load,
         ] {
             values.fill(0.0);
         }
@@ -276,14 +276,14 @@ impl CyclicBank {
 
     /// Modal loads of nodal diameter 0 for the next step, to be set before [`CyclicBank::predict`].
     pub fn loads_mut(&mut self) -> &mut [f64] {
-        &mut self.push
+        &mut self.modal_load
     }
 
     /// Predict one step without contact (eq. 9 of the paper) and recover the contact displacements of all sectors. Contact
     /// forces of the step before act first where they have not yet.
     pub fn predict(&mut self, with_loss: bool) {
-        for (mode, (pushed, push)) in self.pushed.iter_mut().zip(&self.push).enumerate() {
-            *pushed = self.coefficients[mode].load_compliance() * push;
+        for (mode, (load_response, modal_load)) in self.load_response.iter_mut().zip(&self.modal_load).enumerate() {
+            *load_response = self.coefficients[mode].load_compliance() * modal_load;
         }
         let delayed = self.state.acting && self.scheme == Scheme::MasslessBoundary;
         match (self.state.unapplied, delayed, self.state.loss_due) {
@@ -325,7 +325,7 @@ impl CyclicBank {
             coefficients: &self.lane_coefficients,
             shapes: &self.shapes,
             force: &state.force,
-            push: &self.pushed,
+            modal_load: &self.load_response,
             position: &mut state.position,
             increment: &mut state.increment,
             older: &mut state.older,
@@ -355,7 +355,7 @@ impl CyclicBank {
         }
     }
 
-    /// Kinetic and strain energy of the wheel (J), in the quantity the scheme conserves (see [`super::scheme`]).
+    /// Kinetic and strain energy of the disk (J), in the quantity the scheme conserves (see [`super::scheme`]).
     pub fn energies(&self) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
         for nodal_diameter in 0..self.model.diameters.len() {
@@ -366,7 +366,7 @@ impl CyclicBank {
         (kinetic, strain)
     }
 
-    /// Kinetic and strain energy of the wheel at this instant (J), ½q̇² and ½ω²q² of every mode, under the contact forces
+    /// Kinetic and strain energy of the disk at this instant (J), ½q̇² and ½ω²q² of every mode, under the contact forces
     /// that last (`forces[row · lanes + sector]`, N) and the modal loads.
     pub fn energies_now(&mut self, forces: &[f64]) -> (f64, f64) {
         self.gather_forces(forces);

@@ -1,4 +1,4 @@
-//! Modes of a wheel of coupled sectors, nodal diameter by nodal diameter.
+//! Modes of a disk of coupled sectors, nodal diameter by nodal diameter.
 //!
 //! Every nodal diameter n has its Hermitian pencil K_n φ = ω² M_n φ (see [`Harmonic`]). With the mass-normalised modes,
 //! z_n = Φ_n q_n, the equations are q̈ + 2ξω q̇ + ω² q = p for each complex amplitude q, and the displacement of sector s is

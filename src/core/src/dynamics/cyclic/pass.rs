@@ -49,7 +49,7 @@ pub struct Pass<'a, const APPLY: bool, const DELAYED: bool, const LOSS: bool, co
     /// Contact forces of the step before.
     pub force: &'a [Complexes],
     /// Modal loads of nodal diameter 0 on the step predicted; may be empty.
-    pub push: &'a [f64],
+    pub modal_load: &'a [f64],
     pub position: &'a mut [Complexes],
     /// d of the step before; with `ADVANCE` only brought up to date for the loss, not stored.
     pub increment: &'a mut [Complexes],
@@ -81,8 +81,8 @@ impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bo
     fn block<const ROWS: usize>(&mut self, block: usize) {
         let (modes, rows) = (self.modes, self.rows);
         let force = &self.force[block * rows..][..rows];
-        // Loads turn with the wheel: nodal diameter 0 alone.
-        let loaded = block == 0 && !self.push.is_empty();
+        // Loads turn with the disk: nodal diameter 0 alone.
+        let loaded = block == 0 && !self.modal_load.is_empty();
         let mut lost = [0.0; LANES];
         let mut sums = [[[0.0; LANES]; 2]; ROWS];
         let states = self.position[block * modes..][..modes]
@@ -120,7 +120,7 @@ impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bo
                         }
                     }
                     if loaded && part == 0 {
-                        new[0] += self.push.get(mode).copied().unwrap_or(0.0);
+                        new[0] += self.modal_load.get(mode).copied().unwrap_or(0.0);
                     }
                     for lane in 0..LANES {
                         q[part][lane] += new[lane];

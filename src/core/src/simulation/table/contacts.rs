@@ -58,100 +58,102 @@ pub fn totals(table: &mut Builder, friction: bool) {
 /// Name, span, quantity where other code looks for it, text, and the term of the ledger or of the instant.
 type Energy = (&'static str, Span, Quantity, &'static str, fn(&View) -> f64);
 
+/// All rows of the ledger; what has no text is told in other words of rotors and of free bodies.
+const ENERGIES: [Energy; 17] = [
+    ("kinetic_energy", Span::Point, Quantity::KineticEnergy, "", |view| view.energies.0),
+    ("strain_energy", Span::Point, Quantity::StrainEnergy, "", |view| view.energies.1),
+    (
+        "scheme_energy",
+        Span::Point,
+        Quantity::Output,
+        "Energy that the time scheme conserves and the ledger closes with: kinetic plus strain energy up to the second order of \
+         the step",
+        |view| view.conserved,
+    ),
+    ("damping_loss", Span::Total, Quantity::DampingLoss, "Energy lost by modal damping since the start", |view| {
+        view.ledger().damping_loss.value()
+    }),
+    ("friction_loss", Span::Total, Quantity::FrictionLoss, "Friction heat since the start", |view| {
+        view.ledger().friction_loss.value()
+    }),
+    ("impact_loss", Span::Total, Quantity::ImpactLoss, "", |view| view.ledger().impact_loss.value()),
+    (
+        "wear_work",
+        Span::Total,
+        Quantity::Output,
+        "Work of the coating's normal force against the approach of the blades since the start",
+        |view| view.ledger().wear_work.value(),
+    ),
+    (
+        "load_work",
+        Span::Total,
+        Quantity::Output,
+        "Work of centrifugal, thermal and nodal-diameter loads since the start",
+        |view| view.ledger().load_work.value(),
+    ),
+    (
+        "external_work",
+        Span::Total,
+        Quantity::ExternalWork,
+        "Work of all inputs but loads since the start: shaft, whirl, axial shift, moving casing",
+        |view| view.ledger().external_work(),
+    ),
+    (
+        "shaft_work",
+        Span::Total,
+        Quantity::Output,
+        "Work of the shaft through the contacts since the start: minus the integral of torque times speed",
+        |view| view.ledger().shaft_work.value(),
+    ),
+    (
+        "stiffening_work",
+        Span::Total,
+        Quantity::Output,
+        "Strain energy that changes of the speed add by stiffening since the start",
+        |view| view.ledger().stiffening_work.value(),
+    ),
+    (
+        "whirl_work",
+        Span::Total,
+        Quantity::Output,
+        "Work of the whirling shaft since the start: minus the integral of force times velocity of its centre",
+        |view| view.ledger().whirl_work.value(),
+    ),
+    ("shift_work", Span::Total, Quantity::Output, "Work of the axial shift of the rotor since the start", |view| {
+        view.ledger().shift_work.value()
+    }),
+    (
+        "casing_motion_work",
+        Span::Total,
+        Quantity::Output,
+        "Work of prescribed motion of the casing (radius, gap offset, shape) since the start",
+        |view| view.ledger().casing_work.value(),
+    ),
+    (
+        "curvature_work",
+        Span::Total,
+        Quantity::CurvatureWork,
+        "Energy that contact forces add since the start because normals turn and surfaces curve within an internal step \
+         (vanishes with the step)",
+        |view| view.ledger().curvature_work.value(),
+    ),
+    (
+        "step_change_energy",
+        Span::Total,
+        Quantity::Output,
+        "Energy added by changes of the internal step since the start",
+        |view| view.ledger().step_change.value(),
+    ),
+    ("energy_residual", Span::Point, Quantity::Output, "Closure residual of the energy ledger", |view| {
+        view.ledger().residual(view.conserved)
+    }),
+];
+
 /// The ledger's rows that exist; `words` tell of kinetic energy, strain energy and impacts.
 pub fn energies(table: &mut Builder, words: [&'static str; 3], exists: impl Fn(&str) -> bool) {
-    use Quantity::Output;
-    let [kinetic, strain, impact] = words;
-    let rows: [Energy; 17] = [
-        ("kinetic_energy", Span::Point, Quantity::KineticEnergy, kinetic, |view| view.energies.0),
-        ("strain_energy", Span::Point, Quantity::StrainEnergy, strain, |view| view.energies.1),
-        (
-            "scheme_energy",
-            Span::Point,
-            Output,
-            "Energy that the time scheme conserves and the ledger closes with: kinetic plus strain energy up to the second order of \
-             the step",
-            |view| view.conserved,
-        ),
-        ("damping_loss", Span::Total, Quantity::DampingLoss, "Energy lost by modal damping since the start", |view| {
-            view.ledger().damping_loss.value()
-        }),
-        ("friction_loss", Span::Total, Quantity::FrictionLoss, "Friction heat since the start", |view| {
-            view.ledger().friction_loss.value()
-        }),
-        ("impact_loss", Span::Total, Quantity::ImpactLoss, impact, |view| view.ledger().impact_loss.value()),
-        (
-            "wear_work",
-            Span::Total,
-            Output,
-            "Work of the coating's normal force against the approach of the blades since the start",
-            |view| view.ledger().wear_work.value(),
-        ),
-        (
-            "load_work",
-            Span::Total,
-            Output,
-            "Work of centrifugal, thermal and nodal-diameter loads since the start",
-            |view| view.ledger().load_work.value(),
-        ),
-        (
-            "external_work",
-            Span::Total,
-            Quantity::ExternalWork,
-            "Work of all inputs but loads since the start: shaft, whirl, axial shift, moving casing",
-            |view| view.ledger().external_work(),
-        ),
-        (
-            "shaft_work",
-            Span::Total,
-            Output,
-            "Work of the shaft through the contacts since the start: minus the integral of torque times speed",
-            |view| view.ledger().shaft_work.value(),
-        ),
-        (
-            "stiffening_work",
-            Span::Total,
-            Output,
-            "Strain energy that changes of the speed add by stiffening since the start",
-            |view| view.ledger().stiffening_work.value(),
-        ),
-        (
-            "whirl_work",
-            Span::Total,
-            Output,
-            "Work of the whirling shaft since the start: minus the integral of force times velocity of its centre",
-            |view| view.ledger().whirl_work.value(),
-        ),
-        ("shift_work", Span::Total, Output, "Work of the axial shift of the rotor since the start", |view| {
-            view.ledger().shift_work.value()
-        }),
-        (
-            "casing_motion_work",
-            Span::Total,
-            Output,
-            "Work of prescribed motion of the casing (radius, gap offset, shape) since the start",
-            |view| view.ledger().casing_work.value(),
-        ),
-        (
-            "curvature_work",
-            Span::Total,
-            Quantity::CurvatureWork,
-            "Energy that contact forces add since the start because normals turn and surfaces curve within an internal step \
-             (vanishes with the step)",
-            |view| view.ledger().curvature_work.value(),
-        ),
-        (
-            "step_change_energy",
-            Span::Total,
-            Output,
-            "Energy added by changes of the internal step since the start",
-            |view| view.ledger().step_change.value(),
-        ),
-        ("energy_residual", Span::Point, Output, "Closure residual of the energy ledger", |view| {
-            view.ledger().residual(view.conserved)
-        }),
-    ];
-    for (name, span, quantity, text, read) in rows.into_iter().filter(|row| exists(row.0)) {
+    let mut words = words.into_iter();
+    for (name, span, quantity, text, read) in ENERGIES.into_iter().filter(|row| exists(row.0)) {
+        let text = if text.is_empty() { words.next().unwrap_or_default() } else { text };
         table.output(name, span, Some((&ENERGY, 1.0)), text, scalar(read)).quantity = quantity;
     }
     let relative = table.output(

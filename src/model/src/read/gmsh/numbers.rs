@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::source::Place;
+use super::super::source::ClosestPoint;
 use crate::{Error, Result};
 
 /// Where the numbers of one section come from.
@@ -18,7 +18,9 @@ impl<'a> Numbers<'a> {
     /// What is wrong with the number just read or to be read.
     pub fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
         match self {
-            Self::Text { file, line, .. } => Place { file: Arc::clone(file), line: *line }.error(problem, remedy),
+            Self::Text { file, line, .. } => {
+                ClosestPoint { file: Arc::clone(file), line: *line }.error(problem, remedy)
+            }
             Self::Bytes { file, offset, .. } => {
                 Error::Read { place: format!("{file}, byte {offset}"), problem: problem.into(), remedy: remedy.into() }
             }
@@ -26,10 +28,10 @@ impl<'a> Numbers<'a> {
     }
 
     /// Where we are, as a place for later messages.
-    pub fn place(&self) -> Place {
+    pub fn place(&self) -> ClosestPoint {
         match self {
-            Self::Text { file, line, .. } => Place { file: Arc::clone(file), line: *line },
-            Self::Bytes { file, offset, .. } => Place { file: format!("{file}, byte").into(), line: *offset },
+            Self::Text { file, line, .. } => ClosestPoint { file: Arc::clone(file), line: *line },
+            Self::Bytes { file, offset, .. } => ClosestPoint { file: format!("{file}, byte").into(), line: *offset },
         }
     }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::super::source::{Open, Place, beside, text_of};
+use super::super::source::{ClosestPoint, Open, beside, text_of};
 use crate::Result;
 
 /// Files included within each other at most this deep, and this many in all.
@@ -18,7 +18,7 @@ pub(super) struct Card {
     /// Name in upper case without blanks, and value as written, if any.
     pub parameters: Vec<(String, Option<String>)>,
     /// Where the keyword stands.
-    pub place: Place,
+    pub place: ClosestPoint,
     /// Data lines without comments and empty ones.
     pub data: Vec<DataLine>,
 }
@@ -29,7 +29,7 @@ pub(super) struct DataLine {
     /// The line without blanks around it.
     pub text: String,
     /// Where it stands.
-    pub place: Place,
+    pub place: ClosestPoint,
 }
 
 impl DataLine {
@@ -87,7 +87,7 @@ struct Reader<'a> {
     cards: Vec<Card>,
     active: Vec<PathBuf>,
     count: usize,
-    before_first_keyword: Option<Place>,
+    before_first_keyword: Option<ClosestPoint>,
 }
 
 impl Reader<'_> {
@@ -95,10 +95,10 @@ impl Reader<'_> {
         let (text, name) = (text_of(bytes), Arc::from(path.display().to_string()));
         self.active.push(path);
         // A keyword line that ends with a comma goes on in the next line.
-        let mut keyword: Option<(String, Place)> = None;
+        let mut keyword: Option<(String, ClosestPoint)> = None;
         for (index, line) in text.lines().enumerate() {
             let line = line.trim();
-            let place = Place { file: Arc::clone(&name), line: index + 1 };
+            let place = ClosestPoint { file: Arc::clone(&name), line: index + 1 };
             if line.starts_with("**") || line.is_empty() {
                 continue;
             }
@@ -118,14 +118,14 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn data(&mut self, line: &str, place: Place) {
+    fn data(&mut self, line: &str, place: ClosestPoint) {
         match self.cards.last_mut() {
             Some(card) => card.data.push(DataLine { text: line.to_owned(), place }),
             None => _ = self.before_first_keyword.get_or_insert(place),
         }
     }
 
-    fn keyword(&mut self, line: Option<(String, Place)>) -> Result<()> {
+    fn keyword(&mut self, line: Option<(String, ClosestPoint)>) -> Result<()> {
         let Some((text, place)) = line else { return Ok(()) };
         let mut parts = text.split(',');
         let words: Vec<String> = parts.next().unwrap_or("").split_whitespace().map(str::to_uppercase).collect();
@@ -149,7 +149,7 @@ impl Reader<'_> {
         self.open_beside(&written, &card.place)
     }
 
-    fn open_beside(&mut self, written: &str, place: &Place) -> Result<()> {
+    fn open_beside(&mut self, written: &str, place: &ClosestPoint) -> Result<()> {
         let current = self.active.last().cloned().unwrap_or_default();
         let path = beside(&current, written);
         self.count += 1;

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::super::draft::Draft;
-use super::super::source::Place;
+use super::super::source::ClosestPoint;
 use super::lines::Card;
 use crate::Result;
 
@@ -16,10 +16,10 @@ pub(super) fn local_name(name: &str) -> &str {
 enum Member {
     Number(u64),
     /// A number written in a set of its own, which must exist.
-    Written(u64, Place),
+    Written(u64, ClosestPoint),
     /// First, last, increment; what does not exist in between is not missed.
     Range(u64, u64, u64),
-    Set(String, Place),
+    Set(String, ClosestPoint),
 }
 
 /// Sets of one kind by name, in upper case.
@@ -81,12 +81,18 @@ impl Family {
     }
 
     /// Numbers of the members of a set that exist.
-    pub fn members(&self, set: &str, place: &Place, draft: &Draft) -> Result<BTreeSet<u64>> {
+    pub fn members(&self, set: &str, place: &ClosestPoint, draft: &Draft) -> Result<BTreeSet<u64>> {
         let every: Vec<u64> = draft.elements.iter().map(|element| element.number).collect();
         self.resolve(local_name(set), place, &every, &|number| !draft.nodes_of(number).is_empty())
     }
 
-    fn resolve(&self, set: &str, place: &Place, every: &[u64], exists: &dyn Fn(u64) -> bool) -> Result<BTreeSet<u64>> {
+    fn resolve(
+        &self,
+        set: &str,
+        place: &ClosestPoint,
+        every: &[u64],
+        exists: &dyn Fn(u64) -> bool,
+    ) -> Result<BTreeSet<u64>> {
         let (mut found, mut seen) = (BTreeSet::new(), BTreeSet::new());
         let mut open = vec![(set.to_owned(), place.clone())];
         while let Some((name, place)) = open.pop() {
@@ -125,7 +131,7 @@ impl Family {
 impl Sets {
     /// Every node set, and every element set as the set of its nodes.
     pub fn into_node_sets(self, draft: &mut Draft) -> Result<()> {
-        let nowhere = Place { file: "".into(), line: 0 };
+        let nowhere = ClosestPoint { file: "".into(), line: 0 };
         let mut node_sets = BTreeMap::new();
         for name in self.elements.sets.keys() {
             let members = self.elements.members(name, &nowhere, draft)?;

@@ -202,13 +202,13 @@ fn exchanged() -> Vec<Case> {
     cases
 }
 
-/// A wheel whose checks hold the frequencies of each nodal diameter, with two of its harmonics exchanged.
+/// A disk whose checks hold the frequencies of each nodal diameter, with two of its harmonics exchanged.
 fn harmonics(swap: bool) -> Result<Vec<Check>> {
     let tower = Tower { sectors: 8, neighbour: 1e6, ..Tower::default() };
     let mut rom = tower.rom();
-    let wheel = tiprub_core::dynamics::cyclic::CyclicModel::from_rom(&rom, 0.0)?;
+    let disk = tiprub_core::dynamics::cyclic::CyclicModel::from_rom(&rom, 0.0)?;
     let mut all: Vec<(f64, u32)> = Vec::new();
-    for (diameter, number) in wheel.diameters.iter().zip(0_u32..) {
+    for (diameter, number) in disk.diameters.iter().zip(0_u32..) {
         all.extend(diameter.frequencies.iter().take(2).map(|omega| (omega / std::f64::consts::TAU, number)));
     }
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -226,5 +226,5 @@ fn harmonics(swap: bool) -> Result<Vec<Check>> {
         set(&mut simulation, "casing_radius_change", -1e-5)?;
         watch.step(&mut simulation, 2e-6)?;
     }
-    Ok(watch.books())
+    Ok(watch.laws())
 }

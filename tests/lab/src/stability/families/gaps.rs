@@ -77,7 +77,7 @@ fn offset_at_start(solver: Solver, offset: f64) -> Result<Vec<Check>> {
         watch.step(&mut simulation, 2e-6)?;
     }
     let energy = real(&simulation, "kinetic_energy") + real(&simulation, "strain_energy");
-    Ok([watch.books(), vec![Check::so("no energy, no impulse", energy == 0.0 && watch.impulse == 0.0)]].concat())
+    Ok([watch.laws(), vec![Check::so("no energy, no impulse", energy == 0.0 && watch.impulse == 0.0)]].concat())
 }
 
 fn one_inside(solver: Solver) -> Result<Vec<Check>> {

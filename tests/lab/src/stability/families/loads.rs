@@ -150,7 +150,7 @@ fn sudden(mut scene: Scene, what: &str) -> Result<Vec<Check>> {
         most = most.max(amplitudes(&simulation, 2)[0]);
         work = work.max(real(&simulation, "load_work"));
     }
-    let mut checks = watch.books();
+    let mut checks = watch.laws();
     let energy = real(&simulation, "scheme_energy");
     checks.push(Check::relative("energy is the work of the load", energy, real(&simulation, "load_work"), 1e-9));
     checks.push(Check::so("the load did work", work > 0.0));

@@ -2,6 +2,7 @@
 
 pub mod builtin;
 pub mod decay;
+pub mod disk;
 pub mod free;
 pub mod friction;
 pub mod gaps;
@@ -15,7 +16,6 @@ pub mod stepping;
 pub mod surfaces;
 pub mod turning;
 pub mod values;
-pub mod wheel;
 
 use super::Case;
 
@@ -30,7 +30,7 @@ pub fn all() -> Vec<Case> {
         loads::cases(),
         decay::cases(),
         turning::cases(),
-        wheel::cases(),
+        disk::cases(),
         free::cases(),
         plates::cases(),
         builtin::cases(),

@@ -7,11 +7,11 @@ use tiprub_core::settings::{Scheme, Solver};
 use super::{
     super::{Case, Check, Expected, Happened},
     decay::{self, Released},
+    disk::{Mirrored, Still},
     free::Impact,
     heat::Heat,
     plates::Balance,
     turning::{Flank, Pressed, Travelling},
-    wheel::{Mirrored, Still},
 };
 
 /// All of them.
@@ -46,7 +46,7 @@ fn faults() -> Vec<Case> {
         case("coupling-of-sectors-1%", |scheme, solver| {
             Still { scheme, solver, sectors: 8, friction: 0.0, coupling: 8.08e6 }.run()
         }),
-        case("wheel-not-mirrored", |scheme, solver| Mirrored { scheme, solver, sectors: 8, conjugate: false }.run()),
+        case("disk-not-mirrored", |scheme, solver| Mirrored { scheme, solver, sectors: 8, conjugate: false }.run()),
         case("heat-1%", |scheme, solver| Heat { scheme, solver, friction: 0.15, speed: 1300.0, share: 1.01 }.run()),
         case("impact-loses-momentum-1%", |scheme, solver| {
             Impact { scheme, solver, speed: 1.0, mass: 1.0, friction: 0.15, along: 0.5, share: 1.01 }.run()

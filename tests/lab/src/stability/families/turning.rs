@@ -306,7 +306,7 @@ fn flanks() -> Vec<Case> {
 }
 
 impl Flank {
-    /// Place of the tip and λ at rest: the tip stands on s(θ), θ = u_t/R, pushed along the normal there.
+    /// ClosestPoint of the tip and λ at rest: the tip stands on s(θ), θ = u_t/R, pushed along the normal there.
     fn at_rest(self, tower: &Tower, shape: impl Fn(f64) -> [f64; 2], depth: f64) -> [f64; 4] {
         let flexible = [0, 1].map(|i| 1.0 / tower.base[i] + 1.0 / tower.tip);
         let (mut tangential, mut radial, mut force, mut tilt) = (0.0, 0.0, 0.0, 0.0);
@@ -355,7 +355,7 @@ impl Flank {
         let found = [0, 1].map(|row| system.bank().row(row, 0));
         let sideways = system.events().first().map_or(f64::NAN, |event| event.force[1]);
         Ok([
-            watch.books(),
+            watch.laws(),
             vec![
                 Check::relative("λ from the static solution", system.multiplier(0, 0), force, 1e-6),
                 Check::at_most("radial place from the static one", (found[0] - radial).abs() / depth, 1e-6),

@@ -31,7 +31,7 @@ pub const VALUES: [(&str, f64); 12] = [
 ];
 
 /// Scenes whose tables are walked.
-pub const SCENES: [&str; 4] = ["bumps", "round", "ring", "wheel"];
+pub const SCENES: [&str; 4] = ["bumps", "round", "ring", "disk"];
 
 /// One of them.
 pub fn scene(name: &str) -> Scene {
@@ -203,7 +203,7 @@ fn go_on(simulation: &mut Simulation) -> Result<()> {
     Ok(())
 }
 
-/// Finite outputs, books that close, clearances without penetration, friction that heats.
+/// Finite outputs, a ledger that closes, clearances without penetration, friction that heats.
 fn sane(simulation: &Simulation) -> Vec<Check> {
     let finite = outputs(simulation).iter().all(|value| value.is_finite());
     let ledger = simulation.system().ledger();
@@ -398,7 +398,7 @@ fn settings() -> Vec<Case> {
     for (field, word, change) in fields {
         for (text, value) in VALUES {
             let expected = if value.is_finite() {
-                Expected::either_as("finite, books that close", refusals(field))
+                Expected::either_as("finite, a ledger that closes", refusals(field))
             } else {
                 Expected::refused([word])
             };

@@ -1,4 +1,4 @@
-//! Wheels of coupled sectors given by real matrices: as harmonics, and as one structure with all sectors in it.
+//! Disks of coupled sectors given by real matrices: as harmonics, and as one structure with all sectors in it.
 
 #![allow(dead_code, reason = "each test binary uses its part")]
 
@@ -23,7 +23,7 @@ impl Numbers {
 
 /// Sectors that are coupled to their neighbours.
 #[derive(Clone)]
-pub struct Wheel {
+pub struct Disk {
     pub sectors: usize,
     pub nodes: usize,
     /// Matrices of one sector, and of a sector with the one after it (row: this sector, column: the next).
@@ -32,7 +32,7 @@ pub struct Wheel {
     pub contact_map: DMatrix<f64>,
 }
 
-impl Wheel {
+impl Disk {
     /// Random matrices; `coupling` is the size of those between neighbours relative to those of a sector.
     pub fn random(sectors: usize, nodes: usize, order: usize, coupling: f64, seed: u64) -> Self {
         let mut numbers = Numbers(seed);
@@ -89,7 +89,7 @@ impl Wheel {
             meridional_slope: -0.2,
         };
         Rom {
-            name: "wheel".into(),
+            name: "disk".into(),
             origin: "random matrices".into(),
             sectors,
             frame: Frame::Cylindrical,

@@ -1,15 +1,15 @@
-//! The whole wheel from the mesh of one sector.
+//! The whole disk from the mesh of one sector.
 
 use super::{CyclicBoundary, boundary::turned};
 use crate::Result;
 use crate::mesh::{Element, Mesh};
 
-/// A whole wheel.
+/// A whole disk.
 #[derive(Debug, Clone)]
-pub struct WholeWheel {
+pub struct WholeDisk {
     /// Its mesh; sets hold the nodes of all sectors.
     pub mesh: Mesh,
-    /// Node of the wheel for every sector and node of the sector.
+    /// Node of the disk for every sector and node of the sector.
     pub nodes: Vec<Vec<usize>>,
 }
 
@@ -17,7 +17,7 @@ pub struct WholeWheel {
 ///
 /// # Errors
 /// Those of [`Mesh::validate`].
-pub fn whole_wheel(sector: &Mesh, boundary: &CyclicBoundary) -> Result<WholeWheel> {
+pub fn whole_disk(sector: &Mesh, boundary: &CyclicBoundary) -> Result<WholeDisk> {
     let count = sector.nodes.len();
     let mut low_of = vec![usize::MAX; count];
     for &[low, high] in &boundary.pairs {
@@ -54,5 +54,5 @@ pub fn whole_wheel(sector: &Mesh, boundary: &CyclicBoundary) -> Result<WholeWhee
         mesh.sets.insert(name.clone(), all);
     }
     mesh.validate()?;
-    Ok(WholeWheel { mesh, nodes })
+    Ok(WholeDisk { mesh, nodes })
 }

@@ -1,4 +1,4 @@
-//! A wheel of coupled sectors in a flexible casing under a line load, written from the pencils and the geometry alone.
+//! A disk of coupled sectors in a flexible casing under a line load, written from the pencils and the geometry alone.
 //!
 //! Every nodal diameter's Hermitian pencil becomes a real one of twice the size for real and imaginary part; the displacement of
 //! sector s is w_n Re(C z e^(2πi n s/N)). The casing carries a [`Ring`] through its contact grid; blade nodes seek their closest point
@@ -51,7 +51,7 @@ pub struct Stage {
     pub tips: Vec<[f64; 3]>,
     /// Number of sectors.
     pub sectors: usize,
-    /// Modal damping ratio of the wheel.
+    /// Modal damping ratio of the disk.
     pub damping: f64,
     /// The casing.
     pub casing: Casing,
@@ -65,14 +65,14 @@ pub struct Stage {
     pub lobes: [f64; 4],
 }
 
-/// A stage in its modes: those of the wheel, then those of the casing.
+/// A stage in its modes: those of the disk, then those of the casing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageScene {
     stage: Stage,
     modes: Modes,
-    /// Number of modes of the wheel.
-    wheel: usize,
-    /// Rows of the tip nodes of all sectors over the modes of the wheel, `[(sector · nodes + node) · 3 + component]`.
+    /// Number of modes of the disk.
+    disk: usize,
+    /// Rows of the tip nodes of all sectors over the modes of the disk, `[(sector · nodes + node) · 3 + component]`.
     rows: Vec<Vec<f64>>,
     /// Rows of the grid nodes over the modes of the casing.
     grid: Vec<Vec<f64>>,
@@ -140,7 +140,7 @@ impl StageScene {
                 }
             }
         }
-        let wheel = modes.len();
+        let disk = modes.len();
         let casing = &stage.casing;
         let own = Modes::new(&casing.mass, &casing.stiffness, casing.damping)?;
         modes.frequencies.extend(&own.frequencies);
@@ -153,7 +153,7 @@ impl StageScene {
         let [amplitude, waves, phase] = casing.load;
         for (node, [radius, angle, _]) in casing.positions.iter().enumerate() {
             let force = amplitude * radius * TAU / count as f64 * (waves * angle - phase).cos();
-            load[wheel..].iter_mut().zip(&grid[3 * node]).for_each(|(load, row)| *load += force * row);
+            load[disk..].iter_mut().zip(&grid[3 * node]).for_each(|(load, row)| *load += force * row);
         }
         let contour = Contour::new(&stage.tips)?;
         Some(Self {
@@ -163,7 +163,7 @@ impl StageScene {
             rows,
             grid,
             load,
-            wheel,
+            disk,
             modes,
             stage,
         })
@@ -182,8 +182,7 @@ impl StageScene {
 
     /// Control points of the surface now.
     fn control(&self, time: f64, position: &[f64]) -> Vec<Vector3<f64>> {
-        let moved =
-            |row: usize| -> f64 { self.grid[row].iter().zip(&position[self.wheel..]).map(|(a, b)| a * b).sum() };
+        let moved = |row: usize| -> f64 { self.grid[row].iter().zip(&position[self.disk..]).map(|(a, b)| a * b).sum() };
         let places = self.stage.casing.positions.iter().enumerate();
         let data: Vec<Vector3<f64>> = places
             .map(|(node, [_, angle, axial])| {
@@ -195,7 +194,7 @@ impl StageScene {
         self.ring.control(&data)
     }
 
-    /// Place of a point in grid steps, roughly.
+    /// ClosestPoint of a point in grid steps, roughly.
     fn guess(&self, point: Vector3<f64>) -> [f64; 2] {
         let casing = &self.stage.casing;
         let angle = point.y.atan2(point.x) - casing.positions[0][1];
@@ -207,7 +206,7 @@ impl StageScene {
 
     /// Row of the casing's modes for a direction at a place.
     fn casing_row(&self, weights: &DVector<f64>, direction: Vector3<f64>) -> Vec<f64> {
-        let mut row = vec![0.0; self.modes.len() - self.wheel];
+        let mut row = vec![0.0; self.modes.len() - self.disk];
         for (node, weight) in weights.iter().enumerate() {
             let [radial, tangential] = directions(self.stage.casing.positions[node][1]);
             let along = [direction.dot(&radial), direction.dot(&tangential), direction.z];
@@ -257,8 +256,8 @@ impl StageScene {
         let spin = Vector3::new(-x.y, x.x, 0.0) * stage.speed;
         let row = |direction: Vector3<f64>| {
             let along = [direction.dot(&radial), direction.dot(&tangential), direction.z];
-            let wheel = (0..self.wheel).map(|mode| (0..3).map(|i| along[i] * rows[i][mode]).sum());
-            Row(vec![(0, wheel.collect()), (self.wheel, self.casing_row(&weights, direction))])
+            let disk = (0..self.disk).map(|mode| (0..3).map(|i| along[i] * rows[i][mode]).sum());
+            Row(vec![(0, disk.collect()), (self.disk, self.casing_row(&weights, direction))])
         };
         Some(Contact {
             node: node * stage.sectors + sector,
@@ -298,7 +297,7 @@ impl Scene for StageScene {
         (position, vec![0.0; self.modes.len()])
     }
 
-    /// Tip nodes of the wheel: row by row, every sector.
+    /// Tip nodes of the disk: row by row, every sector.
     fn observed(&self, position: &[f64]) -> Vec<f64> {
         let rows = 3 * self.stage.tips.len();
         let moved = |row: usize, sector: usize| -> f64 {

@@ -1,4 +1,4 @@
-//! Coarse bladed wheels: one sector of an annulus with a blade on its rim, sheared so that nothing is symmetric.
+//! Coarse bladed disks: one sector of an annulus with a blade on its rim, sheared so that nothing is symmetric.
 
 use core::f64::consts::TAU;
 
@@ -117,7 +117,7 @@ pub fn pencils(rom: &Rom) -> Vec<[DMatrix<Complex<f64>>; 3]> {
     list
 }
 
-/// How often a mode of nodal diameter n is there in the wheel.
+/// How often a mode of nodal diameter n is there in the disk.
 pub fn copies(nodal_diameter: usize, sectors: usize) -> usize {
     if nodal_diameter == 0 || 2 * nodal_diameter == sectors { 1 } else { 2 }
 }

@@ -1,4 +1,4 @@
-//! Coupled sectors whose waves have a sense: the whole wheel at rest under a few blades' forces, and the wheel in the mirror.
+//! Coupled sectors whose waves have a sense: the whole disk at rest under a few blades' forces, and the disk in the mirror.
 //!
 //! A spring from each sector to the next acts along one direction here and along another one there, so that waves of both
 //! senses differ: an exchange of harmonics with their complex conjugates, of sectors or of senses is seen.
@@ -32,15 +32,15 @@ pub fn cases() -> Vec<Case> {
             for sectors in [2, 3, 8, 12] {
                 for friction in [0.0, 0.3] {
                     let still = Still { scheme, solver, sectors, friction, coupling: COUPLING };
-                    let name = format!("wheel/flexibility/{sectors}/µ={friction}/{scheme_name}/{solver_name}");
+                    let name = format!("disk/flexibility/{sectors}/µ={friction}/{scheme_name}/{solver_name}");
                     let expected =
-                        Expected::right("static λ and every blade's place from the matrix of the whole wheel");
+                        Expected::right("static λ and every blade's place from the matrix of the whole disk");
                     let work = move |_: &_| Happened::of(still.run());
                     cases.push(Case::new(name, expected, work).quick(quick && sectors == 8));
                 }
                 let mirrored = Mirrored { scheme, solver, sectors, conjugate: true };
-                let name = format!("wheel/mirrored/{sectors}/{scheme_name}/{solver_name}");
-                let expected = Expected::right("speed, shape and wheel mirrored: the mirrored answer");
+                let name = format!("disk/mirrored/{sectors}/{scheme_name}/{solver_name}");
+                let expected = Expected::right("speed, shape and disk mirrored: the mirrored answer");
                 let work = move |_: &_| Happened::of(mirrored.run());
                 cases.push(Case::new(name, expected, work).quick(quick && sectors > 2));
             }
@@ -61,8 +61,8 @@ fn tower(sectors: usize) -> Tower {
     Tower { sectors, turned: 0.2, ..Tower::default() }
 }
 
-/// The wheel as one pencil per nodal diameter; in the mirror sector s is sector −s, and tangential motion goes the other way.
-fn wheel(sectors: usize, mirrored: bool, conjugate: bool) -> Rom {
+/// The disk as one pencil per nodal diameter; in the mirror sector s is sector −s, and tangential motion goes the other way.
+fn disk(sectors: usize, mirrored: bool, conjugate: bool) -> Rom {
     let tower = tower(sectors);
     let [own, next] = blocks(&tower, COUPLING);
     let mut rom = tower.rom();
@@ -86,7 +86,7 @@ fn wheel(sectors: usize, mirrored: bool, conjugate: bool) -> Rom {
     rom
 }
 
-/// Some blades of a wheel pressed, the others free to follow.
+/// Some blades of a disk pressed, the others free to follow.
 #[derive(Debug, Clone, Copy)]
 pub struct Still {
     /// Scheme.
@@ -97,12 +97,12 @@ pub struct Still {
     pub sectors: usize,
     /// Coefficient µ.
     pub friction: f64,
-    /// Coupling that the closed form is told (N/m): another than that of the wheel must be found out.
+    /// Coupling that the closed form is told (N/m): another than that of the disk must be found out.
     pub coupling: f64,
 }
 
 impl Still {
-    /// Displacement of all tips per force on them, from the matrix of the whole wheel.
+    /// Displacement of all tips per force on them, from the matrix of the whole disk.
     fn flexibility(self) -> DMatrix<f64> {
         let (count, [own, next]) = (self.sectors, blocks(&tower(self.sectors), self.coupling));
         let mut whole = DMatrix::zeros(6 * count, 6 * count);
@@ -127,7 +127,7 @@ impl Still {
     /// The scene is refused.
     pub fn run(self) -> Result<Vec<Check>> {
         let pressed: Vec<usize> = (0..self.sectors).filter(|sector| [0, 3].contains(sector)).collect();
-        let rom = wheel(self.sectors, false, true);
+        let rom = disk(self.sectors, false, true);
         let slope = rom.contact_nodes[0].meridional_slope;
         let mut scene = with_step(with_methods(round(rom), self.scheme, self.solver), 2e-6);
         scene.settings.contacts[0].friction = self.friction;
@@ -191,14 +191,14 @@ pub struct Mirrored {
     pub solver: Solver,
     /// Number of sectors.
     pub sectors: usize,
-    /// The mirrored wheel has the complex conjugate harmonics; without it must be found out.
+    /// The mirrored disk has the complex conjugate harmonics; without it must be found out.
     pub conjugate: bool,
 }
 
 impl Mirrored {
     fn scene(self, mirrored: bool) -> Scene {
         let sense = if mirrored { -1.0 } else { 1.0 };
-        let rom = wheel(self.sectors, mirrored, self.conjugate);
+        let rom = disk(self.sectors, mirrored, self.conjugate);
         let mut scene = with_step(with_methods(round(rom), self.scheme, self.solver), 1e-6);
         scene.settings.structures[0].speed = 1300.0 * sense;
         scene.settings.structures[0].damping_ratio = Some(0.02);
