@@ -90,6 +90,11 @@ impl Simulation {
     }
 }
 
+/// Of clearances, as an output tells it: finite.
+fn smallest<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
+    values.fold(f64::INFINITY, |low: f64, value| low.min(*value)).min(NO_CLEARANCE)
+}
+
 impl View<'_> {
     pub fn rotor_angle(&self) -> f64 {
         self.simulation.rotor.total(&self.simulation.inputs.speed, self.elapsed)
@@ -123,28 +128,34 @@ impl View<'_> {
         self.system.coating().map_or(0.0, read)
     }
 
-    pub fn sectors(&self) -> impl Iterator<Item = usize> + use<> {
-        0..self.system.bank().sectors()
-    }
-
-    pub fn nodes(&self) -> impl Iterator<Item = usize> + use<> {
-        0..self.window.lowest.len() / self.system.bank().lanes()
-    }
-
-    /// All contact nodes of all sectors.
-    pub fn all(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let sectors = self.system.bank().sectors();
-        self.nodes().flat_map(move |node| (0..sectors).map(move |sector| (node, sector)))
-    }
-
     fn index(&self, node: usize, sector: usize) -> usize {
         node * self.system.bank().lanes() + sector
     }
 
-    /// Smallest clearance of nodes within the communication step (m), as an output tells it: finite.
-    pub fn lowest(&self, nodes: impl IntoIterator<Item = (usize, usize)>) -> f64 {
-        let gaps = nodes.into_iter().map(|(node, sector)| self.window.lowest[self.index(node, sector)]);
-        gaps.fold(f64::INFINITY, f64::min).min(NO_CLEARANCE)
+    /// Smallest clearance of all nodes within the communication step (m).
+    pub fn lowest(&self) -> f64 {
+        smallest(self.window.lowest.iter())
+    }
+
+    /// The same of a node over all sectors.
+    pub fn lowest_of_node(&self, node: usize) -> f64 {
+        let bank = self.system.bank();
+        smallest(self.window.lowest[node * bank.lanes()..][..bank.sectors()].iter())
+    }
+
+    /// The same of a sector over all nodes.
+    pub fn lowest_of_sector(&self, sector: usize) -> f64 {
+        smallest(self.of_sector(&self.window.lowest, sector))
+    }
+
+    /// The same of one node.
+    pub fn lowest_at(&self, node: usize, sector: usize) -> f64 {
+        self.window.lowest[self.index(node, sector)].min(NO_CLEARANCE)
+    }
+
+    /// Values of a sector, node by node.
+    pub fn of_sector<'a>(&self, values: &'a [f64], sector: usize) -> impl Iterator<Item = &'a f64> + use<'a> {
+        values.iter().skip(sector).step_by(self.system.bank().lanes())
     }
 
     pub fn clearance(&self, node: usize, sector: usize) -> f64 {

@@ -7,7 +7,7 @@ use crate::simulation::outputs::{View, scalar};
 use crate::variables::{Kind, Quantity, Span, Unit, Variability};
 
 pub fn smallest_clearance(table: &mut Builder, unit: Option<(&'static Unit, f64)>, text: &str) {
-    let read = scalar(|view| view.lowest(view.all()));
+    let read = scalar(|view| view.lowest());
     table.output("clearance_minimum", Span::Window, unit, text, read).display = Some(1);
 }
 

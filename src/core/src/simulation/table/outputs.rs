@@ -33,7 +33,7 @@ pub fn totals(table: &mut Builder, scene: &Parts) {
             "Smallest clearance over all sectors within the communication step, per contact node ({})",
             node_list(scene)
         ),
-        each(|view, node| view.lowest(view.sectors().map(|sector| (node, sector)))),
+        each(|view, node| view.lowest_of_node(node)),
     );
     (each_node.dimension, each_node.display) = (Some(nodes), Some(1));
     for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
@@ -137,7 +137,7 @@ pub fn watched_rows(sector: usize, [gap, force]: [Option<(&'static Unit, f64)>; 
             unit: gap,
             text: "Smallest clearance within the communication step",
             needs: [false, false],
-            read: each(move |view, node| view.lowest([(node, sector)])),
+            read: each(move |view, node| view.lowest_at(node, sector)),
         },
         NodeRow {
             quantity: Quantity::NormalForce(sector),
@@ -187,7 +187,7 @@ pub fn fields(table: &mut Builder, scene: &Parts) -> Result<()> {
             Span::Window,
             Some((&LENGTH, gap)),
             "Smallest clearance of each sector within the communication step",
-            each(|view, sector| view.lowest(view.nodes().map(|node| (node, sector)))),
+            each(|view, sector| view.lowest_of_sector(sector)),
         );
         (clearance.dimension, clearance.display) = (Some(sectors), Some(1));
         let force = table.output(
@@ -195,7 +195,7 @@ pub fn fields(table: &mut Builder, scene: &Parts) -> Result<()> {
             Span::Mean,
             Some((&FORCE, 100.0)),
             "Normal contact force of each sector, mean over the communication step",
-            each(|view, sector| view.mean * view.nodes().map(|node| view.normal_impulse(node, sector)).sum::<f64>()),
+            each(|view, sector| view.mean * view.of_sector(&view.window.normal_impulse, sector).sum::<f64>()),
         );
         force.dimension = Some(sectors);
     }
