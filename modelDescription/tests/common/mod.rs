@@ -35,6 +35,7 @@ fn variable(name: &str, kind: Kind, causality: Causality, variability: Variabili
         start: None,
         description: format!("About {name}"),
         quantity: Quantity::Time,
+        of: 0,
     }
 }
 

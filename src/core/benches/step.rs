@@ -193,7 +193,9 @@ fn table(title: &str, order: usize, rows: Vec<(&str, Scene)>) {
     println!("{title}; times per internal step");
     println!("{:<40} {:>12} {:>10} {:>16}", "", "time (µs)", "contacts", "dense / this");
     println!("{:<40} {:>12.2} {:>10} {:>16.1}", "two dense products (eq. 9), no contact", dense * 1e6, "-", 1.0);
-    for (name, scene) in rows {
+    // `cargo bench --bench step -- heavy` takes the rows with this word.
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    for (name, scene) in rows.into_iter().filter(|(name, _)| words.iter().all(|word| name.contains(word.as_str()))) {
         let (time, contacts) = stepping(&scene);
         println!("{name:<40} {:>12.3} {contacts:>10.1} {:>16.0}", time * 1e6, dense / time);
     }

@@ -11,6 +11,8 @@
 pub mod contact;
 pub mod dynamics;
 mod error;
+mod history;
+pub mod laws;
 mod ledger;
 pub mod persist;
 pub mod plausibility;
@@ -19,6 +21,7 @@ pub mod rom;
 pub mod settings;
 pub mod simulation;
 pub mod stability;
+mod step;
 pub mod system;
 pub mod variables;
 

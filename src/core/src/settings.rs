@@ -24,6 +24,11 @@ impl Scheme {
     /// All of them, in the order of the FMU's enumeration.
     pub const ALL: [Self; 3] = [Self::CentralDifference, Self::ModalExact, Self::MasslessBoundary];
 
+    /// Whether contact forces act one step after they are found.
+    pub fn acts_later(self) -> bool {
+        self == Self::MasslessBoundary
+    }
+
     /// As in scene files and in the FMU's enumeration.
     pub fn name(self) -> &'static str {
         crate::simulation::SCHEMES.items[self as usize].0
@@ -362,8 +367,8 @@ pub struct ContactSettings {
     pub master: String,
     /// Surface they meet.
     pub slave: String,
-    /// The contact nodes whose names start with this text take part in this pair; all of them when absent. Free masters
-    /// only; of several pairs no two may claim the same node.
+    /// The contact nodes whose names start with this text take part in this pair; all of them when absent. Of several pairs of one
+    /// structure no two may claim the same node.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nodes: Option<String>,
     /// Radial tip clearance of the undeformed structure (m), > 0; absent (0) for a free master, whose gaps follow from

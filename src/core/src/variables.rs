@@ -136,6 +136,9 @@ pub struct Variable {
     pub description: String,
     /// What the value stands for inside the simulation.
     pub quantity: Quantity,
+    /// Which structure that touches, contact pair or structure that carries surfaces it belongs to, each counted from 0 in the
+    /// order of the scene; 0 for what belongs to none.
+    pub of: usize,
 }
 
 /// What a variable stands for, where code other than the reader of an output asks for it.
@@ -167,8 +170,8 @@ pub enum Quantity {
     GapOffset,
     /// ξ, parameter.
     DampingRatio,
-    /// ξ of a structure that carries a slave surface (0-based), parameter.
-    SlaveDampingRatio(usize),
+    /// ξ of a structure that carries surfaces, parameter.
+    CarrierDampingRatio,
     /// Velocity of a free master at the start along x, y, z (component 0, 1, 2), parameter.
     InitialVelocity(usize),
     /// Share of the friction heat that goes into the slave, parameter.
@@ -306,6 +309,11 @@ impl VariableTable {
     /// First variable with this quantity.
     pub fn with_quantity(&self, quantity: Quantity) -> Option<&Variable> {
         self.variables.iter().find(|variable| variable.quantity == quantity)
+    }
+
+    /// The variable with this quantity of one structure or pair.
+    pub fn with_quantity_of(&self, quantity: Quantity, of: usize) -> Option<&Variable> {
+        self.variables.iter().find(|variable| variable.quantity == quantity && variable.of == of)
     }
 
     /// All rows.

@@ -39,7 +39,7 @@ fn collide(elements: usize, scheme: Scheme, solver: Solver) -> Outcome {
     let pair = NodePair { master: (0, 0), slave: Some((1, 0)) };
     let model = ascending(&ModalModel::combined(&models, &[pair]).unwrap(), 2);
     let law = GapLaw::Fixed(FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![GAP], sliding: vec![[0.0; 3]] });
-    let mut system = System::new(&model, 1, law, SystemSettings { scheme, solver, friction: 0.0, ledger: true });
+    let mut system = System::new(&model, 1, law, 0.0, SystemSettings { scheme, solver, ledger: true });
     let courant = COURANT * bars[0].wave_time();
     let step = if scheme == Scheme::MasslessBoundary { quiet_step(&model, courant) } else { courant };
     system.set_step(step);
@@ -54,14 +54,14 @@ fn collide(elements: usize, scheme: Scheme, solver: Solver) -> Outcome {
     let momentum = |system: &System| -> f64 {
         (0..model.len()).map(|mode| rigid(mode, 0) * system.bank().modal_state(mode, 0).1 / step).sum()
     };
-    system.start(&Drive::default());
+    system.start(&[Drive::default()]);
     let (before, moving) = (system.ledger().initial, momentum(&system));
     let (mut touch, mut release, mut impulse, mut mean, mut count) = (f64::NAN, 0.0, 0.0, 0.0, 0);
     let exact = carpenter::exact();
     while system.steps() as f64 * step < 220e-6 {
         // λ enforces the gap at t_{n+1} and acts as the force at t_n.
         let time = system.steps() as f64 * step;
-        system.step(&Drive::default()).unwrap();
+        system.step(&[Drive::default()]).unwrap();
         let force = system.multiplier(0, 0);
         if force > 0.0 {
             touch = if touch.is_nan() { time } else { touch };

@@ -14,7 +14,7 @@ use tiprub_core::dynamics::bank::BankOptions;
 use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::dynamics::sectors::SectorModel;
 use tiprub_core::settings::{Scheme, Solver};
-use tiprub_core::system::{System, SystemParts, SystemSettings};
+use tiprub_core::system::{System, SystemSettings};
 use tiprub_reference::closed::belt::Belt;
 
 const MASS: f64 = 2.0;
@@ -37,15 +37,12 @@ fn block(scheme: Scheme, step: f64) -> System {
         // The belt runs towards +x: the block slides back on it.
         sliding: vec![[-BELT, 0.0, 0.0]],
     });
-    let settings = SystemSettings { scheme, solver: Solver::Coulomb, friction: FRICTION, ledger: true };
+    let settings = SystemSettings { scheme, solver: Solver::Coulomb, ledger: true };
     let bank = BankOptions { loads: true, ..BankOptions::default() };
-    let mut system = {
-        let parts = SystemParts { bank, sticking: true, ..SystemParts::default() };
-        System::with_parts(SectorModel::Uncoupled(&model, 1), law, settings, parts)
-    };
+    let mut system = System::alone(SectorModel::Uncoupled(&model, 1), bank, law, FRICTION, settings);
     system.set_step(step);
     system.bank_mut().set_modal_state(1, 0, 0.0, BELT * MASS.sqrt());
-    system.start(&Drive::default());
+    system.start(&[Drive::default()]);
     system
 }
 
@@ -64,7 +61,7 @@ fn run(scheme: Scheme, step: f64, sticking: f64, sliding: f64, steps: usize) -> 
     for _ in 0..steps {
         system.bank_mut().loads_mut()[0] = -(if stuck { sticking } else { sliding }) / MASS.sqrt();
         let before = system.bank().row(0, 0);
-        system.step(&Drive::default()).unwrap();
+        system.step(&[Drive::default()]).unwrap();
         let now = system.bank().row(0, 0);
         let slip = now - before - BELT * step;
         stuck = slip.abs() < 1e-9 * BELT * step;

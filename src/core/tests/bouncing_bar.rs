@@ -65,14 +65,14 @@ fn bounce(elements: usize, scheme: Scheme, solver: Solver, fraction: f64) -> Out
     let mass = DENSITY * LENGTH;
     let weight = -GRAVITY * mass.sqrt();
     set_samples(&mut system, &model, 0, 0.0, 0.5 * weight * step * step);
-    system.start(&Drive::default());
+    system.start(&[Drive::default()]);
     let delay = if scheme == Scheme::MasslessBoundary { step } else { 0.0 };
     let mut outcome = Outcome { step, ..Outcome::default() };
     let (mut squares, mut squares_force, mut impulses) = ([Squares::default(); PERIODS], Squares::default(), [0.0; 2]);
     while (system.steps() as f64) * step < PERIODS as f64 * PERIOD {
         let acting = system.steps() as f64 * step + delay;
         system.bank_mut().loads_mut()[0] = weight;
-        system.step(&Drive::default()).unwrap();
+        system.step(&[Drive::default()]).unwrap();
         let (time, force) = (system.steps() as f64 * step, system.multiplier(0, 0));
         // The series is long: as many samples for every mesh.
         if system.steps().is_multiple_of((elements / 25) as u64) {

@@ -186,7 +186,7 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
         let scene = scene(feature, Scheme::ModalExact, Solver::Lcp, 0.0, 1e-6);
         let mut simulation = Simulation::new(&scene).unwrap();
         simulation.initialise(0.0).unwrap();
-        let (mut law, lanes) = (simulation.system().law().clone(), simulation.system().bank().lanes());
+        let (mut law, lanes) = (simulation.system().pairs()[0].gap().clone(), simulation.system().bank().lanes());
         let mut displacement = vec![0.0; 9 * lanes];
         (displacement[0], displacement[lanes], displacement[2 * lanes]) = (8e-4, -1.2e-3, 5e-4);
         let drive = Drive {
@@ -252,8 +252,8 @@ fn friction_heat_goes_to_the_patch_that_the_displaced_node_faces() {
             for event in system.acted() {
                 let node = &scene.roms[0].contact_nodes[event.node].position;
                 let undisplaced =
-                    node[1] + std::f64::consts::TAU * event.sector as f64 / 12.0 + system.drive().rotor_angle;
-                let ([u, v, _], [x, y, _]) = (event.point, system.drive().shaft);
+                    node[1] + std::f64::consts::TAU * event.sector as f64 / 12.0 + system.pairs()[0].drive_now().rotor_angle;
+                let ([u, v, _], [x, y, _]) = (event.point, system.pairs()[0].drive_now().shaft);
                 let angle = undisplaced + v / node[0];
                 let place = [(node[0] + u) * angle.cos() + x, (node[0] + u) * angle.sin() + y];
                 // Quarters from θ = 0 on.

@@ -327,10 +327,10 @@ fn a_change_of_step_keeps_the_order_of_the_scheme() {
             }
         }
         let drive = tiprub_core::contact::gap::Drive { speed: 1300.0, ..Default::default() };
-        system.start(&drive);
+        system.start(&[drive]);
         for step in steps {
             system.set_step(*step);
-            system.step(&drive).unwrap();
+            system.step(&[drive]).unwrap();
         }
         system.bank().displacement().to_vec()
     };
@@ -437,7 +437,7 @@ proptest! {
             let time = simulation.time();
             simulation.do_step(time, 5e-5).unwrap();
             let system = simulation.system();
-            for (index, gap) in system.gaps().iter().enumerate().filter(|(index, _)| index % system.bank().lanes() < sectors) {
+            for (index, gap) in system.gaps().enumerate().filter(|(index, _)| index % system.bank().lanes() < sectors) {
                 let multiplier = system.multiplier(index / system.bank().lanes(), index % system.bank().lanes());
                 prop_assert!(*gap >= -1e-16 && multiplier >= 0.0);
                 prop_assert!(multiplier == 0.0 || gap.abs() < 1e-16);

@@ -49,7 +49,7 @@ fn march(system: &mut System, steps: u64, load: Option<f64>) -> [f64; 2] {
         if let Some(load) = load {
             system.bank_mut().loads_mut()[0] = load;
         }
-        system.step(&Drive::default()).unwrap();
+        system.step(&[Drive::default()]).unwrap();
     };
     // The first steps find the contact that is closed from the start.
     for _ in 0..4 {
@@ -72,7 +72,7 @@ fn free(scheme: Scheme, steps: u64) -> [f64; 2] {
     let mut system = against_plane(&model, (scheme, Solver::Lcp), 1.0, 1.0, false);
     system.set_step(quiet_step(&model, 1e-6));
     ring(&mut system, &model, 0.03);
-    system.start(&Drive::default());
+    system.start(&[Drive::default()]);
     march(&mut system, steps, None)
 }
 
@@ -81,13 +81,13 @@ fn closed(scheme: Scheme, steps: u64) -> [f64; 2] {
     let model = rod(scheme);
     let mut system = against_plane(&model, (scheme, Solver::Lcp), 1.0, 0.0, true);
     system.set_step(quiet_step(&model, 1e-6));
-    system.start(&Drive::default());
+    system.start(&[Drive::default()]);
     let load = -2e4;
     // Half of the load comes in slowly, the other half at once: the rod rings between half and one and a half times its rest.
     for index in 0..20_000 {
         let share = f64::from(index) / 20_000.0;
         system.bank_mut().loads_mut()[0] = 0.5 * load * share * share * (3.0 - 2.0 * share);
-        system.step(&Drive::default()).unwrap();
+        system.step(&[Drive::default()]).unwrap();
     }
     let losses = system.ledger().impact_loss.value();
     let found = march(&mut system, steps, Some(load));
@@ -104,7 +104,7 @@ fn impacts(steps: u64, step: f64) -> [f64; 2] {
     let mut system = against_plane(&model, (Scheme::MasslessBoundary, Solver::Lcp), -1.0, 1e-3, false);
     system.set_step(step);
     set_samples(&mut system, &model, 0, -2e-3, -2e-3 * (omega * step).cos());
-    system.start(&Drive::default());
+    system.start(&[Drive::default()]);
     march(&mut system, steps, None)
 }
 

@@ -516,7 +516,7 @@ fn flanks_steeper_than_45_degrees_are_refused() {
     let mut through_points = scene.clone();
     through_points.settings.surfaces[0].spline = Some(SplineSettings::default());
     for (simulation, kind) in [(started(&scene), "revolution"), (started(&through_points), "spline")] {
-        let law = simulation.system().law();
+        let law = simulation.system().pairs()[0].gap();
         for (degrees, answered) in [(0.0_f64, true), (44.9, true), (45.1, false), (80.0, false), (100.0, false)] {
             for sense in [1.0, -1.0] {
                 let (sine, cosine) = degrees.to_radians().sin_cos();

@@ -329,27 +329,27 @@ fn balance(scene: &Scene) -> [f64; 3] {
         simulation.begin_step(time, 1e-5).unwrap();
         while !simulation.advance().unwrap().finished {
             let system = simulation.system();
-            let GapLaw::Spline(law) = system.law() else { panic!("no spline") };
+            let GapLaw::Spline(law) = system.pairs()[0].gap() else { panic!("no spline") };
             let (mut sums, mut scale) = ([[0.0; 3]; 2], 0.0);
-            let mut modal = vec![0.0; system.slave().map_or(0, |slave| slave.bank.modes())];
+            let mut modal = vec![0.0; system.structures().get(1).map_or(0, |slave| slave.contact_force().len())];
             for event in system.events() {
                 let force = event.wrench.force;
                 // About the origin: the shaft's centre is at `shaft`.
-                let lever = cross(system.drive().shaft, force);
+                let lever = cross(system.pairs()[0].drive_now().shaft, force);
                 for i in 0..3 {
                     sums[0][i] += force[i];
                     sums[1][i] += event.wrench.moment[i] + lever[i];
                 }
                 scale += event.normal;
-                let place = system.geometry().places[event.node * system.bank().lanes() + event.sector];
+                let place = system.structures()[0].geometry().places[event.node * system.bank().lanes() + event.sector];
                 for (index, weight) in law.surface.weights(place).iter() {
                     let acts = force.map(|value| -weight * value);
                     let moment = cross(law.surface.control_points()[index], acts);
                     for i in 0..3 {
                         sums[0][i] += acts[i];
                         sums[1][i] += moment[i];
-                        if let Some(slave) = system.slave() {
-                            let shapes = slave.bank.contact_row(3 * index + i);
+                        if let Some(slave) = system.structures().get(1) {
+                            let shapes = slave.modes().uncoupled().unwrap().contact_row(3 * index + i);
                             modal.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += acts[i] * shape);
                         }
                     }
@@ -360,7 +360,7 @@ fn balance(scene: &Scene) -> [f64; 3] {
                 let largest = |sum: [f64; 3]| sum.iter().fold(0.0, |worst: f64, value| worst.max(value.abs()));
                 worst[0] = worst[0].max(largest(sums[0]) / scale);
                 worst[1] = worst[1].max(largest(sums[1]) / (0.25 * scale));
-                let own = system.slave().map_or(&[][..], |slave| slave.contact_force());
+                let own = system.structures().get(1).map_or(&[][..], |slave| slave.contact_force());
                 let most = modal.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
                 let off = own.iter().zip(&modal).map(|(own, modal)| (own - modal).abs() / most);
                 worst[2] = off.fold(worst[2], f64::max);
@@ -397,14 +397,14 @@ fn complementarity_holds_over_a_long_rub_of_the_whole_casing() {
                 shape_factor: 1.0,
                 ..Drive::default()
             };
-            let (mut law, mut gaps) = (system.law().clone(), system.gaps().to_vec());
+            let (mut law, mut gaps) = (system.pairs()[0].gap().clone(), system.structures()[0].gaps().to_vec());
             let mut geometry = law.geometry(lanes);
-            let moved = system.slave().map_or(&[][..], |slave| slave.bank.displacement());
+            let moved = system.structures().get(1).map_or(&[][..], |slave| slave.modes().displacement());
             law.evaluate(&drive, system.bank().displacement(), moved, None, &mut geometry, &mut gaps);
             let off = gaps.iter().zip(system.gaps()).filter(|(gap, _)| gap.is_finite());
             again = off.fold(again, |a, (gap, booked)| a.max((gap - booked).abs() / 3.56e-4));
             most = most.max(system.events().len());
-            for (place, gap) in system.gaps().iter().enumerate().filter(|(place, _)| place % lanes < 12) {
+            for (place, gap) in system.gaps().enumerate().filter(|(place, _)| place % lanes < 12) {
                 let multiplier = system.multiplier(place / lanes, place % lanes);
                 penetration = penetration.max(-gap / 3.56e-4);
                 if largest > 0.0 {

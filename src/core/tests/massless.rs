@@ -33,8 +33,8 @@ fn bar(elements: usize, kept: f64) -> Rod {
 
 fn system(model: &ModalModel, scheme: Scheme, step: f64) -> System {
     let law = GapLaw::Fixed(FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![GAP], sliding: vec![[0.0; 3]] });
-    let settings = SystemSettings { scheme, solver: Solver::Lcp, friction: 0.0, ledger: true };
-    let mut system = System::new(model, 1, law, settings);
+    let settings = SystemSettings { scheme, solver: Solver::Lcp, ledger: true };
+    let mut system = System::new(model, 1, law, 0.0, settings);
     system.set_step(step);
     system
 }
@@ -52,11 +52,11 @@ fn a_bar_bounces_off_without_impact_loss() {
         let mut system = system(&model, scheme, step);
         // Rigid translation at SPEED: mode 0.
         system.bank_mut().set_modal_state(0, 0, 0.0, SPEED * (DENSITY * AREA * LENGTH).sqrt());
-        system.start(&Drive::default());
+        system.start(&[Drive::default()]);
         let before = system.energies();
         let (mut impulse, mut touched, mut released) = (0.0, f64::NAN, 0.0);
         for index in 1..=3000 {
-            system.step(&Drive::default()).unwrap();
+            system.step(&[Drive::default()]).unwrap();
             let force: f64 = system.events().iter().map(|event| event.normal).sum();
             impulse += force * step;
             if force > 0.0 {
@@ -94,13 +94,13 @@ fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
     told!("ξ = {damping_ratio}: limit {limit:.3e} s, {:.2} of 2/ω_max", limit * model.largest_frequency() / 2.0);
     let law = FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![-1e-4], sliding: vec![[0.0; 3]] };
     let settings =
-        SystemSettings { scheme: Scheme::MasslessBoundary, solver: Solver::Lcp, friction: 0.0, ledger: true };
-    let mut pressed = System::new(&model, 1, GapLaw::Fixed(law), settings);
+        SystemSettings { scheme: Scheme::MasslessBoundary, solver: Solver::Lcp, ledger: true };
+    let mut pressed = System::new(&model, 1, GapLaw::Fixed(law), 0.0, settings);
     pressed.set_step(share * limit);
-    pressed.start(&Drive::default());
+    pressed.start(&[Drive::default()]);
     let (mut most, mut last) = (0.0_f64, [f64::INFINITY, f64::NEG_INFINITY]);
     for step in 0..4000 {
-        if pressed.step(&Drive::default()).is_err() {
+        if pressed.step(&[Drive::default()]).is_err() {
             return (f64::INFINITY, f64::INFINITY);
         }
         let (kinetic, strain) = pressed.energies();
@@ -220,10 +220,10 @@ fn dragged(step: f64, solver: Solver) -> (System, f64) {
     let model = ModalModel { quasi_static: 2, ..ModalModel::from_rom(&rom, 0.0).unwrap() };
     let sliding = vec![[0.0, 1.0, 0.0]];
     let law = FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![-1e-4], sliding };
-    let settings = SystemSettings { scheme: Scheme::MasslessBoundary, solver, friction: 0.3, ledger: true };
-    let mut system = System::new(&model, 1, GapLaw::Fixed(law), settings);
+    let settings = SystemSettings { scheme: Scheme::MasslessBoundary, solver, ledger: true };
+    let mut system = System::new(&model, 1, GapLaw::Fixed(law), 0.3, settings);
     system.set_step(step);
-    system.start(&Drive::default());
+    system.start(&[Drive::default()]);
     (system, step)
 }
 
@@ -235,7 +235,7 @@ fn friction_opposes_sliding_however_short_the_step_is() {
             let (mut system, step) = dragged(step, solver);
             let mut time = 0.0;
             while time < 1e-4 {
-                system.step(&Drive::default()).unwrap();
+                system.step(&[Drive::default()]).unwrap();
                 time += step;
                 let event = system.events()[0];
                 assert!((event.force[1] + 0.3 * event.normal).abs() < 1e-12 * event.normal, "h = {step:e}: {event:?}");

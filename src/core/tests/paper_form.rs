@@ -51,15 +51,15 @@ fn a_thousand_contact_steps_agree_to_rounding() {
     let gaps = [-1e-4, 0.1e-4, -0.5e-4];
     let law = GapLaw::Fixed(FixedGap { normals: normals.clone(), gaps: gaps.to_vec(), sliding });
     let settings =
-        SystemSettings { scheme: Scheme::CentralDifference, solver: Solver::Film, friction: FRICTION, ledger: true };
-    let mut system = System::new(&model, 1, law, settings);
+        SystemSettings { scheme: Scheme::CentralDifference, solver: Solver::Film, ledger: true };
+    let mut system = System::new(&model, 1, law, FRICTION, settings);
     system.set_step(step);
     let start = DVector::from_fn(ORDER, |_, _| 2e-4 * number(&mut seed));
     let modal = model.shapes.transpose() * &rom.mass * &start;
     for mode in 0..ORDER {
         system.bank_mut().set_modal_state(mode, 0, modal[mode], 0.0);
     }
-    system.start(&Drive::default());
+    system.start(&[Drive::default()]);
     let physical = |system: &System, before: bool| {
         let coordinates = DVector::from_fn(ORDER, |mode, _| {
             let (position, increment) = system.bank().modal_state(mode, 0);
@@ -89,7 +89,7 @@ fn a_thousand_contact_steps_agree_to_rounding() {
     let gaps = DVector::from_row_slice(&gaps);
     let (mut contact_steps, mut steps, mut worst, mut scale) = (0, 0, 0.0_f64, 0.0_f64);
     while contact_steps < 1000 {
-        system.step(&Drive::default()).unwrap();
+        system.step(&[Drive::default()]).unwrap();
         let multipliers = paper.step(&normal, &slip, &gaps);
         let ours = physical(&system, false);
         worst = worst.max((&ours - &paper.now).amax());

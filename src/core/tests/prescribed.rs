@@ -10,13 +10,14 @@ mod lattice;
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::contact::free_gap::{FreeGap, OpenSurface};
+use tiprub_core::contact::open_gap::{OpenGap, OpenSurface};
 use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw};
 use tiprub_core::contact::spline::SurfaceSpline;
+use tiprub_core::dynamics::bank::BankOptions;
 use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::dynamics::sectors::SectorModel;
 use tiprub_core::settings::{Interpolation, LoadSettings, Scheme, Shape, Solver, SplineSettings};
-use tiprub_core::system::{System, SystemParts, SystemSettings};
+use tiprub_core::system::{Carrier, PairParts, StructureParts, System, SystemSettings};
 use tiprub_core::{Rom, Scene, Simulation};
 
 fn place(simulation: &Simulation, name: &str) -> u32 {
@@ -285,16 +286,16 @@ fn masses(modes: &[(f64, usize, f64)], rows: usize, quasi_static: usize) -> Moda
 }
 
 /// A mass that is pressed along z by its spring and swings along x, on a plane.
-fn swinging_blade(scheme: Scheme, settings: SystemSettings) -> System {
+fn swinging_blade(scheme: Scheme, friction: f64, settings: SystemSettings) -> System {
     let modes = [(SWING, 0, 1.0), (PRESS, 2, 1.0), (1e4, 0, 1e4 * SOFT.sqrt()), (1e4, 2, 1e4 * SOFT.sqrt())];
     let delayed = scheme == Scheme::MasslessBoundary;
     let model = if delayed { masses(&modes, 3, 2) } else { masses(&modes[..2], 3, 0) };
     let law = FixedGap { normals: vec![[0.0, 0.0, 1.0]], gaps: vec![-DEPTH], sliding: vec![[0.0; 3]] };
-    System::new(&model, 1, GapLaw::Fixed(law), settings)
+    System::new(&model, 1, GapLaw::Fixed(law), friction, settings)
 }
 
 /// The same, where the plane swings. A second node, which meets nothing, gives the free structure an extent.
-fn swinging_plane(scheme: Scheme, settings: SystemSettings) -> System {
+fn swinging_plane(scheme: Scheme, friction: f64, settings: SystemSettings) -> System {
     let modes = [(PRESS, 2, 1.0), (1e4, 0, 1e4 * SOFT.sqrt()), (1e4, 2, 1e4 * SOFT.sqrt())];
     let delayed = scheme == Scheme::MasslessBoundary;
     let model = if delayed { masses(&modes, 6, 2) } else { masses(&modes[..1], 6, 0) };
@@ -303,10 +304,11 @@ fn swinging_plane(scheme: Scheme, settings: SystemSettings) -> System {
     let surface = SurfaceSpline::open(&grid, 4, 4, Interpolation::Spline).unwrap();
     let plane = masses(&[(SWING, 0, 1.0)], 48, 0);
     let positions = vec![[0.0, 0.0, -DEPTH], [0.1, 0.0, 0.0]];
-    let law = FreeGap::new(positions, vec![Some(0), None], vec![OpenSurface::new(surface, Some(0))]);
-    let sticking = settings.solver == Solver::Coulomb;
-    let parts = SystemParts { slaves: vec![(plane, false)], sticking, ..SystemParts::default() };
-    System::with_parts(SectorModel::Uncoupled(&model, 1), GapLaw::Free(Box::new(law)), settings, parts)
+    let gap = GapLaw::Open(Box::new(OpenGap::new(positions, vec![0], OpenSurface::new(surface))));
+    let touching = StructureParts::Touching(SectorModel::Uncoupled(&model, 1), BankOptions::default());
+    let carrier = Some(Carrier { structure: 1, first_row: 0 });
+    let pair = PairParts { structure: 0, gap, carrier, friction };
+    System::of(vec![touching, StructureParts::Carrying(&plane, false)], vec![pair], Vec::new(), settings)
 }
 
 /// Friction F on a mass on a spring k takes 2F/k of the amplitude at every turn, whichever of the two bodies swings.
@@ -317,25 +319,25 @@ fn a_mass_that_swings_on_a_plane_loses_the_same_amplitude_every_half_turn() {
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary] {
         for solver in [Solver::Film, Solver::Lcp, Solver::Coulomb] {
             for plane in [false, true] {
-                let settings = SystemSettings { scheme, solver, friction, ledger: true };
+                let settings = SystemSettings { scheme, solver, ledger: true };
                 let mut system =
-                    if plane { swinging_plane(scheme, settings) } else { swinging_blade(scheme, settings) };
+                    if plane { swinging_plane(scheme, friction, settings) } else { swinging_blade(scheme, friction, settings) };
                 system.set_step(step);
                 let soft = if scheme == Scheme::MasslessBoundary { SOFT } else { 0.0 };
                 let pressed = DEPTH / (1.0 + PRESS * PRESS * soft);
                 if plane {
                     system.bank_mut().set_modal_state(0, 0, pressed, 0.0);
-                    system.slaves_mut()[0].bank.set_modal_state(0, 0, amplitude, 0.0);
+                    system.structures_mut()[1].modes_mut().set_modal_state(0, 0, amplitude, 0.0);
                 } else {
                     system.bank_mut().set_modal_state(0, 0, amplitude, 0.0);
                     system.bank_mut().set_modal_state(1, 0, pressed, 0.0);
                 }
-                system.start(&Drive::default());
+                system.start(&[Drive::default()]);
                 let normal = PRESS * PRESS * pressed;
                 let (mut turns, mut last) = (Vec::new(), amplitude);
                 while turns.len() < 6 {
-                    system.step(&Drive::default()).unwrap();
-                    let bank = if plane { &system.slaves()[0].bank } else { system.bank().uncoupled().unwrap() };
+                    system.step(&[Drive::default()]).unwrap();
+                    let bank = system.structures()[usize::from(plane)].modes();
                     let (now, increment) = bank.modal_state(0, 0);
                     let towards = if turns.len() % 2 == 0 { -1.0 } else { 1.0 };
                     if increment * towards < 0.0 && system.steps() > 100 {
@@ -416,8 +418,7 @@ fn damping_parameters_belong_to_their_own_structures() {
         simulation.initialise(0.0).unwrap();
         run(&mut simulation, 7.7e-7);
         let system = simulation.system();
-        let banks =
-            [system.bank().uncoupled().unwrap()].into_iter().chain(system.slaves().iter().map(|slave| &slave.bank));
+        let banks = system.structures().iter().map(|structure| structure.modes().uncoupled().unwrap());
         let banks: Vec<_> = banks.collect();
         assert_eq!(banks.len(), ratios.len());
         for (bank, (name, ratio)) in banks.iter().zip(ratios) {

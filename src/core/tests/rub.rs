@@ -207,7 +207,7 @@ fn lcp_leaves_no_penetration_and_no_adhesion() {
     for _ in 0..200 {
         run(&mut simulation, 1, 5e-5);
         let system = simulation.system();
-        assert!(system.gaps().iter().all(|gap| *gap >= 0.0));
+        assert!(system.gaps().all(|gap| *gap >= 0.0));
         assert!(system.events().iter().all(|event| event.normal > 0.0));
         assert!(real(&simulation, "clearance_minimum") >= 0.0);
         contacts += system.events().len();
@@ -343,7 +343,7 @@ fn outputs_over_a_communication_step_are_those_of_its_internal_steps() {
     for communication in 0..120 {
         let length = if communication % 3 == 0 { 5e-5 } else { 3.1e-5 };
         simulation.begin_step(simulation.time(), length).unwrap();
-        let mut lowest = simulation.system().gaps().to_vec();
+        let mut lowest = simulation.system().structures()[0].gaps().to_vec();
         let (mut normal, mut tangential) = (vec![0.0; lowest.len()], vec![0.0; lowest.len()]);
         let (mut peak, mut last, mut finished) = (0.0_f64, 0.0_f64, false);
         while !finished {
@@ -358,7 +358,7 @@ fn outputs_over_a_communication_step_are_those_of_its_internal_steps() {
             }
             peak = peak.max(last);
         }
-        let now = simulation.system().gaps();
+        let now = simulation.system().structures()[0].gaps();
         let column =
             |values: &[f64], sector: usize| (0..nodes).map(|node| values[node * lanes + sector]).collect::<Vec<_>>();
         let row = |values: &[f64], node: usize| values[node * lanes..][..sectors].to_vec();

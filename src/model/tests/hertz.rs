@@ -158,12 +158,12 @@ struct AtRest {
 
 /// Settle under strong damping with the sphere held at `approach` (m).
 fn at_rest(block: &Block, model: &ModalModel, solver: Solver, approach: f64) -> AtRest {
-    let settings = SystemSettings { scheme: Scheme::ModalExact, solver, friction: 0.0, ledger: true };
-    let mut system = System::new(model, 1, law(block, approach), settings);
+    let settings = SystemSettings { scheme: Scheme::ModalExact, solver, ledger: true };
+    let mut system = System::new(model, 1, law(block, approach), 0.0, settings);
     system.set_step(0.5 / model.frequencies[0]);
-    system.start(&Drive::default());
+    system.start(&[Drive::default()]);
     for _ in 0..200 {
-        system.step(&Drive::default()).unwrap();
+        system.step(&[Drive::default()]).unwrap();
     }
     let nodes = block.distance.len();
     let forces: Vec<f64> = (0..nodes).map(|node| system.multiplier(node, 0)).collect();
@@ -277,15 +277,15 @@ fn a_sphere_that_hits_a_block_meets_hertz() {
     let last = model.len() - 1;
     for scheme in [Scheme::ModalExact] {
         let step = duration / 4000.0;
-        let settings = SystemSettings { scheme, solver: Solver::Lcp, friction: 0.0, ledger: true };
-        let mut system = System::new(&model, 1, law(&block, 0.0), settings);
+        let settings = SystemSettings { scheme, solver: Solver::Lcp, ledger: true };
+        let mut system = System::new(&model, 1, law(&block, 0.0), 0.0, settings);
         system.set_step(step);
         // The sphere comes from above with its lowest point on the surface at time 0.
         system.bank_mut().set_modal_state(last, 0, 0.0, -speed * (0.25 * mass).sqrt());
-        system.start(&Drive::default());
+        system.start(&[Drive::default()]);
         let (mut release, mut force, mut deepest, mut impulse) = (0.0, 0.0_f64, 0.0_f64, 0.0);
         while (system.steps() as f64) * step < 1.2 * duration {
-            system.step(&Drive::default()).unwrap();
+            system.step(&[Drive::default()]).unwrap();
             let now: f64 = 4.0 * (0..nodes).map(|node| system.multiplier(node, 0)).sum::<f64>();
             if now > 0.0 {
                 release = system.steps() as f64 * step;

@@ -153,6 +153,11 @@ impl Coating {
         work
     }
 
+    /// Contact nodes per blade.
+    pub fn nodes(&self) -> usize {
+        self.nodes
+    }
+
     /// Number of cells; cell `row · around + i` is the i-th of its axial row.
     pub fn cells(&self) -> usize {
         self.plastic.len()

@@ -13,7 +13,7 @@
 //!
 //! F = r_c(φ + δ) − ρ + m (u_z + e_z),  ∇F = (−cos δ − s' sin δ/ρ, (1 + u_r/r)(−sin δ + s' cos δ/ρ), m).
 
-use super::free_gap::{FreeGap, tangent};
+use super::open_gap::{OpenGap, tangent};
 use super::layout::Layout;
 pub use super::layout::sector_angle;
 use super::spline::{ClosestPoint, SurfaceSpline};
@@ -69,7 +69,9 @@ pub struct Geometry {
 persist_fields!(Geometry { normal, places });
 
 impl Geometry {
-    fn new(len: usize, places: usize) -> Self {
+    /// Of all contact nodes and lanes of a structure, `len` in all, with places where one of its pairs has them.
+    pub fn new(len: usize, has_places: bool) -> Self {
+        let places = if has_places { len } else { 0 };
         Self { normal: [vec![0.0; len], vec![0.0; len], vec![0.0; len]], places: vec![ClosestPoint::default(); places] }
     }
 
@@ -79,7 +81,8 @@ impl Geometry {
     }
 }
 
-/// A gap function compiled for stepping.
+/// The gap function of a contact pair, compiled for stepping: of some contact nodes of a structure in all sectors. Arrays are
+/// those of the structure, `[node · lanes + lane]`; a pair reads and writes the places of its nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum GapLaw {
     /// Constant normals and gaps: plane obstacles and node-to-node pairs.
@@ -88,8 +91,8 @@ pub enum GapLaw {
     Revolution(RevolutionGap),
     /// Sectors around an axis inside a surface through data points, rigid or carried by a structure.
     Spline(Box<SplineGap>),
-    /// Nodes of a free structure against open surfaces.
-    Free(Box<FreeGap>),
+    /// Nodes described in fixed directions against a surface through data points, rigid or carried by a structure.
+    Open(Box<OpenGap>),
 }
 
 /// Constant normals, gaps and sliding velocities of one group of contacts.
@@ -108,9 +111,11 @@ pub struct FixedGap {
 pub struct RevolutionGap {
     surface: Surface,
     instruction_set: InstructionSet,
-    /// Where the nodes are.
+    /// Where the contact nodes of the structure are.
     pub layout: Layout,
-    /// Meridional slope per node.
+    /// Those that meet the surface.
+    nodes: Vec<usize>,
+    /// Meridional slope per contact node of the structure.
     slopes: Vec<f64>,
     /// The shaft's centre moves.
     shaft_moves: bool,
@@ -119,7 +124,8 @@ pub struct RevolutionGap {
 }
 
 impl RevolutionGap {
-    /// ClosestPoint `rom.sectors` sectors around the axis; `clearances` holds one radial clearance (m) per sector.
+    /// Place `rom.sectors` sectors around the axis, all contact nodes facing the surface; `clearances` holds one radial clearance
+    /// (m) per sector.
     ///
     /// # Errors
     /// Wrong number of clearances.
@@ -129,10 +135,16 @@ impl RevolutionGap {
             surface,
             instruction_set: InstructionSet::detect(),
             layout: Layout::new(rom, clearances, lanes)?,
+            nodes: (0..rom.contact_nodes.len()).collect(),
             slopes: rom.contact_nodes.iter().map(|node| slope(node.meridional_slope)).collect(),
             shaft_moves: false,
             arms: [Vec::new(), Vec::new()],
         })
+    }
+
+    /// Only these contact nodes of the structure.
+    pub fn of_nodes(self, nodes: Vec<usize>) -> Self {
+        Self { nodes, ..self }
     }
 
     /// Let whirl and axial shift of the shaft act.
@@ -219,7 +231,7 @@ impl<const SHAFT: bool> Kernel for Evaluate<'_, SHAFT> {
         let turned = drive.rotor_angle - drive.shape_rotation;
         let factor = drive.shape_factor;
         let lanes = law.layout.lanes;
-        for node in 0..law.layout.radii.len() {
+        for &node in &law.nodes {
             let (slope, radius, per_radius) = (law.slopes[node], law.layout.radii[node], law.layout.per_radius[node]);
             let span = node * lanes..(node + 1) * lanes;
             let [radial, tangential, axial] =
@@ -268,38 +280,40 @@ impl<const SHAFT: bool> Kernel for Evaluate<'_, SHAFT> {
 }
 
 impl GapLaw {
-    /// Number of contact nodes per sector.
+    /// Number of contact nodes per sector of the structure, those of other pairs included.
     pub fn nodes(&self) -> usize {
         match self {
             Self::Fixed(law) => law.gaps.len(),
             Self::Revolution(law) => law.layout.nodes(),
             Self::Spline(law) => law.layout.nodes(),
-            Self::Free(law) => law.nodes(),
+            Self::Open(law) => law.positions().len(),
         }
     }
 
-    /// The surface spline that a contact node meets.
-    pub fn surface_of(&self, node: usize) -> Option<&SurfaceSpline> {
+    /// The contact nodes of this pair.
+    pub fn members(&self) -> Vec<usize> {
+        match self {
+            Self::Fixed(law) => (0..law.gaps.len()).collect(),
+            Self::Revolution(law) => law.nodes.clone(),
+            Self::Spline(law) => law.nodes.clone(),
+            Self::Open(law) => law.nodes().to_vec(),
+        }
+    }
+
+    /// The surface through data points that the nodes meet.
+    #[inline(always)]
+    pub fn spline(&self) -> Option<&SurfaceSpline> {
         match self {
             Self::Fixed(_) | Self::Revolution(_) => None,
             Self::Spline(law) => Some(&law.surface),
-            Self::Free(law) => Some(&law.surfaces[law.surface_of(node)?].surface),
+            Self::Open(law) => Some(&law.surface.surface),
         }
-    }
-
-    /// The same, where one of the carriers may deform it, and which.
-    pub fn spline_of(&self, node: usize) -> Option<(&SurfaceSpline, usize)> {
-        let carrier = match self {
-            Self::Free(law) => law.surfaces[law.surface_of(node)?].carrier?,
-            _ => 0,
-        };
-        Some((self.surface_of(node)?, carrier))
     }
 
     /// Where the nodes stand around the axis, if there is one.
     pub fn layout(&self) -> Option<&Layout> {
         match self {
-            Self::Fixed(_) | Self::Free(_) => None,
+            Self::Fixed(_) | Self::Open(_) => None,
             Self::Revolution(law) => Some(&law.layout),
             Self::Spline(law) => Some(&law.layout),
         }
@@ -308,17 +322,21 @@ impl GapLaw {
     /// Angle over which the casing shape changes noticeably (rad).
     pub fn angular_scale(&self) -> f64 {
         match self {
-            Self::Fixed(_) | Self::Free(_) => f64::INFINITY,
+            Self::Fixed(_) | Self::Open(_) => f64::INFINITY,
             Self::Revolution(law) => law.surface.angular_scale(),
             Self::Spline(law) => law.angular_scale,
         }
     }
 
-    /// Arrays of the right size, filled once for laws that never change.
+    /// Normals and places of the nodes of a structure that meets nothing else, with rows of `lanes` lanes.
     pub fn geometry(&self, lanes: usize) -> Geometry {
-        let len = self.nodes() * lanes;
-        let has_places = matches!(self, Self::Spline(_) | Self::Free(_));
-        let mut geometry = Geometry::new(len, if has_places { len } else { 0 });
+        let mut geometry = Geometry::new(self.nodes() * lanes, self.spline().is_some());
+        self.prepare(lanes, &mut geometry);
+        geometry
+    }
+
+    /// Write what never changes, with rows of `lanes` lanes.
+    pub fn prepare(&self, lanes: usize, geometry: &mut Geometry) {
         if let Self::Fixed(law) = self {
             for (node, normal) in law.normals.iter().enumerate() {
                 for component in 0..3 {
@@ -326,13 +344,12 @@ impl GapLaw {
                 }
             }
         }
-        geometry
     }
 
-    /// Gaps (m) and normals at an instant, for the displacements `[row · lanes + lane]` of the contact rows (m) and
-    /// `moved` of the control points of a surface around an axis that is carried by a structure (open surfaces have been
-    /// displaced by [`super::free_gap::OpenSurface::follow`]). `before` is the geometry of the step
-    /// before, from which closest points are sought. Gaps are infinite in padding lanes and where there is nothing to touch.
+    /// Gaps (m) and normals at an instant, for the displacements `[row · lanes + lane]` of the contact rows (m) and `moved` of the
+    /// control points of a surface that is carried by a structure. `before` is the geometry of the step before, from which
+    /// closest points are sought. Gaps are infinite where there is nothing to touch; padding lanes and nodes of other pairs are
+    /// not written.
     pub fn evaluate(
         &mut self,
         drive: &Drive,
@@ -342,6 +359,7 @@ impl GapLaw {
         geometry: &mut Geometry,
         gap: &mut [f64],
     ) {
+        let guess = before.map(|before| &before.places[..]);
         match self {
             Self::Fixed(law) => {
                 for (node, (normal, initial)) in law.normals.iter().zip(&law.gaps).enumerate() {
@@ -349,11 +367,8 @@ impl GapLaw {
                 }
             }
             Self::Revolution(law) => law.evaluate(drive, displacement, geometry, gap),
-            Self::Spline(law) => {
-                let guess = before.map(|before| &before.places[..]);
-                law.evaluate(drive, displacement, moved, guess, geometry, gap);
-            }
-            Self::Free(law) => law.evaluate(displacement, before.map(|before| &before.places[..]), geometry, gap),
+            Self::Spline(law) => law.evaluate(drive, displacement, moved, guess, geometry, gap),
+            Self::Open(law) => law.evaluate(displacement, moved, guess, geometry, gap),
         }
     }
 
@@ -367,7 +382,7 @@ impl GapLaw {
     /// Largest change of the surface by its shape at factor 1 (m).
     pub fn shape_size(&self) -> f64 {
         match self {
-            Self::Fixed(_) | Self::Free(_) => 0.0,
+            Self::Fixed(_) | Self::Open(_) => 0.0,
             Self::Revolution(law) => law.surface.largest_change(),
             Self::Spline(law) => law.shape_size,
         }
@@ -391,7 +406,7 @@ impl GapLaw {
             Self::Fixed(law) => 1e-9 * law.gaps[node].abs(),
             Self::Revolution(RevolutionGap { layout, .. }) => CURVED * layout.radii[node],
             Self::Spline(law) => CURVED * law.layout.radii[node],
-            Self::Free(law) => CURVED * law.largest(),
+            Self::Open(law) => CURVED * law.largest(),
         }
     }
 
@@ -403,7 +418,7 @@ impl GapLaw {
     /// Largest displacement (m) that counts as small: a tenth of the smallest radius, or of the extent of open surfaces and
     /// what they meet; no limit for fixed obstacles.
     pub fn largest_displacement(&self) -> f64 {
-        if let Self::Free(law) = self {
+        if let Self::Open(law) = self {
             return law.largest();
         }
         let radii = self.layout().map(|layout| layout.radii.iter());
@@ -417,7 +432,7 @@ impl GapLaw {
             Self::Fixed(_) => true,
             Self::Revolution(law) => gap > -0.1 * law.layout.radii[node] && normal[1].abs() <= -normal[0],
             Self::Spline(law) => gap > -0.1 * law.layout.radii[node] && faces_inwards(normal),
-            Self::Free(law) => gap > -law.largest(),
+            Self::Open(law) => gap > -law.largest(),
         }
     }
 
@@ -430,7 +445,7 @@ impl GapLaw {
             Self::Revolution(law) => law.layout.rigid_velocity(node, index, drive, moved),
             Self::Spline(law) => law.rigid_velocity(node, index, drive, moved),
             // Free flight is part of the displacements.
-            Self::Free(_) => [0.0; 3],
+            Self::Open(_) => [0.0; 3],
         }
     }
 
@@ -438,7 +453,7 @@ impl GapLaw {
     /// when nothing slides. On surfaces of revolution axial slip is neglected, as in section 4.3 of the paper.
     pub fn slip_direction(&self, velocity: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
         let candidate = match self {
-            Self::Fixed(_) | Self::Free(_) => velocity,
+            Self::Fixed(_) | Self::Open(_) => velocity,
             Self::Revolution(_) | Self::Spline(_) => [0.0, velocity[1], 0.0],
         };
         tangent(candidate, normal)
@@ -470,6 +485,7 @@ mod tests {
                 axial: vec![0.0],
                 clearances: vec![3.56e-4; 16],
             },
+            nodes: vec![0],
             slopes: vec![-0.26],
             shaft_moves: false,
             arms: [Vec::new(), Vec::new()],
@@ -478,7 +494,7 @@ mod tests {
         let drive = Drive { rotor_angle: 1.1, shape_factor: 1.0, ..Drive::default() };
         let run = |instruction_set| {
             let mut law = GapLaw::Revolution(law(instruction_set));
-            let (mut geometry, mut gap) = (law.geometry(lanes), vec![0.0; 16]);
+            let (mut geometry, mut gap) = (Geometry::new(lanes, false), vec![0.0; 16]);
             law.evaluate(&drive, &displacement, &[], None, &mut geometry, &mut gap);
             let all = geometry.normal.iter().flatten().chain(&gap);
             all.map(|value| value.to_bits()).collect::<Vec<_>>()

@@ -22,7 +22,7 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// ClosestPoint `rom.sectors` sectors around the axis; `clearances` holds one radial clearance (m) per sector.
+    /// Place `rom.sectors` sectors around the axis; `clearances` holds one radial clearance (m) per sector.
     ///
     /// # Errors
     /// Wrong number of clearances.

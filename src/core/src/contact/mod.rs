@@ -2,7 +2,7 @@
 
 pub mod coating;
 pub mod coulomb;
-pub mod free_gap;
+pub mod open_gap;
 pub mod gap;
 pub mod layout;
 pub mod solver;

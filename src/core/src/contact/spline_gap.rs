@@ -15,8 +15,12 @@ const WITHIN_PATCH: std::ops::RangeInclusive<f64> = -1e-6..=1.0 + 1e-6;
 /// Contact nodes of equally spaced sectors facing a surface spline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SplineGap {
-    /// Where the nodes are.
+    /// Where the contact nodes of the structure are.
     pub layout: Layout,
+    /// Those that meet the surface.
+    pub nodes: Vec<usize>,
+    /// The first data point among the nodes of the contact grid that carries the surface.
+    pub first_node: usize,
     /// Clearance that the data points were placed with (m).
     pub nominal_clearance: f64,
     /// The surface as it is now.
@@ -57,6 +61,8 @@ impl SplineGap {
             shape_size: largest.sqrt(),
             // The sagitta of a facet.
             ripple: 0.125 * radius * surface.spacing() * surface.spacing(),
+            nodes: (0..layout.nodes()).collect(),
+            first_node: 0,
             layout,
             nominal_clearance,
             surface,
@@ -106,11 +112,10 @@ impl SplineGap {
         self.follow(drive.shape_factor, moved);
         self.out_of_reach = None;
         let lanes = self.layout.lanes;
-        for (index, gap) in gap.iter_mut().enumerate() {
-            let (node, lane) = (index / lanes, index % lanes);
-            if self.layout.clearances[lane].is_infinite() {
-                continue;
-            }
+        let nodes = self.nodes.iter().flat_map(|node| (0..lanes).map(move |lane| (*node, lane)));
+        // Padding lanes are infinitely far away.
+        for (node, lane) in nodes.filter(|(_, lane)| self.layout.clearances[*lane].is_finite()) {
+            let index = node * lanes + lane;
             let local: [f64; 3] = std::array::from_fn(|component| displacement[(3 * node + component) * lanes + lane]);
             let angle = self.layout.angles[index] + drive.rotor_angle - drive.shape_rotation;
             let frame = Frame::new(angle);
@@ -122,7 +127,7 @@ impl SplineGap {
                 .map_or_else(|| self.surface.locate(point), |places| self.surface.advance(places[index], self.turned));
             match self.surface.project(point, start) {
                 Projection::Found { place, normal, gap: found, .. } => {
-                    *gap = found;
+                    gap[index] = found;
                     let normal = frame.local(normal);
                     for component in 0..3 {
                         geometry.normal[component][index] = normal[component];
@@ -130,12 +135,12 @@ impl SplineGap {
                     geometry.places[index] = place;
                 }
                 Projection::BeyondEdge { place } => {
-                    *gap = NOTHING_TO_TOUCH;
+                    gap[index] = NOTHING_TO_TOUCH;
                     geometry.places[index] = place;
                     self.out_of_reach = self.out_of_reach.or(Some(index));
                 }
                 // Found out by the caller: the state is not what the model describes any more.
-                Projection::Lost => *gap = f64::NAN,
+                Projection::Lost => gap[index] = f64::NAN,
             }
         }
     }

@@ -122,7 +122,7 @@ impl GapLaw {
         match self {
             Self::Fixed(_) | Self::Revolution(_) => moved,
             Self::Spline(law) => law.contact_arm(at.index, at.drive, places[at.index]),
-            Self::Free(law) => law.contact_point(at.node, places[at.index]),
+            Self::Open(law) => law.contact_point(places[at.index]),
         }
     }
 
@@ -133,7 +133,7 @@ impl GapLaw {
         let At { node, index, drive } = at;
         match self {
             Self::Fixed(_) => Wrench { force, ..Wrench::default() },
-            Self::Free(_) => Wrench { point, force, moment: cross(point, force) },
+            Self::Open(_) => Wrench { point, force, moment: cross(point, force) },
             Self::Spline(law) => around(law.frame(index, drive.rotor_angle), drive, point, force),
             Self::Revolution(law) => {
                 let (layout, [radial, tangential, axial]) = (&law.layout, point);
@@ -153,7 +153,7 @@ impl GapLaw {
     pub fn spin_motion(&self, at: At<'_>, point: [f64; 3], motion: &Motion) -> [f64; 3] {
         match self {
             Self::Fixed(law) => law.sliding[at.index].map(|velocity| velocity * motion.step),
-            Self::Free(_) => [0.0; 3],
+            Self::Open(_) => [0.0; 3],
             Self::Revolution(law) => [0.0, law.layout.radii[at.node] * motion.turn, 0.0],
             Self::Spline(_) => [-motion.turn * point[1], motion.turn * point[0], 0.0],
         }
@@ -163,7 +163,7 @@ impl GapLaw {
     #[inline(always)]
     pub fn shaft_motion(&self, At { node, index, drive }: At<'_>, point: [f64; 3], motion: &Motion) -> [f64; 3] {
         match self {
-            Self::Fixed(_) | Self::Free(_) => [0.0; 3],
+            Self::Fixed(_) | Self::Open(_) => [0.0; 3],
             Self::Revolution(law) => law.layout.shaft_motion(node, index, drive.rotor_angle, point, motion.shaft),
             Self::Spline(law) => law.frame(index, drive.rotor_angle).local(motion.shaft),
         }
@@ -180,7 +180,7 @@ impl GapLaw {
         motion: &Motion,
     ) -> f64 {
         match self {
-            Self::Fixed(_) | Self::Free(_) => 0.0,
+            Self::Fixed(_) | Self::Open(_) => 0.0,
             Self::Revolution(law) => law.surface_motion(at, point, normal[0], motion),
             Self::Spline(law) => law.surface_motion(at, point, normal, places[at.index], motion),
         }
@@ -189,7 +189,7 @@ impl GapLaw {
     /// Angle at which a node displaced by `moved` (m, own directions) faces the casing (rad), in the fixed frame.
     pub fn angle_on_casing(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
         match self {
-            Self::Fixed(_) | Self::Free(_) => 0.0,
+            Self::Fixed(_) | Self::Open(_) => 0.0,
             Self::Revolution(law) => law.angle_on_casing(at, moved),
             Self::Spline(law) => law.angle_on_casing(at, moved),
         }

@@ -119,6 +119,15 @@ impl ModalModel {
         (0..self.len()).map(|mode| self.coefficient(mode, 1.0, scheme, step)).collect()
     }
 
+    /// The same modes seen at the contact rows of both, one after the other.
+    pub fn seen_at_both(self, other: Self) -> Self {
+        let rows = (self.contact_modes.nrows(), other.contact_modes.nrows());
+        let mut contact_modes = DMatrix::zeros(rows.0 + rows.1, self.contact_modes.ncols());
+        contact_modes.rows_mut(0, rows.0).copy_from(&self.contact_modes);
+        contact_modes.rows_mut(rows.0, rows.1).copy_from(&other.contact_modes);
+        Self { contact_modes, ..self }
+    }
+
     /// Several structures side by side as one: modes concatenated, contact rows relative (master − slave).
     ///
     /// `pairs` lists (master structure, master node, slave) with an optional slave (structure, node); the rows of

@@ -1,6 +1,6 @@
 //! The documented range of every setting, and how settings go together.
 
-mod free;
+mod pairs;
 
 use super::{
     CoatingSettings, ContactSettings, Motion, SceneSettings, Scheme, Shape, Solver, SplineSettings, StructureSettings,
@@ -273,12 +273,12 @@ impl ContactSettings {
                 "Give the surface of another structure, or a rigid one",
             ));
         }
-        if scene.free_master().is_some() {
-            return self.validate_free(scene, at);
+        if self.nodes.as_ref().is_some_and(String::is_empty) {
+            let remedy = "Give the beginning of the names, or remove the line for all nodes";
+            return Err(Error::invalid(format!("{at}.nodes"), "an empty text", remedy));
         }
-        if self.nodes.is_some() {
-            let remedy = "Remove the line: all contact nodes of a rotor meet its surface";
-            return Err(Error::invalid(format!("{at}.nodes"), "only a free master chooses among its nodes", remedy));
+        if scene.master_of(self).is_some_and(|master| master.motion == Motion::Free) {
+            return self.validate_free(scene, at);
         }
         if slave.is_some_and(|surface| surface.rigid) {
             let remedy = "Remove the line; without `structure` the surface around a rotor is rigid";

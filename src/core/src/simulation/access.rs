@@ -86,13 +86,14 @@ impl Simulation {
     /// Unknown reference, wrong kind, not settable, non-finite, out of range; nothing is changed then.
     pub fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
         self.check_real(reference, value)?;
-        let quantity = self.table.locate(reference)?.0.quantity;
-        if quantity == Quantity::Friction && self.phase != Phase::Created {
-            let mut parameters = self.parameters();
-            parameters.friction = value;
-            let warnings = self.check_limits(&parameters)?;
-            self.tell_of_friction(warnings);
-            self.system.set_friction(value);
+        let (variable, _) = self.table.locate(reference)?;
+        if variable.quantity == Quantity::Friction && self.phase != Phase::Created {
+            let before = std::mem::replace(&mut self.values[reference as usize], value);
+            let parameters = self.parameters();
+            let warnings = self.check_limits(&parameters);
+            self.values[reference as usize] = before;
+            self.tell_of_friction(warnings?);
+            self.apply_friction(&parameters);
         }
         let offset = self.offset_now();
         self.change_input(reference, |input| input.ask(value, offset))?;
@@ -177,8 +178,8 @@ impl Simulation {
     /// by the end and that the internal step can follow; nothing is changed otherwise.
     fn change_input(&mut self, reference: u32, change: impl FnOnce(&mut Input)) -> Result<()> {
         let (variable, element) = self.table.locate(reference)?;
-        let quantity = variable.quantity;
-        let Some(mut input) = self.inputs.get(quantity, element).copied() else { return Ok(()) };
+        let (quantity, of) = (variable.quantity, variable.of);
+        let Some(mut input) = self.inputs.get(quantity, of, element).copied() else { return Ok(()) };
         let (offset, length) = (self.offset_now(), self.communication.length);
         let (stepping, at_once) = (self.phase == Phase::Stepping, self.acts_at_once(quantity));
         change(&mut input);
@@ -191,29 +192,36 @@ impl Simulation {
             input.aim(offset, self.inputs.until);
         }
         if stepping {
-            self.check_motion(quantity, &input)?;
+            self.check_motion(quantity, of, &input)?;
         }
         if quantity == Quantity::Speed {
-            self.rotor.rebase(&self.inputs.speed, offset);
+            self.rotors[of].rebase(&self.inputs.rotors[of].speed, offset);
         }
-        if let Some(place) = self.inputs.get_mut(quantity, element) {
+        if let Some(place) = self.inputs.get_mut(quantity, of, element) {
             *place = input;
         }
         if stepping && quantity == Quantity::Speed {
-            self.inputs.lead_spin(offset, self.inputs.until, self.holds());
+            let (until, hold) = (self.inputs.until, self.holds());
+            self.inputs.rotors[of].lead_spin(offset, until, hold);
         }
         Ok(())
     }
 
     /// Whether the internal step under way can follow a new course of the speed or of the shape's rotation.
-    fn check_motion(&self, quantity: Quantity, input: &Input) -> Result<()> {
-        let (step, length) = (self.system.bank().step(), self.communication.length);
+    fn check_motion(&self, quantity: Quantity, of: usize, input: &Input) -> Result<()> {
+        let (step, length) = (self.system.step_size(), self.communication.length);
         match quantity {
             Quantity::Speed => {
-                self.check_turning(step, length, input, self.inputs.shape_rotation.rate())?;
-                [0.0, length].into_iter().try_for_each(|offset| self.compiled.check_speed(input.at(offset)))
+                for (pair, _) in self.compiled.plan.pairs_of(of) {
+                    let rotation = self.inputs.pairs[pair].shape_rotation.rate();
+                    self.check_turning(pair, step, length, input, rotation)?;
+                }
+                [0.0, length].into_iter().try_for_each(|offset| self.compiled.check_speed(of, input.at(offset)))
             }
-            Quantity::ShapeRotation => self.check_turning(step, length, &self.inputs.speed, input.rate()),
+            Quantity::ShapeRotation => {
+                let body = self.compiled.plan.pairs[of].body;
+                self.check_turning(of, step, length, &self.inputs.rotors[body].speed, input.rate())
+            }
             _ => Ok(()),
         }
     }

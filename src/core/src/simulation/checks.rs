@@ -1,7 +1,7 @@
 //! What a scene asks of its ROMs, its methods and its start.
 
 use super::Simulation;
-use super::compile::{Compiled, Roles};
+use super::compile::Compiled;
 use crate::rom::Frame;
 use crate::settings::{Scheme, Solver, StructureSettings};
 use crate::system::StepFailure;
@@ -20,83 +20,81 @@ impl Compiled {
     /// Naming parameter and remedy.
     pub fn check_methods(&self, scheme: Scheme, solver: Solver) -> Result<()> {
         let refuse = |what: &str, problem: &str, remedy: &str| Err(Error::invalid(what, problem, remedy));
-        let (structure, _) = self.master();
         if solver == Solver::Coulomb && !self.may_stick() {
             let remedy = "Package the scene with friction and contact.solver = \"coulomb\", without coating";
             return refuse("parameter `solver`", "`coulomb` is not prepared in this scene", remedy);
         }
-        if self.free.is_some() && scheme == Scheme::MasslessBoundary {
+        if self.scene.settings.contacts.iter().any(|contact| contact.coating.is_some()) && solver != Solver::Lcp {
+            return refuse("parameter `solver`", "a coating is solved with `lcp` only", "Use lcp, or no coating");
+        }
+        if scheme != Scheme::MasslessBoundary {
+            return Ok(());
+        }
+        if self.bodies.iter().any(|body| body.translations.is_some()) {
             let problem = "`massless-boundary` is not made for a master that flies freely";
             return refuse("parameter `scheme`", problem, "Use modal-exact or central-difference");
         }
-        if self.contact().coating.is_some() && solver != Solver::Lcp {
-            return refuse("parameter `solver`", "a coating is solved with `lcp` only", "Use lcp, or no coating");
-        }
-        if scheme == Scheme::MasslessBoundary && structure.spin.coriolis {
+        if self.scene.settings.structures.iter().any(|structure| structure.spin.coriolis) {
             let remedy = "Use modal-exact, or leave coriolis out";
             return refuse("parameter `scheme`", "`massless-boundary` does not take the Coriolis force", remedy);
         }
-        let left = |modes: usize| modes == 0;
-        let none_left = self.disk.as_ref().map_or_else(
-            || left(self.model.dynamic_modes(scheme)),
-            |disk| disk.diameters.iter().any(|diameter| left(diameter.dynamic_modes(scheme))),
-        );
-        if scheme == Scheme::MasslessBoundary && none_left {
+        if self.bodies.iter().any(|body| body.fewest_dynamic_modes(scheme) == 0) {
             let problem =
                 "`massless-boundary` makes the highest modes quasi-static, three per contact node: none is left";
             return refuse("parameter `scheme`", problem, "Use more modes or fewer contact nodes, or modal-exact");
         }
+        if self.shares_carrier() {
+            let problem = "the largest step of `massless-boundary` is not known where a flexible structure carries the surfaces of \
+                           several contact pairs";
+            return refuse("parameter `scheme`", problem, "Use modal-exact or central-difference, or rigid surfaces");
+        }
         Ok(())
     }
-}
 
-impl Compiled {
     /// What is legal in the ROMs and at the start, and hardly meant.
     pub fn doubts(&self) -> Vec<String> {
-        let (master, rom) = self.master();
-        let mut doubts = match &self.disk {
-            Some(disk) => {
-                plausibility::of_rom(rom, disk.diameters.iter().flat_map(|one| one.frequencies.iter().copied()))
-            }
-            None => plausibility::of_rom(rom, self.model.frequencies.iter().copied()),
-        };
-        let flat = self.roles.carrier.into_iter().zip(&self.carrier);
-        let open = self.free.iter().flat_map(|free| {
-            let carried = free.pairs.iter().filter(|pair| pair.carrier.is_some());
-            carried.map(|pair| pair.structure).zip(&free.carriers)
-        });
-        for (index, model) in flat.chain(open) {
-            doubts.extend(plausibility::of_rom(&self.scene.roms[index], model.frequencies.iter().copied()));
+        let mut doubts = Vec::new();
+        for (index, body) in self.bodies.iter().enumerate() {
+            let (structure, rom) = self.body(index);
+            doubts.extend(match &body.disk {
+                Some(disk) => {
+                    plausibility::of_rom(rom, disk.diameters.iter().flat_map(|one| one.frequencies.iter().copied()))
+                }
+                None => plausibility::of_rom(rom, body.model.frequencies.iter().copied()),
+            });
+            doubts.extend(plausibility::of_velocity(structure.velocity));
         }
-        doubts.extend(plausibility::of_velocity(master.velocity));
+        for carrier in &self.carriers {
+            let rom = &self.scene.roms[carrier.structure];
+            doubts.extend(plausibility::of_rom(rom, carrier.model.frequencies.iter().copied()));
+        }
         doubts
     }
 }
 
 /// What coupled sectors do not take, and where they cannot be.
-pub fn check_coupling(scene: &Scene, roles: Roles) -> Result<()> {
+pub fn check_coupling(scene: &Scene, master: usize, carrier: Option<usize>) -> Result<()> {
     let refuse = |what: &str, problem: String, remedy: &str| Err(Error::invalid(what, problem, remedy));
-    if let Some(index) = roles.carrier.filter(|index| scene.roms[*index].is_cyclic()) {
+    if let Some(index) = carrier.filter(|index| scene.roms[*index].is_cyclic()) {
         let problem = format!("the sectors of ROM `{}` are coupled by harmonics", scene.roms[index].name);
         let remedy = "Give a structure of its own, reduced as a whole (sectors = 1), to carry the surface";
         return refuse("surface.structure", problem, remedy);
     }
-    let (structure, rom) = (&scene.settings.structures[roles.master], &scene.roms[roles.master]);
+    let (structure, rom) = (&scene.settings.structures[master], &scene.roms[master]);
     if !rom.is_cyclic() {
         return Ok(());
     }
     let of = |feature: &str| format!("{feature} with the coupled sectors of ROM `{}`", rom.name);
     let uncoupled = "Leave it out, or use a ROM of uncoupled sectors (without harmonics)";
-    if !structure.frequency_factors.is_empty() {
-        return refuse("structure.frequency_factors", of("mistuning of single sectors"), uncoupled);
+    let asked = [
+        ("frequency_factors", !structure.frequency_factors.is_empty(), "mistuning of single sectors"),
+        ("spin.stiffening", structure.spin.stiffening, "stiffening"),
+        ("spin.coriolis", structure.spin.coriolis, "Coriolis force"),
+    ];
+    match asked.into_iter().find(|(_, asked, _)| *asked) {
+        Some((field, _, feature)) => refuse(&format!("structure.{field}"), of(feature), uncoupled),
+        None => Ok(()),
     }
-    if structure.spin.stiffening {
-        return refuse("structure.spin.stiffening", of("stiffening"), uncoupled);
-    }
-    if structure.spin.coriolis {
-        return refuse("structure.spin.coriolis", of("Coriolis force"), uncoupled);
-    }
-    Ok(())
 }
 
 /// What a structure asks of its ROM.
@@ -138,7 +136,7 @@ impl Simulation {
     pub(super) fn check_initial_state(&self) -> Result<()> {
         let Err(failure) = self.system.check_state() else { return Ok(()) };
         let (what, remedy) = match failure {
-            StepFailure::CasingImplausible => (
+            StepFailure::CarrierImplausible { .. } => (
                 "the casing is displaced at the start by more than a tenth of the radius of the contact nodes",
                 "Check the start values of its loads and temperatures; small displacements cannot describe this",
             ),
@@ -179,54 +177,50 @@ impl Simulation {
 
     /// A start in penetration would be an impact of arbitrary strength.
     pub(super) fn check_initial_gaps(&self) -> Result<()> {
-        let lanes = self.system.bank().lanes();
-        let deepest = self
-            .system
-            .gaps()
-            .iter()
-            .enumerate()
-            .fold((0, 0.0), |worst, (index, gap)| if *gap < worst.1 { (index, *gap) } else { worst });
-        if let Some(lost) = self.system.gaps().iter().position(|gap| gap.is_nan()) {
-            let node = &self.compiled.master().1.contact_nodes[lost / lanes].name;
-            return Err(Error::invalid(
-                "initial clearance",
-                format!("{node} finds no closest point of its surface"),
-                "Check start values of loads and temperatures, which may deform the surface beyond all bounds, and its contact grid: \
-                 it must not be folded, or flattened to a line",
-            ));
+        (0..self.compiled.bodies.len()).try_for_each(|body| self.check_initial_gaps_of(body))
+    }
+
+    fn check_initial_gaps_of(&self, body: usize) -> Result<()> {
+        let structure = &self.system.structures()[body];
+        let (gaps, lanes) = (structure.gaps(), structure.modes().lanes());
+        let refuse = |problem: String, remedy: &str| Err(Error::invalid("initial clearance", problem, remedy));
+        let name = |index: usize| self.compiled.node_name(body, index / lanes);
+        if let Some(lost) = gaps.iter().position(|gap| gap.is_nan()) {
+            let remedy = "Check start values of loads and temperatures, which may deform the surface beyond all bounds, and its \
+                          contact grid: it must not be folded, or flattened to a line";
+            return refuse(format!("{} finds no closest point of its surface", name(lost)), remedy);
         }
-        if let Some(index) = self.system.law().out_of_reach() {
-            let node = &self.compiled.master().1.contact_nodes[index / lanes].name;
-            return Err(Error::invalid(
-                "initial clearance",
-                format!(
-                    "{node} of sector {} starts beyond the first or last ring of the casing's surface by more than {OUT_OF_REACH}",
-                    index % lanes + 1
-                ),
-                OUT_OF_REACH_REMEDY,
-            ));
+        let own = self.system.pairs().iter().filter(|pair| pair.structure() == body);
+        if let Some(index) = own.filter_map(|pair| pair.gap().out_of_reach()).next() {
+            let problem = format!(
+                "{} of sector {} starts beyond the first or last ring of the casing's surface by more than {OUT_OF_REACH}",
+                name(index),
+                index % lanes + 1
+            );
+            return refuse(problem, OUT_OF_REACH_REMEDY);
         }
+        let deepest = gaps.iter().enumerate();
+        let deepest = deepest.fold((0, 0.0), |worst, (index, gap)| if *gap < worst.1 { (index, *gap) } else { worst });
         if deepest.1 >= 0.0 {
             return Ok(());
         }
-        let touching = self.system.gaps().iter().filter(|gap| **gap < 0.0).count();
-        let node = &self.compiled.master().1.contact_nodes[deepest.0 / lanes].name;
-        if self.compiled.free.is_some() {
-            return Err(Error::invalid(
-                "initial clearance",
-                format!("{touching} contact nodes start inside the surfaces, deepest {:.3e} m at {node}", deepest.1),
-                "Move one of the structures: gaps follow from the contact positions in the ROMs; check that S_t x S_s of \
-                 each contact grid points to the master",
-            ));
+        let (touching, node) = (gaps.iter().filter(|gap| **gap < 0.0).count(), name(deepest.0));
+        if self.compiled.bodies[body].translations.is_some() {
+            let remedy = "Move one of the structures: gaps follow from the contact positions in the ROMs; check that S_t x S_s of \
+                          each contact grid points to the master";
+            let problem =
+                format!("{touching} contact nodes start inside the surfaces, deepest {:.3e} m at {node}", deepest.1);
+            return refuse(problem, remedy);
         }
-        Err(Error::invalid(
-            "initial clearance",
-            format!(
-                "{touching} contact nodes start inside the casing, deepest {:.3e} m at {node} of sector {}",
-                deepest.1,
-                deepest.0 % lanes + 1
-            ),
-            "Enlarge the gap, let the casing shape grow in with ramp_time (casing_ramp_time), start at another rotor angle, or give other start values to loads, temperatures and the inputs that move casing and shaft",
-        ))
+        let problem = format!(
+            "{touching} contact nodes start inside the casing, deepest {:.3e} m at {node} of sector {}",
+            deepest.1,
+            deepest.0 % lanes + 1
+        );
+        refuse(
+            problem,
+            "Enlarge the gap, let the casing shape grow in with ramp_time (casing_ramp_time), start at another rotor angle, or give \
+             other start values to loads, temperatures and the inputs that move casing and shaft",
+        )
     }
 }

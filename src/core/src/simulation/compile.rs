@@ -3,24 +3,24 @@
 use crate::contact::coating::Coating;
 use crate::contact::gap::{GapLaw, RevolutionGap};
 use crate::contact::layout::Layout;
-use crate::contact::spline_gap::SplineGap;
+use crate::contact::open_gap::{OpenGap, OpenSurface};
+use crate::contact::spline::SurfaceSpline;
 use crate::contact::surface::Surface;
 use crate::dynamics::bank::BankOptions;
 use crate::dynamics::cyclic::CyclicModel;
 use crate::dynamics::modal::{ModalModel, ModalSpin};
-use crate::dynamics::rigid::free_modes;
+use crate::dynamics::rigid::{Translations, free_modes};
 use crate::dynamics::sectors::SectorModel;
-use crate::settings::{ContactSettings, Motion, Solver, StructureSettings, SurfaceSettings};
-use crate::system::{System, SystemParts, SystemSettings};
+use crate::settings::{ContactSettings, Motion, Scheme, Solver, StructureSettings};
+use crate::system::{Carrier, PairParts, StructureParts, System, SystemSettings};
 use crate::variables::Quantity;
 use crate::{Error, Result, Rom, Scene, shown};
 use nalgebra::DMatrix;
 
-use super::checks::{check_coupling, check_rom};
-use super::free::FreeParts;
-use super::loads::LoadVectors;
+use super::loads::{CarrierLoads, centrifugal};
 use super::patches::Patches;
-use super::slave_surface::{Carrier, spline_law};
+use super::plan::{PairPlan, Plan};
+use super::slave_surface::{CarrierModes, Share, spline_gap};
 
 /// Gaps, casing shapes and displacements beyond this share of the radius are not what the model describes.
 pub const SMALL_FRACTION: f64 = 0.1;
@@ -28,90 +28,97 @@ pub const SMALL_FRACTION: f64 = 0.1;
 pub const MOST_COUPLED: usize = 2000;
 
 /// Places of values that the step reads.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct References {
     pub step_max: usize,
-    pub ramp_time: Option<usize>,
     pub input_interpolation: Option<usize>,
+    /// Of each pair whose shape grows in.
+    pub ramp_times: Vec<Option<usize>>,
 }
 
-/// Which parts of a scene meet; of a free master (see [`super::free`]) the first pair, without its carrier.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Roles {
-    /// Structure whose contact nodes are the masters.
-    pub master: usize,
-    /// Surface they meet.
-    pub surface: usize,
-    /// Structure that carries the surface.
-    pub carrier: Option<usize>,
+/// A structure whose contact nodes touch.
+#[derive(Debug, Clone)]
+pub struct Body {
+    /// Modes, at the reference speed where spin stiffens it; of coupled sectors those of nodal diameter 0.
+    pub model: ModalModel,
+    /// Modes of coupled sectors.
+    pub disk: Option<CyclicModel>,
+    /// Translations of a structure that flies freely.
+    pub translations: Option<Translations>,
+    /// Speed whose stiffness `model` has (rad/s).
+    pub reference_speed: f64,
+    /// Lowest and highest eigenvalue of the modal stiffness per Ω² and per Ω⁴, where spin stiffens it.
+    pub stiffness_range: Option<[[f64; 2]; 2]>,
+    /// Modal load by growth, per Ω² and, with stiffening, per Ω⁴; empty without.
+    pub centrifugal: Vec<[f64; 2]>,
 }
 
-impl Roles {
-    /// Find them in a validated scene.
-    ///
-    /// # Errors
-    /// More than one contact of a rotor, or a structure or surface that takes no part.
-    pub fn new(scene: &Scene) -> Result<Self> {
-        let settings = &scene.settings;
-        let contact = &settings.contacts[0];
-        if settings.free_master().is_some() {
-            return Self::of_free_master(scene);
-        }
-        let structure = |name: &str| settings.structures.iter().position(|structure| structure.name == name);
-        let surface = settings.surfaces.iter().position(|surface| surface.name == contact.slave).unwrap_or(0);
-        let carrier =
-            settings.surfaces.get(surface).and_then(|surface| surface.structure.as_deref()).and_then(structure);
-        let roles = Self { master: structure(&contact.master).unwrap_or(0), surface, carrier };
-        let counts = [settings.structures.len(), settings.surfaces.len(), settings.contacts.len()];
-        let expected = [1 + usize::from(carrier.is_some()), 1, 1];
-        if counts != expected || scene.roms.len() != counts[0] || carrier == Some(roles.master) {
-            return Err(Error::invalid(
-                "scene",
-                format!("{} structures, {} surfaces, {} contacts", counts[0], counts[1], counts[2]),
-                "A rotor takes one surface, which one other structure may carry (surface.structure): remove what takes no \
-                 part. Several pairs need a master with motion = \"free\"",
-            ));
-        }
-        Ok(roles)
-    }
-
-    fn of_free_master(scene: &Scene) -> Result<Self> {
-        let structures = &scene.settings.structures;
-        if scene.roms.len() != structures.len() {
-            let problem = format!("{} structures with {} ROMs", structures.len(), scene.roms.len());
-            return Err(Error::invalid("scene", problem, "Give one ROM per structure"));
-        }
-        let master = structures.iter().position(|structure| structure.motion == Motion::Free).unwrap_or(0);
-        let slave = &scene.settings.contacts[0].slave;
-        let surface = scene.settings.surfaces.iter().position(|surface| surface.name == *slave).unwrap_or(0);
-        Ok(Self { master, surface, carrier: None })
-    }
+/// A structure that carries surfaces.
+#[derive(Debug, Clone)]
+pub struct CarrierParts {
+    /// Place in the scene.
+    pub structure: usize,
+    /// Its modes, seen at its contact grid.
+    pub model: ModalModel,
+    /// Nodal diameters of the load on it.
+    pub load_order: u32,
+    pub loads: CarrierLoads,
 }
 
 /// The parts of a scene that do not change while it runs.
 #[derive(Debug, Clone)]
 pub struct Compiled {
     pub scene: Scene,
-    pub roles: Roles,
-    /// Modes of the master, at the reference speed where spin stiffens it; of coupled sectors those of nodal diameter 0.
-    pub model: ModalModel,
-    /// Modes of the master where its sectors are coupled.
-    pub disk: Option<CyclicModel>,
-    /// Speed whose stiffness `model` has (rad/s).
-    pub reference_speed: f64,
-    /// Lowest and highest eigenvalue of the modal stiffness per Ω² and per Ω⁴, where spin stiffens the master.
-    pub stiffness_range: Option<[[f64; 2]; 2]>,
-    /// Modes of the structure that carries the surface, seen at its contact grid.
-    pub carrier: Option<ModalModel>,
-    /// Nodal diameters of the load on it.
-    pub load_order: u32,
-    pub loads: LoadVectors,
-    pub patches: Option<Patches>,
-    /// Pairs and carriers of a free master.
-    pub free: Option<FreeParts>,
+    pub plan: Plan,
+    /// As in the plan.
+    pub bodies: Vec<Body>,
+    /// As in the plan; in the system they follow the bodies.
+    pub carriers: Vec<CarrierParts>,
+    /// Where friction heat is counted, per pair.
+    pub patches: Vec<Option<Patches>>,
     /// Hash of settings and ROMs; saved states carry it.
     pub fingerprint: u64,
     pub references: References,
+}
+
+impl Body {
+    fn new(scene: &Scene, plan: &Plan, body: usize) -> Result<Self> {
+        let (structure, rom) = plan.structure(scene, body);
+        let ratio = structure.damping_ratio.unwrap_or(rom.damping_ratio);
+        let (model, translations) = if structure.motion == Motion::Free {
+            let (model, translations) = free_modes(rom, ratio)?;
+            (model, Some(translations))
+        } else {
+            (modes(structure, rom, 0.0)?, None)
+        };
+        let disk = rom.is_cyclic().then(|| CyclicModel::from_rom(rom, ratio)).transpose()?;
+        let (reference_speed, stiffness_range, centrifugal) = (0.0, None, Vec::new());
+        Ok(Self { model, disk, translations, reference_speed, stiffness_range, centrifugal })
+    }
+
+    /// Largest angular frequency (rad/s), of all nodal diameters where sectors are coupled.
+    pub fn largest_frequency(&self) -> f64 {
+        self.disk.as_ref().map_or_else(|| self.model.largest_frequency(), CyclicModel::largest_frequency)
+    }
+
+    /// Lowest angular frequency of a mode that vibrates (rad/s); infinite without.
+    fn lowest_frequency(&self) -> f64 {
+        let frequencies = match &self.disk {
+            Some(disk) => disk.diameters.iter().flat_map(|diameter| &diameter.frequencies).collect(),
+            None => self.model.frequencies.iter().collect::<Vec<_>>(),
+        };
+        frequencies.into_iter().copied().filter(|value| *value > 0.0).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Modes with inertia under a scheme, of the nodal diameter that has fewest.
+    pub fn fewest_dynamic_modes(&self, scheme: Scheme) -> usize {
+        match &self.disk {
+            Some(disk) => {
+                disk.diameters.iter().map(|diameter| diameter.dynamic_modes(scheme)).min().unwrap_or(0)
+            }
+            None => self.model.dynamic_modes(scheme),
+        }
+    }
 }
 
 impl Compiled {
@@ -121,136 +128,139 @@ impl Compiled {
     /// Invalid settings or ROM; ROMs without what the scene asks of them.
     pub fn new(scene: &Scene) -> Result<Self> {
         scene.settings.validate()?;
-        let roles = Roles::new(scene)?;
-        let is_free = scene.settings.free_master().is_some();
-        if is_free {
-            super::free::pairs(scene)?;
-        } else {
-            for (structure, rom) in scene.settings.structures.iter().zip(&scene.roms) {
-                check_rom(structure, rom)?;
-            }
-            check_coupling(scene, roles)?;
-        }
-        let (model, free) = if is_free {
-            let (structure, rom) = (&scene.settings.structures[roles.master], &scene.roms[roles.master]);
-            let (model, translations) = free_modes(rom, structure.damping_ratio.unwrap_or(rom.damping_ratio))?;
-            (model, Some(FreeParts::new(scene, translations)?))
-        } else {
-            (modes(scene, roles.master, 0.0)?, None)
+        let plan = Plan::new(scene)?;
+        let bodies = (0..plan.bodies.len()).map(|body| Body::new(scene, &plan, body)).collect::<Result<_>>()?;
+        let carrier = |structure: &usize| {
+            let (settings, rom) = (&scene.settings.structures[*structure], &scene.roms[*structure]);
+            let load_order = settings.load.map_or(0, |load| load.order);
+            let (model, loads) = (modes(settings, rom, 0.0)?, CarrierLoads::default());
+            Ok(CarrierParts { structure: *structure, model, load_order, loads })
         };
-        let carrier = roles.carrier.map(|index| modes(scene, index, 0.0)).transpose()?;
+        let carriers = plan.carriers.iter().map(carrier).collect::<Result<_>>()?;
         let (table, _) = super::table::build(scene)?;
         let place = |quantity| table.with_quantity(quantity).map(|variable| variable.reference as usize);
+        let ramp = |pair: usize| Some(table.with_quantity_of(Quantity::RampTime, pair)?.reference as usize);
         let references = References {
             step_max: place(Quantity::StepMax).unwrap_or(0),
-            ramp_time: place(Quantity::RampTime),
             input_interpolation: place(Quantity::InputInterpolation),
+            ramp_times: (0..plan.pairs.len()).map(ramp).collect(),
         };
         let mut compiled = Self {
             fingerprint: super::fingerprint::of_scene(scene),
+            patches: plan.pairs.iter().map(|pair| Patches::new(scene, &plan, pair)).collect(),
             scene: scene.clone(),
-            roles,
-            model,
-            free,
-            disk: disk(scene, roles.master)?,
-            reference_speed: 0.0,
-            stiffness_range: None,
-            carrier,
-            load_order: roles
-                .carrier
-                .and_then(|index| scene.settings.structures[index].load)
-                .map_or(0, |load| load.order),
-            loads: LoadVectors::default(),
-            patches: Patches::new(scene, roles),
+            plan,
+            bodies,
+            carriers,
             references,
         };
-        compiled.set_load_order(f64::from(compiled.load_order))?;
-        compiled.set_reference_speed(scene.settings.structures[roles.master].speed)?;
+        for carrier in 0..compiled.carriers.len() {
+            compiled.set_load_order(carrier, f64::from(compiled.carriers[carrier].load_order))?;
+            compiled.load_carrier(carrier);
+        }
+        for body in 0..compiled.bodies.len() {
+            compiled.set_reference_speed(body, compiled.body(body).0.speed)?;
+        }
         Ok(compiled)
     }
 
-    /// The master.
-    pub fn master(&self) -> (&StructureSettings, &Rom) {
-        (&self.scene.settings.structures[self.roles.master], &self.scene.roms[self.roles.master])
+    /// Settings and ROM of a structure whose nodes touch.
+    pub fn body(&self, body: usize) -> (&StructureSettings, &Rom) {
+        self.plan.structure(&self.scene, body)
     }
 
-    /// The contact pair.
-    pub fn contact(&self) -> &ContactSettings {
-        &self.scene.settings.contacts[0]
+    /// Settings and ROM of a structure that carries surfaces.
+    pub fn carrier(&self, carrier: usize) -> (&StructureSettings, &Rom) {
+        let structure = self.carriers[carrier].structure;
+        (&self.scene.settings.structures[structure], &self.scene.roms[structure])
     }
 
-    fn surface(&self) -> &SurfaceSettings {
-        &self.scene.settings.surfaces[self.roles.surface]
+    /// Settings of a contact pair.
+    pub fn contact(&self, pair: usize) -> &ContactSettings {
+        &self.scene.settings.contacts[pair]
     }
 
-    /// Largest angular frequency of the master (rad/s), of all nodal diameters where its sectors are coupled.
-    pub fn largest_frequency(&self) -> f64 {
-        self.disk.as_ref().map_or_else(|| self.model.largest_frequency(), CyclicModel::largest_frequency)
+    /// Name of a contact node, with that of its structure where several touch.
+    pub fn node_name(&self, body: usize, node: usize) -> String {
+        let prefix = self.plan.body_prefix(&self.scene, body);
+        format!("{prefix}{}", self.body(body).1.contact_nodes[node].name)
+    }
+
+    /// What turns, for messages: the rotor, or its name where several structures touch.
+    pub fn rotor_name(&self, body: usize) -> String {
+        if self.bodies.len() > 1 { self.body(body).0.name.clone() } else { "the rotor".to_owned() }
+    }
+
+    /// Name of a structure of the system, for messages: that of a rotor or casing where there is one.
+    pub fn carrier_name(&self, structure: usize) -> &str {
+        match structure.checked_sub(self.bodies.len()) {
+            Some(carrier) if self.carriers.len() > 1 => &self.carrier(carrier).0.name,
+            _ => "casing",
+        }
+    }
+
+    /// Whether a structure carries the surfaces of several pairs.
+    pub fn shares_carrier(&self) -> bool {
+        (0..self.carriers.len()).any(|carrier| self.uses(carrier) > 1)
+    }
+
+    /// How many pairs have their surface on a carrier.
+    fn uses(&self, carrier: usize) -> usize {
+        self.plan.pairs.iter().filter(|pair| pair.carrier == Some(carrier)).count()
     }
 
     /// Speed (rad/s) below which tips that vibrate by their clearance in the lowest mode move faster than they slide.
-    pub fn slow_sliding(&self) -> f64 {
-        let frequencies = match &self.disk {
-            Some(disk) => disk.diameters.iter().flat_map(|diameter| &diameter.frequencies).collect(),
-            None => self.model.frequencies.iter().collect::<Vec<_>>(),
-        };
-        let lowest = frequencies.into_iter().copied().filter(|value| *value > 0.0).fold(f64::INFINITY, f64::min);
-        let radius = self.master().1.contact_nodes.iter().fold(0.0, |most: f64, node| most.max(node.position[0]));
-        if lowest.is_finite() { self.contact().nominal_gap() * lowest / radius } else { 0.0 }
+    pub fn slow_sliding(&self, body: usize) -> f64 {
+        let lowest = self.bodies[body].lowest_frequency();
+        let radius = self.body(body).1.contact_nodes.iter().fold(0.0, |most: f64, node| most.max(node.position[0]));
+        let gap = self.plan.pairs_of(body).map(|(pair, _)| self.contact(pair).nominal_gap()).fold(0.0, f64::max);
+        if lowest.is_finite() { gap * lowest / radius } else { 0.0 }
     }
 
-    /// Whether modes or loads of the master depend on the speed.
-    pub fn spins(&self) -> bool {
-        let spin = self.master().0.spin;
+    /// Whether modes or loads of a structure depend on the speed.
+    pub fn spins(&self, body: usize) -> bool {
+        let spin = self.body(body).0.spin;
         spin.stiffening || spin.growth || spin.coriolis
     }
 
-    /// Take the modes of the master at a steady speed (rad/s).
+    /// Take the modes of a structure at a steady speed (rad/s).
     ///
     /// # Errors
     /// A speed at which the stiffness is lost, or beyond what the ROM was fitted for.
-    pub fn set_reference_speed(&mut self, speed: f64) -> Result<()> {
-        let stiffening = self.master().0.spin.stiffening;
-        self.check_speed(speed)?;
-        if stiffening {
-            self.model = modes(&self.scene, self.roles.master, speed)?;
+    pub fn set_reference_speed(&mut self, body: usize, speed: f64) -> Result<()> {
+        self.check_speed(body, speed)?;
+        let (structure, rom) = self.plan.structure(&self.scene, body);
+        if structure.spin.stiffening {
+            let model = modes(structure, rom, speed)?;
             let range = |matrix: &DMatrix<f64>| {
                 let values = matrix.symmetric_eigenvalues();
                 [values.min(), values.max()]
             };
-            let spin = self.master().1.extras.spin.as_ref();
-            let spin = spin.map(|spin| ModalSpin::new(spin, &self.model, speed));
-            self.stiffness_range = spin.map(|spin| [range(&spin.stiffness_speed2), range(&spin.stiffness_speed4)]);
+            let spin = rom.extras.spin.as_ref().map(|spin| ModalSpin::new(spin, &model, speed));
+            let ranges = spin.map(|spin| [range(&spin.stiffness_speed2), range(&spin.stiffness_speed4)]);
+            (self.bodies[body].stiffness_range, self.bodies[body].model) = (ranges, model);
         }
-        self.reference_speed = speed;
-        self.load();
+        let body = &mut self.bodies[body];
+        body.reference_speed = speed;
+        body.centrifugal = centrifugal(structure, rom, &body.model);
         Ok(())
     }
 
-    /// Load vectors for the modes and the load order in use.
-    fn load(&mut self) {
-        let (structure, rom) = self.master();
-        let centrifugal = LoadVectors::of_master(structure, rom, &self.model);
-        self.loads = LoadVectors { centrifugal, ..LoadVectors::default() };
-        if let (Some(index), Some(model)) = (self.roles.carrier, &self.carrier) {
-            let (structure, rom) = (&self.scene.settings.structures[index], &self.scene.roms[index]);
-            self.loads.add_slave(structure, self.load_order, rom, model);
-        }
+    fn load_carrier(&mut self, carrier: usize) {
+        let (structure, rom) = self.carrier(carrier);
+        let parts = &self.carriers[carrier];
+        self.carriers[carrier].loads = CarrierLoads::new(structure, parts.load_order, rom, &parts.model);
     }
 
-    fn has_load(&self) -> bool {
-        self.roles.carrier.is_some_and(|index| self.scene.settings.structures[index].load.is_some())
-    }
-
-    /// Take another number of nodal diameters for the load on the carrier.
+    /// Take another number of nodal diameters for the load on a carrier.
     ///
     /// # Errors
     /// A number that its contact grid does not resolve.
-    pub fn set_load_order(&mut self, order: f64) -> Result<()> {
-        let grid = self.roles.carrier.and_then(|index| self.scene.roms[index].extras.grid);
+    pub fn set_load_order(&mut self, carrier: usize, order: f64) -> Result<()> {
+        let (structure, rom) = self.carrier(carrier);
         // Half as many as nodes would have one phase only, and count twice; more are aliases of fewer.
-        let most = u32::try_from(grid.map_or(0, |grid| (grid.around - 1) / 2)).unwrap_or(u32::MAX);
-        if self.carrier.is_some() && !(0.0..=f64::from(most)).contains(&order) && self.has_load() {
+        let most = u32::try_from(rom.extras.grid.map_or(0, |grid| (grid.around - 1) / 2)).unwrap_or(u32::MAX);
+        if structure.load.is_some() && !(0.0..=f64::from(most)).contains(&order) {
             return Err(Error::invalid(
                 "parameter `casing_load_order`",
                 format!("{order} nodal diameters, where the contact grid of the casing resolves 0 to {most}"),
@@ -259,9 +269,9 @@ impl Compiled {
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 0 and a u32")]
         let order = order as u32;
-        if order != self.load_order {
-            self.load_order = order;
-            self.load();
+        if order != self.carriers[carrier].load_order {
+            self.carriers[carrier].load_order = order;
+            self.load_carrier(carrier);
         }
         Ok(())
     }
@@ -270,8 +280,8 @@ impl Compiled {
     ///
     /// # Errors
     /// Beyond 1.05 times the largest fitted speed.
-    pub fn check_speed(&self, speed: f64) -> Result<()> {
-        let (structure, rom) = self.master();
+    pub fn check_speed(&self, body: usize, speed: f64) -> Result<()> {
+        let (structure, rom) = self.body(body);
         let Some(spin) = rom.extras.spin.as_ref().filter(|_| structure.spin != Default::default()) else {
             return Ok(());
         };
@@ -279,7 +289,7 @@ impl Compiled {
             return Ok(());
         }
         Err(Error::invalid(
-            "variable `speed`",
+            format!("variable `{}speed`", self.plan.body_prefix(&self.scene, body)),
             format!(
                 "{} rad/s is beyond the {} rad/s that stiffening and growth were fitted for",
                 shown(speed),
@@ -289,101 +299,152 @@ impl Compiled {
         ))
     }
 
-    /// Fresh kernels at rest.
+    /// Fresh kernels at rest: bodies, then carriers.
     ///
     /// # Errors
     /// Wrong number of sector gaps or frequency factors, bad shape table, surfaces that do not fit the nodes.
     pub fn system(&self) -> Result<System> {
-        if let Some(free) = &self.free {
-            return self.free_system(free);
+        self.check_size()?;
+        let gaps = (0..self.plan.pairs.len()).map(|pair| self.gap(pair)).collect::<Result<Vec<_>>>()?;
+        let control = self.control_modes(&gaps);
+        let touching = (0..self.bodies.len()).map(|body| {
+            let uncoupled = SectorModel::Uncoupled(&self.bodies[body].model, self.body(body).1.sectors);
+            let model = self.bodies[body].disk.as_ref().map_or(uncoupled, SectorModel::Coupled);
+            StructureParts::Touching(model, self.bank_options(body))
+        });
+        let carrying = self.carriers.iter().zip(&control);
+        let carrying = carrying.map(|(carrier, model)| StructureParts::Carrying(model, carrier.loads.are_there()));
+        let structures = touching.chain(carrying).collect();
+        let mut rows = vec![0; self.carriers.len()];
+        let mut pairs = Vec::new();
+        for (index, (plan, gap)) in self.plan.pairs.iter().zip(gaps).enumerate() {
+            let carrier = plan.carrier.map(|carrier| {
+                let first_row = rows[carrier];
+                rows[carrier] += 3 * gap.spline().map_or(0, |surface| surface.control_points().len());
+                Carrier { structure: self.bodies.len() + carrier, first_row }
+            });
+            pairs.push(PairParts { structure: plan.body, gap, carrier, friction: self.contact(index).friction });
         }
-        let contact = self.contact();
-        let (structure, rom) = self.master();
-        let clearances =
-            if contact.sector_gaps.is_empty() { vec![contact.gap; rom.sectors] } else { contact.sector_gaps.clone() };
-        let surface = Surface::new(&self.surface().shape, contact.nominal_gap())?;
-        let smallest = rom.contact_nodes.iter().fold(f64::INFINITY, |low, node| low.min(node.position[0]));
-        let largest_gap = clearances.iter().fold(0.0, |largest: f64, gap| largest.max(*gap));
-        for (what, value) in [("contact.gap", largest_gap), ("surface.shape", surface.largest_change())] {
-            if value > SMALL_FRACTION * smallest {
+        let coatings = (0..pairs.len()).filter_map(|pair| Some((pair, self.coating(pair).transpose()?)));
+        let coatings = coatings.map(|(pair, coating)| Ok((pair, coating?))).collect::<Result<_>>()?;
+        let settings = &self.scene.settings;
+        let methods = SystemSettings {
+            scheme: settings.time.scheme,
+            solver: settings.contacts[0].solver,
+            ledger: settings.outputs.energies,
+        };
+        Ok(System::of(structures, pairs, coatings, methods))
+    }
+
+    /// Contacts that are solved together must not be too many.
+    fn check_size(&self) -> Result<()> {
+        let mut together = 0;
+        for (body, parts) in self.bodies.iter().enumerate() {
+            let rom = self.body(body).1;
+            let own: usize = self.plan.pairs_of(body).map(|(_, pair)| pair.nodes.len()).sum();
+            let carried = self.plan.pairs_of(body).any(|(_, pair)| pair.carrier.is_some());
+            if parts.disk.is_some() || parts.translations.is_some() || carried {
+                together += own * rom.sectors;
+            }
+            if together > MOST_COUPLED && parts.translations.is_some() {
+                let problem = format!("{together} contact nodes of all pairs, more than {MOST_COUPLED}");
+                return Err(Error::invalid("contact.nodes", problem, "Choose fewer, or a coarser mesh"));
+            }
+            if together > MOST_COUPLED {
                 return Err(Error::invalid(
-                    what,
-                    format!("{value:.3e} m is not small against the radius {smallest:.3e} m of the contact nodes"),
-                    "Give lengths in metres, well below a tenth of the radius",
+                    if parts.disk.is_some() { "ROM metadata `sectors`" } else { "surface.structure" },
+                    format!("{together} contact nodes of all sectors together, coupled, more than {MOST_COUPLED}"),
+                    "Use fewer contact nodes or sectors, or uncoupled sectors on a rigid surface",
                 ));
             }
         }
+        Ok(())
+    }
+
+    /// The gap function of a pair.
+    fn gap(&self, pair: usize) -> Result<GapLaw> {
+        let plan = &self.plan.pairs[pair];
+        if self.bodies[plan.body].translations.is_some() {
+            return self.open_gap(plan);
+        }
+        let (contact, settings) = (self.contact(pair), self.plan.surface(&self.scene.settings, pair));
+        let (structure, rom) = self.body(plan.body);
+        let clearances =
+            if contact.sector_gaps.is_empty() { vec![contact.gap; rom.sectors] } else { contact.sector_gaps.clone() };
+        let surface = Surface::new(&settings.shape, contact.nominal_gap())?;
+        check_lengths(rom, &clearances, &surface)?;
         let lanes = crate::dynamics::bank::lanes(rom.sectors);
-        let contacts = rom.sectors * rom.contact_nodes.len();
-        if (self.disk.is_some() || self.roles.carrier.is_some()) && contacts > MOST_COUPLED {
-            return Err(Error::invalid(
-                if self.disk.is_some() { "ROM metadata `sectors`" } else { "surface.structure" },
-                format!("{contacts} contact nodes of all sectors together, coupled, more than {MOST_COUPLED}"),
-                "Use fewer contact nodes or sectors, or uncoupled sectors on a rigid surface",
-            ));
+        if settings.spline.is_none() && plan.carrier.is_none() {
+            let gap = RevolutionGap::new(rom, surface, &clearances, contact.meridian, lanes)?;
+            let gap = gap.of_nodes(plan.nodes.clone()).with_moving_shaft(structure.whirl || structure.axial_shift);
+            return Ok(GapLaw::Revolution(gap));
         }
-        let (law, slave) = self.law(surface, &clearances, lanes)?;
-        let parts = SystemParts {
-            bank: self.bank_options(structure, rom),
-            slaves: slave.map(|model| (model, self.loads.on_slave())).into_iter().collect(),
-            coating: self.coating(rom)?,
-            sticking: self.may_stick(),
+        let layout = Layout::new(rom, &clearances, lanes)?;
+        let share = |carrier| if self.uses(carrier) > 1 { Share::Near } else { Share::Whole };
+        let carrier = plan.carrier.map(|carrier| (self.carrier(carrier).1, share(carrier)));
+        let gap = spline_gap((rom, &plan.nodes), layout, contact, settings, carrier)?;
+        Ok(GapLaw::Spline(Box::new(gap)))
+    }
+
+    fn open_gap(&self, plan: &PairPlan) -> Result<GapLaw> {
+        let rom = self.body(plan.body).1;
+        let positions = rom.contact_nodes.iter().map(|node| node.position).collect();
+        let mut gap = OpenGap::new(positions, plan.nodes.clone(), self.open_surface(plan)?);
+        for (_, other) in self.plan.pairs_of(plan.body) {
+            gap = gap.beside(self.open_surface(other)?.extent());
+        }
+        Ok(GapLaw::Open(Box::new(gap)))
+    }
+
+    /// The undeformed surface through an open contact grid.
+    fn open_surface(&self, plan: &PairPlan) -> Result<OpenSurface> {
+        let Some(rom) = plan.grid.map(|grid| &self.scene.roms[grid]) else { unreachable!("validated") };
+        let Some(grid) = rom.extras.grid else { unreachable!("checked") };
+        let data: Vec<[f64; 3]> = rom.contact_nodes.iter().map(|node| node.position).collect();
+        let spline = self.scene.settings.surfaces[plan.surface].spline.unwrap_or_default();
+        Ok(OpenSurface::new(SurfaceSpline::open(&data, grid.around, grid.along, spline.interpolation)?))
+    }
+
+    /// Modes of each carrier at the control points of its surfaces, one surface after the other.
+    fn control_modes(&self, gaps: &[GapLaw]) -> Vec<ModalModel> {
+        let of = |index: usize| {
+            let own = self.plan.pairs.iter().zip(gaps).filter(|(pair, _)| pair.carrier == Some(index));
+            let seen = own.filter_map(|(_, gap)| self.control_modes_of(index, gap));
+            seen.reduce(ModalModel::seen_at_both)
         };
-        let uncoupled = SectorModel::Uncoupled(&self.model, rom.sectors);
-        let model = self.disk.as_ref().map_or(uncoupled, SectorModel::Coupled);
-        Ok(System::with_parts(model, law, self.system_settings(), parts))
+        (0..self.carriers.len()).filter_map(of).collect()
     }
 
-    /// Scheme, solver, friction and ledger of the kernels.
-    pub(super) fn system_settings(&self) -> SystemSettings {
-        let (settings, contact) = (&self.scene.settings, self.contact());
-        SystemSettings {
-            scheme: settings.time.scheme,
-            solver: contact.solver,
-            friction: contact.friction,
-            ledger: settings.outputs.energies,
-        }
+    /// Modes of a carrier at the control points of one surface; `None` for a surface that has none.
+    pub fn control_modes_of(&self, carrier: usize, gap: &GapLaw) -> Option<ModalModel> {
+        let first = if let GapLaw::Spline(gap) = gap { gap.first_node } else { 0 };
+        let modes = CarrierModes { rom: self.carrier(carrier).1, model: &self.carriers[carrier].model };
+        Some(modes.at_control_points(gap.spline()?, first))
     }
 
-    fn law(&self, surface: Surface, clearances: &[f64], lanes: usize) -> Result<(GapLaw, Option<ModalModel>)> {
-        let (structure, rom) = self.master();
-        let (contact, settings) = (self.contact(), self.surface());
-        if settings.spline.is_none() && self.roles.carrier.is_none() {
-            let law = RevolutionGap::new(rom, surface, clearances, contact.meridian, lanes)?;
-            let law = law.with_moving_shaft(structure.whirl || structure.axial_shift);
-            return Ok((GapLaw::Revolution(law), None));
-        }
-        let layout = Layout::new(rom, clearances, lanes)?;
-        let carrier = self.roles.carrier.zip(self.carrier.as_ref());
-        let carrier = carrier.map(|(index, model)| Carrier { rom: &self.scene.roms[index], model });
-        let law = spline_law(rom, layout, contact, settings, carrier)?;
-        let slave = match (&law, carrier) {
-            (GapLaw::Spline(law), Some(carrier)) => Some(carrier.control_modes(&law.surface)),
-            _ => None,
-        };
-        Ok((law, slave))
-    }
-
-    fn bank_options(&self, structure: &StructureSettings, rom: &Rom) -> BankOptions {
+    fn bank_options(&self, body: usize) -> BankOptions {
+        let ((structure, rom), parts) = (self.body(body), &self.bodies[body]);
         let coupled = structure.spin.stiffening || structure.spin.coriolis;
         let spin = rom.extras.spin.as_ref().filter(|_| coupled);
         let coupling = spin.map(|spin| {
-            let modal = ModalSpin::new(spin, &self.model, self.reference_speed);
+            let modal = ModalSpin::new(spin, &parts.model, parts.reference_speed);
             (modal, structure.spin.stiffening, structure.spin.coriolis)
         });
         BankOptions {
             frequency_factors: structure.frequency_factors.clone(),
-            loads: !self.loads.centrifugal.is_empty(),
+            loads: !parts.centrifugal.is_empty(),
             coupling,
             flexibility: true,
         }
     }
 
-    fn coating(&self, rom: &Rom) -> Result<Option<Coating>> {
-        let Some(settings) = &self.contact().coating else { return Ok(None) };
-        let nodes = || rom.contact_nodes.iter();
-        let axial: Vec<f64> = nodes().map(|node| node.position[2]).collect();
-        let radii: Vec<f64> = nodes().map(|node| node.position[0]).collect();
+    fn coating(&self, pair: usize) -> Result<Option<Coating>> {
+        let Some(settings) = &self.contact(pair).coating else { return Ok(None) };
+        let plan = &self.plan.pairs[pair];
+        let rom = self.body(plan.body).1;
+        let nodes = || plan.nodes.iter().map(|node| rom.contact_nodes[*node].position);
+        let axial: Vec<f64> = nodes().map(|position| position[2]).collect();
+        let radii: Vec<f64> = nodes().map(|position| position[0]).collect();
         let low = axial.iter().copied().fold(f64::INFINITY, f64::min);
         let high = axial.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let coating = if high - low > 1e-6 * radii[0] {
@@ -396,32 +457,33 @@ impl Compiled {
         Ok(Some(coating))
     }
 
-    /// The carrier's modes at the control points; empty without one.
-    pub fn slave_modes(&self, law: &SplineGap) -> ModalModel {
-        let carrier = self.roles.carrier.zip(self.carrier.as_ref());
-        carrier.map_or_else(
-            || self.model.with_nodes(&[]),
-            |(index, model)| Carrier { rom: &self.scene.roms[index], model }.control_modes(&law.surface),
-        )
-    }
-
     /// Whether `coulomb` can be chosen: a coupled problem of all sectors has room for it only if the scene says so.
     pub fn may_stick(&self) -> bool {
-        let contact = self.contact();
-        let small = self.roles.carrier.is_none() && self.disk.is_none() && self.free.is_none();
-        contact.solver == Solver::Coulomb || (small && contact.friction > 0.0 && contact.coating.is_none())
+        let contacts = &self.scene.settings.contacts;
+        let small = self.bodies.iter().all(|body| body.disk.is_none() && body.translations.is_none());
+        let rubs = contacts.iter().any(|contact| contact.friction > 0.0);
+        let coated = contacts.iter().any(|contact| contact.coating.is_some());
+        contacts[0].solver == Solver::Coulomb || (small && self.carriers.is_empty() && rubs && !coated)
     }
 }
 
-fn modes(scene: &Scene, index: usize, speed: f64) -> Result<ModalModel> {
-    let (structure, rom) = (&scene.settings.structures[index], &scene.roms[index]);
+fn check_lengths(rom: &Rom, clearances: &[f64], surface: &Surface) -> Result<()> {
+    let smallest = rom.contact_nodes.iter().fold(f64::INFINITY, |low, node| low.min(node.position[0]));
+    let largest_gap = clearances.iter().fold(0.0, |largest: f64, gap| largest.max(*gap));
+    for (what, value) in [("contact.gap", largest_gap), ("surface.shape", surface.largest_change())] {
+        if value > SMALL_FRACTION * smallest {
+            return Err(Error::invalid(
+                what,
+                format!("{value:.3e} m is not small against the radius {smallest:.3e} m of the contact nodes"),
+                "Give lengths in metres, well below a tenth of the radius",
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn modes(structure: &StructureSettings, rom: &Rom, speed: f64) -> Result<ModalModel> {
     let ratio = structure.damping_ratio.unwrap_or(rom.damping_ratio);
     if structure.spin.stiffening { ModalModel::at_speed(rom, ratio, speed) } else { ModalModel::from_rom(rom, ratio) }
 }
 
-/// Modes of coupled sectors.
-fn disk(scene: &Scene, index: usize) -> Result<Option<CyclicModel>> {
-    let (structure, rom) = (&scene.settings.structures[index], &scene.roms[index]);
-    let ratio = structure.damping_ratio.unwrap_or(rom.damping_ratio);
-    rom.is_cyclic().then(|| CyclicModel::from_rom(rom, ratio)).transpose()
-}

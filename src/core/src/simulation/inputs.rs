@@ -9,98 +9,131 @@ use crate::{Error, Result, shown};
 /// How many times as fast as before ramps may go because a step is shorter.
 const QUICKER: f64 = 2.0;
 
-/// The real inputs, each with its derivative.
+/// What is prescribed of a structure that turns.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Inputs {
+pub struct RotorInputs {
     /// Speed of the rotor: what is set acts at once, so that its integral is the angle that the importer expects.
     pub speed: Input,
     /// Speed that growth and stiffening follow (rad/s): that of the rotor, without its jumps.
     pub spin: Input,
+    /// Whirl x, whirl y, axial shift.
+    pub shaft: [Input; 3],
+}
+
+/// What is prescribed of a surface.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PairInputs {
     pub gap_offset: Input,
     pub shape_factor: Input,
     pub shape_rotation: Input,
     pub radius_change: Input,
-    /// Whirl x, whirl y, axial shift.
-    pub shaft: [Input; 3],
+}
+
+/// What loads a structure that carries surfaces.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct CarrierInputs {
     pub load_amplitude: Input,
     pub load_phase: Input,
     /// One per patch.
     pub temperatures: Vec<Input>,
+}
+
+/// The real inputs, each with its derivative.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Inputs {
+    /// One per structure that touches.
+    pub rotors: Vec<RotorInputs>,
+    /// One per contact pair.
+    pub pairs: Vec<PairInputs>,
+    /// One per structure that carries surfaces.
+    pub carriers: Vec<CarrierInputs>,
     /// Shortest time that ramps take from here (s), see [`Inputs::reach`].
     pub pace: f64,
     /// When ramps under way end: offset from the start of the communication step (s).
     pub until: f64,
 }
 
-persist_fields!(Inputs {
-    speed,
-    spin,
-    gap_offset,
-    shape_factor,
-    shape_rotation,
-    radius_change,
-    shaft,
-    load_amplitude,
-    load_phase,
-    temperatures,
-    pace,
-    until
-});
+persist_fields!(RotorInputs { speed, spin, shaft });
+persist_fields!(PairInputs { gap_offset, shape_factor, shape_rotation, radius_change });
+persist_fields!(CarrierInputs { load_amplitude, load_phase, temperatures });
+persist_fields!(Inputs { rotors, pairs, carriers, pace, until });
+
+impl RotorInputs {
+    fn moving_mut(&mut self) -> impl Iterator<Item = &mut Input> {
+        self.shaft.iter_mut()
+    }
+
+    /// From `offset` on, growth and stiffening go where the speed is at `until`.
+    pub fn lead_spin(&mut self, offset: f64, until: f64, hold: bool) {
+        self.spin.follow(&self.speed);
+        if hold { self.spin.take() } else { self.spin.aim(offset, until) }
+    }
+}
+
+impl PairInputs {
+    fn moving(&self) -> impl Iterator<Item = &Input> {
+        [&self.gap_offset, &self.shape_factor, &self.shape_rotation, &self.radius_change].into_iter()
+    }
+
+    fn moving_mut(&mut self) -> impl Iterator<Item = &mut Input> {
+        [&mut self.gap_offset, &mut self.shape_factor, &mut self.shape_rotation, &mut self.radius_change].into_iter()
+    }
+}
+
+impl CarrierInputs {
+    fn moving(&self) -> impl Iterator<Item = &Input> {
+        [&self.load_amplitude, &self.load_phase].into_iter().chain(&self.temperatures)
+    }
+
+    fn moving_mut(&mut self) -> impl Iterator<Item = &mut Input> {
+        [&mut self.load_amplitude, &mut self.load_phase].into_iter().chain(&mut self.temperatures)
+    }
+}
 
 impl Inputs {
-    pub fn get(&self, quantity: Quantity, element: usize) -> Option<&Input> {
+    /// The input behind a variable: its quantity, which structure or pair it belongs to, and which element it is.
+    pub fn get(&self, quantity: Quantity, of: usize, element: usize) -> Option<&Input> {
         match quantity {
-            Quantity::Speed => Some(&self.speed),
-            Quantity::GapOffset => Some(&self.gap_offset),
-            Quantity::ShapeFactor => Some(&self.shape_factor),
-            Quantity::ShapeRotation => Some(&self.shape_rotation),
-            Quantity::RadiusChange => Some(&self.radius_change),
-            Quantity::ShaftDisplacement(component) => self.shaft.get(component),
-            Quantity::LoadAmplitude => Some(&self.load_amplitude),
-            Quantity::LoadPhase => Some(&self.load_phase),
-            Quantity::CasingTemperature => self.temperatures.get(element),
+            Quantity::Speed => Some(&self.rotors[of].speed),
+            Quantity::ShaftDisplacement(component) => self.rotors[of].shaft.get(component),
+            Quantity::GapOffset => Some(&self.pairs[of].gap_offset),
+            Quantity::ShapeFactor => Some(&self.pairs[of].shape_factor),
+            Quantity::ShapeRotation => Some(&self.pairs[of].shape_rotation),
+            Quantity::RadiusChange => Some(&self.pairs[of].radius_change),
+            Quantity::LoadAmplitude => Some(&self.carriers[of].load_amplitude),
+            Quantity::LoadPhase => Some(&self.carriers[of].load_phase),
+            Quantity::CasingTemperature => self.carriers[of].temperatures.get(element),
             _ => None,
         }
     }
 
-    pub fn get_mut(&mut self, quantity: Quantity, element: usize) -> Option<&mut Input> {
+    /// The same, to change it.
+    pub fn get_mut(&mut self, quantity: Quantity, of: usize, element: usize) -> Option<&mut Input> {
         match quantity {
-            Quantity::Speed => Some(&mut self.speed),
-            Quantity::GapOffset => Some(&mut self.gap_offset),
-            Quantity::ShapeFactor => Some(&mut self.shape_factor),
-            Quantity::ShapeRotation => Some(&mut self.shape_rotation),
-            Quantity::RadiusChange => Some(&mut self.radius_change),
-            Quantity::ShaftDisplacement(component) => self.shaft.get_mut(component),
-            Quantity::LoadAmplitude => Some(&mut self.load_amplitude),
-            Quantity::LoadPhase => Some(&mut self.load_phase),
-            Quantity::CasingTemperature => self.temperatures.get_mut(element),
+            Quantity::Speed => Some(&mut self.rotors[of].speed),
+            Quantity::ShaftDisplacement(component) => self.rotors[of].shaft.get_mut(component),
+            Quantity::GapOffset => Some(&mut self.pairs[of].gap_offset),
+            Quantity::ShapeFactor => Some(&mut self.pairs[of].shape_factor),
+            Quantity::ShapeRotation => Some(&mut self.pairs[of].shape_rotation),
+            Quantity::RadiusChange => Some(&mut self.pairs[of].radius_change),
+            Quantity::LoadAmplitude => Some(&mut self.carriers[of].load_amplitude),
+            Quantity::LoadPhase => Some(&mut self.carriers[of].load_phase),
+            Quantity::CasingTemperature => self.carriers[of].temperatures.get_mut(element),
             _ => None,
         }
     }
 
     /// All that move or load something, which a jump would hit or shake.
     fn moving(&self) -> impl Iterator<Item = &Input> {
-        let single = [
-            &self.gap_offset,
-            &self.shape_factor,
-            &self.shape_rotation,
-            &self.radius_change,
-            &self.load_amplitude,
-            &self.load_phase,
-        ];
-        single.into_iter().chain(&self.shaft).chain(&self.temperatures)
+        let shafts = self.rotors.iter().flat_map(|rotor| &rotor.shaft);
+        let pairs = self.pairs.iter().flat_map(PairInputs::moving);
+        shafts.chain(pairs).chain(self.carriers.iter().flat_map(CarrierInputs::moving))
     }
 
     fn moving_mut(&mut self) -> impl Iterator<Item = &mut Input> {
-        let single = [
-            &mut self.gap_offset,
-            &mut self.shape_factor,
-            &mut self.shape_rotation,
-            &mut self.radius_change,
-            &mut self.load_amplitude,
-            &mut self.load_phase,
-        ];
-        single.into_iter().chain(&mut self.shaft).chain(&mut self.temperatures)
+        let shafts = self.rotors.iter_mut().flat_map(RotorInputs::moving_mut);
+        let pairs = self.pairs.iter_mut().flat_map(PairInputs::moving_mut);
+        shafts.chain(pairs).chain(self.carriers.iter_mut().flat_map(CarrierInputs::moving_mut))
     }
 
     /// How long ramps take that begin with a step of length `length` (s): as long as the step, but what came together
@@ -112,7 +145,7 @@ impl Inputs {
 
     /// A run starts: no step came before.
     pub fn start(&mut self) {
-        self.spin = self.speed;
+        self.rotors.iter_mut().for_each(|rotor| rotor.spin = rotor.speed);
         (self.pace, self.until) = (0.0, 0.0);
     }
 
@@ -123,36 +156,34 @@ impl Inputs {
         if !hold {
             self.moving_mut().for_each(|input| input.aim(0.0, until));
         }
-        self.lead_spin(0.0, until, hold);
-    }
-
-    /// From `offset` on, growth and stiffening go where the speed is at `until`.
-    pub fn lead_spin(&mut self, offset: f64, until: f64, hold: bool) {
-        self.spin.follow(&self.speed);
-        if hold { self.spin.take() } else { self.spin.aim(offset, until) }
+        self.rotors.iter_mut().for_each(|rotor| rotor.lead_spin(0.0, until, hold));
     }
 
     /// The communication step is over after `length`.
     pub fn shift(&mut self, length: f64) {
         self.moving_mut().for_each(|input| input.shift(length));
-        self.speed.shift(length);
-        self.spin.shift(length);
+        for rotor in &mut self.rotors {
+            rotor.speed.shift(length);
+            rotor.spin.shift(length);
+        }
         self.pace = if self.until > length { self.until - 0.5 * length } else { length };
     }
 
     /// Nothing will move in a step of length `length`.
     fn rest(&self, length: f64) -> bool {
         let rests = |input: &Input| input.slope == 0.0 && input.at(0.0).to_bits() == input.asked(length).to_bits();
-        self.speed.slope == 0.0 && self.moving().all(rests)
+        self.rotors.iter().all(|rotor| rotor.speed.slope == 0.0) && self.moving().all(rests)
     }
 
     /// Start values everywhere.
     pub fn clear(&mut self) {
         self.moving_mut().for_each(|input| *input = Input::default());
-        (self.speed, self.spin) = (Input::default(), Input::default());
+        self.rotors.iter_mut().for_each(|rotor| *rotor = RotorInputs::default());
         (self.pace, self.until) = (0.0, 0.0);
-        self.shape_factor.value = 1.0;
-        self.shape_factor.take();
+        for pair in &mut self.pairs {
+            pair.shape_factor.value = 1.0;
+            pair.shape_factor.take();
+        }
     }
 }
 
@@ -160,18 +191,18 @@ impl Inputs {
 #[derive(Debug, Clone)]
 pub struct Courses {
     inputs: Inputs,
-    rotor: RotorAngle,
+    rotors: Vec<RotorAngle>,
 }
 
 impl Simulation {
     /// What the inputs do, derivatives included.
     pub fn courses(&self) -> Courses {
-        Courses { inputs: self.inputs.clone(), rotor: self.rotor }
+        Courses { inputs: self.inputs.clone(), rotors: self.rotors.clone() }
     }
 
     /// Back to what the inputs did at the same instant; values as read are set back by [`Simulation::set_real`] before.
     pub fn restore_courses(&mut self, courses: Courses) {
-        (self.inputs, self.rotor) = (courses.inputs, courses.rotor);
+        (self.inputs, self.rotors) = (courses.inputs, courses.rotors);
     }
 
     /// Values set act at once instead of at the end of the step.
@@ -195,7 +226,7 @@ impl Simulation {
             }
             let at_once = self.acts_at_once(variable.quantity);
             for element in 0..variable.len() {
-                let Some(input) = self.inputs.get(variable.quantity, element) else { continue };
+                let Some(input) = self.inputs.get(variable.quantity, variable.of, element) else { continue };
                 self.check_course(variable, element, input, at_once, [0.0, step_size])?;
             }
         }

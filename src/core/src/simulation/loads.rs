@@ -1,62 +1,61 @@
 //! Loads beside contact, in modal coordinates: centrifugal growth, heat, nodal-diameter loads.
 
-use super::inputs::Inputs;
+use super::inputs::CarrierInputs;
 use crate::Rom;
 use crate::dynamics::modal::ModalModel;
 use crate::settings::StructureSettings;
 
-/// Modal load vectors per unit of what drives them; empty where a scene does not ask for them.
+/// Modal load of a structure by growth, per Ω² and, with stiffening, per Ω⁴; of coupled sectors on nodal diameter 0. Empty
+/// where a scene does not ask for it.
+pub fn centrifugal(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<[f64; 2]> {
+    let Some(spin) = rom.extras.spin.as_ref().filter(|_| structure.spin.growth) else { return Vec::new() };
+    let second = model.modal_load(&spin.centrifugal_load);
+    // The fourth power belongs to the stiffness of small motions about the stretched shape; with the resting
+    // stiffness Ω²c alone is linear theory.
+    let fourth = model.modal_load(&spin.centrifugal_load_speed4);
+    let share = if structure.spin.stiffening { 1.0 } else { 0.0 };
+    // The load is that of one sector, the same on all N; an amplitude of nodal diameter 0 moves each by 1/√N.
+    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
+    let all = if rom.is_cyclic() { libm::sqrt(rom.sectors as f64) } else { 1.0 };
+    second.into_iter().zip(fourth).map(|(second, fourth)| [all * second, all * share * fourth]).collect()
+}
+
+/// Modal loads by growth at speed Ω (rad/s).
+pub fn fill_centrifugal(centrifugal: &[[f64; 2]], speed: f64, loads: &mut [f64]) {
+    let square = speed * speed;
+    for (load, [second, fourth]) in loads.iter_mut().zip(centrifugal) {
+        *load = square * (second + square * fourth);
+    }
+}
+
+/// Modal load vectors of a structure that carries surfaces, per unit of what drives them; empty where a scene does not ask for
+/// them.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct LoadVectors {
-    /// Master: per Ω² and, with stiffening, per Ω⁴.
-    pub centrifugal: Vec<[f64; 2]>,
-    /// Slave: per kelvin of each patch.
+pub struct CarrierLoads {
+    /// Per kelvin of each patch.
     pub thermal: Vec<Vec<f64>>,
-    /// Slave: nodal-diameter load with phase 0 and a quarter period, per unit amplitude.
+    /// Nodal-diameter load with phase 0 and a quarter period, per unit amplitude.
     pub nodal: Option<[Vec<f64>; 2]>,
 }
 
-impl LoadVectors {
-    /// Loads of the master; of coupled sectors on nodal diameter 0.
-    pub fn of_master(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<[f64; 2]> {
-        let Some(spin) = rom.extras.spin.as_ref().filter(|_| structure.spin.growth) else { return Vec::new() };
-        let second = model.modal_load(&spin.centrifugal_load);
-        // The fourth power belongs to the stiffness of small motions about the stretched shape; with the resting
-        // stiffness Ω²c alone is linear theory.
-        let fourth = model.modal_load(&spin.centrifugal_load_speed4);
-        let share = if structure.spin.stiffening { 1.0 } else { 0.0 };
-        // The load is that of one sector, the same on all N; an amplitude of nodal diameter 0 moves each by 1/√N.
-        #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
-        let all = if rom.is_cyclic() { libm::sqrt(rom.sectors as f64) } else { 1.0 };
-        second.into_iter().zip(fourth).map(|(second, fourth)| [all * second, all * share * fourth]).collect()
+impl CarrierLoads {
+    /// The nodal-diameter load with `order` of them; `model` sees the contact grid of `rom`.
+    pub fn new(structure: &StructureSettings, order: u32, rom: &Rom, model: &ModalModel) -> Self {
+        let thermal = rom.extras.thermal.as_ref().filter(|_| structure.thermal);
+        let load = |column: &[f64]| model.modal_load(column);
+        let thermal = thermal.map(|thermal| thermal.loads.column_iter().map(|one| load(one.as_slice())).collect());
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let nodal = structure.load.map(|_| [0.0, quarter].map(|phase| nodal_load(rom, model, order, phase)));
+        Self { thermal: thermal.unwrap_or_default(), nodal }
     }
 
-    /// Loads of the slave, the nodal-diameter load with `order` of them; `model` sees the contact grid of `rom`.
-    pub fn add_slave(&mut self, structure: &StructureSettings, order: u32, rom: &Rom, model: &ModalModel) {
-        if let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) {
-            self.thermal = thermal.loads.column_iter().map(|load| model.modal_load(load.as_slice())).collect();
-        }
-        if structure.load.is_some() {
-            let quarter = std::f64::consts::FRAC_PI_2;
-            self.nodal = Some([0.0, quarter].map(|phase| nodal_load(rom, model, order, phase)));
-        }
-    }
-
-    /// Whether the slave is loaded.
-    pub fn on_slave(&self) -> bool {
+    /// Whether there are any.
+    pub fn are_there(&self) -> bool {
         !self.thermal.is_empty() || self.nodal.is_some()
     }
 
-    /// Modal loads of the master at speed Ω (rad/s).
-    pub fn fill_master(&self, speed: f64, loads: &mut [f64]) {
-        let square = speed * speed;
-        for (load, [second, fourth]) in loads.iter_mut().zip(&self.centrifugal) {
-            *load = square * (second + square * fourth);
-        }
-    }
-
-    /// Modal loads of the slave for the inputs at `offset`.
-    pub(super) fn fill_slave(&self, inputs: &Inputs, offset: f64, loads: &mut [f64]) {
+    /// Modal loads for the inputs at `offset`.
+    pub(super) fn fill(&self, inputs: &CarrierInputs, offset: f64, loads: &mut [f64]) {
         loads.fill(0.0);
         for (vector, input) in self.thermal.iter().zip(&inputs.temperatures) {
             let temperature = input.at(offset);

@@ -4,13 +4,14 @@ mod access;
 mod checks;
 mod compile;
 mod drive;
+mod failures;
 mod fingerprint;
-mod free;
 mod inputs;
 mod limits;
 mod loads;
 mod outputs;
 mod patches;
+mod plan;
 mod slave_surface;
 mod state;
 mod stepping;
@@ -26,7 +27,7 @@ use crate::{Result, Scene, ranges, shown};
 use compile::Compiled;
 use drive::{Input, RotorAngle};
 pub use inputs::Courses;
-use inputs::Inputs;
+use inputs::{CarrierInputs, Inputs, PairInputs, RotorInputs};
 use window::Window;
 
 /// Communication points may differ from the simulation's own time by this fraction of H (rounding in the importer).
@@ -111,7 +112,12 @@ pub struct Simulation {
     /// Real outputs at the previous communication point, for derivatives.
     previous: Vec<f64>,
     inputs: Inputs,
-    rotor: RotorAngle,
+    /// Of the structures that touch.
+    rotors: Vec<RotorAngle>,
+    /// Prescribed motion at the end of the internal step under way, per contact pair.
+    drives: Vec<Drive>,
+    /// Share of the friction heat that goes into what carries the surface, per pair.
+    slave_shares: Vec<f64>,
     window: Window,
     communication: Communication,
     /// Length of the step before the last (s), 0 before there was one.
@@ -144,19 +150,29 @@ impl Simulation {
         let compiled = Compiled::new(scene)?;
         let (table, readers) = table::build(scene)?;
         let system = compiled.system()?;
-        let patches = compiled.patches.as_ref().map_or(0, patches::Patches::len);
-        let pairs = compiled.free.as_ref().map_or(0, |free| free.pairs.len());
-        let window = Window::new(system.gaps().len(), patches, pairs);
-        let temperatures = vec![Input::default(); compiled.loads.thermal.len()];
+        let window = Window::new(system.structures(), &compiled.patches);
+        let (bodies, pairs) = (compiled.bodies.len(), compiled.plan.pairs.len());
+        let heated = |carrier: &compile::CarrierParts| CarrierInputs {
+            temperatures: vec![Input::default(); carrier.loads.thermal.len()],
+            ..CarrierInputs::default()
+        };
+        let inputs = Inputs {
+            rotors: vec![RotorInputs::default(); bodies],
+            pairs: vec![PairInputs::default(); pairs],
+            carriers: compiled.carriers.iter().map(heated).collect(),
+            ..Inputs::default()
+        };
         let mut simulation = Self {
             readers,
             values: vec![0.0; table.references()],
             previous: vec![0.0; table.references()],
             table,
+            inputs,
+            rotors: vec![RotorAngle::default(); bodies],
+            drives: vec![Drive::default(); pairs],
+            slave_shares: vec![1.0; pairs],
             compiled,
             system,
-            inputs: Inputs { temperatures, ..Inputs::default() },
-            rotor: RotorAngle::default(),
             window,
             communication: Communication::default(),
             previous_length: 0.0,
@@ -165,7 +181,7 @@ impl Simulation {
             phase: Phase::Created,
             warnings: Vec::new(),
             notes: Vec::new(),
-            told: limits::Told::default(),
+            told: limits::Told::new(bodies),
             limits: None,
             state_size: 0,
             energy: 0.0,
@@ -199,31 +215,31 @@ impl Simulation {
         self.warnings.clear();
         self.notes.clear();
         self.compiled.check_methods(parameters.scheme, parameters.solver)?;
-        self.compiled.set_load_order(self.value_of(Quantity::LoadOrder))?;
-        self.follow_reference_speed(self.inputs.speed.value)?;
+        self.follow_load_orders()?;
+        self.follow_reference_speeds(&self.speeds())?;
         self.warnings = self.check_limits(&parameters)?;
         self.warn_of_sticking(&parameters);
-        self.begin_telling(parameters.step, parameters.sense);
-        self.system.set_methods(parameters.scheme, parameters.solver);
-        self.system.set_friction(parameters.friction);
+        self.begin_telling(&parameters);
+        self.apply_methods(&parameters);
         self.rest(&parameters);
         self.time = start_time;
         self.initial_time = start_time;
         self.communication = Communication { start: start_time, length: 0.0, count: 1, done: 1 };
         self.previous_length = 0.0;
-        self.rotor = RotorAngle::new(self.value_of(Quantity::InitialAngle));
-        let drive = self.drive(0.0, start_time);
-        self.system.bank_mut().set_step(parameters.scheme, parameters.step);
-        for slave in self.system.slaves_mut() {
-            slave.bank.set_step(parameters.scheme, parameters.step);
+        for body in 0..self.rotors.len() {
+            self.rotors[body] = RotorAngle::new(self.value_of(Quantity::InitialAngle, body));
+        }
+        self.find_drives(0.0, start_time);
+        for structure in self.system.structures_mut() {
+            structure.modes_mut().set_step(parameters.scheme, parameters.step);
         }
         self.inputs.start();
-        self.settle(drive.speed);
+        self.settle();
         self.launch();
-        self.system.start(&drive);
+        self.system.start(&self.drives);
         self.check_initial_state()?;
         self.check_initial_gaps()?;
-        self.window.open(self.system.gaps());
+        self.window.open(self.system.structures());
         self.update_outputs();
         self.initial_energy = self.energy;
         self.check_outputs(start_time)?;
@@ -232,71 +248,105 @@ impl Simulation {
         Ok(())
     }
 
-    /// Tips that slide more slowly than they vibrate stick at times, which the sliding law does not know.
-    fn warn_of_sticking(&mut self, parameters: &limits::Parameters) {
-        let speed = &self.inputs.speed;
-        let slow = self.compiled.slow_sliding();
-        if self.compiled.free.is_some()
-            || parameters.solver == Solver::Coulomb
-            || parameters.friction == 0.0
-            || speed.slope != 0.0
-            || speed.value.abs() >= slow
-        {
-            return;
-        }
-        self.warnings.push(format!(
-            "the rotor starts at speed {} rad/s with friction: the sliding law does not model sticking; results are \
-             meaningful once the tips slide faster than they vibrate, which they do not below some {slow:.1e} rad/s (the \
-             solver coulomb models it)",
-            shown(speed.value)
-        ));
+    /// Scheme, solver and friction of the parameters.
+    fn apply_methods(&mut self, parameters: &limits::Parameters) {
+        self.system.set_methods(parameters.scheme, parameters.solver);
+        self.apply_friction(parameters);
     }
 
-    /// With stiffening, the modes are those at the speed of the start.
-    fn follow_reference_speed(&mut self, speed: f64) -> Result<()> {
-        if !self.compiled.spins() || self.compiled.reference_speed.to_bits() == speed.to_bits() {
-            return Ok(());
+    fn apply_friction(&mut self, parameters: &limits::Parameters) {
+        for (pair, friction) in parameters.friction.iter().enumerate() {
+            self.system.set_friction(pair, *friction);
         }
-        let before = self.compiled.reference_speed;
-        self.compiled.set_reference_speed(speed)?;
-        // The speed before was accepted before.
-        self.system = self.compiled.system().inspect_err(|_| drop(self.compiled.set_reference_speed(before)))?;
-        self.limits = None;
+    }
+
+    /// Speeds of all structures that touch (rad/s).
+    fn speeds(&self) -> Vec<f64> {
+        self.inputs.rotors.iter().map(|rotor| rotor.speed.value).collect()
+    }
+
+    /// Tips that slide more slowly than they vibrate stick at times, which the sliding law does not know.
+    fn warn_of_sticking(&mut self, parameters: &limits::Parameters) {
+        for body in 0..self.compiled.bodies.len() {
+            let speed = &self.inputs.rotors[body].speed;
+            let slow = self.compiled.slow_sliding(body);
+            if self.compiled.bodies[body].translations.is_some()
+                || parameters.solver == Solver::Coulomb
+                || parameters.friction_of(&self.compiled, body) == 0.0
+                || speed.slope != 0.0
+                || speed.value.abs() >= slow
+            {
+                continue;
+            }
+            let rotor = self.compiled.rotor_name(body);
+            self.warnings.push(format!(
+                "{rotor} starts at speed {} rad/s with friction: the sliding law does not model sticking; results are \
+                 meaningful once the tips slide faster than they vibrate, which they do not below some {slow:.1e} rad/s (the \
+                 solver coulomb models it)",
+                shown(speed.value)
+            ));
+        }
+    }
+
+    /// The numbers of nodal diameters that the parameters give to loads.
+    fn follow_load_orders(&mut self) -> Result<()> {
+        (0..self.compiled.carriers.len()).try_for_each(|carrier| {
+            let order = self.value_of(Quantity::LoadOrder, carrier);
+            self.compiled.set_load_order(carrier, order)
+        })
+    }
+
+    /// With stiffening, the modes are those at the speeds of the start, one per structure that touches.
+    fn follow_reference_speeds(&mut self, speeds: &[f64]) -> Result<()> {
+        for (body, speed) in speeds.iter().enumerate() {
+            let before = self.compiled.bodies[body].reference_speed;
+            if !self.compiled.spins(body) || before.to_bits() == speed.to_bits() {
+                continue;
+            }
+            self.compiled.set_reference_speed(body, *speed)?;
+            // The speed before was accepted before.
+            let system = self.compiled.system();
+            self.system = system.inspect_err(|_| drop(self.compiled.set_reference_speed(body, before)))?;
+            self.limits = None;
+        }
         Ok(())
     }
 
     /// Undeformed and at rest, with the damping of the parameters.
     fn rest(&mut self, parameters: &limits::Parameters) {
-        self.system.bank_mut().rest();
-        self.system.bank_mut().set_damping_ratio(parameters.damping_ratio);
-        for (slave, ratio) in self.system.slaves_mut().iter_mut().zip(&parameters.slave_damping_ratios) {
-            slave.bank.rest();
-            slave.bank.set_damping_ratio(*ratio);
+        for (structure, ratio) in self.system.structures_mut().iter_mut().zip(&parameters.damping_ratios) {
+            structure.modes_mut().rest();
+            structure.modes_mut().set_damping_ratio(*ratio);
         }
     }
 
-    /// A free master flies with its initial velocity as a whole; again for another length of the first step.
+    /// What flies freely starts with its initial velocity as a whole; again for another length of the first step.
     fn launch(&mut self) {
-        let Some(free) = &self.compiled.free else { return };
-        let velocity = [0, 1, 2].map(|axis| self.value_of(Quantity::InitialVelocity(axis)));
-        let crate::dynamics::sectors::Sectors::Uncoupled(bank) = self.system.bank_mut() else { return };
-        for (mode, velocity) in free.translations.modal(velocity).into_iter().enumerate() {
-            bank.set_modal_state(mode, 0, 0.0, velocity);
+        for (body, parts) in self.compiled.bodies.iter().enumerate() {
+            let Some(translations) = &parts.translations else { continue };
+            let velocity = [0, 1, 2].map(|axis| self.value_of(Quantity::InitialVelocity(axis), body));
+            for (mode, velocity) in translations.modal(velocity).into_iter().enumerate() {
+                self.system.structures_mut()[body].modes_mut().set_modal_state(mode, 0, 0.0, velocity);
+            }
         }
     }
 
     /// Static equilibrium under the loads of the start.
-    fn settle(&mut self, speed: f64) {
-        let loads = &self.compiled.loads;
-        if !loads.centrifugal.is_empty() {
-            let mut load = vec![0.0; loads.centrifugal.len()];
-            loads.fill_master(speed, &mut load);
-            self.system.bank_mut().settle(&load);
+    fn settle(&mut self) {
+        let structures = self.system.structures_mut();
+        for (body, parts) in self.compiled.bodies.iter().enumerate().filter(|(_, body)| !body.centrifugal.is_empty()) {
+            let mut load = vec![0.0; parts.centrifugal.len()];
+            let speed = self.inputs.rotors[body].speed.at(0.0);
+            loads::fill_centrifugal(&parts.centrifugal, speed, &mut load);
+            structures[body].modes_mut().settle(&load);
         }
-        if let (true, [slave, ..]) = (loads.on_slave(), self.system.slaves_mut()) {
-            let mut load = vec![0.0; slave.bank.modes()];
-            loads.fill_slave(&self.inputs, 0.0, &mut load);
-            slave.bank.settle(&load);
+        let under = structures.iter_mut().skip(self.compiled.bodies.len());
+        for ((carrier, inputs), structure) in self.compiled.carriers.iter().zip(&self.inputs.carriers).zip(under) {
+            if carrier.loads.are_there() {
+                let mut load = vec![0.0; carrier.model.len()];
+                carrier.loads.fill(inputs, 0.0, &mut load);
+                structure.modes_mut().settle(&load);
+            }
         }
     }
 
@@ -323,35 +373,43 @@ impl Simulation {
         }
     }
 
-    fn value_of(&self, quantity: Quantity) -> f64 {
-        self.table.with_quantity(quantity).map_or(0.0, |variable| self.values[variable.reference as usize])
+    fn value_of(&self, quantity: Quantity, of: usize) -> f64 {
+        let variable = self.table.with_quantity_of(quantity, of);
+        variable.map_or(0.0, |variable| self.values[variable.reference as usize])
     }
 
     /// Prescribed motion at an offset from the start of the communication step, at the time `time`.
-    fn drive(&self, offset: f64, time: f64) -> Drive {
-        let speed = &self.inputs.speed;
-        Drive {
-            rotor_angle: self.rotor.phase(speed, offset),
-            speed: speed.at(offset),
-            gap_offset: self.inputs.gap_offset.at(offset),
-            shape_factor: self.inputs.shape_factor.at(offset) * self.ramp(time),
-            // Exact, so that a rotation by many turns does not swallow the rotor's own.
-            shape_rotation: self.inputs.shape_rotation.at(offset) % std::f64::consts::TAU,
-            radius_change: self.inputs.radius_change.at(offset),
-            shaft: self.inputs.shaft.map(|input| input.at(offset)),
-            shaft_velocity: self.inputs.shaft.map(|input| input.rate()),
+    fn find_drives(&mut self, offset: f64, time: f64) {
+        for pair in 0..self.drives.len() {
+            self.drives[pair] = self.drive(pair, offset, time);
         }
     }
 
-    /// Factor on the casing shape at the internal time reached (-), ramp included.
+    fn drive(&self, pair: usize, offset: f64, time: f64) -> Drive {
+        let body = self.compiled.plan.pairs[pair].body;
+        let (rotor, surface) = (&self.inputs.rotors[body], &self.inputs.pairs[pair]);
+        Drive {
+            rotor_angle: self.rotors[body].phase(&rotor.speed, offset),
+            speed: rotor.speed.at(offset),
+            gap_offset: surface.gap_offset.at(offset),
+            shape_factor: surface.shape_factor.at(offset) * self.ramp(pair, time),
+            // Exact, so that a rotation by many turns does not swallow the rotor's own.
+            shape_rotation: surface.shape_rotation.at(offset) % std::f64::consts::TAU,
+            radius_change: surface.radius_change.at(offset),
+            shaft: rotor.shaft.map(|input| input.at(offset)),
+            shaft_velocity: rotor.shaft.map(|input| input.rate()),
+        }
+    }
+
+    /// Factor on the casing shape of the first pair at the internal time reached (-), ramp included.
     pub fn shape_factor(&self) -> f64 {
         let (offset, done) = (self.offset_now(), self.communication.done);
-        self.inputs.shape_factor.at(offset) * self.ramp(self.communication.time(done))
+        self.inputs.pairs[0].shape_factor.at(offset) * self.ramp(0, self.communication.time(done))
     }
 
     /// Share of the casing shape that has grown in: ½(1 − cos(πt/T)) until T.
-    fn ramp(&self, time: f64) -> f64 {
-        let Some(reference) = self.compiled.references.ramp_time else { return 1.0 };
+    fn ramp(&self, pair: usize, time: f64) -> f64 {
+        let Some(reference) = self.compiled.references.ramp_times[pair] else { return 1.0 };
         let (length, elapsed) = (self.values[reference], time - self.initial_time);
         if elapsed >= length { 1.0 } else { 0.5 * (1.0 - libm::cos(std::f64::consts::PI * elapsed / length)) }
     }
@@ -367,7 +425,7 @@ impl Simulation {
                 Some(Start::Real(values)) => {
                     self.values[reference..][..values.len()].copy_from_slice(values);
                     for (element, value) in values.iter().enumerate() {
-                        if let Some(input) = self.inputs.get_mut(variable.quantity, element) {
+                        if let Some(input) = self.inputs.get_mut(variable.quantity, variable.of, element) {
                             input.ask(*value, 0.0);
                             input.take();
                         }
@@ -378,8 +436,8 @@ impl Simulation {
                 Some(Start::String(_)) | None => {}
             }
         }
-        self.system.bank_mut().rest();
-        self.rotor = RotorAngle::default();
+        self.system.structures_mut().iter_mut().for_each(|structure| structure.modes_mut().rest());
+        self.rotors.fill(RotorAngle::default());
         self.communication = Communication::default();
         self.previous_length = 0.0;
         (self.time, self.initial_time) = (0.0, 0.0);

@@ -51,8 +51,6 @@ pub struct View<'a> {
     pub mean: f64,
     /// That time (s).
     elapsed: f64,
-    /// Share of the friction heat that goes into the slave; all of it where the scene does not say.
-    slave_share: f64,
     /// Kinetic and strain energy of the instant (J), if the ledger is kept.
     pub energies: (f64, f64),
     /// Energy that the scheme conserves (J), if the ledger is kept.
@@ -72,11 +70,13 @@ impl Simulation {
             (energies, conserved) = (self.system.energies_now(), kinetic + strain);
         }
         (self.energy, self.conserved) = (energies.0 + energies.1, conserved);
-        let slave_share = self.table.with_quantity(Quantity::HeatToSlave);
-        let slave_share = slave_share.map_or(1.0, |variable| self.values[variable.reference as usize]);
+        for pair in 0..self.slave_shares.len() {
+            let variable = self.table.with_quantity_of(Quantity::HeatToSlave, pair);
+            self.slave_shares[pair] = variable.map_or(1.0, |variable| self.values[variable.reference as usize]);
+        }
         let mut values = std::mem::take(&mut self.values);
         let (system, window) = (&self.system, &self.window);
-        let view = View { simulation: self, system, window, mean, elapsed, slave_share, energies, conserved };
+        let view = View { simulation: self, system, window, mean, elapsed, energies, conserved };
         let outputs = self.table.variables().iter().filter(|variable| variable.causality == Causality::Output);
         for (variable, read) in outputs.zip(&self.readers) {
             let start = variable.reference as usize;
@@ -96,12 +96,13 @@ fn smallest<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
 }
 
 impl View<'_> {
-    pub fn rotor_angle(&self) -> f64 {
-        self.simulation.rotor.total(&self.simulation.inputs.speed, self.elapsed)
+    pub fn rotor_angle(&self, body: usize) -> f64 {
+        self.simulation.rotors[body].total(&self.simulation.inputs.rotors[body].speed, self.elapsed)
     }
 
-    pub fn slave_share(&self) -> f64 {
-        self.slave_share
+    /// Share of the friction heat of a pair that goes into what carries the surface; all of it where the scene does not say.
+    pub fn slave_share(&self, pair: usize) -> f64 {
+        self.simulation.slave_shares[pair]
     }
 
     pub fn ledger(&self) -> &Ledger {
@@ -123,73 +124,89 @@ impl View<'_> {
         self.system.steps() as f64
     }
 
-    /// What a coating tells; nothing without one.
-    pub fn coating(&self, read: impl Fn(&Coating) -> f64) -> f64 {
-        self.system.coating().map_or(0.0, read)
+    /// What the coating of a pair tells; nothing without one.
+    pub fn coating(&self, pair: usize, read: impl Fn(&Coating) -> f64) -> f64 {
+        self.system.coating(pair).map_or(0.0, read)
     }
 
-    fn index(&self, node: usize, sector: usize) -> usize {
-        node * self.system.bank().lanes() + sector
+    pub fn modes(&self, body: usize) -> &Sectors {
+        self.system.structures()[body].modes()
     }
 
-    /// Smallest clearance of all nodes within the communication step (m).
+    fn index(&self, body: usize, node: usize, sector: usize) -> usize {
+        self.system.structures()[body].index(node, sector)
+    }
+
+    /// Smallest clearance of all nodes of all structures within the communication step (m).
     pub fn lowest(&self) -> f64 {
-        smallest(self.window.lowest.iter())
+        smallest(self.window.bodies.iter().flat_map(|body| &body.lowest))
     }
 
     /// The same of a node over all sectors.
-    pub fn lowest_of_node(&self, node: usize) -> f64 {
-        let bank = self.system.bank();
-        smallest(self.window.lowest[node * bank.lanes()..][..bank.sectors()].iter())
+    pub fn lowest_of_node(&self, body: usize, node: usize) -> f64 {
+        let modes = self.modes(body);
+        smallest(self.window.bodies[body].lowest[node * modes.lanes()..][..modes.sectors()].iter())
     }
 
     /// The same of a sector over all nodes.
-    pub fn lowest_of_sector(&self, sector: usize) -> f64 {
-        smallest(self.of_sector(&self.window.lowest, sector))
+    pub fn lowest_of_sector(&self, body: usize, sector: usize) -> f64 {
+        smallest(self.of_sector(body, &self.window.bodies[body].lowest, sector))
     }
 
     /// The same of one node.
-    pub fn lowest_at(&self, node: usize, sector: usize) -> f64 {
-        self.window.lowest[self.index(node, sector)].min(NO_CLEARANCE)
+    pub fn lowest_at(&self, body: usize, node: usize, sector: usize) -> f64 {
+        self.window.bodies[body].lowest[self.index(body, node, sector)].min(NO_CLEARANCE)
     }
 
     /// Values of a sector, node by node.
-    pub fn of_sector<'a>(&self, values: &'a [f64], sector: usize) -> impl Iterator<Item = &'a f64> + use<'a> {
-        values.iter().skip(sector).step_by(self.system.bank().lanes())
+    pub fn of_sector<'a>(
+        &self,
+        body: usize,
+        values: &'a [f64],
+        sector: usize,
+    ) -> impl Iterator<Item = &'a f64> + use<'a> {
+        values.iter().skip(sector).step_by(self.modes(body).lanes())
     }
 
-    pub fn clearance(&self, node: usize, sector: usize) -> f64 {
-        self.system.gaps()[self.index(node, sector)].min(NO_CLEARANCE)
+    pub fn clearance(&self, body: usize, node: usize, sector: usize) -> f64 {
+        self.system.structures()[body].gap(node, sector).min(NO_CLEARANCE)
     }
 
-    pub fn normal_impulse(&self, node: usize, sector: usize) -> f64 {
-        self.window.normal_impulse[self.index(node, sector)]
+    pub fn normal_impulse(&self, body: usize, node: usize, sector: usize) -> f64 {
+        self.window.bodies[body].normal_impulse[self.index(body, node, sector)]
     }
 
-    pub fn tangential_impulse(&self, node: usize, sector: usize) -> f64 {
-        self.window.tangential_impulse[self.index(node, sector)]
+    /// Of all nodes of all structures.
+    pub fn whole_normal_impulse(&self) -> f64 {
+        self.window.bodies.iter().flat_map(|body| &body.normal_impulse).sum()
+    }
+
+    pub fn tangential_impulse(&self, body: usize, node: usize, sector: usize) -> f64 {
+        self.window.bodies[body].tangential_impulse[self.index(body, node, sector)]
     }
 
     /// Friction force of the last internal step (N).
-    pub fn tangential_now(&self, node: usize, sector: usize) -> f64 {
-        let event = self.system.events().iter().find(|event| (event.sector, event.node) == (sector, node));
+    pub fn tangential_now(&self, body: usize, node: usize, sector: usize) -> f64 {
+        let sought = (body, sector, node);
+        let event = self.system.events().iter().find(|event| (event.structure, event.sector, event.node) == sought);
         event.map_or(0.0, |event| event.tangential)
     }
 
-    /// Value of the centre of mass of a free master along an axis, from the modal (position, increment) of its translations.
-    pub fn centre(&self, axis: usize, value: impl Fn((f64, f64)) -> f64) -> f64 {
-        let (Some(free), Sectors::Uncoupled(bank)) = (&self.simulation.compiled.free, self.system.bank()) else {
-            return 0.0;
-        };
-        free.translations.centre(axis, [0, 1, 2].map(|mode| value(bank.modal_state(mode, 0))))
+    /// Value of the centre of mass of a structure that flies freely along an axis, from the modal (position, increment) of its
+    /// translations.
+    pub fn centre(&self, body: usize, axis: usize, value: impl Fn((f64, f64)) -> f64) -> f64 {
+        let translations = self.simulation.compiled.bodies[body].translations.as_ref();
+        let modal = || [0, 1, 2].map(|mode| value(self.modes(body).modal_state(mode, 0)));
+        translations.map_or(0.0, |translations| translations.centre(axis, modal()))
     }
 
-    /// Radial displacement of the contact grid of the carrier.
-    pub fn slave_displacement(&self, out: &mut [f64]) {
-        let (Some(slave), Some(model)) = (self.system.slave(), &self.simulation.compiled.carrier) else { return };
+    /// Radial displacement of the contact grid of a carrier.
+    pub fn slave_displacement(&self, carrier: usize, out: &mut [f64]) {
+        let compiled = &self.simulation.compiled;
+        let (model, modes) = (&compiled.carriers[carrier].model, self.modes(compiled.bodies.len() + carrier));
         out.fill(0.0);
         for mode in 0..model.len() {
-            let position = slave.bank.modal_state(mode, 0).0;
+            let position = modes.modal_state(mode, 0).0;
             for (node, value) in out.iter_mut().enumerate() {
                 *value += model.contact_modes[(3 * node, mode)] * position;
             }
@@ -197,17 +214,17 @@ impl View<'_> {
     }
 
     /// |(2/N) Σ_b u_b e^(−i n θ_b)| (1/N for n = 0 and n = N/2) of the radial displacement of the middle node.
-    pub fn nodal_diameters(&self, out: &mut [f64]) {
-        let bank = self.system.bank();
-        let sectors = bank.sectors();
-        let row = 3 * (bank.rows() / 6);
+    pub fn nodal_diameters(&self, body: usize, out: &mut [f64]) {
+        let modes = self.modes(body);
+        let sectors = modes.sectors();
+        let row = 3 * (modes.rows() / 6);
         #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
         for (diameter, value) in out.iter_mut().enumerate() {
             let (mut real, mut imaginary) = (0.0, 0.0);
             for sector in 0..sectors {
                 let (sine, cosine) = libm::sincos(diameter as f64 * sector_angle(sector, sectors));
-                real += bank.row(row, sector) * cosine;
-                imaginary += bank.row(row, sector) * sine;
+                real += modes.row(row, sector) * cosine;
+                imaginary += modes.row(row, sector) * sine;
             }
             let weight = if diameter == 0 || 2 * diameter == sectors { 1.0 } else { 2.0 };
             *value = weight / sectors as f64 * libm::hypot(real, imaginary);
@@ -223,8 +240,8 @@ impl Simulation {
             _ if self.phase == Phase::Created || length == 0.0 => 0.0,
             // From nothing to touch to a clearance, and back, there is no rate.
             _ if variable.unit == Some(&LENGTH) && now.max(before) >= NO_CLEARANCE => 0.0,
-            (Quantity::Clearance(sector), _) => self.system.gap_rate(element, sector),
-            (Quantity::RotorAngle, _) => self.inputs.speed.at(0.0),
+            (Quantity::Clearance(sector), _) => self.system.structures()[variable.of].gap_rate(element, sector),
+            (Quantity::RotorAngle, _) => self.inputs.rotors[variable.of].speed.at(0.0),
             (_, Span::Mean) if self.previous_length == 0.0 => 0.0,
             (_, Span::Mean) => (now - before) / (0.5 * (length + self.previous_length)),
             _ => (now - before) / length,

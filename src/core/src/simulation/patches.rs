@@ -1,6 +1,6 @@
 //! Patches of the slave surface that friction power is gathered for.
 
-use super::compile::Roles;
+use super::plan::{PairPlan, Plan};
 use crate::Scene;
 use crate::rom::Patch;
 use crate::settings::PatchSettings;
@@ -20,15 +20,18 @@ pub enum Patches {
 }
 
 impl Patches {
-    /// What the scene asks for: its own patches, else those of a thermal structure.
-    pub fn new(scene: &Scene, roles: Roles) -> Option<Self> {
-        if let Some(parts) = scene.settings.surfaces[roles.surface].patches {
-            let axial = || scene.roms[roles.master].contact_nodes.iter().map(|node| node.position[2]);
+    /// What the scene asks of a pair: patches of its surface, else those of a thermal structure under it.
+    pub fn new(scene: &Scene, plan: &Plan, pair: &PairPlan) -> Option<Self> {
+        if let Some(parts) = scene.settings.surfaces[pair.surface].patches {
+            let nodes = &plan.structure(scene, pair.body).1.contact_nodes;
+            let axial = || pair.nodes.iter().map(|node| nodes[*node].position[2]);
             let extent = [axial().fold(f64::INFINITY, f64::min), axial().fold(f64::NEG_INFINITY, f64::max)];
             return Some(Self::Equal { parts, extent });
         }
-        let carrier = roles.carrier.filter(|index| scene.settings.structures[*index].thermal)?;
-        scene.roms[carrier].extras.thermal.as_ref().map(|thermal| Self::Listed(thermal.patches.clone()))
+        let structure = plan.carriers[pair.carrier?];
+        let thermal = scene.roms[structure].extras.thermal.as_ref();
+        let thermal = thermal.filter(|_| scene.settings.structures[structure].thermal);
+        thermal.map(|thermal| Self::Listed(thermal.patches.clone()))
     }
 
     /// How many there are.

@@ -1,6 +1,5 @@
 //! The slave surface of a scene, laid through data points, and the modes of the structure that carries it.
 
-use crate::contact::gap::GapLaw;
 use crate::contact::layout::Layout;
 use crate::contact::spline::SurfaceSpline;
 use crate::contact::spline_gap::SplineGap;
@@ -9,6 +8,7 @@ use crate::dynamics::modal::ModalModel;
 use crate::rom::Frame;
 use crate::settings::{ContactSettings, Meridian, SplineSettings, SurfaceSettings};
 use crate::{Error, Result, Rom};
+use nalgebra::DMatrix;
 
 /// Rings of a rigid spline reach beyond the contact nodes by this share of their axial extent, and at least by that
 /// share of the radius.
@@ -21,30 +21,33 @@ const SAME_RADIUS: f64 = 0.1;
 #[derive(Debug, Clone)]
 struct Grid {
     around: usize,
+    /// The first data point among the nodes of a contact grid.
+    first_node: usize,
     first_angle: f64,
     rings: Vec<f64>,
 }
 
-/// A structure that carries the surface.
+/// A structure that carries a surface.
 #[derive(Debug, Clone, Copy)]
-pub struct Carrier<'a> {
+pub struct CarrierModes<'a> {
     /// Its ROM.
     pub rom: &'a Rom,
     /// Its modes, seen at its contact grid.
     pub model: &'a ModalModel,
 }
 
-/// The gap function against a surface spline.
+/// The gap function of some contact nodes of a structure against a surface through data points, those of the contact grid of
+/// `carrier` where one carries it.
 ///
 /// # Errors
 /// A structure without contact grid, a grid that the contact nodes stand beyond or far from, too few points.
-pub fn spline_law(
-    master: &Rom,
+pub fn spline_gap(
+    (master, nodes): (&Rom, &[usize]),
     layout: Layout,
     contact: &ContactSettings,
     surface: &SurfaceSettings,
-    carrier: Option<Carrier<'_>>,
-) -> Result<GapLaw> {
+    carrier: Option<(&Rom, Share)>,
+) -> Result<SplineGap> {
     if contact.meridian == Meridian::Cylinder {
         return Err(Error::invalid(
             "contact.meridian",
@@ -53,14 +56,14 @@ pub fn spline_law(
         ));
     }
     let settings = surface.spline.unwrap_or_default();
-    let contour = Contour::new(master);
+    let contour = Contour::new(master, nodes);
     let grid = match carrier {
-        Some(carrier) => carried_grid(carrier.rom, &contour)?,
+        Some((rom, share)) => carried_grid(rom, share, &contour)?,
         None => rigid_grid(settings, &contour),
     };
     let round = data(&grid, |z, _| contour.radius(z) + contact.gap);
-    if let Some(carrier) = carrier {
-        check_radii(carrier.rom, &round)?;
+    if let Some((rom, _)) = carrier {
+        check_radii(rom, grid.first_node, &round)?;
     }
     let spline = SurfaceSpline::new(&round, grid.around, grid.rings.len(), settings.closure, settings.interpolation)?;
     let shape = Surface::new(&surface.shape, contact.gap)?;
@@ -71,19 +74,24 @@ pub fn spline_law(
     } else {
         spline.interpolate(&mut change);
     }
-    Ok(GapLaw::Spline(Box::new(SplineGap::new(layout, contact.gap, spline, change, shape.angular_scale()))))
+    let mut gap = SplineGap::new(layout, contact.gap, spline, change, shape.angular_scale());
+    (gap.nodes, gap.first_node) = (nodes.to_vec(), grid.first_node);
+    Ok(gap)
 }
 
-impl Carrier<'_> {
-    /// Its modes, seen at the control points of the surface along x, y, z.
-    pub fn control_modes(&self, surface: &SurfaceSpline) -> ModalModel {
-        let nodes = self.rom.contact_nodes.len();
+impl CarrierModes<'_> {
+    /// Its modes, seen at the control points of a surface along x, y, z; data points of the surface are nodes of the contact grid
+    /// from `first` on.
+    pub fn at_control_points(&self, surface: &SurfaceSpline, first: usize) -> ModalModel {
+        let nodes = surface.control_points().len();
         let mut model = self.model.clone();
+        model.contact_modes = DMatrix::zeros(3 * nodes, model.len());
         let mut points = vec![[0.0; 3]; nodes];
         for mode in 0..model.len() {
             for (node, point) in points.iter_mut().enumerate() {
-                let own = std::array::from_fn(|component| self.model.contact_modes[(3 * node + component, mode)]);
-                *point = along_axes(self.rom, node, own);
+                let row = 3 * (first + node);
+                let own = std::array::from_fn(|component| self.model.contact_modes[(row + component, mode)]);
+                *point = along_axes(self.rom, first + node, own);
             }
             surface.interpolate(&mut points);
             for (node, point) in points.iter().enumerate() {
@@ -92,7 +100,7 @@ impl Carrier<'_> {
                 }
             }
         }
-        // Contact acts on the master's residual flexibility; all modes of the slave keep their inertia.
+        // Contact acts on the residual flexibility of what touches; all modes of the carrier keep their inertia.
         model.quasi_static = 0;
         model
     }
@@ -108,7 +116,16 @@ fn along_axes(rom: &Rom, node: usize, own: [f64; 3]) -> [f64; 3] {
     [radial * cosine - tangential * sine, radial * sine + tangential * cosine, axial]
 }
 
-fn carried_grid(rom: &Rom, contour: &Contour) -> Result<Grid> {
+/// How much of a contact grid a surface takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Share {
+    /// All of it.
+    Whole,
+    /// The rings around the contact nodes that face it: other surfaces take others.
+    Near,
+}
+
+fn carried_grid(rom: &Rom, share: Share, contour: &Contour) -> Result<Grid> {
     let Some(grid) = rom.extras.grid else {
         return Err(Error::invalid(
             format!("ROM `{}`", rom.name),
@@ -116,7 +133,7 @@ fn carried_grid(rom: &Rom, contour: &Contour) -> Result<Grid> {
             "Reduce the casing with `tiprub reduce casing`, or add the metadata `contact_grid`",
         ));
     };
-    let rings: Vec<f64> = rom.contact_nodes.chunks(grid.around).map(|ring| ring[0].position[2]).collect();
+    let mut rings: Vec<f64> = rom.contact_nodes.chunks(grid.around).map(|ring| ring[0].position[2]).collect();
     let (low, high) = (rings[0], rings[rings.len() - 1]);
     let [first, last] = contour.extent();
     if first < low || last > high {
@@ -128,16 +145,26 @@ fn carried_grid(rom: &Rom, contour: &Contour) -> Result<Grid> {
             "Give a casing that covers the blade tips",
         ));
     }
-    Ok(Grid { around: grid.around, first_angle: rom.contact_nodes[0].position[1], rings })
+    let mut first_ring = 0;
+    if share == Share::Near {
+        let margin = contour.margin();
+        let below = rings.iter().filter(|z| **z <= first - margin).count();
+        let above = rings.iter().filter(|z| **z < last + margin).count();
+        first_ring = below.saturating_sub(1);
+        rings = rings[first_ring..rings.len().min(above + 1)].to_vec();
+    }
+    let first_angle = rom.contact_nodes[0].position[1];
+    Ok(Grid { around: grid.around, first_node: first_ring * grid.around, first_angle, rings })
 }
 
 fn rigid_grid(settings: SplineSettings, contour: &Contour) -> Grid {
     let [first, last] = contour.extent();
-    let margin = (MARGIN_OF_EXTENT * (last - first)).max(MARGIN_OF_RADIUS * contour.points[0].1);
+    let margin = contour.margin();
     let (low, length) = (first - margin, last - first + 2.0 * margin);
     #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
     let ring = |ring: usize| low + length * ring as f64 / (settings.along - 1) as f64;
-    Grid { around: settings.around, first_angle: 0.0, rings: (0..settings.along).map(ring).collect() }
+    let rings = (0..settings.along).map(ring).collect();
+    Grid { around: settings.around, first_node: 0, first_angle: 0.0, rings }
 }
 
 /// Points of all rings at the radius (m) given for (z, θ).
@@ -155,8 +182,8 @@ fn data(grid: &Grid, radius: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
     points
 }
 
-fn check_radii(rom: &Rom, points: &[[f64; 3]]) -> Result<()> {
-    for (node, point) in rom.contact_nodes.iter().zip(points) {
+fn check_radii(rom: &Rom, first: usize, points: &[[f64; 3]]) -> Result<()> {
+    for (node, point) in rom.contact_nodes[first..].iter().zip(points) {
         let (own, wanted) = (node.position[0], libm::hypot(point[0], point[1]));
         if (own - wanted).abs() > SAME_RADIUS * wanted {
             return Err(Error::invalid(
@@ -179,18 +206,24 @@ struct Contour {
 }
 
 impl Contour {
-    fn new(rom: &Rom) -> Self {
-        let mut points: Vec<(f64, f64, f64)> =
-            rom.contact_nodes.iter().map(|node| (node.position[2], node.position[0], 0.0)).collect();
+    fn new(rom: &Rom, nodes: &[usize]) -> Self {
+        let place = |node: &usize| rom.contact_nodes[*node].position;
+        let mut points: Vec<(f64, f64, f64)> = nodes.iter().map(place).map(|[r, _, z]| (z, r, 0.0)).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         let apart = 1e-9 * points[0].1;
         points.dedup_by(|a, b| (a.0 - b.0).abs() < apart);
         second_derivatives(&mut points);
-        Self { points, slope: rom.contact_nodes[0].meridional_slope }
+        Self { points, slope: rom.contact_nodes[nodes[0]].meridional_slope }
     }
 
     fn extent(&self) -> [f64; 2] {
         [self.points[0].0, self.points[self.points.len() - 1].0]
+    }
+
+    /// By how much a surface reaches beyond the nodes (m).
+    fn margin(&self) -> f64 {
+        let [first, last] = self.extent();
+        (MARGIN_OF_EXTENT * (last - first)).max(MARGIN_OF_RADIUS * self.points[0].1)
     }
 
     fn radius(&self, z: f64) -> f64 {

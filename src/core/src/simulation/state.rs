@@ -7,11 +7,11 @@ use super::access::check_range;
 use super::drive::RotorAngle;
 use super::{Communication, Inputs, MOST_STEPS, Phase, SAME_STEP, Simulation, TIME_TOLERANCE, same_step};
 use crate::persist::{Persist, Reader, Writer, fingerprint, persist_fields};
-use crate::variables::{Causality, Kind, Quantity, Variable};
+use crate::variables::{Causality, Kind, Variable};
 use crate::{Error, Result, shown};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 6;
+const VERSION: u64 = 7;
 const CHECKSUM_BYTES: usize = 8;
 
 persist_fields!(Communication { start, length, count, done });
@@ -51,9 +51,10 @@ struct Lead {
     time: f64,
     communication: Communication,
     inputs: Inputs,
-    rotor: RotorAngle,
+    rotors: Vec<RotorAngle>,
     values: Vec<f64>,
-    reference_speed: f64,
+    /// Of each structure that touches (rad/s).
+    reference_speeds: Vec<f64>,
     /// Internal step (s).
     step: f64,
 }
@@ -135,11 +136,11 @@ impl Simulation {
         self.communication.save(writer);
         self.previous_length.save(writer);
         self.inputs.save(writer);
-        self.rotor.save(writer);
+        self.rotors.save(writer);
         self.window.save(writer);
         self.values.save(writer);
         self.previous.save(writer);
-        self.compiled.reference_speed.save(writer);
+        self.compiled.bodies.iter().for_each(|body| body.reference_speed.save(writer));
         self.system.save(writer);
     }
 
@@ -152,9 +153,9 @@ impl Simulation {
             time: 0.0,
             communication: Communication::default(),
             inputs: self.inputs.clone(),
-            rotor: self.rotor,
+            rotors: self.rotors.clone(),
             values: self.values.clone(),
-            reference_speed: 0.0,
+            reference_speeds: vec![0.0; self.rotors.len()],
             step: 0.0,
         };
         lead.phase.restore(reader);
@@ -170,14 +171,14 @@ impl Simulation {
         let others = reader.infinite();
         take(&mut lead.inputs, reader);
         let infinite = reader.infinite() - others;
-        take(&mut lead.rotor, reader);
+        take(&mut lead.rotors, reader);
         reader.up_to(largest);
         let mut window = self.window.clone();
         take(&mut window, reader);
         reader.up_to(f64::MAX);
         take(&mut lead.values, reader);
         self.previous.check(reader);
-        take(&mut lead.reference_speed, reader);
+        take(&mut lead.reference_speeds, reader);
         reader.up_to(largest);
         let endless;
         (lead.step, endless) = self.system.check(reader, runs);
@@ -185,7 +186,7 @@ impl Simulation {
             return damaged(fault);
         }
         // Those of three kinds of gaps: now, a step earlier, and the lowest.
-        let endless = self.system.endless(&window.lowest).map(|lowest| lowest + endless);
+        let endless = self.system.endless(&window.all_lowest()).map(|lowest| lowest + endless);
         if runs && endless != Some(reader.infinite() - infinite) {
             return damaged("it holds a number that is not finite");
         }
@@ -237,15 +238,18 @@ impl Simulation {
         let Communication { length, count, done, .. } = lead.communication;
         let stepping = lead.phase == Phase::Stepping && count > 0;
         let offsets = if stepping { [lead.communication.offset(done), length] } else { [0.0; 2] };
-        let angle = |offset: f64| lead.rotor.total(&lead.inputs.speed, offset);
-        if !offsets.into_iter().all(|offset| angle(offset).is_finite()) {
+        let mut rotors = lead.rotors.iter().zip(&lead.inputs.rotors);
+        let counts = |(angle, rotor): (&RotorAngle, &super::RotorInputs)| {
+            offsets.into_iter().all(|offset| angle.total(&rotor.speed, offset).is_finite())
+        };
+        if !rotors.all(counts) {
             return damaged("its rotor has turned beyond all counting");
         }
         for variable in self.table.variables().iter().filter(|variable| variable.causality == Causality::Input) {
             let (low, high) = (variable.min.unwrap_or(f64::MIN), variable.max.unwrap_or(f64::MAX));
             let rounding = SAME_STEP * low.abs().max(high.abs());
             for element in 0..variable.len() {
-                let Some(input) = lead.inputs.get_mut(variable.quantity, element) else { continue };
+                let Some(input) = lead.inputs.get_mut(variable.quantity, variable.of, element) else { continue };
                 let beyond = |offset: f64| (low - input.at(offset)).max(input.at(offset) - high);
                 if !offsets.into_iter().all(|offset| input.at(offset).is_finite() && beyond(offset) <= rounding) {
                     return damaged(&format!("it takes `{}` out of its range", variable.element_name(element)));
@@ -265,12 +269,10 @@ impl Simulation {
             Phase::Ready | Phase::Stepping if !moves => damaged("an input moves something beyond all bounds"),
             Phase::Created => Ok(()),
             // Looked at when a step begins and when a speed is given, not at every internal step.
-            Phase::Stepping => {
-                let rotation = self.inputs.shape_rotation.rate();
-                self.check_turning(lead.step, lead.communication.length, &self.inputs.speed, rotation)
-                    .and_then(|()| self.adopt(lead.reference_speed))
-            }
-            Phase::Ready | Phase::Failed => self.adopt(lead.reference_speed),
+            Phase::Stepping => self
+                .check_turning_of_all(lead.step, lead.communication.length)
+                .and_then(|()| self.adopt(&lead.reference_speeds)),
+            Phase::Ready | Phase::Failed => self.adopt(&lead.reference_speeds),
         };
         if outcome.is_err() {
             (self.values, self.inputs) = before;
@@ -278,23 +280,35 @@ impl Simulation {
         outcome.or_else(|error| damaged(&error.to_string()))
     }
 
+    fn check_turning_of_all(&self, step: f64, length: f64) -> Result<()> {
+        self.compiled.plan.pairs.iter().enumerate().try_for_each(|(index, pair)| {
+            let rotation = self.inputs.pairs[index].shape_rotation.rate();
+            self.check_turning(index, step, length, &self.inputs.rotors[pair.body].speed, rotation)
+        })
+    }
+
     /// What inputs make of the motion, also those that this scene does not list.
     fn is_moved_within_reason(&self, length: f64, time: f64) -> bool {
-        [0.0, length].into_iter().all(|offset| {
-            let drive = self.drive(offset, time);
+        let moments = (0..self.drives.len()).flat_map(|pair| [(pair, 0.0), (pair, length)]);
+        moments.into_iter().all(|(pair, offset)| {
+            let drive = self.drive(pair, offset, time);
             let single = [drive.speed, drive.gap_offset, drive.shape_factor, drive.shape_rotation, drive.radius_change];
             let mut all = single.into_iter().chain(drive.shaft).chain(drive.shaft_velocity);
             all.all(|value| value.abs() <= LARGEST)
         })
     }
 
-    fn adopt(&mut self, reference_speed: f64) -> Result<()> {
+    fn adopt(&mut self, reference_speeds: &[f64]) -> Result<()> {
         let parameters = self.parameters();
         self.compiled.check_methods(parameters.scheme, parameters.solver)?;
-        let order = f64::from(self.compiled.load_order);
-        self.compiled.set_load_order(self.value_of(Quantity::LoadOrder))?;
-        // The order before was accepted before.
-        self.follow_reference_speed(reference_speed).inspect_err(|_| drop(self.compiled.set_load_order(order)))
+        let orders: Vec<u32> = self.compiled.carriers.iter().map(|carrier| carrier.load_order).collect();
+        self.follow_load_orders()?;
+        // The orders before were accepted before.
+        self.follow_reference_speeds(reference_speeds).inspect_err(|_| {
+            for (carrier, order) in orders.into_iter().enumerate() {
+                drop(self.compiled.set_load_order(carrier, f64::from(order)));
+            }
+        })
     }
 
     /// Take over a state that was looked at.
@@ -306,16 +320,15 @@ impl Simulation {
         self.communication.restore(reader);
         self.previous_length.restore(reader);
         self.inputs.restore(reader);
-        self.rotor.restore(reader);
+        self.rotors.restore(reader);
         self.window.restore(reader);
         self.values.restore(reader);
         self.previous.restore(reader);
         // Followed already.
-        0.0_f64.restore(reader);
+        self.rotors.iter().for_each(|_| 0.0_f64.restore(reader));
         // What the step takes from parameters follows from the restored values.
         let parameters = self.parameters();
-        self.system.set_methods(parameters.scheme, parameters.solver);
-        self.system.set_friction(parameters.friction);
+        self.apply_methods(&parameters);
         self.rest(&parameters);
         self.system.restore(reader);
         if self.phase != Phase::Created {

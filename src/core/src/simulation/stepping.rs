@@ -1,11 +1,10 @@
 //! One communication step: begun, marched, ended.
 
-use super::checks::{OUT_OF_REACH, OUT_OF_REACH_REMEDY};
 use super::drive::Input;
+use super::loads::fill_centrifugal;
 use super::{Communication, MOST_STEPS, Phase, Progress, Simulation, TIME_TOLERANCE, same_step};
 use crate::contact::coating::Coating;
 use crate::settings::Scheme;
-use crate::system::StepFailure;
 use crate::{Error, Result, ranges, shown};
 
 /// A run is warned of once u_θ²/2r is this share of the clearance.
@@ -42,19 +41,10 @@ impl Simulation {
         let count = (ratio * (1.0 - same)).ceil().max(1.0) as u64;
         #[expect(clippy::cast_precision_loss, reason = "count ≤ 1e9")]
         let step = step_size / count as f64;
-        let keeps = (step - self.system.bank().step()).abs() <= same * step;
-        let step = if keeps { self.system.bank().step() } else { step };
+        let keeps = (step - self.system.step_size()).abs() <= same * step;
+        let step = if keeps { self.system.step_size() } else { step };
         let hold = self.holds();
-        let mut rotation = self.inputs.shape_rotation;
-        if !hold {
-            rotation.aim(0.0, self.inputs.reach(step_size));
-        }
-        self.check_turning(step, step_size, &self.inputs.speed, rotation.rate())?;
-        let (first, last) = (self.inputs.speed.at(0.0), self.inputs.speed.at(step_size));
-        self.check_step_size(step, [first, last, self.inputs.spin.at(0.0)])?;
-        if self.compiled.spins() {
-            self.compiled.check_speed(if first.abs() > last.abs() { first } else { last })?;
-        }
+        self.check_motions(step, step_size)?;
         // Nothing is refused from here on.
         if !keeps {
             self.system.set_step(step);
@@ -64,15 +54,36 @@ impl Simulation {
             }
         }
         self.inputs.begin(step_size, hold);
-        if self.compiled.spins() && hold {
-            self.system.set_speed(0.5 * (first + last));
+        for body in (0..self.rotors.len()).filter(|body| hold && self.compiled.spins(*body)) {
+            let speed = &self.inputs.rotors[body].speed;
+            self.system.set_speed(body, 0.5 * (speed.at(0.0) + speed.at(step_size)));
         }
-        self.tell(step, [first, last]);
+        self.tell(step, step_size);
         self.previous.copy_from_slice(&self.values);
         self.previous_length = self.communication.length;
         self.communication = Communication { start: current_time, length: step_size, count, done: 0 };
-        self.window.open(self.system.gaps());
+        self.window.open(self.system.structures());
         self.phase = Phase::Stepping;
+        Ok(())
+    }
+
+    /// Speeds and rotations of shapes that an internal step can follow over a communication step of length `step_size`.
+    fn check_motions(&self, step: f64, step_size: f64) -> Result<()> {
+        for (index, pair) in self.compiled.plan.pairs.iter().enumerate() {
+            let mut rotation = self.inputs.pairs[index].shape_rotation;
+            if !self.holds() {
+                rotation.aim(0.0, self.inputs.reach(step_size));
+            }
+            let speed = &self.inputs.rotors[pair.body].speed;
+            self.check_turning(index, step, step_size, speed, rotation.rate())?;
+        }
+        for (body, rotor) in self.inputs.rotors.iter().enumerate() {
+            let (first, last) = (rotor.speed.at(0.0), rotor.speed.at(step_size));
+            self.check_step_size(body, step, [first, last, rotor.spin.at(0.0)])?;
+            if self.compiled.spins(body) {
+                self.compiled.check_speed(body, if first.abs() > last.abs() { first } else { last })?;
+            }
+        }
         Ok(())
     }
 
@@ -128,8 +139,16 @@ impl Simulation {
     }
 
     /// The rotor must not skip over features of the casing shape or cells of the coating. Inputs are linear in time: the ends decide.
-    pub(super) fn check_turning(&self, step: f64, step_size: f64, speed: &Input, rotation: f64) -> Result<()> {
-        let (scale, cell) = (self.system.law().angular_scale(), self.system.coating().map(Coating::width));
+    pub(super) fn check_turning(
+        &self,
+        pair: usize,
+        step: f64,
+        step_size: f64,
+        speed: &Input,
+        rotation: f64,
+    ) -> Result<()> {
+        let scale = self.system.pairs()[pair].gap().angular_scale();
+        let cell = self.system.coating(pair).map(Coating::width);
         let relative = |offset: f64| (speed.at(offset) - rotation).abs();
         let turned = step * relative(0.0).max(relative(step_size));
         // The coating does not turn with the shape.
@@ -148,10 +167,14 @@ impl Simulation {
         if turned <= scale {
             return Ok(());
         }
+        let (scene, plan) = (&self.compiled.scene, &self.compiled.plan);
         let (what, remedy) = if rotation != 0.0 && passed <= scale {
-            ("variable `casing_shape_rotation`", "Turn the shape more slowly, or use a smaller internal_step_max")
+            let prefix = plan.pair_prefix(&scene.settings, pair);
+            let remedy = "Turn the shape more slowly, or use a smaller internal_step_max";
+            (format!("variable `{prefix}casing_shape_rotation`"), remedy)
         } else {
-            ("variable `speed`", "Use a lower speed or a smaller internal_step_max")
+            let prefix = plan.body_prefix(scene, plan.pairs[pair].body);
+            (format!("variable `{prefix}speed`"), "Use a lower speed or a smaller internal_step_max")
         };
         Err(Error::invalid(
             what,
@@ -174,16 +197,13 @@ impl Simulation {
         }
         let next = self.communication.done + 1;
         let (offset, time) = (self.communication.offset(next), self.communication.time(next));
-        let drive = self.drive(offset, time);
+        self.find_drives(offset, time);
         let before = self.communication.offset(self.communication.done);
         self.load(before);
-        if self.compiled.spins() && !self.holds() {
-            self.system.set_speed(self.inputs.spin.at(before));
-        }
-        if let Err(failure) = self.system.step(&drive) {
+        if let Err(failure) = self.system.step(&self.drives) {
             return Err(self.fail(failure, time));
         }
-        self.window.add(&self.system, self.compiled.patches.as_ref(), self.system.bank().step());
+        self.window.add(&self.system, &self.compiled.patches, self.system.step_size());
         self.communication.done = next;
         let finished = next == self.communication.count;
         if finished {
@@ -192,14 +212,25 @@ impl Simulation {
         Ok(Progress { time, finished })
     }
 
-    /// Loads beside contact for the step that begins at `offset`: q⁺ = a q + b q⁻ + c f takes the force at the time of q.
+    /// Loads beside contact and stiffening for the step that begins at `offset`: q⁺ = a q + b q⁻ + c f takes the force at the time
+    /// of q.
     fn load(&mut self, offset: f64) {
-        let (loads, speed) = (&self.compiled.loads, self.inputs.spin.at(offset));
-        if !loads.centrifugal.is_empty() {
-            loads.fill_master(speed, self.system.bank_mut().loads_mut());
+        let hold = self.holds();
+        for (body, parts) in self.compiled.bodies.iter().enumerate() {
+            let speed = self.inputs.rotors[body].spin.at(offset);
+            if !parts.centrifugal.is_empty() {
+                let loads = self.system.structures_mut()[body].modes_mut().loads_mut();
+                fill_centrifugal(&parts.centrifugal, speed, loads);
+            }
+            if !hold && self.compiled.spins(body) {
+                self.system.set_speed(body, speed);
+            }
         }
-        if let (true, [slave, ..]) = (loads.on_slave(), self.system.slaves_mut()) {
-            loads.fill_slave(&self.inputs, offset, slave.bank.loads_mut());
+        let under = self.system.structures_mut().iter_mut().skip(self.compiled.bodies.len());
+        for ((carrier, inputs), structure) in self.compiled.carriers.iter().zip(&self.inputs.carriers).zip(under) {
+            if carrier.loads.are_there() {
+                carrier.loads.fill(inputs, offset, structure.modes_mut().loads_mut());
+            }
         }
     }
 
@@ -207,15 +238,17 @@ impl Simulation {
         if let Err(failure) = self.system.check_state() {
             return Err(self.fail(failure, time));
         }
-        if let Err(failure) = self.system.check_books() {
+        if let Err(failure) = self.system.check_ledger() {
             return Err(self.fail(failure, time));
         }
         self.note_curved(time);
-        self.rotor.rebase(&self.inputs.speed, offset);
+        for (angle, rotor) in self.rotors.iter_mut().zip(&self.inputs.rotors) {
+            angle.rebase(&rotor.speed, offset);
+        }
         self.update_outputs();
         self.check_outputs(time).inspect_err(|_| self.phase = Phase::Failed)?;
         self.check_energy(time)?;
-        self.rotor.shift(offset);
+        self.rotors.iter_mut().for_each(|rotor| rotor.shift(offset));
         self.inputs.shift(offset);
         self.time = time;
         self.phase = Phase::Ready;
@@ -230,11 +263,11 @@ impl Simulation {
         let Some(most) = self.system.most_curved().filter(|most| most.share() >= CURVED_SHARE) else { return };
         self.told.curved = true;
         self.notes.push(format!(
-            "at t = {} s contact node {} of sector {} is displaced by {:.3e} m around the axis: gaps are linear in displacements, which \
+            "at t = {} s contact node {} of {} is displaced by {:.3e} m around the axis: gaps are linear in displacements, which \
              misses u²/2r = {:.2e} m, {:.0} % of the clearance; further on it grows with the square, and at 100 % the run ends",
             shown(time),
-            self.node_name(most.node),
-            most.sector + 1,
+            self.compiled.node_name(most.structure, most.node),
+            self.sector_name(most.structure, most.sector),
             most.moved,
             most.error,
             100.0 * most.share()
@@ -248,7 +281,7 @@ impl Simulation {
         let supplied = ledger.supplied().max(self.conserved - ledger.initial).max(0.0);
         let factor = match settings.scheme {
             Scheme::CentralDifference => {
-                1.0 / (1.0 - self.compiled.largest_product(self.system.bank().step()).powi(2) / 4.0)
+                1.0 / (1.0 - self.compiled.largest_product(self.system.step_size()).powi(2) / 4.0)
             }
             _ => ENERGY_FACTOR,
         };
@@ -267,183 +300,10 @@ impl Simulation {
                 self.energy,
                 self.initial_energy,
                 supplied,
-                self.system.bank().step()
+                self.system.step_size()
             ),
             remedy: "Use a smaller internal step (internal_step_max). Restore a saved state or reset first".to_owned(),
         })
-    }
-
-    fn fail(&mut self, failure: StepFailure, time: f64) -> Error {
-        self.phase = Phase::Failed;
-        if let StepFailure::Unbalanced { work, exchanged } = failure {
-            return self.unbalanced(work, exchanged, time);
-        }
-        if let Some(error) = self.free_failure(failure, time) {
-            return error;
-        }
-        match failure {
-            StepFailure::NonFinite => Error::NonFinite {
-                last_good_time: self.time,
-                time,
-                remedy: "Restore a saved state or reset, and use a smaller internal step or smaller loads".to_owned(),
-            },
-            StepFailure::Implausible { sector } => Error::Unstable {
-                problem: format!(
-                    "at t = {} s (last good time {} s) a contact node of sector {} is displaced by more than a tenth of \
-                     its radius, is as deep inside the casing, or meets a flank of the casing shape steeper than 45°{}",
-                    shown(time),
-                    shown(self.time),
-                    sector + 1,
-                    self.instability()
-                ),
-                remedy:
-                    "Check gap, casing shape, loads and inputs; small displacements cannot describe this. Restore a \
-                         saved state or reset first"
-                        .to_owned(),
-            },
-            StepFailure::Curved(curved) => Error::Unstable {
-                problem: format!(
-                    "at t = {} s (last good time {} s) contact node {} of sector {} is displaced by {:.3e} m around the axis: gaps are \
-                     linear in displacements, which misses u²/2r = {:.2e} m, as much as the clearance of {:.2e} m{}",
-                    shown(time),
-                    shown(self.time),
-                    self.node_name(curved.node),
-                    curved.sector + 1,
-                    curved.moved,
-                    curved.error,
-                    curved.clearance,
-                    self.instability()
-                ),
-                remedy: "Check casing shape, friction, loads and inputs: small displacements cannot describe this. Restore a saved \
-                         state or reset first"
-                    .to_owned(),
-            },
-            StepFailure::OutOfReach { node, sector } => Error::Unstable {
-                problem: format!(
-                    "at t = {} s (last good time {} s) contact node {} of sector {} has left the surface of the casing in z: it is \
-                     beyond the first or last ring by more than {}",
-                    shown(time),
-                    shown(self.time),
-                    self.node_name(node),
-                    sector + 1,
-                    OUT_OF_REACH
-                ),
-                remedy: format!("{OUT_OF_REACH_REMEDY}. Restore a saved state or reset first"),
-            },
-            StepFailure::Unexplained { node, sector, jump, explained } => {
-                self.unexplained(node, sector, jump, explained, time)
-            }
-            // Of free masters only, dealt with above.
-            StepFailure::TooFast | StepFailure::BehindEdge { .. } | StepFailure::Unbalanced { .. } => Error::Unstable {
-                problem: format!("a contact node moves too far in one internal step at t = {} s", shown(time)),
-                remedy: "Use a smaller internal step; restore a saved state or reset first".to_owned(),
-            },
-            StepFailure::CasingImplausible => Error::Unstable {
-                problem: format!(
-                    "at t = {} s (last good time {} s) the casing is displaced by more than a tenth of the radius",
-                    shown(time),
-                    shown(self.time)
-                ),
-                remedy:
-                    "Check its loads and temperatures; small displacements cannot describe this. Restore a saved state \
-                         or reset first"
-                        .to_owned(),
-            },
-            StepFailure::Unsolved { sector } => Error::Unstable {
-                problem: format!(
-                    "the contact problem of sector {} has no solution at t = {} s (last good time {} s)",
-                    sector + 1,
-                    shown(time),
-                    shown(self.time)
-                ),
-                remedy: "Use less friction or another internal step; restore a saved state or reset first".to_owned(),
-            },
-        }
-    }
-
-    /// Energy that no input brings.
-    fn unbalanced(&self, work: f64, exchanged: f64, time: f64) -> Error {
-        Error::Unstable {
-            problem: format!(
-                "by t = {} s (last good time {} s) contact forces have added {work:.3e} J that no input brings, of {exchanged:.3e} J \
-                 exchanged: normals turn and surfaces curve too far within an internal step (curvature work)",
-                shown(time),
-                shown(self.time)
-            ),
-            remedy: "Use a smaller internal step; restore a saved state or reset first".to_owned(),
-        }
-    }
-
-    fn node_name(&self, node: usize) -> &str {
-        &self.compiled.master().1.contact_nodes[node].name
-    }
-
-    fn unexplained(&self, node: usize, sector: usize, jump: f64, explained: f64, time: f64) -> Error {
-        Error::Unstable {
-            problem: format!(
-                "at t = {} s (last good time {} s) the gap of contact node {} of sector {} has changed by {jump:.3e} m in two steps, \
-                 where motion of node and casing explains {explained:.3e} m: the work of this contact cannot be told",
-                shown(time),
-                shown(self.time),
-                self.node_name(node),
-                sector + 1
-            ),
-            remedy: "Use a smaller internal step; if that does not help, the surface is folded or has more than one closest point \
-                     there. Restore a saved state or reset first"
-                .to_owned(),
-        }
-    }
-
-    /// What only means something else for a free master.
-    fn free_failure(&self, failure: StepFailure, time: f64) -> Option<Error> {
-        self.compiled.free.as_ref()?;
-        let behind;
-        let problem = match failure {
-            StepFailure::NonFinite
-            | StepFailure::Unbalanced { .. }
-            | StepFailure::Unexplained { .. }
-            | StepFailure::OutOfReach { .. }
-            | StepFailure::Curved(_) => return None,
-            StepFailure::TooFast => {
-                "contact nodes of the free structure move by more than a tenth of the extent of the contact nodes in one internal \
-                 step, and could pass a surface unseen"
-            }
-            StepFailure::BehindEdge { node } => {
-                let name = &self.compiled.master().1.contact_nodes[node].name;
-                behind = format!(
-                    "the contact node {name} comes over the edge of a surface and is behind it already: what is at an edge \
-                     is not described, and pushing the node out would be an impact of arbitrary strength"
-                );
-                &behind
-            }
-            StepFailure::Implausible { .. } => {
-                "contact nodes of the free structure have moved against each other, or into a surface, by more than a tenth of \
-                 the extent of the contact nodes"
-            }
-            StepFailure::CasingImplausible => {
-                "a structure that carries a surface is displaced by more than a tenth of the extent of the contact nodes"
-            }
-            StepFailure::Unsolved { .. } => "the contact problem has no solution",
-        };
-        let remedy = match failure {
-            StepFailure::Unsolved { .. } => "Use less friction, another internal step or the solver coulomb",
-            StepFailure::TooFast => "Use a smaller internal step or a lower velocity",
-            StepFailure::BehindEdge { .. } => {
-                "Extend the contact grid to where nodes may come, or move one of the structures; check that S_t x S_s of each \
-                 contact grid points to the master"
-            }
-            _ => "Check positions and velocity; small displacements beside rigid flight cannot describe this",
-        };
-        Some(Error::Unstable {
-            problem: format!("at t = {} s (last good time {} s) {problem}", shown(time), shown(self.time)),
-            remedy: format!("{remedy}. Restore a saved state or reset first"),
-        })
-    }
-
-    /// Growth that the initialisation warned of, as the likely cause of a failure.
-    fn instability(&self) -> String {
-        let grows = |text: &&String| text.contains("physically unstable");
-        self.warnings.iter().find(grows).map_or_else(String::new, |text| format!(". {text}"))
     }
 
     /// End the communication step here, before its end (early return): outputs cover the part done.

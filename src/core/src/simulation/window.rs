@@ -1,109 +1,131 @@
 //! What is gathered over one communication step: impulses, extremes, friction heat.
 
 use super::patches::Patches;
-use crate::contact::gap::GapLaw;
 use crate::persist::persist_fields;
-use crate::system::System;
+use crate::system::{Structure, System};
+
+/// Of a structure that touches: sums and extremes since the communication step began, `[node · lanes + lane]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BodyWindow {
+    /// Smallest gap of every node (m).
+    pub lowest: Vec<f64>,
+    /// ∫λ dt per node (N·s).
+    pub normal_impulse: Vec<f64>,
+    /// ∫µλ dt per node (N·s).
+    pub tangential_impulse: Vec<f64>,
+    /// ∫F dt along fixed x, y, z (N·s).
+    pub force_impulse: [f64; 3],
+    /// ∫M dt about fixed x, y, z (N·m·s): through the shaft's centre, or about the origin where nothing turns.
+    pub moment_impulse: [f64; 3],
+}
+
+/// Of a contact pair.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairWindow {
+    /// ∫F dt on what touches, along x, y, z (N·s).
+    pub force_impulse: [f64; 3],
+    /// ∫M dt (N·m·s), about the same point as that of the structure.
+    pub moment_impulse: [f64; 3],
+    /// Friction heat (J).
+    pub friction_heat: f64,
+    /// The same per patch; empty where the scene has none.
+    pub patch_heat: Vec<f64>,
+}
 
 /// Sums and extremes since the communication step began.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Window {
-    /// Smallest gap of every node (m), `[node · lanes + lane]`.
-    pub lowest: Vec<f64>,
-    /// ∫λ dt per node (N·s), same layout.
-    pub normal_impulse: Vec<f64>,
-    /// ∫µλ dt per node (N·s), same layout.
-    pub tangential_impulse: Vec<f64>,
-    /// ∫F dt on the rotor along fixed x, y, z (N·s).
-    pub force_impulse: [f64; 3],
-    /// ∫M dt on the rotor about fixed x, y, z through the shaft's centre, or on a free master about the origin (N·m·s).
-    pub moment_impulse: [f64; 3],
+    /// Of the structures that touch.
+    pub bodies: Vec<BodyWindow>,
+    /// Of the pairs.
+    pub pairs: Vec<PairWindow>,
     /// Friction heat (J).
     pub friction_heat: f64,
     /// Largest λ (N).
     pub normal_peak: f64,
-    /// Friction heat per patch (J); empty where the scene has none.
-    pub patch_heat: Vec<f64>,
-    /// ∫F dt on a free master along x, y, z (N·s) per pair; empty for rotors.
-    pub pair_impulse: Vec<[f64; 3]>,
-    /// The same of ∫M dt about the origin (N·m·s).
-    pub pair_moment: Vec<[f64; 3]>,
 }
 
-persist_fields!(Window {
-    lowest,
-    normal_impulse,
-    tangential_impulse,
-    force_impulse,
-    moment_impulse,
-    friction_heat,
-    normal_peak,
-    patch_heat,
-    pair_impulse,
-    pair_moment
-});
+persist_fields!(BodyWindow { lowest, normal_impulse, tangential_impulse, force_impulse, moment_impulse });
+persist_fields!(PairWindow { force_impulse, moment_impulse, friction_heat, patch_heat });
+persist_fields!(Window { bodies, pairs, friction_heat, normal_peak });
 
 impl Window {
-    /// Room for `len` nodes of all lanes and numbers of patches and of pairs of a free master.
-    pub fn new(len: usize, patches: usize, pairs: usize) -> Self {
-        Self {
-            lowest: vec![f64::INFINITY; len],
-            normal_impulse: vec![0.0; len],
-            tangential_impulse: vec![0.0; len],
+    /// Room for the contact nodes of all structures and the patches of all pairs.
+    pub fn new(structures: &[Structure], patches: &[Option<Patches>]) -> Self {
+        let body = |structure: &Structure| {
+            let len = structure.gaps().len();
+            BodyWindow {
+                lowest: vec![f64::INFINITY; len],
+                normal_impulse: vec![0.0; len],
+                tangential_impulse: vec![0.0; len],
+                force_impulse: [0.0; 3],
+                moment_impulse: [0.0; 3],
+            }
+        };
+        let pair = |patches: &Option<Patches>| PairWindow {
             force_impulse: [0.0; 3],
             moment_impulse: [0.0; 3],
             friction_heat: 0.0,
+            patch_heat: vec![0.0; patches.as_ref().map_or(0, Patches::len)],
+        };
+        Self {
+            bodies: structures.iter().filter(|structure| structure.nodes() > 0).map(body).collect(),
+            pairs: patches.iter().map(pair).collect(),
+            friction_heat: 0.0,
             normal_peak: 0.0,
-            patch_heat: vec![0.0; patches],
-            pair_impulse: vec![[0.0; 3]; pairs],
-            pair_moment: vec![[0.0; 3]; pairs],
         }
     }
 
     /// Begin anew; the gaps at the beginning belong to the window.
-    pub fn open(&mut self, gaps: &[f64]) {
-        self.lowest.copy_from_slice(gaps);
-        self.normal_impulse.fill(0.0);
-        self.tangential_impulse.fill(0.0);
-        self.force_impulse = [0.0; 3];
-        self.moment_impulse = [0.0; 3];
-        self.friction_heat = 0.0;
-        self.normal_peak = 0.0;
-        self.patch_heat.fill(0.0);
-        self.pair_impulse.fill([0.0; 3]);
-        self.pair_moment.fill([0.0; 3]);
+    pub fn open(&mut self, structures: &[Structure]) {
+        for (body, structure) in self.bodies.iter_mut().zip(structures) {
+            body.lowest.copy_from_slice(structure.gaps());
+            body.normal_impulse.fill(0.0);
+            body.tangential_impulse.fill(0.0);
+            (body.force_impulse, body.moment_impulse) = ([0.0; 3], [0.0; 3]);
+        }
+        for pair in &mut self.pairs {
+            (pair.force_impulse, pair.moment_impulse) = ([0.0; 3], [0.0; 3]);
+            pair.friction_heat = 0.0;
+            pair.patch_heat.fill(0.0);
+        }
+        (self.friction_heat, self.normal_peak) = (0.0, 0.0);
     }
 
     /// Add the internal step just done, of length `step` (s).
-    pub fn add(&mut self, system: &System, patches: Option<&Patches>, step: f64) {
-        for (lowest, gap) in self.lowest.iter_mut().zip(system.gaps()) {
-            *lowest = if *gap < *lowest { *gap } else { *lowest };
+    pub fn add(&mut self, system: &System, patches: &[Option<Patches>], step: f64) {
+        for (body, structure) in self.bodies.iter_mut().zip(system.structures()) {
+            for (lowest, gap) in body.lowest.iter_mut().zip(structure.gaps()) {
+                *lowest = if *gap < *lowest { *gap } else { *lowest };
+            }
         }
         for event in system.events() {
             self.normal_peak = self.normal_peak.max(event.normal);
         }
-        let lanes = system.bank().lanes();
         for event in system.acted() {
-            let index = event.node * lanes + event.sector;
-            self.normal_impulse[index] += event.normal * step;
-            self.tangential_impulse[index] += event.tangential * step;
-            add_scaled(&mut self.force_impulse, step, event.wrench.force);
-            add_scaled(&mut self.moment_impulse, step, event.wrench.moment);
-            if let GapLaw::Free(law) = system.law()
-                && let Some(pair) = law.surface_of(event.node)
-            {
-                add_scaled(&mut self.pair_impulse[pair], step, event.wrench.force);
-                add_scaled(&mut self.pair_moment[pair], step, event.wrench.moment);
+            let index = system.structures()[event.structure].index(event.node, event.sector);
+            let (body, pair) = (&mut self.bodies[event.structure], &mut self.pairs[event.pair]);
+            body.normal_impulse[index] += event.normal * step;
+            body.tangential_impulse[index] += event.tangential * step;
+            for (sum, term) in [
+                (&mut body.force_impulse, event.wrench.force),
+                (&mut body.moment_impulse, event.wrench.moment),
+                (&mut pair.force_impulse, event.wrench.force),
+                (&mut pair.moment_impulse, event.wrench.moment),
+            ] {
+                *sum = std::array::from_fn(|i| sum[i] + step * term[i]);
             }
             self.friction_heat += event.friction_heat;
-            if let Some(patches) = patches {
+            pair.friction_heat += event.friction_heat;
+            if let Some(patches) = &patches[event.pair] {
                 let [x, y, z] = event.wrench.point;
-                self.patch_heat[patches.find(libm::atan2(y, x), z)] += event.friction_heat;
+                pair.patch_heat[patches.find(libm::atan2(y, x), z)] += event.friction_heat;
             }
         }
     }
-}
 
-fn add_scaled(sum: &mut [f64; 3], factor: f64, term: [f64; 3]) {
-    *sum = std::array::from_fn(|i| sum[i] + factor * term[i]);
+    /// Smallest gaps of all structures, one after the other.
+    pub fn all_lowest(&self) -> Vec<f64> {
+        self.bodies.iter().flat_map(|body| &body.lowest).copied().collect()
+    }
 }

@@ -1,6 +1,8 @@
 //! What carries a running state on: another step size, saving and restoring, and ways over an edge.
 
-use super::{ContactEvent, Member, Slave, StepFailure, System, frame_of};
+use super::group::Member;
+use super::pair::When;
+use super::{Bodies, ContactEvent, Pair, StepFailure, Structure, System, sum_of};
 use crate::contact::gap::{GapLaw, dot};
 use crate::contact::spline::ClosestPoint;
 use crate::contact::wrench::At;
@@ -24,109 +26,113 @@ impl System {
     /// an impact is p/h, an impulse that is over, and means nothing over a step of another length. A much longer
     /// step reaches back to times of which the last force knows nothing; there it fades out.
     pub fn set_step(&mut self, step: f64) {
-        let old = self.bank.step();
-        if old > 0.0 && self.state.steps > 0 {
+        let (old, scheme) = (self.step_size(), self.settings.scheme);
+        if old > 0.0 && self.counted.steps > 0 {
             let before = self.mechanical_energy();
-            self.lasting_force(old, step);
-            self.bank.resample(self.settings.scheme, step, &self.displacement_oldest);
-            self.resample_slaves(step);
+            self.find_lasting(old, step);
+            self.structures.iter_mut().for_each(|structure| structure.carry_over(scheme, step));
             // The gap of the step before is continued along its own slope, not along the motion of the modes.
-            self.state.witnessed = self.state.steps + 2;
+            self.counted.witnessed = self.counted.steps + 2;
             let ratio = step / old;
-            self.state.motion = self.state.motion.over(ratio);
-            for (before, now) in self.state.gap_before.iter_mut().zip(&self.state.gap) {
-                if now.is_finite() {
-                    *before = now - ratio * (now - *before);
+            self.pairs.iter_mut().for_each(|pair| pair.stretch(ratio));
+            for structure in &mut self.structures {
+                let gap = &mut structure.history.gap;
+                for (before, now) in gap.before.iter_mut().zip(&gap.now) {
+                    if now.is_finite() {
+                        *before = now - ratio * (now - *before);
+                    }
                 }
             }
             let after = self.mechanical_energy();
-            self.state.ledger.step_change.add(after - before);
-            self.state.ledger.turnover.add((after - before).abs());
+            self.counted.ledger.step_change.add(after - before);
+            self.counted.ledger.turnover.add((after - before).abs());
         } else {
-            self.bank.set_step(self.settings.scheme, step);
-            self.slaves.iter_mut().for_each(|slave| slave.set_step(self.settings.scheme, step));
+            self.structures.iter_mut().for_each(|structure| structure.set_step(scheme, step));
         }
     }
 
     /// Kinetic and strain energy of all structures at this instant (J): ½q̇ᵀMq̇ with the velocity of the instant, ½qᵀKq. Between
     /// steps only.
     pub fn energies_now(&mut self) -> (f64, f64) {
-        let step = self.bank.step();
-        self.lasting_force(step, step);
-        self.spread_lasting();
-        let own = self.bank.energies_now(&self.displacement_oldest);
-        let slaves = self.slaves.iter_mut().map(Slave::energies_now);
-        slaves.fold(own, |sum, slave| (sum.0 + slave.0, sum.1 + slave.1))
+        let step = self.step_size();
+        self.find_lasting(step, step);
+        sum_of(self.structures.iter_mut().map(Structure::energies_now))
     }
 
-    fn resample_slaves(&mut self, step: f64) {
-        self.spread_lasting();
-        self.slaves.iter_mut().for_each(|slave| slave.carry_over(self.settings.scheme, step));
-    }
-
-    /// The same forces act on the slaves, where the last step found them.
-    fn spread_lasting(&mut self) {
-        if self.slaves.is_empty() {
-            return;
-        }
-        let lanes = self.lanes;
-        self.slaves.iter_mut().for_each(Slave::clear_lasting);
-        for index in 0..self.state.gap.len() {
-            let (node, sector) = (index / lanes, index % lanes);
-            let force: [f64; 3] = std::array::from_fn(|i| self.displacement_oldest[(3 * node + i) * lanes + sector]);
-            if let (true, Some((surface, carrier))) =
-                (force.iter().any(|value| *value != 0.0), self.law.spline_of(node))
-            {
-                let frame = frame_of(&self.law, index, self.state.drive.rotor_angle);
-                self.slaves[carrier].add_lasting(surface, self.state.geometry.places[index], frame, force);
-            }
-        }
-    }
-
-    /// Leaves in `displacement_oldest` (scratch between steps) the contact forces without those of impacts.
-    fn lasting_force(&mut self, old: f64, new: f64) {
-        let lanes = self.lanes;
+    /// The contact forces without those of impacts, on all structures where the last step found them.
+    fn find_lasting(&mut self, old: f64, new: f64) {
         let reach = (FORCE_REACH * old / new).min(1.0);
-        for (lasting, force) in self.displacement_oldest.iter_mut().zip(&self.state.force) {
-            *lasting = reach * reach * force;
+        for structure in &mut self.structures {
+            let history = &mut structure.history;
+            history.passing.lasting.fill(0.0);
+            for (lasting, force) in history.passing.lasting.iter_mut().zip(&history.force.now) {
+                *lasting = reach * reach * force;
+            }
         }
-        for (index, gap) in self.state.gap_before.iter().enumerate() {
-            // `film` closes gaps up to rounding.
-            let closed = CLOSED * self.law.indifferent(index / lanes);
-            let lasts = *gap <= closed && self.state.gap[index] <= closed;
-            if !lasts {
-                let (node, sector) = (index / lanes, index % lanes);
-                for component in 0..3 {
-                    self.displacement_oldest[(3 * node + component) * lanes + sector] = 0.0;
-                }
+        for index in 0..self.structures.len() {
+            let lanes = self.structures[index].modes().lanes();
+            for contact in 0..self.structures[index].gaps().len() {
+                self.end_impact(index, contact / lanes, contact % lanes);
+            }
+        }
+        for pair in &self.pairs {
+            pair.spread_lasting(&mut self.structures);
+        }
+    }
+
+    /// The force of a contact that was not closed at both ends of the last step does not last.
+    fn end_impact(&mut self, structure: usize, node: usize, sector: usize) {
+        let of = &mut self.structures[structure];
+        let (index, lanes) = (of.index(node, sector), of.modes().lanes());
+        // `film` closes gaps up to rounding.
+        let closed = of.pair_of[node].map_or(0.0, |pair| CLOSED * self.pairs[pair].gap().indifferent(node));
+        let gap = &of.history.gap;
+        if !(gap.before[index] <= closed && gap.now[index] <= closed) {
+            for component in 0..3 {
+                of.history.passing.lasting[(3 * node + component) * lanes + sector] = 0.0;
             }
         }
     }
 
-    /// A node of a free master that moves far in one step could pass a surface, or its edge, between two looks.
-    pub(super) fn check_travel(&self) -> Result<(), StepFailure> {
-        let GapLaw::Free(law) = &self.law else { return Ok(()) };
-        let (now, before) = (self.bank.displacement(), self.bank.displacement_before());
-        let mut moved = now.iter().zip(before).map(|(now, before)| (now - before).abs());
-        if moved.any(|moved| moved > law.largest()) { Err(StepFailure::TooFast) } else { Ok(()) }
+    /// A node that meets an open surface and moves far in one step could pass it, or its edge, between two looks.
+    pub(crate) fn check_travel(&self) -> Result<(), StepFailure> {
+        for pair in &self.pairs {
+            let GapLaw::Open(gap) = pair.gap() else { continue };
+            let structure = pair.structure();
+            let modes = self.structures[structure].modes();
+            let mut moved = modes.displacement().iter().zip(modes.displacement_before());
+            if moved.any(|(now, before)| (now - before).abs() > gap.largest()) {
+                return Err(StepFailure::TooFast { structure });
+            }
+        }
+        Ok(())
     }
 
     /// A node that comes over a free edge was in front of the surface, continued beyond the edge; else it is a start in
     /// penetration, an impact of arbitrary strength.
     ///
     /// A surface around an axis goes on beyond its edge, and a node further out ends the run.
-    pub(super) fn check_edges(&self) -> Result<(), StepFailure> {
-        if let Some(index) = self.law.out_of_reach() {
-            return Err(StepFailure::OutOfReach { node: index / self.lanes, sector: index % self.lanes });
-        }
-        let GapLaw::Free(law) = &self.law else { return Ok(()) };
-        for (node, (gap, before)) in self.state.gap.iter().zip(&self.state.gap_before).enumerate() {
-            if *gap < 0.0 && before.is_infinite() {
-                let moved = self.slip_of_deformation(Member { node, sector: 0, index: node });
-                let approach = dot(moved, self.state.geometry.normal_at(node));
-                let travel = dot(moved, moved).sqrt();
-                if gap - approach < -(BEHIND_EDGE[0] * travel + BEHIND_EDGE[1] * law.largest()) {
-                    return Err(StepFailure::BehindEdge { node });
+    pub(crate) fn check_edges(&mut self) -> Result<(), StepFailure> {
+        let bodies =
+            Bodies { structures: &mut self.structures, pairs: &self.pairs, acts_later: false, ledger: false };
+        for (number, pair) in bodies.pairs.iter().enumerate() {
+            let structure = pair.structure();
+            let of = &bodies.structures[structure];
+            if let Some(index) = pair.gap().out_of_reach() {
+                let lanes = of.modes().lanes();
+                return Err(StepFailure::OutOfReach { structure, node: index / lanes, sector: index % lanes });
+            }
+            let GapLaw::Open(open) = pair.gap() else { continue };
+            for &node in pair.nodes() {
+                let (gap, before) = (of.history.gap.now[node], of.history.gap.before[node]);
+                if gap < 0.0 && before.is_infinite() {
+                    let at = Member { structure, pair: number, node, sector: 0, index: node };
+                    let moved = bodies.slip_of_deformation(at);
+                    let approach = dot(moved, of.history.geometry.now.normal_at(node));
+                    let travel = dot(moved, moved).sqrt();
+                    if gap - approach < -(BEHIND_EDGE[0] * travel + BEHIND_EDGE[1] * open.largest()) {
+                        return Err(StepFailure::BehindEdge { structure, node });
+                    }
                 }
             }
         }
@@ -138,8 +144,8 @@ impl System {
     ///
     /// # Errors
     /// It is not: [`StepFailure::Unbalanced`].
-    pub fn check_books(&self) -> Result<(), StepFailure> {
-        let ledger = &self.state.ledger;
+    pub fn check_ledger(&self) -> Result<(), StepFailure> {
+        let ledger = &self.counted.ledger;
         let curved = ledger.curvature_work.value();
         if curved.abs() > MOST_CURVATURE * ledger.exchanged() {
             return Err(StepFailure::Unbalanced { work: curved, exchanged: ledger.exchanged() });
@@ -149,13 +155,11 @@ impl System {
 
     /// Write everything that determines the future, the step size included.
     pub fn save(&self, writer: &mut Writer) {
-        self.bank.step().save(writer);
-        self.bank.save(writer);
-        self.slaves.iter().for_each(|slave| slave.save(writer));
-        if let Some((coating, _)) = &self.coating {
-            coating.save(writer);
-        }
-        self.state.save(writer);
+        self.step_size().save(writer);
+        self.structures.iter().for_each(|structure| structure.save(writer));
+        self.pairs.iter().for_each(|pair| pair.state().save(writer));
+        self.groups.iter().for_each(|group| group.law().save(writer));
+        self.counted.save(writer);
     }
 
     /// Pass over a saved state and refuse what is none; returns its step size (s) and how many of its gaps are infinite. Before
@@ -166,34 +170,49 @@ impl System {
         if !(0.0..=f64::MAX).contains(&step) {
             reader.refuse("its internal step is no length of time");
         }
-        self.bank.check(reader);
-        self.slaves.iter().for_each(|slave| slave.check(reader));
-        if let Some((coating, _)) = &self.coating {
-            coating.check(reader);
+        let mut endless = Some(0);
+        for structure in &self.structures {
+            let mut saved = structure.history.clone();
+            structure.check(reader, &mut saved);
+            if !self.places_exist(structure, &saved.geometry.now.places) {
+                reader.refuse("a contact node is on a patch that its surface does not have");
+            }
+            let found = self.endless_of(structure, &saved.gap.now).zip(self.endless_of(structure, &saved.gap.before));
+            endless = endless.zip(found).map(|(sum, (now, before))| sum + now + before);
         }
-        let mut saved = self.state.clone();
-        saved.restore(&mut reader.clone());
-        self.state.check(reader);
-        let exists = |(index, place): (usize, &ClosestPoint)| {
-            self.law.surface_of(index / self.lanes).is_none_or(|surface| surface.has_patch(*place))
-        };
-        if !saved.geometry.places.iter().enumerate().all(exists) {
-            reader.refuse("a contact node is on a patch that its surface does not have");
-        }
-        let endless = self.endless(&saved.gap).zip(self.endless(&saved.gap_before));
         if started && endless.is_none() {
             reader.refuse("a gap is not finite");
         }
-        (step, endless.map_or(0, |(now, before)| now + before))
+        self.pairs.iter().for_each(|pair| pair.state().check(reader));
+        self.groups.iter().for_each(|group| group.law().check(reader));
+        self.counted.check(reader);
+        (step, endless.unwrap_or(0))
     }
 
-    /// How many gaps, `[node · lanes + lane]`, are infinite: those of padding lanes, and of nodes of a free master that have
-    /// nothing to touch; `None` where others are, or one is negative.
+    fn places_exist(&self, structure: &Structure, places: &[ClosestPoint]) -> bool {
+        let lanes = structure.modes().lanes();
+        let surface = |index: usize| self.pairs[structure.pair_of[index / lanes]?].gap().spline();
+        places.iter().enumerate().all(|(index, place)| surface(index).is_none_or(|surface| surface.has_patch(*place)))
+    }
+
+    /// How many of the gaps of all structures, one after the other as [`Structure::gaps`], are infinite: those of padding lanes, of
+    /// nodes of no pair, and of nodes that have nothing to touch beyond a free edge; `None` where others are, or one is negative.
     pub fn endless(&self, gaps: &[f64]) -> Option<usize> {
-        let (sectors, free) = (self.bank.sectors(), matches!(self.law, GapLaw::Free(_)));
+        let (mut rest, mut sum) = (gaps, 0);
+        for structure in &self.structures {
+            let (own, others) = rest.split_at(structure.gaps().len());
+            sum += self.endless_of(structure, own)?;
+            rest = others;
+        }
+        Some(sum)
+    }
+
+    fn endless_of(&self, structure: &Structure, gaps: &[f64]) -> Option<usize> {
+        let (lanes, sectors) = (structure.modes().lanes(), structure.modes().sectors());
+        let may_end = |pair: Option<usize>| pair.is_none_or(|pair| matches!(self.pairs[pair].gap(), GapLaw::Open(_)));
         let sound = |(index, gap): (usize, &f64)| {
-            let padding = index % self.lanes >= sectors;
-            if padding || free && gap.is_infinite() { *gap == f64::INFINITY } else { gap.is_finite() }
+            let infinite = index % lanes >= sectors || may_end(structure.pair_of[index / lanes]) && gap.is_infinite();
+            if infinite { *gap == f64::INFINITY } else { gap.is_finite() }
         };
         let all = gaps.iter().enumerate().all(sound);
         all.then(|| gaps.iter().filter(|gap| gap.is_infinite()).count())
@@ -203,33 +222,59 @@ impl System {
     pub fn restore(&mut self, reader: &mut Reader) {
         let mut step = 0.0_f64;
         step.restore(reader);
-        if step > 0.0 {
-            self.bank.set_step(self.settings.scheme, step);
-            self.slaves.iter_mut().for_each(|slave| slave.set_step(self.settings.scheme, step));
+        for structure in &mut self.structures {
+            if step > 0.0 {
+                structure.set_step(self.settings.scheme, step);
+            }
+            structure.restore(reader);
         }
-        self.bank.restore(reader);
-        self.slaves.iter_mut().for_each(|slave| slave.restore(reader));
-        if let Some((coating, _)) = &mut self.coating {
-            coating.restore(reader);
-        }
-        self.state.restore(reader);
+        self.pairs.iter_mut().for_each(|pair| pair.state_mut().restore(reader));
+        self.groups.iter_mut().for_each(|group| group.law_mut().restore(reader));
+        self.counted.restore(reader);
         self.rebuild_events();
     }
 
     /// The events of the last step follow from the saved multipliers and forces (heat is not part of the future).
     fn rebuild_events(&mut self) {
-        let lanes = self.lanes;
-        self.events.clear();
-        for sector in 0..self.bank.sectors() {
-            for node in 0..self.law.nodes() {
-                let normal = self.state.multiplier[node * lanes + sector];
-                if normal != 0.0 {
-                    let index = node * lanes + sector;
-                    let of = |rows: &[f64]| std::array::from_fn(|i| rows[(3 * node + i) * lanes + sector]);
-                    let (force, point) = (of(&self.state.force), of(&self.state.points));
-                    let wrench = self.law.wrench(At { node, index, drive: &self.state.drive }, point, force);
-                    let (place, coating) = ((sector, node), self.state.coating_force[index]);
-                    self.events.push(ContactEvent::new(place, normal, force, coating, (point, wrench)));
+        self.events.now.clear();
+        for (number, structure) in self.structures.iter().enumerate() {
+            for sector in 0..structure.modes().sectors() {
+                for (node, pair) in structure.pair_of.iter().enumerate() {
+                    let (Some(pair), index) = (*pair, structure.index(node, sector)) else { continue };
+                    let (history, normal) = (&structure.history, structure.history.multiplier[index]);
+                    if normal != 0.0 {
+                        let force = structure.three(&history.force.now, node, sector);
+                        let point = structure.three(&history.points, node, sector);
+                        let of = &self.pairs[pair];
+                        let wrench = of.gap().wrench(At { node, index, drive: of.drive(When::Now) }, point, force);
+                        let at = Member { structure: number, pair, node, sector, index };
+                        let coating = history.coating_force[index];
+                        self.events.now.push(ContactEvent::new(at, normal, force, coating, (point, wrench)));
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Pair {
+    /// Contact forces that last act on the structure under their nodes, too.
+    fn spread_lasting(&self, structures: &mut [Structure]) {
+        let Some((surface, carrier)) = self.carried() else { return };
+        let Ok([touching, under]) = structures.get_disjoint_mut([self.structure(), carrier.structure]) else { return };
+        let rotor_angle = self.drive(When::Now).rotor_angle;
+        for &node in self.nodes() {
+            for sector in 0..touching.modes().sectors() {
+                let force = touching.three(&touching.history.passing.lasting, node, sector);
+                if force.iter().all(|value| *value == 0.0) {
+                    continue;
+                }
+                let index = touching.index(node, sector);
+                let force = self.frame(index, rotor_angle).fixed(force);
+                for (point, weight) in surface.weights(touching.geometry().places[index]).iter() {
+                    for (component, value) in force.iter().enumerate() {
+                        under.history.passing.lasting[carrier.first_row + 3 * point + component] -= weight * value;
+                    }
                 }
             }
         }

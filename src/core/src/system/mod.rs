@@ -1,136 +1,42 @@
-//! One internal step: prediction, gaps, correction (section 4.3 of the paper), and the ledger kept on the way.
+//! Structures and contact pairs put together: everything that moves in a scene. [`crate::step`] is what one step does with it.
 
+mod carrier;
 mod continuation;
+mod delassus;
+mod event;
+mod failure;
 mod group;
-mod slave;
+mod pair;
 mod small;
+mod structure;
 mod witness;
 mod work;
 
-use crate::contact::coating::{CoatedProblem, Coating};
-use crate::contact::coulomb::CoulombSolver;
-use crate::contact::gap::{Drive, GapLaw, Geometry, dot};
-use crate::contact::solver::ContactSolver;
-use crate::contact::spline_gap::Frame;
-use crate::contact::wrench::{Motion, Wrench};
+use crate::contact::coating::Coating;
+use crate::contact::gap::{Drive, GapLaw};
 use crate::dynamics::bank::BankOptions;
 use crate::dynamics::modal::ModalModel;
 use crate::dynamics::sectors::{SectorModel, Sectors};
+use crate::history::Two;
 use crate::ledger::Ledger;
 use crate::persist::persist_fields;
 use crate::settings::{Scheme, Solver};
-pub use group::{Member, Solution};
-pub use slave::Slave;
+pub use event::ContactEvent;
+pub use failure::StepFailure;
+pub use group::Member;
+pub(crate) use group::{Bodies, Found, Group};
+use group::Reach;
+pub use pair::{Carrier, Pair, PairParts};
 pub use small::Curved;
+pub use structure::Structure;
 
-/// Denormals are flushed every this many steps.
-const FLUSH_EVERY: u64 = 512;
-
-/// One active contact of the last step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ContactEvent {
-    /// Sector (0-based).
-    pub sector: usize,
-    /// Contact node (0-based).
-    pub node: usize,
-    /// Multiplier λ: normal force (N).
-    pub normal: f64,
-    /// Magnitude of the friction force (N): µλ against slip, less where the contact sticks; 0 without slip.
-    pub tangential: f64,
-    /// Force on the master (N) in the coordinates of its displacements.
-    pub force: [f64; 3],
-    /// What tells the contact point, see [`GapLaw::contact_point`].
-    pub point: [f64; 3],
-    /// The force in fixed directions, its moment, and where it acts.
-    pub wrench: Wrench,
-    /// Part of λ that a coating carries (N).
-    pub coating: f64,
-    /// Friction heat of the step (J).
-    pub friction_heat: f64,
-}
-
-impl ContactEvent {
-    fn new(
-        (sector, node): (usize, usize),
-        normal: f64,
-        force: [f64; 3],
-        coating: f64,
-        (point, wrench): ([f64; 3], Wrench),
-    ) -> Self {
-        let square = dot(force, force) - normal * normal;
-        // What rounding leaves of a frictionless contact is no friction.
-        let tangential = if square > 1e-14 * normal * normal { square.sqrt() } else { 0.0 };
-        Self { sector, node, normal, tangential, force, point, wrench, coating, friction_heat: 0.0 }
-    }
-}
-
-/// What only some scenes need; what is off takes neither time nor memory.
-#[derive(Debug, Clone, Default)]
-pub struct SystemParts {
-    /// Options of the master's modes.
-    pub bank: BankOptions,
-    /// Modes of each structure that carries a slave surface, one contact row per component of every control point, and
-    /// whether it is loaded beside contact: at most one with [`GapLaw::Spline`], those that the surfaces of
-    /// [`GapLaw::Free`] name, none with other gap functions.
-    pub slaves: Vec<(ModalModel, bool)>,
-    /// Abradable coating.
-    pub coating: Option<Coating>,
-    /// The solver may be [`Solver::Coulomb`].
-    pub sticking: bool,
-}
-
-/// Why a step failed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum StepFailure {
-    /// A displacement or gap became infinite or NaN.
-    NonFinite,
-    /// A node is displaced or penetrates by more than a tenth of its radius, or meets a flank of the casing steeper than
-    /// 45°; of a free master, by more than a tenth of the extent of the contact nodes.
-    Implausible {
-        /// Sector (0-based).
-        sector: usize,
-    },
-    /// A structure that carries a slave surface is displaced by more than a tenth of the radius, or of the extent.
-    CasingImplausible,
-    /// A contact node of a free master moves by more than a tenth of the extent in one step: it could pass a surface unseen.
-    TooFast,
-    /// A node of a free master comes over a free edge and is behind the surface already.
-    BehindEdge {
-        /// Contact node (0-based).
-        node: usize,
-    },
-    /// Normals turn and surfaces curve so far within steps that this adds energy which no input brings.
-    Unbalanced {
-        /// What it has added (J).
-        work: f64,
-        /// All energy exchanged (J).
-        exchanged: f64,
-    },
-    /// A node moves so far around the axis that what linear kinematics misses is as large as its clearance.
-    Curved(Curved),
-    /// A node has left a surface around an axis over its edge, further than the surface goes on.
-    OutOfReach {
-        /// Contact node (0-based).
-        node: usize,
-        /// Sector (0-based).
-        sector: usize,
-    },
-    /// A gap has changed by more than the motion of node and surface explains: it is not a distance.
-    Unexplained {
-        /// Contact node (0-based).
-        node: usize,
-        /// Sector (0-based).
-        sector: usize,
-        /// Change of the gap over two steps (m).
-        jump: f64,
-        /// What motion can explain of it (m).
-        explained: f64,
-    },
-    /// The contact problem of a sector has no solution within the pivoting limit.
-    Unsolved {
-        /// Sector (0-based).
-        sector: usize,
-    },
+/// A structure about to be put into a system.
+#[derive(Debug, Clone)]
+pub enum StructureParts<'a> {
+    /// Its contact nodes touch surfaces.
+    Touching(SectorModel<'a>, BankOptions),
+    /// It carries surfaces, whose control points have three contact rows each; whether it is loaded beside contact.
+    Carrying(&'a ModalModel, bool),
 }
 
 /// How the system is stepped.
@@ -140,273 +46,168 @@ pub struct SystemSettings {
     pub scheme: Scheme,
     /// Contact solver.
     pub solver: Solver,
-    /// Coulomb coefficient µ.
-    pub friction: f64,
     /// Gather the damping loss, without which the ledger does not close.
     pub ledger: bool,
 }
 
-#[derive(Debug, Clone, PartialEq)]
-struct SystemState {
-    steps: u64,
-    factorisations: u64,
-    /// Gaps at the current step (m), `[node · lanes + lane]`.
-    gap: Vec<f64>,
-    /// Gaps one step earlier (m).
-    gap_before: Vec<f64>,
-    /// λ of the last step (N), `[node · lanes + lane]`.
-    multiplier: Vec<f64>,
-    /// Contact force of the last step on each row (N), `[row · lanes + lane]`.
-    force: Vec<f64>,
-    /// Part of λ that the coating carries (N); empty without one.
-    coating_force: Vec<f64>,
-    /// Displacement of the contact rows as the last step predicted it (m); of massless-boundary alone, whose prediction is
-    /// that of the modes with inertia.
-    predicted: Vec<f64>,
-    /// Normals and places of the last step.
-    geometry: Geometry,
-    /// Contact points of the last step as [`GapLaw::contact_point`] tells them, `[row · lanes + lane]`.
-    points: Vec<f64>,
-    /// Prescribed motion at the last step, and over it.
-    drive: Drive,
-    motion: Motion,
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Counted {
+    /// Internal steps done.
+    pub steps: u64,
+    pub factorisations: u64,
     /// Steps done when the gap two steps back was first one of steps of this size.
-    witnessed: u64,
-    ledger: Ledger,
+    pub witnessed: u64,
+    pub ledger: Ledger,
 }
 
-persist_fields!(SystemState {
-    steps,
-    factorisations,
-    gap,
-    gap_before,
-    multiplier,
-    force,
-    coating_force,
-    predicted,
-    geometry,
-    points,
-    drive,
-    motion,
-    witnessed,
-    ledger
-});
+persist_fields!(Counted { steps, factorisations, witnessed, ledger });
 
-/// Modes, gap function and contact solver put together.
+/// Structures, the contact pairs between them, and which of the contacts can push each other.
 #[derive(Debug, Clone)]
 pub struct System {
-    bank: Sectors,
-    /// Lanes of a row of the sectors.
-    lanes: usize,
-    /// All contacts form one group: through slaves, the disk, or as those of one free structure.
-    coupled: bool,
-    slaves: Vec<Slave>,
-    law: GapLaw,
-    settings: SystemSettings,
-    problem: ContactSolver,
-    coulomb: Option<CoulombSolver>,
-    coating: Option<(Coating, CoatedProblem)>,
-    events: Vec<ContactEvent>,
-    events_before: Vec<ContactEvent>,
-    lowest: Vec<f64>,
-    /// The group being solved, sector by sector.
-    members: Vec<Member>,
-    chosen: Vec<bool>,
-    row_directions: Vec<[f64; 3]>,
-    column_directions: Vec<[f64; 3]>,
-    solution: Solution,
-    corrected: Vec<f64>,
-    coating_share: Vec<f64>,
-    /// Change of all gaps by the solution of a coupled group.
-    response: Vec<f64>,
-    /// Forces on the members of a group of a disk.
-    member_forces: Vec<[f64; 3]>,
-    /// Contact force on the rows of one sector.
-    force: Vec<f64>,
-    /// Contact force of the step before on all rows; only where it is needed.
-    force_before: Vec<f64>,
-    /// Fixed-frame angles of the nodes of one blade.
-    angles: Vec<f64>,
-    gap_oldest: Vec<f64>,
-    geometry_before: Geometry,
-    drive_before: Drive,
-    displacement_oldest: Vec<f64>,
-    predicted_before: Vec<f64>,
-    state: SystemState,
-}
-
-/// Directions of a node's own frame at a rotor angle (rad); the fixed ones where nothing turns.
-#[inline(always)]
-fn frame_of(law: &GapLaw, index: usize, rotor_angle: f64) -> Frame {
-    law.layout().map_or(Frame::FIXED, |layout| Frame::new(layout.angles[index] + rotor_angle))
+    pub(crate) structures: Vec<Structure>,
+    pub(crate) pairs: Vec<Pair>,
+    pub(crate) groups: Vec<Group>,
+    pub(crate) settings: SystemSettings,
+    pub(crate) events: Two<Vec<ContactEvent>>,
+    pub(crate) counted: Counted,
 }
 
 impl System {
-    /// All sectors at rest against something rigid. [`System::set_step`] and [`System::start`] come before the first step.
-    pub fn new(model: &ModalModel, sectors: usize, law: GapLaw, settings: SystemSettings) -> Self {
-        let sticking = settings.solver == Solver::Coulomb;
-        let parts = SystemParts { sticking, ..SystemParts::default() };
-        Self::with_parts(SectorModel::Uncoupled(model, sectors), law, settings, parts)
+    /// All sectors of one structure at rest against something rigid, with Coulomb coefficient µ. [`System::set_step`] and
+    /// [`System::start`] come before the first step.
+    pub fn new(model: &ModalModel, sectors: usize, gap: GapLaw, friction: f64, settings: SystemSettings) -> Self {
+        Self::alone(SectorModel::Uncoupled(model, sectors), BankOptions::default(), gap, friction, settings)
     }
 
-    /// The same with coupled sectors, or with parts that only some scenes need.
-    pub fn with_parts(model: SectorModel, law: GapLaw, settings: SystemSettings, parts: SystemParts) -> Self {
-        let bank = Sectors::new(model, parts.bank);
-        let (sectors, lanes, nodes) = (bank.sectors(), bank.lanes(), law.nodes());
-        let contacts = nodes * lanes;
-        let coupled = !parts.slaves.is_empty() || bank.coupled().is_some() || matches!(law, GapLaw::Free(_));
-        let group = if coupled { nodes * sectors } else { nodes };
-        let directions = if parts.sticking { 3 } else { 1 };
-        let coating = parts.coating.map(|coating| {
-            let problem = coating.problem(group / nodes);
-            (coating, problem)
-        });
-        Self {
-            slaves: parts.slaves.iter().map(|(model, loads)| Slave::new(model, *loads, group, directions)).collect(),
-            problem: ContactSolver::new(group),
-            coulomb: parts.sticking.then(|| CoulombSolver::new(group)),
-            events: Vec::with_capacity(contacts),
-            events_before: Vec::with_capacity(contacts),
-            lowest: vec![0.0; lanes],
-            members: Vec::with_capacity(group),
-            chosen: vec![false; if coupled { contacts } else { 0 }],
-            row_directions: vec![[0.0; 3]; directions * group],
-            column_directions: vec![[0.0; 3]; directions * group],
-            solution: Solution::new(directions * group),
-            corrected: vec![0.0; group],
-            coating_share: vec![0.0; group],
-            response: vec![0.0; if coupled { contacts } else { 0 }],
-            member_forces: vec![[0.0; 3]; if bank.coupled().is_some() { group } else { 0 }],
-            force: vec![0.0; 3 * nodes],
-            force_before: vec![0.0; 3 * contacts],
-            angles: vec![0.0; nodes],
-            gap_oldest: vec![f64::INFINITY; contacts],
-            geometry_before: law.geometry(lanes),
-            drive_before: Drive::default(),
-            displacement_oldest: vec![0.0; 3 * contacts],
-            predicted_before: vec![0.0; 3 * contacts],
-            state: SystemState {
-                steps: 0,
-                factorisations: 0,
-                // Padding lanes keep an infinite gap.
-                gap: vec![f64::INFINITY; contacts],
-                gap_before: vec![f64::INFINITY; contacts],
-                multiplier: vec![0.0; contacts],
-                force: vec![0.0; 3 * contacts],
-                coating_force: vec![0.0; contacts],
-                predicted: vec![0.0; 3 * contacts],
-                geometry: law.geometry(lanes),
-                points: vec![0.0; 3 * contacts],
-                drive: Drive::default(),
-                motion: Motion::default(),
-                witnessed: 0,
-                ledger: Ledger::default(),
-            },
-            bank,
-            lanes,
-            coupled,
-            law,
+    /// The same with coupled sectors, or with options of its modes.
+    pub fn alone(
+        model: SectorModel,
+        options: BankOptions,
+        gap: GapLaw,
+        friction: f64,
+        settings: SystemSettings,
+    ) -> Self {
+        let pair = PairParts { structure: 0, gap, carrier: None, friction };
+        Self::of(vec![StructureParts::Touching(model, options)], vec![pair], Vec::new(), settings)
+    }
+
+    /// Any number of structures and pairs; `coatings` are those of pairs.
+    pub fn of(
+        parts: Vec<StructureParts>,
+        pairs: Vec<PairParts>,
+        mut coatings: Vec<(usize, Coating)>,
+        settings: SystemSettings,
+    ) -> Self {
+        let structures: Vec<Structure> =
+            parts.into_iter().enumerate().map(|(index, part)| made(part, index, &pairs)).collect();
+        let pairs: Vec<Pair> = pairs.into_iter().map(Pair::new).collect();
+        let group = |(reach, touching): (Reach, Vec<usize>)| {
+            let of_group = |pair: &&Pair| touching.contains(&pair.structure());
+            let mut carriers: Vec<usize> =
+                pairs.iter().filter(of_group).filter_map(|pair| Some(pair.carrier()?.structure)).collect();
+            carriers.sort_unstable();
+            carriers.dedup();
+            let coated = coatings.iter().position(|(pair, _)| touching.contains(&pairs[*pair].structure()));
+            let coating = coated.map(|index| coatings.swap_remove(index).1);
+            Group::new((reach, &touching, &carriers), &structures, (settings.solver, coating))
+        };
+        let groups: Vec<Group> = reaches(&structures, &pairs).into_iter().map(group).collect();
+        let contacts = structures.iter().map(|structure| structure.gaps().len()).sum();
+        let room = || Vec::with_capacity(contacts);
+        let mut system = Self {
+            groups,
             settings,
-            coating,
+            events: Two { now: room(), before: room() },
+            counted: Counted::default(),
+            structures,
+            pairs,
+        };
+        for pair in &system.pairs {
+            let structure = &mut system.structures[pair.structure()];
+            let lanes = structure.modes().lanes();
+            pair.gap().prepare(lanes, &mut structure.history.geometry.now);
+            pair.gap().prepare(lanes, &mut structure.history.geometry.before);
         }
+        system
     }
 
-    /// Normals and places of the last step.
-    pub fn geometry(&self) -> &Geometry {
-        &self.state.geometry
+    /// The structures.
+    pub fn structures(&self) -> &[Structure] {
+        &self.structures
     }
 
-    /// Prescribed motion at the last step.
-    pub fn drive(&self) -> &Drive {
-        &self.state.drive
+    /// The structures, to set loads and initial conditions before [`System::start`].
+    pub fn structures_mut(&mut self) -> &mut [Structure] {
+        &mut self.structures
     }
 
-    /// The structure that carries the slave surface; of several the first.
-    pub fn slave(&self) -> Option<&Slave> {
-        self.slaves.first()
+    /// The contact pairs.
+    pub fn pairs(&self) -> &[Pair] {
+        &self.pairs
     }
 
-    /// The structures that carry slave surfaces.
-    pub fn slaves(&self) -> &[Slave] {
-        &self.slaves
+    /// The coating of a pair.
+    pub fn coating(&self, pair: usize) -> Option<&Coating> {
+        let structure = self.pairs[pair].structure();
+        let group = self.groups.iter().find(|group| group.structures().any(|one| one == structure))?;
+        Some(group.law().coated()?.coating())
     }
 
-    /// The same, to set loads and initial conditions.
-    pub fn slaves_mut(&mut self) -> &mut [Slave] {
-        &mut self.slaves
-    }
-
-    /// The coating.
-    pub fn coating(&self) -> Option<&Coating> {
-        self.coating.as_ref().map(|(coating, _)| coating)
-    }
-
-    /// Contacts whose forces acted over the last step, and whose work was entered for it: those of that step, or with
-    /// massless-boundary those of the step before.
+    /// Contacts whose forces acted over the last step, and whose work was entered for it: those of that step, or of schemes whose
+    /// contact forces act later those of the step before.
     pub fn acted(&self) -> &[ContactEvent] {
-        if self.is_delayed() { &self.events_before } else { &self.events }
-    }
-
-    /// Contact forces act one step after they were found.
-    fn is_delayed(&self) -> bool {
-        self.settings.scheme == Scheme::MasslessBoundary
-    }
-
-    /// The modes.
-    pub fn bank(&self) -> &Sectors {
-        &self.bank
-    }
-
-    /// The modes, to set initial conditions before [`System::start`].
-    pub fn bank_mut(&mut self) -> &mut Sectors {
-        &mut self.bank
-    }
-
-    /// The gap function.
-    pub fn law(&self) -> &GapLaw {
-        &self.law
+        if self.settings.scheme.acts_later() { &self.events.before } else { &self.events.now }
     }
 
     /// Active contacts of the last step.
     pub fn events(&self) -> &[ContactEvent] {
-        &self.events
+        &self.events.now
     }
 
-    /// Gaps at the current step (m), `[node · lanes + lane]`; padding lanes are infinite.
-    pub fn gaps(&self) -> &[f64] {
-        &self.state.gap
+    /// The modes of the first structure.
+    pub fn bank(&self) -> &Sectors {
+        self.structures[0].modes()
     }
 
-    /// Gap of one node of one sector (m).
+    /// The modes of the first structure, to set initial conditions before [`System::start`].
+    pub fn bank_mut(&mut self) -> &mut Sectors {
+        self.structures[0].modes_mut()
+    }
+
+    /// Gap of one node of one sector of the first structure (m).
     pub fn gap(&self, node: usize, sector: usize) -> f64 {
-        self.state.gap[node * self.lanes + sector]
+        self.structures[0].gap(node, sector)
     }
 
-    /// Rate of that gap over the last step (m/s); 0 where there was or is nothing to touch.
-    pub fn gap_rate(&self, node: usize, sector: usize) -> f64 {
-        let index = node * self.lanes + sector;
-        let change = self.state.gap[index] - self.state.gap_before[index];
-        if change.is_finite() { change / self.bank.step() } else { 0.0 }
-    }
-
-    /// λ of one node of one sector in the last step (N).
+    /// λ of one node of one sector of the first structure in the last step (N).
     pub fn multiplier(&self, node: usize, sector: usize) -> f64 {
-        self.state.multiplier[node * self.lanes + sector]
+        self.structures[0].multiplier(node, sector)
+    }
+
+    /// Gaps of all contact nodes of all structures (m); infinite in padding lanes and where there is nothing to touch.
+    pub fn gaps(&self) -> impl Iterator<Item = &f64> {
+        self.structures.iter().flat_map(Structure::gaps)
+    }
+
+    /// Length of the internal step (s).
+    pub fn step_size(&self) -> f64 {
+        self.structures[0].modes().step()
     }
 
     /// Internal steps done.
     pub fn steps(&self) -> u64 {
-        self.state.steps
+        self.counted.steps
     }
 
     /// Small linear systems factorised by the contact solver.
     pub fn factorisations(&self) -> u64 {
-        self.state.factorisations
+        self.counted.factorisations
     }
 
     /// Work and losses so far.
     pub fn ledger(&self) -> &Ledger {
-        &self.state.ledger
+        &self.counted.ledger
     }
 
     /// Settings in use.
@@ -414,39 +215,32 @@ impl System {
         &self.settings
     }
 
-    /// Change friction (takes effect with the next step).
-    pub fn set_friction(&mut self, friction: f64) {
-        self.settings.friction = friction;
+    /// Change the friction of a pair (takes effect with the next step).
+    pub fn set_friction(&mut self, pair: usize, friction: f64) {
+        self.pairs[pair].parts.friction = friction;
     }
 
-    /// Choose scheme and solver; only before [`System::start`].
+    /// Choose scheme and solver; only before [`System::start`]. Allocates where the solver is another.
     pub fn set_methods(&mut self, scheme: Scheme, solver: Solver) {
         self.settings.scheme = scheme;
         self.settings.solver = solver;
+        self.groups.iter_mut().for_each(|group| group.set_solver(solver, &self.structures));
     }
 
-    /// Clear history and ledger, take the present modal state as initial, and evaluate the gaps at `drive`.
-    pub fn start(&mut self, drive: &Drive) {
-        self.bank.recover();
-        self.bank.collect_loss();
-        self.slaves.iter_mut().for_each(Slave::start);
-        if let Some((coating, _)) = &mut self.coating {
-            coating.reset();
+    /// Clear history and ledger, take the present modal state as initial, and evaluate the gaps with the prescribed motion
+    /// `drives`, one per pair.
+    pub fn start(&mut self, drives: &[Drive]) {
+        self.structures.iter_mut().for_each(Structure::start);
+        self.groups.iter_mut().filter_map(|group| group.law_mut().coated_mut()).for_each(|law| law.coating_mut().reset());
+        self.events.now.clear();
+        self.events.before.clear();
+        self.pairs.iter_mut().zip(drives).for_each(|(pair, drive)| pair.start(drive));
+        self.find_gaps(false);
+        for structure in &mut self.structures {
+            structure.remember_start();
         }
-        self.state.steps = 0;
-        self.state.factorisations = 0;
-        self.state.multiplier.fill(0.0);
-        self.state.force.fill(0.0);
-        self.state.coating_force.fill(0.0);
-        self.events.clear();
-        self.events_before.clear();
-        self.state.points.fill(0.0);
-        (self.state.drive, self.state.motion) = (*drive, Motion::default());
-        self.evaluate_gaps(drive, false);
-        self.state.gap_before.copy_from_slice(&self.state.gap);
-        self.state.witnessed = 0;
-        self.state.predicted.copy_from_slice(self.bank.displacement());
-        self.state.ledger = Ledger { initial: self.mechanical_energy(), ..Ledger::default() };
+        self.counted = Counted::default();
+        self.counted.ledger.initial = self.mechanical_energy();
     }
 
     fn mechanical_energy(&self) -> f64 {
@@ -456,130 +250,67 @@ impl System {
 
     /// Kinetic and strain energy of all structures (J), in the quantity the scheme conserves and the ledger closes with.
     pub fn energies(&self) -> (f64, f64) {
-        let slaves = self.slaves.iter().map(|slave| slave.bank.energies());
-        slaves.fold(self.bank.energies(), |sum, slave| (sum.0 + slave.0, sum.1 + slave.1))
+        sum_of(self.structures.iter().map(|structure| structure.modes().energies()))
     }
 
-    /// Follow the speed of the rotor (rad/s) where its modes depend on it; the strain energy this adds is work of the
-    /// shaft.
-    pub fn set_speed(&mut self, speed: f64) {
-        let work = self.bank.set_speed(speed);
-        self.state.ledger.stiffening_work.add(work);
-        self.state.ledger.turnover.add(work.abs());
+    /// Follow the speed of a rotor (rad/s) where its modes depend on it; the strain energy this adds is work of the shaft.
+    pub fn set_speed(&mut self, structure: usize, speed: f64) {
+        let work = self.structures[structure].modes_mut().set_speed(speed);
+        self.counted.ledger.stiffening_work.add(work);
+        self.counted.ledger.turnover.add(work.abs());
     }
 
     /// Move the damping loss gathered in the step kernel to the ledger.
     pub fn close_ledger(&mut self) {
-        let loss = self.bank.collect_loss();
-        self.state.ledger.damping_loss.add(loss);
-        for slave in &mut self.slaves {
-            self.state.ledger.damping_loss.add(slave.bank.collect_loss());
+        for structure in &mut self.structures {
+            self.counted.ledger.damping_loss.add(structure.modes_mut().collect_loss());
         }
     }
+}
 
-    /// One internal step to the instant described by `drive`.
-    ///
-    /// # Errors
-    /// [`StepFailure`]; the state is then not meaningful any more.
-    pub fn step(&mut self, drive: &Drive) -> Result<(), StepFailure> {
-        let (delayed, ledger) = (self.is_delayed(), self.settings.ledger);
-        self.displacement_oldest.copy_from_slice(self.bank.displacement_before());
-        self.bank.predict(ledger);
-        self.slaves.iter_mut().for_each(|slave| slave.predict(delayed, ledger));
-        if delayed {
-            self.act_delayed();
-            std::mem::swap(&mut self.predicted_before, &mut self.state.predicted);
-            self.state.predicted.copy_from_slice(self.bank.displacement());
-        }
-        std::mem::swap(&mut self.gap_oldest, &mut self.state.gap_before);
-        std::mem::swap(&mut self.state.gap_before, &mut self.state.gap);
-        std::mem::swap(&mut self.geometry_before, &mut self.state.geometry);
-        self.drive_before = std::mem::replace(&mut self.state.drive, *drive);
-        let motion = Motion::between(&self.drive_before, drive, self.bank.step());
-        self.law.turn(motion.turn);
-        self.check_travel()?;
-        self.evaluate_gaps(drive, true);
-        self.check_edges()?;
-        self.retire_events();
-        if self.coupled {
-            self.solve_coupled(drive)?;
-        } else {
-            self.solve_sectors(drive)?;
-        }
-        self.witness(drive, &motion)?;
-        self.book_all(&motion);
-        self.state.motion = motion;
-        self.finish_loads();
-        self.state.steps += 1;
-        if self.state.steps.is_multiple_of(FLUSH_EVERY) {
-            self.bank.flush();
-            self.slaves.iter_mut().for_each(|slave| slave.bank.flush());
-        }
-        Ok(())
-    }
+/// Sums of pairs of energies.
+fn sum_of(mut energies: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
+    let first = energies.next().unwrap_or_default();
+    energies.fold(first, |sum, one| (sum.0 + one.0, sum.1 + one.1))
+}
 
-    /// Contact forces of the last step act on the modes with inertia.
-    fn act_delayed(&mut self) {
-        // A disk of coupled sectors keeps its forces until it predicts.
-        let Sectors::Uncoupled(bank) = &mut self.bank else { return };
-        let lanes = bank.lanes();
-        for sector in 0..bank.sectors() {
-            for (row, force) in self.force.iter_mut().enumerate() {
-                *force = self.state.force[row * lanes + sector];
-            }
-            if self.force.iter().any(|force| *force != 0.0) {
-                bank.act_delayed(sector, &self.force, self.settings.ledger);
-            }
-        }
+fn made(part: StructureParts, index: usize, pairs: &[PairParts]) -> Structure {
+    let (model, options) = match part {
+        StructureParts::Carrying(model, loads) => return Structure::carrying(model, loads),
+        StructureParts::Touching(model, options) => (model, options),
+    };
+    let own = || pairs.iter().enumerate().filter(|(_, pair)| pair.structure == index);
+    let nodes = own().map(|(_, pair)| pair.gap.nodes()).max().unwrap_or(0);
+    let mut pair_of = vec![None; nodes];
+    for (pair, parts) in own() {
+        parts.gap.members().into_iter().for_each(|node| pair_of[node] = Some(pair));
     }
+    let has_places = own().any(|(_, pair)| pair.gap.spline().is_some());
+    Structure::touching(model, options, pair_of, has_places)
+}
 
-    fn finish_loads(&mut self) {
-        let mut work = self.bank.finish_loads();
-        for slave in &mut self.slaves {
-            work += slave.bank.finish_loads();
-        }
-        if work != 0.0 {
-            self.state.ledger.load_work.add(work);
-            self.state.ledger.turnover.add(work.abs());
-        }
-    }
-
-    /// Gap of every node, and the smallest of each lane.
-    fn evaluate_gaps(&mut self, drive: &Drive, warm: bool) {
-        let moved = self.slaves.first().map_or(&[][..], |slave| slave.bank.displacement());
-        if let GapLaw::Free(law) = &mut self.law {
-            for surface in &mut law.surfaces {
-                if let Some(carrier) = surface.carrier {
-                    surface.follow(self.slaves[carrier].bank.displacement());
-                }
-            }
-        }
-        let before = warm.then_some(&self.geometry_before);
-        let state = &mut self.state;
-        self.law.evaluate(drive, self.bank.displacement(), moved, before, &mut state.geometry, &mut state.gap);
-        self.lowest.fill(f64::INFINITY);
-        for row in self.state.gap.chunks(self.lanes) {
-            for (lowest, gap) in self.lowest.iter_mut().zip(row) {
-                // NaN sticks.
-                *lowest = if *lowest <= *gap || lowest.is_nan() { *lowest } else { *gap };
-            }
+/// Which structures can push each other, and how far their contacts reach.
+fn reaches(structures: &[Structure], pairs: &[Pair]) -> Vec<(Reach, Vec<usize>)> {
+    // Structures that share a carrier, directly or through others, get the same number.
+    let mut number: Vec<usize> = (0..structures.len()).collect();
+    for pair in pairs {
+        if let Some(carrier) = pair.carrier() {
+            let (kept, lost) = (number[pair.structure()], number[carrier.structure]);
+            number.iter_mut().filter(|number| **number == lost).for_each(|number| *number = kept);
         }
     }
-
-    /// The contacts of the last step become those of the step before.
-    fn retire_events(&mut self) {
-        let lanes = self.lanes;
-        if self.settings.solver == Solver::Coulomb {
-            self.force_before.copy_from_slice(&self.state.force);
+    let touching = |index: &usize| structures[*index].nodes() > 0;
+    let mut groups: Vec<(Reach, Vec<usize>)> = Vec::new();
+    for one in 0..structures.len() {
+        let members: Vec<usize> =
+            (0..structures.len()).filter(|index| number[*index] == one).filter(touching).collect();
+        if let [first, ..] = members[..] {
+            let carried = pairs.iter().any(|pair| members.contains(&pair.structure()) && pair.carrier().is_some());
+            // Sectors turn against what stands still; a single structure is one sector with all of its contacts at once.
+            let open = pairs.iter().any(|pair| pair.structure() == first && matches!(pair.gap(), GapLaw::Open(_)));
+            let together = carried || structures[first].modes().coupled().is_some() || open;
+            groups.push((if together { Reach::All } else { Reach::Sector }, members));
         }
-        std::mem::swap(&mut self.events, &mut self.events_before);
-        for event in &self.events_before {
-            self.state.multiplier[event.node * lanes + event.sector] = 0.0;
-            self.state.coating_force[event.node * lanes + event.sector] = 0.0;
-            for component in 0..3 {
-                self.state.force[(3 * event.node + component) * lanes + event.sector] = 0.0;
-            }
-        }
-        self.events.clear();
     }
+    groups
 }

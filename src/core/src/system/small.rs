@@ -1,6 +1,6 @@
 //! Whether the state is still what small displacements describe.
 
-use super::{StepFailure, System};
+use super::{Pair, StepFailure, System};
 use crate::contact::gap::GapLaw;
 
 /// Clearances below this share of the radius are those of a press fit, in which errors as small do not matter.
@@ -9,6 +9,8 @@ pub const LEAST_CLEARANCE: f64 = 1e-4;
 /// What linear kinematics misses at a node that moves far around the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curved {
+    /// Structure (0-based).
+    pub structure: usize,
     /// Sector (0-based).
     pub sector: usize,
     /// Contact node (0-based).
@@ -32,30 +34,38 @@ impl System {
     /// Whether the state is still what the model describes.
     ///
     /// # Errors
-    /// Coordinates that are not finite; displacements beyond a tenth of the radius, or those of the nodes of a free master
+    /// Coordinates that are not finite; displacements beyond a tenth of the radius, or those of nodes that meet open surfaces
     /// against each other beyond a tenth of their extent; displacements around the axis whose u_θ²/2r is the clearance
     /// ([`System::most_curved`]).
     pub fn check_state(&self) -> Result<(), StepFailure> {
-        if !self.bank.is_finite() || self.slaves.iter().any(|slave| !slave.bank.is_finite()) {
+        if self.structures.iter().any(|structure| !structure.modes().is_finite()) {
             return Err(StepFailure::NonFinite);
         }
-        let limit = self.law.largest_displacement();
-        let mut moved = self.slaves.iter().flat_map(|slave| slave.bank.displacement());
-        if moved.any(|displacement| displacement.abs() > limit) {
-            return Err(StepFailure::CasingImplausible);
+        for pair in &self.pairs {
+            let Some(carrier) = pair.carrier() else { continue };
+            let limit = pair.gap().largest_displacement();
+            let moved = self.structures[carrier.structure].modes().displacement();
+            if moved.iter().any(|displacement| displacement.abs() > limit) {
+                return Err(StepFailure::CarrierImplausible { structure: carrier.structure });
+            }
         }
-        if let GapLaw::Free(law) = &self.law {
-            let distorted = law.is_distorted(self.bank.displacement());
-            return if distorted { Err(StepFailure::Implausible { sector: 0 }) } else { Ok(()) };
-        }
-        let beyond = self.bank.displacement().iter().position(|displacement| displacement.abs() > limit);
-        if let Some(index) = beyond {
-            return Err(StepFailure::Implausible { sector: index % self.lanes });
-        }
+        self.pairs.iter().try_for_each(|pair| self.check_small(pair))?;
         match self.most_curved() {
             Some(curved) if curved.share() >= 1.0 => Err(StepFailure::Curved(curved)),
             _ => Ok(()),
         }
+    }
+
+    fn check_small(&self, pair: &Pair) -> Result<(), StepFailure> {
+        let structure = pair.structure();
+        let modes = self.structures[structure].modes();
+        if let GapLaw::Open(gap) = pair.gap() {
+            let distorted = gap.is_distorted(modes.displacement());
+            return if distorted { Err(StepFailure::Implausible { structure, sector: 0 }) } else { Ok(()) };
+        }
+        let limit = pair.gap().largest_displacement();
+        let beyond = modes.displacement().iter().position(|displacement| displacement.abs() > limit);
+        beyond.map_or(Ok(()), |index| Err(StepFailure::Implausible { structure, sector: index % modes.lanes() }))
     }
 
     /// The node whose displacement around the axis misleads most: a node that moves by u_θ along its tangent is u_θ²/2r further
@@ -63,20 +73,25 @@ impl System {
     /// yet what turns is a blade, which draws its tip in by as much and more, and modes are straight lines: the same
     /// measure. `None` where nothing turns around an axis.
     pub fn most_curved(&self) -> Option<Curved> {
-        let layout = self.law.layout()?;
         let mut most: Option<Curved> = None;
-        for (node, per_radius) in layout.per_radius.iter().enumerate() {
-            let row = &self.bank.displacement()[(3 * node + 1) * self.lanes..][..self.bank.sectors()];
-            for (sector, (moved, clearance)) in row.iter().zip(&layout.clearances).enumerate() {
-                let found = Curved {
-                    sector,
-                    node,
-                    moved: moved.abs(),
-                    error: 0.5 * moved * moved * per_radius,
-                    clearance: clearance.max(LEAST_CLEARANCE / per_radius),
-                };
-                if most.is_none_or(|most| found.share() > most.share()) {
-                    most = Some(found);
+        for pair in &self.pairs {
+            let Some(layout) = pair.gap().layout() else { continue };
+            let (structure, modes) = (pair.structure(), self.structures[pair.structure()].modes());
+            for &node in pair.nodes() {
+                let per_radius = layout.per_radius[node];
+                let row = &modes.displacement()[(3 * node + 1) * modes.lanes()..][..modes.sectors()];
+                for (sector, (moved, clearance)) in row.iter().zip(&layout.clearances).enumerate() {
+                    let found = Curved {
+                        structure,
+                        sector,
+                        node,
+                        moved: moved.abs(),
+                        error: 0.5 * moved * moved * per_radius,
+                        clearance: clearance.max(LEAST_CLEARANCE / per_radius),
+                    };
+                    if most.is_none_or(|most| found.share() > most.share()) {
+                        most = Some(found);
+                    }
                 }
             }
         }

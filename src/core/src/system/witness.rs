@@ -4,9 +4,9 @@
 //! signed distance: it changes by no more than what the node moves, the surface moves under it, and the prescribed motion
 //! of either adds. A change beyond that is no distance, and the step fails.
 
-use super::{ContactEvent, StepFailure, System};
-use crate::contact::gap::{Drive, dot};
-use crate::contact::wrench::Motion;
+use super::pair::When;
+use super::{ContactEvent, Pair, StepFailure, System};
+use crate::contact::gap::dot;
 
 /// Changes below this are rounding, whatever the model (m): no length that means anything is as short.
 const ROUNDING: f64 = 1e-15;
@@ -14,66 +14,63 @@ const ROUNDING: f64 = 1e-15;
 const FACTOR: f64 = 2.0;
 
 impl System {
-    /// The gaps of the contacts about to be booked have changed, over the two steps that are booked, by no more than motion
+    /// The gaps of the contacts about to be entered have changed, over the two steps that are entered, by no more than motion
     /// explains.
     ///
     /// # Errors
     /// [`StepFailure::Unexplained`] for the first that has not.
-    pub(super) fn witness(&self, drive: &Drive, motion: &Motion) -> Result<(), StepFailure> {
-        if self.acted().is_empty() || self.state.steps < self.state.witnessed {
+    pub(crate) fn witness(&self) -> Result<(), StepFailure> {
+        if self.acted().is_empty() || self.counted.steps < self.counted.witnessed {
             return Ok(());
         }
-        let rigid = self.explained_by_drive(drive, &motion.since(&self.state.motion));
+        let (mut of, mut rigid) = (usize::MAX, 0.0);
         for event in self.acted() {
-            let index = event.node * self.lanes + event.sector;
-            let (gap, oldest) = (self.state.gap[index], self.gap_oldest[index]);
-            // A node of a free master that comes over an edge was looked at before (`check_edges`).
+            if event.pair != of {
+                (of, rigid) = (event.pair, self.explained_by_drive(&self.pairs[event.pair]));
+            }
+            let structure = &self.structures[event.structure];
+            let (index, gaps) = (structure.index(event.node, event.sector), &structure.history.gap);
+            let (gap, oldest) = (gaps.now[index], gaps.oldest[index]);
+            // A node that comes over a free edge was looked at before (`check_edges`).
             if oldest.is_infinite() {
                 continue;
             }
-            let (jump, explained) = ((gap - oldest).abs(), rigid + self.explained_by_motion(event, index));
+            let (jump, explained) = ((gap - oldest).abs(), rigid + self.explained_by_motion(event));
             if jump.is_nan() || explained.is_nan() || jump > explained {
-                let (node, sector) = (event.node, event.sector);
-                return Err(StepFailure::Unexplained { node, sector, jump, explained });
+                let ContactEvent { structure, node, sector, .. } = *event;
+                return Err(StepFailure::Unexplained { structure, node, sector, jump, explained });
             }
         }
         Ok(())
     }
 
     /// What prescribed motion over two steps explains (m): inputs that move, and turning under the shape of the casing.
-    fn explained_by_drive(&self, drive: &Drive, motion: &Motion) -> f64 {
+    fn explained_by_drive(&self, pair: &Pair) -> f64 {
+        let (drive, motion) = (pair.drive(When::Now), pair.motion().since(pair.motion_before()));
         // Against the casing or its shape, whichever is more.
         let turned = motion.turn.abs().max((motion.turn - motion.shape_rotation).abs());
         let off_centre = libm::hypot(drive.shaft[0], drive.shaft[1]);
         let factor = drive.shape_factor.abs().max((drive.shape_factor - motion.shape_factor).abs());
-        let shape = self.law.shape_size() * motion.shape_factor.abs();
-        let carried = if self.law.layout().is_none() { 0.0 } else { self.largest_of_slave() };
-        let turning = self.law.turned_under(turned, factor, carried);
+        let shape = pair.gap().shape_size() * motion.shape_factor.abs();
+        let carrier = pair.carrier().filter(|_| pair.gap().layout().is_some());
+        let carried = carrier.map_or(0.0, |carrier| self.structures[carrier.structure].largest_displacement());
+        let turning = pair.gap().turned_under(turned, factor, carried);
         let shifted = dot(motion.shaft, motion.shaft).sqrt();
         FACTOR * (shifted + turned * off_centre + motion.opening.abs() + shape + turning)
     }
 
-    /// Largest displacement of a control point of the surface around the axis (m).
-    fn largest_of_slave(&self) -> f64 {
-        let moved = self.slaves.iter().flat_map(|slave| slave.bank.displacement().as_chunks::<3>().0);
-        moved.fold(0.0, |most: f64, moved| most.max(dot(*moved, *moved))).sqrt()
-    }
-
     /// What the motion of the node against the surface explains, and rounding and the linear gap within a step (m).
-    fn explained_by_motion(&self, event: &ContactEvent, index: usize) -> f64 {
-        let delayed = self.is_delayed();
-        let geometry = if delayed { &self.geometry_before } else { &self.state.geometry };
-        let drive = if delayed { &self.drive_before } else { &self.state.drive };
+    fn explained_by_motion(&self, event: &ContactEvent) -> f64 {
         // Half of the motion over two steps.
-        let moved = self.relative_motion(event, index, geometry, drive);
-        2.0 * FACTOR * dot(moved, moved).sqrt() + self.law.indifferent(event.node) + ROUNDING
+        let moved = self.relative_motion(event, self.when_acted());
+        2.0 * FACTOR * dot(moved, moved).sqrt() + self.pairs[event.pair].gap().indifferent(event.node) + ROUNDING
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::gap::{FixedGap, GapLaw};
+    use crate::contact::gap::{Drive, FixedGap, GapLaw};
     use crate::dynamics::modal::ModalModel;
     use crate::settings::{Scheme, Solver};
     use crate::system::SystemSettings;
@@ -90,11 +87,11 @@ mod tests {
         };
         let law = FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![1e-4], sliding: vec![[0.0; 3]] };
         let (scheme, solver) = (Scheme::ModalExact, Solver::Lcp);
-        let settings = SystemSettings { scheme, solver, friction: 0.0, ledger: true };
-        let mut system = System::new(&model, 1, GapLaw::Fixed(law), settings);
+        let settings = SystemSettings { scheme, solver, ledger: true };
+        let mut system = System::new(&model, 1, GapLaw::Fixed(law), 0.0, settings);
         system.set_step(1e-6);
         system.bank_mut().set_modal_state(0, 0, 0.0, 1.0);
-        system.start(&Drive::default());
+        system.start(&[Drive::default()]);
         system
     }
 
@@ -104,16 +101,16 @@ mod tests {
         let mut honest = system.clone();
         while system.events().is_empty() {
             honest = system.clone();
-            system.step(&Drive::default()).unwrap();
+            system.step(&[Drive::default()]).unwrap();
         }
         // It came a micrometre closer; a metre, or ten micrometres, is not what it came.
         for (off, passes) in [(0.0, true), (1e-7, true), (1e-5, false), (1.0, false), (f64::NAN, false)] {
             let mut spoilt = honest.clone();
-            spoilt.state.gap_before[0] += off;
-            let outcome = spoilt.step(&Drive::default());
+            spoilt.structures[0].history.gap.before[0] += off;
+            let outcome = spoilt.step(&[Drive::default()]);
             assert_eq!(outcome.is_ok(), passes, "{off}: {outcome:?}");
             if let (Err(failure), false) = (outcome, off.is_nan()) {
-                let StepFailure::Unexplained { node: 0, sector: 0, jump, explained } = failure else {
+                let StepFailure::Unexplained { structure: 0, node: 0, sector: 0, jump, explained } = failure else {
                     panic!("{failure:?}")
                 };
                 assert!(jump > off && explained < 1e-5, "{jump:e}, {explained:e}");

@@ -1,9 +1,8 @@
-//! The energy ledger's entries of contact.
+//! The energy ledger's entries of a step.
 
-use super::slave::carrier_of;
-use super::{ContactEvent, System, frame_of};
-use crate::contact::gap::{Drive, Geometry, dot};
-use crate::contact::spline_gap::Frame;
+use super::pair::{When, at_place};
+use super::{ContactEvent, System};
+use crate::contact::gap::{Geometry, dot};
 use crate::contact::wrench::{At, Motion};
 
 /// What one contact did over a step (J).
@@ -30,22 +29,50 @@ impl Work {
 }
 
 impl System {
-    /// Enter the work of all contacts that acted over the step just done, whose prescribed motion was `motion`.
-    pub(super) fn book_all(&mut self, motion: &Motion) {
-        let delayed = self.is_delayed();
-        let centred = motion.centred(&self.state.motion);
-        let mut events = std::mem::take(if delayed { &mut self.events_before } else { &mut self.events });
+    /// Enter the work of all contacts that acted over the step just done, and of loads beside contact.
+    pub(crate) fn enter_work(&mut self) {
+        let when = self.when_acted();
+        let acted = match when {
+            When::Now => &mut self.events.now,
+            When::Before => &mut self.events.before,
+        };
+        let mut events = std::mem::take(acted);
+        let (mut of, mut motion) = (usize::MAX, Motion::default());
         for event in &mut events {
-            event.friction_heat = self.book(event, &centred, delayed);
+            if event.pair != of {
+                of = event.pair;
+                motion = self.pairs[of].motion().centred(self.pairs[of].motion_before());
+            }
+            event.friction_heat = self.enter(event, &motion, when);
         }
-        *(if delayed { &mut self.events_before } else { &mut self.events }) = events;
+        match when {
+            When::Now => self.events.now = events,
+            When::Before => self.events.before = events,
+        }
+        self.enter_loads();
+    }
+
+    /// When the contacts that acted over the last step were found.
+    pub(super) fn when_acted(&self) -> When {
+        if self.settings.scheme.acts_later() { When::Before } else { When::Now }
+    }
+
+    fn enter_loads(&mut self) {
+        let mut work = 0.0;
+        for structure in &mut self.structures {
+            work += structure.modes_mut().finish_loads();
+        }
+        if work != 0.0 {
+            self.counted.ledger.load_work.add(work);
+            self.counted.ledger.turnover.add(work.abs());
+        }
     }
 
     /// Enter one contact's work into the ledger; returns its friction heat (J).
-    fn book(&mut self, event: &ContactEvent, motion: &Motion, before: bool) -> f64 {
-        let work = self.work_of(event, motion, before);
+    fn enter(&mut self, event: &ContactEvent, motion: &Motion, when: When) -> f64 {
+        let work = self.work_of(event, motion, when);
         let (curvature, worn) = (work.curvature(), event.coating * work.approach);
-        let ledger = &mut self.state.ledger;
+        let ledger = &mut self.counted.ledger;
         ledger.wear_work.add(worn);
         ledger.impact_loss.add(work.closing - worn);
         ledger.friction_loss.add(work.heat);
@@ -62,19 +89,19 @@ impl System {
     /// prescribed motion, less the friction heat, friction force times slip, and what the approach of the node costs, λ
     /// times half the change of gap, but for what turns and curves within the step. On a coating the approach is what its
     /// rods absorb.
-    fn work_of(&self, event: &ContactEvent, motion: &Motion, before: bool) -> Work {
-        let (node, index) = (event.node, event.node * self.lanes + event.sector);
-        let geometry = if before { &self.geometry_before } else { &self.state.geometry };
-        let drive = if before { &self.drive_before } else { &self.state.drive };
-        let (normal, at) = (geometry.normal_at(index), At { node, index, drive });
-        let moved = self.relative_motion(event, index, geometry, drive);
+    fn work_of(&self, event: &ContactEvent, motion: &Motion, when: When) -> Work {
+        let (structure, pair) = (&self.structures[event.structure], &self.pairs[event.pair]);
+        let (node, index) = (event.node, structure.index(event.node, event.sector));
+        let (geometry, gaps) = (self.geometry_of(event, when), &structure.history.gap);
+        let (normal, at) = (geometry.normal_at(index), At { node, index, drive: pair.drive(when) });
+        let moved = self.relative_motion(event, when);
         let tangential: [f64; 3] = std::array::from_fn(|i| event.force[i] - event.normal * normal[i]);
-        let spin = self.law.spin_motion(at, event.point, motion);
-        let shaft = self.law.shaft_motion(at, event.point, motion);
-        let surface = self.law.surface_motion(at, event.point, normal, &geometry.places, motion);
+        let spin = pair.gap().spin_motion(at, event.point, motion);
+        let shaft = pair.gap().shaft_motion(at, event.point, motion);
+        let surface = pair.gap().surface_motion(at, event.point, normal, &geometry.places, motion);
         let slip: [f64; 3] = std::array::from_fn(|i| moved[i] + spin[i] + shaft[i]);
-        // A node of a free master that comes over an edge had no gap to close: its motion is the approach.
-        let (now, oldest) = (self.state.gap[index], self.gap_oldest[index]);
+        // A node that comes over a free edge had no gap to close: its motion is the approach.
+        let (now, oldest) = (gaps.now[index], gaps.oldest[index]);
         let approach = if oldest.is_finite() { -0.5 * (now - oldest) } else { -dot(normal, moved) };
         let [x, y, z] = event.wrench.force;
         Work {
@@ -89,30 +116,36 @@ impl System {
         }
     }
 
-    /// Half the displacement of a node relative to the slave over the last two steps (m), in its own directions.
-    #[inline(always)]
-    pub(super) fn relative_motion(
-        &self,
-        event: &ContactEvent,
-        index: usize,
-        geometry: &Geometry,
-        drive: &Drive,
-    ) -> [f64; 3] {
-        let (lanes, now) = (self.lanes, self.bank.displacement());
-        let (node, sector) = (event.node, event.sector);
-        let mut moved: [f64; 3] = std::array::from_fn(|component| {
-            let row = (3 * node + component) * lanes + sector;
-            0.5 * (now[row] - self.displacement_oldest[row])
-        });
-        if let Some((slave, surface)) = carrier_of(&self.slaves, &self.law, node) {
-            let slave = slave.moved(surface, geometry.places[index], self.frame(index, drive.rotor_angle));
-            moved = std::array::from_fn(|i| moved[i] - slave[i]);
+    /// Normals and places that a contact was found with.
+    fn geometry_of(&self, event: &ContactEvent, when: When) -> &Geometry {
+        let geometry = &self.structures[event.structure].history.geometry;
+        match when {
+            When::Now => &geometry.now,
+            When::Before => &geometry.before,
         }
-        moved
     }
 
-    /// Directions of a node's own frame at a rotor angle (rad).
-    pub(super) fn frame(&self, index: usize, rotor_angle: f64) -> Frame {
-        frame_of(&self.law, index, rotor_angle)
+    /// Half the displacement of a node relative to its surface over the last two steps (m), in its own directions.
+    #[inline(always)]
+    pub(super) fn relative_motion(&self, event: &ContactEvent, when: When) -> [f64; 3] {
+        let structure = &self.structures[event.structure];
+        let now = structure.three(structure.modes().displacement(), event.node, event.sector);
+        let oldest = structure.three(&structure.history.passing.oldest, event.node, event.sector);
+        let moved: [f64; 3] = std::array::from_fn(|i| 0.5 * (now[i] - oldest[i]));
+        let pair = &self.pairs[event.pair];
+        if pair.carrier().is_none() { moved } else { self.less_of_carrier(event, when, moved) }
+    }
+
+    /// Out of line: on rigid surfaces contacts never get here.
+    #[inline(never)]
+    fn less_of_carrier(&self, event: &ContactEvent, when: When, moved: [f64; 3]) -> [f64; 3] {
+        let (pair, index) = (&self.pairs[event.pair], self.structures[event.structure].index(event.node, event.sector));
+        let Some(surface) = pair.carried() else { return moved };
+        let under = &self.structures[surface.1.structure];
+        let (now, oldest) = (under.modes().displacement(), &under.history.passing.oldest);
+        let frame = pair.frame(index, pair.drive(when).rotor_angle);
+        let place = self.geometry_of(event, when).places[index];
+        let carried = at_place(surface, place, frame, |row| 0.5 * (now[row] - oldest[row]));
+        std::array::from_fn(|i| moved[i] - carried[i])
     }
 }

@@ -11,7 +11,7 @@ use tiprub_core::dynamics::sectors::SectorModel;
 use tiprub_core::rom::{ContactNode, Frame, Rom, RomChecks, RomExtras};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::stability::massless::{MasslessCheck, QUIET};
-use tiprub_core::system::{System, SystemParts, SystemSettings};
+use tiprub_core::system::{System, SystemSettings};
 
 pub const SCHEMES: [Scheme; 3] = Scheme::ALL;
 pub const SOLVERS: [Solver; 3] = Solver::ALL;
@@ -114,10 +114,9 @@ pub fn single(modes: &[(f64, f64)], quasi_static: usize) -> ModalModel {
 /// One node against a plane across x; `normal` is +1 where the plane is below it, −1 where it is above.
 pub fn against_plane(model: &ModalModel, methods: (Scheme, Solver), normal: f64, gap: f64, loads: bool) -> System {
     let law = FixedGap { normals: vec![[normal, 0.0, 0.0]], gaps: vec![gap], sliding: vec![[0.0; 3]] };
-    let settings = SystemSettings { scheme: methods.0, solver: methods.1, friction: 0.0, ledger: true };
+    let settings = SystemSettings { scheme: methods.0, solver: methods.1, ledger: true };
     let bank = BankOptions { loads, ..BankOptions::default() };
-    let parts = SystemParts { bank, sticking: methods.1 == Solver::Coulomb, ..SystemParts::default() };
-    System::with_parts(SectorModel::Uncoupled(model, 1), GapLaw::Fixed(law), settings, parts)
+    System::alone(SectorModel::Uncoupled(model, 1), bank, GapLaw::Fixed(law), 0.0, settings)
 }
 
 /// Set amplitude and increment q(0) − q(−h) of a mode.

@@ -89,7 +89,7 @@ impl Run for SceneRun {
         loop {
             let progress = self.simulation.advance().map_err(|error| error.to_string())?;
             let system = self.simulation.system();
-            let least = system.gaps().iter().fold(f64::INFINITY, |least: f64, gap| least.min(*gap));
+            let least = system.gaps().fold(f64::INFINITY, |least: f64, gap| least.min(*gap));
             seen.add(progress.time, step, system.events().iter().map(|event| event.normal), least);
             if progress.finished {
                 return Ok(());

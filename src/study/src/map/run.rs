@@ -101,7 +101,7 @@ impl Tally {
             self.largest_force = self.largest_force.max(event.normal);
         }
         self.touching += touched.iter().filter(|touched| **touched).count() as u64;
-        self.penetration = system.gaps().iter().fold(self.penetration, |deepest, gap| deepest.max(-gap));
+        self.penetration = system.gaps().fold(self.penetration, |deepest, gap| deepest.max(-gap));
         self.steps += 1;
     }
 }

@@ -2,9 +2,10 @@
 
 use tiprub_core::{
     Result, Scene, Simulation,
-    contact::{gap::GapLaw, spline::SurfaceSpline, surface::Surface, wrench::Wrench},
+    contact::{spline::SurfaceSpline, surface::Surface, wrench::Wrench},
+    dynamics::sectors::Sectors,
     settings::{CoatingSettings, Scheme, Shape, Solver, SplineSettings},
-    system::{ContactEvent, System},
+    system::{ContactEvent, Structure, System},
 };
 
 use crate::stability::{
@@ -242,7 +243,8 @@ fn look(scene: &Scene, simulation: &Simulation, seen: &mut Seen) {
 fn reaction(scene: &Scene, simulation: &Simulation) -> [[f64; 3]; 3] {
     let system = simulation.system();
     let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
-    let mut expected: Vec<Vec<f64>> = system.slaves().iter().map(|slave| vec![0.0; slave.bank.modes()]).collect();
+    let zeros = |structure: &Structure| vec![0.0; structure.contact_force().len()];
+    let mut expected: Vec<Vec<f64>> = system.structures().iter().map(zeros).collect();
     for event in system.events() {
         let Some((surface, place, rotation)) = surface_of(simulation, event) else {
             let point = on_revolution(scene, simulation, event);
@@ -250,17 +252,17 @@ fn reaction(scene: &Scene, simulation: &Simulation) -> [[f64; 3]; 3] {
             add(&mut moment, -1.0, cross(point, event.wrench.force));
             continue;
         };
-        let carrier = system.law().spline_of(event.node).map(|(_, carrier)| carrier);
+        let carrier = system.pairs()[event.pair].carrier();
         for (index, weight) in surface.weights(place).iter() {
             let point = turned(surface.control_points()[index], rotation);
             let acts = event.wrench.force.map(|value| -weight * value);
             add(&mut force, 1.0, acts);
             add(&mut moment, 1.0, cross(point, acts));
-            if let Some((slave, modal)) =
-                carrier.and_then(|index| Some((system.slaves().get(index)?, &mut expected[index])))
-            {
+            let Some(carrier) = carrier else { continue };
+            if let Sectors::Uncoupled(bank) = system.structures()[carrier.structure].modes() {
                 for (component, value) in acts.iter().enumerate() {
-                    let shapes = slave.bank.contact_row(3 * index + component);
+                    let shapes = bank.contact_row(carrier.first_row + 3 * index + component);
+                    let modal = &mut expected[carrier.structure];
                     modal.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += value * shape);
                 }
             }
@@ -271,7 +273,7 @@ fn reaction(scene: &Scene, simulation: &Simulation) -> [[f64; 3]; 3] {
 
 fn modal_residual(system: &System, expected: &[Vec<f64>]) -> f64 {
     let (mut off, mut largest) = (0.0_f64, 0.0_f64);
-    for (slave, expected) in system.slaves().iter().zip(expected) {
+    for (slave, expected) in system.structures().iter().zip(expected) {
         for (found, expected) in slave.contact_force().iter().zip(expected) {
             (off, largest) = (off.max((found - expected).abs()), largest.max(expected.abs()));
         }
@@ -285,18 +287,15 @@ fn surface_of<'a>(
     event: &ContactEvent,
 ) -> Option<(&'a SurfaceSpline, tiprub_core::contact::spline::ClosestPoint, f64)> {
     let system = simulation.system();
-    let place = *system.geometry().places.get(event.node * system.bank().lanes() + event.sector)?;
-    match system.law() {
-        GapLaw::Spline(law) => Some((&law.surface, place, system.drive().shape_rotation)),
-        GapLaw::Free(law) => Some((&law.surfaces[law.surface_of(event.node)?].surface, place, 0.0)),
-        _ => None,
-    }
+    let (structure, pair) = (&system.structures()[event.structure], &system.pairs()[event.pair]);
+    let place = *structure.geometry().places.get(structure.index(event.node, event.sector))?;
+    Some((pair.gap().spline()?, place, pair.drive_now().shape_rotation))
 }
 
 /// Where the casing of revolution is at the angle of a contact (m).
 fn on_revolution(scene: &Scene, simulation: &Simulation, event: &ContactEvent) -> [f64; 3] {
     let [x, y, z] = event.wrench.point;
-    let (settings, drive) = (&scene.settings, simulation.system().drive());
+    let (settings, drive) = (&scene.settings, simulation.system().pairs()[event.pair].drive_now());
     let node = &scene.roms[0].contact_nodes[event.node];
     let angle = y.atan2(x);
     let shape = Surface::new(&settings.surfaces[0].shape, GAP)

@@ -140,7 +140,7 @@ impl Columns {
         history.kinetic.push(simulation.real(self.kinetic)?);
         history.strain.push(simulation.real(self.strain)?);
         history.velocity.push(velocity);
-        history.penetration.push(simulation.system().gaps().iter().fold(0.0, |most: f64, gap| most.max(-gap)));
+        history.penetration.push(simulation.system().gaps().fold(0.0, |most: f64, gap| most.max(-gap)));
         run.curvature.push(simulation.real(self.curvature)?);
         run.residual = run.residual.max(simulation.real(self.residual)?.abs());
         Ok(())

@@ -8,7 +8,7 @@ use tiprub_core::{
     rom::{ContactNode, Frame, RomChecks, RomExtras},
     settings::{Scheme, Solver},
     stability::{self, massless},
-    system::{System, SystemParts, SystemSettings},
+    system::{System, SystemSettings},
 };
 use tiprub_reference::reduced::bars::Rod;
 
@@ -83,17 +83,16 @@ impl CoreRod {
         }
         let gap = self.gap * (1.0 + perturbation);
         let law = GapLaw::Fixed(FixedGap { normals: vec![NORMAL], gaps: vec![gap], sliding: vec![[0.0; 3]] });
-        let settings = SystemSettings { scheme, solver, friction: 0.0, ledger: true };
+        let settings = SystemSettings { scheme, solver, ledger: true };
         let bank = BankOptions { loads: true, ..BankOptions::default() };
-        let parts = SystemParts { bank, sticking: solver == Solver::Coulomb, ..SystemParts::default() };
-        let mut system = System::with_parts(SectorModel::Uncoupled(&self.model, 1), law, settings, parts);
+        let mut system = System::alone(SectorModel::Uncoupled(&self.model, 1), bank, law, 0.0, settings);
         system.set_step(step);
         for mode in 0..self.model.len() {
             let dynamic = mode < self.model.dynamic_modes(scheme);
             let velocity = self.start[1][mode] - if dynamic { self.half_kick(mode, step) } else { 0.0 };
             system.bank_mut().set_modal_state(mode, 0, self.start[0][mode], velocity);
         }
-        system.start(&Drive::default());
+        system.start(&[Drive::default()]);
         Ok(RodRun { rod: self, system, division, step })
     }
 
@@ -121,7 +120,7 @@ pub struct RodRun<'a> {
 impl RodRun<'_> {
     fn one(&mut self) -> Result<(), String> {
         self.system.bank_mut().loads_mut().copy_from_slice(&self.rod.load);
-        let stepped = self.system.step(&Drive::default());
+        let stepped = self.system.step(&[Drive::default()]);
         stepped.map_err(|failure| format!("step {} failed: {failure:?}", self.system.steps()))
     }
 

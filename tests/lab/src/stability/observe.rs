@@ -2,7 +2,6 @@
 
 use tiprub_core::{
     Result, Simulation,
-    contact::gap::GapLaw,
     settings::{Scheme, Shape},
 };
 
@@ -265,10 +264,6 @@ pub fn apart(first: &[f64], second: &[f64]) -> f64 {
 /// Displacements of all contact nodes of the sectors (m).
 pub fn displacements(simulation: &Simulation) -> Vec<f64> {
     let system = simulation.system();
-    let rows = 3 * nodes(system.law());
+    let rows = system.bank().rows();
     (0..system.bank().sectors()).flat_map(|sector| (0..rows).map(move |row| system.bank().row(row, sector))).collect()
-}
-
-fn nodes(law: &GapLaw) -> usize {
-    law.nodes()
 }

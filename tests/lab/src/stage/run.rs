@@ -121,7 +121,7 @@ impl Watch {
         };
         run.energy_residual = most(&elements.residual, run.energy_residual)?;
         run.largest_force = most(&elements.peak, run.largest_force)?;
-        let gaps = simulation.system().gaps().iter().copied();
+        let gaps = simulation.system().gaps().copied();
         run.least_clearance = gaps.fold(run.least_clearance, f64::min);
         for (node, one) in elements.least.iter().enumerate() {
             let least = simulation.real(*one)?;

@@ -122,10 +122,20 @@ impl ModalBank {
         }
     }
 
-    /// Let contact forces found in the step before act on one sector (massless-boundary), after the prediction.
-    pub fn act_delayed(&mut self, sector: usize, force: &[f64], with_loss: bool) {
-        self.project(force);
-        self.act_delayed_modal_force(sector, with_loss);
+    /// Let contact forces found in the step before (`forces[row · lanes + sector]`, N) act after the prediction
+    /// (massless-boundary).
+    pub fn act_delayed(&mut self, forces: &[f64], with_loss: bool) {
+        let (lanes, mut force) = (self.lanes(), std::mem::take(&mut self.moved));
+        for sector in 0..self.sectors {
+            for (row, force) in force.iter_mut().enumerate() {
+                *force = forces[row * lanes + sector];
+            }
+            if force.iter().any(|force| *force != 0.0) {
+                self.project(&force);
+                self.act_delayed_modal_force(sector, with_loss);
+            }
+        }
+        self.moved = force;
     }
 
     /// The same for modal forces.

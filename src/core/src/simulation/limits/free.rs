@@ -8,15 +8,15 @@
 
 use nalgebra::DMatrix;
 
-use super::{Limits, Parameters, Sense};
-use crate::contact::free_gap::{FreeGap, tangent};
+use super::{BodyLimits, Parameters, Sense};
 use crate::contact::gap::{GapLaw, Geometry, dot};
+use crate::contact::open_gap::{OpenGap, tangent};
 use crate::dynamics::modal::ModalModel;
-use crate::settings::{Scheme, Solver};
+use crate::settings::Solver;
 use crate::simulation::compile::Compiled;
-use crate::simulation::free::FreeParts;
 use crate::stability::massless::MasslessLimit;
 use crate::stability::{self, ContactDirections};
+use crate::system::System;
 use crate::{Error, Result, shown};
 
 /// The flight is looked at in this many places, this share of the extent apart.
@@ -35,22 +35,16 @@ struct Met {
 }
 
 impl Compiled {
-    pub(super) fn free_limits(&self, parameters: &Parameters, free: &FreeParts, law: &FreeGap) -> Limits {
-        let step = self.expected_step(parameters.step);
-        // Contacts of a free master may act along any direction.
-        let unresolved = match parameters.scheme {
-            Scheme::ModalExact => stability::unresolved::limit_along_axes(&self.model).min(self.unresolved(
-                &[],
-                parameters.scheme,
-                |_| Vec::new(),
-            )),
-            _ => f64::INFINITY,
-        };
-        let resolved = stability::unresolved::check(step, unresolved, self.model.largest_frequency());
-        let outcome = resolved.and_then(|()| self.free_warnings(parameters, free, law, step));
+    pub(super) fn free_limits(&self, body: usize, parameters: &Parameters, system: &System) -> BodyLimits {
+        let (step, model) = (self.expected_step(parameters.step), &self.bodies[body].model);
+        // Contacts of what flies freely may act along any direction.
+        let own = std::iter::once_with(|| stability::unresolved::limit_along_axes(model));
+        let unresolved = self.unresolved(body, own, parameters.scheme);
+        let resolved = stability::unresolved::check(step, unresolved, model.largest_frequency());
+        let flight = Flight { compiled: self, system, body, parameters };
+        let outcome = resolved.and_then(|()| flight.warnings(step));
         let quiet = || Some(Sense { outcome: Ok(Vec::new()), ranges: Vec::new() });
-        Limits {
-            parameters: parameters.clone(),
+        BodyLimits {
             outcome,
             senses: [quiet(), quiet()],
             massless: MasslessLimit::NONE,
@@ -58,29 +52,48 @@ impl Compiled {
             unresolved,
         }
     }
+}
 
-    fn free_warnings(
-        &self,
-        parameters: &Parameters,
-        free: &FreeParts,
-        law: &FreeGap,
-        step: f64,
-    ) -> Result<Vec<String>> {
-        let Parameters { friction, scheme, solver, velocity, .. } = *parameters;
-        let mut warnings: Vec<String> =
-            stability::check_step(self.model.largest_frequency(), scheme, step)?.into_iter().collect();
-        for (pair, model) in free.pairs.iter().filter(|pair| pair.carrier.is_some()).zip(&free.carriers) {
-            let name = &self.scene.settings.structures[pair.structure].name;
-            let warning = stability::check_step(model.largest_frequency(), scheme, step)?;
+/// A structure about to fly.
+struct Flight<'a> {
+    compiled: &'a Compiled,
+    system: &'a System,
+    body: usize,
+    parameters: &'a Parameters,
+}
+
+impl Flight<'_> {
+    fn warnings(&self, step: f64) -> Result<Vec<String>> {
+        let (compiled, scheme) = (self.compiled, self.parameters.scheme);
+        let largest = compiled.bodies[self.body].model.largest_frequency();
+        let mut warnings: Vec<String> = stability::check_step(largest, scheme, step)?.into_iter().collect();
+        for carrier in compiled.carriers_of(self.body) {
+            let name = &compiled.carrier(carrier).0.name;
+            let largest = compiled.carriers[carrier].model.largest_frequency();
+            let warning = stability::check_step(largest, scheme, step)?;
             warnings.extend(warning.map(|warning| format!("{name}: {warning}")));
         }
-        if friction == 0.0 || solver == Solver::Coulomb {
+        let friction = self.parameters.friction_of(compiled, self.body);
+        if friction == 0.0 || self.parameters.solver == Solver::Coulomb {
             return Ok(warnings);
         }
+        let pairs: Vec<usize> = compiled.plan.pairs_of(self.body).map(|(pair, _)| pair).collect();
+        let mut laws: Vec<OpenGap> = Vec::new();
+        for pair in &pairs {
+            if let GapLaw::Open(gap) = self.system.pairs()[*pair].gap() {
+                laws.push((**gap).clone());
+            }
+        }
+        let carriers = pairs.iter().map(|pair| {
+            let carrier = compiled.plan.pairs[*pair].carrier?;
+            Some((carrier, compiled.control_modes_of(carrier, self.system.pairs()[*pair].gap())?))
+        });
+        let carriers: Vec<Option<(usize, ModalModel)>> = carriers.collect();
+        let frictions: Vec<f64> = pairs.iter().map(|pair| self.parameters.friction[*pair]).collect();
         let mut worst = 0.0_f64;
-        for met in flight(law, velocity) {
+        for met in flight(&mut laws, self.parameters.velocities[self.body], &frictions, friction) {
             for part in STEPS {
-                worst = worst.min(self.solvability(&met, parameters, free, law, part * step)?);
+                worst = worst.min(self.solvability(&met, friction, &laws, &carriers, part * step)?);
             }
         }
         if worst < ROUNDING {
@@ -98,23 +111,23 @@ impl Compiled {
     fn solvability(
         &self,
         met: &Met,
-        parameters: &Parameters,
-        free: &FreeParts,
-        law: &FreeGap,
+        friction: f64,
+        laws: &[OpenGap],
+        carriers: &[Option<(usize, ModalModel)>],
         step: f64,
     ) -> Result<f64> {
-        let Parameters { friction, scheme, damping_ratio, .. } = *parameters;
-        let mut model = self.model.with_nodes(&met.nodes);
-        model.damping_ratios.fill(damping_ratio);
-        let mut matrix = stability::delassus(&model, scheme, step, friction, &met.directions);
-        for (carrier, modes) in free.carriers.iter().enumerate() {
-            let mut seen = seen_by(carrier, modes, met, law);
-            seen.damping_ratios.fill(parameters.slave_damping_ratios[carrier]);
-            matrix += stability::delassus(&seen, scheme, step, friction, &met.directions);
+        let Parameters { scheme, damping_ratios, .. } = self.parameters;
+        let mut model = self.compiled.bodies[self.body].model.with_nodes(&met.nodes);
+        model.damping_ratios.fill(damping_ratios[self.body]);
+        let mut matrix = stability::delassus(&model, *scheme, step, friction, &met.directions);
+        for carrier in self.compiled.carriers_of(self.body) {
+            let Some(mut seen) = seen_by(carrier, met, laws, carriers) else { continue };
+            seen.damping_ratios.fill(damping_ratios[self.compiled.bodies.len() + carrier]);
+            matrix += stability::delassus(&seen, *scheme, step, friction, &met.directions);
         }
         let diagonal = matrix.diagonal();
         if let Some(jammed) = (0..met.nodes.len()).find(|member| diagonal[*member] <= 0.0) {
-            let node = &self.master().1.contact_nodes[met.nodes[jammed]].name;
+            let node = self.compiled.node_name(self.body, met.nodes[jammed]);
             return Err(Error::Unstable {
                 problem: format!(
                     "with friction_coefficient µ = {friction} and an internal step of {step:.3e} s the contact of {node} alone has \
@@ -131,33 +144,33 @@ impl Compiled {
     }
 }
 
-/// Where the undeformed master touches on its flight.
-fn flight(law: &FreeGap, velocity: [f64; 3]) -> Vec<Met> {
+/// Where the undeformed structure touches on its flight; slip directions are as long as `frictions` of the pairs are against the
+/// largest.
+fn flight(laws: &mut [OpenGap], velocity: [f64; 3], frictions: &[f64], largest: f64) -> Vec<Met> {
     let speed = dot(velocity, velocity).sqrt();
-    if speed == 0.0 {
-        return Vec::new();
-    }
-    let nodes = law.nodes();
+    let Some(extent) = laws.first().map(OpenGap::largest).filter(|_| speed != 0.0) else { return Vec::new() };
+    let nodes = laws[0].positions().len();
     // `largest` is a tenth of the extent.
-    let spacing = 10.0 * SPACING * law.largest() / speed;
-    let geometry = || GapLaw::Free(Box::new(law.clone())).geometry(1);
-    let (mut gap, mut displacement) = (vec![0.0; nodes], vec![0.0; 3 * nodes]);
+    let spacing = 10.0 * SPACING * extent / speed;
+    let mut displacement = vec![0.0; 3 * nodes];
     let mut met = Vec::new();
     for place in 0..PLACES {
         let time = spacing * f64::from(place);
         for (row, value) in displacement.iter_mut().enumerate() {
             *value = time * velocity[row % 3];
         }
-        let mut geometry = geometry();
-        law.evaluate(&displacement, None, &mut geometry, &mut gap);
-        // Beyond small displacements the master does not get there undeformed.
+        let (mut geometry, mut gap) = (Geometry::new(nodes, true), vec![f64::INFINITY; nodes]);
+        laws.iter_mut().for_each(|law| law.evaluate(&displacement, &[], None, &mut geometry, &mut gap));
+        // Beyond small displacements the structure does not get there undeformed.
         let inside: Vec<usize> = (0..nodes).filter(|node| gap[*node] <= 0.0).collect();
         if inside.is_empty() {
             continue;
         }
         let direction = |node: &usize| {
             let normal = geometry.normal_at(*node);
-            (normal, tangent(velocity, normal))
+            let own = laws.iter().position(|law| law.nodes().contains(node)).map_or(largest, |law| frictions[law]);
+            let share = if own < largest { own / largest } else { 1.0 };
+            (normal, tangent(velocity, normal).map(|value| share * value))
         };
         let directions = inside.iter().map(direction).collect();
         met.push(Met { nodes: inside, directions, geometry });
@@ -166,14 +179,19 @@ fn flight(law: &FreeGap, velocity: [f64; 3]) -> Vec<Met> {
 }
 
 /// The modes of a carrier at the places of the contacts; zero for contacts with other surfaces.
-fn seen_by(carrier: usize, modes: &ModalModel, met: &Met, law: &FreeGap) -> ModalModel {
-    let mut contact_modes = DMatrix::zeros(3 * met.nodes.len(), modes.len());
+fn seen_by(
+    carrier: usize,
+    met: &Met,
+    laws: &[OpenGap],
+    carriers: &[Option<(usize, ModalModel)>],
+) -> Option<ModalModel> {
+    let of = |pair: usize| carriers[pair].as_ref().filter(|(own, _)| *own == carrier).map(|(_, modes)| modes);
+    let first = (0..laws.len()).find_map(of)?;
+    let mut contact_modes = DMatrix::zeros(3 * met.nodes.len(), first.len());
     for (member, node) in met.nodes.iter().enumerate() {
-        let Some(surface) = law.surface_of(*node).map(|index| &law.surfaces[index]) else { continue };
-        if surface.carrier != Some(carrier) {
-            continue;
-        }
-        for (point, weight) in surface.surface.weights(met.geometry.places[*node]).iter() {
+        let pair = laws.iter().position(|law| law.nodes().contains(node));
+        let Some((law, modes)) = pair.and_then(|pair| Some((&laws[pair], of(pair)?))) else { continue };
+        for (point, weight) in law.surface.surface.weights(met.geometry.places[*node]).iter() {
             for component in 0..3 {
                 let row = modes.contact_modes.row(3 * point + component) * weight;
                 let mut target = contact_modes.row_mut(3 * member + component);
@@ -181,5 +199,5 @@ fn seen_by(carrier: usize, modes: &ModalModel, met: &Met, law: &FreeGap) -> Moda
             }
         }
     }
-    ModalModel { contact_modes, ..modes.clone() }
+    Some(ModalModel { contact_modes, ..first.clone() })
 }

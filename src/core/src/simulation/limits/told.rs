@@ -1,7 +1,7 @@
 //! Warnings that hold for the step taken: told at the start for the step to expect, and once more where a run takes another
 //! step, turns the other way, or gets too fast for any machine.
 
-use super::{Limits, in_range, senses_of};
+use super::{BodyLimits, Parameters, in_range, senses_of};
 use crate::plausibility;
 use crate::simulation::Simulation;
 use crate::stability::{self, massless};
@@ -18,32 +18,45 @@ const KINDS: usize = 4;
 pub struct Told {
     /// Longest step told about (s), per kind.
     steps: [f64; KINDS],
-    /// Senses of slip, + and −.
-    senses: [bool; 2],
-    /// Speed beyond which tips are too fast (rad/s); infinite once that was told.
-    fastest: f64,
+    /// Senses of slip, + and −, of each structure that touches.
+    senses: Vec<[bool; 2]>,
+    /// Speed beyond which its tips are too fast (rad/s); infinite once that was told.
+    fastest: Vec<f64>,
     /// Most warnings at once of one friction coefficient.
     friction: usize,
     /// A displacement that linear kinematics describes badly.
     pub(in crate::simulation) curved: bool,
 }
 
+impl Told {
+    /// Nothing, of so many structures that touch.
+    pub(in crate::simulation) fn new(bodies: usize) -> Self {
+        Self { senses: vec![[false; 2]; bodies], fastest: vec![0.0; bodies], ..Self::default() }
+    }
+}
+
 impl Simulation {
     /// Warnings of the start are told; those of the step to expect among them.
-    pub(in crate::simulation) fn begin_telling(&mut self, largest: f64, sense: f64) {
-        let expected = self.compiled.expected_step(largest);
-        self.told = Told::default();
+    pub(in crate::simulation) fn begin_telling(&mut self, parameters: &Parameters) {
+        let expected = self.compiled.expected_step(parameters.step);
+        self.told = Told::new(self.rotors.len());
         for kind in 0..KINDS {
             self.told.steps[kind] = if self.doubt(kind, expected).is_some() { expected } else { 0.0 };
         }
-        senses_of(sense).for_each(|sense| self.told.senses[sense] = true);
         let limits = self.limits.as_ref();
-        self.told.friction = limits.and_then(|limits| limits.warnings(sense).ok()).map_or(0, |warnings| warnings.len());
-        let (rom, speed) = (self.compiled.master().1, self.inputs.speed.value);
-        let fast = plausibility::of_speed(rom, speed);
-        self.told.fastest = if fast.is_some() { f64::INFINITY } else { plausibility::fastest(rom) };
-        let doubts = self.compiled.doubts();
-        self.warnings.extend(doubts.into_iter().chain(fast));
+        let warnings = limits.and_then(|limits| limits.warnings(&parameters.senses).ok());
+        self.told.friction = warnings.map_or(0, |warnings| warnings.len());
+        let mut doubts = self.compiled.doubts();
+        for (body, speed) in self.speeds().into_iter().enumerate() {
+            let mut told = [false; 2];
+            senses_of(parameters.senses[body]).for_each(|sense| told[sense] = true);
+            self.told.senses[body] = told;
+            let rom = self.compiled.body(body).1;
+            let fast = plausibility::of_speed(rom, speed);
+            self.told.fastest[body] = if fast.is_some() { f64::INFINITY } else { plausibility::fastest(rom) };
+            doubts.extend(fast);
+        }
+        self.warnings.extend(doubts);
     }
 
     /// Warnings of another friction coefficient, unless as many were told before.
@@ -54,8 +67,9 @@ impl Simulation {
         }
     }
 
-    /// Tell what holds for a step (s) and for speeds (rad/s) that were not told about. Allocates only to tell.
-    pub(in crate::simulation) fn tell(&mut self, step: f64, speeds: [f64; 2]) {
+    /// Tell what holds for an internal step (s) and for the speeds of a communication step of length `length` (s) that were not
+    /// told about. Allocates only to tell.
+    pub(in crate::simulation) fn tell(&mut self, step: f64, length: f64) {
         for kind in 0..KINDS {
             if step > MATERIAL * self.told.steps[kind]
                 && let Some(text) = self.doubt(kind, step)
@@ -64,18 +78,24 @@ impl Simulation {
                 self.note(text);
             }
         }
-        for speed in speeds {
-            if speed.abs() > self.told.fastest
-                && let Some(text) = plausibility::of_speed(self.compiled.master().1, speed)
-            {
-                self.told.fastest = f64::INFINITY;
-                self.note(text);
+        for body in 0..self.rotors.len() {
+            for offset in [0.0, length] {
+                self.tell_of_speed(body, self.inputs.rotors[body].speed.at(offset));
             }
-            for sense in senses_of(speed).filter(|_| speed != 0.0) {
-                if !std::mem::replace(&mut self.told.senses[sense], true) {
-                    let found = self.limits.as_ref().map_or(Vec::new(), |limits| limits.of_sense(sense));
-                    found.into_iter().for_each(|text| self.note(text));
-                }
+        }
+    }
+
+    fn tell_of_speed(&mut self, body: usize, speed: f64) {
+        if speed.abs() > self.told.fastest[body]
+            && let Some(text) = plausibility::of_speed(self.compiled.body(body).1, speed)
+        {
+            self.told.fastest[body] = f64::INFINITY;
+            self.note(text);
+        }
+        for sense in senses_of(speed).filter(|_| speed != 0.0) {
+            if !std::mem::replace(&mut self.told.senses[body][sense], true) {
+                let found = self.limits.as_ref().map_or(Vec::new(), |limits| limits.bodies[body].of_sense(sense));
+                found.into_iter().for_each(|text| self.note(text));
             }
         }
     }
@@ -86,13 +106,17 @@ impl Simulation {
         let scheme = limits.parameters.scheme;
         let unresolved = |frequency: f64| stability::check_step(frequency, scheme, step).ok().flatten();
         match kind {
-            0 => unresolved(self.compiled.largest_frequency() * self.compiled.stiffest()),
+            0 => {
+                let of = |body: usize| self.compiled.bodies[body].largest_frequency() * self.compiled.stiffest(body);
+                unresolved((0..self.compiled.bodies.len()).map(of).fold(0.0, f64::max))
+            }
             1 => {
-                let highest = self.compiled.carriers().map(|model| model.largest_frequency()).fold(0.0, f64::max);
+                let models = self.compiled.carriers.iter().map(|carrier| &carrier.model);
+                let highest = models.map(|model| model.largest_frequency()).fold(0.0, f64::max);
                 unresolved(highest).map(|text| format!("casing: {text}"))
             }
-            2 => massless::warning(step, limits.massless),
-            _ => in_range(&limits.casing, step).cloned(),
+            2 => limits.bodies.iter().find_map(|body| massless::warning(step, body.massless)),
+            _ => limits.bodies.iter().find_map(|body| in_range(&body.casing, step).cloned()),
         }
     }
 
@@ -108,12 +132,16 @@ impl Simulation {
     /// before [`Simulation::initialise`], and for coupled sectors, where looking takes as long again.
     pub fn if_reversed(&self) -> Vec<String> {
         let Some(limits) = &self.limits else { return Vec::new() };
-        let other = [0, 1].into_iter().filter(|sense| !self.told.senses[*sense] && limits.senses[*sense].is_some());
-        other.flat_map(|sense| limits.of_sense(sense)).collect()
+        let mut found = Vec::new();
+        for (body, told) in limits.bodies.iter().zip(&self.told.senses) {
+            let other = [0, 1].into_iter().filter(|sense| !told[*sense] && body.senses[*sense].is_some());
+            found.extend(other.flat_map(|sense| body.of_sense(sense)));
+        }
+        found
     }
 }
 
-impl Limits {
+impl BodyLimits {
     /// What contact that slides in a sense does at the step expected.
     fn of_sense(&self, sense: usize) -> Vec<String> {
         match self.senses[sense].as_ref().map(|sense| &sense.outcome) {

@@ -21,9 +21,22 @@ pub struct Builder {
     /// Of the outputs, in their order.
     readers: Vec<Reader>,
     next: u32,
+    /// What rows from here on belong to, and what their names start with.
+    of: usize,
+    prefix: String,
 }
 
 impl Builder {
+    /// Rows from here on belong to structure or pair `of`, and their names start with `prefix`.
+    pub fn belongs(&mut self, of: usize, prefix: String) {
+        (self.of, self.prefix) = (of, prefix);
+    }
+
+    /// Rows from here on belong to the scene as a whole.
+    pub fn belongs_to_all(&mut self) {
+        self.belongs(0, String::new());
+    }
+
     pub fn push(
         &mut self,
         quantity: Quantity,
@@ -32,7 +45,7 @@ impl Builder {
     ) -> &mut Variable {
         self.close();
         self.variables.push(Variable {
-            name: name.into(),
+            name: format!("{}{}", self.prefix, name.into()),
             reference: self.next,
             dimension: None,
             kind: Kind::Real,
@@ -47,6 +60,7 @@ impl Builder {
             start: None,
             description: description.into(),
             quantity,
+            of: self.of,
         });
         self.variables.last_mut().unwrap_or_else(|| unreachable!("just pushed"))
     }

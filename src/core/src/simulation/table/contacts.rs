@@ -2,7 +2,8 @@
 
 use super::builder::Builder;
 use super::units::{ENERGY, FORCE, IMPULSE, POWER, TIME};
-use crate::settings::SceneSettings;
+use super::{Body, Parts, features};
+use crate::settings::{Motion, SceneSettings};
 use crate::simulation::outputs::{View, scalar};
 use crate::variables::{Kind, Quantity, Span, Unit, Variability};
 
@@ -26,7 +27,7 @@ pub fn totals(table: &mut Builder, friction: bool) {
         Span::Window,
         Some((&IMPULSE, 1e-3)),
         "Sum of the normal impulses of all contact nodes within the communication step",
-        scalar(|view| view.window.normal_impulse.iter().sum()),
+        scalar(|view| view.whole_normal_impulse()),
     );
     if friction {
         table.output(
@@ -149,10 +150,10 @@ const ENERGIES: [Energy; 17] = [
     }),
 ];
 
-/// The ledger's rows that exist; `words` tell of kinetic energy, strain energy and impacts.
-pub fn energies(table: &mut Builder, words: [&'static str; 3], exists: impl Fn(&str) -> bool) {
-    let mut words = words.into_iter();
-    for (name, span, quantity, text, read) in ENERGIES.into_iter().filter(|row| exists(row.0)) {
+/// The ledger's rows that exist.
+pub fn energies(table: &mut Builder, parts: &Parts) {
+    let mut words = words(parts).into_iter();
+    for (name, span, quantity, text, read) in ENERGIES.into_iter().filter(|row| exists(parts, row.0)) {
         let text = if text.is_empty() { words.next().unwrap_or_default() } else { text };
         table.output(name, span, Some((&ENERGY, 1.0)), text, scalar(read)).quantity = quantity;
     }
@@ -166,6 +167,40 @@ pub fn energies(table: &mut Builder, words: [&'static str; 3], exists: impl Fn(&
     relative.quantity = Quantity::EnergyResidualRelative;
 }
 
+/// Of kinetic energy, strain energy and impacts.
+fn words(parts: &Parts) -> [&'static str; 3] {
+    if parts.bodies().iter().any(|body| body.free) {
+        return [
+            "Kinetic energy of all structures, flight included",
+            "Strain energy of all structures",
+            "Energy lost by contact nodes stopping at a surface since the start",
+        ];
+    }
+    [
+        "Kinetic energy of the vibration in the rotating frame, of the instant",
+        "Strain energy of the instant",
+        "Energy lost by contact nodes stopping at the casing since the start",
+    ]
+}
+
+fn exists(parts: &Parts, name: &str) -> bool {
+    let (bodies, pairs) = (parts.bodies(), parts.pairs());
+    let turns = |body: &Body| body.structure.motion == Motion::Rotating;
+    match name {
+        "friction_loss" => parts.has_friction(),
+        "wear_work" => pairs.iter().any(|pair| pair.contact.coating.is_some()),
+        "load_work" => features::is_loaded(parts),
+        // What flies freely has no inputs that could work.
+        "external_work" => bodies.iter().any(|body| !body.free),
+        "shaft_work" => bodies.iter().any(turns),
+        "stiffening_work" => bodies.iter().any(|body| body.structure.spin.stiffening),
+        "whirl_work" => bodies.iter().any(|body| body.structure.whirl),
+        "shift_work" => bodies.iter().any(|body| body.structure.axial_shift),
+        "casing_motion_work" => pairs.iter().any(|pair| pair.surface.moving),
+        _ => true,
+    }
+}
+
 /// Internal step in use and number of steps.
 pub fn internal_steps(table: &mut Builder, settings: &SceneSettings) {
     let internal = table.output(
@@ -173,7 +208,7 @@ pub fn internal_steps(table: &mut Builder, settings: &SceneSettings) {
         Span::Point,
         Some((&TIME, settings.time.step)),
         "Internal time step in use",
-        scalar(|view| view.system.bank().step()),
+        scalar(|view| view.system.step_size()),
     );
     (internal.variability, internal.quantity) = (Variability::Discrete, Quantity::InternalStep);
     let steps = table.output(

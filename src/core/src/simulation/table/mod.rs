@@ -1,99 +1,166 @@
 //! The variable table of a scene: one row per thing an importer can see. Features that are off have no row.
+//!
+//! Names of a scene with one rotor are plain. Where several structures touch, what belongs to one starts with its name; of several
+//! pairs, what belongs to one starts with the name of its surface.
 
 mod builder;
 mod contacts;
 mod features;
 mod free;
-mod outputs;
+mod rotor;
 mod units;
 
-use super::compile::{Roles, SMALL_FRACTION};
-use super::outputs::Reader;
+use super::compile::SMALL_FRACTION;
+use super::outputs::{Reader, scalar};
 use super::patches::Patches;
+use super::plan::{Plan, prefix};
 use crate::contact::surface::Surface;
-use crate::settings::{InputInterpolation, Motion, Scene, SceneSettings, Shape, StructureSettings, SurfaceSettings};
-use crate::variables::{Quantity, Variability, VariableTable};
-use crate::{Result, Rom, ranges};
+use crate::settings::{
+    ContactSettings, InputInterpolation, Motion, Scene, SceneSettings, Shape, StructureSettings, SurfaceSettings,
+};
+use crate::variables::{Quantity, Span, Variability, VariableTable};
+use crate::{Error, Result, Rom, ranges};
 use builder::{Builder, RAMPED};
-use units::{ANGLE, ANGULAR_SPEED, TIME};
+use units::{ANGLE, ANGULAR_SPEED, FORCE, TIME, TORQUE};
 pub use units::{LENGTH, SCHEMES, SOLVERS};
+
+const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// What of a scene the variables depend on.
 struct Parts<'a> {
+    scene: &'a Scene,
     settings: &'a SceneSettings,
-    master: &'a StructureSettings,
+    plan: Plan,
+}
+
+/// A structure that touches.
+#[derive(Clone, Copy)]
+struct Body<'a> {
+    index: usize,
+    structure: &'a StructureSettings,
     rom: &'a Rom,
+    free: bool,
+}
+
+/// A contact pair.
+struct Pair<'a> {
+    index: usize,
+    contact: &'a ContactSettings,
     surface: &'a SurfaceSettings,
-    carrier: Option<(&'a StructureSettings, &'a Rom)>,
+    body: Body<'a>,
+    /// Structure that deforms the surface.
+    carrier: Option<usize>,
     /// Patches that friction power is gathered for.
     patches: usize,
 }
 
+/// A structure that carries surfaces.
+struct Carrier<'a> {
+    index: usize,
+    structure: &'a StructureSettings,
+    rom: &'a Rom,
+    /// Of open surfaces.
+    open: bool,
+}
+
 impl<'a> Parts<'a> {
-    fn new(scene: &'a Scene) -> Result<Self> {
-        let roles = Roles::new(scene)?;
-        let settings = &scene.settings;
-        let structure = |index: usize| (&settings.structures[index], &scene.roms[index]);
-        let (master, rom) = structure(roles.master);
-        Ok(Self {
-            settings,
-            master,
-            rom,
-            surface: &settings.surfaces[roles.surface],
-            carrier: roles.carrier.map(structure),
-            patches: Patches::new(scene, roles).as_ref().map_or(0, Patches::len),
-        })
+    fn bodies(&self) -> Vec<Body<'a>> {
+        let body = |index: usize| {
+            let (structure, rom) = self.plan.structure(self.scene, index);
+            Body { index, structure, rom, free: self.plan.is_free(self.scene, index) }
+        };
+        (0..self.plan.bodies.len()).map(body).collect()
+    }
+
+    fn pairs(&self) -> Vec<Pair<'a>> {
+        let bodies = self.bodies();
+        let pair = |(index, plan): (usize, &super::plan::PairPlan)| Pair {
+            index,
+            contact: &self.settings.contacts[index],
+            surface: &self.settings.surfaces[plan.surface],
+            body: bodies[plan.body],
+            carrier: plan.carrier,
+            patches: Patches::new(self.scene, &self.plan, plan).as_ref().map_or(0, Patches::len),
+        };
+        self.plan.pairs.iter().enumerate().map(pair).collect()
+    }
+
+    fn carriers(&self) -> Vec<Carrier<'a>> {
+        let carrier = |(index, structure): (usize, &usize)| Carrier {
+            index,
+            structure: &self.settings.structures[*structure],
+            rom: &self.scene.roms[*structure],
+            open: self.plan.pairs.iter().any(|pair| pair.carrier == Some(index) && self.plan.is_free(self.scene, pair.body)),
+        };
+        self.plan.carriers.iter().enumerate().map(carrier).collect()
+    }
+
+    /// A scene that gives no friction coefficient has no friction variables.
+    fn has_friction(&self) -> bool {
+        self.settings.contacts.iter().any(|contact| contact.friction > 0.0)
+    }
+
+    fn of_body(&self, body: &Body) -> String {
+        prefix(self.plan.bodies.len(), &body.structure.name)
+    }
+
+    fn of_pair(&self, pair: &Pair) -> String {
+        prefix(self.plan.pairs.len(), &pair.surface.name)
+    }
+
+    fn of_carrier(&self, carrier: &Carrier) -> String {
+        prefix(self.plan.carriers.len(), &carrier.structure.name)
+    }
+
+    /// The structure that a text speaks of: the rotor, or its name.
+    fn rotor(&self, body: &Body) -> String {
+        if body.free || self.plan.bodies.len() > 1 { body.structure.name.clone() } else { "the rotor".to_owned() }
     }
 }
 
 /// Build the table of a validated scene, and what fills its outputs, in their order.
 ///
 /// # Errors
-/// A watched sector or nodal diameter the ROM does not have.
+/// A watched sector or nodal diameter that no ROM has; pairs that do not fit the ROMs.
 pub fn build(scene: &Scene) -> Result<(VariableTable, Vec<Reader>)> {
-    if scene.settings.free_master().is_some() {
-        return free::build(scene);
-    }
-    let scene = &Parts::new(scene)?;
+    let parts = &Parts { scene, settings: &scene.settings, plan: Plan::new(scene)? };
     let mut table = Builder::default();
     table.time();
-    inputs(&mut table, scene)?;
-    features::inputs(&mut table, scene);
-    parameters(&mut table, scene);
-    features::parameters(&mut table, scene);
-    outputs::totals(&mut table, scene);
-    outputs::watched(&mut table, scene)?;
-    outputs::fields(&mut table, scene)?;
-    features::outputs(&mut table, scene);
-    if scene.settings.outputs.energies {
-        outputs::energies(&mut table, scene);
+    inputs(&mut table, parts)?;
+    features::inputs(&mut table, parts);
+    parameters(&mut table, parts);
+    features::parameters(&mut table, parts);
+    totals(&mut table, parts);
+    free::bodies(&mut table, parts);
+    rotor::watched(&mut table, parts)?;
+    rotor::fields(&mut table, parts)?;
+    features::outputs(&mut table, parts);
+    table.belongs_to_all();
+    if parts.settings.outputs.energies {
+        contacts::energies(&mut table, parts);
     }
-    contacts::internal_steps(&mut table, scene.settings);
+    contacts::internal_steps(&mut table, parts.settings);
     table.finish()
 }
 
 /// Lengths beyond this are not small against the radius of the contact nodes (m).
-fn largest_length(scene: &Parts) -> f64 {
-    let radii = scene.rom.contact_nodes.iter().map(|node| node.position[0]);
+fn largest_length(rom: &Rom) -> f64 {
+    let radii = rom.contact_nodes.iter().map(|node| node.position[0]);
     SMALL_FRACTION * radii.fold(f64::INFINITY, f64::min)
 }
 
-fn inputs(table: &mut Builder, scene: &Parts) -> Result<()> {
-    let structure = scene.master;
-    if structure.motion == Motion::Rotating {
-        let speed = table.input(
-            Quantity::Speed,
-            "speed",
-            Some(&ANGULAR_SPEED),
-            structure.speed,
-            "Speed of the rotor about +z; held over a step, or linear with a derivative",
-        );
+fn inputs(table: &mut Builder, parts: &Parts) -> Result<()> {
+    for body in parts.bodies().iter().filter(|body| body.structure.motion == Motion::Rotating) {
+        table.belongs(body.index, parts.of_body(body));
+        let text = format!("Speed of {} about +z; held over a step, or linear with a derivative", parts.rotor(body));
+        let speed = table.input(Quantity::Speed, "speed", Some(&ANGULAR_SPEED), body.structure.speed, &text);
         speed.display = Some(0);
         speed.nominal = Some(1000.0);
         (speed.min, speed.max) = (Some(-ranges::SPEED), Some(ranges::SPEED));
     }
-    let surface = scene.surface;
-    if surface.moving {
+    for pair in parts.pairs().iter().filter(|pair| pair.surface.moving) {
+        table.belongs(pair.index, parts.of_pair(pair));
+        let largest = largest_length(pair.body.rom);
         let change = table.moving_input(
             Quantity::RadiusChange,
             "casing_radius_change",
@@ -102,76 +169,212 @@ fn inputs(table: &mut Builder, scene: &Parts) -> Result<()> {
             "Uniform change of the casing radius; positive opens every clearance",
         );
         (change.nominal, change.display) = (Some(1e-4), Some(1));
-        (change.min, change.max) = (Some(-largest_length(scene)), Some(largest_length(scene)));
-        if surface.shape != (Shape::Circular {}) {
-            let factor = table.moving_input(
-                Quantity::ShapeFactor,
-                "casing_shape_factor",
-                None,
-                1.0,
-                "Factor on the casing shape (0 = round, 1 = as in the scene)",
-            );
-            let change = Surface::new(&surface.shape, scene.settings.contacts[0].nominal_gap())?.largest_change();
-            let largest = if change > 0.0 { largest_length(scene) / change } else { 1.0 };
-            (factor.min, factor.max) = (Some(-largest), Some(largest));
-            if scene.carrier.is_none() {
-                table.moving_input(
-                    Quantity::ShapeRotation,
-                    "casing_shape_rotation",
-                    Some(&ANGLE),
-                    0.0,
-                    "Rotation of the casing shape about +z",
-                );
-            }
+        (change.min, change.max) = (Some(-largest), Some(largest));
+        if pair.surface.shape == (Shape::Circular {}) {
+            continue;
+        }
+        let text = "Factor on the casing shape (0 = round, 1 = as in the scene)";
+        let factor = table.moving_input(Quantity::ShapeFactor, "casing_shape_factor", None, 1.0, text);
+        let change = Surface::new(&pair.surface.shape, pair.contact.nominal_gap())?.largest_change();
+        let largest = if change > 0.0 { largest / change } else { 1.0 };
+        (factor.min, factor.max) = (Some(-largest), Some(largest));
+        if pair.carrier.is_none() {
+            let text = "Rotation of the casing shape about +z";
+            table.moving_input(Quantity::ShapeRotation, "casing_shape_rotation", Some(&ANGLE), 0.0, text);
         }
     }
     Ok(())
 }
 
-fn parameters(table: &mut Builder, scene: &Parts) {
-    let settings = &scene.settings;
-    let contact = &settings.contacts[0];
-    if has_friction(scene) {
-        table.friction(contact, "Coulomb friction coefficient between tip and casing");
+fn parameters(table: &mut Builder, parts: &Parts) {
+    let (settings, bodies, pairs) = (parts.settings, parts.bodies(), parts.pairs());
+    for body in bodies.iter().filter(|body| body.free) {
+        table.belongs(body.index, parts.of_body(body));
+        free::velocity(table, body);
     }
-    let offset = table.parameter(
-        Quantity::GapOffset,
-        "gap_offset",
-        Some(&LENGTH),
-        0.0,
-        "Added to the radial clearance of every sector",
-    );
-    offset.description += RAMPED;
-    (offset.display, offset.nominal, offset.variability) = (Some(1), Some(1e-4), Variability::Tunable);
-    (offset.min, offset.max) = (Some(-largest_length(scene)), Some(largest_length(scene)));
-    let ratio = scene.master.damping_ratio.unwrap_or(scene.rom.damping_ratio);
-    table.damping(Quantity::DampingRatio, "damping_ratio", ratio, "Modal damping ratio of the rotor");
+    friction(table, parts);
+    for pair in pairs.iter().filter(|pair| !pair.body.free) {
+        table.belongs(pair.index, parts.of_pair(pair));
+        gap_offset(table, pair.body.rom);
+    }
+    for body in &bodies {
+        table.belongs(body.index, parts.of_body(body));
+        let ratio = body.structure.damping_ratio.unwrap_or(body.rom.damping_ratio);
+        let rigid = if body.free { "; its rigid modes are not damped" } else { "" };
+        let text = format!("Modal damping ratio of {}{rigid}", parts.rotor(body));
+        table.damping(Quantity::DampingRatio, "damping_ratio", ratio, &text);
+    }
+    for carrier in parts.carriers().iter().filter(|carrier| carrier.open) {
+        features::damping(table, carrier, format!("{}.", carrier.structure.name), &carrier.structure.name);
+    }
+    table.belongs_to_all();
     table.methods(settings);
-    if features::has_moving_inputs(scene) || settings.time.input_interpolation == InputInterpolation::Hold {
+    if features::has_moving_inputs(parts) || settings.time.input_interpolation == InputInterpolation::Hold {
         table.input_interpolation(settings);
     }
-    let angle = table.parameter(
-        Quantity::InitialAngle,
-        "initial_rotor_angle",
-        Some(&ANGLE),
-        0.0,
-        "Angle of the rotor about +z at the start",
-    );
-    angle.display = Some(0);
-    if scene.surface.shape != (Shape::Circular {}) {
-        let ramp = table.parameter(
-            Quantity::RampTime,
-            "casing_ramp_time",
-            Some(&TIME),
-            scene.surface.ramp_time,
-            "Time over which the casing shape grows smoothly from round to full after the start",
-        );
+    for body in bodies.iter().filter(|body| !body.free) {
+        table.belongs(body.index, parts.of_body(body));
+        let text = format!("Angle of {} about +z at the start", parts.rotor(body));
+        table.parameter(Quantity::InitialAngle, "initial_rotor_angle", Some(&ANGLE), 0.0, &text).display = Some(0);
+    }
+    for pair in pairs.iter().filter(|pair| !pair.body.free && pair.surface.shape != (Shape::Circular {})) {
+        table.belongs(pair.index, parts.of_pair(pair));
+        let text = "Time over which the casing shape grows smoothly from round to full after the start";
+        let ramp = table.parameter(Quantity::RampTime, "casing_ramp_time", Some(&TIME), pair.surface.ramp_time, text);
         (ramp.min, ramp.max) = (Some(0.0), Some(ranges::TIME));
     }
+    table.belongs_to_all();
     table.scene_name(settings);
 }
 
-/// A scene that gives no friction coefficient has no friction variables.
-fn has_friction(scene: &Parts) -> bool {
-    scene.settings.contacts[0].friction > 0.0
+/// One coefficient where all pairs have the same, else one each.
+fn friction(table: &mut Builder, parts: &Parts) {
+    if !parts.has_friction() {
+        return;
+    }
+    let free = parts.bodies().iter().all(|body| body.free);
+    if has_one_friction(parts.settings) {
+        table.belongs_to_all();
+        let text = if free || parts.plan.pairs.len() > 1 {
+            "Coulomb friction coefficient of all contacts"
+        } else {
+            "Coulomb friction coefficient between tip and casing"
+        };
+        table.friction(&parts.settings.contacts[0], text);
+        return;
+    }
+    for pair in parts.pairs() {
+        table.belongs(pair.index, parts.of_pair(&pair));
+        let text = format!("Coulomb friction coefficient between {} and {}", pair.body.structure.name, pair.surface.name);
+        table.friction(pair.contact, &text);
+    }
+}
+
+/// Whether all pairs of a scene have the same friction coefficient.
+pub fn has_one_friction(settings: &SceneSettings) -> bool {
+    let first = settings.contacts[0].friction.to_bits();
+    settings.contacts.iter().all(|contact| contact.friction.to_bits() == first)
+}
+
+fn gap_offset(table: &mut Builder, rom: &Rom) {
+    let text = "Added to the radial clearance of every sector";
+    let offset = table.parameter(Quantity::GapOffset, "gap_offset", Some(&LENGTH), 0.0, text);
+    offset.description += RAMPED;
+    (offset.display, offset.nominal, offset.variability) = (Some(1), Some(1e-4), Variability::Tunable);
+    (offset.min, offset.max) = (Some(-largest_length(rom)), Some(largest_length(rom)));
+}
+
+/// Angles, clearances, forces and moments of structures and pairs, and what all contacts do together.
+fn totals(table: &mut Builder, parts: &Parts) {
+    let (bodies, pairs) = (parts.bodies(), parts.pairs());
+    let rotors = || bodies.iter().filter(|body| !body.free);
+    for body in rotors() {
+        table.belongs(body.index, parts.of_body(body));
+        rotor::angle(table, parts, body);
+    }
+    table.belongs_to_all();
+    smallest_clearance(table, parts);
+    for body in rotors() {
+        table.belongs(body.index, parts.of_body(body));
+        rotor::clearances(table, parts, body);
+    }
+    for body in &bodies {
+        table.belongs(body.index, parts.of_body(body));
+        forces(table, parts, body);
+    }
+    for pair in pairs.iter().filter(|pair| pair.body.free || pairs.len() > 1) {
+        table.belongs(pair.index, String::new());
+        pair_forces(table, pair);
+    }
+    table.belongs_to_all();
+    contacts::totals(table, parts.has_friction());
+}
+
+fn smallest_clearance(table: &mut Builder, parts: &Parts) {
+    let free = parts.bodies().iter().any(|body| body.free);
+    let gap = if free { 1e-3 } else { parts.settings.contacts[0].gap };
+    let text = match (free, parts.plan.pairs.len()) {
+        (true, _) => {
+            "Smallest clearance of all contact nodes within the communication step, normal to their surfaces; 1e9 m where none of \
+             them has a surface to touch, beyond the edges"
+        }
+        (false, 1) => "Smallest clearance of the whole disk within the communication step, normal to the casing",
+        _ => "Smallest clearance of all contact nodes within the communication step, normal to their surfaces",
+    };
+    contacts::smallest_clearance(table, Some((&LENGTH, gap)), text);
+}
+
+/// Force on a structure, and its moment: of a rotor about the shaft's centre.
+fn forces(table: &mut Builder, parts: &Parts, body: &Body) {
+    let (index, name) = (body.index, parts.rotor(body));
+    for (axis, letter) in AXES.into_iter().enumerate() {
+        let text = if body.free {
+            format!("Contact force on {name} along {letter}, all pairs, mean over the communication step")
+        } else {
+            format!("Contact force on {name} along fixed {letter}, mean over the communication step")
+        };
+        let read = scalar(move |view| view.mean * view.window.bodies[index].force_impulse[axis]);
+        table.output(format!("force_{letter}"), Span::Mean, Some((&FORCE, 100.0)), text, read);
+    }
+    for axis in 0..3 {
+        // The other two of a rotor are for a model of the shaft, which is what gives whirl.
+        if !body.free && axis < 2 && !body.structure.whirl {
+            continue;
+        }
+        let (row, text) = moment(parts, body, axis);
+        let read = scalar(move |view| view.mean * view.window.bodies[index].moment_impulse[axis]);
+        table.output(row, Span::Mean, Some((&TORQUE, 10.0)), text, read).quantity = Quantity::Moment(axis);
+    }
+}
+
+/// Name and text of a moment.
+fn moment(parts: &Parts, body: &Body, axis: usize) -> (String, String) {
+    let (name, letter) = (parts.rotor(body), AXES[axis]);
+    let row = format!("moment_{letter}");
+    match (body.free, axis) {
+        (true, _) => (
+            row,
+            format!(
+                "Moment of the contact forces on {name} about {letter} through the origin, all pairs, mean over the communication step"
+            ),
+        ),
+        (false, 2) => (
+            "torque".to_owned(),
+            format!(
+                "Torque of the contact forces on {name} about +z through the shaft's centre, conjugate to the rotor angle, mean \
+                 over the communication step"
+            ),
+        ),
+        (false, _) => (
+            row,
+            format!(
+                "Moment of the contact forces on {name} about fixed {letter} through the shaft's centre at z = 0 of the rotor \
+                 (whirl and axial shift move it), mean over the communication step"
+            ),
+        ),
+    }
+}
+
+/// Force of one surface on what touches it, and its moment.
+fn pair_forces(table: &mut Builder, pair: &Pair) {
+    let (index, surface, master) = (pair.index, &pair.surface.name, &pair.body.structure.name);
+    let point = if pair.body.free { "the origin" } else { "the shaft's centre" };
+    for (axis, letter) in AXES.into_iter().enumerate() {
+        let text = format!(
+            "Moment of the contact force on {master} from {surface} about {letter} through {point}, mean over the \
+             communication step"
+        );
+        let read = scalar(move |view| view.mean * view.window.pairs[index].moment_impulse[axis]);
+        table.output(format!("{surface}.moment_{letter}"), Span::Mean, Some((&TORQUE, 10.0)), text, read);
+    }
+    for (axis, letter) in AXES.into_iter().enumerate() {
+        let text = format!("Contact force on {master} from {surface} along {letter}, mean over the communication step");
+        let read = scalar(move |view| view.mean * view.window.pairs[index].force_impulse[axis]);
+        table.output(format!("{surface}.force_{letter}"), Span::Mean, Some((&FORCE, 100.0)), text, read);
+    }
+}
+
+/// Refuse what no structure has.
+fn refuse<T>(field: &str, problem: String, remedy: String) -> Result<T> {
+    Err(Error::invalid(format!("outputs.{field}"), problem, remedy))
 }

@@ -244,7 +244,7 @@ fn worn(mut scene: Scene, coating: CoatingSettings) -> Result<Vec<Check>> {
         fallen = fallen.max(before - volume);
         before = volume;
         let system = simulation.system();
-        deepest = system.gaps().iter().fold(deepest, |most: f64, gap| most.max(-gap));
+        deepest = system.gaps().fold(deepest, |most: f64, gap| most.max(-gap));
     }
     let energy = real(&simulation, "wear_energy");
     let (yields, depth) = (coating.yield_stress, real(&simulation, "wear_depth_maximum"));

@@ -1,8 +1,7 @@
-//! Gaps of a free master: every contact node against the open surface of its pair, all in the fixed frame.
+//! Gaps of structures described in fixed directions: contact nodes against a surface through a contact grid.
 //!
 //! A node stands at x = X + u, rigid flight included, and meets the closest point of its surface: g = (x − S)·n with
-//! n = S_t × S_s/|S_t × S_s|. A node beyond a free edge has nothing to touch, and so has one that belongs to no pair: their
-//! gap is infinite and their normal zero.
+//! n = S_t × S_s/|S_t × S_s|. A node beyond a free edge has nothing to touch: its gap is infinite and its normal zero.
 
 use super::gap::{Geometry, dot};
 use super::spline::{ClosestPoint, Projection, SurfaceSpline};
@@ -11,13 +10,11 @@ use super::spline_gap::NOTHING_TO_TOUCH;
 /// Displacements and penetrations beyond this share of the extent of the contact nodes are not small.
 const SMALL_FRACTION: f64 = 0.1;
 
-/// A surface through the open contact grid of a structure.
+/// A surface through the contact grid of a structure, in fixed directions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenSurface {
     /// The surface as it is now.
     pub surface: SurfaceSpline,
-    /// Which of the carriers deforms it; `None` for a rigid surface.
-    pub carrier: Option<usize>,
     /// Control points undeformed (m).
     undeformed: Vec<[f64; 3]>,
     /// Control points in use.
@@ -26,84 +23,89 @@ pub struct OpenSurface {
 
 impl OpenSurface {
     /// Undeformed.
-    pub fn new(surface: SurfaceSpline, carrier: Option<usize>) -> Self {
+    pub fn new(surface: SurfaceSpline) -> Self {
         let undeformed = surface.control_points().to_vec();
-        Self { surface, carrier, control: undeformed.clone(), undeformed }
+        Self { surface, control: undeformed.clone(), undeformed }
     }
 
-    /// Displace the control points by `moved` (m, three per control point).
-    pub fn follow(&mut self, moved: &[f64]) {
+    /// Displace the control points by `moved` (m, three per control point); a rigid surface is moved by nothing.
+    fn follow(&mut self, moved: &[f64]) {
+        if moved.is_empty() {
+            return;
+        }
         let (moved, _) = moved.as_chunks::<3>();
         for ((point, undeformed), moved) in self.control.iter_mut().zip(&self.undeformed).zip(moved) {
             *point = std::array::from_fn(|i| undeformed[i] + moved[i]);
         }
         self.surface.set_control_points(&self.control);
     }
+
+    /// Longest side of the box around its undeformed control points (m).
+    pub fn extent(&self) -> f64 {
+        extent(&self.undeformed)
+    }
 }
 
-/// Contact nodes of a free structure facing open surfaces.
+/// Contact nodes described in fixed directions, facing a surface.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FreeGap {
-    /// Undeformed positions of the contact nodes (m).
+pub struct OpenGap {
+    /// Undeformed positions of the contact nodes of the structure (m).
     positions: Vec<[f64; 3]>,
-    /// Surface that each node meets; `None` for nodes of no pair.
-    surface_of: Vec<Option<usize>>,
-    /// The surfaces.
-    pub surfaces: Vec<OpenSurface>,
+    /// Those that meet the surface.
+    nodes: Vec<usize>,
+    /// The surface.
+    pub surface: OpenSurface,
     /// Largest displacement that counts as small (m).
     largest: f64,
 }
 
-impl FreeGap {
-    /// Nodes at `positions` (m), each against the surface of this index.
-    pub fn new(positions: Vec<[f64; 3]>, surface_of: Vec<Option<usize>>, surfaces: Vec<OpenSurface>) -> Self {
-        let of = |surface: &OpenSurface| extent(surface.surface.control_points());
-        let smallest = surfaces.iter().map(of).fold(extent(&positions), f64::min);
-        Self { positions, surface_of, surfaces, largest: SMALL_FRACTION * smallest }
+impl OpenGap {
+    /// `nodes` of those at `positions` (m) face the surface.
+    pub fn new(positions: Vec<[f64; 3]>, nodes: Vec<usize>, surface: OpenSurface) -> Self {
+        let smallest = surface.extent().min(extent(&positions));
+        Self { positions, nodes, surface, largest: SMALL_FRACTION * smallest }
     }
 
-    /// Number of contact nodes.
-    pub fn nodes(&self) -> usize {
-        self.positions.len()
+    /// With another pair of the same structure, whose surface has this extent (m).
+    pub fn beside(self, extent: f64) -> Self {
+        Self { largest: self.largest.min(SMALL_FRACTION * extent), ..self }
     }
 
-    /// Index of the surface that a node meets.
-    pub fn surface_of(&self, node: usize) -> Option<usize> {
-        self.surface_of[node]
+    /// The contact nodes of the pair.
+    pub fn nodes(&self) -> &[usize] {
+        &self.nodes
     }
 
-    /// Largest displacement and penetration that count as small (m): a tenth of the smallest extent of the contact nodes
-    /// of master and slaves.
+    /// Undeformed positions of the contact nodes of the structure (m).
+    pub fn positions(&self) -> &[[f64; 3]] {
+        &self.positions
+    }
+
+    /// Largest displacement and penetration that count as small (m): a tenth of the smallest extent of the contact nodes and of
+    /// the surfaces they meet.
     pub fn largest(&self) -> f64 {
         self.largest
     }
 
-    /// Undeformed position of a node (m).
-    pub fn position(&self, node: usize) -> [f64; 3] {
-        self.positions[node]
+    /// The point of the surface at a place (m).
+    pub fn contact_point(&self, place: ClosestPoint) -> [f64; 3] {
+        self.surface.surface.evaluate(place).point
     }
 
-    /// The point of the surface at the place that a node meets (m); the node itself if it belongs to no pair.
-    pub fn contact_point(&self, node: usize, place: ClosestPoint) -> [f64; 3] {
-        let surface = self.surface_of[node].map(|index| &self.surfaces[index].surface);
-        surface.map_or(self.positions[node], |surface| surface.evaluate(place).point)
-    }
-
-    /// Gaps (m), normals and places of all nodes for the displacements of the contact rows (m); closest points are sought
-    /// from `guess`, or from the nearest data point.
+    /// Gaps (m), normals and places of the nodes for the displacements of the contact rows (m), of a surface whose control points
+    /// are displaced by `moved` (m; empty for a rigid one). Closest points are sought from `guess`, or from the nearest data
+    /// point.
     pub fn evaluate(
-        &self,
+        &mut self,
         displacement: &[f64],
+        moved: &[f64],
         guess: Option<&[ClosestPoint]>,
         geometry: &mut Geometry,
         gap: &mut [f64],
     ) {
-        for (node, gap) in gap.iter_mut().enumerate() {
-            let Some(index) = self.surface_of[node] else {
-                *gap = NOTHING_TO_TOUCH;
-                continue;
-            };
-            let surface = &self.surfaces[index].surface;
+        self.surface.follow(moved);
+        let surface = &self.surface.surface;
+        for &node in &self.nodes {
             let point = std::array::from_fn(|i| self.positions[node][i] + displacement[3 * node + i]);
             let start = guess.map_or_else(|| surface.locate(point), |places| places[node]);
             let mut found = surface.project(point, start);
@@ -116,7 +118,7 @@ impl FreeGap {
                 // Found out by the caller: the state is not what the model describes any more.
                 Projection::Lost => (f64::NAN, start, [0.0; 3]),
             };
-            *gap = value;
+            gap[node] = value;
             geometry.places[node] = place;
             for (component, value) in normal.into_iter().enumerate() {
                 geometry.normal[component][node] = value;

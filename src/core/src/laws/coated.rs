@@ -1,0 +1,98 @@
+//! Contact with an abradable coating: rods that are free, elastic or yielding, and the hard casing behind them.
+
+use nalgebra::DMatrix;
+
+use super::{ContactLaw, Prediction};
+use crate::contact::coating::{CoatedProblem, Coating};
+use crate::contact::solver::Outcome;
+
+/// A coating with its wear, and the problem of the blades on it. Groups are whole blades, whose nodes share cells.
+#[derive(Debug, Clone)]
+pub struct Coated {
+    coating: Coating,
+    problem: CoatedProblem,
+    size: usize,
+    /// Angles at which the contacts face the casing (rad), predicted gaps (m), and which rest on the hard casing at first.
+    angles: Vec<f64>,
+    gaps: Vec<f64>,
+    closed: Vec<bool>,
+    /// Force of coating and hard casing together (N).
+    multipliers: Vec<f64>,
+}
+
+impl Coated {
+    /// Room for `contacts` contacts, all of whole blades.
+    pub fn new(coating: Coating, contacts: usize) -> Self {
+        Self {
+            problem: coating.problem(contacts / coating.nodes()),
+            coating,
+            size: 0,
+            angles: vec![0.0; contacts],
+            gaps: vec![0.0; contacts],
+            closed: vec![false; contacts],
+            multipliers: vec![0.0; contacts],
+        }
+    }
+
+    /// The coating.
+    pub fn coating(&self) -> &Coating {
+        &self.coating
+    }
+
+    /// The same, to change its wear.
+    pub fn coating_mut(&mut self) -> &mut Coating {
+        &mut self.coating
+    }
+
+    /// Take over the wear of the last solution; returns the energy it takes (J).
+    pub fn commit(&mut self) -> f64 {
+        self.coating.commit(&self.problem)
+    }
+}
+
+impl ContactLaw for Coated {
+    const DIRECTIONS: usize = 1;
+    const LOOKS_AGAIN: bool = true;
+
+    fn begin(&mut self, size: usize) {
+        self.problem.clear();
+        self.size = size;
+    }
+
+    fn matrix(&mut self) -> &mut DMatrix<f64> {
+        &mut self.problem.delassus
+    }
+
+    fn pose(&mut self, contact: usize, _: &[[f64; 3]], at: &impl Prediction) {
+        self.angles[contact] = at.angle();
+        self.gaps[contact] = at.gap();
+        self.closed[contact] = at.gap_before() <= -self.coating.thickness();
+    }
+
+    #[inline(never)]
+    fn solve(&mut self) -> Outcome {
+        let size = self.size;
+        for blade in self.angles[..size].chunks_exact(self.coating.nodes()) {
+            self.coating.locate(&mut self.problem, blade);
+        }
+        self.problem.gaps[..size].copy_from_slice(&self.gaps[..size]);
+        self.problem.closed[..size].copy_from_slice(&self.closed[..size]);
+        let outcome = self.problem.solve();
+        for contact in 0..size {
+            self.multipliers[contact] = self.problem.coating[contact] + self.problem.hard[contact];
+        }
+        outcome
+    }
+
+    fn multipliers(&self) -> &[f64] {
+        &self.multipliers[..self.size]
+    }
+
+    fn gaps(&self) -> &[f64] {
+        &self.problem.gaps[..self.size]
+    }
+
+    fn coating_shares(&self) -> &[f64] {
+        &self.problem.coating[..self.size]
+    }
+}

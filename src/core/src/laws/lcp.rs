@@ -1,0 +1,48 @@
+//! Signorini's law on all contacts of a group: 0 ≤ λ ⟂ g + Wλ ≥ 0.
+
+use nalgebra::DMatrix;
+
+use super::{ContactLaw, Prediction};
+use crate::contact::solver::{ContactSolver, Outcome};
+
+/// Linear complementarity, started from what was closed one step before.
+#[derive(Debug, Clone)]
+pub struct Lcp(ContactSolver);
+
+impl Lcp {
+    /// Room for `contacts` contacts.
+    pub fn new(contacts: usize) -> Self {
+        Self(ContactSolver::new(contacts))
+    }
+}
+
+impl ContactLaw for Lcp {
+    const DIRECTIONS: usize = 1;
+    const LOOKS_AGAIN: bool = true;
+
+    fn begin(&mut self, size: usize) {
+        self.0.set_size(size);
+    }
+
+    fn matrix(&mut self) -> &mut DMatrix<f64> {
+        &mut self.0.delassus
+    }
+
+    fn pose(&mut self, contact: usize, _: &[[f64; 3]], at: &impl Prediction) {
+        self.0.gaps[contact] = at.gap();
+        // Closed in the last step: the likeliest guess for this one.
+        self.0.active[contact] = at.gap_before() <= 0.0;
+    }
+
+    fn solve(&mut self) -> Outcome {
+        self.0.lcp()
+    }
+
+    fn multipliers(&self) -> &[f64] {
+        &self.0.multipliers[..self.0.size()]
+    }
+
+    fn gaps(&self) -> &[f64] {
+        &self.0.gaps[..self.0.size()]
+    }
+}

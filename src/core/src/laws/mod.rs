@@ -1,0 +1,228 @@
+//! Contact laws: what the forces of one group of coupled contacts are, given predicted gaps and the Delassus matrix. A law is a
+//! file here, a variant of [`Law`], and where an importer may choose it a row of the enumeration of solvers.
+//!
+//! Each owns its matrix, its unknowns and its state. The group that asks fills the Delassus matrix W = C_Nᵀ A⁻¹ C_NT along the
+//! directions of the law, poses the contacts one after the other, and lets the law solve.
+
+mod coated;
+mod coulomb;
+mod film;
+mod lcp;
+
+use nalgebra::DMatrix;
+
+use crate::contact::coating::Coating;
+use crate::contact::gap::dot;
+use crate::contact::solver::Outcome;
+use crate::persist::{Persist, Reader, Writer};
+use crate::settings::Solver;
+pub use coated::Coated;
+pub use coulomb::Coulomb;
+pub use film::Film;
+pub use lcp::Lcp;
+
+/// What is known of a contact before its force is.
+pub trait Prediction {
+    /// Predicted gap (m).
+    fn gap(&self) -> f64;
+    /// Gap one step earlier (m).
+    fn gap_before(&self) -> f64;
+    /// Coulomb coefficient µ (-).
+    fn friction(&self) -> f64;
+    /// Predicted slip over the step, rigid motion included (m, own directions of the node).
+    fn slip(&self) -> [f64; 3];
+    /// Contact force of the last step (N, own directions).
+    fn last_force(&self) -> [f64; 3];
+    /// Angle at which the node faces the casing (rad, fixed frame).
+    fn angle(&self) -> f64;
+}
+
+/// What every law can do. Slices are along the columns of the Delassus matrix or one entry per contact.
+pub trait ContactLaw {
+    /// Directions per contact in the Delassus matrix: 1 (normal, with sliding friction in the columns) or 3 (normal and tangents).
+    const DIRECTIONS: usize;
+    /// Whether a contact that the solution would open or press in is looked at again; the paper's rule detects once.
+    const LOOKS_AGAIN: bool;
+    /// Whether it starts from the contact forces of the last step.
+    const STARTS_FROM_FORCES: bool = false;
+    /// A group of `size` contacts follows.
+    fn begin(&mut self, size: usize);
+    /// Delassus matrix (m/N), to be filled.
+    fn matrix(&mut self) -> &mut DMatrix<f64>;
+    /// Contact `contact` of the group, in order; `directions` are its rows of the matrix.
+    fn pose(&mut self, contact: usize, directions: &[[f64; 3]], at: &impl Prediction);
+    /// Forces of all contacts posed.
+    fn solve(&mut self) -> Outcome;
+    /// Multipliers along the columns (N).
+    fn multipliers(&self) -> &[f64];
+    /// Corrected gaps (m).
+    fn gaps(&self) -> &[f64];
+    /// Parts of the normal forces that a coating carries (N); empty without one.
+    fn coating_shares(&self) -> &[f64] {
+        &[]
+    }
+}
+
+/// A law with its unknowns.
+#[derive(Debug, Clone)]
+pub enum Law {
+    /// Forward-increment Lagrange multipliers: penetration detected once, equality there.
+    Film(Film),
+    /// Complementarity on all contacts.
+    Lcp(Lcp),
+    /// Complementarity with stick and slip.
+    Coulomb(Coulomb),
+    /// Complementarity on an abradable coating.
+    Coated(Coated),
+}
+
+/// The same call on every law.
+macro_rules! each_law {
+    ($self:expr, $law:ident => $call:expr) => {
+        match $self {
+            Law::Film($law) => $call,
+            Law::Lcp($law) => $call,
+            Law::Coulomb($law) => $call,
+            Law::Coated($law) => $call,
+        }
+    };
+}
+
+/// One body of code for each law: all of them in their caller are too much for the instruction cache.
+#[inline(never)]
+fn pose_all<L: ContactLaw, P: Prediction>(law: &mut L, rows: &[[f64; 3]], contacts: impl Iterator<Item = P>) {
+    for (contact, at) in contacts.enumerate() {
+        law.pose(contact, &rows[L::DIRECTIONS * contact..][..L::DIRECTIONS], &at);
+    }
+}
+
+fn directions<L: ContactLaw>(_: &L) -> usize {
+    L::DIRECTIONS
+}
+
+fn looks_again<L: ContactLaw>(_: &L) -> bool {
+    L::LOOKS_AGAIN
+}
+
+fn starts_from_forces<L: ContactLaw>(_: &L) -> bool {
+    L::STARTS_FROM_FORCES
+}
+
+impl Law {
+    /// Room for groups of up to `contacts` contacts; on a coating for whole blades.
+    pub fn new(solver: Solver, coating: Option<Coating>, contacts: usize) -> Self {
+        match (coating, solver) {
+            (Some(coating), _) => Self::Coated(Coated::new(coating, contacts)),
+            (None, Solver::Film) => Self::Film(Film::new(contacts)),
+            (None, Solver::Lcp) => Self::Lcp(Lcp::new(contacts)),
+            (None, Solver::Coulomb) => Self::Coulomb(Coulomb::new(contacts)),
+        }
+    }
+
+    /// Whether it is what [`Law::new`] would make for the solver; a coating has one law.
+    pub fn is_of(&self, solver: Solver) -> bool {
+        match self {
+            Self::Film(_) => solver == Solver::Film,
+            Self::Lcp(_) => solver == Solver::Lcp,
+            Self::Coulomb(_) => solver == Solver::Coulomb,
+            Self::Coated(_) => true,
+        }
+    }
+
+    /// [`ContactLaw::DIRECTIONS`].
+    #[inline(always)]
+    pub fn directions(&self) -> usize {
+        each_law!(self, law => directions(law))
+    }
+
+    /// [`ContactLaw::LOOKS_AGAIN`].
+    #[inline(always)]
+    pub fn looks_again(&self) -> bool {
+        each_law!(self, law => looks_again(law))
+    }
+
+    /// [`ContactLaw::STARTS_FROM_FORCES`].
+    pub fn starts_from_forces(&self) -> bool {
+        each_law!(self, law => starts_from_forces(law))
+    }
+
+    /// [`ContactLaw::begin`].
+    #[inline(always)]
+    pub fn begin(&mut self, size: usize) {
+        each_law!(self, law => law.begin(size));
+    }
+
+    /// [`ContactLaw::matrix`].
+    #[inline(always)]
+    pub fn matrix(&mut self) -> &mut DMatrix<f64> {
+        each_law!(self, law => law.matrix())
+    }
+
+    /// [`ContactLaw::pose`] of all contacts; `rows` are all rows of the matrix.
+    #[inline(always)]
+    pub fn pose_all<P: Prediction>(&mut self, rows: &[[f64; 3]], contacts: impl Iterator<Item = P>) {
+        each_law!(self, law => pose_all(law, rows, contacts));
+    }
+
+    /// [`ContactLaw::solve`].
+    #[inline(always)]
+    pub fn solve(&mut self) -> Outcome {
+        each_law!(self, law => law.solve())
+    }
+
+    /// [`ContactLaw::multipliers`].
+    #[inline(always)]
+    pub fn multipliers(&self) -> &[f64] {
+        each_law!(self, law => law.multipliers())
+    }
+
+    /// [`ContactLaw::gaps`].
+    #[inline(always)]
+    pub fn gaps(&self) -> &[f64] {
+        each_law!(self, law => law.gaps())
+    }
+
+    /// [`ContactLaw::coating_shares`].
+    #[inline(always)]
+    pub fn coating_shares(&self) -> &[f64] {
+        each_law!(self, law => law.coating_shares())
+    }
+
+    /// The law of a coating.
+    pub fn coated(&self) -> Option<&Coated> {
+        if let Self::Coated(law) = self { Some(law) } else { None }
+    }
+
+    /// The same, to change its wear.
+    pub fn coated_mut(&mut self) -> Option<&mut Coated> {
+        if let Self::Coated(law) = self { Some(law) } else { None }
+    }
+}
+
+/// The state of a law is the wear of its coating.
+impl Persist for Law {
+    fn save(&self, writer: &mut Writer) {
+        self.coated().into_iter().for_each(|law| law.coating().save(writer));
+    }
+    fn restore(&mut self, reader: &mut Reader) {
+        self.coated_mut().into_iter().for_each(|law| law.coating_mut().restore(reader));
+    }
+    fn check(&self, reader: &mut Reader) {
+        self.coated().into_iter().for_each(|law| law.coating().check(reader));
+    }
+}
+
+/// Two unit tangents; the first as near to the direction of sliding (second component) as the normal allows.
+pub fn tangents(normal: [f64; 3]) -> [[f64; 3]; 2] {
+    let start = if normal[1].abs() < 0.9 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
+    let along = dot(start, normal);
+    let first: [f64; 3] = std::array::from_fn(|i| start[i] - along * normal[i]);
+    let length = dot(first, first).sqrt();
+    let first = first.map(|value| value / length);
+    let second = [
+        normal[1] * first[2] - normal[2] * first[1],
+        normal[2] * first[0] - normal[0] * first[2],
+        normal[0] * first[1] - normal[1] * first[0],
+    ];
+    [first, second]
+}

@@ -1,0 +1,159 @@
+//! Why a step failed, in words: what, where, and what helps.
+
+use super::checks::{OUT_OF_REACH, OUT_OF_REACH_REMEDY};
+use super::{Phase, Simulation};
+use crate::system::{Curved, StepFailure};
+use crate::{Error, shown};
+
+const AGAIN: &str = "Restore a saved state or reset first";
+
+impl Simulation {
+    /// The error of a step that should have ended at `time`; the simulation is of no use until restored or reset.
+    pub(super) fn fail(&mut self, failure: StepFailure, time: f64) -> Error {
+        self.phase = Phase::Failed;
+        if failure == StepFailure::NonFinite {
+            return Error::NonFinite {
+                last_good_time: self.time,
+                time,
+                remedy: "Restore a saved state or reset, and use a smaller internal step or smaller loads".to_owned(),
+            };
+        }
+        let (problem, remedy) = self.told_failure(failure);
+        Error::Unstable {
+            problem: format!("at t = {} s (last good time {} s) {problem}", shown(time), shown(self.time)),
+            remedy: format!("{remedy}. {AGAIN}"),
+        }
+    }
+
+    /// What happened, and what helps.
+    fn told_failure(&self, failure: StepFailure) -> (String, String) {
+        let is_free = |structure: usize| self.compiled.bodies[structure].translations.is_some();
+        match failure {
+            StepFailure::Implausible { structure, .. } | StepFailure::Unsolved { structure, .. } if is_free(structure) => {
+                free_failure(failure)
+            }
+            StepFailure::NonFinite => (String::new(), String::new()),
+            StepFailure::Implausible { structure, sector } => (
+                format!(
+                    "a contact node of {} is displaced by more than a tenth of its radius, is as deep inside the casing, or meets a \
+                     flank of the casing shape steeper than 45°{}",
+                    self.sector_name(structure, sector),
+                    self.instability()
+                ),
+                "Check gap, casing shape, loads and inputs; small displacements cannot describe this".to_owned(),
+            ),
+            StepFailure::CarrierImplausible { structure } => self.carrier_failure(structure),
+            StepFailure::Curved(curved) => self.curved_failure(curved),
+            StepFailure::OutOfReach { structure, node, sector } => (
+                format!(
+                    "contact node {} of {} has left the surface of the casing in z: it is beyond the first or last ring by more than \
+                     {OUT_OF_REACH}",
+                    self.compiled.node_name(structure, node),
+                    self.sector_name(structure, sector)
+                ),
+                OUT_OF_REACH_REMEDY.to_owned(),
+            ),
+            StepFailure::Unexplained { structure, node, sector, jump, explained } => (
+                format!(
+                    "the gap of contact node {} of {} has changed by {jump:.3e} m in two steps, where motion of node and casing \
+                     explains {explained:.3e} m: the work of this contact cannot be told",
+                    self.compiled.node_name(structure, node),
+                    self.sector_name(structure, sector)
+                ),
+                "Use a smaller internal step; if that does not help, the surface is folded or has more than one closest point \
+                 there"
+                    .to_owned(),
+            ),
+            StepFailure::Unbalanced { work, exchanged } => (
+                format!(
+                    "contact forces have added {work:.3e} J that no input brings, of {exchanged:.3e} J exchanged: normals turn and \
+                     surfaces curve too far within an internal step (curvature work)"
+                ),
+                "Use a smaller internal step".to_owned(),
+            ),
+            StepFailure::TooFast { .. } => (
+                "contact nodes of the free structure move by more than a tenth of the extent of the contact nodes in one internal \
+                 step, and could pass a surface unseen"
+                    .to_owned(),
+                "Use a smaller internal step or a lower velocity".to_owned(),
+            ),
+            StepFailure::BehindEdge { structure, node } => (
+                format!(
+                    "the contact node {} comes over the edge of a surface and is behind it already: what is at an edge is not \
+                     described, and pushing the node out would be an impact of arbitrary strength",
+                    self.compiled.node_name(structure, node)
+                ),
+                "Extend the contact grid to where nodes may come, or move one of the structures; check that S_t x S_s of each \
+                 contact grid points to the master"
+                    .to_owned(),
+            ),
+            StepFailure::Unsolved { structure, sector } => (
+                format!("the contact problem of {} has no solution", self.sector_name(structure, sector)),
+                "Use less friction or another internal step".to_owned(),
+            ),
+        }
+    }
+
+    fn carrier_failure(&self, structure: usize) -> (String, String) {
+        let open = self.system.pairs().iter().any(|pair| {
+            pair.carrier().is_some_and(|carrier| carrier.structure == structure) && pair.gap().layout().is_none()
+        });
+        if open {
+            let problem = "a structure that carries a surface is displaced by more than a tenth of the extent of the contact nodes";
+            return (problem.to_owned(), BESIDE_FLIGHT.to_owned());
+        }
+        let name = self.compiled.carrier_name(structure);
+        (
+            format!("the {name} is displaced by more than a tenth of the radius"),
+            "Check its loads and temperatures; small displacements cannot describe this".to_owned(),
+        )
+    }
+
+    fn curved_failure(&self, curved: Curved) -> (String, String) {
+        let problem = format!(
+            "contact node {} of {} is displaced by {:.3e} m around the axis: gaps are linear in displacements, which misses \
+             u²/2r = {:.2e} m, as much as the clearance of {:.2e} m{}",
+            self.compiled.node_name(curved.structure, curved.node),
+            self.sector_name(curved.structure, curved.sector),
+            curved.moved,
+            curved.error,
+            curved.clearance,
+            self.instability()
+        );
+        let remedy = "Check casing shape, friction, loads and inputs: small displacements cannot describe this";
+        (problem, remedy.to_owned())
+    }
+
+    /// A sector, with the name of its structure where several touch.
+    pub(super) fn sector_name(&self, structure: usize, sector: usize) -> String {
+        let of = match self.compiled.bodies.len() {
+            1 => String::new(),
+            _ => format!(" of {}", self.compiled.body(structure).0.name),
+        };
+        format!("sector {}{of}", sector + 1)
+    }
+
+    /// Growth that the initialisation warned of, as the likely cause of a failure.
+    fn instability(&self) -> String {
+        let grows = |text: &&String| text.contains("physically unstable");
+        self.warnings.iter().find(grows).map_or_else(String::new, |text| format!(". {text}"))
+    }
+}
+
+const BESIDE_FLIGHT: &str = "Check positions and velocity; small displacements beside rigid flight cannot describe this";
+
+/// What means something else for a structure that flies freely.
+fn free_failure(failure: StepFailure) -> (String, String) {
+    let (problem, remedy) = match failure {
+        StepFailure::Unsolved { .. } => (
+            "the contact problem has no solution",
+            "Use less friction, another internal step or the solver coulomb",
+        ),
+        _ => (
+            "contact nodes of the free structure have moved against each other, or into a surface, by more than a tenth of the \
+             extent of the contact nodes",
+            BESIDE_FLIGHT,
+        ),
+    };
+    (problem.to_owned(), remedy.to_owned())
+}

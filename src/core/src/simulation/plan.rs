@@ -1,0 +1,175 @@
+//! Which structures and surfaces of a scene meet: found once, from names.
+
+use crate::rom::{ContactGrid, Frame};
+use crate::settings::{ContactSettings, Motion, SceneSettings, StructureSettings, SurfaceSettings};
+use crate::{Error, Result, Rom, Scene};
+
+use super::checks;
+
+/// A contact pair of a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairPlan {
+    /// Surface.
+    pub surface: usize,
+    /// Structure whose contact nodes touch: place in [`Plan::bodies`].
+    pub body: usize,
+    /// Structure through whose contact grid an open surface is laid.
+    pub grid: Option<usize>,
+    /// Structure that deforms the surface: place in [`Plan::carriers`].
+    pub carrier: Option<usize>,
+    /// Contact nodes that take part.
+    pub nodes: Vec<usize>,
+}
+
+/// Structures in the order in which they are stepped, and the pairs between them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Structures whose contact nodes touch, in the order of the scene.
+    pub bodies: Vec<usize>,
+    /// Structures that carry surfaces and deform them, in the order of the pairs.
+    pub carriers: Vec<usize>,
+    /// In the order of the scene.
+    pub pairs: Vec<PairPlan>,
+}
+
+/// Names that a scene of one has no need of.
+pub fn prefix(count: usize, name: &str) -> String {
+    if count > 1 { format!("{name}.") } else { String::new() }
+}
+
+impl Plan {
+    /// Of a validated scene.
+    ///
+    /// # Errors
+    /// ROMs that do not fit what is asked of them; pairs without nodes, nodes of two pairs.
+    pub fn new(scene: &Scene) -> Result<Self> {
+        let settings = &scene.settings;
+        if scene.roms.len() != settings.structures.len() {
+            let problem = format!("{} structures with {} ROMs", settings.structures.len(), scene.roms.len());
+            return Err(Error::invalid("scene", problem, "Give one ROM per structure"));
+        }
+        let structure = |name: &str| settings.structures.iter().position(|structure| structure.name == name);
+        let touches = |index: &usize| settings.contacts.iter().any(|one| one.master == settings.structures[*index].name);
+        let bodies: Vec<usize> = (0..settings.structures.len()).filter(touches).collect();
+        let mut plan = Self { bodies, carriers: Vec::new(), pairs: Vec::new() };
+        for (index, contact) in settings.contacts.iter().enumerate() {
+            let surface = settings.surfaces.iter().position(|surface| surface.name == contact.slave);
+            let (Some(master), Some(surface)) = (structure(&contact.master), surface) else { unreachable!("validated") };
+            let under = settings.surfaces[surface].structure.as_deref().and_then(structure);
+            let open = settings.structures[master].motion == Motion::Free;
+            check_roms(scene, master, under, open)?;
+            let body = plan.bodies.iter().position(|body| *body == master).unwrap_or(0);
+            let carrier = under.filter(|_| !settings.surfaces[surface].rigid).map(|under| plan.carrier(under));
+            let nodes = nodes_of(contact, &scene.roms[master], index)?;
+            let own = plan.pairs.iter().enumerate().filter(|(_, pair)| pair.body == body);
+            if let Some((other, node)) = claimed(own, &nodes) {
+                let name = &scene.roms[master].contact_nodes[node].name;
+                let problem = format!("claims the node `{name}`, which contact[{}] claims as well", other + 1);
+                let at = format!("contact[{}].nodes", index + 1);
+                return Err(Error::invalid(at, problem, "Give each contact node to one pair"));
+            }
+            plan.pairs.push(PairPlan { surface, body, grid: under.filter(|_| open), carrier, nodes });
+        }
+        Ok(plan)
+    }
+
+    fn carrier(&mut self, structure: usize) -> usize {
+        let known = self.carriers.iter().position(|carrier| *carrier == structure);
+        known.unwrap_or_else(|| {
+            self.carriers.push(structure);
+            self.carriers.len() - 1
+        })
+    }
+
+    /// Pairs of a body.
+    pub fn pairs_of(&self, body: usize) -> impl Iterator<Item = (usize, &PairPlan)> {
+        self.pairs.iter().enumerate().filter(move |(_, pair)| pair.body == body)
+    }
+
+    /// The structure of a body.
+    pub fn structure<'a>(&self, scene: &'a Scene, body: usize) -> (&'a StructureSettings, &'a Rom) {
+        (&scene.settings.structures[self.bodies[body]], &scene.roms[self.bodies[body]])
+    }
+
+    /// What belongs to the structure of a body starts with this, in names.
+    pub fn body_prefix(&self, scene: &Scene, body: usize) -> String {
+        prefix(self.bodies.len(), &self.structure(scene, body).0.name)
+    }
+
+    /// What belongs to a pair starts with this: the name of its surface.
+    pub fn pair_prefix(&self, settings: &SceneSettings, pair: usize) -> String {
+        prefix(self.pairs.len(), &self.surface(settings, pair).name)
+    }
+
+    /// The surface of a pair.
+    pub fn surface<'a>(&self, settings: &'a SceneSettings, pair: usize) -> &'a SurfaceSettings {
+        &settings.surfaces[self.pairs[pair].surface]
+    }
+
+    /// Whether a body meets surfaces that are open, described along x, y, z.
+    pub fn is_free(&self, scene: &Scene, body: usize) -> bool {
+        self.structure(scene, body).0.motion == Motion::Free
+    }
+}
+
+/// Contact nodes of a pair.
+fn nodes_of(contact: &ContactSettings, rom: &Rom, index: usize) -> Result<Vec<usize>> {
+    let start = contact.nodes.as_deref().unwrap_or_default();
+    let names = rom.contact_nodes.iter().enumerate();
+    let nodes: Vec<usize> = names.filter(|(_, node)| node.name.starts_with(start)).map(|(node, _)| node).collect();
+    if !nodes.is_empty() {
+        return Ok(nodes);
+    }
+    let problem = format!("no contact node of ROM `{}` has a name that starts with {start:?}", contact.master);
+    let remedy = rom.contact_nodes.first().map_or_else(
+        || "Give a ROM with contact nodes".to_owned(),
+        |first| format!("Use the beginning of names such as `{}`", first.name),
+    );
+    Err(Error::invalid(format!("contact[{}].nodes", index + 1), problem, remedy))
+}
+
+/// A node that a pair before has already: (pair, node).
+fn claimed<'a>(mut pairs: impl Iterator<Item = (usize, &'a PairPlan)>, nodes: &[usize]) -> Option<(usize, usize)> {
+    let both = |pair: &PairPlan| nodes.iter().copied().find(|node| pair.nodes.contains(node));
+    pairs.find_map(|(index, pair)| both(pair).map(|node| (index, node)))
+}
+
+fn check_roms(scene: &Scene, master: usize, under: Option<usize>, open: bool) -> Result<()> {
+    if open {
+        check_cartesian(&scene.roms[master])?;
+        return under.map_or(Ok(()), |under| {
+            check_cartesian(&scene.roms[under])?;
+            check_open_grid(&scene.roms[under])
+        });
+    }
+    for structure in [Some(master), under].into_iter().flatten() {
+        checks::check_rom(&scene.settings.structures[structure], &scene.roms[structure])?;
+    }
+    checks::check_coupling(scene, master, under)
+}
+
+fn refuse(rom: &Rom, problem: &str, remedy: &str) -> Result<()> {
+    Err(Error::invalid(format!("ROM `{}`", rom.name), problem, remedy))
+}
+
+/// A structure that flies freely, or that such a one meets.
+fn check_cartesian(rom: &Rom) -> Result<()> {
+    if rom.frame != Frame::Cartesian {
+        let problem =
+            "its contact displacements are cylindrical; a free master and what it meets are described along x, y, z";
+        return refuse(rom, problem, "Write the ROM with frame = cartesian");
+    }
+    if rom.sectors != 1 || rom.is_cyclic() {
+        let problem = "it has several sectors; a free master and what it meets are single structures";
+        return refuse(rom, problem, "Use sectors = 1");
+    }
+    Ok(())
+}
+
+fn check_open_grid(rom: &Rom) -> Result<()> {
+    if matches!(rom.extras.grid, Some(ContactGrid { closed: false, .. })) {
+        return Ok(());
+    }
+    let remedy = "Add the metadata `contact_grid` for an open grid, its contact nodes row after row";
+    refuse(rom, "it has no open contact grid for a surface", remedy)
+}

@@ -1,0 +1,212 @@
+//! Outputs of a rotor, one row each with what fills it.
+
+use super::builder::Builder;
+use super::units::{ANGLE, FORCE, LENGTH};
+use super::{Body, Parts, refuse};
+use crate::Result;
+use crate::simulation::outputs::{Reader, each, scalar, whole};
+use crate::variables::{Quantity, Span, Unit};
+
+pub fn angle(table: &mut Builder, parts: &Parts, body: &Body) {
+    let index = body.index;
+    let text = format!("Angle of {} about +z", parts.rotor(body));
+    let read = scalar(move |view| view.rotor_angle(index));
+    let angle = table.output("rotor_angle", Span::Point, Some((&ANGLE, 1.0)), text, read);
+    (angle.display, angle.quantity) = (Some(0), Quantity::RotorAngle);
+}
+
+/// Clearance that the outputs of a rotor are as large as (m): that of its first pair.
+fn nominal(parts: &Parts, body: &Body) -> Option<(&'static Unit, f64)> {
+    let mut pairs = parts.plan.pairs_of(body.index);
+    let gap = pairs.next().map_or(0.0, |(pair, _)| parts.settings.contacts[pair].gap);
+    Some((&LENGTH, gap))
+}
+
+pub fn clearances(table: &mut Builder, parts: &Parts, body: &Body) {
+    let index = body.index;
+    let each_node = table.output(
+        "node_clearance_minimum",
+        Span::Window,
+        nominal(parts, body),
+        format!(
+            "Smallest clearance over all sectors within the communication step, per contact node ({})",
+            node_list(body)
+        ),
+        each(move |view, node| view.lowest_of_node(index, node)),
+    );
+    (each_node.dimension, each_node.display) = (Some(body.rom.contact_nodes.len()), Some(1));
+}
+
+fn node_list(body: &Body) -> String {
+    let names: Vec<&str> = body.rom.contact_nodes.iter().map(|node| node.name.as_str()).collect();
+    names.join(", ")
+}
+
+pub fn watched(table: &mut Builder, parts: &Parts) -> Result<()> {
+    let bodies = parts.bodies();
+    let most = bodies.iter().map(|body| body.rom.sectors).max().unwrap_or(0);
+    for sector in &parts.settings.outputs.watched_sectors {
+        if *sector == 0 || *sector > most {
+            let remedy = "Use sector numbers from 1 to the number of sectors of the ROM";
+            return refuse("watched_sectors", format!("sector {sector} of {most}"), remedy.to_owned());
+        }
+    }
+    for body in bodies.iter().filter(|body| !body.free) {
+        table.belongs(body.index, parts.of_body(body));
+        for sector in &parts.settings.outputs.watched_sectors {
+            if *sector <= body.rom.sectors {
+                watch(table, parts, body, *sector);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn watch(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
+    let list = node_list(body);
+    for row in watched_rows(body.index, sector - 1, [nominal(parts, body), Some((&FORCE, 100.0))]) {
+        if row.exists(parts.settings.outputs.instantaneous_forces, parts.has_friction()) {
+            let text = format!("{} ({list})", row.text);
+            row.add(table, format!("blade[{sector}].{}", row.name), text, body.rom.contact_nodes.len());
+        }
+    }
+}
+
+/// An output over the contact nodes of a sector.
+pub struct NodeRow {
+    quantity: Quantity,
+    pub name: &'static str,
+    span: Span,
+    unit: Option<(&'static Unit, f64)>,
+    pub text: &'static str,
+    /// Only with friction, and only where instantaneous forces are asked for.
+    needs: [bool; 2],
+    read: Reader,
+}
+
+impl NodeRow {
+    pub fn exists(&self, instantaneous: bool, friction: bool) -> bool {
+        let [needs_friction, needs_instantaneous] = self.needs;
+        (friction || !needs_friction) && (instantaneous || !needs_instantaneous)
+    }
+
+    pub fn add(&self, table: &mut Builder, name: String, text: String, nodes: usize) {
+        let row = table.output(name, self.span, self.unit, text, self.read.clone());
+        (row.dimension, row.quantity) = (Some(nodes), self.quantity);
+        row.display = self.unit.filter(|(unit, _)| **unit == LENGTH).map(|_| 1);
+    }
+}
+
+/// Outputs over the contact nodes of a sector of a structure (0-based); units of gaps and forces.
+pub fn watched_rows(body: usize, sector: usize, [gap, force]: [Option<(&'static Unit, f64)>; 2]) -> [NodeRow; 6] {
+    [
+        NodeRow {
+            quantity: Quantity::Clearance(sector),
+            name: "clearance",
+            span: Span::Point,
+            unit: gap,
+            text: "Clearance normal to the casing at the communication point",
+            needs: [false, false],
+            read: each(move |view, node| view.clearance(body, node, sector)),
+        },
+        NodeRow {
+            quantity: Quantity::WatchedClearanceMinimum(sector),
+            name: "clearance_minimum",
+            span: Span::Window,
+            unit: gap,
+            text: "Smallest clearance within the communication step",
+            needs: [false, false],
+            read: each(move |view, node| view.lowest_at(body, node, sector)),
+        },
+        NodeRow {
+            quantity: Quantity::NormalForce(sector),
+            name: "normal_force",
+            span: Span::Mean,
+            unit: force,
+            text: "Normal contact force, mean over the communication step",
+            needs: [false, false],
+            read: each(move |view, node| view.mean * view.normal_impulse(body, node, sector)),
+        },
+        NodeRow {
+            quantity: Quantity::TangentialForce(sector),
+            name: "tangential_force",
+            span: Span::Mean,
+            unit: force,
+            text: "Magnitude of the friction force (axial part included), mean over the communication step",
+            needs: [true, false],
+            read: each(move |view, node| view.mean * view.tangential_impulse(body, node, sector)),
+        },
+        NodeRow {
+            quantity: Quantity::Output,
+            name: "normal_force_now",
+            span: Span::Point,
+            unit: force,
+            text: "Normal contact force of the last internal step",
+            needs: [false, true],
+            read: each(move |view, node| view.system.structures()[body].multiplier(node, sector)),
+        },
+        NodeRow {
+            quantity: Quantity::Output,
+            name: "tangential_force_now",
+            span: Span::Point,
+            unit: force,
+            text: "Friction force of the last internal step",
+            needs: [true, true],
+            read: each(move |view, node| view.tangential_now(body, node, sector)),
+        },
+    ]
+}
+
+pub fn fields(table: &mut Builder, parts: &Parts) -> Result<()> {
+    for body in parts.bodies().iter().filter(|body| !body.free) {
+        table.belongs(body.index, parts.of_body(body));
+        if parts.settings.outputs.all_sectors {
+            all_sectors(table, parts, body);
+        }
+        if let Some(largest) = parts.settings.outputs.nodal_diameters {
+            nodal_diameters(table, parts, body, largest)?;
+        }
+    }
+    Ok(())
+}
+
+fn all_sectors(table: &mut Builder, parts: &Parts, body: &Body) {
+    let (index, sectors) = (body.index, body.rom.sectors);
+    let clearance = table.output(
+        "sector_clearance_minimum",
+        Span::Window,
+        nominal(parts, body),
+        "Smallest clearance of each sector within the communication step",
+        each(move |view, sector| view.lowest_of_sector(index, sector)),
+    );
+    (clearance.dimension, clearance.display) = (Some(sectors), Some(1));
+    let force = table.output(
+        "sector_normal_force",
+        Span::Mean,
+        Some((&FORCE, 100.0)),
+        "Normal contact force of each sector, mean over the communication step",
+        each(move |view, sector| {
+            let impulses = &view.window.bodies[index].normal_impulse;
+            view.mean * view.of_sector(index, impulses, sector).sum::<f64>()
+        }),
+    );
+    force.dimension = Some(sectors);
+}
+
+fn nodal_diameters(table: &mut Builder, parts: &Parts, body: &Body, largest: usize) -> Result<()> {
+    let (index, sectors) = (body.index, body.rom.sectors);
+    if largest > sectors / 2 {
+        let remedy = format!("Use at most {}", sectors / 2);
+        return refuse("nodal_diameters", format!("{largest} with {sectors} sectors"), remedy);
+    }
+    let amplitude = table.output(
+        "nodal_diameter_amplitude",
+        Span::Point,
+        nominal(parts, body),
+        "Amplitude of the radial displacement of the middle contact node per nodal diameter 0, 1, 2, …",
+        whole(move |view, out| view.nodal_diameters(index, out)),
+    );
+    (amplitude.dimension, amplitude.display) = (Some(largest + 1), Some(1));
+    amplitude.quantity = Quantity::NodalDiameterAmplitude;
+    Ok(())
+}

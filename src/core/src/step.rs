@@ -1,0 +1,69 @@
+//! One internal step: prediction, gaps, correction (section 4.3 of the paper), and the ledger kept on the way.
+
+use crate::contact::gap::Drive;
+use crate::system::{Bodies, Found, StepFailure, System};
+
+/// Denormals are flushed every this many steps.
+const FLUSH_EVERY: u64 = 512;
+
+impl System {
+    /// One internal step to the instant described by `drives`, one per contact pair.
+    ///
+    /// # Errors
+    /// [`StepFailure`]; the state is then not meaningful any more.
+    pub fn step(&mut self, drives: &[Drive]) -> Result<(), StepFailure> {
+        let (acts_later, ledger) = (self.settings.scheme.acts_later(), self.settings.ledger);
+        // Eq. 9: all structures go on without new contact forces.
+        for structure in &mut self.structures {
+            structure.predict(acts_later, ledger);
+        }
+        self.check_travel()?;
+        // Eqs 3 and 10: gaps at the predicted places.
+        let step = self.step_size();
+        for (pair, drive) in self.pairs.iter_mut().zip(drives) {
+            pair.go_to(drive, step);
+        }
+        self.find_gaps(true);
+        self.check_edges()?;
+        // Eq. 11: forces that close what penetrates, and what they do, group by group.
+        self.retire_events();
+        let mut bodies = Bodies { structures: &mut self.structures, pairs: &self.pairs, acts_later, ledger };
+        let mut found = Found {
+            events: &mut self.events.now,
+            factorisations: &mut self.counted.factorisations,
+            wear_energy: &mut self.counted.ledger.wear_energy,
+        };
+        for group in &mut self.groups {
+            group.solve(&mut bodies, &mut found)?;
+        }
+        self.witness()?;
+        self.enter_work();
+        self.counted.steps += 1;
+        if self.counted.steps.is_multiple_of(FLUSH_EVERY) {
+            self.structures.iter_mut().for_each(|structure| structure.modes_mut().flush());
+        }
+        Ok(())
+    }
+
+    /// Gap of every node, and the smallest of each lane; `warm`: closest points are sought from those of the step before.
+    pub(crate) fn find_gaps(&mut self, warm: bool) {
+        for index in 0..self.pairs.len() {
+            self.pairs[index].find_gaps(&mut self.structures, warm);
+        }
+        for structure in &mut self.structures {
+            structure.find_lowest();
+        }
+    }
+
+    /// The contacts of the last step become those of the step before.
+    fn retire_events(&mut self) {
+        self.events.shift();
+        self.events.now.clear();
+        if self.groups.iter().any(|group| group.law().starts_from_forces()) {
+            self.structures.iter_mut().for_each(|structure| structure.history.keep_forces());
+        }
+        for event in &self.events.before {
+            self.structures[event.structure].forget_force(event.node, event.sector);
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! What a group of contacts does to a structure that carries their surfaces: through its modes, contact by contact.
+
+use super::Structure;
+use super::pair::{Carrier, at_place};
+use crate::contact::spline::{ClosestPoint, SurfaceSpline};
+use crate::contact::spline_gap::Frame;
+use crate::dynamics::bank::ModalBank;
+use crate::dynamics::sectors::Sectors;
+use nalgebra::DMatrix;
+
+/// Where a contact acts on a structure.
+#[derive(Debug, Clone, Copy)]
+pub struct Spot<'a> {
+    /// The surface, and where it is carried.
+    pub surface: (&'a SurfaceSpline, Carrier),
+    /// The place on it.
+    pub place: ClosestPoint,
+    /// Directions of the node that touches.
+    pub frame: Frame,
+}
+
+/// Scratch of a group for one structure under it.
+#[derive(Debug, Clone)]
+pub struct Reaction {
+    /// The structure.
+    pub structure: usize,
+    /// Contacts of the group that act on it.
+    members: Vec<usize>,
+    /// Modes seen at the contacts along the rows and columns of the Delassus matrix.
+    rows: Vec<f64>,
+    columns: Vec<f64>,
+    /// Modes seen at one place along x, y, z.
+    seen: [Vec<f64>; 3],
+    /// Modal forces, or modal displacements per unit force.
+    force: Vec<f64>,
+    /// Displacement of its rows by the forces of a solution (m).
+    response: Vec<f64>,
+}
+
+/// Structures that carry surfaces are single.
+fn bank(structure: &Structure) -> &ModalBank {
+    structure.bank().unwrap_or_else(|| unreachable!("a structure that carries surfaces has one sector"))
+}
+
+impl Reaction {
+    /// For up to `contacts` contacts at once with `directions` directions each.
+    pub fn new(structure: usize, of: &Structure, contacts: usize, directions: usize) -> Self {
+        let (modes, rows) = (bank(of).modes(), bank(of).rows());
+        Self {
+            structure,
+            members: Vec::with_capacity(contacts),
+            rows: vec![0.0; contacts * directions * modes],
+            columns: vec![0.0; contacts * directions * modes],
+            seen: std::array::from_fn(|_| vec![0.0; modes]),
+            force: vec![0.0; modes],
+            response: vec![0.0; rows],
+        }
+    }
+
+    /// Forget the group.
+    pub fn clear(&mut self) {
+        self.members.clear();
+    }
+
+    /// Project the modes on the directions of contact `member` of the group, which acts on this structure.
+    pub fn see(&mut self, of: &Structure, member: usize, spot: Spot, rows: &[[f64; 3]], columns: &[[f64; 3]]) {
+        self.members.push(member);
+        let (bank, (surface, carrier)) = (bank(of), spot.surface);
+        let modes = bank.modes();
+        for (component, seen) in self.seen.iter_mut().enumerate() {
+            seen.fill(0.0);
+            for (index, weight) in surface.weights(spot.place).iter() {
+                let shapes = bank.contact_row(carrier.first_row + 3 * index + component);
+                seen.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += weight * shape);
+            }
+        }
+        let [x, y, z] = &self.seen;
+        for (directions, target) in [(rows, &mut self.rows), (columns, &mut self.columns)] {
+            for (index, direction) in directions.iter().enumerate() {
+                let [a, b, c] = spot.frame.fixed(*direction);
+                let target = &mut target[(member * directions.len() + index) * modes..][..modes];
+                for (((value, x), y), z) in target.iter_mut().zip(x).zip(y).zip(z) {
+                    *value = a * x + b * y + c * z;
+                }
+            }
+        }
+    }
+
+    /// Add this structure's part to the Delassus matrix (m/N) of a group with `per` directions per contact.
+    pub fn add_delassus(&mut self, of: &Structure, matrix: &mut DMatrix<f64>, per: usize) {
+        for at in 0..self.members.len() {
+            for column in per * self.members[at]..per * (self.members[at] + 1) {
+                self.prepare_column(of, column);
+                for member in &self.members {
+                    for row in per * member..per * (member + 1) {
+                        matrix[(row, column)] += self.delassus(row);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Entry of the Delassus matrix (m/N) in this row and the column prepared.
+    fn delassus(&self, row: usize) -> f64 {
+        let modes = self.force.len();
+        self.rows[row * modes..][..modes].iter().zip(&self.force).map(|(shape, moved)| shape * moved).sum()
+    }
+
+    /// Modal displacement per unit force along a column of the Delassus matrix.
+    fn prepare_column(&mut self, of: &Structure, column: usize) {
+        let modes = self.force.len();
+        let shapes = &self.columns[column * modes..][..modes];
+        for ((value, shape), k) in self.force.iter_mut().zip(shapes).zip(bank(of).coefficients(0)) {
+            *value = k.compliance * shape;
+        }
+    }
+
+    /// Modal force −Σ F_j λ_j of a solution with `per` directions per contact into the scratch.
+    fn gather(&mut self, multipliers: &[f64], per: usize) {
+        let modes = self.force.len();
+        self.force.fill(0.0);
+        let columns = self.members.iter().flat_map(|member| per * member..per * (member + 1));
+        for (column, value) in columns.map(|column| (column, multipliers[column])) {
+            if value != 0.0 {
+                let shapes = &self.columns[column * modes..][..modes];
+                self.force.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum -= value * shape);
+            }
+        }
+    }
+
+    /// What the forces of a solution would do to the rows of the structure.
+    pub fn respond(&mut self, of: &mut Structure, multipliers: &[f64], per: usize) {
+        self.gather(multipliers, per);
+        if self.members.is_empty() {
+            self.response.fill(0.0);
+        } else if let Sectors::Uncoupled(bank) = of.modes_mut() {
+            bank.response_to_modal(&self.force, &mut self.response);
+        }
+    }
+
+    /// Displacement of a place by the last [`Reaction::respond`], in the directions of the node there (m).
+    pub fn responded(&self, spot: Spot) -> [f64; 3] {
+        at_place(spot.surface, spot.place, spot.frame, |row| self.response[row])
+    }
+
+    /// Let the forces of the solution act that [`Reaction::respond`] was asked about last.
+    pub fn apply(&self, of: &mut Structure, ledger: bool) {
+        of.delayed.copy_from_slice(&self.force);
+        if let (false, Sectors::Uncoupled(bank)) = (self.members.is_empty(), of.modes_mut()) {
+            bank.correct_modal(&self.force, &self.response, ledger);
+        }
+    }
+}

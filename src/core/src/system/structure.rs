@@ -1,0 +1,261 @@
+//! One structure: its modes, its contact nodes and their past, and the forces on surfaces that it carries.
+
+use crate::contact::gap::{Drive, GapLaw, Geometry, dot};
+use crate::dynamics::bank::{BankOptions, ModalBank};
+use crate::dynamics::modal::ModalModel;
+use crate::dynamics::sectors::{SectorModel, Sectors};
+use crate::history::History;
+use crate::persist::{Persist, Reader, Writer};
+use crate::settings::Scheme;
+
+/// Penetrations below this are none (m): squares of what they lead to leave the range of double precision, and modes as small
+/// are flushed to rest.
+const LEAST_PENETRATION: f64 = 1e-150;
+
+/// A structure of a scene. Rows of its modes are three per contact node, or three per control point of the surfaces it carries.
+#[derive(Debug, Clone)]
+pub struct Structure {
+    modes: Sectors,
+    /// Lanes of a row of the sectors.
+    lanes: usize,
+    /// Pair that each contact node belongs to.
+    pub(super) pair_of: Vec<Option<usize>>,
+    /// Past of the contact nodes.
+    pub(crate) history: History,
+    /// Smallest gap of each lane (m).
+    pub(super) lowest: Vec<f64>,
+    /// Modal contact force on its surfaces found in the last step (N·√kg⁻¹); empty where it carries none.
+    pub(super) delayed: Vec<f64>,
+}
+
+impl Structure {
+    /// With contact nodes, each of the pair given, and whether one of these pairs tells places on a surface.
+    pub(super) fn touching(
+        model: SectorModel,
+        options: BankOptions,
+        pair_of: Vec<Option<usize>>,
+        has_places: bool,
+    ) -> Self {
+        let modes = Sectors::new(model, options);
+        let contacts = pair_of.len() * modes.lanes();
+        let rows = modes.rows() * modes.lanes();
+        Self {
+            history: History::new(Geometry::new(contacts, has_places), contacts, rows),
+            lowest: vec![f64::INFINITY; modes.lanes()],
+            delayed: Vec::new(),
+            pair_of,
+            lanes: modes.lanes(),
+            modes,
+        }
+    }
+
+    /// Carrying surfaces, whose control points the rows of `model` move; `loads`: loaded beside contact.
+    pub(super) fn carrying(model: &ModalModel, loads: bool) -> Self {
+        let options = BankOptions { loads, flexibility: false, ..BankOptions::default() };
+        let modes = Sectors::Uncoupled(ModalBank::with_options(model, 1, options));
+        let rows = modes.rows() * modes.lanes();
+        Self {
+            history: History::new(Geometry::new(0, false), 0, rows),
+            pair_of: Vec::new(),
+            lowest: Vec::new(),
+            delayed: vec![0.0; model.len()],
+            lanes: modes.lanes(),
+            modes,
+        }
+    }
+
+    /// The modes.
+    pub fn modes(&self) -> &Sectors {
+        &self.modes
+    }
+
+    /// The modes, to set loads and initial conditions.
+    pub fn modes_mut(&mut self) -> &mut Sectors {
+        &mut self.modes
+    }
+
+    /// Number of contact nodes per sector; 0 where it carries surfaces only.
+    pub fn nodes(&self) -> usize {
+        self.pair_of.len()
+    }
+
+    /// Whether it carries a surface.
+    pub fn carries(&self) -> bool {
+        !self.delayed.is_empty()
+    }
+
+    /// Its single bank of modes, where sectors are not coupled.
+    pub(super) fn bank(&self) -> Option<&ModalBank> {
+        self.modes.uncoupled()
+    }
+
+    /// Lanes of a row of the sectors.
+    #[inline(always)]
+    pub fn lanes(&self) -> usize {
+        self.lanes
+    }
+
+    /// Place of a node of a sector in arrays over all of them.
+    #[inline(always)]
+    pub fn index(&self, node: usize, sector: usize) -> usize {
+        node * self.lanes + sector
+    }
+
+    /// Gaps at the current step (m), `[node · lanes + lane]`; padding lanes are infinite.
+    pub fn gaps(&self) -> &[f64] {
+        &self.history.gap.now
+    }
+
+    /// Gap of one node of one sector (m).
+    pub fn gap(&self, node: usize, sector: usize) -> f64 {
+        self.history.gap.now[self.index(node, sector)]
+    }
+
+    /// Rate of that gap over the last step (m/s); 0 where there was or is nothing to touch.
+    pub fn gap_rate(&self, node: usize, sector: usize) -> f64 {
+        let index = self.index(node, sector);
+        let change = self.history.gap.now[index] - self.history.gap.before[index];
+        if change.is_finite() { change / self.modes.step() } else { 0.0 }
+    }
+
+    /// λ of one node of one sector in the last step (N).
+    pub fn multiplier(&self, node: usize, sector: usize) -> f64 {
+        self.history.multiplier[self.index(node, sector)]
+    }
+
+    /// Normals and closest points of the last step.
+    pub fn geometry(&self) -> &Geometry {
+        &self.history.geometry.now
+    }
+
+    /// Modal forces on its surfaces found in the last step; empty where it carries none.
+    pub fn contact_force(&self) -> &[f64] {
+        &self.delayed
+    }
+
+    /// Three components of a node of a sector from an array over rows.
+    #[inline(always)]
+    pub(super) fn three(&self, rows: &[f64], node: usize, sector: usize) -> [f64; 3] {
+        let lanes = self.lanes;
+        std::array::from_fn(|component| rows[(3 * node + component) * lanes + sector])
+    }
+
+    /// Nothing has touched yet; the modal state there is the first.
+    pub(super) fn start(&mut self) {
+        self.modes.recover();
+        self.modes.collect_loss();
+        self.delayed.fill(0.0);
+        self.history.clear();
+    }
+
+    /// There was no step before: gaps and predictions are those of the start.
+    pub(super) fn remember_start(&mut self) {
+        let History { gap, predicted, .. } = &mut self.history;
+        gap.before.copy_from_slice(&gap.now);
+        let rows = predicted.now.len();
+        predicted.now.copy_from_slice(&self.modes.displacement()[..rows]);
+    }
+
+    /// Predict one step (eq. 9 of the paper). Where contact forces act one step later, those of the last step act now.
+    pub(crate) fn predict(&mut self, acts_later: bool, ledger: bool) {
+        self.history.shift(self.modes.displacement_before());
+        self.modes.predict(ledger);
+        if acts_later {
+            self.act_later(ledger);
+            self.history.predicted.shift();
+            let touching = self.history.predicted.now.len();
+            self.history.predicted.now.copy_from_slice(&self.modes.displacement()[..touching]);
+        }
+        self.delayed.fill(0.0);
+    }
+
+    /// Contact forces of the last step act on the modes with inertia.
+    fn act_later(&mut self, ledger: bool) {
+        // A disk of coupled sectors keeps its forces until it predicts.
+        let Sectors::Uncoupled(bank) = &mut self.modes else { return };
+        if self.delayed.iter().any(|force| *force != 0.0) {
+            bank.act_delayed_modal(0, &self.delayed, ledger);
+        }
+        if !self.pair_of.is_empty() {
+            bank.act_delayed(&self.history.force.now, ledger);
+        }
+    }
+
+    /// Gaps of the nodes of a pair whose surface has moved.
+    #[inline(always)]
+    pub(super) fn find_gaps(&mut self, gap: &mut GapLaw, drive: &Drive, moved: &[f64], warm: bool) {
+        let History { gap: gaps, geometry, .. } = &mut self.history;
+        let before = warm.then_some(&geometry.before);
+        gap.evaluate(drive, self.modes.displacement(), moved, before, &mut geometry.now, &mut gaps.now);
+    }
+
+    /// No force acts on a node any more.
+    pub(crate) fn forget_force(&mut self, node: usize, sector: usize) {
+        let (index, lanes) = (self.index(node, sector), self.lanes);
+        self.history.multiplier[index] = 0.0;
+        self.history.coating_force[index] = 0.0;
+        for component in 0..3 {
+            self.history.force.now[(3 * node + component) * lanes + sector] = 0.0;
+        }
+    }
+
+    /// Smallest gap of each lane; one that is no number stays.
+    pub(crate) fn find_lowest(&mut self) {
+        self.lowest.fill(f64::INFINITY);
+        for row in self.history.gap.now.chunks(self.lanes) {
+            for (lowest, gap) in self.lowest.iter_mut().zip(row) {
+                *lowest = if *lowest <= *gap || lowest.is_nan() { *lowest } else { *gap };
+            }
+        }
+    }
+
+    /// The first sector from `first` on of which a node penetrates. What is no number counts, and is found out then.
+    #[inline(always)]
+    pub(super) fn touching_from(&self, first: usize) -> Option<usize> {
+        let touches = |gap: &f64| *gap < -LEAST_PENETRATION || gap.is_nan();
+        self.lowest.get(first..)?.iter().position(touches).map(|later| first + later)
+    }
+
+    /// Use a step size (s) from here, at rest or without regard to the state.
+    pub(super) fn set_step(&mut self, scheme: Scheme, step: f64) {
+        self.modes.set_step(scheme, step);
+    }
+
+    /// Carry the state to another step size under the forces that last.
+    pub(super) fn carry_over(&mut self, scheme: Scheme, step: f64) {
+        self.modes.resample(scheme, step, &self.history.passing.lasting);
+    }
+
+    /// Kinetic and strain energy at this instant under the forces that last (J).
+    pub(super) fn energies_now(&mut self) -> (f64, f64) {
+        self.modes.energies_now(&self.history.passing.lasting)
+    }
+
+    /// Largest displacement of a control point (m).
+    pub(super) fn largest_displacement(&self) -> f64 {
+        let moved = self.modes.displacement().as_chunks::<3>().0.iter();
+        moved.fold(0.0, |most: f64, moved| most.max(dot(*moved, *moved))).sqrt()
+    }
+
+    /// Write everything that determines the future, but the step size.
+    pub(super) fn save(&self, writer: &mut Writer) {
+        self.modes.save(writer);
+        self.delayed.save(writer);
+        self.history.save(writer);
+    }
+
+    /// Pass over a saved state and refuse what is none; its history is left in `saved`.
+    pub(super) fn check(&self, reader: &mut Reader, saved: &mut History) {
+        self.modes.check(reader);
+        self.delayed.check(reader);
+        saved.restore(&mut reader.clone());
+        self.history.check(reader);
+    }
+
+    /// Restore a saved state, after the step size is set.
+    pub(super) fn restore(&mut self, reader: &mut Reader) {
+        self.modes.restore(reader);
+        self.delayed.restore(reader);
+        self.history.restore(reader);
+    }
+}
