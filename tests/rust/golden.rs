@@ -27,7 +27,8 @@ fn lengths() -> impl Iterator<Item = f64> {
 fn course(name: &str, time: f64) -> (f64, f64) {
     let (rate, speed) = (700.0, 1300.0);
     let (sine, cosine) = (rate * time).sin_cos();
-    match name {
+    // Of several structures or pairs each follows the course of one.
+    match name.rsplit('.').next().unwrap_or(name) {
         "speed" => (speed + 3e4 * time, 3e4),
         "whirl_x" => (6e-5 * sine, 6e-5 * rate * cosine),
         "whirl_y" => (6e-5 * (1.0 - cosine), 6e-5 * rate * sine),

@@ -251,8 +251,9 @@ fn friction_heat_goes_to_the_patch_that_the_displaced_node_faces() {
             let system = simulation.system();
             for event in system.acted() {
                 let node = &scene.roms[0].contact_nodes[event.node].position;
-                let undisplaced =
-                    node[1] + std::f64::consts::TAU * event.sector as f64 / 12.0 + system.pairs()[0].drive_now().rotor_angle;
+                let undisplaced = node[1]
+                    + std::f64::consts::TAU * event.sector as f64 / 12.0
+                    + system.pairs()[0].drive_now().rotor_angle;
                 let ([u, v, _], [x, y, _]) = (event.point, system.pairs()[0].drive_now().shaft);
                 let angle = undisplaced + v / node[0];
                 let place = [(node[0] + u) * angle.cos() + x, (node[0] + u) * angle.sin() + y];

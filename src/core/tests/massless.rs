@@ -93,8 +93,7 @@ fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
     let limit = check.limit(1.0).unwrap().closed;
     told!("ξ = {damping_ratio}: limit {limit:.3e} s, {:.2} of 2/ω_max", limit * model.largest_frequency() / 2.0);
     let law = FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![-1e-4], sliding: vec![[0.0; 3]] };
-    let settings =
-        SystemSettings { scheme: Scheme::MasslessBoundary, solver: Solver::Lcp, ledger: true };
+    let settings = SystemSettings { scheme: Scheme::MasslessBoundary, solver: Solver::Lcp, ledger: true };
     let mut pressed = System::new(&model, 1, GapLaw::Fixed(law), 0.0, settings);
     pressed.set_step(share * limit);
     pressed.start(&[Drive::default()]);

@@ -50,8 +50,7 @@ fn a_thousand_contact_steps_agree_to_rounding() {
     // Two nodes are pressed against the obstacle at rest, one touches now and then.
     let gaps = [-1e-4, 0.1e-4, -0.5e-4];
     let law = GapLaw::Fixed(FixedGap { normals: normals.clone(), gaps: gaps.to_vec(), sliding });
-    let settings =
-        SystemSettings { scheme: Scheme::CentralDifference, solver: Solver::Film, ledger: true };
+    let settings = SystemSettings { scheme: Scheme::CentralDifference, solver: Solver::Film, ledger: true };
     let mut system = System::new(&model, 1, law, FRICTION, settings);
     system.set_step(step);
     let start = DVector::from_fn(ORDER, |_, _| 2e-4 * number(&mut seed));

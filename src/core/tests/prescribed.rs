@@ -10,8 +10,8 @@ mod lattice;
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::contact::open_gap::{OpenGap, OpenSurface};
 use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw};
+use tiprub_core::contact::open_gap::{OpenGap, OpenSurface};
 use tiprub_core::contact::spline::SurfaceSpline;
 use tiprub_core::dynamics::bank::BankOptions;
 use tiprub_core::dynamics::modal::ModalModel;
@@ -320,8 +320,11 @@ fn a_mass_that_swings_on_a_plane_loses_the_same_amplitude_every_half_turn() {
         for solver in [Solver::Film, Solver::Lcp, Solver::Coulomb] {
             for plane in [false, true] {
                 let settings = SystemSettings { scheme, solver, ledger: true };
-                let mut system =
-                    if plane { swinging_plane(scheme, friction, settings) } else { swinging_blade(scheme, friction, settings) };
+                let mut system = if plane {
+                    swinging_plane(scheme, friction, settings)
+                } else {
+                    swinging_blade(scheme, friction, settings)
+                };
                 system.set_step(step);
                 let soft = if scheme == Scheme::MasslessBoundary { SOFT } else { 0.0 };
                 let pressed = DEPTH / (1.0 + PRESS * PRESS * soft);

@@ -135,7 +135,11 @@ fn an_impact_after_a_change_of_step_is_booked_as_an_impact() {
             (0..5).for_each(|_| system.step(&[Drive::default()]).unwrap());
             assert!(system.events().is_empty());
             system.set_step(ratio * step);
-            assert!((system.structures()[0].gap_rate(0, 0) / -speed - 1.0).abs() < 1e-9, "{} m/s", system.structures()[0].gap_rate(0, 0));
+            assert!(
+                (system.structures()[0].gap_rate(0, 0) / -speed - 1.0).abs() < 1e-9,
+                "{} m/s",
+                system.structures()[0].gap_rate(0, 0)
+            );
             system.step(&[Drive::default()]).unwrap();
             assert_eq!(system.events().len(), 1);
             (0..20).for_each(|_| system.step(&[Drive::default()]).unwrap());

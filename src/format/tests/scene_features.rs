@@ -48,11 +48,15 @@ fn slips_of_free_masters_are_located() {
     told("[0.0, -100.0, 0.5]", "[0.0, nan, 0.5]", &["structure[1].velocity"]);
     told("motion = \"free\"", "motion = \"rotating\"", &["structure[1].velocity: only a free structure has it"]);
     told("nodes = \"left_\"", "nodes = 3", &["contact[1].nodes: integer `3` found"]);
-    told("nodes = \"left_\"\n", "", &["contact[2].nodes: of several pairs one claims all", "Give every pair `nodes`"]);
+    told(
+        "nodes = \"left_\"\n",
+        "",
+        &["contact[1].nodes: of several pairs of one structure one claims all", "Give every pair `nodes`"],
+    );
     told("nodes = \"left_\"", "nodes = \"left_\"\ngap = 1e-3", &["contact[1].gap: a free master does not have it"]);
     told("rigid = true", "rigid = 1", &["surface[2].rigid: integer `1` found, true or false expected"]);
     told("rigid = true", "rigit = true", &["surface[2].rigit: unknown key", "Did you mean `rigid`?"]);
-    told("friction = 0.15", "friction = 0.2", &["Give all pairs the same friction and solver"]);
+    told("solver = \"lcp\"", "solver = \"film\"", &["Give all pairs the same solver"]);
     let parts = ["time.input_interpolation: a scene with a free master has no inputs"];
     told("[time]", "[time]\ninput_interpolation = \"hold\"", &parts);
 }
@@ -237,6 +241,12 @@ fn outputs_of_what_the_scene_does_not_have_are_refused() {
     let parts = ["outputs.wear: no contact has a coating", "Add a `coating` to the contact"];
     refused(|scene| scene.contacts[0].coating = None, &parts);
     let parts = ["outputs.slave_displacement: every surface is rigid", "Give the surface a `structure`"];
+    let rigid = |scene: &mut SceneSettings| {
+        scene.surfaces[0].structure = None;
+        scene.structures.truncate(1);
+    };
+    refused(rigid, &parts);
+    let parts = ["structure[2].name: `", "takes no part in any contact", "or remove it"];
     refused(|scene| scene.surfaces[0].structure = None, &parts);
 }
 

@@ -7,6 +7,9 @@ mod features;
 #[path = "../../../src/core/tests/common/lattice.rs"]
 mod lattice;
 
+#[path = "../../../src/core/tests/common/several.rs"]
+mod several;
+
 use features::{coating, flexible};
 use lattice::Side;
 use tiprub_core::Scene;
@@ -167,7 +170,22 @@ fn bodies() -> Vec<Scene> {
     ]
 }
 
+/// Several structures, several pairs.
+fn several() -> Vec<Scene> {
+    let named = |name: &str, mut scene: Scene| {
+        scene.settings.name = name.into();
+        scene
+    };
+    let blades = || common::scene(6);
+    vec![
+        named("two_rotors_one_casing", several::in_one_casing(blades(), Solver::Lcp, 0.15)),
+        named("two_rotors_coulomb", several::in_one_casing(blades(), Solver::Coulomb, 0.15)),
+        named("tip_and_seal", several::tip_and_seal(blades(), Solver::Film)),
+        named("three_pairs", several::split(&blades())),
+    ]
+}
+
 /// All of them.
 pub fn all() -> Vec<Scene> {
-    rotors().into_iter().chain(bodies()).collect()
+    rotors().into_iter().chain(bodies()).chain(several()).collect()
 }

@@ -13,9 +13,9 @@
 //!
 //! F = r_c(φ + δ) − ρ + m (u_z + e_z),  ∇F = (−cos δ − s' sin δ/ρ, (1 + u_r/r)(−sin δ + s' cos δ/ρ), m).
 
-use super::open_gap::{OpenGap, tangent};
 use super::layout::Layout;
 pub use super::layout::sector_angle;
+use super::open_gap::{OpenGap, tangent};
 use super::spline::{ClosestPoint, SurfaceSpline};
 use super::spline_gap::{Frame, SplineGap, faces_inwards};
 use super::surface::Surface;

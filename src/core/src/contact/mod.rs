@@ -2,9 +2,9 @@
 
 pub mod coating;
 pub mod coulomb;
-pub mod open_gap;
 pub mod gap;
 pub mod layout;
+pub mod open_gap;
 pub mod solver;
 pub mod spline;
 pub mod spline_gap;

@@ -113,9 +113,7 @@ impl Body {
     /// Modes with inertia under a scheme, of the nodal diameter that has fewest.
     pub fn fewest_dynamic_modes(&self, scheme: Scheme) -> usize {
         match &self.disk {
-            Some(disk) => {
-                disk.diameters.iter().map(|diameter| diameter.dynamic_modes(scheme)).min().unwrap_or(0)
-            }
+            Some(disk) => disk.diameters.iter().map(|diameter| diameter.dynamic_modes(scheme)).min().unwrap_or(0),
             None => self.model.dynamic_modes(scheme),
         }
     }
@@ -486,4 +484,3 @@ fn modes(structure: &StructureSettings, rom: &Rom, speed: f64) -> Result<ModalMo
     let ratio = structure.damping_ratio.unwrap_or(rom.damping_ratio);
     if structure.spin.stiffening { ModalModel::at_speed(rom, ratio, speed) } else { ModalModel::from_rom(rom, ratio) }
 }
-

@@ -140,15 +140,15 @@ impl Simulation {
     }
 }
 
-const BESIDE_FLIGHT: &str = "Check positions and velocity; small displacements beside rigid flight cannot describe this";
+const BESIDE_FLIGHT: &str =
+    "Check positions and velocity; small displacements beside rigid flight cannot describe this";
 
 /// What means something else for a structure that flies freely.
 fn free_failure(failure: StepFailure) -> (String, String) {
     let (problem, remedy) = match failure {
-        StepFailure::Unsolved { .. } => (
-            "the contact problem has no solution",
-            "Use less friction, another internal step or the solver coulomb",
-        ),
+        StepFailure::Unsolved { .. } => {
+            ("the contact problem has no solution", "Use less friction, another internal step or the solver coulomb")
+        }
         _ => (
             "contact nodes of the free structure have moved against each other, or into a surface, by more than a tenth of the \
              extent of the contact nodes",

@@ -143,8 +143,7 @@ impl Simulation {
     pub(super) fn check_step_size(&self, body: usize, step: f64, speeds: [f64; 3]) -> Result<()> {
         let Some(limits) = &self.limits else { return Ok(()) };
         let (scheme, own) = (limits.parameters.scheme, &limits.bodies[body]);
-        let stiffened =
-            speeds.into_iter().fold(1.0, |most: f64, speed| most.max(self.compiled.stiffened(body, speed)));
+        let stiffened = speeds.into_iter().fold(1.0, |most: f64, speed| most.max(self.compiled.stiffened(body, speed)));
         let largest = self.compiled.bodies[body].largest_frequency();
         stability::check_step_allowed(largest * self.compiled.stiffest(body) * stiffened, scheme, step)?;
         for carrier in self.compiled.carriers_of(body) {
@@ -270,7 +269,8 @@ impl Limits {
 
     /// Whether they are, and the senses were looked at.
     fn cover(&self, parameters: &Parameters) -> bool {
-        let looked_at = |(body, sense): (&BodyLimits, &f64)| senses_of(*sense).all(|sense| body.senses[sense].is_some());
+        let looked_at =
+            |(body, sense): (&BodyLimits, &f64)| senses_of(*sense).all(|sense| body.senses[sense].is_some());
         self.are_of(parameters) && self.bodies.iter().zip(&parameters.senses).all(looked_at)
     }
 
@@ -537,7 +537,8 @@ impl<'a> Checking<'a> {
             let mut check = massless::MasslessCheck { model, normals, slave: None };
             if let Some((gap, _, modes)) = carried.first() {
                 let at = |place| slave_at(gap, modes, &self.nodes, slave_angle(place)).0;
-                check = yielding_most(check, (0..SLAVE_ANGLES).map(|place| self.seen_by(diameter, at(place))), modes, step);
+                check =
+                    yielding_most(check, (0..SLAVE_ANGLES).map(|place| self.seen_by(diameter, at(place))), modes, step);
             }
             // Of several only the tightest counts.
             let own = check.limit(largest.min(limit.closed))?;
@@ -582,16 +583,24 @@ impl<'a> Checking<'a> {
         let nodes = self.nodes.iter().cycle().take(model.contact_modes.nrows() / 3);
         nodes
             .map(|node| {
-                let pair = self.compiled.plan.pairs_of(self.body).find(|(_, pair)| pair.nodes.contains(node));
-                let pair = pair.map_or(0, |(pair, _)| pair);
-                let contour = self.compiled.contact(pair).meridian == Meridian::Contour;
+                let contour = self.compiled.contact(self.pair_at(*node)).meridian == Meridian::Contour;
                 let slope = if contour { rom.contact_nodes[*node].meridional_slope } else { 0.0 };
                 let length = (1.0 + slope * slope).sqrt();
-                let friction = self.parameters.friction[pair];
+                let friction = self.friction_at(*node);
                 let share = if friction < self.friction { friction / self.friction } else { 1.0 };
                 ([-1.0 / length, 0.0, slope / length], [0.0, share * sense, 0.0])
             })
             .collect()
+    }
+
+    /// The pair of a contact node.
+    fn pair_at(&self, node: usize) -> usize {
+        let pair = self.compiled.plan.pairs_of(self.body).find(|(_, pair)| pair.nodes.contains(&node));
+        pair.map_or(0, |(pair, _)| pair)
+    }
+
+    fn friction_at(&self, node: usize) -> f64 {
+        self.parameters.friction[self.pair_at(node)]
     }
 
     fn normals(&self, model: &ModalModel) -> Vec<[f64; 3]> {
@@ -663,9 +672,13 @@ impl<'a> Checking<'a> {
         let names: Vec<&str> = nodes.iter().map(|node| all[self.nodes[*node]].name.as_str()).collect();
         let direction = if sense > 0.0 { "+θ" } else { "−θ" };
         let where_closed = if self.disk().is_some() { " of all sectors" } else { "" };
+        let mut frictions: Vec<f64> = nodes.iter().map(|node| self.friction_at(self.nodes[*node])).collect();
+        frictions.sort_by(f64::total_cmp);
+        frictions.dedup();
+        let frictions: Vec<String> = frictions.into_iter().map(|friction| shown(friction).to_string()).collect();
         format!(
             "with µ = {}, contact closed at {}{where_closed} and sliding in {direction}",
-            shown(self.friction),
+            frictions.join(" and "),
             names.join(", ")
         )
     }

@@ -49,12 +49,15 @@ impl Plan {
             return Err(Error::invalid("scene", problem, "Give one ROM per structure"));
         }
         let structure = |name: &str| settings.structures.iter().position(|structure| structure.name == name);
-        let touches = |index: &usize| settings.contacts.iter().any(|one| one.master == settings.structures[*index].name);
+        let touches =
+            |index: &usize| settings.contacts.iter().any(|one| one.master == settings.structures[*index].name);
         let bodies: Vec<usize> = (0..settings.structures.len()).filter(touches).collect();
         let mut plan = Self { bodies, carriers: Vec::new(), pairs: Vec::new() };
         for (index, contact) in settings.contacts.iter().enumerate() {
             let surface = settings.surfaces.iter().position(|surface| surface.name == contact.slave);
-            let (Some(master), Some(surface)) = (structure(&contact.master), surface) else { unreachable!("validated") };
+            let (Some(master), Some(surface)) = (structure(&contact.master), surface) else {
+                unreachable!("validated")
+            };
             let under = settings.surfaces[surface].structure.as_deref().and_then(structure);
             let open = settings.structures[master].motion == Motion::Free;
             check_roms(scene, master, under, open)?;

@@ -607,8 +607,7 @@ impl Side {
             Sectors::Coupled(disk) => {
                 let (sectors, lanes, [across, around, along]) = (disk.sectors(), disk.lanes(), &normals.normal);
                 let nodes = disk.moved().chunks_exact(3 * lanes).zip(self.response.chunks_exact_mut(lanes));
-                let normals =
-                    across.chunks_exact(lanes).zip(around.chunks_exact(lanes)).zip(along.chunks_exact(lanes));
+                let normals = across.chunks_exact(lanes).zip(around.chunks_exact(lanes)).zip(along.chunks_exact(lanes));
                 for ((moved, response), ((across, around), along)) in nodes.zip(normals) {
                     for lane in 0..sectors {
                         response[lane] = across[lane] * moved[lane]
@@ -620,4 +619,3 @@ impl Side {
         }
     }
 }
-

@@ -24,8 +24,8 @@ use crate::settings::{Scheme, Solver};
 pub use event::ContactEvent;
 pub use failure::StepFailure;
 pub use group::Member;
-pub(crate) use group::{Bodies, Found, Group};
 use group::Reach;
+pub(crate) use group::{Bodies, Found, Group};
 pub use pair::{Carrier, Pair, PairParts};
 pub use small::Curved;
 pub use structure::Structure;
@@ -231,7 +231,10 @@ impl System {
     /// `drives`, one per pair.
     pub fn start(&mut self, drives: &[Drive]) {
         self.structures.iter_mut().for_each(Structure::start);
-        self.groups.iter_mut().filter_map(|group| group.law_mut().coated_mut()).for_each(|law| law.coating_mut().reset());
+        self.groups
+            .iter_mut()
+            .filter_map(|group| group.law_mut().coated_mut())
+            .for_each(|law| law.coating_mut().reset());
         self.events.now.clear();
         self.events.before.clear();
         self.pairs.iter_mut().zip(drives).for_each(|(pair, drive)| pair.start(drive));

@@ -26,15 +26,15 @@ impl SceneSettings {
 
     /// Every structure and every surface takes part; a surface belongs to one pair.
     pub(super) fn validate_pairs(&self) -> Result<()> {
-        for structure in &self.structures {
-            self.validate_part(structure)?;
+        for (index, structure) in self.structures.iter().enumerate() {
+            self.validate_part(structure, format!("structure[{}]", index + 1))?;
         }
-        for surface in &self.surfaces {
+        for (index, surface) in self.surfaces.iter().enumerate() {
             let count = self.contacts.iter().filter(|contact| contact.slave == surface.name).count();
             if count != 1 {
                 return Err(Error::invalid(
-                    format!("surface `{}`", surface.name),
-                    format!("named by {count} contacts; a surface belongs to one pair"),
+                    format!("surface[{}].name", index + 1),
+                    format!("`{}` is named by {count} contacts; a surface belongs to one pair", surface.name),
                     "Name it in one [[contact]], or remove it: another pair takes a [[surface]] of its own, on the same structure if \
                      it has one",
                 ));
@@ -47,24 +47,26 @@ impl SceneSettings {
     }
 
     /// A structure touches something or carries a surface.
-    fn validate_part(&self, structure: &StructureSettings) -> Result<()> {
+    fn validate_part(&self, structure: &StructureSettings, at: String) -> Result<()> {
         let carries = self.surfaces.iter().any(|surface| surface.structure.as_ref() == Some(&structure.name));
-        let what = format!("structure `{}`", structure.name);
+        let (name, what) = (&structure.name, format!("{at}.name"));
         match (self.touches(structure), carries) {
             (true, true) => Err(Error::invalid(
                 what,
-                "it is the master of a contact and carries a surface: contact nodes and control points of one structure together \
-                 are not made for",
+                format!(
+                    "`{name}` is the master of a contact and carries a surface: contact nodes and control points of one structure \
+                     together are not made for"
+                ),
                 "Let it be the master of both contacts, with surfaces on what it meets",
             )),
             (false, false) if structure.motion == Motion::Free => Err(Error::invalid(
-                "structure.motion",
-                format!("`{}` flies freely and is the master of no contact", structure.name),
+                format!("{at}.motion"),
+                format!("`{name}` flies freely and is the master of no contact"),
                 "Make it the master of a [[contact]], or remove it",
             )),
             (false, false) => {
                 let remedy = "Make it the `master` of a [[contact]] or the `structure` of a [[surface]], or remove it";
-                Err(Error::invalid(what, "takes no part in any contact", remedy))
+                Err(Error::invalid(what, format!("`{name}` takes no part in any contact"), remedy))
             }
             _ => Ok(()),
         }

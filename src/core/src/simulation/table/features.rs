@@ -129,7 +129,8 @@ pub fn outputs(table: &mut Builder, parts: &Parts) {
             wear(table, parts, pair, coating);
         }
     }
-    for carrier in parts.carriers().iter().filter(|carrier| parts.settings.outputs.slave_displacement && !carrier.open) {
+    for carrier in parts.carriers().iter().filter(|carrier| parts.settings.outputs.slave_displacement && !carrier.open)
+    {
         table.belongs(carrier.index, parts.of_carrier(carrier));
         let text = "Radial displacement of the contact grid of the casing, ring after ring along z, outwards positive";
         let index = carrier.index;
@@ -144,16 +145,14 @@ fn heat(table: &mut Builder, pair: &Pair) {
     let (index, power) = (pair.index, Some((&POWER, 100.0)));
     if pair.patches > 0 {
         let text = "Friction power into each casing patch, mean over the communication step";
-        let read = each(move |view, patch| {
-            view.mean * view.slave_share(index) * view.window.pairs[index].patch_heat[patch]
-        });
+        let read =
+            each(move |view, patch| view.mean * view.slave_share(index) * view.window.pairs[index].patch_heat[patch]);
         table.output("casing_friction_power", Span::Mean, power, text, read).dimension = Some(pair.patches);
     }
     if pair.contact.heat_to_slave.is_some() {
         let text = "Friction power into the blades, mean over the communication step";
-        let read = scalar(move |view| {
-            view.mean * (1.0 - view.slave_share(index)) * view.window.pairs[index].friction_heat
-        });
+        let read =
+            scalar(move |view| view.mean * (1.0 - view.slave_share(index)) * view.window.pairs[index].friction_heat);
         table.output("blade_friction_power", Span::Mean, power, text, read);
     }
 }

@@ -90,7 +90,11 @@ impl<'a> Parts<'a> {
             index,
             structure: &self.settings.structures[*structure],
             rom: &self.scene.roms[*structure],
-            open: self.plan.pairs.iter().any(|pair| pair.carrier == Some(index) && self.plan.is_free(self.scene, pair.body)),
+            open: self
+                .plan
+                .pairs
+                .iter()
+                .any(|pair| pair.carrier == Some(index) && self.plan.is_free(self.scene, pair.body)),
         };
         self.plan.carriers.iter().enumerate().map(carrier).collect()
     }
@@ -245,7 +249,8 @@ fn friction(table: &mut Builder, parts: &Parts) {
     }
     for pair in parts.pairs() {
         table.belongs(pair.index, parts.of_pair(&pair));
-        let text = format!("Coulomb friction coefficient between {} and {}", pair.body.structure.name, pair.surface.name);
+        let text =
+            format!("Coulomb friction coefficient between {} and {}", pair.body.structure.name, pair.surface.name);
         table.friction(pair.contact, &text);
     }
 }
