@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use tiprub_model::cube::{MassMatrix, Side};
 use tiprub_shell::Failure;
-use tiprub_study::arguments::{CacheArguments, ErrorArguments, MapArguments, assignment, positive};
+use tiprub_study::arguments::{CacheArguments, ErrorArguments, MapArguments, StabilityArguments, assignment, positive};
 
 use crate::{casing_arguments::CasingArguments, file_arguments::FileArguments};
 
@@ -92,11 +92,9 @@ pub enum Command {
     )]
     Inspect(InspectArguments),
     /// Studies of a scene: pictures, numbers, and whether they show what they should.
-    #[command(
-        after_help = "Examples:\n  tiprub study error scene.toml\n  tiprub study map scene.toml --speeds 1200:1500:61\n  \
-                            tiprub study error --help\n\n\
-                            DIR then holds index.html (opens offline), an SVG and a CSV per figure, and results.json."
-    )]
+    #[command(after_help = "Examples:\n  tiprub study error scene.toml\n  tiprub study stability scene.toml\n  \
+                            tiprub study map scene.toml --speeds 1200:1500:61\n  tiprub study error --help\n\n\
+                            DIR then holds index.html (opens offline), an SVG and a CSV per figure, and results.json.")]
     Study(StudyArguments),
     /// What moved to the laboratory of the sources.
     #[command(hide = true, trailing_var_arg = true)]
@@ -253,6 +251,14 @@ pub enum StudyCommand {
                             The errors are those of the steps, against two fine runs by different schemes that must meet."
     )]
     Error(ErrorArguments),
+    /// Over friction, speed and internal step: what is right, warned of or refused and why, growth rates of sliding contact, and the
+    /// largest usable step of every scheme and solver.
+    #[command(
+        after_help = "Examples:\n  tiprub study stability scene.toml\n  tiprub study stability builtin:rotor37 --quick\n  \
+                            tiprub study stability scene.toml --friction 0:0.6:13 --speeds -1700:1700:2 --steps 1e-7:2e-5:12\n\n\
+                            The answers are those of `tiprub run`, without the run. Of coupled sectors each takes long: by default few are asked."
+    )]
+    Stability(StabilityArguments),
     /// What was a study of the models that ship.
     #[command(external_subcommand)]
     Other(Vec<String>),

@@ -34,6 +34,7 @@ pub fn check(command: &Command) -> Result<()> {
         }
         Command::Study(arguments) => match &arguments.study {
             StudyCommand::Map(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
+            StudyCommand::Stability(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
             StudyCommand::Error(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
             StudyCommand::Other(_) => Ok(()),
         },

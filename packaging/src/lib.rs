@@ -4,7 +4,7 @@
 //!
 //! - [`cli`], [`casing_arguments`], [`file_arguments`]: what can be asked for;
 //! - [`command_files`]: what each command reads and writes, looked at before any work;
-//! - [`scene_features`], [`rom_facts`], [`step_limits`]: what is to be known of a scene or a ROM before it is trusted;
+//! - [`scene_features`], [`rom_facts`]: what is to be known of a scene or a ROM before it is trusted;
 //! - [`users_model`], [`cube_models`], [`mod@reduced`]: models read, judged, reduced, and what is told of them;
 //! - [`fmu`], [`library`]: what is in an FMU, and where its shared library comes from;
 //! - [`report`]: the HTML report of the demo.
@@ -21,5 +21,4 @@ pub mod reduced;
 pub mod report;
 pub mod rom_facts;
 pub mod scene_features;
-pub mod step_limits;
 pub mod users_model;

@@ -7,8 +7,7 @@ use tiprub_shell::{
     console::{Console, Outcome},
     output_file,
 };
-use tiprub_study as study;
-use tiprub_study::{arguments::StudyCommon, error, map};
+use tiprub_study::{Study, arguments::StudyCommon, error, map, output, stability};
 
 use crate::cli::{StudyArguments, StudyCommand};
 
@@ -17,19 +16,16 @@ use crate::cli::{StudyArguments, StudyCommand};
 /// # Errors
 /// A run that fails, or files that cannot be written.
 pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
-    let (name, common) = match &arguments.study {
-        StudyCommand::Map(arguments) => ("map", &arguments.common),
-        StudyCommand::Error(arguments) => ("error", &arguments.common),
+    type Work<'a> = Box<dyn Fn(&Console) -> Result<Study> + 'a>;
+    let (name, common, work): (_, _, Work) = match &arguments.study {
+        StudyCommand::Map(own) => ("map", &own.common, Box::new(|console| map::study(own, console))),
+        StudyCommand::Error(own) => ("error", &own.common, Box::new(|console| error::study(own, console))),
+        StudyCommand::Stability(own) => ("stability", &own.common, Box::new(|console| stability::study(own, console))),
         StudyCommand::Other(words) => return Err(moved(words.first().map_or("", String::as_str))),
     };
     let directory = directory(name, common);
     output_file::try_directory(&directory)?;
-    let study = match &arguments.study {
-        StudyCommand::Map(arguments) => map::study(arguments, console)?,
-        StudyCommand::Error(arguments) => error::study(arguments, console)?,
-        StudyCommand::Other(words) => return Err(moved(words.first().map_or("", String::as_str))),
-    };
-    study::output::write(&study, &directory)
+    output::write(&work(console)?, &directory)
 }
 
 /// Where everything goes.
@@ -38,7 +34,14 @@ pub fn directory(name: &str, common: &StudyCommon) -> PathBuf {
 }
 
 /// Studies of the models that ship, which are evidence for the program and none of its commands.
-const LABORATORY: [&str; 7] = ["stage", "convergence", "modes", "cube", "conjugacy", "inputs", "stability"];
+const LABORATORY: [&str; 5] = ["stage", "modes", "cube", "conjugacy", "inputs"];
+
+/// The answer to what was `tiprub stability`.
+pub fn stability_moved() -> Failure {
+    let problem = "of a scene it is a study; stiff and extreme cases have moved to the laboratory in the sources";
+    let remedy = "Run `tiprub study stability SCENE`, or `cargo run --release -p tiprub-lab -- stability` there";
+    Failure::usage("stability", problem, remedy)
+}
 
 /// The answer to a study that is none, or is one of the laboratory.
 pub fn moved(name: &str) -> Failure {
@@ -47,5 +50,9 @@ pub fn moved(name: &str) -> Failure {
         let remedy = format!("Run `cargo run --release -p tiprub-lab -- {name}` there");
         return Failure::usage(name, problem, remedy);
     }
-    Failure::usage(format!("study {name}"), "no such study", "Choose `map` or `error`, see `tiprub study --help`")
+    Failure::usage(
+        format!("study {name}"),
+        "no such study",
+        "Choose `map`, `error` or `stability`, see `tiprub study --help`",
+    )
 }

@@ -10,6 +10,7 @@ pub mod error_study;
 pub mod machine;
 pub mod map;
 pub mod output;
+pub mod stability;
 
 use serde_json::{Value, json};
 use tiprub_figure::{plots::Plot, waterfall::Waterfall};

@@ -29,6 +29,20 @@ const QUICK_SAMPLES: usize = 100;
 /// What no start value may replace.
 const COMPARED: [&str; 3] = ["scheme", "solver", "internal_step_max"];
 
+/// Start values that a study varies itself.
+///
+/// # Errors
+/// One of them.
+pub fn refuse_compared(settings: &[(String, String)]) -> Result<()> {
+    match settings.iter().find(|(name, _)| COMPARED.contains(&name.as_str())) {
+        Some((name, _)) => {
+            let problem = "the study compares all of them";
+            Err(Failure::usage(format!("--set {name}"), problem, "Leave it out"))
+        }
+        None => Ok(()),
+    }
+}
+
 /// A scene of one's own.
 pub struct Own {
     title: String,
@@ -46,12 +60,7 @@ impl Own {
     /// # Errors
     /// The scene cannot be read or does not run; nothing touches within the window.
     pub fn new(arguments: &ErrorArguments, console: &Console) -> Result<Self> {
-        for (name, _) in &arguments.set {
-            if COMPARED.contains(&name.as_str()) {
-                let problem = "the study compares all of them";
-                return Err(Failure::usage(format!("--set {name}"), problem, "Leave it out"));
-            }
-        }
+        refuse_compared(&arguments.set)?;
         let quick = arguments.common.quick;
         let scene = scene_source::load(&arguments.scene, &arguments.common.cache.cache(), console)?;
         let schedule = Schedule::new(&scene.settings.experiment, None, None)?;
