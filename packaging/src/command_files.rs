@@ -9,8 +9,9 @@ use tiprub_shell::{
 };
 
 use crate::{
-    cli::{Command, Model, ReduceArguments, StudyCommand},
+    cli::{Command, StudyCommand},
     commands::demo,
+    reduce_arguments::Written,
 };
 
 /// Extensions of what a study writes.
@@ -26,7 +27,7 @@ pub fn check(command: &Command) -> Result<()> {
             let csv = arguments.csv.clone().filter(|path| path != Path::new("-"));
             outputs(&scene(&arguments.scene), &Vec::from_iter(Named::option("--csv", &csv)))
         }
-        Command::Reduce(arguments) => outputs(&model_files(arguments), &reduce_outputs(arguments)),
+        Command::Reduce(arguments) => outputs(&arguments.model.files(), &written(arguments.model.written())),
         Command::Demo(arguments) => {
             let files: Vec<Named> = demo::FILES.map(|name| Named::new("--out", arguments.out.join(name))).to_vec();
             apart(&Vec::from_iter(Named::option("--library", &arguments.library)), &files)?;
@@ -36,10 +37,9 @@ pub fn check(command: &Command) -> Result<()> {
             StudyCommand::Map(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
             StudyCommand::Stability(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
             StudyCommand::Error(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
-            StudyCommand::Other(_) => Ok(()),
         },
         // Names follow from the scene: see the command.
-        Command::Package(_) | Command::Inspect(_) | Command::Stability { .. } => Ok(()),
+        Command::Package(_) | Command::Inspect(_) => Ok(()),
     }
 }
 
@@ -52,20 +52,8 @@ pub fn scene(argument: &str) -> Vec<Named> {
         .collect()
 }
 
-/// The files that describe a model of one's own.
-pub fn model_files(arguments: &ReduceArguments) -> Vec<Named> {
-    let mesh = match &arguments.model {
-        Some(Model::File(path)) => Some(Named::new("MODEL", path)),
-        _ => None,
-    };
-    let file = &arguments.file;
-    let options =
-        [("--stiffness", &file.stiffness), ("--mass", &file.mass), ("--nodes", &file.nodes), ("--dofs", &file.dofs)];
-    mesh.into_iter().chain(options.into_iter().filter_map(|(role, path)| Named::option(role, path))).collect()
-}
-
 /// The files that `reduce` was told to write.
-fn reduce_outputs(arguments: &ReduceArguments) -> Vec<Named> {
+fn written(arguments: &Written) -> Vec<Named> {
     let options = [("--output", &arguments.output), ("--inp", &arguments.inp), ("--vtk", &arguments.vtk)];
     options.into_iter().filter_map(|(role, path)| Named::option(role, path)).collect()
 }

@@ -102,6 +102,62 @@ fn the_quick_study_of_errors_takes_any_scene() {
     }
 }
 
+/// Every answer of the study is that of a run with the same start values and step, for a scene that ships and one from a file; and
+/// the largest usable steps part what runs from what is refused.
+#[test]
+fn the_study_of_stability_answers_as_runs_do() {
+    let root = tempfile::tempdir().unwrap();
+    let cache = env!("CARGO_TARGET_TMPDIR");
+    let text = tiprub_gallery::scene_source::ROTOR37_SCENE.replace("name = \"rotor37_rub\"", "name = \"own\"");
+    fs::write(root.path().join("own.toml"), text).unwrap();
+    let run = |scene: &str, friction: f64, speed: f64, step: f64| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+        let values = [
+            format!("--set=friction_coefficient={friction:?}"),
+            format!("--set=speed={speed:?}"),
+            format!("--set=internal_step_max={step:?}"),
+            format!("--step={step:?}"),
+            format!("--stop={:?}", 1.0e-3 + step),
+        ];
+        let output = command.current_dir(root.path()).env("TIPRUB_CACHE", cache);
+        let output = output.args(["run", scene, "--json", "--quiet"]).args(values).output().unwrap();
+        let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+        (output.status.success(), json)
+    };
+    let mut answers = Vec::new();
+    for scene in ["builtin:rotor37", "own.toml"] {
+        let arguments = ["study", "stability", scene, "--friction", "0.15:0.9:2", "--speeds=-1800:1800:2"];
+        let more = ["--steps", "1e-6:1.6e-5:2", "--quick", "--json", "--quiet", "--out", "out"];
+        let (stdout, _) = tiprub(root.path(), cache, &[&arguments[..], &more].concat());
+        let json: Value = serde_json::from_str(&stdout).unwrap();
+        only_no(&json, &[]);
+        let points = json["results"]["points"].as_array().unwrap();
+        assert_eq!(points.len(), 8);
+        answers.push(points.iter().map(|point| point["answer"].as_str().unwrap().to_owned()).collect::<Vec<_>>());
+        for point in points.iter().filter(|_| scene == "own.toml") {
+            let number = |name: &str| point[name].as_f64().unwrap();
+            let (ran, told) = run(scene, number("friction"), number("speed"), number("internal_step"));
+            assert_eq!(ran, point["answer"] != "refused", "{point:#} {told:#}");
+            let words = if ran { told["warnings"].to_string() } else { told["error"].to_string() };
+            let wanted = point["refusal"].as_str().map_or(Vec::new(), |text| vec![text.split(". ").next().unwrap()]);
+            let warned = point["warnings"].as_array().into_iter().flatten().map(|text| text.as_str().unwrap());
+            for text in wanted.into_iter().chain(warned) {
+                assert!(words.contains(text.trim_start_matches("refused: ")), "{text} {words}");
+            }
+        }
+        for limit in json["results"]["largest_steps"].as_array().unwrap() {
+            assert!(limit["step"].as_f64().unwrap() > 1e-6 && limit["refusal_beyond"] != "", "{limit:#}");
+        }
+    }
+    assert_eq!(answers[0], answers[1], "the same code for both");
+    assert!(["right", "flutter", "refused"].iter().all(|kind| answers[0].iter().any(|one| one == kind)), "{answers:?}");
+    let flutter = columns(&root.path().join("out/answers.csv")).1;
+    let frequencies: Vec<f64> = flutter.iter().map(|row| row[6]).filter(|hertz| hertz.is_finite()).collect();
+    assert!(!frequencies.is_empty() && flutter.iter().all(|row| row[6].is_nan() || row[4] > 0.0), "{flutter:?}");
+    let page = fs::read_to_string(root.path().join("out/index.html")).unwrap();
+    assert!(page.contains("Largest usable internal step") && page.contains("Read a column"));
+}
+
 /// Told at once: nothing is reduced for it, and no directory stays.
 #[test]
 fn what_a_study_cannot_do_is_told_before_the_work() {
@@ -116,18 +172,18 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1, "something stays");
         told
     };
-    for name in ["map", "error"] {
+    for name in ["map", "error", "stability"] {
         let told = refuse(&["study", name, "builtin:rotor37", "--quick", "--out", "file/out"], 1);
         assert!(told.contains("file/out: cannot create the directory"), "{told}");
     }
     let told = refuse(&["study", "map", "builtin:cube-between-rings"], 2);
     assert!(told.contains("`cube`, flies freely") && told.contains("rotating master"), "{told}");
-    for name in ["stage", "convergence", "modes", "cube", "conjugacy", "inputs"] {
+    for name in ["stage", "modes", "cube", "conjugacy", "inputs"] {
         let told = refuse(&["study", name, "--quick"], 2);
         assert!(told.contains("the laboratory") && told.contains(&format!("-p tiprub-lab -- {name}")), "{told}");
     }
     assert!(refuse(&["stability", "--case", "friction/"], 2).contains("-p tiprub-lab -- stability"));
-    assert!(refuse(&["study", "tip"], 2).contains("Choose `map` or `error`"));
+    assert!(refuse(&["study", "tip"], 2).contains("Choose `map`, `error`"));
     let told = refuse(&["study", "error", "builtin:rotor37", "--set", "scheme=film"], 2);
     assert!(told.contains("--set scheme: the study compares all of them"), "{told}");
 }

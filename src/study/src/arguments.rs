@@ -72,13 +72,13 @@ pub struct StabilityArguments {
     #[arg(value_name = "SCENE")]
     pub scene: String,
     /// Friction coefficients, from, to and how many [default: 11 from 0 to 1, or to twice the scene's].
-    #[arg(long, value_name = "FROM:TO:COUNT", value_parser = frictions)]
+    #[arg(long, value_name = "FROM:TO:COUNT", value_parser = frictions, allow_hyphen_values = true)]
     pub friction: Option<Range>,
     /// Speeds (rad/s), from, to and how many; negative ones turn backwards [default: -1, 0.5, 1 and 1.5 times the scene's].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = range, allow_hyphen_values = true)]
     pub speeds: Option<Range>,
     /// Internal steps (s), from, to and how many, evenly on a logarithmic scale [default: 9 from 1/16 to 16 times the scene's].
-    #[arg(long, value_name = "FROM:TO:COUNT", value_parser = steps)]
+    #[arg(long, value_name = "FROM:TO:COUNT", value_parser = steps, allow_hyphen_values = true)]
     pub steps: Option<Range>,
     /// Answers sought at the same time [default: one per processor].
     #[arg(long, value_name = "N")]
