@@ -102,58 +102,69 @@ fn the_quick_study_of_errors_takes_any_scene() {
     }
 }
 
-/// Every answer of the study is that of a run with the same start values and step, for a scene that ships and one from a file; and
-/// the largest usable steps part what runs from what is refused.
+/// A scene of one's own around a coarse blade.
+fn own_scene(root: &Path) {
+    let reduce = ["reduce", "rotor37", "--mesh", "6x1x8", "--modes", "4", "--contact-nodes", "2", "--quiet"];
+    tiprub(root, "", &[&reduce[..], &["-o", "coarse.rom.safetensors"]].concat());
+    let text = tiprub_gallery::scene_source::ROTOR37_SCENE.replace("builtin:rotor37", "coarse.rom.safetensors");
+    fs::write(root.join("own.toml"), text).unwrap();
+}
+
+/// Every answer of the study is that of a run with the same start values and step, and the largest usable steps part what is accepted
+/// from what is refused.
 #[test]
 fn the_study_of_stability_answers_as_runs_do() {
     let root = tempfile::tempdir().unwrap();
-    let cache = env!("CARGO_TARGET_TMPDIR");
-    let text = tiprub_gallery::scene_source::ROTOR37_SCENE.replace("name = \"rotor37_rub\"", "name = \"own\"");
-    fs::write(root.path().join("own.toml"), text).unwrap();
-    let run = |scene: &str, friction: f64, speed: f64, step: f64| {
+    own_scene(root.path());
+    let run = |friction: f64, speed: f64, step: f64, method: &str| {
+        let (scheme, solver) = method.split_once(" + ").unwrap();
         let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
         let values = [
             format!("--set=friction_coefficient={friction:?}"),
             format!("--set=speed={speed:?}"),
             format!("--set=internal_step_max={step:?}"),
+            format!("--set=scheme={scheme}"),
+            format!("--set=solver={solver}"),
             format!("--step={step:?}"),
-            format!("--stop={:?}", 1.0e-3 + step),
+            format!("--stop={:?}", 3.0 * step),
         ];
-        let output = command.current_dir(root.path()).env("TIPRUB_CACHE", cache);
-        let output = output.args(["run", scene, "--json", "--quiet"]).args(values).output().unwrap();
-        let json: Value = serde_json::from_slice(&output.stdout).unwrap();
-        (output.status.success(), json)
+        let output =
+            command.current_dir(root.path()).args(["run", "own.toml", "--json", "--quiet"]).args(values).output();
+        serde_json::from_slice::<Value>(&output.unwrap().stdout).unwrap()
     };
-    let mut answers = Vec::new();
-    for scene in ["builtin:rotor37", "own.toml"] {
-        let arguments = ["study", "stability", scene, "--friction", "0.15:0.9:2", "--speeds=-1800:1800:2"];
-        let more = ["--steps", "1e-6:1.6e-5:2", "--quick", "--json", "--quiet", "--out", "out"];
-        let (stdout, _) = tiprub(root.path(), cache, &[&arguments[..], &more].concat());
-        let json: Value = serde_json::from_str(&stdout).unwrap();
-        only_no(&json, &[]);
-        let points = json["results"]["points"].as_array().unwrap();
-        assert_eq!(points.len(), 8);
-        answers.push(points.iter().map(|point| point["answer"].as_str().unwrap().to_owned()).collect::<Vec<_>>());
-        for point in points.iter().filter(|_| scene == "own.toml") {
-            let number = |name: &str| point[name].as_f64().unwrap();
-            let (ran, told) = run(scene, number("friction"), number("speed"), number("internal_step"));
-            assert_eq!(ran, point["answer"] != "refused", "{point:#} {told:#}");
-            let words = if ran { told["warnings"].to_string() } else { told["error"].to_string() };
-            let wanted = point["refusal"].as_str().map_or(Vec::new(), |text| vec![text.split(". ").next().unwrap()]);
-            let warned = point["warnings"].as_array().into_iter().flatten().map(|text| text.as_str().unwrap());
-            for text in wanted.into_iter().chain(warned) {
-                assert!(words.contains(text.trim_start_matches("refused: ")), "{text} {words}");
+    let arguments = ["study", "stability", "own.toml", "--friction", "0.15:0.9:2", "--speeds=-1800:1800:2"];
+    let more = ["--steps", "1e-6:1.6e-5:2", "--json", "--quiet", "--out", "out"];
+    let (stdout, _) = tiprub(root.path(), "", &[&arguments[..], &more].concat());
+    let json: Value = serde_json::from_str(&stdout).unwrap();
+    only_no(&json, &[]);
+    let number = |value: &Value, name: &str| value[name].as_f64().unwrap();
+    let points = json["results"]["points"].as_array().unwrap();
+    assert_eq!(points.len(), 8);
+    for point in points {
+        let [friction, speed, step] = ["friction", "speed", "internal_step"].map(|name| number(point, name));
+        let told = run(friction, speed, step, "modal-exact + lcp");
+        match point["refusal"].as_str() {
+            // What and where stand apart in JSON.
+            Some(text) => {
+                let told = told["error"]["problem"].as_str().unwrap();
+                assert!(told.starts_with("refused: ") && text.starts_with(told), "{text} {told}");
             }
-        }
-        for limit in json["results"]["largest_steps"].as_array().unwrap() {
-            assert!(limit["step"].as_f64().unwrap() > 1e-6 && limit["refusal_beyond"] != "", "{limit:#}");
+            None => assert_eq!(told["warnings"], point["warnings"], "{point:#}"),
         }
     }
-    assert_eq!(answers[0], answers[1], "the same code for both");
-    assert!(["right", "flutter", "refused"].iter().all(|kind| answers[0].iter().any(|one| one == kind)), "{answers:?}");
-    let flutter = columns(&root.path().join("out/answers.csv")).1;
-    let frequencies: Vec<f64> = flutter.iter().map(|row| row[6]).filter(|hertz| hertz.is_finite()).collect();
-    assert!(!frequencies.is_empty() && flutter.iter().all(|row| row[6].is_nan() || row[4] > 0.0), "{flutter:?}");
+    let answers: Vec<&str> = points.iter().map(|point| point["answer"].as_str().unwrap()).collect();
+    assert!(["right", "warned", "flutter", "refused"].iter().all(|kind| answers.contains(kind)), "{answers:?}");
+    let limits = json["results"]["largest_steps"].as_array().unwrap();
+    assert_eq!(limits.len(), 9);
+    for limit in limits.iter().filter(|limit| !limit["method"].as_str().unwrap().ends_with("coulomb")) {
+        for (factor, accepted) in [(0.999, true), (1.02, false)] {
+            let told = run(0.15, 1800.0, factor * number(limit, "step"), limit["method"].as_str().unwrap());
+            assert_eq!(told["error"].is_null(), accepted, "{limit:#} {told:#}");
+        }
+    }
+    for row in columns(&root.path().join("out/answers.csv")).1 {
+        assert_eq!(row[6].is_finite(), row[4] > 0.0, "what flutters has a frequency: {row:?}");
+    }
     let page = fs::read_to_string(root.path().join("out/index.html")).unwrap();
     assert!(page.contains("Largest usable internal step") && page.contains("Read a column"));
 }
