@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use tiprub_study::arguments::{CacheArguments, ErrorArguments, MapArguments, StabilityArguments, assignment, positive};
 
-use crate::reduce_arguments::ReduceArguments;
+use crate::{own_arguments::ConvergenceCommand, reduce_arguments::ReduceArguments};
 
 /// Blade-tip/casing contact (rub) as an FMU.
 #[derive(Debug, Parser)]
@@ -178,6 +178,15 @@ pub enum StudyCommand {
                             The answers are those of `tiprub run`, without the run. Of coupled sectors each takes long: by default few are asked."
     )]
     Stability(StabilityArguments),
+    /// What another internal step, more or fewer modes, and other contact nodes change: displacements, impulse, friction work, peak
+    /// force and strain energy.
+    #[command(
+        after_help = "Examples:\n  tiprub study convergence scene.toml\n  tiprub study convergence builtin:rotor37 --quick\n  \
+                            tiprub study convergence scene.toml --mesh blade.inp --contact-set TIP --clamp-set ROOT --sectors 36 --units mm-t-s\n\n\
+                            Modes are taken away from any ROM; more modes and other contact nodes need what it was reduced from: a model that \
+                            ships, or --mesh with the options of `tiprub reduce blade`."
+    )]
+    Convergence(Box<ConvergenceCommand>),
 }
 
 /// Which FMUs to write.

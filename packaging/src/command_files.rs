@@ -34,9 +34,13 @@ pub fn check(command: &Command) -> Result<()> {
             output_file::try_directory(&arguments.out)
         }
         Command::Study(arguments) => match &arguments.study {
-            StudyCommand::Map(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
-            StudyCommand::Stability(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
-            StudyCommand::Error(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
+            StudyCommand::Map(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),
+            StudyCommand::Convergence(own) => {
+                let (common, source) = (&own.study.common, own.blade.source(own.file.as_deref()).files());
+                study(&own.study.scene, common.out.as_deref(), source)
+            }
+            StudyCommand::Stability(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),
+            StudyCommand::Error(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),
         },
         // Names follow from the scene: see the command.
         Command::Package(_) | Command::Inspect(_) => Ok(()),
@@ -59,10 +63,10 @@ fn written(arguments: &Written) -> Vec<Named> {
 }
 
 /// A study names its files itself, in one directory: what is read must not be there under a name of that kind.
-pub fn study(argument: &str, out: Option<&Path>) -> Result<()> {
+pub fn study(argument: &str, out: Option<&Path>, more: Vec<Named>) -> Result<()> {
     let Some(out) = out else { return Ok(()) };
     let directory = identity(out);
-    for input in scene(argument) {
+    for input in scene(argument).into_iter().chain(more) {
         let kind = input.path.extension().and_then(|kind| kind.to_str()).unwrap_or_default().to_ascii_lowercase();
         let real = output_file::destination(&input.path).unwrap_or_else(|_| input.path.clone());
         let inside = directory.is_some() && identity(real.parent().unwrap_or(Path::new("."))) == directory;

@@ -7,7 +7,8 @@ use tiprub_model::{
     Material,
     read::{Axis, Units},
 };
-use tiprub_shell::places::Named;
+use tiprub_shell::{Failure, Result, places::Named};
+use tiprub_study::arguments::ConvergenceArguments;
 
 use crate::{
     casing_arguments::{MaterialChoice, axial, pair},
@@ -29,7 +30,7 @@ pub struct BladeArguments {
 }
 
 /// How blades are reduced.
-#[derive(Debug, Clone, PartialEq, Args)]
+#[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct BladeOptions {
     /// Number of blades around the axis, that know nothing of each other [default: 1].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
@@ -46,6 +47,52 @@ pub struct BladeOptions {
     /// Matrices.
     #[command(flatten)]
     pub matrices: MatrixOptions,
+}
+
+/// Arguments of `tiprub study convergence`.
+#[derive(Debug, Args)]
+pub struct ConvergenceCommand {
+    /// Scene and window.
+    #[command(flatten)]
+    pub study: ConvergenceArguments,
+    /// Mesh (or, with --stiffness, nodes and sets) that the ROM of the blades was reduced from, with the options of `tiprub reduce
+    /// blade`: more modes and other contact nodes are then tried.
+    #[arg(long = "mesh", value_name = "FILE", help_heading = MESH)]
+    pub file: Option<PathBuf>,
+    /// Its options.
+    #[command(flatten, next_help_heading = MESH)]
+    pub blade: BladeOptions,
+}
+
+const MESH: &str = "Where the ROM is from, as for `tiprub reduce blade`";
+
+impl ConvergenceCommand {
+    /// Whether a mesh or matrices are given.
+    ///
+    /// # Errors
+    /// Options of a mesh without one, and what the study varies itself.
+    pub fn has_source(&self) -> Result<bool> {
+        let given = self.file.is_some() || self.blade.matrices.stiffness.is_some();
+        if !given && self.blade != BladeOptions::default() {
+            let problem = "an option given describes a mesh, and there is none";
+            return Err(Failure::usage(
+                "--mesh",
+                problem,
+                "Give --mesh FILE, or leave the options of `tiprub reduce blade` out",
+            ));
+        }
+        let varied = [
+            ("--modes", self.blade.model.modes.is_some()),
+            ("--contact-nodes", self.blade.tips.contact_nodes.is_some()),
+            ("--contact-names", !self.blade.tips.contact_names.is_empty()),
+        ];
+        match varied.into_iter().find(|(_, given)| *given) {
+            Some((option, _)) => {
+                Err(Failure::usage(option, "the study takes it from the scene's ROM and varies it", "Leave it out"))
+            }
+            None => Ok(given),
+        }
+    }
 }
 
 /// Arguments of `tiprub reduce sector`.

@@ -18,9 +18,10 @@ pub(crate) const ROWS_SHOWN: usize = 40;
 const FREQUENCIES_SHOWN: usize = 6;
 /// Modes below this share of the highest frequency that was checked are those of a rigid body.
 const RIGID: f64 = 1e-4;
-/// Largest frequency deviation (eq. 13) and residual convergence criterion (eq. 12) without a warning, in %.
-const DEVIATION_LIMIT: f64 = 0.3;
-const RESIDUAL_LIMIT: f64 = 1.0;
+/// Largest frequency deviation (eq. 13) without a warning (%): what the paper calls satisfactory.
+pub const DEVIATION_LIMIT: f64 = 0.3;
+/// The same for the residual convergence criterion (eq. 12, %).
+pub const RESIDUAL_LIMIT: f64 = 1.0;
 
 /// Facts of one ROM.
 #[derive(Debug, Clone)]

@@ -105,7 +105,7 @@ fn the_quick_study_of_errors_takes_any_scene() {
 /// A scene of one's own around a coarse blade.
 fn own_scene(root: &Path) {
     let reduce = ["reduce", "rotor37", "--mesh", "6x1x8", "--modes", "4", "--contact-nodes", "2", "--quiet"];
-    tiprub(root, "", &[&reduce[..], &["-o", "coarse.rom.safetensors"]].concat());
+    tiprub(root, "", &[&reduce[..], &["-o", "coarse.rom.safetensors", "--inp", "blade.inp"]].concat());
     let text = tiprub_gallery::scene_source::ROTOR37_SCENE.replace("builtin:rotor37", "coarse.rom.safetensors");
     fs::write(root.join("own.toml"), text).unwrap();
 }
@@ -169,6 +169,65 @@ fn the_study_of_stability_answers_as_runs_do() {
     assert!(page.contains("Largest usable internal step") && page.contains("Read a column"));
 }
 
+/// Steps of any scene, fewer modes of any ROM; more modes and other contact nodes where the mesh is named, and it is the ROM's.
+#[test]
+fn the_study_of_convergence_refines_what_it_can_and_says_what_it_cannot() {
+    let root = tempfile::tempdir().unwrap();
+    own_scene(root.path());
+    let own = ["study", "convergence", "own.toml", "--quick", "--json", "--quiet", "--out", "out"];
+    let mesh = ["--mesh", "blade.inp", "--contact-set", "TIP", "--clamp-set", "HUB"];
+    let study = |more: &[&str]| -> Value {
+        serde_json::from_str(&tiprub(root.path(), "", &[&own[..], more].concat()).0).unwrap()
+    };
+    let values = |direction: &Value| -> Vec<f64> {
+        direction["levels"].as_array().unwrap().iter().map(|level| level["value"].as_f64().unwrap()).collect()
+    };
+    let alone = study(&[])["results"]["directions"].clone();
+    assert_eq!([values(&alone[0]), values(&alone[1])], [vec![2e-6, 1e-6, 5e-7], vec![2.0, 4.0]]);
+    assert!(values(&alone[2]).is_empty());
+    for direction in [1, 2] {
+        assert!(alone[direction]["not_refined"].as_str().unwrap().contains("--mesh FILE"), "{alone:#}");
+    }
+    let whole = study(&[&mesh[..], &["--sectors", "36"]].concat());
+    let found = &whole["results"]["directions"];
+    assert_eq!([values(&found[1]), values(&found[2])], [vec![2.0, 4.0, 6.0], vec![2.0, 3.0]]);
+    assert!(found.as_array().unwrap().iter().all(|direction| direction["not_refined"].is_null()), "{found:#}");
+    // The scene as it stands is the same run in every direction, and that of the scene without a mesh.
+    let standing = |directions: &Value| -> Vec<Value> {
+        let levels = directions.as_array().unwrap().iter().flat_map(|one| one["levels"].as_array().unwrap());
+        let own = levels.filter(|level| level["own"] == true);
+        own.map(|level| {
+            ["impulse", "friction_work", "peak_force", "strain_energy"].map(|name| level[name].clone()).to_vec().into()
+        })
+        .collect()
+    };
+    let all = standing(found);
+    assert!(all.len() == 3 && all.iter().all(|one| *one == all[0]) && all[0] == standing(&alone)[0], "{all:?}");
+    // A change is to the next run; the step changes least of all.
+    let change = |direction: &Value, level: usize, name: &str| {
+        direction["levels"][level]["changes_to_next"][name].as_f64().unwrap()
+    };
+    let steps = [0, 1].map(|level| change(&found[0], level, "displacements"));
+    assert!(steps.iter().all(|step| (1e-6..0.01).contains(step)), "{steps:?}");
+    assert!(steps[1] < 0.1 * change(&found[1], 1, "displacements"), "{found:#}");
+    let impulse = |level: usize| found[1]["levels"][level]["impulse"].as_f64().unwrap();
+    let expected = (impulse(1) - impulse(2)).abs() / impulse(1).max(impulse(2));
+    assert!((change(&found[1], 1, "impulse") / expected - 1.0).abs() < 1e-9);
+    assert!(fs::read_to_string(root.path().join("out/levels.csv")).unwrap().lines().count() == 1 + 3 + 3 + 2);
+    let refuse = |more: &[&str], code: i32| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+        let output = command.current_dir(root.path()).args(["study", "convergence", "own.toml", "--quick"]).args(more);
+        let output = output.output().unwrap();
+        assert_eq!(output.status.code(), Some(code), "{more:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let other = refuse(&[&mesh[..], &["--sectors", "36", "--material", "steel"]].concat(), 1);
+    assert!(other.contains("it does not give the ROM `rotor37` of the scene: first frequency"), "{other}");
+    assert!(refuse(&mesh, 1).contains("1 sectors instead of"), "sectors");
+    assert!(refuse(&mesh[2..], 2).contains("--mesh: an option given describes a mesh, and there is none"));
+    assert!(refuse(&[&mesh[..], &["--modes", "9"]].concat(), 2).contains("--modes: the study takes it"));
+}
+
 /// Told at once: nothing is reduced for it, and no directory stays.
 #[test]
 fn what_a_study_cannot_do_is_told_before_the_work() {
@@ -183,7 +242,7 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1, "something stays");
         told
     };
-    for name in ["map", "error", "stability"] {
+    for name in ["map", "error", "stability", "convergence"] {
         let told = refuse(&["study", name, "builtin:rotor37", "--quick", "--out", "file/out"], 1);
         assert!(told.contains("file/out: cannot create the directory"), "{told}");
     }

@@ -7,9 +7,17 @@ use tiprub_shell::{
     console::{Console, Outcome},
     output_file,
 };
-use tiprub_study::{Study, arguments::StudyCommon, error, map, output, stability};
+use tiprub_study::{
+    Study,
+    arguments::StudyCommon,
+    convergence::{self, refine::Source},
+    error, map, output, stability,
+};
 
-use crate::cli::{StudyArguments, StudyCommand};
+use crate::{
+    cli::{StudyArguments, StudyCommand},
+    users_model::BladeSource,
+};
 
 /// Study, write, sum up.
 ///
@@ -20,6 +28,14 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
     let (name, common, work): (_, _, Work) = match &arguments.study {
         StudyCommand::Map(own) => ("map", &own.common, Box::new(|console| map::study(own, console))),
         StudyCommand::Error(own) => ("error", &own.common, Box::new(|console| error::study(own, console))),
+        StudyCommand::Convergence(own) => {
+            let has_source = own.has_source()?;
+            let of = move |console: &Console| {
+                let source = BladeSource { file: own.file.as_deref(), options: &own.blade };
+                convergence::study(&own.study, has_source.then_some(&source as &dyn Source), console)
+            };
+            ("convergence", &own.study.common, Box::new(of))
+        }
         StudyCommand::Stability(own) => ("stability", &own.common, Box::new(|console| stability::study(own, console))),
     };
     let directory = directory(name, common);

@@ -7,7 +7,7 @@ mod judge;
 use std::{cell::RefCell, fmt::Write as _, path::Path};
 
 use choose::Chosen;
-use tiprub_core::rom::Frame;
+use tiprub_core::{Rom, rom::Frame};
 use tiprub_gallery::reduction::{self, with_progress};
 use tiprub_model::{
     CasingOptions, FeModel, Reduction,
@@ -20,6 +20,7 @@ use tiprub_model::{
     thermal::equal_patches,
 };
 use tiprub_shell::{Failure, Result, console::Console};
+use tiprub_study::convergence::refine;
 
 use crate::{
     own_arguments::{BladeOptions, CasingMeshArguments, SectorArguments, Source},
@@ -46,6 +47,22 @@ pub fn blade(file: Option<&Path>, asked: &BladeOptions, console: &Console) -> Re
     told(&source, imported, choose, |model, chosen, clamped| {
         Ok(Reduced::general(general(&source, asked, model, chosen, console)?, clamped))
     })
+}
+
+/// Where a ROM of blades came from: a mesh or matrices with the options that it was reduced with.
+pub struct BladeSource<'a> {
+    /// Mesh file.
+    pub file: Option<&'a Path>,
+    /// Options.
+    pub options: &'a BladeOptions,
+}
+
+impl refine::Source for BladeSource<'_> {
+    fn reduce(&self, modes: usize, contact_nodes: usize, console: &Console) -> Result<Rom> {
+        let mut options = self.options.clone();
+        (options.model.modes, options.tips.contact_nodes) = (Some(modes), Some(contact_nodes));
+        Ok(blade(self.file, &options, console)?.rom)
+    }
 }
 
 /// A disk of coupled sectors.

@@ -91,6 +91,27 @@ pub struct StabilityArguments {
     pub common: StudyCommon,
 }
 
+/// Arguments of `tiprub study convergence`.
+#[derive(Debug, Args)]
+pub struct ConvergenceArguments {
+    /// Scene file (TOML), or one that ships, such as `builtin:rotor37`.
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// Time from the start of the experiment that is compared (s), at most until runs that differ by almost nothing part [default: 400
+    /// communication steps beyond the first contact].
+    #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
+    pub window: Option<f64>,
+    /// Runs at the same time [default: one per processor].
+    #[arg(long, value_name = "N")]
+    pub threads: Option<std::num::NonZero<usize>>,
+    /// Start value of an input or parameter; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
+    pub set: Vec<(String, String)>,
+    /// What all studies take.
+    #[command(flatten)]
+    pub common: StudyCommon,
+}
+
 /// A range of numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {

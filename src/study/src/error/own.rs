@@ -61,8 +61,21 @@ impl Own {
     /// The scene cannot be read or does not run; nothing touches within the window.
     pub fn new(arguments: &ErrorArguments, console: &Console) -> Result<Self> {
         refuse_compared(&arguments.set)?;
-        let quick = arguments.common.quick;
         let scene = scene_source::load(&arguments.scene, &arguments.common.cache.cache(), console)?;
+        Self::of(&arguments.scene, scene, &arguments.set, (arguments.window, arguments.common.quick), console)
+    }
+
+    /// The scene called `name`, with start values replaced; a `window` (s) is that of a quick study or of a whole one.
+    ///
+    /// # Errors
+    /// The scene does not run; nothing touches within the window.
+    pub fn of(
+        name: &str,
+        scene: Scene,
+        settings: &[(String, String)],
+        (window, quick): (Option<f64>, bool),
+        console: &Console,
+    ) -> Result<Self> {
         let schedule = Schedule::new(&scene.settings.experiment, None, None)?;
         let (interval, step) = (scene.settings.experiment.communication_step, scene.settings.time.step);
         let own = (interval / step).ceil().max(1.0);
@@ -71,24 +84,17 @@ impl Own {
         divisions.dedup();
         let most = if quick { QUICK_SAMPLES } else { SAMPLES };
         let title = scene.settings.name.clone();
-        let mut case = Self {
-            title,
-            scene,
-            settings: arguments.set.clone(),
-            interval,
-            samples: 0,
-            divisions,
-            parting: Vec::new(),
-        };
-        let refused = |problem| Failure::new(&arguments.scene, problem, "");
+        let mut case =
+            Self { title, scene, settings: settings.to_vec(), interval, samples: 0, divisions, parting: Vec::new() };
+        let refused = |problem| Failure::new(name, problem, "");
         let task = console.task("How long the scene can be followed", None);
         let touch = case.first_touch(count(own), schedule.count).map_err(refused)?;
-        let asked = arguments.window.map_or(touch + most, |window| count(window / interval) as usize);
+        let asked = window.map_or(touch + most, |window| count(window / interval) as usize);
         let samples = asked.clamp(1, schedule.count);
         if touch >= samples {
             let when = if touch < schedule.count { shown(interval * touch as f64) + " s" } else { "never".into() };
             let problem = format!("nothing touches within the window: first contact after the start is at {when}");
-            return Err(Failure::new(&arguments.scene, problem, "Give a longer --window, or a scene that rubs"));
+            return Err(Failure::new(name, problem, "Give a longer --window, or a scene that rubs"));
         }
         case.parting = window::parting(&case, count(2.0 * own), samples).map_err(refused)?;
         drop(task);

@@ -59,7 +59,7 @@ fn set(simulation: &mut Simulation, quantity: Quantity, value: Option<f64>) -> t
 }
 
 /// The step (s) that a communication step of this length is divided into; the largest allowed where that divides it.
-fn divided(length: f64, largest: f64) -> f64 {
+pub fn divided(length: f64, largest: f64) -> f64 {
     let step = length / (length / largest * (1.0 - 1e-9)).ceil().max(1.0);
     if (step / largest - 1.0).abs() < 1e-9 { largest } else { step }
 }

@@ -22,7 +22,7 @@ use tiprub_core::{
 use tiprub_gallery::scene_source;
 use tiprub_shell::{Failure, Result, console::Console, sweep};
 
-use super::Study;
+use super::{Study, master};
 use crate::{arguments::StabilityArguments, error::own::refuse_compared};
 
 /// The answer at one place and step.
@@ -110,12 +110,6 @@ pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study>
     let limits = limits::of(&asked, &own, threads, arguments.common.quick, console)?;
     let found = Found { name: arguments.scene.clone(), own, grid, points, limits, no_rates, scene: scene.clone() };
     page::study(&found)
-}
-
-/// Index of the structure whose tips touch.
-fn master(scene: &Scene) -> usize {
-    let name = &scene.settings.contacts[0].master;
-    scene.settings.structures.iter().position(|structure| structure.name == *name).unwrap_or(0)
 }
 
 /// The master at every speed of the grid; or why its growth cannot be told.
