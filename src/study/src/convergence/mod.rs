@@ -56,23 +56,14 @@ pub fn study(arguments: &ConvergenceArguments, source: Option<&dyn Source>, cons
     let interval = case.interval();
     let own = divisions(interval, scene.settings.time.step);
     let directions = refine::directions(&scene, own, source, quick, console)?;
-    let levels: Vec<&Level> = directions.iter().flat_map(|direction| &direction.levels).collect();
-    let task = console.task(&format!("Running {} refinements", scene.settings.name), Some(levels.len() as u64));
     let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
-    let run = |level: &&Level| Ok(march(&level.scene, &arguments.set, level.division, case.samples()));
-    let progress = |done: usize| {
-        task.at(done as u64);
-        task.line(&format!("{done} of {} runs", levels.len()));
-    };
-    let mut runs = sweep::sweep(&levels, threads, run, progress)?.into_iter();
-    drop(task);
+    let runner = Runner { settings: &arguments.set, samples: case.samples(), threads, console };
+    let mut refined = Vec::new();
+    for direction in directions {
+        refined.push(runner.refined(direction)?);
+    }
     let method = crate::error_study::name((scene.settings.time.scheme, scene.settings.contacts[0].solver));
-    let with_runs = |direction: Direction| {
-        let runs = runs.by_ref().take(direction.levels.len()).collect();
-        Refined { direction, runs }
-    };
-    let refined: Vec<Refined> = directions.into_iter().map(with_runs).collect();
-    if let Some((_, why)) = refined.iter().find_map(own_refused) {
+    if let Some(why) = refined.iter().find_map(own_refused) {
         return Err(Failure::new(&arguments.scene, format!("the scene as it stands does not run: {why}"), ""));
     }
     page::study(&Found {
@@ -83,16 +74,56 @@ pub fn study(arguments: &ConvergenceArguments, source: Option<&dyn Source>, cons
     })
 }
 
+/// Shares of the step at which a direction is run once more where one of its levels is refused.
+const SHORTER: [u32; 3] = [2, 4, 8];
+
+/// How levels are run.
+struct Runner<'a> {
+    settings: &'a [(String, String)],
+    samples: usize,
+    threads: usize,
+    console: &'a Console,
+}
+
+impl Runner<'_> {
+    /// Run a direction. A ROM with more modes or nodes may ask for a shorter step than the scene's: then all of its levels take one.
+    fn refined(&self, mut direction: Direction) -> Result<Refined> {
+        let runs = self.runs(&direction)?;
+        let refused = runs.iter().any(std::result::Result::is_err) && direction.name != refine::STEP;
+        for shorter in SHORTER.into_iter().filter(|_| refused) {
+            let finer = direction.stepped(shorter);
+            let runs = self.runs(&finer)?;
+            if runs.iter().all(std::result::Result::is_ok) {
+                direction = finer;
+                direction.shorter = Some(shorter);
+                return Ok(Refined { direction, runs });
+            }
+        }
+        Ok(Refined { direction, runs })
+    }
+
+    fn runs(&self, direction: &Direction) -> Result<Vec<std::result::Result<Marched, String>>> {
+        let count = direction.levels.len();
+        let task = self.console.task(&format!("Refining {}", direction.title), Some(count as u64));
+        let run = |level: &Level| Ok(march(&level.scene, self.settings, level.division, self.samples));
+        let progress = |done: usize| {
+            task.at(done as u64);
+            task.line(&format!("{done} of {count} runs"));
+        };
+        sweep::sweep(&direction.levels, self.threads, run, progress)
+    }
+}
+
 /// Internal steps per communication step.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
 fn divisions(interval: f64, step: f64) -> u32 {
     (interval / step * (1.0 - 1e-9)).ceil().clamp(1.0, 1e8) as u32
 }
 
-fn own_refused(refined: &Refined) -> Option<(&Level, String)> {
+fn own_refused(refined: &Refined) -> Option<String> {
     let levels = refined.direction.levels.iter().zip(&refined.runs);
     let own = levels.filter(|(level, _)| level.own);
-    own.filter_map(|(level, run)| Some((level, run.as_ref().err()?.clone()))).next()
+    own.filter_map(|(_, run)| run.as_ref().err().cloned()).next()
 }
 
 impl Refined {

@@ -8,7 +8,7 @@ use tiprub_figure::{
 };
 use tiprub_shell::Result;
 
-use super::{Found, Refined, march::QUANTITIES};
+use super::{Found, Refined, march::QUANTITIES, refine::Direction};
 use crate::{Figure, Picture, Sheet, Statement, Study};
 
 /// Largest change by the next refinement that is called small.
@@ -78,12 +78,21 @@ fn statements(found: &Found) -> Vec<Statement> {
     all
 }
 
+/// "modes of rotor", and with which step where it is not the scene's.
+fn title(refined: &Refined) -> String {
+    let Direction { title, shorter, .. } = &refined.direction;
+    match shorter {
+        None => title.clone(),
+        Some(factor) => format!("{title} (all at 1/{factor} of the scene's step, at which one is refused)"),
+    }
+}
+
 fn small(refined: &Refined) -> Option<Statement> {
     let (changes, onwards) = refined.at_own()?;
     let most = changes.iter().flatten().fold(0.0, |most: f64, change| most.max(*change));
     let which = if onwards { "the next refinement changes" } else { "the last refinement changed" };
     Some(Statement::tested(
-        format!("{}: {which} nothing by more than {} %", refined.direction.title, 100.0 * SMALL),
+        format!("{}: {which} nothing by more than {} %", title(refined), 100.0 * SMALL),
         most <= SMALL,
         told(&changes),
     ))
@@ -103,10 +112,11 @@ fn worst(found: &Found) -> Option<Statement> {
     ))
 }
 
-const HEADINGS: [&str; 12] = [
+const HEADINGS: [&str; 13] = [
     "direction",
     "value (s of steps, else how many)",
     "scene's own",
+    "internal step (s)",
     "impulse (N·s)",
     "friction work (J)",
     "peak force (N)",
@@ -118,13 +128,19 @@ const HEADINGS: [&str; 12] = [
     "change of strain energy",
 ];
 
+/// The internal step of a level (s).
+fn step(level: &super::Level) -> String {
+    let length = level.scene.settings.experiment.communication_step;
+    format!("{:.4e}", length / f64::from(level.division))
+}
+
 /// Rows of one direction; a refused level says so in place of its numbers.
 fn rows(refined: &Refined) -> Vec<Vec<String>> {
     let mut changes = refined.changes().into_iter();
     let levels = refined.direction.levels.iter().zip(&refined.runs);
     let row = |(level, run): (&super::Level, &std::result::Result<super::Marched, String>)| {
         let own = if level.own { "yes" } else { "" };
-        let mut cells = vec![refined.direction.title.clone(), shown(level.value), own.into()];
+        let mut cells = vec![refined.direction.title.clone(), shown(level.value), own.into(), step(level)];
         match run {
             Ok(run) => {
                 cells.extend(run.quantities().map(|value| format!("{value:.6e}")));
@@ -139,7 +155,7 @@ fn rows(refined: &Refined) -> Vec<Vec<String>> {
 }
 
 fn table(refined: &Refined) -> Table {
-    let caption = format!("{}: every level, and the change to the next finer one", refined.direction.title);
+    let caption = format!("{}: every level, and the change to the next finer one", title(refined));
     Table { rows: rows(refined), ..Table::new(caption, HEADINGS) }
 }
 
@@ -191,7 +207,7 @@ fn figure(refined: &Refined) -> Result<Figure> {
     }
     let own =
         direction.levels.iter().find(|level| level.own).map_or(String::new(), |level| value(refined, level.value));
-    let caption = format!("{}: change of a run to the next finer one; the scene has {own}.", direction.title);
+    let caption = format!("{}: change of a run to the next finer one; the scene has {own}.", title(refined));
     Ok(Figure { name: direction.name, caption, picture: Picture { html, ..picture }, sheet })
 }
 
@@ -214,7 +230,7 @@ fn results(found: &Found) -> Value {
     };
     let direction = |refined: &Refined| {
         json!({
-            "direction": refined.direction.title, "unit": refined.direction.unit, "levels": level(refined),
+            "direction": refined.direction.title, "step_divided_by": refined.direction.shorter.unwrap_or(1), "unit": refined.direction.unit, "levels": level(refined),
             "not_refined": (!refined.direction.missing.is_empty()).then_some(&refined.direction.missing),
         })
     };

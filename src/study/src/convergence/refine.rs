@@ -54,7 +54,24 @@ pub struct Direction {
     pub levels: Vec<Level>,
     /// What cannot be refined, and why; empty where all can.
     pub missing: String,
+    /// All levels take a step shorter by this factor than the scene's, at which one of them is refused.
+    pub shorter: Option<u32>,
 }
+
+impl Direction {
+    /// The same with shorter steps.
+    pub fn stepped(&self, shorter: u32) -> Self {
+        let mut finer = self.clone();
+        for level in &mut finer.levels {
+            level.division = level.division.saturating_mul(shorter);
+            level.scene.settings.time.step /= f64::from(shorter);
+        }
+        finer
+    }
+}
+
+/// Name of the direction of steps.
+pub const STEP: &str = "step";
 
 /// Names of the directions of structures, for files.
 const MODES: [&str; 4] = ["modes", "modes-2", "modes-3", "modes-4"];
@@ -170,7 +187,14 @@ impl Refiner<'_> {
             Level { value, own: division == self.own, scene, division }
         };
         let levels = divisions.into_iter().map(level).collect();
-        Direction { name: "step", title: "internal step".into(), unit: "s", levels, missing: String::new() }
+        Direction {
+            name: STEP,
+            title: "internal step".into(),
+            unit: "s",
+            levels,
+            missing: String::new(),
+            shorter: None,
+        }
     }
 
     /// Modes of one structure: fewer of the ROM's own, more where it can be reduced again.
@@ -184,6 +208,7 @@ impl Refiner<'_> {
             unit: "modes",
             levels: Vec::new(),
             missing: String::new(),
+            shorter: None,
         };
         let fewer = if self.quick { &QUICK_FEWER[..] } else { &FEWER[..] };
         let mut counts: Vec<usize> = fewer.iter().map(|share| count(share * own as f64) as usize).collect();
@@ -226,8 +251,14 @@ impl Refiner<'_> {
         let index = master(self.scene);
         let structure = &self.scene.settings.structures[index];
         let title = format!("contact nodes of {}", structure.name);
-        let mut direction =
-            Direction { name: "nodes", title, unit: "nodes", levels: Vec::new(), missing: String::new() };
+        let mut direction = Direction {
+            name: "nodes",
+            title,
+            unit: "nodes",
+            levels: Vec::new(),
+            missing: String::new(),
+            shorter: None,
+        };
         let builtin = structure.rom.strip_prefix(BUILTIN).filter(|name| builtin::has_chord(name));
         if self.source.is_none() && builtin.is_none() {
             direction.missing =
