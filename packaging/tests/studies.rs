@@ -214,6 +214,22 @@ fn the_study_of_convergence_refines_what_it_can_and_says_what_it_cannot() {
     let expected = (impulse(1) - impulse(2)).abs() / impulse(1).max(impulse(2));
     assert!((change(&found[1], 1, "impulse") / expected - 1.0).abs() < 1e-9);
     assert!(fs::read_to_string(root.path().join("out/levels.csv")).unwrap().lines().count() == 1 + 3 + 3 + 2);
+    // Just below the limit of central differences, models with more modes or nodes are refused: their direction takes half the step.
+    let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
+    let replaced = |line: &str| match line.split(' ').next() {
+        Some("scheme") => "scheme = \"central-difference\"".to_owned(),
+        Some("step") => "step = 4.4e-6".to_owned(),
+        Some("communication_step") => "communication_step = 8.8e-6".to_owned(),
+        _ => line.to_owned(),
+    };
+    fs::write(root.path().join("own.toml"), scene.lines().map(replaced).collect::<Vec<_>>().join("\n")).unwrap();
+    let limited = study(&[&mesh[..], &["--sectors", "36"]].concat());
+    let found = limited["results"]["directions"].as_array().unwrap();
+    let divided: Vec<u64> = found.iter().map(|one| one["step_divided_by"].as_u64().unwrap()).collect();
+    assert_eq!(divided, [1, 2, 2]);
+    let refused =
+        |one: &Value| one["levels"].as_array().unwrap().iter().filter(|level| level["refused"].is_string()).count();
+    assert_eq!(found.iter().map(refused).collect::<Vec<_>>(), [1, 0, 0], "{limited:#}");
     let refuse = |more: &[&str], code: i32| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
         let output = command.current_dir(root.path()).args(["study", "convergence", "own.toml", "--quick"]).args(more);

@@ -288,6 +288,15 @@ fn a_casing_of_ones_own_is_the_casing_that_ships() {
     let off = (own.stiffness.diagonal() - ships.stiffness.diagonal()).component_div(&ships.stiffness.diagonal()).amax();
     println!("eigenvalues differ by {off:.1e}");
     assert!(own.order() == ships.order() && off < 1e-9, "{off:.1e}");
+    // The expansion of the command line holds beside the file's material, which has the rest.
+    let heated = file
+        .replace("12x2", "4x2")
+        .replace("--modes 20 --fixed-interface-modes 40", "--modes 8 --fixed-interface-modes 8");
+    let loads = |expansion: &str| {
+        project.succeed(&format!("{heated} --patches 4x1 --expansion {expansion} -o hot.rom.safetensors --force"));
+        project.rom("hot.rom.safetensors").extras.thermal.unwrap().loads.amax()
+    };
+    assert!((loads("2e-5") / loads("1e-5") - 2.0).abs() < 1e-6);
     for (line, code, words) in [
         (file.replace("12x2", "13x2"), 1, ["no node at", "divides"]),
         (file.replace("12x2", "12x14"), 1, ["fewer than 14 rings", "fewer rings"]),

@@ -195,3 +195,17 @@ pub fn stage_casing(coarse: bool) -> StageCasingOptions {
         StageCasingOptions { name: STAGE_CASING.into(), ..defaults }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn models_are_refined_by_name() {
+        let console = Console::new(true, false);
+        let order = |factor: f64| refined("ring-left", factor, 0, &console).unwrap().unwrap().order();
+        assert_eq!(order(0.5), 50);
+        assert!(refined(CUBE, 2.0, 0, &console).is_none() && refined("none", 2.0, 0, &console).is_none());
+        assert!(has_chord("rotor37-spin") && has_chord(STAGE) && !has_chord(STAGE_CASING) && !has_chord(CUBE));
+    }
+}
