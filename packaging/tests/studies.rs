@@ -162,6 +162,17 @@ fn the_study_of_stability_answers_as_runs_do() {
             assert_eq!(told["error"].is_null(), accepted, "{limit:#} {told:#}");
         }
     }
+    // A step far too long is no reason to show nothing but refusals.
+    let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
+    let text = scene
+        .replace("step = 1.0e-6 ", "step = 1.0e-4 ")
+        .replace("communication_step = 1.0e-5", "communication_step = 1.0e-4");
+    fs::write(root.path().join("long.toml"), text).unwrap();
+    let arguments = ["study", "stability", "long.toml", "--quick", "--json", "--quiet", "--out", "long"];
+    let long: Value = serde_json::from_str(&tiprub(root.path(), "", &arguments).0).unwrap();
+    only_no(&long, &["The scene as it stands is accepted", "Its internal step lies within"]);
+    let accepted = ["right", "warned"].map(|kind| long["results"]["counts"][kind].as_u64().unwrap());
+    assert!(accepted[0] + accepted[1] > 0, "{}", long["results"]["counts"]);
     for row in columns(&root.path().join("out/answers.csv")).1 {
         assert_eq!(row[6].is_finite(), row[4] > 0.0, "what flutters has a frequency: {row:?}");
     }

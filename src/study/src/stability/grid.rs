@@ -28,11 +28,12 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// What the command line asks for, and the scene's own values always.
+    /// What the command line asks for, and the scene's own values always; where the largest `usable` step (s) lies below, steps go
+    /// down to half of it.
     ///
     /// # Errors
     /// A range of what the scene has no variable for.
-    pub fn new(arguments: &StabilityArguments, own: &Own, coupled: bool) -> Result<Self> {
+    pub fn new(arguments: &StabilityArguments, own: &Own, coupled: bool, usable: Option<f64>) -> Result<Self> {
         let quick = arguments.common.quick;
         let refuse = |option: &str, what: &str| {
             Err(Failure::usage(option, format!("the scene has no {what} that could be changed"), "Leave it out"))
@@ -69,9 +70,13 @@ impl Grid {
         } else {
             &STEPS[..]
         };
-        let steps = arguments
-            .steps
-            .map_or_else(|| factors.iter().map(|factor| factor * own.step).collect(), |range| range.geometric());
+        let steps = match (arguments.steps, usable.map(|step| 0.5 * step)) {
+            (Some(range), _) => range.geometric(),
+            (None, Some(from)) if from < factors[0] * own.step => {
+                Range { from, to: factors[factors.len() - 1] * own.step, count: factors.len() + 2 }.geometric()
+            }
+            _ => factors.iter().map(|factor| factor * own.step).collect(),
+        };
         let steps = with(steps, own.step).into_iter().flatten().collect();
         Ok(Self { frictions, speeds, steps })
     }

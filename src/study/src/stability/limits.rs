@@ -35,7 +35,7 @@ impl Usable {
         match &self.sought {
             Sought::All(step) => format!("none refused up to {step:.1e} s"),
             Sought::Below(step, _) => format!("{step:.3e} s"),
-            Sought::None(why) => format!("refused: {why}"),
+            Sought::None(why) => format!("refused: {}", why.trim_start_matches("refused: ")),
         }
     }
 

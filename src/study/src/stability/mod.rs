@@ -101,13 +101,16 @@ pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study>
     let asked = Asked { scene: &scene, settings: &arguments.set };
     let own = asked.own()?;
     let coupled = scene.roms[master(&scene)].is_cyclic();
-    let grid = Grid::new(arguments, &own, coupled)?;
+    // Ranges that are wrong are refused before the work.
+    Grid::new(arguments, &own, coupled, None)?;
     let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
+    let limits = limits::of(&asked, &own, threads, arguments.common.quick, console)?;
+    let usable = limits.iter().find(|usable| usable.method == own.method).and_then(limits::Usable::step);
+    let grid = Grid::new(arguments, &own, coupled, usable)?;
     let structures = structures(&scene, &own, &grid)?;
     let no_rates = structures.as_ref().err().copied();
     let structures = structures.unwrap_or_default();
     let points = points(&asked, &own, &grid, &structures, threads, console)?;
-    let limits = limits::of(&asked, &own, threads, arguments.common.quick, console)?;
     let found = Found { name: arguments.scene.clone(), own, grid, points, limits, no_rates, scene: scene.clone() };
     page::study(&found)
 }
