@@ -11,6 +11,7 @@ use tiprub_shell::{
 use crate::{
     cli::{Command, StudyCommand},
     commands::demo,
+    own_arguments::KeptOptions,
     reduce_arguments::Written,
 };
 
@@ -36,7 +37,8 @@ pub fn check(command: &Command) -> Result<()> {
         Command::Study(arguments) => match &arguments.study {
             StudyCommand::Map(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),
             StudyCommand::Convergence(own) => {
-                let (common, source) = (&own.study.common, own.blade.source(own.file.as_deref()).files());
+                let (common, source) =
+                    (&own.study.common, own.blade.source(own.file.as_deref(), KeptOptions::default()).files());
                 study(&own.study.scene, common.out.as_deref(), source)
             }
             StudyCommand::Stability(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),

@@ -21,15 +21,21 @@ pub struct BladeArguments {
     /// Mesh file: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh). With --stiffness its nodes and sets are taken.
     #[arg(value_name = "FILE", required_unless_present = "stiffness")]
     pub file: Option<PathBuf>,
-    /// What it is made of.
+    /// Contact nodes.
+    #[command(flatten)]
+    pub tips: TipOptions,
+    /// What is read.
     #[command(flatten)]
     pub blade: BladeOptions,
+    /// What it becomes.
+    #[command(flatten)]
+    pub kept: KeptOptions,
     /// What is written.
     #[command(flatten)]
     pub written: Written,
 }
 
-/// How blades are reduced.
+/// What blades are read from.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct BladeOptions {
     /// Number of blades around the axis, that know nothing of each other [default: 1].
@@ -38,9 +44,6 @@ pub struct BladeOptions {
     /// Also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s); from a mesh only.
     #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true, conflicts_with = "stiffness")]
     pub spin: Option<f64>,
-    /// Of both.
-    #[command(flatten)]
-    pub tips: TipOptions,
     /// What is read.
     #[command(flatten)]
     pub model: ModelOptions,
@@ -70,28 +73,14 @@ impl ConvergenceCommand {
     /// Whether a mesh or matrices are given.
     ///
     /// # Errors
-    /// Options of a mesh without one, and what the study varies itself.
+    /// Options of a mesh without one.
     pub fn has_source(&self) -> Result<bool> {
         let given = self.file.is_some() || self.blade.matrices.stiffness.is_some();
-        if !given && self.blade != BladeOptions::default() {
-            let problem = "an option given describes a mesh, and there is none";
-            return Err(Failure::usage(
-                "--mesh",
-                problem,
-                "Give --mesh FILE, or leave the options of `tiprub reduce blade` out",
-            ));
+        if given || self.blade == BladeOptions::default() {
+            return Ok(given);
         }
-        let varied = [
-            ("--modes", self.blade.model.modes.is_some()),
-            ("--contact-nodes", self.blade.tips.contact_nodes.is_some()),
-            ("--contact-names", !self.blade.tips.contact_names.is_empty()),
-        ];
-        match varied.into_iter().find(|(_, given)| *given) {
-            Some((option, _)) => {
-                Err(Failure::usage(option, "the study takes it from the scene's ROM and varies it", "Leave it out"))
-            }
-            None => Ok(given),
-        }
+        let problem = "an option given describes a mesh, and there is none";
+        Err(Failure::usage("--mesh", problem, "Give --mesh FILE, or leave the options of `tiprub reduce blade` out"))
     }
 }
 
@@ -123,6 +112,9 @@ pub struct SectorArguments {
     /// Matrices.
     #[command(flatten)]
     pub matrices: MatrixOptions,
+    /// What it becomes.
+    #[command(flatten)]
+    pub kept: KeptOptions,
     /// What is written.
     #[command(flatten)]
     pub written: Written,
@@ -152,6 +144,9 @@ pub struct CasingMeshArguments {
     /// What is read.
     #[command(flatten)]
     pub model: ModelOptions,
+    /// What it becomes.
+    #[command(flatten)]
+    pub kept: KeptOptions,
     /// What is written.
     #[command(flatten)]
     pub written: Written,
@@ -178,9 +173,6 @@ pub struct ModelOptions {
     /// Set of nodes that are held, or their numbers in the file; may be repeated. `none`: the structure flies freely.
     #[arg(long, value_name = "SET")]
     pub clamp_set: Vec<String>,
-    /// Modes kept [default: 25 fixed-interface modes, of a disk per nodal diameter; 60 of a casing].
-    #[arg(long, value_name = "N")]
-    pub modes: Option<usize>,
     /// Units of the file; everything on the command line is in SI units, whatever the file's are [default: m].
     #[arg(long, value_enum)]
     pub units: Option<UnitChoice>,
@@ -202,6 +194,14 @@ pub struct ModelOptions {
     /// Temperature at which the file's tables of properties are read, in its unit.
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     pub temperature: Option<f64>,
+}
+
+/// What a model of one's own becomes.
+#[derive(Debug, Clone, PartialEq, Default, Args)]
+pub struct KeptOptions {
+    /// Modes kept [default: 25 fixed-interface modes, of a disk per nodal diameter; 60 of a casing].
+    #[arg(long, value_name = "N")]
+    pub modes: Option<usize>,
     /// Modal damping ratio proposed with the model [default: 0.005].
     #[arg(long, value_name = "RATIO", value_parser = share)]
     pub damping: Option<f64>,
@@ -228,7 +228,7 @@ pub struct MatrixOptions {
 }
 
 /// What is read of a model of one's own, whatever it becomes.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Source<'a> {
     /// Mesh file.
     pub file: Option<&'a Path>,
@@ -236,19 +236,21 @@ pub struct Source<'a> {
     pub model: &'a ModelOptions,
     /// Matrices, where they can be given.
     pub matrices: Option<&'a MatrixOptions>,
+    /// What it becomes.
+    pub kept: KeptOptions,
 }
 
 impl BladeArguments {
     /// What is read.
     pub fn source(&self) -> Source<'_> {
-        self.blade.source(self.file.as_deref())
+        self.blade.source(self.file.as_deref(), self.kept.clone())
     }
 }
 
 impl BladeOptions {
     /// What is read, with this mesh file.
-    pub fn source<'a>(&'a self, file: Option<&'a Path>) -> Source<'a> {
-        Source { file, model: &self.model, matrices: Some(&self.matrices) }
+    pub fn source<'a>(&'a self, file: Option<&'a Path>, kept: KeptOptions) -> Source<'a> {
+        Source { file, model: &self.model, matrices: Some(&self.matrices), kept }
     }
 }
 
@@ -256,21 +258,21 @@ impl SectorArguments {
     /// What is read.
     pub fn source(&self) -> Source<'_> {
         let file = self.file.as_deref();
-        Source { file, model: &self.model, matrices: Some(&self.matrices) }
+        Source { file, model: &self.model, matrices: Some(&self.matrices), kept: self.kept.clone() }
     }
 }
 
 impl CasingMeshArguments {
     /// What is read.
     pub fn source(&self) -> Source<'_> {
-        Source { file: Some(&self.file), model: &self.model, matrices: None }
+        Source { file: Some(&self.file), model: &self.model, matrices: None, kept: self.kept.clone() }
     }
 }
 
 impl Source<'_> {
     /// Name of the model.
     pub fn name(&self) -> String {
-        if let Some(name) = &self.model.name {
+        if let Some(name) = &self.kept.name {
             return name.clone();
         }
         let stiffness = self.matrices.and_then(|matrices| matrices.stiffness.as_deref());

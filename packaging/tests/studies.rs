@@ -252,7 +252,7 @@ fn the_study_of_convergence_refines_what_it_can_and_says_what_it_cannot() {
     assert!(other.contains("it does not give the ROM `rotor37` of the scene: first frequency"), "{other}");
     assert!(refuse(&mesh, 1).contains("1 sectors instead of"), "sectors");
     assert!(refuse(&mesh[2..], 2).contains("--mesh: an option given describes a mesh, and there is none"));
-    assert!(refuse(&[&mesh[..], &["--modes", "9"]].concat(), 2).contains("--modes: the study takes it"));
+    assert!(refuse(&[&mesh[..], &["--modes", "9"]].concat(), 2).contains("unexpected argument '--modes'"));
 }
 
 /// Told at once: nothing is reduced for it, and no directory stays.

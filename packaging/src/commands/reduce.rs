@@ -131,7 +131,9 @@ fn json(reduced: &Reduced, facts: &RomFacts, written: &Written, output: &Path, w
 fn reduced(model: &Model, console: &Console) -> Result<Reduced> {
     let [left, right] = builtin::RINGS.map(|(_, side)| side);
     match model {
-        Model::Blade(own) => users_model::blade(own.file.as_deref(), &own.blade, console),
+        Model::Blade(own) => {
+            users_model::blade(own.file.as_deref(), &own.blade, (&own.tips, own.kept.clone()), console)
+        }
         Model::Sector(own) => users_model::sector(own, console),
         Model::CasingMesh(own) => users_model::casing(own, console),
         Model::Casing(own) => casing(own, console),

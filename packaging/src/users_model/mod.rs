@@ -23,7 +23,7 @@ use tiprub_shell::{Failure, Result, console::Console};
 use tiprub_study::convergence::refine;
 
 use crate::{
-    own_arguments::{BladeOptions, CasingMeshArguments, SectorArguments, Source},
+    own_arguments::{BladeOptions, CasingMeshArguments, KeptOptions, SectorArguments, Source, TipOptions},
     reduced::Reduced,
 };
 
@@ -40,10 +40,15 @@ const FACES: [&str; 2] = ["CYCLIC_LOW", "CYCLIC_HIGH"];
 ///
 /// # Errors
 /// Files and sets, naming file, line and remedy; and whatever the reduction refuses.
-pub fn blade(file: Option<&Path>, asked: &BladeOptions, console: &Console) -> Result<Reduced> {
-    let source = asked.source(file);
+pub fn blade(
+    file: Option<&Path>,
+    asked: &BladeOptions,
+    (tips, kept): (&TipOptions, KeptOptions),
+    console: &Console,
+) -> Result<Reduced> {
+    let source = asked.source(file, kept);
     let imported = import(&source, console)?;
-    let choose = |imported: &Imported| choose::tips(imported, source.model, &asked.tips, None);
+    let choose = |imported: &Imported| choose::tips(imported, source.model, tips, None);
     told(&source, imported, choose, |model, chosen, clamped| {
         Ok(Reduced::general(general(&source, asked, model, chosen, console)?, clamped))
     })
@@ -59,9 +64,9 @@ pub struct BladeSource<'a> {
 
 impl refine::Source for BladeSource<'_> {
     fn reduce(&self, modes: usize, contact_nodes: usize, console: &Console) -> Result<Rom> {
-        let mut options = self.options.clone();
-        (options.model.modes, options.tips.contact_nodes) = (Some(modes), Some(contact_nodes));
-        Ok(blade(self.file, &options, console)?.rom)
+        let tips = TipOptions { contact_nodes: Some(contact_nodes), ..TipOptions::default() };
+        let kept = KeptOptions { modes: Some(modes), ..KeptOptions::default() };
+        Ok(blade(self.file, self.options, (&tips, kept), console)?.rom)
     }
 }
 
@@ -136,11 +141,11 @@ fn general(
     let title = format!("Reducing {name}");
     let options = ReductionOptions {
         name,
-        fixed_interface_modes: source.model.modes.unwrap_or(MODES),
+        fixed_interface_modes: source.kept.modes.unwrap_or(MODES),
         checked_modes: CHECKED_MODES,
         sectors: asked.sectors.unwrap_or(1) as usize,
         frame: Frame::Cylindrical,
-        damping_ratio: source.model.damping.unwrap_or(DAMPING),
+        damping_ratio: source.kept.damping.unwrap_or(DAMPING),
     };
     let model = RefCell::new(Some(model));
     with_progress(&title, console, &|listener| {
@@ -169,9 +174,9 @@ fn ring(
         name,
         formulation: Formulation::Displacement,
         fixed_interface_modes: asked.fixed_interface_modes.unwrap_or(defaults.fixed_interface_modes),
-        modes: source.model.modes.unwrap_or(defaults.modes),
+        modes: source.kept.modes.unwrap_or(defaults.modes),
         checked_modes: CHECKED_MODES,
-        damping_ratio: source.model.damping.unwrap_or(DAMPING),
+        damping_ratio: source.kept.damping.unwrap_or(DAMPING),
     };
     let mesh = RefCell::new(Some(mesh));
     with_progress(&title, console, &|listener| {
@@ -194,9 +199,9 @@ fn cyclic(
     let title = format!("Reducing {name}");
     let options = CyclicOptions {
         name,
-        modes: ModeSelection::Families(source.model.modes.unwrap_or(MODES)),
+        modes: ModeSelection::Families(source.kept.modes.unwrap_or(MODES)),
         checked_modes: CHECKED_MODES,
-        damping_ratio: source.model.damping.unwrap_or(DAMPING),
+        damping_ratio: source.kept.damping.unwrap_or(DAMPING),
     };
     let reduction = with_progress(&title, console, &|listener| {
         reduce_cyclic(&model, &chosen.clamped, &chosen.contact, boundary, &options, listener)

@@ -1,6 +1,6 @@
 //! What refining a scene changes: its internal step, the modes of its structures, the contact nodes of its blades, one at a time.
 //!
-//! [`refine`] finds the directions and the scenes at every level, [`truncate`] takes modes away from any ROM, [`march`] runs and
+//! [`refine`] finds the directions and the scenes at every level, [`truncate`] takes modes away from any ROM, [`mod@march`] runs and
 //! compares, [`page`] draws and tells.
 
 pub mod march;
