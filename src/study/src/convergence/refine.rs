@@ -59,6 +59,14 @@ pub struct Direction {
 }
 
 impl Direction {
+    /// Say what cannot be refined, once.
+    fn misses(&mut self, why: String) {
+        if !self.missing.contains(&why) {
+            let between = if self.missing.is_empty() { "" } else { "; " };
+            self.missing = format!("{}{between}{why}", self.missing);
+        }
+    }
+
     /// The same with shorter steps.
     pub fn stepped(&self, shorter: u32) -> Self {
         let mut finer = self.clone();
@@ -217,7 +225,7 @@ impl Refiner<'_> {
         for modes in counts {
             match truncated(rom, modes) {
                 Ok(rom) => direction.levels.push(self.level(modes as f64, false, self.with_rom(index, rom))),
-                Err(why) => direction.missing = format!("fewer modes: {why}"),
+                Err(why) => direction.misses(format!("{modes} modes: {why}")),
             }
         }
         direction.levels.push(self.level(own as f64, true, self.scene.clone()));
@@ -231,7 +239,7 @@ impl Refiner<'_> {
                         direction.levels.push(self.level(modes as f64, false, self.with_rom(index, rom)));
                     }
                 }
-                None => direction.missing = no_more(&structure.rom, index == master(self.scene)),
+                None => direction.misses(no_more(&structure.rom, rom, index == master(self.scene))),
             }
         }
         Ok(direction)
@@ -265,7 +273,7 @@ impl Refiner<'_> {
                 if self.scene.roms[index].frame == Frame::Cartesian || structure.rom.starts_with(BUILTIN) {
                     "contact nodes are chosen anew of blades only".into()
                 } else {
-                    no_source("contact nodes")
+                    no_source("contact nodes", &self.scene.roms[index])
                 };
             return Ok(direction);
         }
@@ -286,21 +294,27 @@ impl Refiner<'_> {
             match rom {
                 Ok(rom) => direction.levels.push(self.level(nodes as f64, nodes == own, self.with_rom(index, rom))),
                 // A mesh has no more nodes than it has.
-                Err(failure) => direction.missing = format!("{nodes} nodes: {failure}"),
+                Err(failure) => direction.misses(format!("{nodes} nodes: {failure}")),
             }
         }
         Ok(direction)
     }
 }
 
-fn no_source(what: &str) -> String {
+/// Why a ROM from a file stays as it is; coupled sectors are chosen in whole families, which a ROM does not tell.
+fn no_source(what: &str, rom: &Rom) -> String {
+    if rom.is_cyclic() {
+        return format!(
+            "{what} are fixed in the ROM file; of coupled sectors only the disk that ships is reduced again"
+        );
+    }
     format!("{what} are fixed in the ROM file: give the mesh it was reduced from with --mesh FILE and its options")
 }
 
-fn no_more(rom: &str, master: bool) -> String {
-    match (rom.starts_with(BUILTIN), master) {
+fn no_more(name: &str, rom: &Rom, master: bool) -> String {
+    match (name.starts_with(BUILTIN), master) {
         (true, _) => "it has all of its modes".into(),
-        (false, true) => no_source("more modes than the ROM has"),
+        (false, true) => no_source("more modes than the ROM has", rom),
         (false, false) => "more modes than the ROM has: only the master can be reduced again, from --mesh FILE".into(),
     }
 }
