@@ -162,6 +162,19 @@ fn the_study_of_stability_answers_as_runs_do() {
             assert_eq!(told["error"].is_null(), accepted, "{limit:#} {told:#}");
         }
     }
+    // A scene without friction is asked what it would take.
+    let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
+    fs::write(root.path().join("dry.toml"), scene.replace("friction = 0.15", "friction = 0.0")).unwrap();
+    let arguments = ["study", "stability", "dry.toml", "--friction", "0.15:0.9:2", "--speeds=-1800:1800:2"];
+    let dry: Value = serde_json::from_str(&tiprub(root.path(), "", &[&arguments[..], &more].concat()).0).unwrap();
+    assert_eq!(dry["results"]["own"]["friction"], 0.0);
+    let rubbing = |point: &&Value| point["friction"] != 0.0;
+    let (with, without) = dry["results"]["points"].as_array().unwrap().iter().partition::<Vec<_>, _>(rubbing);
+    assert!(with.iter().zip(points).all(|(a, b)| *a == b) && without.len() == 4, "{with:#?}");
+    assert!(
+        without.iter().all(|point| point["refusal"].is_null() && point["growth_of_steps"].is_null()),
+        "{without:#?}"
+    );
     // A step far too long is no reason to show nothing but refusals.
     let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
     let text = scene

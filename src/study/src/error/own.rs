@@ -92,8 +92,12 @@ impl Own {
         let asked = window.map_or(touch + most, |window| count(window / interval) as usize);
         let samples = asked.clamp(1, schedule.count);
         if touch >= samples {
-            let when = if touch < schedule.count { shown(interval * touch as f64) + " s" } else { "never".into() };
-            let problem = format!("nothing touches within the window: first contact after the start is at {when}");
+            let problem = if touch < schedule.count {
+                let when = shown(interval * touch as f64);
+                format!("nothing touches within the window: first contact after the start is at {when} s")
+            } else {
+                "nothing touches before the experiment ends".into()
+            };
             return Err(Failure::new(name, problem, "Give a longer --window, or a scene that rubs"));
         }
         case.parting = window::parting(&case, count(2.0 * own), samples).map_err(refused)?;

@@ -15,7 +15,7 @@ use asked::{Answer, Asked, Own, Place};
 use grid::Grid;
 use structure::{Rates, Sliding, Structure};
 use tiprub_core::{
-    Scene,
+    Scene, Simulation,
     rom::Frame,
     settings::{Meridian, Motion, Scheme},
 };
@@ -24,6 +24,9 @@ use tiprub_shell::{Failure, Result, console::Console, sweep};
 
 use super::{Study, master};
 use crate::{arguments::StabilityArguments, error::own::refuse_compared};
+
+/// What makes friction a parameter of a scene; every answer sets it.
+const SOME_FRICTION: f64 = 0.1;
 
 /// The answer at one place and step.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,8 +101,12 @@ pub struct Found {
 pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study> {
     refuse_compared(&arguments.set)?;
     let scene = scene_source::load(&arguments.scene, &arguments.common.cache.cache(), console)?;
+    let (scene, frictionless) = with_friction(scene);
     let asked = Asked { scene: &scene, settings: &arguments.set };
-    let own = asked.own()?;
+    let mut own = asked.own()?;
+    if frictionless && !arguments.set.iter().any(|(name, _)| name == "friction_coefficient") {
+        own.friction = Some(0.0);
+    }
     let coupled = scene.roms[master(&scene)].is_cyclic();
     // Ranges that are wrong are refused before the work.
     Grid::new(arguments, &own, coupled, None)?;
@@ -113,6 +120,18 @@ pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study>
     let points = points(&asked, &own, &grid, &structures, threads, console)?;
     let found = Found { name: arguments.scene.clone(), own, grid, points, limits, no_rates, scene: scene.clone() };
     page::study(&found)
+}
+
+/// Where a scene has no friction, the same with the parameter, so that more than none can be asked about; and whether it had none.
+fn with_friction(scene: Scene) -> (Scene, bool) {
+    let mut other = scene.clone();
+    let contacts = other.settings.contacts.iter_mut().filter(|contact| contact.friction == 0.0);
+    let changed = contacts.map(|contact| contact.friction = SOME_FRICTION).count();
+    if changed == scene.settings.contacts.len() && Simulation::new(&other).is_ok() {
+        (other, true)
+    } else {
+        (scene, false)
+    }
 }
 
 /// The master at every speed of the grid; or why its growth cannot be told.
