@@ -82,7 +82,7 @@ impl Direction {
 pub const STEP: &str = "step";
 
 /// Names of the directions of structures, for files.
-const MODES: [&str; 4] = ["modes", "modes-2", "modes-3", "modes-4"];
+const MODES: [&str; 8] = ["modes", "modes-2", "modes-3", "modes-4", "modes-5", "modes-6", "modes-7", "modes-8"];
 
 /// All directions of a scene whose master comes from `source`; steps are in multiples of `own` per communication step.
 ///
@@ -104,6 +104,16 @@ pub fn directions(
         all.push(refiner.modes(index, name)?);
     }
     all.push(refiner.nodes()?);
+    if let Some(structure) = scene.settings.structures.get(MODES.len()) {
+        all.push(Direction {
+            name: "modes-more",
+            title: format!("modes of {} and those after it", structure.name),
+            unit: "modes",
+            levels: Vec::new(),
+            missing: format!("the study refines {} structures", MODES.len()),
+            shorter: None,
+        });
+    }
     Ok(all)
 }
 
