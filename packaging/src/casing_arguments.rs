@@ -1,21 +1,18 @@
 //! Options of `tiprub reduce casing`: a ring described on the command line.
 
+use crate::reduce_arguments::{MeshSize, Written};
 use clap::{Args, ValueEnum};
 use tiprub_model::{
     CasingOptions, Material,
     casing::{ContactRings, Contour, Flange, RingCounts, Support},
     element::ElementKind,
 };
-use tiprub_shell::{Failure, Result};
-
-use crate::cli::ReduceArguments;
 
 /// Share of a casing's length before the first and behind the last contact ring, where no positions are given.
 const MARGIN: f64 = 0.1;
 
 /// What describes a casing; absent options are those of casing37.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
-#[command(next_help_heading = "Options of `casing`")]
 pub struct CasingArguments {
     /// Inner contour as points z:r in m, by growing z (the tip of rotor 37 and the design gap when absent).
     #[arg(long, value_name = "Z:R,Z:R,...", value_parser = contour, allow_hyphen_values = true)]
@@ -51,9 +48,18 @@ pub struct CasingArguments {
     /// Thermal patches around and along; 0x0 leaves heat out [default: 12x1].
     #[arg(long, value_name = "AxL", value_parser = pair)]
     pub patches: Option<[usize; 2]>,
-    /// Fixed-interface modes to reduce with; `--modes` is the number of modes kept in the ROM [default: 156].
+    /// Modes kept in the ROM, those below the cut-off [default: 60].
+    #[arg(long, value_name = "N")]
+    pub modes: Option<usize>,
+    /// Fixed-interface modes to reduce with [default: 156].
     #[arg(long, value_name = "N")]
     pub fixed_interface_modes: Option<usize>,
+    /// Elements around, through the thickness and along the axis [default: 72x1x12].
+    #[arg(long, value_name = "AxTxL")]
+    pub mesh: Option<MeshSize>,
+    /// What is written; a casing other than casing37 is called casing.
+    #[command(flatten)]
+    pub written: Written,
 }
 
 /// A flange, or none.
@@ -93,49 +99,40 @@ pub enum ElementChoice {
     Hex8,
 }
 
-/// The casing asked for.
-///
-/// # Errors
-/// Options of the blade.
-pub fn options(arguments: &ReduceArguments) -> Result<CasingOptions> {
-    if arguments.contact_nodes.is_some() {
-        let remedy = "Give --contact-grid AxL for a casing";
-        return Err(Failure::usage("--contact-nodes", "it belongs to blades", remedy));
+impl CasingArguments {
+    /// The casing asked for.
+    pub fn options(&self) -> CasingOptions {
+        let defaults = CasingOptions::default();
+        let mut options = defaults.clone();
+        if let Some(contour) = self.contour.clone() {
+            let [low, high] = contour.axial();
+            let margin = MARGIN * (high - low);
+            options.rings.axial = [low + margin, high - margin];
+            options.geometry.contour = contour;
+        }
+        options.geometry.thickness = self.thickness.unwrap_or(defaults.geometry.thickness);
+        for (flange, choice) in options.geometry.flanges.iter_mut().zip([self.low_flange, self.high_flange]) {
+            *flange = choice.map_or(*flange, |choice| choice.0);
+        }
+        let [around, along] = self.contact_grid.unwrap_or([defaults.rings.around, defaults.rings.along]);
+        options.rings = ContactRings { around, along, axial: self.contact_axial.unwrap_or(options.rings.axial) };
+        options.counts = self.mesh.map_or(defaults.counts, |size| {
+            let [around, through, along] = size.0;
+            RingCounts { around, through, along, flange: through }
+        });
+        options.support = self.support.map_or(defaults.support, SupportChoice::support);
+        options.material = self.material.map_or(defaults.material.clone(), MaterialChoice::material);
+        options.material.expansion = self.expansion.unwrap_or(options.material.expansion);
+        options.kind = self.element.map_or(defaults.kind, ElementChoice::kind);
+        options.patches = self.patches.unwrap_or(defaults.patches);
+        options.fixed_interface_modes = self.fixed_interface_modes.unwrap_or(defaults.fixed_interface_modes);
+        options.modes = self.modes.unwrap_or(defaults.modes);
+        // The name stands for the one casing that ships, and not for any other.
+        if options != defaults {
+            options.name = "casing".into();
+        }
+        options
     }
-    if arguments.spin.is_some() {
-        return Err(Failure::usage("--spin", "it belongs to blades", "Leave it out: a casing stands still"));
-    }
-    let defaults = CasingOptions::default();
-    let asked = arguments.casing.clone();
-    let mut options = defaults.clone();
-    if let Some(contour) = asked.contour {
-        let [low, high] = contour.axial();
-        let margin = MARGIN * (high - low);
-        options.rings.axial = [low + margin, high - margin];
-        options.geometry.contour = contour;
-    }
-    options.geometry.thickness = asked.thickness.unwrap_or(defaults.geometry.thickness);
-    for (flange, choice) in options.geometry.flanges.iter_mut().zip([asked.low_flange, asked.high_flange]) {
-        *flange = choice.map_or(*flange, |choice| choice.0);
-    }
-    let [around, along] = asked.contact_grid.unwrap_or([defaults.rings.around, defaults.rings.along]);
-    options.rings = ContactRings { around, along, axial: asked.contact_axial.unwrap_or(options.rings.axial) };
-    options.counts = arguments.mesh.map_or(defaults.counts, |size| {
-        let [around, through, along] = size.0;
-        RingCounts { around, through, along, flange: through }
-    });
-    options.support = asked.support.map_or(defaults.support, SupportChoice::support);
-    options.material = asked.material.map_or(defaults.material.clone(), MaterialChoice::material);
-    options.material.expansion = asked.expansion.unwrap_or(options.material.expansion);
-    options.kind = asked.element.map_or(defaults.kind, ElementChoice::kind);
-    options.patches = asked.patches.unwrap_or(defaults.patches);
-    options.fixed_interface_modes = asked.fixed_interface_modes.unwrap_or(defaults.fixed_interface_modes);
-    options.modes = arguments.modes.unwrap_or(defaults.modes);
-    // The name stands for the one casing that ships, and not for any other.
-    if options != defaults {
-        options.name = "casing".into();
-    }
-    Ok(options)
 }
 
 impl SupportChoice {
@@ -197,7 +194,11 @@ fn flange(text: &str) -> Result<FlangeChoice, String> {
     }
 }
 
-fn pair(text: &str) -> Result<[usize; 2], String> {
+/// Two counts.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn pair(text: &str) -> Result<[usize; 2], String> {
     let counts: Result<Vec<usize>, _> = text.split(['x', 'X']).map(str::parse).collect();
     match counts.as_deref() {
         Ok([around, along]) if *around <= 360 && *along <= 100 => Ok([*around, *along]),
@@ -205,7 +206,11 @@ fn pair(text: &str) -> Result<[usize; 2], String> {
     }
 }
 
-fn axial(text: &str) -> Result<[f64; 2], String> {
+/// Two axial positions (m).
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn axial(text: &str) -> Result<[f64; 2], String> {
     let ends = text.split_once(':').map(|(from, to)| [from, to].map(|end| end.trim().parse::<f64>().ok()));
     match ends {
         Some([Some(from), Some(to)]) if from < to => Ok([from, to]),

@@ -3,23 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use tiprub_model::cube::{MassMatrix, Side};
-use tiprub_shell::Failure;
-use tiprub_study::arguments::{CacheArguments, ErrorArguments, MapArguments, assignment, positive};
+use tiprub_study::arguments::{CacheArguments, ErrorArguments, MapArguments, StabilityArguments, assignment, positive};
 
-use crate::{casing_arguments::CasingArguments, file_arguments::FileArguments};
-
-/// A command line that is not understood, for programs: where `--json` is among the `arguments`, and it asks for no help.
-pub fn usage_failure(error: &clap::Error, mut arguments: impl Iterator<Item = std::ffi::OsString>) -> Option<Failure> {
-    let asked = arguments.by_ref().take_while(|argument| argument != "--").any(|argument| argument == "--json");
-    // Of help the exit code is 0.
-    if !asked || error.exit_code() == 0 {
-        return None;
-    }
-    let text = error.render().to_string();
-    let problem = text.split("\n\nUsage:").next().unwrap_or(&text).trim().trim_start_matches("error: ").to_owned();
-    Some(Failure::usage("command line", problem, "See `tiprub --help`, or `--help` of the command"))
-}
+use crate::{own_arguments::ConvergenceCommand, reduce_arguments::ReduceArguments};
 
 /// Blade-tip/casing contact (rub) as an FMU.
 #[derive(Debug, Parser)]
@@ -40,10 +26,10 @@ pub fn usage_failure(error: &clap::Error, mut arguments: impl Iterator<Item = st
 )]
 pub struct Cli {
     /// Print one JSON object with the result on stdout (errors too); progress stays on stderr.
-    #[arg(long, global = true)]
+    #[arg(long, global = true, display_order = 900)]
     pub json: bool,
     /// No progress on stderr; results, warnings and errors are still printed.
-    #[arg(long, short, global = true)]
+    #[arg(long, short, global = true, display_order = 901)]
     pub quiet: bool,
     /// What to do.
     #[command(subcommand)]
@@ -58,19 +44,12 @@ pub enum Command {
                             DIR then holds report.html (opens offline), the two .fmu files, the ROM, the scene and \
                             the results as CSV.")]
     Demo(DemoArguments),
-    /// From a blade, a casing or a finite-element model of your own to a reduced-order model (ROM), with its checks.
-    #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  \
-                            tiprub reduce rotor37 --modes 30 --contact-nodes 5 --mesh 10x2x16 -o fine.rom.safetensors\n  \
-                            tiprub reduce casing\n  \
-                            tiprub reduce casing --material titanium --thickness 0.003 --high-flange none\n  \
-                            tiprub reduce casing --contour=-0.02:0.256,0.04:0.245 --contact-axial 0.0026:0.038\n\n\
-                            tiprub reduce blade.inp --contact-set TIP --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
-                            tiprub reduce blade.msh --contact-set TIP --clamp-set ROOT --material titanium --contact-nodes 5\n  \
-                            tiprub reduce job.inp --stiffness job.sti --mass job.mas --contact-set TIP --clamp-set ROOT\n  \
-                            tiprub reduce sector.inp --contact-set TIP --clamp-set BORE --sectors 56 --cyclic-low LOW --cyclic-high HIGH\n  \
-                            tiprub reduce stage --coarse --inp sector.inp --vtk sector.vtu\n\n\
+    /// From a finite-element model to a reduced-order model (ROM), with its checks: of your own, or one that ships.
+    #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  tiprub reduce casing --material titanium\n  \
+                            tiprub reduce blade blade.inp --contact-set TIP --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
+                            tiprub reduce blade --help\n\n\
                             docs/models.md describes models of your own; docs/rom-file.md writes a ROM from Python.")]
-    Reduce(Box<ReduceArguments>),
+    Reduce(ReduceArguments),
     /// From a scene to .fmu files. Compiles nothing: the library is generic, scene and ROM are data.
     #[command(
         after_help = "Examples:\n  tiprub package scene.toml                 both FMUs beside each other here\n  \
@@ -92,19 +71,10 @@ pub enum Command {
     )]
     Inspect(InspectArguments),
     /// Studies of a scene: pictures, numbers, and whether they show what they should.
-    #[command(
-        after_help = "Examples:\n  tiprub study error scene.toml\n  tiprub study map scene.toml --speeds 1200:1500:61\n  \
-                            tiprub study error --help\n\n\
-                            DIR then holds index.html (opens offline), an SVG and a CSV per figure, and results.json."
-    )]
+    #[command(after_help = "Examples:\n  tiprub study error scene.toml\n  tiprub study stability scene.toml\n  \
+                            tiprub study map scene.toml --speeds 1200:1500:61\n  tiprub study error --help\n\n\
+                            DIR then holds index.html (opens offline), an SVG and a CSV per figure, and results.json.")]
     Study(StudyArguments),
-    /// What moved to the laboratory of the sources.
-    #[command(hide = true, trailing_var_arg = true)]
-    Stability {
-        /// Anything.
-        #[arg(allow_hyphen_values = true)]
-        rest: Vec<String>,
-    },
 }
 
 /// Arguments of `tiprub demo`.
@@ -119,59 +89,6 @@ pub struct DemoArguments {
     /// Revolutions of the rotor to simulate (the scene's own stop time when absent).
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     pub revolutions: Option<f64>,
-}
-
-/// Arguments of `tiprub reduce`.
-#[derive(Debug, Args)]
-pub struct ReduceArguments {
-    /// What to reduce: `rotor37`, the NASA rotor 37 blade that ships with tiprub; `casing`, a ring around it; `stage`, a
-    /// disk with 56 blades; `stage-casing`, the casing around that; `cube`, `ring-left`, `ring-right`, the bodies of the cube between two rings; or a
-    /// mesh file of your own: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh).
-    #[arg(value_name = "MODEL", value_parser = model, required_unless_present = "stiffness")]
-    pub model: Option<Model>,
-    /// Number of modes kept: fixed-interface modes of a blade [default: 20 of rotor37, 25 of a file and of the stage, there per nodal diameter] and of the
-    /// cube [default: all], modes of the casing below the cut-off [default: 60], of the cube's rings [default: 100].
-    #[arg(long, value_name = "N")]
-    pub modes: Option<usize>,
-    /// Number of contact nodes: along the tip chord of `rotor37`, leading edge to trailing edge (≥ 2); of a file, chosen
-    /// evenly along the chord out of the contact set.
-    #[arg(long, value_name = "N")]
-    pub contact_nodes: Option<usize>,
-    /// Elements: of the blade along the chord, through the thickness and along the span [default: 16x2x20]; of the
-    /// casing around, through the thickness and along the axis [default: 72x1x12].
-    #[arg(long, value_name = "NxNxN")]
-    pub mesh: Option<MeshSize>,
-    /// Of the blade, also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s).
-    #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true)]
-    pub spin: Option<f64>,
-    /// ROM file to write [default: NAME.rom.safetensors with the name of the model; casing37 is called casing where
-    /// options change it].
-    #[arg(long, short, value_name = "FILE")]
-    pub output: Option<PathBuf>,
-    /// Replace files that are there already.
-    #[arg(long)]
-    pub force: bool,
-    /// Also write the mesh as a CalculiX/Abaqus input file that computes its frequencies.
-    #[arg(long, value_name = "FILE")]
-    pub inp: Option<PathBuf>,
-    /// Also write mesh, sets and mode shapes for ParaView (.vtu).
-    #[arg(long, value_name = "FILE")]
-    pub vtk: Option<PathBuf>,
-    /// Of the rings of `cube`: static responses to contact forces kept beside the modes [default: 0].
-    #[arg(long, value_name = "N")]
-    pub static_responses: Option<usize>,
-    /// Of `cube` and its rings: mass matrix of the finite elements [default: lumped].
-    #[arg(long, value_enum)]
-    pub mass_matrix: Option<MassChoice>,
-    /// Of `stage` and `stage-casing`, a coarse mesh (and few modes of the disk), for trials.
-    #[arg(long)]
-    pub coarse: bool,
-    /// What describes a casing.
-    #[command(flatten)]
-    pub casing: CasingArguments,
-    /// What describes a model of one's own.
-    #[command(flatten)]
-    pub file: FileArguments,
 }
 
 /// Arguments of `tiprub package`.
@@ -253,28 +170,23 @@ pub enum StudyCommand {
                             The errors are those of the steps, against two fine runs by different schemes that must meet."
     )]
     Error(ErrorArguments),
-    /// What was a study of the models that ship.
-    #[command(external_subcommand)]
-    Other(Vec<String>),
-}
-
-/// What can be reduced.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Model {
-    /// One blade of NASA rotor 37 (36 blades), hub clamped.
-    Rotor37,
-    /// A flexible casing ring, by default the one around rotor 37.
-    Casing,
-    /// The bladed disk of the 56-sector stage.
-    Stage,
-    /// The casing of the 56-sector stage.
-    StageCasing,
-    /// The cube that flies between two rings.
-    Cube,
-    /// One of these rings.
-    Ring(Side),
-    /// A mesh file.
-    File(PathBuf),
+    /// Over friction, speed and internal step: what is right, warned of or refused and why, growth rates of sliding contact, and the
+    /// largest usable step of every scheme and solver.
+    #[command(
+        after_help = "Examples:\n  tiprub study stability scene.toml\n  tiprub study stability builtin:rotor37 --quick\n  \
+                            tiprub study stability scene.toml --friction 0:0.6:13 --speeds -1700:1700:2 --steps 1e-7:2e-5:12\n\n\
+                            The answers are those of `tiprub run`, without the run. Of coupled sectors each takes long: by default few are asked."
+    )]
+    Stability(StabilityArguments),
+    /// What another internal step, more or fewer modes, and other contact nodes change: displacements, impulse, friction work, peak
+    /// force and strain energy.
+    #[command(
+        after_help = "Examples:\n  tiprub study convergence scene.toml\n  tiprub study convergence builtin:rotor37 --quick\n  \
+                            tiprub study convergence scene.toml --mesh blade.inp --contact-set TIP --clamp-set ROOT --sectors 36 --units mm-t-s\n\n\
+                            Modes are taken away from any ROM; more modes and other contact nodes need what it was reduced from: a model that \
+                            ships, or --mesh with the options of `tiprub reduce blade`."
+    )]
+    Convergence(Box<ConvergenceCommand>),
 }
 
 /// Which FMUs to write.
@@ -290,68 +202,12 @@ pub enum FmiChoice {
     Both,
 }
 
-/// Mass matrix of finite elements.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MassChoice {
-    /// On the nodes.
-    Lumped,
-    /// As the elements' shape functions share it out.
-    Consistent,
-}
-
-impl From<MassChoice> for MassMatrix {
-    fn from(choice: MassChoice) -> Self {
-        match choice {
-            MassChoice::Lumped => Self::Lumped,
-            MassChoice::Consistent => Self::Consistent,
-        }
-    }
-}
-
-/// Three element counts: chord, thickness and span of a blade; around, through and along of a casing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MeshSize(pub [usize; 3]);
-
-impl std::str::FromStr for MeshSize {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let counts: Result<Vec<usize>, _> = text.split(['x', 'X']).map(str::parse).collect();
-        match counts.as_deref() {
-            Ok([a, b, c]) if [a, b, c].iter().all(|count| (1..=200).contains(*count)) => Ok(Self([*a, *b, *c])),
-            _ => {
-                Err("give three element counts from 1 to 200: CHORDxTHICKNESSxSPAN of the blade, for example 10x1x14, \
-                      AROUNDxTHROUGHxALONG of the casing, for example 72x1x12"
-                    .into())
-            }
-        }
-    }
-}
-
-fn model(text: &str) -> Result<Model, String> {
-    match text {
-        "rotor37" => Ok(Model::Rotor37),
-        "casing" => Ok(Model::Casing),
-        "stage" => Ok(Model::Stage),
-        "stage-casing" => Ok(Model::StageCasing),
-        "cube" => Ok(Model::Cube),
-        "ring-left" => Ok(Model::Ring(Side::Left)),
-        "ring-right" => Ok(Model::Ring(Side::Right)),
-        // Names of files have an extension or a directory; anything else is a slip in the name of a model.
-        _ if text.contains(['.', '/', '\\']) => Ok(Model::File(text.into())),
-        _ => Err(
-            "`rotor37`, `casing`, `stage`, `stage-casing`, `cube`, `ring-left` and `ring-right` ship with tiprub; a \
-                 model of your own is a file: .inp or .msh"
-                .into(),
-        ),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use clap::CommandFactory;
 
     use super::*;
+    use crate::reduce_arguments::{MeshSize, Model};
 
     fn parse(line: &str) -> Result<Cli, clap::Error> {
         Cli::try_parse_from(std::iter::once("tiprub").chain(line.split_whitespace()))
@@ -362,15 +218,67 @@ mod tests {
         Cli::command().debug_assert();
     }
 
+    /// Of a command and all of its subcommands.
+    fn explained(command: &clap::Command, name: &str) {
+        for command in command.get_subcommands().filter(|command| command.get_name() != "help") {
+            let name = format!("{name} {}", command.get_name());
+            assert!(command.get_about().is_some(), "{name}");
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            assert!(help.contains(&name), "{name}: {help}");
+            for line in help.lines().filter_map(|line| line.trim().strip_prefix("tiprub ")) {
+                // Remarks stand behind some spaces.
+                let line = line.split("   ").next().unwrap_or(line).split(" | ").next().unwrap_or(line);
+                let parsed = parse(line);
+                let fine = parsed.as_ref().err().is_none_or(|error| error.exit_code() == 0);
+                assert!(fine, "{line}: {}", parsed.unwrap_err());
+            }
+            explained(command, &name);
+        }
+    }
+
     #[test]
-    fn every_command_explains_itself_with_an_example() {
+    fn every_command_explains_itself_with_examples_that_are_understood() {
         let mut cli = Cli::command();
         cli.build();
-        for command in cli.get_subcommands().filter(|command| command.get_name() != "help" && !command.is_hide_set()) {
-            assert!(command.get_about().is_some(), "{}", command.get_name());
-            let example = format!("tiprub {}", command.get_name());
-            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
-            assert!(help.contains(&example), "{help}");
+        explained(&cli, "tiprub");
+    }
+
+    /// An option that a command does not list does not exist there.
+    #[test]
+    fn options_of_another_model_are_refused() {
+        let own = "blade.inp --contact-set TIP --clamp-set ROOT";
+        for (line, right) in [
+            (format!("reduce blade {own} --sectors 36 --spin 900 --contact-nodes 3"), true),
+            (format!("reduce blade {own} --cyclic-low A --cyclic-high B"), false),
+            (format!("reduce blade {own} --contact-grid 24x3"), false),
+            (format!("reduce blade {own} --coarse"), false),
+            (format!("reduce blade {own} --mesh 3x3x3"), false),
+            (format!("reduce blade {own} --expansion 1e-5"), false),
+            (format!("reduce blade {own} --spin 900 --stiffness K --mass M"), false),
+            (format!("reduce blade {own} --material steel --stiffness K --mass M"), false),
+            (format!("reduce blade {own} --nodes n.csv --stiffness K --mass M"), false),
+            (format!("reduce sector {own} --sectors 9 --cyclic-low A --cyclic-high B"), true),
+            (format!("reduce sector {own} --sectors 9 --cyclic-low A --cyclic-high B --spin 900"), false),
+            (format!("reduce sector {own} --cyclic-low A --cyclic-high B"), false),
+            (format!("reduce casing-mesh {own} --contact-grid 24x3 --patches 4x1 --expansion 1e-5"), true),
+            (format!("reduce casing-mesh {own}"), false),
+            (format!("reduce casing-mesh {own} --contact-grid 24x3 --sectors 9"), false),
+            (format!("reduce casing-mesh {own} --contact-grid 24x3 --stiffness K --mass M"), false),
+            ("reduce casing --thickness 0.003".into(), true),
+            ("reduce casing --contact-nodes 3".into(), false),
+            ("reduce casing --spin 900".into(), false),
+            ("reduce rotor37 --thickness 0.003".into(), false),
+            ("reduce rotor37 --contact-set TIP".into(), false),
+            ("reduce rotor37 --coarse".into(), false),
+            ("reduce stage --coarse --modes 9".into(), true),
+            ("reduce stage --mesh 3x3x3".into(), false),
+            ("reduce stage-casing --coarse --contact-grid 14x3".into(), true),
+            ("reduce stage-casing --thickness 0.003".into(), false),
+            ("reduce cube --static-responses 3".into(), false),
+            ("reduce ring-left --static-responses 3 --mass-matrix consistent".into(), true),
+            ("reduce ring-right --coarse".into(), false),
+        ] {
+            assert_eq!(parse(&line).is_ok(), right, "{line}");
         }
     }
 
@@ -391,7 +299,8 @@ mod tests {
         assert_eq!(run.set, [("speed".into(), "-2".into()), ("name".into(), "a=b".into())]);
         assert_eq!(run.stop, Some(1e-3));
         let Command::Reduce(reduce) = parse("reduce rotor37 --mesh 10x2x14").unwrap().command else { panic!("reduce") };
-        assert_eq!(reduce.mesh, Some(MeshSize([10, 2, 14])));
+        let Model::Rotor37(rotor) = reduce.model else { panic!("rotor37") };
+        assert_eq!(rotor.mesh, Some(MeshSize([10, 2, 14])));
     }
 
     #[test]
@@ -402,10 +311,13 @@ mod tests {
             ("reduce rotor37 --mesh 0x2x3", "CHORDxTHICKNESSxSPAN"),
             ("demo --revolutions -1", "positive"),
             ("package a.toml --fmi 4", "possible values: 2, 3, both"),
-            ("reduce rotor38", "rotor37"),
-            ("reduce", "MODEL"),
-            ("reduce blade.inp --units inch", "possible values: mm-t-s, m"),
-            ("reduce blade.inp --poisson 0.5", "below 0.5"),
+            ("reduce", "rotor37"),
+            ("reduce blade", "<FILE>"),
+            ("reduce blade blade.inp --units inch", "possible values: mm-t-s, m"),
+            ("reduce blade blade.inp --poisson 0.5", "below 0.5"),
+            ("study stability a.toml --friction -0.1:1:3", "from 0 on"),
+            ("study stability a.toml --steps 0:1:3", "positive steps"),
+            ("study stability a.toml --speeds 5:1:3", "FROM:TO:COUNT"),
             ("reduce casing --contour 0.1", "z:r"),
             ("reduce casing --contour=0.1:0.2,0.1:0.2", "does not lie beyond"),
             ("reduce casing --thickness 0", "positive length"),

@@ -9,8 +9,10 @@ use tiprub_shell::{
 };
 
 use crate::{
-    cli::{Command, Model, ReduceArguments, StudyCommand},
+    cli::{Command, StudyCommand},
     commands::demo,
+    own_arguments::KeptOptions,
+    reduce_arguments::Written,
 };
 
 /// Extensions of what a study writes.
@@ -26,19 +28,24 @@ pub fn check(command: &Command) -> Result<()> {
             let csv = arguments.csv.clone().filter(|path| path != Path::new("-"));
             outputs(&scene(&arguments.scene), &Vec::from_iter(Named::option("--csv", &csv)))
         }
-        Command::Reduce(arguments) => outputs(&model_files(arguments), &reduce_outputs(arguments)),
+        Command::Reduce(arguments) => outputs(&arguments.model.files(), &written(arguments.model.written())),
         Command::Demo(arguments) => {
             let files: Vec<Named> = demo::FILES.map(|name| Named::new("--out", arguments.out.join(name))).to_vec();
             apart(&Vec::from_iter(Named::option("--library", &arguments.library)), &files)?;
             output_file::try_directory(&arguments.out)
         }
         Command::Study(arguments) => match &arguments.study {
-            StudyCommand::Map(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
-            StudyCommand::Error(arguments) => study(&arguments.scene, arguments.common.out.as_deref()),
-            StudyCommand::Other(_) => Ok(()),
+            StudyCommand::Map(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),
+            StudyCommand::Convergence(own) => {
+                let (common, source) =
+                    (&own.study.common, own.blade.source(own.file.as_deref(), KeptOptions::default()).files());
+                study(&own.study.scene, common.out.as_deref(), source)
+            }
+            StudyCommand::Stability(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),
+            StudyCommand::Error(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),
         },
         // Names follow from the scene: see the command.
-        Command::Package(_) | Command::Inspect(_) | Command::Stability { .. } => Ok(()),
+        Command::Package(_) | Command::Inspect(_) => Ok(()),
     }
 }
 
@@ -51,29 +58,17 @@ pub fn scene(argument: &str) -> Vec<Named> {
         .collect()
 }
 
-/// The files that describe a model of one's own.
-pub fn model_files(arguments: &ReduceArguments) -> Vec<Named> {
-    let mesh = match &arguments.model {
-        Some(Model::File(path)) => Some(Named::new("MODEL", path)),
-        _ => None,
-    };
-    let file = &arguments.file;
-    let options =
-        [("--stiffness", &file.stiffness), ("--mass", &file.mass), ("--nodes", &file.nodes), ("--dofs", &file.dofs)];
-    mesh.into_iter().chain(options.into_iter().filter_map(|(role, path)| Named::option(role, path))).collect()
-}
-
 /// The files that `reduce` was told to write.
-fn reduce_outputs(arguments: &ReduceArguments) -> Vec<Named> {
+fn written(arguments: &Written) -> Vec<Named> {
     let options = [("--output", &arguments.output), ("--inp", &arguments.inp), ("--vtk", &arguments.vtk)];
     options.into_iter().filter_map(|(role, path)| Named::option(role, path)).collect()
 }
 
 /// A study names its files itself, in one directory: what is read must not be there under a name of that kind.
-pub fn study(argument: &str, out: Option<&Path>) -> Result<()> {
+pub fn study(argument: &str, out: Option<&Path>, more: Vec<Named>) -> Result<()> {
     let Some(out) = out else { return Ok(()) };
     let directory = identity(out);
-    for input in scene(argument) {
+    for input in scene(argument).into_iter().chain(more) {
         let kind = input.path.extension().and_then(|kind| kind.to_str()).unwrap_or_default().to_ascii_lowercase();
         let real = output_file::destination(&input.path).unwrap_or_else(|_| input.path.clone());
         let inside = directory.is_some() && identity(real.parent().unwrap_or(Path::new("."))) == directory;

@@ -2,9 +2,9 @@
 //!
 //! It wires the lower floors together. [`commands`] holds one module per command; the rest are the parts they share.
 //!
-//! - [`cli`], [`casing_arguments`], [`file_arguments`]: what can be asked for;
+//! - [`cli`], [`reduce_arguments`], [`casing_arguments`], [`own_arguments`]: what can be asked for; [`spelling`]: what was;
 //! - [`command_files`]: what each command reads and writes, looked at before any work;
-//! - [`scene_features`], [`rom_facts`], [`step_limits`]: what is to be known of a scene or a ROM before it is trusted;
+//! - [`scene_features`], [`rom_facts`]: what is to be known of a scene or a ROM before it is trusted;
 //! - [`users_model`], [`cube_models`], [`mod@reduced`]: models read, judged, reduced, and what is told of them;
 //! - [`fmu`], [`library`]: what is in an FMU, and where its shared library comes from;
 //! - [`report`]: the HTML report of the demo.
@@ -14,12 +14,13 @@ pub mod cli;
 pub mod command_files;
 pub mod commands;
 pub mod cube_models;
-pub mod file_arguments;
 pub mod fmu;
 pub mod library;
+pub mod own_arguments;
+pub mod reduce_arguments;
 pub mod reduced;
 pub mod report;
 pub mod rom_facts;
 pub mod scene_features;
-pub mod step_limits;
+pub mod spelling;
 pub mod users_model;

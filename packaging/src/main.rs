@@ -1,20 +1,23 @@
 //! The `tiprub` command line.
 
-use std::process::ExitCode;
+use std::{ffi::OsString, process::ExitCode};
 
 use clap::Parser;
-use tiprub_packaging::{
-    cli::{self, Cli},
-    commands,
-};
+use tiprub_packaging::{cli::Cli, commands, spelling};
 use tiprub_shell::console::Console;
 
 fn main() -> ExitCode {
+    let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
+    let asked = Console::new(true, spelling::asks_for_json(&arguments));
+    if let Some(failure) = spelling::of_before(&arguments) {
+        asked.fail(&failure);
+        return ExitCode::from(failure.exit_code());
+    }
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            if let Some(failure) = cli::usage_failure(&error, std::env::args_os().skip(1)) {
-                Console::new(true, true).answer(&failure);
+            if let Some(failure) = spelling::failure(&error) {
+                asked.answer(&failure);
             }
             error.exit()
         }

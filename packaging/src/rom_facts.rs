@@ -3,21 +3,9 @@
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
-use tiprub_core::{
-    Rom,
-    dynamics::{cyclic::CyclicModel, modal::ModalModel},
-    plausibility,
-    rom::Frame,
-    settings::Scheme,
-    stability::{self, ContactDirections},
-};
+use tiprub_core::{Rom, plausibility, rom::Frame, stability};
 use tiprub_shell::{Failure, Result};
-
-use crate::step_limits::{Sliding, StepLimit, step_limits};
-
-/// Friction coefficients for which solvability is tried, ascending.
-const FRICTION_STEPS: u32 = 40;
-const FRICTION_STEPS_PER_UNIT: f64 = 20.0;
+use tiprub_study::stability::structure::{Sliding, StepLimit, Structure};
 
 /// Modes that a warning of the checks is about: those that blade-tip contact excites most. Of coupled sectors the first
 /// family: as many modes of the disk as there are sectors.
@@ -30,9 +18,10 @@ pub(crate) const ROWS_SHOWN: usize = 40;
 const FREQUENCIES_SHOWN: usize = 6;
 /// Modes below this share of the highest frequency that was checked are those of a rigid body.
 const RIGID: f64 = 1e-4;
-/// Largest frequency deviation (eq. 13) and residual convergence criterion (eq. 12) without a warning, in %.
-const DEVIATION_LIMIT: f64 = 0.3;
-const RESIDUAL_LIMIT: f64 = 1.0;
+/// Largest frequency deviation (eq. 13) without a warning (%): what the paper calls satisfactory.
+pub const DEVIATION_LIMIT: f64 = 0.3;
+/// The same for the residual convergence criterion (eq. 12, %).
+pub const RESIDUAL_LIMIT: f64 = 1.0;
 
 /// Facts of one ROM.
 #[derive(Debug, Clone)]
@@ -78,27 +67,20 @@ impl RomFacts {
     /// A ROM whose eigenproblem cannot be solved.
     pub fn of(rom: &Rom, sliding: Option<Sliding>) -> Result<Self> {
         let in_rom = |error| Failure::from_core(format!("ROM `{}`", rom.name), error);
-        let hertz = |frequencies: &[f64]| frequencies.iter().map(|omega| omega / std::f64::consts::TAU).collect();
-        let mut by_nodal_diameter: Vec<Vec<f64>> = Vec::new();
-        let models = if rom.is_cyclic() {
-            let disk = CyclicModel::from_rom(rom, rom.damping_ratio).map_err(in_rom)?;
-            by_nodal_diameter.extend(disk.diameters.iter().map(|diameter| hertz(&diameter.frequencies)));
-            (0..disk.diameters.len()).map(|number| disk.paired(number)).collect()
-        } else {
-            vec![ModalModel::from_rom(rom, rom.damping_ratio).map_err(in_rom)?]
-        };
-        let mut frequencies: Vec<f64> =
-            if rom.is_cyclic() { by_nodal_diameter.concat() } else { hertz(&models[0].frequencies) };
+        let structure = Structure::new(rom, rom.damping_ratio, 0.0).map_err(in_rom)?;
+        let hertz = |frequencies: &Vec<f64>| frequencies.iter().map(|omega| omega / std::f64::consts::TAU).collect();
+        let by_nodal_diameter: Vec<Vec<f64>> = structure.frequencies.iter().map(hertz).collect();
+        let mut frequencies = by_nodal_diameter.concat();
         frequencies.sort_by(f64::total_cmp);
-        let limits = models.iter().map(stability::central_difference_limit);
+        let limits = structure.models.iter().map(stability::central_difference_limit);
         Ok(Self {
             rom: rom.clone(),
             frequencies,
-            by_nodal_diameter,
-            largest_angular_frequency: models.iter().map(ModalModel::largest_frequency).fold(0.0, f64::max),
+            by_nodal_diameter: if rom.is_cyclic() { by_nodal_diameter } else { Vec::new() },
+            largest_angular_frequency: structure.highest(),
             central_difference_limit: limits.fold(f64::INFINITY, f64::min),
-            solvable_friction: solvable_friction(rom, &models),
-            step_limits: step_limits(rom, &models, sliding, &[1.0, -1.0].map(|sign| closed_contacts(rom, sign))),
+            solvable_friction: structure.solvable_friction(),
+            step_limits: structure.step_limits(sliding),
             sliding,
         })
     }
@@ -372,43 +354,4 @@ fn extras_text(rom: &Rom) -> String {
         let _ = writeln!(text, "  heated patches            {}", thermal.patches.len());
     }
     text
-}
-
-/// Largest µ tried for which the contact problem is solvable for both slip directions; `models` is the one sector, or all
-/// nodal diameters of coupled sectors.
-///
-/// A Cartesian ROM does not say where the other body is: what can be solved is checked with the scene.
-fn solvable_friction(rom: &Rom, models: &[ModalModel]) -> Option<f64> {
-    if rom.frame == Frame::Cartesian {
-        return None;
-    }
-    let largest = models.iter().map(ModalModel::largest_frequency).fold(0.0, f64::max);
-    let step = 1.0 / largest;
-    let senses = [1.0, -1.0].map(|sign| closed_contacts(rom, sign));
-    // Real and imaginary parts of a nodal diameter are contacts of their own.
-    let copies = |model: &ModalModel| model.contact_modes.nrows() / (3 * rom.contact_nodes.len());
-    let together: Vec<Vec<ContactDirections>> =
-        models.iter().map(|model| senses.iter().map(|sense| sense.repeat(copies(model))).collect()).collect();
-    let solvable = |friction: f64| {
-        if rom.is_cyclic() {
-            stability::check_solvable_together(models, Scheme::ModalExact, step, friction, &together).is_ok()
-        } else {
-            stability::check_solvable(&models[0], Scheme::ModalExact, step, friction, &senses).is_ok()
-        }
-    };
-    (0..=FRICTION_STEPS)
-        .map(|step| f64::from(step) / FRICTION_STEPS_PER_UNIT)
-        .take_while(|friction| solvable(*friction))
-        .last()
-}
-
-/// Normal and slip direction of every contact node against a round casing: inwards along the contour's normal, and
-/// along ±θ.
-fn closed_contacts(rom: &Rom, slip_sign: f64) -> ContactDirections {
-    let directions = rom.contact_nodes.iter().map(|node| {
-        let length = node.meridional_slope.hypot(1.0);
-        let normal = [-1.0 / length, 0.0, node.meridional_slope / length];
-        (normal, [0.0, slip_sign, 0.0])
-    });
-    directions.collect()
 }

@@ -102,6 +102,172 @@ fn the_quick_study_of_errors_takes_any_scene() {
     }
 }
 
+/// A scene of one's own around a coarse blade.
+fn own_scene(root: &Path) {
+    let reduce = ["reduce", "rotor37", "--mesh", "6x1x8", "--modes", "4", "--contact-nodes", "2", "--quiet"];
+    tiprub(root, "", &[&reduce[..], &["-o", "coarse.rom.safetensors", "--inp", "blade.inp"]].concat());
+    let text = tiprub_gallery::scene_source::ROTOR37_SCENE.replace("builtin:rotor37", "coarse.rom.safetensors");
+    fs::write(root.join("own.toml"), text).unwrap();
+}
+
+/// Every answer of the study is that of a run with the same start values and step, and the largest usable steps part what is accepted
+/// from what is refused.
+#[test]
+fn the_study_of_stability_answers_as_runs_do() {
+    let root = tempfile::tempdir().unwrap();
+    own_scene(root.path());
+    let run = |friction: f64, speed: f64, step: f64, method: &str| {
+        let (scheme, solver) = method.split_once(" + ").unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+        let values = [
+            format!("--set=friction_coefficient={friction:?}"),
+            format!("--set=speed={speed:?}"),
+            format!("--set=internal_step_max={step:?}"),
+            format!("--set=scheme={scheme}"),
+            format!("--set=solver={solver}"),
+            format!("--step={step:?}"),
+            format!("--stop={:?}", 3.0 * step),
+        ];
+        let output =
+            command.current_dir(root.path()).args(["run", "own.toml", "--json", "--quiet"]).args(values).output();
+        serde_json::from_slice::<Value>(&output.unwrap().stdout).unwrap()
+    };
+    let arguments = ["study", "stability", "own.toml", "--friction", "0.15:0.9:2", "--speeds=-1800:1800:2"];
+    let more = ["--steps", "1e-6:1.6e-5:2", "--json", "--quiet", "--out", "out"];
+    let (stdout, _) = tiprub(root.path(), "", &[&arguments[..], &more].concat());
+    let json: Value = serde_json::from_str(&stdout).unwrap();
+    only_no(&json, &[]);
+    let number = |value: &Value, name: &str| value[name].as_f64().unwrap();
+    let points = json["results"]["points"].as_array().unwrap();
+    assert_eq!(points.len(), 8);
+    for point in points {
+        let [friction, speed, step] = ["friction", "speed", "internal_step"].map(|name| number(point, name));
+        let told = run(friction, speed, step, "modal-exact + lcp");
+        match point["refusal"].as_str() {
+            // What and where stand apart in JSON.
+            Some(text) => {
+                let told = told["error"]["problem"].as_str().unwrap();
+                assert!(told.starts_with("refused: ") && text.starts_with(told), "{text} {told}");
+            }
+            None => assert_eq!(told["warnings"], point["warnings"], "{point:#}"),
+        }
+    }
+    let answers: Vec<&str> = points.iter().map(|point| point["answer"].as_str().unwrap()).collect();
+    assert!(["right", "warned", "flutter", "refused"].iter().all(|kind| answers.contains(kind)), "{answers:?}");
+    let limits = json["results"]["largest_steps"].as_array().unwrap();
+    assert_eq!(limits.len(), 9);
+    for limit in limits.iter().filter(|limit| !limit["method"].as_str().unwrap().ends_with("coulomb")) {
+        for (factor, accepted) in [(0.999, true), (1.02, false)] {
+            let told = run(0.15, 1800.0, factor * number(limit, "step"), limit["method"].as_str().unwrap());
+            assert_eq!(told["error"].is_null(), accepted, "{limit:#} {told:#}");
+        }
+    }
+    // A scene without friction is asked what it would take.
+    let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
+    fs::write(root.path().join("dry.toml"), scene.replace("friction = 0.15", "friction = 0.0")).unwrap();
+    let arguments = ["study", "stability", "dry.toml", "--friction", "0.15:0.9:2", "--speeds=-1800:1800:2"];
+    let dry: Value = serde_json::from_str(&tiprub(root.path(), "", &[&arguments[..], &more].concat()).0).unwrap();
+    assert_eq!(dry["results"]["own"]["friction"], 0.0);
+    let rubbing = |point: &&Value| point["friction"] != 0.0;
+    let (with, without) = dry["results"]["points"].as_array().unwrap().iter().partition::<Vec<_>, _>(rubbing);
+    assert!(with.iter().zip(points).all(|(a, b)| *a == b) && without.len() == 4, "{with:#?}");
+    assert!(
+        without.iter().all(|point| point["refusal"].is_null() && point["growth_of_steps"].is_null()),
+        "{without:#?}"
+    );
+    // A step far too long is no reason to show nothing but refusals.
+    let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
+    let text = scene
+        .replace("step = 1.0e-6 ", "step = 1.0e-4 ")
+        .replace("communication_step = 1.0e-5", "communication_step = 1.0e-4");
+    fs::write(root.path().join("long.toml"), text).unwrap();
+    let arguments = ["study", "stability", "long.toml", "--quick", "--json", "--quiet", "--out", "long"];
+    let long: Value = serde_json::from_str(&tiprub(root.path(), "", &arguments).0).unwrap();
+    only_no(&long, &["The scene as it stands is accepted", "Its internal step lies within"]);
+    let accepted = ["right", "warned"].map(|kind| long["results"]["counts"][kind].as_u64().unwrap());
+    assert!(accepted[0] + accepted[1] > 0, "{}", long["results"]["counts"]);
+    for row in columns(&root.path().join("out/answers.csv")).1 {
+        assert_eq!(row[6].is_finite(), row[4] > 0.0, "what flutters has a frequency: {row:?}");
+    }
+    let page = fs::read_to_string(root.path().join("out/index.html")).unwrap();
+    assert!(page.contains("Largest usable internal step") && page.contains("Read a column"));
+}
+
+/// Steps of any scene, fewer modes of any ROM; more modes and other contact nodes where the mesh is named, and it is the ROM's.
+#[test]
+fn the_study_of_convergence_refines_what_it_can_and_says_what_it_cannot() {
+    let root = tempfile::tempdir().unwrap();
+    own_scene(root.path());
+    let own = ["study", "convergence", "own.toml", "--quick", "--json", "--quiet", "--out", "out"];
+    let mesh = ["--mesh", "blade.inp", "--contact-set", "TIP", "--clamp-set", "HUB"];
+    let study = |more: &[&str]| -> Value {
+        serde_json::from_str(&tiprub(root.path(), "", &[&own[..], more].concat()).0).unwrap()
+    };
+    let values = |direction: &Value| -> Vec<f64> {
+        direction["levels"].as_array().unwrap().iter().map(|level| level["value"].as_f64().unwrap()).collect()
+    };
+    let alone = study(&[])["results"]["directions"].clone();
+    assert_eq!([values(&alone[0]), values(&alone[1])], [vec![2e-6, 1e-6, 5e-7], vec![2.0, 4.0]]);
+    assert!(values(&alone[2]).is_empty());
+    for direction in [1, 2] {
+        assert!(alone[direction]["not_refined"].as_str().unwrap().contains("--mesh FILE"), "{alone:#}");
+    }
+    let whole = study(&[&mesh[..], &["--sectors", "36"]].concat());
+    let found = &whole["results"]["directions"];
+    assert_eq!([values(&found[1]), values(&found[2])], [vec![2.0, 4.0, 6.0], vec![2.0, 3.0]]);
+    assert!(found.as_array().unwrap().iter().all(|direction| direction["not_refined"].is_null()), "{found:#}");
+    // The scene as it stands is the same run in every direction, and that of the scene without a mesh.
+    let standing = |directions: &Value| -> Vec<Value> {
+        let levels = directions.as_array().unwrap().iter().flat_map(|one| one["levels"].as_array().unwrap());
+        let own = levels.filter(|level| level["own"] == true);
+        own.map(|level| {
+            ["impulse", "friction_work", "peak_force", "strain_energy"].map(|name| level[name].clone()).to_vec().into()
+        })
+        .collect()
+    };
+    let all = standing(found);
+    assert!(all.len() == 3 && all.iter().all(|one| *one == all[0]) && all[0] == standing(&alone)[0], "{all:?}");
+    // A change is to the next run; the step changes least of all.
+    let change = |direction: &Value, level: usize, name: &str| {
+        direction["levels"][level]["changes_to_next"][name].as_f64().unwrap()
+    };
+    let steps = [0, 1].map(|level| change(&found[0], level, "displacements"));
+    assert!(steps.iter().all(|step| (1e-6..0.01).contains(step)), "{steps:?}");
+    assert!(steps[1] < 0.1 * change(&found[1], 1, "displacements"), "{found:#}");
+    let impulse = |level: usize| found[1]["levels"][level]["impulse"].as_f64().unwrap();
+    let expected = (impulse(1) - impulse(2)).abs() / impulse(1).max(impulse(2));
+    assert!((change(&found[1], 1, "impulse") / expected - 1.0).abs() < 1e-9);
+    assert!(fs::read_to_string(root.path().join("out/levels.csv")).unwrap().lines().count() == 1 + 3 + 3 + 2);
+    // Just below the limit of central differences, models with more modes or nodes are refused: their direction takes half the step.
+    let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
+    let replaced = |line: &str| match line.split(' ').next() {
+        Some("scheme") => "scheme = \"central-difference\"".to_owned(),
+        Some("step") => "step = 4.4e-6".to_owned(),
+        Some("communication_step") => "communication_step = 8.8e-6".to_owned(),
+        _ => line.to_owned(),
+    };
+    fs::write(root.path().join("own.toml"), scene.lines().map(replaced).collect::<Vec<_>>().join("\n")).unwrap();
+    let limited = study(&[&mesh[..], &["--sectors", "36"]].concat());
+    let found = limited["results"]["directions"].as_array().unwrap();
+    let divided: Vec<u64> = found.iter().map(|one| one["step_divided_by"].as_u64().unwrap()).collect();
+    assert_eq!(divided, [1, 2, 2]);
+    let refused =
+        |one: &Value| one["levels"].as_array().unwrap().iter().filter(|level| level["refused"].is_string()).count();
+    assert_eq!(found.iter().map(refused).collect::<Vec<_>>(), [1, 0, 0], "{limited:#}");
+    let refuse = |more: &[&str], code: i32| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+        let output = command.current_dir(root.path()).args(["study", "convergence", "own.toml", "--quick"]).args(more);
+        let output = output.output().unwrap();
+        assert_eq!(output.status.code(), Some(code), "{more:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let other = refuse(&[&mesh[..], &["--sectors", "36", "--material", "steel"]].concat(), 1);
+    assert!(other.contains("it does not give the ROM `rotor37` of the scene: first frequency"), "{other}");
+    assert!(refuse(&mesh, 1).contains("1 sectors instead of"), "sectors");
+    assert!(refuse(&mesh[2..], 2).contains("--mesh: an option given describes a mesh, and there is none"));
+    assert!(refuse(&[&mesh[..], &["--modes", "9"]].concat(), 2).contains("unexpected argument '--modes'"));
+}
+
 /// Told at once: nothing is reduced for it, and no directory stays.
 #[test]
 fn what_a_study_cannot_do_is_told_before_the_work() {
@@ -116,18 +282,18 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1, "something stays");
         told
     };
-    for name in ["map", "error"] {
+    for name in ["map", "error", "stability", "convergence"] {
         let told = refuse(&["study", name, "builtin:rotor37", "--quick", "--out", "file/out"], 1);
         assert!(told.contains("file/out: cannot create the directory"), "{told}");
     }
     let told = refuse(&["study", "map", "builtin:cube-between-rings"], 2);
     assert!(told.contains("`cube`, flies freely") && told.contains("rotating master"), "{told}");
-    for name in ["stage", "convergence", "modes", "cube", "conjugacy", "inputs"] {
+    for name in ["stage", "modes", "cube", "conjugacy", "inputs"] {
         let told = refuse(&["study", name, "--quick"], 2);
         assert!(told.contains("the laboratory") && told.contains(&format!("-p tiprub-lab -- {name}")), "{told}");
     }
     assert!(refuse(&["stability", "--case", "friction/"], 2).contains("-p tiprub-lab -- stability"));
-    assert!(refuse(&["study", "tip"], 2).contains("Choose `map` or `error`"));
+    assert!(refuse(&["study", "tip"], 2).contains("Choose `map`, `error`"));
     let told = refuse(&["study", "error", "builtin:rotor37", "--set", "scheme=film"], 2);
     assert!(told.contains("--set scheme: the study compares all of them"), "{told}");
 }

@@ -78,9 +78,9 @@ fn scene() -> String {
 /// The command of the guide that reduces the blade, without `tiprub`.
 fn command() -> String {
     let guide = guide();
-    let lines = guide.split("\n    tiprub reduce blade.inp --contact-set TIP").nth(2).expect("the second one");
+    let lines = guide.split("\n    tiprub reduce blade blade.inp --contact-set TIP").nth(2).expect("the second one");
     let text: String = lines.split("\n    tiprub package").next().unwrap().replace("\\\n", " ");
-    format!("reduce blade_hex20.inp --contact-set TIP{text}")
+    format!("reduce blade blade_hex20.inp --contact-set TIP{text}")
 }
 
 #[test]
@@ -116,12 +116,13 @@ fn matrices_of_calculix_give_the_rom_of_the_mesh() {
         Project::new(&["bar.inp", "bar.sti", "bar.mas", "bar.dof", "bar_held.sti", "bar_held.mas", "bar_held.dof"]);
     let common = "--contact-set TIP --contact-nodes 3 --modes 8 --units mm-t-s";
     let mesh = format!(
-        "reduce bar.inp --clamp-set ROOT --young 210e9 --poisson 0.3 --density 7850 {common} -o mesh.rom.safetensors"
+        "reduce blade bar.inp --clamp-set ROOT --young 210e9 --poisson 0.3 --density 7850 {common} -o mesh.rom.safetensors"
     );
     let matrices = format!(
-        "reduce bar.inp --clamp-set ROOT --stiffness bar.sti --mass bar.mas {common} -o matrices.rom.safetensors"
+        "reduce blade bar.inp --clamp-set ROOT --stiffness bar.sti --mass bar.mas {common} -o matrices.rom.safetensors"
     );
-    let held = format!("reduce bar.inp --stiffness bar_held.sti --mass bar_held.mas {common} -o held.rom.safetensors");
+    let held =
+        format!("reduce blade bar.inp --stiffness bar_held.sti --mass bar_held.mas {common} -o held.rom.safetensors");
     for line in [&mesh, &matrices, &held] {
         project.succeed(line);
     }
@@ -141,7 +142,7 @@ fn matrices_of_calculix_give_the_rom_of_the_mesh() {
 #[test]
 fn a_sector_of_gmsh_becomes_a_disk_with_the_frequencies_of_calculix() {
     let project = Project::new(&["sector.msh"]);
-    let line = "reduce sector.msh --contact-set TIP --clamp-set BORE --sectors 12 --cyclic-low LOW --cyclic-high HIGH \
+    let line = "reduce sector sector.msh --contact-set TIP --clamp-set BORE --sectors 12 --cyclic-low LOW --cyclic-high HIGH \
                 --units mm-t-s --young 210e9 --poisson 0.3 --density 7850 --contact-nodes 3 --modes 12 \
                 --inp sector_out.inp --vtk sector.vtu";
     let told = project.succeed(line);
@@ -185,7 +186,8 @@ fn a_sector_of_gmsh_becomes_a_disk_with_the_frequencies_of_calculix() {
 fn an_exported_mesh_is_read_back_to_the_same_frequencies() {
     let project = Project::new(&[]);
     let first = project.succeed("reduce rotor37 --mesh 6x1x6 --inp blade.inp");
-    let again = project.succeed("reduce blade.inp --contact-set TIP --clamp-set HUB --contact-nodes 3 --modes 20");
+    let again =
+        project.succeed("reduce blade blade.inp --contact-set TIP --clamp-set HUB --contact-nodes 3 --modes 20");
     let (a, b) = (numbers(&first["rom"]["checks"], "full_hz"), numbers(&again["rom"]["checks"], "full_hz"));
     assert!(a.iter().zip(&b).all(|(a, b)| (a / b - 1.0).abs() < 1e-9), "{a:?} {b:?}");
 }
@@ -193,8 +195,7 @@ fn an_exported_mesh_is_read_back_to_the_same_frequencies() {
 #[test]
 fn effects_of_spin_are_computed_for_a_mesh_of_ones_own() {
     let project = Project::new(&["blade_tet10.msh"]);
-    let line =
-        "reduce blade_tet10.msh --contact-set TIP --clamp-set ROOT --units mm-t-s --material titanium --spin 1500";
+    let line = "reduce blade blade_tet10.msh --contact-set TIP --clamp-set ROOT --units mm-t-s --material titanium --spin 1500";
     let told = project.succeed(line);
     assert_eq!(told["rom"]["spin"]["largest_speed"], 1500.0);
     let check = &told["spin"][1];
@@ -211,35 +212,37 @@ fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
     project.write("k.mtx", "%%MatrixMarket matrix coordinate real symmetric\n3 3 1\n1 1 1.0\n");
     let bar = "--contact-set TIP --clamp-set ROOT --units mm-t-s";
     let cases: Vec<(i32, String, &[&str])> = vec![
-        (2, "reduce blade".into(), &["rotor37", ".inp"]),
-        (1, format!("reduce missing.inp {bar}"), &["missing.inp", "Check the path"]),
-        (1, format!("reduce empty.inp {bar}"), &["empty.inp", "no solid element"]),
-        (1, format!("reduce picture.png {bar}"), &["picture.png", ".inp", ".msh"]),
-        (1, format!("reduce old.msh {bar}"), &["old.msh:2", "Mesh.MshFileVersion"]),
-        (1, format!("reduce bar.inp {bar}"), &["bar.inp", "no material", "--material"]),
-        (1, "reduce blade_hex8.inp --contact-set TIP --clamp-set ROOT --material steel".into(), &["6.0", "--units mm-t-s", "--units m"]),
-        (1, format!("reduce bar.inp {bar} --young 210e3 --poisson 0.3 --density 7.85e-9"), &["Young's modulus", "SI units"]),
-        (2, "reduce bar.inp --material steel --units mm-t-s".into(), &["--contact-set", "TIP (8)", "ROOT (8)"]),
-        (2, "reduce bar.inp --material steel --units mm-t-s --contact-set TIP".into(), &["--clamp-set", "ROOT (8)", "none"]),
-        (1, "reduce bar.inp --material steel --units mm-t-s --contact-set TIPS --clamp-set ROOT".into(), &["`TIPS`", "TIP (8)"]),
-        (1, "reduce bar.inp --material steel --units mm-t-s --contact-set ROOT --clamp-set ROOT".into(), &["ROOT", "clamped"]),
-        (1, format!("reduce bar.inp {bar} --material steel --contact-nodes 40"), &["40 of a set of", "Give a number"]),
-        (1, format!("reduce bar.inp {bar} --material steel --contact-nodes 2 --contact-names a,b,c"), &["3 names for 2"]),
-        (1, format!("reduce bar.inp {bar} --material steel --modes 5000"), &["5000", "fewer modes"]),
-        (2, format!("reduce bar.inp {bar} --material steel --young 1e11 --poisson 0.3 --density 1e3"), &["given twice"]),
-        (2, format!("reduce bar.inp {bar} --young 1e11"), &["--poisson"]),
-        (2, format!("reduce bar.inp {bar} --material steel --contour 0:1,1:1"), &["casing"]),
-        (2, "reduce rotor37 --contact-set TIP".into(), &["one's own"]),
-        (2, format!("reduce bar.inp {bar} --material steel --name ../up"), &["plain name"]),
-        (2, format!("reduce bar.inp {bar} --material steel --contact-names a-b"), &["variable names"]),
-        (2, format!("reduce bar.inp {bar} --stiffness bar.sti"), &["--mass"]),
-        (2, format!("reduce --stiffness bar.sti --mass bar.mas {bar}"), &["--nodes", "mesh file"]),
-        (2, format!("reduce bar.inp {bar} --stiffness bar.sti --mass bar.mas --material steel"), &["matrices hold their material"]),
-        (1, format!("reduce bar.inp {bar} --stiffness k.mtx --mass bar.mas"), &["k.mtx", "3 rows", "96"]),
-        (1, format!("reduce bar.inp {bar} --stiffness bar.mas --mass bar.sti --dofs bar.dof"), &["exchanged"]),
-        (2, "reduce sector.msh --contact-set TIP --clamp-set BORE --cyclic-low LOW --material steel --units mm-t-s".into(), &["--cyclic-high"]),
-        (1, "reduce sector.msh --contact-set TIP --clamp-set BORE --cyclic-low LOW --cyclic-high HIGH --sectors 13 --material steel --units mm-t-s".into(), &["cyclic faces", "number of sectors"]),
-        (1, "reduce sector.msh --contact-set LOW --clamp-set BORE --cyclic-low LOW --cyclic-high HIGH --sectors 12 --material steel --units mm-t-s".into(), &["LOW", "faces"]),
+        (2, "reduce blade".into(), &["<FILE>"]),
+        (2, "reduce rotor38".into(), &["`rotor37`", ".inp"]),
+        (2, format!("reduce bar.inp {bar}"), &["tiprub reduce blade bar.inp --contact-set TIP"]),
+        (1, format!("reduce blade missing.inp {bar}"), &["missing.inp", "Check the path"]),
+        (1, format!("reduce blade empty.inp {bar}"), &["empty.inp", "no solid element"]),
+        (1, format!("reduce blade picture.png {bar}"), &["picture.png", ".inp", ".msh"]),
+        (1, format!("reduce blade old.msh {bar}"), &["old.msh:2", "Mesh.MshFileVersion"]),
+        (1, format!("reduce blade bar.inp {bar}"), &["bar.inp", "no material", "--material"]),
+        (1, "reduce blade blade_hex8.inp --contact-set TIP --clamp-set ROOT --material steel".into(), &["6.0", "--units mm-t-s", "--units m"]),
+        (1, format!("reduce blade bar.inp {bar} --young 210e3 --poisson 0.3 --density 7.85e-9"), &["Young's modulus", "SI units"]),
+        (2, "reduce blade bar.inp --material steel --units mm-t-s".into(), &["--contact-set", "TIP (8)", "ROOT (8)"]),
+        (2, "reduce blade bar.inp --material steel --units mm-t-s --contact-set TIP".into(), &["--clamp-set", "ROOT (8)", "none"]),
+        (1, "reduce blade bar.inp --material steel --units mm-t-s --contact-set TIPS --clamp-set ROOT".into(), &["`TIPS`", "TIP (8)"]),
+        (1, "reduce blade bar.inp --material steel --units mm-t-s --contact-set ROOT --clamp-set ROOT".into(), &["ROOT", "clamped"]),
+        (1, format!("reduce blade bar.inp {bar} --material steel --contact-nodes 40"), &["40 of a set of", "Give a number"]),
+        (1, format!("reduce blade bar.inp {bar} --material steel --contact-nodes 2 --contact-names a,b,c"), &["3 names for 2"]),
+        (1, format!("reduce blade bar.inp {bar} --material steel --modes 5000"), &["5000", "fewer modes"]),
+        (2, format!("reduce blade bar.inp {bar} --material steel --young 1e11 --poisson 0.3 --density 1e3"), &["--material", "cannot be used with", "--young"]),
+        (2, format!("reduce blade bar.inp {bar} --young 1e11"), &["--poisson"]),
+        (2, format!("reduce blade bar.inp {bar} --material steel --contour 0:1,1:1"), &["unexpected argument", "--contour"]),
+        (2, "reduce rotor37 --contact-set TIP".into(), &["unexpected argument", "--contact-set"]),
+        (2, format!("reduce blade bar.inp {bar} --material steel --name ../up"), &["plain name"]),
+        (2, format!("reduce blade bar.inp {bar} --material steel --contact-names a-b"), &["variable names"]),
+        (2, format!("reduce blade bar.inp {bar} --stiffness bar.sti"), &["--mass"]),
+        (2, format!("reduce blade --stiffness bar.sti --mass bar.mas {bar}"), &["--nodes", "mesh file"]),
+        (2, format!("reduce blade bar.inp {bar} --stiffness bar.sti --mass bar.mas --material steel"), &["cannot be used with", "--stiffness"]),
+        (1, format!("reduce blade bar.inp {bar} --stiffness k.mtx --mass bar.mas"), &["k.mtx", "3 rows", "96"]),
+        (1, format!("reduce blade bar.inp {bar} --stiffness bar.mas --mass bar.sti --dofs bar.dof"), &["exchanged"]),
+        (2, "reduce sector sector.msh --contact-set TIP --clamp-set BORE --cyclic-low LOW --material steel --units mm-t-s".into(), &["--cyclic-high"]),
+        (1, "reduce sector sector.msh --contact-set TIP --clamp-set BORE --cyclic-low LOW --cyclic-high HIGH --sectors 13 --material steel --units mm-t-s".into(), &["cyclic faces", "number of sectors"]),
+        (1, "reduce sector sector.msh --contact-set LOW --clamp-set BORE --cyclic-low LOW --cyclic-high HIGH --sectors 12 --material steel --units mm-t-s".into(), &["LOW", "faces"]),
     ];
     for (code, line, wanted) in cases {
         let message = project.fail(&line, code);
@@ -253,7 +256,7 @@ fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
 #[test]
 fn rigid_body_modes_of_a_free_disk_are_no_reason_to_warn() {
     let project = Project::new(&["sector.msh"]);
-    let line = "reduce sector.msh --contact-set TIP --clamp-set none --sectors 12 --cyclic-low LOW --cyclic-high HIGH \
+    let line = "reduce sector sector.msh --contact-set TIP --clamp-set none --sectors 12 --cyclic-low LOW --cyclic-high HIGH \
                 --units mm-t-s --material steel --contact-nodes 2 --modes 25";
     let output = project.run(line);
     let stderr = String::from_utf8_lossy(&output.stderr);
@@ -268,7 +271,9 @@ fn a_casing_of_ones_own_is_the_casing_that_ships() {
     project.succeed(&format!(
         "reduce casing --mesh 24x1x6 --patches 0x0 {common} -o ships.rom.safetensors --inp ring.inp"
     ));
-    let file = format!("reduce ring.inp --contact-set INNER --clamp-set CLAMPED --contact-axial 0.0026:0.038 {common}");
+    let file = format!(
+        "reduce casing-mesh ring.inp --contact-set INNER --clamp-set CLAMPED --contact-axial 0.0026:0.038 {common}"
+    );
     let told = project.succeed(&format!("{file} -o own.rom.safetensors"));
     assert_eq!(told["model"]["contact_nodes"].as_array().unwrap().len(), 24);
     let (ships, own) = (project.rom("ships.rom.safetensors"), project.rom("own.rom.safetensors"));
@@ -283,10 +288,19 @@ fn a_casing_of_ones_own_is_the_casing_that_ships() {
     let off = (own.stiffness.diagonal() - ships.stiffness.diagonal()).component_div(&ships.stiffness.diagonal()).amax();
     println!("eigenvalues differ by {off:.1e}");
     assert!(own.order() == ships.order() && off < 1e-9, "{off:.1e}");
+    // The expansion of the command line holds beside the file's material, which has the rest.
+    let heated = file
+        .replace("12x2", "4x2")
+        .replace("--modes 20 --fixed-interface-modes 40", "--modes 8 --fixed-interface-modes 8");
+    let loads = |expansion: &str| {
+        project.succeed(&format!("{heated} --patches 4x1 --expansion {expansion} -o hot.rom.safetensors --force"));
+        project.rom("hot.rom.safetensors").extras.thermal.unwrap().loads.amax()
+    };
+    assert!((loads("2e-5") / loads("1e-5") - 2.0).abs() < 1e-6);
     for (line, code, words) in [
         (file.replace("12x2", "13x2"), 1, ["no node at", "divides"]),
         (file.replace("12x2", "12x14"), 1, ["fewer than 14 rings", "fewer rings"]),
-        (format!("{file} --sectors 12"), 2, ["describes blades", "--sectors"]),
+        (format!("{file} --sectors 12"), 2, ["unexpected argument", "--sectors"]),
     ] {
         let text = project.fail(&line, code);
         assert!(words.iter().all(|word| text.contains(word)), "{line}: {text}");
@@ -296,7 +310,8 @@ fn a_casing_of_ones_own_is_the_casing_that_ships() {
 #[test]
 fn contact_nodes_are_given_by_number_and_slips_of_tip_and_axis_are_asked_about() {
     let project = Project::new(&["blade_hex8.inp"]);
-    let line = "reduce blade_hex8.inp --clamp-set ROOT --sectors 36 --units mm-t-s --material steel --modes 4 --force";
+    let line =
+        "reduce blade blade_hex8.inp --clamp-set ROOT --sectors 36 --units mm-t-s --material steel --modes 4 --force";
     let told = project.succeed(&format!("{line} --contact-set TIP -o set.rom.safetensors"));
     let numbers: Vec<String> =
         told["model"]["contact_nodes"].as_array().unwrap().iter().map(|node| node["node"].to_string()).collect();
@@ -308,7 +323,7 @@ fn contact_nodes_are_given_by_number_and_slips_of_tip_and_axis_are_asked_about()
     let error = project.fail(&format!("{line} --contact-set 1,999999999"), 1);
     assert!(error.contains("no node 999999999"), "{error}");
     // Held at the tip, touching with the root.
-    let line = "reduce blade_hex8.inp --sectors 36 --units mm-t-s --material steel --modes 4 --force";
+    let line = "reduce blade blade_hex8.inp --sectors 36 --units mm-t-s --material steel --modes 4 --force";
     let swapped = project.succeed(&format!("{line} --contact-set ROOT --clamp-set TIP"));
     assert!(swapped["warnings"].to_string().contains("tip and root"), "{}", swapped["warnings"]);
     let turned = project.succeed(

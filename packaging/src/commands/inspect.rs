@@ -18,8 +18,9 @@ use tiprub_shell::{
     Failure, Result,
     console::{Console, Outcome},
 };
+use tiprub_study::stability::structure::Sliding;
 
-use crate::{cli::InspectArguments, rom_facts::RomFacts, scene_features, step_limits::Sliding};
+use crate::{cli::InspectArguments, rom_facts::RomFacts, scene_features};
 
 /// Kinds of files, told apart by name and, where that does not help, by their first bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -30,7 +30,6 @@ pub fn run(command: &Command, console: &Console) -> Result<Outcome> {
             Command::Package(arguments) => package::run(arguments, console),
             Command::Run(arguments) => run::run(arguments, console),
             Command::Inspect(arguments) => inspect::run(arguments, console),
-            Command::Stability { .. } => Err(study::moved("stability")),
             Command::Study(arguments) => study::run(arguments, console),
         }
     })

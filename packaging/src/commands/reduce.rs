@@ -1,17 +1,12 @@
 //! `tiprub reduce`: from a blade or a casing to a ROM file, with its checks.
 
-use std::{
-    fmt::Write as _,
-    path::{Path, PathBuf},
-};
+use std::{fmt::Write as _, path::Path};
 
 use serde_json::{Value, json};
 use tiprub_gallery::{builtin, reduction};
 use tiprub_model::{
-    Rotor37Options,
     casing::{CLAMPED, Support},
     cyclic::ModeSelection,
-    rotor37::MeshCounts,
     stage::sector_mesh,
 };
 use tiprub_shell::{
@@ -22,10 +17,9 @@ use tiprub_shell::{
 };
 
 use crate::{
-    casing_arguments::{self, CasingArguments, MaterialChoice},
-    cli::{Model, ReduceArguments},
-    command_files, cube_models,
-    file_arguments::FileArguments,
+    casing_arguments::{CasingArguments, MaterialChoice},
+    cube_models,
+    reduce_arguments::{Model, ReduceArguments, StageArguments, StageCasingArguments, Written},
     reduced::Reduced,
     rom_facts::RomFacts,
     users_model,
@@ -37,23 +31,20 @@ use crate::{
 /// Counts that do not fit the mesh, wrong files, or files that cannot be written.
 pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     // What would fail after the work is said before it.
-    let output = &arguments.output.clone().map_or_else(|| expected_output(arguments), Ok)?;
-    let others = arguments.inp.iter().chain(&arguments.vtk);
-    let names = [
-        Some(("--output", output)),
-        arguments.inp.as_ref().map(|path| ("--inp", path)),
-        arguments.vtk.as_ref().map(|path| ("--vtk", path)),
-    ];
-    let names: Vec<Named> = names.into_iter().flatten().map(|(role, path)| Named::new(role, path)).collect();
-    places::apart(&command_files::model_files(arguments), &names)?;
-    std::iter::once(output).chain(others).try_for_each(|path| check_target(path, arguments))?;
-    let reduced = reduced(arguments, console)?;
+    let written = arguments.model.written();
+    let output =
+        &written.output.clone().unwrap_or_else(|| format!("{}.rom.safetensors", arguments.model.name()).into());
+    let targets = [("--output", Some(output)), ("--inp", written.inp.as_ref()), ("--vtk", written.vtk.as_ref())];
+    let names: Vec<Named> = targets.into_iter().filter_map(|(role, path)| Some(Named::new(role, path?))).collect();
+    places::apart(&arguments.model.files(), &names)?;
+    targets.into_iter().filter_map(|(_, path)| path).try_for_each(|path| check_target(path, written))?;
+    let reduced = reduced(&arguments.model, console)?;
     let facts = RomFacts::of(&reduced.rom, None)?;
     let mut files = vec![(output, tiprub_format::write_rom(&reduced.rom))];
-    if let Some(path) = &arguments.inp {
+    if let Some(path) = &written.inp {
         files.push((path, reduced.calculix()?));
     }
-    if let Some(path) = &arguments.vtk {
+    if let Some(path) = &written.vtk {
         files.push((path, reduced.vtk()?));
     }
     for (path, bytes) in &files {
@@ -64,29 +55,12 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     warnings.extend(spin_warning(&reduced.spin_checks));
     console.warn(&warnings);
     let paths: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
-    Ok(Outcome { text: text(&reduced, &facts, &paths), json: json(&reduced, &facts, arguments, output, &warnings) })
-}
-
-/// The file that is written where none is named: that of the name which the model will have.
-fn expected_output(arguments: &ReduceArguments) -> Result<PathBuf> {
-    let name = match &arguments.model {
-        Some(Model::Rotor37) => "rotor37".to_owned(),
-        Some(Model::Casing) => casing_arguments::options(arguments)?.name,
-        Some(Model::Stage) => builtin::stage(arguments.coarse).0.to_owned(),
-        Some(Model::StageCasing) => builtin::stage_casing(arguments.coarse).name,
-        Some(Model::Cube) => builtin::CUBE.to_owned(),
-        Some(Model::Ring(side)) => {
-            let [left, right] = builtin::RINGS;
-            (if *side == left.1 { left.0 } else { right.0 }).to_owned()
-        }
-        Some(Model::File(_)) | None => users_model::name(arguments),
-    };
-    Ok(format!("{name}.rom.safetensors").into())
+    Ok(Outcome { text: text(&reduced, &facts, &paths), json: json(&reduced, &facts, written, output, &warnings) })
 }
 
 /// Whether a file can be written there, and replaces none without being told to. Devices and pipes take whatever comes.
-fn check_target(path: &Path, arguments: &ReduceArguments) -> Result<()> {
-    if path.is_file() && !arguments.force {
+fn check_target(path: &Path, written: &Written) -> Result<()> {
+    if path.is_file() && !written.force {
         let remedy = "Choose another file, or replace it with --force";
         return Err(Failure::new(path.display(), "is there already", remedy));
     }
@@ -128,7 +102,7 @@ fn text(reduced: &Reduced, facts: &RomFacts, paths: &[&Path]) -> String {
 }
 
 /// For programs.
-fn json(reduced: &Reduced, facts: &RomFacts, arguments: &ReduceArguments, output: &Path, warnings: &[String]) -> Value {
+fn json(reduced: &Reduced, facts: &RomFacts, written: &Written, output: &Path, warnings: &[String]) -> Value {
     json!({
         "rom": facts.to_json(),
         "model": reduced.read.1,
@@ -148,46 +122,38 @@ fn json(reduced: &Reduced, facts: &RomFacts, arguments: &ReduceArguments, output
         "warnings": warnings,
         "files": {
             "rom": shown_path(output),
-            "inp": arguments.inp.as_deref().map(shown_path),
-            "vtk": arguments.vtk.as_deref().map(shown_path),
+            "inp": written.inp.as_deref().map(shown_path),
+            "vtk": written.vtk.as_deref().map(shown_path),
         },
     })
 }
 
-fn reduced(arguments: &ReduceArguments, console: &Console) -> Result<Reduced> {
-    cube_models::refuse_elsewhere(arguments)?;
-    match &arguments.model {
-        Some(Model::Rotor37) => {
-            refuse_file_options(arguments)?;
-            let reduction = reduction::rotor37(&rotor37_options(arguments)?, console)?;
-            Ok(Reduced::general(reduction, Some("hub")))
+fn reduced(model: &Model, console: &Console) -> Result<Reduced> {
+    let [left, right] = builtin::RINGS.map(|(_, side)| side);
+    match model {
+        Model::Blade(own) => {
+            users_model::blade(own.file.as_deref(), &own.blade, (&own.tips, own.kept.clone()), console)
         }
-        Some(Model::Casing) => {
-            refuse_file_options(arguments)?;
-            let options = casing_arguments::options(arguments)?;
-            let clamped = (options.support != Support::Free).then_some(CLAMPED);
-            Ok(Reduced::general(reduction::casing(&options, console)?, clamped))
-        }
-        Some(Model::Stage) => {
-            refuse_file_options(arguments)?;
-            stage(arguments, console)
-        }
-        Some(Model::StageCasing) => {
-            refuse_file_options(arguments)?;
-            stage_casing(arguments, console)
-        }
-        Some(Model::Cube) => cube_models::cube(arguments, console),
-        Some(Model::Ring(side)) => cube_models::ring(arguments, *side, console),
-        Some(Model::File(_)) | None => users_model::reduce(arguments, console),
+        Model::Sector(own) => users_model::sector(own, console),
+        Model::CasingMesh(own) => users_model::casing(own, console),
+        Model::Casing(own) => casing(own, console),
+        Model::Rotor37(own) => Ok(Reduced::general(reduction::rotor37(&own.options(), console)?, Some("hub"))),
+        Model::Stage(own) => stage(own, console),
+        Model::StageCasing(own) => stage_casing(own, console),
+        Model::Cube(own) => cube_models::cube(own, console),
+        Model::RingLeft(own) => cube_models::ring(own, left, console),
+        Model::RingRight(own) => cube_models::ring(own, right, console),
     }
 }
 
+fn casing(arguments: &CasingArguments, console: &Console) -> Result<Reduced> {
+    let options = arguments.options();
+    let clamped = (options.support != Support::Free).then_some(CLAMPED);
+    Ok(Reduced::general(reduction::casing(&options, console)?, clamped))
+}
+
 /// The bladed disk that ships.
-fn stage(arguments: &ReduceArguments, console: &Console) -> Result<Reduced> {
-    if arguments.casing != CasingArguments::default() || arguments.mesh.is_some() || arguments.spin.is_some() {
-        let remedy = "Leave out --mesh, --spin and what `tiprub reduce --help` lists as options of `casing`";
-        return Err(Failure::usage("stage", "an option given describes another model", remedy));
-    }
+fn stage(arguments: &StageArguments, console: &Console) -> Result<Reduced> {
     let (name, mut options) = builtin::stage(arguments.coarse);
     options.contact_nodes = arguments.contact_nodes.unwrap_or(options.contact_nodes);
     options.modes = arguments.modes.map_or(options.modes, ModeSelection::Families);
@@ -199,52 +165,14 @@ fn stage(arguments: &ReduceArguments, console: &Console) -> Result<Reduced> {
 }
 
 /// The casing around it.
-fn stage_casing(arguments: &ReduceArguments, console: &Console) -> Result<Reduced> {
-    let other = arguments.mesh.is_some() || arguments.spin.is_some() || arguments.contact_nodes.is_some();
-    let mut described = arguments.casing.clone();
-    let (grid, patches) = (described.contact_grid.take(), described.patches.take());
-    let (fixed_interface_modes, material) = (described.fixed_interface_modes.take(), described.material.take());
-    if other || described != CasingArguments::default() {
-        let problem = "an option given describes another model";
-        let remedy = "Give only --coarse, --modes, --fixed-interface-modes, --contact-grid, --patches and --material";
-        return Err(Failure::usage("stage-casing", problem, remedy));
-    }
+fn stage_casing(arguments: &StageCasingArguments, console: &Console) -> Result<Reduced> {
     let mut options = builtin::stage_casing(arguments.coarse);
-    options.contact = grid.unwrap_or(options.contact);
-    options.patches = patches.unwrap_or(options.patches);
-    options.fixed_interface_modes = fixed_interface_modes.unwrap_or(options.fixed_interface_modes);
+    options.contact = arguments.contact_grid.unwrap_or(options.contact);
+    options.patches = arguments.patches.unwrap_or(options.patches);
+    options.fixed_interface_modes = arguments.fixed_interface_modes.unwrap_or(options.fixed_interface_modes);
     options.modes = arguments.modes.unwrap_or(options.modes);
-    options.material = material.map_or(options.material.clone(), MaterialChoice::material);
+    options.material = arguments.material.map_or(options.material.clone(), MaterialChoice::material);
     Ok(Reduced::general(reduction::stage_casing(&options, console)?, Some(CLAMPED)))
-}
-
-fn refuse_file_options(arguments: &ReduceArguments) -> Result<()> {
-    if arguments.coarse && !matches!(arguments.model, Some(Model::Stage | Model::StageCasing)) {
-        return Err(Failure::usage("--coarse", "it belongs to `stage` and `stage-casing`", "Leave it out"));
-    }
-    if arguments.file == FileArguments::default() {
-        return Ok(());
-    }
-    let remedy = "Leave out what `tiprub reduce --help` lists as options of a model of your own";
-    Err(Failure::usage("MODEL", "an option given describes a model of one's own, and this one ships", remedy))
-}
-
-fn rotor37_options(arguments: &ReduceArguments) -> Result<Rotor37Options> {
-    if arguments.casing != CasingArguments::default() {
-        let remedy = "Leave out what `tiprub reduce --help` lists as options of `casing`";
-        return Err(Failure::usage("rotor37", "an option given describes a casing", remedy));
-    }
-    let defaults = Rotor37Options::default();
-    Ok(Rotor37Options {
-        mesh: arguments.mesh.map_or(defaults.mesh, |size| {
-            let [chord, thickness, span] = size.0;
-            MeshCounts { chord, thickness, span }
-        }),
-        contact_nodes: arguments.contact_nodes.unwrap_or(defaults.contact_nodes),
-        fixed_interface_modes: arguments.modes.unwrap_or(defaults.fixed_interface_modes),
-        spin: arguments.spin,
-        ..defaults
-    })
 }
 
 /// Share (%) by which frequencies or growth at speed may be off without a warning.

@@ -1,5 +1,6 @@
-//! Everything that is drawn: line plots, waterfalls, pictures of meshes, tables, and the style of the pages they stand on.
+//! Everything that is drawn: line plots, waterfalls, maps of cells, pictures of meshes, tables, and the style of the pages they stand on.
 
+pub mod cells;
 pub mod decimate;
 pub mod picture;
 pub mod plots;

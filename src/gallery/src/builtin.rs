@@ -85,6 +85,58 @@ pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom
     })
 }
 
+/// Whether the contact nodes of a model can be chosen anew by their number: blades along their chord.
+pub fn has_chord(name: &str) -> bool {
+    name.starts_with("rotor37") || [STAGE, STAGE_COARSE].contains(&name)
+}
+
+/// The model of this name with another number of modes, as a factor on its own, and of contact nodes where it [has a
+/// chord](has_chord); made anew and not kept. `None` where there is no such model, or none with more modes: the cube has all.
+pub fn refined(name: &str, factor: f64, contact_nodes: usize, console: &Console) -> Option<Result<Rom>> {
+    let times = |modes: usize| scaled(modes, factor);
+    let families = |selection: ModeSelection| match selection {
+        ModeSelection::Families(modes) => ModeSelection::Families(times(modes)),
+        other => other,
+    };
+    let blade = |spin| {
+        let defaults = Rotor37Options::default();
+        let fixed_interface_modes = times(defaults.fixed_interface_modes);
+        Rotor37Options { spin, contact_nodes, fixed_interface_modes, ..defaults }
+    };
+    Some(match name {
+        "rotor37" => reduction::rotor37(&blade(None), console).map(|reduction| reduction.rom),
+        "rotor37-spin" => reduction::rotor37(&blade(Some(DESIGN_SPEED)), console).map(|reduction| reduction.rom),
+        STAGE | STAGE_COARSE => {
+            let (name, options) = stage(name == STAGE_COARSE);
+            let options = StageOptions { modes: families(options.modes), contact_nodes, ..options };
+            DiskModel::with_options(name, options).reduce(console).map(|(reduction, _)| reduction.rom)
+        }
+        CASING37 => {
+            let defaults = CasingOptions::default();
+            let fixed_interface_modes = times(defaults.fixed_interface_modes);
+            let options = CasingOptions { modes: times(defaults.modes), fixed_interface_modes, ..defaults };
+            reduction::casing(&options, console).map(|reduction| reduction.rom)
+        }
+        STAGE_CASING | STAGE_CASING_COARSE => {
+            let defaults = stage_casing(name == STAGE_CASING_COARSE);
+            let fixed_interface_modes = times(defaults.fixed_interface_modes);
+            let options = StageCasingOptions { modes: times(defaults.modes), fixed_interface_modes, ..defaults };
+            reduction::stage_casing(&options, console).map(|reduction| reduction.rom)
+        }
+        _ => {
+            let (_, side) = RINGS.iter().find(|(ring, _)| *ring == name)?;
+            let defaults = RingOptions::new(*side);
+            let options = RingOptions { modes: times(defaults.modes), ..defaults };
+            reduction::cube_ring(&options, console).map(|reduction| reduction.rom)
+        }
+    })
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred modes at most")]
+fn scaled(modes: usize, factor: f64) -> usize {
+    (modes as f64 * factor).round() as usize
+}
+
 /// Name and options of the bladed disk of the stage, of the paper's size or coarse.
 pub fn stage(coarse: bool) -> (&'static str, StageOptions) {
     if coarse {
@@ -141,5 +193,19 @@ pub fn stage_casing(coarse: bool) -> StageCasingOptions {
         StageCasingOptions { name: STAGE_CASING_COARSE.into(), around: defaults.around / 8, ..defaults }
     } else {
         StageCasingOptions { name: STAGE_CASING.into(), ..defaults }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn models_are_refined_by_name() {
+        let console = Console::new(true, false);
+        let order = |factor: f64| refined("ring-left", factor, 0, &console).unwrap().unwrap().order();
+        assert_eq!(order(0.5), 50);
+        assert!(refined(CUBE, 2.0, 0, &console).is_none() && refined("none", 2.0, 0, &console).is_none());
+        assert!(has_chord("rotor37-spin") && has_chord(STAGE) && !has_chord(STAGE_CASING) && !has_chord(CUBE));
     }
 }

@@ -9,7 +9,7 @@
 use faer::{Mat, Side};
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactGrid, ContactNode, Frame, RomExtras};
+use tiprub_core::rom::{ContactGrid, ContactNode, Frame, RomChecks, RomExtras};
 
 use crate::assembly::free_dofs;
 use crate::craig_bampton::{CraigBampton, with_static_responses};
@@ -114,30 +114,8 @@ pub fn reduce_panel(
         report(listener, Stage::Checks, 1, 1);
         Ok(checks)
     })?;
-    let rom = Rom {
-        name: options.name.clone(),
-        origin: format!(
-            "{}; {} modes up to {:.0} Hz and {} static responses to forces on {} x {} contact nodes",
-            description(&model, clamped.len()),
-            options.modes,
-            full.modes.frequencies()[..options.modes].last().copied().unwrap_or(0.0),
-            order - options.modes,
-            grid.around,
-            grid.along(),
-        ),
-        sectors: 1,
-        frame: Frame::Cartesian,
-        contact_map: contact_map(&free, grid, &reduced.transformation),
-        mass: reduced.mass,
-        stiffness: reduced.stiffness,
-        damping_ratio: options.damping_ratio,
-        contact_nodes: contact_nodes(&model, grid),
-        checks,
-        extras: RomExtras {
-            grid: Some(ContactGrid { around: grid.around, along: grid.along(), closed: false }),
-            ..RomExtras::default()
-        },
-    };
+    let origin = origin(&model, clamped.len(), grid, options, (&full, order));
+    let rom = rom((options, origin), &model, contact_map(&free, grid, &reduced.transformation), grid, reduced, checks);
     rom.validate()?;
     Ok(Reduction {
         rom,
@@ -152,6 +130,51 @@ pub fn reduce_panel(
         mesh: model.mesh.map(|(mesh, _)| mesh),
         timings,
     })
+}
+
+/// How the ROM of this order came about.
+fn origin(
+    model: &FeModel,
+    clamped: usize,
+    grid: &PanelGrid,
+    options: &PanelOptions,
+    (full, order): (&FullModes, usize),
+) -> String {
+    format!(
+        "{}; {} modes up to {:.0} Hz and {} static responses to forces on {} x {} contact nodes",
+        description(model, clamped),
+        options.modes,
+        full.modes.frequencies()[..options.modes].last().copied().unwrap_or(0.0),
+        order - options.modes,
+        grid.around,
+        grid.along(),
+    )
+}
+
+fn rom(
+    (options, origin): (&PanelOptions, String),
+    model: &FeModel,
+    contact_map: DMatrix<f64>,
+    grid: &PanelGrid,
+    reduced: CraigBampton,
+    checks: RomChecks,
+) -> Rom {
+    Rom {
+        name: options.name.clone(),
+        origin,
+        sectors: 1,
+        frame: Frame::Cartesian,
+        contact_map,
+        mass: reduced.mass,
+        stiffness: reduced.stiffness,
+        damping_ratio: options.damping_ratio,
+        contact_nodes: contact_nodes(model, grid),
+        checks,
+        extras: RomExtras {
+            grid: Some(ContactGrid { around: grid.around, along: grid.along(), closed: false }),
+            ..RomExtras::default()
+        },
+    }
 }
 
 fn lowest(modes: &Modes, count: usize) -> Modes {

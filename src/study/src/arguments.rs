@@ -65,9 +65,56 @@ pub struct ErrorArguments {
     pub common: StudyCommon,
 }
 
-/// A range of angular velocities (rad/s).
+/// Arguments of `tiprub study stability`.
+#[derive(Debug, Args)]
+pub struct StabilityArguments {
+    /// Scene file (TOML), or one that ships, such as `builtin:rotor37`.
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// Friction coefficients, from, to and how many [default: 11 from 0 to 1, or to twice the scene's].
+    #[arg(long, value_name = "FROM:TO:COUNT", value_parser = frictions, allow_hyphen_values = true)]
+    pub friction: Option<Range>,
+    /// Speeds (rad/s), from, to and how many; negative ones turn backwards [default: -1, 0.5, 1 and 1.5 times the scene's].
+    #[arg(long, value_name = "FROM:TO:COUNT", value_parser = range, allow_hyphen_values = true)]
+    pub speeds: Option<Range>,
+    /// Internal steps (s), from, to and how many, evenly on a logarithmic scale [default: 9 from 1/16 to 16 times the scene's].
+    #[arg(long, value_name = "FROM:TO:COUNT", value_parser = steps, allow_hyphen_values = true)]
+    pub steps: Option<Range>,
+    /// Answers sought at the same time [default: one per processor].
+    #[arg(long, value_name = "N")]
+    pub threads: Option<std::num::NonZero<usize>>,
+    /// Start value of an input or parameter; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
+    pub set: Vec<(String, String)>,
+    /// What all studies take.
+    #[command(flatten)]
+    pub common: StudyCommon,
+}
+
+/// Arguments of `tiprub study convergence`.
+#[derive(Debug, Args)]
+pub struct ConvergenceArguments {
+    /// Scene file (TOML), or one that ships, such as `builtin:rotor37`.
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// Time from the start of the experiment that is compared (s), at most until runs that differ by almost nothing part [default: 400
+    /// communication steps beyond the first contact].
+    #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
+    pub window: Option<f64>,
+    /// Runs at the same time [default: one per processor].
+    #[arg(long, value_name = "N")]
+    pub threads: Option<std::num::NonZero<usize>>,
+    /// Start value of an input or parameter; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
+    pub set: Vec<(String, String)>,
+    /// What all studies take.
+    #[command(flatten)]
+    pub common: StudyCommon,
+}
+
+/// A range of numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Speeds {
+pub struct Range {
     /// First.
     pub from: f64,
     /// Last.
@@ -76,13 +123,55 @@ pub struct Speeds {
     pub count: usize,
 }
 
-impl Speeds {
-    /// All of them, ascending.
+impl Range {
+    /// All of them, ascending and evenly spaced.
     pub fn values(&self) -> Vec<f64> {
+        self.shares().map(|share| self.from + (self.to - self.from) * share).collect()
+    }
+
+    /// The same evenly on a logarithmic scale.
+    pub fn geometric(&self) -> Vec<f64> {
+        self.shares().map(|share| self.from * (self.to / self.from).powf(share)).collect()
+    }
+
+    fn shares(&self) -> impl Iterator<Item = f64> {
         let last = self.count.saturating_sub(1).max(1) as f64;
-        (0..self.count).map(|index| self.from + (self.to - self.from) * index as f64 / last).collect()
+        (0..self.count).map(move |index| index as f64 / last)
     }
 }
+
+/// Two growing numbers and a count of at most `most`.
+fn counted(text: &str, most: usize) -> Option<Range> {
+    let parts: Vec<&str> = text.split(':').collect();
+    let [from, to, count] = parts.as_slice() else { return None };
+    let range = Range { from: from.parse().ok()?, to: to.parse().ok()?, count: count.parse().ok()? };
+    let growing = range.from.is_finite() && range.from < range.to && range.to.is_finite();
+    (growing && (2..=most).contains(&range.count)).then_some(range)
+}
+
+/// Most values of one range of a map of answers: more cannot be looked at.
+const MOST_ANSWERS: usize = 200;
+
+fn range(text: &str) -> Result<Range, String> {
+    counted(text, MOST_ANSWERS).ok_or_else(|| {
+        "give two growing numbers and a count from 2 to 200 as FROM:TO:COUNT, for example -1700:1700:5".into()
+    })
+}
+
+fn frictions(text: &str) -> Result<Range, String> {
+    counted(text, MOST_ANSWERS).filter(|range| range.from >= 0.0).ok_or_else(|| {
+        "give growing friction coefficients from 0 on and a count from 2 to 200 as FROM:TO:COUNT, for example 0:0.5:11".into()
+    })
+}
+
+fn steps(text: &str) -> Result<Range, String> {
+    counted(text, MOST_ANSWERS).filter(|range| range.from > 0.0).ok_or_else(|| {
+        "give growing positive steps in s and a count from 2 to 200 as FROM:TO:COUNT, for example 1e-7:1e-5:9".into()
+    })
+}
+
+/// A range of angular velocities (rad/s).
+pub type Speeds = Range;
 
 /// Whether built-in models are kept from one command to the next.
 #[derive(Debug, Clone, Default, Args)]
@@ -119,20 +208,12 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// `FROM:TO:COUNT`.
+/// `FROM:TO:COUNT` of positive angular velocities.
 ///
 /// # Errors
 /// What is wrong with the text.
 pub fn speeds(text: &str) -> Result<Speeds, String> {
-    let parts: Vec<&str> = text.split(':').collect();
-    let read = || match parts.as_slice() {
-        [from, to, count] => {
-            Some(Speeds { from: from.parse().ok()?, to: to.parse().ok()?, count: count.parse().ok()? })
-        }
-        _ => None,
-    };
-    let sound = |speeds: &Speeds| speeds.from > 0.0 && speeds.from < speeds.to && speeds.to.is_finite();
-    read().filter(|speeds| sound(speeds) && (2..=1000).contains(&speeds.count)).ok_or_else(|| {
+    counted(text, 1000).filter(|speeds| speeds.from > 0.0).ok_or_else(|| {
         "give growing positive angular velocities in rad/s and a count from 2 to 1000 as FROM:TO:COUNT, for example 400:1600:25".into()
     })
 }

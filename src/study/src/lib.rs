@@ -5,15 +5,24 @@
 //! figure, and `results.json`. Runs that do not depend on each other go through `tiprub_shell::sweep`.
 
 pub mod arguments;
+pub mod convergence;
 pub mod error;
 pub mod error_study;
 pub mod machine;
 pub mod map;
 pub mod output;
+pub mod stability;
 
 use serde_json::{Value, json};
+use tiprub_core::Scene;
 use tiprub_figure::{plots::Plot, waterfall::Waterfall};
 use tiprub_shell::{Failure, Result, recording::shortest};
+
+/// Index of the structure whose tips touch.
+pub fn master(scene: &Scene) -> usize {
+    let name = &scene.settings.contacts[0].master;
+    scene.settings.structures.iter().position(|structure| structure.name == *name).unwrap_or(0)
+}
 
 /// A finished study.
 #[derive(Debug, Clone)]

@@ -7,12 +7,10 @@ use tiprub_figure::{
     waterfall::{Axis, Waterfall},
 };
 use tiprub_model::cyclic::{ConvergenceRow, CyclicReduction, NodalDiameter};
+use tiprub_packaging::rom_facts::{DEVIATION_LIMIT, RESIDUAL_LIMIT};
 use tiprub_shell::Result;
 use tiprub_study::{Figure, Picture, Sheet, Statement, Study};
 
-/// What the paper calls satisfactory, in %.
-const DEVIATION_LIMIT: f64 = 0.3;
-const RESIDUAL_LIMIT: f64 = 1.0;
 /// Where the paper's figures end, in %.
 const DEVIATION_SHOWN: f64 = 3.0;
 const RESIDUAL_SHOWN: f64 = 5.0;

@@ -29,6 +29,20 @@ const QUICK_SAMPLES: usize = 100;
 /// What no start value may replace.
 const COMPARED: [&str; 3] = ["scheme", "solver", "internal_step_max"];
 
+/// Start values that a study varies itself.
+///
+/// # Errors
+/// One of them.
+pub fn refuse_compared(settings: &[(String, String)]) -> Result<()> {
+    match settings.iter().find(|(name, _)| COMPARED.contains(&name.as_str())) {
+        Some((name, _)) => {
+            let problem = "the study compares all of them";
+            Err(Failure::usage(format!("--set {name}"), problem, "Leave it out"))
+        }
+        None => Ok(()),
+    }
+}
+
 /// A scene of one's own.
 pub struct Own {
     title: String,
@@ -46,14 +60,22 @@ impl Own {
     /// # Errors
     /// The scene cannot be read or does not run; nothing touches within the window.
     pub fn new(arguments: &ErrorArguments, console: &Console) -> Result<Self> {
-        for (name, _) in &arguments.set {
-            if COMPARED.contains(&name.as_str()) {
-                let problem = "the study compares all of them";
-                return Err(Failure::usage(format!("--set {name}"), problem, "Leave it out"));
-            }
-        }
-        let quick = arguments.common.quick;
+        refuse_compared(&arguments.set)?;
         let scene = scene_source::load(&arguments.scene, &arguments.common.cache.cache(), console)?;
+        Self::of(&arguments.scene, scene, &arguments.set, (arguments.window, arguments.common.quick), console)
+    }
+
+    /// The scene called `name`, with start values replaced; a `window` (s) is that of a quick study or of a whole one.
+    ///
+    /// # Errors
+    /// The scene does not run; nothing touches within the window.
+    pub fn of(
+        name: &str,
+        scene: Scene,
+        settings: &[(String, String)],
+        (window, quick): (Option<f64>, bool),
+        console: &Console,
+    ) -> Result<Self> {
         let schedule = Schedule::new(&scene.settings.experiment, None, None)?;
         let (interval, step) = (scene.settings.experiment.communication_step, scene.settings.time.step);
         let own = (interval / step).ceil().max(1.0);
@@ -62,24 +84,21 @@ impl Own {
         divisions.dedup();
         let most = if quick { QUICK_SAMPLES } else { SAMPLES };
         let title = scene.settings.name.clone();
-        let mut case = Self {
-            title,
-            scene,
-            settings: arguments.set.clone(),
-            interval,
-            samples: 0,
-            divisions,
-            parting: Vec::new(),
-        };
-        let refused = |problem| Failure::new(&arguments.scene, problem, "");
+        let mut case =
+            Self { title, scene, settings: settings.to_vec(), interval, samples: 0, divisions, parting: Vec::new() };
+        let refused = |problem| Failure::new(name, problem, "");
         let task = console.task("How long the scene can be followed", None);
         let touch = case.first_touch(count(own), schedule.count).map_err(refused)?;
-        let asked = arguments.window.map_or(touch + most, |window| count(window / interval) as usize);
+        let asked = window.map_or(touch + most, |window| count(window / interval) as usize);
         let samples = asked.clamp(1, schedule.count);
         if touch >= samples {
-            let when = if touch < schedule.count { shown(interval * touch as f64) + " s" } else { "never".into() };
-            let problem = format!("nothing touches within the window: first contact after the start is at {when}");
-            return Err(Failure::new(&arguments.scene, problem, "Give a longer --window, or a scene that rubs"));
+            let problem = if touch < schedule.count {
+                let when = shown(interval * touch as f64);
+                format!("nothing touches within the window: first contact after the start is at {when} s")
+            } else {
+                "nothing touches before the experiment ends".into()
+            };
+            return Err(Failure::new(name, problem, "Give a longer --window, or a scene that rubs"));
         }
         case.parting = window::parting(&case, count(2.0 * own), samples).map_err(refused)?;
         drop(task);

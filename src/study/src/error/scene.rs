@@ -68,6 +68,16 @@ impl SceneRun {
         Ok(Self { simulation, start, interval, division, samples: 0 })
     }
 
+    /// Strain energy of all structures (J).
+    pub fn strain_energy(&self) -> f64 {
+        self.simulation.system().energies().1
+    }
+
+    /// Work of friction since the start (J).
+    pub fn friction_work(&self) -> f64 {
+        self.simulation.system().ledger().friction_loss.value()
+    }
+
     /// Time reached (s).
     pub fn time(&self) -> f64 {
         self.start + f64::from(self.samples) * self.interval

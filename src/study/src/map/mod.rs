@@ -256,28 +256,33 @@ impl Map {
     }
 
     fn facts(&self, steps: u64, stepping: f64) -> Result<Vec<(String, String)>> {
+        let mut facts = self.facts_of_scene()?;
+        facts.extend(self.facts_of_runs());
+        facts.push((
+            "stepping".into(),
+            format!(
+                "{:.2} µs per internal step, {stepping:.1} s in all on one processor",
+                1e6 * stepping / steps.max(1) as f64
+            ),
+        ));
+        Ok(facts)
+    }
+
+    /// What was studied.
+    fn facts_of_scene(&self) -> Result<Vec<(String, String)>> {
         let (setup, settings) = (&self.setup, &self.setup.scene.settings);
         let rom = &setup.scene.roms[prediction::master(&setup.scene.settings)?];
         let ([low, high], without) = (self.start.clearance, self.start.without());
         let middle = self.runs[self.runs.len() / 2].speed;
         let modes = self.prediction.modes(self.prediction.base_order.max(1), middle);
         let shown: Vec<String> = modes.iter().take(MODES).map(|mode| format!("{mode:.2}")).collect();
-        let factors: Vec<usize> = self.answered().map(|(_, response)| response.factor).collect();
-        let periods = setup.top * std::f64::consts::TAU / (self.runs[0].speed * setup.samples as f64);
-        let factor = factors.iter().copied().min().unwrap_or(1);
-        let folded = 100.0 * spectrum::gain(1.0 - periods, factor) / spectrum::gain(periods, factor);
+        let at = if self.prediction.stiffening { format!(" at {middle:.1} rad/s") } else { " at rest".into() };
         let changed: Vec<String> = setup.settings.iter().map(|(name, value)| format!("{name} = {value}")).collect();
         Ok(vec![
             ("scene".into(), format!("{}: {}", settings.name, settings.description)),
             ("start values changed".into(), if changed.is_empty() { "none".into() } else { changed.join(", ") }),
             ("rotor".into(), format!("{} blades; {}", rom.sectors, rom.origin)),
-            (
-                format!(
-                    "natural frequencies{}",
-                    if self.prediction.stiffening { format!(" at {middle:.1} rad/s") } else { " at rest".into() }
-                ),
-                format!("{} Hz", shown.join(", ")),
-            ),
+            (format!("natural frequencies{at}"), format!("{} Hz", shown.join(", "))),
             (
                 format!("clearance at rest{without}"),
                 if low < high { format!("{low:.4e} to {high:.4e} m") } else { format!("{low:.4e} m") },
@@ -285,13 +290,24 @@ impl Map {
             (format!("the casing reaches beyond the tips by{without}"), format!("{:.4e} m", self.intrusion)),
             ("friction coefficient".into(), self.start.friction.to_string()),
             ("damping ratio".into(), self.start.damping_ratio.to_string()),
+        ])
+    }
+
+    /// How it was run.
+    fn facts_of_runs(&self) -> Vec<(String, String)> {
+        let setup = &self.setup;
+        let [first, last] = [self.runs[0].speed, self.runs[self.runs.len() - 1].speed];
+        let factors: Vec<usize> = self.answered().map(|(_, response)| response.factor).collect();
+        let periods = setup.top * std::f64::consts::TAU / (first * setup.samples as f64);
+        let factor = factors.iter().copied().min().unwrap_or(1);
+        let folded = 100.0 * spectrum::gain(1.0 - periods, factor) / spectrum::gain(periods, factor);
+        let bin = |speed: f64| speed / std::f64::consts::TAU / setup.revolutions as f64;
+        vec![
             (
                 "angular velocities".into(),
                 format!(
-                    "{} from {:.3} to {:.3} rad/s, in the {} sense about +z",
+                    "{} from {first:.3} to {last:.3} rad/s, in the {} sense about +z",
                     self.runs.len(),
-                    self.runs[0].speed,
-                    self.runs[self.runs.len() - 1].speed,
                     if setup.sense() < 0.0 { "negative" } else { "positive" }
                 ),
             ),
@@ -303,8 +319,8 @@ impl Map {
                 "frequency resolution".into(),
                 format!(
                     "{:.3} to {:.3} Hz from bin to bin: 1/{} of the rotational frequency",
-                    self.runs[0].speed / std::f64::consts::TAU / setup.revolutions as f64,
-                    self.runs[self.runs.len() - 1].speed / std::f64::consts::TAU / setup.revolutions as f64,
+                    bin(first),
+                    bin(last),
                     setup.revolutions
                 ),
             ),
@@ -318,14 +334,7 @@ impl Map {
                     factors.iter().copied().max().unwrap_or(1)
                 ),
             ),
-            (
-                "stepping".into(),
-                format!(
-                    "{:.2} µs per internal step, {stepping:.1} s in all on one processor",
-                    1e6 * stepping / steps.max(1) as f64
-                ),
-            ),
-        ])
+        ]
     }
 
     fn statements(&self) -> Vec<Statement> {

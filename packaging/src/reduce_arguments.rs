@@ -1,0 +1,279 @@
+//! What `tiprub reduce` is asked for: a subcommand per kind of model, each with its own options.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+use tiprub_gallery::builtin;
+use tiprub_model::{Rotor37Options, cube::MassMatrix, rotor37::MeshCounts};
+use tiprub_shell::{Result, places::Named};
+use tiprub_study::arguments::positive;
+
+use crate::{
+    casing_arguments::{CasingArguments, MaterialChoice, pair},
+    own_arguments::{BladeArguments, CasingMeshArguments, SectorArguments},
+};
+
+/// Arguments of `tiprub reduce`.
+#[derive(Debug, Args)]
+pub struct ReduceArguments {
+    /// What to reduce.
+    #[command(subcommand)]
+    pub model: Model,
+}
+
+/// What can be reduced.
+#[derive(Debug, Subcommand)]
+pub enum Model {
+    /// Blades of your own on a rigid hub: a mesh (CalculiX/Abaqus .inp, Gmsh 4.1 .msh), or matrices of any code.
+    #[command(
+        after_help = "Examples:\n  tiprub reduce blade blade.inp --contact-set TIP --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
+                            tiprub reduce blade blade.msh --contact-set TIP --clamp-set ROOT --material titanium --contact-nodes 5\n  \
+                            tiprub reduce blade job.inp --stiffness job.sti --mass job.mas --contact-set TIP --clamp-set ROOT\n\n\
+                            Without --contact-set or --clamp-set the sets of the file are listed."
+    )]
+    Blade(Box<BladeArguments>),
+    /// A bladed disk of your own from a mesh or matrices of one sector: coupled sectors, nodal diameter by nodal diameter.
+    #[command(
+        after_help = "Example:\n  tiprub reduce sector sector.inp --contact-set TIP --clamp-set BORE --sectors 56 --cyclic-low LOW --cyclic-high HIGH"
+    )]
+    Sector(Box<SectorArguments>),
+    /// A casing of your own from a mesh, with a grid of contact nodes that a surface is laid through.
+    #[command(
+        after_help = "Example:\n  tiprub reduce casing-mesh ring.inp --contact-set INNER --clamp-set FLANGE --contact-grid 24x3 --contact-axial 0.002:0.038"
+    )]
+    CasingMesh(Box<CasingMeshArguments>),
+    /// A casing described on the command line, by default casing37, the one around rotor 37.
+    #[command(after_help = "Examples:\n  tiprub reduce casing\n  \
+                            tiprub reduce casing --material titanium --thickness 0.003 --high-flange none\n  \
+                            tiprub reduce casing --contour=-0.02:0.256,0.04:0.245 --contact-axial 0.0026:0.038")]
+    Casing(Box<CasingArguments>),
+    /// The NASA rotor 37 blade that ships with tiprub.
+    #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  \
+                            tiprub reduce rotor37 --modes 30 --contact-nodes 5 --mesh 10x2x16 -o fine.rom.safetensors")]
+    Rotor37(Rotor37Arguments),
+    /// The disk with 56 blades that ships.
+    #[command(after_help = "Example:\n  tiprub reduce stage --coarse --inp sector.inp --vtk sector.vtu")]
+    Stage(StageArguments),
+    /// The casing around that disk.
+    #[command(after_help = "Example:\n  tiprub reduce stage-casing --coarse --material titanium")]
+    StageCasing(StageCasingArguments),
+    /// The cube that flies between two rings.
+    #[command(after_help = "Example:\n  tiprub reduce cube --modes 100")]
+    Cube(CubeArguments),
+    /// The ring at its left.
+    #[command(after_help = "Example:\n  tiprub reduce ring-left --modes 50 --static-responses 12")]
+    RingLeft(RingArguments),
+    /// The ring at its right.
+    #[command(after_help = "Example:\n  tiprub reduce ring-right --modes 50 --static-responses 12")]
+    RingRight(RingArguments),
+}
+
+/// What every reduction writes.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Args)]
+pub struct Written {
+    /// ROM file to write [default: NAME.rom.safetensors with the name of the model].
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Replace files that are there already.
+    #[arg(long)]
+    pub force: bool,
+    /// Also write the mesh as a CalculiX/Abaqus input file that computes its frequencies.
+    #[arg(long, value_name = "FILE")]
+    pub inp: Option<PathBuf>,
+    /// Also write mesh, sets and mode shapes for ParaView (.vtu).
+    #[arg(long, value_name = "FILE")]
+    pub vtk: Option<PathBuf>,
+}
+
+/// Arguments of `tiprub reduce rotor37`.
+#[derive(Debug, Args)]
+pub struct Rotor37Arguments {
+    /// Fixed-interface modes kept [default: 20].
+    #[arg(long, value_name = "N")]
+    pub modes: Option<usize>,
+    /// Contact nodes along the tip chord, leading edge to trailing edge (≥ 2) [default: 3].
+    #[arg(long, value_name = "N")]
+    pub contact_nodes: Option<usize>,
+    /// Elements along the chord, through the thickness and along the span [default: 16x2x20].
+    #[arg(long, value_name = "CxTxS")]
+    pub mesh: Option<MeshSize>,
+    /// Also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s).
+    #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true)]
+    pub spin: Option<f64>,
+    /// What is written.
+    #[command(flatten)]
+    pub written: Written,
+}
+
+impl Rotor37Arguments {
+    /// The blade asked for.
+    pub fn options(&self) -> Rotor37Options {
+        let defaults = Rotor37Options::default();
+        Rotor37Options {
+            mesh: self.mesh.map_or(defaults.mesh, |size| {
+                let [chord, thickness, span] = size.0;
+                MeshCounts { chord, thickness, span }
+            }),
+            contact_nodes: self.contact_nodes.unwrap_or(defaults.contact_nodes),
+            fixed_interface_modes: self.modes.unwrap_or(defaults.fixed_interface_modes),
+            spin: self.spin,
+            ..defaults
+        }
+    }
+}
+
+/// Arguments of `tiprub reduce stage`.
+#[derive(Debug, Args)]
+pub struct StageArguments {
+    /// A coarse mesh and few modes, for trials.
+    #[arg(long)]
+    pub coarse: bool,
+    /// Fixed-interface modes kept per nodal diameter, in whole families [default: 25; 12 of the coarse mesh].
+    #[arg(long, value_name = "N")]
+    pub modes: Option<usize>,
+    /// Contact nodes along the tip chord [default: 3].
+    #[arg(long, value_name = "N")]
+    pub contact_nodes: Option<usize>,
+    /// What is written.
+    #[command(flatten)]
+    pub written: Written,
+}
+
+/// Arguments of `tiprub reduce stage-casing`.
+#[derive(Debug, Args)]
+pub struct StageCasingArguments {
+    /// An eighth of the elements around, for trials.
+    #[arg(long)]
+    pub coarse: bool,
+    /// Modes kept below the cut-off [default: 60].
+    #[arg(long, value_name = "N")]
+    pub modes: Option<usize>,
+    /// Fixed-interface modes to reduce with [default: 160].
+    #[arg(long, value_name = "N")]
+    pub fixed_interface_modes: Option<usize>,
+    /// Contact nodes around the circumference and along the axis [default: 28x3].
+    #[arg(long, value_name = "AxL", value_parser = pair)]
+    pub contact_grid: Option<[usize; 2]>,
+    /// Thermal patches around and along [default: none].
+    #[arg(long, value_name = "AxL", value_parser = pair)]
+    pub patches: Option<[usize; 2]>,
+    /// Material [default: titanium].
+    #[arg(long, value_enum)]
+    pub material: Option<MaterialChoice>,
+    /// What is written.
+    #[command(flatten)]
+    pub written: Written,
+}
+
+/// Arguments of `tiprub reduce cube`.
+#[derive(Debug, Args)]
+pub struct CubeArguments {
+    /// Modes kept [default: all].
+    #[arg(long, value_name = "N")]
+    pub modes: Option<usize>,
+    /// Mass matrix of the finite elements [default: lumped].
+    #[arg(long, value_enum)]
+    pub mass_matrix: Option<MassChoice>,
+    /// What is written.
+    #[command(flatten)]
+    pub written: Written,
+}
+
+/// Arguments of `tiprub reduce ring-left` and `ring-right`.
+#[derive(Debug, Args)]
+pub struct RingArguments {
+    /// Modes kept [default: 100].
+    #[arg(long, value_name = "N")]
+    pub modes: Option<usize>,
+    /// Static responses to contact forces kept beside the modes [default: 0].
+    #[arg(long, value_name = "N")]
+    pub static_responses: Option<usize>,
+    /// Mass matrix of the finite elements [default: lumped].
+    #[arg(long, value_enum)]
+    pub mass_matrix: Option<MassChoice>,
+    /// What is written.
+    #[command(flatten)]
+    pub written: Written,
+}
+
+/// Mass matrix of finite elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MassChoice {
+    /// On the nodes.
+    Lumped,
+    /// As the elements' shape functions share it out.
+    Consistent,
+}
+
+impl From<MassChoice> for MassMatrix {
+    fn from(choice: MassChoice) -> Self {
+        match choice {
+            MassChoice::Lumped => Self::Lumped,
+            MassChoice::Consistent => Self::Consistent,
+        }
+    }
+}
+
+/// Three element counts: chord, thickness and span of a blade; around, through and along of a casing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MeshSize(pub [usize; 3]);
+
+impl std::str::FromStr for MeshSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let counts: Result<Vec<usize>, _> = text.split(['x', 'X']).map(str::parse).collect();
+        match counts.as_deref() {
+            Ok([a, b, c]) if [a, b, c].iter().all(|count| (1..=200).contains(*count)) => Ok(Self([*a, *b, *c])),
+            _ => {
+                Err("give three element counts from 1 to 200: CHORDxTHICKNESSxSPAN of the blade, for example 10x1x14, \
+                      AROUNDxTHROUGHxALONG of the casing, for example 72x1x12"
+                    .into())
+            }
+        }
+    }
+}
+
+impl Model {
+    /// What it writes.
+    pub fn written(&self) -> &Written {
+        match self {
+            Self::Blade(own) => &own.written,
+            Self::Sector(own) => &own.written,
+            Self::CasingMesh(own) => &own.written,
+            Self::Casing(own) => &own.written,
+            Self::Rotor37(own) => &own.written,
+            Self::Stage(own) => &own.written,
+            Self::StageCasing(own) => &own.written,
+            Self::Cube(own) => &own.written,
+            Self::RingLeft(own) | Self::RingRight(own) => &own.written,
+        }
+    }
+
+    /// The name that the model will have.
+    pub fn name(&self) -> String {
+        let [left, right] = builtin::RINGS;
+        match self {
+            Self::Blade(own) => own.source().name(),
+            Self::Sector(own) => own.source().name(),
+            Self::CasingMesh(own) => own.source().name(),
+            Self::Casing(own) => own.options().name,
+            Self::Rotor37(_) => "rotor37".to_owned(),
+            Self::Stage(own) => builtin::stage(own.coarse).0.to_owned(),
+            Self::StageCasing(own) => builtin::stage_casing(own.coarse).name,
+            Self::Cube(_) => builtin::CUBE.to_owned(),
+            Self::RingLeft(_) => left.0.to_owned(),
+            Self::RingRight(_) => right.0.to_owned(),
+        }
+    }
+
+    /// The files that describe it.
+    pub fn files(&self) -> Vec<Named> {
+        match self {
+            Self::Blade(own) => own.source().files(),
+            Self::Sector(own) => own.source().files(),
+            Self::CasingMesh(own) => own.source().files(),
+            _ => Vec::new(),
+        }
+    }
+}

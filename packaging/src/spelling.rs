@@ -1,0 +1,237 @@
+//! Command lines of before, answered with what they are now, and command lines that are not understood, for programs.
+
+use std::{ffi::OsString, fmt::Write as _};
+
+use clap::{
+    CommandFactory,
+    error::{ContextKind, ContextValue, ErrorKind},
+};
+use tiprub_shell::Failure;
+
+use crate::cli::Cli;
+
+/// Whether `--json` is among the arguments: a file may be called so behind `--`.
+pub fn asks_for_json(arguments: &[OsString]) -> bool {
+    arguments.iter().take_while(|argument| *argument != "--").any(|argument| argument == "--json")
+}
+
+/// The answer to a command line of before; `None` where it is none. The arguments are without the name of the program.
+pub fn of_before(arguments: &[OsString]) -> Option<Failure> {
+    let words: Vec<String> = arguments.iter().map(|word| word.to_string_lossy().into_owned()).collect();
+    let global = |word: &&String| ["--json", "--quiet", "-q"].contains(&word.as_str());
+    let start = words.iter().position(|word| !global(&word))?;
+    let rest = &words[start + 1..];
+    match words[start].as_str() {
+        "stability" => Some(stability()),
+        "reduce" => reduce(rest),
+        "study" => study(rest.iter().find(|word| !global(word))?),
+        _ => None,
+    }
+}
+
+/// What was `tiprub stability`.
+fn stability() -> Failure {
+    let problem = "of a scene it is a study; stiff and extreme cases have moved to the laboratory in the sources";
+    let remedy = "Run `tiprub study stability SCENE`, or `cargo run --release -p tiprub-lab -- stability` there";
+    Failure::usage("stability", problem, remedy)
+}
+
+/// Studies of the models that ship, which are evidence for the program and none of its commands.
+const LABORATORY: [&str; 5] = ["stage", "modes", "cube", "conjugacy", "inputs"];
+
+fn study(name: &str) -> Option<Failure> {
+    let known = subcommands("study");
+    if name.starts_with('-') || name == "help" || known.iter().any(|known| known == name) {
+        return None;
+    }
+    if LABORATORY.contains(&name) {
+        let problem = "is a study of the models that ship, which has moved to the laboratory in the sources";
+        let remedy = format!("Run `cargo run --release -p tiprub-lab -- {name}` there");
+        return Some(Failure::usage(name, problem, remedy));
+    }
+    let remedy = format!("Choose {}, see `tiprub study --help`", listed(&known));
+    Some(Failure::usage(format!("study {name}"), "no such study", remedy))
+}
+
+/// Names of the subcommands of a command.
+fn subcommands(of: &str) -> Vec<String> {
+    let cli = Cli::command();
+    let command = cli.find_subcommand(of).into_iter().flat_map(clap::Command::get_subcommands);
+    command.map(|command| command.get_name().to_owned()).collect()
+}
+
+/// "`a`, `b` or `c`".
+fn listed(names: &[String]) -> String {
+    let mut text = String::new();
+    for (index, name) in names.iter().enumerate() {
+        let between = if index == 0 {
+            ""
+        } else if index + 1 == names.len() {
+            " or "
+        } else {
+            ", "
+        };
+        let _ = write!(text, "{between}`{name}`");
+    }
+    text
+}
+
+/// Options that stand before the model belong behind it now, and a file needs the word for what it is.
+fn reduce(words: &[String]) -> Option<Failure> {
+    let (own, global): (Vec<&String>, Vec<&String>) =
+        words.iter().partition(|word| !["--json", "--quiet", "-q"].contains(&word.as_str()));
+    let first = own.first()?.as_str();
+    let models = subcommands("reduce");
+    if ["-h", "--help", "help", "--version", "-V", "--"].contains(&first) || models.iter().any(|model| model == first) {
+        return None;
+    }
+    let given = |option: &str| own.iter().any(|word| word.split('=').next() == Some(option));
+    let shipped = own.iter().position(|word| models.iter().any(|model| model == *word));
+    let is_file = first.contains(['.', '/', '\\']);
+    let mut now: Vec<&str> = own.iter().map(|word| word.as_str()).collect();
+    if let (true, Some(place)) = (first.starts_with('-'), shipped) {
+        let model = now.remove(place);
+        now.insert(0, model);
+    } else if first.starts_with('-') && !given("--stiffness") && !own.iter().any(|word| is_mesh(word)) {
+        return None;
+    } else if first.starts_with('-') || is_file {
+        let kind = if given("--contact-grid") {
+            "casing-mesh"
+        } else if given("--cyclic-low") || given("--cyclic-high") {
+            "sector"
+        } else {
+            "blade"
+        };
+        now.insert(0, kind);
+    } else {
+        return Some(no_model(first, &models));
+    }
+    let line: Vec<String> = now.into_iter().chain(global.into_iter().map(String::as_str)).map(quoted).collect();
+    let remedy = format!("Say `tiprub reduce {}`", line.join(" "));
+    Some(Failure::usage(format!("reduce {first}"), "the kind of model comes first now", remedy))
+}
+
+fn is_mesh(word: &str) -> bool {
+    let lower = word.to_ascii_lowercase();
+    !word.starts_with('-') && [".inp", ".msh"].iter().any(|end| lower.ends_with(end))
+}
+
+/// Models are names, and those of one's own are files.
+fn no_model(name: &str, models: &[String]) -> Failure {
+    let near = models.iter().map(|model| (strsim::jaro_winkler(name, model), model));
+    let near = near.filter(|(score, _)| *score > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
+    let hint = near.map_or(String::new(), |(_, model)| format!("Did you mean `{model}`? "));
+    let remedy = format!(
+        "{hint}Choose {}; a model of your own is a file: `tiprub reduce blade FILE`, .inp or .msh",
+        listed(models)
+    );
+    Failure::usage(format!("reduce {name}"), "no such kind of model", remedy)
+}
+
+/// As a shell would take it.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+\\".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
+    }
+}
+
+/// A command line that clap does not understand, as what, problem and remedy; `None` of help, which is no failure.
+pub fn failure(error: &clap::Error) -> Option<Failure> {
+    if error.exit_code() == 0 {
+        return None;
+    }
+    let help = "See `tiprub --help`, or `--help` of the command";
+    let text = |kind: ContextKind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.clone()),
+        Some(ContextValue::Strings(all)) => Some(all.join(", ")),
+        _ => None,
+    };
+    let what = text(ContextKind::InvalidArg).or_else(|| text(ContextKind::InvalidSubcommand));
+    let what = what.unwrap_or_else(|| "command line".to_owned());
+    let missing = [ErrorKind::MissingSubcommand, ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand];
+    if missing.contains(&error.kind()) {
+        let known =
+            text(ContextKind::ValidSubcommand).map_or(String::new(), |known| format!("Choose one of {known}. "));
+        return Some(Failure::usage(what, "a command is missing", format!("{known}{help}")));
+    }
+    let told = error.render().to_string();
+    let problem = told.split("\n\nUsage:").next().unwrap_or(&told).trim().trim_start_matches("error: ");
+    // Hints of clap stand behind an empty line.
+    let (problem, hints) = problem.split_once("\n\n").unwrap_or((problem, ""));
+    let hints = hints.lines().map(|line| line.trim().trim_start_matches("tip: ")).filter(|line| !line.is_empty());
+    let remedy: Vec<&str> = hints.chain([help]).collect();
+    let lines: Vec<&str> = problem.lines().map(str::trim).collect();
+    Some(Failure::usage(what, lines.join(" "), remedy.join(". ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    fn words(line: &str) -> Vec<OsString> {
+        line.split_whitespace().map(OsString::from).collect()
+    }
+
+    #[test]
+    fn old_spellings_of_reduce_are_answered_with_one_that_is_understood() {
+        for (line, now) in [
+            (
+                "reduce blade.inp --contact-set TIP --clamp-set ROOT --sectors 36",
+                "blade blade.inp --contact-set TIP --clamp-set ROOT --sectors 36",
+            ),
+            ("--json reduce ./b.msh --spin 9", "blade ./b.msh --spin 9"),
+            (
+                "reduce s.inp --sectors 9 --cyclic-low A --cyclic-high B -q",
+                "sector s.inp --sectors 9 --cyclic-low A --cyclic-high B -q",
+            ),
+            ("reduce r.inp --contact-grid=24x3", "casing-mesh r.inp --contact-grid=24x3"),
+            (
+                "reduce --stiffness K.mtx --mass M.mtx --nodes n.csv",
+                "blade --stiffness K.mtx --mass M.mtx --nodes n.csv",
+            ),
+            ("reduce --modes 30 rotor37", "rotor37 --modes 30"),
+            ("reduce -o x.rom --contact-set TIP bar.inp", "blade -o x.rom --contact-set TIP bar.inp"),
+        ] {
+            let failure = of_before(&words(line)).unwrap_or_else(|| panic!("{line}"));
+            assert_eq!(failure.remedy, format!("Say `tiprub reduce {now}`"), "{line}");
+            assert_eq!(failure.exit_code(), 2);
+            let parsed = Cli::try_parse_from(words(&format!("tiprub reduce {now}")));
+            assert!(parsed.is_ok(), "{now}: {}", parsed.unwrap_err());
+        }
+        for line in [
+            "reduce",
+            "reduce --help",
+            "reduce rotor37 --modes 30",
+            "reduce help",
+            "run a.toml",
+            "reduce --modes 3",
+            "",
+        ] {
+            assert_eq!(of_before(&words(line)), None, "{line}");
+        }
+    }
+
+    #[test]
+    fn names_that_are_none_are_answered_with_those_that_are() {
+        let failure = of_before(&words("reduce rotor38")).unwrap();
+        assert!(failure.remedy.starts_with("Did you mean `rotor37`? Choose `blade`, "), "{failure}");
+        assert!(of_before(&words("study tip")).unwrap().remedy.starts_with("Choose `map`, "));
+        assert!(of_before(&words("study --json stage --quick")).unwrap().remedy.contains("-p tiprub-lab -- stage"));
+        assert!(of_before(&words("stability --case a")).unwrap().remedy.contains("tiprub study stability SCENE"));
+        for line in ["study map", "study error --help", "study --help", "study"] {
+            assert_eq!(of_before(&words(line)), None, "{line}");
+        }
+    }
+
+    #[test]
+    fn words_that_a_shell_would_part_are_quoted() {
+        assert_eq!(quoted("my blade.inp"), "'my blade.inp'");
+        assert_eq!(quoted("it's"), "'it'\\''s'");
+        assert_eq!(quoted("-0.02:0.256,0.04:0.245"), "-0.02:0.256,0.04:0.245");
+    }
+}

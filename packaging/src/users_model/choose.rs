@@ -1,0 +1,147 @@
+//! Contact nodes, held nodes and faces, out of the sets of a model that was read.
+
+use tiprub_model::{
+    casing::GridNodes,
+    cyclic::{CyclicBoundary, PairingReport},
+    read::{ContactChoice, Imported, choose_contact_nodes, set_counts},
+    reduce::ContactPoint,
+};
+use tiprub_shell::{Failure, Result};
+
+use super::failure;
+use crate::own_arguments::{CasingMeshArguments, ModelOptions, SectorArguments, TipOptions};
+
+/// Share of the largest radius by which nodes of the two faces of a sector may miss each other.
+const FACE_TOLERANCE: f64 = 1e-5;
+
+/// What is reduced, chosen from what was read.
+pub struct Chosen {
+    /// Nodes that are held, ascending.
+    pub clamped: Vec<usize>,
+    /// Contact nodes.
+    pub contact: Vec<ContactPoint>,
+    /// Faces of a sector.
+    pub faces: Option<(CyclicBoundary, PairingReport)>,
+    /// Contact nodes of a casing.
+    pub grid: Option<GridNodes>,
+}
+
+/// For blades, or for a sector between its faces.
+///
+/// # Errors
+/// Sets that are missing or do not fit each other.
+pub fn tips(
+    imported: &Imported,
+    asked: &ModelOptions,
+    tips: &TipOptions,
+    sector: Option<&SectorArguments>,
+) -> Result<Chosen> {
+    // What is missing on the command line is said before what is wrong in the sets.
+    named_set(imported, asked.contact_set.as_deref(), "--contact-set")?;
+    let clamped = clamped_nodes(imported, &asked.clamp_set)?;
+    let faces = sector.map(|sector| pair_faces(imported, sector)).transpose()?;
+    let mut fixed = clamped.clone();
+    if let Some((boundary, _)) = &faces {
+        fixed.extend(boundary.pairs.iter().flatten());
+        fixed.sort_unstable();
+    }
+    let (free, by_number) = free_contact_nodes(imported, asked, &fixed)?;
+    // Nodes given one by one are all meant.
+    let count = tips.contact_nodes.or(by_number.then_some(free.len()));
+    let choice = ContactChoice { count, names: tips.contact_names.clone() };
+    let contact = choose_contact_nodes(&imported.model.nodes, &free, &choice).map_err(failure)?;
+    Ok(Chosen { clamped, contact, faces, grid: None })
+}
+
+/// For a casing.
+///
+/// # Errors
+/// Sets that are missing, and a grid that they do not hold.
+pub fn grid(imported: &Imported, asked: &CasingMeshArguments) -> Result<Chosen> {
+    named_set(imported, asked.model.contact_set.as_deref(), "--contact-set")?;
+    let clamped = clamped_nodes(imported, &asked.model.clamp_set)?;
+    let (free, _) = free_contact_nodes(imported, &asked.model, &clamped)?;
+    let Some((mesh, _)) = &imported.model.mesh else { return Err(super::no_mesh()) };
+    let [around, along] = asked.contact_grid;
+    let grid = GridNodes::chosen(mesh, &free, around, along, asked.contact_axial).map_err(failure)?;
+    Ok(Chosen { clamped, contact: grid.contact_points(), faces: None, grid: Some(grid) })
+}
+
+/// Contact nodes that are not among the `fixed` ones, and whether they were given by number.
+fn free_contact_nodes(imported: &Imported, asked: &ModelOptions, fixed: &[usize]) -> Result<(Vec<usize>, bool)> {
+    let name = named_set(imported, asked.contact_set.as_deref(), "--contact-set")?;
+    let (nodes, by_number) = nodes_of(imported, name, "--contact-set")?;
+    let free: Vec<usize> = nodes.into_iter().filter(|node| fixed.binary_search(node).is_err()).collect();
+    if free.is_empty() {
+        let problem = "all of its nodes are clamped or lie on the faces to the neighbours";
+        return Err(Failure::new(format!("--contact-set {name}"), problem, "Choose a set whose nodes can move"));
+    }
+    Ok((free, by_number))
+}
+
+fn pair_faces(imported: &Imported, asked: &SectorArguments) -> Result<(CyclicBoundary, PairingReport)> {
+    let nodes = &imported.model.nodes;
+    let radius = nodes.iter().map(|[x, y, _]| x.hypot(*y)).fold(0.0, f64::max);
+    let tolerance = asked.cyclic_tolerance.unwrap_or(FACE_TOLERANCE * radius);
+    let (low, high) = (set(imported, &asked.cyclic_low)?, set(imported, &asked.cyclic_high)?);
+    CyclicBoundary::pair(nodes, low, high, asked.sectors as usize, tolerance).map_err(failure)
+}
+
+fn sets_of(imported: &Imported) -> String {
+    if imported.model.sets.is_empty() {
+        return "the model has no sets: name groups of nodes, elements or faces where it is meshed".into();
+    }
+    format!("sets of the model, with their numbers of nodes: {}", set_counts(&imported.model.sets))
+}
+
+fn named_set<'a>(imported: &Imported, name: Option<&'a str>, option: &str) -> Result<&'a str> {
+    name.ok_or_else(|| Failure::usage(option, "it is missing", format!("Give one; {}", sets_of(imported))))
+}
+
+fn set<'a>(imported: &'a Imported, name: &str) -> Result<&'a [usize]> {
+    imported.model.set(name).map_err(failure)
+}
+
+/// Nodes of a set, or those whose numbers in the file are listed (then true), ascending.
+fn nodes_of(imported: &Imported, text: &str, option: &str) -> Result<(Vec<usize>, bool)> {
+    let numbers: Result<Vec<u64>, _> = text.split(',').map(|part| part.trim().parse::<u64>()).collect();
+    let (Ok(numbers), false) = (numbers, imported.model.sets.contains_key(text)) else {
+        return Ok((set(imported, text)?.to_vec(), false));
+    };
+    let mut nodes = Vec::with_capacity(numbers.len());
+    for number in numbers {
+        let found = imported.node_numbers.iter().position(|own| *own == number);
+        nodes.push(found.ok_or_else(|| {
+            let remedy =
+                "Give the name of a set, or numbers of nodes of the file that belong to solid elements: 12,57,103";
+            Failure::new(format!("{option} {text}"), format!("the model has no node {number}"), remedy)
+        })?);
+    }
+    nodes.sort_unstable();
+    nodes.dedup();
+    Ok((nodes, true))
+}
+
+/// All nodes that are held, ascending.
+fn clamped_nodes(imported: &Imported, names: &[String]) -> Result<Vec<usize>> {
+    let mut clamped = imported.absent.clone();
+    let free = matches!(names, [only] if only.eq_ignore_ascii_case("none"));
+    if names.is_empty() && clamped.is_empty() {
+        let held = match imported.held.as_slice() {
+            [] => String::new(),
+            held => format!(
+                "; *BOUNDARY of the file holds {}",
+                held.iter().take(10).cloned().collect::<Vec<_>>().join(", ")
+            ),
+        };
+        let remedy = format!("Give the set that is held, or `none`; {}{held}", sets_of(imported));
+        return Err(Failure::usage("--clamp-set", "it is missing", remedy));
+    }
+    for name in names.iter().filter(|_| !free) {
+        // Of matrices the set was left out when they were read.
+        clamped.extend(nodes_of(imported, name, "--clamp-set")?.0);
+    }
+    clamped.sort_unstable();
+    clamped.dedup();
+    Ok(clamped)
+}

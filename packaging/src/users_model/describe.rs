@@ -1,0 +1,82 @@
+//! What was read and chosen, told.
+
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+use tiprub_model::{
+    cyclic::PairingReport,
+    read::{Imported, bounding_box, set_counts, total_mass},
+};
+
+use super::choose::Chosen;
+use crate::own_arguments::ModelOptions;
+
+/// What was read and chosen, for people and for programs.
+pub fn describe(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> (String, Value) {
+    let model = &imported.model;
+    let [low, high] = bounding_box(&model.nodes);
+    let mass = total_mass(model);
+    let mut text = format!("{}: {} nodes", model.origin, model.nodes.len());
+    if let Some((mesh, _)) = &model.mesh {
+        let _ = write!(text, ", {} elements", mesh.elements.len());
+    }
+    for material in &imported.materials {
+        let _ = write!(
+            text,
+            "\n  material                  {}: E = {:.4e} Pa, ν = {}, ρ = {:.1} kg/m³",
+            material.name, material.young_modulus, material.poisson_ratio, material.density
+        );
+    }
+    for (axis, name) in ["x", "y", "z"].iter().enumerate() {
+        let _ = write!(text, "\n  {name}                         {:.6} m to {:.6} m", low[axis], high[axis]);
+    }
+    let _ = write!(
+        text,
+        "\n  mass                      {mass:.6} kg\n  sets                      {}",
+        set_counts(&model.sets)
+    );
+    let _ = write!(text, "\n  clamped                   {} nodes", chosen.clamped.len());
+    let contact_set = asked.contact_set.as_deref().unwrap_or_default();
+    let _ = write!(text, "\n  contact nodes             {} from {contact_set}", chosen.contact.len());
+    if let Some(grid) = &chosen.grid {
+        let _ = write!(text, ": {} around x {} along", grid.around, grid.along());
+    }
+    for point in chosen.contact.iter().filter(|_| chosen.grid.is_none()) {
+        let number = imported.node_numbers[point.node];
+        let _ = write!(text, "\n    {:<24}node {number} of the file", point.name);
+    }
+    if let Some((boundary, report)) = &chosen.faces {
+        let PairingReport { largest_mismatch, typical_mismatch, .. } = report;
+        let (pairs, pitch) = (boundary.pairs.len(), boundary.pitch().to_degrees());
+        let _ = write!(
+            text,
+            "\n  faces                     {pairs} pairs of nodes, {pitch:.4}° apart; off by {largest_mismatch:.2e} m at most, \
+             typically {typical_mismatch:.2e} m"
+        );
+        if report.swapped {
+            text.push_str("\n  note: the faces are named the other way round: low is the one at the smaller angle");
+        }
+    }
+    for note in &imported.notes {
+        let _ = write!(text, "\n  note: {note}");
+    }
+    let json = json!({
+        "origin": model.origin,
+        "nodes": model.nodes.len(),
+        "box": { "low": low, "high": high },
+        "mass": mass,
+        "sets": model.sets.iter().map(|(name, nodes)| (name.clone(), json!(nodes.len()))).collect::<serde_json::Map<_, _>>(),
+        "clamped_nodes": chosen.clamped.len(),
+        "faces": chosen.faces.as_ref().map(|(boundary, report)| json!({
+            "pairs": boundary.pairs.len(),
+            "largest_mismatch": report.largest_mismatch,
+            "typical_mismatch": report.typical_mismatch,
+            "swapped": report.swapped,
+        })),
+        "contact_nodes": chosen.contact.iter().map(|point| json!({
+            "name": point.name, "node": imported.node_numbers[point.node], "slope": point.meridional_slope,
+        })).collect::<Vec<_>>(),
+        "notes": imported.notes,
+    });
+    (text, json)
+}

@@ -1,0 +1,66 @@
+//! What of a model that was read cannot be meant, and what is asked about.
+
+use tiprub_core::Rom;
+use tiprub_model::read::{Imported, plausibility};
+use tiprub_shell::{Failure, Result};
+
+use super::choose::Chosen;
+use crate::own_arguments::{ModelOptions, UnitChoice};
+
+/// First natural frequencies (Hz) of things that are built lie in here.
+const USUAL_FREQUENCIES: [f64; 2] = [1.0, 1e6];
+
+/// What cannot be meant is refused, unless the units are said to be SI; what is unusual is asked about.
+pub fn judge(imported: &Imported, asked: &ModelOptions) -> Result<Vec<String>> {
+    let found = plausibility(&imported.model, &imported.materials);
+    let question = |list: &[String]| format!("{}: is that meant?", list.join("; "));
+    let mut warnings = Vec::new();
+    if !found.impossible.is_empty() {
+        if asked.units != Some(UnitChoice::Metre) {
+            let remedy = match asked.units {
+                _ if asked.young.is_some() && found.impossible.iter().all(|text| text.starts_with("material")) => {
+                    "--young and --density are in SI units, Pa and kg/m³, whatever the file's units are"
+                }
+                None => {
+                    "If lengths are in mm, masses in t and stresses in MPa, say --units mm-t-s; if it is meant, --units m"
+                }
+                Some(_) => "Are the file's units m, kg and s after all? Then leave --units out",
+            };
+            let problem = format!("{} cannot be meant", found.impossible.join("; "));
+            return Err(Failure::new("units of the model", problem, remedy));
+        }
+        warnings.push(question(&found.impossible));
+    }
+    if !found.doubtful.is_empty() {
+        warnings.push(format!("{} (--units mm-t-s is for files in mm, t and s)", question(&found.doubtful)));
+    }
+    Ok(warnings)
+}
+
+/// Share of the largest radius of the model below which contact nodes are not its tips: shrouds and flared tips stay above.
+const TIPS: f64 = 0.9;
+
+/// Blades whose contact nodes lie inside: tip and root exchanged, or another axis.
+pub fn radius_warning(imported: &Imported, chosen: &Chosen) -> Option<String> {
+    let radius = |[x, y, _]: [f64; 3]| x.hypot(y);
+    let nodes = &imported.model.nodes;
+    let outermost = nodes.iter().copied().map(radius).fold(0.0, f64::max);
+    let contact = chosen.contact.iter().map(|point| radius(nodes[point.node])).fold(0.0, f64::max);
+    (chosen.grid.is_none() && contact < TIPS * outermost).then(|| {
+        format!(
+            "the contact nodes reach a radius of {contact:.6} m, the model one of {outermost:.6} m: are tip and root, and the \
+             axis of rotation, those that are meant?"
+        )
+    })
+}
+
+/// A first frequency that no machine has; of a `free` structure the seventh.
+pub fn frequency_warning(rom: &Rom, free: bool) -> Option<String> {
+    let first = *rom.checks.full_frequencies.get(if free { 6 } else { 0 })?;
+    let [low, high] = USUAL_FREQUENCIES;
+    (!(low..=high).contains(&first)).then(|| {
+        format!(
+            "the first natural frequency is {first:.3e} Hz: are units, material and clamped nodes those that are meant?"
+        )
+    })
+}

@@ -1,0 +1,252 @@
+//! A finite-element model of one's own: read, judged, reduced, told about.
+
+mod choose;
+mod describe;
+mod judge;
+
+use std::{cell::RefCell, fmt::Write as _, path::Path};
+
+use choose::Chosen;
+use tiprub_core::{Rom, rom::Frame};
+use tiprub_gallery::reduction::{self, with_progress};
+use tiprub_model::{
+    CasingOptions, FeModel, Reduction,
+    casing::{self, CasingReductionOptions},
+    cyclic::{CyclicOptions, ModeSelection, reduce_cyclic},
+    element::Formulation,
+    read::{Imported, MatrixFiles, MeshOptions, bounding_box, read_matrices, read_mesh},
+    reduce::ReductionOptions,
+    reduce_casing, reduce_model,
+    thermal::equal_patches,
+};
+use tiprub_shell::{Failure, Result, console::Console};
+use tiprub_study::convergence::refine;
+
+use crate::{
+    own_arguments::{BladeOptions, CasingMeshArguments, KeptOptions, SectorArguments, Source, TipOptions},
+    reduced::Reduced,
+};
+
+/// Fixed-interface modes, modes compared with the full model, and damping ratio where none are given.
+pub const MODES: usize = 25;
+const CHECKED_MODES: usize = 10;
+const DAMPING: f64 = 0.005;
+
+/// Names of the sets of all clamped nodes and of the two faces in exported files.
+const CLAMPED: &str = casing::CLAMPED;
+const FACES: [&str; 2] = ["CYCLIC_LOW", "CYCLIC_HIGH"];
+
+/// Blades on a rigid hub.
+///
+/// # Errors
+/// Files and sets, naming file, line and remedy; and whatever the reduction refuses.
+pub fn blade(
+    file: Option<&Path>,
+    asked: &BladeOptions,
+    (tips, kept): (&TipOptions, KeptOptions),
+    console: &Console,
+) -> Result<Reduced> {
+    let source = asked.source(file, kept);
+    let imported = import(&source, console)?;
+    let choose = |imported: &Imported| choose::tips(imported, source.model, tips, None);
+    told(&source, imported, choose, |model, chosen, clamped| {
+        Ok(Reduced::general(general(&source, asked, model, chosen, console)?, clamped))
+    })
+}
+
+/// Where a ROM of blades came from: a mesh or matrices with the options that it was reduced with.
+pub struct BladeSource<'a> {
+    /// Mesh file.
+    pub file: Option<&'a Path>,
+    /// Options.
+    pub options: &'a BladeOptions,
+}
+
+impl refine::Source for BladeSource<'_> {
+    fn reduce(&self, modes: usize, contact_nodes: usize, console: &Console) -> Result<Rom> {
+        let tips = TipOptions { contact_nodes: Some(contact_nodes), ..TipOptions::default() };
+        let kept = KeptOptions { modes: Some(modes), ..KeptOptions::default() };
+        Ok(blade(self.file, self.options, (&tips, kept), console)?.rom)
+    }
+}
+
+/// A disk of coupled sectors.
+///
+/// # Errors
+/// As [`blade`].
+pub fn sector(asked: &SectorArguments, console: &Console) -> Result<Reduced> {
+    let source = asked.source();
+    let imported = import(&source, console)?;
+    let choose = |imported: &Imported| choose::tips(imported, source.model, &asked.tips, Some(asked));
+    told(&source, imported, choose, |model, chosen, clamped| cyclic(&source, model, chosen, clamped, console))
+}
+
+/// A casing whose contact nodes form a grid.
+///
+/// # Errors
+/// As [`blade`]; a mesh of several materials.
+pub fn casing(asked: &CasingMeshArguments, console: &Console) -> Result<Reduced> {
+    let source = asked.source();
+    let imported = import(&source, console)?;
+    let materials = imported.materials.len();
+    let choose = |imported: &Imported| choose::grid(imported, asked);
+    told(&source, imported, choose, |model, chosen, clamped| {
+        if materials != 1 {
+            return Err(no_mesh());
+        }
+        Ok(Reduced::general(ring(&source, asked, model, chosen, console)?, clamped))
+    })
+}
+
+fn no_mesh() -> Failure {
+    let problem = "a casing is reduced from a mesh of one material";
+    Failure::usage("FILE", problem, "Give a mesh file whose elements share one material")
+}
+
+/// Judge and choose, reduce with the set of clamped nodes, and tell of all.
+fn told(
+    source: &Source,
+    imported: Imported,
+    choose: impl FnOnce(&Imported) -> Result<Chosen>,
+    reduce: impl FnOnce(FeModel, &Chosen, Option<&str>) -> Result<Reduced>,
+) -> Result<Reduced> {
+    let mut warnings = imported.warnings.clone();
+    warnings.extend(judge::judge(&imported, source.model)?);
+    let chosen = choose(&imported)?;
+    let read = describe::describe(&imported, source.model, &chosen);
+    warnings.extend(judge::radius_warning(&imported, &chosen));
+    let mut model = imported.model;
+    let clamped = (!chosen.clamped.is_empty()).then_some(CLAMPED);
+    if let Some((mesh, _)) = model.mesh.as_mut().filter(|_| clamped.is_some()) {
+        mesh.sets.insert(CLAMPED.to_owned(), chosen.clamped.clone());
+    }
+    let mut reduced = reduce(model, &chosen, clamped)?;
+    let notes = core::mem::replace(&mut reduced.read, read).0;
+    for note in notes.lines() {
+        let _ = write!(reduced.read.0, "\n  note: {note}");
+    }
+    warnings.extend(judge::frequency_warning(&reduced.rom, clamped.is_none()));
+    reduced.warnings = warnings;
+    Ok(reduced)
+}
+
+fn general(
+    source: &Source,
+    asked: &BladeOptions,
+    model: FeModel,
+    chosen: &Chosen,
+    console: &Console,
+) -> Result<Reduction> {
+    let name = source.name();
+    let title = format!("Reducing {name}");
+    let options = ReductionOptions {
+        name,
+        fixed_interface_modes: source.kept.modes.unwrap_or(MODES),
+        checked_modes: CHECKED_MODES,
+        sectors: asked.sectors.unwrap_or(1) as usize,
+        frame: Frame::Cylindrical,
+        damping_ratio: source.kept.damping.unwrap_or(DAMPING),
+    };
+    let model = RefCell::new(Some(model));
+    with_progress(&title, console, &|listener| {
+        // The matrices are handed over, not copied.
+        let model = model.take().ok_or_else(|| tiprub_model::Error::invalid("model", "it is reduced already", ""))?;
+        reduce_model(model, &chosen.clamped, &chosen.contact, &options, asked.spin, listener)
+    })
+}
+
+fn ring(
+    source: &Source,
+    asked: &CasingMeshArguments,
+    model: FeModel,
+    chosen: &Chosen,
+    console: &Console,
+) -> Result<Reduction> {
+    let (Some((mesh, mut material)), Some(grid)) = (model.mesh, &chosen.grid) else { return Err(no_mesh()) };
+    material.expansion = asked.expansion.unwrap_or(material.expansion);
+    let [low, high] = bounding_box(&mesh.nodes);
+    let [around, along] = asked.patches.unwrap_or([0, 0]);
+    let patches = equal_patches(around, along, [low[2], high[2]]);
+    let name = source.name();
+    let title = format!("Reducing {name}");
+    let defaults = CasingOptions::default();
+    let options = CasingReductionOptions {
+        name,
+        formulation: Formulation::Displacement,
+        fixed_interface_modes: asked.fixed_interface_modes.unwrap_or(defaults.fixed_interface_modes),
+        modes: source.kept.modes.unwrap_or(defaults.modes),
+        checked_modes: CHECKED_MODES,
+        damping_ratio: source.kept.damping.unwrap_or(DAMPING),
+    };
+    let mesh = RefCell::new(Some(mesh));
+    with_progress(&title, console, &|listener| {
+        let mesh = mesh.take().ok_or_else(|| tiprub_model::Error::invalid("model", "it is reduced already", ""))?;
+        reduce_casing(mesh, &material, &chosen.clamped, grid, &patches, &options, listener)
+    })
+}
+
+fn cyclic(
+    source: &Source,
+    model: FeModel,
+    chosen: &Chosen,
+    clamped: Option<&str>,
+    console: &Console,
+) -> Result<Reduced> {
+    let Some((boundary, _)) = &chosen.faces else {
+        return Err(Failure::new("sector", "its faces were not paired", "Report this to the developers"));
+    };
+    let name = source.name();
+    let title = format!("Reducing {name}");
+    let options = CyclicOptions {
+        name,
+        modes: ModeSelection::Families(source.kept.modes.unwrap_or(MODES)),
+        checked_modes: CHECKED_MODES,
+        damping_ratio: source.kept.damping.unwrap_or(DAMPING),
+    };
+    let reduction = with_progress(&title, console, &|listener| {
+        reduce_cyclic(&model, &chosen.clamped, &chosen.contact, boundary, &options, listener)
+    })?;
+    let nodes = model.nodes.len();
+    let mut mesh = model.mesh;
+    if let Some((mesh, _)) = &mut mesh {
+        for (face, side) in FACES.iter().zip([0, 1]) {
+            let mut face_nodes: Vec<usize> = boundary.pairs.iter().map(|pair| pair[side]).collect();
+            face_nodes.sort_unstable();
+            mesh.sets.insert((*face).to_owned(), face_nodes);
+        }
+    }
+    Ok(Reduced::cyclic(reduction, mesh, nodes, clamped, FACES))
+}
+
+fn import(source: &Source, console: &Console) -> Result<Imported> {
+    let (asked, material) = (source.model, source.material());
+    let matrices = source.matrices.and_then(|own| Some((own, own.stiffness.as_ref()?, own.mass.as_ref()?)));
+    let Some((matrices, stiffness, mass)) = matrices else {
+        let Some(path) = source.file else {
+            return Err(Failure::usage("FILE", "there is no file", "Give a mesh file, or --stiffness and --mass"));
+        };
+        let options =
+            MeshOptions { units: asked.units(), axis: asked.axis(), material, temperature: asked.temperature };
+        let title = format!("Reading {}", path.display());
+        return with_progress(&title, console, &|listener| read_mesh(path, &options, listener));
+    };
+    let Some(nodes) = matrices.nodes.as_deref().or(source.file) else {
+        let remedy = "Give --nodes FILE (lines NODE,X,Y,Z,SETS) or the mesh file of the model";
+        return Err(Failure::usage("--stiffness", "the positions of the nodes are missing", remedy));
+    };
+    let files = MatrixFiles {
+        stiffness: stiffness.clone(),
+        mass: mass.clone(),
+        nodes: nodes.to_path_buf(),
+        dofs: matrices.dofs.clone(),
+        units: asked.units(),
+        axis: asked.axis(),
+        left_out: asked.clamp_set.clone(),
+    };
+    console.say(format_args!("Reading {} and {}", stiffness.display(), mass.display()));
+    read_matrices(&files).map_err(failure)
+}
+
+fn failure(error: tiprub_model::Error) -> Failure {
+    reduction::failure("model", error)
+}

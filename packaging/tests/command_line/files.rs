@@ -1,0 +1,149 @@
+//! Outputs and inputs as files: pipes, names, permissions, nothing replaced.
+
+use std::{fs, path::PathBuf, process::Command};
+
+use crate::project::{Project, SCENE, json};
+
+#[test]
+#[cfg(target_os = "linux")]
+fn results_that_stdout_does_not_take_are_a_failure() {
+    let project = Project::new();
+    let onto = |stdout: fs::File| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+        command.current_dir(project.root.path()).args(["run", "scene.toml", "--csv", "-", "-q"]);
+        command.stdout(stdout).output().unwrap()
+    };
+    let full = onto(fs::OpenOptions::new().write(true).open("/dev/full").unwrap());
+    assert_eq!(full.status.code(), Some(1));
+    let message = String::from_utf8(full.stderr).unwrap();
+    assert!(message.contains("stdout: cannot be written"), "{message}");
+    let good = onto(fs::File::create(project.path("good.csv")).unwrap());
+    assert_eq!(good.status.code(), Some(0));
+}
+
+#[test]
+#[cfg(unix)]
+fn names_that_are_no_text_are_names_of_files() {
+    use std::{ffi::OsStr, os::unix::ffi::OsStrExt};
+    let project = Project::new();
+    let odd = OsStr::from_bytes(b"a\xffb");
+    let run = |words: &[&str], last: &OsStr| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+        command.current_dir(project.root.path()).arg("--json").arg("--quiet").args(words).arg(last).output().unwrap()
+    };
+    let csv = run(&["run", "scene.toml", "--csv"], odd);
+    assert_eq!(csv.status.code(), Some(0), "{csv:?}");
+    assert_eq!(json(&csv)["csv"], "a\u{fffd}b");
+    assert!(fs::read_to_string(project.path("").join(odd)).unwrap().starts_with("time,"));
+    fs::remove_file(project.path("").join(odd)).unwrap();
+    let package = run(&["package", "scene.toml", "--library", "library.so", "-o"], odd);
+    assert_eq!(package.status.code(), Some(0), "{package:?}");
+    assert!(json(&package)["fmus"][0]["file"].as_str().unwrap().starts_with("a\u{fffd}b/"));
+    let scene = OsStr::from_bytes(b"s\xff.toml");
+    fs::write(project.path("").join(scene), SCENE).unwrap();
+    let inspect = run(&["inspect"], scene);
+    assert_eq!((inspect.status.code(), &json(&inspect)["kind"]), (Some(0), &"scene".into()), "{inspect:?}");
+}
+
+#[cfg(unix)]
+fn pipe(project: &Project, name: &str) -> PathBuf {
+    let path = project.path(name);
+    assert!(Command::new("mkfifo").arg(&path).status().unwrap().success());
+    path
+}
+
+#[test]
+#[cfg(unix)]
+fn pipes_and_devices_are_no_inputs_and_stdout_is_no_second_output() {
+    let project = Project::new();
+    for name in ["pipe", "pipe.toml", "pipe.fmu", "pipe.safetensors", "pipe.inp", "pipe.so"] {
+        pipe(&project, name);
+    }
+    std::os::unix::fs::symlink("/dev/zero", project.path("zero.toml")).unwrap();
+    let mesh = ["--contact-set", "A", "--clamp-set", "B"];
+    for words in [
+        &["run", "pipe"][..],
+        &["run", "zero.toml"],
+        &["package", "pipe.toml", "-o", "out"],
+        &["package", "scene.toml", "-o", "out", "--library", "pipe.so"],
+        &["inspect", "pipe.toml"],
+        &["inspect", "zero.toml"],
+        &["inspect", "pipe.fmu"],
+        &["inspect", "pipe.safetensors"],
+        &["inspect", "pipe"],
+        &[&["reduce", "blade", "pipe.inp"], &mesh[..]].concat(),
+    ] {
+        let message = project.fail(words, 1);
+        assert!(message.contains("pipe or a device"), "{message}");
+    }
+    // Stdout is a pipe here, and takes the summary.
+    for words in [&["run", "scene.toml", "--csv", "/dev/stdout"][..], &["reduce", "rotor37", "-o", "/proc/self/fd/1"]] {
+        let message = project.fail(words, 2);
+        assert!(message.contains("is the same file as stdout"), "{message}");
+    }
+    project.succeed(&["run", "scene.toml", "--csv", "/dev/null"]);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_pipe_that_nobody_reads_is_waited_for_with_a_word_and_takes_all() {
+    use std::io::{BufRead, BufReader};
+    let project = Project::new();
+    let path = pipe(&project, "pipe");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+    command.current_dir(project.root.path()).args(["run", "scene.toml", "--quiet", "--csv", "pipe"]);
+    let mut child = command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    let said =
+        BufReader::new(child.stderr.take().unwrap()).lines().find(|line| line.as_ref().unwrap().contains("pipe"));
+    assert_eq!(said.unwrap().unwrap(), "pipe is a pipe that nobody reads: waiting for its reader");
+    let read = fs::read_to_string(&path).unwrap();
+    assert!(child.wait().unwrap().success());
+    assert_eq!(read, project.succeed(&["run", "scene.toml", "--quiet", "--csv", "-"]));
+}
+
+#[test]
+#[cfg(unix)]
+fn no_output_is_an_input_or_another_output() {
+    let project = Project::new();
+    fs::hard_link(project.path("scene.toml"), project.path("hard.csv")).unwrap();
+    std::os::unix::fs::symlink("small.rom.safetensors", project.path("soft.csv")).unwrap();
+    fs::create_dir(project.path("out")).unwrap();
+    fs::write(project.path("out/scene.json"), SCENE).unwrap();
+    fs::copy(project.path("library.so"), project.path("library.fmu")).unwrap();
+    let before = project.files();
+    for words in [
+        &["run", "scene.toml", "--csv", "scene.toml"][..],
+        &["run", "scene.toml", "--csv", "./out/../scene.toml"],
+        &["run", "scene.toml", "--csv", "hard.csv"],
+        &["run", "scene.toml", "--csv", "soft.csv"],
+        &["reduce", "rotor37", "-o", "x", "--vtk", "x"],
+        &["reduce", "rotor37", "-o", "new/x", "--inp", "new/y/../x"],
+        &["reduce", "blade", "small.msh", "-o", "y", "--vtk", "small.msh", "--force"],
+        &["package", "scene.toml", "--fmi", "2", "--library", "library.fmu", "-o", "library.fmu"],
+        &["demo", "--out", "out", "--library", "out/report.html"],
+    ] {
+        fs::write(project.path("small.msh"), "").unwrap();
+        fs::write(project.path("out/report.html"), "").unwrap();
+        let message = project.fail(words, 2);
+        assert!(message.contains("is the same file as"), "{message}");
+    }
+    let message = project.fail(&["study", "map", "out/scene.json", "--out", "out"], 2);
+    assert!(message.contains("a file of the study may replace"), "{message}");
+    assert_eq!(fs::read_to_string(project.path("scene.toml")).unwrap(), SCENE);
+    assert_eq!(project.files().len(), before.len() + 1);
+}
+
+#[test]
+#[cfg(unix)]
+fn new_files_follow_the_umask() {
+    use std::os::unix::fs::PermissionsExt;
+    let project = Project::new();
+    for (mask, mode) in [("077", 0o600), ("022", 0o644), ("002", 0o664)] {
+        let line = format!("umask {mask}; exec \"$0\" run scene.toml --quiet --csv {mask}.csv");
+        let mut shell = Command::new("sh");
+        shell.current_dir(project.root.path()).args(["-c", &line, env!("CARGO_BIN_EXE_tiprub")]);
+        assert!(shell.output().unwrap().status.success());
+        let made = fs::metadata(project.path(&format!("{mask}.csv"))).unwrap().permissions().mode();
+        assert_eq!(made & 0o777, mode, "umask {mask}");
+    }
+}

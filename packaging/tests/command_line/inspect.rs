@@ -1,0 +1,59 @@
+//! `tiprub inspect`.
+
+use std::fs;
+
+use crate::project::{Project, SCENE};
+
+#[test]
+fn damaged_fmus_are_named_by_inspect_at_every_length() {
+    let project = Project::new();
+    project.succeed(&["package", "scene.toml", "--fmi", "2", "-o", "x.fmu", "--library", "library.so"]);
+    let bytes = fs::read(project.path("x.fmu")).unwrap();
+    for share in 0..10 {
+        fs::write(project.path("x.fmu"), &bytes[..bytes.len() * share / 10]).unwrap();
+        let error = project.fail(&["inspect", "x.fmu"], 1);
+        assert!(error.contains("x.fmu") && error.contains("truncated"), "{error}");
+    }
+    // One flipped byte inside the compressed library fails its checksum.
+    let mut damaged = bytes.clone();
+    let at = bytes.windows(3).position(|window| window == b".so").unwrap() + 5;
+    damaged[at] ^= 0x10;
+    fs::write(project.path("x.fmu"), damaged).unwrap();
+    let error = project.fail(&["inspect", "x.fmu"], 1);
+    assert!(error.contains("tiprub.so") && error.contains("damaged"), "{error}");
+}
+
+#[test]
+fn inspect_shows_where_contact_nodes_are_and_what_the_scene_sets() {
+    let project = Project::new();
+    let rom = project.succeed(&["inspect", "small.rom.safetensors"]);
+    assert!(rom.contains("r 0.250000 m, θ 0.000000 rad, z 0.000000 m, slope 0.0000"), "{rom}");
+    let scene = project.succeed(&["inspect", "scene.toml"]);
+    for shown in ["100 rad/s (954.9 rpm)", "damping ratio of the ROM", "\"watched_sectors\":[1]"] {
+        assert!(scene.contains(shown), "{shown}: {scene}");
+    }
+}
+
+#[test]
+fn step_limits_are_those_at_which_a_scene_is_refused() {
+    let project = Project::new();
+    let limits = |friction: &str| {
+        let scene = SCENE.replace("friction = 0.1", friction);
+        fs::write(project.path("scene.toml"), scene).unwrap();
+        let json: serde_json::Value =
+            serde_json::from_str(&project.succeed(&["inspect", "scene.toml", "--json", "--quiet"])).unwrap();
+        json["scene"]["roms"][0]["largest_stable_step"].clone()
+    };
+    let found = limits("friction = 0.1");
+    assert!((found["central-difference"].as_f64().unwrap() / 2e-3 - 1.0).abs() < 1e-3, "{found}");
+    assert_eq!(found["friction"], 0.1);
+    for (factor, accepted) in [(0.99, true), (1.01, false)] {
+        let step = factor * found["central-difference"].as_f64().unwrap();
+        let scene = SCENE
+            .replace("step = 1e-4", &format!("scheme = \"central-difference\"\nstep = {step:e}"))
+            .replace("communication_step = 1e-3", &format!("communication_step = {step:e}"))
+            .replace("amplitude = 2e-3", "amplitude = 2e-6");
+        fs::write(project.path("scene.toml"), scene).unwrap();
+        assert_eq!(project.run(&["run", "scene.toml", "--quiet"]).status.success(), accepted, "{step:e}");
+    }
+}

@@ -1,0 +1,124 @@
+//! `tiprub run`.
+
+use std::fs;
+
+use crate::project::{Project, SCENE, columns, json};
+
+#[test]
+fn a_native_run_writes_one_row_per_communication_point() {
+    let project = Project::new();
+    let json = project.succeed(&["run", "scene.toml", "--csv", "new/out.csv", "--json", "--quiet"]);
+    let summary: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(summary["communication_steps"], 50);
+    assert_eq!(summary["internal_steps"], 500);
+    let (names, rows) = columns(&fs::read_to_string(project.path("new/out.csv")).unwrap());
+    assert_eq!((names[0].as_str(), rows.len()), ("time", 51));
+    let clearance = names.iter().position(|name| name == "clearance_minimum").expect("a column for the clearance");
+    assert!((rows[0][clearance] - rows[50][clearance]).abs() > 1e-6, "the casing's lobes meet the blades");
+    assert!(rows.iter().all(|row| row.len() == names.len()));
+    assert_eq!(rows[50][0].to_bits(), 0.05_f64.to_bits());
+    let again = project.succeed(&["run", "scene.toml", "--csv", "-", "--quiet"]);
+    assert_eq!(columns(&again).1, rows, "the same run gives the same bits");
+}
+
+/// What the CSV says, without looking for it: the lobes of the scene reach through the gap.
+#[test]
+fn the_summary_of_a_run_tells_its_extremes() {
+    let project = Project::new();
+    let text = project.succeed(&["run", "scene.toml", "--csv", "out.csv", "--quiet"]);
+    let json = project.succeed(&["run", "scene.toml", "--json", "--quiet"]);
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let (names, rows) = columns(&fs::read_to_string(project.path("out.csv")).unwrap());
+    let column = |name: &str| {
+        let index = names.iter().position(|other| other == name).unwrap();
+        rows.iter().map(|row| (row[0], row[index])).collect::<Vec<_>>()
+    };
+    // Communication steps of 1 ms.
+    let total: Vec<_> = column("normal_impulse").into_iter().map(|(time, impulse)| (time, impulse / 1e-3)).collect();
+    let largest = |column: Vec<(f64, f64)>| column.into_iter().map(|row| row.1).fold(f64::MIN, f64::max);
+    let least = column("clearance_minimum").into_iter().map(|row| row.1).fold(f64::MAX, f64::min);
+    for (name, value) in [
+        ("largest_total_normal_force", largest(total.clone())),
+        ("largest_node_normal_force", largest(column("normal_force_peak"))),
+        ("smallest_clearance", least),
+        ("most_contacts", largest(column("contact_count"))),
+    ] {
+        let found = &json["extremes"][name];
+        assert!((found["value"].as_f64().unwrap() - value).abs() <= 1e-9 * value.abs(), "{name}: {found}, {value}");
+    }
+    let force = &json["extremes"]["largest_total_normal_force"];
+    assert!(force["value"].as_f64().unwrap() > 1.0, "{force}");
+    let at = force["time"].as_f64().unwrap();
+    let there = total.iter().find(|row| row.0.to_bits() == at.to_bits()).unwrap();
+    assert!((there.1 - largest(total.clone())).abs() <= 1e-9 * there.1, "{there:?}");
+    let told = text.split("over the run:").nth(1).unwrap();
+    assert!(told.contains(&format!(" N at t = {at} s")) && told.contains("smallest clearance: "), "{text}");
+    assert!(told.contains("most contact nodes touching at a communication point: "), "{text}");
+}
+
+#[test]
+fn settings_and_times_can_be_replaced() {
+    let project = Project::new();
+    let csv = |arguments: &[&str]| {
+        let all = [&["run", "scene.toml", "--csv", "-", "--quiet"], arguments].concat();
+        columns(&project.succeed(&all)).1
+    };
+    assert_eq!(csv(&["--stop", "0.01", "--step", "0.003"]).len(), 5);
+    assert_ne!(csv(&["--set", "speed=50"]), csv(&[]));
+    assert_eq!(csv(&["--set", "speed=100"]), csv(&[]));
+}
+
+#[test]
+fn a_communication_step_longer_than_the_run_is_warned_of() {
+    let project = Project::new();
+    fs::write(project.path("scene.toml"), SCENE.replace("communication_step = 1e-3", "communication_step = 0.1"))
+        .unwrap();
+    for arguments in
+        [&["run", "scene.toml", "-q"][..], &["package", "scene.toml", "-o", "x", "--library", "library.so", "-q"]]
+    {
+        let stderr = String::from_utf8(project.run(arguments).stderr).unwrap();
+        assert!(stderr.starts_with("warning: the communication step 0.1 s is longer"), "{arguments:?}: {stderr}");
+    }
+    assert!(project.run(&["run", "scene.toml", "-q", "--step", "0.05"]).stderr.is_empty());
+}
+
+#[test]
+fn a_run_is_warned_for_the_step_it_takes() {
+    let project = Project::new();
+    // 2/omega_max of the springs is 2 ms.
+    let scene =
+        SCENE.replace("step = 1e-4", "step = 3e-3").replace("lobes\", amplitude = 2e-3", "lobes\", amplitude = 2e-6");
+    fs::write(project.path("scene.toml"), scene).unwrap();
+    let warnings = |arguments: &[&str]| {
+        let output = project.run(&[&["run", "scene.toml", "--quiet"], arguments].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{stderr}");
+        stderr.lines().filter(|line| line.contains("not resolved")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(warnings(&[]), Vec::<String>::new());
+    let told = warnings(&["--step", "2.5e-3"]);
+    assert!(told.len() == 1 && told[0].contains("2.500e-3"), "{told:?}");
+}
+
+#[test]
+fn gaps_of_sectors_stand_for_the_gap_and_heat_needs_friction() {
+    let project = Project::new();
+    fs::write(project.path("scene.toml"), SCENE.replace("gap = 1e-3", "sector_gaps = [1e-3, 1e-3, 1.2e-3, 1e-3]"))
+        .unwrap();
+    let (names, rows) = columns(&project.succeed(&["run", "scene.toml", "--csv", "-", "--quiet"]));
+    let clearance = names.iter().position(|name| name == "clearance_minimum").unwrap();
+    assert!(rows.last().unwrap()[clearance] <= 1e-3);
+    assert!(project.succeed(&["inspect", "scene.toml", "--quiet"]).contains("gaps 0.001 m to 0.0012 m"));
+    fs::write(project.path("scene.toml"), SCENE.replace("friction = 0.1", "heat_to_slave = 0.5")).unwrap();
+    let error = project.fail(&["run", "scene.toml"], 1);
+    assert!(error.contains("heat_to_slave") && error.contains("friction"), "{error}");
+}
+
+#[test]
+fn a_run_beyond_the_memory_is_refused_with_its_size() {
+    let project = Project::new();
+    let message = project.fail(&["run", "scene.toml", "--step", "1e-9", "--quiet"], 2);
+    assert!(message.contains("50000001 communication points") && message.contains("GB"), "{message}");
+    let output = project.run(&["run", "scene.toml", "--step", "1e-9", "--json"]);
+    assert_eq!(json(&output)["error"]["exit_code"], 2);
+}

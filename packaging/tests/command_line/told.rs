@@ -1,0 +1,91 @@
+//! Warnings, and what is printed.
+
+use std::fs;
+
+use crate::project::{Project, SCENE, json};
+
+#[test]
+fn warnings_are_on_stderr_even_when_quiet_and_in_json() {
+    let project = Project::new();
+    // Just longer than 2/omega_max = 2 ms of the springs; much longer ones end the run, for energy that was not supplied.
+    let coarse = SCENE
+        .replace("step = 1e-4", "step = 2.05e-3")
+        .replace("communication_step = 1e-3", "communication_step = 4.1e-3");
+    fs::write(project.path("scene.toml"), coarse).unwrap();
+    for arguments in [
+        &["run", "scene.toml", "--json", "--quiet"][..],
+        &["package", "scene.toml", "-o", "x", "--library", "library.so", "--json", "--quiet"],
+        &["inspect", "scene.toml", "--json", "--quiet"],
+        &["inspect", "x/small_fmi2.fmu", "--json", "--quiet"],
+    ] {
+        let output = project.run(arguments);
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        let shown: Vec<&str> = stderr.lines().filter_map(|line| line.strip_prefix("warning: ")).collect();
+        assert!(output.status.success() && shown.len() == 1, "{arguments:?}: {stderr}");
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let warnings = if arguments[0] == "inspect" { &json["scene"]["warnings"] } else { &json["warnings"] };
+        assert_eq!(warnings, &serde_json::json!(shown), "{arguments:?}");
+    }
+}
+
+#[test]
+fn slips_are_asked_about_by_every_command() {
+    let project = Project::new();
+    fs::write(
+        project.path("scene.toml"),
+        SCENE
+            .replace("speed = 100.0", "speed = 17188.0")
+            .replace("step = 1e-4", "step = 1e-5")
+            .replace("amplitude = 2e-3", "amplitude = 2e-6"),
+    )
+    .unwrap();
+    for line in [
+        "run scene.toml --stop 1e-4 --step 1e-5",
+        "inspect scene.toml",
+        "package scene.toml -o x --library library.so",
+        "inspect x/small_fmi3.fmu",
+    ] {
+        let output = project.run(&line.split(' ').collect::<Vec<_>>());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        let told: Vec<_> = stderr.lines().filter(|text| text.contains("rpm")).collect();
+        assert!(output.status.success() && told.len() == 1 && told[0].contains("4297 m/s"), "{line}: {stderr}");
+    }
+    // A ROM by hand in millimetres.
+    let path = project.path("small.rom.safetensors");
+    let mut rom = tiprub_format::read_rom(&fs::read(&path).unwrap(), "small").unwrap();
+    rom.contact_nodes[0].position[0] = 250.0;
+    fs::write(&path, tiprub_format::write_rom(&rom)).unwrap();
+    for line in ["inspect small.rom.safetensors", "inspect scene.toml"] {
+        let output = project.run(&line.split(' ').collect::<Vec<_>>());
+        assert!(String::from_utf8(output.stderr).unwrap().contains("millimetres"), "{line}");
+    }
+}
+
+#[test]
+fn nothing_that_a_terminal_obeys_is_printed() {
+    let project = Project::new();
+    let mut rom = tiprub_format::read_rom(&fs::read(project.path("small.rom.safetensors")).unwrap(), "").unwrap();
+    rom.origin = "mass\u{1b}]0;owned\u{7}\u{9b}31m\u{202e}".into();
+    fs::write(project.path("odd.safetensors"), tiprub_format::write_rom(&rom)).unwrap();
+    let described = SCENE.replace("name = \"small\"", "name = \"small\"\ndescription = \"red \\u001b[31m\"");
+    fs::write(project.path("odd.toml"), described).unwrap();
+    for words in [
+        &["inspect", "odd.safetensors"][..],
+        &["inspect", "odd.safetensors", "--json"],
+        &["inspect", "odd.toml"],
+        &["inspect", "odd.toml", "--json"],
+        &["inspect", "no\u{1b}[31m\nerror: forged.toml"],
+        &["run", "no\u{1b}[31m\nerror: forged.toml", "--json"],
+    ] {
+        let output = project.run(words);
+        let text = String::from_utf8([output.stdout.clone(), output.stderr.clone()].concat()).unwrap();
+        let obeyed = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
+        assert!(
+            !text.contains(obeyed) && !text.lines().any(|line| line.starts_with("error: forged")),
+            "{words:?}: {text:?}"
+        );
+        if words.contains(&"--json") {
+            json(&output);
+        }
+    }
+}

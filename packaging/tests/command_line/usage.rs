@@ -1,0 +1,127 @@
+//! Command lines and files that are wrong: exit codes, what is said, and the same as JSON.
+
+use std::fs;
+
+use crate::project::{Project, SCENE, json};
+
+#[test]
+fn wrong_command_lines_exit_with_two_and_say_what_to_do() {
+    let project = Project::new();
+    let unknown = project.fail(&["run", "scene.toml", "--set", "sped=1"], 2);
+    assert!(unknown.contains("no such variable") && unknown.contains("`speed`"), "{unknown}");
+    let wrong = project.fail(&["run", "scene.toml", "--set", "speed=fast"], 2);
+    assert!(wrong.contains("not a number"), "{wrong}");
+    let infinite = project.fail(&["run", "scene.toml", "--set", "speed=inf"], 2);
+    assert!(infinite.contains("--set speed=inf"), "{infinite}");
+    let stop = project.fail(&["run", "scene.toml", "--stop", "-1"], 2);
+    assert!(stop.contains("--stop"), "{stop}");
+    let two = project.fail(&["package", "scene.toml", "-o", "x.fmu"], 2);
+    assert!(two.contains("two FMUs"), "{two}");
+    project.fail(&["package", "scene.toml", "--fmi", "4"], 2);
+    project.fail(&["frobnicate"], 2);
+}
+
+#[test]
+fn failures_exit_with_one_and_are_json_too() {
+    let project = Project::new();
+    let output = project.run(&["run", "missing.toml", "--json"]);
+    assert_eq!(output.status.code(), Some(1));
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(json["error"]["what"].as_str().unwrap().contains("missing.toml"), "{json}");
+    fs::write(project.path("bad.toml"), SCENE.replace("friction = 0.1", "frictoin = 0.1")).unwrap();
+    let bad = project.fail(&["run", "bad.toml"], 1);
+    assert!(bad.contains("bad.toml:") && bad.contains("frictoin") && bad.contains("`friction`"), "{bad}");
+    let rom = fs::read(project.path("small.rom.safetensors")).unwrap();
+    fs::write(project.path("small.rom.safetensors"), &rom[..rom.len() / 2]).unwrap();
+    let truncated = project.fail(&["run", "scene.toml"], 1);
+    assert!(truncated.contains("small.rom.safetensors"), "{truncated}");
+}
+
+/// Of every command, whoever refuses: the parser, the program for a spelling of before, or the work.
+#[test]
+fn every_error_is_one_json_object_too() {
+    let project = Project::new();
+    for (line, code, what, words) in [
+        ("run --json", 2, "<SCENE>", "required"),
+        ("frobnicate --json", 2, "frobnicate", "unrecognized subcommand"),
+        ("--json run scene.toml --stop", 2, "--stop", "value is required"),
+        ("--json run scene.toml --setp a=1", 2, "--setp", "--set"),
+        ("package scene.toml --fmi 4 --json", 2, "--fmi", "both"),
+        ("--json", 2, "tiprub", "a command is missing. Choose one of demo"),
+        ("--json reduce", 2, "command line", "a command is missing"),
+        ("study --json", 2, "tiprub study", "a command is missing. Choose one of map"),
+        ("study tip --json", 2, "study tip", "`stability`"),
+        ("study stage --json", 2, "stage", "tiprub-lab"),
+        ("stability --case friction/ --json", 2, "stability", "tiprub study stability SCENE"),
+        ("reduce bar.inp --contact-set A --clamp-set B --json", 2, "reduce bar.inp", "tiprub reduce blade bar.inp"),
+        ("reduce rotor38 --json", 2, "reduce rotor38", "rotor37"),
+        ("reduce rotor37 --thickness 0.003 --json", 2, "--thickness", "unexpected argument"),
+        ("reduce blade none.inp --contact-set A --clamp-set B --json", 1, "none.inp", "cannot be read"),
+        ("inspect none.fmu --json", 1, "none.fmu", "cannot be read"),
+        ("package scene.toml --library none.so --json", 1, "none.so", "cannot be read"),
+        ("study stability none.toml --json", 1, "none.toml", "cannot be read"),
+        ("study error scene.toml --set scheme=1 --json", 2, "--set scheme", "compares"),
+        ("demo --out scene.toml --json", 1, "scene.toml", "directory"),
+    ] {
+        let output = project.run(&line.split(' ').collect::<Vec<_>>());
+        let error = &json(&output)["error"];
+        assert_eq!((output.status.code(), error["exit_code"].as_i64()), (Some(code), Some(i64::from(code))), "{line}");
+        let [name, problem, remedy] = ["what", "problem", "remedy"].map(|key| error[key].as_str().unwrap());
+        assert!(name.contains(what), "{line}: {error}");
+        assert!(format!("{problem}. {remedy}").contains(words), "{line}: {error}");
+        assert!(!problem.is_empty() && !problem.contains('\n') && !problem.contains("Usage:"), "{line}: {error}");
+        assert!(!output.stderr.is_empty(), "{line}");
+    }
+    // Help is no failure, and a file may be called --json.
+    assert!(String::from_utf8(project.run(&["--json", "--help"]).stdout).unwrap().contains("Usage"));
+    assert!(project.run(&["run", "--nothing", "--", "--json"]).stdout.is_empty());
+}
+
+#[test]
+fn help_is_there_for_every_command() {
+    let project = Project::new();
+    for command in ["demo", "reduce", "package", "run", "inspect", "study"] {
+        let help = project.succeed(&[command, "--help"]);
+        assert!(help.contains("Examples:") && help.contains("--json"), "{help}");
+    }
+}
+
+/// Whatever is given, an error is a line or two: no number is written out with three hundred digits.
+#[test]
+fn numbers_in_errors_are_short() {
+    let project = Project::new();
+    for (from, to, number) in [
+        ("friction = 0.1", "friction = 1e300", "1e300"),
+        ("gap = 1e-3", "gap = -1e300", "-1e300"),
+        ("stop = 0.05", "stop = -1e300", "-1e300"),
+        ("step = 1e-4", "step = 1e-300", "1e-300"),
+        ("ramp_time = 0.02", "ramp_time = 1e300", "1e300"),
+    ] {
+        fs::write(project.path("wrong.toml"), SCENE.replacen(from, to, 1)).unwrap();
+        let told = project.fail(&["run", "wrong.toml"], 1);
+        assert!(told.contains(number) && told.len() < 300, "{told}");
+    }
+    for (arguments, number) in [
+        (["--set", "damping_ratio=1e300"], "1e300"),
+        (["--set", "damping_ratio=-1e300"], "-1e300"),
+        (["--set", "friction_coefficient=1e300"], "1e300"),
+        (["--stop", "-1e300"], "-1e300"),
+        (["--step", "-1e300"], "-1e300"),
+    ] {
+        let told = project.fail(&[&["run", "scene.toml"], &arguments[..]].concat(), 2);
+        assert!(told.contains(number) && told.len() < 300, "{told}");
+    }
+}
+
+#[test]
+fn a_changed_scene_stops_the_demo_before_any_work() {
+    let project = Project::new();
+    fs::create_dir(project.path("demo")).unwrap();
+    for (changed, kept) in [("rotor37.toml", SCENE), ("rotor37.toml", "")] {
+        fs::write(project.path("demo").join(changed), kept).unwrap();
+        let error = project.fail(&["demo", "--library", "none.so"], 1);
+        assert!(error.contains("rotor37.toml") && error.contains("--out"), "{error}");
+        assert_eq!(fs::read_to_string(project.path("demo").join(changed)).unwrap(), kept);
+    }
+    assert_eq!(fs::read_dir(project.path("demo")).unwrap().count(), 1);
+}

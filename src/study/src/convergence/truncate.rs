@@ -1,0 +1,207 @@
+//! A ROM with fewer of its own modes: Craig and Bampton's reduction applied to the reduced model itself, so that contact nodes and
+//! their static responses stay. Of a ROM whose contact nodes leave no room for that, the lowest natural modes.
+
+use nalgebra::{ComplexField, DMatrix};
+use tiprub_core::{
+    Rom,
+    rom::{Harmonic, RomChecks, Spin, Thermal},
+};
+
+/// How a ROM is truncated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// Modes with the contact nodes held, beside the displacements of these.
+    Held,
+    /// Natural modes.
+    Natural,
+}
+
+impl Form {
+    /// Of a ROM.
+    pub fn of(rom: &Rom) -> Self {
+        if rom.contact_map.nrows() < rom.order() { Self::Held } else { Self::Natural }
+    }
+
+    /// Modes that a ROM has in this form; of coupled sectors those of nodal diameter 0.
+    pub fn modes(self, rom: &Rom) -> usize {
+        match self {
+            Self::Held => rom.order() - rom.contact_map.nrows(),
+            Self::Natural => rom.order(),
+        }
+    }
+}
+
+/// The ROM with `modes` of its own modes; of coupled sectors at every nodal diameter as many less.
+///
+/// # Errors
+/// Why it cannot be truncated.
+pub fn truncated(rom: &Rom, modes: usize) -> Result<Rom, String> {
+    let form = Form::of(rom);
+    let less = form.modes(rom).saturating_sub(modes);
+    let basis = basis(form, [&rom.mass, &rom.stiffness, &rom.contact_map], less)?;
+    let [mass, stiffness] = [&rom.mass, &rom.stiffness].map(|matrix| congruent(matrix, &basis));
+    let mut found = Rom {
+        mass,
+        stiffness,
+        contact_map: &rom.contact_map * &basis,
+        checks: RomChecks::default(),
+        origin: format!("{}; truncated to {modes} modes", rom.origin),
+        ..rom.clone()
+    };
+    found.extras.spin = rom.extras.spin.as_ref().map(|spin| of_spin(spin, &basis));
+    found.extras.thermal = rom
+        .extras
+        .thermal
+        .as_ref()
+        .map(|thermal| Thermal { loads: basis.transpose() * &thermal.loads, patches: thermal.patches.clone() });
+    let harmonics = rom.extras.harmonics.iter().map(|harmonic| of_harmonic(form, harmonic, less));
+    found.extras.harmonics = harmonics.collect::<Result<_, _>>()?;
+    found.validate().map_err(|error| error.to_string())?;
+    Ok(found)
+}
+
+fn of_harmonic(form: Form, harmonic: &Harmonic, less: usize) -> Result<Harmonic, String> {
+    let basis = basis(form, [&harmonic.mass, &harmonic.stiffness, &harmonic.contact_map], less)?;
+    Ok(Harmonic {
+        mass: congruent(&harmonic.mass, &basis),
+        stiffness: congruent(&harmonic.stiffness, &basis),
+        contact_map: &harmonic.contact_map * &basis,
+    })
+}
+
+fn of_spin(spin: &Spin, basis: &DMatrix<f64>) -> Spin {
+    let load = |load: &[f64]| (basis.transpose() * DMatrix::from_column_slice(load.len(), 1, load)).as_slice().to_vec();
+    let coriolis = basis.transpose() * &spin.coriolis * basis;
+    Spin {
+        stiffness_speed2: congruent(&spin.stiffness_speed2, basis),
+        stiffness_speed4: congruent(&spin.stiffness_speed4, basis),
+        coriolis: (&coriolis - coriolis.transpose()) * 0.5,
+        centrifugal_load: load(&spin.centrifugal_load),
+        centrifugal_load_speed4: load(&spin.centrifugal_load_speed4),
+        largest_speed: spin.largest_speed,
+    }
+}
+
+/// Tᴴ A T of a Hermitian A, Hermitian to the last bit.
+fn congruent<T: ComplexField<RealField = f64>>(matrix: &DMatrix<T>, basis: &DMatrix<T>) -> DMatrix<T> {
+    let found = basis.adjoint() * matrix * basis;
+    (&found + found.adjoint()).map(|entry| entry.scale(0.5))
+}
+
+/// Columns that are kept: static responses to displacements of the contact nodes and modes with these held, or natural modes; `less`
+/// of the highest modes are left out.
+fn basis<T: ComplexField<RealField = f64>>(
+    form: Form,
+    [mass, stiffness, map]: [&DMatrix<T>; 3],
+    less: usize,
+) -> Result<DMatrix<T>, String> {
+    let order = mass.nrows();
+    if form == Form::Natural {
+        let kept = order.checked_sub(less).filter(|kept| *kept > 0).ok_or("no mode would be left")?;
+        return modes(&DMatrix::identity(order, order), mass, stiffness, kept);
+    }
+    // Displacements of the contact nodes by the shortest coordinates, and what moves none of them.
+    let gram = (map * map.adjoint()).try_inverse().ok_or("two of its contact displacements are one")?;
+    let inverse = map.adjoint() * gram;
+    let projector = DMatrix::identity(order, order) - &inverse * map;
+    let eigen = projector.symmetric_eigen();
+    let free: Vec<usize> = (0..order).filter(|column| eigen.eigenvalues[*column] > 0.5).collect();
+    let inner = eigen.eigenvectors.select_columns(&free);
+    let kept = free.len().checked_sub(less).ok_or("no mode would be left at one of the nodal diameters")?;
+    let held = inner.adjoint() * stiffness * &inner;
+    let moved = held.try_inverse().ok_or("it moves as a rigid body with its contact nodes held")?;
+    let statics = &inverse - &inner * (moved * inner.adjoint() * stiffness * &inverse);
+    let modes = modes(&inner, mass, stiffness, kept)?;
+    let mut basis = DMatrix::zeros(order, statics.ncols() + kept);
+    basis.columns_mut(0, statics.ncols()).copy_from(&statics);
+    basis.columns_mut(statics.ncols(), kept).copy_from(&modes);
+    Ok(basis)
+}
+
+/// The `kept` lowest modes of the pencil within a space.
+fn modes<T: ComplexField<RealField = f64>>(
+    space: &DMatrix<T>,
+    mass: &DMatrix<T>,
+    stiffness: &DMatrix<T>,
+    kept: usize,
+) -> Result<DMatrix<T>, String> {
+    let lower = congruent(mass, space).cholesky().ok_or("its mass matrix is not positive definite")?.l();
+    let inverse = lower.try_inverse().ok_or("its mass matrix is singular")?;
+    let scaled = &inverse * congruent(stiffness, space) * inverse.adjoint();
+    let eigen = (&scaled + scaled.adjoint()).map(|entry| entry.scale(0.5)).symmetric_eigen();
+    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+    order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+    order.truncate(kept);
+    Ok(space * inverse.adjoint() * eigen.eigenvectors.select_columns(&order))
+}
+
+#[cfg(test)]
+mod tests {
+    use tiprub_core::dynamics::modal::ModalModel;
+    use tiprub_model::{Rotor37Options, reduce_rotor37, rotor37::MeshCounts};
+
+    use super::*;
+
+    /// Craig and Bampton's modes are nested: fewer of them by truncation are fewer of them by reduction, spin included.
+    #[test]
+    fn truncation_is_the_reduction_with_fewer_modes() {
+        let options = |modes: usize| Rotor37Options {
+            mesh: MeshCounts { chord: 4, thickness: 1, span: 6 },
+            contact_nodes: 2,
+            fixed_interface_modes: modes,
+            spin: Some(1000.0),
+            ..Rotor37Options::default()
+        };
+        let [fine, coarse] = [8, 4].map(|modes| reduce_rotor37(&options(modes), &|_| {}).unwrap().rom);
+        let found = truncated(&fine, 4).unwrap();
+        assert_eq!((Form::of(&fine), Form::of(&fine).modes(&fine), found.order()), (Form::Held, 8, coarse.order()));
+        // The stiffness over speed is a fit, to the modes that are kept.
+        for (speed, close) in [(0.0, 1e-6), (900.0, 1e-3)] {
+            let [own, other] = [&found, &coarse].map(|rom| ModalModel::at_speed(rom, 0.01, speed).unwrap());
+            for (a, b) in own.frequencies.iter().zip(&other.frequencies) {
+                assert!((a / b - 1.0).abs() < close, "{a} {b} at {speed}");
+            }
+        }
+        // With all modes nothing changes; and the response at rest never does. Coordinates of another kind are no matter.
+        let order = fine.order();
+        let turned = DMatrix::from_fn(order, order, |i, j| if i == j { 1.0 } else { 0.3 / (1 + i + 2 * j) as f64 });
+        let mut other = fine.clone();
+        (other.mass, other.stiffness) = (congruent(&fine.mass, &turned), congruent(&fine.stiffness, &turned));
+        other.contact_map = &fine.contact_map * &turned;
+        other.extras.spin = None;
+        let again = truncated(&other, 4).unwrap();
+        let [own, expected] = [&again, &coarse].map(|rom| ModalModel::from_rom(rom, 0.01).unwrap().frequencies);
+        assert!(own.iter().zip(&expected).all(|(a, b)| (a / b - 1.0).abs() < 1e-6), "{own:?} {expected:?}");
+        let whole = truncated(&fine, 8).unwrap();
+        let compliance =
+            |rom: &Rom| &rom.contact_map * rom.stiffness.clone().try_inverse().unwrap() * rom.contact_map.transpose();
+        for rom in [&whole, &found, &again] {
+            let off = (compliance(rom) - compliance(&fine)).amax() / compliance(&fine).amax();
+            assert!(off < 1e-9, "{off:e}");
+        }
+    }
+
+    #[test]
+    fn a_rom_with_more_contact_than_coordinates_keeps_its_lowest_modes() {
+        let options = Rotor37Options {
+            mesh: MeshCounts { chord: 4, thickness: 1, span: 6 },
+            contact_nodes: 2,
+            fixed_interface_modes: 8,
+            ..Rotor37Options::default()
+        };
+        let mut rom = reduce_rotor37(&options, &|_| {}).unwrap().rom;
+        let frequencies = ModalModel::from_rom(&rom, 0.01).unwrap().frequencies;
+        // The same displacements named many times over.
+        rom.contact_map = DMatrix::from_fn(18, rom.order(), |row, column| rom.contact_map[(row % 6, column)]);
+        let nodes = rom.contact_nodes.iter().cycle().take(6).enumerate();
+        rom.contact_nodes = nodes
+            .map(|(number, node)| tiprub_core::rom::ContactNode { name: format!("node_{number}"), ..node.clone() })
+            .collect();
+        let found = truncated(&rom, 5).unwrap();
+        assert_eq!((Form::of(&rom), found.order()), (Form::Natural, 5));
+        for (a, b) in ModalModel::from_rom(&found, 0.01).unwrap().frequencies.iter().zip(&frequencies) {
+            assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+        }
+        assert!(truncated(&rom, 0).unwrap_err().contains("no mode"));
+    }
+}

@@ -1,0 +1,128 @@
+//! The largest internal step of every scheme and solver at the scene's own friction and speed, up to which all that were tried are
+//! accepted.
+
+use tiprub_core::{
+    dynamics::{cyclic::CyclicModel, modal::ModalModel},
+    settings::{Scheme, Solver},
+};
+use tiprub_shell::{Result, console::Console, sweep};
+
+use super::{
+    asked::{Answer, Asked, Method, Own, Place},
+    seek::{Sought, TRIED, seek},
+};
+
+/// How far a scheme goes with a solver.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Usable {
+    /// Scheme and solver.
+    pub method: Method,
+    /// The largest step (s), and why a longer one is refused; or why none is accepted.
+    pub sought: Sought<String>,
+}
+
+impl Usable {
+    /// The largest step (s) that was accepted.
+    pub fn step(&self) -> Option<f64> {
+        match self.sought {
+            Sought::All(step) | Sought::Below(step, _) => Some(step),
+            Sought::None(_) => None,
+        }
+    }
+
+    /// For people.
+    pub fn to_text(&self) -> String {
+        match &self.sought {
+            Sought::All(step) => format!("none refused up to {step:.1e} s"),
+            Sought::Below(step, _) => format!("{step:.3e} s"),
+            Sought::None(why) => format!("refused: {}", why.trim_start_matches("refused: ")),
+        }
+    }
+
+    /// Why a longer step is refused.
+    pub fn why(&self) -> &str {
+        match &self.sought {
+            Sought::All(_) => "",
+            Sought::Below(_, why) | Sought::None(why) => why,
+        }
+    }
+}
+
+/// Highest angular frequency of all structures (rad/s).
+fn highest(asked: &Asked) -> f64 {
+    let of = |rom: &tiprub_core::Rom| {
+        if rom.is_cyclic() {
+            CyclicModel::from_rom(rom, 0.0).map(|model| model.largest_frequency())
+        } else {
+            ModalModel::from_rom(rom, 0.0).map(|model| model.largest_frequency())
+        }
+    };
+    asked.scene.roms.iter().filter_map(|rom| of(rom).ok()).fold(0.0, f64::max)
+}
+
+/// Limits of all: scheme by scheme at the same time. What a solver changes is asked at the limit of the scheme's first, and sought
+/// anew where the answers differ.
+///
+/// # Errors
+/// A thread that is lost.
+pub fn of(asked: &Asked, own: &Own, threads: usize, quick: bool, console: &Console) -> Result<Vec<Usable>> {
+    let place = [Place { friction: own.friction, speed: own.speed }];
+    let highest = highest(asked);
+    let range = TRIED.map(|product| product / highest);
+    // Quickly: from the scene's own step or the resolved one, whichever is longer; below it nothing is looked at.
+    let range = if quick { [range[0].max(own.step).min(range[1]), range[1]] } else { range };
+    let task = console.task("Seeking the largest usable steps", Some(Scheme::ALL.len() as u64));
+    let of_scheme = |scheme: &Scheme| {
+        let ask = |solver: Solver, step: f64| -> Answer { asked.at((*scheme, solver), step, &place).remove(0) };
+        let known = (*scheme == Scheme::CentralDifference).then(|| 2.0 / highest);
+        let sought = |solver: Solver, range: [f64; 2]| seek(range, known, |step| ask(solver, step).map(drop));
+        let mut found: Vec<Usable> = Vec::new();
+        for solver in Solver::ALL {
+            let like = found.iter().find(|other| alike(other, &|step| ask(solver, step)));
+            let sought = match like {
+                Some(other) => other.sought.clone(),
+                None => match sought(solver, range) {
+                    // Refused at the scene's own step already: the limit lies below.
+                    Sought::None(_) if quick => sought(solver, TRIED.map(|product| product / highest)),
+                    found => found,
+                },
+            };
+            found.push(Usable { method: (*scheme, solver), sought });
+        }
+        Ok(found)
+    };
+    let progress = |done: usize| {
+        task.at(done as u64);
+        task.line(&format!("{done} of {} schemes", Scheme::ALL.len()));
+    };
+    Ok(sweep::sweep(&Scheme::ALL, threads, of_scheme, progress)?.concat())
+}
+
+/// Whether another solver answers the same just below and just above a limit, and in the same words.
+fn alike(other: &Usable, ask: &dyn Fn(f64) -> Answer) -> bool {
+    let Sought::Below(step, why) = &other.sought else { return false };
+    // Twice the width of the last interval.
+    ask(step * (1.0 - 1e-6)).is_ok() && ask(step * 1.02).is_err_and(|refusal| same_reason(&refusal, why))
+}
+
+/// Refusals that differ in their numbers only.
+pub fn same_reason(a: &str, b: &str) -> bool {
+    let words = |text: &str| {
+        text.split_whitespace()
+            .filter(|word| !word.contains(|c: char| c.is_ascii_digit()))
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
+    };
+    words(a) == words(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reasons_are_told_apart_by_their_words() {
+        assert!(same_reason("ω_max·h = 2.1 ≥ 2 at 1e-6 s", "ω_max·h = 3.7 ≥ 2 at 2e-6 s"));
+        assert!(!same_reason("ω_max·h = 2.1 ≥ 2", "`coulomb` is not prepared"));
+    }
+}

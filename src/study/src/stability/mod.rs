@@ -1,0 +1,195 @@
+//! What a scene allows: right, warned or refused over friction, speed and internal step, growth of sliding contact, and the largest
+//! usable step of every scheme and solver.
+//!
+//! The answers are those of the core, asked as a run asks it ([`asked`]). [`structure`] holds growth rates and limits of one structure
+//! by itself, [`grid`] what is asked, [`limits`] the largest steps, [`page`] pictures and tables.
+
+pub mod asked;
+pub mod grid;
+pub mod limits;
+pub mod page;
+pub mod seek;
+pub mod structure;
+
+use asked::{Answer, Asked, Own, Place};
+use grid::Grid;
+use structure::{Rates, Sliding, Structure};
+use tiprub_core::{
+    Scene, Simulation,
+    rom::Frame,
+    settings::{Meridian, Motion, Scheme},
+};
+use tiprub_gallery::scene_source;
+use tiprub_shell::{Failure, Result, console::Console, sweep};
+
+use super::{Study, master};
+use crate::{arguments::StabilityArguments, error::own::refuse_compared};
+
+/// What makes friction a parameter of a scene; every answer sets it.
+const SOME_FRICTION: f64 = 0.1;
+
+/// The answer at one place and step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    /// Friction and speed.
+    pub place: Place,
+    /// Internal step (s).
+    pub step: f64,
+    /// What the core says.
+    pub answer: Answer,
+    /// How sliding contact grows there, where that can be told.
+    pub rates: Option<Rates>,
+}
+
+/// Kinds of answers, the better first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Verdict {
+    /// Accepted without a word.
+    Right,
+    /// Accepted with warnings.
+    Warned,
+    /// Accepted with warnings, and sliding contact flutters by itself.
+    Flutter,
+    /// Refused.
+    Refused,
+}
+
+impl Point {
+    /// The kind of the answer.
+    pub fn verdict(&self) -> Verdict {
+        let flutters = self.rates.as_ref().is_some_and(|rates| rates.growth.is_flutter());
+        match &self.answer {
+            Err(_) => Verdict::Refused,
+            Ok(_) if flutters => Verdict::Flutter,
+            Ok(warnings) if warnings.is_empty() => Verdict::Right,
+            Ok(_) => Verdict::Warned,
+        }
+    }
+
+    /// Refusal or warnings; empty where all is right.
+    pub fn words(&self) -> String {
+        match &self.answer {
+            Ok(warnings) => warnings.join("; "),
+            Err(refusal) => refusal.clone(),
+        }
+    }
+}
+
+/// Everything that was found of a scene.
+#[derive(Debug)]
+pub struct Found {
+    /// The scene.
+    pub scene: Scene,
+    /// How it was named on the command line.
+    pub name: String,
+    /// With what it starts.
+    pub own: Own,
+    /// What was asked.
+    pub grid: Grid,
+    /// All answers: step by step, in each speed by speed, in each by friction.
+    pub points: Vec<Point>,
+    /// Largest usable steps.
+    pub limits: Vec<limits::Usable>,
+    /// Why growth rates cannot be told, where they cannot.
+    pub no_rates: Option<&'static str>,
+}
+
+/// The study of a scene.
+///
+/// # Errors
+/// The scene cannot be read, is refused whatever is asked, or start values are wrong.
+pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study> {
+    refuse_compared(&arguments.set)?;
+    let scene = scene_source::load(&arguments.scene, &arguments.common.cache.cache(), console)?;
+    let (scene, frictionless) = with_friction(scene);
+    let asked = Asked { scene: &scene, settings: &arguments.set };
+    let mut own = asked.own()?;
+    if frictionless && !arguments.set.iter().any(|(name, _)| name == "friction_coefficient") {
+        own.friction = Some(0.0);
+    }
+    let coupled = scene.roms[master(&scene)].is_cyclic();
+    // Ranges that are wrong are refused before the work.
+    Grid::new(arguments, &own, coupled, None)?;
+    let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
+    let limits = limits::of(&asked, &own, threads, arguments.common.quick, console)?;
+    let usable = limits.iter().find(|usable| usable.method == own.method).and_then(limits::Usable::step);
+    let grid = Grid::new(arguments, &own, coupled, usable)?;
+    let structures = structures(&scene, &own, &grid)?;
+    let no_rates = structures.as_ref().err().copied();
+    let structures = structures.unwrap_or_default();
+    let points = points(&asked, &own, &grid, &structures, threads, console)?;
+    let found = Found { name: arguments.scene.clone(), own, grid, points, limits, no_rates, scene: scene.clone() };
+    page::study(&found)
+}
+
+/// Where a scene has no friction, the same with the parameter, so that more than none can be asked about; and whether it had none.
+fn with_friction(scene: Scene) -> (Scene, bool) {
+    let mut other = scene.clone();
+    let contacts = other.settings.contacts.iter_mut().filter(|contact| contact.friction == 0.0);
+    let changed = contacts.map(|contact| contact.friction = SOME_FRICTION).count();
+    if changed == scene.settings.contacts.len() && Simulation::new(&other).is_ok() {
+        (other, true)
+    } else {
+        (scene, false)
+    }
+}
+
+/// The master at every speed of the grid; or why its growth cannot be told.
+fn structures<'a>(scene: &'a Scene, own: &Own, grid: &Grid) -> Result<Result<Vec<Structure<'a>>, &'static str>> {
+    let index = master(scene);
+    let (settings, rom) = (&scene.settings.structures[index], &scene.roms[index]);
+    if settings.motion == Motion::Free || rom.frame == Frame::Cartesian {
+        return Ok(Err(
+            "the master flies freely: which contacts are closed, where and how long is not known beforehand",
+        ));
+    }
+    let damping = own.damping_ratio.unwrap_or(rom.damping_ratio);
+    let factor = settings.frequency_factors.iter().fold(1.0, |most: f64, factor| most.max(*factor));
+    let radial = scene.settings.contacts[0].meridian != Meridian::Contour;
+    let at = |speed: &Option<f64>| {
+        let speed = speed.filter(|_| settings.spin.stiffening).unwrap_or(0.0);
+        let structure = Structure::new(rom, damping, speed).map(|structure| structure.stiffened(factor));
+        structure.map(|structure| if radial { structure.radial() } else { structure })
+    };
+    // A speed that the structure does not take is refused by the core, place by place.
+    let found: Vec<Structure> = grid.speeds.iter().map(at).collect::<tiprub_core::Result<_>>().unwrap_or_default();
+    Ok(if found.is_empty() { Err("its modes cannot be found at every speed") } else { Ok(found) })
+}
+
+/// All answers.
+fn points(
+    asked: &Asked,
+    own: &Own,
+    grid: &Grid,
+    structures: &[Structure],
+    threads: usize,
+    console: &Console,
+) -> Result<Vec<Point>> {
+    let places = grid.places();
+    let title =
+        format!("Asking {} about {} steps at {} places", asked.scene.settings.name, grid.steps.len(), places.len());
+    let task = console.task(&title, Some(grid.steps.len() as u64));
+    let of_step = |step: &f64| {
+        let answers = asked.at(own.method, *step, &places);
+        let rates = |index: usize, place: &Place| {
+            let structure = structures.get(index / grid.frictions.len())?;
+            rates(structure, own.method.0, *step, *place)
+        };
+        let points = places.iter().zip(answers).enumerate();
+        Ok(points
+            .map(|(index, (place, answer))| Point { place: *place, step: *step, answer, rates: rates(index, place) })
+            .collect::<Vec<_>>())
+    };
+    let progress = |done: usize| {
+        task.at(done as u64);
+        task.line(&format!("{done} of {} steps", grid.steps.len()));
+    };
+    let found = sweep::sweep(&grid.steps, threads, of_step, progress)?;
+    let found = found.concat();
+    if found.is_empty() { Err(Failure::new("stability", "nothing was asked", "")) } else { Ok(found) }
+}
+
+fn rates(structure: &Structure, scheme: Scheme, step: f64, place: Place) -> Option<Rates> {
+    let sliding = Sliding { friction: place.friction?, speed: place.speed.unwrap_or(0.0) };
+    structure.rates(scheme, step, sliding)
+}

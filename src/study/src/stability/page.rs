@@ -1,0 +1,376 @@
+//! The answers as pictures, tables and files.
+
+use serde_json::{Value, json};
+use tiprub_core::shown;
+use tiprub_figure::{
+    cells::{Cell, Cells, Kind, Panel},
+    plots::{Plot, Series},
+    table::Table,
+};
+use tiprub_shell::Result;
+
+use super::{Found, Point, Verdict, seek::Sought};
+use crate::{Figure, Picture, Sheet, Statement, Study, error_study};
+
+const VERDICTS: [Verdict; 4] = [Verdict::Right, Verdict::Warned, Verdict::Flutter, Verdict::Refused];
+
+const HOW_TO_READ: &str = "Every cell is the answer to a run with that friction, speed and internal step: the refusal or the warnings that \
+    `tiprub run` would give, here without the run. Read a column from the bottom up: where it turns to refused is the longest step for that \
+    friction; growth by friction comes in bands, so that an accepted step above a refused one is possible, and the table of largest usable \
+    steps names the step below the first refusal. Flutter is physics and no error of the step: friction feeds the blades while they touch, and \
+    a shorter step does not help; a frequency of 0 Hz is divergence, which grows without swinging. The framed cell is the scene as it stands; the words of a cell show where the pointer rests on it, and stand \
+    in the table and in answers-in-words.csv.";
+
+impl Verdict {
+    fn kind(self) -> Kind {
+        let (label, color, sign) = match self {
+            Self::Right => ("right", "#c5e0d2", ""),
+            Self::Warned => ("accepted with warnings", "#f4e3a1", "!"),
+            Self::Flutter => ("accepted, flutters by friction", "#f2b98c", "~"),
+            Self::Refused => ("refused", "#cf8a98", "×"),
+        };
+        Kind { label: label.into(), color, sign }
+    }
+
+    fn name(self) -> &'static str {
+        ["right", "warned", "flutter", "refused"][self as usize]
+    }
+}
+
+/// The study from everything that was found.
+///
+/// # Errors
+/// A plot cannot be drawn.
+pub fn study(found: &Found) -> Result<Study> {
+    let mut figures = vec![answers(found)];
+    figures.extend(growth(found)?);
+    Ok(Study {
+        name: "stability",
+        title: format!("What {} allows", found.scene.settings.name),
+        summary: HOW_TO_READ.into(),
+        facts: facts(found),
+        statements: statements(found),
+        figures,
+        results: results(found),
+        files: vec![
+            (
+                "answers-in-words.csv".into(),
+                "every answer with its words and growth rates".into(),
+                words(found).into_bytes(),
+            ),
+            (
+                "largest-steps.csv".into(),
+                "largest usable step of every scheme and solver".into(),
+                limits_csv(found).into_bytes(),
+            ),
+        ],
+    })
+}
+
+fn or_none(value: Option<f64>) -> String {
+    value.map_or_else(|| "not in this scene".into(), shown)
+}
+
+/// Numbers for a cell or a label.
+fn short(value: f64) -> String {
+    format!("{:.4}", value).trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+fn micro(step: f64) -> String {
+    let value = 1e6 * step;
+    if (0.01..1e5).contains(&value) { short(value) } else { format!("{value:.2e}") }
+}
+
+fn facts(found: &Found) -> Vec<(String, String)> {
+    let (settings, own) = (&found.scene.settings, &found.own);
+    let range = |values: &[Option<f64>]| match values {
+        [Some(low), .., Some(high)] => format!("{} from {} to {}", values.len(), short(*low), short(*high)),
+        [one] => or_none(*one),
+        _ => or_none(None),
+    };
+    let steps = match found.grid.steps.as_slice() {
+        [low, .., high] => format!("{} from {low:.3e} to {high:.3e}", found.grid.steps.len()),
+        steps => steps.iter().map(|step| shown(*step)).collect(),
+    };
+    let mut facts = vec![
+        ("scene".to_owned(), format!("{}, {}", found.name, settings.name)),
+        ("friction coefficient of the scene".into(), or_none(own.friction)),
+        ("speed of the scene (rad/s)".into(), or_none(own.speed)),
+        ("internal step of the scene (s)".into(), shown(own.step)),
+        ("scheme and solver of the scene".into(), error_study::name(own.method)),
+        ("asked: friction coefficients".into(), range(&found.grid.frictions)),
+        ("asked: speeds (rad/s)".into(), range(&found.grid.speeds)),
+        ("asked: internal steps (s)".into(), steps),
+    ];
+    for usable in &found.limits {
+        facts.push((format!("largest usable step, {}", error_study::name(usable.method)), usable.to_text()));
+    }
+    facts
+}
+
+/// The point of the scene as it stands.
+fn own(found: &Found) -> Option<&Point> {
+    let own = &found.own;
+    let is = |point: &&Point| {
+        point.place.friction == own.friction
+            && point.place.speed == own.speed
+            && point.step.to_bits() == own.step.to_bits()
+    };
+    found.points.iter().find(is)
+}
+
+fn statements(found: &Found) -> Vec<Statement> {
+    let mut all = Vec::new();
+    if let Some(point) = own(found) {
+        let words = match (&point.answer, point.words()) {
+            (Err(_), words) => words,
+            (Ok(_), words) if words.is_empty() => "accepted without a warning".into(),
+            (Ok(_), words) => format!("accepted with warnings: {words}"),
+        };
+        all.push(Statement::tested("The scene as it stands is accepted", point.answer.is_ok(), words));
+        all.extend(flutter(found, point));
+    }
+    let usable = found.limits.iter().find(|usable| usable.method == found.own.method);
+    if let Some(usable) = usable {
+        let within = usable.step().is_some_and(|step| found.own.step <= step);
+        all.push(Statement::tested(
+            "Its internal step lies within those of which all shorter ones are accepted",
+            within,
+            format!("{} s of {}", shown(found.own.step), usable.to_text()),
+        ));
+    }
+    let count = |verdict: Verdict| found.points.iter().filter(|point| point.verdict() == verdict).count();
+    let counts: Vec<String> =
+        VERDICTS.iter().map(|verdict| format!("{} {}", count(*verdict), verdict.kind().label)).collect();
+    all.push(Statement::remark(format!("Answers at {} places", found.points.len()), counts.join(", ")));
+    all
+}
+
+fn flutter(found: &Found, point: &Point) -> Option<Statement> {
+    let expected = "At the scene's friction sliding contact does not grow by itself (flutter)";
+    if let Some(why) = found.no_rates {
+        return Some(Statement::remark(expected, format!("not known: {why}")));
+    }
+    let Some(rates) = &point.rates else {
+        return Some(Statement::remark(expected, "not known: no friction, or more modes than rates are computed for"));
+    };
+    let frequency = rates.frequency.map_or(String::new(), |hertz| format!(" at {hertz:.1} Hz"));
+    let text = format!("growth rate {:.3e} 1/s{frequency}, closed at {}", rates.growth.continuous, rates.closed);
+    Some(Statement::tested(expected, !rates.growth.is_flutter(), text))
+}
+
+fn title(speed: Option<f64>) -> String {
+    speed.map_or_else(String::new, |speed| format!("{} rad/s", short(speed)))
+}
+
+/// The map, with the tables below it.
+fn answers(found: &Found) -> Figure {
+    let (grid, count) = (&found.grid, found.grid.frictions.len());
+    let of = |speed: usize, step: usize| {
+        let places = count * grid.speeds.len();
+        &found.points[step * places + speed * count..][..count]
+    };
+    let cell = |point: &Point| Cell {
+        kind: point.verdict() as usize,
+        words: format!(
+            "µ {}, h {} µs: {}",
+            point.place.friction.map_or("-".into(), short),
+            micro(point.step),
+            if point.words().is_empty() { "right".into() } else { point.words() }
+        ),
+    };
+    let at = |values: &[Option<f64>], own: Option<f64>| values.iter().position(|value| *value == own);
+    let row = grid.steps.iter().rev().position(|step| step.to_bits() == found.own.step.to_bits());
+    let panel = |(index, speed): (usize, &Option<f64>)| Panel {
+        title: title(*speed),
+        cells: (0..grid.steps.len()).rev().map(|step| of(index, step).iter().map(cell).collect()).collect(),
+        framed: row.zip(at(&grid.frictions, found.own.friction)).filter(|_| *speed == found.own.speed),
+    };
+    let cells = Cells {
+        x_label: "friction coefficient µ".into(),
+        y_label: "h (µs)".into(),
+        columns: grid.frictions.iter().map(|friction| friction.map_or("-".into(), short)).collect(),
+        rows: grid.steps.iter().rev().map(|step| micro(*step)).collect(),
+        kinds: VERDICTS.iter().map(|verdict| verdict.kind()).collect(),
+        panels: grid.speeds.iter().enumerate().map(panel).collect(),
+    };
+    let svg = cells.to_svg();
+    let html = format!("{svg}{}{}", limits_table(found).to_html(false), points_table(found).to_html(true));
+    Figure {
+        name: "answers",
+        caption: format!(
+            "Answers of {} with {}, a panel per speed.",
+            found.scene.settings.name,
+            error_study::name(found.own.method)
+        ),
+        picture: Picture { svg, html },
+        sheet: sheet(found),
+    }
+}
+
+const COLUMNS: [&str; 7] = [
+    "speed (rad/s)",
+    "friction",
+    "internal step (s)",
+    "answer (0 right, 1 warned, 2 flutter, 3 refused)",
+    "growth of the equations (1/s)",
+    "growth of the steps (1/s)",
+    "frequency of flutter (Hz)",
+];
+
+/// NaN where the scene has no such value, or a rate cannot be told.
+fn sheet(found: &Found) -> Sheet {
+    let mut sheet = Sheet::new(COLUMNS);
+    let known = |value: Option<f64>| value.unwrap_or(f64::NAN);
+    for point in &found.points {
+        let growth = point.rates.as_ref().map(|rates| rates.growth);
+        sheet.rows.push(vec![
+            known(point.place.speed),
+            known(point.place.friction),
+            point.step,
+            f64::from(point.verdict() as u8),
+            known(growth.map(|growth| growth.continuous)),
+            known(growth.map(|growth| growth.stepped)),
+            known(point.rates.as_ref().and_then(|rates| rates.frequency)),
+        ]);
+    }
+    sheet
+}
+
+/// Cells of the tables for one point.
+fn row(point: &Point) -> Vec<String> {
+    let growth = point.rates.as_ref().map(|rates| rates.growth);
+    let rate = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.3e}"));
+    let frequency = point.rates.as_ref().and_then(|rates| rates.frequency);
+    vec![
+        point.place.speed.map_or(String::new(), shown),
+        point.place.friction.map_or(String::new(), short),
+        format!("{:.4e}", point.step),
+        point.verdict().name().into(),
+        rate(growth.map(|growth| growth.continuous)),
+        rate(growth.map(|growth| growth.stepped)),
+        frequency.map_or(String::new(), |hertz| format!("{hertz:.1}")),
+        point.words(),
+    ]
+}
+
+const HEADINGS: [&str; 8] = [
+    "speed (rad/s)",
+    "friction",
+    "internal step (s)",
+    "answer",
+    "growth of the equations (1/s)",
+    "growth of the steps (1/s)",
+    "flutter (Hz)",
+    "words",
+];
+
+fn points_table(found: &Found) -> Table {
+    let caption = format!("All {} answers in words", found.points.len());
+    Table { rows: found.points.iter().map(row).collect(), ..Table::new(caption, HEADINGS) }
+}
+
+/// A cell of a CSV file of text.
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
+
+fn csv(table: &Table) -> String {
+    let line = |cells: &[String]| cells.iter().map(|cell| quoted(cell)).collect::<Vec<_>>().join(",") + "\n";
+    std::iter::once(&table.columns).chain(&table.rows).map(|cells| line(cells)).collect()
+}
+
+fn words(found: &Found) -> String {
+    csv(&points_table(found))
+}
+
+fn limits_csv(found: &Found) -> String {
+    csv(&limits_table(found))
+}
+
+fn limits_table(found: &Found) -> Table {
+    let (friction, speed) = (or_none(found.own.friction), or_none(found.own.speed));
+    let caption = format!(
+        "Largest usable internal step at the scene's friction ({friction}) and speed ({speed} rad/s), to within 1 %: all shorter ones that were tried are accepted"
+    );
+    let mut table = Table::new(caption, ["scheme and solver", "largest step (s)", "what refuses a longer one"]);
+    for usable in &found.limits {
+        let step = match &usable.sought {
+            Sought::All(step) => format!("none refused up to {step:.1e}"),
+            Sought::Below(step, _) => format!("{step:.3e}"),
+            Sought::None(_) => "none".into(),
+        };
+        table.rows.push(vec![error_study::name(usable.method), step, usable.why().to_owned()]);
+    }
+    table
+}
+
+/// Growth rates over friction at the scene's speed: of the equations, and of the steps.
+fn growth(found: &Found) -> Result<Option<Figure>> {
+    let here: Vec<&Point> = found.points.iter().filter(|point| point.place.speed == found.own.speed).collect();
+    let rate = |point: &Point, value: &dyn Fn(&super::Rates) -> f64| {
+        Some((point.place.friction?, point.rates.as_ref().map(value)?))
+    };
+    let at = |step: f64, value: &dyn Fn(&super::Rates) -> f64| -> Vec<(f64, f64)> {
+        here.iter()
+            .filter(|point| point.step.to_bits() == step.to_bits())
+            .filter_map(|point| rate(point, value))
+            .collect()
+    };
+    let equations = at(found.own.step, &|rates| rates.growth.continuous);
+    if equations.len() < 2 {
+        return Ok(None);
+    }
+    let mut series = vec![Series::line("without time discretisation", equations.clone())];
+    let mut sheet =
+        Sheet { columns: vec!["friction".into(), "growth of the equations (1/s)".into()], rows: Vec::new() };
+    let mut columns = vec![equations];
+    for step in &found.grid.steps {
+        let points = at(*step, &|rates| rates.growth.stepped);
+        series.push(Series::line(format!("h = {} µs", micro(*step)), points.clone()));
+        sheet.columns.push(format!("growth of steps of {} s (1/s)", shown(*step)));
+        columns.push(points);
+    }
+    for (index, (friction, _)) in columns[0].iter().enumerate() {
+        let values = columns.iter().map(|column| column.get(index).map_or(f64::NAN, |point| point.1));
+        sheet.rows.push([*friction].into_iter().chain(values).collect());
+    }
+    let plot = Plot { height: 320, marked: true, ..Plot::new("friction coefficient µ", "growth rate (1/s)", series) };
+    Ok(Some(Figure {
+        name: "growth",
+        caption: format!(
+            "Growth of closed sliding contact at {}, of all sets of closed nodes the one that grows most: above 0 without time \
+             discretisation it flutters; where the steps of {} grow more than that, they are refused.",
+            title(found.own.speed),
+            found.own.method.0.name()
+        ),
+        picture: Picture::plot(&plot)?,
+        sheet,
+    }))
+}
+
+fn results(found: &Found) -> Value {
+    let count = |verdict: Verdict| found.points.iter().filter(|point| point.verdict() == verdict).count();
+    let point = |point: &Point| {
+        json!({
+            "speed": point.place.speed, "friction": point.place.friction, "internal_step": point.step,
+            "answer": point.verdict().name(),
+            "warnings": point.answer.as_ref().ok(), "refusal": point.answer.as_ref().err(),
+            "growth_of_equations": point.rates.as_ref().map(|rates| rates.growth.continuous),
+            "growth_of_steps": point.rates.as_ref().map(|rates| rates.growth.stepped),
+            "flutter_frequency_hz": point.rates.as_ref().and_then(|rates| rates.frequency),
+        })
+    };
+    json!({
+        "scene": found.name,
+        "own": {
+            "friction": found.own.friction, "speed": found.own.speed, "internal_step": found.own.step,
+            "method": error_study::name(found.own.method),
+        },
+        "counts": VERDICTS.iter().map(|verdict| (verdict.name().to_owned(), json!(count(*verdict)))).collect::<serde_json::Map<_, _>>(),
+        "points": found.points.iter().map(point).collect::<Vec<_>>(),
+        "largest_steps": found.limits.iter().map(|usable| json!({
+            "method": error_study::name(usable.method), "step": usable.step(), "refusal_beyond": usable.why(),
+        })).collect::<Vec<_>>(),
+    })
+}
