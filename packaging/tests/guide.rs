@@ -1,12 +1,14 @@
 //! Figures of the user guide: every table of figures says where it comes from, and what a command of the program says is what
 //! the guide shows. Blocks from tests are held by these tests ([`guide::hold`]).
 
+#[path = "guide/book.rs"]
+mod book;
 #[path = "../../tests/guide.rs"]
 mod guide;
 
 use std::{collections::BTreeSet, fs, path::Path, process::Command};
 
-use guide::{blocks, holds, missing, numbers, pages};
+use guide::{blocks, holds, missing, numbers, pages, told};
 
 /// Output of `tiprub ...`, line by line.
 fn run(command: &str) -> Vec<String> {
@@ -55,6 +57,25 @@ fn every_block_from_a_test_is_held_by_it() {
         let source = fs::read_to_string(root.join(folder).join("tests").join(format!("{file}.rs"))).unwrap();
         assert!(source.contains(&format!("guide::hold(\"{command}\")")), "{page}: {command}");
     }
+}
+
+/// The rub of the first run at one, half and a quarter of its internal step: what a newcomer sees of the step.
+#[test]
+fn the_first_run_at_halved_steps() {
+    for step in [1.0, 0.5, 0.25] {
+        let lines = run(&format!("tiprub run builtin:rotor37 --set internal_step_max={step}e-6"));
+        let number = |name: &str| {
+            let line =
+                lines.iter().find(|line| line.trim_start().starts_with(name)).unwrap_or_else(|| panic!("{name}"));
+            let rest = line.split_once(name).unwrap().1.trim_start_matches(|c: char| !c.is_ascii_digit());
+            rest.split(' ').next().unwrap().parse::<f64>().unwrap()
+        };
+        let sum = number("largest normal force of all contact nodes together, mean over a communication step:");
+        let node = number("largest normal force of one contact node in an internal step:");
+        let [heat, curvature] = ["friction_loss", "curvature_work"].map(number);
+        told!("| {step} | {sum} | {node} | {heat} | {curvature} |");
+    }
+    guide::hold("cargo test -p tiprub --test guide halved");
 }
 
 /// Tables with decimals stand in a block, in a part that is generated, or behind a mark that says who wrote them and when, or

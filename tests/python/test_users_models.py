@@ -48,3 +48,15 @@ def test_an_fmu_of_a_users_mesh_runs_with_the_bits_of_the_native_run(product, ve
     marched = march(instance, names, times)
     instance.free()
     assert marched == [bits([float(value) for value in row[1:]]) for row in rows]
+
+
+def test_the_scene_and_the_loop_of_the_first_pages_run(tiprub, tmp_path, monkeypatch, capsys):
+    scene = re.search(r"```toml\n(.*?)```", (ROOT / "docs" / "first-scene.md").read_text(), re.S).group(1)
+    loop = re.search(r"```python\n(.*?)```", (ROOT / "docs" / "coupling.md").read_text(), re.S).group(1)
+    monkeypatch.chdir(tmp_path)
+    Path("my_scene.toml").write_text(scene)
+    library = ["--library", os.environ["TIPRUB_LIBRARY"]] if "TIPRUB_LIBRARY" in os.environ else []
+    tiprub("package", "my_scene.toml", *library)
+    exec(compile(loop, "coupling.md", "exec"), {})  # noqa: S102 - the guide's own words
+    shown = float(re.search(r"print\(speed\)  # ([\d.]+) rad/s", loop).group(1))
+    assert abs(float(capsys.readouterr().out.split()[-1]) - shown) <= 0.005

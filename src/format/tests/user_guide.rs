@@ -155,27 +155,47 @@ fn overlay(scene: &mut toml::Table, fragment: toml::Table) {
     }
 }
 
+/// The TOML of a page.
+fn examples(page: &str) -> Vec<String> {
+    let blocks = page.split("```toml\n").skip(1).map(|text| text.split("```").next().unwrap());
+    blocks.map(String::from).collect()
+}
+
+/// README and chapters: name and TOML.
+fn all_examples() -> Vec<(String, String)> {
+    let chapters = fs::read_dir(chapter("")).unwrap().map(|entry| entry.unwrap().path());
+    let mut pages: Vec<_> = chapters.filter(|path| path.extension().is_some_and(|kind| kind == "md")).collect();
+    pages.push(chapter("../README.md"));
+    let of_page = |path: PathBuf| {
+        let found = examples(&fs::read_to_string(&path).unwrap());
+        found.into_iter().map(move |example| (path.file_name().unwrap().to_string_lossy().into_owned(), example))
+    };
+    pages.into_iter().flat_map(of_page).collect()
+}
+
+/// A whole scene has a name, and is a scene. Else it is what a scene can add: to the first one of the chapter on scenes.
 #[test]
-fn every_addition_of_the_chapter_on_scenes_makes_a_scene_of_its_example() {
-    let chapter = fs::read_to_string(chapter("scene-file.md")).unwrap();
-    let mut examples = chapter.split("```toml\n").skip(1).map(|text| text.split("```").next().unwrap());
-    let base: toml::Table = toml::from_str(examples.next().unwrap()).unwrap();
-    let (mut count, mut whole) = (0, 0);
-    for example in examples {
-        let fragment: toml::Table = toml::from_str(example).unwrap();
+fn every_example_of_the_guide_makes_a_scene() {
+    let base = examples(&fs::read_to_string(chapter("scene-file.md")).unwrap()).remove(0);
+    let settings = parse_scene(&base, "base").unwrap();
+    let base: toml::Table = toml::from_str(&base).unwrap();
+    let (mut additions, mut whole) = (0, 0);
+    for (page, example) in all_examples() {
+        let fragment: toml::Table =
+            toml::from_str(&example).unwrap_or_else(|error| panic!("{page}: {error}\n{example}"));
         if fragment.contains_key("name") {
-            parse_scene(example, "example").unwrap_or_else(|error| panic!("{error}\n{example}"));
+            parse_scene(&example, &page).unwrap_or_else(|error| panic!("{error}\n{example}"));
             whole += 1;
             continue;
         }
         let mut scene = base.clone();
         overlay(&mut scene, fragment);
         let text = toml::to_string(&scene).unwrap();
-        let settings = parse_scene(&text, "example").unwrap_or_else(|error| panic!("{error}\n{example}"));
-        assert_ne!(settings, parse_scene(&toml::to_string(&base).unwrap(), "base").unwrap(), "{example}");
-        count += 1;
+        let changed = parse_scene(&text, &page).unwrap_or_else(|error| panic!("{error}\n{example}"));
+        assert_ne!(changed, settings, "{page}: {example}");
+        additions += 1;
     }
-    assert_eq!((count, whole), (9, 1));
+    assert_eq!((additions, whole), (9, 4));
 }
 
 #[test]

@@ -1,6 +1,9 @@
 //! Studies of the laboratory in their quick forms.
 
-use std::{fs, path::Path, process::Command};
+#[path = "../../guide.rs"]
+mod guide;
+
+use std::{collections::BTreeSet, fs, path::Path, process::Command};
 
 use serde_json::Value;
 
@@ -198,4 +201,24 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         let told = refuse(&[name, "--quick", "--out", "file/out"], 1);
         assert!(told.contains("file/out: cannot create the directory"), "{told}");
     }
+}
+
+/// `lab NAME` at the start of a line of code or of what stands between backticks.
+fn studies_named(page: &str) -> impl Iterator<Item = &str> {
+    let lines = page.lines().filter_map(|line| line.strip_prefix("    "));
+    let spans = page.split('`').skip(1).step_by(2);
+    let named = lines.chain(spans).filter_map(|code| code.trim_start().strip_prefix("lab "));
+    named.filter_map(|rest| rest.split_whitespace().next())
+}
+
+#[test]
+fn the_guide_names_every_study_and_no_other() {
+    let root = tempfile::tempdir().unwrap();
+    let (help, _) = lab(root.path(), "", &["--help"]);
+    let list = help.split_once("\nCommands:\n").unwrap().1.split("\n\n").next().unwrap();
+    let names = list.lines().filter(|line| !line.starts_with("   ")).filter_map(|line| line.split_whitespace().next());
+    let known: BTreeSet<&str> = names.filter(|name| *name != "help").collect();
+    let pages = guide::pages();
+    let named: BTreeSet<&str> = pages.iter().flat_map(|page| studies_named(&page.1)).collect();
+    assert_eq!(named, known);
 }

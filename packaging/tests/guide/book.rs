@@ -1,0 +1,271 @@
+//! The guide as a book: no link, anchor, image or path is dead, no page is missing, and every command shown is one.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::{Component, Path, PathBuf},
+    process::Command,
+};
+
+/// Folders of the packages whose tests and examples the guide names.
+const PACKAGES: [(&str, &str); 7] = [
+    ("tiprub", "packaging"),
+    ("tiprub-core", "src/core"),
+    ("tiprub-format", "src/format"),
+    ("tiprub-model", "src/model"),
+    ("tiprub-model-description", "modelDescription"),
+    ("tiprub-reference", "src/reference"),
+    ("tiprub-tests", "tests/rust"),
+];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
+}
+
+/// Pages in `folder` of the sources, by their paths in the sources.
+fn pages_in(folder: &str) -> Vec<(PathBuf, String)> {
+    let entries = fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path());
+    let mut paths: Vec<_> = entries.filter(|path| path.extension().is_some_and(|kind| kind == "md")).collect();
+    paths.sort();
+    let name = |path: &PathBuf| Path::new(folder).join(path.file_name().unwrap());
+    paths.iter().map(|path| (name(path), fs::read_to_string(path).unwrap())).collect()
+}
+
+/// The pages beside the sources' root and all chapters; not the changelog, which tells of what was.
+fn pages() -> Vec<(PathBuf, String)> {
+    let mut all = pages_in("");
+    all.retain(|(path, _)| path.as_path() != Path::new("CHANGELOG.md"));
+    all.extend(pages_in("docs"));
+    assert!(all.len() > 30);
+    all
+}
+
+/// A page without what is in fences, and its lines of code: those in fences and those indented.
+fn split(text: &str) -> (String, Vec<String>) {
+    let (mut prose, mut code, mut fenced) = (String::new(), Vec::new(), false);
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            fenced = !fenced;
+        } else if fenced || line.starts_with("    ") {
+            code.push(line.trim().to_owned());
+        }
+        if !fenced {
+            prose += line;
+            prose.push('\n');
+        }
+    }
+    (prose, code)
+}
+
+/// What stands between backticks.
+fn spans(prose: &str) -> Vec<String> {
+    let paragraphs = prose.split("\n\n").flat_map(|text| text.split('`').skip(1).step_by(2));
+    paragraphs.map(|span| span.split_whitespace().collect::<Vec<_>>().join(" ")).collect()
+}
+
+/// Targets of links and images.
+fn targets(prose: &str) -> Vec<String> {
+    let paragraph = |text: &str| text.split('`').step_by(2).collect::<Vec<_>>().join("`");
+    let without_code: Vec<_> = prose.split("\n\n").map(paragraph).collect();
+    let text = without_code.join("\n\n");
+    let after = text.split("](").skip(1).filter_map(|rest| rest.split_once(')'));
+    after.map(|(target, _)| target.trim().to_owned()).collect()
+}
+
+/// The anchors of a page, one per heading, as GitHub and mdBook make them.
+fn anchors(prose: &str) -> BTreeSet<String> {
+    let mut counts = BTreeMap::<String, usize>::new();
+    let headings = prose.lines().filter(|line| line.starts_with('#'));
+    let anchor = |line: &str| {
+        let title = line.trim_start_matches('#').trim().to_lowercase();
+        let mut anchor: String = title.split(' ').collect::<Vec<_>>().join("-");
+        anchor.retain(|c| c.is_alphanumeric() || c == '-' || c == '_');
+        let count = counts.entry(anchor.clone()).or_default();
+        *count += 1;
+        if *count == 1 { anchor } else { format!("{anchor}-{}", *count - 1) }
+    };
+    headings.map(anchor).collect()
+}
+
+/// A path without `..`.
+fn plain(path: &Path) -> PathBuf {
+    path.components().fold(PathBuf::new(), |mut plain, part| {
+        if part == Component::ParentDir {
+            assert!(plain.pop(), "{} leaves the sources", path.display());
+        } else {
+            plain.push(part);
+        }
+        plain
+    })
+}
+
+/// What is wrong with a link on the page `page`; a book holds what is in its own folder alone.
+fn dead(page: &Path, target: &str, pages: &BTreeMap<PathBuf, BTreeSet<String>>) -> Option<String> {
+    if target.starts_with("https://") {
+        return None;
+    }
+    let (file, anchor) = target.split_once('#').map_or((target, None), |(file, anchor)| (file, Some(anchor)));
+    let path = if file.is_empty() { page.to_owned() } else { plain(&page.parent().unwrap().join(file)) };
+    if !root().join(&path).exists() {
+        return Some("there is no such file".into());
+    }
+    if page.starts_with("docs") && !path.starts_with("docs") {
+        return Some("it leaves the book".into());
+    }
+    let anchor = anchor?;
+    match pages.get(&path) {
+        Some(known) if known.contains(anchor) => None,
+        Some(known) => Some(format!("there is no such heading, but {known:?}")),
+        None => Some("only pages have anchors".into()),
+    }
+}
+
+#[test]
+fn no_link_is_dead() {
+    let pages: Vec<_> = pages().into_iter().map(|(path, text)| (path, split(&text).0)).collect();
+    let known: BTreeMap<_, _> = pages.iter().map(|(path, prose)| (path.clone(), anchors(prose))).collect();
+    let (mut wrong, mut count) = (Vec::new(), 0);
+    for (page, prose) in &pages {
+        for target in targets(prose) {
+            count += 1;
+            let problem = dead(page, &target, &known);
+            wrong.extend(problem.map(|problem| format!("{}: {target}: {problem}", page.display())));
+        }
+    }
+    assert!(count > 200, "{count}");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    // A link that is dead is seen.
+    let page = Path::new("docs/README.md");
+    for (target, problem) in [
+        ("theory-14.md", "no such file"),
+        ("theory-05-contact.md#eq-12", "no such heading"),
+        ("../README.md", "leaves the book"),
+        ("images/none.svg", "no such file"),
+        ("images/film-sub-steps.svg#one", "only pages"),
+    ] {
+        assert!(dead(page, target, &known).is_some_and(|found| found.contains(problem)), "{target}");
+    }
+}
+
+/// Paths of the sources that the pages name, such as `src/core/src/contact/solver.rs`.
+#[test]
+fn no_path_is_dead() {
+    let roots = ["src/", "tests/", "fmi/", "packaging/", "modelDescription/", "docs/", ".ci/"];
+    let (mut wrong, mut count) = (Vec::new(), 0);
+    for (page, text) in pages() {
+        for span in spans(&split(&text).0) {
+            let path = span.split("::").next().unwrap();
+            let named = path.chars().all(|c| c.is_ascii_alphanumeric() || "/._-".contains(c));
+            if named && roots.iter().any(|root| path.starts_with(root)) {
+                count += 1;
+                if !root().join(path).exists() {
+                    wrong.push(format!("{}: {path}", page.display()));
+                }
+            }
+        }
+    }
+    assert!(count > 30, "{count}");
+    assert!(wrong.is_empty(), "there is no\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_page_is_in_the_summary_once_and_every_picture_on_a_page() {
+    let summary = fs::read_to_string(root().join("docs/SUMMARY.md")).unwrap();
+    let mut listed: Vec<_> = targets(&summary).iter().map(|target| Path::new("docs").join(target)).collect();
+    listed.sort();
+    let chapters = pages_in("docs").into_iter().map(|(path, _)| path);
+    let chapters: Vec<_> = chapters.filter(|path| path.as_path() != Path::new("docs/SUMMARY.md")).collect();
+    assert_eq!(listed, chapters);
+    let pages = pages().into_iter().map(|(path, text)| (path, targets(&split(&text).0)));
+    let used: BTreeSet<PathBuf> = pages
+        .flat_map(|(page, targets)| targets.into_iter().map(move |target| page.parent().unwrap().join(target)))
+        .collect();
+    for folder in ["images", "error", "cube"] {
+        for entry in fs::read_dir(root().join("docs").join(folder)).unwrap() {
+            let picture = Path::new("docs").join(folder).join(entry.unwrap().file_name());
+            assert!(used.contains(&picture), "no page shows {}", picture.display());
+        }
+    }
+}
+
+/// Names under "Commands:" in the help of a command.
+fn commands_of(words: &[&str]) -> BTreeSet<String> {
+    let output = Command::new(env!("CARGO_BIN_EXE_tiprub")).args(words).arg("--help").output().unwrap();
+    assert!(output.status.success(), "{words:?} --help: {}", String::from_utf8_lossy(&output.stderr));
+    let help = String::from_utf8(output.stdout).unwrap();
+    let section = help.split_once("\nCommands:\n").map_or("", |(_, rest)| rest.split("\n\n").next().unwrap());
+    let names = section.lines().filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    names.filter_map(|line| line.split_whitespace().next()).map(String::from).collect()
+}
+
+/// The word of a command line that is no command, where the program has commands.
+fn unknown<'a>(line: &'a str, known: &mut BTreeMap<Vec<&'a str>, BTreeSet<String>>) -> Option<&'a str> {
+    let mut before = Vec::new();
+    for word in line.split_whitespace().skip(1) {
+        let commands = known.entry(before.clone()).or_insert_with(|| commands_of(&before));
+        let placeholder = word.starts_with(['-', '.', '…']) || word.chars().all(|c| c.is_ascii_uppercase());
+        if commands.is_empty() || placeholder {
+            return None;
+        }
+        if !commands.contains(word) {
+            return Some(word);
+        }
+        before.push(word);
+    }
+    None
+}
+
+#[test]
+fn every_command_shown_is_one() {
+    let mut shown = Vec::new();
+    for (page, text) in pages() {
+        let (prose, code) = split(&text);
+        let lines =
+            code.into_iter().chain(spans(&prose)).map(|line| line.replace("cargo run --release -- ", "tiprub "));
+        shown.extend(lines.filter(|line| line.starts_with("tiprub ")).map(|line| (page.clone(), line)));
+    }
+    assert!(shown.len() > 50, "{}", shown.len());
+    let mut known = BTreeMap::new();
+    let unknown_words = shown.iter().filter_map(|(page, line)| {
+        let word = unknown(line, &mut known)?;
+        Some(format!("{}: `{line}`: there is no `{word}`", page.display()))
+    });
+    let wrong: Vec<_> = unknown_words.collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    // The commands are found, and a slip is seen.
+    assert!(known[&vec![]].contains("package") && known[&vec!["study"]].contains("map"));
+    for (line, word) in [("tiprub packge scene.toml", "packge"), ("tiprub study errors SCENE", "errors")] {
+        assert_eq!(unknown(line, &mut known), Some(word));
+    }
+}
+
+/// `cargo test -p PACKAGE --test NAME` and `--example NAME` name files that are there.
+#[test]
+fn every_test_and_example_named_is_there() {
+    let mut count = 0;
+    for (page, text) in pages() {
+        let (prose, code) = split(&text);
+        for line in code.into_iter().chain(spans(&prose)) {
+            let words: Vec<_> = line.split(' ').collect();
+            let after = |flag: &str, at: usize| (words[at] == flag).then(|| words.get(at + 1).copied().unwrap_or(""));
+            let package = (0..words.len()).find_map(|at| after("-p", at));
+            let Some(folder) = PACKAGES.iter().find(|known| Some(known.0) == package).map(|known| root().join(known.1))
+            else {
+                continue;
+            };
+            for at in 0..words.len() {
+                let test = after("--test", at).map(|name| folder.join("tests").join(format!("{name}.rs")));
+                let example = after("--example", at).map(|name| {
+                    let file = folder.join("examples").join(format!("{name}.rs"));
+                    if file.exists() { file } else { folder.join("examples").join(name).join("main.rs") }
+                });
+                let Some(file) = test.or(example) else { continue };
+                // The package of whole-product tests has them beside its library.
+                let file = if package == Some("tiprub-tests") { folder.join(file.file_name().unwrap()) } else { file };
+                count += 1;
+                assert!(file.exists(), "{}: `{line}`: there is no {}", page.display(), file.display());
+            }
+        }
+    }
+    assert!(count > 30, "{count}");
+}
