@@ -36,8 +36,7 @@ impl System {
         for group in &mut self.groups {
             group.solve(&mut bodies, &mut found)?;
         }
-        self.witness()?;
-        self.enter_work();
+        self.enter_work()?;
         self.counted.steps += 1;
         if self.counted.steps.is_multiple_of(FLUSH_EVERY) {
             self.structures.iter_mut().for_each(|structure| structure.modes_mut().flush());

@@ -6,6 +6,7 @@ use super::{Bodies, ContactEvent, Pair, StepFailure, Structure, System, sum_of};
 use crate::contact::gap::{GapLaw, dot};
 use crate::contact::spline::ClosestPoint;
 use crate::contact::wrench::At;
+use crate::history::History;
 use crate::persist::{Persist, Reader, Writer};
 
 /// A contact force is continued over steps at most this many times as long as the one it was found in.
@@ -59,38 +60,26 @@ impl System {
         sum_of(self.structures.iter_mut().map(Structure::energies_now))
     }
 
-    /// The contact forces without those of impacts, on all structures where the last step found them.
+    /// The contact forces without those of impacts, on all structures where the last step found them. The force of a contact that
+    /// was not closed at both ends of the last step does not last.
     fn find_lasting(&mut self, old: f64, new: f64) {
         let reach = (FORCE_REACH * old / new).min(1.0);
-        for structure in &mut self.structures {
-            let history = &mut structure.history;
-            history.passing.lasting.fill(0.0);
-            for (lasting, force) in history.passing.lasting.iter_mut().zip(&history.force.now) {
-                *lasting = reach * reach * force;
-            }
-        }
-        for index in 0..self.structures.len() {
-            let lanes = self.structures[index].modes().lanes();
-            for contact in 0..self.structures[index].gaps().len() {
-                self.end_impact(index, contact / lanes, contact % lanes);
+        self.structures.iter_mut().for_each(|structure| structure.history.passing.lasting.fill(0.0));
+        for event in &self.events.now {
+            let structure = &mut self.structures[event.structure];
+            let (index, lanes) = (structure.index(event.node, event.sector), structure.lanes());
+            // `film` closes gaps up to rounding.
+            let closed = CLOSED * self.pairs[event.pair].gap().indifferent(event.node);
+            let History { gap, force, passing, .. } = &mut structure.history;
+            if gap.before[index] <= closed && gap.now[index] <= closed {
+                for component in 0..3 {
+                    let row = (3 * event.node + component) * lanes + event.sector;
+                    passing.lasting[row] = reach * reach * force.now[row];
+                }
             }
         }
         for pair in &self.pairs {
             pair.spread_lasting(&mut self.structures);
-        }
-    }
-
-    /// The force of a contact that was not closed at both ends of the last step does not last.
-    fn end_impact(&mut self, structure: usize, node: usize, sector: usize) {
-        let of = &mut self.structures[structure];
-        let (index, lanes) = (of.index(node, sector), of.modes().lanes());
-        // `film` closes gaps up to rounding.
-        let closed = of.pair_of[node].map_or(0.0, |pair| CLOSED * self.pairs[pair].gap().indifferent(node));
-        let gap = &of.history.gap;
-        if !(gap.before[index] <= closed && gap.now[index] <= closed) {
-            for component in 0..3 {
-                of.history.passing.lasting[(3 * node + component) * lanes + sector] = 0.0;
-            }
         }
     }
 
@@ -126,7 +115,7 @@ impl System {
                 let (gap, before) = (of.history.gap.now[node], of.history.gap.before[node]);
                 if gap < 0.0 && before.is_infinite() {
                     let at = Member { structure, pair: number, node, sector: 0, index: node };
-                    let moved = bodies.slip_of_deformation(at);
+                    let moved = bodies.pose(at).slip_of_deformation();
                     let approach = dot(moved, of.history.geometry.now.normal_at(node));
                     let travel = dot(moved, moved).sqrt();
                     if gap - approach < -(BEHIND_EDGE[0] * travel + BEHIND_EDGE[1] * open.largest()) {

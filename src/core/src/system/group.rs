@@ -90,119 +90,131 @@ pub struct Group {
     sector_force: Vec<f64>,
 }
 
-/// A member as its law sees it.
-struct Posed<'a> {
+/// A member with what it belongs to, as its law sees it.
+pub struct Posed<'a> {
     bodies: &'a Bodies<'a>,
+    structure: &'a Structure,
+    pair: &'a Pair,
     member: Member,
 }
 
 impl Bodies<'_> {
-    /// The structure and the pair of a member.
+    /// A member with what it belongs to.
     #[inline(always)]
-    fn of(&self, at: Member) -> (&Structure, &Pair) {
-        (&self.structures[at.structure], &self.pairs[at.pair])
+    pub fn pose(&self, member: Member) -> Posed<'_> {
+        Posed { bodies: self, structure: &self.structures[member.structure], pair: &self.pairs[member.pair], member }
+    }
+}
+
+impl Posed<'_> {
+    /// Displacement as predicted (m), in its own directions.
+    #[inline(always)]
+    fn displacement(&self) -> [f64; 3] {
+        self.structure.three(self.structure.modes().displacement(), self.member.node, self.member.sector)
     }
 
-    /// Displacement of a node relative to its surface over the step, prediction included (m), without rigid motion.
+    /// Displacement relative to its surface over the step, prediction included (m), without rigid motion.
     #[inline(always)]
-    pub fn slip_of_deformation(&self, at: Member) -> [f64; 3] {
-        let (structure, pair) = self.of(at);
-        let modes = structure.modes();
-        let moved = moved_between(structure, at, modes.displacement(), modes.displacement_before());
-        if pair.carrier().is_none() { moved } else { self.less_of_carrier(at, moved) }
+    pub fn slip_of_deformation(&self) -> [f64; 3] {
+        let modes = self.structure.modes();
+        self.slip_between(modes.displacement(), modes.displacement_before())
     }
 
     /// The same of the modes with inertia alone. A prediction whose contact forces act later is without the forces that deform
     /// quasi-static modes, however short the step is: taken for a slip over h it would grow without bounds.
-    fn slip_of_inertia(&self, at: Member) -> [f64; 3] {
-        let (structure, pair) = self.of(at);
-        let predicted = &structure.history.predicted;
-        let moved = moved_between(structure, at, &predicted.now, &predicted.before);
-        if pair.carrier().is_none() { moved } else { self.less_of_carrier(at, moved) }
+    fn slip_of_inertia(&self) -> [f64; 3] {
+        let predicted = &self.structure.history.predicted;
+        self.slip_between(&predicted.now, &predicted.before)
+    }
+
+    #[inline(always)]
+    fn slip_between(&self, now: &[f64], before: &[f64]) -> [f64; 3] {
+        let Member { node, sector, .. } = self.member;
+        let (now, before) = (self.structure.three(now, node, sector), self.structure.three(before, node, sector));
+        let moved: [f64; 3] = std::array::from_fn(|i| now[i] - before[i]);
+        if self.pair.carrier().is_none() { moved } else { self.less_of_carrier(moved) }
     }
 
     /// Out of line: on rigid surfaces contacts never get here.
     #[inline(never)]
-    fn less_of_carrier(&self, at: Member, moved: [f64; 3]) -> [f64; 3] {
-        let Some(spot) = self.spot(at) else { return moved };
-        let modes = self.structures[spot.surface.1.structure].modes();
+    fn less_of_carrier(&self, moved: [f64; 3]) -> [f64; 3] {
+        let Some(spot) = self.spot() else { return moved };
+        let modes = self.bodies.structures[spot.surface.1.structure].modes();
         let (now, before) = (modes.displacement(), modes.displacement_before());
         let carried = super::pair::at_place(spot.surface, spot.place, spot.frame, |row| now[row] - before[row]);
         std::array::from_fn(|i| moved[i] - carried[i])
     }
 
-    /// Where a member acts on the structure that carries its surface, if one does.
+    /// Where it acts on the structure that carries its surface, if one does.
     #[inline(always)]
-    fn spot(&self, at: Member) -> Option<Spot<'_>> {
-        let (structure, pair) = self.of(at);
-        let surface = pair.carried()?;
-        let frame = pair.frame(at.index, pair.drive(When::Now).rotor_angle);
-        Some(Spot { surface, place: structure.history.geometry.now.places[at.index], frame })
+    fn spot(&self) -> Option<Spot<'_>> {
+        let surface = self.pair.carried()?;
+        let frame = self.pair.frame(self.member.index, self.pair.drive(When::Now).rotor_angle);
+        Some(Spot { surface, place: self.structure.history.geometry.now.places[self.member.index], frame })
+    }
+
+    /// Prescribed velocity relative to the surface (m/s).
+    #[inline(always)]
+    fn sliding(&self) -> [f64; 3] {
+        let Member { node, index, .. } = self.member;
+        self.pair.gap().sliding_velocity(node, index, self.pair.drive(When::Now), self.displacement())
+    }
+
+    /// Unit normal.
+    #[inline(always)]
+    fn normal(&self) -> [f64; 3] {
+        self.structure.history.geometry.now.normal_at(self.member.index)
     }
 
     /// Unit direction of slip from the predicted relative velocity; 0 where nothing slides.
     #[inline(always)]
-    fn slip_direction(&self, at: Member, normal: [f64; 3]) -> [f64; 3] {
-        let (structure, pair) = self.of(at);
-        let (step, gap) = (structure.modes().step(), pair.gap());
-        let displacement = structure.three(structure.modes().displacement(), at.node, at.sector);
-        let mut velocity = gap.sliding_velocity(at.node, at.index, pair.drive(When::Now), displacement);
-        let moved = if self.acts_later { self.slip_of_inertia(at) } else { self.slip_of_deformation(at) };
+    fn slip_direction(&self, normal: [f64; 3]) -> [f64; 3] {
+        let (mut velocity, step) = (self.sliding(), self.structure.modes().step());
+        let moved = if self.bodies.acts_later { self.slip_of_inertia() } else { self.slip_of_deformation() };
         for (value, moved) in velocity.iter_mut().zip(moved) {
             *value += moved / step;
         }
-        gap.slip_direction(velocity, normal)
+        self.pair.gap().slip_direction(velocity, normal)
     }
 
-    /// A member must be one that small displacements can describe.
+    /// It must be one that small displacements can describe.
     #[inline(always)]
-    fn check(&self, at: Member) -> Result<(), StepFailure> {
-        let (structure, pair) = self.of(at);
-        let gap = structure.history.gap.now[at.index];
+    fn check(&self) -> Result<(), StepFailure> {
+        let Member { structure, node, sector, .. } = self.member;
+        let gap = self.gap();
         if !gap.is_finite() {
             return Err(StepFailure::NonFinite);
         }
-        let normal = structure.history.geometry.now.normal_at(at.index);
-        if gap < 0.0 && !pair.gap().is_plausible(at.node, gap, normal) {
-            return Err(StepFailure::Implausible { structure: at.structure, sector: at.sector });
+        if gap < 0.0 && !self.pair.gap().is_plausible(node, gap, self.normal()) {
+            return Err(StepFailure::Implausible { structure, sector });
         }
         Ok(())
     }
 }
 
-/// How far a node has moved (m), in its own directions.
-#[inline(always)]
-fn moved_between(structure: &Structure, at: Member, now: &[f64], before: &[f64]) -> [f64; 3] {
-    let (now, before) = (structure.three(now, at.node, at.sector), structure.three(before, at.node, at.sector));
-    std::array::from_fn(|i| now[i] - before[i])
-}
-
 impl Prediction for Posed<'_> {
+    #[inline(always)]
     fn gap(&self) -> f64 {
-        self.bodies.structures[self.member.structure].history.gap.now[self.member.index]
+        self.structure.history.gap.now[self.member.index]
     }
+    #[inline(always)]
     fn gap_before(&self) -> f64 {
-        self.bodies.structures[self.member.structure].history.gap.before[self.member.index]
+        self.structure.history.gap.before[self.member.index]
     }
     fn friction(&self) -> f64 {
-        self.bodies.pairs[self.member.pair].friction()
+        self.pair.friction()
     }
     fn slip(&self) -> [f64; 3] {
-        let ((structure, pair), at) = (self.bodies.of(self.member), self.member);
-        let (drive, modes) = (pair.drive(When::Now), structure.modes());
-        let moved = structure.three(modes.displacement(), at.node, at.sector);
-        let sliding = pair.gap().sliding_velocity(at.node, at.index, drive, moved);
-        let moved = self.bodies.slip_of_deformation(at);
-        std::array::from_fn(|i| sliding[i] * modes.step() + moved[i])
+        let (sliding, step) = (self.sliding(), self.structure.modes().step());
+        let moved = self.slip_of_deformation();
+        std::array::from_fn(|i| sliding[i] * step + moved[i])
     }
     fn last_force(&self) -> [f64; 3] {
-        let (structure, _) = self.bodies.of(self.member);
-        structure.three(&structure.history.force.before, self.member.node, self.member.sector)
+        self.structure.three(&self.structure.history.force.before, self.member.node, self.member.sector)
     }
     fn angle(&self) -> f64 {
-        let ((structure, pair), at) = (self.bodies.of(self.member), self.member);
-        let place = At { node: at.node, index: at.index, drive: pair.drive(When::Now) };
-        pair.gap().angle_on_casing(place, structure.three(structure.modes().displacement(), at.node, at.sector))
+        let Member { node, index, .. } = self.member;
+        self.pair.gap().angle_on_casing(At { node, index, drive: self.pair.drive(When::Now) }, self.displacement())
     }
 }
 
@@ -379,12 +391,16 @@ impl Group {
 
     /// Fill and solve the problem of the members.
     fn find_forces(&mut self, bodies: &Bodies, found: &mut Found) -> Result<(), StepFailure> {
-        self.members.iter().try_for_each(|member| bodies.check(*member))?;
         let per = self.law.directions();
-        self.fill_directions(bodies, per);
+        for (contact, &member) in self.members.iter().enumerate() {
+            let at = bodies.pose(member);
+            at.check()?;
+            let span = per * contact..per * (contact + 1);
+            fill_directions(&at, &mut self.rows[span.clone()], &mut self.columns[span]);
+        }
         self.law.begin(self.members.len());
         self.fill_delassus(bodies, per);
-        self.law.pose_all(&self.rows, self.members.iter().map(|&member| Posed { bodies, member }));
+        self.law.pose_all(&self.rows, self.members.iter().map(|&member| bodies.pose(member)));
         let outcome = self.law.solve();
         *found.factorisations += outcome.factorisations as u64;
         if self.law.multipliers().iter().any(|value| !value.is_finite()) {
@@ -396,25 +412,6 @@ impl Group {
         }
         self.find_force_vectors(per);
         Ok(())
-    }
-
-    /// Rows n and columns n − µt per contact; n, t₁, t₂ for both where contacts may stick.
-    fn fill_directions(&mut self, bodies: &Bodies, per: usize) {
-        for (contact, &at) in self.members.iter().enumerate() {
-            let normal = bodies.structures[at.structure].history.geometry.now.normal_at(at.index);
-            if per == 3 {
-                let [first, second] = tangents(normal);
-                for (direction, value) in [normal, first, second].into_iter().enumerate() {
-                    self.rows[3 * contact + direction] = value;
-                    self.columns[3 * contact + direction] = value;
-                }
-                continue;
-            }
-            let friction = bodies.pairs[at.pair].friction();
-            let slip = if friction > 0.0 { bodies.slip_direction(at, normal) } else { [0.0; 3] };
-            self.rows[contact] = normal;
-            self.columns[contact] = std::array::from_fn(|i| normal[i] - friction * slip[i]);
-        }
     }
 
     /// W of the group: every structure that touches by its flexibility, those under the contacts through their modes.
@@ -443,7 +440,8 @@ impl Group {
             reaction.clear();
             let of = &bodies.structures[reaction.structure];
             for (contact, &member) in self.members.iter().enumerate() {
-                let Some(spot) = bodies.spot(member) else { continue };
+                let posed = bodies.pose(member);
+                let Some(spot) = posed.spot() else { continue };
                 if spot.surface.1.structure == reaction.structure {
                     let span = per * contact..per * (contact + 1);
                     reaction.see(of, contact, spot, &self.rows[span.clone()], &self.columns[span]);
@@ -495,7 +493,8 @@ impl Group {
                 for sector in 0..sectors {
                     let index = structure.index(node, sector);
                     let at = Member { structure: side.structure, pair, node, sector, index };
-                    let Some(spot) = bodies.spot(at) else { continue };
+                    let posed = bodies.pose(at);
+                    let Some(spot) = posed.spot() else { continue };
                     let under = self.reactions.iter().find(|one| one.structure == spot.surface.1.structure);
                     let moved = under.map_or([0.0; 3], |reaction| reaction.responded(spot));
                     side.response[index] -= dot(structure.history.geometry.now.normal_at(index), moved);
@@ -578,6 +577,22 @@ impl Group {
             found.events.push(ContactEvent::new(member, normal, force, share, (point, wrench)));
         }
     }
+}
+
+/// Row n and column n − µt of a contact; n, t₁, t₂ for both where it may stick.
+#[inline(always)]
+fn fill_directions(at: &Posed, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+    let normal = at.normal();
+    if rows.len() == 3 {
+        let [first, second] = tangents(normal);
+        rows.copy_from_slice(&[normal, first, second]);
+        columns.copy_from_slice(rows);
+        return;
+    }
+    let friction = at.friction();
+    let slip = if friction > 0.0 { at.slip_direction(normal) } else { [0.0; 3] };
+    rows[0] = normal;
+    columns[0] = std::array::from_fn(|i| normal[i] - friction * slip[i]);
 }
 
 impl Side {

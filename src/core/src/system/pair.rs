@@ -112,12 +112,11 @@ impl Pair {
 
     /// A step (s) to `drive` is under way.
     pub(crate) fn go_to(&mut self, drive: &Drive, step: f64) {
-        self.prescribed.drive.shift();
-        self.prescribed.drive.now = *drive;
-        self.prescribed.motion.shift();
-        let motion = Motion::between(&self.prescribed.drive.before, drive, step);
-        self.prescribed.motion.now = motion;
-        self.parts.gap.turn(motion.turn);
+        let Prescribed { drive: drives, motion } = &mut self.prescribed;
+        (drives.before, motion.before) = (drives.now, motion.now);
+        drives.now = *drive;
+        motion.now = Motion::between(&drives.before, drive, step);
+        self.parts.gap.turn(motion.now.turn);
     }
 
     /// The step before was `ratio` times as long.

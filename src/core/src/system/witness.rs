@@ -5,7 +5,7 @@
 //! of either adds. A change beyond that is no distance, and the step fails.
 
 use super::pair::When;
-use super::{ContactEvent, Pair, StepFailure, System};
+use super::{ContactEvent, StepFailure, System};
 use crate::contact::gap::dot;
 
 /// Changes below this are rounding, whatever the model (m): no length that means anything is as short.
@@ -14,38 +14,35 @@ const ROUNDING: f64 = 1e-15;
 const FACTOR: f64 = 2.0;
 
 impl System {
-    /// The gaps of the contacts about to be entered have changed, over the two steps that are entered, by no more than motion
-    /// explains.
+    /// The gap of a contact about to be entered, which has `moved` by so much (m), has changed over the two steps that are entered by
+    /// no more than that and `rigid` (m), prescribed motion, explain.
     ///
     /// # Errors
-    /// [`StepFailure::Unexplained`] for the first that has not.
-    pub(crate) fn witness(&self) -> Result<(), StepFailure> {
-        if self.acted().is_empty() || self.counted.steps < self.counted.witnessed {
+    /// [`StepFailure::Unexplained`].
+    #[inline(always)]
+    pub(super) fn witness(&self, event: &ContactEvent, moved: [f64; 3], rigid: f64) -> Result<(), StepFailure> {
+        let ContactEvent { structure, node, sector, .. } = *event;
+        let of = &self.structures[structure];
+        let (index, gaps) = (of.index(node, sector), &of.history.gap);
+        let (gap, oldest) = (gaps.now[index], gaps.oldest[index]);
+        // A node that comes over a free edge was looked at before (`check_edges`).
+        if oldest.is_infinite() || self.counted.steps < self.counted.witnessed {
             return Ok(());
         }
-        let (mut of, mut rigid) = (usize::MAX, 0.0);
-        for event in self.acted() {
-            if event.pair != of {
-                (of, rigid) = (event.pair, self.explained_by_drive(&self.pairs[event.pair]));
-            }
-            let structure = &self.structures[event.structure];
-            let (index, gaps) = (structure.index(event.node, event.sector), &structure.history.gap);
-            let (gap, oldest) = (gaps.now[index], gaps.oldest[index]);
-            // A node that comes over a free edge was looked at before (`check_edges`).
-            if oldest.is_infinite() {
-                continue;
-            }
-            let (jump, explained) = ((gap - oldest).abs(), rigid + self.explained_by_motion(event));
-            if jump.is_nan() || explained.is_nan() || jump > explained {
-                let ContactEvent { structure, node, sector, .. } = *event;
-                return Err(StepFailure::Unexplained { structure, node, sector, jump, explained });
-            }
+        // Rounding and the linear gap within a step; `moved` is half of the motion over two steps.
+        let own = self.pairs[event.pair].gap().indifferent(node) + ROUNDING;
+        let explained = rigid + (2.0 * FACTOR * dot(moved, moved).sqrt() + own);
+        let jump = (gap - oldest).abs();
+        if jump.is_nan() || explained.is_nan() || jump > explained {
+            return Err(StepFailure::Unexplained { structure, node, sector, jump, explained });
         }
         Ok(())
     }
 
-    /// What prescribed motion over two steps explains (m): inputs that move, and turning under the shape of the casing.
-    fn explained_by_drive(&self, pair: &Pair) -> f64 {
+    /// What prescribed motion over two steps explains of the gaps of a pair (m): inputs that move, and turning under the shape of
+    /// the casing.
+    pub(super) fn explained_by_drive(&self, pair: usize) -> f64 {
+        let pair = &self.pairs[pair];
         let (drive, motion) = (pair.drive(When::Now), pair.motion().since(pair.motion_before()));
         // Against the casing or its shape, whichever is more.
         let turned = motion.turn.abs().max((motion.turn - motion.shape_rotation).abs());
@@ -57,13 +54,6 @@ impl System {
         let turning = pair.gap().turned_under(turned, factor, carried);
         let shifted = dot(motion.shaft, motion.shaft).sqrt();
         FACTOR * (shifted + turned * off_centre + motion.opening.abs() + shape + turning)
-    }
-
-    /// What the motion of the node against the surface explains, and rounding and the linear gap within a step (m).
-    fn explained_by_motion(&self, event: &ContactEvent) -> f64 {
-        // Half of the motion over two steps.
-        let moved = self.relative_motion(event, self.when_acted());
-        2.0 * FACTOR * dot(moved, moved).sqrt() + self.pairs[event.pair].gap().indifferent(event.node) + ROUNDING
     }
 }
 

@@ -1,7 +1,7 @@
 //! The energy ledger's entries of a step.
 
 use super::pair::{When, at_place};
-use super::{ContactEvent, System};
+use super::{ContactEvent, StepFailure, System};
 use crate::contact::gap::{Geometry, dot};
 use crate::contact::wrench::{At, Motion};
 
@@ -29,27 +29,38 @@ impl Work {
 }
 
 impl System {
-    /// Enter the work of all contacts that acted over the step just done, and of loads beside contact.
-    pub(crate) fn enter_work(&mut self) {
+    /// Enter the work of all contacts that acted over the step just done, each after a look at whether its gap is a distance, and of
+    /// loads beside contact.
+    ///
+    /// # Errors
+    /// [`StepFailure::Unexplained`] for the first whose gap is not.
+    pub(crate) fn enter_work(&mut self) -> Result<(), StepFailure> {
         let when = self.when_acted();
-        let acted = match when {
-            When::Now => &mut self.events.now,
-            When::Before => &mut self.events.before,
-        };
-        let mut events = std::mem::take(acted);
-        let (mut of, mut motion) = (usize::MAX, Motion::default());
+        let mut events = std::mem::take(self.acted_mut(when));
+        let (mut of, mut motion, mut explained, mut outcome) = (usize::MAX, Motion::default(), 0.0, Ok(()));
         for event in &mut events {
             if event.pair != of {
                 of = event.pair;
                 motion = self.pairs[of].motion().centred(self.pairs[of].motion_before());
+                explained = self.explained_by_drive(of);
             }
-            event.friction_heat = self.enter(event, &motion, when);
+            let moved = self.relative_motion(event, when);
+            outcome = self.witness(event, moved, explained);
+            if outcome.is_err() {
+                break;
+            }
+            event.friction_heat = self.enter(event, moved, &motion, when);
         }
-        match when {
-            When::Now => self.events.now = events,
-            When::Before => self.events.before = events,
-        }
+        *self.acted_mut(when) = events;
         self.enter_loads();
+        outcome
+    }
+
+    fn acted_mut(&mut self, when: When) -> &mut Vec<ContactEvent> {
+        match when {
+            When::Now => &mut self.events.now,
+            When::Before => &mut self.events.before,
+        }
     }
 
     /// When the contacts that acted over the last step were found.
@@ -69,8 +80,8 @@ impl System {
     }
 
     /// Enter one contact's work into the ledger; returns its friction heat (J).
-    fn enter(&mut self, event: &ContactEvent, motion: &Motion, when: When) -> f64 {
-        let work = self.work_of(event, motion, when);
+    fn enter(&mut self, event: &ContactEvent, moved: [f64; 3], motion: &Motion, when: When) -> f64 {
+        let work = self.work_of(event, moved, motion, when);
         let (curvature, worn) = (work.curvature(), event.coating * work.approach);
         let ledger = &mut self.counted.ledger;
         ledger.wear_work.add(worn);
@@ -89,12 +100,11 @@ impl System {
     /// prescribed motion, less the friction heat, friction force times slip, and what the approach of the node costs, λ
     /// times half the change of gap, but for what turns and curves within the step. On a coating the approach is what its
     /// rods absorb.
-    fn work_of(&self, event: &ContactEvent, motion: &Motion, when: When) -> Work {
+    fn work_of(&self, event: &ContactEvent, moved: [f64; 3], motion: &Motion, when: When) -> Work {
         let (structure, pair) = (&self.structures[event.structure], &self.pairs[event.pair]);
         let (node, index) = (event.node, structure.index(event.node, event.sector));
         let (geometry, gaps) = (self.geometry_of(event, when), &structure.history.gap);
         let (normal, at) = (geometry.normal_at(index), At { node, index, drive: pair.drive(when) });
-        let moved = self.relative_motion(event, when);
         let tangential: [f64; 3] = std::array::from_fn(|i| event.force[i] - event.normal * normal[i]);
         let spin = pair.gap().spin_motion(at, event.point, motion);
         let shaft = pair.gap().shaft_motion(at, event.point, motion);
