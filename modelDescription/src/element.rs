@@ -24,7 +24,7 @@ impl Element {
     }
 
     /// Add an attribute where there is a value.
-    pub fn with_some(self, key: &'static str, value: Option<impl AsRef<str>>) -> Self {
+    pub(crate) fn with_some(self, key: &'static str, value: Option<impl AsRef<str>>) -> Self {
         match value {
             Some(value) => self.with(key, value),
             None => self,
@@ -32,7 +32,7 @@ impl Element {
     }
 
     /// Add an attribute where the text is not empty.
-    pub fn with_text(self, key: &'static str, value: &str) -> Self {
+    pub(crate) fn with_text(self, key: &'static str, value: &str) -> Self {
         self.with_some(key, (!value.is_empty()).then_some(value))
     }
 
@@ -41,13 +41,13 @@ impl Element {
         self
     }
 
-    pub fn children(mut self, children: impl IntoIterator<Item = Element>) -> Self {
+    pub(crate) fn children(mut self, children: impl IntoIterator<Item = Element>) -> Self {
         self.children.extend(children);
         self
     }
 
     /// The element if it has children: the schemas forbid most empty lists.
-    pub fn unless_empty(self) -> Option<Self> {
+    pub(crate) fn unless_empty(self) -> Option<Self> {
         (!self.children.is_empty()).then_some(self)
     }
 

@@ -50,24 +50,24 @@ fn start(variable: &Variable, elements: std::ops::Range<usize>) -> Option<String
 
 impl Row<'_> {
     /// Whether it belongs to the list of outputs of the model structure.
-    pub fn is_output(&self) -> bool {
+    pub(crate) fn is_output(&self) -> bool {
         self.variable.causality == Causality::Output
     }
 
     /// Whether it belongs to the initial unknowns: outputs that are computed during initialisation.
-    pub fn is_initial_unknown(&self) -> bool {
+    pub(crate) fn is_initial_unknown(&self) -> bool {
         self.is_output() && self.variable.initial_is_exact() == Some(false)
     }
 
     /// The attribute `dependencies` of an output: none. Outputs are computed by `doStep` and stay as they are until the
     /// next one, whatever inputs are set in between, so that importers find no algebraic loop through this FMU.
-    pub fn output_dependencies(&self) -> &'static str {
+    pub(crate) fn output_dependencies(&self) -> &'static str {
         ""
     }
 
     /// The attribute `dependencies` of an initial unknown: nothing has been averaged or accumulated at the start, so
     /// that means and totals are zero; everything else may depend on every input and parameter, said by its absence.
-    pub fn initial_dependencies(&self) -> Option<&'static str> {
+    pub(crate) fn initial_dependencies(&self) -> Option<&'static str> {
         matches!(self.variable.span, Span::Mean | Span::Total).then_some("")
     }
 
@@ -77,7 +77,7 @@ impl Row<'_> {
     }
 
     /// The name of the display unit, if one is better than SI.
-    pub fn display_unit(&self) -> Option<&'static str> {
+    pub(crate) fn display_unit(&self) -> Option<&'static str> {
         let unit = self.variable.unit?;
         self.variable.display.and_then(|index| unit.display.get(index)).map(|(name, _)| *name)
     }

@@ -20,7 +20,7 @@ pub fn readable(value: f64) -> String {
 
 /// Text for an attribute: line breaks and tabs become spaces, as XML readers make them, and characters that XML 1.0
 /// has no way to write become the replacement character.
-pub fn clean(text: &str) -> String {
+pub(crate) fn clean(text: &str) -> String {
     let replace = |c: char| match c {
         '\n' | '\r' | '\t' => ' ',
         '\u{0}'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => '\u{fffd}',

@@ -74,7 +74,7 @@ impl ImportedDescription {
 
 impl ImportedVariable {
     /// Scalar names of all elements.
-    pub fn scalar_names(&self) -> Vec<String> {
+    pub(crate) fn scalar_names(&self) -> Vec<String> {
         match self.elements {
             None => vec![self.name.clone()],
             Some(elements) => (1..=elements).map(|element| format!("{}[{element}]", self.name)).collect(),

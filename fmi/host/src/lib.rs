@@ -93,7 +93,7 @@ pub fn entries(archive: &mut ZipArchive<impl Read + io::Seek>) -> Result<Vec<(St
 ///
 /// # Errors
 /// A damaged entry, or a target that takes no more.
-pub fn unpack_entry(
+pub(crate) fn unpack_entry(
     archive: &mut ZipArchive<impl Read + io::Seek>,
     index: usize,
     name: &str,

@@ -50,7 +50,7 @@ pub fn set<T: Value, C>(
 }
 
 /// Get texts; they live in the instance until texts are asked for again.
-pub fn strings(
+pub(crate) fn strings(
     (handle, rule): (Handle, &Rule),
     (references, count): (In<u32>, usize),
     (values, n_values): (Out<*const c_char>, usize),
@@ -67,7 +67,12 @@ pub fn strings(
 }
 
 /// `fmi2SetDebugLogging`, `fmi3SetDebugLogging`.
-pub fn set_debug_logging(handle: Handle, rule: &Rule, on: bool, (categories, count): (In<Text>, usize)) -> Status {
+pub(crate) fn set_debug_logging(
+    handle: Handle,
+    rule: &Rule,
+    on: bool,
+    (categories, count): (In<Text>, usize),
+) -> Status {
     let outcome = enter(handle, rule, |_, instance| {
         let categories = categories.array(count, 64, "categories")?;
         let names = categories.iter().map(|name| name.required("categories")).collect::<Result<Vec<_>>>()?;
@@ -78,7 +83,7 @@ pub fn set_debug_logging(handle: Handle, rule: &Rule, on: bool, (categories, cou
 }
 
 /// `fmi2FMUstate`, `fmi3FMUState`: an opaque name of a saved state.
-pub type StateHandle = *const Vec<u8>;
+pub(crate) type StateHandle = *const Vec<u8>;
 
 /// Saved states.
 pub mod state {

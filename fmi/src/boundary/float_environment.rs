@@ -10,7 +10,7 @@
 ///
 /// On processors other than x86-64 nothing is changed.
 #[derive(Debug)]
-pub struct StandardFloats {
+pub(crate) struct StandardFloats {
     #[cfg(target_arch = "x86_64")]
     of_caller: u32,
 }

@@ -36,7 +36,7 @@ pub struct Instance {
 /// `fmi2Component`, `fmi3Instance`: NULL, or what [`instantiate`] returned and [`release`] has not yet taken back.
 #[derive(Debug, Clone, Copy)]
 #[repr(transparent)]
-pub struct Handle(*mut Instance);
+pub(crate) struct Handle(*mut Instance);
 
 impl Handle {
     const NULL: Self = Self(std::ptr::null_mut());
@@ -112,7 +112,7 @@ pub fn instantiate(request: Instantiation<'_>) -> Handle {
 }
 
 /// Refuse to instantiate; the message goes to the importer.
-pub fn refuse_instantiation(sink: Sink, function: &str, reason: &str) -> Handle {
+pub(crate) fn refuse_instantiation(sink: Sink, function: &str, reason: &str) -> Handle {
     Log::new(sink, false).emit(Status::Error, &format!("{function}: {reason}"));
     Handle::NULL
 }
@@ -186,12 +186,12 @@ pub fn enter<T>(
 }
 
 /// The guard for calls whose only result is their status.
-pub fn guard(handle: Handle, rule: &Rule, action: impl FnOnce(&mut Slave) -> Result<Status>) -> Status {
+pub(crate) fn guard(handle: Handle, rule: &Rule, action: impl FnOnce(&mut Slave) -> Result<Status>) -> Status {
     enter(handle, rule, |slave, _| Ok((action(slave)?, ()))).0
 }
 
 /// Answer of a function whose capability this FMU does not have.
-pub fn unsupported(handle: Handle, name: &'static str, capability: &str) -> Status {
+pub(crate) fn unsupported(handle: Handle, name: &'static str, capability: &str) -> Status {
     guard(handle, &order::unsupported(name), |_| {
         Err(Refusal::error(format!("this FMU has no {capability}, as its modelDescription.xml says. Do not call it")))
     })

@@ -7,12 +7,13 @@ mod log;
 mod panics;
 mod pointers;
 
-pub use calls::{StateHandle, get, set, set_debug_logging, state, strings};
-pub use instance::{
-    Callbacks, Handle, Instantiation, enter, guard, instantiate, refuse_instantiation, release, unsupported,
-};
-pub use log::{Fmi2Logger, Fmi3Logger, Sink};
-pub use pointers::{Environment, In, Out, Text};
+pub(crate) use calls::{StateHandle, set_debug_logging, strings};
+pub use calls::{get, set, state};
+pub use instance::{Callbacks, Instantiation, enter, instantiate, release};
+pub(crate) use instance::{Handle, guard, refuse_instantiation, unsupported};
+pub(crate) use log::{Fmi2Logger, Fmi3Logger, Sink};
+pub(crate) use pointers::{Environment, Out};
+pub use pointers::{In, Text};
 
 /// `fmi3IntermediateUpdateCallback`.
 pub type IntermediateUpdate = unsafe extern "C" fn(
@@ -27,7 +28,7 @@ pub type IntermediateUpdate = unsafe extern "C" fn(
 );
 
 /// Call the importer's intermediate update; the time at which it wants the step to end early, if it does.
-pub fn intermediate_update(
+pub(crate) fn intermediate_update(
     callback: IntermediateUpdate,
     environment: Environment,
     time: f64,

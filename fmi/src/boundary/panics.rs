@@ -19,7 +19,7 @@ thread_local! {
 static HOOK: Once = Once::new();
 
 /// Make panics of this library silent, once.
-pub fn silence() {
+pub(crate) fn silence() {
     HOOK.call_once(|| panic::set_hook(Box::new(remember)));
 }
 

@@ -7,7 +7,7 @@ use std::mem::size_of;
 use crate::slave::{Refusal, Result};
 
 /// The importer's pointer that goes back to it with every callback, never followed.
-pub type Environment = *mut c_void;
+pub(crate) type Environment = *mut c_void;
 
 /// Array or single value to read from.
 #[derive(Debug, Clone, Copy)]
@@ -17,7 +17,7 @@ pub struct In<T>(*const T);
 /// Array or single value to write to.
 #[derive(Debug, Clone, Copy)]
 #[repr(transparent)]
-pub struct Out<T>(*mut T);
+pub(crate) struct Out<T>(*mut T);
 
 /// NUL-terminated text.
 #[derive(Debug, Clone, Copy)]
@@ -97,7 +97,7 @@ impl<T: Copy> Out<T> {
     }
 
     /// Write one value if there is a place for it.
-    pub fn offer(&self, value: T) {
+    pub(crate) fn offer(&self, value: T) {
         if let Ok(window) = self.single("") {
             window.fill(&[value]);
         }

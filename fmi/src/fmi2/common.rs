@@ -14,7 +14,7 @@ use crate::slave::{Dialect, Experiment, Refusal, Status};
 /// `fmi2CallbackFunctions`. Memory functions and `stepFinished` are never called.
 #[derive(Clone, Copy)]
 #[repr(C)]
-pub struct CallbackFunctions {
+pub(crate) struct CallbackFunctions {
     logger: Option<Fmi2Logger>,
     allocate_memory: Option<unsafe extern "C" fn(usize, usize) -> Environment>,
     free_memory: Option<unsafe extern "C" fn(Environment)>,

@@ -9,7 +9,7 @@ const CAPABILITY: &str = "Model Exchange interface";
 /// `fmi2EventInfo`.
 #[repr(C)]
 #[derive(Clone, Copy)]
-pub struct EventInfo {
+pub(crate) struct EventInfo {
     new_discrete_states_needed: Boolean,
     terminate_simulation: Boolean,
     nominals_of_continuous_states_changed: Boolean,

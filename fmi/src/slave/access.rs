@@ -139,7 +139,7 @@ fn type_name(dialect: Dialect, kind: Kind) -> &'static str {
 impl Slave {
     /// Most value references a single call may bring. More than this can only be a mistaken count, and following it would
     /// read beyond the importer's array; repeating references is legal, hence the margin.
-    pub fn reference_limit(&self) -> usize {
+    pub(crate) fn reference_limit(&self) -> usize {
         16 * self.simulation.table().references() + 1024
     }
 
@@ -282,7 +282,7 @@ impl Slave {
     ///
     /// # Errors
     /// Unknown reference, not a continuous input, order other than 1, non-finite value.
-    pub fn set_input_derivatives(&mut self, references: &[u32], orders: &[i32], values: &[f64]) -> Result<()> {
+    pub(crate) fn set_input_derivatives(&mut self, references: &[u32], orders: &[i32], values: &[f64]) -> Result<()> {
         for ((&reference, &order), value) in references.iter().zip(orders).zip(values) {
             let what = self.check_derivative(reference, order, Causality::Input)?;
             if !value.is_finite() {
@@ -303,7 +303,7 @@ impl Slave {
     }
 
     /// One order per element, of one order per value reference.
-    pub fn orders_of_elements(&self, references: &[u32], orders: &[i32]) -> Vec<i32> {
+    pub(crate) fn orders_of_elements(&self, references: &[u32], orders: &[i32]) -> Vec<i32> {
         let table = self.simulation.table();
         let count = |reference: u32| match table.locate(reference) {
             Ok((variable, _)) if self.arrays => variable.len(),
@@ -320,7 +320,7 @@ impl Slave {
     ///
     /// # Errors
     /// Unknown reference, not a continuous output, order other than 1.
-    pub fn output_derivatives(&self, elements: &[u32], orders: &[i32]) -> Result<Vec<f64>> {
+    pub(crate) fn output_derivatives(&self, elements: &[u32], orders: &[i32]) -> Result<Vec<f64>> {
         let derivative = |(&element, &order): (&u32, &i32)| {
             self.check_derivative(element, order, Causality::Output)?;
             Ok(self.simulation.output_derivative(element, order)?)

@@ -33,7 +33,7 @@ pub enum Status {
 
 /// Which version of the standard an instance was made by: names of types and arguments differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Dialect {
+pub(crate) enum Dialect {
     /// FMI 2.0.
     Fmi2,
     /// FMI 3.0.
@@ -42,7 +42,7 @@ pub enum Dialect {
 
 /// A call that was not carried out, and the message that explains it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refusal {
+pub(crate) struct Refusal {
     /// `Error` or `Discard`.
     pub status: Status,
     /// What, where, and the remedy.
@@ -56,7 +56,7 @@ impl Refusal {
     }
 
     /// A refusal that answers `Discard`.
-    pub fn discard(message: impl Into<String>) -> Self {
+    pub(crate) fn discard(message: impl Into<String>) -> Self {
         Self { status: Status::Discard, message: message.into() }
     }
 }
@@ -128,7 +128,7 @@ impl Slave {
     }
 
     /// Version of the standard this instance was made by.
-    pub fn dialect(&self) -> Dialect {
+    pub(crate) fn dialect(&self) -> Dialect {
         self.dialect
     }
 

@@ -14,7 +14,7 @@ use super::{Dialect, Phase, Refusal, Result};
 
 /// One row of a call-order table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Rule {
+pub(crate) struct Rule {
     /// Name of the exported function.
     pub name: &'static str,
     /// Phases in which it may be called.
@@ -23,7 +23,7 @@ pub struct Rule {
 
 impl Rule {
     /// Version of the standard, by the prefix of the name.
-    pub fn dialect(&self) -> Dialect {
+    pub(crate) fn dialect(&self) -> Dialect {
         if self.name.starts_with("fmi2") { Dialect::Fmi2 } else { Dialect::Fmi3 }
     }
 
@@ -45,7 +45,7 @@ impl Rule {
 }
 
 /// No phase.
-pub const NOWHERE: States = 0;
+pub(crate) const NOWHERE: States = 0;
 /// Phases in which the whole state can be saved and restored.
 const SETTABLE: States = INSTANTIATED | INITIALISING | STEPPING | FAILED | TERMINATED;
 /// Phases in which values can be read.
@@ -151,6 +151,6 @@ pub mod fmi3 {
 }
 
 /// Row of a function that belongs to a capability this FMU does not have; its own message says so in every phase.
-pub const fn unsupported(name: &'static str) -> Rule {
+pub(crate) const fn unsupported(name: &'static str) -> Rule {
     Rule { name, states: ANY }
 }

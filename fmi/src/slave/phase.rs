@@ -52,22 +52,22 @@ pub enum Phase {
 }
 
 /// Set of phases, one bit each.
-pub type States = u8;
+pub(crate) type States = u8;
 
 /// [`Phase::Instantiated`].
-pub const INSTANTIATED: States = 1;
+pub(crate) const INSTANTIATED: States = 1;
 /// [`Phase::Initialising`].
-pub const INITIALISING: States = 2;
+pub(crate) const INITIALISING: States = 2;
 /// [`Phase::Stepping`].
-pub const STEPPING: States = 4;
+pub(crate) const STEPPING: States = 4;
 /// [`Phase::Updating`].
-pub const UPDATING: States = 8;
+pub(crate) const UPDATING: States = 8;
 /// [`Phase::Failed`].
-pub const FAILED: States = 16;
+pub(crate) const FAILED: States = 16;
 /// [`Phase::Terminated`].
-pub const TERMINATED: States = 32;
+pub(crate) const TERMINATED: States = 32;
 /// Every phase.
-pub const ANY: States = 63;
+pub(crate) const ANY: States = 63;
 
 /// Names for messages, in the order of the bits.
 const NAMES: [&str; 6] =

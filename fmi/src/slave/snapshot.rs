@@ -14,7 +14,7 @@ const CHECKSUM: usize = 8;
 pub type Snapshot = Vec<u8>;
 
 /// Opaque address by which the importer names a saved state.
-pub type Handle = *const Snapshot;
+pub(crate) type Handle = *const Snapshot;
 
 fn damaged(problem: impl std::fmt::Display) -> Refusal {
     Refusal::error(format!(
@@ -130,7 +130,7 @@ impl Slave {
     ///
     /// # Errors
     /// Not a state of this instance.
-    pub fn free_snapshot(&mut self, handle: Handle) -> Result<()> {
+    pub(crate) fn free_snapshot(&mut self, handle: Handle) -> Result<()> {
         let index = self.index(handle)?;
         self.snapshots.swap_remove(index);
         Ok(())
@@ -140,12 +140,12 @@ impl Slave {
     ///
     /// # Errors
     /// Not a state of this instance.
-    pub fn serialised(&self, handle: Handle) -> Result<&[u8]> {
+    pub(crate) fn serialised(&self, handle: Handle) -> Result<&[u8]> {
         Ok(&self.snapshots[self.index(handle)?])
     }
 
     /// Length of every saved state of this FMU (bytes).
-    pub fn serialised_size(&self) -> usize {
+    pub(crate) fn serialised_size(&self) -> usize {
         MAGIC.len() + 4 + 4 + self.token.len() + 4 + 8 + 8 + 8 + self.simulation.state_size() + CHECKSUM
     }
 

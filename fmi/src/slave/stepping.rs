@@ -59,7 +59,7 @@ impl Slave {
     ///
     /// # Errors
     /// Early: the state is not finite; the phase is [`Phase::Failed`] then.
-    pub fn end_step(&mut self, early: bool) -> Result<()> {
+    pub(crate) fn end_step(&mut self, early: bool) -> Result<()> {
         let last_good = self.simulation.time();
         if let Phase::Updating { stop, .. } = self.phase {
             if early {

@@ -1,6 +1,6 @@
 //! Everything that is drawn: line plots, waterfalls, pictures of meshes, tables, and the style of the pages they stand on.
 
-pub mod decimate;
+pub(crate) mod decimate;
 pub mod picture;
 pub mod plots;
 pub mod table;

@@ -21,9 +21,9 @@ use crate::{
 };
 
 /// The bladed disk of the stage.
-pub const STAGE: &str = "stage";
+pub(crate) const STAGE: &str = "stage";
 /// The casing of the stage.
-pub const STAGE_CASING: &str = "stage-casing";
+pub(crate) const STAGE_CASING: &str = "stage-casing";
 /// The same two on coarse meshes, for tests and first looks: shapes alike, frequencies some percent off.
 pub const STAGE_COARSE: &str = "stage-coarse";
 /// See [`STAGE_COARSE`].

@@ -173,7 +173,7 @@ fn column_norms(block: &Mat<f64>, mass_block: &Mat<f64>) -> Vec<f64> {
 ///
 /// # Errors
 /// [`Error::NotPositiveDefinite`] with the given name and remedy.
-pub fn positive_factor(shifted: &SparseMatrix, mass: &SparseMatrix, name: &str, remedy: &str) -> Result<Factor> {
+pub(crate) fn positive_factor(shifted: &SparseMatrix, mass: &SparseMatrix, name: &str, remedy: &str) -> Result<Factor> {
     let factor = shifted.factor(name, remedy)?;
     if mass.order() == 0 {
         return Ok(factor);

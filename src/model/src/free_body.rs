@@ -19,7 +19,7 @@ use crate::reduce::{
 
 /// What to reduce a body to, and what to call it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FreeBodyOptions {
+pub(crate) struct FreeBodyOptions {
     /// Name of the structure.
     pub name: String,
     /// Number of fixed-interface modes; all where absent, and the reduction is then exact.
@@ -36,7 +36,7 @@ pub struct FreeBodyOptions {
 /// [`crate::Error::Invalid`] for contact nodes that are repeated or do not exist;
 /// [`crate::Error::NotPositiveDefinite`] for contact nodes on one line, and where the body
 /// is not one connected part.
-pub fn reduce_free_body(
+pub(crate) fn reduce_free_body(
     model: FeModel,
     contact: &[ContactPoint],
     options: &FreeBodyOptions,

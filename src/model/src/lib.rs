@@ -17,7 +17,7 @@ pub mod element;
 mod error;
 pub mod fe_model;
 mod file;
-pub mod free_body;
+pub(crate) mod free_body;
 pub mod inp;
 pub mod material;
 pub mod mesh;

@@ -61,7 +61,7 @@ impl PanelGrid {
 
 /// What to reduce to, and what to call it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PanelOptions {
+pub(crate) struct PanelOptions {
     /// Name of the structure.
     pub name: String,
     /// Number of modes.
@@ -80,7 +80,7 @@ pub struct PanelOptions {
 /// # Errors
 /// [`Error::Invalid`] for a grid of nodes that do not exist or are repeated, more modes than degrees of freedom or
 /// more static responses than forces; [`Error::NotPositiveDefinite`] for a structure that is not held.
-pub fn reduce_panel(
+pub(crate) fn reduce_panel(
     model: FeModel,
     clamped: &[usize],
     grid: &PanelGrid,

@@ -27,7 +27,7 @@ const WIDTH: usize = 8;
 const ROWS: usize = 4096;
 
 /// AᵀB of two tall matrices, in parallel.
-pub fn tall_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+pub(crate) fn tall_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     assert_eq!(a.nrows(), b.nrows(), "the product's inner dimensions must agree");
     let pieces = a.nrows().div_ceil(ROWS);
     // A few pieces at a time, so that their products need not be kept all at once.
@@ -51,7 +51,7 @@ pub fn tall_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
 }
 
 /// target + factor · A C for a tall A and a small C, in parallel.
-pub fn add_tall(target: MatMut<'_, f64>, factor: f64, a: MatRef<'_, f64>, c: MatRef<'_, f64>) {
+pub(crate) fn add_tall(target: MatMut<'_, f64>, factor: f64, a: MatRef<'_, f64>, c: MatRef<'_, f64>) {
     let chunks: Vec<_> = target.par_row_chunks_mut(ROWS).collect();
     chunks.into_par_iter().enumerate().for_each(|(piece, rows)| {
         let part = a.get(piece * ROWS..piece * ROWS + rows.nrows(), ..);
@@ -309,7 +309,7 @@ impl Factor {
     }
 
     /// As [`Self::solve`], all columns together in the calling thread: for callers that are parallel themselves.
-    pub fn solve_in_place(&self, right: MatMut<'_, f64>) {
+    pub(crate) fn solve_in_place(&self, right: MatMut<'_, f64>) {
         let scratch = self.symbolic.inner.solve_in_place_scratch::<f64>(right.ncols(), PAR);
         let mut memory = MemBuffer::new(scratch);
         let factor = LltRef::new(&self.symbolic.inner, &self.values);

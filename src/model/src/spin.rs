@@ -19,7 +19,8 @@ mod equilibrium;
 mod reduced;
 
 pub use equilibrium::{Rotating, SpinningState, turned_about_axis, without_axial};
-pub use reduced::{CHECKED, MIDDLE, ReducedSpin, Resting, SPARE_MODES, SpinCheck, SpinningStates, reduced_spin};
+pub use reduced::SpinCheck;
+pub(crate) use reduced::{ReducedSpin, Resting, SPARE_MODES, SpinningStates, reduced_spin};
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::{Rom, rom::Spin};

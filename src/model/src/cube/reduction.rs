@@ -134,7 +134,7 @@ fn model(mesh: Mesh, material: &Material, mass: MassMatrix, origin: &str, listen
 ///
 /// # Errors
 /// A mesh without the sets of [`cube_of`].
-pub fn master_points(mesh: &Mesh) -> Result<Vec<ContactPoint>> {
+pub(crate) fn master_points(mesh: &Mesh) -> Result<Vec<ContactPoint>> {
     let mut points = Vec::new();
     for (set, name) in [("MASTER_LEFT", "left"), ("MASTER_RIGHT", "right")] {
         points.extend(mesh.set(set)?.iter().zip(1..).map(|(&node, number)| ContactPoint {

@@ -94,14 +94,14 @@ impl<'a> Condensed<'a> {
     }
 
     /// A_II⁻¹ in place.
-    pub fn solve_interior(&self, right: &mut Mat<f64>) {
+    pub(crate) fn solve_interior(&self, right: &mut Mat<f64>) {
         if let Some(factor) = &self.interior {
             factor.solve_in_place(right.as_mut());
         }
     }
 
     /// A_BI t.
-    pub fn boundary_rows(&self, inner: MatRef<'_, f64>) -> Mat<f64> {
+    pub(crate) fn boundary_rows(&self, inner: MatRef<'_, f64>) -> Mat<f64> {
         let (interior, order) = (self.sector.parts.interior, self.shifted.order());
         let mut product = Mat::zeros(order - interior, inner.ncols());
         for j in 0..inner.ncols() {
@@ -122,7 +122,7 @@ impl<'a> Condensed<'a> {
     }
 
     /// A_IB u for the boundary displacements u.
-    pub fn interior_columns(&self, boundary: MatRef<'_, f64>) -> Mat<f64> {
+    pub(crate) fn interior_columns(&self, boundary: MatRef<'_, f64>) -> Mat<f64> {
         let interior = self.sector.parts.interior;
         let mut product = Mat::zeros(interior, boundary.ncols());
         for j in 0..boundary.ncols() {

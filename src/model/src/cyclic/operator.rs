@@ -157,7 +157,7 @@ impl<'a> Operator<'a> {
 
     /// Constraint modes (interior, face, contact) × contact: unit displacements of the contact, everything else at rest;
     /// and the stiffness of the contact that goes with them. Those of K when the shift is 0.
-    pub fn constraint_modes(&self) -> (Mat<c64>, Mat<c64>) {
+    pub(crate) fn constraint_modes(&self) -> (Mat<c64>, Mat<c64>) {
         let parts = self.parts();
         let (face, contact) = (parts.face, parts.contact);
         let mut edge = self.contact_columns.get(..face, ..).to_owned();

@@ -6,9 +6,9 @@ use crate::reduce::ContactPoint;
 use crate::{Error, Result};
 
 /// A set of at most this many nodes is taken whole.
-pub const TAKEN_WHOLE: usize = 12;
+pub(crate) const TAKEN_WHOLE: usize = 12;
 /// Of a larger set, this many: both edges and the middle.
-pub const CHOSEN: usize = 3;
+pub(crate) const CHOSEN: usize = 3;
 
 /// Axial positions closer than this share of the set's extent are one.
 const SAME_PLACE: f64 = 1e-3;

@@ -21,7 +21,7 @@ use crate::material::Material;
 use crate::progress::Listener;
 use crate::{Error, Result};
 
-pub use contact_nodes::{CHOSEN, ContactChoice, TAKEN_WHOLE, choose_contact_nodes};
+pub use contact_nodes::{ContactChoice, choose_contact_nodes};
 pub use matrices::{MatrixFiles, read_matrices};
 pub use plausibility::{Plausibility, bounding_box, plausibility, total_mass};
 

@@ -30,7 +30,7 @@ use crate::progress::{Listener, Stage, report};
 use crate::reduce::{Reduction, ReductionOptions, reduce, reduce_spinning};
 
 /// Number of blades.
-pub const BLADES: usize = 36;
+pub(crate) const BLADES: usize = 36;
 /// Design speed (rad/s), positive about +z for the mesh of this module.
 pub const DESIGN_SPEED: f64 = 1800.0;
 /// Running tip clearance at design speed (m).

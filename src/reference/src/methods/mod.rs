@@ -3,7 +3,7 @@
 //! where a master meets a surface ([`contact`]), nothing else.
 
 pub mod augmented;
-pub mod bipotential;
+pub(crate) mod bipotential;
 mod blocks;
 pub mod contact;
 pub mod film;

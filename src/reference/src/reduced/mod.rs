@@ -46,7 +46,7 @@ impl Row {
     }
 
     /// values += factor·row.
-    pub fn add_to(&self, factor: f64, values: &mut [f64]) {
+    pub(crate) fn add_to(&self, factor: f64, values: &mut [f64]) {
         for (start, row) in &self.0 {
             values[*start..].iter_mut().zip(row).for_each(|(value, row)| *value += factor * row);
         }

@@ -30,7 +30,7 @@ struct Loss {
 
 /// Losses with smaller and smaller steps.
 #[derive(Debug)]
-pub struct Losses(Vec<Loss>);
+pub(crate) struct Losses(Vec<Loss>);
 
 impl Losses {
     /// Fly with every step.

@@ -18,7 +18,7 @@ use super::product::{Product, ProductRun};
 
 /// How the cube flies.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Flight {
+pub(crate) struct Flight {
     /// Speed along −y (m/s).
     pub speed: f64,
     pub friction: f64,
@@ -44,7 +44,7 @@ impl Outcome {
         self.result.as_ref().ok().map(|run| &run.history)
     }
 
-    pub fn is_product(&self) -> bool {
+    pub(crate) fn is_product(&self) -> bool {
         matches!(self.competitor, Competitor::Product(_))
     }
 }
@@ -59,7 +59,7 @@ fn reference(method: Method, surface: SurfaceKind, step: f64, stride: usize) -> 
 
 /// Names of the product's runs that statements are about.
 pub const PAPER: &str = "product, film, central differences";
-pub const BEST: &str = "product, lcp, modal-exact";
+pub(crate) const BEST: &str = "product, lcp, modal-exact";
 pub const STICKING: &str = "product, coulomb, modal-exact";
 /// Names of the reference methods on the same surface.
 pub const A: &str = "a, film";
@@ -100,7 +100,7 @@ pub fn competitors(flight: &Flight, quick: bool, facets: bool) -> Vec<(&'static 
 }
 
 /// Interval of the records (s), the same for all.
-pub const RECORD: f64 = 1e-6;
+pub(crate) const RECORD: f64 = 1e-6;
 
 /// One run to `end` (s), alone, so that processor time is its own.
 ///

@@ -29,7 +29,7 @@ const PRODUCT: Product = Product {
 
 /// A run with one body reduced otherwise.
 #[derive(Debug, Clone)]
-pub struct Size {
+pub(crate) struct Size {
     pub modes: usize,
     pub static_responses: usize,
     /// Size of the ROM file (bytes).
@@ -42,7 +42,7 @@ pub struct Size {
 
 /// Rings against method a, and the cube against all its modes.
 #[derive(Debug, Clone)]
-pub struct Sizes {
+pub(crate) struct Sizes {
     pub rings: Vec<Size>,
     pub cube: Vec<Size>,
 }

@@ -43,7 +43,7 @@ enum Problem {
 }
 
 /// A problem of rods at several numbers of elements.
-pub struct Bars {
+pub(crate) struct Bars {
     problem: Problem,
     sizes: Vec<Size>,
     standard: usize,

@@ -14,7 +14,7 @@ use super::{
 
 /// How soft contact may be: what augmented Lagrangian and penalty need to know of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Softness {
+pub(crate) struct Softness {
     /// Contact stiffness of the softer penalty (N/m); the augmented Lagrangian has ten times as much.
     pub stiffness: f64,
     /// Penetration that the augmented Lagrangian lets pass (m).
@@ -24,7 +24,7 @@ pub struct Softness {
 }
 
 /// A run of a method of the reference crate.
-pub struct OutsideRun<'a, S: Scene> {
+pub(crate) struct OutsideRun<'a, S: Scene> {
     scene: &'a S,
     method: Box<dyn Method + 'a>,
     step: f64,
@@ -61,7 +61,7 @@ impl<'a, S: Scene> OutsideRun<'a, S> {
     }
 
     /// Leave the potential of the loads out of the energy, as a whole scene does.
-    pub fn without_potential(self) -> Self {
+    pub(crate) fn without_potential(self) -> Self {
         Self { potential: false, ..self }
     }
 

@@ -19,7 +19,7 @@ const NORMAL: [f64; 3] = [-1.0, 0.0, 0.0];
 
 /// A rod prepared for the core.
 #[derive(Debug, Clone)]
-pub struct CoreRod {
+pub(crate) struct CoreRod {
     model: ModalModel,
     load: Vec<f64>,
     start: [Vec<f64>; 2],
@@ -111,7 +111,7 @@ impl CoreRod {
 }
 
 /// A run of a rod.
-pub struct RodRun<'a> {
+pub(crate) struct RodRun<'a> {
     rod: &'a CoreRod,
     system: System,
     division: u32,

@@ -39,7 +39,7 @@ const QUICK_REFERENCES: (u32, u32) = (320, 160);
 const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 5e-6, margin: 2e-5 };
 
 /// A rub of rotor 37.
-pub struct Rotor {
+pub(crate) struct Rotor {
     heavy: bool,
     sizes: Vec<(usize, Scene, BladeScene)>,
     divisions: Vec<u32>,

@@ -13,11 +13,11 @@ use tiprub_core::{
 use super::observe::real;
 
 /// Half the side of the body (m), and half its width.
-pub const HALF: f64 = 0.02;
+pub(crate) const HALF: f64 = 0.02;
 /// Half the extent of a plate along y (m).
-pub const PLATE: f64 = 0.09;
+pub(crate) const PLATE: f64 = 0.09;
 /// Nodes that move in one step by more than this could pass a surface unseen (m): a tenth of the body.
-pub const FURTHEST: f64 = 0.1 * 2.0 * HALF;
+pub(crate) const FURTHEST: f64 = 0.1 * 2.0 * HALF;
 
 /// Lumps in a row along x, the first at the left face and the last at the right one; four contact nodes on each of these faces.
 /// One lump is a rigid body without rotation: it has both faces.

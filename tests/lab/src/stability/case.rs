@@ -30,7 +30,7 @@ impl Expected {
     }
 
     /// A refusal that contains all words of one of these lists: where several are sound.
-    pub fn refused_as(lists: &[&[&str]]) -> Self {
+    pub(crate) fn refused_as(lists: &[&[&str]]) -> Self {
         Self::Refused(owned(lists))
     }
 
@@ -40,7 +40,7 @@ impl Expected {
     }
 
     /// A right answer or a refusal that contains all words of one of these lists.
-    pub fn either_as(against: impl Into<String>, lists: &[&[&str]]) -> Self {
+    pub(crate) fn either_as(against: impl Into<String>, lists: &[&[&str]]) -> Self {
         Self::Either(against.into(), owned(lists))
     }
 
@@ -170,7 +170,7 @@ impl Happened {
     }
 
     /// What a child process wrote.
-    pub fn from_json(value: &Value) -> Option<Self> {
+    pub(crate) fn from_json(value: &Value) -> Option<Self> {
         let number = |value: &Value| value.as_u64().map(f64::from_bits);
         let check = |check: &Value| {
             let what = check["what"].as_str()?.to_owned();
@@ -305,7 +305,7 @@ impl Case {
     }
 
     /// Needs packaged FMUs.
-    pub fn importing(self) -> Self {
+    pub(crate) fn importing(self) -> Self {
         Self { imports: true, ..self }
     }
 

@@ -10,11 +10,12 @@ pub mod child;
 pub mod command;
 pub mod families;
 pub mod models;
-pub mod observe;
+pub(crate) mod observe;
 pub mod press;
 pub mod table;
 
-pub use case::{Case, Check, Context, Expected, Happened, Verdict, judge};
+pub use case::{Case, Check, Context, Expected, judge};
+pub use case::{Happened, Verdict};
 
 /// All cases of the full table, or of the quick one; those that prove the judge itself come with their family's name only.
 pub fn cases(quick: bool) -> Vec<Case> {

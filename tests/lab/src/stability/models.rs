@@ -24,7 +24,7 @@ pub const SOLVERS: [(Solver, &str); 3] = [(Solver::Film, "film"), (Solver::Lcp, 
 
 /// A contact node on a spring on a mass on a spring, in each direction: six degrees of freedom per sector.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tower {
+pub(crate) struct Tower {
     /// Number of sectors.
     pub sectors: usize,
     /// Mass of the base and of the contact node (kg).
@@ -265,7 +265,7 @@ pub fn bumps(rom: Rom) -> Scene {
 }
 
 /// Let an elastic ring carry the surface.
-pub fn on_ring(scene: &mut Scene, damping_ratio: f64) {
+pub(crate) fn on_ring(scene: &mut Scene, damping_ratio: f64) {
     scene.settings.structures.push(StructureSettings {
         name: "ring".into(),
         rom: "ring".into(),
@@ -278,7 +278,7 @@ pub fn on_ring(scene: &mut Scene, damping_ratio: f64) {
 }
 
 /// Choose scheme and solver.
-pub fn with_methods(mut scene: Scene, scheme: Scheme, solver: Solver) -> Scene {
+pub(crate) fn with_methods(mut scene: Scene, scheme: Scheme, solver: Solver) -> Scene {
     scene.settings.time.scheme = scheme;
     scene.settings.contacts[0].solver = solver;
     scene

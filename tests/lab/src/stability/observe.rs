@@ -9,7 +9,7 @@ use tiprub_core::{
 use super::Check;
 
 /// Largest share of the energy exchanged that massless-boundary may give back in one step: its warning names it.
-pub const MASSLESS_RETURN: f64 = 2e-2;
+pub(crate) const MASSLESS_RETURN: f64 = 2e-2;
 
 /// Value of a real variable that the scene has.
 pub fn real(simulation: &Simulation, name: &str) -> f64 {
@@ -60,7 +60,7 @@ pub fn amplitudes(simulation: &Simulation, order: u32) -> [f64; 3] {
 
 /// Largest of everything that should be small, over a run.
 #[derive(Debug, Clone)]
-pub struct Watch {
+pub(crate) struct Watch {
     sectors: usize,
     slopes: Vec<f64>,
     clearances: Vec<f64>,
@@ -143,7 +143,7 @@ impl Watch {
     ///
     /// # Errors
     /// The step is refused.
-    pub fn step_moving(&mut self, simulation: &mut Simulation, length: f64) -> Result<()> {
+    pub(crate) fn step_moving(&mut self, simulation: &mut Simulation, length: f64) -> Result<()> {
         self.round = false;
         self.step(simulation, length)
     }
@@ -189,7 +189,7 @@ impl Watch {
     }
 
     /// Books that close, and entries that have their physical signs: contact takes energy, friction heats.
-    pub fn laws(&self) -> Vec<Check> {
+    pub(crate) fn laws(&self) -> Vec<Check> {
         vec![
             Check::so("all outputs finite", self.finite),
             Check::at_most("ledger residual", self.residual, 1e-9),
@@ -199,7 +199,7 @@ impl Watch {
     }
 
     /// The same for a scheme: massless-boundary takes contact forces a step late, and gives back a little of what it took.
-    pub fn books_of(&self, scheme: Scheme) -> Vec<Check> {
+    pub(crate) fn books_of(&self, scheme: Scheme) -> Vec<Check> {
         let mut checks = self.laws();
         if scheme == Scheme::MasslessBoundary {
             checks[2].bound = MASSLESS_RETURN;
@@ -213,12 +213,12 @@ impl Watch {
     }
 
     /// How far the impact loss fell in a communication step, relative to the energy exchanged in all.
-    pub fn impact_drop(&self) -> f64 {
+    pub(crate) fn impact_drop(&self) -> f64 {
         self.share(self.impact_drop)
     }
 
     /// The same of the friction heat.
-    pub fn heat_drop(&self) -> f64 {
+    pub(crate) fn heat_drop(&self) -> f64 {
         self.share(self.heat_drop)
     }
 

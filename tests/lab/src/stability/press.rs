@@ -19,7 +19,7 @@ const DAMPING: f64 = 0.3;
 
 /// A casing that closes over `rise` seconds by gap and depth, and stays for `hold` seconds.
 #[derive(Debug, Clone)]
-pub struct Press {
+pub(crate) struct Press {
     /// Rotor in a round rigid casing.
     pub scene: Scene,
     /// How far beyond the clearance (m).

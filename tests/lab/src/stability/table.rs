@@ -24,11 +24,6 @@ impl Table {
         self.rows.iter().filter(|row| row.verdict == verdict).count()
     }
 
-    /// Whether every case ended in a right answer or in the refusal expected.
-    pub fn is_sound(&self) -> bool {
-        self.rows.iter().all(|row| matches!(row.verdict, Verdict::Right | Verdict::Refused))
-    }
-
     fn families(&self) -> Vec<&str> {
         let mut families: Vec<&str> = Vec::new();
         for row in &self.rows {
@@ -41,7 +36,7 @@ impl Table {
     }
 
     /// Rows that are neither right nor refused.
-    pub fn unsound(&self) -> impl Iterator<Item = &Row> {
+    pub(crate) fn unsound(&self) -> impl Iterator<Item = &Row> {
         self.rows.iter().filter(|row| !matches!(row.verdict, Verdict::Right | Verdict::Refused))
     }
 

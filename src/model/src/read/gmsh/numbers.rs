@@ -71,7 +71,7 @@ impl<'a> Numbers<'a> {
     }
 
     /// An `int` of the format.
-    pub fn int(&mut self) -> Result<i64> {
+    pub(crate) fn int(&mut self) -> Result<i64> {
         let value = match self {
             Self::Text { .. } => self.word().and_then(|word| word.parse::<i32>().ok()),
             Self::Bytes { .. } => self.bytes().map(i32::from_le_bytes),

@@ -39,7 +39,7 @@ impl DataLine {
     }
 
     /// Whether the record goes on in the next line.
-    pub fn goes_on(&self) -> bool {
+    pub(crate) fn goes_on(&self) -> bool {
         self.text.ends_with(',')
     }
 }

@@ -32,7 +32,7 @@ impl DeckMaterial {
         &self.name
     }
 
-    pub fn is_named(&self, name: &str) -> bool {
+    pub(crate) fn is_named(&self, name: &str) -> bool {
         self.name.eq_ignore_ascii_case(name)
     }
 

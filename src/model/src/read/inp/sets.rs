@@ -130,7 +130,7 @@ impl Family {
 
 impl Sets {
     /// Every node set, and every element set as the set of its nodes.
-    pub fn into_node_sets(self, draft: &mut Draft) -> Result<()> {
+    pub(crate) fn into_node_sets(self, draft: &mut Draft) -> Result<()> {
         let nowhere = ClosestPoint { file: "".into(), line: 0 };
         let mut node_sets = BTreeMap::new();
         for name in self.elements.sets.keys() {

@@ -22,9 +22,6 @@ pub fn cases() -> Vec<Case> {
     [rotor37(), stage(), exchanged()].into_iter().flatten().collect()
 }
 
-/// Models that cases of the full table load; made before the children need them.
-pub const MODELS: [&str; 3] = ["rotor37", builtin::STAGE_COARSE, builtin::STAGE_CASING_COARSE];
-
 fn model(name: &str) -> Option<Rom> {
     builtin::rom(name, &RomCache::of_user(), &Console::new(true, false))?.ok()
 }

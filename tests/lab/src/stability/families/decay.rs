@@ -53,7 +53,7 @@ pub fn cases() -> Vec<Case> {
 
 /// A blade with one node that is let go.
 #[derive(Debug, Clone, Copy)]
-pub struct Released {
+pub(crate) struct Released {
     /// Scheme.
     pub scheme: Scheme,
     /// Solver.

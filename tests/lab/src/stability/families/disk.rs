@@ -184,7 +184,7 @@ impl Still {
 
 /// A rub and the same in the mirror.
 #[derive(Debug, Clone, Copy)]
-pub struct Mirrored {
+pub(crate) struct Mirrored {
     /// Scheme.
     pub scheme: Scheme,
     /// Solver.

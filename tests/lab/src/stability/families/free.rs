@@ -23,7 +23,7 @@ pub fn cases() -> Vec<Case> {
 }
 
 /// Thrown without friction.
-pub fn throw(body: Body, velocity: [f64; 3], plates: Vec<Plate>) -> Throw {
+pub(crate) fn throw(body: Body, velocity: [f64; 3], plates: Vec<Plate>) -> Throw {
     Throw { body, velocity, plates, friction: 0.0, scheme: Scheme::ModalExact, solver: Solver::Lcp, step: STEP }
 }
 
@@ -117,7 +117,7 @@ fn tunnels() -> Vec<Case> {
 
 /// A body of one lump that hits a plate obliquely.
 #[derive(Debug, Clone, Copy)]
-pub struct Impact {
+pub(crate) struct Impact {
     /// Scheme.
     pub scheme: Scheme,
     /// Solver.

@@ -20,7 +20,7 @@ const STEP: f64 = 1e-6;
 
 /// Blades that a casing touches twice.
 #[derive(Debug, Clone, Copy)]
-pub struct Heat {
+pub(crate) struct Heat {
     /// Scheme.
     pub scheme: Scheme,
     /// Solver.

@@ -10,7 +10,7 @@ pub mod heat;
 pub mod limits;
 pub mod loads;
 pub mod plates;
-pub mod proof;
+pub(crate) mod proof;
 pub mod random;
 pub mod stepping;
 pub mod surfaces;

@@ -22,7 +22,7 @@ pub fn cases() -> Vec<Case> {
 
 /// Between two plates that give way, one of them curved.
 #[derive(Debug, Clone, Copy)]
-pub struct Balance {
+pub(crate) struct Balance {
     /// Scheme.
     pub scheme: Scheme,
     /// Solver.

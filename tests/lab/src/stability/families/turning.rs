@@ -56,7 +56,7 @@ fn mode(frequency: f64, ratio: f64, omega: f64) -> Complex<f64> {
 
 /// A load that travels around a ring.
 #[derive(Debug, Clone, Copy)]
-pub struct Travelling {
+pub(crate) struct Travelling {
     /// Scheme.
     pub scheme: Scheme,
     /// Nodal diameters.
@@ -274,7 +274,7 @@ impl Pressed {
 
 /// A blade that stands on the flank of a lobe; nothing turns, nothing rubs.
 #[derive(Debug, Clone, Copy)]
-pub struct Flank {
+pub(crate) struct Flank {
     /// Scheme.
     pub scheme: Scheme,
     /// Solver.

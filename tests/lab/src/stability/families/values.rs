@@ -31,7 +31,7 @@ pub const VALUES: [(&str, f64); 12] = [
 ];
 
 /// Scenes whose tables are walked.
-pub const SCENES: [&str; 4] = ["bumps", "round", "ring", "disk"];
+pub(crate) const SCENES: [&str; 4] = ["bumps", "round", "ring", "disk"];
 
 /// One of them.
 pub fn scene(name: &str) -> Scene {
