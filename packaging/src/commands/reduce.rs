@@ -3,6 +3,7 @@
 use std::{
     fmt::Write as _,
     path::{Path, PathBuf},
+    time::Instant,
 };
 
 use serde_json::{Value, json};
@@ -47,7 +48,8 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     let names: Vec<Named> = names.into_iter().flatten().map(|(role, path)| Named::new(role, path)).collect();
     places::apart(&command_files::model_files(arguments), &names)?;
     std::iter::once(output).chain(others).try_for_each(|path| check_target(path, arguments))?;
-    let reduced = reduced(arguments, console)?;
+    let start = Instant::now();
+    let reduced = Reduced { seconds: start.elapsed().as_secs_f64(), ..reduced(arguments, console)? };
     let facts = RomFacts::of(&reduced.rom, None)?;
     let mut files = vec![(output, tiprub_format::write_rom(&reduced.rom))];
     if let Some(path) = &arguments.inp {

@@ -40,5 +40,5 @@ pub use fe_model::FeModel;
 pub use material::Material;
 pub use mesh::{Mesh, surface_quads};
 pub use progress::{Progress, Stage};
-pub use reduce::{Reduction, reduce, reduce_model, reduce_spinning};
+pub use reduce::{Reduction, reduce, reduce_model};
 pub use rotor37::{Rotor37Options, reduce_rotor37};

@@ -16,7 +16,7 @@ use crate::craig_bampton::{CraigBampton, with_static_responses};
 use crate::eigen::Modes;
 use crate::fe_model::FeModel;
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{FullModes, Reduction, Timings, compare, description, full_modes, node_modes, timed};
+use crate::reduce::{FullModes, Reduction, compare, description, full_modes};
 use crate::sparse::{SparseMatrix, principal_pair};
 use crate::{Error, Result};
 
@@ -89,16 +89,12 @@ pub(crate) fn reduce_panel(
 ) -> Result<Reduction> {
     faer::set_global_parallelism(faer::Par::Seq);
     grid.check(&model)?;
-    let mut timings = Timings::default();
     let free = free_dofs(model.nodes.len(), clamped);
     let (stiffness, mass) = principal_pair(&model.stiffness, &model.mass, &free);
-    let full = timed(&mut timings.full_modes, || {
-        full_modes(&stiffness, &mass, false, options.modes.max(options.checked_modes), listener)
-    })?;
-    let basis = timed(&mut timings.reduction, || {
-        let kept = lowest(&full.modes, options.modes);
-        with_grid_responses(kept, &full, (&stiffness, &mass), &grid_dofs(&free, grid), options, listener)
-    })?;
+    let full = full_modes(&stiffness, &mass, false, options.modes.max(options.checked_modes), listener)?;
+    let kept = lowest(&full.modes, options.modes);
+    let dofs = grid_dofs(&free, grid);
+    let basis = with_grid_responses(kept, &full, (&stiffness, &mass), &dofs, options, listener)?;
     let order = basis.eigenvalues.len();
     let reduced = CraigBampton {
         mass: DMatrix::identity(order, order),
@@ -106,14 +102,11 @@ pub(crate) fn reduce_panel(
         transformation: basis.shapes,
         fixed_interface_frequencies: Vec::new(),
     };
-    let checks = timed(&mut timings.checks, || {
-        report(listener, Stage::Checks, 0, 1);
-        let mut judged = full.clone();
-        judged.modes = lowest(&full.modes, options.checked_modes);
-        let checks = compare(&judged, &mass, &reduced, &basis.eigenvalues, &DMatrix::identity(order, order));
-        report(listener, Stage::Checks, 1, 1);
-        Ok(checks)
-    })?;
+    report(listener, Stage::Checks, 0, 1);
+    let mut judged = full.clone();
+    judged.modes = lowest(&full.modes, options.checked_modes);
+    let checks = compare(&judged, &mass, &reduced, &basis.eigenvalues, &DMatrix::identity(order, order));
+    report(listener, Stage::Checks, 1, 1);
     let rom = Rom {
         name: options.name.clone(),
         origin: format!(
@@ -138,20 +131,10 @@ pub(crate) fn reduce_panel(
             ..RomExtras::default()
         },
     };
-    rom.validate()?;
-    Ok(Reduction {
-        rom,
-        modes: node_modes(&lowest(&full.modes, options.checked_modes), &free, model.nodes.len()),
-        largest_residual: full.modes.residuals.iter().copied().fold(0.0, f64::max),
-        free_dofs: free.len(),
-        reduced_angular_frequencies: basis.eigenvalues.iter().map(|square| square.sqrt()).collect(),
-        fixed_interface_frequencies: Vec::new(),
-        spin_checks: Vec::new(),
-        nodes: model.nodes.len(),
-        material: model.mesh.as_ref().map(|(_, material)| material.clone()),
-        mesh: model.mesh.map(|(mesh, _)| mesh),
-        timings,
-    })
+    let model = (model.nodes.len(), model.mesh);
+    let mut reduction = Reduction::new(rom, &full.modes, &free, &basis.eigenvalues, model)?;
+    reduction.modes.truncate(options.checked_modes);
+    Ok(reduction)
 }
 
 fn lowest(modes: &Modes, count: usize) -> Modes {

@@ -19,7 +19,7 @@ use crate::element::Formulation;
 use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{Reduction, Timings, check_nodes, compare, element_names, full_modes, node_modes, timed};
+use crate::reduce::{Reduction, check_nodes, compare, element_names, full_modes};
 use crate::sparse::{principal_pair, tall_product};
 use crate::thermal::patch_loads;
 
@@ -64,37 +64,27 @@ pub fn reduce_casing(
 ) -> Result<Reduction> {
     // As for blades: the library's own threads would split sums by their number, and with it the bits of the ROM.
     faer::set_global_parallelism(faer::Par::Seq);
-    let mut timings = Timings::default();
-    let (stiffness, mass, loads, free) = timed(&mut timings.assembly, || {
-        grid.validate()?;
-        check_nodes(&mesh.nodes, clamped, &grid.contact_points(), Frame::Cylindrical)?;
-        let free = free_dofs(mesh.nodes.len(), clamped);
-        let loads = patch_loads(&mesh, material, patches)?;
-        let loads = Mat::from_fn(free.len(), patches.len(), |i, k| loads[(free[i], k)]);
-        let assembled = assemble_with(&mesh, material, options.formulation, listener)?;
-        let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
-        Ok((stiffness, mass, loads, free))
-    })?;
-    let full = timed(&mut timings.full_modes, || {
-        full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)
-    })?;
-    let (reduced, modes, reduced_loads) = timed(&mut timings.reduction, || {
-        let inner = InnerBasis { modes: options.fixed_interface_modes, whole_pairs: true, loads: Some(loads.as_ref()) };
-        let reduced = craig_bampton_with(&stiffness, &mass, &interface_dofs(&free, grid), &inner, listener)?;
-        let order = reduced.mass.nrows();
-        let points: Vec<[f64; 3]> = grid.nodes.iter().map(|&node| mesh.nodes[node]).collect();
-        let rigid = if clamped.is_empty() { rigid_motions(&points, order) } else { DMatrix::zeros(order, 0) };
-        let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
-        let reduced_loads = reduced_loads(grid, &reduced, &loads);
-        let modes = condense(&modes, options.modes, &reduced_loads);
-        Ok((reduced, modes, reduced_loads))
-    })?;
-    let checks = timed(&mut timings.checks, || {
-        report(listener, Stage::Checks, 0, 1);
-        let checks = compare(&full, &mass, &reduced, &modes.squares, &modes.shapes);
-        report(listener, Stage::Checks, 1, 1);
-        Ok(if clamped.is_empty() { without_rigid_motions(checks) } else { checks })
-    })?;
+    grid.validate()?;
+    check_nodes(&mesh.nodes, clamped, &grid.contact_points(), Frame::Cylindrical)?;
+    let free = free_dofs(mesh.nodes.len(), clamped);
+    let loads = patch_loads(&mesh, material, patches)?;
+    let loads = Mat::from_fn(free.len(), patches.len(), |i, k| loads[(free[i], k)]);
+    let assembled = assemble_with(&mesh, material, options.formulation, listener)?;
+    let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
+    drop(assembled);
+    let full = full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)?;
+    let inner = InnerBasis { modes: options.fixed_interface_modes, whole_pairs: true, loads: Some(loads.as_ref()) };
+    let reduced = craig_bampton_with(&stiffness, &mass, &interface_dofs(&free, grid), &inner, listener)?;
+    let order = reduced.mass.nrows();
+    let points: Vec<[f64; 3]> = grid.nodes.iter().map(|&node| mesh.nodes[node]).collect();
+    let rigid = if clamped.is_empty() { rigid_motions(&points, order) } else { DMatrix::zeros(order, 0) };
+    let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
+    let reduced_loads = reduced_loads(grid, &reduced, &loads);
+    let modes = condense(&modes, options.modes, &reduced_loads);
+    report(listener, Stage::Checks, 0, 1);
+    let checks = compare(&full, &mass, &reduced, &modes.squares, &modes.shapes);
+    report(listener, Stage::Checks, 1, 1);
+    let checks = if clamped.is_empty() { without_rigid_motions(checks) } else { checks };
     let rom = Rom {
         name: options.name.clone(),
         origin: origin(&mesh, (material, options.formulation), clamped.len(), grid, &reduced, &modes),
@@ -112,20 +102,9 @@ pub fn reduce_casing(
             ..RomExtras::default()
         },
     };
-    rom.validate()?;
-    Ok(Reduction {
-        rom,
-        modes: node_modes(&full.modes, &free, mesh.nodes.len()),
-        largest_residual: full.modes.residuals.iter().copied().fold(0.0, f64::max),
-        free_dofs: free.len(),
-        reduced_angular_frequencies: modes.squares.iter().map(|square| square.sqrt()).collect(),
-        fixed_interface_frequencies: reduced.fixed_interface_frequencies,
-        spin_checks: Vec::new(),
-        material: Some(material.clone()),
-        nodes: mesh.nodes.len(),
-        mesh: Some(mesh),
-        timings,
-    })
+    let model = (mesh.nodes.len(), Some((mesh, material.clone())));
+    let fixed_interface_frequencies = reduced.fixed_interface_frequencies;
+    Ok(Reduction { fixed_interface_frequencies, ..Reduction::new(rom, &full.modes, &free, &modes.squares, model)? })
 }
 
 /// Rows of the contact nodes' dofs among the free ones; none is clamped.
