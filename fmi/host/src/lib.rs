@@ -1,6 +1,7 @@
 //! A packaged FMU driven the way any importer would: unzip, read modelDescription.xml, load the shared library,
 //! and go through the standard's call sequence. It knows nothing of the scene or of the core behind the ABI.
 
+pub mod api;
 pub mod archive;
 mod description;
 mod fmi2;
@@ -181,11 +182,14 @@ impl UnpackedFmu {
     /// # Errors
     /// The library cannot be loaded, or a call answers worse than Warning; the FMU's own messages are included.
     pub fn simulate(&self, schedule: &Schedule, progress: &dyn Fn(usize)) -> Result<ImportedRun> {
-        let library = slave::load(&self.library()?)?;
-        let run = |slave: &mut dyn slave::Slave| slave::drive(slave, &self.description, schedule, progress);
+        slave::drive(&mut *self.instance()?, &self.description, schedule, progress)
+    }
+
+    /// An instance of the FMU, of whichever version it is.
+    fn instance(&self) -> Result<Box<dyn slave::Slave>> {
         match self.description.fmi_version.as_str() {
-            "2.0" => run(&mut fmi2::Fmi2Slave::new(self, library)?),
-            "3.0" => run(&mut fmi3::Fmi3Slave::new(self, library)?),
+            "2.0" => Ok(Box::new(fmi2::Fmi2Slave::new(self)?)),
+            "3.0" => Ok(Box::new(fmi3::Fmi3Slave::new(self)?)),
             other => Err(Failure::new("FMU", format!("FMI version {other}"), "Only 2.0 and 3.0 can be imported")),
         }
     }

@@ -1,11 +1,9 @@
 //! What a scene with a free master is refused for, before it flies and on the flight.
 
-#[path = "common/lattice.rs"]
-mod lattice;
-
 use lattice::*;
 use tiprub_core::settings::*;
 use tiprub_core::{Scene, Simulation};
+use tiprub_test_models::{go, lattice, real, started};
 
 #[test]
 fn what_flies_into_a_surface_too_deep_ends_with_the_reason() {
@@ -119,7 +117,7 @@ fn a_body_too_fast_for_the_step_is_refused_and_passes_nothing_unseen() {
     }
     // A tenth of the block in one step is the limit.
     let mut slow = started(&scene(block([0.0; 3], 3e6), &[(Side::Left, 0.5)], false, [3900.0, 0.0, 0.0]));
-    advance(&mut slow, 1e-5);
+    go(&mut slow, 1e-5);
 }
 
 #[test]

@@ -8,11 +8,10 @@
     reason = "indices of small grids"
 )]
 
-mod common;
-
 use nalgebra::{DMatrix, DVector, Vector3};
 use tiprub_core::settings::{Motion, Shape, StructureSettings};
 use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_test_models::{self as models};
 
 const SECTORS: usize = 3;
 const GAP: f64 = 3.56e-4;
@@ -291,8 +290,8 @@ impl Second {
 
 #[test]
 fn a_second_implementation_of_the_flexible_rub_agrees() {
-    let mut scene = common::scene(SECTORS);
-    scene.roms[0] = common::rich_rom(SECTORS);
+    let mut scene = models::rub(SECTORS);
+    scene.roms[0] = models::rich_blade(SECTORS);
     let factors = [1.0, 1.02, 0.97];
     scene.settings.structures[0].frequency_factors = factors.to_vec();
     scene.settings.structures[0].whirl = true;
@@ -306,7 +305,7 @@ fn a_second_implementation_of_the_flexible_rub_agrees() {
         thermal: true,
         ..StructureSettings::default()
     });
-    scene.roms.push(common::casing(36, 3));
+    scene.roms.push(models::ring(36, 3));
     scene.settings.surfaces[0].structure = Some("ring".into());
     let friction = 0.15;
     scene.settings.contacts[0].friction = friction;

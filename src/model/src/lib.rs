@@ -16,7 +16,6 @@ pub mod eigen;
 pub mod element;
 mod error;
 pub mod fe_model;
-mod file;
 pub(crate) mod free_body;
 pub mod inp;
 pub mod material;

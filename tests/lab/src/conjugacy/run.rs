@@ -3,7 +3,7 @@
 use tiprub_core::{
     Result, Scene, Simulation,
     contact::{gap::GapLaw, spline::SurfaceSpline, surface::Surface, wrench::Wrench},
-    settings::{CoatingSettings, Scheme, Shape, Solver, SplineSettings},
+    settings::{Scheme, Shape, Solver, SplineSettings},
     system::{ContactEvent, System},
 };
 
@@ -78,17 +78,8 @@ impl Feature {
         match self {
             Self::Spline => scene.settings.surfaces[0].spline = Some(SplineSettings::default()),
             Self::Casing | Self::DiskInCasing => on_ring(&mut scene, 0.01),
-            Self::Coating => {
-                scene.settings.contacts[0].coating = Some(CoatingSettings {
-                    thickness: 1.5e-4,
-                    modulus: 2e8,
-                    yield_stress: 1e6,
-                    hardening: 2e7,
-                    cells_around: 500,
-                    cells_along: 7,
-                });
-            }
-            _ => {}
+            Self::Coating => tiprub_test_models::coating(&mut scene),
+            Self::Revolution | Self::Disk | Self::Free => {}
         }
         Some(scene)
     }

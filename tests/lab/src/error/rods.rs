@@ -2,15 +2,14 @@
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::{
-    Rom,
     contact::gap::{Drive, FixedGap, GapLaw},
     dynamics::{bank::BankOptions, modal::ModalModel, sectors::SectorModel},
-    rom::{ContactNode, Frame, RomChecks, RomExtras},
     settings::{Scheme, Solver},
     stability::{self, massless},
     system::{System, SystemParts, SystemSettings},
 };
 use tiprub_reference::reduced::bars::Rod;
+use tiprub_test_models::{node, structure};
 
 use super::run::{Run, Seen};
 
@@ -38,19 +37,8 @@ impl CoreRod {
         let count = rod.closing.len();
         let mut contact_map = DMatrix::zeros(3, count);
         contact_map.row_mut(0).copy_from(&rod.closing.transpose());
-        let rom = Rom {
-            name: "rod".into(),
-            origin: "linear rod elements, lumped mass".into(),
-            sectors: 1,
-            frame: Frame::Cartesian,
-            mass: rod.mass.clone(),
-            stiffness: rod.stiffness.clone(),
-            damping_ratio: 0.0,
-            contact_map,
-            contact_nodes: vec![ContactNode { name: "end".into(), position: [0.0; 3], meridional_slope: 0.0 }],
-            checks: RomChecks::default(),
-            extras: RomExtras::default(),
-        };
+        let nodes = vec![node("end", [0.0; 3], 0.0)];
+        let rom = structure("rod", rod.mass.clone(), rod.stiffness.clone(), contact_map, nodes);
         let model = ModalModel::from_rom(&rom, 0.0).map_err(|error| error.to_string())?;
         let model = ModalModel { quasi_static: ends, ..model };
         let amplitudes = |values: &DVector<f64>| model.modal_load((&rod.mass * values).as_slice());

@@ -3,12 +3,13 @@
 use nalgebra::DMatrix;
 use tiprub_core::{
     Rom, Scene, Simulation,
-    rom::{ContactGrid, ContactNode, Frame, RomChecks, RomExtras},
+    rom::ContactGrid,
     settings::{
         ContactSettings, ExperimentSettings, Motion, OutputSettings, SceneSettings, Scheme, Solver, StructureSettings,
         SurfaceSettings, TimeSettings,
     },
 };
+use tiprub_test_models::{node, structure};
 
 use super::observe::real;
 
@@ -95,20 +96,8 @@ fn rom(
     contact_map: DMatrix<f64>,
     nodes: Vec<(String, [f64; 3])>,
 ) -> Rom {
-    let node = |(name, position)| ContactNode { name, position, meridional_slope: 0.0 };
-    Rom {
-        name: name.into(),
-        origin: "lumps and springs".into(),
-        sectors: 1,
-        frame: Frame::Cartesian,
-        mass,
-        stiffness,
-        damping_ratio: 0.0,
-        contact_map,
-        contact_nodes: nodes.into_iter().map(node).collect(),
-        checks: RomChecks::default(),
-        extras: RomExtras::default(),
-    }
+    let nodes = nodes.into_iter().map(|(name, position)| node(name, position, 0.0)).collect();
+    structure(name, mass, stiffness, contact_map, nodes)
 }
 
 /// A plate beside the body: at x = −distance on the left, +distance on the right.

@@ -9,7 +9,7 @@ use tiprub_core::{
 
 use super::super::{
     Case, Check, Expected, Happened,
-    models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, blade, bumps, on_ring, ring, round, with_methods, with_step},
+    models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, blade, bumps, on_ring, round, with_methods, with_step},
     observe::{Watch, amplitudes, apart, displacements, real, set},
 };
 
@@ -111,7 +111,7 @@ fn heated(temperature: f64) -> Result<Vec<Check>> {
     for _ in 0..20 {
         simulation.do_step(simulation.time(), 2e-6)?;
     }
-    let ring = ring();
+    let ring = tiprub_test_models::ring(36, 3);
     let Some(loads) = ring.extras.thermal.as_ref().map(|thermal| &thermal.loads) else { return Ok(Vec::new()) };
     let Some(row) = simulation.table().find("casing_displacement").map(|row| row.reference) else {
         return Ok(Vec::new());
@@ -167,14 +167,7 @@ fn sudden(mut scene: Scene, what: &str) -> Result<Vec<Check>> {
 
 fn coatings() -> Vec<Case> {
     let mut cases = Vec::new();
-    let plain = CoatingSettings {
-        thickness: 1.5e-4,
-        modulus: 2e8,
-        yield_stress: 1e6,
-        hardening: 2e7,
-        cells_around: 500,
-        cells_along: 7,
-    };
+    let plain = tiprub_test_models::coating_of(1.5e-4, [500, 7]);
     type Change = fn(CoatingSettings) -> CoatingSettings;
     let accepted: [(&str, Change); 13] = [
         ("plain", |c| c),
