@@ -6,19 +6,19 @@ use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 use crate::text::clean;
 
 /// An XML element without text content: model descriptions have attributes only.
-pub struct Element {
+pub(crate) struct Element {
     name: &'static str,
     attributes: Vec<(&'static str, String)>,
     children: Vec<Element>,
 }
 
 impl Element {
-    pub fn new(name: &'static str) -> Self {
+    pub(crate) fn new(name: &'static str) -> Self {
         Self { name, attributes: Vec::new(), children: Vec::new() }
     }
 
     /// Add an attribute; the value is cleaned here and escaped on writing.
-    pub fn with(mut self, key: &'static str, value: impl AsRef<str>) -> Self {
+    pub(crate) fn with(mut self, key: &'static str, value: impl AsRef<str>) -> Self {
         self.attributes.push((key, clean(value.as_ref())));
         self
     }
@@ -36,7 +36,7 @@ impl Element {
         self.with_some(key, (!value.is_empty()).then_some(value))
     }
 
-    pub fn child(mut self, child: Element) -> Self {
+    pub(crate) fn child(mut self, child: Element) -> Self {
         self.children.push(child);
         self
     }
@@ -52,7 +52,7 @@ impl Element {
     }
 
     /// The document with this element as its root.
-    pub fn document(&self) -> String {
+    pub(crate) fn document(&self) -> String {
         let mut writer = Writer::new_with_indent(Vec::new(), b' ', 2);
         let declaration = BytesDecl::new("1.0", Some("UTF-8"), None);
         writer

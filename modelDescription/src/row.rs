@@ -6,7 +6,7 @@ use tiprub_core::variables::{Causality, Kind, Span, Start, Variability, Variable
 use crate::text::number;
 
 /// A variable of the description: a scalar, an element of an array, or a whole array.
-pub struct Row<'a> {
+pub(crate) struct Row<'a> {
     pub name: String,
     pub reference: u32,
     /// Number of elements for a whole array.
@@ -19,7 +19,7 @@ pub struct Row<'a> {
 }
 
 /// Every variable in order of value references; `arrays` keeps arrays whole.
-pub fn rows(table: &VariableTable, arrays: bool) -> Vec<Row<'_>> {
+pub(crate) fn rows(table: &VariableTable, arrays: bool) -> Vec<Row<'_>> {
     let mut rows = Vec::new();
     for variable in table.variables() {
         let elements = if arrays { 1 } else { variable.len() };
@@ -72,7 +72,7 @@ impl Row<'_> {
     }
 
     /// The attribute `initial`, absent for inputs and time.
-    pub fn initial(&self) -> Option<&'static str> {
+    pub(crate) fn initial(&self) -> Option<&'static str> {
         self.variable.initial_is_exact().map(|exact| if exact { "exact" } else { "calculated" })
     }
 
@@ -83,7 +83,7 @@ impl Row<'_> {
     }
 
     /// The enumeration of an enumeration variable.
-    pub fn type_name(&self) -> Option<&'static str> {
+    pub(crate) fn type_name(&self) -> Option<&'static str> {
         match self.variable.kind {
             Kind::Enumeration(enumeration) => Some(enumeration.name),
             _ => None,
@@ -92,7 +92,7 @@ impl Row<'_> {
 }
 
 /// The attribute `causality`.
-pub fn causality(causality: Causality) -> &'static str {
+pub(crate) fn causality(causality: Causality) -> &'static str {
     match causality {
         Causality::Independent => "independent",
         Causality::Input => "input",
@@ -103,7 +103,7 @@ pub fn causality(causality: Causality) -> &'static str {
 }
 
 /// The attribute `variability`.
-pub fn variability(variability: Variability) -> &'static str {
+pub(crate) fn variability(variability: Variability) -> &'static str {
     match variability {
         Variability::Constant => "constant",
         Variability::Fixed => "fixed",

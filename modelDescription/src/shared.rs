@@ -63,7 +63,7 @@ pub(crate) fn enumerations(description: &Description) -> Vec<&'static Enumeratio
 }
 
 /// The items of an enumeration; values count from 1.
-pub fn items(enumeration: &'static Enumeration) -> impl Iterator<Item = Element> {
+pub(crate) fn items(enumeration: &'static Enumeration) -> impl Iterator<Item = Element> {
     enumeration.items.iter().enumerate().map(|(index, (name, description))| {
         Element::new("Item")
             .with("name", name)
@@ -81,7 +81,7 @@ pub(crate) fn log_categories() -> Element {
 }
 
 /// The default experiment.
-pub fn default_experiment(description: &Description) -> Element {
+pub(crate) fn default_experiment(description: &Description) -> Element {
     Element::new("DefaultExperiment")
         .with("startTime", number(description.experiment.start))
         .with("stopTime", number(description.experiment.stop))

@@ -1,6 +1,7 @@
 //! A packaged FMU driven the way any importer would: unzip, read modelDescription.xml, load the shared library,
 //! and go through the standard's call sequence. It knows nothing of the scene or of the core behind the ABI.
 
+#![warn(unreachable_pub)]
 pub mod api;
 pub mod archive;
 mod description;

@@ -64,7 +64,7 @@ pub(crate) struct Log {
 
 impl Log {
     /// A log as at instantiation.
-    pub fn new(sink: Sink, logging_on: bool) -> Self {
+    pub(super) fn new(sink: Sink, logging_on: bool) -> Self {
         let log = Self { sink, wanted: AtomicU8::new(EXPLANATIONS) };
         log.choose(logging_on, &[]).unwrap_or_default();
         log
@@ -74,7 +74,7 @@ impl Log {
     ///
     /// # Errors
     /// A category that does not exist; nothing is changed then.
-    pub fn choose(&self, logging_on: bool, categories: &[&str]) -> Result<(), String> {
+    pub(super) fn choose(&self, logging_on: bool, categories: &[&str]) -> Result<(), String> {
         let mut wanted = 0;
         for category in categories {
             let known = CATEGORIES.iter().position(|known| known.to_bytes() == category.as_bytes());

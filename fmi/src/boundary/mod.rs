@@ -8,15 +8,15 @@ mod panics;
 mod pointers;
 
 pub(crate) use calls::{StateHandle, set_debug_logging, strings};
-pub use calls::{get, set, state};
-pub use instance::{Callbacks, Instantiation, enter, instantiate, release};
+pub(crate) use calls::{get, set, state};
+pub(crate) use instance::{Callbacks, Instantiation, enter, instantiate, release};
 pub(crate) use instance::{Handle, guard, refuse_instantiation, unsupported};
 pub(crate) use log::{Fmi2Logger, Fmi3Logger, Sink};
 pub(crate) use pointers::{Environment, Out};
-pub use pointers::{In, Text};
+pub(crate) use pointers::{In, Text};
 
 /// `fmi3IntermediateUpdateCallback`.
-pub type IntermediateUpdate = unsafe extern "C" fn(
+pub(crate) type IntermediateUpdate = unsafe extern "C" fn(
     environment: Environment,
     intermediate_update_time: f64,
     set_requested: u8,
@@ -53,3 +53,14 @@ pub(crate) fn intermediate_update(
     }
     (requested != 0).then_some(at)
 }
+
+/// Exported functions with their arguments after the instance, and the capability they belong to.
+macro_rules! refused {
+    ($($name:ident ($($argument:ident: $type:ty),*) $capability:expr;)*) => {$(
+        #[unsafe(no_mangle)]
+        pub(crate) extern "C" fn $name(instance: $crate::boundary::Handle $(, $argument: $type)*) -> $crate::slave::Status {
+            $crate::boundary::unsupported(instance, stringify!($name), $capability)
+        }
+    )*};
+}
+pub(crate) use refused;

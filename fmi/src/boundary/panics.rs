@@ -33,7 +33,7 @@ fn remember(info: &PanicHookInfo<'_>) {
 }
 
 /// Message for the importer's log.
-pub fn describe(payload: &(dyn Any + Send)) -> String {
+pub(super) fn describe(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().copied();
     let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message");
     let (bytes, length, line) = PLACE.get();

@@ -7,7 +7,7 @@ use super::{Dialect, Phase, Refusal, Result, Slave};
 
 /// A get or set call as the importer made it.
 #[derive(Debug, Clone, Copy)]
-pub struct Request<'a> {
+pub(crate) struct Request<'a> {
     /// Type in the function's name: `Real`, `Float64`, ...
     pub type_name: &'static str,
     /// Value references.
@@ -17,7 +17,7 @@ pub struct Request<'a> {
 }
 
 /// A value of one of the types that variables have.
-pub trait Value: Sized {
+pub(crate) trait Value: Sized {
     /// Say what is wrong with the value for this variable, if anything.
     fn problem(&self, _variable: &Variable) -> Option<String> {
         None
@@ -147,7 +147,7 @@ impl Slave {
     ///
     /// # Errors
     /// Unknown reference, another type, reference into the middle of an array, wrong number of values.
-    pub fn elements(&self, request: &Request<'_>) -> Result<Vec<u32>> {
+    pub(crate) fn elements(&self, request: &Request<'_>) -> Result<Vec<u32>> {
         let mut elements = Vec::with_capacity(request.references.len());
         for &reference in request.references {
             let (variable, index) = self.simulation.table().locate(reference)?;
@@ -187,7 +187,7 @@ impl Slave {
     ///
     /// # Errors
     /// As [`Slave::elements`]; a value that does not exist yet; an initial state that cannot be computed.
-    pub fn read<T: Value>(&mut self, request: &Request<'_>) -> Result<Vec<T>> {
+    pub(crate) fn read<T: Value>(&mut self, request: &Request<'_>) -> Result<Vec<T>> {
         let elements = self.elements(request)?;
         if matches!(self.phase, Phase::Instantiated { .. }) {
             self.require_start_values(&elements)?;
@@ -226,7 +226,7 @@ impl Slave {
     ///
     /// # Errors
     /// As [`Slave::elements`]; a variable that cannot be set now; a value out of range.
-    pub fn write<T: Value>(&mut self, elements: &[u32], values: &[T]) -> Result<()> {
+    pub(crate) fn write<T: Value>(&mut self, elements: &[u32], values: &[T]) -> Result<()> {
         for (&element, value) in elements.iter().zip(values) {
             let (variable, index) = self.simulation.table().locate(element)?;
             let problem = self.not_settable(variable).or_else(|| value.problem(variable));

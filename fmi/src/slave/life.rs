@@ -9,7 +9,7 @@ impl Experiment {
     ///
     /// # Errors
     /// Non-finite times, stop before start.
-    pub fn new(start: f64, stop: Option<f64>) -> Result<Self> {
+    pub(crate) fn new(start: f64, stop: Option<f64>) -> Result<Self> {
         if !start.is_finite() {
             return Err(Refusal::error(format!("startTime = {start} is not finite. Give a start time in seconds")));
         }
@@ -91,12 +91,12 @@ impl Slave {
     }
 
     /// Terminate; values can still be read afterwards.
-    pub fn terminate(&mut self) {
+    pub(crate) fn terminate(&mut self) {
         self.phase = Phase::Terminated { time: self.time() };
     }
 
     /// Back to the state after instantiation. Saved states stay valid.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.simulation.reset();
         self.strings.clear();
         self.phase = Phase::Instantiated { experiment: Experiment::default() };

@@ -31,7 +31,7 @@ impl Rule {
     ///
     /// # Errors
     /// The message names the phase and the phases in which the call is allowed.
-    pub fn check(&self, phase: &Phase) -> Result<()> {
+    pub(crate) fn check(&self, phase: &Phase) -> Result<()> {
         if self.states & phase.state() != 0 {
             return Ok(());
         }
@@ -56,13 +56,13 @@ const WRITABLE: States = INSTANTIATED | INITIALISING | STEPPING | UPDATING;
 /// One `const` per row.
 macro_rules! table {
     ($($constant:ident $name:literal $states:expr;)*) => {
-        $(pub const $constant: Rule = Rule { name: $name, states: $states };)*
+        $(pub(crate) const $constant: Rule = Rule { name: $name, states: $states };)*
     };
 }
 
 /// FMI 2.0. Phases: stepComplete is `STEPPING`, stepFailed and error are `FAILED`; stepInProgress and stepCanceled do not
 /// exist in a slave that never steps asynchronously.
-pub mod fmi2 {
+pub(crate) mod fmi2 {
     use super::*;
 
     table! {
@@ -100,7 +100,7 @@ pub mod fmi2 {
 }
 
 /// FMI 3.0 Co-Simulation without Event Mode.
-pub mod fmi3 {
+pub(crate) mod fmi3 {
     use super::*;
 
     table! {

@@ -2,7 +2,7 @@
 
 /// Start and stop time given by the importer.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Experiment {
+pub(crate) struct Experiment {
     /// Start time (s).
     pub start: f64,
     /// Stop time (s), where defined: steps beyond it are refused.
@@ -11,7 +11,7 @@ pub struct Experiment {
 
 /// Where an instance is in the state machines of the standards.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Phase {
+pub(crate) enum Phase {
     /// Instantiated: start values can be set.
     Instantiated {
         /// Set by `fmi2SetupExperiment`; the default starts at 0 without a stop.
@@ -75,7 +75,7 @@ const NAMES: [&str; 6] =
 
 impl Phase {
     /// The phase as a set of one.
-    pub fn state(&self) -> States {
+    pub(crate) fn state(&self) -> States {
         match self {
             Self::Instantiated { .. } => INSTANTIATED,
             Self::Initialising { .. } => INITIALISING,
@@ -88,7 +88,7 @@ impl Phase {
 }
 
 /// Names of the phases in a set, for messages.
-pub fn names(states: States) -> String {
+pub(super) fn names(states: States) -> String {
     let named = NAMES.iter().enumerate().filter(|(bit, _)| states & (1 << bit) != 0);
     named.map(|(_, name)| *name).collect::<Vec<_>>().join(", ")
 }

@@ -11,7 +11,7 @@ const VERSION: u32 = 1;
 const CHECKSUM: usize = 8;
 
 /// One saved state.
-pub type Snapshot = Vec<u8>;
+pub(super) type Snapshot = Vec<u8>;
 
 /// Opaque address by which the importer names a saved state.
 pub(crate) type Handle = *const Snapshot;
@@ -85,7 +85,7 @@ impl Slave {
     ///
     /// # Errors
     /// A handle that this instance did not hand out.
-    pub fn save(&mut self, existing: Option<Handle>) -> Result<Handle> {
+    pub(crate) fn save(&mut self, existing: Option<Handle>) -> Result<Handle> {
         let bytes = self.encode()?;
         self.store(existing, bytes)
     }
@@ -114,7 +114,7 @@ impl Slave {
     ///
     /// # Errors
     /// Not a state of this instance, or not one of this FMU; nothing is changed then.
-    pub fn restore(&mut self, handle: Handle) -> Result<()> {
+    pub(crate) fn restore(&mut self, handle: Handle) -> Result<()> {
         let index = self.index(handle)?;
         let snapshot = std::mem::take(&mut *self.snapshots[index]);
         let outcome = self.decode(&snapshot).and_then(|(phase, state)| {
@@ -153,7 +153,7 @@ impl Slave {
     ///
     /// # Errors
     /// Wrong length, another FMU's state, damaged bytes.
-    pub fn deserialise(&mut self, bytes: &[u8], existing: Option<Handle>) -> Result<Handle> {
+    pub(crate) fn deserialise(&mut self, bytes: &[u8], existing: Option<Handle>) -> Result<Handle> {
         self.decode(bytes)?;
         self.store(existing, bytes.to_vec())
     }

@@ -4,6 +4,7 @@
 //! Everything here is used twice: by the command line, which writes, and by the library inside the FMU, which reads
 //! what the command line wrote. Nothing is trusted: every length, shape, key and value is checked, and every refusal
 //! names the file, the place in it, what is wrong, and the remedy.
+#![warn(unreachable_pub)]
 #![forbid(unsafe_code)]
 
 mod error;

@@ -20,7 +20,7 @@ pub(crate) struct Document<'a> {
 }
 
 /// Line and column, both from 1, of a byte offset; columns count characters.
-pub fn position(text: &str, offset: usize) -> (usize, usize) {
+pub(crate) fn position(text: &str, offset: usize) -> (usize, usize) {
     let before = text.get(..offset.min(text.len())).unwrap_or(text);
     let line_start = before.rfind('\n').map_or(0, |index| index + 1);
     (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
@@ -37,7 +37,7 @@ struct ClosestPoint<'a> {
 impl<'a> Document<'a> {
     /// A refusal of a field that [`SceneSettings::validate`](tiprub_core::settings::SceneSettings::validate) names by
     /// its path, with or without indices; located where the document holds exactly one such field.
-    pub fn refusal(&self, path: &str, problem: String, remedy: String) -> Error {
+    pub(crate) fn refusal(&self, path: &str, problem: String, remedy: String) -> Error {
         let bare = path.replace('`', "");
         let mut candidates: Vec<_> = self.places().into_iter().filter(|place| place.path == bare).collect();
         if candidates.is_empty() {

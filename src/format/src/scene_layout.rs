@@ -47,7 +47,7 @@ pub(crate) const INNER_TABLES: [(&str, &str); 6] = [
 ];
 
 /// How a table is written in the file.
-pub fn header(table: &str) -> String {
+pub(crate) fn header(table: &str) -> String {
     match table.split_once('.') {
         Some((outer, inner)) => format!("`{inner}` of {}", header(outer)),
         None if table.is_empty() => "the top of the file, before the first [table]".to_owned(),

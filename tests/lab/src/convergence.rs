@@ -223,7 +223,7 @@ fn monotone(rows: &[ConvergenceRow]) -> Statement {
 ///
 /// # Errors
 /// A plot cannot be drawn.
-pub fn study(reduction: &CyclicReduction, seconds: f64, quick: bool) -> Result<Study> {
+pub(crate) fn study(reduction: &CyclicReduction, seconds: f64, quick: bool) -> Result<Study> {
     let rows = &reduction.convergence;
     let rom = &reduction.rom;
     let order = rom.order();

@@ -5,12 +5,13 @@
 //! - [`cube`], [`mod@stage`], [`convergence`], [`modes`]: what the paper's figures show of the models that ship;
 //! - [`conjugacy`]: forces, moments and work on both sides of contacts; [`inputs`]: what the communication step does.
 
+#![warn(unreachable_pub)]
 pub mod cli;
-pub mod conjugacy;
-pub mod convergence;
-pub mod cube;
-pub mod error;
-pub mod inputs;
-pub mod modes;
-pub mod stability;
-pub mod stage;
+mod conjugacy;
+mod convergence;
+mod cube;
+mod error;
+mod inputs;
+mod modes;
+mod stability;
+mod stage;

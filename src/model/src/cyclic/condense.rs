@@ -37,7 +37,7 @@ impl<'a> Condensed<'a> {
     ///
     /// # Errors
     /// [`crate::Error::NotPositiveDefinite`] when the interior can move with the faces and the contact nodes held.
-    pub fn new(sector: &'a Sector, shift: f64, listener: Listener<'_>) -> Result<Self> {
+    pub(super) fn new(sector: &'a Sector, shift: f64, listener: Listener<'_>) -> Result<Self> {
         let shifted =
             if shift == 0.0 { sector.stiffness.clone() } else { sector.stiffness.plus_scaled(-shift, &sector.mass) };
         let interior = if sector.parts.interior == 0 {
@@ -142,7 +142,7 @@ impl<'a> Condensed<'a> {
     }
 
     /// Numbers of dofs.
-    pub fn parts(&self) -> Parts {
+    pub(super) fn parts(&self) -> Parts {
         self.sector.parts
     }
 }

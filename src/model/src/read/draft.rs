@@ -89,12 +89,12 @@ impl Draft {
     }
 
     /// The element of this number.
-    pub fn element(&mut self, number: u64) -> Option<&mut DraftElement> {
+    pub(super) fn element(&mut self, number: u64) -> Option<&mut DraftElement> {
         self.element_index.get(&number).map(|&index| &mut self.elements[index])
     }
 
     /// Nodes of an element.
-    pub fn nodes_of(&self, number: u64) -> &[u64] {
+    pub(super) fn nodes_of(&self, number: u64) -> &[u64] {
         self.element_index.get(&number).map_or(&[], |&index| &self.elements[index].nodes)
     }
 

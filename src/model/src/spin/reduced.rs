@@ -77,7 +77,7 @@ impl SpinningStates {
     ///
     /// # Errors
     /// Those of [`Rotating::equilibrium`].
-    pub fn find(body: &Rotating<'_>, largest_speed: f64, found: &dyn Fn(usize)) -> Result<Self> {
+    pub(crate) fn find(body: &Rotating<'_>, largest_speed: f64, found: &dyn Fn(usize)) -> Result<Self> {
         let scaled = |state: &SpinningState, share: f64| {
             let ratio = share * largest_speed / state.speed;
             faer::Scale(ratio * ratio) * &state.displacement

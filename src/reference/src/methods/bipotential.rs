@@ -35,7 +35,7 @@ const UPDATES: usize = 30;
 ///
 /// # Errors
 /// As [`super::Method::run`].
-pub fn run(scene: &Scene, run: &Run) -> Result<History> {
+pub(crate) fn run(scene: &Scene, run: &Run) -> Result<History> {
     let mut recorder = Recorder::new(scene, run, "bipotential");
     let (h, square) = (run.step, run.step * run.step);
     let operator = Operator::new(scene, 0.25 * square)?;

@@ -23,7 +23,7 @@ const RAMP: f64 = 4e4;
 
 /// What the contact nodes meet, and what moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Feature {
+pub(crate) enum Feature {
     /// Rigid surface of revolution.
     Revolution,
     /// Rigid surface through data points.
@@ -42,11 +42,11 @@ pub enum Feature {
 
 impl Feature {
     /// All of them.
-    pub const ALL: [Self; 7] =
+    pub(crate) const ALL: [Self; 7] =
         [Self::Revolution, Self::Spline, Self::Casing, Self::Disk, Self::DiskInCasing, Self::Coating, Self::Free];
 
     /// For the table.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Revolution => "surface of revolution",
             Self::Spline => "rigid spline",
@@ -59,7 +59,7 @@ impl Feature {
     }
 
     /// What is known of the other side.
-    pub fn side(self) -> Side {
+    pub(crate) fn side(self) -> Side {
         match self {
             Self::Revolution | Self::Disk => Side::Surface,
             Self::Coating => Side::Dented,
@@ -85,7 +85,7 @@ impl Feature {
     }
 
     /// The scene with friction, and with whirl and axial shift where there is a shaft. A round casing for the torque.
-    pub fn scene(self, friction: f64, moves: bool, round: bool) -> Scene {
+    pub(crate) fn scene(self, friction: f64, moves: bool, round: bool) -> Scene {
         let Some(mut scene) = self.rotor() else {
             let left = Plate { stiffness: 1e7, ..Plate::left(HALF + 2e-4) };
             let right = Plate { stiffness: 0.0, radius: 0.18, ..Plate::right(HALF + 3e-4) };
@@ -115,7 +115,7 @@ impl Feature {
 
 /// What forces and moments on the slave follow from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
+pub(crate) enum Side {
     /// Forces on control points, where they stand.
     ControlPoints,
     /// The same force where the surface of revolution is.
@@ -126,7 +126,7 @@ pub enum Side {
 
 /// What a run showed; residuals are relative.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Seen {
+pub(crate) struct Seen {
     /// Contacts, summed over the steps.
     pub contacts: usize,
     /// Largest moment of a step about the axis of the casing, of Σ|F| r.
@@ -151,7 +151,7 @@ pub struct Seen {
 ///
 /// # Errors
 /// The scene is refused, or fails.
-pub fn run(scene: &Scene, step: f64) -> Result<Seen> {
+pub(crate) fn run(scene: &Scene, step: f64) -> Result<Seen> {
     let mut scene = scene.clone();
     scene.settings.time.step = step;
     let mut simulation = Simulation::new(&scene)?;

@@ -44,7 +44,7 @@ impl Product {
     ///
     /// # Errors
     /// A scene that is refused, a state that is.
-    pub fn run(&self, scene: &Scene, flight: &Flight, end: f64, record: f64) -> Result<ProductRun> {
+    pub(super) fn run(&self, scene: &Scene, flight: &Flight, end: f64, record: f64) -> Result<ProductRun> {
         let started = processor_time();
         let mut simulation = Simulation::new(&self.scene(scene, flight))?;
         simulation.initialise(0.0)?;

@@ -26,21 +26,21 @@ pub(crate) struct Flight {
 
 /// A method of either kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Competitor {
+pub(super) enum Competitor {
     Product(Product),
     Reference { method: Method, surface: SurfaceKind, step: f64, stride: usize },
 }
 
 /// One run; failures are results.
 #[derive(Debug, Clone)]
-pub struct Outcome {
+pub(super) struct Outcome {
     pub name: &'static str,
     pub competitor: Competitor,
     pub result: std::result::Result<ProductRun, String>,
 }
 
 impl Outcome {
-    pub fn history(&self) -> Option<&History> {
+    pub(super) fn history(&self) -> Option<&History> {
         self.result.as_ref().ok().map(|run| &run.history)
     }
 
@@ -58,16 +58,16 @@ fn reference(method: Method, surface: SurfaceKind, step: f64, stride: usize) -> 
 }
 
 /// Names of the product's runs that statements are about.
-pub const PAPER: &str = "product, film, central differences";
+pub(super) const PAPER: &str = "product, film, central differences";
 pub(crate) const BEST: &str = "product, lcp, modal-exact";
-pub const STICKING: &str = "product, coulomb, modal-exact";
+pub(super) const STICKING: &str = "product, coulomb, modal-exact";
 /// Names of the reference methods on the same surface.
-pub const A: &str = "a, film";
-pub const B: &str = "b, bi-potential";
-pub const C: &str = "c, augmented Lagrangian";
+pub(super) const A: &str = "a, film";
+pub(super) const B: &str = "b, bi-potential";
+pub(super) const C: &str = "c, augmented Lagrangian";
 
 /// All methods of a flight; on facets as well where `facets`.
-pub fn competitors(flight: &Flight, quick: bool, facets: bool) -> Vec<(&'static str, Competitor)> {
+pub(super) fn competitors(flight: &Flight, quick: bool, facets: bool) -> Vec<(&'static str, Competitor)> {
     let (film, augmented, spline) =
         (Method::Film(Default::default()), Method::Augmented(Default::default()), SurfaceKind::Spline);
     let mut list = vec![
@@ -106,7 +106,7 @@ pub(crate) const RECORD: f64 = 1e-6;
 ///
 /// # Errors
 /// The full model cannot be assembled.
-pub fn run(
+pub(super) fn run(
     (name, competitor): (&'static str, Competitor),
     scene: &Scene,
     flight: &Flight,
@@ -131,7 +131,7 @@ pub fn run(
 }
 
 /// Last time of contact of node 1 (s), as far as it has one contact: until it is free for 50 µs.
-pub fn released(history: &History) -> f64 {
+pub(super) fn released(history: &History) -> f64 {
     let mut last = None;
     for (time, force) in history.times.iter().zip(history.first_force()) {
         if force > 0.0 {

@@ -26,7 +26,12 @@ impl FullRun {
     ///
     /// # Errors
     /// What the method refuses.
-    pub fn new(scene: &Scene, method: Full, (interval, samples): (f64, usize), division: u32) -> Result<Self, String> {
+    pub(crate) fn new(
+        scene: &Scene,
+        method: Full,
+        (interval, samples): (f64, usize),
+        division: u32,
+    ) -> Result<Self, String> {
         let method = match method {
             Full::Film => Method::Film(Default::default()),
             Full::Bipotential => Method::Bipotential,

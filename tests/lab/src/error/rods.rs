@@ -33,7 +33,7 @@ impl CoreRod {
     ///
     /// # Errors
     /// Never with rods.
-    pub fn new(rod: &Rod, ends: usize, whole: bool) -> Result<Self, String> {
+    pub(crate) fn new(rod: &Rod, ends: usize, whole: bool) -> Result<Self, String> {
         let count = rod.closing.len();
         let mut contact_map = DMatrix::zeros(3, count);
         contact_map.row_mut(0).copy_from(&rod.closing.transpose());
@@ -57,7 +57,7 @@ impl CoreRod {
     ///
     /// # Errors
     /// Steps beyond the limit of the scheme, with numbers.
-    pub fn run(
+    pub(crate) fn run(
         &self,
         (scheme, solver): (Scheme, Solver),
         interval: f64,

@@ -12,10 +12,11 @@ pub(crate) use tiprub_test_models::{GAP, RADIUS, Random, bumps, rich_blade as bl
 use tiprub_test_models::{node, ring, structure};
 
 /// All schemes with their names.
-pub const SCHEMES: [(Scheme, &str); 3] =
+pub(crate) const SCHEMES: [(Scheme, &str); 3] =
     [(Scheme::CentralDifference, "central"), (Scheme::ModalExact, "exact"), (Scheme::MasslessBoundary, "massless")];
 /// All contact solvers with their names.
-pub const SOLVERS: [(Solver, &str); 3] = [(Solver::Film, "film"), (Solver::Lcp, "lcp"), (Solver::Coulomb, "coulomb")];
+pub(crate) const SOLVERS: [(Solver, &str); 3] =
+    [(Solver::Film, "film"), (Solver::Lcp, "lcp"), (Solver::Coulomb, "coulomb")];
 
 /// A contact node on a spring on a mass on a spring, in each direction: six degrees of freedom per sector.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,7 +76,7 @@ impl Tower {
     }
 
     /// The ROM.
-    pub fn rom(&self) -> Rom {
+    pub(crate) fn rom(&self) -> Rom {
         let mass = DMatrix::from_fn(6, 6, |i, j| if i == j { self.mass[i / 3] } else { 0.0 });
         let contact_map =
             DMatrix::from_fn(3 * self.copies, 6, |row, column| f64::from(u8::from(3 + row % 3 == column)));
@@ -97,7 +98,7 @@ impl Tower {
     }
 
     /// Largest angular frequency of one sector (rad/s), from the springs as written.
-    pub fn largest_frequency(&self) -> f64 {
+    pub(crate) fn largest_frequency(&self) -> f64 {
         let scale = |i: usize| 1.0 / self.mass[i / 3].sqrt();
         let stiffness = self.stiffness(4.0 * self.neighbour);
         DMatrix::from_fn(6, 6, |i, j| scale(i) * stiffness[(i, j)] * scale(j)).symmetric_eigenvalues().max().sqrt()
@@ -117,7 +118,7 @@ pub(crate) fn with_methods(mut scene: Scene, scheme: Scheme, solver: Solver) -> 
 }
 
 /// Choose the internal step, with communication steps as long.
-pub fn with_step(mut scene: Scene, step: f64) -> Scene {
+pub(crate) fn with_step(mut scene: Scene, step: f64) -> Scene {
     scene.settings.time.step = step;
     scene.settings.experiment.communication_step = step;
     scene

@@ -12,7 +12,7 @@ use super::Check;
 pub(crate) const MASSLESS_RETURN: f64 = 2e-2;
 
 /// Value of a real variable that the scene has.
-pub fn real(simulation: &Simulation, name: &str) -> f64 {
+pub(crate) fn real(simulation: &Simulation, name: &str) -> f64 {
     let row = simulation.table().find(name);
     row.and_then(|row| simulation.real(row.reference).ok()).unwrap_or(f64::NAN)
 }
@@ -21,13 +21,13 @@ pub fn real(simulation: &Simulation, name: &str) -> f64 {
 ///
 /// # Errors
 /// The value is refused.
-pub fn set(simulation: &mut Simulation, name: &str, value: f64) -> Result<()> {
+pub(crate) fn set(simulation: &mut Simulation, name: &str, value: f64) -> Result<()> {
     let Some(reference) = simulation.table().find(name).map(|row| row.reference) else { return Ok(()) };
     simulation.set_real(reference, value)
 }
 
 /// All numeric outputs, to compare two runs bit by bit.
-pub fn outputs(simulation: &Simulation) -> Vec<f64> {
+pub(crate) fn outputs(simulation: &Simulation) -> Vec<f64> {
     let mut values = Vec::new();
     for variable in simulation.table().variables() {
         for reference in (variable.reference..).take(variable.len()) {
@@ -40,13 +40,13 @@ pub fn outputs(simulation: &Simulation) -> Vec<f64> {
 }
 
 /// The same as bits.
-pub fn bits(simulation: &Simulation) -> Vec<u64> {
+pub(crate) fn bits(simulation: &Simulation) -> Vec<u64> {
     outputs(simulation).into_iter().map(f64::to_bits).collect()
 }
 
 /// Of the radial displacement of the first ring of the 36 × 3 nodes of the casing: amplitudes of cos nθ and of sin nθ, and the
 /// largest rest at any node (m).
-pub fn amplitudes(simulation: &Simulation, order: u32) -> [f64; 3] {
+pub(crate) fn amplitudes(simulation: &Simulation, order: u32) -> [f64; 3] {
     let Some(row) = simulation.table().find("casing_displacement").map(|row| row.reference) else {
         return [f64::NAN; 3];
     };
@@ -89,7 +89,7 @@ pub(crate) struct Watch {
 
 impl Watch {
     /// Before the first step of an initialised simulation of `scene`.
-    pub fn new(scene: &tiprub_core::Scene) -> Self {
+    pub(crate) fn new(scene: &tiprub_core::Scene) -> Self {
         let (contact, rom) = (&scene.settings.contacts[0], &scene.roms[0]);
         let clearances =
             if contact.sector_gaps.is_empty() { vec![contact.gap; rom.sectors] } else { contact.sector_gaps.clone() };
@@ -125,7 +125,7 @@ impl Watch {
     ///
     /// # Errors
     /// The step is refused.
-    pub fn step(&mut self, simulation: &mut Simulation, length: f64) -> Result<()> {
+    pub(crate) fn step(&mut self, simulation: &mut Simulation, length: f64) -> Result<()> {
         simulation.begin_step(simulation.time(), length)?;
         loop {
             let progress = simulation.advance()?;
@@ -208,7 +208,7 @@ impl Watch {
     }
 
     /// The ledger alone.
-    pub fn ledger(&self) -> Check {
+    pub(crate) fn ledger(&self) -> Check {
         Check::at_most("ledger residual", self.residual, 1e-9)
     }
 
@@ -227,7 +227,7 @@ impl Watch {
     }
 
     /// λ ≥ 0, g ≥ 0, λg = 0 at every internal step, and g again from the displacements.
-    pub fn complementarity(&self) -> Vec<Check> {
+    pub(crate) fn complementarity(&self) -> Vec<Check> {
         let mut checks = vec![
             Check::at_most("adhesion", self.adhesion, 1e-10),
             Check::at_most("penetration", self.penetration, 1e-10),
@@ -241,7 +241,7 @@ impl Watch {
 }
 
 /// The larger one; not-a-number sticks.
-pub fn worse(before: f64, now: f64) -> f64 {
+pub(crate) fn worse(before: f64, now: f64) -> f64 {
     if before >= now || before.is_nan() { before } else { now }
 }
 
@@ -252,7 +252,7 @@ fn open(simulation: &Simulation) -> f64 {
 }
 
 /// Largest difference of two histories of displacements relative to the largest of the second.
-pub fn apart(first: &[f64], second: &[f64]) -> f64 {
+pub(crate) fn apart(first: &[f64], second: &[f64]) -> f64 {
     let largest = second.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
     let square = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
     if largest == 0.0 || first.len() != second.len() {
@@ -263,7 +263,7 @@ pub fn apart(first: &[f64], second: &[f64]) -> f64 {
 }
 
 /// Displacements of all contact nodes of the sectors (m).
-pub fn displacements(simulation: &Simulation) -> Vec<f64> {
+pub(crate) fn displacements(simulation: &Simulation) -> Vec<f64> {
     let system = simulation.system();
     let rows = 3 * nodes(system.law());
     (0..system.bank().sectors()).flat_map(|sector| (0..rows).map(move |row| system.bank().row(row, sector))).collect()

@@ -13,7 +13,7 @@ const OFTEN: usize = 2;
 const LEDGER: f64 = 1e-9;
 
 /// What is said of one casing.
-pub fn of(setup: &Setup, casing: Casing, runs: &[Run], names: &[String]) -> Result<Vec<Statement>> {
+pub(super) fn of(setup: &Setup, casing: Casing, runs: &[Run], names: &[String]) -> Result<Vec<Statement>> {
     let [numerator, denominator] = [SHOWN[1], SHOWN[0]];
     let share = |run: &Run| run.effective(numerator, setup.full()) / run.effective(denominator, setup.full());
     let shares: Vec<(f64, f64)> = runs.iter().map(|run| (run.speed, share(run))).collect();

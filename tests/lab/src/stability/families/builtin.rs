@@ -18,7 +18,7 @@ use super::{
 };
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [rotor37(), stage(), exchanged()].into_iter().flatten().collect()
 }
 

@@ -25,7 +25,7 @@ const DEPTH: f64 = 5e-5;
 const LEFT: f64 = 1e-4;
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for (scheme, scheme_name) in SCHEMES {
         for ratio in [1e-3, 0.005, 0.05, 0.3, 0.9] {
@@ -105,7 +105,7 @@ impl Decay {
 }
 
 /// Modes of a pencil with diagonal mass: frequencies (rad/s) ascending, and mass-normalised shapes.
-pub fn modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
+pub(crate) fn modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
     let order = mass.nrows();
     let scale = |i: usize| 1.0 / mass[(i, i)].sqrt();
     let eigen = DMatrix::from_fn(order, order, |i, j| scale(i) * stiffness[(i, j)] * scale(j)).symmetric_eigen();
@@ -120,7 +120,7 @@ impl Released {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn blade(self) -> Result<Vec<Check>> {
+    pub(crate) fn blade(self) -> Result<Vec<Check>> {
         let step = 2e-6;
         let tower = Tower { sectors: 1, turned: self.turned, ..Tower::default() };
         let mut scene = with_step(with_methods(round(tower.rom()), self.scheme, self.solver), step);
@@ -196,7 +196,7 @@ fn close(simulation: &mut Simulation, settle: f64) -> Result<()> {
 ///
 /// # Errors
 /// The scene is refused.
-pub fn ring(scheme: Scheme, order: u32, ratio: f64, told: f64) -> Result<Vec<Check>> {
+pub(crate) fn ring(scheme: Scheme, order: u32, ratio: f64, told: f64) -> Result<Vec<Check>> {
     let step = 2e-6;
     let mut scene = with_methods(round(Tower { slope: 0.0, ..Tower::default() }.rom()), scheme, Solver::Lcp);
     on_ring(&mut scene, ratio);

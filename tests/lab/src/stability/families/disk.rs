@@ -24,7 +24,7 @@ const COUPLING: f64 = 8e6;
 const DEPTH: f64 = 5e-5;
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for (scheme, scheme_name) in SCHEMES {
         for (solver, solver_name) in SOLVERS {
@@ -88,7 +88,7 @@ fn disk(sectors: usize, mirrored: bool, conjugate: bool) -> Rom {
 
 /// Some blades of a disk pressed, the others free to follow.
 #[derive(Debug, Clone, Copy)]
-pub struct Still {
+pub(crate) struct Still {
     /// Scheme.
     pub scheme: Scheme,
     /// Solver.
@@ -125,7 +125,7 @@ impl Still {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn run(self) -> Result<Vec<Check>> {
+    pub(crate) fn run(self) -> Result<Vec<Check>> {
         let pressed: Vec<usize> = (0..self.sectors).filter(|sector| [0, 3].contains(sector)).collect();
         let rom = disk(self.sectors, false, true);
         let slope = rom.contact_nodes[0].meridional_slope;
@@ -235,7 +235,7 @@ impl Mirrored {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn run(self) -> Result<Vec<Check>> {
+    pub(crate) fn run(self) -> Result<Vec<Check>> {
         let (first, contacts) = self.history(false)?;
         let (second, _) = self.history(true)?;
         Ok(vec![

@@ -13,12 +13,12 @@ use super::super::{
 };
 
 /// Internal step of most cases (s).
-pub const STEP: f64 = 1e-6;
+pub(crate) const STEP: f64 = 1e-6;
 /// Schemes of free bodies.
-pub const SCHEMES: [(Scheme, &str); 2] = [(Scheme::CentralDifference, "central"), (Scheme::ModalExact, "exact")];
+pub(crate) const SCHEMES: [(Scheme, &str); 2] = [(Scheme::CentralDifference, "central"), (Scheme::ModalExact, "exact")];
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [flights(), tunnels(), impacts(), rebounds()].into_iter().flatten().collect()
 }
 
@@ -31,21 +31,21 @@ pub(crate) fn throw(body: Body, velocity: [f64; 3], plates: Vec<Plate>) -> Throw
 ///
 /// # Errors
 /// The scene is refused.
-pub fn started(throw: &Throw) -> Result<Simulation> {
+pub(crate) fn started(throw: &Throw) -> Result<Simulation> {
     let mut simulation = Simulation::new(&throw.scene())?;
     simulation.initialise(0.0)?;
     Ok(simulation)
 }
 
 /// Length of a vector.
-pub fn size(v: [f64; 3]) -> f64 {
+pub(crate) fn size(v: [f64; 3]) -> f64 {
     // Scaled: squares of what is tiny or huge leave the range of numbers.
     let largest = v.iter().fold(0.0, |most: f64, x| worse(most, x.abs()));
     if largest == 0.0 { 0.0 } else { largest * v.iter().map(|x| (x / largest).powi(2)).sum::<f64>().sqrt() }
 }
 
 /// Length of a difference.
-pub fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(crate) fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
     size(std::array::from_fn(|i| a[i] - b[i]))
 }
 
@@ -167,7 +167,7 @@ impl Impact {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn run(self) -> Result<Vec<Check>> {
+    pub(crate) fn run(self) -> Result<Vec<Check>> {
         let (speed, mass, sideways) = (self.speed, self.mass * self.share, self.along * self.speed);
         let velocity = [-speed, 0.8 * sideways, -0.6 * sideways];
         let plate = Plate::left(HALF + 5.37 * speed * STEP);

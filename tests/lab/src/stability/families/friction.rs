@@ -15,7 +15,7 @@ use super::super::{
 const COEFFICIENTS: [f64; 6] = [0.0, 0.15, 0.5, 1.0, 1.5, 2.0];
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     coefficients().into_iter().chain(speeds()).collect()
 }
 

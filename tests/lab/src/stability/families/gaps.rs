@@ -13,7 +13,7 @@ use super::super::{
 };
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [clearances(), redundant(), sectors(), whole_casing(), scales()].into_iter().flatten().collect()
 }
 
@@ -323,7 +323,7 @@ fn small_rub(exponent: i32, solver: Solver, friction: f64) -> Result<(Vec<f64>, 
 }
 
 /// Processor time of this process's only working thread (s), as the system counts it; 0 where it does not tell.
-pub fn processor_time() -> f64 {
+pub(crate) fn processor_time() -> f64 {
     let told = std::fs::read_to_string("/proc/self/schedstat").unwrap_or_default();
     told.split_whitespace()
         .next()

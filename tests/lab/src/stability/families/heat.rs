@@ -34,7 +34,7 @@ pub(crate) struct Heat {
 }
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for (scheme, scheme_name) in SCHEMES {
         for (solver, solver_name) in SOLVERS {
@@ -59,7 +59,7 @@ impl Heat {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn run(self) -> Result<Vec<Check>> {
+    pub(crate) fn run(self) -> Result<Vec<Check>> {
         let tower = Tower { slope: 0.0, ..Tower::default() };
         let mut scene = with_step(with_methods(round(tower.rom()), self.scheme, self.solver), STEP);
         scene.settings.contacts[0].friction = self.friction;

@@ -14,7 +14,7 @@ use super::super::{
 const FACTORS: [f64; 5] = [0.9, 0.999, 1.001, 1.5, 10.0];
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [step_limit(), ratios(), massless()].into_iter().flatten().collect()
 }
 

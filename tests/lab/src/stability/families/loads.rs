@@ -14,7 +14,7 @@ use super::super::{
 };
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [loads(), coatings(), shapes()].into_iter().flatten().collect()
 }
 

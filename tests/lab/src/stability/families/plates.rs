@@ -16,7 +16,7 @@ use super::{
 };
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [balances(), mirrors(), edges(), starts()].into_iter().flatten().collect()
 }
 
@@ -63,7 +63,7 @@ impl Balance {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn run(self) -> Result<Vec<Check>> {
+    pub(crate) fn run(self) -> Result<Vec<Check>> {
         let body = Body::elastic(&[0.1, 0.15, 0.05], 2e7);
         let mass = body.mass() * self.share;
         let gap = 30.4 * self.speed * STEP;

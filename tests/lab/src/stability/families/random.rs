@@ -15,7 +15,7 @@ use super::super::{
 const COUNT: [u64; 2] = [12, 100];
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let case = |index: u64| {
         let against = "signs of the ledger, complementarity, the same with a fourth of the step";
         let expected = Expected::either_as(

@@ -16,7 +16,7 @@ use super::{
 };
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [communication(), long(), jumps(), restore()].into_iter().flatten().collect()
 }
 

@@ -12,7 +12,7 @@ use super::super::{
 };
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [edges(), resolution(), curved()].into_iter().flatten().collect()
 }
 

@@ -27,7 +27,7 @@ const STEP: f64 = 2e-6;
 const BESIDE: f64 = 5e-4;
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [loads(), lobes(), flanks()].into_iter().flatten().collect()
 }
 
@@ -93,7 +93,7 @@ impl Travelling {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn run(self) -> Result<Vec<Check>> {
+    pub(crate) fn run(self) -> Result<Vec<Check>> {
         let (damping, load) = (0.05, 1e3);
         let frequency = ring_frequency(self.order);
         let omega = self.ratio * frequency;
@@ -136,7 +136,7 @@ impl Travelling {
 
 /// A rotor all of whose blades are pressed on a casing with lobes.
 #[derive(Debug, Clone, Copy)]
-pub struct Pressed {
+pub(crate) struct Pressed {
     /// Scheme.
     pub scheme: Scheme,
     /// Solver.
@@ -220,7 +220,7 @@ impl Pressed {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn run(self) -> Result<Vec<Check>> {
+    pub(crate) fn run(self) -> Result<Vec<Check>> {
         let (tower, scene, amplitude) = self.scene();
         let step = scene.settings.time.step;
         let (lobes, depth) = (f64::from(self.order), 2e-5);
@@ -327,7 +327,7 @@ impl Flank {
     ///
     /// # Errors
     /// The scene is refused, or the flank is too steep.
-    pub fn run(self) -> Result<Vec<Check>> {
+    pub(crate) fn run(self) -> Result<Vec<Check>> {
         let tower = Tower { sectors: 1, base: [4e7, 4e7, 2e7], slope: 0.0, ..Tower::default() };
         let mut scene = with_step(with_methods(round(tower.rom()), self.scheme, self.solver), 5e-7);
         let (order, depth) = (30, 1e-5);
