@@ -12,7 +12,7 @@ use crate::sparse::{Factor, SparseMatrix, add_tall, tall_product};
 use crate::{Error, Result};
 
 /// Relative accuracy of the returned pairs: ‖Aφ - θφ‖_M ≤ `TOLERANCE` θ, which bounds the relative error of ω² - σ.
-pub const TOLERANCE: f64 = 1e-10;
+pub(crate) const TOLERANCE: f64 = 1e-10;
 /// The explicitly formed residual is allowed this much, since it also contains the solve's round-off.
 const CHECKED_TOLERANCE: f64 = 1e-8;
 /// Vectors that this share of the block's largest is left of depend on the basis.

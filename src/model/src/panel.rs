@@ -35,7 +35,7 @@ pub struct PanelGrid {
 
 impl PanelGrid {
     /// Number of rows.
-    pub fn along(&self) -> usize {
+    pub(crate) fn along(&self) -> usize {
         self.nodes.len() / self.around.max(1)
     }
 

@@ -79,7 +79,7 @@ impl Pattern {
     }
 
     /// Pattern of the rows and columns `keep` (ascending), and for each of its entries the entry it is here.
-    pub fn principal(&self, keep: &[usize]) -> (Self, Vec<usize>) {
+    pub(crate) fn principal(&self, keep: &[usize]) -> (Self, Vec<usize>) {
         let mut position = vec![usize::MAX; self.order()];
         for (new, &old) in keep.iter().enumerate() {
             position[old] = new;
@@ -317,7 +317,7 @@ impl Factor {
     }
 
     /// Number of stored entries, the zeros that blocks include counted.
-    pub fn entries(&self) -> usize {
+    pub(crate) fn entries(&self) -> usize {
         self.values.len()
     }
 }

@@ -59,7 +59,7 @@ impl Contour {
     }
 
     /// The points (z, r) it goes through.
-    pub fn points(&self) -> &[[f64; 2]] {
+    pub(crate) fn points(&self) -> &[[f64; 2]] {
         &self.points
     }
 

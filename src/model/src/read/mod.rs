@@ -39,7 +39,7 @@ pub enum Units {
 
 impl Units {
     /// Metres per unit of length.
-    pub fn length(self) -> f64 {
+    pub(crate) fn length(self) -> f64 {
         match self {
             Self::Si => 1.0,
             Self::MillimetreTonneSecond => 1e-3,

@@ -177,7 +177,7 @@ impl SectorGeometry {
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the length, angle or number.
-    pub fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(&self) -> Result<()> {
         let (blade, disk) = (&self.blade, &self.disk);
         if self.sectors < 3 {
             let remedy = "Give at least three, so that a sector is less than half a turn";

@@ -111,7 +111,7 @@ pub struct Ball {
 
 impl Ball {
     /// Speed at which it touches: √(2gH) (m/s).
-    pub fn speed(&self) -> f64 {
+    pub(crate) fn speed(&self) -> f64 {
         (2.0 * self.gravity * self.height).sqrt()
     }
 
@@ -121,7 +121,7 @@ impl Ball {
     }
 
     /// Time in contact: 2/ω · (π − atan(vω/g)) (s).
-    pub fn contact(&self) -> f64 {
+    pub(crate) fn contact(&self) -> f64 {
         2.0 * (PI - (self.speed() * self.omega / self.gravity).atan()) / self.omega
     }
 

@@ -46,7 +46,7 @@ type Memory = Vec<(usize, usize, [f64; 3])>;
 ///
 /// # Errors
 /// As [`super::Method::run`].
-pub fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
+pub(crate) fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
     let mut recorder = Recorder::new(scene, run, "augmented");
     let h = run.step;
     let quarter = 0.25 * h * h;

@@ -6,7 +6,7 @@ use crate::surface::{add_scaled, cross, dot, minus, scaled, unit};
 
 /// A master near or inside a ring.
 #[derive(Debug, Clone)]
-pub struct Contact {
+pub(crate) struct Contact {
     /// 0 left, 1 right.
     pub side: usize,
     /// Number of the master on its face.

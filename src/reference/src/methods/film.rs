@@ -40,7 +40,7 @@ impl Default for Options {
 ///
 /// # Errors
 /// As [`super::Method::run`].
-pub fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
+pub(crate) fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
     let mut recorder = Recorder::new(scene, run, "film");
     let operator = Operator::new(scene, 0.0)?;
     let rest = surface_at_rest(scene);

@@ -29,7 +29,7 @@ pub struct Run {
 
 impl Run {
     /// Number of steps to the end.
-    pub fn steps(&self) -> usize {
+    pub(crate) fn steps(&self) -> usize {
         let mut steps = 0;
         while (steps as f64 + 0.5) * self.step < self.end {
             steps += 1;
@@ -53,7 +53,7 @@ pub enum Method {
 
 impl Method {
     /// Name for tables and files.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Film(_) => "film",
             Self::Bipotential => "bipotential",

@@ -56,7 +56,7 @@ impl Surface {
     }
 
     /// Whether there is no node.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
