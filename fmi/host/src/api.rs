@@ -15,9 +15,9 @@ pub type Instance = *mut c_void;
 /// Saved state.
 pub type State = *mut c_void;
 /// Text.
-pub type Text = *const c_char;
+pub(crate) type Text = *const c_char;
 /// Value references.
-pub type References = *const u32;
+pub(crate) type References = *const u32;
 
 /// Structs of function pointers, loaded by name, and the list of the names.
 macro_rules! api {

@@ -67,7 +67,7 @@ pub struct ImportedDescription {
 
 impl ImportedDescription {
     /// The outputs that hold numbers, in file order.
-    pub fn numeric_outputs(&self) -> impl Iterator<Item = &ImportedVariable> {
+    pub(crate) fn numeric_outputs(&self) -> impl Iterator<Item = &ImportedVariable> {
         self.variables.iter().filter(|variable| variable.causality == "output" && variable.kind != VariableType::Text)
     }
 }

@@ -162,7 +162,7 @@ impl UnpackedFmu {
     ///
     /// # Errors
     /// The FMU has none.
-    pub fn library(&self) -> Result<PathBuf> {
+    pub(crate) fn library(&self) -> Result<PathBuf> {
         let platform = if self.description.fmi_version.starts_with('2') { "linux64" } else { "x86_64-linux" };
         let name = format!("binaries/{platform}/{}.so", self.description.model_identifier);
         let path = self.directory.path().join(&name);

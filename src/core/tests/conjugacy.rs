@@ -5,7 +5,7 @@ use tiprub_core::contact::gap::{Drive, GapLaw};
 use tiprub_core::contact::wrench::{At, Motion};
 use tiprub_core::settings::{PatchSettings, Scheme, Solver, SplineSettings};
 use tiprub_core::{Scene, Simulation};
-use tiprub_test_models::{self as models, coating, disk, flexible};
+use tiprub_test_models::{self as models, coating, disk, flexible, started};
 
 fn set(simulation: &mut Simulation, name: &str, value: f64, slope: f64) {
     let Some(reference) = simulation.table().find(name).map(|row| row.reference) else { return };
@@ -93,8 +93,7 @@ fn looked(
 fn normals_and_motions_are_the_derivatives_of_the_gap() {
     for feature in [FEATURES[1], FEATURES[3]] {
         let scene = scene(feature, Scheme::ModalExact, Solver::Lcp, 0.0, 1e-6);
-        let mut simulation = Simulation::new(&scene).unwrap();
-        simulation.initialise(0.0).unwrap();
+        let simulation = started(&scene);
         let (mut law, lanes) = (simulation.system().law().clone(), simulation.system().bank().lanes());
         let mut displacement = vec![0.0; 9 * lanes];
         (displacement[0], displacement[lanes], displacement[2 * lanes]) = (8e-4, -1.2e-3, 5e-4);
@@ -147,8 +146,7 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
 #[test]
 fn friction_heat_goes_to_the_patch_that_the_displaced_node_faces() {
     let scene = scene(FEATURES[1], Scheme::ModalExact, Solver::Lcp, 0.15, 1e-6);
-    let mut simulation = Simulation::new(&scene).unwrap();
-    simulation.initialise(0.0).unwrap();
+    let mut simulation = started(&scene);
     let first = simulation.table().find("casing_friction_power").unwrap().reference;
     let (mut moved, mut total) = (0.0, 0.0);
     for _ in 0..200 {
@@ -191,8 +189,7 @@ fn friction_heat_goes_to_the_patch_that_the_displaced_node_faces() {
 fn energy_that_no_input_brings_ends_the_run() {
     let ends = |step: f64| {
         let scene = scene(FEATURES[2], Scheme::ModalExact, Solver::Lcp, 0.0, step);
-        let mut simulation = Simulation::new(&scene).unwrap();
-        simulation.initialise(0.0).unwrap();
+        let mut simulation = started(&scene);
         while simulation.time() < 4e-3 {
             let time = simulation.time();
             set(&mut simulation, "casing_radius_change", -0.05 * time, -0.05);

@@ -14,7 +14,7 @@ use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{
     self as models, coating,
     disk::{Disk, with_rotor},
-    flexible, real, started, try_started,
+    flexible, go, real, started, try_started,
 };
 
 const SCHEMES: [Scheme; 3] = Scheme::ALL;
@@ -177,8 +177,7 @@ fn a_casing_turned_by_sectors_turns_the_answer() {
             let mut simulation = started(&scene);
             let mut contact = 0;
             while simulation.time() < 2e-3 {
-                let time = simulation.time();
-                simulation.do_step(time, 5e-5).unwrap();
+                go(&mut simulation, 5e-5);
                 contact += simulation.system().events().len();
             }
             assert!(contact > 0);
@@ -343,8 +342,7 @@ proptest! {
         scene.settings.structures[0].damping_ratio = Some(0.0);
         let mut simulation = started(&scene);
         for _ in 0..25 {
-            let time = simulation.time();
-            simulation.do_step(time, 5e-5).unwrap();
+            go(&mut simulation, 5e-5);
             let system = simulation.system();
             for (index, gap) in system.gaps().iter().enumerate().filter(|(index, _)| index % system.bank().lanes() < sectors) {
                 let multiplier = system.multiplier(index / system.bank().lanes(), index % system.bank().lanes());

@@ -88,21 +88,18 @@ fn friction_that_jams_a_contact_on_the_flight_is_refused() {
     let mut simulation = Simulation::new(&with_local_mode(&[(0, [1.0, 1.0, 0.0])])).unwrap();
     let error = simulation.initialise(0.0).unwrap_err().to_string();
     assert!(error.contains("contact of left_000 alone has no unique solution"), "{error}");
-    let mut other = Simulation::new(&with_local_mode(&[(0, [1.0, -1.0, 0.0])])).unwrap();
-    other.initialise(0.0).unwrap();
+    let other = started(&with_local_mode(&[(0, [1.0, -1.0, 0.0])]));
     assert!(other.warnings().is_empty(), "{:?}", other.warnings());
 }
 
 #[test]
 fn friction_that_may_leave_the_flight_without_one_solution_is_warned_of() {
-    let mut simulation = Simulation::new(&with_local_mode(&[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])])).unwrap();
-    simulation.initialise(0.0).unwrap();
+    let simulation = started(&with_local_mode(&[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]));
     let told = simulation.warnings().join(" ");
     assert!(told.contains("cannot be shown to have one solution"), "{told}");
     let mut frictionless = with_local_mode(&[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]);
     frictionless.settings.contacts[0].friction = 0.0;
-    let mut simulation = Simulation::new(&frictionless).unwrap();
-    simulation.initialise(0.0).unwrap();
+    let simulation = started(&frictionless);
     assert!(simulation.warnings().is_empty(), "{:?}", simulation.warnings());
 }
 

@@ -2,7 +2,7 @@
 
 use tiprub_core::settings::{InputInterpolation, LoadSettings, Motion, Shape, StructureSettings};
 use tiprub_core::{Rom, Scene, Simulation};
-use tiprub_test_models::{self as models, real, reference, saved, set, slope, started, started_at};
+use tiprub_test_models::{self as models, go, real, reference, saved, set, slope, started, started_at};
 
 const STEP: f64 = 1e-6;
 
@@ -205,7 +205,7 @@ fn derivatives_say_where_the_step_ends_and_do_not_make_it_jump() {
     slope(&mut simulation, "casing_shape_factor", 0.1 / length);
     assert!((simulation.shape_factor() - 0.5).abs() < 1e-14);
     for end in [0.3, 0.4, 0.5] {
-        simulation.do_step(simulation.time(), length).unwrap();
+        go(&mut simulation, length);
         assert!((simulation.shape_factor() - end).abs() < 1e-14, "{}", simulation.shape_factor());
     }
 }
@@ -234,7 +234,7 @@ fn a_value_set_within_a_step_turns_the_ramp_where_it_is_and_an_early_return_keep
     assert!((simulation.shape_factor() - 0.8).abs() < 1e-14);
     while !simulation.advance().unwrap().finished {}
     acts(&simulation, 1.0);
-    twin.do_step(twin.time(), 2e-6).unwrap();
+    go(&mut twin, 2e-6);
     assert!((twin.shape_factor() - (0.6 + 0.4 * 2.0 / 7.0)).abs() < 1e-14, "{}", twin.shape_factor());
 }
 
@@ -267,7 +267,7 @@ fn a_state_saved_within_a_ramp_goes_on_bit_by_bit_elsewhere() {
     let mut simulation = started(&scene);
     for index in 0..5 {
         disturb(&mut simulation, index);
-        simulation.do_step(simulation.time(), 1e-5).unwrap();
+        go(&mut simulation, 1e-5);
     }
     let mut other = Simulation::new(&scene).unwrap();
     // At a communication point with values that wait for the next step, within it, and with a ramp turned there.
@@ -288,7 +288,7 @@ fn a_state_saved_within_a_ramp_goes_on_bit_by_bit_elsewhere() {
         other.restore_state(&saved(&simulation)).unwrap();
     }
     for one in [&mut simulation, &mut other] {
-        one.do_step(one.time(), 3e-5).unwrap();
+        go(one, 3e-5);
     }
     assert_eq!(outputs(&simulation), outputs(&other));
 }
@@ -342,7 +342,7 @@ fn refused_steps_name_the_input_and_change_nothing() {
     set(&mut simulation, "casing_shape_rotation", 0.2);
     // A fast turn is no wrap where the derivative says it.
     slope(&mut simulation, "casing_shape_rotation", 1300.0);
-    simulation.do_step(simulation.time(), 1e-2).unwrap();
+    go(&mut simulation, 1e-2);
 }
 
 #[test]

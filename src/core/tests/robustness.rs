@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use proptest::prelude::*;
 use tiprub_core::settings::{Scheme, Shape, Solver, SplineSettings, TimeSettings};
 use tiprub_core::{Result, Scene, Simulation};
-use tiprub_test_models::{self as models, bits, real, reference, saved, set, try_started};
+use tiprub_test_models::{self as models, bits, go, real, reference, saved, set, try_started};
 
 fn energy(simulation: &Simulation) -> f64 {
     real(simulation, "strain_energy") + real(simulation, "kinetic_energy")
@@ -91,7 +91,7 @@ fn central_differences_are_refused_when_stiffening_takes_them_over_their_limit()
     assert!(message.contains("ω_max"), "{message}");
     // Slower again, it goes on.
     set(&mut simulation, "speed", 500.0);
-    simulation.do_step(simulation.time(), step).unwrap();
+    go(&mut simulation, step);
 }
 
 #[test]
@@ -116,7 +116,7 @@ fn pressed_blades_gain_no_energy_at_the_largest_step_of_massless_boundary() {
         let mut most: f64 = 0.0;
         for index in 0..10_000 {
             set(&mut simulation, "casing_radius_change", -4.2e-4 * (f64::from(index) * step / 2e-3).min(1.0));
-            simulation.do_step(simulation.time(), step).unwrap();
+            go(&mut simulation, step);
             most = most.max(energy(&simulation));
         }
         let (gained, supplied) = (-real(&simulation, "impact_loss"), real(&simulation, "external_work"));
@@ -142,7 +142,7 @@ fn a_stiff_casing_gains_no_energy_at_the_largest_step_of_massless_boundary() {
         let (mut most, mut supplied) = (0.0_f64, 0.0_f64);
         for index in 0..5000 {
             set(&mut simulation, "casing_radius_change", -4.2e-4 * (f64::from(index) * step / 2e-3).min(1.0));
-            simulation.do_step(simulation.time(), step).unwrap();
+            go(&mut simulation, step);
             most = most.max(energy(&simulation));
             supplied = supplied.max(real(&simulation, "external_work"));
         }
@@ -177,11 +177,11 @@ fn a_change_of_step_leaves_the_pressed_casing_at_rest() {
         let mut simulation = try_started(&scene).unwrap();
         for index in 0..8000 {
             set(&mut simulation, "casing_radius_change", -5e-4 * (f64::from(index) / 4000.0).min(1.0));
-            simulation.do_step(simulation.time(), 1e-6).unwrap();
+            go(&mut simulation, 1e-6);
         }
         let (before, booked) = (energy(&simulation), real(&simulation, "step_change_energy"));
         for index in 0..400 {
-            simulation.do_step(simulation.time(), if index % 2 == 0 { 2.5e-7 } else { 1e-6 }).unwrap();
+            go(&mut simulation, if index % 2 == 0 { 2.5e-7 } else { 1e-6 });
         }
         let share = (real(&simulation, "step_change_energy") - booked).abs() / before;
         println!("{scheme:?}: 400 changes of step book {share:.1e} of the energy");
@@ -243,7 +243,7 @@ fn a_node_that_wanders_over_the_edge_of_a_flexible_casing_loses_no_more_than_is_
             let x = f64::from(index);
             set(&mut simulation, "casing_radius_change", -4e-4 * (x / 1000.0).min(1.0));
             set(&mut simulation, "axial_shift", 0.015 * (x / 300.0).sin());
-            simulation.do_step(simulation.time(), 1e-6).unwrap();
+            go(&mut simulation, 1e-6);
         }
         let (loss, work) = (real(&simulation, "impact_loss"), real(&simulation, "external_work"));
         println!("slope {slope}: impact loss {loss:.3e} J, external work {work:.3e} J");
@@ -488,7 +488,7 @@ fn warnings_hold_for_the_step_that_is_taken_and_are_told_once() {
     assert!(simulation.warnings().is_empty(), "{:?}", simulation.warnings());
     let mut told = Vec::new();
     for length in [5e-6, 7.9e-6, 8e-6, 8e-6, 4e-6, 1.6e-5] {
-        simulation.do_step(simulation.time(), length).unwrap();
+        go(&mut simulation, length);
         told.push(simulation.take_notes().join("; "));
     }
     assert!(told[2].contains("8.000e-6"), "{told:?}");
@@ -500,7 +500,7 @@ fn warnings_hold_for_the_step_that_is_taken_and_are_told_once() {
     assert!(simulation.warnings().join(" ").contains("1.000e-5"), "{:?}", simulation.warnings());
     let steps = [1e-5, 1.1e-5, 2e-5, 1e-5, 2e-5];
     let told = steps.map(|length| {
-        simulation.do_step(simulation.time(), length).unwrap();
+        go(&mut simulation, length);
         simulation.take_notes().len()
     });
     assert_eq!(told, [0, 0, 1, 0, 0]);
@@ -526,7 +526,7 @@ fn the_other_sense_is_told_of_when_the_rotor_turns_that_way() {
     assert!(simulation.take_notes().is_empty());
     for (speed, expected) in [(-1300.0, backwards), (1300.0, 0), (-1300.0, 0)] {
         set(&mut simulation, "speed", speed);
-        simulation.do_step(simulation.time(), 1e-6).unwrap();
+        go(&mut simulation, 1e-6);
         assert_eq!(simulation.take_notes().len(), expected, "{speed}");
     }
 }

@@ -5,12 +5,11 @@ use std::collections::BTreeMap;
 use tiprub_core::Simulation;
 use tiprub_core::settings::{Scheme, Shape};
 use tiprub_core::variables::{Causality, Variability};
-use tiprub_test_models::{self as models, bits, real, reference, saved, started};
+use tiprub_test_models::{self as models, bits, go, real, reference, saved, started};
 
 fn run(simulation: &mut Simulation, steps: u32, length: f64) {
     for _ in 0..steps {
-        let time = simulation.time();
-        simulation.do_step(time, length).unwrap();
+        go(simulation, length);
     }
 }
 
@@ -31,8 +30,7 @@ fn friction_heat_is_force_times_sliding() {
     };
     let (mut oldest, mut before, mut heat) = (all(&simulation), all(&simulation), 0.0);
     for _ in 0..3000 {
-        let time = simulation.time();
-        simulation.do_step(time, step).unwrap();
+        go(&mut simulation, step);
         for event in simulation.system().events() {
             let place = event.node * sectors + event.sector;
             let moved = 0.5 * (tangential(&simulation, event.node, event.sector) - oldest[place]);
@@ -371,8 +369,7 @@ fn a_tiny_communication_step_at_an_impact_adds_no_energy() {
         let mut simulation = started(&models::rub(12));
         let (mut impacts, mut worst) = (0, 0.0_f64);
         for step in 0..4000_u32 {
-            let time = simulation.time();
-            simulation.do_step(time, if step % 2 == 0 { 7.3e-7 } else { tiny }).unwrap();
+            go(&mut simulation, if step % 2 == 0 { 7.3e-7 } else { tiny });
             if step % 2 == 1 && !simulation.system().events().is_empty() {
                 impacts += 1;
             }

@@ -3,7 +3,7 @@
 use tiprub_core::persist::fingerprint;
 use tiprub_core::settings::{LoadSettings, Scheme, Solver, SplineSettings};
 use tiprub_core::{Error, Scene, Simulation};
-use tiprub_test_models::{self as models, coating, disk, flexible, lattice, saved};
+use tiprub_test_models::{self as models, coating, disk, flexible, go, lattice, saved};
 
 /// Magic, format version and fingerprint of the scene, in front of what is damaged here.
 const HEADER: usize = 24;
@@ -60,7 +60,7 @@ fn moments(scene: &Scene, length: f64) -> Vec<Vec<u8>> {
     states.push(saved(&simulation));
     let mut contacts = 0;
     for _ in 0..400 {
-        simulation.do_step(simulation.time(), length).unwrap();
+        go(&mut simulation, length);
         contacts += simulation.system().events().len();
         if contacts > 20 && !simulation.system().events().is_empty() {
             break;

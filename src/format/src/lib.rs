@@ -28,4 +28,4 @@ pub use scene_file::{parse_scene, write_scene};
 pub use scene_layout::{FIELDS, SceneField};
 
 /// Result of this crate.
-pub type Result<T, E = Error> = core::result::Result<T, E>;
+pub(crate) type Result<T, E = Error> = core::result::Result<T, E>;

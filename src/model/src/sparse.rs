@@ -315,9 +315,4 @@ impl Factor {
         let factor = LltRef::new(&self.symbolic.inner, &self.values);
         factor.solve_in_place_with_conj(Conj::No, right, PAR, MemStack::new(&mut memory));
     }
-
-    /// Number of stored entries, the zeros that blocks include counted.
-    pub(crate) fn entries(&self) -> usize {
-        self.values.len()
-    }
 }

@@ -164,7 +164,7 @@ pub fn ring_of(around: usize, along: usize, diameters: usize) -> Rom {
 }
 
 /// Four thermal patches around.
-pub fn quarters(axial: [f64; 2]) -> Vec<Patch> {
+pub(crate) fn quarters(axial: [f64; 2]) -> Vec<Patch> {
     let quarter = |index: u32| [FRAC_PI_2 * f64::from(index), FRAC_PI_2 * f64::from(index + 1)];
     (0..4).map(|index| Patch { angle: quarter(index), axial }).collect()
 }

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use tiprub_model::assembly::{assemble, free_dofs, lumped_masses};
 use tiprub_model::progress::silent;
 use tiprub_model::sparse::{Factor, SparseMatrix, principal_pair};
-use tiprub_model::{FeModel, Material, Mesh, Result};
+use tiprub_model::{Material, Mesh, Result};
 
 use super::{
     CENTRE, FRICTION, HALF_ARC, RING_ELEMENTS, Side, WIDTH, cube_material, cube_mesh, ring_material, ring_mesh,
@@ -76,27 +76,9 @@ impl Body {
         Ok(body)
     }
 
-    /// The same body for a reduction by the product, without friction surfaces or clamps applied.
-    pub(crate) fn fe_model(&self, origin: &str) -> FeModel {
-        FeModel {
-            nodes: self.mesh.nodes.clone(),
-            sets: self.mesh.sets.clone(),
-            stiffness: self.stiffness.clone(),
-            mass: self.mass.clone(),
-            mesh: Some((self.mesh.clone(), self.material.clone())),
-            origin: origin.into(),
-        }
-    }
-
     /// Number of dofs.
     pub fn dofs(&self) -> usize {
         self.mass.order()
-    }
-
-    /// Positions of the contact nodes under displacements of all dofs (m).
-    pub(crate) fn contact_positions(&self, displacements: &[f64]) -> Vec<[f64; 3]> {
-        let place = |&node: &usize| core::array::from_fn(|i| self.mesh.nodes[node][i] + displacements[3 * node + i]);
-        self.contact.iter().map(place).collect()
     }
 
     /// Factor of M + c K without the clamped dofs.

@@ -52,16 +52,6 @@ pub enum Method {
 }
 
 impl Method {
-    /// Name for tables and files.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Film(_) => "film",
-            Self::Bipotential => "bipotential",
-            Self::Augmented(_) => "augmented",
-            Self::Penalty(_) => "penalty",
-        }
-    }
-
     /// Run the scene.
     ///
     /// # Errors

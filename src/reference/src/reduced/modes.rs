@@ -46,11 +46,6 @@ impl Modes {
         self.frequencies.len()
     }
 
-    /// True when there is none.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.frequencies.is_empty()
-    }
-
     /// Largest angular frequency (rad/s).
     pub(crate) fn largest_frequency(&self) -> f64 {
         self.frequencies.iter().fold(0.0, |largest, value| f64::max(largest, *value))

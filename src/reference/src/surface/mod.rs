@@ -55,11 +55,6 @@ impl Surface {
         self.rows * self.columns
     }
 
-    /// Whether there is no node.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// Values of the carriers from values at the nodes (any vector quantity: positions, displacements).
     pub fn carriers(&self, nodal: &[[f64; 3]]) -> Vec<[f64; 3]> {
         self.tensor.apply(nodal)

@@ -320,6 +320,30 @@ impl Case {
     }
 }
 
+/// Cases in a row.
+pub(crate) trait Cases {
+    /// One whose work finds checks, or is refused; in the quick table as well, if `quick`.
+    fn add(
+        &mut self,
+        quick: bool,
+        name: impl Into<String>,
+        expected: Expected,
+        work: impl Fn() -> tiprub_core::Result<Vec<Check>> + Send + Sync + 'static,
+    );
+}
+
+impl Cases for Vec<Case> {
+    fn add(
+        &mut self,
+        quick: bool,
+        name: impl Into<String>,
+        expected: Expected,
+        work: impl Fn() -> tiprub_core::Result<Vec<Check>> + Send + Sync + 'static,
+    ) {
+        self.push(Case::new(name, expected, move |_| Happened::of(work())).quick(quick));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

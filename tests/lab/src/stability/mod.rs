@@ -14,7 +14,7 @@ pub(crate) mod observe;
 pub(crate) mod press;
 pub(crate) mod table;
 
-pub(crate) use case::{Case, Check, Context, Expected, judge};
+pub(crate) use case::{Case, Cases, Check, Context, Expected, judge};
 pub(crate) use case::{Happened, Verdict};
 
 /// All cases of the full table, or of the quick one; those that prove the judge itself come with their family's name only.

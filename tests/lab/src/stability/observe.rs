@@ -1,7 +1,7 @@
 //! What is watched while a simulation runs, each time from the state and not from what the solver said.
 
 use tiprub_core::{
-    Result, Simulation,
+    Result, Scene, Simulation,
     contact::gap::GapLaw,
     settings::{Scheme, Shape},
 };
@@ -10,6 +10,16 @@ use super::Check;
 
 /// Largest share of the energy exchanged that massless-boundary may give back in one step: its warning names it.
 pub(crate) const MASSLESS_RETURN: f64 = 2e-2;
+
+/// At time 0, with what watches it.
+///
+/// # Errors
+/// The scene is refused.
+pub(crate) fn begin(scene: &Scene) -> Result<(Simulation, Watch)> {
+    let mut simulation = Simulation::new(scene)?;
+    simulation.initialise(0.0)?;
+    Ok((simulation, Watch::new(scene)))
+}
 
 /// Value of a real variable that the scene has.
 pub(crate) fn real(simulation: &Simulation, name: &str) -> f64 {

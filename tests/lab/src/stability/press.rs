@@ -11,7 +11,7 @@ use tiprub_core::{Result, Rom, Scene, Simulation, settings::Solver};
 use super::{
     Check,
     models::RADIUS,
-    observe::{Watch, real, set},
+    observe::{Watch, begin, real, set},
 };
 
 /// Damping that brings the blades to rest.
@@ -76,9 +76,7 @@ impl Press {
         scene.settings.structures[0].damping_ratio.get_or_insert(DAMPING);
         let step = scene.settings.time.step;
         scene.settings.experiment.communication_step = step;
-        let mut simulation = Simulation::new(&scene)?;
-        simulation.initialise(0.0)?;
-        let mut watch = Watch::new(&scene);
+        let (mut simulation, mut watch) = begin(&scene)?;
         watch.scale = watch.scale.max(self.depth);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number of steps")]
         let count = ((self.rise + self.hold) / step).ceil() as u64;

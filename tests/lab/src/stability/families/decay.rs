@@ -13,7 +13,7 @@ use tiprub_core::{
 };
 
 use super::super::{
-    Case, Check, Expected, Happened,
+    Case, Cases, Check, Expected,
     models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, on_ring, round, with_methods, with_step},
     observe::{amplitudes, real, set, worse},
     press::pressed,
@@ -32,19 +32,17 @@ pub(crate) fn cases() -> Vec<Case> {
             for (kind, turned) in [("straight", 0.0), ("turned", 0.45)] {
                 for (solver, solver_name) in SOLVERS {
                     let released = Released { scheme, solver, turned, ratio, told: ratio };
-                    let work = move |_: &_| Happened::of(released.blade());
                     let name = format!("decay/blade/{kind}/ξ={ratio}/{scheme_name}/{solver_name}");
                     let expected = Expected::right("decay of every mode from the static place, step by step");
                     let quick =
                         solver == Solver::Lcp && ratio >= if scheme == Scheme::ModalExact { 0.005 } else { 0.05 };
-                    cases.push(Case::new(name, expected, work).quick(quick));
+                    cases.add(quick, name, expected, move || released.blade());
                 }
             }
             for order in [1, 2, 3, 4] {
-                let work = move |_: &_| Happened::of(ring(scheme, order, ratio, ratio));
                 let name = format!("decay/ring/{order}/ξ={ratio}/{scheme_name}");
                 let expected = Expected::right("decay of the nodal diameter from the static amplitude, step by step");
-                cases.push(Case::new(name, expected, work).quick(order == 2 && ratio >= 0.05));
+                cases.add(order == 2 && ratio >= 0.05, name, expected, move || ring(scheme, order, ratio, ratio));
             }
         }
     }
