@@ -52,17 +52,17 @@ macro_rules! calls_of_both {
 
             /// Bytes into a new state.
             pub fn deserialise(&self, bytes: &[u8]) -> (i32, State) {
-                let mut state = std::ptr::null_mut();
+                let (mut state, size) = (std::ptr::null_mut(), bytes.len());
                 // SAFETY: an array of that size, a place for the state.
-                let status =
-                    unsafe { (self.api.$deserialise)(self.handle, bytes.as_ptr(), bytes.len(), &raw mut state) };
+                let status = unsafe { (self.api.$deserialise)(self.handle, bytes.as_ptr(), size, &raw mut state) };
                 (status, state)
             }
 
             /// Messages so far; the journal is empty afterwards.
             pub fn log(&self) -> String {
                 // SAFETY: the journal lives as long as this importer, and is only touched between calls.
-                std::mem::take(AsMut::<crate::Journal>::as_mut(unsafe { &mut *self.context })).text()
+                let context = unsafe { &mut *self.context };
+                std::mem::take(AsMut::<crate::Journal>::as_mut(context)).text()
             }
 
             /// Require OK or Warning.

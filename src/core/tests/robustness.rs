@@ -353,7 +353,7 @@ fn a_speed_given_within_a_communication_step_is_checked_as_well() {
 
 /// What the FMU does when an output is asked for in Initialization Mode: on a refusal it goes back to the state before.
 fn tried(simulation: &mut Simulation) -> bool {
-    let state = saved(&simulation);
+    let state = saved(simulation);
     let outcome = simulation.initialise(0.0);
     if outcome.is_err() {
         simulation.restore_state(&state).unwrap();

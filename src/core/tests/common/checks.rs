@@ -59,10 +59,10 @@ pub fn ledger_closes(name: &str, mut simulation: Simulation, bound: f64) {
 /// Saved after contact, at a communication point and within a step, and restored into another instance that has been elsewhere.
 pub fn state_continues(name: &str, start: &dyn Fn() -> Simulation) {
     let mut simulation = start();
-    let mut contacts = steps(&mut simulation, 0, 40);
+    let mut contacts = steps(&mut simulation, 0, 30);
     for within in [0, 21] {
         if within > 0 {
-            disturb(&mut simulation, 40);
+            disturb(&mut simulation, 30);
             simulation.begin_step(simulation.time(), 5e-5).unwrap();
             for _ in 0..within {
                 assert!(!simulation.advance().unwrap().finished);
@@ -78,7 +78,7 @@ pub fn state_continues(name: &str, start: &dyn Fn() -> Simulation) {
             if within > 0 {
                 while !simulation.advance().unwrap().finished {}
             }
-            contacts += steps(simulation, 41, 20);
+            contacts += steps(simulation, 31, 10);
             saved(simulation)
         });
         assert!(ends[0] == ends[1], "{name}, {within} internal steps in");

@@ -86,8 +86,8 @@ pub(super) fn find(scene: &Scene, rest: &SurfaceVectors, moved: &SurfaceVectors,
 pub(super) fn surface_forces(scene: &Scene, contacts: &[Contact], forces: &[[f64; 3]]) -> SurfaceVectors {
     let mut all: SurfaceVectors = [
         vec![[0.0; 3]; 2 * scene.masters],
-        vec![[0.0; 3]; scene.surfaces[0].len()],
-        vec![[0.0; 3]; scene.surfaces[1].len()],
+        vec![[0.0; 3]; scene.surfaces[0].count()],
+        vec![[0.0; 3]; scene.surfaces[1].count()],
     ];
     for (contact, force) in contacts.iter().zip(forces) {
         let force = contact.global(*force);

@@ -199,7 +199,7 @@ fn carriers(surface: Option<&Surface>, nodal: DMatrix<f64>) -> DMatrix<f64> {
         let mut mapped = DMatrix::zeros(matrix.nrows(), matrix.ncols());
         for column in 0..matrix.ncols() {
             let vectors: Vec<[f64; 3]> =
-                (0..surface.len()).map(|i| core::array::from_fn(|k| matrix[(3 * i + k, column)])).collect();
+                (0..surface.count()).map(|i| core::array::from_fn(|k| matrix[(3 * i + k, column)])).collect();
             for (i, vector) in surface.carriers(&vectors).into_iter().enumerate() {
                 (0..3).for_each(|k| mapped[(3 * i + k, column)] = vector[k]);
             }
@@ -214,7 +214,7 @@ fn isotropic_carriers(surface: Option<&Surface>, nodal: DMatrix<f64>) -> DMatrix
     let map = |matrix: &DMatrix<f64>| {
         let mut mapped = DMatrix::zeros(matrix.nrows(), matrix.ncols());
         for column in 0..matrix.ncols() {
-            let vectors: Vec<[f64; 3]> = (0..surface.len()).map(|i| [matrix[(i, column)], 0.0, 0.0]).collect();
+            let vectors: Vec<[f64; 3]> = (0..surface.count()).map(|i| [matrix[(i, column)], 0.0, 0.0]).collect();
             for (i, vector) in surface.carriers(&vectors).into_iter().enumerate() {
                 mapped[(i, column)] = vector[0];
             }

@@ -51,7 +51,7 @@ impl Surface {
     }
 
     /// Number of carriers, and of nodes.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.rows * self.columns
     }
 
