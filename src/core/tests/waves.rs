@@ -1,15 +1,16 @@
 //! Waves around the circumference against closed forms: a cyclic chain pressed at rest, pressed by a casing of lobes and by
-//! whirl that travel around it. A ring under a travelling load is in `lab stability`, `turning/load`.
+//! whirl that travel around it, and a flexible ring under a travelling load.
 
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, Matrix2, Vector2};
-use tiprub_core::settings::{Meridian, Scheme, Shape, Solver};
+use tiprub_core::settings::{LoadSettings, Meridian, Scheme, Shape, Solver};
 use tiprub_core::{Scene, Simulation};
 use tiprub_reference::closed::chain::Chain;
 use tiprub_test_models::{
+    self as models,
     disk::{Disk, with_rotor},
-    go, started,
+    started,
 };
 
 const CHAIN: Chain = Chain { sectors: 12, mass: 0.3, spring: 2e6, coupling: 7e5, damping_ratio: 0.05 };
@@ -47,9 +48,9 @@ fn chain(chain: Chain, scheme: Scheme, solver: Solver, step: f64) -> Scene {
 /// Close the casing by `closing` (m) within `time` (s), then keep it for `rest` (s).
 fn close(simulation: &mut Simulation, closing: f64, time: f64, rest: f64) {
     set(simulation, "casing_radius_change", 0.0, -closing / time);
-    go(simulation, time);
+    simulation.do_step(simulation.time(), time).unwrap();
     set(simulation, "casing_radius_change", -closing, 0.0);
-    go(simulation, rest);
+    simulation.do_step(simulation.time(), rest).unwrap();
 }
 
 fn radial(simulation: &Simulation, sector: usize) -> f64 {
@@ -207,7 +208,7 @@ fn whirl_error(simulation: &mut Simulation, whirl: f64, rotor: f64, step: f64) -
         for (name, axis) in [("whirl_x", 0), ("whirl_y", 1)] {
             set(simulation, name, now[axis], (then[axis] - now[axis]) / step);
         }
-        go(simulation, step);
+        simulation.do_step(simulation.time(), step).unwrap();
         assert_eq!(simulation.system().events().len(), CHAIN.sectors, "open at {time}");
         if time < 0.02 + 2.0 * step {
             continue;
@@ -220,4 +221,72 @@ fn whirl_error(simulation: &mut Simulation, whirl: f64, rotor: f64, step: f64) -
         }
     }
     worst / (circle * force)
+}
+
+/// A load of n nodal diameters that turns around the flexible casing: a wave of the amplitude and lag of its pair of modes.
+#[test]
+fn a_load_that_travels_around_the_casing_is_followed_as_one_mode_follows_a_harmonic_force() {
+    println!("| scheme | n | ω/ω_n | amplitude (m) | error at h = 5, 2.5, 1.25 µs | order |");
+    println!("|---|---|---|---|---|---|");
+    for scheme in SCHEMES {
+        for (n, hertz) in [(2, 400.0), (3, 1100.0)] {
+            for ratio in [0.5, 1.0, -1.3] {
+                let mut amplitude = 0.0;
+                let errors = [5e-6, 2.5e-6, 1.25e-6].map(|step| {
+                    let (error, exact) = travelling(scheme, n, TAU * hertz, ratio, step);
+                    amplitude = exact;
+                    error
+                });
+                let order = 0.5 * (errors[0] / errors[2]).log2();
+                println!(
+                    "| {scheme:?} | {n} | {ratio} | {amplitude:.4e} | {:.1e}, {:.1e}, {:.1e} | {order:.2} |",
+                    errors[0], errors[1], errors[2]
+                );
+                assert!((1.9..2.1).contains(&order) && errors[2] < 1e-4, "{errors:?}");
+            }
+        }
+    }
+}
+
+/// Largest error of the casing's radial displacement over the last turn, relative to the amplitude, and the amplitude (m).
+fn travelling(scheme: Scheme, n: u32, own: f64, ratio: f64, step: f64) -> (f64, f64) {
+    let (load, damping, omega) = (1e3, 0.05, ratio * own);
+    let turn = TAU / omega.abs();
+    // One step size for all that follows.
+    let step = turn / 24.0 / (turn / 24.0 / step).round();
+    let mut scene = models::rub(1);
+    models::flexible(&mut scene);
+    scene.settings.outputs.watched_sectors = vec![1];
+    scene.settings.outputs.nodal_diameters = None;
+    (scene.settings.time.scheme, scene.settings.time.step) = (scheme, step);
+    scene.settings.structures[0].speed = 0.0;
+    scene.settings.structures[1].damping_ratio = Some(damping);
+    scene.settings.structures[1].load = Some(LoadSettings { order: n, amplitude: load, phase: 0.0 });
+    scene.settings.surfaces[0].shape = Shape::Circular {};
+    scene.settings.contacts[0].gap = 2e-2;
+    scene.settings.outputs.slave_displacement = true;
+    // Under a load that does not move it starts settled.
+    let mut simulation = started(&scene);
+    set(&mut simulation, "casing_load_phase", 0.0, omega);
+    let first = simulation.table().find("casing_displacement").unwrap().reference;
+    // 26 time constants: e⁻²⁶ of the start is left.
+    simulation.do_step(0.0, (26.0 / (damping * own) / turn).ceil() * turn).unwrap();
+    let phase = omega * simulation.time();
+    set(&mut simulation, "casing_load_phase", phase, omega);
+    // Modes of displacement 0.5 cos nθ and modal mass 1: the line load does π R/2 of work per unit.
+    let force = load * std::f64::consts::PI * 0.25 * 0.5;
+    let (real, imaginary) = (own * own - omega * omega, 2.0 * damping * own * omega);
+    let (amplitude, lag) = (0.5 * force / real.hypot(imaginary), imaginary.atan2(real));
+    let mut worst = 0.0_f64;
+    for _ in 0..24 {
+        simulation.do_step(simulation.time(), turn / 24.0).unwrap();
+        let phase = omega * simulation.time();
+        set(&mut simulation, "casing_load_phase", phase, omega);
+        for node in 0..36 {
+            let angle = f64::from(n) * TAU * f64::from(node) / 36.0 - phase + lag;
+            let found = simulation.real(first + node).unwrap();
+            worst = worst.max((found - amplitude * angle.cos()).abs());
+        }
+    }
+    (worst / amplitude, amplitude)
 }
