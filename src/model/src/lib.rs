@@ -3,7 +3,7 @@
 //! Floor 1. A [`Mesh`] of the six solid [elements](element) is [assembled](assembly) into sparse stiffness and mass,
 //! its lowest modes are found by [shift-invert Lanczos](eigen), and [Craig-Bampton](craig_bampton) leaves a small dense
 //! pencil in the displacements of the contact nodes: a [`tiprub_core::Rom`] with the checks that come with it
-//! (eqs 12 and 13 of the paper). [`rotor37`] is the blade that ships, [`casing`] the ring around it; [`cube`] a benchmark of [free bodies](free_body) and [open surfaces](panel); models of others are [`read`]. Nothing is printed: a caller passes a
+//! (eqs 12 and 13 of the paper). [`rotor37`] is the blade that ships, [`casing`] the ring around it; [`cube`] a benchmark of free bodies and [open surfaces](panel); models of others are [`read`]. Nothing is printed: a caller passes a
 //! [listener](progress) and shows what it likes. SI units everywhere.
 #![warn(unreachable_pub)]
 #![forbid(unsafe_code)]

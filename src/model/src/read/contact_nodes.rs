@@ -18,7 +18,7 @@ const FLAT: f64 = 1e-6;
 /// What is wanted of the contact nodes.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ContactChoice {
-    /// How many; all of a set of at most [`TAKEN_WHOLE`], [`CHOSEN`] of a larger one where absent.
+    /// How many; all of a set of at most `TAKEN_WHOLE`, `CHOSEN` of a larger one where absent.
     pub count: Option<usize>,
     /// Their names by growing z; `tip_1`, `tip_2`, ... where empty.
     pub names: Vec<String>,

@@ -1,5 +1,5 @@
 //! Four methods for the cube between two rings, each with time stepping and contact of its own:
-//! [`film`], [`bipotential`], [`augmented`] and [`penalty`]. They share the finite-element matrices, the surfaces and
+//! [`film`], `bipotential`, [`augmented`] and [`penalty`]. They share the finite-element matrices, the surfaces and
 //! where a master meets a surface ([`contact`]), nothing else.
 
 pub mod augmented;
@@ -43,7 +43,7 @@ impl Run {
 pub enum Method {
     /// [`film`].
     Film(film::Options),
-    /// [`bipotential`].
+    /// `bipotential`.
     Bipotential,
     /// [`augmented`].
     Augmented(augmented::Options),
