@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{distorted_box, nodes_at, straight_box, wobble};
+use common::{blade_steel, distorted_box, nodes_at, straight_box, wobble};
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::rom::Frame;
@@ -17,10 +17,6 @@ use tiprub_model::spin::{
 };
 use tiprub_model::{FeModel, Material, Mesh, Reduction, Result, reduce, reduce_model};
 
-fn material(poisson_ratio: f64) -> Material {
-    Material { young_modulus: 200e9, poisson_ratio, ..Material::maraging_steel() }
-}
-
 fn column(rows: usize, entry: impl Fn(usize) -> f64) -> Mat<f64> {
     Mat::from_fn(rows, 1, |i, _| entry(i))
 }
@@ -32,7 +28,7 @@ fn forces_on_a_rigid_body_are_those_of_its_mass_at_its_centre() {
     for kind in ElementKind::ALL {
         let mut mesh = distorted_box(kind, [3, 2, 2], size, wobble(0.1));
         mesh.nodes.iter_mut().for_each(|x| (0..3).for_each(|i| x[i] += corner[i]));
-        let mass = assemble(&mesh, &material(0.3), &silent).unwrap().mass;
+        let mass = assemble(&mesh, &blade_steel(0.3), &silent).unwrap().mass;
         let (dofs, weight) = (mass.order(), 8000.0 * size.iter().product::<f64>());
         let total = |forces: &Mat<f64>, i: usize| (0..dofs / 3).map(|node| forces[(3 * node + i, 0)]).sum::<f64>();
         let velocity = [1.5, -0.7, 0.4];
@@ -77,7 +73,7 @@ fn a_mass_on_two_springs_whirls_as_the_closed_form_says() {
 #[test]
 fn motion_across_the_axis_softens_by_the_square_of_the_speed() {
     let mesh = straight_box(ElementKind::Hex8, [8, 1, 1], [0.4, 0.05, 0.05]);
-    let assembled = assemble(&mesh, &material(0.0), &silent).unwrap();
+    let assembled = assemble(&mesh, &blade_steel(0.0), &silent).unwrap();
     let free: Vec<usize> =
         (0..3 * mesh.nodes.len()).filter(|dof| dof % 3 == 0 && mesh.nodes[dof / 3][0] > 0.0).collect();
     let squares = |speed: f64| {
@@ -119,7 +115,7 @@ fn beam(elements: usize, length: f64, height: f64, poisson_ratio: f64) -> Body {
     let mut mesh = straight_box(ElementKind::Hex20, [elements, 1, 1], [length, height, height]);
     mesh.nodes.iter_mut().for_each(|x| (1..3).for_each(|i| x[i] -= 0.5 * height));
     let clamped = nodes_at(&mesh, 0, 0.0);
-    Body::clamped(mesh, material(poisson_ratio), &clamped)
+    Body::clamped(mesh, blade_steel(poisson_ratio), &clamped)
 }
 
 /// A thin rod stretched by 3 %: with P = E(λ³ - λ)/2 and ρΩ²x along it, (3λ⁴ - 2λ²)/8 + ρΩ²x²/2E is constant, and λ = 1 at
@@ -191,7 +187,7 @@ fn what_cannot_spin_is_refused() {
         assert!(error.unwrap_err().to_string().starts_with("largest speed: "), "{speed}");
     }
     let (mesh, clamped, contact) = blade();
-    let still = reduce(mesh, &material(0.3), &clamped, &contact, &options(Frame::Cartesian), &silent).unwrap();
+    let still = reduce(mesh, &blade_steel(0.3), &clamped, &contact, &options(Frame::Cartesian), &silent).unwrap();
     assert!(frequencies_at(&still.rom, 100.0, true).unwrap_err().to_string().contains("no spin matrices"));
 }
 
@@ -224,7 +220,7 @@ fn spinning(
     options: &ReductionOptions,
     speed: f64,
 ) -> Result<Reduction> {
-    let model = FeModel::assembled(mesh, &material(0.3), String::new(), &silent)?;
+    let model = FeModel::assembled(mesh, &blade_steel(0.3), String::new(), &silent)?;
     reduce_model(model, clamped, contact, options, Some(speed), &silent)
 }
 
@@ -243,7 +239,7 @@ fn options(frame: Frame) -> ReductionOptions {
 /// resting part of the ROM is that without spin, bit for bit.
 #[test]
 fn spin_adds_its_arrays_and_changes_nothing_else() {
-    let steel = material(0.3);
+    let steel = blade_steel(0.3);
     let both = [Frame::Cartesian, Frame::Cylindrical].map(|frame| {
         let (mesh, clamped, contact) = blade();
         spinning(mesh, &clamped, &contact, &options(frame), 1200.0).unwrap()
