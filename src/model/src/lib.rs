@@ -23,6 +23,7 @@ pub mod material;
 pub mod mesh;
 pub mod ordering;
 pub mod panel;
+mod pattern;
 pub mod progress;
 pub mod quality;
 pub mod read;

@@ -9,15 +9,15 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::linalg::matmul::matmul;
 use faer::perm::PermRef;
+use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Accum, Conj, Mat, MatMut, MatRef, Par, Side, Spec};
 use rayon::prelude::*;
 
 use crate::ordering::{Ordering, elimination_order};
-
+pub use crate::pattern::Pattern;
 use crate::{Error, Result};
 
 /// Columns of a dense matrix that a sparse one is multiplied with at once.
@@ -57,48 +57,6 @@ pub(crate) fn add_tall(target: MatMut<'_, f64>, factor: f64, a: MatRef<'_, f64>,
         let part = a.get(piece * ROWS..piece * ROWS + rows.nrows(), ..);
         matmul(rows, Accum::Add, part, c, factor, PAR);
     });
-}
-
-/// Where the entries of a symmetric matrix are: compressed columns, rows ascending, both triangles.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Pattern {
-    /// Start of each column in `rows`, and the end of the last one.
-    pub starts: Vec<usize>,
-    /// Row index of each entry.
-    pub rows: Vec<usize>,
-}
-
-impl Pattern {
-    /// Number of rows and columns.
-    pub fn order(&self) -> usize {
-        self.starts.len() - 1
-    }
-
-    fn as_faer(&self) -> SymbolicSparseColMatRef<'_, usize> {
-        SymbolicSparseColMatRef::new_checked(self.order(), self.order(), &self.starts, None, &self.rows)
-    }
-
-    /// Pattern of the rows and columns `keep` (ascending), and for each of its entries the entry it is here.
-    pub(crate) fn principal(&self, keep: &[usize]) -> (Self, Vec<usize>) {
-        let mut position = vec![usize::MAX; self.order()];
-        for (new, &old) in keep.iter().enumerate() {
-            position[old] = new;
-        }
-        let mut starts = Vec::with_capacity(keep.len() + 1);
-        let (mut rows, mut entries) = (Vec::new(), Vec::new());
-        starts.push(0);
-        for &column in keep {
-            for entry in self.starts[column]..self.starts[column + 1] {
-                let row = position[self.rows[entry]];
-                if row != usize::MAX {
-                    rows.push(row);
-                    entries.push(entry);
-                }
-            }
-            starts.push(rows.len());
-        }
-        (Self { starts, rows }, entries)
-    }
 }
 
 /// A symmetric sparse matrix.

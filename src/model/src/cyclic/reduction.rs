@@ -3,7 +3,7 @@
 use faer::{Mat, MatRef, c64};
 use nalgebra::{Complex, DMatrix};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, Frame, Harmonic, RomChecks, RomExtras};
+use tiprub_core::rom::{ContactNode, Frame, Harmonic, RomExtras};
 
 use super::component::Component;
 use super::condense::Condensed;
@@ -223,19 +223,5 @@ fn nodal_diameter(number: usize, found: &Found, kept: usize, quality: &super::co
         residual_criterion: quality.residual_criterion[..count].to_vec(),
         fixed_interface_frequencies: found.component.squares[..kept].iter().map(|&square| hertz(square)).collect(),
         shapes: Vec::new(),
-    }
-}
-
-/// The checks of all nodal diameters in one list, ascending in frequency.
-pub(super) fn sorted_checks(list: Vec<(u32, [f64; 4])>) -> RomChecks {
-    let mut list = list;
-    list.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]).then(a.0.cmp(&b.0)));
-    let column = |i: usize| list.iter().map(|entry| entry.1[i]).collect();
-    RomChecks {
-        full_frequencies: column(0),
-        reduced_frequencies: column(1),
-        frequency_deviation: column(2),
-        residual_criterion: column(3),
-        nodal_diameters: list.iter().map(|entry| entry.0).collect(),
     }
 }

@@ -8,8 +8,10 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use tiprub_model::{Error, Result};
 
 use super::Run;
-use super::contact::{Contact, add_to_loads, find, surface_at_rest, surface_forces, surface_of};
-use super::operator::{Operator, SurfaceVectors, Vectors, inner};
+use super::contact::{
+    Contact, SurfaceVectors, Vectors, add_to_loads, find, surface_at_rest, surface_forces, surface_of,
+};
+use super::operator::{Operator, inner};
 use super::recorder::{Entry, Recorder};
 use crate::cube::history::History;
 use crate::cube::scene::Scene;

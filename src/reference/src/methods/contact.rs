@@ -1,8 +1,13 @@
 //! Where masters meet a ring's surface: gap, frame, weights; relative displacements; forces back on the bodies.
 
-use super::operator::{SurfaceVectors, Vectors};
 use crate::cube::scene::Scene;
 use crate::surface::{add_scaled, cross, dot, minus, scaled, unit};
+
+/// Displacements, forces or velocities of all dofs of cube, left ring, right ring.
+pub(super) type Vectors = [Vec<f64>; 3];
+
+/// Vectors at the masters (left face, then right) and at the carriers of the left and the right ring.
+pub(super) type SurfaceVectors = [Vec<[f64; 3]>; 3];
 
 /// A master near or inside a ring.
 #[derive(Debug, Clone)]

@@ -5,12 +5,9 @@ use tiprub_model::sparse::Factor;
 use tiprub_model::{Error, Result};
 
 use super::blocks::BlockMatrix;
-use super::contact::Contact;
+use super::contact::{Contact, SurfaceVectors, Vectors};
 use crate::cube::scene::{Mass, Scene};
 use crate::surface::{Surface, is_zero};
-
-/// Displacements, forces or velocities of all dofs of cube, left ring, right ring.
-pub(super) type Vectors = [Vec<f64>; 3];
 
 #[derive(Debug)]
 enum Inverse {
@@ -184,9 +181,6 @@ impl Operator {
         })
     }
 }
-
-/// Vectors at the masters (left face, then right) and at the carriers of the left and the right ring.
-pub(super) type SurfaceVectors = [Vec<[f64; 3]>; 3];
 
 pub(super) fn inner(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
