@@ -13,6 +13,7 @@
 //! Invariants, written as what is absent: no unsafe code outside `boundary` (the `no_mangle` attributes of the façades
 //! apart), no global mutable state (but the silent panic hook of this library's own copy of the standard library), no
 //! thread, no output, no panic across the ABI, no value handed out by a call that did not succeed.
+#![warn(unreachable_pub)]
 #![deny(unsafe_op_in_unsafe_fn)]
 
 mod boundary;

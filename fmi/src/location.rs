@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// A message naming the location: empty, another scheme or host, not absolute, damaged encoding, no such directory.
-pub fn from_uri(location: &str) -> Result<PathBuf, String> {
+pub(crate) fn from_uri(location: &str) -> Result<PathBuf, String> {
     let remedy = "Pass the URI of the unpacked resources directory, such as file:///tmp/fmu/resources";
     if location.trim().is_empty() {
         return Err(format!("fmuResourceLocation is empty, but this FMU reads its model from there. {remedy}"));
@@ -39,7 +39,7 @@ pub fn from_uri(location: &str) -> Result<PathBuf, String> {
 ///
 /// # Errors
 /// A message naming the path: empty, not absolute, no such directory.
-pub fn from_native(path: &str) -> Result<PathBuf, String> {
+pub(crate) fn from_native(path: &str) -> Result<PathBuf, String> {
     let remedy = "Pass the absolute native path of the unpacked resources directory, such as /tmp/fmu/resources/";
     if path.trim().is_empty() {
         return Err(format!("resourcePath is empty, but this FMU reads its model from there. {remedy}"));

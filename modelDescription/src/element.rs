@@ -6,25 +6,25 @@ use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 use crate::text::clean;
 
 /// An XML element without text content: model descriptions have attributes only.
-pub struct Element {
+pub(crate) struct Element {
     name: &'static str,
     attributes: Vec<(&'static str, String)>,
     children: Vec<Element>,
 }
 
 impl Element {
-    pub fn new(name: &'static str) -> Self {
+    pub(crate) fn new(name: &'static str) -> Self {
         Self { name, attributes: Vec::new(), children: Vec::new() }
     }
 
     /// Add an attribute; the value is cleaned here and escaped on writing.
-    pub fn with(mut self, key: &'static str, value: impl AsRef<str>) -> Self {
+    pub(crate) fn with(mut self, key: &'static str, value: impl AsRef<str>) -> Self {
         self.attributes.push((key, clean(value.as_ref())));
         self
     }
 
     /// Add an attribute where there is a value.
-    pub fn with_some(self, key: &'static str, value: Option<impl AsRef<str>>) -> Self {
+    pub(crate) fn with_some(self, key: &'static str, value: Option<impl AsRef<str>>) -> Self {
         match value {
             Some(value) => self.with(key, value),
             None => self,
@@ -32,27 +32,27 @@ impl Element {
     }
 
     /// Add an attribute where the text is not empty.
-    pub fn with_text(self, key: &'static str, value: &str) -> Self {
+    pub(crate) fn with_text(self, key: &'static str, value: &str) -> Self {
         self.with_some(key, (!value.is_empty()).then_some(value))
     }
 
-    pub fn child(mut self, child: Element) -> Self {
+    pub(crate) fn child(mut self, child: Element) -> Self {
         self.children.push(child);
         self
     }
 
-    pub fn children(mut self, children: impl IntoIterator<Item = Element>) -> Self {
+    pub(crate) fn children(mut self, children: impl IntoIterator<Item = Element>) -> Self {
         self.children.extend(children);
         self
     }
 
     /// The element if it has children: the schemas forbid most empty lists.
-    pub fn unless_empty(self) -> Option<Self> {
+    pub(crate) fn unless_empty(self) -> Option<Self> {
         (!self.children.is_empty()).then_some(self)
     }
 
     /// The document with this element as its root.
-    pub fn document(&self) -> String {
+    pub(crate) fn document(&self) -> String {
         let mut writer = Writer::new_with_indent(Vec::new(), b' ', 2);
         let declaration = BytesDecl::new("1.0", Some("UTF-8"), None);
         writer

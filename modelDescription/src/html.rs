@@ -126,12 +126,12 @@ fn variable_row(page: &mut String, variable: &Variable) {
 }
 
 /// `name`, or `name[1..n]`.
-pub fn array_name(variable: &Variable) -> String {
+pub(crate) fn array_name(variable: &Variable) -> String {
     variable.dimension.map_or_else(|| variable.name.clone(), |size| format!("{}[1..{size}]", variable.name))
 }
 
 /// Unit with the display unit in brackets, or the data type of what is not a number.
-pub fn unit(variable: &Variable) -> String {
+pub(crate) fn unit(variable: &Variable) -> String {
     match (variable.kind, variable.unit) {
         (Kind::Integer, _) => "whole number".into(),
         (Kind::Boolean, _) => "true or false".into(),
@@ -146,7 +146,7 @@ pub fn unit(variable: &Variable) -> String {
 }
 
 /// Legal values in words.
-pub fn range(variable: &Variable) -> String {
+pub(crate) fn range(variable: &Variable) -> String {
     if let Kind::Enumeration(enumeration) = variable.kind {
         let item = |(index, (name, _)): (usize, &(&str, &str))| format!("{} = {name}", index + 1);
         return enumeration.items.iter().enumerate().map(item).collect::<Vec<_>>().join(", ");
@@ -160,7 +160,7 @@ pub fn range(variable: &Variable) -> String {
 }
 
 /// Start value; of arrays the common value, or the first and last.
-pub fn start(variable: &Variable) -> String {
+pub(crate) fn start(variable: &Variable) -> String {
     match &variable.start {
         None => String::new(),
         Some(Start::Real(values)) => match values.as_slice() {

@@ -2,6 +2,7 @@
 //!
 //! Nothing here decides anything about a variable: names, references, units, causality and start values come from the
 //! [`VariableTable`], which the FMU's get and set functions use as well.
+#![warn(unreachable_pub)]
 #![forbid(unsafe_code)]
 
 mod element;

@@ -6,7 +6,7 @@ use tiprub_core::variables::{Causality, Kind, Span, Start, Variability, Variable
 use crate::text::number;
 
 /// A variable of the description: a scalar, an element of an array, or a whole array.
-pub struct Row<'a> {
+pub(crate) struct Row<'a> {
     pub name: String,
     pub reference: u32,
     /// Number of elements for a whole array.
@@ -19,7 +19,7 @@ pub struct Row<'a> {
 }
 
 /// Every variable in order of value references; `arrays` keeps arrays whole.
-pub fn rows(table: &VariableTable, arrays: bool) -> Vec<Row<'_>> {
+pub(crate) fn rows(table: &VariableTable, arrays: bool) -> Vec<Row<'_>> {
     let mut rows = Vec::new();
     for variable in table.variables() {
         let elements = if arrays { 1 } else { variable.len() };
@@ -50,40 +50,40 @@ fn start(variable: &Variable, elements: std::ops::Range<usize>) -> Option<String
 
 impl Row<'_> {
     /// Whether it belongs to the list of outputs of the model structure.
-    pub fn is_output(&self) -> bool {
+    pub(crate) fn is_output(&self) -> bool {
         self.variable.causality == Causality::Output
     }
 
     /// Whether it belongs to the initial unknowns: outputs that are computed during initialisation.
-    pub fn is_initial_unknown(&self) -> bool {
+    pub(crate) fn is_initial_unknown(&self) -> bool {
         self.is_output() && self.variable.initial_is_exact() == Some(false)
     }
 
     /// The attribute `dependencies` of an output: none. Outputs are computed by `doStep` and stay as they are until the
     /// next one, whatever inputs are set in between, so that importers find no algebraic loop through this FMU.
-    pub fn output_dependencies(&self) -> &'static str {
+    pub(crate) fn output_dependencies(&self) -> &'static str {
         ""
     }
 
     /// The attribute `dependencies` of an initial unknown: nothing has been averaged or accumulated at the start, so
     /// that means and totals are zero; everything else may depend on every input and parameter, said by its absence.
-    pub fn initial_dependencies(&self) -> Option<&'static str> {
+    pub(crate) fn initial_dependencies(&self) -> Option<&'static str> {
         matches!(self.variable.span, Span::Mean | Span::Total).then_some("")
     }
 
     /// The attribute `initial`, absent for inputs and time.
-    pub fn initial(&self) -> Option<&'static str> {
+    pub(crate) fn initial(&self) -> Option<&'static str> {
         self.variable.initial_is_exact().map(|exact| if exact { "exact" } else { "calculated" })
     }
 
     /// The name of the display unit, if one is better than SI.
-    pub fn display_unit(&self) -> Option<&'static str> {
+    pub(crate) fn display_unit(&self) -> Option<&'static str> {
         let unit = self.variable.unit?;
         self.variable.display.and_then(|index| unit.display.get(index)).map(|(name, _)| *name)
     }
 
     /// The enumeration of an enumeration variable.
-    pub fn type_name(&self) -> Option<&'static str> {
+    pub(crate) fn type_name(&self) -> Option<&'static str> {
         match self.variable.kind {
             Kind::Enumeration(enumeration) => Some(enumeration.name),
             _ => None,
@@ -92,7 +92,7 @@ impl Row<'_> {
 }
 
 /// The attribute `causality`.
-pub fn causality(causality: Causality) -> &'static str {
+pub(crate) fn causality(causality: Causality) -> &'static str {
     match causality {
         Causality::Independent => "independent",
         Causality::Input => "input",
@@ -103,7 +103,7 @@ pub fn causality(causality: Causality) -> &'static str {
 }
 
 /// The attribute `variability`.
-pub fn variability(variability: Variability) -> &'static str {
+pub(crate) fn variability(variability: Variability) -> &'static str {
     match variability {
         Variability::Constant => "constant",
         Variability::Fixed => "fixed",

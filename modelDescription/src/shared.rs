@@ -16,7 +16,7 @@ pub const LOG_CATEGORIES: [(&str, &str); 5] = [
 ];
 
 /// Attributes of the root element after those that differ between the versions.
-pub fn root_attributes(element: Element, description: &Description) -> Element {
+pub(crate) fn root_attributes(element: Element, description: &Description) -> Element {
     element
         .with_text("description", description.description)
         .with_text("author", description.author)
@@ -29,7 +29,7 @@ pub fn root_attributes(element: Element, description: &Description) -> Element {
 }
 
 /// Units in order of first use.
-pub fn unit_definitions(description: &Description) -> Option<Element> {
+pub(crate) fn unit_definitions(description: &Description) -> Option<Element> {
     let mut units: Vec<&'static Unit> = Vec::new();
     for unit in description.table.variables().iter().filter_map(|variable| variable.unit) {
         if units.iter().all(|known| known.name != unit.name) {
@@ -50,7 +50,7 @@ fn unit_definition(unit: &Unit) -> Element {
 }
 
 /// Enumerations in order of first use.
-pub fn enumerations(description: &Description) -> Vec<&'static Enumeration> {
+pub(crate) fn enumerations(description: &Description) -> Vec<&'static Enumeration> {
     let mut enumerations: Vec<&'static Enumeration> = Vec::new();
     for variable in description.table.variables() {
         if let Kind::Enumeration(enumeration) = variable.kind
@@ -63,7 +63,7 @@ pub fn enumerations(description: &Description) -> Vec<&'static Enumeration> {
 }
 
 /// The items of an enumeration; values count from 1.
-pub fn items(enumeration: &'static Enumeration) -> impl Iterator<Item = Element> {
+pub(crate) fn items(enumeration: &'static Enumeration) -> impl Iterator<Item = Element> {
     enumeration.items.iter().enumerate().map(|(index, (name, description))| {
         Element::new("Item")
             .with("name", name)
@@ -73,7 +73,7 @@ pub fn items(enumeration: &'static Enumeration) -> impl Iterator<Item = Element>
 }
 
 /// The log categories.
-pub fn log_categories() -> Element {
+pub(crate) fn log_categories() -> Element {
     let category = |(name, description): (&str, &str)| {
         Element::new("Category").with("name", name).with("description", description)
     };
@@ -81,7 +81,7 @@ pub fn log_categories() -> Element {
 }
 
 /// The default experiment.
-pub fn default_experiment(description: &Description) -> Element {
+pub(crate) fn default_experiment(description: &Description) -> Element {
     Element::new("DefaultExperiment")
         .with("startTime", number(description.experiment.start))
         .with("stopTime", number(description.experiment.stop))

@@ -1,7 +1,7 @@
 //! Numbers and texts as XML has them.
 
 /// A number as `xs:double`, shortest form that reads back to the same bits.
-pub fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     if value.is_nan() {
         return "NaN".into();
     }
@@ -13,14 +13,14 @@ pub fn number(value: f64) -> String {
 }
 
 /// A number for people: as [`number`], whole numbers without decimals.
-pub fn readable(value: f64) -> String {
+pub(crate) fn readable(value: f64) -> String {
     let text = number(value);
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
 /// Text for an attribute: line breaks and tabs become spaces, as XML readers make them, and characters that XML 1.0
 /// has no way to write become the replacement character.
-pub fn clean(text: &str) -> String {
+pub(crate) fn clean(text: &str) -> String {
     let replace = |c: char| match c {
         '\n' | '\r' | '\t' => ' ',
         '\u{0}'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => '\u{fffd}',

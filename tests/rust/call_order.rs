@@ -6,8 +6,9 @@
 //! message in every state.
 
 use std::ffi::{CString, c_void};
+use std::ptr::{null, null_mut};
 
-use tiprub_tests::api::{Fmi2Api, Fmi3Api};
+use tiprub_fmi_host::api::{Fmi2Api, Fmi3Api};
 use tiprub_tests::scene::Resources;
 use tiprub_tests::{ERROR, fmi2, fmi3, shipped};
 
@@ -199,68 +200,69 @@ fn references() -> References {
     }
 }
 
+/// Call the function of that name: `function(arguments after the instance);` one by one.
+macro_rules! call {
+    ($name:expr, $api:expr, $handle:expr; $($function:ident($($argument:expr),*);)*) => {
+        match $name {
+            $(stringify!($function) => ($api.$function)($handle $(, $argument)*),)*
+            other => panic!("{other} is not called"),
+        }
+    };
+}
+
 /// Call one function with arguments that are proper where it is allowed.
 fn call2(api: &Fmi2Api, slave: &fmi2::Slave<'_>, name: &str, known: References) -> i32 {
-    let h = slave.handle;
-    let (one, value, mut real, mut integer) = (1, 300.0, 0.0, 0);
-    let (mut text, null) = (std::ptr::null(), std::ptr::null_mut::<c_void>());
-    let (input, output, string, choice) =
-        (&raw const known.input, &raw const known.output, &raw const known.text, &raw const known.choice);
-    let (mut flag, order) = (0, 1);
-    let mut state = null;
+    let (h, value, mut real, mut integer) = (slave.handle, 300.0, 0.0, 0);
+    let (mut text, mut flag, mut state, order) = (null(), 0, null_mut(), 1);
+    let (mut size, mut saved, mut bytes) = (0, null_mut(), Vec::new());
+    if name.contains("FMUstate") && !name.contains("Free") && !name.contains("Get") {
+        saved = slave.save();
+        bytes = slave.serialise(saved);
+    }
+    let (input, output, string, choice) = (&known.input, &known.output, &known.text, &known.choice);
     // SAFETY: all pointers are to single values, or NULL with a count of zero.
     unsafe {
-        match name {
-            "fmi2SetDebugLogging" => (api.fmi2SetDebugLogging)(h, 0, 0, std::ptr::null()),
-            "fmi2SetupExperiment" => slave.setup(0.0, None),
-            "fmi2EnterInitializationMode" => slave.enter(),
-            "fmi2ExitInitializationMode" => slave.exit(),
-            "fmi2Terminate" => slave.terminate(),
-            "fmi2Reset" => slave.reset(),
-            "fmi2GetReal" => (api.fmi2GetReal)(h, input, 1, &raw mut real),
-            "fmi2GetInteger" => (api.fmi2GetInteger)(h, choice, 1, &raw mut integer),
-            "fmi2GetBoolean" => (api.fmi2GetBoolean)(h, std::ptr::null(), 0, std::ptr::null_mut()),
-            "fmi2GetString" => (api.fmi2GetString)(h, string, 1, &raw mut text),
-            "fmi2SetReal" => (api.fmi2SetReal)(h, input, 1, &raw const value),
-            "fmi2SetInteger" => (api.fmi2SetInteger)(h, std::ptr::null(), 0, std::ptr::null()),
-            "fmi2SetBoolean" => (api.fmi2SetBoolean)(h, std::ptr::null(), 0, std::ptr::null()),
-            "fmi2SetString" => (api.fmi2SetString)(h, std::ptr::null(), 0, std::ptr::null()),
-            "fmi2GetFMUstate" => (api.fmi2GetFMUstate)(h, &raw mut state),
-            "fmi2FreeFMUstate" => (api.fmi2FreeFMUstate)(h, &raw mut state),
-            "fmi2SetFMUstate" | "fmi2SerializedFMUstateSize" | "fmi2SerializeFMUstate" | "fmi2DeSerializeFMUstate" => {
-                let saved = slave.save();
-                let bytes = slave.serialise(saved);
-                match name {
-                    "fmi2SetFMUstate" => slave.restore(saved),
-                    "fmi2DeSerializeFMUstate" => slave.deserialise(&bytes).0,
-                    _ => 0,
-                }
-            }
-            "fmi2SetRealInputDerivatives" => slave.set_derivatives(&[known.input], 1, &[0.0]),
-            "fmi2GetRealOutputDerivatives" => {
-                (api.fmi2GetRealOutputDerivatives)(h, output, 1, &raw const order, &raw mut real)
-            }
-            "fmi2DoStep" => slave.step(1e-4, 1e-4),
-            "fmi2CancelStep" => (api.fmi2CancelStep)(h),
-            "fmi2GetStatus" => (api.fmi2GetStatus)(h, 0, &raw mut integer),
-            "fmi2GetRealStatus" => (api.fmi2GetRealStatus)(h, 2, &raw mut real),
-            "fmi2GetIntegerStatus" => (api.fmi2GetIntegerStatus)(h, 0, &raw mut integer),
-            "fmi2GetBooleanStatus" => (api.fmi2GetBooleanStatus)(h, 3, &raw mut integer),
-            "fmi2GetStringStatus" => (api.fmi2GetStringStatus)(h, 1, &raw mut text),
-            "fmi2GetDirectionalDerivative" => {
-                (api.fmi2GetDirectionalDerivative)(h, output, 1, input, 1, &raw const value, &raw mut real)
-            }
-            "fmi2EnterEventMode" => (api.fmi2EnterEventMode)(h),
-            "fmi2NewDiscreteStates" => (api.fmi2NewDiscreteStates)(h, null),
-            "fmi2EnterContinuousTimeMode" => (api.fmi2EnterContinuousTimeMode)(h),
-            "fmi2CompletedIntegratorStep" => (api.fmi2CompletedIntegratorStep)(h, one, &raw mut integer, &raw mut flag),
-            "fmi2SetTime" => (api.fmi2SetTime)(h, 0.0),
-            "fmi2SetContinuousStates" => (api.fmi2SetContinuousStates)(h, &raw const value, 1),
-            "fmi2GetDerivatives" => (api.fmi2GetDerivatives)(h, &raw mut real, 1),
-            "fmi2GetEventIndicators" => (api.fmi2GetEventIndicators)(h, &raw mut real, 1),
-            "fmi2GetContinuousStates" => (api.fmi2GetContinuousStates)(h, &raw mut real, 1),
-            "fmi2GetNominalsOfContinuousStates" => (api.fmi2GetNominalsOfContinuousStates)(h, &raw mut real, 1),
-            _ => panic!("{name} is not called"),
+        call! { name, api, h;
+            fmi2SetDebugLogging(0, 0, null());
+            fmi2SetupExperiment(0, 0.0, 0.0, 0, 0.0);
+            fmi2EnterInitializationMode();
+            fmi2ExitInitializationMode();
+            fmi2Terminate();
+            fmi2Reset();
+            fmi2GetReal(input, 1, &raw mut real);
+            fmi2GetInteger(choice, 1, &raw mut integer);
+            fmi2GetBoolean(null(), 0, null_mut());
+            fmi2GetString(string, 1, &raw mut text);
+            fmi2SetReal(input, 1, &raw const value);
+            fmi2SetInteger(null(), 0, null());
+            fmi2SetBoolean(null(), 0, null());
+            fmi2SetString(null(), 0, null());
+            fmi2GetFMUstate(&raw mut state);
+            fmi2FreeFMUstate(&raw mut state);
+            fmi2SetFMUstate(saved);
+            fmi2SerializedFMUstateSize(saved, &raw mut size);
+            fmi2SerializeFMUstate(saved, bytes.as_mut_ptr(), bytes.len());
+            fmi2DeSerializeFMUstate(bytes.as_ptr(), bytes.len(), &raw mut state);
+            fmi2SetRealInputDerivatives(input, 1, &raw const order, &raw const real);
+            fmi2GetRealOutputDerivatives(output, 1, &raw const order, &raw mut real);
+            fmi2DoStep(1e-4, 1e-4, 1);
+            fmi2CancelStep();
+            fmi2GetStatus(0, &raw mut integer);
+            fmi2GetRealStatus(2, &raw mut real);
+            fmi2GetIntegerStatus(0, &raw mut integer);
+            fmi2GetBooleanStatus(3, &raw mut integer);
+            fmi2GetStringStatus(1, &raw mut text);
+            fmi2GetDirectionalDerivative(output, 1, input, 1, &raw const value, &raw mut real);
+            fmi2EnterEventMode();
+            fmi2NewDiscreteStates(null_mut());
+            fmi2EnterContinuousTimeMode();
+            fmi2CompletedIntegratorStep(1, &raw mut integer, &raw mut flag);
+            fmi2SetTime(0.0);
+            fmi2SetContinuousStates(&raw const value, 1);
+            fmi2GetDerivatives(&raw mut real, 1);
+            fmi2GetEventIndicators(&raw mut real, 1);
+            fmi2GetContinuousStates(&raw mut real, 1);
+            fmi2GetNominalsOfContinuousStates(&raw mut real, 1);
         }
     }
 }
@@ -298,112 +300,82 @@ fn fmi2_pair_by_pair() {
 /// from within an intermediate update.
 unsafe fn call3(api: &Fmi3Api, h: *mut c_void, saved: (*mut c_void, &[u8]), name: &str, known: References) -> i32 {
     let (value, mut real, mut long, order) = (300.0, 0.0, 0_i64, 1);
-    let (mut text, mut state, null) = (std::ptr::null(), std::ptr::null_mut(), std::ptr::null());
-    let (input, output, string, choice) =
-        (&raw const known.input, &raw const known.output, &raw const known.text, &raw const known.choice);
-    let (mut a, mut b, mut c, mut size) = (false, false, false, 0);
-    let (saved, bytes) = saved;
-    let mut copy = bytes.to_vec();
-    let out = std::ptr::null_mut();
-    /// The same call for the types that no variable has: nothing to get or set.
-    macro_rules! nothing {
-        ($field:ident) => {
-            (api.$field)(h, std::ptr::null(), 0, std::ptr::null_mut(), 0)
-        };
-    }
+    let (mut text, mut state, (saved, bytes)) = (null(), null_mut(), saved);
+    let (input, output, string, choice) = (&known.input, &known.output, &known.text, &known.choice);
+    let (mut a, mut b, mut c, mut size, mut copy) = (false, false, false, 0, bytes.to_vec());
     // SAFETY: all pointers are to single values, or NULL with a count of zero, or not touched by refusing functions.
     unsafe {
-        match name {
-            "fmi3SetDebugLogging" => (api.fmi3SetDebugLogging)(h, false, 0, null),
-            "fmi3EnterInitializationMode" => (api.fmi3EnterInitializationMode)(h, false, 0.0, 0.0, false, 0.0),
-            "fmi3ExitInitializationMode" => (api.fmi3ExitInitializationMode)(h),
-            "fmi3Terminate" => (api.fmi3Terminate)(h),
-            "fmi3Reset" => (api.fmi3Reset)(h),
-            "fmi3GetFloat64" => (api.fmi3GetFloat64)(h, input, 1, &raw mut real, 1),
-            "fmi3GetInt64" => (api.fmi3GetInt64)(h, choice, 1, &raw mut long, 1),
-            "fmi3GetString" => (api.fmi3GetString)(h, string, 1, &raw mut text, 1),
-            "fmi3SetFloat64" => (api.fmi3SetFloat64)(h, input, 1, &raw const value, 1),
-            "fmi3GetFloat32" => nothing!(fmi3GetFloat32),
-            "fmi3GetInt8" => nothing!(fmi3GetInt8),
-            "fmi3GetUInt8" => nothing!(fmi3GetUInt8),
-            "fmi3GetInt16" => nothing!(fmi3GetInt16),
-            "fmi3GetUInt16" => nothing!(fmi3GetUInt16),
-            "fmi3GetInt32" => nothing!(fmi3GetInt32),
-            "fmi3GetUInt32" => nothing!(fmi3GetUInt32),
-            "fmi3GetUInt64" => nothing!(fmi3GetUInt64),
-            "fmi3GetBoolean" => nothing!(fmi3GetBoolean),
-            "fmi3SetFloat32" => nothing!(fmi3SetFloat32),
-            "fmi3SetInt8" => nothing!(fmi3SetInt8),
-            "fmi3SetUInt8" => nothing!(fmi3SetUInt8),
-            "fmi3SetInt16" => nothing!(fmi3SetInt16),
-            "fmi3SetUInt16" => nothing!(fmi3SetUInt16),
-            "fmi3SetInt32" => nothing!(fmi3SetInt32),
-            "fmi3SetUInt32" => nothing!(fmi3SetUInt32),
-            "fmi3SetInt64" => nothing!(fmi3SetInt64),
-            "fmi3SetUInt64" => nothing!(fmi3SetUInt64),
-            "fmi3SetBoolean" => nothing!(fmi3SetBoolean),
-            "fmi3SetString" => nothing!(fmi3SetString),
-            "fmi3GetBinary" => (api.fmi3GetBinary)(h, std::ptr::null(), 0, &raw mut size, std::ptr::null_mut(), 0),
-            "fmi3SetBinary" => (api.fmi3SetBinary)(h, std::ptr::null(), 0, &raw const size, std::ptr::null(), 0),
-            "fmi3GetClock" => (api.fmi3GetClock)(h, std::ptr::null(), 0, std::ptr::null_mut()),
-            "fmi3SetClock" => (api.fmi3SetClock)(h, std::ptr::null(), 0, std::ptr::null()),
-            "fmi3GetFMUState" => (api.fmi3GetFMUState)(h, &raw mut state),
-            "fmi3FreeFMUState" => (api.fmi3FreeFMUState)(h, &raw mut state),
-            "fmi3SetFMUState" => (api.fmi3SetFMUState)(h, saved),
-            "fmi3SerializedFMUStateSize" => (api.fmi3SerializedFMUStateSize)(h, saved, &raw mut size),
-            "fmi3SerializeFMUState" => (api.fmi3SerializeFMUState)(h, saved, copy.as_mut_ptr(), copy.len()),
-            "fmi3DeserializeFMUState" => (api.fmi3DeserializeFMUState)(h, bytes.as_ptr(), bytes.len(), &raw mut state),
-            "fmi3GetOutputDerivatives" => {
-                (api.fmi3GetOutputDerivatives)(h, output, 1, &raw const order, &raw mut real, 1)
-            }
-            "fmi3DoStep" => (api.fmi3DoStep)(h, 1e-4, 1e-4, true, &raw mut a, &raw mut b, &raw mut c, &raw mut real),
-            "fmi3GetNumberOfVariableDependencies" => {
-                (api.fmi3GetNumberOfVariableDependencies)(h, known.output, &raw mut size)
-            }
-            "fmi3GetVariableDependencies" => {
-                let (size, references, kinds) = (std::ptr::null_mut(), std::ptr::null_mut(), std::ptr::null_mut());
-                (api.fmi3GetVariableDependencies)(h, known.output, size, references, size, kinds, 0)
-            }
-            "fmi3GetDirectionalDerivative" => {
-                (api.fmi3GetDirectionalDerivative)(h, output, 1, input, 1, &raw const value, 1, &raw mut real, 1)
-            }
-            "fmi3GetAdjointDerivative" => {
-                (api.fmi3GetAdjointDerivative)(h, output, 1, input, 1, &raw const value, 1, &raw mut real, 1)
-            }
-            "fmi3EnterConfigurationMode" => (api.fmi3EnterConfigurationMode)(h),
-            "fmi3ExitConfigurationMode" => (api.fmi3ExitConfigurationMode)(h),
-            "fmi3EnterEventMode" => (api.fmi3EnterEventMode)(h),
-            "fmi3EnterStepMode" => (api.fmi3EnterStepMode)(h),
-            "fmi3EvaluateDiscreteStates" => (api.fmi3EvaluateDiscreteStates)(h),
-            "fmi3UpdateDiscreteStates" => {
-                let places = (&raw mut a, &raw mut b, &raw mut c);
-                (api.fmi3UpdateDiscreteStates)(h, places.0, places.1, places.2, places.0, places.1, &raw mut real)
-            }
-            "fmi3GetIntervalDecimal" => (api.fmi3GetIntervalDecimal)(h, input, 0, out, std::ptr::null_mut()),
-            "fmi3GetIntervalFraction" => {
-                let counters = std::ptr::null_mut();
-                (api.fmi3GetIntervalFraction)(h, input, 0, counters, counters, std::ptr::null_mut())
-            }
-            "fmi3GetShiftDecimal" => (api.fmi3GetShiftDecimal)(h, input, 0, out),
-            "fmi3GetShiftFraction" => {
-                (api.fmi3GetShiftFraction)(h, input, 0, std::ptr::null_mut(), std::ptr::null_mut())
-            }
-            "fmi3SetIntervalDecimal" => (api.fmi3SetIntervalDecimal)(h, input, 0, out),
-            "fmi3SetIntervalFraction" => (api.fmi3SetIntervalFraction)(h, input, 0, std::ptr::null(), std::ptr::null()),
-            "fmi3SetShiftDecimal" => (api.fmi3SetShiftDecimal)(h, input, 0, out),
-            "fmi3SetShiftFraction" => (api.fmi3SetShiftFraction)(h, input, 0, std::ptr::null(), std::ptr::null()),
-            "fmi3EnterContinuousTimeMode" => (api.fmi3EnterContinuousTimeMode)(h),
-            "fmi3CompletedIntegratorStep" => (api.fmi3CompletedIntegratorStep)(h, true, &raw mut a, &raw mut b),
-            "fmi3SetTime" => (api.fmi3SetTime)(h, 0.0),
-            "fmi3SetContinuousStates" => (api.fmi3SetContinuousStates)(h, &raw const value, 1),
-            "fmi3GetContinuousStateDerivatives" => (api.fmi3GetContinuousStateDerivatives)(h, &raw mut real, 1),
-            "fmi3GetEventIndicators" => (api.fmi3GetEventIndicators)(h, &raw mut real, 1),
-            "fmi3GetContinuousStates" => (api.fmi3GetContinuousStates)(h, &raw mut real, 1),
-            "fmi3GetNominalsOfContinuousStates" => (api.fmi3GetNominalsOfContinuousStates)(h, &raw mut real, 1),
-            "fmi3GetNumberOfEventIndicators" => (api.fmi3GetNumberOfEventIndicators)(h, &raw mut size),
-            "fmi3GetNumberOfContinuousStates" => (api.fmi3GetNumberOfContinuousStates)(h, &raw mut size),
-            "fmi3ActivateModelPartition" => (api.fmi3ActivateModelPartition)(h, 0, 0.0),
-            _ => panic!("{name} is not called"),
+        call! { name, api, h;
+            fmi3SetDebugLogging(false, 0, null());
+            fmi3EnterInitializationMode(false, 0.0, 0.0, false, 0.0);
+            fmi3ExitInitializationMode();
+            fmi3Terminate();
+            fmi3Reset();
+            fmi3GetFloat64(input, 1, &raw mut real, 1);
+            fmi3GetInt64(choice, 1, &raw mut long, 1);
+            fmi3GetString(string, 1, &raw mut text, 1);
+            fmi3SetFloat64(input, 1, &raw const value, 1);
+            fmi3GetFloat32(null(), 0, null_mut(), 0);
+            fmi3GetInt8(null(), 0, null_mut(), 0);
+            fmi3GetUInt8(null(), 0, null_mut(), 0);
+            fmi3GetInt16(null(), 0, null_mut(), 0);
+            fmi3GetUInt16(null(), 0, null_mut(), 0);
+            fmi3GetInt32(null(), 0, null_mut(), 0);
+            fmi3GetUInt32(null(), 0, null_mut(), 0);
+            fmi3GetUInt64(null(), 0, null_mut(), 0);
+            fmi3GetBoolean(null(), 0, null_mut(), 0);
+            fmi3SetFloat32(null(), 0, null_mut(), 0);
+            fmi3SetInt8(null(), 0, null_mut(), 0);
+            fmi3SetUInt8(null(), 0, null_mut(), 0);
+            fmi3SetInt16(null(), 0, null_mut(), 0);
+            fmi3SetUInt16(null(), 0, null_mut(), 0);
+            fmi3SetInt32(null(), 0, null_mut(), 0);
+            fmi3SetUInt32(null(), 0, null_mut(), 0);
+            fmi3SetInt64(null(), 0, null_mut(), 0);
+            fmi3SetUInt64(null(), 0, null_mut(), 0);
+            fmi3SetBoolean(null(), 0, null_mut(), 0);
+            fmi3SetString(null(), 0, null_mut(), 0);
+            fmi3GetBinary(null(), 0, &raw mut size, null_mut(), 0);
+            fmi3SetBinary(null(), 0, &raw const size, null(), 0);
+            fmi3GetClock(null(), 0, null_mut());
+            fmi3SetClock(null(), 0, null());
+            fmi3GetFMUState(&raw mut state);
+            fmi3FreeFMUState(&raw mut state);
+            fmi3SetFMUState(saved);
+            fmi3SerializedFMUStateSize(saved, &raw mut size);
+            fmi3SerializeFMUState(saved, copy.as_mut_ptr(), copy.len());
+            fmi3DeserializeFMUState(bytes.as_ptr(), bytes.len(), &raw mut state);
+            fmi3GetOutputDerivatives(output, 1, &raw const order, &raw mut real, 1);
+            fmi3DoStep(1e-4, 1e-4, true, &raw mut a, &raw mut b, &raw mut c, &raw mut real);
+            fmi3GetNumberOfVariableDependencies(known.output, &raw mut size);
+            fmi3GetVariableDependencies(known.output, null_mut(), null_mut(), null_mut(), null_mut(), 0);
+            fmi3GetDirectionalDerivative(output, 1, input, 1, &raw const value, 1, &raw mut real, 1);
+            fmi3GetAdjointDerivative(output, 1, input, 1, &raw const value, 1, &raw mut real, 1);
+            fmi3EnterConfigurationMode();
+            fmi3ExitConfigurationMode();
+            fmi3EnterEventMode();
+            fmi3EnterStepMode();
+            fmi3EvaluateDiscreteStates();
+            fmi3UpdateDiscreteStates(&raw mut a, &raw mut b, &raw mut c, &raw mut a, &raw mut b, &raw mut real);
+            fmi3GetIntervalDecimal(input, 0, null_mut(), null_mut());
+            fmi3GetIntervalFraction(input, 0, null_mut(), null_mut(), null_mut());
+            fmi3GetShiftDecimal(input, 0, null_mut());
+            fmi3GetShiftFraction(input, 0, null_mut(), null_mut());
+            fmi3SetIntervalDecimal(input, 0, null_mut());
+            fmi3SetIntervalFraction(input, 0, null(), null());
+            fmi3SetShiftDecimal(input, 0, null_mut());
+            fmi3SetShiftFraction(input, 0, null(), null());
+            fmi3EnterContinuousTimeMode();
+            fmi3CompletedIntegratorStep(true, &raw mut a, &raw mut b);
+            fmi3SetTime(0.0);
+            fmi3SetContinuousStates(&raw const value, 1);
+            fmi3GetContinuousStateDerivatives(&raw mut real, 1);
+            fmi3GetEventIndicators(&raw mut real, 1);
+            fmi3GetContinuousStates(&raw mut real, 1);
+            fmi3GetNominalsOfContinuousStates(&raw mut real, 1);
+            fmi3GetNumberOfEventIndicators(&raw mut size);
+            fmi3GetNumberOfContinuousStates(&raw mut size);
+            fmi3ActivateModelPartition(0, 0.0);
         }
     }
 }
@@ -426,7 +398,7 @@ unsafe extern "C" fn call_inside(
         if finished && wish >= 0.0 {
             let row = (0_u32..).zip(rows(FMI3)).find(|(row, _)| (f64::from(*row) - wish).abs() < 0.5);
             let Some((_, (name, _))) = row else { return };
-            let status = call3(api, handle, (std::ptr::null_mut(), &[]), name, references());
+            let status = call3(api, handle, (null_mut(), &[]), name, references());
             (*context).notes.push(f64::from(status));
             (*context).wish = -1.0;
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
-use tiprub_tests::api::{Fmi2Api, Fmi3Api};
+use tiprub_fmi_host::api::{Fmi2Api, Fmi3Api};
 use tiprub_tests::shipped;
 
 fn run(program: &str, arguments: &[&str], path: &Path) -> String {

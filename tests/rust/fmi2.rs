@@ -4,9 +4,9 @@
 use std::ffi::CString;
 use std::path::Path;
 
-use crate::api::{Fmi2Api, Fmi2Callbacks, Instance, State};
 use crate::scene::Resources;
-use crate::{Journal, OK, WARNING, journal2};
+use crate::{Journal, journal2, pointer};
+use tiprub_fmi_host::api::{Fmi2Api, Fmi2Callbacks, Instance, State};
 
 /// What the instantiation is given; change a field to try something else.
 #[derive(Debug, Clone)]
@@ -44,17 +44,19 @@ pub struct Slave<'a> {
     pub api: &'a Fmi2Api,
     /// The instance.
     pub handle: Instance,
-    journal: *mut Journal,
+    context: *mut Journal,
 }
 
 /// Load the library.
 #[track_caller]
 pub fn load(path: &Path) -> Fmi2Api {
-    Fmi2Api::load(path)
+    Fmi2Api::load(path).unwrap_or_else(|failure| panic!("{failure}"))
 }
 
-fn pointer(text: &Option<CString>) -> *const std::ffi::c_char {
-    text.as_ref().map_or(std::ptr::null(), |text| text.as_ptr())
+calls_of_both! {
+    exit: fmi2ExitInitializationMode, reset: fmi2Reset, terminate: fmi2Terminate, free: fmi2FreeInstance,
+    save: fmi2GetFMUstate, restore: fmi2SetFMUstate,
+    size: fmi2SerializedFMUstateSize, serialise: fmi2SerializeFMUstate, deserialise: fmi2DeSerializeFMUstate,
 }
 
 impl<'a> Slave<'a> {
@@ -63,13 +65,13 @@ impl<'a> Slave<'a> {
     /// # Errors
     /// All messages logged.
     pub fn try_new(api: &'a Fmi2Api, arguments: &Arguments) -> Result<Self, String> {
-        let journal = Box::into_raw(Box::new(Journal::default()));
+        let context = Box::into_raw(Box::new(Journal::default()));
         let callbacks = Fmi2Callbacks {
             logger: journal2 as *const _,
             allocateMemory: std::ptr::null(),
             freeMemory: std::ptr::null(),
             stepFinished: std::ptr::null(),
-            componentEnvironment: journal.cast(),
+            componentEnvironment: context.cast(),
         };
         let Arguments { name, kind, token, location, logging_on } = arguments;
         // SAFETY: all pointers are valid for the call or NULL, which the library must bear.
@@ -84,7 +86,7 @@ impl<'a> Slave<'a> {
                 *logging_on,
             )
         };
-        let slave = Self { api, handle, journal };
+        let slave = Self { api, handle, context };
         if handle.is_null() { Err(slave.log()) } else { Ok(slave) }
     }
 
@@ -115,30 +117,12 @@ impl<'a> Slave<'a> {
         unsafe { (self.api.fmi2EnterInitializationMode)(self.handle) }
     }
 
-    /// `fmi2ExitInitializationMode`.
-    pub fn exit(&self) -> i32 {
-        // SAFETY: the instance is alive.
-        unsafe { (self.api.fmi2ExitInitializationMode)(self.handle) }
-    }
-
     /// `fmi2SetupExperiment`.
     pub fn setup(&self, start: f64, stop: Option<f64>) -> i32 {
         // SAFETY: the instance is alive.
         unsafe {
             (self.api.fmi2SetupExperiment)(self.handle, 0, 0.0, start, i32::from(stop.is_some()), stop.unwrap_or(0.0))
         }
-    }
-
-    /// `fmi2Reset`.
-    pub fn reset(&self) -> i32 {
-        // SAFETY: the instance is alive.
-        unsafe { (self.api.fmi2Reset)(self.handle) }
-    }
-
-    /// `fmi2Terminate`.
-    pub fn terminate(&self) -> i32 {
-        // SAFETY: the instance is alive.
-        unsafe { (self.api.fmi2Terminate)(self.handle) }
     }
 
     /// `fmi2DoStep`.
@@ -176,64 +160,6 @@ impl<'a> Slave<'a> {
                 orders.as_ptr(),
                 values.as_ptr(),
             )
-        }
-    }
-
-    /// `fmi2GetFMUstate` into a new state.
-    #[track_caller]
-    pub fn save(&self) -> State {
-        let mut state = std::ptr::null_mut();
-        // SAFETY: a place for the state.
-        self.expect(unsafe { (self.api.fmi2GetFMUstate)(self.handle, &raw mut state) });
-        state
-    }
-
-    /// `fmi2SetFMUstate`.
-    pub fn restore(&self, state: State) -> i32 {
-        // SAFETY: the instance is alive; the library must bear any state.
-        unsafe { (self.api.fmi2SetFMUstate)(self.handle, state) }
-    }
-
-    /// The bytes of a state.
-    #[track_caller]
-    pub fn serialise(&self, state: State) -> Vec<u8> {
-        let mut size = 0;
-        // SAFETY: a place for the size.
-        self.expect(unsafe { (self.api.fmi2SerializedFMUstateSize)(self.handle, state, &raw mut size) });
-        let mut bytes = vec![0; size];
-        // SAFETY: an array of that size.
-        self.expect(unsafe { (self.api.fmi2SerializeFMUstate)(self.handle, state, bytes.as_mut_ptr(), size) });
-        bytes
-    }
-
-    /// `fmi2DeSerializeFMUstate` into a new state.
-    pub fn deserialise(&self, bytes: &[u8]) -> (i32, State) {
-        let mut state = std::ptr::null_mut();
-        // SAFETY: an array of that size, a place for the state.
-        let status =
-            unsafe { (self.api.fmi2DeSerializeFMUstate)(self.handle, bytes.as_ptr(), bytes.len(), &raw mut state) };
-        (status, state)
-    }
-
-    /// Messages so far; the journal is empty afterwards.
-    pub fn log(&self) -> String {
-        // SAFETY: the journal lives as long as this importer, and is only touched between calls.
-        std::mem::take(unsafe { &mut *self.journal }).text()
-    }
-
-    /// Require OK or Warning.
-    #[track_caller]
-    pub fn expect(&self, status: i32) {
-        assert!(status == OK || status == WARNING, "status {status}: {}", self.log());
-    }
-}
-
-impl Drop for Slave<'_> {
-    fn drop(&mut self) {
-        // SAFETY: the instance is NULL or alive and not used any more; the journal came from a box.
-        unsafe {
-            (self.api.fmi2FreeInstance)(self.handle);
-            drop(Box::from_raw(self.journal));
         }
     }
 }

@@ -4,9 +4,9 @@
 use std::ffi::{CString, c_void};
 use std::path::Path;
 
-use crate::api::{Fmi3Api, Instance, State, Update};
 use crate::scene::Resources;
-use crate::{Journal, OK, WARNING, journal3};
+use crate::{Journal, OK, journal3, pointer};
+use tiprub_fmi_host::api::{Fmi3Api, Instance, State, Update};
 
 /// What the instantiation is given; change a field to try something else.
 #[derive(Debug, Clone)]
@@ -88,11 +88,19 @@ pub struct Slave<'a> {
 /// Load the library.
 #[track_caller]
 pub fn load(path: &Path) -> Fmi3Api {
-    Fmi3Api::load(path)
+    Fmi3Api::load(path).unwrap_or_else(|failure| panic!("{failure}"))
 }
 
-fn pointer(text: &Option<CString>) -> *const std::ffi::c_char {
-    text.as_ref().map_or(std::ptr::null(), |text| text.as_ptr())
+calls_of_both! {
+    exit: fmi3ExitInitializationMode, reset: fmi3Reset, terminate: fmi3Terminate, free: fmi3FreeInstance,
+    save: fmi3GetFMUState, restore: fmi3SetFMUState,
+    size: fmi3SerializedFMUStateSize, serialise: fmi3SerializeFMUState, deserialise: fmi3DeserializeFMUState,
+}
+
+impl AsMut<Journal> for Context {
+    fn as_mut(&mut self) -> &mut Journal {
+        &mut self.journal
+    }
 }
 
 impl<'a> Slave<'a> {
@@ -152,24 +160,6 @@ impl<'a> Slave<'a> {
         unsafe { (self.api.fmi3EnterInitializationMode)(self.handle, false, 0.0, start, defined, stop) }
     }
 
-    /// `fmi3ExitInitializationMode`.
-    pub fn exit(&self) -> i32 {
-        // SAFETY: the instance is alive.
-        unsafe { (self.api.fmi3ExitInitializationMode)(self.handle) }
-    }
-
-    /// `fmi3Reset`.
-    pub fn reset(&self) -> i32 {
-        // SAFETY: the instance is alive.
-        unsafe { (self.api.fmi3Reset)(self.handle) }
-    }
-
-    /// `fmi3Terminate`.
-    pub fn terminate(&self) -> i32 {
-        // SAFETY: the instance is alive.
-        unsafe { (self.api.fmi3Terminate)(self.handle) }
-    }
-
     /// `fmi3DoStep`; the places for the answers hold improper values before.
     pub fn step(&self, time: f64, size: f64) -> Step {
         let (mut event, mut terminate, mut early, mut last) = (true, true, true, f64::NAN);
@@ -212,48 +202,6 @@ impl<'a> Slave<'a> {
         unsafe { (self.api.fmi3SetFloat64)(self.handle, references.as_ptr(), count, values.as_ptr(), n) }
     }
 
-    /// `fmi3GetFMUState` into a new state.
-    #[track_caller]
-    pub fn save(&self) -> State {
-        let mut state = std::ptr::null_mut();
-        // SAFETY: a place for the state.
-        self.expect(unsafe { (self.api.fmi3GetFMUState)(self.handle, &raw mut state) });
-        state
-    }
-
-    /// `fmi3SetFMUState`.
-    pub fn restore(&self, state: State) -> i32 {
-        // SAFETY: the instance is alive; the library must bear any state.
-        unsafe { (self.api.fmi3SetFMUState)(self.handle, state) }
-    }
-
-    /// The bytes of a state.
-    #[track_caller]
-    pub fn serialise(&self, state: State) -> Vec<u8> {
-        let mut size = 0;
-        // SAFETY: a place for the size.
-        self.expect(unsafe { (self.api.fmi3SerializedFMUStateSize)(self.handle, state, &raw mut size) });
-        let mut bytes = vec![0; size];
-        // SAFETY: an array of that size.
-        self.expect(unsafe { (self.api.fmi3SerializeFMUState)(self.handle, state, bytes.as_mut_ptr(), size) });
-        bytes
-    }
-
-    /// `fmi3DeserializeFMUState` into a new state.
-    pub fn deserialise(&self, bytes: &[u8]) -> (i32, State) {
-        let mut state = std::ptr::null_mut();
-        // SAFETY: an array of that size, a place for the state.
-        let status =
-            unsafe { (self.api.fmi3DeserializeFMUState)(self.handle, bytes.as_ptr(), bytes.len(), &raw mut state) };
-        (status, state)
-    }
-
-    /// Messages so far; the journal is empty afterwards.
-    pub fn log(&self) -> String {
-        // SAFETY: the context lives as long as this importer, and is only touched between calls.
-        std::mem::take(unsafe { &mut (*self.context).journal }).text()
-    }
-
     /// What the test's callback noted.
     pub fn notes(&self) -> Vec<f64> {
         // SAFETY: as in `log`.
@@ -264,21 +212,5 @@ impl<'a> Slave<'a> {
     pub fn wish(&self, value: f64) {
         // SAFETY: as in `log`.
         unsafe { (*self.context).wish = value };
-    }
-
-    /// Require OK or Warning.
-    #[track_caller]
-    pub fn expect(&self, status: i32) {
-        assert!(status == OK || status == WARNING, "status {status}: {}", self.log());
-    }
-}
-
-impl Drop for Slave<'_> {
-    fn drop(&mut self) {
-        // SAFETY: the instance is NULL or alive and not used any more; the context came from a box.
-        unsafe {
-            (self.api.fmi3FreeInstance)(self.handle);
-            drop(Box::from_raw(self.context));
-        }
     }
 }

@@ -4,8 +4,6 @@
 //! `GOLDEN=write cargo test -p tiprub-tests --release --test golden` renews the table. What changes is then on purpose, and the
 //! commit says why. Where the digest differs and the numbers beside it hardly do, only rounding has changed.
 
-#[path = "../../src/core/tests/common/mod.rs"]
-mod common;
 #[path = "golden/scenes.rs"]
 mod scenes;
 

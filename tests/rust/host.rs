@@ -5,7 +5,7 @@
 
 use std::ffi::{CString, c_void};
 
-use tiprub_tests::api::Fmi3Api;
+use tiprub_fmi_host::api::Fmi3Api;
 use tiprub_tests::refusals::{count, refused, summary};
 use tiprub_tests::scene::{Resources, reference};
 use tiprub_tests::{ERROR, OK, fmi2, fmi3, shipped};
@@ -50,7 +50,7 @@ fn loggers() {
     // No callbacks at all, and callbacks without a logger: everything works in silence.
     let good = fmi2::Arguments::new(&resources);
     let (name, token, place) = (good.name.expect("set"), good.token.expect("set"), good.location.expect("set"));
-    let none = tiprub_tests::api::Fmi2Callbacks {
+    let none = tiprub_fmi_host::api::Fmi2Callbacks {
         logger: std::ptr::null(),
         allocateMemory: std::ptr::null(),
         freeMemory: std::ptr::null(),

@@ -1,13 +1,14 @@
 //! Helpers shared by the whole-product tests: a small scene, the built library, and importers over the C ABI.
 #![allow(clippy::missing_panics_doc, reason = "helpers of tests panic where a test fails")]
 
-pub mod api;
+#[macro_use]
+mod calls;
 pub mod fmi2;
 pub mod fmi3;
 pub mod refusals;
 pub mod scene;
 
-use std::ffi::{CStr, c_char, c_void};
+use std::ffi::{CStr, CString, c_char, c_void};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -77,6 +78,16 @@ impl Journal {
     pub fn text(&self) -> String {
         self.messages.iter().map(|message| format!("{}\n", message.text)).collect()
     }
+}
+
+impl AsMut<Journal> for Journal {
+    fn as_mut(&mut self) -> &mut Journal {
+        self
+    }
+}
+
+fn pointer(text: &Option<CString>) -> *const c_char {
+    text.as_ref().map_or(std::ptr::null(), |text| text.as_ptr())
 }
 
 fn owned(text: *const c_char) -> String {

@@ -3,7 +3,7 @@
 use std::ffi::c_void;
 
 use tiprub_core::Simulation;
-use tiprub_tests::api::Fmi3Api;
+use tiprub_fmi_host::api::Fmi3Api;
 use tiprub_tests::scene::{Resources, scene};
 use tiprub_tests::{ERROR, OK, WARNING, fmi2, fmi3, shipped};
 

@@ -45,7 +45,7 @@ pub fn write(target: &Path, entries: &[Entry]) -> Result<()> {
 ///
 /// # Errors
 /// As [`write()`].
-pub fn write_into(target: impl Write + Seek, entries: &[Entry]) -> Result<()> {
+pub(crate) fn write_into(target: impl Write + Seek, entries: &[Entry]) -> Result<()> {
     check_names(entries)?;
     let mut writer = ZipWriter::new(target);
     for entry in entries {

@@ -67,14 +67,14 @@ pub struct ImportedDescription {
 
 impl ImportedDescription {
     /// The outputs that hold numbers, in file order.
-    pub fn numeric_outputs(&self) -> impl Iterator<Item = &ImportedVariable> {
+    pub(crate) fn numeric_outputs(&self) -> impl Iterator<Item = &ImportedVariable> {
         self.variables.iter().filter(|variable| variable.causality == "output" && variable.kind != VariableType::Text)
     }
 }
 
 impl ImportedVariable {
     /// Scalar names of all elements.
-    pub fn scalar_names(&self) -> Vec<String> {
+    pub(crate) fn scalar_names(&self) -> Vec<String> {
         match self.elements {
             None => vec![self.name.clone()],
             Some(elements) => (1..=elements).map(|element| format!("{}[{element}]", self.name)).collect(),

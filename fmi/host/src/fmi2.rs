@@ -2,42 +2,13 @@
 
 use std::ffi::{CStr, c_char, c_void};
 
-use libloading::Library;
 use tiprub_shell::{Failure, Result, schedule::Schedule};
 
 use super::{
     UnpackedFmu, VariableType,
-    slave::{MessageList, OutputGroup, Slave, c_text, check, symbol},
+    api::{Fmi2Api, Fmi2Callbacks, Instance},
+    slave::{MessageList, OutputGroup, Slave, c_text, check},
 };
-
-type Component = *mut c_void;
-type Status = i32;
-type Reference = u32;
-
-type Allocate = extern "C" fn(usize, usize) -> *mut c_void;
-type Free = extern "C" fn(*mut c_void);
-/// The logger of the standard is variadic; see [`log_message`].
-type Logger = unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, ...);
-
-/// fmi2CallbackFunctions.
-#[repr(C)]
-struct Callbacks {
-    logger: Option<Logger>,
-    allocate_memory: Option<Allocate>,
-    free_memory: Option<Free>,
-    step_finished: Option<extern "C" fn(*mut c_void, Status)>,
-    component_environment: *mut c_void,
-}
-
-type Instantiate =
-    unsafe extern "C" fn(*const c_char, i32, *const c_char, *const c_char, *const Callbacks, i32, i32) -> Component;
-type SetupExperiment = unsafe extern "C" fn(Component, i32, f64, f64, i32, f64) -> Status;
-type PhaseChange = unsafe extern "C" fn(Component) -> Status;
-type DoStep = unsafe extern "C" fn(Component, f64, f64, i32) -> Status;
-type GetReal = unsafe extern "C" fn(Component, *const Reference, usize, *mut f64) -> Status;
-type SetReal = unsafe extern "C" fn(Component, *const Reference, usize, *const f64) -> Status;
-type GetInteger = unsafe extern "C" fn(Component, *const Reference, usize, *mut i32) -> Status;
-type FreeInstance = unsafe extern "C" fn(Component);
 
 /// Co-simulation slave of fmi2Type.
 const CO_SIMULATION: i32 = 1;
@@ -61,7 +32,7 @@ extern "C" fn release(block: *mut c_void) {
 unsafe extern "C" fn log_message(
     environment: *mut c_void,
     _instance: *const c_char,
-    _status: Status,
+    _status: i32,
     _category: *const c_char,
     format: *const c_char,
     argument: *const c_char,
@@ -79,94 +50,55 @@ unsafe extern "C" fn log_message(
 }
 
 #[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
-fn logger() -> Option<Logger> {
-    type Plain = unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, *const c_char);
-    // SAFETY: same registers for the first six arguments, as said at `log_message`.
-    Some(unsafe { std::mem::transmute::<Plain, Logger>(log_message) })
+fn logger() -> *const c_void {
+    log_message as *const c_void
 }
 
 #[cfg(not(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64"))))]
-fn logger() -> Option<Logger> {
-    None
-}
-
-/// The functions in use, looked up once; plain pointers, valid as long as the library is loaded.
-struct Functions {
-    instantiate: Instantiate,
-    setup_experiment: SetupExperiment,
-    enter_initialization: PhaseChange,
-    exit_initialization: PhaseChange,
-    do_step: DoStep,
-    get_real: GetReal,
-    set_real: SetReal,
-    get_integer: GetInteger,
-    get_boolean: GetInteger,
-    terminate: PhaseChange,
-    free_instance: FreeInstance,
-}
-
-impl Functions {
-    fn load(library: &Library) -> Result<Self> {
-        // SAFETY: the signatures are those of fmi2FunctionTypes.h, and the library is kept as long as this value.
-        unsafe {
-            Ok(Self {
-                instantiate: symbol(library, "fmi2Instantiate")?,
-                setup_experiment: symbol(library, "fmi2SetupExperiment")?,
-                enter_initialization: symbol(library, "fmi2EnterInitializationMode")?,
-                exit_initialization: symbol(library, "fmi2ExitInitializationMode")?,
-                do_step: symbol(library, "fmi2DoStep")?,
-                get_real: symbol(library, "fmi2GetReal")?,
-                set_real: symbol(library, "fmi2SetReal")?,
-                get_integer: symbol(library, "fmi2GetInteger")?,
-                get_boolean: symbol(library, "fmi2GetBoolean")?,
-                terminate: symbol(library, "fmi2Terminate")?,
-                free_instance: symbol(library, "fmi2FreeInstance")?,
-            })
-        }
-    }
+fn logger() -> *const c_void {
+    std::ptr::null()
 }
 
 /// One FMI 2.0 co-simulation instance; freed when dropped.
 pub(super) struct Fmi2Slave {
-    component: Component,
-    functions: Functions,
+    component: Instance,
     messages: Box<MessageList>,
     /// The FMU may keep the pointer it was given.
-    _callbacks: Box<Callbacks>,
+    _callbacks: Box<Fmi2Callbacks>,
     /// Last, so that the code is unloaded after everything else.
-    _library: Library,
+    api: Fmi2Api,
 }
 
 impl Fmi2Slave {
     /// Load the library and instantiate.
-    pub(super) fn new(fmu: &UnpackedFmu, library: Library) -> Result<Self> {
-        let functions = Functions::load(&library)?;
+    pub(super) fn new(fmu: &UnpackedFmu) -> Result<Self> {
+        let api = Fmi2Api::load(&fmu.library()?)?;
         let messages = Box::new(MessageList::default());
-        let callbacks = Box::new(Callbacks {
+        let callbacks = Box::new(Fmi2Callbacks {
             logger: logger(),
-            allocate_memory: Some(allocate),
-            free_memory: Some(release),
-            step_finished: None,
-            component_environment: std::ptr::from_ref(messages.as_ref()).cast_mut().cast(),
+            allocateMemory: allocate as *const c_void,
+            freeMemory: release as *const c_void,
+            stepFinished: std::ptr::null(),
+            componentEnvironment: std::ptr::from_ref(messages.as_ref()).cast_mut().cast(),
         });
         let name = c_text(&fmu.description.model_name)?;
         let token = c_text(&fmu.description.token)?;
         let resources = c_text(&file_uri(&fmu.resources()))?;
         // SAFETY: all strings live through the call, the callbacks as long as the instance.
         let component = unsafe {
-            (functions.instantiate)(name.as_ptr(), CO_SIMULATION, token.as_ptr(), resources.as_ptr(), &*callbacks, 0, 0)
+            (api.fmi2Instantiate)(name.as_ptr(), CO_SIMULATION, token.as_ptr(), resources.as_ptr(), &*callbacks, 0, 0)
         };
         if component.is_null() {
             return Err(Failure::new("FMU", format!("fmi2Instantiate failed{}", messages.last_words()), ""));
         }
-        Ok(Self { component, functions, messages, _callbacks: callbacks, _library: library })
+        Ok(Self { component, messages, _callbacks: callbacks, api })
     }
 }
 
 impl Drop for Fmi2Slave {
     fn drop(&mut self) {
         // SAFETY: the component is alive until here and not used afterwards.
-        unsafe { (self.functions.free_instance)(self.component) }
+        unsafe { (self.api.fmi2FreeInstance)(self.component) }
     }
 }
 
@@ -175,9 +107,9 @@ impl Slave for Fmi2Slave {
         // SAFETY: a live component, in the order the standard wants.
         let (setup, enter, exit) = unsafe {
             (
-                (self.functions.setup_experiment)(self.component, 0, 0.0, schedule.start, 1, schedule.stop),
-                (self.functions.enter_initialization)(self.component),
-                (self.functions.exit_initialization)(self.component),
+                (self.api.fmi2SetupExperiment)(self.component, 0, 0.0, schedule.start, 1, schedule.stop),
+                (self.api.fmi2EnterInitializationMode)(self.component),
+                (self.api.fmi2ExitInitializationMode)(self.component),
             )
         };
         check("fmi2SetupExperiment", None, setup, &self.messages)?;
@@ -187,7 +119,7 @@ impl Slave for Fmi2Slave {
 
     fn do_step(&mut self, time: f64, step: f64) -> Result<()> {
         // SAFETY: a live component in step mode.
-        let status = unsafe { (self.functions.do_step)(self.component, time, step, 1) };
+        let status = unsafe { (self.api.fmi2DoStep)(self.component, time, step, 1) };
         check("fmi2DoStep", Some(time), status, &self.messages)
     }
 
@@ -199,12 +131,12 @@ impl Slave for Fmi2Slave {
                 values.resize(at + count, 0.0);
                 // SAFETY: `count` references and `count` values behind the pointers.
                 let status =
-                    unsafe { (self.functions.get_real)(self.component, references, count, values[at..].as_mut_ptr()) };
+                    unsafe { (self.api.fmi2GetReal)(self.component, references, count, values[at..].as_mut_ptr()) };
                 check("fmi2GetReal", None, status, &self.messages)
             }
             _ => {
                 let boolean = group.kind == VariableType::Boolean;
-                let get = if boolean { self.functions.get_boolean } else { self.functions.get_integer };
+                let get = if boolean { self.api.fmi2GetBoolean } else { self.api.fmi2GetInteger };
                 let mut integers = vec![0_i32; count];
                 // SAFETY: `count` references and `count` values behind the pointers.
                 let status = unsafe { get(self.component, references, count, integers.as_mut_ptr()) };
@@ -217,13 +149,13 @@ impl Slave for Fmi2Slave {
 
     fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
         // SAFETY: one reference and one value behind the pointers.
-        let status = unsafe { (self.functions.set_real)(self.component, &raw const reference, 1, &raw const value) };
+        let status = unsafe { (self.api.fmi2SetReal)(self.component, &raw const reference, 1, &raw const value) };
         check("fmi2SetReal", None, status, &self.messages)
     }
 
     fn terminate(&mut self) -> Result<()> {
         // SAFETY: a live component in step mode.
-        let status = unsafe { (self.functions.terminate)(self.component) };
+        let status = unsafe { (self.api.fmi2Terminate)(self.component) };
         check("fmi2Terminate", None, status, &self.messages)
     }
 
@@ -259,7 +191,9 @@ mod tests {
     fn the_logger_reads_format_and_argument() {
         let messages = MessageList::default();
         let environment: *mut c_void = std::ptr::from_ref(&messages).cast_mut().cast();
-        let log = logger().expect("this platform has a logger");
+        type Logger = unsafe extern "C" fn(*mut c_void, *const c_char, i32, *const c_char, *const c_char, ...);
+        // SAFETY: same registers for the first six arguments, as said at `log_message`.
+        let log = unsafe { std::mem::transmute::<*const c_void, Logger>(logger()) };
         // SAFETY: a variadic call as an FMU makes it, with live strings.
         unsafe {
             log(environment, c"i".as_ptr(), 3, c"error".as_ptr(), c"%s".as_ptr(), c"100 % wrong".as_ptr());

@@ -2,46 +2,18 @@
 
 use std::ffi::{CStr, c_char, c_void};
 
-use libloading::Library;
 use tiprub_shell::{Failure, Result, schedule::Schedule};
 
 use super::{
     UnpackedFmu, VariableType,
-    slave::{MessageList, OutputGroup, Slave, c_text, check, symbol},
+    api::{Fmi3Api, Instance, References},
+    slave::{MessageList, OutputGroup, Slave, c_text, check},
 };
-
-type Instance = *mut c_void;
-type Status = i32;
-type Reference = u32;
-
-type LogMessage = unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char);
-type IntermediateUpdate = Option<unsafe extern "C" fn()>;
-
-type Instantiate = unsafe extern "C" fn(
-    *const c_char,      // instanceName
-    *const c_char,      // instantiationToken
-    *const c_char,      // resourcePath
-    bool,               // visible
-    bool,               // loggingOn
-    bool,               // eventModeUsed
-    bool,               // earlyReturnAllowed
-    *const Reference,   // requiredIntermediateVariables
-    usize,              // nRequiredIntermediateVariables
-    *mut c_void,        // instanceEnvironment
-    Option<LogMessage>, // logMessage
-    IntermediateUpdate, // intermediateUpdate
-) -> Instance;
-type EnterInitialization = unsafe extern "C" fn(Instance, bool, f64, f64, bool, f64) -> Status;
-type PhaseChange = unsafe extern "C" fn(Instance) -> Status;
-type DoStep = unsafe extern "C" fn(Instance, f64, f64, bool, *mut bool, *mut bool, *mut bool, *mut f64) -> Status;
-type Get<T> = unsafe extern "C" fn(Instance, *const Reference, usize, *mut T, usize) -> Status;
-type SetFloat64 = unsafe extern "C" fn(Instance, *const Reference, usize, *const f64, usize) -> Status;
-type FreeInstance = unsafe extern "C" fn(Instance);
 
 /// The logger: the environment is the message list of the slave.
 unsafe extern "C" fn log_message(
     environment: *mut c_void,
-    _status: Status,
+    _status: i32,
     _category: *const c_char,
     message: *const c_char,
 ) {
@@ -52,55 +24,18 @@ unsafe extern "C" fn log_message(
     unsafe { (*environment.cast::<MessageList>()).push(CStr::from_ptr(message)) }
 }
 
-/// The functions in use, looked up once; plain pointers, valid as long as the library is loaded.
-struct Functions {
-    instantiate: Instantiate,
-    enter_initialization: EnterInitialization,
-    exit_initialization: PhaseChange,
-    do_step: DoStep,
-    get_float64: Get<f64>,
-    set_float64: SetFloat64,
-    get_int32: Get<i32>,
-    get_int64: Get<i64>,
-    get_boolean: Get<u8>,
-    terminate: PhaseChange,
-    free_instance: FreeInstance,
-}
-
-impl Functions {
-    fn load(library: &Library) -> Result<Self> {
-        // SAFETY: the signatures are those of fmi3FunctionTypes.h, and the library is kept as long as this value.
-        unsafe {
-            Ok(Self {
-                instantiate: symbol(library, "fmi3InstantiateCoSimulation")?,
-                enter_initialization: symbol(library, "fmi3EnterInitializationMode")?,
-                exit_initialization: symbol(library, "fmi3ExitInitializationMode")?,
-                do_step: symbol(library, "fmi3DoStep")?,
-                get_float64: symbol(library, "fmi3GetFloat64")?,
-                set_float64: symbol(library, "fmi3SetFloat64")?,
-                get_int32: symbol(library, "fmi3GetInt32")?,
-                get_int64: symbol(library, "fmi3GetInt64")?,
-                get_boolean: symbol(library, "fmi3GetBoolean")?,
-                terminate: symbol(library, "fmi3Terminate")?,
-                free_instance: symbol(library, "fmi3FreeInstance")?,
-            })
-        }
-    }
-}
-
 /// One FMI 3.0 co-simulation instance; freed when dropped.
 pub(super) struct Fmi3Slave {
     instance: Instance,
-    functions: Functions,
     messages: Box<MessageList>,
     /// Last, so that the code is unloaded after everything else.
-    _library: Library,
+    api: Fmi3Api,
 }
 
 impl Fmi3Slave {
     /// Load the library and instantiate.
-    pub(super) fn new(fmu: &UnpackedFmu, library: Library) -> Result<Self> {
-        let functions = Functions::load(&library)?;
+    pub(super) fn new(fmu: &UnpackedFmu) -> Result<Self> {
+        let api = Fmi3Api::load(&fmu.library()?)?;
         let messages = Box::new(MessageList::default());
         let name = c_text(&fmu.description.model_name)?;
         let token = c_text(&fmu.description.token)?;
@@ -108,7 +43,7 @@ impl Fmi3Slave {
         let resources = c_text(&format!("{}/", fmu.resources().display()))?;
         // SAFETY: all strings live through the call, the message list as long as the instance.
         let instance = unsafe {
-            (functions.instantiate)(
+            (api.fmi3InstantiateCoSimulation)(
                 name.as_ptr(),
                 token.as_ptr(),
                 resources.as_ptr(),
@@ -127,11 +62,16 @@ impl Fmi3Slave {
             let problem = format!("fmi3InstantiateCoSimulation failed{}", messages.last_words());
             return Err(Failure::new("FMU", problem, ""));
         }
-        Ok(Self { instance, functions, messages, _library: library })
+        Ok(Self { instance, messages, api })
     }
 
     /// Read `group.values` numbers with one getter.
-    fn get<T: Copy + Default>(&self, function: &str, get: Get<T>, group: &OutputGroup) -> Result<Vec<T>> {
+    fn get<T: Copy + Default>(
+        &self,
+        function: &str,
+        get: unsafe extern "C" fn(Instance, References, usize, *mut T, usize) -> i32,
+        group: &OutputGroup,
+    ) -> Result<Vec<T>> {
         let mut values = vec![T::default(); group.values];
         let references = &group.references;
         // SAFETY: the two counts say how much is behind the two pointers.
@@ -145,7 +85,7 @@ impl Fmi3Slave {
 impl Drop for Fmi3Slave {
     fn drop(&mut self) {
         // SAFETY: the instance is alive until here and not used afterwards.
-        unsafe { (self.functions.free_instance)(self.instance) }
+        unsafe { (self.api.fmi3FreeInstance)(self.instance) }
     }
 }
 
@@ -154,8 +94,8 @@ impl Slave for Fmi3Slave {
         // SAFETY: a live instance, in the order the standard wants.
         let (enter, exit) = unsafe {
             (
-                (self.functions.enter_initialization)(self.instance, false, 0.0, schedule.start, true, schedule.stop),
-                (self.functions.exit_initialization)(self.instance),
+                (self.api.fmi3EnterInitializationMode)(self.instance, false, 0.0, schedule.start, true, schedule.stop),
+                (self.api.fmi3ExitInitializationMode)(self.instance),
             )
         };
         check("fmi3EnterInitializationMode", None, enter, &self.messages)?;
@@ -167,7 +107,7 @@ impl Slave for Fmi3Slave {
         let mut last_time = f64::NAN;
         // SAFETY: a live instance in step mode, four valid places to write to.
         let status = unsafe {
-            (self.functions.do_step)(
+            (self.api.fmi3DoStep)(
                 self.instance,
                 time,
                 step,
@@ -191,17 +131,17 @@ impl Slave for Fmi3Slave {
 
     fn read(&mut self, group: &OutputGroup, values: &mut Vec<f64>) -> Result<()> {
         match group.kind {
-            VariableType::Float64 => values.extend(self.get("fmi3GetFloat64", self.functions.get_float64, group)?),
+            VariableType::Float64 => values.extend(self.get("fmi3GetFloat64", self.api.fmi3GetFloat64, group)?),
             VariableType::Int32 => {
-                values.extend(self.get("fmi3GetInt32", self.functions.get_int32, group)?.into_iter().map(f64::from));
+                values.extend(self.get("fmi3GetInt32", self.api.fmi3GetInt32, group)?.into_iter().map(f64::from));
             }
             VariableType::Int64 => {
-                let numbers = self.get("fmi3GetInt64", self.functions.get_int64, group)?;
+                let numbers = self.get("fmi3GetInt64", self.api.fmi3GetInt64, group)?;
                 values.extend(numbers.into_iter().map(|number| number as f64));
             }
             // One byte each; anything but 0 is true.
             VariableType::Boolean => {
-                let bytes = self.get("fmi3GetBoolean", self.functions.get_boolean, group)?;
+                let bytes = self.get("fmi3GetBoolean", self.api.fmi3GetBoolean, group)?;
                 values.extend(bytes.into_iter().map(|byte| f64::from(u8::from(byte != 0))));
             }
             VariableType::Text => {}
@@ -211,14 +151,13 @@ impl Slave for Fmi3Slave {
 
     fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
         // SAFETY: one reference and one value behind the pointers.
-        let status =
-            unsafe { (self.functions.set_float64)(self.instance, &raw const reference, 1, &raw const value, 1) };
+        let status = unsafe { (self.api.fmi3SetFloat64)(self.instance, &raw const reference, 1, &raw const value, 1) };
         check("fmi3SetFloat64", None, status, &self.messages)
     }
 
     fn terminate(&mut self) -> Result<()> {
         // SAFETY: a live instance in step mode.
-        let status = unsafe { (self.functions.terminate)(self.instance) };
+        let status = unsafe { (self.api.fmi3Terminate)(self.instance) };
         check("fmi3Terminate", None, status, &self.messages)
     }
 

@@ -1,6 +1,8 @@
 //! A packaged FMU driven the way any importer would: unzip, read modelDescription.xml, load the shared library,
 //! and go through the standard's call sequence. It knows nothing of the scene or of the core behind the ABI.
 
+#![warn(unreachable_pub)]
+pub mod api;
 pub mod archive;
 mod description;
 mod fmi2;
@@ -93,7 +95,7 @@ pub fn entries(archive: &mut ZipArchive<impl Read + io::Seek>) -> Result<Vec<(St
 ///
 /// # Errors
 /// A damaged entry, or a target that takes no more.
-pub fn unpack_entry(
+pub(crate) fn unpack_entry(
     archive: &mut ZipArchive<impl Read + io::Seek>,
     index: usize,
     name: &str,
@@ -160,7 +162,7 @@ impl UnpackedFmu {
     ///
     /// # Errors
     /// The FMU has none.
-    pub fn library(&self) -> Result<PathBuf> {
+    pub(crate) fn library(&self) -> Result<PathBuf> {
         let platform = if self.description.fmi_version.starts_with('2') { "linux64" } else { "x86_64-linux" };
         let name = format!("binaries/{platform}/{}.so", self.description.model_identifier);
         let path = self.directory.path().join(&name);
@@ -181,11 +183,14 @@ impl UnpackedFmu {
     /// # Errors
     /// The library cannot be loaded, or a call answers worse than Warning; the FMU's own messages are included.
     pub fn simulate(&self, schedule: &Schedule, progress: &dyn Fn(usize)) -> Result<ImportedRun> {
-        let library = slave::load(&self.library()?)?;
-        let run = |slave: &mut dyn slave::Slave| slave::drive(slave, &self.description, schedule, progress);
+        slave::drive(&mut *self.instance()?, &self.description, schedule, progress)
+    }
+
+    /// An instance of the FMU, of whichever version it is.
+    fn instance(&self) -> Result<Box<dyn slave::Slave>> {
         match self.description.fmi_version.as_str() {
-            "2.0" => run(&mut fmi2::Fmi2Slave::new(self, library)?),
-            "3.0" => run(&mut fmi3::Fmi3Slave::new(self, library)?),
+            "2.0" => Ok(Box::new(fmi2::Fmi2Slave::new(self)?)),
+            "3.0" => Ok(Box::new(fmi3::Fmi3Slave::new(self)?)),
             other => Err(Failure::new("FMU", format!("FMI version {other}"), "Only 2.0 and 3.0 can be imported")),
         }
     }

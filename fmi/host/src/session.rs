@@ -4,7 +4,7 @@ use tiprub_core::settings::ExperimentSettings;
 use tiprub_shell::{Failure, Result, schedule::Schedule};
 
 use super::{
-    UnpackedFmu, fmi2, fmi3,
+    UnpackedFmu,
     slave::{self, OutputGroup, Slave},
 };
 
@@ -27,14 +27,7 @@ impl<'a> Session<'a> {
     /// # Errors
     /// As [`UnpackedFmu::simulate`].
     pub fn new(fmu: &'a UnpackedFmu) -> Result<Self> {
-        let library = slave::load(&fmu.library()?)?;
-        let slave: Box<dyn Slave> = match fmu.description.fmi_version.as_str() {
-            "2.0" => Box::new(fmi2::Fmi2Slave::new(fmu, library)?),
-            "3.0" => Box::new(fmi3::Fmi3Slave::new(fmu, library)?),
-            other => {
-                return Err(Failure::new("FMU", format!("FMI version {other}"), "Only 2.0 and 3.0 can be imported"));
-            }
-        };
+        let slave = fmu.instance()?;
         Ok(Self { fmu, slave, groups: slave::group_outputs(&fmu.description) })
     }
 

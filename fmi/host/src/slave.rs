@@ -3,11 +3,9 @@
 use std::{
     cell::RefCell,
     ffi::{CStr, CString},
-    path::Path,
     time::{Duration, Instant},
 };
 
-use libloading::Library;
 use tiprub_shell::{Failure, Result, recording::Recording, schedule::Schedule};
 
 use super::{ImportedDescription, ImportedRun, VariableType};
@@ -114,24 +112,6 @@ pub(super) fn check(function: &str, time: Option<f64>, status: i32, messages: &M
     Err(Failure::new("FMU", format!("{function}{at} answered {status_name}{}", messages.last_words()), ""))
 }
 
-/// Load a shared library.
-pub(super) fn load(path: &Path) -> Result<Library> {
-    // SAFETY: loading runs the library's initialisers; that is what importing an FMU means, and the user named it.
-    unsafe { Library::new(path) }
-        .map_err(|error| Failure::new(path.display(), format!("cannot be loaded: {error}"), "Is it for this machine?"))
-}
-
-/// A function of the library as a plain pointer.
-///
-/// # Safety
-/// `F` must be the signature of that function, and the library must stay loaded while the pointer is used.
-pub(super) unsafe fn symbol<F: Copy>(library: &Library, name: &str) -> Result<F> {
-    // SAFETY: the caller vouches for the signature.
-    unsafe { library.get::<F>(name) }
-        .map(|symbol| *symbol)
-        .map_err(|error| Failure::new("FMU library", format!("does not export {name}: {error}"), ""))
-}
-
 /// A string for the C side.
 pub(super) fn c_text(text: &str) -> Result<CString> {
     CString::new(text).map_err(|_| Failure::new(format!("{text:?}"), "contains a zero byte", "Remove it"))
@@ -156,6 +136,6 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("tiprub.so");
         std::fs::write(&path, "text").unwrap();
-        assert!(load(&path).unwrap_err().problem.contains("cannot be loaded"));
+        assert!(crate::api::Fmi3Api::load(&path).unwrap_err().problem.contains("cannot be loaded"));
     }
 }

@@ -16,7 +16,7 @@ fn arguments(dialect: Dialect) -> (&'static str, &'static str) {
 }
 
 /// Get values of one type; `convert` makes the C value.
-pub fn get<T: Value, C: Copy>(
+pub(crate) fn get<T: Value, C: Copy>(
     (handle, rule, type_name): (Handle, &Rule, &'static str),
     (references, count): (In<u32>, usize),
     (values, n_values): (Out<C>, usize),
@@ -33,7 +33,7 @@ pub fn get<T: Value, C: Copy>(
 }
 
 /// Set values of one type; `convert` makes the Rust value, or says what is wrong with the C value.
-pub fn set<T: Value, C>(
+pub(crate) fn set<T: Value, C>(
     (handle, rule, type_name): (Handle, &Rule, &'static str),
     (references, count): (In<u32>, usize),
     (values, n_values): (In<C>, usize),
@@ -50,7 +50,7 @@ pub fn set<T: Value, C>(
 }
 
 /// Get texts; they live in the instance until texts are asked for again.
-pub fn strings(
+pub(crate) fn strings(
     (handle, rule): (Handle, &Rule),
     (references, count): (In<u32>, usize),
     (values, n_values): (Out<*const c_char>, usize),
@@ -67,7 +67,12 @@ pub fn strings(
 }
 
 /// `fmi2SetDebugLogging`, `fmi3SetDebugLogging`.
-pub fn set_debug_logging(handle: Handle, rule: &Rule, on: bool, (categories, count): (In<Text>, usize)) -> Status {
+pub(crate) fn set_debug_logging(
+    handle: Handle,
+    rule: &Rule,
+    on: bool,
+    (categories, count): (In<Text>, usize),
+) -> Status {
     let outcome = enter(handle, rule, |_, instance| {
         let categories = categories.array(count, 64, "categories")?;
         let names = categories.iter().map(|name| name.required("categories")).collect::<Result<Vec<_>>>()?;
@@ -78,10 +83,10 @@ pub fn set_debug_logging(handle: Handle, rule: &Rule, on: bool, (categories, cou
 }
 
 /// `fmi2FMUstate`, `fmi3FMUState`: an opaque name of a saved state.
-pub type StateHandle = *const Vec<u8>;
+pub(crate) type StateHandle = *const Vec<u8>;
 
 /// Saved states.
-pub mod state {
+pub(crate) mod state {
     use super::*;
 
     fn required(state: StateHandle) -> Result<StateHandle> {
@@ -92,7 +97,7 @@ pub mod state {
     }
 
     /// Save into a new state, or into the one that `*state` names.
-    pub fn save(handle: Handle, rule: &Rule, state: Out<StateHandle>) -> Status {
+    pub(crate) fn save(handle: Handle, rule: &Rule, state: Out<StateHandle>) -> Status {
         guard(handle, rule, |slave| {
             let window = state.single("FMUstate")?;
             let existing = window.current().filter(|existing| !existing.is_null());
@@ -103,7 +108,7 @@ pub mod state {
     }
 
     /// Restore.
-    pub fn restore(handle: Handle, rule: &Rule, state: StateHandle) -> Status {
+    pub(crate) fn restore(handle: Handle, rule: &Rule, state: StateHandle) -> Status {
         guard(handle, rule, |slave| {
             slave.restore(required(state)?)?;
             Ok(Status::Ok)
@@ -111,7 +116,7 @@ pub mod state {
     }
 
     /// Free; NULL, or a pointer to NULL, is legal.
-    pub fn free(handle: Handle, rule: &Rule, state: Out<StateHandle>) -> Status {
+    pub(crate) fn free(handle: Handle, rule: &Rule, state: Out<StateHandle>) -> Status {
         guard(handle, rule, |slave| {
             if state.is_null() {
                 return Ok(Status::Ok);
@@ -126,7 +131,7 @@ pub mod state {
     }
 
     /// Size in bytes.
-    pub fn size(handle: Handle, rule: &Rule, state: StateHandle, size: Out<usize>) -> Status {
+    pub(crate) fn size(handle: Handle, rule: &Rule, state: StateHandle, size: Out<usize>) -> Status {
         guard(handle, rule, |slave| {
             let window = size.single("size")?;
             let length = slave.serialised(required(state)?)?.len();
@@ -145,7 +150,7 @@ pub mod state {
     }
 
     /// Serialise.
-    pub fn serialise(handle: Handle, rule: &Rule, state: StateHandle, bytes: Out<u8>, size: usize) -> Status {
+    pub(crate) fn serialise(handle: Handle, rule: &Rule, state: StateHandle, bytes: Out<u8>, size: usize) -> Status {
         guard(handle, rule, |slave: &mut Slave| {
             let saved = slave.serialised(required(state)?)?;
             check_size(size, saved.len())?;
@@ -155,7 +160,13 @@ pub mod state {
     }
 
     /// Deserialise into a new state, or into the one that `*state` names.
-    pub fn deserialise(handle: Handle, rule: &Rule, bytes: In<u8>, size: usize, state: Out<StateHandle>) -> Status {
+    pub(crate) fn deserialise(
+        handle: Handle,
+        rule: &Rule,
+        bytes: In<u8>,
+        size: usize,
+        state: Out<StateHandle>,
+    ) -> Status {
         guard(handle, rule, |slave| {
             let window = state.single("FMUstate")?;
             check_size(size, slave.serialised_size())?;

@@ -10,7 +10,7 @@
 ///
 /// On processors other than x86-64 nothing is changed.
 #[derive(Debug)]
-pub struct StandardFloats {
+pub(crate) struct StandardFloats {
     #[cfg(target_arch = "x86_64")]
     of_caller: u32,
 }
@@ -18,16 +18,16 @@ pub struct StandardFloats {
 #[cfg(target_arch = "x86_64")]
 mod control {
     /// Control and status register of SSE after power-up (Intel 64 manual, volume 1, section 10.2.3).
-    pub const STANDARD: u32 = 0x1F80;
+    pub(super) const STANDARD: u32 = 0x1F80;
 
-    pub fn read() -> u32 {
+    pub(super) fn read() -> u32 {
         let mut value = 0_u32;
         // SAFETY: `stmxcsr` writes four bytes to the place given and changes nothing else; every x86-64 has it.
         unsafe { std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut value, options(nostack, preserves_flags)) };
         value
     }
 
-    pub fn write(value: u32) {
+    pub(super) fn write(value: u32) {
         // SAFETY: `ldmxcsr` reads four bytes; the value is the standard one, which compiled code assumes, or one that
         // `read` gave for the code that goes on with it, hence no reserved bit is set.
         unsafe { std::arch::asm!("ldmxcsr [{}]", in(reg) &raw const value, options(nostack, preserves_flags)) };
@@ -37,7 +37,7 @@ mod control {
 impl StandardFloats {
     /// Put the caller's environment aside.
     #[cfg(target_arch = "x86_64")]
-    pub fn enter() -> Self {
+    pub(super) fn enter() -> Self {
         let of_caller = control::read();
         control::write(control::STANDARD);
         Self { of_caller }

@@ -12,7 +12,7 @@ use crate::slave::{Dialect, Phase, Refusal, Result, Slave, Status};
 
 /// FMI 3.0 callbacks and flags that belong to stepping.
 #[derive(Debug, Clone, Copy)]
-pub struct Callbacks {
+pub(crate) struct Callbacks {
     /// `intermediateUpdate`, may be NULL.
     pub update: Option<IntermediateUpdate>,
     /// `earlyReturnAllowed`.
@@ -24,7 +24,7 @@ pub struct Callbacks {
 /// What a handle points to. The mutex costs some twenty nanoseconds a call and buys two answers that the standard leaves
 /// open: a call on an instance that another thread is using is refused, and a panic inside the slave poisons it for good.
 #[derive(Debug)]
-pub struct Instance {
+pub(crate) struct Instance {
     dialect: Dialect,
     slave: Mutex<Slave>,
     /// Messages go out after the lock is released, so that a logger may call functions on the instance.
@@ -36,7 +36,7 @@ pub struct Instance {
 /// `fmi2Component`, `fmi3Instance`: NULL, or what [`instantiate`] returned and [`release`] has not yet taken back.
 #[derive(Debug, Clone, Copy)]
 #[repr(transparent)]
-pub struct Handle(*mut Instance);
+pub(crate) struct Handle(*mut Instance);
 
 impl Handle {
     const NULL: Self = Self(std::ptr::null_mut());
@@ -50,7 +50,7 @@ impl Handle {
 }
 
 /// Arguments of the instantiation functions.
-pub struct Instantiation<'a> {
+pub(crate) struct Instantiation<'a> {
     /// Version of the standard, and with it how to read the location.
     pub dialect: Dialect,
     /// Exported function, for messages.
@@ -74,7 +74,7 @@ pub struct Instantiation<'a> {
 }
 
 /// Make an instance; NULL with a message if that is not possible.
-pub fn instantiate(request: Instantiation<'_>) -> Handle {
+pub(crate) fn instantiate(request: Instantiation<'_>) -> Handle {
     panics::silence();
     let function = request.function;
     let log = Log::new(request.sink, request.logging_on);
@@ -112,13 +112,13 @@ pub fn instantiate(request: Instantiation<'_>) -> Handle {
 }
 
 /// Refuse to instantiate; the message goes to the importer.
-pub fn refuse_instantiation(sink: Sink, function: &str, reason: &str) -> Handle {
+pub(crate) fn refuse_instantiation(sink: Sink, function: &str, reason: &str) -> Handle {
     Log::new(sink, false).emit(Status::Error, &format!("{function}: {reason}"));
     Handle::NULL
 }
 
 /// Free an instance. NULL is legal. A free from within an intermediate update is refused: the step under way needs it.
-pub fn release(handle: Handle, rule: &Rule) {
+pub(crate) fn release(handle: Handle, rule: &Rule) {
     let Some(instance) = handle.instance() else { return };
     if instance.dialect != rule.dialect() {
         return instance.log.emit(Status::Error, &format!("{}: {}", rule.name, other_version(instance)));
@@ -146,7 +146,7 @@ fn other_version(instance: &Instance) -> String {
 /// The guard: every call on an instance goes through here. It checks the instance, that it is not faulted, that the call
 /// is allowed now; it puts the caller's floating-point environment aside (callbacks have it again), catches panics, hands
 /// messages to the importer and gives the status. `None` if not carried out.
-pub fn enter<T>(
+pub(crate) fn enter<T>(
     handle: Handle,
     rule: &Rule,
     action: impl FnOnce(&mut Slave, &Instance) -> Result<(Status, T)>,
@@ -186,12 +186,12 @@ pub fn enter<T>(
 }
 
 /// The guard for calls whose only result is their status.
-pub fn guard(handle: Handle, rule: &Rule, action: impl FnOnce(&mut Slave) -> Result<Status>) -> Status {
+pub(crate) fn guard(handle: Handle, rule: &Rule, action: impl FnOnce(&mut Slave) -> Result<Status>) -> Status {
     enter(handle, rule, |slave, _| Ok((action(slave)?, ()))).0
 }
 
 /// Answer of a function whose capability this FMU does not have.
-pub fn unsupported(handle: Handle, name: &'static str, capability: &str) -> Status {
+pub(crate) fn unsupported(handle: Handle, name: &'static str, capability: &str) -> Status {
     guard(handle, &order::unsupported(name), |_| {
         Err(Refusal::error(format!("this FMU has no {capability}, as its modelDescription.xml says. Do not call it")))
     })

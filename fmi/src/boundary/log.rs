@@ -8,10 +8,11 @@ use super::Environment;
 use crate::slave::Status;
 
 /// `fmi2CallbackLogger`: variadic, with a printf format.
-pub type Fmi2Logger = unsafe extern "C" fn(Environment, *const c_char, Status, *const c_char, *const c_char, ...);
+pub(crate) type Fmi2Logger =
+    unsafe extern "C" fn(Environment, *const c_char, Status, *const c_char, *const c_char, ...);
 
 /// `fmi3LogMessageCallback`.
-pub type Fmi3Logger = unsafe extern "C" fn(Environment, Status, *const c_char, *const c_char);
+pub(crate) type Fmi3Logger = unsafe extern "C" fn(Environment, Status, *const c_char, *const c_char);
 
 /// Categories as `modelDescription.xml` lists them; the last one stands for everything.
 const CATEGORIES: [&CStr; 5] =
@@ -23,7 +24,7 @@ const ALL: u8 = 1 << 4;
 const EXPLANATIONS: u8 = ALL - 1;
 
 /// Where messages go.
-pub enum Sink {
+pub(crate) enum Sink {
     /// FMI 2.0.
     Fmi2 {
         /// May be NULL.
@@ -56,14 +57,14 @@ impl fmt::Debug for Sink {
 /// Messages that explain an answer other than OK are given with `loggingOn` false too: an importer that gets an error
 /// must be able to say why. Only a choice of categories silences them.
 #[derive(Debug)]
-pub struct Log {
+pub(crate) struct Log {
     sink: Sink,
     wanted: AtomicU8,
 }
 
 impl Log {
     /// A log as at instantiation.
-    pub fn new(sink: Sink, logging_on: bool) -> Self {
+    pub(super) fn new(sink: Sink, logging_on: bool) -> Self {
         let log = Self { sink, wanted: AtomicU8::new(EXPLANATIONS) };
         log.choose(logging_on, &[]).unwrap_or_default();
         log
@@ -73,7 +74,7 @@ impl Log {
     ///
     /// # Errors
     /// A category that does not exist; nothing is changed then.
-    pub fn choose(&self, logging_on: bool, categories: &[&str]) -> Result<(), String> {
+    pub(super) fn choose(&self, logging_on: bool, categories: &[&str]) -> Result<(), String> {
         let mut wanted = 0;
         for category in categories {
             let known = CATEGORIES.iter().position(|known| known.to_bytes() == category.as_bytes());
@@ -93,7 +94,7 @@ impl Log {
     }
 
     /// Hand a message to the importer, if it wants its category.
-    pub fn emit(&self, status: Status, message: &str) {
+    pub(crate) fn emit(&self, status: Status, message: &str) {
         let category = match status {
             Status::Ok => 4,
             Status::Warning => 0,

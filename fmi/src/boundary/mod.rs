@@ -7,15 +7,16 @@ mod log;
 mod panics;
 mod pointers;
 
-pub use calls::{StateHandle, get, set, set_debug_logging, state, strings};
-pub use instance::{
-    Callbacks, Handle, Instantiation, enter, guard, instantiate, refuse_instantiation, release, unsupported,
-};
-pub use log::{Fmi2Logger, Fmi3Logger, Sink};
-pub use pointers::{Environment, In, Out, Text};
+pub(crate) use calls::{StateHandle, set_debug_logging, strings};
+pub(crate) use calls::{get, set, state};
+pub(crate) use instance::{Callbacks, Instantiation, enter, instantiate, release};
+pub(crate) use instance::{Handle, guard, refuse_instantiation, unsupported};
+pub(crate) use log::{Fmi2Logger, Fmi3Logger, Sink};
+pub(crate) use pointers::{Environment, Out};
+pub(crate) use pointers::{In, Text};
 
 /// `fmi3IntermediateUpdateCallback`.
-pub type IntermediateUpdate = unsafe extern "C" fn(
+pub(crate) type IntermediateUpdate = unsafe extern "C" fn(
     environment: Environment,
     intermediate_update_time: f64,
     set_requested: u8,
@@ -27,7 +28,7 @@ pub type IntermediateUpdate = unsafe extern "C" fn(
 );
 
 /// Call the importer's intermediate update; the time at which it wants the step to end early, if it does.
-pub fn intermediate_update(
+pub(crate) fn intermediate_update(
     callback: IntermediateUpdate,
     environment: Environment,
     time: f64,
@@ -52,3 +53,14 @@ pub fn intermediate_update(
     }
     (requested != 0).then_some(at)
 }
+
+/// Exported functions with their arguments after the instance, and the capability they belong to.
+macro_rules! refused {
+    ($($name:ident ($($argument:ident: $type:ty),*) $capability:expr;)*) => {$(
+        #[unsafe(no_mangle)]
+        pub(crate) extern "C" fn $name(instance: $crate::boundary::Handle $(, $argument: $type)*) -> $crate::slave::Status {
+            $crate::boundary::unsupported(instance, stringify!($name), $capability)
+        }
+    )*};
+}
+pub(crate) use refused;

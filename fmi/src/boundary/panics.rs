@@ -19,7 +19,7 @@ thread_local! {
 static HOOK: Once = Once::new();
 
 /// Make panics of this library silent, once.
-pub fn silence() {
+pub(crate) fn silence() {
     HOOK.call_once(|| panic::set_hook(Box::new(remember)));
 }
 
@@ -33,7 +33,7 @@ fn remember(info: &PanicHookInfo<'_>) {
 }
 
 /// Message for the importer's log.
-pub fn describe(payload: &(dyn Any + Send)) -> String {
+pub(super) fn describe(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().copied();
     let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message");
     let (bytes, length, line) = PLACE.get();

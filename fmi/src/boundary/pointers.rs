@@ -7,26 +7,26 @@ use std::mem::size_of;
 use crate::slave::{Refusal, Result};
 
 /// The importer's pointer that goes back to it with every callback, never followed.
-pub type Environment = *mut c_void;
+pub(crate) type Environment = *mut c_void;
 
 /// Array or single value to read from.
 #[derive(Debug, Clone, Copy)]
 #[repr(transparent)]
-pub struct In<T>(*const T);
+pub(crate) struct In<T>(*const T);
 
 /// Array or single value to write to.
 #[derive(Debug, Clone, Copy)]
 #[repr(transparent)]
-pub struct Out<T>(*mut T);
+pub(crate) struct Out<T>(*mut T);
 
 /// NUL-terminated text.
 #[derive(Debug, Clone, Copy)]
 #[repr(transparent)]
-pub struct Text(*const c_char);
+pub(crate) struct Text(*const c_char);
 
 /// A checked place for a known number of values.
 #[derive(Debug)]
-pub struct Window<T> {
+pub(crate) struct Window<T> {
     pointer: *mut T,
     length: usize,
 }
@@ -53,7 +53,7 @@ impl<T> In<T> {
     ///
     /// # Errors
     /// NULL, misaligned, or more than `limit` elements.
-    pub fn array(&self, count: usize, limit: usize, name: &str) -> Result<&[T]> {
+    pub(crate) fn array(&self, count: usize, limit: usize, name: &str) -> Result<&[T]> {
         if count == 0 {
             return Ok(&[]);
         }
@@ -69,7 +69,7 @@ impl<T> In<T> {
     }
 
     /// The single value; `None` if the pointer is NULL.
-    pub fn single(&self) -> Option<&T> {
+    pub(crate) fn single(&self) -> Option<&T> {
         // SAFETY: null is handled by `as_ref`, misalignment by the filter, and by the standard's contract the pointer is to
         // an initialised value for the duration of the call.
         unsafe { Some(self.0).filter(|pointer| pointer.is_aligned())?.as_ref() }
@@ -81,7 +81,7 @@ impl<T: Copy> Out<T> {
     ///
     /// # Errors
     /// NULL or misaligned.
-    pub fn window(&self, count: usize, name: &str) -> Result<Window<T>> {
+    pub(crate) fn window(&self, count: usize, name: &str) -> Result<Window<T>> {
         if count > 0 {
             check(self.0.cast_const(), count, name)?;
         }
@@ -92,26 +92,26 @@ impl<T: Copy> Out<T> {
     ///
     /// # Errors
     /// NULL or misaligned.
-    pub fn single(&self, name: &str) -> Result<Window<T>> {
+    pub(crate) fn single(&self, name: &str) -> Result<Window<T>> {
         self.window(1, name)
     }
 
     /// Write one value if there is a place for it.
-    pub fn offer(&self, value: T) {
+    pub(crate) fn offer(&self, value: T) {
         if let Ok(window) = self.single("") {
             window.fill(&[value]);
         }
     }
 
     /// Whether the pointer is NULL.
-    pub fn is_null(&self) -> bool {
+    pub(crate) fn is_null(&self) -> bool {
         self.0.is_null()
     }
 }
 
 impl<T: Copy> Window<T> {
     /// Write the values. Their number must be that of the window; with any other nothing is written.
-    pub fn fill(self, values: &[T]) {
+    pub(crate) fn fill(self, values: &[T]) {
         if values.len() == self.length && self.length > 0 {
             // SAFETY: checked not null and aligned, by the standard's contract valid for `length` elements; `copy` allows
             // the importer's array to be anywhere.
@@ -120,7 +120,7 @@ impl<T: Copy> Window<T> {
     }
 
     /// The value in the first place, which by the standard is initialised for in-out arguments.
-    pub fn current(&self) -> Option<T> {
+    pub(crate) fn current(&self) -> Option<T> {
         // SAFETY: checked not null and aligned; in-out arguments are initialised by the importer.
         (self.length > 0).then(|| unsafe { self.pointer.read() })
     }
@@ -131,7 +131,7 @@ impl Text {
     ///
     /// # Errors
     /// Not UTF-8.
-    pub fn read(&self, name: &str) -> Result<Option<&str>> {
+    pub(crate) fn read(&self, name: &str) -> Result<Option<&str>> {
         if self.0.is_null() {
             return Ok(None);
         }
@@ -145,7 +145,7 @@ impl Text {
     ///
     /// # Errors
     /// NULL or not UTF-8.
-    pub fn required(&self, name: &str) -> Result<&str> {
+    pub(crate) fn required(&self, name: &str) -> Result<&str> {
         self.read(name)?.ok_or_else(|| Refusal::error(format!("argument {name} is NULL. Pass a text")))
     }
 }

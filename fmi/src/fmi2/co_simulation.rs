@@ -13,7 +13,7 @@ const LAST_SUCCESSFUL_TIME: i32 = 2;
 const TERMINATED: i32 = 3;
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2SetRealInputDerivatives(
+pub(super) extern "C" fn fmi2SetRealInputDerivatives(
     c: Handle,
     vr: In<u32>,
     nvr: usize,
@@ -31,7 +31,7 @@ pub extern "C" fn fmi2SetRealInputDerivatives(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetRealOutputDerivatives(
+pub(super) extern "C" fn fmi2GetRealOutputDerivatives(
     c: Handle,
     vr: In<u32>,
     nvr: usize,
@@ -50,7 +50,7 @@ pub extern "C" fn fmi2GetRealOutputDerivatives(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2DoStep(
+pub(super) extern "C" fn fmi2DoStep(
     c: Handle,
     currentCommunicationPoint: f64,
     communicationStepSize: f64,
@@ -76,17 +76,17 @@ fn status<T: Copy>(kind: i32, value: &Out<T>, answer: Option<T>) -> Result<Statu
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetStatus(c: Handle, s: i32, value: Out<i32>) -> Status {
+pub(super) extern "C" fn fmi2GetStatus(c: Handle, s: i32, value: Out<i32>) -> Status {
     guard(c, &order::GET_STATUS, |_| status(s, &value, None))
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetRealStatus(c: Handle, s: i32, value: Out<f64>) -> Status {
+pub(super) extern "C" fn fmi2GetRealStatus(c: Handle, s: i32, value: Out<f64>) -> Status {
     guard(c, &order::GET_REAL_STATUS, |slave| status(s, &value, (s == LAST_SUCCESSFUL_TIME).then(|| slave.time())))
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetIntegerStatus(c: Handle, s: i32, value: Out<i32>) -> Status {
+pub(super) extern "C" fn fmi2GetIntegerStatus(c: Handle, s: i32, value: Out<i32>) -> Status {
     guard(c, &order::GET_INTEGER_STATUS, |_| status(s, &value, None))
 }
 
@@ -96,13 +96,13 @@ fn wants_to_terminate(slave: &Slave) -> Boolean {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetBooleanStatus(c: Handle, s: i32, value: Out<Boolean>) -> Status {
+pub(super) extern "C" fn fmi2GetBooleanStatus(c: Handle, s: i32, value: Out<Boolean>) -> Status {
     guard(c, &order::GET_BOOLEAN_STATUS, |slave| {
         status(s, &value, (s == TERMINATED).then(|| wants_to_terminate(slave)))
     })
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetStringStatus(c: Handle, s: i32, value: Out<*const c_char>) -> Status {
+pub(super) extern "C" fn fmi2GetStringStatus(c: Handle, s: i32, value: Out<*const c_char>) -> Status {
     guard(c, &order::GET_STRING_STATUS, |_| status(s, &value, None))
 }

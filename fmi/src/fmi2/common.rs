@@ -5,7 +5,7 @@ use std::ffi::{CString, c_char};
 use super::Boolean;
 use crate::boundary::{
     self, Environment, Fmi2Logger, Handle, In, Instantiation, Out, Sink, StateHandle, Text, guard, instantiate,
-    refuse_instantiation, release, state, unsupported,
+    refuse_instantiation, release, state,
 };
 use crate::location;
 use crate::slave::order::fmi2 as order;
@@ -14,7 +14,7 @@ use crate::slave::{Dialect, Experiment, Refusal, Status};
 /// `fmi2CallbackFunctions`. Memory functions and `stepFinished` are never called.
 #[derive(Clone, Copy)]
 #[repr(C)]
-pub struct CallbackFunctions {
+pub(crate) struct CallbackFunctions {
     logger: Option<Fmi2Logger>,
     allocate_memory: Option<unsafe extern "C" fn(usize, usize) -> Environment>,
     free_memory: Option<unsafe extern "C" fn(Environment)>,
@@ -26,17 +26,17 @@ pub struct CallbackFunctions {
 const CO_SIMULATION: i32 = 1;
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
+pub(super) extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
     c"default".as_ptr()
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetVersion() -> *const c_char {
+pub(super) extern "C" fn fmi2GetVersion() -> *const c_char {
     c"2.0".as_ptr()
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2SetDebugLogging(
+pub(super) extern "C" fn fmi2SetDebugLogging(
     c: Handle,
     loggingOn: Boolean,
     nCategories: usize,
@@ -46,7 +46,7 @@ pub extern "C" fn fmi2SetDebugLogging(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2Instantiate(
+pub(super) extern "C" fn fmi2Instantiate(
     instanceName: Text,
     fmuType: i32,
     fmuGUID: Text,
@@ -82,12 +82,12 @@ pub extern "C" fn fmi2Instantiate(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2FreeInstance(c: Handle) {
+pub(super) extern "C" fn fmi2FreeInstance(c: Handle) {
     release(c, &order::FREE_INSTANCE);
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2SetupExperiment(
+pub(super) extern "C" fn fmi2SetupExperiment(
     c: Handle,
     _toleranceDefined: Boolean,
     _tolerance: f64,
@@ -102,7 +102,7 @@ pub extern "C" fn fmi2SetupExperiment(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2EnterInitializationMode(c: Handle) -> Status {
+pub(super) extern "C" fn fmi2EnterInitializationMode(c: Handle) -> Status {
     guard(c, &order::ENTER_INITIALIZATION_MODE, |slave| {
         slave.enter_initialisation(None);
         Ok(Status::Ok)
@@ -110,12 +110,12 @@ pub extern "C" fn fmi2EnterInitializationMode(c: Handle) -> Status {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2ExitInitializationMode(c: Handle) -> Status {
+pub(super) extern "C" fn fmi2ExitInitializationMode(c: Handle) -> Status {
     guard(c, &order::EXIT_INITIALIZATION_MODE, |slave| slave.exit_initialisation())
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2Terminate(c: Handle) -> Status {
+pub(super) extern "C" fn fmi2Terminate(c: Handle) -> Status {
     guard(c, &order::TERMINATE, |slave| {
         slave.terminate();
         Ok(Status::Ok)
@@ -123,7 +123,7 @@ pub extern "C" fn fmi2Terminate(c: Handle) -> Status {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2Reset(c: Handle) -> Status {
+pub(super) extern "C" fn fmi2Reset(c: Handle) -> Status {
     guard(c, &order::RESET, |slave| {
         slave.reset();
         Ok(Status::Ok)
@@ -131,69 +131,69 @@ pub extern "C" fn fmi2Reset(c: Handle) -> Status {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetReal(c: Handle, vr: In<u32>, nvr: usize, value: Out<f64>) -> Status {
+pub(super) extern "C" fn fmi2GetReal(c: Handle, vr: In<u32>, nvr: usize, value: Out<f64>) -> Status {
     boundary::get((c, &order::GET_REAL, "Real"), (vr, nvr), (value, nvr), |value: f64| value)
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetInteger(c: Handle, vr: In<u32>, nvr: usize, value: Out<i32>) -> Status {
+pub(super) extern "C" fn fmi2GetInteger(c: Handle, vr: In<u32>, nvr: usize, value: Out<i32>) -> Status {
     boundary::get((c, &order::GET_INTEGER, "Integer"), (vr, nvr), (value, nvr), |value: i32| value)
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetBoolean(c: Handle, vr: In<u32>, nvr: usize, value: Out<Boolean>) -> Status {
+pub(super) extern "C" fn fmi2GetBoolean(c: Handle, vr: In<u32>, nvr: usize, value: Out<Boolean>) -> Status {
     boundary::get((c, &order::GET_BOOLEAN, "Boolean"), (vr, nvr), (value, nvr), |value: bool| Boolean::from(value))
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetString(c: Handle, vr: In<u32>, nvr: usize, value: Out<*const c_char>) -> Status {
+pub(super) extern "C" fn fmi2GetString(c: Handle, vr: In<u32>, nvr: usize, value: Out<*const c_char>) -> Status {
     boundary::strings((c, &order::GET_STRING), (vr, nvr), (value, nvr))
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2SetReal(c: Handle, vr: In<u32>, nvr: usize, value: In<f64>) -> Status {
+pub(super) extern "C" fn fmi2SetReal(c: Handle, vr: In<u32>, nvr: usize, value: In<f64>) -> Status {
     boundary::set((c, &order::SET_REAL, "Real"), (vr, nvr), (value, nvr), |value: &f64| Ok(*value))
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2SetInteger(c: Handle, vr: In<u32>, nvr: usize, value: In<i32>) -> Status {
+pub(super) extern "C" fn fmi2SetInteger(c: Handle, vr: In<u32>, nvr: usize, value: In<i32>) -> Status {
     boundary::set((c, &order::SET_INTEGER, "Integer"), (vr, nvr), (value, nvr), |value: &i32| Ok(*value))
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2SetBoolean(c: Handle, vr: In<u32>, nvr: usize, value: In<Boolean>) -> Status {
+pub(super) extern "C" fn fmi2SetBoolean(c: Handle, vr: In<u32>, nvr: usize, value: In<Boolean>) -> Status {
     boundary::set((c, &order::SET_BOOLEAN, "Boolean"), (vr, nvr), (value, nvr), |value: &Boolean| Ok(*value != 0))
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2SetString(c: Handle, vr: In<u32>, nvr: usize, value: In<Text>) -> Status {
+pub(super) extern "C" fn fmi2SetString(c: Handle, vr: In<u32>, nvr: usize, value: In<Text>) -> Status {
     boundary::set((c, &order::SET_STRING, "String"), (vr, nvr), (value, nvr), |value: &Text| {
         value.required("value").map(str::to_owned)
     })
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetFMUstate(c: Handle, FMUstate: Out<StateHandle>) -> Status {
+pub(super) extern "C" fn fmi2GetFMUstate(c: Handle, FMUstate: Out<StateHandle>) -> Status {
     state::save(c, &order::GET_FMU_STATE, FMUstate)
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2SetFMUstate(c: Handle, FMUstate: StateHandle) -> Status {
+pub(super) extern "C" fn fmi2SetFMUstate(c: Handle, FMUstate: StateHandle) -> Status {
     state::restore(c, &order::SET_FMU_STATE, FMUstate)
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2FreeFMUstate(c: Handle, FMUstate: Out<StateHandle>) -> Status {
+pub(super) extern "C" fn fmi2FreeFMUstate(c: Handle, FMUstate: Out<StateHandle>) -> Status {
     state::free(c, &order::FREE_FMU_STATE, FMUstate)
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2SerializedFMUstateSize(c: Handle, FMUstate: StateHandle, size: Out<usize>) -> Status {
+pub(super) extern "C" fn fmi2SerializedFMUstateSize(c: Handle, FMUstate: StateHandle, size: Out<usize>) -> Status {
     state::size(c, &order::SERIALIZED_FMU_STATE_SIZE, FMUstate, size)
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2SerializeFMUstate(
+pub(super) extern "C" fn fmi2SerializeFMUstate(
     c: Handle,
     FMUstate: StateHandle,
     serializedState: Out<u8>,
@@ -203,7 +203,7 @@ pub extern "C" fn fmi2SerializeFMUstate(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2DeSerializeFMUstate(
+pub(super) extern "C" fn fmi2DeSerializeFMUstate(
     c: Handle,
     serializedState: In<u8>,
     size: usize,
@@ -212,22 +212,9 @@ pub extern "C" fn fmi2DeSerializeFMUstate(
     state::deserialise(c, &order::DESERIALIZE_FMU_STATE, serializedState, size, FMUstate)
 }
 
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetDirectionalDerivative(
-    c: Handle,
-    _vUnknown_ref: In<u32>,
-    _nUnknown: usize,
-    _vKnown_ref: In<u32>,
-    _nKnown: usize,
-    _dvKnown: In<f64>,
-    _dvUnknown: Out<f64>,
-) -> Status {
-    unsupported(c, "fmi2GetDirectionalDerivative", "directional derivatives")
-}
-
 /// Answer of `fmi2CancelStep`: there is never an asynchronous step.
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2CancelStep(c: Handle) -> Status {
+pub(super) extern "C" fn fmi2CancelStep(c: Handle) -> Status {
     guard(c, &order::CANCEL_STEP, |_| {
         Err(Refusal::error("no step is pending: steps of this FMU are never asynchronous"))
     })

@@ -12,12 +12,12 @@ use crate::slave::order::fmi3 as order;
 use crate::slave::{Dialect, Experiment, Refusal, Status};
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3GetVersion() -> *const c_char {
+pub(super) extern "C" fn fmi3GetVersion() -> *const c_char {
     c"3.0".as_ptr()
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3SetDebugLogging(
+pub(super) extern "C" fn fmi3SetDebugLogging(
     instance: Handle,
     loggingOn: Boolean,
     nCategories: usize,
@@ -27,7 +27,7 @@ pub extern "C" fn fmi3SetDebugLogging(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3InstantiateModelExchange(
+pub(super) extern "C" fn fmi3InstantiateModelExchange(
     _instanceName: Text,
     _instantiationToken: Text,
     _resourcePath: Text,
@@ -44,7 +44,7 @@ pub extern "C" fn fmi3InstantiateModelExchange(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3InstantiateCoSimulation(
+pub(super) extern "C" fn fmi3InstantiateCoSimulation(
     instanceName: Text,
     instantiationToken: Text,
     resourcePath: Text,
@@ -89,7 +89,7 @@ pub extern "C" fn fmi3InstantiateCoSimulation(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3InstantiateScheduledExecution(
+pub(super) extern "C" fn fmi3InstantiateScheduledExecution(
     _instanceName: Text,
     _instantiationToken: Text,
     _resourcePath: Text,
@@ -109,12 +109,12 @@ pub extern "C" fn fmi3InstantiateScheduledExecution(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3FreeInstance(instance: Handle) {
+pub(super) extern "C" fn fmi3FreeInstance(instance: Handle) {
     release(instance, &order::FREE_INSTANCE);
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3EnterInitializationMode(
+pub(super) extern "C" fn fmi3EnterInitializationMode(
     instance: Handle,
     _toleranceDefined: Boolean,
     _tolerance: f64,
@@ -130,12 +130,12 @@ pub extern "C" fn fmi3EnterInitializationMode(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3ExitInitializationMode(instance: Handle) -> Status {
+pub(super) extern "C" fn fmi3ExitInitializationMode(instance: Handle) -> Status {
     guard(instance, &order::EXIT_INITIALIZATION_MODE, |slave| slave.exit_initialisation())
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3Terminate(instance: Handle) -> Status {
+pub(super) extern "C" fn fmi3Terminate(instance: Handle) -> Status {
     guard(instance, &order::TERMINATE, |slave| {
         slave.terminate();
         Ok(Status::Ok)
@@ -143,7 +143,7 @@ pub extern "C" fn fmi3Terminate(instance: Handle) -> Status {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3Reset(instance: Handle) -> Status {
+pub(super) extern "C" fn fmi3Reset(instance: Handle) -> Status {
     guard(instance, &order::RESET, |slave| {
         slave.reset();
         Ok(Status::Ok)
@@ -151,27 +151,31 @@ pub extern "C" fn fmi3Reset(instance: Handle) -> Status {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3GetFMUState(instance: Handle, FMUState: Out<StateHandle>) -> Status {
+pub(super) extern "C" fn fmi3GetFMUState(instance: Handle, FMUState: Out<StateHandle>) -> Status {
     state::save(instance, &order::GET_FMU_STATE, FMUState)
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3SetFMUState(instance: Handle, FMUState: StateHandle) -> Status {
+pub(super) extern "C" fn fmi3SetFMUState(instance: Handle, FMUState: StateHandle) -> Status {
     state::restore(instance, &order::SET_FMU_STATE, FMUState)
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3FreeFMUState(instance: Handle, FMUState: Out<StateHandle>) -> Status {
+pub(super) extern "C" fn fmi3FreeFMUState(instance: Handle, FMUState: Out<StateHandle>) -> Status {
     state::free(instance, &order::FREE_FMU_STATE, FMUState)
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3SerializedFMUStateSize(instance: Handle, FMUState: StateHandle, size: Out<usize>) -> Status {
+pub(super) extern "C" fn fmi3SerializedFMUStateSize(
+    instance: Handle,
+    FMUState: StateHandle,
+    size: Out<usize>,
+) -> Status {
     state::size(instance, &order::SERIALIZED_FMU_STATE_SIZE, FMUState, size)
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3SerializeFMUState(
+pub(super) extern "C" fn fmi3SerializeFMUState(
     instance: Handle,
     FMUState: StateHandle,
     serializedState: Out<u8>,
@@ -181,7 +185,7 @@ pub extern "C" fn fmi3SerializeFMUState(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3DeserializeFMUState(
+pub(super) extern "C" fn fmi3DeserializeFMUState(
     instance: Handle,
     serializedState: In<u8>,
     size: usize,

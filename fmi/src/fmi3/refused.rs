@@ -2,8 +2,7 @@
 //! message. Their arguments are not touched.
 
 use super::Boolean;
-use crate::boundary::{Handle, In, Out, unsupported};
-use crate::slave::Status;
+use crate::boundary::{In, Out, refused};
 
 const MODEL_EXCHANGE: &str = "Model Exchange interface";
 const SCHEDULED_EXECUTION: &str = "Scheduled Execution interface";
@@ -12,16 +11,6 @@ const CLOCKS: &str = "clocks";
 const DEPENDENCIES: &str = "per-element dependencies";
 const DERIVATIVES: &str = "directional or adjoint derivatives";
 const CONFIGURATION: &str = "structural parameters";
-
-/// Exported functions with their arguments after the instance, and the capability they belong to.
-macro_rules! refused {
-    ($($name:ident ($($argument:ident: $type:ty),*) $capability:expr;)*) => {$(
-        #[unsafe(no_mangle)]
-        pub extern "C" fn $name(instance: Handle $(, $argument: $type)*) -> Status {
-            unsupported(instance, stringify!($name), $capability)
-        }
-    )*};
-}
 
 refused! {
     fmi3EnterEventMode() EVENT_MODE;

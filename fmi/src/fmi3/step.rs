@@ -18,7 +18,7 @@ struct Outcome {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3DoStep(
+pub(super) extern "C" fn fmi3DoStep(
     instance: Handle,
     currentCommunicationPoint: f64,
     communicationStepSize: f64,
@@ -110,7 +110,7 @@ fn march(instance: Handle, callbacks: Callbacks, update: IntermediateUpdate, sta
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3GetOutputDerivatives(
+pub(super) extern "C" fn fmi3GetOutputDerivatives(
     instance: Handle,
     valueReferences: In<u32>,
     nValueReferences: usize,

@@ -13,7 +13,7 @@ use crate::slave::{Refusal, Request, Status};
 macro_rules! with_variables {
     ($($get:ident $get_rule:ident $set:ident $set_rule:ident $name:literal $c:ty, $rust:ty, $out:expr, $in:expr;)*) => {$(
         #[unsafe(no_mangle)]
-        pub extern "C" fn $get(
+        pub(crate) extern "C" fn $get(
             instance: Handle,
             valueReferences: In<u32>,
             nValueReferences: usize,
@@ -26,7 +26,7 @@ macro_rules! with_variables {
         }
 
         #[unsafe(no_mangle)]
-        pub extern "C" fn $set(
+        pub(crate) extern "C" fn $set(
             instance: Handle,
             valueReferences: In<u32>,
             nValueReferences: usize,
@@ -48,7 +48,7 @@ with_variables! {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3GetString(
+pub(super) extern "C" fn fmi3GetString(
     instance: Handle,
     valueReferences: In<u32>,
     nValueReferences: usize,
@@ -59,7 +59,7 @@ pub extern "C" fn fmi3GetString(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3SetString(
+pub(super) extern "C" fn fmi3SetString(
     instance: Handle,
     valueReferences: In<u32>,
     nValueReferences: usize,
@@ -94,7 +94,7 @@ fn no_variable(
 macro_rules! without_variables {
     ($($get:ident $get_rule:ident $set:ident $set_rule:ident $name:literal $c:ty;)*) => {$(
         #[unsafe(no_mangle)]
-        pub extern "C" fn $get(
+        pub(crate) extern "C" fn $get(
             instance: Handle,
             valueReferences: In<u32>,
             nValueReferences: usize,
@@ -105,7 +105,7 @@ macro_rules! without_variables {
         }
 
         #[unsafe(no_mangle)]
-        pub extern "C" fn $set(
+        pub(crate) extern "C" fn $set(
             instance: Handle,
             valueReferences: In<u32>,
             nValueReferences: usize,
@@ -128,7 +128,7 @@ without_variables! {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3GetBinary(
+pub(super) extern "C" fn fmi3GetBinary(
     instance: Handle,
     valueReferences: In<u32>,
     nValueReferences: usize,
@@ -140,7 +140,7 @@ pub extern "C" fn fmi3GetBinary(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3SetBinary(
+pub(super) extern "C" fn fmi3SetBinary(
     instance: Handle,
     valueReferences: In<u32>,
     nValueReferences: usize,
@@ -152,7 +152,7 @@ pub extern "C" fn fmi3SetBinary(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3GetClock(
+pub(super) extern "C" fn fmi3GetClock(
     instance: Handle,
     valueReferences: In<u32>,
     nValueReferences: usize,
@@ -162,7 +162,7 @@ pub extern "C" fn fmi3GetClock(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3SetClock(
+pub(super) extern "C" fn fmi3SetClock(
     instance: Handle,
     valueReferences: In<u32>,
     nValueReferences: usize,

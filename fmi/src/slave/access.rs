@@ -7,7 +7,7 @@ use super::{Dialect, Phase, Refusal, Result, Slave};
 
 /// A get or set call as the importer made it.
 #[derive(Debug, Clone, Copy)]
-pub struct Request<'a> {
+pub(crate) struct Request<'a> {
     /// Type in the function's name: `Real`, `Float64`, ...
     pub type_name: &'static str,
     /// Value references.
@@ -17,7 +17,7 @@ pub struct Request<'a> {
 }
 
 /// A value of one of the types that variables have.
-pub trait Value: Sized {
+pub(crate) trait Value: Sized {
     /// Say what is wrong with the value for this variable, if anything.
     fn problem(&self, _variable: &Variable) -> Option<String> {
         None
@@ -139,7 +139,7 @@ fn type_name(dialect: Dialect, kind: Kind) -> &'static str {
 impl Slave {
     /// Most value references a single call may bring. More than this can only be a mistaken count, and following it would
     /// read beyond the importer's array; repeating references is legal, hence the margin.
-    pub fn reference_limit(&self) -> usize {
+    pub(crate) fn reference_limit(&self) -> usize {
         16 * self.simulation.table().references() + 1024
     }
 
@@ -147,7 +147,7 @@ impl Slave {
     ///
     /// # Errors
     /// Unknown reference, another type, reference into the middle of an array, wrong number of values.
-    pub fn elements(&self, request: &Request<'_>) -> Result<Vec<u32>> {
+    pub(crate) fn elements(&self, request: &Request<'_>) -> Result<Vec<u32>> {
         let mut elements = Vec::with_capacity(request.references.len());
         for &reference in request.references {
             let (variable, index) = self.simulation.table().locate(reference)?;
@@ -187,7 +187,7 @@ impl Slave {
     ///
     /// # Errors
     /// As [`Slave::elements`]; a value that does not exist yet; an initial state that cannot be computed.
-    pub fn read<T: Value>(&mut self, request: &Request<'_>) -> Result<Vec<T>> {
+    pub(crate) fn read<T: Value>(&mut self, request: &Request<'_>) -> Result<Vec<T>> {
         let elements = self.elements(request)?;
         if matches!(self.phase, Phase::Instantiated { .. }) {
             self.require_start_values(&elements)?;
@@ -226,7 +226,7 @@ impl Slave {
     ///
     /// # Errors
     /// As [`Slave::elements`]; a variable that cannot be set now; a value out of range.
-    pub fn write<T: Value>(&mut self, elements: &[u32], values: &[T]) -> Result<()> {
+    pub(crate) fn write<T: Value>(&mut self, elements: &[u32], values: &[T]) -> Result<()> {
         for (&element, value) in elements.iter().zip(values) {
             let (variable, index) = self.simulation.table().locate(element)?;
             let problem = self.not_settable(variable).or_else(|| value.problem(variable));
@@ -282,7 +282,7 @@ impl Slave {
     ///
     /// # Errors
     /// Unknown reference, not a continuous input, order other than 1, non-finite value.
-    pub fn set_input_derivatives(&mut self, references: &[u32], orders: &[i32], values: &[f64]) -> Result<()> {
+    pub(crate) fn set_input_derivatives(&mut self, references: &[u32], orders: &[i32], values: &[f64]) -> Result<()> {
         for ((&reference, &order), value) in references.iter().zip(orders).zip(values) {
             let what = self.check_derivative(reference, order, Causality::Input)?;
             if !value.is_finite() {
@@ -303,7 +303,7 @@ impl Slave {
     }
 
     /// One order per element, of one order per value reference.
-    pub fn orders_of_elements(&self, references: &[u32], orders: &[i32]) -> Vec<i32> {
+    pub(crate) fn orders_of_elements(&self, references: &[u32], orders: &[i32]) -> Vec<i32> {
         let table = self.simulation.table();
         let count = |reference: u32| match table.locate(reference) {
             Ok((variable, _)) if self.arrays => variable.len(),
@@ -320,7 +320,7 @@ impl Slave {
     ///
     /// # Errors
     /// Unknown reference, not a continuous output, order other than 1.
-    pub fn output_derivatives(&self, elements: &[u32], orders: &[i32]) -> Result<Vec<f64>> {
+    pub(crate) fn output_derivatives(&self, elements: &[u32], orders: &[i32]) -> Result<Vec<f64>> {
         let derivative = |(&element, &order): (&u32, &i32)| {
             self.check_derivative(element, order, Causality::Output)?;
             Ok(self.simulation.output_derivative(element, order)?)

@@ -9,7 +9,7 @@ impl Experiment {
     ///
     /// # Errors
     /// Non-finite times, stop before start.
-    pub fn new(start: f64, stop: Option<f64>) -> Result<Self> {
+    pub(crate) fn new(start: f64, stop: Option<f64>) -> Result<Self> {
         if !start.is_finite() {
             return Err(Refusal::error(format!("startTime = {start} is not finite. Give a start time in seconds")));
         }
@@ -25,7 +25,7 @@ impl Experiment {
 
 impl Slave {
     /// `fmi2SetupExperiment`; may be called again, the last call counts.
-    pub fn set_experiment(&mut self, experiment: Experiment) {
+    pub(crate) fn set_experiment(&mut self, experiment: Experiment) {
         if let Phase::Instantiated { experiment: current } = &mut self.phase {
             *current = experiment;
         }
@@ -34,7 +34,7 @@ impl Slave {
     /// Enter Initialization Mode, with the experiment given here (FMI 3.0) or before (FMI 2.0).
     ///
     /// Nothing is computed yet: parameters may still be set one after the other.
-    pub fn enter_initialisation(&mut self, given: Option<Experiment>) {
+    pub(crate) fn enter_initialisation(&mut self, given: Option<Experiment>) {
         if let Phase::Instantiated { experiment } = self.phase {
             self.phase = Phase::Initialising { experiment: given.unwrap_or(experiment), before: None };
         }
@@ -79,7 +79,7 @@ impl Slave {
     ///
     /// # Errors
     /// The core's refusal; the instance stays in Initialization Mode and can be given other parameters.
-    pub fn exit_initialisation(&mut self) -> Result<Status> {
+    pub(crate) fn exit_initialisation(&mut self) -> Result<Status> {
         self.refresh()?;
         if let Phase::Initialising { experiment, .. } = self.phase {
             self.phase = Phase::Stepping { stop: experiment.stop };
@@ -91,12 +91,12 @@ impl Slave {
     }
 
     /// Terminate; values can still be read afterwards.
-    pub fn terminate(&mut self) {
+    pub(crate) fn terminate(&mut self) {
         self.phase = Phase::Terminated { time: self.time() };
     }
 
     /// Back to the state after instantiation. Saved states stay valid.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.simulation.reset();
         self.strings.clear();
         self.phase = Phase::Instantiated { experiment: Experiment::default() };
@@ -106,7 +106,7 @@ impl Slave {
     ///
     /// # Errors
     /// A reference that does not exist, or is no input, output or time.
-    pub fn check_intermediate_variables(&self, references: &[u32]) -> Result<()> {
+    pub(crate) fn check_intermediate_variables(&self, references: &[u32]) -> Result<()> {
         for &reference in references {
             let (variable, index) = self.simulation.table().locate(reference)?;
             let accessible = [Causality::Input, Causality::Output, Causality::Independent];

@@ -2,7 +2,7 @@
 
 mod access;
 mod life;
-pub mod order;
+pub(crate) mod order;
 mod phase;
 mod snapshot;
 mod stepping;
@@ -13,14 +13,14 @@ use std::path::Path;
 
 use tiprub_core::Simulation;
 
-pub use access::{Request, Value};
-pub use phase::{Experiment, Phase};
+pub(crate) use access::{Request, Value};
+pub(crate) use phase::{Experiment, Phase};
 
 /// Answer of a call. The numbers are those of `fmi2Status` and `fmi3Status`; `Fatal` (4) is never answered, because in
 /// FMI 2.0 it would condemn all instances of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(i32)]
-pub enum Status {
+pub(crate) enum Status {
     /// All well.
     Ok = 0,
     /// Done, and the message logged deserves attention.
@@ -33,7 +33,7 @@ pub enum Status {
 
 /// Which version of the standard an instance was made by: names of types and arguments differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Dialect {
+pub(crate) enum Dialect {
     /// FMI 2.0.
     Fmi2,
     /// FMI 3.0.
@@ -42,7 +42,7 @@ pub enum Dialect {
 
 /// A call that was not carried out, and the message that explains it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refusal {
+pub(crate) struct Refusal {
     /// `Error` or `Discard`.
     pub status: Status,
     /// What, where, and the remedy.
@@ -51,12 +51,12 @@ pub struct Refusal {
 
 impl Refusal {
     /// A refusal that answers `Error`.
-    pub fn error(message: impl Into<String>) -> Self {
+    pub(crate) fn error(message: impl Into<String>) -> Self {
         Self { status: Status::Error, message: message.into() }
     }
 
     /// A refusal that answers `Discard`.
-    pub fn discard(message: impl Into<String>) -> Self {
+    pub(crate) fn discard(message: impl Into<String>) -> Self {
         Self { status: Status::Discard, message: message.into() }
     }
 }
@@ -74,11 +74,11 @@ impl fmt::Display for Refusal {
 }
 
 /// Result of the slave's own calls.
-pub type Result<T, E = Refusal> = std::result::Result<T, E>;
+pub(crate) type Result<T, E = Refusal> = std::result::Result<T, E>;
 
 /// One FMU instance without its callbacks.
 #[derive(Debug)]
-pub struct Slave {
+pub(crate) struct Slave {
     dialect: Dialect,
     simulation: Simulation,
     token: String,
@@ -101,7 +101,7 @@ impl Slave {
     ///
     /// # Errors
     /// Unreadable or damaged resources, a token that does not belong to them, a scene that the core refuses.
-    pub fn new(dialect: Dialect, resources: &Path, token: &str) -> Result<Self> {
+    pub(crate) fn new(dialect: Dialect, resources: &Path, token: &str) -> Result<Self> {
         let loaded = tiprub_format::load_resources(resources).map_err(|error| Refusal::error(error.to_string()))?;
         if loaded.token != token {
             let (name, file) = match dialect {
@@ -128,17 +128,17 @@ impl Slave {
     }
 
     /// Version of the standard this instance was made by.
-    pub fn dialect(&self) -> Dialect {
+    pub(crate) fn dialect(&self) -> Dialect {
         self.dialect
     }
 
     /// Phase of life.
-    pub fn phase(&self) -> &Phase {
+    pub(crate) fn phase(&self) -> &Phase {
         &self.phase
     }
 
     /// Time of the instance (s): what the importer would call the current time, in any phase.
-    pub fn time(&self) -> f64 {
+    pub(crate) fn time(&self) -> f64 {
         match self.phase {
             Phase::Instantiated { experiment } | Phase::Initialising { experiment, .. } => experiment.start,
             Phase::Stepping { .. } => self.simulation.time(),
@@ -148,13 +148,13 @@ impl Slave {
     }
 
     /// Keep texts that are handed out by pointer.
-    pub fn keep(&mut self, texts: Vec<CString>) -> &[CString] {
+    pub(crate) fn keep(&mut self, texts: Vec<CString>) -> &[CString] {
         self.strings = texts;
         &self.strings
     }
 
     /// Messages that do not come with a refusal, in order; the list is empty afterwards.
-    pub fn take_notes(&mut self) -> Vec<(Status, String)> {
+    pub(crate) fn take_notes(&mut self) -> Vec<(Status, String)> {
         std::mem::take(&mut self.notes)
     }
 
@@ -164,7 +164,7 @@ impl Slave {
     }
 
     /// Add a message to be handed to the importer after the call.
-    pub fn note(&mut self, status: Status, message: impl Into<String>) {
+    pub(crate) fn note(&mut self, status: Status, message: impl Into<String>) {
         self.notes.push((status, message.into()));
     }
 }

@@ -14,7 +14,7 @@ use super::{Dialect, Phase, Refusal, Result};
 
 /// One row of a call-order table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Rule {
+pub(crate) struct Rule {
     /// Name of the exported function.
     pub name: &'static str,
     /// Phases in which it may be called.
@@ -23,7 +23,7 @@ pub struct Rule {
 
 impl Rule {
     /// Version of the standard, by the prefix of the name.
-    pub fn dialect(&self) -> Dialect {
+    pub(crate) fn dialect(&self) -> Dialect {
         if self.name.starts_with("fmi2") { Dialect::Fmi2 } else { Dialect::Fmi3 }
     }
 
@@ -31,7 +31,7 @@ impl Rule {
     ///
     /// # Errors
     /// The message names the phase and the phases in which the call is allowed.
-    pub fn check(&self, phase: &Phase) -> Result<()> {
+    pub(crate) fn check(&self, phase: &Phase) -> Result<()> {
         if self.states & phase.state() != 0 {
             return Ok(());
         }
@@ -45,7 +45,7 @@ impl Rule {
 }
 
 /// No phase.
-pub const NOWHERE: States = 0;
+pub(crate) const NOWHERE: States = 0;
 /// Phases in which the whole state can be saved and restored.
 const SETTABLE: States = INSTANTIATED | INITIALISING | STEPPING | FAILED | TERMINATED;
 /// Phases in which values can be read.
@@ -56,13 +56,13 @@ const WRITABLE: States = INSTANTIATED | INITIALISING | STEPPING | UPDATING;
 /// One `const` per row.
 macro_rules! table {
     ($($constant:ident $name:literal $states:expr;)*) => {
-        $(pub const $constant: Rule = Rule { name: $name, states: $states };)*
+        $(pub(crate) const $constant: Rule = Rule { name: $name, states: $states };)*
     };
 }
 
 /// FMI 2.0. Phases: stepComplete is `STEPPING`, stepFailed and error are `FAILED`; stepInProgress and stepCanceled do not
 /// exist in a slave that never steps asynchronously.
-pub mod fmi2 {
+pub(crate) mod fmi2 {
     use super::*;
 
     table! {
@@ -100,7 +100,7 @@ pub mod fmi2 {
 }
 
 /// FMI 3.0 Co-Simulation without Event Mode.
-pub mod fmi3 {
+pub(crate) mod fmi3 {
     use super::*;
 
     table! {
@@ -151,6 +151,6 @@ pub mod fmi3 {
 }
 
 /// Row of a function that belongs to a capability this FMU does not have; its own message says so in every phase.
-pub const fn unsupported(name: &'static str) -> Rule {
+pub(crate) const fn unsupported(name: &'static str) -> Rule {
     Rule { name, states: ANY }
 }

@@ -2,7 +2,7 @@
 
 /// Start and stop time given by the importer.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Experiment {
+pub(crate) struct Experiment {
     /// Start time (s).
     pub start: f64,
     /// Stop time (s), where defined: steps beyond it are refused.
@@ -11,7 +11,7 @@ pub struct Experiment {
 
 /// Where an instance is in the state machines of the standards.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Phase {
+pub(crate) enum Phase {
     /// Instantiated: start values can be set.
     Instantiated {
         /// Set by `fmi2SetupExperiment`; the default starts at 0 without a stop.
@@ -52,22 +52,22 @@ pub enum Phase {
 }
 
 /// Set of phases, one bit each.
-pub type States = u8;
+pub(crate) type States = u8;
 
 /// [`Phase::Instantiated`].
-pub const INSTANTIATED: States = 1;
+pub(crate) const INSTANTIATED: States = 1;
 /// [`Phase::Initialising`].
-pub const INITIALISING: States = 2;
+pub(crate) const INITIALISING: States = 2;
 /// [`Phase::Stepping`].
-pub const STEPPING: States = 4;
+pub(crate) const STEPPING: States = 4;
 /// [`Phase::Updating`].
-pub const UPDATING: States = 8;
+pub(crate) const UPDATING: States = 8;
 /// [`Phase::Failed`].
-pub const FAILED: States = 16;
+pub(crate) const FAILED: States = 16;
 /// [`Phase::Terminated`].
-pub const TERMINATED: States = 32;
+pub(crate) const TERMINATED: States = 32;
 /// Every phase.
-pub const ANY: States = 63;
+pub(crate) const ANY: States = 63;
 
 /// Names for messages, in the order of the bits.
 const NAMES: [&str; 6] =
@@ -75,7 +75,7 @@ const NAMES: [&str; 6] =
 
 impl Phase {
     /// The phase as a set of one.
-    pub fn state(&self) -> States {
+    pub(crate) fn state(&self) -> States {
         match self {
             Self::Instantiated { .. } => INSTANTIATED,
             Self::Initialising { .. } => INITIALISING,
@@ -88,7 +88,7 @@ impl Phase {
 }
 
 /// Names of the phases in a set, for messages.
-pub fn names(states: States) -> String {
+pub(super) fn names(states: States) -> String {
     let named = NAMES.iter().enumerate().filter(|(bit, _)| states & (1 << bit) != 0);
     named.map(|(_, name)| *name).collect::<Vec<_>>().join(", ")
 }

@@ -11,10 +11,10 @@ const VERSION: u32 = 1;
 const CHECKSUM: usize = 8;
 
 /// One saved state.
-pub type Snapshot = Vec<u8>;
+pub(super) type Snapshot = Vec<u8>;
 
 /// Opaque address by which the importer names a saved state.
-pub type Handle = *const Snapshot;
+pub(crate) type Handle = *const Snapshot;
 
 fn damaged(problem: impl std::fmt::Display) -> Refusal {
     Refusal::error(format!(
@@ -85,7 +85,7 @@ impl Slave {
     ///
     /// # Errors
     /// A handle that this instance did not hand out.
-    pub fn save(&mut self, existing: Option<Handle>) -> Result<Handle> {
+    pub(crate) fn save(&mut self, existing: Option<Handle>) -> Result<Handle> {
         let bytes = self.encode()?;
         self.store(existing, bytes)
     }
@@ -114,7 +114,7 @@ impl Slave {
     ///
     /// # Errors
     /// Not a state of this instance, or not one of this FMU; nothing is changed then.
-    pub fn restore(&mut self, handle: Handle) -> Result<()> {
+    pub(crate) fn restore(&mut self, handle: Handle) -> Result<()> {
         let index = self.index(handle)?;
         let snapshot = std::mem::take(&mut *self.snapshots[index]);
         let outcome = self.decode(&snapshot).and_then(|(phase, state)| {
@@ -130,7 +130,7 @@ impl Slave {
     ///
     /// # Errors
     /// Not a state of this instance.
-    pub fn free_snapshot(&mut self, handle: Handle) -> Result<()> {
+    pub(crate) fn free_snapshot(&mut self, handle: Handle) -> Result<()> {
         let index = self.index(handle)?;
         self.snapshots.swap_remove(index);
         Ok(())
@@ -140,12 +140,12 @@ impl Slave {
     ///
     /// # Errors
     /// Not a state of this instance.
-    pub fn serialised(&self, handle: Handle) -> Result<&[u8]> {
+    pub(crate) fn serialised(&self, handle: Handle) -> Result<&[u8]> {
         Ok(&self.snapshots[self.index(handle)?])
     }
 
     /// Length of every saved state of this FMU (bytes).
-    pub fn serialised_size(&self) -> usize {
+    pub(crate) fn serialised_size(&self) -> usize {
         MAGIC.len() + 4 + 4 + self.token.len() + 4 + 8 + 8 + 8 + self.simulation.state_size() + CHECKSUM
     }
 
@@ -153,7 +153,7 @@ impl Slave {
     ///
     /// # Errors
     /// Wrong length, another FMU's state, damaged bytes.
-    pub fn deserialise(&mut self, bytes: &[u8], existing: Option<Handle>) -> Result<Handle> {
+    pub(crate) fn deserialise(&mut self, bytes: &[u8], existing: Option<Handle>) -> Result<Handle> {
         self.decode(bytes)?;
         self.store(existing, bytes.to_vec())
     }

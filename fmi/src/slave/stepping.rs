@@ -19,7 +19,7 @@ impl Slave {
     ///
     /// # Errors
     /// Wrong time, bad step size, a step beyond the stop time; the state is as before.
-    pub fn begin_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
+    pub(crate) fn begin_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
         let Phase::Stepping { stop } = self.phase else {
             return Err(Refusal::error("no step can begin in this phase"));
         };
@@ -45,7 +45,7 @@ impl Slave {
     ///
     /// # Errors
     /// The state became non-finite; the phase is [`Phase::Failed`] then.
-    pub fn advance(&mut self) -> Result<Progress> {
+    pub(crate) fn advance(&mut self) -> Result<Progress> {
         let last_good = self.simulation.time();
         let Phase::Updating { stop, .. } = self.phase else {
             return Err(Refusal::error("no step is under way"));
@@ -59,7 +59,7 @@ impl Slave {
     ///
     /// # Errors
     /// Early: the state is not finite; the phase is [`Phase::Failed`] then.
-    pub fn end_step(&mut self, early: bool) -> Result<()> {
+    pub(crate) fn end_step(&mut self, early: bool) -> Result<()> {
         let last_good = self.simulation.time();
         if let Phase::Updating { stop, .. } = self.phase {
             if early {
@@ -74,7 +74,7 @@ impl Slave {
     ///
     /// # Errors
     /// As [`Slave::begin_step`] and [`Slave::advance`].
-    pub fn step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
+    pub(crate) fn step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
         self.begin_step(current_time, step_size)?;
         while !self.advance()?.finished {}
         self.end_step(false)

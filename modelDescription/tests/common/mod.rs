@@ -1,10 +1,11 @@
 //! A synthetic table with every kind of variable, and a description around it.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{ContactNode, Frame, RomChecks};
+use tiprub_core::rom::{Frame, RomChecks};
 use tiprub_core::variables::*;
 use tiprub_core::{Rom, VariableTable};
 use tiprub_model_description::{Description, Experiment};
+use tiprub_test_models::{node, structure};
 
 pub static METRE: Unit = Unit { name: "m", exponents: [0, 1, 0, 0, 0], display: &[("mm", 1e3), ("µm", 1e6)] };
 pub static SECOND: Unit = Unit { name: "s", exponents: [0, 0, 1, 0, 0], display: &[] };
@@ -96,29 +97,17 @@ pub fn table() -> VariableTable {
 }
 
 pub fn rom() -> Rom {
-    Rom {
-        name: "blade".into(),
-        origin: "hex20 mesh of <many> nodes".into(),
-        sectors: 36,
-        frame: Frame::Cylindrical,
-        mass: DMatrix::identity(2, 2),
-        stiffness: DMatrix::identity(2, 2),
-        damping_ratio: 0.001,
-        contact_map: DMatrix::zeros(3, 2),
-        contact_nodes: vec![ContactNode {
-            name: "leading_edge".into(),
-            position: [0.25, 0.0, 0.0],
-            meridional_slope: 0.0,
-        }],
-        checks: RomChecks {
-            full_frequencies: vec![812.345678, 2345.6],
-            reduced_frequencies: vec![812.35, 2345.7],
-            frequency_deviation: vec![5.3e-4, 0.0043],
-            residual_criterion: vec![0.1],
-            nodal_diameters: Vec::new(),
-        },
-        extras: tiprub_core::rom::RomExtras::default(),
-    }
+    let nodes = vec![node("leading_edge", [0.25, 0.0, 0.0], 0.0)];
+    let rom = structure("blade", DMatrix::identity(2, 2), DMatrix::identity(2, 2), DMatrix::zeros(3, 2), nodes);
+    let checks = RomChecks {
+        full_frequencies: vec![812.345678, 2345.6],
+        reduced_frequencies: vec![812.35, 2345.7],
+        frequency_deviation: vec![5.3e-4, 0.0043],
+        residual_criterion: vec![0.1],
+        nodal_diameters: Vec::new(),
+    };
+    let origin = "hex20 mesh of <many> nodes".into();
+    Rom { sectors: 36, frame: Frame::Cylindrical, damping_ratio: 0.001, checks, origin, ..rom }
 }
 
 pub fn description<'a>(table: &'a VariableTable, rom: &'a Rom, fmi3_arrays: bool) -> Description<'a> {

@@ -1,94 +1,9 @@
 //! A scene with every option on, small blades in a small flexible casing, and what each option is.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
-
-use nalgebra::{DMatrix, DVector};
-use tiprub_core::rom::{ContactGrid, ContactNode, Frame, Patch, RomChecks, RomExtras, Spin, Thermal};
 use tiprub_core::settings::*;
 use tiprub_core::{Rom, Scene, VariableTable};
 use tiprub_model_description::{Description, Experiment};
-
-/// Blades whose three contact nodes are masses on springs: 1 g, about 1 kHz.
-fn rom() -> Rom {
-    let node = |name: &str, z: f64| ContactNode { name: name.into(), position: [0.25, 0.0, z], meridional_slope: 0.0 };
-    Rom {
-        name: "blade".into(),
-        origin: "three masses on springs".into(),
-        sectors: 36,
-        frame: Frame::Cylindrical,
-        mass: DMatrix::identity(9, 9) * 1e-3,
-        stiffness: DMatrix::identity(9, 9) * 4e4,
-        damping_ratio: 0.001,
-        contact_map: DMatrix::identity(9, 9),
-        contact_nodes: vec![node("leading_edge", 0.0), node("mid_chord", 0.02), node("trailing_edge", 0.04)],
-        checks: RomChecks::default(),
-        extras: RomExtras { spin: Some(spin()), ..RomExtras::default() },
-    }
-}
-
-/// Spin of those masses: softening in the plane of rotation, Coriolis between radial and tangential, load outwards.
-fn spin() -> Spin {
-    let in_plane = |i: usize| i % 3 < 2;
-    let coriolis = |i: usize, j: usize| match (i % 3, i.abs_diff(j)) {
-        (0, 1) if j > i => -1e-3,
-        (1, 1) if j < i => 1e-3,
-        _ => 0.0,
-    };
-    Spin {
-        stiffness_speed2: DMatrix::from_fn(9, 9, |i, j| if i == j && in_plane(i) { -1e-3 } else { 0.0 }),
-        stiffness_speed4: DMatrix::zeros(9, 9),
-        coriolis: DMatrix::from_fn(9, 9, coriolis),
-        centrifugal_load: (0..9).map(|i| if i % 3 == 0 { 1e-6 } else { 0.0 }).collect(),
-        centrifugal_load_speed4: vec![0.0; 9],
-        largest_speed: 2000.0,
-    }
-}
-
-/// Nodes around and along of the contact grid of the casing.
-const GRID: [usize; 2] = [24, 3];
-
-/// A ring in its five softest in-plane shapes: breathing, and two and three nodal diameters in pairs; four patches.
-fn ring() -> Rom {
-    let [around, along] = GRID;
-    let modes = [(9e3, 0.0, 0.0), (4e2, 2.0, 0.0), (4e2, 2.0, FRAC_PI_2), (1.1e3, 3.0, 0.0), (1.1e3, 3.0, FRAC_PI_2)];
-    let angle = |node: usize| TAU * (node % around) as f64 / around as f64;
-    let shape = |row: usize, mode: usize| {
-        let ((_, order, phase), theta) = (modes[mode], angle(row / 3));
-        match row % 3 {
-            0 => 0.5 * (order * theta - phase).cos(),
-            1 if order > 0.0 => -0.5 * (order * theta - phase).sin() / order,
-            _ => 0.0,
-        }
-    };
-    let node = |node: usize| ContactNode {
-        name: format!("c{}", node + 1),
-        position: [0.25, angle(node), -0.02 + 0.04 * (node / around) as f64],
-        meridional_slope: 0.0,
-    };
-    let quarter = |patch: u32| [FRAC_PI_2 * f64::from(patch), FRAC_PI_2 * f64::from(patch + 1)];
-    let squares = modes.map(|(frequency, ..)| (TAU * frequency).powi(2));
-    Rom {
-        name: "ring".into(),
-        origin: "in-plane shapes of a ring".into(),
-        sectors: 1,
-        frame: Frame::Cylindrical,
-        mass: DMatrix::identity(5, 5),
-        stiffness: DMatrix::from_diagonal(&DVector::from_row_slice(&squares)),
-        damping_ratio: 0.01,
-        contact_map: DMatrix::from_fn(3 * around * along, 5, shape),
-        contact_nodes: (0..around * along).map(node).collect(),
-        checks: RomChecks::default(),
-        extras: RomExtras {
-            spin: None,
-            thermal: Some(Thermal {
-                loads: DMatrix::from_fn(5, 4, |mode, patch| if mode == 0 { 200.0 } else { (mode + patch) as f64 }),
-                patches: (0..4).map(|patch| Patch { angle: quarter(patch), axial: [-0.02, 0.06] }).collect(),
-            }),
-            grid: Some(ContactGrid { around, along, closed: true }),
-            harmonics: Vec::new(),
-        },
-    }
-}
+use tiprub_test_models as models;
 
 /// Every option on.
 pub fn complete() -> Scene {
@@ -96,16 +11,9 @@ pub fn complete() -> Scene {
     let rotor = &mut scene.settings.structures[0];
     rotor.spin = SpinSettings { stiffening: true, growth: true, coriolis: true };
     (rotor.whirl, rotor.axial_shift) = (true, true);
-    scene.settings.structures.push(StructureSettings {
-        name: "ring".into(),
-        rom: "ring.rom.safetensors".into(),
-        motion: Motion::Still,
-        thermal: true,
-        load: Some(LoadSettings { order: 2, amplitude: 0.0, phase: 0.0 }),
-        ..StructureSettings::default()
-    });
-    scene.roms.push(ring());
-    scene.settings.surfaces[0].structure = Some("ring".into());
+    models::on_ring(&mut scene, models::ring(24, 3), 0.01);
+    let ring = &mut scene.settings.structures[1];
+    (ring.thermal, ring.load) = (true, Some(LoadSettings { order: 2, amplitude: 0.0, phase: 0.0 }));
     scene.settings.surfaces[0].patches = Some(PatchSettings { around: 8, along: 1 });
     let contact = &mut scene.settings.contacts[0];
     contact.heat_to_slave = Some(0.4);
@@ -123,46 +31,23 @@ pub fn complete() -> Scene {
 
 /// A rigid casing, and every option on that this leaves.
 pub fn rigid() -> Scene {
-    let settings = SceneSettings {
-        name: "rotor_rub".into(),
-        description: "Tip rub of 36 blades".into(),
-        structures: vec![StructureSettings {
-            name: "rotor".into(),
-            rom: "blade.rom.safetensors".into(),
-            motion: Motion::Rotating,
-            speed: 1800.0,
-            damping_ratio: None,
-            ..StructureSettings::default()
-        }],
-        surfaces: vec![SurfaceSettings {
-            name: "casing".into(),
-            shape: Shape::TwoLobe { depth: 1.2, width: 0.15, phase: 0.0 },
-            ramp_time: 1e-4,
-            moving: true,
-            ..SurfaceSettings::default()
-        }],
-        contacts: vec![ContactSettings {
-            master: "rotor".into(),
-            slave: "casing".into(),
-            gap: 3.56e-4,
-            sector_gaps: Vec::new(),
-            friction: 0.15,
-            solver: Solver::Lcp,
-            meridian: Meridian::Contour,
-            ..ContactSettings::default()
-        }],
-        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6, ..TimeSettings::default() },
-        outputs: OutputSettings {
-            watched_sectors: vec![1],
-            all_sectors: true,
-            nodal_diameters: Some(18),
-            energies: true,
-            instantaneous_forces: true,
-            ..OutputSettings::default()
-        },
-        experiment: ExperimentSettings { start: 0.0, stop: 0.01, communication_step: 1e-5 },
+    let mut rom = models::blade(36);
+    rom.extras.spin = Some(models::spin(rom.order()));
+    let mut scene = models::bumps(rom);
+    let settings = &mut scene.settings;
+    settings.structures[0].speed = 1800.0;
+    settings.surfaces[0].shape = Shape::TwoLobe { depth: 1.2, width: 0.15, phase: 0.0 };
+    settings.surfaces[0].ramp_time = 1e-4;
+    settings.outputs = OutputSettings {
+        watched_sectors: vec![1],
+        all_sectors: true,
+        nodal_diameters: Some(18),
+        energies: true,
+        instantaneous_forces: true,
+        ..OutputSettings::default()
     };
-    Scene { settings, roms: vec![rom()] }
+    settings.experiment.communication_step = 1e-5;
+    scene
 }
 
 /// An option as the user guide writes it, and a function that switches it off.

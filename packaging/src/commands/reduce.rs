@@ -1,6 +1,6 @@
 //! `tiprub reduce`: from a blade or a casing to a ROM file, with its checks.
 
-use std::{fmt::Write as _, path::Path};
+use std::{fmt::Write as _, path::Path, time::Instant};
 
 use serde_json::{Value, json};
 use tiprub_gallery::{builtin, reduction};
@@ -38,7 +38,9 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     let names: Vec<Named> = targets.into_iter().filter_map(|(role, path)| Some(Named::new(role, path?))).collect();
     places::apart(&arguments.model.files(), &names)?;
     targets.into_iter().filter_map(|(_, path)| path).try_for_each(|path| check_target(path, written))?;
-    let reduced = reduced(&arguments.model, console)?;
+    let start = Instant::now();
+    let mut reduced = reduced(&arguments.model, console)?;
+    reduced.seconds = start.elapsed().as_secs_f64();
     let facts = RomFacts::of(&reduced.rom, None)?;
     let mut files = vec![(output, tiprub_format::write_rom(&reduced.rom))];
     if let Some(path) = &written.inp {

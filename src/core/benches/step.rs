@@ -5,18 +5,13 @@
 //! its two matrices multiplied out beforehand, in the reduced coordinates of all blades. An argument after `--` selects
 //! rows by a part of their name.
 
-#[path = "../tests/common/mod.rs"]
-mod common;
-
 use std::time::Instant;
 
 use nalgebra::{Complex, DMatrix, DVector};
-use tiprub_core::rom::{ContactNode, Frame, Harmonic, Rom, RomChecks};
-use tiprub_core::settings::{
-    CoatingSettings, ContactSettings, ExperimentSettings, Meridian, Motion, OutputSettings, SceneSettings, Scheme,
-    Shape, Solver, SplineSettings, StructureSettings, SurfaceSettings, TimeSettings,
-};
+use tiprub_core::rom::{Harmonic, Rom};
+use tiprub_core::settings::{CoatingSettings, ExperimentSettings, OutputSettings, Shape, Solver, SplineSettings};
 use tiprub_core::{Scene, Simulation};
+use tiprub_test_models::{self as models};
 
 const SECTORS: usize = 36;
 const WHEEL_SECTORS: usize = 56;
@@ -34,62 +29,19 @@ const FREQUENCIES: [f64; MODES] = [
 ];
 
 fn scene(shape: Shape, energies: bool) -> Scene {
-    let stiffness = FREQUENCIES.map(|frequency: f64| (std::f64::consts::TAU * frequency).powi(2));
-    let rom = Rom {
-        name: "blade".into(),
-        origin: "frequencies of rotor 37, synthetic shapes".into(),
-        sectors: SECTORS,
-        frame: Frame::Cylindrical,
-        mass: DMatrix::identity(MODES, MODES),
-        stiffness: DMatrix::from_diagonal(&DVector::from_row_slice(&stiffness)),
-        damping_ratio: 0.005,
-        contact_map: DMatrix::from_fn(9, MODES, |row, mode| {
-            let size = if row % 3 == 1 { 4.0 } else { 1.5 };
-            size * (1.7 * mode as f64 + 2.3 * row as f64).cos() + if mode == 20 + row { 60.0 } else { 0.0 }
-        }),
-        contact_nodes: (0..3_u8)
-            .map(|index| ContactNode {
-                name: format!("node_{index}"),
-                position: [0.25, 0.1 - 0.1 * f64::from(index), 0.01 * f64::from(index)],
-                meridional_slope: -0.25,
-            })
-            .collect(),
-        checks: RomChecks::default(),
-        extras: tiprub_core::rom::RomExtras::default(),
+    let shape_of = |row: usize, mode: usize| {
+        let size = if row % 3 == 1 { 4.0 } else { 1.5 };
+        size * (1.7 * mode as f64 + 2.3 * row as f64).cos() + if mode == 20 + row { 60.0 } else { 0.0 }
     };
-    let settings = SceneSettings {
-        name: "bench".into(),
-        description: String::new(),
-        structures: vec![StructureSettings {
-            name: "rotor".into(),
-            rom: "blade".into(),
-            motion: Motion::Rotating,
-            speed: 1300.0,
-            damping_ratio: None,
-            ..StructureSettings::default()
-        }],
-        surfaces: vec![SurfaceSettings {
-            name: "casing".into(),
-            shape,
-            ramp_time: 2e-3,
-            moving: false,
-            ..SurfaceSettings::default()
-        }],
-        contacts: vec![ContactSettings {
-            master: "rotor".into(),
-            slave: "casing".into(),
-            gap: 3.56e-4,
-            sector_gaps: vec![],
-            friction: 0.15,
-            solver: Solver::Lcp,
-            meridian: Meridian::Contour,
-            ..ContactSettings::default()
-        }],
-        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6, ..TimeSettings::default() },
-        outputs: OutputSettings { energies, ..OutputSettings::default() },
-        experiment: ExperimentSettings { start: 0.0, stop: 1.0, communication_step: 1e-4 },
-    };
-    Scene { settings, roms: vec![rom] }
+    let place = |index: u8| [0.25, 0.1 - 0.1 * f64::from(index), 0.01 * f64::from(index)];
+    let nodes = (0..3_u8).map(|index| models::node(format!("node_{index}"), place(index), -0.25)).collect();
+    let blade = models::modal("blade", &FREQUENCIES, shape_of, nodes);
+    let mut scene = models::bumps(Rom { sectors: SECTORS, damping_ratio: 0.005, ..blade });
+    let surface = &mut scene.settings.surfaces[0];
+    (surface.shape, surface.ramp_time, surface.moving) = (shape, 2e-3, false);
+    scene.settings.outputs = OutputSettings { energies, ..OutputSettings::default() };
+    scene.settings.experiment = ExperimentSettings { start: 0.0, stop: 1.0, communication_step: 1e-4 };
+    scene
 }
 
 fn coated(scene: &mut Scene) {
@@ -104,14 +56,7 @@ fn coated(scene: &mut Scene) {
 }
 
 fn flexible(scene: &mut Scene) {
-    scene.settings.structures.push(StructureSettings {
-        name: "ring".into(),
-        rom: "ring".into(),
-        motion: Motion::Still,
-        ..StructureSettings::default()
-    });
-    scene.roms.push(common::casing_of(36, 3, 34));
-    scene.settings.surfaces[0].structure = Some("ring".into());
+    models::on_ring(scene, models::ring_of(36, 3, 34), 0.03);
 }
 
 /// Time per call (s) of the fastest tenth of `batches` batches of `calls` calls: other work on the machine only adds time.

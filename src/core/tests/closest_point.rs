@@ -41,11 +41,11 @@ fn the_closest_point_is_found_from_anywhere_around() {
             let surface = spline(&data(around, along, casing), around, along);
             let (mut offset, mut gradient, mut away): (f64, f64, f64) = (0.0, 0.0, 0.0);
             for _ in 0..100 {
-                let at = ClosestPoint { t: random.within(0.05, 0.95), ..random.place(&surface) };
+                let at = ClosestPoint { t: random.within(0.05, 0.95), ..anywhere(&mut random, &surface) };
                 let gap = random.within(-5e-3, 5e-3);
                 let x = node(&surface, at, gap);
                 for _ in 0..20 {
-                    let (place, point, normal, value) = found(surface.project(x, random.place(&surface)));
+                    let (place, point, normal, value) = found(surface.project(x, anywhere(&mut random, &surface)));
                     let r: [f64; 3] = std::array::from_fn(|i| x[i] - point[i]);
                     let evaluation = surface.evaluate(place);
                     for tangent in [evaluation.d_s, evaluation.d_t] {
@@ -91,13 +91,13 @@ fn no_sampled_point_is_closer() {
             let (mut closer, mut farther): (f64, f64) = (0.0, 0.0);
             let samples = 1500 / around;
             for index in 0..40 {
-                let mut at = ClosestPoint { t: random.within(0.05, 0.95), ..random.place(&surface) };
+                let mut at = ClosestPoint { t: random.within(0.05, 0.95), ..anywhere(&mut random, &surface) };
                 // Half of the nodes stand next to a border of patches, where facets and free ends kink.
                 if index % 2 == 0 {
-                    (at.patch[0], at.s) = (if index % 4 == 0 { 0 } else { at.patch[0] }, 1e-3 * random.next());
+                    (at.patch[0], at.s) = (if index % 4 == 0 { 0 } else { at.patch[0] }, 1e-3 * random.unit());
                 }
                 let x = node(&surface, at, random.within(-3e-3, 3e-3));
-                let guess = ClosestPoint { t: 0.5, ..random.place(&surface) };
+                let guess = ClosestPoint { t: 0.5, ..anywhere(&mut random, &surface) };
                 let (_, point, _, _) = found(surface.project(x, guess));
                 let (least, found) = (brute_force(&surface, x, samples), distance(point, x));
                 closer = closer.max(found - least);
@@ -195,7 +195,7 @@ fn a_node_finds_the_surface_beyond_its_edge_and_not_beyond_its_reach() {
             for (q, t, outwards) in [(0, 0.0, -1.0), (1, 1.0, 1.0)] {
                 let edge = place(p, q, s, t);
                 let x = node(&surface, edge, gap);
-                let guess = ClosestPoint { t: random.next(), patch: [p, random.below(2)], s: random.next() };
+                let guess = ClosestPoint { t: random.unit(), patch: [p, random.below(2)], s: random.unit() };
                 let (at, _, _, value) = found(surface.project(x, guess));
                 assert!((value - gap).abs() < 4e-16 && (at.t - t).abs() < 1e-9, "{at:?} for {edge:?}");
                 // Anywhere on what goes on, at its distance, on either side of it.
@@ -271,7 +271,7 @@ fn places_from_angle_and_axial_position_are_near() {
     for (surface, _) in every_surface() {
         let mut random = Random(10);
         for _ in 0..100 {
-            let at = random.place(&surface);
+            let at = anywhere(&mut random, &surface);
             let (guess, far) = (surface.locate(surface.evaluate(at).point), surface.around());
             let [found, expected] = [guess, at].map(|place| place.patch[0] as f64 + place.s);
             let apart = (found - expected).rem_euclid(far as f64);
@@ -328,7 +328,7 @@ fn a_start_from_the_last_step_ends_where_a_start_from_elsewhere_does() {
             let x = [r * angle.cos(), r * angle.sin(), z];
             let warm = found(surface.project(x, surface.advance(guess, turn)));
             let located = found(surface.project(x, surface.locate(x)));
-            let cold = found(surface.project(x, ClosestPoint { t: 0.5, ..random.place(&surface) }));
+            let cold = found(surface.project(x, ClosestPoint { t: 0.5, ..anywhere(&mut random, &surface) }));
             for other in [located, cold] {
                 gaps = gaps.max((warm.3 - other.3).abs());
                 // Two facets or two sides of the seam may be equally far away.
@@ -375,7 +375,7 @@ fn nothing_but_construction_allocates() {
     for (mut surface, points) in every_surface() {
         let mut values = points.clone();
         let mut random = Random(12);
-        let starts: Vec<ClosestPoint> = (0..50).map(|_| random.place(&surface)).collect();
+        let starts: Vec<ClosestPoint> = (0..50).map(|_| anywhere(&mut random, &surface)).collect();
         let allocations = counting::allocations_of(|| {
             surface.interpolate(&mut values);
             surface.set_control_points(&values);

@@ -1,22 +1,11 @@
 //! Forces, moments and work agree: the normal is the gradient of the gap, the torque is conjugate to the rotor angle, every
 //! input has its work, and what acts on the master acts on the slave.
 
-mod common;
-#[path = "common/features.rs"]
-mod common_features;
-#[path = "common/disk.rs"]
-mod disk;
-
-use common_features::{coating, flexible};
 use tiprub_core::contact::gap::{Drive, GapLaw};
 use tiprub_core::contact::wrench::{At, Motion};
-use tiprub_core::settings::{PatchSettings, Scheme, Shape, Solver, SplineSettings};
+use tiprub_core::settings::{PatchSettings, Scheme, Solver, SplineSettings};
 use tiprub_core::{Scene, Simulation};
-
-fn real(simulation: &Simulation, name: &str) -> f64 {
-    let reference = simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference;
-    simulation.real(reference).unwrap()
-}
+use tiprub_test_models::{self as models, coating, disk, flexible, started};
 
 fn set(simulation: &mut Simulation, name: &str, value: f64, slope: f64) {
     let Some(reference) = simulation.table().find(name).map(|row| row.reference) else { return };
@@ -59,8 +48,8 @@ const FEATURES: [Feature; 8] = [
 ];
 
 fn scene(feature: Feature, scheme: Scheme, solver: Solver, friction: f64, step: f64) -> Scene {
-    let mut scene = common::scene(12);
-    scene.roms[0] = common::rich_rom(12);
+    let mut scene = models::rub(12);
+    scene.roms[0] = models::rich_blade(12);
     scene.settings.time.scheme = scheme;
     scene.settings.time.step = step;
     scene.settings.contacts[0].solver = solver;
@@ -87,86 +76,6 @@ fn drive(simulation: &mut Simulation) -> f64 {
     speed
 }
 
-#[test]
-fn without_friction_a_round_casing_turns_no_shaft_about_its_axis() {
-    for feature in FEATURES {
-        let mut scene = scene(feature, Scheme::ModalExact, Solver::Lcp, 0.0, 1e-6);
-        scene.settings.surfaces[0].shape = Shape::Circular {};
-        let mut simulation = Simulation::new(&scene).unwrap();
-        simulation.initialise(0.0).unwrap();
-        let (mut worst, mut contacts, mut turned) = (0.0_f64, 0, 0.0_f64);
-        for _ in 0..110 {
-            drive(&mut simulation);
-            simulation.begin_step(simulation.time(), LENGTH).unwrap();
-            let mut finished = false;
-            while !finished {
-                finished = simulation.advance().unwrap().finished;
-                for event in simulation.system().events() {
-                    let ([x, y, _], [fx, fy, _]) = (event.wrench.point, event.wrench.force);
-                    worst = worst.max((x * fy - y * fx).abs() / (0.25 * event.normal));
-                    turned = turned.max(event.wrench.moment[2].abs() / (0.25 * event.normal));
-                    contacts += 1;
-                }
-            }
-        }
-        println!("{}: {contacts} contacts, {worst:.1e} about the casing, {turned:.1e} about the shaft", feature.0);
-        assert!(contacts > 300, "{}", feature.0);
-        // Data points on a circle make no exact circle; a casing that yields is none.
-        let bound = if feature.0.contains("spline") { 1e-5 } else { 1e-14 };
-        assert!(feature.0.contains("flexible") || worst < bound, "{}: {worst:e}", feature.0);
-        // The shaft's centre is off the axis: e × F.
-        assert!(!feature.0.contains("whirl") || turned > 5e-5, "{}: {turned:e}", feature.0);
-    }
-}
-
-/// Torque·speed against shaft work, the ledger, and curvature work, relative to all work.
-fn balances(scene: &Scene) -> (f64, f64, f64) {
-    let mut simulation = Simulation::new(scene).unwrap();
-    simulation.initialise(0.0).unwrap();
-    let mut supplied = 0.0;
-    for _ in 0..110 {
-        let speed = drive(&mut simulation);
-        let time = simulation.time();
-        simulation.do_step(time, LENGTH).unwrap();
-        supplied += real(&simulation, "torque") * speed * LENGTH;
-    }
-    let ledger = simulation.system().ledger();
-    let inputs = ["shaft_work", "whirl_work", "shift_work", "casing_motion_work"];
-    let works = inputs.iter().filter(|name| simulation.table().find(name).is_some());
-    let sum: f64 = works.map(|name| real(&simulation, name)).sum();
-    assert!((sum - real(&simulation, "external_work")).abs() < 1e-13 * ledger.scale());
-    (
-        (supplied + real(&simulation, "shaft_work")).abs() / ledger.scale(),
-        real(&simulation, "energy_residual_relative").abs(),
-        real(&simulation, "curvature_work").abs() / ledger.scale(),
-    )
-}
-
-#[test]
-fn mean_torque_times_speed_is_the_work_of_the_shaft_and_the_rest_vanishes_with_the_step() {
-    for feature in FEATURES {
-        for (scheme, solver) in [
-            (Scheme::CentralDifference, Solver::Film),
-            (Scheme::ModalExact, Solver::Lcp),
-            (Scheme::ModalExact, Solver::Coulomb),
-            (Scheme::MasslessBoundary, Solver::Lcp),
-        ] {
-            if feature.0.contains("coating") && solver != Solver::Lcp {
-                continue;
-            }
-            let (shaft, residual, coarse) = balances(&scene(feature, scheme, solver, 0.15, 1e-6));
-            println!("{} {scheme:?} {solver:?}: {shaft:.1e} {residual:.1e} {coarse:.1e}", feature.0);
-            assert!(shaft < 1e-13 && residual < 1e-13, "{} {scheme:?} {solver:?}: {shaft:e}, {residual:e}", feature.0);
-            assert!(coarse < 1e-4, "{} {scheme:?} {solver:?}: {coarse:e}", feature.0);
-            if (scheme, solver) == (Scheme::ModalExact, Solver::Lcp) {
-                let (_, _, fine) = balances(&scene(feature, scheme, solver, 0.0, 5e-7));
-                let (_, _, coarse) = balances(&scene(feature, scheme, solver, 0.0, 1e-6));
-                assert!(fine < 0.6 * coarse, "{}: {coarse:e}, {fine:e}", feature.0);
-            }
-        }
-    }
-}
-
 /// Gap and normal of the first node of a law at a state.
 fn looked(
     law: &mut GapLaw,
@@ -184,8 +93,7 @@ fn looked(
 fn normals_and_motions_are_the_derivatives_of_the_gap() {
     for feature in [FEATURES[1], FEATURES[3]] {
         let scene = scene(feature, Scheme::ModalExact, Solver::Lcp, 0.0, 1e-6);
-        let mut simulation = Simulation::new(&scene).unwrap();
-        simulation.initialise(0.0).unwrap();
+        let simulation = started(&scene);
         let (mut law, lanes) = (simulation.system().pairs()[0].gap().clone(), simulation.system().bank().lanes());
         let mut displacement = vec![0.0; 9 * lanes];
         (displacement[0], displacement[lanes], displacement[2 * lanes]) = (8e-4, -1.2e-3, 5e-4);
@@ -238,8 +146,7 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
 #[test]
 fn friction_heat_goes_to_the_patch_that_the_displaced_node_faces() {
     let scene = scene(FEATURES[1], Scheme::ModalExact, Solver::Lcp, 0.15, 1e-6);
-    let mut simulation = Simulation::new(&scene).unwrap();
-    simulation.initialise(0.0).unwrap();
+    let mut simulation = started(&scene);
     let first = simulation.table().find("casing_friction_power").unwrap().reference;
     let (mut moved, mut total) = (0.0, 0.0);
     for _ in 0..200 {
@@ -283,8 +190,7 @@ fn friction_heat_goes_to_the_patch_that_the_displaced_node_faces() {
 fn energy_that_no_input_brings_ends_the_run() {
     let ends = |step: f64| {
         let scene = scene(FEATURES[2], Scheme::ModalExact, Solver::Lcp, 0.0, step);
-        let mut simulation = Simulation::new(&scene).unwrap();
-        simulation.initialise(0.0).unwrap();
+        let mut simulation = started(&scene);
         while simulation.time() < 4e-3 {
             let time = simulation.time();
             set(&mut simulation, "casing_radius_change", -0.05 * time, -0.05);

@@ -1,32 +1,20 @@
 //! A disk of coupled sectors stepped by nodal diameters against the same disk as one general structure.
 
-mod common;
-#[path = "common/disk.rs"]
-mod disk;
-
-use disk::{Disk, rub};
+use tiprub_core::Simulation;
 use tiprub_core::dynamics::cyclic::CyclicModel;
 use tiprub_core::settings::{InputInterpolation, Scheme, Solver};
-use tiprub_core::{Scene, Simulation};
-
-fn real(simulation: &Simulation, name: &str) -> f64 {
-    let reference = simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference;
-    simulation.real(reference).unwrap()
-}
+use tiprub_test_models::{
+    disk::{Disk, with_rotor},
+    real, started,
+};
 
 const SCHEMES: [Scheme; 3] = Scheme::ALL;
 const SOLVERS: [Solver; 3] = Solver::ALL;
 
-fn started(scene: &Scene) -> Simulation {
-    let mut simulation = Simulation::new(scene).unwrap_or_else(|error| panic!("{error}"));
-    simulation.initialise(0.0).unwrap_or_else(|error| panic!("{error}"));
-    simulation
-}
-
 /// Both forms of one disk with the same settings.
 fn pair(disk: &Disk, scheme: Scheme, solver: Solver, friction: f64) -> [Simulation; 2] {
     [disk.cyclic(), disk.whole()].map(|rom| {
-        let mut scene = rub(common::scene(disk.sectors), rom);
+        let mut scene = with_rotor(rom);
         scene.settings.time.scheme = scheme;
         scene.settings.contacts[0].solver = solver;
         scene.settings.contacts[0].friction = friction;

@@ -1,33 +1,11 @@
 //! Extreme cases: each ends in a right answer or in a refusal that says why.
 
-mod common;
-#[path = "common/features.rs"]
-mod features;
-
-#[path = "common/disk.rs"]
-mod disk;
-#[path = "common/lattice.rs"]
-mod lattice;
-
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 use tiprub_core::settings::{LoadSettings, Scheme, Shape, SplineSettings};
 use tiprub_core::variables::{Causality, Kind, Variability};
 use tiprub_core::{Scene, Simulation};
-
-fn reference(simulation: &Simulation, name: &str) -> u32 {
-    simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
-}
-
-fn real(simulation: &Simulation, name: &str) -> f64 {
-    simulation.real(reference(simulation, name)).unwrap()
-}
-
-fn started(scene: &Scene) -> Simulation {
-    let mut simulation = Simulation::new(scene).unwrap();
-    simulation.initialise(0.0).unwrap();
-    simulation
-}
+use tiprub_test_models::{self as models, disk, go, lattice, real, reference, started};
 
 /// What a scene of a hundred steps of 0.1 ms is refused with.
 fn refusal(scene: &Scene) -> String {
@@ -44,7 +22,7 @@ fn refusal(scene: &Scene) -> String {
 
 #[test]
 fn a_rotor_that_skips_over_the_lobes_is_refused_and_can_go_on_slower() {
-    let mut scene = common::scene(12);
+    let mut scene = models::rub(12);
     for speed in [5e5, -1e6, 1e6] {
         scene.settings.structures[0].speed = speed;
         let message = refusal(&scene);
@@ -62,7 +40,7 @@ fn a_rotor_that_skips_over_the_lobes_is_refused_and_can_go_on_slower() {
 
 #[test]
 fn casings_that_small_displacements_cannot_describe_are_refused() {
-    let mut scene = common::scene(12);
+    let mut scene = models::rub(12);
     for depth in [100.0, 1e6, 1e12] {
         scene.settings.surfaces[0].shape = Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
         let message = refusal(&scene);
@@ -76,11 +54,11 @@ fn casings_that_small_displacements_cannot_describe_are_refused() {
     let message = outcome.unwrap_err().to_string();
     assert!(message.contains("tenth of") && message.contains("sector"), "{message}");
     // Millimetres for metres.
-    let mut scene = common::scene(12);
+    let mut scene = models::rub(12);
     scene.settings.contacts[0].gap = 0.356;
     assert!(refusal(&scene).contains("metres"));
     // Teeth: 4 mm high, 0.9 mm apart.
-    let mut scene = common::scene(12);
+    let mut scene = models::rub(12);
     scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 4e-3, order: 300, phase: 0.0 };
     let message = refusal(&scene);
     assert!(message.contains("45°") || message.contains("displaced by"), "{message}");
@@ -88,8 +66,8 @@ fn casings_that_small_displacements_cannot_describe_are_refused() {
 
 #[test]
 fn a_load_that_is_too_large_at_the_start_is_named_and_not_the_surface_it_folds() {
-    let mut scene = common::scene(12);
-    features::flexible(&mut scene);
+    let mut scene = models::rub(12);
+    models::flexible(&mut scene);
     for amplitude in [1e9, 1e12] {
         scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude, phase: 0.0 });
         let message = refusal(&scene);
@@ -99,7 +77,7 @@ fn a_load_that_is_too_large_at_the_start_is_named_and_not_the_surface_it_folds()
 
 #[test]
 fn refusals_write_numbers_of_any_size_in_short() {
-    let mut scene = common::scene(12);
+    let mut scene = models::rub(12);
     scene.settings.structures[0].damping_ratio = Some(1e308);
     let message = refusal(&scene);
     assert!(message.contains("damping_ratio: 1e308. Give"), "{message}");
@@ -108,7 +86,7 @@ fn refusals_write_numbers_of_any_size_in_short() {
     let message = refusal(&scene);
     assert!(message.contains("features of the casing shape 1.000e-5 rad wide"), "{message}");
     // What is wrong is that entries are too far apart, not that stiffness is negative.
-    scene = common::scene(12);
+    scene = models::rub(12);
     scene.roms[0].mass[(2, 2)] = 1e-310;
     let message = refusal(&scene);
     assert!(message.contains("`mass` and `stiffness`") && message.contains("orders of magnitude"), "{message}");
@@ -116,7 +94,7 @@ fn refusals_write_numbers_of_any_size_in_short() {
 
 #[test]
 fn a_derivative_that_leaves_the_range_within_the_step_is_refused_and_changes_nothing() {
-    let mut scene = common::scene(12);
+    let mut scene = models::rub(12);
     scene.settings.surfaces[0].moving = true;
     let (mut refused, mut other) = (started(&scene), started(&scene));
     let radius = reference(&refused, "casing_radius_change");
@@ -145,9 +123,9 @@ fn a_derivative_that_leaves_the_range_within_the_step_is_refused_and_changes_not
 
 #[test]
 fn a_speed_beyond_the_fitted_one_is_refused_before_anything_changes() {
-    let mut scene = common::scene(12);
+    let mut scene = models::rub(12);
     let order = scene.roms[0].order();
-    scene.roms[0].extras.spin = Some(common::spin(order));
+    scene.roms[0].extras.spin = Some(models::spin(order));
     scene.settings.structures[0].spin.stiffening = true;
     let mut simulation = started(&scene);
     simulation.do_step(0.0, 1e-5).unwrap();
@@ -164,14 +142,14 @@ fn a_speed_beyond_the_fitted_one_is_refused_before_anything_changes() {
 #[test]
 fn what_counts_is_the_step_in_use_not_the_largest_allowed() {
     // Central differences far beyond their limit by internal_step_max, well within it by the communication step.
-    let mut scene = common::scene(12);
+    let mut scene = models::rub(12);
     scene.settings.time.scheme = Scheme::CentralDifference;
     scene.settings.contacts[0].friction = 0.0;
     scene.settings.time.step = 1e-3;
     scene.settings.experiment.communication_step = 1e-6;
     let mut simulation = started(&scene);
     for _ in 0..10 {
-        simulation.do_step(simulation.time(), 1e-6).unwrap();
+        go(&mut simulation, 1e-6);
     }
     let time = simulation.time();
     let message = simulation.do_step(time, 1e-4).unwrap_err().to_string();
@@ -182,7 +160,7 @@ fn what_counts_is_the_step_in_use_not_the_largest_allowed() {
 
 #[test]
 fn growth_is_judged_in_the_sense_of_rotation_and_named_by_node() {
-    let mut scene = common::scene(12);
+    let mut scene = models::rub(12);
     scene.settings.time.scheme = Scheme::CentralDifference;
     scene.settings.time.step = 7.2e-6;
     scene.settings.experiment.communication_step = 5e-5;
@@ -206,7 +184,7 @@ fn growth_is_judged_in_the_sense_of_rotation_and_named_by_node() {
 
 #[test]
 fn the_friction_a_refusal_proposes_is_accepted() {
-    let mut scene = common::scene(12);
+    let mut scene = models::rub(12);
     for friction in [0.5, 1.0, 2.0] {
         scene.settings.contacts[0].friction = friction;
         let message = refusal(&scene);
@@ -218,36 +196,9 @@ fn the_friction_a_refusal_proposes_is_accepted() {
 }
 
 #[test]
-fn a_whole_casing_closing_in_presses_every_blade() {
-    let mut scene = common::scene(12);
-    scene.settings.contacts[0].friction = 0.0;
-    scene.settings.structures[0].damping_ratio = Some(0.3);
-    scene.settings.surfaces[0].shape = Shape::Circular {};
-    let mut simulation = started(&scene);
-    let radius = reference(&simulation, "casing_radius_change");
-    let rate = -0.2;
-    for _ in 0..1000 {
-        let time = simulation.time();
-        simulation.set_real(radius, (rate * time).max(-4e-4)).unwrap();
-        simulation.set_input_derivative(radius, 1, if rate * time > -4e-4 { rate } else { 0.0 }).unwrap();
-        simulation.do_step(time, 1e-5).unwrap();
-    }
-    // At rest: no slope, no friction, no torque; all blades alike; work done equals strain energy and losses.
-    let system = simulation.system();
-    assert!(system.events().len() >= 12 && real(&simulation, "torque").abs() < 1e-9);
-    for sector in 1..12 {
-        assert_eq!(system.multiplier(0, sector).to_bits(), system.multiplier(0, 0).to_bits());
-    }
-    let force = real(&simulation, "force_x").hypot(real(&simulation, "force_y"));
-    let total: f64 = system.events().iter().map(|event| event.normal).sum();
-    assert!(force < 1e-12 * total, "resultant {force} of {total} N");
-    assert!(real(&simulation, "kinetic_energy") < 1e-6 * real(&simulation, "strain_energy"));
-}
-
-#[test]
 fn a_blade_keeps_its_energy_over_ten_million_undamped_steps() {
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
-        let mut scene = common::scene(1);
+        let mut scene = models::rub(1);
         scene.settings.time.scheme = scheme;
         scene.settings.contacts[0].friction = 0.0;
         scene.settings.structures[0].damping_ratio = Some(0.0);
@@ -255,16 +206,16 @@ fn a_blade_keeps_its_energy_over_ten_million_undamped_steps() {
         scene.settings.outputs.nodal_diameters = None;
         let mut simulation = started(&scene);
         for _ in 0..40 {
-            simulation.do_step(simulation.time(), 5e-5).unwrap();
+            go(&mut simulation, 5e-5);
         }
         let (factor, offset) = (reference(&simulation, "casing_shape_factor"), reference(&simulation, "gap_offset"));
         simulation.set_real(factor, 0.0).unwrap();
         simulation.set_real(offset, 1e-2).unwrap();
         let energy = |simulation: &Simulation| real(simulation, "scheme_energy");
-        simulation.do_step(simulation.time(), 5e-5).unwrap();
+        go(&mut simulation, 5e-5);
         let before = energy(&simulation);
         for _ in 0..100 {
-            simulation.do_step(simulation.time(), 0.1).unwrap();
+            go(&mut simulation, 0.1);
         }
         let drift = energy(&simulation) / before - 1.0;
         println!("{scheme:?}: relative energy drift {drift:.1e} over 1e7 steps");
@@ -276,23 +227,23 @@ fn a_blade_keeps_its_energy_over_ten_million_undamped_steps() {
 fn kinds() -> Vec<Scene> {
     let mut scenes = Vec::new();
     for scheme in [Scheme::ModalExact, Scheme::CentralDifference, Scheme::MasslessBoundary] {
-        let mut scene = common::scene(4);
-        scene.roms[0] = common::rich_rom(4);
+        let mut scene = models::rub(4);
+        scene.roms[0] = models::rich_blade(4);
         scene.settings.time.scheme = scheme;
         scene.settings.time.step = 1e-7;
         scene.settings.contacts[0].friction = 0.1;
         scenes.push(scene);
     }
-    let mut scene = common::scene(3);
-    features::flexible(&mut scene);
+    let mut scene = models::rub(3);
+    models::flexible(&mut scene);
     scene.settings.structures[1].thermal = true;
     scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 1e3, phase: 0.2 });
     scene.settings.contacts[0].heat_to_slave = Some(0.3);
     scenes.push(scene);
-    let mut scene = common::scene(3);
-    features::coating(&mut scene);
+    let mut scene = models::rub(3);
+    models::coating(&mut scene);
     scenes.push(scene);
-    scenes.push(disk::rub(common::scene(6), disk::Disk::random(6, 2, 5, 0.2, 7).cyclic()));
+    scenes.push(disk::with_rotor(disk::Disk::random(6, 2, 5, 0.2, 7).cyclic()));
     scenes.push(lattice::squeezed_by(-1e-3, [-10.0, 1.0, 0.0]));
     scenes
 }
@@ -417,7 +368,7 @@ fn numbers_beyond_the_table_of_ranges_are_refused_by_name() {
         }),
     ];
     for (named, value, change) in changes {
-        let mut scene = common::scene(4);
+        let mut scene = models::rub(4);
         change(&mut scene, value);
         let message = match scene.roms[0].validate() {
             Err(refusal) => refusal.to_string(),
@@ -444,12 +395,12 @@ fn what_does_not_belong_to_the_sectors_is_refused_by_name() {
         (&["watched_sectors", "5"], |scene| scene.settings.outputs.watched_sectors = vec![1, 5]),
     ];
     for (words, change) in changes {
-        let mut scene = common::scene(4);
+        let mut scene = models::rub(4);
         change(&mut scene);
         let message = refusal(&scene);
         assert!(words.iter().all(|word| message.contains(word)), "{words:?}: {message}");
     }
-    let mut scene = common::scene(4);
+    let mut scene = models::rub(4);
     scene.settings.structures[0].frequency_factors = vec![1.0, 0.99, 1.01, 1.0];
     scene.settings.outputs.watched_sectors = vec![4, 1, 3];
     started(&scene);
@@ -512,7 +463,7 @@ fn units_are_what_their_names_say() {
 /// Flanks of teeth by their slope: 44° is rubbed on, 46° is refused, by its angle in a step, and by itself as a contact.
 #[test]
 fn flanks_steeper_than_45_degrees_are_refused() {
-    let mut scene = common::scene(4);
+    let mut scene = models::rub(4);
     let mut through_points = scene.clone();
     through_points.settings.surfaces[0].spline = Some(SplineSettings::default());
     for (simulation, kind) in [(started(&scene), "revolution"), (started(&through_points), "spline")] {
@@ -581,10 +532,10 @@ fn slips_of_units_and_axes_are_asked_about_and_change_nothing() {
         }),
         ("Hz", |scene| scene.roms[0].stiffness *= 1e-10),
     ];
-    let plain = started(&common::scene(12));
+    let plain = started(&models::rub(12));
     assert!(plain.warnings().iter().all(|text| !text.contains('?')), "{:?}", plain.warnings());
     for (word, change) in slips {
-        let mut scene = common::scene(12);
+        let mut scene = models::rub(12);
         scene.settings.contacts[0].friction = 0.0;
         scene.settings.surfaces[0].shape = Shape::Circular {};
         scene.settings.surfaces[0].moving = false;
@@ -598,7 +549,7 @@ fn slips_of_units_and_axes_are_asked_about_and_change_nothing() {
 
 #[test]
 fn tips_that_become_too_fast_are_told_of_once() {
-    let mut scene = common::scene(4);
+    let mut scene = models::rub(4);
     scene.settings.contacts[0].friction = 0.0;
     scene.settings.surfaces[0].shape = Shape::Circular {};
     let mut simulation = started(&scene);
@@ -606,7 +557,7 @@ fn tips_that_become_too_fast_are_told_of_once() {
     let mut told = Vec::new();
     for speed in [1300.0, 5990.0, 6010.0, 17_188.0, 1300.0, 17_188.0] {
         simulation.set_real(reference(&simulation, "speed"), speed).unwrap();
-        simulation.do_step(simulation.time(), 1e-6).unwrap();
+        go(&mut simulation, 1e-6);
         told.push(simulation.take_notes().len());
     }
     assert_eq!(told, [0, 0, 1, 0, 0, 0]);

@@ -1,32 +1,22 @@
 //! Everything that is off unless a scene asks for it: a ledger that closes, states that continue, laws of mechanics.
 
-mod common;
-#[path = "common/features.rs"]
-mod common_features;
+#[path = "common/checks.rs"]
+mod checks;
 #[path = "common/counting.rs"]
 mod counting;
 
-use common_features::{coating, flexible};
-use tiprub_core::contact::gap::{Drive, GapLaw};
+use checks::{allocates_nothing, disturb, ledger_closes, state_continues};
+use tiprub_core::contact::gap::Drive;
 use tiprub_core::settings::{LoadSettings, PatchSettings, Scheme, Shape, Solver, SplineSettings};
 use tiprub_core::{Scene, Simulation};
-
-fn real(simulation: &Simulation, name: &str) -> f64 {
-    let reference = simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference;
-    simulation.real(reference).unwrap()
-}
-
-fn set(simulation: &mut Simulation, name: &str, element: u32, value: f64) {
-    let reference = simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference;
-    simulation.set_real(reference + element, value).unwrap();
-}
+use tiprub_test_models::{self as models, coating, flexible, go, real, saved, set, started, try_started};
 
 /// Twelve blades that rub the two-lobe casing, with one thing added.
 type Feature = (&'static str, fn(&mut Scene));
 
 fn spinning(scene: &mut Scene) {
     let order = scene.roms[0].order();
-    scene.roms[0].extras.spin = Some(common::spin(order));
+    scene.roms[0].extras.spin = Some(models::spin(order));
 }
 
 const FEATURES: [Feature; 13] = [
@@ -73,32 +63,9 @@ const FEATURES: [Feature; 13] = [
     }),
 ];
 
-/// Inputs that change from step to step, wherever the scene has them.
-fn disturb(simulation: &mut Simulation, index: u32) {
-    let x = f64::from(index);
-    let inputs: [(&str, f64); 6] = [
-        ("speed", 1300.0 + 40.0 * (0.2 * x).sin()),
-        ("whirl_x", 2e-5 * (0.3 * x).sin()),
-        ("whirl_y", 2e-5 * (0.3 * x).cos()),
-        ("axial_shift", 1e-5 * (0.1 * x).sin()),
-        ("casing_load_amplitude", 3e3 * (0.05 * x).cos()),
-        ("casing_load_phase", 0.05 * x),
-    ];
-    for (name, value) in inputs {
-        let Some(reference) = simulation.table().find(name).map(|row| row.reference) else { continue };
-        simulation.set_real(reference, value).unwrap();
-        simulation.set_input_derivative(reference, 1, 0.1 * value).unwrap();
-    }
-    if simulation.table().find("casing_temperature").is_some() {
-        for patch in 0..4 {
-            set(simulation, "casing_temperature", patch, (0.1 * x + f64::from(patch)).sin());
-        }
-    }
-}
-
 fn scene_with(feature: Feature, scheme: Scheme, solver: Solver) -> Scene {
-    let mut scene = common::scene(12);
-    scene.roms[0] = common::rich_rom(12);
+    let mut scene = models::rub(12);
+    scene.roms[0] = models::rich_blade(12);
     scene.settings.time.scheme = scheme;
     scene.settings.contacts[0].solver = solver;
     scene.settings.surfaces[0].patches = Some(PatchSettings { around: 8, along: 2 });
@@ -112,42 +79,39 @@ fn is_refused(feature: &str, scheme: Scheme, solver: Solver) -> bool {
         || (feature == "coriolis" && scheme == Scheme::MasslessBoundary)
 }
 
-#[test]
-fn the_energy_ledger_closes_for_every_combination() {
-    println!("| feature | scheme | solver | contact steps | residual / energy |\n|---|---|---|---|---|");
-    let mut worst: f64 = 0.0;
+/// Every combination that is not refused, by its name; what is refused says so at once.
+fn every_combination(mut check: impl FnMut(&str, Scene)) {
     for feature in FEATURES {
-        for scheme in [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary] {
-            for solver in [Solver::Film, Solver::Lcp, Solver::Coulomb] {
-                let scene = scene_with(feature, scheme, solver);
-                let started = Simulation::new(&scene).and_then(|mut simulation| {
-                    simulation.initialise(0.0)?;
-                    Ok(simulation)
-                });
-                if is_refused(feature.0, scheme, solver) {
-                    assert!(started.is_err(), "{} {scheme:?} {solver:?} was not refused", feature.0);
-                    continue;
-                }
-                let mut simulation =
-                    started.unwrap_or_else(|error| panic!("{} {scheme:?} {solver:?}: {error}", feature.0));
-                let mut contact = 0;
-                for index in 0..60 {
-                    disturb(&mut simulation, index);
-                    let (time, step) = (simulation.time(), if index % 7 == 0 { 6.3e-5 } else { 5e-5 });
-                    simulation
-                        .do_step(time, step)
-                        .unwrap_or_else(|error| panic!("{} {scheme:?} {solver:?} step {index}: {error}", feature.0));
-                    contact += simulation.system().events().len();
-                }
-                let residual = real(&simulation, "energy_residual_relative");
-                println!("| {} | {scheme:?} | {solver:?} | {contact} | {residual:.1e} |", feature.0);
-                assert!(contact > 0, "{} {scheme:?} {solver:?} never touched", feature.0);
-                assert!(residual.abs() < 1e-13, "{} {scheme:?} {solver:?}: {residual:e}", feature.0);
-                worst = worst.max(residual.abs());
+        for (scheme, solver) in Scheme::ALL.into_iter().flat_map(|scheme| Solver::ALL.map(|solver| (scheme, solver))) {
+            let (name, scene) =
+                (format!("{} | {scheme:?} | {solver:?}", feature.0), scene_with(feature, scheme, solver));
+            if is_refused(feature.0, scheme, solver) {
+                assert!(try_started(&scene).is_err(), "{name} was not refused");
+            } else {
+                check(&name, scene);
             }
         }
     }
-    println!("worst {worst:.1e}");
+}
+
+#[test]
+fn the_energy_ledger_closes_for_every_combination() {
+    every_combination(|name, scene| ledger_closes(name, started(&scene), 1e-13));
+}
+
+#[test]
+fn a_saved_state_continues_with_identical_bits_whatever_is_on() {
+    every_combination(|name, scene| {
+        let richest = if name.contains("coating") { Solver::Lcp } else { Solver::Coulomb };
+        if scene.settings.contacts[0].solver == richest && scene.settings.time.scheme != Scheme::CentralDifference {
+            state_continues(name, &|| started(&scene));
+        }
+    });
+}
+
+#[test]
+fn a_step_asks_for_no_memory_whatever_is_on() {
+    every_combination(|name, scene| allocates_nothing(name, started(&scene)));
 }
 
 #[test]
@@ -166,90 +130,24 @@ fn a_load_that_the_contact_grid_cannot_carry_is_refused() {
 }
 
 #[test]
-fn a_saved_state_continues_with_identical_bits_whatever_is_on() {
-    for feature in FEATURES {
-        for scheme in [Scheme::ModalExact, Scheme::MasslessBoundary] {
-            let solver = if feature.0.contains("coating") { Solver::Lcp } else { Solver::Coulomb };
-            if is_refused(feature.0, scheme, solver) {
-                continue;
-            }
-            let scene = scene_with(feature, scheme, solver);
-            let mut simulation = Simulation::new(&scene).unwrap();
-            simulation.initialise(0.0).unwrap();
-            let advance = |simulation: &mut Simulation, from: u32| {
-                for index in from..from + 15 {
-                    disturb(simulation, index);
-                    let time = simulation.time();
-                    simulation.do_step(time, if index % 4 == 0 { 6.1e-5 } else { 5e-5 }).unwrap();
-                }
-                let mut state = vec![0; simulation.state_size()];
-                simulation.save_state(&mut state).unwrap();
-                state
-            };
-            advance(&mut simulation, 0);
-            advance(&mut simulation, 15);
-            let middle = advance(&mut simulation, 30);
-            let end = advance(&mut simulation, 45);
-            // Into another instance, which has been elsewhere in between.
-            let mut other = Simulation::new(&scene).unwrap();
-            set(&mut other, "speed", 0, 900.0);
-            other.initialise(0.0).unwrap();
-            let time = other.time();
-            other.do_step(time, 5e-5).unwrap();
-            other.restore_state(&middle).unwrap();
-            assert!(advance(&mut other, 45) == end, "{} {scheme:?}", feature.0);
-        }
-    }
-}
-
-#[test]
-fn a_step_asks_for_no_memory_whatever_is_on() {
-    for feature in FEATURES {
-        for scheme in [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary] {
-            for solver in [Solver::Film, Solver::Lcp, Solver::Coulomb] {
-                if is_refused(feature.0, scheme, solver) {
-                    continue;
-                }
-                let mut simulation = Simulation::new(&scene_with(feature, scheme, solver)).unwrap();
-                simulation.initialise(0.0).unwrap();
-                let mut state = vec![0; simulation.state_size()];
-                let (mut contacts, mut allocations) = (0, 0);
-                for index in 0..40 {
-                    disturb(&mut simulation, index);
-                    let (time, step) = (simulation.time(), if index % 7 == 0 { 6.3e-5 } else { 5e-5 });
-                    allocations += counting::allocations_of(|| simulation.do_step(time, step).unwrap());
-                    contacts += simulation.system().events().len();
-                }
-                allocations += counting::allocations_of(|| simulation.save_state(&mut state).unwrap());
-                assert!(contacts > 0, "{} {scheme:?} {solver:?} never touched", feature.0);
-                assert_eq!(allocations, 0, "{} {scheme:?} {solver:?}", feature.0);
-            }
-        }
-    }
-}
-
-#[test]
 fn a_state_with_any_bit_changed_is_refused_and_changes_nothing() {
     let (name, all) = FEATURES[FEATURES.len() - 1];
     let mut scene = scene_with((name, all), Scheme::ModalExact, Solver::Lcp);
     coating(&mut scene);
     scene.settings.contacts[0].coating.as_mut().unwrap().cells_around = 40;
-    let mut simulation = Simulation::new(&scene).unwrap();
-    simulation.initialise(0.0).unwrap();
+    let mut simulation = started(&scene);
     // Saved in the middle of a communication step, after contact.
     for index in 0..40 {
         disturb(&mut simulation, index);
-        simulation.do_step(simulation.time(), 5e-5).unwrap();
+        go(&mut simulation, 5e-5);
     }
     simulation.begin_step(simulation.time(), 5e-5).unwrap();
     for _ in 0..20 {
         assert!(!simulation.advance().unwrap().finished);
     }
-    let mut state = vec![0; simulation.state_size()];
-    simulation.save_state(&mut state).unwrap();
+    let state = saved(&simulation);
     let mut twin = Simulation::new(&scene).unwrap();
-    let mut untouched = vec![0; twin.state_size()];
-    twin.save_state(&mut untouched).unwrap();
+    let untouched = saved(&twin);
     let mut again = untouched.clone();
     for byte in (0..state.len()).step_by(1 + state.len() / 997).chain([0, 8, 16, 24, state.len() - 1]) {
         let mut damaged = state.clone();
@@ -261,114 +159,17 @@ fn a_state_with_any_bit_changed_is_refused_and_changes_nothing() {
     }
     twin.save_state(&mut again).unwrap();
     assert!(again == untouched);
-    // The twin continues in the middle of the step; neither disturbs the other.
-    twin.restore_state(&state).unwrap();
-    let finish = |simulation: &mut Simulation| {
-        while !simulation.advance().unwrap().finished {}
-        disturb(simulation, 41);
-        simulation.do_step(simulation.time(), 6.1e-5).unwrap();
-        let mut end = vec![0; simulation.state_size()];
-        simulation.save_state(&mut end).unwrap();
-        end
-    };
-    let (first, second) = (finish(&mut twin), finish(&mut simulation));
-    assert!(first == second);
     // Reset forgets everything, wear included.
     assert!(real(&simulation, "worn_volume") > 0.0);
     simulation.reset();
     simulation.initialise(0.0).unwrap();
-    let mut fresh = Simulation::new(&scene).unwrap();
-    fresh.initialise(0.0).unwrap();
+    let mut fresh = started(&scene);
     let ends = [&mut simulation, &mut fresh].map(|simulation| {
         simulation.do_step(0.0, 5e-5).unwrap();
-        let mut state = vec![0; simulation.state_size()];
-        simulation.save_state(&mut state).unwrap();
-        state
+        saved(simulation)
     });
     assert!(ends[0] == ends[1]);
     assert_eq!(real(&simulation, "worn_volume").to_bits(), 0.0_f64.to_bits());
-}
-
-#[test]
-fn action_equals_reaction_and_angular_momentum_is_kept() {
-    for (name, feature) in [
-        ("flexible casing", flexible as fn(&mut Scene)),
-        ("rigid spline", |scene: &mut Scene| {
-            scene.settings.surfaces[0].spline = Some(SplineSettings::default());
-        }),
-    ] {
-        for (scheme, solver) in [
-            (Scheme::CentralDifference, Solver::Film),
-            (Scheme::ModalExact, Solver::Lcp),
-            (Scheme::ModalExact, Solver::Coulomb),
-            (Scheme::MasslessBoundary, Solver::Lcp),
-        ] {
-            let mut scene = scene_with((name, feature), scheme, solver);
-            scene.settings.structures[0].whirl = true;
-            scene.settings.structures[0].axial_shift = true;
-            let [force, moment, modal] = balance(&scene);
-            println!(
-                "{name} {scheme:?} {solver:?}: forces {force:.1e}, moments {moment:.1e}, modal forces {modal:.1e}"
-            );
-            assert!(force < 1e-14 && moment < 1e-13 && modal < 1e-12, "{force:e}, {moment:e}, {modal:e}");
-        }
-    }
-}
-
-/// Largest residuals over a rub: of force and moment on master and on control points about the origin, relative to |F| and |F| r, and
-/// of the modal forces on the casing against those of the control points.
-fn balance(scene: &Scene) -> [f64; 3] {
-    let mut simulation = Simulation::new(scene).unwrap();
-    simulation.initialise(0.0).unwrap();
-    let (mut worst, mut contacts) = ([0.0_f64; 3], 0);
-    let cross =
-        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    for index in 0..150 {
-        disturb(&mut simulation, index);
-        let time = simulation.time();
-        simulation.begin_step(time, 1e-5).unwrap();
-        while !simulation.advance().unwrap().finished {
-            let system = simulation.system();
-            let GapLaw::Spline(law) = system.pairs()[0].gap() else { panic!("no spline") };
-            let (mut sums, mut scale) = ([[0.0; 3]; 2], 0.0);
-            let mut modal = vec![0.0; system.structures().get(1).map_or(0, |slave| slave.contact_force().len())];
-            for event in system.events() {
-                let force = event.wrench.force;
-                // About the origin: the shaft's centre is at `shaft`.
-                let lever = cross(system.pairs()[0].drive_now().shaft, force);
-                for i in 0..3 {
-                    sums[0][i] += force[i];
-                    sums[1][i] += event.wrench.moment[i] + lever[i];
-                }
-                scale += event.normal;
-                let place = system.structures()[0].geometry().places[event.node * system.bank().lanes() + event.sector];
-                for (index, weight) in law.surface.weights(place).iter() {
-                    let acts = force.map(|value| -weight * value);
-                    let moment = cross(law.surface.control_points()[index], acts);
-                    for i in 0..3 {
-                        sums[0][i] += acts[i];
-                        sums[1][i] += moment[i];
-                        if let Some(slave) = system.structures().get(1) {
-                            let shapes = slave.modes().uncoupled().unwrap().contact_row(3 * index + i);
-                            modal.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += acts[i] * shape);
-                        }
-                    }
-                }
-                contacts += 1;
-            }
-            if scale > 0.0 {
-                let largest = |sum: [f64; 3]| sum.iter().fold(0.0, |worst: f64, value| worst.max(value.abs()));
-                worst[0] = worst[0].max(largest(sums[0]) / scale);
-                worst[1] = worst[1].max(largest(sums[1]) / (0.25 * scale));
-                let own = system.structures().get(1).map_or(&[][..], |slave| slave.contact_force());
-                let most = modal.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-                let off = own.iter().zip(&modal).map(|(own, modal)| (own - modal).abs() / most);
-                worst[2] = off.fold(worst[2], f64::max);
-            }
-        }
-    }
-    assert!(contacts > 100, "{contacts} contacts");
-    worst
 }
 
 #[test]
@@ -379,15 +180,13 @@ fn complementarity_holds_over_a_long_rub_of_the_whole_casing() {
         let mut scene = scene_with(feature, Scheme::ModalExact, Solver::Lcp);
         // A round casing: gaps are affine in the displacements, so that they can be evaluated again independently.
         scene.settings.surfaces[0].shape = Shape::Circular {};
-        let mut simulation = Simulation::new(&scene).unwrap();
-        simulation.initialise(0.0).unwrap();
+        let mut simulation = started(&scene);
         let (mut adhesion, mut penetration, mut product, mut again, mut most) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64, 0);
         for index in 0..20_000 {
             // The casing closes on all blades and opens again.
             let closing = -9e-4 * (std::f64::consts::PI * f64::from(index) / 20_000.0).sin();
-            set(&mut simulation, "casing_radius_change", 0, closing);
-            let time = simulation.time();
-            simulation.do_step(time, 1e-6).unwrap();
+            set(&mut simulation, "casing_radius_change", closing);
+            go(&mut simulation, 1e-6);
             let system = simulation.system();
             let lanes = system.bank().lanes();
             let largest = system.events().iter().fold(0.0, |a: f64, event| a.max(event.normal));
@@ -433,8 +232,8 @@ fn the_order_of_the_casing_load_is_a_parameter() {
         let mut simulation = Simulation::new(&scene).unwrap();
         let reference = simulation.table().find("casing_load_order").unwrap().reference;
         simulation.set_integer(reference, order).unwrap();
-        set(&mut simulation, "casing_load_amplitude", 0, 1e3);
-        set(&mut simulation, "casing_load_phase", 0, phase);
+        set(&mut simulation, "casing_load_amplitude", 1e3);
+        set(&mut simulation, "casing_load_phase", phase);
         simulation.initialise(0.0).map(|()| {
             let first = simulation.table().find("casing_displacement").unwrap().reference;
             (0..36).map(|i| simulation.real(first + i).unwrap()).collect::<Vec<f64>>()
@@ -460,12 +259,10 @@ fn the_order_of_the_casing_load_is_a_parameter() {
 
 #[test]
 fn wearing_takes_at_least_the_yield_stress_times_the_worn_volume() {
-    let mut simulation = Simulation::new(&scene_with(("coating", coating), Scheme::ModalExact, Solver::Lcp)).unwrap();
-    simulation.initialise(0.0).unwrap();
+    let mut simulation = started(&scene_with(("coating", coating), Scheme::ModalExact, Solver::Lcp));
     let mut before = 0.0;
     for _ in 0..60 {
-        let time = simulation.time();
-        simulation.do_step(time, 5e-5).unwrap();
+        go(&mut simulation, 5e-5);
         let energy = real(&simulation, "wear_energy");
         assert!(energy >= before);
         before = energy;

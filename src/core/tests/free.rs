@@ -2,12 +2,11 @@
 
 #[path = "common/counting.rs"]
 mod counting;
-#[path = "common/lattice.rs"]
-mod lattice;
 
 use lattice::*;
 use tiprub_core::settings::*;
 use tiprub_core::{Scene, Simulation};
+use tiprub_test_models::{element, go, lattice, real, saved, started};
 
 const SCHEMES: [Scheme; 2] = [Scheme::CentralDifference, Scheme::ModalExact];
 const SOLVERS: [Solver; 3] = Solver::ALL;
@@ -18,42 +17,6 @@ fn total_mass() -> f64 {
 
 fn size(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
-#[test]
-fn a_body_that_touches_nothing_flies_straight_with_exact_energies() {
-    let velocity = [30.0, -20.0, 5.0];
-    for scheme in SCHEMES {
-        let far = scene(block([0.0; 3], 3e6), &[(Side::Left, 9.0), (Side::Right, 9.0)], false, velocity);
-        let mut simulation = started(&with(far, 0.2, Solver::Lcp, scheme));
-        let kinetic = 0.5 * total_mass() * size(velocity).powi(2);
-        for _ in 0..300 {
-            advance(&mut simulation, 3.7e-5);
-        }
-        let time = simulation.time();
-        let moved = vector(&simulation, "block.displacement");
-        // A position is the sum of 11400 steps.
-        for axis in 0..3 {
-            let exact = velocity[axis] * time;
-            assert!((moved[axis] - exact).abs() < 1e-12 * exact.abs(), "{scheme:?}: {} m, {exact} m", moved[axis]);
-            let name = format!("block.node_displacement_{}", ["x", "y", "z"][axis]);
-            for node in 0..27 {
-                assert!((element(&simulation, &name, node) - exact).abs() < 1e-12 * exact.abs());
-            }
-        }
-        let found = vector(&simulation, "block.velocity");
-        assert!((0..3).all(|axis| (found[axis] - velocity[axis]).abs() < 2e-15 * size(velocity)), "{found:?}");
-        let energies = ["kinetic_energy", "strain_energy", "energy_residual"].map(|name| real(&simulation, name));
-        println!(
-            "{scheme:?}: kinetic {:.17} J of {kinetic:.17} J, strain {:.1e} J, residual {:.1e} J",
-            energies[0], energies[1], energies[2]
-        );
-        assert!(
-            (energies[0] / kinetic - 1.0).abs() < 1e-14 && energies[1] == 0.0 && energies[2] == 0.0,
-            "{energies:?}"
-        );
-        assert!(real(&simulation, "normal_impulse") == 0.0);
-    }
 }
 
 /// Scenes in which something happens: (name, scene, communication steps of 1e-5 s).
@@ -88,7 +51,7 @@ fn momentum_and_energy_are_kept_by_every_scheme_and_solver() {
             let (start, mut impulse, mut exchanged) = (vector(&simulation, "block.velocity"), [0.0; 3], 0.0_f64);
             let (mut off, mut residual) = (0.0_f64, 0.0_f64);
             for _ in 0..steps {
-                advance(&mut simulation, 1e-5);
+                go(&mut simulation, 1e-5);
                 let force = vector(&simulation, "force");
                 let pairs = scene
                     .settings
@@ -180,7 +143,7 @@ fn a_symmetric_scene_stays_symmetric_to_rounding() {
         let mut simulation = started(&with(squeezed(), 0.15, solver, scheme));
         let mut most = [[0.0_f64; 2]; 2];
         for _ in 0..60 {
-            advance(&mut simulation, 1e-5);
+            go(&mut simulation, 1e-5);
             let now = asymmetry(&simulation);
             most = std::array::from_fn(|i| std::array::from_fn(|j| most[i][j].max(now[i][j])));
         }
@@ -228,7 +191,7 @@ fn film_with_central_differences_is_the_papers_form() {
             sliding[(3 * node + 2, column)] = -friction * z / y.hypot(z);
         }
         let multipliers = dense.step(&normal, &sliding, &gaps);
-        advance(&mut simulation, h);
+        go(&mut simulation, h);
         touched += multipliers.iter().filter(|value| **value != 0.0).count();
         let displacement = simulation.system().bank().displacement();
         off = (0..order).fold(off, |off, row| off.max((displacement[row] - dense.now[row]).abs()));
@@ -250,7 +213,7 @@ fn a_pair_far_away_changes_nothing() {
         let mut touched = false;
         for _ in 0..60 {
             for simulation in &mut runs {
-                advance(simulation, 1e-5);
+                go(simulation, 1e-5);
             }
             let [first, second] = &runs;
             let bits = |simulation: &Simulation| {
@@ -269,7 +232,7 @@ fn friction_with_sticking_blocks_the_body() {
     scene.settings.structures.iter_mut().for_each(|structure| structure.damping_ratio = Some(0.05));
     let mut simulation = started(&scene);
     for _ in 0..800 {
-        advance(&mut simulation, 1e-5);
+        go(&mut simulation, 1e-5);
     }
     let (kinetic, strain) = (real(&simulation, "kinetic_energy"), real(&simulation, "strain_energy"));
     let velocity = size(vector(&simulation, "block.velocity"));
@@ -290,24 +253,23 @@ fn a_saved_state_continues_with_the_same_bits_and_reset_starts_again() {
                 .collect::<Vec<_>>()
         };
         let mut simulation = started(&scene);
-        (0..35).for_each(|_| advance(&mut simulation, 1e-5));
-        let mut state = vec![0; simulation.state_size()];
-        simulation.save_state(&mut state).unwrap();
-        (0..30).for_each(|_| advance(&mut simulation, 1e-5));
+        (0..35).for_each(|_| go(&mut simulation, 1e-5));
+        let state = saved(&simulation);
+        (0..30).for_each(|_| go(&mut simulation, 1e-5));
         let end = values(&simulation);
         assert!(real(&simulation, "normal_impulse") > 0.0, "still in contact");
 
         simulation.restore_state(&state).unwrap();
-        (0..30).for_each(|_| advance(&mut simulation, 1e-5));
+        (0..30).for_each(|_| go(&mut simulation, 1e-5));
         assert_eq!(values(&simulation), end);
         let mut other = Simulation::new(&scene).unwrap();
         other.restore_state(&state).unwrap();
-        (0..30).for_each(|_| advance(&mut other, 1e-5));
+        (0..30).for_each(|_| go(&mut other, 1e-5));
         assert_eq!(values(&other), end);
 
         simulation.reset();
         simulation.initialise(0.0).unwrap();
-        (0..65).for_each(|_| advance(&mut simulation, 1e-5));
+        (0..65).for_each(|_| go(&mut simulation, 1e-5));
         assert_eq!(values(&simulation), end);
     }
 }
@@ -317,7 +279,7 @@ fn the_books_close_when_the_step_changes() {
     for scheme in SCHEMES {
         let mut simulation = started(&with(squeezed(), 0.15, Solver::Lcp, scheme));
         for index in 0..120 {
-            advance(&mut simulation, if index % 2 == 0 { 1e-5 } else { 0.63e-5 });
+            go(&mut simulation, if index % 2 == 0 { 1e-5 } else { 0.63e-5 });
             let residual = real(&simulation, "energy_residual_relative");
             assert!(residual.abs() < 1e-13, "{scheme:?}, step {index}: {residual:e}");
         }
@@ -367,13 +329,12 @@ fn the_first_step_may_have_any_length() {
         // The scene's own steps are 1e-6 s; these make others.
         for first in [1e-5, 0.7e-6, 1.4e-6, 3.3e-6, 1e-9, 1e-12] {
             let mut simulation = started(&scene);
-            let mut state = vec![0; simulation.state_size()];
-            simulation.save_state(&mut state).unwrap();
+            let state = saved(&simulation);
             let mut restored = Simulation::new(&scene).unwrap();
             restored.restore_state(&state).unwrap();
             for simulation in [&mut simulation, &mut restored] {
                 for length in [first, first, 1e-5, 0.63e-5] {
-                    advance(simulation, length);
+                    go(simulation, length);
                 }
                 let (found, moved) = (vector(simulation, "block.velocity"), vector(simulation, "block.displacement"));
                 for axis in 0..3 {
@@ -424,7 +385,7 @@ fn the_answer_does_not_depend_on_where_and_how_the_scene_stands() {
             let mut runs = [started(&here), started(&carried_elsewhere(&here, r, shift))];
             let (mut off, mut largest) = (0.0_f64, 0.0_f64);
             for _ in 0..40 {
-                runs.iter_mut().for_each(|simulation| advance(simulation, 1e-5));
+                runs.iter_mut().for_each(|simulation| go(simulation, 1e-5));
                 for node in 0..27 {
                     let [first, second] = [0, 1].map(|run| element(&runs[run], "block.normal_force", node));
                     (off, largest) = (off.max((first - second).abs()), largest.max(first));

@@ -1,11 +1,9 @@
 //! What a scene with a free master is refused for, before it flies and on the flight.
 
-#[path = "common/lattice.rs"]
-mod lattice;
-
 use lattice::*;
 use tiprub_core::settings::*;
 use tiprub_core::{Scene, Simulation};
+use tiprub_test_models::{go, lattice, real, started};
 
 #[test]
 fn what_flies_into_a_surface_too_deep_ends_with_the_reason() {
@@ -90,21 +88,18 @@ fn friction_that_jams_a_contact_on_the_flight_is_refused() {
     let mut simulation = Simulation::new(&with_local_mode(&[(0, [1.0, 1.0, 0.0])])).unwrap();
     let error = simulation.initialise(0.0).unwrap_err().to_string();
     assert!(error.contains("contact of left_000 alone has no unique solution"), "{error}");
-    let mut other = Simulation::new(&with_local_mode(&[(0, [1.0, -1.0, 0.0])])).unwrap();
-    other.initialise(0.0).unwrap();
+    let other = started(&with_local_mode(&[(0, [1.0, -1.0, 0.0])]));
     assert!(other.warnings().is_empty(), "{:?}", other.warnings());
 }
 
 #[test]
 fn friction_that_may_leave_the_flight_without_one_solution_is_warned_of() {
-    let mut simulation = Simulation::new(&with_local_mode(&[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])])).unwrap();
-    simulation.initialise(0.0).unwrap();
+    let simulation = started(&with_local_mode(&[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]));
     let told = simulation.warnings().join(" ");
     assert!(told.contains("cannot be shown to have one solution"), "{told}");
     let mut frictionless = with_local_mode(&[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]);
     frictionless.settings.contacts[0].friction = 0.0;
-    let mut simulation = Simulation::new(&frictionless).unwrap();
-    simulation.initialise(0.0).unwrap();
+    let simulation = started(&frictionless);
     assert!(simulation.warnings().is_empty(), "{:?}", simulation.warnings());
 }
 
@@ -119,7 +114,7 @@ fn a_body_too_fast_for_the_step_is_refused_and_passes_nothing_unseen() {
     }
     // A tenth of the block in one step is the limit.
     let mut slow = started(&scene(block([0.0; 3], 3e6), &[(Side::Left, 0.5)], false, [3900.0, 0.0, 0.0]));
-    advance(&mut slow, 1e-5);
+    go(&mut slow, 1e-5);
 }
 
 #[test]

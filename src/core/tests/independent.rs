@@ -8,11 +8,10 @@
     reason = "indices of small grids"
 )]
 
-mod common;
-
 use nalgebra::{DMatrix, DVector, Vector3};
-use tiprub_core::settings::{Motion, Shape, StructureSettings};
+use tiprub_core::settings::Shape;
 use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_test_models::{self as models, set, set_element};
 
 const SECTORS: usize = 3;
 const GAP: f64 = 3.56e-4;
@@ -155,6 +154,15 @@ struct Second {
     gaps: Vec<f64>,
 }
 
+/// Per contact node: modes of blade and casing at it, normal, force per multiplier.
+#[derive(Default)]
+struct Met {
+    blade_rows: Vec<DMatrix<f64>>,
+    casing_rows: Vec<DMatrix<f64>>,
+    normals: Vec<Vector3<f64>>,
+    forces: Vec<Vector3<f64>>,
+}
+
 impl Second {
     fn new(scene: &Scene, factors: &[f64], load: &DVector<f64>) -> Self {
         let (rotor, ring) = (&scene.roms[0], &scene.roms[1]);
@@ -213,14 +221,10 @@ impl Second {
         (at(&value), value)
     }
 
-    /// One step to the given angle; `shaft` is the displacement of its centre, `closing` reduces the casing's radius.
-    fn step(&mut self, angle: f64, closing: f64, shaft: Vector3<f64>, friction: f64) {
-        self.casing.predict();
-        self.blades.iter_mut().for_each(Body::predict);
+    /// Gaps of the predicted places at the given angle, and what the forces on them act on.
+    fn meet(&mut self, angle: f64, closing: f64, shaft: Vector3<f64>, friction: f64) -> Met {
         let points = self.points();
-        let size = 3 * SECTORS;
-        let (mut blade_rows, mut casing_rows) = (vec![], vec![]);
-        let (mut normals, mut forces) = (vec![], vec![]);
+        let mut met = Met::default();
         for sector in 0..SECTORS {
             for node in 0..3 {
                 let contact = &self.blades[sector].rom.contact_nodes[node];
@@ -240,17 +244,43 @@ impl Second {
                 let normal = if inside { apart.normalize() } else { -apart.normalize() };
                 self.gaps[index] = apart.dot(&normal);
                 let slip = (tangential - normal * tangential.dot(&normal)).normalize();
-                normals.push(normal);
-                forces.push(normal - slip * friction);
-                casing_rows.push(
+                met.normals.push(normal);
+                met.forces.push(normal - slip * friction);
+                met.casing_rows.push(
                     self.seen
                         .iter()
                         .zip(&weights)
                         .fold(DMatrix::zeros(3, self.casing.now.len()), |sum, (seen, weight)| sum + seen * *weight),
                 );
-                blade_rows.push(modes);
+                met.blade_rows.push(modes);
             }
         }
+        met
+    }
+
+    /// Projected Gauss-Seidel to rounding.
+    fn settle(&mut self, delassus: &DMatrix<f64>) {
+        let size = self.gaps.len();
+        for _ in 0..20_000 {
+            let mut change = 0.0_f64;
+            for i in 0..size {
+                let gap = self.gaps[i] + (0..size).map(|j| delassus[(i, j)] * self.multipliers[j]).sum::<f64>();
+                let next = (self.multipliers[i] - gap / delassus[(i, i)]).max(0.0);
+                change = change.max((next - self.multipliers[i]).abs());
+                self.multipliers[i] = next;
+            }
+            if change < 1e-13 {
+                break;
+            }
+        }
+    }
+
+    /// One step to the given angle; `shaft` is the displacement of its centre, `closing` reduces the casing's radius.
+    fn step(&mut self, angle: f64, closing: f64, shaft: Vector3<f64>, friction: f64) {
+        self.casing.predict();
+        self.blades.iter_mut().for_each(Body::predict);
+        let Met { blade_rows, casing_rows, normals, forces } = self.meet(angle, closing, shaft, friction);
+        let size = 3 * SECTORS;
         let project =
             |rows: &DMatrix<f64>, v: &Vector3<f64>| rows.transpose() * DVector::from_column_slice(v.as_slice());
         let (soft, ring) = (self.blades.iter().map(Body::compliance).collect::<Vec<_>>(), self.casing.compliance());
@@ -266,19 +296,7 @@ impl Second {
                     0.0
                 }
         });
-        // Projected Gauss-Seidel to rounding.
-        for _ in 0..20_000 {
-            let mut change = 0.0_f64;
-            for i in 0..size {
-                let gap = self.gaps[i] + (0..size).map(|j| delassus[(i, j)] * self.multipliers[j]).sum::<f64>();
-                let next = (self.multipliers[i] - gap / delassus[(i, i)]).max(0.0);
-                change = change.max((next - self.multipliers[i]).abs());
-                self.multipliers[i] = next;
-            }
-            if change < 1e-13 {
-                break;
-            }
-        }
+        self.settle(&delassus);
         let before = self.gaps.clone();
         for i in 0..size {
             self.gaps[i] = before[i] + (0..size).map(|j| delassus[(i, j)] * self.multipliers[j]).sum::<f64>();
@@ -289,35 +307,30 @@ impl Second {
     }
 }
 
-#[test]
-fn a_second_implementation_of_the_flexible_rub_agrees() {
-    let mut scene = common::scene(SECTORS);
-    scene.roms[0] = common::rich_rom(SECTORS);
-    let factors = [1.0, 1.02, 0.97];
+/// Mistuned blades on a shaft that whirls, in an elastic casing that is warm.
+fn scene(factors: &[f64], friction: f64) -> Scene {
+    let mut scene = models::rub(SECTORS);
+    scene.roms[0] = models::rich_blade(SECTORS);
+    models::flexible(&mut scene);
     scene.settings.structures[0].frequency_factors = factors.to_vec();
     scene.settings.structures[0].whirl = true;
     scene.settings.structures[0].axial_shift = true;
+    scene.settings.structures[1].thermal = true;
     scene.settings.surfaces[0].shape = Shape::Circular {};
-    scene.settings.structures.push(StructureSettings {
-        name: "ring".into(),
-        rom: "ring.safetensors".into(),
-        motion: Motion::Still,
-        damping_ratio: Some(0.01),
-        thermal: true,
-        ..StructureSettings::default()
-    });
-    scene.roms.push(common::casing(36, 3));
-    scene.settings.surfaces[0].structure = Some("ring".into());
-    let friction = 0.15;
     scene.settings.contacts[0].friction = friction;
+    scene
+}
+
+#[test]
+fn a_second_implementation_of_the_flexible_rub_agrees() {
+    let (factors, friction) = ([1.0, 1.02, 0.97], 0.15);
+    let scene = scene(&factors, friction);
     let mut simulation = Simulation::new(&scene).unwrap();
-    let place = |simulation: &Simulation, name: &str| simulation.table().find(name).unwrap().reference;
     let temperatures = [3.0, -2.0, 1.0, 4.0];
     let thermal = scene.roms[1].extras.thermal.as_ref().unwrap();
     let load = &thermal.loads * DVector::from_row_slice(&temperatures);
-    let first = place(&simulation, "casing_temperature");
-    for (patch, temperature) in temperatures.iter().enumerate() {
-        simulation.set_real(first + patch as u32, *temperature).unwrap();
+    for (patch, temperature) in (0..).zip(temperatures) {
+        set_element(&mut simulation, "casing_temperature", patch, temperature);
     }
     simulation.initialise(0.0).unwrap();
     let mut second = Second::new(&scene, &factors, &load);
@@ -330,7 +343,7 @@ fn a_second_implementation_of_the_flexible_rub_agrees() {
         for (name, value) in
             [("casing_radius_change", -closing), ("whirl_x", shaft.x), ("whirl_y", shaft.y), ("axial_shift", shaft.z)]
         {
-            simulation.set_real(place(&simulation, name), value).unwrap();
+            set(&mut simulation, name, value);
         }
         simulation.do_step(STEP * f64::from(index - 1), STEP).unwrap();
         second.step(SPEED * time, closing, shaft, friction);

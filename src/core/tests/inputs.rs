@@ -1,43 +1,10 @@
 //! Inputs between communication points: nothing that moves or loads something jumps, unless the scene asks for it.
 
-mod common;
-
 use tiprub_core::settings::{InputInterpolation, LoadSettings, Motion, Shape, StructureSettings};
 use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_test_models::{self as models, go, real, reference, saved, set, slope, started, started_at};
 
 const STEP: f64 = 1e-6;
-
-fn reference(simulation: &Simulation, name: &str) -> u32 {
-    simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
-}
-
-fn real(simulation: &Simulation, name: &str) -> f64 {
-    simulation.real(reference(simulation, name)).unwrap()
-}
-
-fn set(simulation: &mut Simulation, name: &str, value: f64) {
-    simulation.set_real(reference(simulation, name), value).unwrap();
-}
-
-fn slope(simulation: &mut Simulation, name: &str, value: f64) {
-    simulation.set_input_derivative(reference(simulation, name), 1, value).unwrap();
-}
-
-fn started_at(scene: &Scene, time: f64) -> Simulation {
-    let mut simulation = Simulation::new(scene).unwrap();
-    simulation.initialise(time).unwrap();
-    simulation
-}
-
-fn started(scene: &Scene) -> Simulation {
-    started_at(scene, 0.0)
-}
-
-fn state(simulation: &Simulation) -> Vec<u8> {
-    let mut bytes = vec![0; simulation.state_size()];
-    simulation.save_state(&mut bytes).unwrap();
-    bytes
-}
 
 fn outputs(simulation: &Simulation) -> Vec<u64> {
     let rows = simulation.table().variables().iter().filter(|row| row.start.is_none());
@@ -54,7 +21,7 @@ fn acts(simulation: &Simulation, expected: f64) {
 
 /// Blades in bumps whose size is an input, at once; no contact as long as the factor is small.
 fn bumps() -> Scene {
-    let mut scene = common::scene(6);
+    let mut scene = models::rub(6);
     (scene.settings.time.step, scene.settings.surfaces[0].ramp_time) = (STEP, 0.0);
     scene
 }
@@ -73,8 +40,8 @@ fn whirling() -> Scene {
 }
 
 fn spinning_rom() -> Rom {
-    let mut rom = common::rich_rom(6);
-    rom.extras.spin = Some(common::spin(rom.order()));
+    let mut rom = models::rich_blade(6);
+    rom.extras.spin = Some(models::spin(rom.order()));
     rom
 }
 
@@ -93,7 +60,7 @@ fn rich() -> Scene {
         load: Some(LoadSettings { order: 2, amplitude: 100.0, phase: 0.1 }),
         ..StructureSettings::default()
     });
-    scene.roms.push(common::casing(24, 3));
+    scene.roms.push(models::ring(24, 3));
     scene.settings.surfaces[0].structure = Some("ring".into());
     scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 0.3, width: 0.15, phase: 0.0 };
     scene
@@ -238,7 +205,7 @@ fn derivatives_say_where_the_step_ends_and_do_not_make_it_jump() {
     slope(&mut simulation, "casing_shape_factor", 0.1 / length);
     assert!((simulation.shape_factor() - 0.5).abs() < 1e-14);
     for end in [0.3, 0.4, 0.5] {
-        simulation.do_step(simulation.time(), length).unwrap();
+        go(&mut simulation, length);
         assert!((simulation.shape_factor() - end).abs() < 1e-14, "{}", simulation.shape_factor());
     }
 }
@@ -267,7 +234,7 @@ fn a_value_set_within_a_step_turns_the_ramp_where_it_is_and_an_early_return_keep
     assert!((simulation.shape_factor() - 0.8).abs() < 1e-14);
     while !simulation.advance().unwrap().finished {}
     acts(&simulation, 1.0);
-    twin.do_step(twin.time(), 2e-6).unwrap();
+    go(&mut twin, 2e-6);
     assert!((twin.shape_factor() - (0.6 + 0.4 * 2.0 / 7.0)).abs() < 1e-14, "{}", twin.shape_factor());
 }
 
@@ -300,12 +267,12 @@ fn a_state_saved_within_a_ramp_goes_on_bit_by_bit_elsewhere() {
     let mut simulation = started(&scene);
     for index in 0..5 {
         disturb(&mut simulation, index);
-        simulation.do_step(simulation.time(), 1e-5).unwrap();
+        go(&mut simulation, 1e-5);
     }
     let mut other = Simulation::new(&scene).unwrap();
     // At a communication point with values that wait for the next step, within it, and with a ramp turned there.
     disturb(&mut simulation, 17);
-    other.restore_state(&state(&simulation)).unwrap();
+    other.restore_state(&saved(&simulation)).unwrap();
     for part in 0..12 {
         for one in [&mut simulation, &mut other] {
             if part == 0 {
@@ -316,12 +283,12 @@ fn a_state_saved_within_a_ramp_goes_on_bit_by_bit_elsewhere() {
             }
             one.advance().unwrap();
         }
-        assert_eq!(state(&simulation), state(&other), "{part}");
+        assert_eq!(saved(&simulation), saved(&other), "{part}");
         other = Simulation::new(&scene).unwrap();
-        other.restore_state(&state(&simulation)).unwrap();
+        other.restore_state(&saved(&simulation)).unwrap();
     }
     for one in [&mut simulation, &mut other] {
-        one.do_step(one.time(), 3e-5).unwrap();
+        go(one, 3e-5);
     }
     assert_eq!(outputs(&simulation), outputs(&other));
 }
@@ -340,7 +307,7 @@ fn a_thousand_resets_within_a_ramp_leave_nothing() {
         set(&mut simulation, "gap_offset", 1e-5);
         simulation.begin_step(simulation.time(), 4e-6).unwrap();
         simulation.advance().unwrap();
-        let now = state(&simulation);
+        let now = saved(&simulation);
         assert_eq!(*first.get_or_insert_with(|| now.clone()), now);
         simulation.reset();
     }
@@ -349,10 +316,10 @@ fn a_thousand_resets_within_a_ramp_leave_nothing() {
 /// What a refused step must leave alone.
 #[track_caller]
 fn refused(simulation: &mut Simulation, length: f64, words: &[&str]) {
-    let before = state(simulation);
+    let before = saved(simulation);
     let message = simulation.begin_step(simulation.time(), length).unwrap_err().to_string();
     assert!(words.iter().all(|word| message.contains(word)), "{message}");
-    assert_eq!(state(simulation), before, "a refused step changes something");
+    assert_eq!(saved(simulation), before, "a refused step changes something");
 }
 
 #[test]
@@ -375,7 +342,7 @@ fn refused_steps_name_the_input_and_change_nothing() {
     set(&mut simulation, "casing_shape_rotation", 0.2);
     // A fast turn is no wrap where the derivative says it.
     slope(&mut simulation, "casing_shape_rotation", 1300.0);
-    simulation.do_step(simulation.time(), 1e-2).unwrap();
+    go(&mut simulation, 1e-2);
 }
 
 #[test]
@@ -384,14 +351,14 @@ fn refused_values_within_a_step_change_nothing() {
     set(&mut simulation, "casing_shape_rotation", 0.001);
     simulation.begin_step(0.0, 3e-6).unwrap();
     simulation.advance().unwrap();
-    let before = state(&simulation);
+    let before = saved(&simulation);
     let rotation = reference(&simulation, "casing_shape_rotation");
     let radius = reference(&simulation, "casing_radius_change");
     let wrapped = simulation.set_real(rotation, -6.2).unwrap_err().to_string();
     let fast = simulation.set_real(rotation, 3.0).unwrap_err().to_string();
     let beyond = simulation.set_input_derivative(radius, 1, 1e6).unwrap_err().to_string();
     assert!(wrapped.contains("half a turn") && fast.contains("`casing_shape_rotation`") && beyond.contains("outside"));
-    assert_eq!(state(&simulation), before);
+    assert_eq!(saved(&simulation), before);
 }
 
 /// Growth: one blade under Ω²c, as a speed that jumps and as the same speed ramped.
@@ -432,7 +399,7 @@ fn blades_grow_by_the_forces_of_their_speed_over_the_stiffness_of_their_speed() 
         let structure = &mut scene.settings.structures[0];
         (structure.speed, structure.spin.growth, structure.spin.stiffening) = (speed, true, stiffening);
         // Both powers count: they are alike at 1000 rad/s.
-        let mut spin = common::spin(scene.roms[0].order());
+        let mut spin = models::spin(scene.roms[0].order());
         let loads = spin.centrifugal_load.iter().enumerate();
         spin.centrifugal_load_speed4 = loads.map(|(i, load)| load * (1e-6 - 1e-7 * i as f64)).collect();
         scene.roms[0].extras.spin = Some(spin.clone());
@@ -466,9 +433,9 @@ fn blades_grow_by_the_forces_of_their_speed_over_the_stiffness_of_their_speed() 
 /// A blade left vibrating while its rotor speeds up, its stiffness that of the middle of each step: of second order in H.
 #[test]
 fn held_inputs_follow_a_speed_by_its_mean_over_the_step() {
-    let mut scene = held(common::scene(1));
+    let mut scene = held(models::rub(1));
     let order = scene.roms[0].order();
-    let mut spin = common::spin(order);
+    let mut spin = models::spin(order);
     spin.stiffness_speed2 = nalgebra::DMatrix::identity(order, order) * 3.0;
     spin.stiffness_speed4.fill(0.0);
     scene.roms[0].extras.spin = Some(spin);
@@ -481,7 +448,7 @@ fn held_inputs_follow_a_speed_by_its_mean_over_the_step() {
     // No casing in the way from here on.
     set(&mut rubbed, "casing_shape_factor", 0.0);
     set(&mut rubbed, "casing_radius_change", 5e-3);
-    let left = state(&rubbed);
+    let left = saved(&rubbed);
     let end = |steps: u32| {
         let mut simulation = Simulation::new(&scene).unwrap();
         simulation.restore_state(&left).unwrap();
@@ -508,7 +475,7 @@ fn held_inputs_follow_a_speed_by_its_mean_over_the_step() {
 
 #[test]
 fn a_scene_without_such_inputs_has_no_choice_of_them() {
-    let mut scene = common::scene(6);
+    let mut scene = models::rub(6);
     let has = |scene: &Scene| Simulation::new(scene).unwrap().table().find("input_interpolation").is_some();
     assert!(has(&scene) && has(&whirling()));
     // Only gap_offset is left, which is ramped.

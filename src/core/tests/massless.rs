@@ -8,14 +8,13 @@ mod rods;
 use guide::told;
 use nalgebra::DMatrix;
 use rods::{NEARLY_NONE, Rod};
-use tiprub_core::Rom;
 use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw};
 use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::stability::massless::MasslessCheck;
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_reference::carpenter;
+use tiprub_test_models::{node, structure};
 
 /// The bars of N. J. Carpenter, R. L. Taylor, M. G. Katona, Int. J. Numer. Methods Eng. 32 (1991): half of the
 /// symmetric problem, a bar that hits a rigid wall.
@@ -203,19 +202,8 @@ fn dragged(step: f64, solver: Solver) -> (System, f64) {
     });
     let mut map = DMatrix::zeros(3, 4);
     (map[(0, 0)], map[(1, 1)]) = (1.0, 1.0);
-    let rom = Rom {
-        name: "dragged".into(),
-        origin: "springs and masses".into(),
-        sectors: 1,
-        frame: Frame::Cartesian,
-        mass: DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![light, light, 1.0, 1.0])),
-        stiffness,
-        damping_ratio: 0.0,
-        contact_map: map,
-        contact_nodes: vec![ContactNode { name: "end".into(), position: [0.0; 3], meridional_slope: 0.0 }],
-        checks: RomChecks::default(),
-        extras: RomExtras::default(),
-    };
+    let mass = DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![light, light, 1.0, 1.0]));
+    let rom = structure("dragged", mass, stiffness, map, vec![node("end", [0.0; 3], 0.0)]);
     let model = ModalModel { quasi_static: 2, ..ModalModel::from_rom(&rom, 0.0).unwrap() };
     let sliding = vec![[0.0, 1.0, 0.0]];
     let law = FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![-1e-4], sliding };

@@ -56,7 +56,7 @@ fn data_points_are_interpolated_and_forces_go_back_with_the_same_work() {
             }
             let mut random = Random(3);
             for _ in 0..200 {
-                let place = place(random.below(around - 1), random.below(along - 1), random.next(), random.next());
+                let place = place(random.below(around - 1), random.below(along - 1), random.unit(), random.unit());
                 let weights = surface.weights(place);
                 partition = partition.max((weights.iter().map(|(_, weight)| weight).sum::<f64>() - 1.0).abs());
                 // Work of a force at the place on displacements of the data points, both ways round.
@@ -144,7 +144,7 @@ fn closest_points_and_gaps_are_those_of_the_reference() {
         let (mut gaps, mut normals, mut found) = (0.0_f64, 0.0_f64, 0);
         let mut random = Random(11);
         for _ in 0..3000 {
-            let start = place(random.below(around - 1), random.below(along - 1), random.next(), random.next());
+            let start = place(random.below(around - 1), random.below(along - 1), random.unit(), random.unit());
             let foot = surface.evaluate(start);
             let Projection::Found { normal, .. } = surface.project(foot.point, start) else { panic!("on the surface") };
             let height = random.within(-1e-3, 1e-3);

@@ -1,16 +1,12 @@
 //! Scenes of several structures and pairs: each is what it is alone, and together they keep the books.
 
-mod common;
 #[path = "common/counting.rs"]
 mod counting;
-#[path = "common/lattice.rs"]
-mod lattice;
-#[path = "common/several.rs"]
-mod several;
 
 use tiprub_core::settings::{Motion, Scheme, Shape, Solver, StructureSettings};
 use tiprub_core::variables::{Causality, Kind};
 use tiprub_core::{Scene, Simulation};
+use tiprub_test_models::{lattice, real, rich_blade, rub, several};
 
 const SCHEMES: [Scheme; 3] = Scheme::ALL;
 const SOLVERS: [Solver; 3] = Solver::ALL;
@@ -23,10 +19,6 @@ fn set_all(simulation: &mut Simulation, name: &str, value: f64) {
     for reference in references {
         simulation.set_real(reference, value).unwrap();
     }
-}
-
-fn real(simulation: &Simulation, name: &str) -> f64 {
-    simulation.real(simulation.table().find(name).unwrap_or_else(|| panic!("no {name}")).reference).unwrap()
 }
 
 /// Real outputs, by name.
@@ -67,7 +59,7 @@ fn run_closing(scene: &Scene, steps: u32, length: f64, mut each: impl FnMut(&Sim
 fn a_pair_split_into_three_gives_the_bits_of_one() {
     for scheme in SCHEMES {
         for solver in SOLVERS {
-            let mut whole = common::scene(6);
+            let mut whole = rub(6);
             (whole.settings.time.scheme, whole.settings.contacts[0].solver) = (scheme, solver);
             // massless-boundary makes nine modes quasi-static of eight here.
             if scheme == Scheme::MasslessBoundary {
@@ -89,7 +81,7 @@ fn a_pair_split_into_three_gives_the_bits_of_one() {
 #[test]
 fn rotors_in_rigid_casings_are_each_what_they_are_alone() {
     let slower = |rear: &mut StructureSettings| rear.speed = -900.0;
-    let mut scene = several::two_rotors(common::scene(6), 0.1, slower);
+    let mut scene = several::two_rotors(rub(6), 0.1, slower);
     scene.settings.surfaces[1].shape = Shape::Lobes { amplitude: 4.5e-4, order: 3, phase: 0.3 };
     let alone = |index: usize| {
         let mut alone = scene.clone();
@@ -121,7 +113,7 @@ fn rotors_in_rigid_casings_are_each_what_they_are_alone() {
 #[test]
 fn two_rotors_in_one_casing_keep_the_books() {
     for (solver, friction) in [(Solver::Lcp, 0.15), (Solver::Coulomb, 0.15), (Solver::Film, 0.1), (Solver::Lcp, 0.0)] {
-        let mut scene = several::in_one_casing(common::scene(6), solver, friction);
+        let mut scene = several::in_one_casing(rub(6), solver, friction);
         scene.settings.surfaces.iter_mut().for_each(|surface| surface.shape = Shape::Circular {});
         let (mut off, mut largest, mut together) = (0.0_f64, 0.0_f64, 0);
         let simulation = run_closing(&scene, 80, 3.7e-4, |simulation, finished| {
@@ -162,7 +154,7 @@ fn two_rotors_in_one_casing_keep_the_books() {
 /// The torque of each rotor times its speed, summed over the run, is the work of the shafts.
 #[test]
 fn torques_of_two_rotors_are_the_work_of_their_shafts() {
-    let scene = several::in_one_casing(common::scene(6), Solver::Lcp, 0.15);
+    let scene = several::in_one_casing(rub(6), Solver::Lcp, 0.15);
     let mut work = 0.0;
     let simulation = run(&scene, 80, |simulation, finished| {
         let finished = f64::from(u8::from(finished));
@@ -182,7 +174,7 @@ fn torques_of_two_rotors_are_the_work_of_their_shafts() {
 #[test]
 fn a_rub_is_felt_by_the_other_rotor_through_the_casing() {
     let felt = |stiffness: f64| {
-        let mut scene = several::in_one_casing(common::scene(6), Solver::Lcp, 0.15);
+        let mut scene = several::in_one_casing(rub(6), Solver::Lcp, 0.15);
         scene.roms[2].stiffness *= stiffness;
         // The rear never touches.
         scene.settings.contacts[1].gap = 2e-3;
@@ -207,7 +199,7 @@ fn a_rub_is_felt_by_the_other_rotor_through_the_casing() {
 #[test]
 fn a_tip_and_a_seal_on_one_blade_each_have_their_own_friction() {
     for solver in [Solver::Lcp, Solver::Film] {
-        let scene = several::tip_and_seal(common::scene(6), solver);
+        let scene = several::tip_and_seal(rub(6), solver);
         let mut seen = [0; 2];
         let simulation = run(&scene, 60, |simulation, finished| {
             for event in simulation.system().events() {
@@ -279,7 +271,7 @@ fn free_bodies_are_each_what_they_are_alone() {
 /// States of several structures continue with the same bits, elsewhere and after a change of the step.
 #[test]
 fn a_saved_state_of_two_rotors_continues_with_the_same_bits() {
-    let scene = several::in_one_casing(common::scene(6), Solver::Coulomb, 0.15);
+    let scene = several::in_one_casing(rub(6), Solver::Coulomb, 0.15);
     let mut simulation = run(&scene, 30, |_, _| ());
     let mut state = vec![0; simulation.state_size()];
     simulation.save_state(&mut state).unwrap();
@@ -299,9 +291,9 @@ fn a_saved_state_of_two_rotors_continues_with_the_same_bits() {
 #[test]
 fn a_step_asks_for_no_memory() {
     for scene in [
-        several::in_one_casing(common::scene(6), Solver::Lcp, 0.15),
-        several::in_one_casing(common::scene(6), Solver::Coulomb, 0.15),
-        several::split(&common::scene(6)),
+        several::in_one_casing(rub(6), Solver::Lcp, 0.15),
+        several::in_one_casing(rub(6), Solver::Coulomb, 0.15),
+        several::split(&rub(6)),
     ] {
         let mut simulation = run(&scene, 25, |_, _| ());
         let before = simulation.system().factorisations();
@@ -318,7 +310,7 @@ fn what_does_not_go_together_is_refused_by_name() {
         let message = Simulation::new(scene).map(|_| ()).unwrap_err().to_string();
         assert!(message.contains(part), "{part:?} is not in {message:?}");
     };
-    let both = several::in_one_casing(common::scene(6), Solver::Lcp, 0.15);
+    let both = several::in_one_casing(rub(6), Solver::Lcp, 0.15);
     let mut scene = both.clone();
     scene.settings.contacts[1].solver = Solver::Film;
     refused(&scene, "contact[2].solver: differs from that of contact[1]");
@@ -339,7 +331,7 @@ fn what_does_not_go_together_is_refused_by_name() {
     scene.settings.contacts.pop();
     scene.settings.surfaces.pop();
     refused(&scene, "structure[2].name: `rear` takes no part");
-    let mut scene = several::split(&common::scene(6));
+    let mut scene = several::split(&rub(6));
     scene.settings.contacts[1].nodes = None;
     refused(&scene, "contact[2].nodes: of several pairs of one structure one claims all");
     scene.settings.contacts[1].nodes = Some("leading".into());
@@ -348,7 +340,7 @@ fn what_does_not_go_together_is_refused_by_name() {
     refused(&scene, "no contact node of ROM `rotor` has a name that starts with \"tip\"");
     let mut scene = both;
     scene.settings.time.scheme = Scheme::MasslessBoundary;
-    scene.roms[..2].iter_mut().for_each(|rom| *rom = common::rich_rom(6));
+    scene.roms[..2].iter_mut().for_each(|rom| *rom = rich_blade(6));
     scene.roms[1].contact_nodes.iter_mut().for_each(|node| node.position[2] += 0.01);
     let message = match Simulation::new(&scene).and_then(|mut simulation| simulation.initialise(0.0)) {
         Err(error) => error.to_string(),

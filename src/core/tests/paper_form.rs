@@ -3,44 +3,32 @@
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw, dot};
 use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::rom::{ContactNode, Frame, Rom, RomChecks};
+use tiprub_core::rom::Rom;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_reference::paper::DenseFilm;
+use tiprub_test_models::{Random, node, structure};
 
 const CONTACTS: usize = 3;
 const ORDER: usize = 14;
 const FRICTION: f64 = 0.3;
 const DAMPING: f64 = 0.02;
 
-/// Reproducible numbers in (−1, 1) without a generator to depend on.
-fn number(seed: &mut u64) -> f64 {
-    *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-    (*seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-}
-
-fn rom(seed: &mut u64) -> Rom {
-    let a = DMatrix::from_fn(ORDER, ORDER, |_, _| number(seed));
-    let b = DMatrix::from_fn(ORDER, ORDER, |_, _| number(seed));
+fn rom(numbers: &mut Random) -> Rom {
+    let [a, b] = [(); 2].map(|()| numbers.matrix(ORDER, ORDER));
+    let mass = &a * a.transpose() * 0.1 + DMatrix::identity(ORDER, ORDER);
+    let stiffness = (&b * b.transpose() + DMatrix::identity(ORDER, ORDER) * 0.3) * 1e6;
+    let nodes = vec![node("node", [0.0; 3], 0.0); CONTACTS];
     Rom {
-        name: "random".into(),
-        origin: "random symmetric positive definite matrices".into(),
-        sectors: 1,
-        frame: Frame::Cartesian,
-        mass: &a * a.transpose() * 0.1 + DMatrix::identity(ORDER, ORDER),
-        stiffness: (&b * b.transpose() + DMatrix::identity(ORDER, ORDER) * 0.3) * 1e6,
         damping_ratio: DAMPING,
-        contact_map: DMatrix::from_fn(3 * CONTACTS, ORDER, |row, column| if row == column { 1.0 } else { 0.0 }),
-        contact_nodes: vec![ContactNode { name: "node".into(), position: [0.0; 3], meridional_slope: 0.0 }; CONTACTS],
-        checks: RomChecks::default(),
-        extras: tiprub_core::rom::RomExtras::default(),
+        ..structure("random", mass, stiffness, DMatrix::identity(3 * CONTACTS, ORDER), nodes)
     }
 }
 
 #[test]
 fn a_thousand_contact_steps_agree_to_rounding() {
-    let mut seed = 2010;
-    let rom = rom(&mut seed);
+    let mut numbers = Random(2010);
+    let rom = rom(&mut numbers);
     let model = ModalModel::from_rom(&rom, DAMPING).unwrap();
     let step = 0.2 / model.largest_frequency();
     let normals = vec![[0.6, 0.0, 0.8]; CONTACTS];
@@ -53,7 +41,7 @@ fn a_thousand_contact_steps_agree_to_rounding() {
     let settings = SystemSettings { scheme: Scheme::CentralDifference, solver: Solver::Film, ledger: true };
     let mut system = System::new(&model, 1, law, FRICTION, settings);
     system.set_step(step);
-    let start = DVector::from_fn(ORDER, |_, _| 2e-4 * number(&mut seed));
+    let start = DVector::from_fn(ORDER, |_, _| 2e-4 * numbers.signed());
     let modal = model.shapes.transpose() * &rom.mass * &start;
     for mode in 0..ORDER {
         system.bank_mut().set_modal_state(mode, 0, modal[mode], 0.0);

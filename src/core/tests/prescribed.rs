@@ -1,12 +1,6 @@
 //! What is prescribed and where it acts, against closed forms that know signs and places: how inputs and parameters move casing
 //! and shaft, what slides on what, which sector and which structure a setting belongs to.
 
-mod common;
-#[path = "common/features.rs"]
-mod features;
-#[path = "common/lattice.rs"]
-mod lattice;
-
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
@@ -19,29 +13,7 @@ use tiprub_core::dynamics::sectors::SectorModel;
 use tiprub_core::settings::{Interpolation, LoadSettings, Scheme, Shape, Solver, SplineSettings};
 use tiprub_core::system::{Carrier, PairParts, StructureParts, System, SystemSettings};
 use tiprub_core::{Rom, Scene, Simulation};
-
-fn place(simulation: &Simulation, name: &str) -> u32 {
-    simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
-}
-
-fn real(simulation: &Simulation, name: &str) -> f64 {
-    simulation.real(place(simulation, name)).unwrap()
-}
-
-fn set(simulation: &mut Simulation, name: &str, value: f64) {
-    simulation.set_real(place(simulation, name), value).unwrap();
-}
-
-/// From `value` on with a constant rate.
-fn move_on(simulation: &mut Simulation, name: &str, value: f64, rate: f64) {
-    let reference = place(simulation, name);
-    simulation.set_real(reference, value).unwrap();
-    simulation.set_input_derivative(reference, 1, rate).unwrap();
-}
-
-fn run(simulation: &mut Simulation, length: f64) {
-    simulation.do_step(simulation.time(), length).unwrap();
-}
+use tiprub_test_models::{self as models, go, lattice, move_on, real, reference, set, started};
 
 const SECTORS: usize = 5;
 const SLOPE: f64 = -0.2;
@@ -50,7 +22,7 @@ const GAPS: [f64; SECTORS] = [5e-4, 5.3e-4, 4.8e-4, 5.1e-4, 5.6e-4];
 
 /// Blades with conical tips in a casing of lobes that can be moved in every way.
 fn movable() -> Scene {
-    let mut scene = common::scene(SECTORS);
+    let mut scene = models::rub(SECTORS);
     for node in &mut scene.roms[0].contact_nodes {
         (node.position[0], node.meridional_slope) = (0.25 + SLOPE * node.position[2], SLOPE);
     }
@@ -95,7 +67,7 @@ fn gaps_are_distances_in_space_whatever_moves_casing_and_shaft() {
     let kinds: [Kind; 3] = [
         ("revolution", |_| {}),
         ("spline", |scene| scene.settings.surfaces[0].spline = Some(SplineSettings::default())),
-        ("flexible casing", features::flexible),
+        ("flexible casing", models::flexible),
     ];
     for (kind, change) in kinds {
         let mut scene = movable();
@@ -119,7 +91,7 @@ fn gaps_are_distances_in_space_whatever_moves_casing_and_shaft() {
                 error = error.max((simulation.system().gap(node, sector) - exact).abs());
                 effect = effect.max((exact - distance(&scene.roms[0], node, sector, unmoved)).abs());
                 let watched =
-                    place(&simulation, &format!("blade[{}].clearance", sector + 1)) + u32::try_from(node).unwrap();
+                    reference(&simulation, &format!("blade[{}].clearance", sector + 1)) + u32::try_from(node).unwrap();
                 let shown = simulation.real(watched).unwrap();
                 assert_eq!(shown.to_bits(), simulation.system().gap(node, sector).to_bits());
             }
@@ -143,7 +115,7 @@ const TOWARDS: f64 = 0.3;
 
 /// Blades with one mode along each direction, in a round casing that can close; nothing turns.
 fn blades(scheme: Scheme, solver: Solver, friction: f64) -> Scene {
-    let mut scene = common::scene(SECTORS);
+    let mut scene = models::rub(SECTORS);
     let rom = &mut scene.roms[0];
     rom.mass = DMatrix::identity(3, 3);
     rom.stiffness = DMatrix::from_diagonal(&DVector::from_iterator(3, MODES.iter().map(|mode| mode * mode)));
@@ -159,18 +131,12 @@ fn blades(scheme: Scheme, solver: Solver, friction: f64) -> Scene {
     scene
 }
 
-fn started(scene: &Scene) -> Simulation {
-    let mut simulation = Simulation::new(scene).unwrap_or_else(|error| panic!("{error}"));
-    simulation.initialise(0.0).unwrap_or_else(|error| panic!("{error}"));
-    simulation
-}
-
 /// Close the casing by more than the gap, and wait.
 fn close(simulation: &mut Simulation, closing: f64) {
     move_on(simulation, "casing_radius_change", 0.0, -closing / 4e-3);
-    run(simulation, 4e-3);
+    go(simulation, 4e-3);
     move_on(simulation, "casing_radius_change", -closing, 0.0);
-    run(simulation, 4e-3);
+    go(simulation, 4e-3);
 }
 
 /// Every blade that slides with `slip(θ)` (tangential, axial; m/s) is held back by µλ against it, and heats by µλ|slip|.
@@ -221,7 +187,7 @@ fn friction_opposes_whirl_and_axial_motion_of_the_shaft() {
                     for (name, rate) in ["whirl_x", "whirl_y", "axial_shift"].into_iter().zip(rates) {
                         move_on(&mut simulation, name, rate * moved, rate);
                     }
-                    run(&mut simulation, length);
+                    go(&mut simulation, length);
                     moved += length;
                 }
                 let case = format!("{scheme:?}, {solver:?}, speed {speed}, along {along}");
@@ -237,7 +203,7 @@ fn friction_drags_the_blades_along_with_a_casing_that_moves() {
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
         for solver in [Solver::Lcp, Solver::Coulomb] {
             let mut scene = blades(scheme, solver, FRICTION);
-            features::flexible(&mut scene);
+            models::flexible(&mut scene);
             scene.settings.structures[1].damping_ratio = Some(0.5);
             scene.settings.structures[1].load = Some(LoadSettings { order: 1, amplitude: 0.0, phase: TOWARDS });
             scene.settings.outputs.slave_displacement = true;
@@ -246,13 +212,13 @@ fn friction_drags_the_blades_along_with_a_casing_that_moves() {
             // The mode has the displacement 0.5 cos θ and the mass 1: line load times π R/2 is its force.
             let rate = VELOCITY * (TAU * 900.0).powi(2) / (0.5 * 0.5 * std::f64::consts::PI * 0.25);
             move_on(&mut simulation, "casing_load_amplitude", 0.0, rate);
-            run(&mut simulation, 4e-3);
+            go(&mut simulation, 4e-3);
             // Nodes at 0 and 90 degrees of the first ring.
-            let first = place(&simulation, "casing_displacement");
+            let first = reference(&simulation, "casing_displacement");
             let position = |simulation: &Simulation| [0, 9].map(|node| simulation.real(first + node).unwrap());
             let before = position(&simulation);
             move_on(&mut simulation, "casing_load_amplitude", rate * 4e-3, rate);
-            run(&mut simulation, 5e-5);
+            go(&mut simulation, 5e-5);
             let now = position(&simulation);
             let [x, y] = [0, 1].map(|axis| (now[axis] - before[axis]) / 5e-5);
             let case = format!("{scheme:?}, {solver:?}: casing at ({x:.4}, {y:.4}) m/s");
@@ -375,7 +341,7 @@ fn gaps_and_frequency_factors_belong_to_their_own_sectors() {
         scene.settings.structures[0].frequency_factors = factors.to_vec();
         scene.settings.time.step = 2e-5;
         scene.settings.contacts[0].sector_gaps = GAPS.to_vec();
-        let mut spin = common::spin(3);
+        let mut spin = models::spin(3);
         (spin.centrifugal_load, spin.centrifugal_load_speed4) = (vec![load, 0.0, 0.0], vec![0.0; 3]);
         scene.roms[0].extras.spin = Some(spin);
         scene.settings.structures[0].spin.growth = true;
@@ -387,14 +353,14 @@ fn gaps_and_frequency_factors_belong_to_their_own_sectors() {
             assert!((found - exact).abs() < 1e-12, "{scheme:?}, sector {sector}: gap {found}, exactly {exact}");
         }
         move_on(&mut simulation, "casing_radius_change", 0.0, -8e-4 / 4e-3);
-        run(&mut simulation, 4e-3);
+        go(&mut simulation, 4e-3);
         // The forces of a step close its gaps: each blade gives way by its own flexibility.
         for (sector, gap) in GAPS.iter().enumerate() {
             let left = gap - 8e-4 - simulation.system().bank().row(0, sector);
             assert!(left.abs() < 1e-12, "{scheme:?}, sector {sector}: {left:e} m are left between blade and casing");
         }
         move_on(&mut simulation, "casing_radius_change", -8e-4, 0.0);
-        run(&mut simulation, 4e-3);
+        go(&mut simulation, 4e-3);
         for (sector, gap) in GAPS.iter().enumerate() {
             let (found, exact) = (simulation.system().multiplier(0, sector), stiffness(sector) * (8e-4 - gap) + push);
             println!("{scheme:?}, sector {sector}: {found:.4} N, exactly {exact:.4} N");
@@ -406,8 +372,8 @@ fn gaps_and_frequency_factors_belong_to_their_own_sectors() {
 /// e^(−2ξωh) of every mode: damping given as a parameter reaches the structure it is named after.
 #[test]
 fn damping_parameters_belong_to_their_own_structures() {
-    let mut ring = common::scene(3);
-    features::flexible(&mut ring);
+    let mut ring = models::rub(3);
+    models::flexible(&mut ring);
     let plates = lattice::with(lattice::squeezed(), 0.0, Solver::Lcp, Scheme::ModalExact);
     let cases: [(Scene, &[(&str, f64)]); 2] = [
         (ring, &[("damping_ratio", 0.03), ("casing_damping_ratio", 0.11)]),
@@ -419,7 +385,7 @@ fn damping_parameters_belong_to_their_own_structures() {
             set(&mut simulation, name, *ratio);
         }
         simulation.initialise(0.0).unwrap();
-        run(&mut simulation, 7.7e-7);
+        go(&mut simulation, 7.7e-7);
         let system = simulation.system();
         let banks = system.structures().iter().map(|structure| structure.modes().uncoupled().unwrap());
         let banks: Vec<_> = banks.collect();
@@ -439,11 +405,11 @@ fn damping_parameters_belong_to_their_own_structures() {
 fn casing_and_blades_swing_out_at_the_rate_of_their_parameters() {
     let (casing, rotor) = (0.06, 0.03);
     let mut scene = blades(Scheme::ModalExact, Solver::Lcp, 0.0);
-    features::flexible(&mut scene);
+    models::flexible(&mut scene);
     scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 2e3, phase: 0.0 });
     scene.settings.outputs.slave_displacement = true;
     scene.settings.structures[0].speed = 600.0;
-    let mut spin = common::spin(3);
+    let mut spin = models::spin(3);
     (spin.centrifugal_load, spin.centrifugal_load_speed4) = (vec![2e-3, 0.0, 0.0], vec![0.0; 3]);
     scene.roms[0].extras.spin = Some(spin);
     scene.settings.structures[0].spin.growth = true;
@@ -452,15 +418,15 @@ fn casing_and_blades_swing_out_at_the_rate_of_their_parameters() {
     set(&mut simulation, "damping_ratio", rotor);
     simulation.initialise(0.0).unwrap();
     let read = |simulation: &Simulation| {
-        [simulation.real(place(simulation, "casing_displacement")).unwrap(), simulation.system().bank().row(0, 0)]
+        [simulation.real(reference(simulation, "casing_displacement")).unwrap(), simulation.system().bank().row(0, 0)]
     };
     let start = read(&simulation);
     set(&mut simulation, "casing_load_amplitude", 0.0);
     set(&mut simulation, "speed", 0.0);
     // One internal step of a thousandth of a period: how the load goes within it does not matter.
-    run(&mut simulation, 1e-6);
+    go(&mut simulation, 1e-6);
     for _ in 0..40 {
-        run(&mut simulation, 1e-4);
+        go(&mut simulation, 1e-4);
         let found = read(&simulation);
         for (body, (ratio, omega)) in [(casing, TAU * 400.0), (rotor, MODES[0])].into_iter().enumerate() {
             let damped = omega * (1.0_f64 - ratio * ratio).sqrt();

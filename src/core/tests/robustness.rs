@@ -1,40 +1,19 @@
 //! What users may combine without thinking of it: every case once gave wrong numbers in silence.
 
-mod common;
-
 use nalgebra::DMatrix;
 use proptest::prelude::*;
-use tiprub_core::settings::{
-    CoatingSettings, Motion, Scheme, Shape, Solver, SplineSettings, StructureSettings, TimeSettings,
-};
+use tiprub_core::settings::{Scheme, Shape, Solver, SplineSettings, TimeSettings};
 use tiprub_core::{Result, Scene, Simulation};
-
-fn reference(simulation: &Simulation, name: &str) -> u32 {
-    simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
-}
-
-fn real(simulation: &Simulation, name: &str) -> f64 {
-    simulation.real(reference(simulation, name)).unwrap()
-}
-
-fn set(simulation: &mut Simulation, name: &str, value: f64) {
-    simulation.set_real(reference(simulation, name), value).unwrap();
-}
+use tiprub_test_models::{self as models, bits, go, real, reference, saved, set, try_started};
 
 fn energy(simulation: &Simulation) -> f64 {
     real(simulation, "strain_energy") + real(simulation, "kinetic_energy")
 }
 
-fn started(scene: &Scene) -> Result<Simulation> {
-    let mut simulation = Simulation::new(scene)?;
-    simulation.initialise(0.0)?;
-    Ok(simulation)
-}
-
 /// Twelve blades in a round casing, without friction.
 fn round(scheme: Scheme) -> Scene {
-    let mut scene = common::scene(12);
-    scene.roms[0] = common::rich_rom(12);
+    let mut scene = models::rub(12);
+    scene.roms[0] = models::rich_blade(12);
     scene.settings.time.scheme = scheme;
     scene.settings.contacts[0].friction = 0.0;
     scene.settings.surfaces[0].shape = Shape::Circular {};
@@ -48,30 +27,22 @@ fn with_step(mut scene: Scene, step: f64) -> Scene {
 }
 
 fn on_a_ring(mut scene: Scene) -> Scene {
-    scene.settings.structures.push(StructureSettings {
-        name: "ring".into(),
-        rom: "ring.safetensors".into(),
-        motion: Motion::Still,
-        damping_ratio: Some(0.3),
-        ..StructureSettings::default()
-    });
-    scene.roms.push(common::casing(36, 3));
-    scene.settings.surfaces[0].structure = Some("ring".into());
+    models::on_ring(&mut scene, models::ring(36, 3), 0.3);
     scene
 }
 
 /// The largest usable step that a refusal names (s).
 fn usable_step(scene: Scene) -> f64 {
-    let message = started(&with_step(scene, 1e-3)).unwrap_err().to_string();
+    let message = try_started(&with_step(scene, 1e-3)).unwrap_err().to_string();
     let number = message.split("Set the internal step below ").nth(1).and_then(|text| text.split(' ').next());
     number.and_then(|text| text.parse().ok()).unwrap_or_else(|| panic!("{message}"))
 }
 
 /// Stiffens with the speed by 3Ω².
 fn stiffening(scheme: Scheme, step: f64) -> Scene {
-    let mut scene = with_step(common::scene(12), step);
+    let mut scene = with_step(models::rub(12), step);
     let order = scene.roms[0].order();
-    let mut spin = common::spin(order);
+    let mut spin = models::spin(order);
     spin.stiffness_speed2 = DMatrix::identity(order, order) * 3.0;
     spin.stiffness_speed4.fill(0.0);
     scene.roms[0].extras.spin = Some(spin);
@@ -104,7 +75,7 @@ fn stiffening_does_not_make_unresolved_modes_grow() {
         let mut scene = stiffening(Scheme::ModalExact, step);
         // Here a resonance of the step, not the bound on energies, is looked at.
         scene.settings.outputs.energies = false;
-        let mut simulation = started(&scene).unwrap();
+        let mut simulation = try_started(&scene).unwrap();
         run_up(&mut simulation, step).unwrap();
         let left = simulation.system().bank().modal_state(7, 0).0.abs();
         println!("ωh = {turns} π: highest mode left at {left:.1e} m·√kg");
@@ -115,12 +86,12 @@ fn stiffening_does_not_make_unresolved_modes_grow() {
 #[test]
 fn central_differences_are_refused_when_stiffening_takes_them_over_their_limit() {
     let step = 1.99995 / (std::f64::consts::TAU * 40_000.0);
-    let mut simulation = started(&stiffening(Scheme::CentralDifference, step)).unwrap();
+    let mut simulation = try_started(&stiffening(Scheme::CentralDifference, step)).unwrap();
     let message = run_up(&mut simulation, step).unwrap_err().to_string();
     assert!(message.contains("ω_max"), "{message}");
     // Slower again, it goes on.
     set(&mut simulation, "speed", 500.0);
-    simulation.do_step(simulation.time(), step).unwrap();
+    go(&mut simulation, step);
 }
 
 #[test]
@@ -140,12 +111,12 @@ fn pressed_blades_gain_no_energy_at_the_largest_step_of_massless_boundary() {
         scene.settings.structures[0].frequency_factors = vec![factor; 12];
         scene.settings.structures[0].damping_ratio = Some(1e-3);
         let step = 0.999 * usable_step(scene.clone());
-        let mut simulation = started(&with_step(scene, step)).unwrap();
+        let mut simulation = try_started(&with_step(scene, step)).unwrap();
         assert!(simulation.warnings().iter().any(|text| text.contains("gain energy")), "{:?}", simulation.warnings());
         let mut most: f64 = 0.0;
         for index in 0..10_000 {
             set(&mut simulation, "casing_radius_change", -4.2e-4 * (f64::from(index) * step / 2e-3).min(1.0));
-            simulation.do_step(simulation.time(), step).unwrap();
+            go(&mut simulation, step);
             most = most.max(energy(&simulation));
         }
         let (gained, supplied) = (-real(&simulation, "impact_loss"), real(&simulation, "external_work"));
@@ -167,11 +138,11 @@ fn a_stiff_casing_gains_no_energy_at_the_largest_step_of_massless_boundary() {
         scene.roms[1].stiffness *= raised * raised;
         scene.roms[1].contact_map *= seen;
         let step = 0.999 * usable_step(scene.clone());
-        let mut simulation = started(&with_step(scene, step)).unwrap();
+        let mut simulation = try_started(&with_step(scene, step)).unwrap();
         let (mut most, mut supplied) = (0.0_f64, 0.0_f64);
         for index in 0..5000 {
             set(&mut simulation, "casing_radius_change", -4.2e-4 * (f64::from(index) * step / 2e-3).min(1.0));
-            simulation.do_step(simulation.time(), step).unwrap();
+            go(&mut simulation, step);
             most = most.max(energy(&simulation));
             supplied = supplied.max(real(&simulation, "external_work"));
         }
@@ -188,7 +159,7 @@ fn flutter_is_told_with_massless_boundary_as_with_modal_exact() {
     let rate = |scheme| {
         let mut scene = with_step(round(scheme), 2e-7);
         scene.settings.contacts[0].friction = 0.15;
-        let warnings = started(&scene).unwrap().warnings().to_vec();
+        let warnings = try_started(&scene).unwrap().warnings().to_vec();
         let number = warnings.iter().find_map(|text| text.split("flutter), growth rate ").nth(1)).map(str::to_owned);
         let number = number.unwrap_or_else(|| panic!("{scheme:?}: {warnings:?}"));
         number.trim_end_matches(" 1/s").parse::<f64>().unwrap()
@@ -203,14 +174,14 @@ fn a_change_of_step_leaves_the_pressed_casing_at_rest() {
     for scheme in [Scheme::ModalExact, Scheme::MasslessBoundary] {
         let mut scene = on_a_ring(round(scheme));
         scene.settings.structures[0].damping_ratio = Some(0.3);
-        let mut simulation = started(&scene).unwrap();
+        let mut simulation = try_started(&scene).unwrap();
         for index in 0..8000 {
             set(&mut simulation, "casing_radius_change", -5e-4 * (f64::from(index) / 4000.0).min(1.0));
-            simulation.do_step(simulation.time(), 1e-6).unwrap();
+            go(&mut simulation, 1e-6);
         }
         let (before, booked) = (energy(&simulation), real(&simulation, "step_change_energy"));
         for index in 0..400 {
-            simulation.do_step(simulation.time(), if index % 2 == 0 { 2.5e-7 } else { 1e-6 }).unwrap();
+            go(&mut simulation, if index % 2 == 0 { 2.5e-7 } else { 1e-6 });
         }
         let share = (real(&simulation, "step_change_energy") - booked).abs() / before;
         println!("{scheme:?}: 400 changes of step book {share:.1e} of the energy");
@@ -227,7 +198,7 @@ fn a_node_that_wanders_over_the_edge_and_back_rubs_as_on_an_endless_surface() {
         scene.settings.contacts[0].friction = 0.1;
         scene.settings.surfaces[0].spline = spline;
         scene.settings.structures[0].axial_shift = true;
-        let mut simulation = started(&scene).unwrap();
+        let mut simulation = try_started(&scene).unwrap();
         let mut peak = 0.0_f64;
         for index in 0..3000 {
             let x = f64::from(index);
@@ -267,12 +238,12 @@ fn a_node_that_wanders_over_the_edge_of_a_flexible_casing_loses_no_more_than_is_
             (node.meridional_slope, node.position[2]) = (slope, node.position[2] - 0.02);
         }
         scene.settings.structures[0].axial_shift = true;
-        let mut simulation = started(&scene).unwrap();
+        let mut simulation = try_started(&scene).unwrap();
         for index in 0..3000 {
             let x = f64::from(index);
             set(&mut simulation, "casing_radius_change", -4e-4 * (x / 1000.0).min(1.0));
             set(&mut simulation, "axial_shift", 0.015 * (x / 300.0).sin());
-            simulation.do_step(simulation.time(), 1e-6).unwrap();
+            go(&mut simulation, 1e-6);
         }
         let (loss, work) = (real(&simulation, "impact_loss"), real(&simulation, "external_work"));
         println!("slope {slope}: impact loss {loss:.3e} J, external work {work:.3e} J");
@@ -311,7 +282,7 @@ fn a_casing_that_small_displacements_cannot_describe_is_refused() {
     let load = DMatrix::from_fn(map.ncols(), 4, |mode, _| (0..map.nrows() / 3).map(|node| map[(3 * node, mode)]).sum());
     for (scale, refused) in [(1e3, false), (4e3, true)] {
         scene.roms[1].extras.thermal.as_mut().unwrap().loads = &load * scale;
-        let mut simulation = started(&scene).unwrap();
+        let mut simulation = try_started(&scene).unwrap();
         let first = reference(&simulation, "casing_temperature");
         for patch in 0..4 {
             simulation.set_real(first + patch, 300.0).unwrap();
@@ -331,15 +302,8 @@ fn a_casing_that_small_displacements_cannot_describe_is_refused() {
 fn coating_cells_that_the_blades_would_skip_are_refused() {
     for (cells, refused) in [(4800, false), (5000, true), (100_000, true)] {
         let mut scene = round(Scheme::ModalExact);
-        scene.settings.contacts[0].coating = Some(CoatingSettings {
-            thickness: 1e-3,
-            modulus: 2e8,
-            yield_stress: 1e6,
-            hardening: 2e7,
-            cells_around: cells,
-            cells_along: 3,
-        });
-        let mut simulation = started(&scene).unwrap();
+        scene.settings.contacts[0].coating = Some(models::coating_of(1e-3, [cells, 3]));
+        let mut simulation = try_started(&scene).unwrap();
         let outcome = simulation.do_step(0.0, 1e-6);
         assert_eq!(outcome.is_err(), refused, "{cells}: {outcome:?}");
         if let Err(error) = outcome {
@@ -355,10 +319,9 @@ fn a_restored_state_brings_the_limits_of_its_own_parameters() {
     let mut scene = with_step(round(Scheme::CentralDifference), 1e-3);
     scene.settings.experiment.communication_step = 1e-6;
     scene.settings.contacts[0].solver = Solver::Lcp;
-    let mut simulation = started(&scene).unwrap();
+    let mut simulation = try_started(&scene).unwrap();
     simulation.do_step(0.0, 1e-6).unwrap();
-    let mut state = vec![0; simulation.state_size()];
-    simulation.save_state(&mut state).unwrap();
+    let state = saved(&simulation);
     let expected = simulation.do_step(1e-6, 1e-4).unwrap_err().to_string();
     assert!(expected.contains("ω_max"), "{expected}");
     let mut fresh = Simulation::new(&scene).unwrap();
@@ -374,7 +337,7 @@ fn a_restored_state_brings_the_limits_of_its_own_parameters() {
 
 #[test]
 fn a_speed_given_within_a_communication_step_is_checked_as_well() {
-    let mut simulation = started(&common::scene(12)).unwrap();
+    let mut simulation = try_started(&models::rub(12)).unwrap();
     let speed = reference(&simulation, "speed");
     simulation.begin_step(0.0, 5e-5).unwrap();
     simulation.advance().unwrap();
@@ -390,8 +353,7 @@ fn a_speed_given_within_a_communication_step_is_checked_as_well() {
 
 /// What the FMU does when an output is asked for in Initialization Mode: on a refusal it goes back to the state before.
 fn tried(simulation: &mut Simulation) -> bool {
-    let mut state = vec![0; simulation.state_size()];
-    simulation.save_state(&mut state).unwrap();
+    let state = saved(simulation);
     let outcome = simulation.initialise(0.0);
     if outcome.is_err() {
         simulation.restore_state(&state).unwrap();
@@ -399,16 +361,10 @@ fn tried(simulation: &mut Simulation) -> bool {
     outcome.is_ok()
 }
 
-fn bits(simulation: &Simulation) -> Vec<u64> {
-    (0..u32::try_from(simulation.table().references()).unwrap())
-        .filter_map(|reference| simulation.real(reference).ok().map(f64::to_bits))
-        .collect()
-}
-
 /// Scenes with parameters that are refused in many ways.
 fn refusing() -> Vec<Scene> {
-    let small = common::scene(3);
-    let mut elastic = on_a_ring(common::scene(3));
+    let small = models::rub(3);
+    let mut elastic = on_a_ring(models::rub(3));
     elastic.settings.contacts[0].friction = 0.1;
     let mut stiffened = stiffening(Scheme::ModalExact, 1e-6);
     stiffened.roms[0].sectors = 3;
@@ -451,8 +407,7 @@ proptest! {
                     let _ = simulation.do_step(simulation.time(), 10_f64.powf(-7.0 + 3.0 * share));
                 }
                 7 => {
-                    let mut state = vec![0; simulation.state_size()];
-                    simulation.save_state(&mut state).unwrap();
+                    let state = saved(&simulation);
                     states.push(state);
                     history.push(started);
                 }
@@ -491,7 +446,7 @@ proptest! {
 #[test]
 fn a_scheme_that_leaves_no_mode_is_refused_and_the_instance_goes_on() {
     // Eight modes, three contact nodes: massless-boundary would make all of them quasi-static.
-    let scene = common::scene(3);
+    let scene = models::rub(3);
     let mut simulation = Simulation::new(&scene).unwrap();
     let scheme = reference(&simulation, "scheme");
     simulation.set_integer(scheme, 3).unwrap();
@@ -505,10 +460,10 @@ fn a_scheme_that_leaves_no_mode_is_refused_and_the_instance_goes_on() {
 fn a_refused_friction_leaves_the_limits_of_the_one_in_use() {
     // Growth by friction forbids the longer step, at which central differences are stable otherwise.
     let (short, long) = (1e-6, 5e-5 / 7.0);
-    let mut scene = common::scene(3);
+    let mut scene = models::rub(3);
     scene.settings.time = TimeSettings { scheme: Scheme::CentralDifference, step: 1.0, ..TimeSettings::default() };
     scene.settings.experiment.communication_step = short;
-    let mut simulation = started(&scene).unwrap();
+    let mut simulation = try_started(&scene).unwrap();
     let mut twin = simulation.clone();
     let friction = reference(&simulation, "friction_coefficient");
     let refused =
@@ -525,15 +480,15 @@ fn a_refused_friction_leaves_the_limits_of_the_one_in_use() {
 
 #[test]
 fn warnings_hold_for_the_step_that_is_taken_and_are_told_once() {
-    let mut scene = with_step(common::scene(3), 8e-6);
+    let mut scene = with_step(models::rub(3), 8e-6);
     scene.settings.contacts[0].friction = 0.0;
     // ω_max·h = 2 lies at 7.96e-6 s.
     scene.settings.experiment.communication_step = 5e-6;
-    let mut simulation = started(&scene).unwrap();
+    let mut simulation = try_started(&scene).unwrap();
     assert!(simulation.warnings().is_empty(), "{:?}", simulation.warnings());
     let mut told = Vec::new();
     for length in [5e-6, 7.9e-6, 8e-6, 8e-6, 4e-6, 1.6e-5] {
-        simulation.do_step(simulation.time(), length).unwrap();
+        go(&mut simulation, length);
         told.push(simulation.take_notes().join("; "));
     }
     assert!(told[2].contains("8.000e-6"), "{told:?}");
@@ -541,11 +496,11 @@ fn warnings_hold_for_the_step_that_is_taken_and_are_told_once() {
     // Told at the start for the step to expect, it is told again when the step is materially longer.
     let mut scene = with_step(scene, 2e-5);
     scene.settings.experiment.communication_step = 1e-5;
-    let mut simulation = started(&scene).unwrap();
+    let mut simulation = try_started(&scene).unwrap();
     assert!(simulation.warnings().join(" ").contains("1.000e-5"), "{:?}", simulation.warnings());
     let steps = [1e-5, 1.1e-5, 2e-5, 1e-5, 2e-5];
     let told = steps.map(|length| {
-        simulation.do_step(simulation.time(), length).unwrap();
+        go(&mut simulation, length);
         simulation.take_notes().len()
     });
     assert_eq!(told, [0, 0, 1, 0, 0]);
@@ -554,9 +509,9 @@ fn warnings_hold_for_the_step_that_is_taken_and_are_told_once() {
 #[test]
 fn the_other_sense_is_told_of_when_the_rotor_turns_that_way() {
     // Slip in one sense only makes this blade flutter.
-    let mut scene = with_step(common::scene(3), 1e-6);
+    let mut scene = with_step(models::rub(3), 1e-6);
     let flutters = |scene: &Scene| {
-        let warnings = started(scene).unwrap().warnings().to_vec();
+        let warnings = try_started(scene).unwrap().warnings().to_vec();
         warnings.iter().filter(|text| text.contains("flutter")).count()
     };
     scene.settings.structures[0].speed = -1300.0;
@@ -564,14 +519,14 @@ fn the_other_sense_is_told_of_when_the_rotor_turns_that_way() {
     scene.settings.structures[0].speed = 1300.0;
     let forwards = flutters(&scene);
     assert!(backwards > 0, "{backwards} {forwards}");
-    let mut simulation = started(&scene).unwrap();
+    let mut simulation = try_started(&scene).unwrap();
     let other = simulation.if_reversed();
     assert_eq!(other.len(), backwards);
     simulation.do_step(0.0, 1e-6).unwrap();
     assert!(simulation.take_notes().is_empty());
     for (speed, expected) in [(-1300.0, backwards), (1300.0, 0), (-1300.0, 0)] {
         set(&mut simulation, "speed", speed);
-        simulation.do_step(simulation.time(), 1e-6).unwrap();
+        go(&mut simulation, 1e-6);
         assert_eq!(simulation.take_notes().len(), expected, "{speed}");
     }
 }

@@ -1,77 +1,15 @@
 //! A rub of a synthetic bladed disk through the whole simulation: books, states, time, steps.
 
-mod common;
-#[path = "common/counting.rs"]
-mod counting;
-
 use std::collections::BTreeMap;
 
-use tiprub_core::settings::{Scheme, Shape, Solver};
-use tiprub_core::variables::{Causality, Kind, Variability};
-use tiprub_core::{Error, Scene, Simulation};
-
-fn reference(simulation: &Simulation, name: &str) -> u32 {
-    simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
-}
-
-fn real(simulation: &Simulation, name: &str) -> f64 {
-    simulation.real(reference(simulation, name)).unwrap()
-}
-
-/// All real values, by reference, as bits.
-fn bits(simulation: &Simulation) -> BTreeMap<u32, u64> {
-    let rows = simulation.table().variables().iter().filter(|row| row.kind == Kind::Real);
-    rows.flat_map(|row| (0..row.len()).map(|i| row.reference + u32::try_from(i).unwrap()))
-        .map(|reference| (reference, simulation.real(reference).unwrap().to_bits()))
-        .collect()
-}
-
-fn started(scene: &Scene) -> Simulation {
-    let mut simulation = Simulation::new(scene).unwrap();
-    simulation.initialise(0.0).unwrap();
-    simulation
-}
+use tiprub_core::Simulation;
+use tiprub_core::settings::{Scheme, Shape};
+use tiprub_core::variables::{Causality, Variability};
+use tiprub_test_models::{self as models, bits, go, real, reference, saved, started};
 
 fn run(simulation: &mut Simulation, steps: u32, length: f64) {
     for _ in 0..steps {
-        let time = simulation.time();
-        simulation.do_step(time, length).unwrap();
-    }
-}
-
-#[test]
-fn the_ledger_closes_for_every_scheme_and_solver() {
-    for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
-        for solver in [Solver::Film, Solver::Lcp] {
-            for friction in [0.0, 0.15] {
-                let mut scene = common::scene(12);
-                scene.settings.time.scheme = scheme;
-                scene.settings.contacts[0].solver = solver;
-                scene.settings.contacts[0].friction = friction;
-                let mut simulation = started(&scene);
-                let mut touched = 0.0;
-                for step in 0..200 {
-                    let length = if step % 3 == 0 { 5e-5 } else { 3.7e-5 };
-                    let time = simulation.time();
-                    simulation.do_step(time, length).unwrap();
-                    touched += real(&simulation, "normal_impulse");
-                    let residual = real(&simulation, "energy_residual_relative");
-                    assert!(residual.abs() < 1e-13, "{scheme:?} {solver:?} µ {friction}: residual {residual:e}");
-                }
-                assert!(touched > 0.0, "no contact: the test would prove nothing");
-                // Without friction its variables do not exist.
-                assert_eq!(simulation.table().find("friction_loss").is_some(), friction > 0.0);
-                if friction > 0.0 {
-                    assert!(real(&simulation, "friction_loss") > 0.0);
-                }
-                assert!(real(&simulation, "impact_loss") > 0.0 || solver == Solver::Film);
-                println!(
-                    "{scheme:?} {solver:?} µ {friction}: residual {:.1e} of {:.3e} J turnover",
-                    real(&simulation, "energy_residual_relative"),
-                    real(&simulation, "energy_residual") / real(&simulation, "energy_residual_relative")
-                );
-            }
-        }
+        go(simulation, length);
     }
 }
 
@@ -80,7 +18,7 @@ fn the_ledger_closes_for_every_scheme_and_solver() {
 #[test]
 fn friction_heat_is_force_times_sliding() {
     let (friction, radius, sectors) = (0.15, 0.25, 4);
-    let mut scene = common::scene(sectors);
+    let mut scene = models::rub(sectors);
     scene.settings.surfaces[0].shape = Shape::Circular {};
     let mut simulation = started(&scene);
     simulation.set_real(reference(&simulation, "casing_radius_change"), -4.2e-4).unwrap();
@@ -92,8 +30,7 @@ fn friction_heat_is_force_times_sliding() {
     };
     let (mut oldest, mut before, mut heat) = (all(&simulation), all(&simulation), 0.0);
     for _ in 0..3000 {
-        let time = simulation.time();
-        simulation.do_step(time, step).unwrap();
+        go(&mut simulation, step);
         for event in simulation.system().events() {
             let place = event.node * sectors + event.sector;
             let moved = 0.5 * (tangential(&simulation, event.node, event.sector) - oldest[place]);
@@ -116,7 +53,7 @@ fn shaft_power_is_torque_times_speed() {
 }
 
 fn shaft_power(friction: f64) {
-    let mut scene = common::scene(12);
+    let mut scene = models::rub(12);
     scene.settings.time.step = 1e-7;
     scene.settings.contacts[0].friction = friction;
     let mut simulation = started(&scene);
@@ -136,7 +73,7 @@ fn shaft_power(friction: f64) {
 #[test]
 fn forces_and_torque_are_those_of_the_touching_blade_in_the_fixed_frame() {
     // A round casing moved by 0.4 mm towards 0.7 rad + π: blades are pressed inwards at 0.7 rad and dragged against +z.
-    let mut scene = common::scene(12);
+    let mut scene = models::rub(12);
     scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 4.1e-4, order: 1, phase: 0.7 };
     let nodes = scene.roms[0].contact_nodes.clone();
     let mut simulation = started(&scene);
@@ -175,7 +112,7 @@ fn forces_and_torque_are_those_of_the_touching_blade_in_the_fixed_frame() {
 #[test]
 fn a_pressed_blade_stays_at_rest_however_time_is_divided() {
     // Closed contact under a constant force: carrying (q, d) to another h must neither push nor pull.
-    let mut scene = common::scene(1);
+    let mut scene = models::rub(1);
     scene.settings.contacts[0].friction = 0.0;
     scene.settings.structures[0].damping_ratio = Some(0.3);
     scene.settings.surfaces[0].shape = Shape::Circular {};
@@ -200,45 +137,6 @@ fn a_pressed_blade_stays_at_rest_however_time_is_divided() {
     assert!(at_rest > 100.0 && worst < 1e-6, "{worst} of {at_rest} N");
 }
 
-#[test]
-fn lcp_leaves_no_penetration_and_no_adhesion() {
-    let mut simulation = started(&common::scene(12));
-    let mut contacts = 0;
-    for _ in 0..200 {
-        run(&mut simulation, 1, 5e-5);
-        let system = simulation.system();
-        assert!(system.gaps().all(|gap| *gap >= 0.0));
-        assert!(system.events().iter().all(|event| event.normal > 0.0));
-        assert!(real(&simulation, "clearance_minimum") >= 0.0);
-        contacts += system.events().len();
-    }
-    assert!(contacts > 0);
-}
-
-#[test]
-fn a_saved_state_continues_with_identical_bits() {
-    let scene = common::scene(12);
-    let mut simulation = started(&scene);
-    while simulation.system().events().is_empty() {
-        run(&mut simulation, 1, 5e-5);
-    }
-    let mut state = vec![0; simulation.state_size()];
-    simulation.save_state(&mut state).unwrap();
-    let at_save = bits(&simulation);
-    run(&mut simulation, 40, 5e-5);
-    let first = bits(&simulation);
-    simulation.restore_state(&state).unwrap();
-    assert_eq!(bits(&simulation), at_save);
-    run(&mut simulation, 40, 5e-5);
-    assert_eq!(bits(&simulation), first);
-    // Another instance that has done something else meanwhile.
-    let mut other = started(&scene);
-    run(&mut other, 3, 1.3e-5);
-    other.restore_state(&state).unwrap();
-    run(&mut other, 40, 5e-5);
-    assert_eq!(bits(&other), first);
-}
-
 /// Every element of every continuous output: its derivative (1/s), as bits.
 fn derivatives(simulation: &Simulation) -> BTreeMap<u32, u64> {
     let rows = simulation.table().variables().iter();
@@ -251,7 +149,7 @@ fn derivatives(simulation: &Simulation) -> BTreeMap<u32, u64> {
 /// Steps of other lengths lie behind the instance that takes the state over: none of them counts.
 #[test]
 fn a_restored_state_gives_the_derivatives_of_its_own_steps() {
-    let scene = common::scene(12);
+    let scene = models::rub(12);
     let names = ["force_x", "torque", "kinetic_energy", "external_work"];
     let read = |simulation: &Simulation| names.map(|name| real(simulation, name));
     let mut simulation = started(&scene);
@@ -260,8 +158,7 @@ fn a_restored_state_gives_the_derivatives_of_its_own_steps() {
     let before = read(&simulation);
     run(&mut simulation, 1, 7e-5);
     let now = read(&simulation);
-    let mut state = vec![0; simulation.state_size()];
-    simulation.save_state(&mut state).unwrap();
+    let state = saved(&simulation);
     let at_save = derivatives(&simulation);
     // Means belong to the middles of their steps.
     for (index, length) in [5e-5, 5e-5, 7e-5, 7e-5].into_iter().enumerate() {
@@ -293,7 +190,7 @@ fn a_restored_state_gives_the_derivatives_of_its_own_steps() {
 #[test]
 fn rates_of_clearances_and_of_the_angle_are_those_of_the_motion() {
     let rate = |simulation: &Simulation, reference| simulation.output_derivative(reference, 1).unwrap();
-    let mut scene = common::scene(4);
+    let mut scene = models::rub(4);
     scene.settings.surfaces[0].shape = Shape::Circular {};
     let mut simulation = started(&scene);
     let (clearance, angle) = (reference(&simulation, "blade[1].clearance"), reference(&simulation, "rotor_angle"));
@@ -316,7 +213,7 @@ fn rates_of_clearances_and_of_the_angle_are_those_of_the_motion() {
         while !simulation.advance().unwrap().finished {}
         opened += 1.37 * opening * length;
     }
-    let mut simulation = started(&common::scene(4));
+    let mut simulation = started(&models::rub(4));
     run(&mut simulation, 20, 5e-5);
     let clearance = reference(&simulation, "blade[1].clearance");
     let (mut fastest, read) = (0.0_f64, |simulation: &Simulation| simulation.real(clearance).unwrap());
@@ -335,7 +232,7 @@ fn rates_of_clearances_and_of_the_angle_are_those_of_the_motion() {
 #[test]
 fn outputs_over_a_communication_step_are_those_of_its_internal_steps() {
     let (sectors, nodes) = (12, 3);
-    let mut simulation = started(&common::scene(sectors));
+    let mut simulation = started(&models::rub(sectors));
     let lanes = simulation.system().bank().lanes();
     let least = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min);
     // Per kind: clearances that were smaller within the step than at its end.
@@ -401,51 +298,22 @@ fn outputs_over_a_communication_step_are_those_of_its_internal_steps() {
 }
 
 #[test]
-fn a_state_inside_a_communication_step_continues_too() {
-    let scene = common::scene(12);
-    let mut simulation = started(&scene);
-    run(&mut simulation, 40, 5e-5);
-    simulation.begin_step(simulation.time(), 5e-5).unwrap();
-    for _ in 0..20 {
-        simulation.advance().unwrap();
-    }
-    let mut state = vec![0; simulation.state_size()];
-    simulation.save_state(&mut state).unwrap();
-    let mut other = Simulation::new(&scene).unwrap();
-    other.restore_state(&state).unwrap();
-    for simulation in [&mut simulation, &mut other] {
-        while !simulation.advance().unwrap().finished {}
-        run(simulation, 10, 5e-5);
-    }
-    assert_eq!(bits(&simulation), bits(&other));
-}
-
-#[test]
-fn damaged_and_foreign_states_are_refused_and_change_nothing() {
-    let mut simulation = started(&common::scene(12));
+fn states_of_another_scene_are_refused_and_change_nothing() {
+    let mut simulation = started(&models::rub(12));
     run(&mut simulation, 30, 5e-5);
-    let mut state = vec![0; simulation.state_size()];
-    simulation.save_state(&mut state).unwrap();
-    let before = bits(&simulation);
-    for position in [0, 9, 17, 40, state.len() / 2, state.len() - 1] {
-        let mut damaged = state.clone();
-        damaged[position] ^= 4;
-        assert!(matches!(simulation.restore_state(&damaged), Err(Error::State { .. })), "byte {position}");
-    }
+    let (mut state, before) = (saved(&simulation), bits(&simulation));
     assert!(simulation.restore_state(&state[1..]).is_err());
     assert!(simulation.save_state(&mut state[1..]).is_err());
-    let mut foreign_scene = common::scene(12);
+    let mut foreign_scene = models::rub(12);
     foreign_scene.settings.contacts[0].gap = 4e-4;
-    let foreign = started(&foreign_scene);
-    foreign.save_state(&mut state).unwrap();
-    let message = simulation.restore_state(&state).unwrap_err().to_string();
+    let message = simulation.restore_state(&saved(&started(&foreign_scene))).unwrap_err().to_string();
     assert!(message.contains("another scene"), "{message}");
     assert_eq!(bits(&simulation), before);
 }
 
 #[test]
 fn a_thousand_resets_give_identical_bits() {
-    let scene = common::scene(6);
+    let scene = models::rub(6);
     let mut simulation = Simulation::new(&scene).unwrap();
     let mut first = None;
     for _ in 0..1000 {
@@ -460,7 +328,7 @@ fn a_thousand_resets_give_identical_bits() {
 
 #[test]
 fn any_division_of_time_lands_exactly_and_converges() {
-    let scene = common::scene(12);
+    let scene = models::rub(12);
     let end = 6e-3;
     let result = |lengths: &dyn Fn(u32) -> f64, step: f64| {
         let mut scene = scene.clone();
@@ -498,11 +366,10 @@ fn any_division_of_time_lands_exactly_and_converges() {
 fn a_tiny_communication_step_at_an_impact_adds_no_energy() {
     // The importer inserts an event: a step of a nanosecond or less, whose impact has a multiplier p/h of meganewtons.
     for tiny in [1e-8, 1e-10, 1e-12] {
-        let mut simulation = started(&common::scene(12));
+        let mut simulation = started(&models::rub(12));
         let (mut impacts, mut worst) = (0, 0.0_f64);
         for step in 0..4000_u32 {
-            let time = simulation.time();
-            simulation.do_step(time, if step % 2 == 0 { 7.3e-7 } else { tiny }).unwrap();
+            go(&mut simulation, if step % 2 == 0 { 7.3e-7 } else { tiny });
             if step % 2 == 1 && !simulation.system().events().is_empty() {
                 impacts += 1;
             }
@@ -520,7 +387,7 @@ fn a_tiny_communication_step_at_an_impact_adds_no_energy() {
 
 #[test]
 fn one_sixtieth_computed_in_three_ways_is_one_step() {
-    let mut scene = common::scene(6);
+    let mut scene = models::rub(6);
     scene.settings.time.step = 1e-5;
     let ways = [1.0 / 60.0, 0.016_666_666_666_666_677, 2.0 / 60.0 - 1.0 / 60.0 + 1e-17];
     let ends: Vec<Vec<f64>> = ways
@@ -543,24 +410,8 @@ fn one_sixtieth_computed_in_three_ways_is_one_step() {
 }
 
 #[test]
-fn the_step_does_not_allocate() {
-    let mut simulation = started(&common::scene(12));
-    run(&mut simulation, 30, 5e-5);
-    let mut contacts = 0;
-    let allocations = counting::allocations_of(|| {
-        for index in 0..200 {
-            let time = simulation.time();
-            simulation.do_step(time, if index % 5 == 0 { 3.1e-5 } else { 5e-5 }).unwrap();
-            contacts += simulation.system().events().len();
-        }
-    });
-    assert!(contacts > 0);
-    assert_eq!(allocations, 0, "allocations inside the step");
-}
-
-#[test]
 fn inputs_are_linear_where_derivatives_are_given() {
-    let scene = common::scene(6);
+    let scene = models::rub(6);
     let mut simulation = started(&scene);
     let speed = reference(&simulation, "speed");
     for _ in 0..10 {
@@ -577,7 +428,7 @@ fn inputs_are_linear_where_derivatives_are_given() {
 
 #[test]
 fn nothing_unsound_enters() {
-    let scene = common::scene(6);
+    let scene = models::rub(6);
     let mut simulation = Simulation::new(&scene).unwrap();
     let rows = simulation.table().variables().to_vec();
     for row in &rows {
@@ -604,7 +455,7 @@ fn nothing_unsound_enters() {
 
 #[test]
 fn unstable_or_penetrating_starts_are_refused_with_numbers() {
-    let mut scene = common::scene(6);
+    let mut scene = models::rub(6);
     scene.settings.time.scheme = Scheme::CentralDifference;
     scene.settings.time.step = 2.002 / (std::f64::consts::TAU * 40_000.0);
     scene.settings.experiment.communication_step = scene.settings.time.step;
@@ -623,7 +474,7 @@ fn unstable_or_penetrating_starts_are_refused_with_numbers() {
 
 #[test]
 fn round_casing_never_touches_an_undisturbed_disk() {
-    let mut scene = common::scene(12);
+    let mut scene = models::rub(12);
     scene.settings.surfaces[0].shape = Shape::Circular {};
     let mut simulation = started(&scene);
     run(&mut simulation, 20, 1e-3);
@@ -635,7 +486,7 @@ fn round_casing_never_touches_an_undisturbed_disk() {
 /// An importer takes lengths as differences of times, which late ones round: to 1e-5 of H here.
 #[test]
 fn a_rub_that_begins_late_is_that_of_one_that_begins_at_zero() {
-    let (scene, length) = (common::scene(6), 1e-5);
+    let (scene, length) = (models::rub(6), 1e-5);
     let run = |begin: f64| {
         let mut simulation = Simulation::new(&scene).unwrap();
         simulation.initialise(begin).unwrap();
@@ -647,8 +498,7 @@ fn a_rub_that_begins_late_is_that_of_one_that_begins_at_zero() {
             impulse += real(&simulation, "normal_impulse");
             assert_eq!(real(&simulation, "internal_step").to_bits(), 1e-6_f64.to_bits());
             if index % 7 == 0 {
-                let mut state = vec![0; simulation.state_size()];
-                simulation.save_state(&mut state).unwrap();
+                let state = saved(&simulation);
                 simulation.restore_state(&state).unwrap();
             }
         }

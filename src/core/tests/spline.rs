@@ -21,7 +21,7 @@ fn weights_sum_to_one_and_are_the_derivative_of_the_point() {
     let (mut unity, mut derivative): (f64, f64) = (0.0, 0.0);
     for (surface, _) in every_surface() {
         for _ in 0..500 {
-            let place = random.place(&surface);
+            let place = anywhere(&mut random, &surface);
             let weights = surface.weights(place);
             unity = unity.max((weights.values[..weights.len].iter().sum::<f64>() - 1.0).abs());
             let mut sum = [0.0; 3];
@@ -64,7 +64,7 @@ fn a_patch_is_the_matrix_form_of_equation_7() {
     let mut random = Random(2);
     let mut error: f64 = 0.0;
     for _ in 0..2000 {
-        let (p, q, s, t) = (random.below(around), 1 + random.below(along - 3), random.next(), random.next());
+        let (p, q, s, t) = (random.below(around), 1 + random.below(along - 3), random.unit(), random.unit());
         let (a, b) = (basis(s), basis(t));
         let mut point = [0.0; 3];
         for i in 0..4 {
@@ -200,7 +200,11 @@ fn derivatives_are_those_of_the_point() {
         let step = 1e-3;
         let mut worst: f64 = 0.0;
         for _ in 0..100 {
-            let at = ClosestPoint { s: random.within(0.1, 0.9), t: random.within(0.1, 0.9), ..random.place(&surface) };
+            let at = ClosestPoint {
+                s: random.within(0.1, 0.9),
+                t: random.within(0.1, 0.9),
+                ..anywhere(&mut random, &surface)
+            };
             let point =
                 |i: f64, j: f64| surface.evaluate(ClosestPoint { s: at.s + i * step, t: at.t + j * step, ..at }).point;
             // Third derivatives are constant along a parameter: two step sizes leave no truncation error.
@@ -247,7 +251,7 @@ fn virtual_work_is_the_same_on_the_surface_and_on_the_data() {
             moved.set_control_points(&control);
             let (mut forces, mut work, mut size) = (vec![[0.0; 3]; count], 0.0, 0.0);
             for index in 0..30 {
-                let (mut place, force) = (random.place(&surface), random.vector(1.0));
+                let (mut place, force) = (anywhere(&mut random, &surface), random.vector(1.0));
                 if index % 3 == 0 && place.patch[1] == 0 {
                     // Before the first ring.
                     place.t *= -REACH * (surface.along() - 1) as f64;

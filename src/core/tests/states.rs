@@ -1,30 +1,22 @@
 //! States whose checksum is right and whose content is not: refused with nothing changed, or run on to an end.
 
-mod common;
-#[path = "common/features.rs"]
-mod common_features;
-#[path = "common/disk.rs"]
-mod disk;
-#[path = "common/lattice.rs"]
-mod lattice;
-
-use common_features::{coating, flexible};
 use tiprub_core::persist::fingerprint;
 use tiprub_core::settings::{LoadSettings, Scheme, Solver, SplineSettings};
 use tiprub_core::{Error, Scene, Simulation};
+use tiprub_test_models::{self as models, coating, disk, flexible, go, lattice, saved};
 
 /// Magic, format version and fingerprint of the scene, in front of what is damaged here.
 const HEADER: usize = 24;
 
 fn scenes() -> Vec<(&'static str, Scene)> {
     let rotor = |change: fn(&mut Scene)| {
-        let mut scene = common::scene(12);
-        scene.roms[0] = common::rich_rom(12);
+        let mut scene = models::rub(12);
+        scene.roms[0] = models::rich_blade(12);
         change(&mut scene);
         scene
     };
     let disk = disk::Disk::random(6, 2, 9, 0.25, 5).cyclic();
-    let mut coupled = disk::rub(common::scene(disk.sectors), disk);
+    let mut coupled = disk::with_rotor(disk);
     flexible(&mut coupled);
     coupled.settings.contacts[0].solver = Solver::Coulomb;
     vec![
@@ -44,19 +36,13 @@ fn scenes() -> Vec<(&'static str, Scene)> {
             rotor(|scene| {
                 flexible(scene);
                 scene.settings.contacts[0].solver = Solver::Coulomb;
-                scene.roms[0].extras.spin = Some(common::spin(scene.roms[0].order()));
+                scene.roms[0].extras.spin = Some(models::spin(scene.roms[0].order()));
                 scene.settings.structures[0].spin.stiffening = true;
             }),
         ),
         ("coupled sectors", coupled),
         ("free", lattice::with(lattice::squeezed(), 0.15, Solver::Coulomb, Scheme::ModalExact)),
     ]
-}
-
-fn saved(simulation: &Simulation) -> Vec<u8> {
-    let mut state = vec![0; simulation.state_size()];
-    simulation.save_state(&mut state).unwrap();
-    state
 }
 
 fn sealed(mut state: Vec<u8>) -> Vec<u8> {
@@ -74,7 +60,7 @@ fn moments(scene: &Scene, length: f64) -> Vec<Vec<u8>> {
     states.push(saved(&simulation));
     let mut contacts = 0;
     for _ in 0..400 {
-        simulation.do_step(simulation.time(), length).unwrap();
+        go(&mut simulation, length);
         contacts += simulation.system().events().len();
         if contacts > 20 && !simulation.system().events().is_empty() {
             break;

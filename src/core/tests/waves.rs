@@ -1,20 +1,17 @@
 //! Waves around the circumference against closed forms: a cyclic chain pressed at rest, pressed by a casing of lobes and by
 //! whirl that travel around it, and a flexible ring under a travelling load.
 
-#[path = "common/disk.rs"]
-mod disk;
-#[path = "common/features.rs"]
-mod features;
-
-mod common;
-
 use std::f64::consts::TAU;
 
-use disk::{Disk, rub};
 use nalgebra::{DMatrix, Matrix2, Vector2};
 use tiprub_core::settings::{LoadSettings, Meridian, Scheme, Shape, Solver};
 use tiprub_core::{Scene, Simulation};
 use tiprub_reference::closed::chain::Chain;
+use tiprub_test_models::{
+    self as models,
+    disk::{Disk, with_rotor},
+    started,
+};
 
 const CHAIN: Chain = Chain { sectors: 12, mass: 0.3, spring: 2e6, coupling: 7e5, damping_ratio: 0.05 };
 /// Schemes that a chain without local flexibility can be stepped with.
@@ -36,7 +33,7 @@ fn chain(chain: Chain, scheme: Scheme, solver: Solver, step: f64) -> Scene {
         stiffness: [one(chain.spring + 2.0 * chain.coupling), one(-chain.coupling)],
         contact_map: DMatrix::from_column_slice(3, 1, &[1.0, 0.0, 0.0]),
     };
-    let mut scene = rub(common::scene(chain.sectors), disk.cyclic());
+    let mut scene = with_rotor(disk.cyclic());
     scene.settings.time.scheme = scheme;
     scene.settings.time.step = step;
     scene.settings.structures[0].speed = 0.0;
@@ -46,12 +43,6 @@ fn chain(chain: Chain, scheme: Scheme, solver: Solver, step: f64) -> Scene {
     let contact = &mut scene.settings.contacts[0];
     (contact.solver, contact.friction, contact.meridian, contact.gap) = (solver, 0.0, Meridian::Cylinder, 5e-4);
     scene
-}
-
-fn started(scene: &Scene) -> Simulation {
-    let mut simulation = Simulation::new(scene).unwrap_or_else(|error| panic!("{error}"));
-    simulation.initialise(0.0).unwrap_or_else(|error| panic!("{error}"));
-    simulation
 }
 
 /// Close the casing by `closing` (m) within `time` (s), then keep it for `rest` (s).
@@ -263,8 +254,8 @@ fn travelling(scheme: Scheme, n: u32, own: f64, ratio: f64, step: f64) -> (f64, 
     let turn = TAU / omega.abs();
     // One step size for all that follows.
     let step = turn / 24.0 / (turn / 24.0 / step).round();
-    let mut scene = common::scene(1);
-    features::flexible(&mut scene);
+    let mut scene = models::rub(1);
+    models::flexible(&mut scene);
     scene.settings.outputs.watched_sectors = vec![1];
     scene.settings.outputs.nodal_diameters = None;
     (scene.settings.time.scheme, scene.settings.time.step) = (scheme, step);

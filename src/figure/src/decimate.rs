@@ -2,7 +2,7 @@
 
 /// At most `2 * buckets + 2` points of `points` (x ascending): first and last, and of each of `buckets` equal parts
 /// the smallest and the largest value, in their order. Series that are short enough come back unchanged.
-pub fn decimate(points: &[(f64, f64)], buckets: usize) -> Vec<(f64, f64)> {
+pub(crate) fn decimate(points: &[(f64, f64)], buckets: usize) -> Vec<(f64, f64)> {
     if points.len() <= 2 * buckets + 2 || buckets == 0 {
         return points.to_vec();
     }

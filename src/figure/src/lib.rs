@@ -1,7 +1,7 @@
 //! Everything that is drawn: line plots, waterfalls, maps of cells, pictures of meshes, tables, and the style of the pages they stand on.
 
 pub mod cells;
-pub mod decimate;
+pub(crate) mod decimate;
 pub mod picture;
 pub mod plots;
 pub mod table;

@@ -4,6 +4,7 @@
 //! Everything here is used twice: by the command line, which writes, and by the library inside the FMU, which reads
 //! what the command line wrote. Nothing is trusted: every length, shape, key and value is checked, and every refusal
 //! names the file, the place in it, what is wrong, and the remedy.
+#![warn(unreachable_pub)]
 #![forbid(unsafe_code)]
 
 mod error;
@@ -19,15 +20,12 @@ mod suggestion;
 
 pub use error::Error;
 pub use input::{open_file, read_file};
-pub use load::{BUILTIN_PREFIX, load_scene, load_settings};
-pub use resources::{
-    PACKAGE_FILE, RESOURCES_FORMAT_VERSION, Resources, SCENE_FILE, instantiation_token, load_resources, packed_roms,
-    resource_files,
-};
+pub use load::{load_scene, load_settings};
+pub use resources::{Resources, SCENE_FILE, instantiation_token, load_resources, packed_roms, resource_files};
 pub use rom_file::{read_rom, write_rom};
-pub use rom_layout::{ARRAYS, ArrayLayout, METADATA, MetadataLayout, ROM_FORMAT, ROM_FORMAT_VERSION};
+pub use rom_layout::{ARRAYS, ArrayLayout, METADATA, MetadataLayout};
 pub use scene_file::{parse_scene, write_scene};
-pub use scene_layout::{FIELDS, REPEATED_TABLES, SINGLE_TABLES, SceneField};
+pub use scene_layout::{FIELDS, SceneField};
 
 /// Result of this crate.
-pub type Result<T, E = Error> = core::result::Result<T, E>;
+pub(crate) type Result<T, E = Error> = core::result::Result<T, E>;

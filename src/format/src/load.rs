@@ -8,7 +8,7 @@ use tiprub_core::{Rom, Scene};
 use crate::{Error, Result, parse_scene, read_file, read_rom};
 
 /// Start of a `rom` entry that names a model which comes with the program.
-pub const BUILTIN_PREFIX: &str = "builtin:";
+pub(crate) const BUILTIN_PREFIX: &str = "builtin:";
 
 /// Largest file of a scene or ROM (bytes): far beyond any, far below what exhausts the machine.
 pub(crate) const LARGEST: u64 = 8 << 30;

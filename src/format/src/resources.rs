@@ -15,9 +15,9 @@ use crate::{Error, Result, parse_scene, read_rom, write_rom, write_scene};
 /// File name of the scene inside `resources/`.
 pub const SCENE_FILE: &str = "scene.toml";
 /// File name of the packaging choices inside `resources/`.
-pub const PACKAGE_FILE: &str = "package.toml";
+pub(crate) const PACKAGE_FILE: &str = "package.toml";
 /// Version of the layout of `resources/`.
-pub const RESOURCES_FORMAT_VERSION: u32 = 1;
+pub(crate) const RESOURCES_FORMAT_VERSION: u32 = 1;
 
 const INTACT: &str = "The FMU is damaged or was changed: import it again, or write it again with `tiprub package`";
 

@@ -1,9 +1,9 @@
 //! What a ROM file contains: one list for reader, writer and user guide.
 
 /// Value of the metadata entry `format`.
-pub const ROM_FORMAT: &str = "tiprub-rom";
+pub(crate) const ROM_FORMAT: &str = "tiprub-rom";
 /// Value of the metadata entry `format_version`.
-pub const ROM_FORMAT_VERSION: &str = "1";
+pub(crate) const ROM_FORMAT_VERSION: &str = "1";
 
 /// One named array of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,10 +142,10 @@ pub const ARRAYS: [ArrayLayout; 20] = [
 ];
 
 /// The arrays of a structure that spins: all or none.
-pub const SPIN_ARRAYS: [&str; 5] =
+pub(crate) const SPIN_ARRAYS: [&str; 5] =
     ["stiffness_speed2", "stiffness_speed4", "coriolis", "centrifugal_load", "centrifugal_load_speed4"];
 /// The arrays of a structure that heats up: both or none.
-pub const THERMAL_ARRAYS: [&str; 2] = ["thermal_loads", "thermal_patches"];
+pub(crate) const THERMAL_ARRAYS: [&str; 2] = ["thermal_loads", "thermal_patches"];
 
 const fn entry(name: &'static str, default: Option<&'static str>, description: &'static str) -> MetadataLayout {
     MetadataLayout { name, default, description }
@@ -188,7 +188,7 @@ pub(crate) const HARMONIC_ARRAYS: [&str; 3] = ["mass_<n>", "stiffness_<n>", "con
 pub(crate) const NUMBER: &str = "<n>";
 
 /// The text of the metadata entry `units` of a file, given which arrays it holds.
-pub fn units_text(holds: impl Fn(&str) -> bool) -> String {
+pub(crate) fn units_text(holds: impl Fn(&str) -> bool) -> String {
     let (general, special) = ARRAYS.split_at(GENERAL_ARRAYS);
     let listed = general.iter().chain(special.iter().filter(|array| holds(array.name)));
     listed.map(|array| format!("{} {}: {}", array.name, array.shape, array.unit)).collect::<Vec<_>>().join("\n")

@@ -13,14 +13,14 @@ use crate::scene_layout::{FIELDS, INNER_TABLES, REPEATED_TABLES, SINGLE_TABLES, 
 use crate::{Error, suggestion};
 
 /// A syntactically correct scene file.
-pub struct Document<'a> {
+pub(crate) struct Document<'a> {
     pub text: &'a str,
     pub origin: &'a str,
     pub root: &'a DeTable<'a>,
 }
 
 /// Line and column, both from 1, of a byte offset; columns count characters.
-pub fn position(text: &str, offset: usize) -> (usize, usize) {
+pub(crate) fn position(text: &str, offset: usize) -> (usize, usize) {
     let before = text.get(..offset.min(text.len())).unwrap_or(text);
     let line_start = before.rfind('\n').map_or(0, |index| index + 1);
     (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
@@ -37,7 +37,7 @@ struct ClosestPoint<'a> {
 impl<'a> Document<'a> {
     /// A refusal of a field that [`SceneSettings::validate`](tiprub_core::settings::SceneSettings::validate) names by
     /// its path, with or without indices; located where the document holds exactly one such field.
-    pub fn refusal(&self, path: &str, problem: String, remedy: String) -> Error {
+    pub(crate) fn refusal(&self, path: &str, problem: String, remedy: String) -> Error {
         let bare = path.replace('`', "");
         let mut candidates: Vec<_> = self.places().into_iter().filter(|place| place.path == bare).collect();
         if candidates.is_empty() {
@@ -108,7 +108,7 @@ fn collect_value<'a>(value: &'a Spanned<DeValue<'a>>, path: &str, fields: &str, 
 }
 
 /// The refusal of a document that does not fit the settings.
-pub fn diagnose(document: &Document, error: &toml::de::Error) -> Error {
+pub(crate) fn diagnose(document: &Document, error: &toml::de::Error) -> Error {
     let message = error.message();
     // The library marks a key missing at the top level with the empty span at the start of the text.
     let place = error.span().filter(|span| !span.is_empty()).and_then(|span| document.covering(&span));
@@ -172,7 +172,7 @@ fn wrong_value(document: &Document, place: ClosestPoint, message: &str) -> Error
 
 /// `[contact]` where `[[contact]]` is meant, and the reverse. Checked before the settings are filled in, since the
 /// library would take a list of values in place of a table of named ones.
-pub fn check_brackets(document: &Document) -> Result<(), Error> {
+pub(crate) fn check_brackets(document: &Document) -> Result<(), Error> {
     for (key, value) in document.root {
         let name: &str = key.get_ref();
         let all_tables = |list: &DeArray| list.iter().all(|element| element.get_ref().is_table());

@@ -32,12 +32,12 @@ impl SceneField {
 }
 
 /// Tables that may be repeated: written `[[name]]`.
-pub const REPEATED_TABLES: [&str; 3] = ["structure", "surface", "contact"];
+pub(crate) const REPEATED_TABLES: [&str; 3] = ["structure", "surface", "contact"];
 /// Tables that appear once: written `[name]`.
-pub const SINGLE_TABLES: [&str; 3] = ["time", "outputs", "experiment"];
+pub(crate) const SINGLE_TABLES: [&str; 3] = ["time", "outputs", "experiment"];
 
 /// Tables inside the repeated ones, each with an example: written inline, or below as `[structure.spin]`.
-pub const INNER_TABLES: [(&str, &str); 6] = [
+pub(crate) const INNER_TABLES: [(&str, &str); 6] = [
     ("structure.spin", "{ stiffening = true }"),
     ("structure.load", "{ order = 2, amplitude = 100.0 }"),
     ("surface.shape", "{ kind = \"circular\" } or with the keys of another kind"),
@@ -47,7 +47,7 @@ pub const INNER_TABLES: [(&str, &str); 6] = [
 ];
 
 /// How a table is written in the file.
-pub fn header(table: &str) -> String {
+pub(crate) fn header(table: &str) -> String {
     match table.split_once('.') {
         Some((outer, inner)) => format!("`{inner}` of {}", header(outer)),
         None if table.is_empty() => "the top of the file, before the first [table]".to_owned(),

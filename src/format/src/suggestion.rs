@@ -3,7 +3,7 @@
 use strsim::{damerau_levenshtein, jaro_winkler};
 
 /// The accepted name closest to `given`, if one is close enough to be meant.
-pub fn closest<'a>(given: &str, accepted: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub(crate) fn closest<'a>(given: &str, accepted: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let given = normalised(given);
     let similarity = |name: &str| jaro_winkler(&given, &normalised(name));
     let best = accepted.into_iter().max_by(|a, b| similarity(a).total_cmp(&similarity(b)))?;
@@ -18,7 +18,7 @@ fn normalised(name: &str) -> String {
 }
 
 /// `Did you mean `x`? Accepted here: `x`, `y`, `z`` (the question only where a name is close).
-pub fn remedy(given: &str, accepted: &[&str]) -> String {
+pub(crate) fn remedy(given: &str, accepted: &[&str]) -> String {
     let list = accepted.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
     match closest(given, accepted.iter().copied()) {
         Some(name) => format!("Did you mean `{name}`? Accepted here: {list}"),

@@ -6,31 +6,20 @@ use std::fs;
 use std::path::Path;
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{ContactGrid, ContactNode, Frame, Patch, RomChecks, RomExtras, Spin, Thermal};
+use tiprub_core::rom::{ContactGrid, ContactNode, Frame, Patch, RomExtras, Spin, Thermal};
 use tiprub_core::settings::{LoadSettings, Motion, SpinSettings, StructureSettings};
 use tiprub_core::{Rom, Scene};
 use tiprub_format::{
     instantiation_token, load_resources, load_scene, read_rom, resource_files, write_rom, write_scene,
 };
+use tiprub_test_models::{node, structure};
 
 fn rom() -> Rom {
-    Rom {
-        name: "blade".into(),
-        origin: "by hand".into(),
-        sectors: 2,
-        frame: Frame::Cylindrical,
-        mass: DMatrix::identity(2, 2),
-        stiffness: DMatrix::from_row_slice(2, 2, &[3e6, -1e6, -1e6, 4e6]),
-        damping_ratio: 0.001,
-        contact_map: DMatrix::from_row_slice(3, 2, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]),
-        contact_nodes: vec![ContactNode {
-            name: "leading_edge".into(),
-            position: [0.25, 0.0, 0.01],
-            meridional_slope: -0.1,
-        }],
-        checks: RomChecks::default(),
-        extras: tiprub_core::rom::RomExtras::default(),
-    }
+    let stiffness = DMatrix::from_row_slice(2, 2, &[3e6, -1e6, -1e6, 4e6]);
+    let map = DMatrix::from_row_slice(3, 2, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    let nodes = vec![node("leading_edge", [0.25, 0.0, 0.01], -0.1)];
+    let rom = structure("blade", DMatrix::identity(2, 2), stiffness, map, nodes);
+    Rom { sectors: 2, frame: Frame::Cylindrical, damping_ratio: 0.001, ..rom }
 }
 
 fn scene() -> Scene {

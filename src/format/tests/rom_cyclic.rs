@@ -9,8 +9,9 @@ use loose::Loose;
 use nalgebra::{Complex, DMatrix};
 use proptest::prelude::*;
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, Frame, Harmonic, RomChecks, RomExtras};
+use tiprub_core::rom::{Frame, Harmonic, RomChecks, RomExtras};
 use tiprub_format::{read_rom, write_rom};
+use tiprub_test_models::{node, structure};
 
 /// Numbers in (-1, 1), one after the other.
 fn numbers(seed: u64) -> impl FnMut() -> f64 {
@@ -46,31 +47,20 @@ fn disk(seed: u64, sectors: usize, nodes: usize, order: impl Fn(usize) -> usize)
         Harmonic { mass, stiffness, contact_map }
     };
     let harmonics: Vec<_> = (1..=sectors / 2).map(|number| harmonic(number, &mut value)).collect();
-    let node = |index: usize| ContactNode {
-        name: format!("n{index}"),
-        position: [0.35, 0.01 * index as f64, 0.0],
-        meridional_slope: 0.0,
-    };
     let modes = if harmonics.is_empty() { 0 } else { 4 };
     let frequencies: Vec<f64> = (0..modes).map(|_| 100.0 + value()).collect();
-    Rom {
-        name: "disk".into(),
-        origin: "by hand".into(),
-        sectors,
-        frame: Frame::Cylindrical,
-        mass: DMatrix::identity(order(0), order(0)),
-        stiffness: DMatrix::identity(order(0), order(0)) * 1e6,
-        damping_ratio: 0.005,
-        contact_map: DMatrix::from_fn(3 * nodes, order(0), |_, _| value()),
-        contact_nodes: (0..nodes).map(node).collect(),
-        checks: RomChecks {
-            full_frequencies: frequencies.clone(),
-            reduced_frequencies: frequencies,
-            nodal_diameters: (0..modes).map(|mode| u32::try_from(mode % (sectors / 2 + 1)).unwrap()).collect(),
-            ..RomChecks::default()
-        },
-        extras: RomExtras { harmonics, ..RomExtras::default() },
-    }
+    let map = DMatrix::from_fn(3 * nodes, order(0), |_, _| value());
+    let contact_nodes = (0..nodes).map(|index| node(format!("n{index}"), [0.35, 0.01 * index as f64, 0.0], 0.0));
+    let identity = DMatrix::identity(order(0), order(0));
+    let rom = structure("disk", identity.clone(), identity * 1e6, map, contact_nodes.collect());
+    let checks = RomChecks {
+        full_frequencies: frequencies.clone(),
+        reduced_frequencies: frequencies,
+        nodal_diameters: (0..modes).map(|mode| u32::try_from(mode % (sectors / 2 + 1)).unwrap()).collect(),
+        ..RomChecks::default()
+    };
+    let extras = RomExtras { harmonics, ..RomExtras::default() };
+    Rom { sectors, frame: Frame::Cylindrical, damping_ratio: 0.005, checks, extras, ..rom }
 }
 
 proptest! {

@@ -8,8 +8,9 @@ use nalgebra::DMatrix;
 use proptest::prelude::*;
 use sha2::{Digest, Sha256};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactGrid, ContactNode, Frame, Patch, RomChecks, RomExtras, Spin, Thermal};
+use tiprub_core::rom::{ContactGrid, Frame, Patch, RomExtras, Spin, Thermal};
 use tiprub_format::{read_rom, write_rom};
+use tiprub_test_models::{node, structure};
 
 const AROUND: usize = 6;
 const ALONG: usize = 2;
@@ -17,28 +18,14 @@ const ALONG: usize = 2;
 /// A ring of 6 x 2 contact nodes with `order` coordinates; `value` gives its numbers one by one.
 fn ring(order: usize, value: &mut dyn FnMut() -> f64) -> Rom {
     let nodes = AROUND * ALONG;
-    let node = |index: usize| ContactNode {
-        name: format!("n{index}"),
-        position: [
-            0.25,
-            (index % AROUND) as f64 * std::f64::consts::TAU / AROUND as f64,
-            (index / AROUND) as f64 * 0.02,
-        ],
-        meridional_slope: 0.0,
+    let place = |index: usize| {
+        [0.25, (index % AROUND) as f64 * std::f64::consts::TAU / AROUND as f64, (index / AROUND) as f64 * 0.02]
     };
-    Rom {
-        name: "ring".into(),
-        origin: "by hand".into(),
-        sectors: 1,
-        frame: Frame::Cylindrical,
-        mass: DMatrix::identity(order, order),
-        stiffness: DMatrix::identity(order, order) * 1e6,
-        damping_ratio: 0.001,
-        contact_map: DMatrix::from_fn(3 * nodes, order, |_, _| value()),
-        contact_nodes: (0..nodes).map(node).collect(),
-        checks: RomChecks::default(),
-        extras: RomExtras::default(),
-    }
+    let contact_nodes = (0..nodes).map(|index| node(format!("n{index}"), place(index), 0.0)).collect();
+    let map = DMatrix::from_fn(3 * nodes, order, |_, _| value());
+    let (mass, stiffness) = (DMatrix::identity(order, order), DMatrix::identity(order, order) * 1e6);
+    let ring = structure("ring", mass, stiffness, map, contact_nodes);
+    Rom { frame: Frame::Cylindrical, damping_ratio: 0.001, origin: "by hand".into(), ..ring }
 }
 
 fn spin(order: usize, value: &mut dyn FnMut() -> f64) -> Spin {

@@ -21,13 +21,13 @@ use crate::{
 };
 
 /// The bladed disk of the stage.
-pub const STAGE: &str = "stage";
+pub(crate) const STAGE: &str = "stage";
 /// The casing of the stage.
-pub const STAGE_CASING: &str = "stage-casing";
+pub(crate) const STAGE_CASING: &str = "stage-casing";
 /// The same two on coarse meshes, for tests and first looks: shapes alike, frequencies some percent off.
-pub const STAGE_COARSE: &str = "stage-coarse";
+pub(crate) const STAGE_COARSE: &str = "stage-coarse";
 /// See [`STAGE_COARSE`].
-pub const STAGE_CASING_COARSE: &str = "stage-casing-coarse";
+pub(crate) const STAGE_CASING_COARSE: &str = "stage-casing-coarse";
 
 /// The cube of the cube between two rings.
 pub const CUBE: &str = "cube";
@@ -35,7 +35,8 @@ pub const CUBE: &str = "cube";
 pub const RINGS: [(&str, Side); 2] = [("ring-left", Side::Left), ("ring-right", Side::Right)];
 
 /// Every name that [`rom`] knows.
-pub const NAMES: [&str; 10] = [
+#[cfg(test)]
+pub(crate) const NAMES: [&str; 10] = [
     "rotor37",
     "rotor37-spin",
     CASING37,

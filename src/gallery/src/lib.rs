@@ -3,6 +3,7 @@
 //! [`scene_source`] loads any scene with its ROMs, [`builtin`] knows the models, [`rom_cache`] keeps them,
 //! [`mod@reduction`] reduces with progress.
 
+#![warn(unreachable_pub)]
 pub mod builtin;
 pub mod reduction;
 pub mod rom_cache;

@@ -41,7 +41,7 @@ impl RomCache {
     }
 
     /// Keep models in this directory.
-    pub fn at(directory: impl Into<PathBuf>) -> Self {
+    pub(crate) fn at(directory: impl Into<PathBuf>) -> Self {
         Self { directory: Some(directory.into()) }
     }
 

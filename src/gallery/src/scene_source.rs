@@ -15,7 +15,7 @@ use crate::{builtin, rom_cache::RomCache};
 pub const ROTOR37_SCENE: &str = include_str!("../scenes/rotor37.toml");
 
 /// Coupled blades in an oval flexible casing.
-pub const STAGE_SCENE: &str = include_str!("../scenes/stage.toml");
+pub(crate) const STAGE_SCENE: &str = include_str!("../scenes/stage.toml");
 
 /// A cube that flies between two rings.
 pub const CUBE_SCENE: &str = include_str!("../scenes/cube-between-rings.toml");

@@ -5,10 +5,8 @@
 //! BASE.inp is a CalculiX input file of the sector with its cyclic symmetry and a frequency step (ten modes) for each nodal
 //! diameter n (0, 2, 5, 28 without); BASE-blade.inp is the blade clamped at its root; BASE.vtu has the sector with its sets.
 
-use std::path::Path;
-
 use tiprub_model::assembly::lumped_masses;
-use tiprub_model::inp::{CyclicSymmetry, calculix_cyclic_input, write_calculix_input};
+use tiprub_model::inp::{CyclicSymmetry, calculix_cyclic_input, calculix_input};
 use tiprub_model::quality::worst_quality;
 use tiprub_model::stage::{SectorOptions, blade_mesh, sector_mesh};
 use tiprub_model::{Error, Material, Mesh, Result, vtk};
@@ -40,10 +38,12 @@ fn main() -> Result<()> {
     }
     let symmetry = CyclicSymmetry { faces: ["CYCLIC_LOW", "CYCLIC_HIGH"], sectors, nodal_diameters: &diameters };
     let text = calculix_cyclic_input(&sector, &material, Some("CLAMPED"), &symmetry, 10)?;
-    let path = format!("{base}.inp");
-    std::fs::write(&path, text).map_err(|source| Error::File { path: path.into(), source })?;
-    write_calculix_input(Path::new(&format!("{base}-blade.inp")), &blade, &material, Some("CLAMPED"), 10)?;
-    vtk::write_file(Path::new(&format!("{base}.vtu")), &sector, &[])
+    let alone = calculix_input(&blade, &material, Some("CLAMPED"), 10)?;
+    let files = [(".inp", text.into_bytes()), ("-blade.inp", alone.into_bytes()), (".vtu", vtk::write(&sector, &[])?)];
+    files.into_iter().try_for_each(|(ending, bytes)| {
+        let path = format!("{base}{ending}");
+        std::fs::write(&path, bytes).map_err(|source| Error::File { path: path.into(), source })
+    })
 }
 
 fn print_mesh(name: &str, mesh: &Mesh, material: &Material) -> Result<()> {

@@ -1,4 +1,4 @@
-//! Reduce the casing of the stage and print what came of it: counts, frequencies, checks, times.
+//! Reduce the casing of the stage and print what came of it: counts, frequencies, checks.
 //!
 //!     cargo run --release -p tiprub-model --example stage_casing -- [fixed-interface modes] [modes] [around] [hex8|hex8i|hex20]
 
@@ -37,6 +37,5 @@ fn main() -> tiprub_model::Result<()> {
     }
     let fixed = &reduction.fixed_interface_frequencies;
     println!("{} fixed-interface modes, {:.1} to {:.1} Hz", fixed.len(), fixed[0], fixed[fixed.len() - 1]);
-    println!("{:?}, total {:.2} s", reduction.timings, reduction.timings.total());
     Ok(())
 }

@@ -127,7 +127,7 @@ pub fn assemble_with(
     })
 }
 
-/// Lumped mass of every node (kg), for explicit time stepping of the full model; see [`lumped_mass`].
+/// Lumped mass of every node (kg), for explicit time stepping of the full model; see `lumped_mass`.
 ///
 /// # Errors
 /// [`Error::Invalid`] for an unsound mesh, [`Error::NegativeJacobian`] naming the element.

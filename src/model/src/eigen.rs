@@ -12,7 +12,7 @@ use crate::sparse::{Factor, SparseMatrix, add_tall, tall_product};
 use crate::{Error, Result};
 
 /// Relative accuracy of the returned pairs: ‖Aφ - θφ‖_M ≤ `TOLERANCE` θ, which bounds the relative error of ω² - σ.
-pub const TOLERANCE: f64 = 1e-10;
+pub(crate) const TOLERANCE: f64 = 1e-10;
 /// The explicitly formed residual is allowed this much, since it also contains the solve's round-off.
 const CHECKED_TOLERANCE: f64 = 1e-8;
 /// Vectors that this share of the block's largest is left of depend on the basis.
@@ -173,7 +173,7 @@ fn column_norms(block: &Mat<f64>, mass_block: &Mat<f64>) -> Vec<f64> {
 ///
 /// # Errors
 /// [`Error::NotPositiveDefinite`] with the given name and remedy.
-pub fn positive_factor(shifted: &SparseMatrix, mass: &SparseMatrix, name: &str, remedy: &str) -> Result<Factor> {
+pub(crate) fn positive_factor(shifted: &SparseMatrix, mass: &SparseMatrix, name: &str, remedy: &str) -> Result<Factor> {
     let factor = shifted.factor(name, remedy)?;
     if mass.order() == 0 {
         return Ok(factor);

@@ -73,7 +73,7 @@ impl FeModel {
         let remedy = if self.sets.is_empty() {
             "It has none: name groups of nodes, elements or faces where it is meshed".to_owned()
         } else {
-            format!("It has: {}", crate::read::set_counts(&self.sets))
+            format!("It has: {}", crate::mesh::set_counts(&self.sets))
         };
         Err(Error::invalid(format!("node set `{name}`"), problem, remedy))
     }

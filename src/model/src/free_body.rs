@@ -13,13 +13,11 @@ use crate::casing::{modal_form, rigid_motions, without_rigid_motions};
 use crate::craig_bampton::craig_bampton;
 use crate::fe_model::FeModel;
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{
-    ContactPoint, Reduction, Timings, check_nodes, compare, description, full_modes, interface_dofs, node_modes, timed,
-};
+use crate::reduce::{ContactPoint, Reduction, check_nodes, compare, description, full_modes, interface_dofs};
 
 /// What to reduce a body to, and what to call it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FreeBodyOptions {
+pub(crate) struct FreeBodyOptions {
     /// Name of the structure.
     pub name: String,
     /// Number of fixed-interface modes; all where absent, and the reduction is then exact.
@@ -36,7 +34,7 @@ pub struct FreeBodyOptions {
 /// [`crate::Error::Invalid`] for contact nodes that are repeated or do not exist;
 /// [`crate::Error::NotPositiveDefinite`] for contact nodes on one line, and where the body
 /// is not one connected part.
-pub fn reduce_free_body(
+pub(crate) fn reduce_free_body(
     model: FeModel,
     contact: &[ContactPoint],
     options: &FreeBodyOptions,
@@ -44,27 +42,18 @@ pub fn reduce_free_body(
 ) -> Result<Reduction> {
     faer::set_global_parallelism(faer::Par::Seq);
     check_nodes(&model.nodes, &[], contact, Frame::Cartesian)?;
-    let mut timings = Timings::default();
     let free = free_dofs(model.nodes.len(), &[]);
-    let full = timed(&mut timings.full_modes, || {
-        full_modes(&model.stiffness, &model.mass, true, options.checked_modes, listener)
-    })?;
+    let full = full_modes(&model.stiffness, &model.mass, true, options.checked_modes, listener)?;
     let interface = interface_dofs(&free, contact)?;
     let inner = free.len().saturating_sub(interface.len());
     let count = options.fixed_interface_modes.unwrap_or(inner);
     let points: Vec<[f64; 3]> = contact.iter().map(|point| model.nodes[point.node]).collect();
-    let (reduced, modes) = timed(&mut timings.reduction, || {
-        let reduced = craig_bampton(&model.stiffness, &model.mass, &interface, count, listener)?;
-        let rigid = rigid_motions(&points, reduced.mass.nrows());
-        let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
-        Ok((reduced, modes))
-    })?;
-    let checks = timed(&mut timings.checks, || {
-        report(listener, Stage::Checks, 0, 1);
-        let checks = compare(&full, &model.mass, &reduced, &modes.squares, &modes.shapes);
-        report(listener, Stage::Checks, 1, 1);
-        Ok(without_rigid_motions(checks))
-    })?;
+    let reduced = craig_bampton(&model.stiffness, &model.mass, &interface, count, listener)?;
+    let rigid = rigid_motions(&points, reduced.mass.nrows());
+    let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
+    report(listener, Stage::Checks, 0, 1);
+    let checks = without_rigid_motions(compare(&full, &model.mass, &reduced, &modes.squares, &modes.shapes));
+    report(listener, Stage::Checks, 1, 1);
     let order = modes.squares.len();
     let exact = if count == inner { ", all of them" } else { "" };
     let rom = Rom {
@@ -84,20 +73,9 @@ pub fn reduce_free_body(
         checks,
         extras: RomExtras::default(),
     };
-    rom.validate()?;
-    Ok(Reduction {
-        rom,
-        modes: node_modes(&full.modes, &free, model.nodes.len()),
-        largest_residual: full.modes.residuals.iter().copied().fold(0.0, f64::max),
-        free_dofs: free.len(),
-        reduced_angular_frequencies: modes.squares.iter().map(|square| square.sqrt()).collect(),
-        fixed_interface_frequencies: reduced.fixed_interface_frequencies,
-        spin_checks: Vec::new(),
-        nodes: model.nodes.len(),
-        material: model.mesh.as_ref().map(|(_, material)| material.clone()),
-        mesh: model.mesh.map(|(mesh, _)| mesh),
-        timings,
-    })
+    let fixed_interface_frequencies = reduced.fixed_interface_frequencies;
+    let model = (model.nodes.len(), model.mesh);
+    Ok(Reduction { fixed_interface_frequencies, ..Reduction::new(rom, &full.modes, &free, &modes.squares, model)? })
 }
 
 fn contact_node(point: &ContactPoint, position: [f64; 3]) -> ContactNode {

@@ -1,9 +1,7 @@
 //! Export of a mesh with material, sets and boundary as a CalculiX (Abaqus) input file.
 
 use std::fmt::Write as _;
-use std::path::Path;
 
-use crate::file::write_whole;
 use crate::{Error, Result, element::ElementKind, material::Material, mesh::Mesh};
 
 /// A sector of a disk, for [`calculix_cyclic_input`].
@@ -90,20 +88,6 @@ fn model(mesh: &Mesh, material: &Material, clamped: Option<&str>) -> Result<Stri
         put(&mut text, format_args!("*BOUNDARY\n{}, 1, 3\n", set.to_uppercase()));
     }
     Ok(text)
-}
-
-/// Write [`calculix_input`] to a file: to a temporary one beside it first, then renamed.
-///
-/// # Errors
-/// As [`calculix_input`]; [`Error::File`] when the file cannot be written, and then nothing is left behind.
-pub fn write_calculix_input(
-    path: &Path,
-    mesh: &Mesh,
-    material: &Material,
-    clamped: Option<&str>,
-    frequencies: usize,
-) -> Result<()> {
-    write_whole(path, calculix_input(mesh, material, clamped, frequencies)?.as_bytes())
 }
 
 fn write_set(text: &mut String, name: &str, nodes: &[usize]) {

@@ -3,8 +3,9 @@
 //! Floor 1. A [`Mesh`] of the six solid [elements](element) is [assembled](assembly) into sparse stiffness and mass,
 //! its lowest modes are found by [shift-invert Lanczos](eigen), and [Craig-Bampton](craig_bampton) leaves a small dense
 //! pencil in the displacements of the contact nodes: a [`tiprub_core::Rom`] with the checks that come with it
-//! (eqs 12 and 13 of the paper). [`rotor37`] is the blade that ships, [`casing`] the ring around it; [`cube`] a benchmark of [free bodies](free_body) and [open surfaces](panel); models of others are [`read`]. Nothing is printed: a caller passes a
+//! (eqs 12 and 13 of the paper). [`rotor37`] is the blade that ships, [`casing`] the ring around it; [`cube`] a benchmark of free bodies and [open surfaces](panel); models of others are [`read`]. Nothing is printed: a caller passes a
 //! [listener](progress) and shows what it likes. SI units everywhere.
+#![warn(unreachable_pub)]
 #![forbid(unsafe_code)]
 
 pub mod assembly;
@@ -16,13 +17,13 @@ pub mod eigen;
 pub mod element;
 mod error;
 pub mod fe_model;
-mod file;
-pub mod free_body;
+pub(crate) mod free_body;
 pub mod inp;
 pub mod material;
 pub mod mesh;
 pub mod ordering;
 pub mod panel;
+mod pattern;
 pub mod progress;
 pub mod quality;
 pub mod read;
@@ -40,5 +41,5 @@ pub use fe_model::FeModel;
 pub use material::Material;
 pub use mesh::{Mesh, surface_quads};
 pub use progress::{Progress, Stage};
-pub use reduce::{Reduction, reduce, reduce_model, reduce_spinning};
+pub use reduce::{Reduction, reduce, reduce_model};
 pub use rotor37::{Rotor37Options, reduce_rotor37};

@@ -59,7 +59,7 @@ impl Material {
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the property.
-    pub fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(&self) -> Result<()> {
         let positive = |value: f64| value.is_finite() && value > 0.0;
         let fail = |property: &str, value: f64, range: &str| {
             Err(Error::invalid(

@@ -128,3 +128,9 @@ pub fn surface_quads(mesh: &Mesh) -> Vec<Vec<usize>> {
     }
     faces.into_iter().filter(|face| count[&sorted(face)] == 1).collect()
 }
+
+/// Sets with as many nodes as they have, for messages.
+pub fn set_counts(sets: &BTreeMap<String, Vec<usize>>) -> String {
+    let counts: Vec<String> = sets.iter().map(|(name, nodes)| format!("{name} ({})", nodes.len())).collect();
+    counts.join(", ")
+}

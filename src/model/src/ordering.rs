@@ -14,7 +14,7 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::amd;
 
-use crate::sparse::Pattern;
+use crate::pattern::Pattern;
 use graph::Graph;
 
 /// How the elimination order is found.

@@ -9,14 +9,14 @@
 use faer::{Mat, Side};
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactGrid, ContactNode, Frame, RomChecks, RomExtras};
+use tiprub_core::rom::{ContactGrid, ContactNode, Frame, RomExtras};
 
 use crate::assembly::free_dofs;
 use crate::craig_bampton::{CraigBampton, with_static_responses};
 use crate::eigen::Modes;
 use crate::fe_model::FeModel;
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{FullModes, Reduction, Timings, compare, description, full_modes, node_modes, timed};
+use crate::reduce::{FullModes, Reduction, compare, description, full_modes};
 use crate::sparse::{SparseMatrix, principal_pair};
 use crate::{Error, Result};
 
@@ -35,7 +35,7 @@ pub struct PanelGrid {
 
 impl PanelGrid {
     /// Number of rows.
-    pub fn along(&self) -> usize {
+    pub(crate) fn along(&self) -> usize {
         self.nodes.len() / self.around.max(1)
     }
 
@@ -61,7 +61,7 @@ impl PanelGrid {
 
 /// What to reduce to, and what to call it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PanelOptions {
+pub(crate) struct PanelOptions {
     /// Name of the structure.
     pub name: String,
     /// Number of modes.
@@ -80,7 +80,7 @@ pub struct PanelOptions {
 /// # Errors
 /// [`Error::Invalid`] for a grid of nodes that do not exist or are repeated, more modes than degrees of freedom or
 /// more static responses than forces; [`Error::NotPositiveDefinite`] for a structure that is not held.
-pub fn reduce_panel(
+pub(crate) fn reduce_panel(
     model: FeModel,
     clamped: &[usize],
     grid: &PanelGrid,
@@ -89,16 +89,12 @@ pub fn reduce_panel(
 ) -> Result<Reduction> {
     faer::set_global_parallelism(faer::Par::Seq);
     grid.check(&model)?;
-    let mut timings = Timings::default();
     let free = free_dofs(model.nodes.len(), clamped);
     let (stiffness, mass) = principal_pair(&model.stiffness, &model.mass, &free);
-    let full = timed(&mut timings.full_modes, || {
-        full_modes(&stiffness, &mass, false, options.modes.max(options.checked_modes), listener)
-    })?;
-    let basis = timed(&mut timings.reduction, || {
-        let kept = lowest(&full.modes, options.modes);
-        with_grid_responses(kept, &full, (&stiffness, &mass), &grid_dofs(&free, grid), options, listener)
-    })?;
+    let full = full_modes(&stiffness, &mass, false, options.modes.max(options.checked_modes), listener)?;
+    let kept = lowest(&full.modes, options.modes);
+    let dofs = grid_dofs(&free, grid);
+    let basis = with_grid_responses(kept, &full, (&stiffness, &mass), &dofs, options, listener)?;
     let order = basis.eigenvalues.len();
     let reduced = CraigBampton {
         mass: DMatrix::identity(order, order),
@@ -106,75 +102,39 @@ pub fn reduce_panel(
         transformation: basis.shapes,
         fixed_interface_frequencies: Vec::new(),
     };
-    let checks = timed(&mut timings.checks, || {
-        report(listener, Stage::Checks, 0, 1);
-        let mut judged = full.clone();
-        judged.modes = lowest(&full.modes, options.checked_modes);
-        let checks = compare(&judged, &mass, &reduced, &basis.eigenvalues, &DMatrix::identity(order, order));
-        report(listener, Stage::Checks, 1, 1);
-        Ok(checks)
-    })?;
-    let origin = origin(&model, clamped.len(), grid, options, (&full, order));
-    let rom = rom((options, origin), &model, contact_map(&free, grid, &reduced.transformation), grid, reduced, checks);
-    rom.validate()?;
-    Ok(Reduction {
-        rom,
-        modes: node_modes(&lowest(&full.modes, options.checked_modes), &free, model.nodes.len()),
-        largest_residual: full.modes.residuals.iter().copied().fold(0.0, f64::max),
-        free_dofs: free.len(),
-        reduced_angular_frequencies: basis.eigenvalues.iter().map(|square| square.sqrt()).collect(),
-        fixed_interface_frequencies: Vec::new(),
-        spin_checks: Vec::new(),
-        nodes: model.nodes.len(),
-        material: model.mesh.as_ref().map(|(_, material)| material.clone()),
-        mesh: model.mesh.map(|(mesh, _)| mesh),
-        timings,
-    })
-}
-
-/// How the ROM of this order came about.
-fn origin(
-    model: &FeModel,
-    clamped: usize,
-    grid: &PanelGrid,
-    options: &PanelOptions,
-    (full, order): (&FullModes, usize),
-) -> String {
-    format!(
-        "{}; {} modes up to {:.0} Hz and {} static responses to forces on {} x {} contact nodes",
-        description(model, clamped),
-        options.modes,
-        full.modes.frequencies()[..options.modes].last().copied().unwrap_or(0.0),
-        order - options.modes,
-        grid.around,
-        grid.along(),
-    )
-}
-
-fn rom(
-    (options, origin): (&PanelOptions, String),
-    model: &FeModel,
-    contact_map: DMatrix<f64>,
-    grid: &PanelGrid,
-    reduced: CraigBampton,
-    checks: RomChecks,
-) -> Rom {
-    Rom {
+    report(listener, Stage::Checks, 0, 1);
+    let mut judged = full.clone();
+    judged.modes = lowest(&full.modes, options.checked_modes);
+    let checks = compare(&judged, &mass, &reduced, &basis.eigenvalues, &DMatrix::identity(order, order));
+    report(listener, Stage::Checks, 1, 1);
+    let rom = Rom {
         name: options.name.clone(),
-        origin,
+        origin: format!(
+            "{}; {} modes up to {:.0} Hz and {} static responses to forces on {} x {} contact nodes",
+            description(&model, clamped.len()),
+            options.modes,
+            full.modes.frequencies()[..options.modes].last().copied().unwrap_or(0.0),
+            order - options.modes,
+            grid.around,
+            grid.along(),
+        ),
         sectors: 1,
         frame: Frame::Cartesian,
-        contact_map,
+        contact_map: contact_map(&free, grid, &reduced.transformation),
         mass: reduced.mass,
         stiffness: reduced.stiffness,
         damping_ratio: options.damping_ratio,
-        contact_nodes: contact_nodes(model, grid),
+        contact_nodes: contact_nodes(&model, grid),
         checks,
         extras: RomExtras {
             grid: Some(ContactGrid { around: grid.around, along: grid.along(), closed: false }),
             ..RomExtras::default()
         },
-    }
+    };
+    let model = (model.nodes.len(), model.mesh);
+    let mut reduction = Reduction::new(rom, &full.modes, &free, &basis.eigenvalues, model)?;
+    reduction.modes.truncate(options.checked_modes);
+    Ok(reduction)
 }
 
 fn lowest(modes: &Modes, count: usize) -> Modes {

@@ -2,8 +2,6 @@
 
 mod outcome;
 
-use std::time::Instant;
-
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
@@ -22,7 +20,7 @@ use crate::spin::{ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, Spinni
 use crate::{Error, Result};
 
 use outcome::{build_rom, rotated};
-pub(crate) use outcome::{description, element_names, node_modes};
+pub(crate) use outcome::{description, element_names};
 
 /// A contact node before the reduction.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,28 +59,6 @@ pub struct Mode {
     pub shape: Vec<[f64; 3]>,
 }
 
-/// Wall time of the parts of a reduction (s).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Timings {
-    /// Mesh, element matrices and assembly.
-    pub assembly: f64,
-    /// Factorisation and modes of the full model.
-    pub full_modes: f64,
-    /// Fixed-interface and constraint modes.
-    pub reduction: f64,
-    /// Equilibria under spin, spin arrays and their checks; zero where no spin was asked for.
-    pub spin: f64,
-    /// Frequency deviation and residual criterion.
-    pub checks: f64,
-}
-
-impl Timings {
-    /// Sum of the parts (s).
-    pub fn total(&self) -> f64 {
-        self.assembly + self.full_modes + self.reduction + self.spin + self.checks
-    }
-}
-
 /// A reduced-order model with what it came from.
 #[derive(Debug, Clone)]
 pub struct Reduction {
@@ -106,8 +82,6 @@ pub struct Reduction {
     pub fixed_interface_frequencies: Vec<f64>,
     /// How well the spin arrays hold, at half the largest speed and at the largest; empty where none were asked for.
     pub spin_checks: Vec<SpinCheck>,
-    /// Wall times.
-    pub timings: Timings,
 }
 
 /// Reduce a mesh to its contact nodes and fixed-interface modes.
@@ -126,34 +100,19 @@ pub fn reduce(
     options: &ReductionOptions,
     listener: Listener<'_>,
 ) -> Result<Reduction> {
-    assembled_and_reduced(mesh, material, clamped, contact, (options, None), listener)
+    check_nodes(&mesh.nodes, clamped, contact, options.frame)?;
+    let model = FeModel::assembled(mesh, material, String::new(), listener)?;
+    reduce_model(model, clamped, contact, options, None, listener)
 }
 
-/// [`reduce`] with the effects of spin up to `largest_speed` (rad/s), in [`tiprub_core::rom::RomExtras::spin`]; see [`crate::spin`].
+/// Reduce a model, from a mesh or from the matrices of another code, as [`reduce`] does.
 ///
-/// The rest of the ROM is that of [`reduce`], bit for bit.
-///
-/// # Errors
-/// Those of [`reduce`]; [`Error::Invalid`] for a speed that is not a finite number above zero, for a structure without
-/// clamped nodes, and where the structure finds no equilibrium with the centrifugal force.
-pub fn reduce_spinning(
-    mesh: Mesh,
-    material: &Material,
-    clamped: &[usize],
-    contact: &[ContactPoint],
-    options: &ReductionOptions,
-    largest_speed: f64,
-    listener: Listener<'_>,
-) -> Result<Reduction> {
-    check_speed(largest_speed)?;
-    assembled_and_reduced(mesh, material, clamped, contact, (options, Some(largest_speed)), listener)
-}
-
-/// Reduce a model, from a mesh or from the matrices of another code, as [`reduce`] does; `largest_speed` (rad/s) as in
-/// [`reduce_spinning`].
+/// With a `largest_speed` (rad/s) the effects of spin up to it are added, in [`tiprub_core::rom::RomExtras::spin`], see [`crate::spin`]; the
+/// rest of the ROM stays the same, bit for bit.
 ///
 /// # Errors
-/// Those of [`reduce`] and [`reduce_spinning`]; [`Error::Invalid`] for effects of spin without a mesh.
+/// Those of [`reduce`]; [`Error::Invalid`] for a speed that is not a finite number above zero, for effects of spin without a mesh or
+/// without clamped nodes, and where the structure finds no equilibrium with the centrifugal force.
 pub fn reduce_model(
     model: FeModel,
     clamped: &[usize],
@@ -166,65 +125,22 @@ pub fn reduce_model(
         check_speed(speed)?;
     }
     check_nodes(&model.nodes, clamped, contact, options.frame)?;
-    reduced(model, clamped, contact, options, largest_speed, Timings::default(), listener)
-}
-
-fn check_speed(speed: f64) -> Result<()> {
-    if speed.is_finite() && speed > 0.0 {
-        return Ok(());
-    }
-    let problem = format!("{} rad/s is not a finite speed > 0", shown(speed));
-    Err(Error::invalid("largest speed", problem, "Give the largest speed that is to be computed"))
-}
-
-fn assembled_and_reduced(
-    mesh: Mesh,
-    material: &Material,
-    clamped: &[usize],
-    contact: &[ContactPoint],
-    (options, largest_speed): (&ReductionOptions, Option<f64>),
-    listener: Listener<'_>,
-) -> Result<Reduction> {
-    let mut timings = Timings::default();
-    let model = timed(&mut timings.assembly, || {
-        check_nodes(&mesh.nodes, clamped, contact, options.frame)?;
-        FeModel::assembled(mesh, material, String::new(), listener)
-    })?;
-    reduced(model, clamped, contact, options, largest_speed, timings, listener)
-}
-
-fn reduced(
-    model: FeModel,
-    clamped: &[usize],
-    contact: &[ContactPoint],
-    options: &ReductionOptions,
-    largest_speed: Option<f64>,
-    mut timings: Timings,
-    listener: Listener<'_>,
-) -> Result<Reduction> {
     // The library's own threads split sums by their number, and a ROM must have the same bits on every number of threads.
     faer::set_global_parallelism(faer::Par::Seq);
     let free = free_dofs(model.nodes.len(), clamped);
     let (stiffness, mass) = principal_pair(&model.stiffness, &model.mass, &free);
-    let full = timed(&mut timings.full_modes, || {
-        full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)
-    })?;
+    let full = full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)?;
     let interface = interface_dofs(&free, contact)?;
     let component_modes = |stiffness: &SparseMatrix, modes: usize, listener: Listener<'_>| {
-        let cartesian = craig_bampton(stiffness, &mass, &interface, modes, listener)?;
-        Ok(rotated(cartesian, &model.nodes, contact, options.frame))
+        let cartesian = craig_bampton(stiffness, &mass, &interface, modes, listener);
+        cartesian.map(|found| rotated(found, &model.nodes, contact, options.frame))
     };
-    let craig_bampton =
-        timed(&mut timings.reduction, || component_modes(&stiffness, options.fixed_interface_modes, listener))?;
-    let (checks, squares) = timed(&mut timings.checks, || {
-        report(listener, Stage::Checks, 0, 1);
-        let (squares, vectors) = dense_modes(&craig_bampton.stiffness, &craig_bampton.mass)?;
-        let checks = compare(&full, &mass, &craig_bampton, &squares, &vectors);
-        report(listener, Stage::Checks, 1, 1);
-        Ok((checks, squares))
-    })?;
-    let spin = timed(&mut timings.spin, || {
-        let Some(speed) = largest_speed else { return Ok(None) };
+    let craig_bampton = component_modes(&stiffness, options.fixed_interface_modes, listener)?;
+    report(listener, Stage::Checks, 0, 1);
+    let (squares, vectors) = dense_modes(&craig_bampton.stiffness, &craig_bampton.mass)?;
+    let checks = compare(&full, &mass, &craig_bampton, &squares, &vectors);
+    report(listener, Stage::Checks, 1, 1);
+    let spin = |speed| -> Result<ReducedSpin> {
         let resting = Resting { model: &craig_bampton, mass: &mass, free: &free, interface: &interface };
         let states = spinning_states(&model, &free, &stiffness, speed, listener)?;
         let modes = (options.fixed_interface_modes + SPARE_MODES).min(free.len() - interface.len());
@@ -234,27 +150,23 @@ fn reduced(
         report(listener, Stage::Spin, 5, 6);
         let spin = reduced_spin(&states, resting, &middle, &largest, options.checked_modes)?;
         report(listener, Stage::Spin, 6, 6);
-        Ok(Some(spin))
-    })?;
+        Ok(spin)
+    };
+    let spin = largest_speed.map(spin).transpose()?;
     let (spin, spin_checks) = spin.map_or((None, Vec::new()), |ReducedSpin { spin, checks }| (Some(spin), checks));
-    let mut rom = build_rom(&model, clamped.len(), contact, options, &craig_bampton, checks)?;
+    let mut rom = build_rom(&model, clamped.len(), contact, options, &craig_bampton, checks);
     rom.extras.spin = spin;
-    rom.validate()?;
-    let nodes = model.nodes.len();
-    let (mesh, material) = model.mesh.unzip();
-    Ok(Reduction {
-        rom,
-        modes: node_modes(&full.modes, &free, nodes),
-        largest_residual: full.modes.residuals.iter().copied().fold(0.0, f64::max),
-        free_dofs: free.len(),
-        reduced_angular_frequencies: squares.iter().map(|square| square.max(0.0).sqrt()).collect(),
-        fixed_interface_frequencies: craig_bampton.fixed_interface_frequencies,
-        spin_checks,
-        material,
-        mesh,
-        nodes,
-        timings,
-    })
+    let fixed_interface_frequencies = craig_bampton.fixed_interface_frequencies;
+    let reduction = Reduction::new(rom, &full.modes, &free, &squares, (model.nodes.len(), model.mesh))?;
+    Ok(Reduction { spin_checks, fixed_interface_frequencies, ..reduction })
+}
+
+fn check_speed(speed: f64) -> Result<()> {
+    if speed.is_finite() && speed > 0.0 {
+        return Ok(());
+    }
+    let problem = format!("{} rad/s is not a finite speed > 0", shown(speed));
+    Err(Error::invalid("largest speed", problem, "Give the largest speed that is to be computed"))
 }
 
 fn spinning_states(
@@ -356,13 +268,6 @@ pub(crate) fn compare(
         residual_criterion,
         nodal_diameters: Vec::new(),
     }
-}
-
-pub(crate) fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> Result<T>) -> Result<T> {
-    let start = Instant::now();
-    let result = work();
-    *seconds += start.elapsed().as_secs_f64();
-    result
 }
 
 pub(crate) fn check_nodes(nodes: &[[f64; 3]], clamped: &[usize], contact: &[ContactPoint], frame: Frame) -> Result<()> {

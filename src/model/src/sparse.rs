@@ -9,15 +9,15 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::linalg::matmul::matmul;
 use faer::perm::PermRef;
+use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Accum, Conj, Mat, MatMut, MatRef, Par, Side, Spec};
 use rayon::prelude::*;
 
 use crate::ordering::{Ordering, elimination_order};
-
+pub use crate::pattern::Pattern;
 use crate::{Error, Result};
 
 /// Columns of a dense matrix that a sparse one is multiplied with at once.
@@ -27,7 +27,7 @@ const WIDTH: usize = 8;
 const ROWS: usize = 4096;
 
 /// AᵀB of two tall matrices, in parallel.
-pub fn tall_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+pub(crate) fn tall_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     assert_eq!(a.nrows(), b.nrows(), "the product's inner dimensions must agree");
     let pieces = a.nrows().div_ceil(ROWS);
     // A few pieces at a time, so that their products need not be kept all at once.
@@ -51,54 +51,12 @@ pub fn tall_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
 }
 
 /// target + factor · A C for a tall A and a small C, in parallel.
-pub fn add_tall(target: MatMut<'_, f64>, factor: f64, a: MatRef<'_, f64>, c: MatRef<'_, f64>) {
+pub(crate) fn add_tall(target: MatMut<'_, f64>, factor: f64, a: MatRef<'_, f64>, c: MatRef<'_, f64>) {
     let chunks: Vec<_> = target.par_row_chunks_mut(ROWS).collect();
     chunks.into_par_iter().enumerate().for_each(|(piece, rows)| {
         let part = a.get(piece * ROWS..piece * ROWS + rows.nrows(), ..);
         matmul(rows, Accum::Add, part, c, factor, PAR);
     });
-}
-
-/// Where the entries of a symmetric matrix are: compressed columns, rows ascending, both triangles.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Pattern {
-    /// Start of each column in `rows`, and the end of the last one.
-    pub starts: Vec<usize>,
-    /// Row index of each entry.
-    pub rows: Vec<usize>,
-}
-
-impl Pattern {
-    /// Number of rows and columns.
-    pub fn order(&self) -> usize {
-        self.starts.len() - 1
-    }
-
-    fn as_faer(&self) -> SymbolicSparseColMatRef<'_, usize> {
-        SymbolicSparseColMatRef::new_checked(self.order(), self.order(), &self.starts, None, &self.rows)
-    }
-
-    /// Pattern of the rows and columns `keep` (ascending), and for each of its entries the entry it is here.
-    pub fn principal(&self, keep: &[usize]) -> (Self, Vec<usize>) {
-        let mut position = vec![usize::MAX; self.order()];
-        for (new, &old) in keep.iter().enumerate() {
-            position[old] = new;
-        }
-        let mut starts = Vec::with_capacity(keep.len() + 1);
-        let (mut rows, mut entries) = (Vec::new(), Vec::new());
-        starts.push(0);
-        for &column in keep {
-            for entry in self.starts[column]..self.starts[column + 1] {
-                let row = position[self.rows[entry]];
-                if row != usize::MAX {
-                    rows.push(row);
-                    entries.push(entry);
-                }
-            }
-            starts.push(rows.len());
-        }
-        (Self { starts, rows }, entries)
-    }
 }
 
 /// A symmetric sparse matrix.
@@ -309,15 +267,10 @@ impl Factor {
     }
 
     /// As [`Self::solve`], all columns together in the calling thread: for callers that are parallel themselves.
-    pub fn solve_in_place(&self, right: MatMut<'_, f64>) {
+    pub(crate) fn solve_in_place(&self, right: MatMut<'_, f64>) {
         let scratch = self.symbolic.inner.solve_in_place_scratch::<f64>(right.ncols(), PAR);
         let mut memory = MemBuffer::new(scratch);
         let factor = LltRef::new(&self.symbolic.inner, &self.values);
         factor.solve_in_place_with_conj(Conj::No, right, PAR, MemStack::new(&mut memory));
-    }
-
-    /// Number of stored entries, the zeros that blocks include counted.
-    pub fn entries(&self) -> usize {
-        self.values.len()
     }
 }

@@ -8,7 +8,7 @@
 //! with the tangent stiffness K_T (elasticity of the deformed structure, its stress) and the spin softening -Ω²M_xy.
 //! Craig-Bampton reduces each of these states with its own constraint and fixed-interface modes, turned so that the
 //! coordinates and the mass matrix stay those of the resting structure; its stiffness K(Ω) is fitted by
-//! K₀ + Ω²K₁ + Ω⁴K₂ through three speeds, 0, 0.6 Ω and Ω ([`reduced_spin`]). With modes of its own a state needs no more
+//! K₀ + Ω²K₁ + Ω⁴K₂ through three speeds, 0, 0.6 Ω and Ω (`reduced_spin`). With modes of its own a state needs no more
 //! coordinates than the resting structure. In the resting modes the untwist would cost membrane strain that is not there.
 //! The load Ω²c + Ω⁴c₂ is such that its static response under K(Ω) is the growth u(Ω) of the contact nodes, exactly at
 //! 0.6 Ω and Ω.
@@ -19,7 +19,8 @@ mod equilibrium;
 mod reduced;
 
 pub use equilibrium::{Rotating, SpinningState, turned_about_axis, without_axial};
-pub use reduced::{CHECKED, MIDDLE, ReducedSpin, Resting, SPARE_MODES, SpinCheck, SpinningStates, reduced_spin};
+pub use reduced::SpinCheck;
+pub(crate) use reduced::{ReducedSpin, Resting, SPARE_MODES, SpinningStates, reduced_spin};
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::{Rom, rom::Spin};

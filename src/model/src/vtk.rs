@@ -5,14 +5,12 @@
 
 use core::f64::consts::TAU;
 use std::fmt::Write as _;
-use std::path::Path;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use nalgebra::Complex;
 
 use crate::element::ElementKind;
-use crate::file::write_whole;
 use crate::mesh::Mesh;
 use crate::{Error, Result};
 
@@ -98,14 +96,6 @@ pub fn write(mesh: &Mesh, fields: &[Field]) -> Result<Vec<u8>> {
     }
     text.push_str("</PointData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n");
     Ok(text.into_bytes())
-}
-
-/// Write [`write()`]'s bytes to a file: to a temporary one beside it first, then renamed.
-///
-/// # Errors
-/// As [`write()`]; [`Error::File`] when the file cannot be written, and then nothing is left behind.
-pub fn write_file(path: &Path, mesh: &Mesh, fields: &[Field]) -> Result<()> {
-    write_whole(path, &write(mesh, fields)?)
 }
 
 /// The mesh of a whole disk: copies of a sector turned about z, sector by sector; nodes on the faces are there twice.

@@ -119,7 +119,6 @@ fn casing37_agrees_with_calculix_and_its_reduction_with_it() {
         );
         assert!(errors.iter().all(|error| error.abs() < 1e-6));
     }
-    println!("times {:?}, total {:.2} s; {}", reduction.timings, reduction.timings.total(), rom.origin);
 }
 
 #[test]

@@ -2,32 +2,15 @@
 
 mod common;
 
-use common::{distorted_box, wobble};
+use common::{distorted_box, distorted_nodes, steel, wobble};
 use faer::Mat;
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 use tiprub_model::Error;
 use tiprub_model::assembly::{assemble, lumped_masses};
 use tiprub_model::element::{ElementKind, consistent_mass, stiffness, strain, stress};
-use tiprub_model::material::Material;
 use tiprub_model::progress::silent;
 use tiprub_model::sparse::principal_pair;
-
-fn steel() -> Material {
-    Material { name: "steel".into(), young_modulus: 210e9, poisson_ratio: 0.3, density: 7800.0, expansion: 0.0 }
-}
-
-/// Nodes of one element in physical space: the natural ones, scaled and bent by a smooth map without symmetry.
-fn distorted_nodes(kind: ElementKind) -> Vec<[f64; 3]> {
-    let map = |[x, y, z]: [f64; 3]| {
-        [
-            0.03 * x + 0.004 * y + 0.002 * z + 0.002 * y * z,
-            0.003 * x + 0.02 * y - 0.003 * z + 0.001 * x * z,
-            -0.002 * x + 0.002 * y + 0.025 * z + 0.0015 * x * y,
-        ]
-    };
-    kind.natural_nodes().iter().map(|&node| map(node)).collect()
-}
 
 #[test]
 fn each_shape_function_is_one_at_its_node_and_zero_at_the_others() {

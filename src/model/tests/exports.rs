@@ -197,17 +197,3 @@ fn a_mode_is_expanded_to_the_disk() {
         }
     }
 }
-
-#[test]
-fn files_appear_whole_or_not_at_all() {
-    let directory = std::env::temp_dir().join(format!("tiprub-exports-{}", std::process::id()));
-    let path = directory.join("sector.vtu");
-    let message = vtk::write_file(&path, &coarse(), &[]).unwrap_err().to_string();
-    assert!(message.contains("sector.vtu"), "{message}");
-    std::fs::create_dir(&directory).unwrap();
-    vtk::write_file(&path, &coarse(), &[]).unwrap();
-    assert_eq!(std::fs::read(&path).unwrap(), vtk::write(&coarse(), &[]).unwrap());
-    let names: Vec<_> = std::fs::read_dir(&directory).unwrap().map(|entry| entry.unwrap().file_name()).collect();
-    assert_eq!(names, ["sector.vtu"]);
-    std::fs::remove_dir_all(&directory).unwrap();
-}

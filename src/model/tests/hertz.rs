@@ -9,7 +9,6 @@ use nalgebra::DMatrix;
 use tiprub_core::Rom;
 use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw};
 use tiprub_core::dynamics::modal::{ModalModel, NodePair};
-use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_model::assembly::assemble_with;
@@ -20,6 +19,7 @@ use tiprub_model::progress::silent;
 use tiprub_model::sparse::principal_pair;
 use tiprub_model::{Material, Mesh};
 use tiprub_reference::closed::impact::Hertz;
+use tiprub_test_models::{node, structure};
 
 /// Radius of the contact that is computed (m), and of the sphere.
 const CONTACT: f64 = 1e-3;
@@ -114,27 +114,10 @@ fn block(per_radius: usize) -> Block {
 
 /// The first `nodes` coordinates are the displacements of the contact nodes along z.
 fn rom(name: &str, mass: DMatrix<f64>, stiffness: DMatrix<f64>, nodes: usize) -> Rom {
-    let order = mass.nrows();
-    let node = |i: usize| ContactNode { name: format!("{name}_{i}"), position: [0.0; 3], meridional_slope: 0.0 };
-    Rom {
-        name: name.into(),
-        origin: "Hertz's problem".into(),
-        sectors: 1,
-        frame: Frame::Cartesian,
-        mass,
-        stiffness,
-        damping_ratio: 0.0,
-        contact_map: DMatrix::from_fn(
-            3 * nodes,
-            order,
-            |row, column| {
-                if row % 3 == 2 && row / 3 == column { 1.0 } else { 0.0 }
-            },
-        ),
-        contact_nodes: (0..nodes).map(node).collect(),
-        checks: RomChecks::default(),
-        extras: RomExtras::default(),
-    }
+    let along_z = |row: usize, column: usize| if row % 3 == 2 && row / 3 == column { 1.0 } else { 0.0 };
+    let map = DMatrix::from_fn(3 * nodes, mass.nrows(), along_z);
+    let nodes = (0..nodes).map(|i| node(format!("{name}_{i}"), [0.0; 3], 0.0)).collect();
+    structure(name, mass, stiffness, map, nodes)
 }
 
 /// A paraboloid r²/2R, as in Hertz's theory, closer by `approach` than touching; the sphere is above the block.

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{distorted_box, nodes_at, straight_box, wobble};
+use common::{distorted_box, distorted_nodes, nodes_at, straight_box, wobble};
 use faer::Mat;
 use tiprub_model::assembly::{assemble_with, free_dofs};
 use tiprub_model::element::{ElementKind, Formulation, incompatible_stiffness, stiffness, thermal_load};
@@ -13,20 +13,9 @@ use tiprub_model::sparse::principal_pair;
 
 const KIND: ElementKind = ElementKind::Hex8;
 
-fn distorted_nodes() -> Vec<[f64; 3]> {
-    let map = |[x, y, z]: [f64; 3]| {
-        [
-            0.03 * x + 0.004 * y + 0.002 * z + 0.002 * y * z,
-            0.003 * x + 0.02 * y - 0.003 * z + 0.001 * x * z,
-            -0.002 * x + 0.002 * y + 0.025 * z + 0.0015 * x * y,
-        ]
-    };
-    KIND.natural_nodes().iter().map(|&node| map(node)).collect()
-}
-
 #[test]
 fn a_distorted_element_has_six_rigid_body_modes_and_is_never_stiffer() {
-    let nodes = distorted_nodes();
+    let nodes = distorted_nodes(KIND);
     let incompatible = incompatible_stiffness(&nodes, &Material::steel(), 0).unwrap();
     let mut values: Vec<f64> = incompatible.symmetric_eigenvalues().iter().copied().collect();
     values.sort_by(f64::total_cmp);
@@ -71,7 +60,7 @@ fn patch_test() {
 
 #[test]
 fn free_growth_in_uniform_heat_is_without_stress() {
-    let (nodes, material) = (distorted_nodes(), Material::steel());
+    let (nodes, material) = (distorted_nodes(KIND), Material::steel());
     let matrix = incompatible_stiffness(&nodes, &material, 0).unwrap();
     let load = thermal_load(KIND, &nodes, &material, 0).unwrap();
     let growth = nalgebra::DVector::from_iterator(24, nodes.iter().flatten().map(|x| material.expansion * x));

@@ -2,18 +2,14 @@
 
 mod common;
 
-use common::{distorted_box, nodes_at, straight_box, wobble};
+use common::{blade_steel, distorted_box, nodes_at, straight_box, wobble};
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
+use tiprub_model::Mesh;
 use tiprub_model::assembly::assemble;
 use tiprub_model::element::{ElementKind, consistent_mass, geometric_stiffness, second_stresses, stiffness, tangent};
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::full_modes;
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
-use tiprub_model::{Material, Mesh};
-
-fn material(poisson_ratio: f64) -> Material {
-    Material { young_modulus: 200e9, poisson_ratio, ..Material::maraging_steel() }
-}
 
 /// Coordinates of an irregular element of a kind: one out of the middle of a distorted box.
 fn element(kind: ElementKind) -> Vec<[f64; 3]> {
@@ -37,7 +33,7 @@ fn volume(kind: ElementKind, coordinates: &[[f64; 3]]) -> f64 {
 #[test]
 fn the_tangent_of_the_resting_element_is_the_linear_stiffness() {
     for kind in ElementKind::ALL {
-        let (coordinates, steel) = (element(kind), material(0.3));
+        let (coordinates, steel) = (element(kind), blade_steel(0.3));
         let at_rest = tangent(kind, &coordinates, &vec![[0.0; 3]; kind.node_count()], &steel, 0).unwrap();
         let linear = stiffness(kind, &coordinates, &steel, 0).unwrap();
         assert!((&at_rest.stiffness - &linear).amax() < 1e-13 * linear.amax(), "{kind:?}");
@@ -49,7 +45,7 @@ fn the_tangent_of_the_resting_element_is_the_linear_stiffness() {
 #[test]
 fn the_tangent_is_the_derivative_of_the_force() {
     for kind in ElementKind::ALL {
-        let (coordinates, steel) = (element(kind), material(0.3));
+        let (coordinates, steel) = (element(kind), blade_steel(0.3));
         let (at, along) = (irregular(kind.node_count(), 0.01, 0.3), irregular(kind.node_count(), 0.004, 7.1));
         let force = |share: f64| {
             let moved: Vec<[f64; 3]> =
@@ -69,7 +65,7 @@ fn the_tangent_is_the_derivative_of_the_force() {
 fn a_turned_element_has_no_stress_and_a_turned_stiffness() {
     let rotation = Rotation3::from_euler_angles(0.7, -1.1, 2.0);
     for kind in ElementKind::ALL {
-        let (coordinates, steel) = (element(kind), material(0.3));
+        let (coordinates, steel) = (element(kind), blade_steel(0.3));
         let turned: Vec<[f64; 3]> =
             coordinates.iter().map(|x| (rotation * Vector3::from(*x) - Vector3::from(*x)).into()).collect();
         let found = tangent(kind, &coordinates, &turned, &steel, 0).unwrap();
@@ -120,7 +116,7 @@ fn stress_stiffness_of_a_uniform_stress_is_exact_for_linear_motions() {
 
 #[test]
 fn the_stress_of_a_stretched_bar_is_that_of_its_green_strain() {
-    let (stretch, steel) = (0.01, material(0.0));
+    let (stretch, steel) = (0.01, blade_steel(0.0));
     for kind in ElementKind::ALL {
         let coordinates = element(kind);
         let moved: Vec<[f64; 3]> = coordinates.iter().map(|x| [stretch * x[0], 0.0, 0.0]).collect();
@@ -138,7 +134,7 @@ fn a_tensioned_beam_sings_as_the_closed_form_says() {
     let (length, height, tension) = (1.0, 0.03, 4e8);
     for kind in [ElementKind::Hex20, ElementKind::Penta15, ElementKind::Tet10] {
         let mesh = straight_box(kind, [20, 1, 1], [length, height, height]);
-        let assembled = assemble(&mesh, &material(0.0), &silent).unwrap();
+        let assembled = assemble(&mesh, &blade_steel(0.0), &silent).unwrap();
         let stressed = with_stress(&mesh, &assembled.stiffness, tension);
         let mut held: Vec<usize> = [nodes_at(&mesh, 0, 0.0), nodes_at(&mesh, 0, length)]
             .concat()

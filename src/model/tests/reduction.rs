@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{distorted_box, nodes_at, straight_box, wobble};
+use common::{distorted_box, nodes_at, steel, straight_box, wobble};
 use faer::Mat;
 use nalgebra::DMatrix;
 use proptest::prelude::*;
@@ -11,15 +11,10 @@ use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::craig_bampton::{craig_bampton, dense_modes};
 use tiprub_model::eigen::lowest_modes;
 use tiprub_model::element::ElementKind;
-use tiprub_model::material::Material;
 use tiprub_model::progress::{Progress, Stage, silent};
 use tiprub_model::reduce::{ContactPoint, Reduction, ReductionOptions, full_modes, reduce};
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::{Error, Mesh};
-
-fn steel() -> Material {
-    Material { name: "steel".into(), young_modulus: 210e9, poisson_ratio: 0.3, density: 7800.0, expansion: 0.0 }
-}
 
 const SIZE: [f64; 3] = [0.3, 0.04, 0.05];
 

@@ -258,7 +258,6 @@ fn default_blade_agrees_with_calculix_and_its_reduction_with_it() {
     let rom = &reduction.rom;
     assert_eq!((rom.sectors, rom.order(), rom.contact_nodes.len()), (36, 29, 3));
     rom.validate().unwrap();
-    println!("times {:?}, total {:.2} s", reduction.timings, reduction.timings.total());
 }
 
 #[test]
@@ -302,18 +301,6 @@ fn exported_file_is_complete_and_nothing_is_left_behind_on_failure() {
     assert_eq!(section("*BOUNDARY"), ["HUB, 1, 3"]);
     let error = inp::calculix_input(&blade.mesh, &material, Some("root"), 10).unwrap_err().to_string();
     assert!(error.contains("node set `root`") && error.contains("hub"), "{error}");
-
-    let folder = std::env::temp_dir().join(format!("tiprub-inp-{}", std::process::id()));
-    std::fs::create_dir(&folder).unwrap();
-    let target = folder.join("blade.inp");
-    std::fs::create_dir(&target).unwrap();
-    let error = inp::write_calculix_input(&target, &blade.mesh, &material, Some("hub"), 10).unwrap_err();
-    assert!(error.to_string().contains("blade.inp"), "{error}");
-    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1, "only the folder that was in the way");
-    std::fs::remove_dir(&target).unwrap();
-    inp::write_calculix_input(&target, &blade.mesh, &material, Some("hub"), 10).unwrap();
-    assert_eq!(std::fs::read_to_string(&target).unwrap(), text);
-    std::fs::remove_dir_all(&folder).unwrap();
 }
 
 #[test]

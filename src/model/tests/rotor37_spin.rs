@@ -218,7 +218,6 @@ fn the_checks_that_come_with_the_blade_hold() {
     let reduction = reduced();
     assert_eq!(reduction.rom.order(), 29, "spin costs no coordinates");
     reduction.rom.validate().unwrap();
-    println!("times {:?}, total {:.2} s", reduction.timings, reduction.timings.total());
     for check in &reduction.spin_checks {
         println!(
             "{} rad/s: frequencies {:.4?} %, growth {:.4} %",
@@ -230,7 +229,6 @@ fn the_checks_that_come_with_the_blade_hold() {
         assert!(check.growth_deviation() < 0.5);
     }
     let still = reduce_rotor37(&Rotor37Options::default(), &silent).unwrap();
-    println!("without spin {:.2} s", still.timings.total());
     let mut stripped = reduction.rom.clone();
     stripped.extras.spin = None;
     // Linear theory: the resting stiffness under Ω²c grows like a linear static step, 388.6 µm at the leading edge

@@ -1,6 +1,7 @@
 //! Independent methods and closed forms that the product is compared with, by tests and by `lab error`. Nothing here
 //! goes into the FMU, and nothing here uses the product's stepping or contact code; meshes, element matrices and sparse factors are those of `tiprub-model`.
 
+#![warn(unreachable_pub)]
 pub mod carpenter;
 pub mod closed;
 #[cfg(feature = "cube")]

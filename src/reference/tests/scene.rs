@@ -146,7 +146,7 @@ fn facets_are_the_chords_of_the_cylinder() {
 fn spread_forces_do_the_work_of_the_carriers() {
     let surface = Surface::new(SurfaceKind::Spline, 41, 9, 1.0);
     let irregular = |seed: f64| -> Vec<[f64; 3]> {
-        (0..surface.len()).map(|i| core::array::from_fn(|k| (seed * (i as f64 + 0.3) + k as f64).sin())).collect()
+        (0..surface.count()).map(|i| core::array::from_fn(|k| (seed * (i as f64 + 0.3) + k as f64).sin())).collect()
     };
     let (nodal, forces) = (irregular(12.9), irregular(7.7));
     let work = |a: &[[f64; 3]], b: &[[f64; 3]]| -> f64 {

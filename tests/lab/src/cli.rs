@@ -170,8 +170,9 @@ impl Cli {
         match &self.command {
             Command::Error(arguments) => error::study(arguments, console),
             Command::Convergence(common) => {
+                let start = std::time::Instant::now();
                 let (reduction, _) = DiskModel::new(common.quick).reduce(console)?;
-                convergence::study(&reduction, common.quick)
+                convergence::study(&reduction, start.elapsed().as_secs_f64(), common.quick)
             }
             Command::Modes(arguments) => {
                 let (reduction, mesh) = DiskModel::new(arguments.common.quick).reduce(console)?;

@@ -282,7 +282,7 @@ fn statements(course: &Course, runs: &Runs) -> [Statement; 2] {
 ///
 /// # Errors
 /// A model that cannot be reduced, a run that fails, a plot that cannot be drawn.
-pub fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
+pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
     let length = if arguments.quick { QUICK_LENGTH } else { LENGTH };
     let courses = courses(arguments, console)?;
     let mut tasks = Vec::new();

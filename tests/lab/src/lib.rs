@@ -1,16 +1,17 @@
 //! The laboratory: evidence for the product, one command per study. Nothing of it ships.
 //!
-//! - [`error`]: error against run time of the standard problems, beside methods that share no code with the product;
-//! - [`stability`]: stiff and extreme cases, each in a process of its own, judged;
-//! - [`cube`], [`mod@stage`], [`convergence`], [`modes`]: what the paper's figures show of the models that ship;
-//! - [`conjugacy`]: forces, moments and work on both sides of contacts; [`inputs`]: what the communication step does.
+//! - `error`: error against run time of the standard problems, beside methods that share no code with the product;
+//! - `stability`: stiff and extreme cases, each in a process of its own, judged;
+//! - `cube`, `stage`, `convergence`, `modes`: what the paper's figures show of the models that ship;
+//! - `conjugacy`: forces, moments and work on both sides of contacts; `inputs`: what the communication step does.
 
+#![warn(unreachable_pub)]
 pub mod cli;
-pub mod conjugacy;
-pub mod convergence;
-pub mod cube;
-pub mod error;
-pub mod inputs;
-pub mod modes;
-pub mod stability;
-pub mod stage;
+mod conjugacy;
+mod convergence;
+mod cube;
+mod error;
+mod inputs;
+mod modes;
+mod stability;
+mod stage;

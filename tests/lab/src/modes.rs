@@ -223,7 +223,7 @@ fn vtk(mesh: &Mesh, diameters: &[NodalDiameter]) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// A plot cannot be drawn.
-pub fn study(reduction: &CyclicReduction, mesh: &Mesh, speed: Option<f64>, quick: bool) -> Result<Study> {
+pub(crate) fn study(reduction: &CyclicReduction, mesh: &Mesh, speed: Option<f64>, quick: bool) -> Result<Study> {
     let diameters = &reduction.nodal_diameters;
     let sectors = reduction.rom.sectors;
     let oval = diameters.get(2).and_then(|diameter| diameter.full_frequencies.first()).copied();

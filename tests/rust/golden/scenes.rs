@@ -1,31 +1,22 @@
 //! Scenes that together have every feature, scheme, solver, gap law and shape.
 
-#[path = "../../../src/core/tests/common/disk.rs"]
-mod disk;
-#[path = "../../../src/core/tests/common/features.rs"]
-mod features;
-#[path = "../../../src/core/tests/common/lattice.rs"]
-mod lattice;
-
-#[path = "../../../src/core/tests/common/several.rs"]
-mod several;
-
-use features::{coating, flexible};
-use lattice::Side;
 use tiprub_core::Scene;
 use tiprub_core::settings::{
     Closure, InputInterpolation, Interpolation, LoadSettings, Meridian, PatchSettings, Scheme, Shape, Solver,
     SplineSettings,
 };
-
-use crate::common;
+use tiprub_test_models::{
+    coating, disk, flexible,
+    lattice::{self, Side},
+    rich_blade, rub, several as models, spin,
+};
 
 const SECTORS: usize = 12;
 
 /// Twelve uncoupled blades in a rigid casing of two bumps.
 fn rotor(name: &str, scheme: Scheme, solver: Solver, change: impl Fn(&mut Scene)) -> Scene {
-    let mut scene = common::scene(SECTORS);
-    scene.roms[0] = common::rich_rom(SECTORS);
+    let mut scene = rub(SECTORS);
+    scene.roms[0] = rich_blade(SECTORS);
     scene.settings.name = name.into();
     (scene.settings.time.scheme, scene.settings.contacts[0].solver) = (scheme, solver);
     scene.settings.outputs.nodal_diameters = Some(SECTORS / 2);
@@ -63,7 +54,7 @@ fn mistuned(scene: &mut Scene) {
 
 fn spinning(scene: &mut Scene) {
     let order = scene.roms[0].order();
-    scene.roms[0].extras.spin = Some(common::spin(order));
+    scene.roms[0].extras.spin = Some(spin(order));
     let spin = &mut scene.settings.structures[0].spin;
     (spin.stiffening, spin.growth, spin.coriolis) = (true, true, true);
 }
@@ -176,12 +167,12 @@ fn several() -> Vec<Scene> {
         scene.settings.name = name.into();
         scene
     };
-    let blades = || common::scene(6);
+    let blades = || rub(6);
     vec![
-        named("two_rotors_one_casing", several::in_one_casing(blades(), Solver::Lcp, 0.15)),
-        named("two_rotors_coulomb", several::in_one_casing(blades(), Solver::Coulomb, 0.15)),
-        named("tip_and_seal", several::tip_and_seal(blades(), Solver::Film)),
-        named("three_pairs", several::split(&blades())),
+        named("two_rotors_one_casing", models::in_one_casing(blades(), Solver::Lcp, 0.15)),
+        named("two_rotors_coulomb", models::in_one_casing(blades(), Solver::Coulomb, 0.15)),
+        named("tip_and_seal", models::tip_and_seal(blades(), Solver::Film)),
+        named("three_pairs", models::split(&blades())),
     ]
 }
 

@@ -7,37 +7,17 @@ use std::f64::consts::TAU;
 use tiprub_core::contact::gap::dot;
 use tiprub_core::contact::spline::{ClosestPoint, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
+pub use tiprub_test_models::Random;
 
 pub const RADIUS: f64 = 0.25;
 pub const EPS: f64 = f64::EPSILON;
 
-/// Random numbers that are the same everywhere.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    pub fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-
-    pub fn vector(&mut self, size: f64) -> [f64; 3] {
-        [(); 3].map(|()| self.within(-size, size))
-    }
-
-    pub fn below(&mut self, count: usize) -> usize {
-        ((self.next() * count as f64) as usize).min(count - 1)
-    }
-
-    pub fn place(&mut self, surface: &SurfaceSpline) -> ClosestPoint {
-        ClosestPoint {
-            patch: [self.below(surface.around()), self.below(surface.along() - 1)],
-            s: self.next(),
-            t: self.next(),
-        }
+/// Somewhere on a surface.
+pub fn anywhere(random: &mut Random, surface: &SurfaceSpline) -> ClosestPoint {
+    ClosestPoint {
+        patch: [random.below(surface.around()), random.below(surface.along() - 1)],
+        s: random.unit(),
+        t: random.unit(),
     }
 }
 

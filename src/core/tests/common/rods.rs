@@ -8,10 +8,11 @@ use tiprub_core::dynamics::bank::BankOptions;
 use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::dynamics::scheme::free_increment;
 use tiprub_core::dynamics::sectors::SectorModel;
-use tiprub_core::rom::{ContactNode, Frame, Rom, RomChecks, RomExtras};
+use tiprub_core::rom::Rom;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::stability::massless::{MasslessCheck, QUIET};
 use tiprub_core::system::{System, SystemSettings};
+use tiprub_test_models::{node, structure};
 
 pub const SCHEMES: [Scheme; 3] = Scheme::ALL;
 pub const SOLVERS: [Solver; 3] = Solver::ALL;
@@ -56,19 +57,7 @@ impl Rod {
         m[(neighbour, neighbour)] += moved;
         let mut map = DMatrix::zeros(3, nodes);
         map[(0, self.end)] = 1.0;
-        Rom {
-            name: "rod".into(),
-            origin: "linear rod elements, lumped mass".into(),
-            sectors: 1,
-            frame: Frame::Cartesian,
-            mass: m,
-            stiffness: k,
-            damping_ratio: 0.0,
-            contact_map: map,
-            contact_nodes: vec![ContactNode { name: "end".into(), position: [0.0; 3], meridional_slope: 0.0 }],
-            checks: RomChecks::default(),
-            extras: RomExtras::default(),
-        }
+        structure("rod", m, k, map, vec![node("end", [0.0; 3], 0.0)])
     }
 
     /// Its modes; one of them, the highest, is the flexibility of the contact node.

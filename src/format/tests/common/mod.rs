@@ -4,36 +4,14 @@ use tiprub_core::settings::*;
 
 /// One of everything.
 pub fn complete_scene() -> SceneSettings {
-    SceneSettings {
-        name: "complete".into(),
-        description: "Every key.".into(),
-        structures: vec![StructureSettings {
-            name: "rotor".into(),
-            rom: "rotor.rom.safetensors".into(),
-            motion: Motion::Rotating,
-            speed: 1800.0,
-            damping_ratio: Some(0.01),
-            ..StructureSettings::default()
-        }],
-        surfaces: vec![SurfaceSettings {
-            name: "casing".into(),
-            shape: Shape::Lobes { amplitude: 1e-4, order: 2, phase: 0.5 },
-            ramp_time: 0.01,
-            moving: true,
-            ..SurfaceSettings::default()
-        }],
-        contacts: vec![ContactSettings {
-            master: "rotor".into(),
-            slave: "casing".into(),
-            gap: 3.56e-4,
-            sector_gaps: vec![3.5e-4, 3.6e-4],
-            friction: 0.15,
-            solver: Solver::Lcp,
-            meridian: Meridian::Contour,
-            ..ContactSettings::default()
-        }],
-        time: TimeSettings { scheme: Scheme::ModalExact, step: 1e-6, ..TimeSettings::default() },
-        outputs: OutputSettings { nodal_diameters: Some(4), ..OutputSettings::default() },
-        experiment: ExperimentSettings { start: 0.0, stop: 0.1, communication_step: 1e-4 },
-    }
+    let mut settings = tiprub_test_models::round(tiprub_test_models::blade(2)).settings;
+    (settings.name, settings.description) = ("complete".into(), "Every key.".into());
+    let rotor = &mut settings.structures[0];
+    (rotor.rom, rotor.speed, rotor.damping_ratio) = ("rotor.rom.safetensors".into(), 1800.0, Some(0.01));
+    settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order: 2, phase: 0.5 };
+    settings.surfaces[0].ramp_time = 0.01;
+    (settings.contacts[0].sector_gaps, settings.contacts[0].friction) = (vec![3.5e-4, 3.6e-4], 0.15);
+    settings.outputs = OutputSettings { nodal_diameters: Some(4), ..OutputSettings::default() };
+    settings.experiment = ExperimentSettings { start: 0.0, stop: 0.1, communication_step: 1e-4 };
+    settings
 }

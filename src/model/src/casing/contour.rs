@@ -58,11 +58,6 @@ impl Contour {
         [self.points[0][0], self.points[self.points.len() - 1][0]]
     }
 
-    /// The points (z, r) it goes through.
-    pub fn points(&self) -> &[[f64; 2]] {
-        &self.points
-    }
-
     /// Radius (m) at the axial position z (m); beyond the ends the outer polynomials go on.
     pub fn radius(&self, z: f64) -> f64 {
         let (i, h, t) = self.place(z);

@@ -121,7 +121,7 @@ impl GridNodes {
     ///
     /// # Errors
     /// [`Error::Invalid`] giving the counts.
-    pub fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(&self) -> Result<()> {
         let whole = self.around > 0 && self.nodes.len().is_multiple_of(self.around);
         if whole && self.slopes.len() == self.along() {
             return Ok(());
@@ -137,12 +137,12 @@ impl GridNodes {
     }
 
     /// Its shape, as the ROM has it.
-    pub fn shape(&self) -> ContactGrid {
+    pub(crate) fn shape(&self) -> ContactGrid {
         ContactGrid { around: self.around, along: self.along(), closed: true }
     }
 
     /// The contact nodes in the cylindrical frame.
-    pub fn contact_nodes(&self, mesh: &Mesh) -> Vec<ContactNode> {
+    pub(crate) fn contact_nodes(&self, mesh: &Mesh) -> Vec<ContactNode> {
         let node = |(index, node): (usize, &usize)| {
             let [x, y, z] = mesh.nodes[*node];
             let meridional_slope = self.slopes[index / self.around];
@@ -162,7 +162,7 @@ impl GridNodes {
     }
 
     /// Name of the contact node with the given index: `ring_1_node_1`, ...
-    pub fn name(&self, index: usize) -> String {
+    pub(crate) fn name(&self, index: usize) -> String {
         format!("ring_{}_node_{}", index / self.around + 1, index % self.around + 1)
     }
 

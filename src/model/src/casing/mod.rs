@@ -74,14 +74,12 @@ pub struct CasingOptions {
 /// # Errors
 /// [`Error::Invalid`](crate::Error::Invalid) for lengths, counts and contact rings that do not fit each other, and those of [`reduce_casing`].
 pub fn reduce_ring(options: &CasingOptions, listener: Listener<'_>) -> Result<Reduction> {
-    let start = std::time::Instant::now();
     report(listener, Stage::Mesh, 0, 1);
     let ring = supported_ring(options)?;
     let clamped = if options.support == Support::Free { Vec::new() } else { ring.mesh.set(CLAMPED)?.to_vec() };
     let [around, along] = options.patches;
     let patches = equal_patches(around, along, options.geometry.contour.axial());
     report(listener, Stage::Mesh, 1, 1);
-    let meshing = start.elapsed().as_secs_f64();
     let reduction_options = CasingReductionOptions {
         name: options.name.clone(),
         formulation: Formulation::Displacement,
@@ -92,7 +90,6 @@ pub fn reduce_ring(options: &CasingOptions, listener: Listener<'_>) -> Result<Re
     };
     let mut reduction =
         reduce_casing(ring.mesh, &options.material, &clamped, &ring.grid, &patches, &reduction_options, listener)?;
-    reduction.timings.assembly += meshing;
     reduction.rom.origin = format!("{}: {}", describe(options), reduction.rom.origin);
     Ok(reduction)
 }

@@ -19,8 +19,8 @@ use crate::element::Formulation;
 use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{Reduction, Timings, check_nodes, compare, element_names, full_modes, node_modes, timed};
-use crate::sparse::{SparseMatrix, principal_pair, tall_product};
+use crate::reduce::{Reduction, check_nodes, compare, element_names, full_modes};
+use crate::sparse::{principal_pair, tall_product};
 use crate::thermal::patch_loads;
 
 /// Rigid-body motions of a free structure.
@@ -64,128 +64,47 @@ pub fn reduce_casing(
 ) -> Result<Reduction> {
     // As for blades: the library's own threads would split sums by their number, and with it the bits of the ROM.
     faer::set_global_parallelism(faer::Par::Seq);
-    let mut timings = Timings::default();
-    let full = timed(&mut timings.assembly, || {
-        grid.validate()?;
-        check_nodes(&mesh.nodes, clamped, &grid.contact_points(), Frame::Cylindrical)?;
-        FullCasing::assembled(&mesh, material, clamped, patches, options.formulation, listener)
-    })?;
-    let free = clamped.is_empty();
-    let full_modes = timed(&mut timings.full_modes, || {
-        full_modes(&full.stiffness, &full.mass, free, options.checked_modes, listener)
-    })?;
-    let condensed = timed(&mut timings.reduction, || full.condensed(&mesh, free, grid, options, listener))?;
-    let Condensed { reduced, modes, .. } = &condensed;
-    let checks = timed(&mut timings.checks, || {
-        report(listener, Stage::Checks, 0, 1);
-        let checks = compare(&full_modes, &full.mass, reduced, &modes.squares, &modes.shapes);
-        report(listener, Stage::Checks, 1, 1);
-        Ok(if free { without_rigid_motions(checks) } else { checks })
-    })?;
-    let origin = origin(&mesh, (material, options.formulation), clamped.len(), grid, reduced, modes);
-    let rom = condensed.rom((options, origin), &mesh, grid, patches, checks);
-    rom.validate()?;
-    Ok(Reduction {
-        rom,
-        modes: node_modes(&full_modes.modes, &full.free, mesh.nodes.len()),
-        largest_residual: full_modes.modes.residuals.iter().copied().fold(0.0, f64::max),
-        free_dofs: full.free.len(),
-        reduced_angular_frequencies: modes.squares.iter().map(|square| square.sqrt()).collect(),
-        fixed_interface_frequencies: condensed.reduced.fixed_interface_frequencies,
-        spin_checks: Vec::new(),
-        material: Some(material.clone()),
-        nodes: mesh.nodes.len(),
-        mesh: Some(mesh),
-        timings,
-    })
-}
-
-/// The finite-element model on its free degrees of freedom.
-struct FullCasing {
-    stiffness: SparseMatrix,
-    mass: SparseMatrix,
-    /// Thermal loads, free dofs × patches.
-    loads: Mat<f64>,
-    /// Free dofs, ascending.
-    free: Vec<usize>,
-}
-
-/// Its reduction.
-struct Condensed {
-    reduced: CraigBampton,
-    modes: ModalForm,
-    /// Unit forces on the contact nodes and thermal loads in the coordinates of `reduced`.
-    loads: DMatrix<f64>,
-}
-
-impl FullCasing {
-    fn assembled(
-        mesh: &Mesh,
-        material: &Material,
-        clamped: &[usize],
-        patches: &[Patch],
-        formulation: Formulation,
-        listener: Listener<'_>,
-    ) -> Result<Self> {
-        let free = free_dofs(mesh.nodes.len(), clamped);
-        let loads = patch_loads(mesh, material, patches)?;
-        let loads = Mat::from_fn(free.len(), patches.len(), |i, k| loads[(free[i], k)]);
-        let assembled = assemble_with(mesh, material, formulation, listener)?;
-        let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
-        Ok(Self { stiffness, mass, loads, free })
-    }
-
-    /// Craig-Bampton, its modes, and those above the cut-off condensed; `free` says that nothing is clamped.
-    fn condensed(
-        &self,
-        mesh: &Mesh,
-        free: bool,
-        grid: &GridNodes,
-        options: &CasingReductionOptions,
-        listener: Listener<'_>,
-    ) -> Result<Condensed> {
-        let loads = Some(self.loads.as_ref());
-        let inner = InnerBasis { modes: options.fixed_interface_modes, whole_pairs: true, loads };
-        let interface = interface_dofs(&self.free, grid);
-        let reduced = craig_bampton_with(&self.stiffness, &self.mass, &interface, &inner, listener)?;
-        let order = reduced.mass.nrows();
-        let points: Vec<[f64; 3]> = grid.nodes.iter().map(|&node| mesh.nodes[node]).collect();
-        let rigid = if free { rigid_motions(&points, order) } else { DMatrix::zeros(order, 0) };
-        let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
-        let loads = reduced_loads(grid, &reduced, &self.loads);
-        let modes = condense(&modes, options.modes, &loads);
-        Ok(Condensed { reduced, modes, loads })
-    }
-}
-
-impl Condensed {
-    fn rom(
-        &self,
-        (options, origin): (&CasingReductionOptions, String),
-        mesh: &Mesh,
-        grid: &GridNodes,
-        patches: &[Patch],
-        checks: RomChecks,
-    ) -> Rom {
-        let modes = &self.modes;
-        Rom {
-            name: options.name.clone(),
-            origin,
-            sectors: 1,
-            frame: Frame::Cylindrical,
-            mass: DMatrix::identity(modes.squares.len(), modes.squares.len()),
-            stiffness: DMatrix::from_diagonal(&DVector::from_column_slice(&modes.squares)),
-            damping_ratio: options.damping_ratio,
-            contact_map: contact_map(mesh, grid, modes),
-            contact_nodes: grid.contact_nodes(mesh),
-            checks,
-            extras: RomExtras {
-                thermal: thermal(&self.loads, patches, modes),
-                grid: Some(grid.shape()),
-                ..RomExtras::default()
-            },
-        }
-    }
+    grid.validate()?;
+    check_nodes(&mesh.nodes, clamped, &grid.contact_points(), Frame::Cylindrical)?;
+    let free = free_dofs(mesh.nodes.len(), clamped);
+    let loads = patch_loads(&mesh, material, patches)?;
+    let loads = Mat::from_fn(free.len(), patches.len(), |i, k| loads[(free[i], k)]);
+    let assembled = assemble_with(&mesh, material, options.formulation, listener)?;
+    let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
+    drop(assembled);
+    let full = full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)?;
+    let inner = InnerBasis { modes: options.fixed_interface_modes, whole_pairs: true, loads: Some(loads.as_ref()) };
+    let reduced = craig_bampton_with(&stiffness, &mass, &interface_dofs(&free, grid), &inner, listener)?;
+    let order = reduced.mass.nrows();
+    let points: Vec<[f64; 3]> = grid.nodes.iter().map(|&node| mesh.nodes[node]).collect();
+    let rigid = if clamped.is_empty() { rigid_motions(&points, order) } else { DMatrix::zeros(order, 0) };
+    let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
+    let reduced_loads = reduced_loads(grid, &reduced, &loads);
+    let modes = condense(&modes, options.modes, &reduced_loads);
+    report(listener, Stage::Checks, 0, 1);
+    let checks = compare(&full, &mass, &reduced, &modes.squares, &modes.shapes);
+    report(listener, Stage::Checks, 1, 1);
+    let checks = if clamped.is_empty() { without_rigid_motions(checks) } else { checks };
+    let rom = Rom {
+        name: options.name.clone(),
+        origin: origin(&mesh, (material, options.formulation), clamped.len(), grid, &reduced, &modes),
+        sectors: 1,
+        frame: Frame::Cylindrical,
+        mass: DMatrix::identity(modes.squares.len(), modes.squares.len()),
+        stiffness: DMatrix::from_diagonal(&DVector::from_column_slice(&modes.squares)),
+        damping_ratio: options.damping_ratio,
+        contact_map: contact_map(&mesh, grid, &modes),
+        contact_nodes: grid.contact_nodes(&mesh),
+        checks,
+        extras: RomExtras {
+            thermal: thermal(&reduced_loads, patches, &modes),
+            grid: Some(grid.shape()),
+            ..RomExtras::default()
+        },
+    };
+    let model = (mesh.nodes.len(), Some((mesh, material.clone())));
+    let fixed_interface_frequencies = reduced.fixed_interface_frequencies;
+    Ok(Reduction { fixed_interface_frequencies, ..Reduction::new(rom, &full.modes, &free, &modes.squares, model)? })
 }
 
 /// Rows of the contact nodes' dofs among the free ones; none is clamped.

@@ -75,7 +75,7 @@ impl RingGeometry {
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the length.
-    pub fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(&self) -> Result<()> {
         let [low, high] = self.contour.axial();
         let positive = |what: &str, value: f64| {
             if value.is_finite() && value > 0.0 {

@@ -8,7 +8,7 @@ mod mesh;
 mod reduction;
 
 pub use mesh::{cube_mesh, cube_of, ring_mesh, ring_of};
-pub use reduction::{CubeOptions, MassMatrix, RingOptions, master_points, reduce_cube, reduce_cube_ring, ring_grid};
+pub use reduction::{CubeOptions, MassMatrix, RingOptions, reduce_cube, reduce_cube_ring, ring_grid};
 
 use crate::Material;
 

@@ -73,7 +73,7 @@ impl CyclicBoundary {
     ///
     /// # Errors
     /// [`Error::Invalid`] for fewer than two sectors, for nodes that do not exist or appear twice.
-    pub fn validate(&self, count: usize) -> Result<()> {
+    pub(crate) fn validate(&self, count: usize) -> Result<()> {
         check_sectors(self.sectors)?;
         check_indices(count, self.pairs.iter().flatten())
     }
@@ -85,7 +85,7 @@ impl CyclicBoundary {
     }
 
     /// Largest nodal diameter ⌊N/2⌋.
-    pub fn largest_nodal_diameter(&self) -> usize {
+    pub(crate) fn largest_nodal_diameter(&self) -> usize {
         self.sectors / 2
     }
 }

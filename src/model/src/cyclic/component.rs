@@ -57,7 +57,7 @@ impl Component {
     ///
     /// # Errors
     /// Those of [`lowest_modes`]; [`Error::NotPositiveDefinite`] when the reduced mass is not.
-    pub fn new(at_rest: &Operator<'_>, full: &Operator<'_>, wanted: Wanted) -> Result<Self> {
+    pub(super) fn new(at_rest: &Operator<'_>, full: &Operator<'_>, wanted: Wanted) -> Result<Self> {
         let parts = at_rest.parts();
         let fixed = fixed_interface_modes(at_rest, wanted)?;
         let (constraint, static_stiffness) = at_rest.constraint_modes();
@@ -86,7 +86,7 @@ impl Component {
     ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`] when the reduced mass is not.
-    pub fn quality(&self, modes: usize, count: usize) -> Result<Quality> {
+    pub(super) fn quality(&self, modes: usize, count: usize) -> Result<Quality> {
         let size = self.contact + modes;
         let (mass, stiffness) = (self.mass.get(..size, ..size), self.stiffness.get(..size, ..size));
         let (squares, vectors) = dense_modes(stiffness, mass, self.real)?;

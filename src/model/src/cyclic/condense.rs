@@ -37,7 +37,7 @@ impl<'a> Condensed<'a> {
     ///
     /// # Errors
     /// [`crate::Error::NotPositiveDefinite`] when the interior can move with the faces and the contact nodes held.
-    pub fn new(sector: &'a Sector, shift: f64, listener: Listener<'_>) -> Result<Self> {
+    pub(super) fn new(sector: &'a Sector, shift: f64, listener: Listener<'_>) -> Result<Self> {
         let shifted =
             if shift == 0.0 { sector.stiffness.clone() } else { sector.stiffness.plus_scaled(-shift, &sector.mass) };
         let interior = if sector.parts.interior == 0 {
@@ -94,14 +94,14 @@ impl<'a> Condensed<'a> {
     }
 
     /// A_II⁻¹ in place.
-    pub fn solve_interior(&self, right: &mut Mat<f64>) {
+    pub(crate) fn solve_interior(&self, right: &mut Mat<f64>) {
         if let Some(factor) = &self.interior {
             factor.solve_in_place(right.as_mut());
         }
     }
 
     /// A_BI t.
-    pub fn boundary_rows(&self, inner: MatRef<'_, f64>) -> Mat<f64> {
+    pub(crate) fn boundary_rows(&self, inner: MatRef<'_, f64>) -> Mat<f64> {
         let (interior, order) = (self.sector.parts.interior, self.shifted.order());
         let mut product = Mat::zeros(order - interior, inner.ncols());
         for j in 0..inner.ncols() {
@@ -122,7 +122,7 @@ impl<'a> Condensed<'a> {
     }
 
     /// A_IB u for the boundary displacements u.
-    pub fn interior_columns(&self, boundary: MatRef<'_, f64>) -> Mat<f64> {
+    pub(crate) fn interior_columns(&self, boundary: MatRef<'_, f64>) -> Mat<f64> {
         let interior = self.sector.parts.interior;
         let mut product = Mat::zeros(interior, boundary.ncols());
         for j in 0..boundary.ncols() {
@@ -142,7 +142,7 @@ impl<'a> Condensed<'a> {
     }
 
     /// Numbers of dofs.
-    pub fn parts(&self) -> Parts {
+    pub(super) fn parts(&self) -> Parts {
         self.sector.parts
     }
 }

@@ -21,8 +21,6 @@ pub use families::SMALLEST_GAP;
 pub use quality::WHEEL_MODES;
 pub use reduction::reduce_cyclic;
 
-use crate::reduce::Timings;
-
 /// The two faces where a sector meets its neighbours.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CyclicBoundary {
@@ -106,6 +104,4 @@ pub struct CyclicReduction {
     pub largest_angular_frequency: f64,
     /// What is worth telling about the choice of modes.
     pub notes: Vec<String>,
-    /// Wall times.
-    pub timings: Timings,
 }

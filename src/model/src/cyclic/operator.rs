@@ -49,7 +49,7 @@ impl<'a> Operator<'a> {
     ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`] when the structure can move as a rigid body.
-    pub fn new(condensed: &'a Condensed<'a>, nodal_diameter: usize, sectors: usize, held: bool) -> Result<Self> {
+    pub(super) fn new(condensed: &'a Condensed<'a>, nodal_diameter: usize, sectors: usize, held: bool) -> Result<Self> {
         let parts = condensed.parts();
         let phase = phase(nodal_diameter, sectors);
         let schur = boundary_pencil(&condensed.schur, parts, phase);
@@ -66,12 +66,12 @@ impl<'a> Operator<'a> {
         Ok(operator)
     }
 
-    pub fn parts(&self) -> Parts {
+    pub(super) fn parts(&self) -> Parts {
         self.condensed.parts()
     }
 
     /// W x as real columns: real parts, then, unless all is real, imaginary parts. Missing contact rows are zero.
-    pub fn expand(&self, x: MatRef<'_, c64>) -> Mat<f64> {
+    pub(super) fn expand(&self, x: MatRef<'_, c64>) -> Mat<f64> {
         self.expand_from(x, self.parts().interior)
     }
 
@@ -118,17 +118,17 @@ impl<'a> Operator<'a> {
     }
 
     /// M_n x.
-    pub fn mass(&self, x: MatRef<'_, c64>) -> Mat<c64> {
+    pub(super) fn mass(&self, x: MatRef<'_, c64>) -> Mat<c64> {
         self.product(&self.condensed.sector.lean_mass, x)
     }
 
     /// A_n x.
-    pub fn shifted(&self, x: MatRef<'_, c64>) -> Mat<c64> {
+    pub(super) fn shifted(&self, x: MatRef<'_, c64>) -> Mat<c64> {
         self.product(&self.condensed.shifted, x)
     }
 
     /// A_n⁻¹ b; with the contact held where b has no contact rows.
-    pub fn solve(&self, b: MatRef<'_, c64>) -> Mat<c64> {
+    pub(super) fn solve(&self, b: MatRef<'_, c64>) -> Mat<c64> {
         let parts = self.parts();
         let inner = parts.interior;
         let boundary = b.nrows() - inner;
@@ -157,7 +157,7 @@ impl<'a> Operator<'a> {
 
     /// Constraint modes (interior, face, contact) × contact: unit displacements of the contact, everything else at rest;
     /// and the stiffness of the contact that goes with them. Those of K when the shift is 0.
-    pub fn constraint_modes(&self) -> (Mat<c64>, Mat<c64>) {
+    pub(crate) fn constraint_modes(&self) -> (Mat<c64>, Mat<c64>) {
         let parts = self.parts();
         let (face, contact) = (parts.face, parts.contact);
         let mut edge = self.contact_columns.get(..face, ..).to_owned();

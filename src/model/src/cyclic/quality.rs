@@ -3,7 +3,6 @@
 use tiprub_core::rom::RomChecks;
 
 use super::component::Component;
-use super::reduction::sorted_checks;
 use super::{ConvergenceRow, NodalDiameter};
 use crate::Result;
 
@@ -81,4 +80,18 @@ pub(super) fn convergence(components: &[&Component], full: &[&[f64]], sectors: u
         Ok(ConvergenceRow { modes: count, total_modes: count * sectors, frequency_deviation, residual_criterion })
     };
     (0..=most).map(row).collect()
+}
+
+/// The checks of all nodal diameters in one list, ascending in frequency.
+fn sorted_checks(list: Vec<(u32, [f64; 4])>) -> RomChecks {
+    let mut list = list;
+    list.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]).then(a.0.cmp(&b.0)));
+    let column = |i: usize| list.iter().map(|entry| entry.1[i]).collect();
+    RomChecks {
+        full_frequencies: column(0),
+        reduced_frequencies: column(1),
+        frequency_deviation: column(2),
+        residual_criterion: column(3),
+        nodal_diameters: list.iter().map(|entry| entry.0).collect(),
+    }
 }

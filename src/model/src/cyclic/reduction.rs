@@ -1,11 +1,9 @@
 //! From the model of one sector to a checked reduced-order model of the disk.
 
-use std::time::Instant;
-
 use faer::{Mat, MatRef, c64};
 use nalgebra::{Complex, DMatrix};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, Frame, Harmonic, RomChecks, RomExtras};
+use tiprub_core::rom::{ContactNode, Frame, Harmonic, RomExtras};
 
 use super::component::Component;
 use super::condense::Condensed;
@@ -14,7 +12,7 @@ use super::sector::Sector;
 use super::{CyclicBoundary, CyclicOptions, CyclicReduction, ModeSelection, NodalDiameter};
 use super::{families, lanczos, parallel, quality};
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{ContactPoint, Timings, check_nodes, timed};
+use crate::reduce::{ContactPoint, check_nodes};
 use crate::{Error, FeModel, Result};
 
 /// What is found of one nodal diameter in parallel.
@@ -22,8 +20,6 @@ struct Found {
     component: Component,
     full_squares: Vec<f64>,
     shapes: Vec<Vec<[Complex<f64>; 3]>>,
-    /// Seconds spent on the full modes and on the reduction.
-    seconds: [f64; 2],
 }
 
 /// Reduce one sector of a disk to its contact nodes and fixed-interface modes, for every nodal diameter.
@@ -46,40 +42,22 @@ pub fn reduce_cyclic(
 ) -> Result<CyclicReduction> {
     // As in `reduce`: the bits must not depend on the number of threads.
     faer::set_global_parallelism(faer::Par::Seq);
-    let mut timings = Timings::default();
-    let sector = timed(&mut timings.assembly, || {
-        check_options(contact, options)?;
-        boundary.validate(model.nodes.len())?;
-        check_nodes(&model.nodes, clamped, contact, Frame::Cylindrical)?;
-        Sector::new(model, clamped, contact, boundary)
-    })?;
-    let mut condensation = 0.0;
-    let (at_rest, shifted) = timed(&mut condensation, || {
-        let at_rest = Condensed::new(&sector, 0.0, listener)?;
-        // As in `reduce`: a millionth of the order of the highest ω² lies among the lowest elastic ones.
-        let shift = -1e-6 * sector.stiffness.trace() / sector.mass.trace();
-        let shifted = if clamped.is_empty() { Some(Condensed::new(&sector, shift, listener)?) } else { None };
-        Ok((at_rest, shifted))
-    })?;
+    check_options(contact, options)?;
+    boundary.validate(model.nodes.len())?;
+    check_nodes(&model.nodes, clamped, contact, Frame::Cylindrical)?;
+    let sector = Sector::new(model, clamped, contact, boundary)?;
+    let at_rest = Condensed::new(&sector, 0.0, listener)?;
+    // As in `reduce`: a millionth of the order of the highest ω² lies among the lowest elastic ones.
+    let shift = -1e-6 * sector.stiffness.trace() / sector.mass.trace();
+    let shifted = if clamped.is_empty() { Some(Condensed::new(&sector, shift, listener)?) } else { None };
     let diameters = boundary.largest_nodal_diameter() + 1;
-    let mut parallel = 0.0;
-    let found = timed(&mut parallel, || {
-        let report_to = (Stage::FixedInterfaceModes, listener);
-        parallel::for_each(diameters, 2, report_to, |number, step| {
-            find(&at_rest, shifted.as_ref(), (number, boundary.sectors, model.nodes.len()), options, step)
-        })
+    let found = parallel::for_each(diameters, 2, (Stage::FixedInterfaceModes, listener), |number, step| {
+        find(&at_rest, shifted.as_ref(), (number, boundary.sectors, model.nodes.len()), options, step)
     })?;
-    let shares: [f64; 2] = core::array::from_fn(|i| found.iter().map(|one| one.seconds[i]).sum());
-    timings.full_modes = parallel * shares[0] / (shares[0] + shares[1]);
-    timings.reduction = condensation + parallel - timings.full_modes;
     report(listener, Stage::FullModes, 1, 1);
-    let mut result = timed(&mut timings.checks, || {
-        report(listener, Stage::Checks, 0, 1);
-        let result = assembled((model, clamped.len(), contact, boundary), &sector, found, options)?;
-        report(listener, Stage::Checks, 1, 1);
-        Ok(result)
-    })?;
-    result.timings = timings;
+    report(listener, Stage::Checks, 0, 1);
+    let result = assembled((model, clamped.len(), contact, boundary), &sector, found, options)?;
+    report(listener, Stage::Checks, 1, 1);
     Ok(result)
 }
 
@@ -108,7 +86,6 @@ fn find(
     options: &CyclicOptions,
     step: &dyn Fn(),
 ) -> Result<Found> {
-    let start = Instant::now();
     let parts = at_rest.parts();
     let held = Operator::new(at_rest, number, sectors, shifted.is_some())?;
     let moving = shifted.map(|condensed| Operator::new(condensed, number, sectors, false)).transpose()?;
@@ -119,12 +96,10 @@ fn find(
     modes.eigenvalues.truncate(checked);
     let shapes = node_shapes(full, modes.shapes.get(.., ..checked), nodes);
     step();
-    let between = Instant::now();
     let wanted = families::wanted(options.modes, parts.order() - parts.contact);
     let component = Component::new(&held, full, wanted)?;
     step();
-    let seconds = [between.duration_since(start).as_secs_f64(), between.elapsed().as_secs_f64()];
-    Ok(Found { component, full_squares: modes.eigenvalues, shapes, seconds })
+    Ok(Found { component, full_squares: modes.eigenvalues, shapes })
 }
 
 /// Displacements (x, y, z) of every node of the model; zero where clamped.
@@ -210,7 +185,6 @@ fn assembled(
         free_dofs: sector.parts.order(),
         largest_angular_frequency: largest.max(0.0).sqrt(),
         notes: choice.note.into_iter().collect(),
-        timings: Timings::default(),
     })
 }
 
@@ -249,19 +223,5 @@ fn nodal_diameter(number: usize, found: &Found, kept: usize, quality: &super::co
         residual_criterion: quality.residual_criterion[..count].to_vec(),
         fixed_interface_frequencies: found.component.squares[..kept].iter().map(|&square| hertz(square)).collect(),
         shapes: Vec::new(),
-    }
-}
-
-/// The checks of all nodal diameters in one list, ascending in frequency.
-pub(super) fn sorted_checks(list: Vec<(u32, [f64; 4])>) -> RomChecks {
-    let mut list = list;
-    list.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]).then(a.0.cmp(&b.0)));
-    let column = |i: usize| list.iter().map(|entry| entry.1[i]).collect();
-    RomChecks {
-        full_frequencies: column(0),
-        reduced_frequencies: column(1),
-        frequency_deviation: column(2),
-        residual_criterion: column(3),
-        nodal_diameters: list.iter().map(|entry| entry.0).collect(),
     }
 }

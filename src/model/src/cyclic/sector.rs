@@ -28,7 +28,7 @@ pub(super) struct Parts {
 
 impl Parts {
     /// Dofs of one nodal diameter.
-    pub fn order(self) -> usize {
+    pub(super) fn order(self) -> usize {
         self.interior + self.face + self.contact
     }
 }
@@ -54,7 +54,7 @@ impl Sector {
     ///
     /// # Errors
     /// [`Error::Invalid`] for contact nodes on a face, or when nothing is left free.
-    pub fn new(
+    pub(super) fn new(
         model: &FeModel,
         clamped: &[usize],
         contact: &[ContactPoint],

@@ -144,7 +144,12 @@ pub fn thermal_load(
 ///
 /// # Errors
 /// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
-pub fn lumped_mass(kind: ElementKind, coordinates: &[[f64; 3]], density: f64, element: usize) -> Result<Vec<f64>> {
+pub(crate) fn lumped_mass(
+    kind: ElementKind,
+    coordinates: &[[f64; 3]],
+    density: f64,
+    element: usize,
+) -> Result<Vec<f64>> {
     let consistent = consistent_mass(kind, coordinates, density, element)?;
     let scale = consistent.sum() / consistent.trace();
     Ok(consistent.diagonal().iter().map(|mass| mass * scale).collect())

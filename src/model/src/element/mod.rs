@@ -19,14 +19,15 @@ mod quadrature;
 mod shape;
 
 pub use incompatible::{Formulation, incompatible_stiffness};
+pub(crate) use matrices::lumped_mass;
 pub use matrices::thermal_load;
-pub use matrices::{consistent_mass, lumped_mass, stiffness, strain, stress};
+pub use matrices::{consistent_mass, stiffness, strain, stress};
 pub use nonlinear::{Tangent, geometric_stiffness, second_stresses, tangent};
 pub use quadrature::QuadraturePoint;
 pub use shape::Shape;
 
 /// Largest number of nodes of any element.
-pub const MAX_NODES: usize = 20;
+pub(crate) const MAX_NODES: usize = 20;
 
 /// A solid element's kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

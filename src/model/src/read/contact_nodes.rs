@@ -6,9 +6,9 @@ use crate::reduce::ContactPoint;
 use crate::{Error, Result};
 
 /// A set of at most this many nodes is taken whole.
-pub const TAKEN_WHOLE: usize = 12;
+pub(crate) const TAKEN_WHOLE: usize = 12;
 /// Of a larger set, this many: both edges and the middle.
-pub const CHOSEN: usize = 3;
+pub(crate) const CHOSEN: usize = 3;
 
 /// Axial positions closer than this share of the set's extent are one.
 const SAME_PLACE: f64 = 1e-3;
@@ -18,7 +18,7 @@ const FLAT: f64 = 1e-6;
 /// What is wanted of the contact nodes.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ContactChoice {
-    /// How many; all of a set of at most [`TAKEN_WHOLE`], [`CHOSEN`] of a larger one where absent.
+    /// How many; all of a set of at most `TAKEN_WHOLE`, `CHOSEN` of a larger one where absent.
     pub count: Option<usize>,
     /// Their names by growing z; `tip_1`, `tip_2`, ... where empty.
     pub names: Vec<String>,

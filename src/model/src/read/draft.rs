@@ -59,7 +59,7 @@ pub(super) struct Numbered {
 
 impl Draft {
     /// Add a node. The same number may come again with the same coordinates.
-    pub fn add_node(&mut self, number: u64, position: [f64; 3], place: &dyn Fn() -> ClosestPoint) -> Result<()> {
+    pub(crate) fn add_node(&mut self, number: u64, position: [f64; 3], place: &dyn Fn() -> ClosestPoint) -> Result<()> {
         if let Some(&index) = self.index.get(&number) {
             if self.positions[index].map(f64::to_bits) == position.map(f64::to_bits) {
                 return Ok(());
@@ -74,7 +74,7 @@ impl Draft {
     }
 
     /// Add an element.
-    pub fn add_element(&mut self, element: DraftElement) -> Result<()> {
+    pub(crate) fn add_element(&mut self, element: DraftElement) -> Result<()> {
         if self.element_index.insert(element.number, self.elements.len()).is_some() {
             let problem = format!("element {} is defined a second time", element.number);
             return Err(element.place.error(problem, "Number the elements uniquely"));
@@ -84,23 +84,28 @@ impl Draft {
     }
 
     /// Whether there is a node of this number.
-    pub fn has_node(&self, number: u64) -> bool {
+    pub(crate) fn has_node(&self, number: u64) -> bool {
         self.index.contains_key(&number)
     }
 
     /// The element of this number.
-    pub fn element(&mut self, number: u64) -> Option<&mut DraftElement> {
+    pub(super) fn element(&mut self, number: u64) -> Option<&mut DraftElement> {
         self.element_index.get(&number).map(|&index| &mut self.elements[index])
     }
 
     /// Nodes of an element.
-    pub fn nodes_of(&self, number: u64) -> &[u64] {
+    pub(super) fn nodes_of(&self, number: u64) -> &[u64] {
         self.element_index.get(&number).map_or(&[], |&index| &self.elements[index].nodes)
     }
 
     /// The mesh of the solid elements, coordinates times `scale`, turned so that `axis` is z; nodes of no solid element are
     /// left out.
-    pub fn into_mesh(mut self, scale: f64, axis: Axis, what: &str) -> Result<(Numbered, Vec<String>, Vec<String>)> {
+    pub(crate) fn into_mesh(
+        mut self,
+        scale: f64,
+        axis: Axis,
+        what: &str,
+    ) -> Result<(Numbered, Vec<String>, Vec<String>)> {
         let mut used = vec![false; self.numbers.len()];
         for element in &self.elements {
             self.check_nodes(element)?;

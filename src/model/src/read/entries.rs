@@ -12,7 +12,7 @@ pub(super) struct Entries {
 
 impl Entries {
     /// Add all entries of a matrix, rows and columns renamed.
-    pub fn add_matrix(&mut self, matrix: &SparseMatrix, name: impl Fn(usize) -> usize) {
+    pub(crate) fn add_matrix(&mut self, matrix: &SparseMatrix, name: impl Fn(usize) -> usize) {
         let pattern = &matrix.pattern;
         for column in 0..matrix.order() {
             for entry in pattern.starts[column]..pattern.starts[column + 1] {

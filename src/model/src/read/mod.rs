@@ -13,7 +13,6 @@ mod matrices;
 mod plausibility;
 mod source;
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::fe_model::FeModel;
@@ -21,7 +20,8 @@ use crate::material::Material;
 use crate::progress::Listener;
 use crate::{Error, Result};
 
-pub use contact_nodes::{CHOSEN, ContactChoice, TAKEN_WHOLE, choose_contact_nodes};
+pub use crate::mesh::set_counts;
+pub use contact_nodes::{ContactChoice, choose_contact_nodes};
 pub use matrices::{MatrixFiles, read_matrices};
 pub use plausibility::{Plausibility, bounding_box, plausibility, total_mass};
 
@@ -39,7 +39,7 @@ pub enum Units {
 
 impl Units {
     /// Metres per unit of length.
-    pub fn length(self) -> f64 {
+    pub(crate) fn length(self) -> f64 {
         match self {
             Self::Si => 1.0,
             Self::MillimetreTonneSecond => 1e-3,
@@ -189,10 +189,4 @@ pub fn parse_mesh(name: &str, bytes: &[u8]) -> Result<crate::Mesh> {
     let none = |path: &Path| Err(Error::File { path: path.to_path_buf(), source: std::io::ErrorKind::NotFound.into() });
     let (numbered, _, _) = mesh_file(path, bytes, Some(0.0), &none)?.draft.into_mesh(1.0, Axis::Z, name)?;
     Ok(numbered.mesh)
-}
-
-/// Sets with as many nodes as they have, for messages.
-pub fn set_counts(sets: &BTreeMap<String, Vec<usize>>) -> String {
-    let counts: Vec<String> = sets.iter().map(|(name, nodes)| format!("{name} ({})", nodes.len())).collect();
-    counts.join(", ")
 }

@@ -23,7 +23,7 @@ impl fmt::Display for ClosestPoint {
 
 impl ClosestPoint {
     /// What is wrong here, and what to do about it.
-    pub fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
+    pub(super) fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
         Error::Read { place: self.to_string(), problem: problem.into(), remedy: remedy.into() }
     }
 }

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use tiprub_core::Rom;
 use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
 
-use super::{ContactPoint, Mode, ReductionOptions};
+use super::{ContactPoint, Mode, Reduction, ReductionOptions};
 use crate::Result;
 use crate::craig_bampton::CraigBampton;
 use crate::eigen::Modes;
@@ -71,6 +71,35 @@ pub(crate) fn description(model: &FeModel, clamped: usize) -> String {
     format!("{before}{nodes} nodes{elements}, {clamped} nodes clamped{material}")
 }
 
+impl Reduction {
+    /// What comes of a reduced model once it is valid; `full` are the modes of the full model over its `free` dofs, `squares` all ω² of the reduced one.
+    ///
+    /// # Errors
+    /// The ROM's own validation refuses.
+    pub(crate) fn new(
+        rom: Rom,
+        full: &Modes,
+        free: &[usize],
+        squares: &[f64],
+        (nodes, mesh): (usize, Option<(Mesh, Material)>),
+    ) -> Result<Self> {
+        rom.validate()?;
+        let (mesh, material) = mesh.unzip();
+        Ok(Self {
+            rom,
+            mesh,
+            material,
+            nodes,
+            modes: node_modes(full, free, nodes),
+            largest_residual: full.residuals.iter().copied().fold(0.0, f64::max),
+            free_dofs: free.len(),
+            reduced_angular_frequencies: squares.iter().map(|square| square.max(0.0).sqrt()).collect(),
+            fixed_interface_frequencies: Vec::new(),
+            spin_checks: Vec::new(),
+        })
+    }
+}
+
 pub(super) fn build_rom(
     full: &FeModel,
     clamped: usize,
@@ -78,14 +107,14 @@ pub(super) fn build_rom(
     options: &ReductionOptions,
     model: &CraigBampton,
     checks: RomChecks,
-) -> Result<Rom> {
+) -> Rom {
     let (boundary, order) = (3 * contact.len(), model.mass.nrows());
     let origin = format!(
         "{}; Craig-Bampton with {boundary} interface degrees of freedom and {} fixed-interface modes",
         description(full, clamped),
         order - boundary,
     );
-    let rom = Rom {
+    Rom {
         name: options.name.clone(),
         origin,
         sectors: options.sectors,
@@ -97,9 +126,7 @@ pub(super) fn build_rom(
         contact_nodes: contact.iter().map(|point| contact_node(&full.nodes, point, options.frame)).collect(),
         checks,
         extras: RomExtras::default(),
-    };
-    rom.validate()?;
-    Ok(rom)
+    }
 }
 
 pub(crate) fn element_names(mesh: &Mesh) -> String {
@@ -109,7 +136,7 @@ pub(crate) fn element_names(mesh: &Mesh) -> String {
     names.join(", ")
 }
 
-pub(crate) fn node_modes(modes: &Modes, free: &[usize], nodes: usize) -> Vec<Mode> {
+fn node_modes(modes: &Modes, free: &[usize], nodes: usize) -> Vec<Mode> {
     let mode = |(k, frequency)| {
         let mut shape = vec![[0.0; 3]; nodes];
         for (row, dof) in free.iter().enumerate() {

@@ -24,13 +24,13 @@ pub use section::{Section, SurfacePoint};
 
 use tiprub_core::rom::Frame;
 
-use crate::Result;
 use crate::material::Material;
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{Reduction, ReductionOptions, reduce, reduce_spinning};
+use crate::reduce::{Reduction, ReductionOptions, reduce_model};
+use crate::{FeModel, Result};
 
 /// Number of blades.
-pub const BLADES: usize = 36;
+pub(crate) const BLADES: usize = 36;
 /// Design speed (rad/s), positive about +z for the mesh of this module.
 pub const DESIGN_SPEED: f64 = 1800.0;
 /// Running tip clearance at design speed (m).
@@ -83,14 +83,12 @@ impl Default for Rotor37Options {
 ///
 /// # Errors
 /// [`Error::Invalid`](crate::Error::Invalid) for counts that are too small or more contact nodes than the mesh has, and
-/// those of [`reduce`].
+/// those of [`reduce_model`].
 pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Result<Reduction> {
-    let start = std::time::Instant::now();
     report(listener, Stage::Mesh, 0, 1);
     let blade = blade_mesh(options.mesh)?;
     let contact = blade.contact_points(options.contact_nodes)?;
     report(listener, Stage::Mesh, 1, 1);
-    let meshing = start.elapsed().as_secs_f64();
     let clamped = blade.mesh.set("hub")?.to_vec();
     let reduction_options = ReductionOptions {
         name: "rotor37".into(),
@@ -100,12 +98,8 @@ pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Resul
         frame: Frame::Cylindrical,
         damping_ratio: options.damping_ratio,
     };
-    let (mesh, material) = (blade.mesh, &options.material);
-    let mut reduction = match options.spin {
-        None => reduce(mesh, material, &clamped, &contact, &reduction_options, listener),
-        Some(speed) => reduce_spinning(mesh, material, &clamped, &contact, &reduction_options, speed, listener),
-    }?;
-    reduction.timings.assembly += meshing;
+    let model = FeModel::assembled(blade.mesh, &options.material, String::new(), listener)?;
+    let mut reduction = reduce_model(model, &clamped, &contact, &reduction_options, options.spin, listener)?;
     reduction.rom.origin = format!(
         "Blade of NASA rotor 37 (fit of the coordinates of NASA TP-1659), hub clamped: {}",
         reduction.rom.origin

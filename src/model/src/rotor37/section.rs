@@ -89,7 +89,7 @@ impl Section {
     }
 
     /// Slope dr/dz of the surface of revolution at plane abscissa X.
-    pub fn meridional_slope(&self, x: f64) -> f64 {
+    pub(crate) fn meridional_slope(&self, x: f64) -> f64 {
         let step = 1e-4 * (self.meridional_range[1] - self.meridional_range[0]);
         let [a, b] = [x - step, x + step].map(|x| self.on_surface([x, 0.0]));
         (b.r - a.r) / (b.z - a.z)

@@ -13,12 +13,12 @@ use crate::{Error, Result};
 
 /// Share of the largest speed through which the fit over the speed goes beside 0 and 1. Interpolation in Ω² from here to
 /// the largest speed leaves about the same error above and, down to half of the largest speed, below it.
-pub const MIDDLE: f64 = 0.6;
+pub(crate) const MIDDLE: f64 = 0.6;
 /// Share of the largest speed at which the fit is checked: about where it is worst.
-pub const CHECKED: f64 = 0.8;
+pub(crate) const CHECKED: f64 = 0.8;
 /// A spinning state is searched for this many more fixed-interface modes than the resting one has, since the order of
 /// frequencies changes with the speed.
-pub const SPARE_MODES: usize = 10;
+pub(crate) const SPARE_MODES: usize = 10;
 /// Least share that every resting fixed-interface mode must have in the spinning ones.
 const OVERLAP: f64 = 0.5;
 
@@ -53,7 +53,7 @@ impl SpinCheck {
 
 /// Spin arrays of a ROM and how well they hold.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ReducedSpin {
+pub(crate) struct ReducedSpin {
     /// The arrays.
     pub spin: Spin,
     /// At [`CHECKED`] of the largest speed, where the fit is not exact, and at the largest, where it is.
@@ -62,7 +62,7 @@ pub struct ReducedSpin {
 
 /// The equilibria that the spin arrays are made and checked with.
 #[derive(Debug)]
-pub struct SpinningStates {
+pub(crate) struct SpinningStates {
     /// At [`MIDDLE`] Ω: fitted.
     pub middle: SpinningState,
     /// At [`CHECKED`] Ω: checked.
@@ -77,7 +77,7 @@ impl SpinningStates {
     ///
     /// # Errors
     /// Those of [`Rotating::equilibrium`].
-    pub fn find(body: &Rotating<'_>, largest_speed: f64, found: &dyn Fn(usize)) -> Result<Self> {
+    pub(crate) fn find(body: &Rotating<'_>, largest_speed: f64, found: &dyn Fn(usize)) -> Result<Self> {
         let scaled = |state: &SpinningState, share: f64| {
             let ratio = share * largest_speed / state.speed;
             faer::Scale(ratio * ratio) * &state.displacement
@@ -95,7 +95,7 @@ impl SpinningStates {
 
 /// The reduced model at rest, in whose coordinates the spin arrays are.
 #[derive(Debug, Clone, Copy)]
-pub struct Resting<'a> {
+pub(crate) struct Resting<'a> {
     /// The model; its first coordinates are the contact displacements.
     pub model: &'a CraigBampton,
     /// Mass matrix of the free dofs.
@@ -181,7 +181,7 @@ fn line(first: (f64, &DMatrix<f64>), second: (f64, &DMatrix<f64>)) -> (DMatrix<f
 /// # Errors
 /// Those of [`full_modes`]; [`Error::NotPositiveDefinite`] for an unstable reduced model; [`Error::Invalid`] when the
 /// modes change beyond recognition.
-pub fn reduced_spin(
+pub(crate) fn reduced_spin(
     states: &SpinningStates,
     resting: Resting<'_>,
     middle: &CraigBampton,

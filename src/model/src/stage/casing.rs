@@ -140,14 +140,12 @@ pub fn stage_casing_mesh(options: &StageCasingOptions) -> Result<RingMesh> {
 /// # Errors
 /// Those of [`stage_casing_mesh`] and [`reduce_casing`].
 pub fn reduce_stage_casing(options: &StageCasingOptions, listener: Listener<'_>) -> Result<Reduction> {
-    let start = std::time::Instant::now();
     report(listener, Stage::Mesh, 0, 1);
     let ring = stage_casing_mesh(options)?;
     let clamped = ring.mesh.set(CLAMPED)?.to_vec();
     let [around, along] = options.patches;
     let patches = equal_patches(around, along, AXIAL);
     report(listener, Stage::Mesh, 1, 1);
-    let meshing = start.elapsed().as_secs_f64();
     let reduction_options = CasingReductionOptions {
         name: options.name.clone(),
         formulation: options.formulation,
@@ -158,7 +156,6 @@ pub fn reduce_stage_casing(options: &StageCasingOptions, listener: Listener<'_>)
     };
     let mut reduction =
         reduce_casing(ring.mesh, &options.material, &clamped, &ring.grid, &patches, &reduction_options, listener)?;
-    reduction.timings.assembly += meshing;
     reduction.rom.origin = format!(
         "Casing of the 56-blade stage: cylindrical wall of {:.1} mm inner radius and {:.1} mm thickness, z = {:.0} to {:.0} \
          mm, flanges of {:.0} mm x {:.0} mm, two hooks, held at the face of the low flange: {}",

@@ -120,7 +120,7 @@ pub(super) struct CamberPoint {
 
 impl BladeSection {
     /// Camber line at a share of the axial chord; outside 0..=1 it goes on straight, and so do the sides.
-    pub fn at(&self, share: f64) -> CamberPoint {
+    pub(super) fn at(&self, share: f64) -> CamberPoint {
         let [leading, trailing] = self.axial;
         let chord = trailing - leading;
         let (inside, [inlet, outlet]) = (share.clamp(0.0, 1.0), self.slopes);
@@ -135,7 +135,7 @@ impl BladeSection {
     }
 
     /// Share of the axial chord at an axial position.
-    pub fn share(&self, z: f64) -> f64 {
+    pub(super) fn share(&self, z: f64) -> f64 {
         (z - self.axial[0]) / (self.axial[1] - self.axial[0])
     }
 }
@@ -177,7 +177,7 @@ impl SectorGeometry {
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the length, angle or number.
-    pub fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(&self) -> Result<()> {
         let (blade, disk) = (&self.blade, &self.disk);
         if self.sectors < 3 {
             let remedy = "Give at least three, so that a sector is less than half a turn";

@@ -28,7 +28,7 @@ pub(super) struct Lattice<'a> {
 const ALIKE: f64 = 0.05;
 
 impl<'a> Lattice<'a> {
-    pub fn new(options: &'a SectorOptions) -> Result<Self> {
+    pub(super) fn new(options: &'a SectorOptions) -> Result<Self> {
         options.validate()?;
         let (counts, kind) = (options.counts, options.kind);
         let (web, rim) = (counts.bore[1], counts.bore[1] + counts.web[1]);
@@ -52,7 +52,7 @@ impl<'a> Lattice<'a> {
     }
 
     /// Rows of the whole sector.
-    pub fn rows(&self) -> usize {
+    pub(super) fn rows(&self) -> usize {
         self.hub + self.counts.span
     }
 
@@ -99,7 +99,7 @@ impl<'a> Lattice<'a> {
         places
     }
 
-    pub fn mesh(&self, first_row: usize) -> Result<SectorMesh> {
+    pub(super) fn mesh(&self, first_row: usize) -> Result<SectorMesh> {
         let prisms = self.prisms(first_row);
         let places: BTreeSet<ClosestPoint> = prisms.iter().flatten().copied().collect();
         let numbers: BTreeMap<ClosestPoint, usize> =

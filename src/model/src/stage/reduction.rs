@@ -85,9 +85,7 @@ pub fn stage_model(options: &StageOptions, listener: Listener<'_>) -> Result<Sta
 /// # Errors
 /// Those of [`stage_model`] and [`reduce_cyclic`].
 pub fn reduce_stage(options: &StageOptions, listener: Listener<'_>) -> Result<CyclicReduction> {
-    let start = std::time::Instant::now();
     let stage = stage_model(options, listener)?;
-    let assembly = start.elapsed().as_secs_f64();
     let cyclic = CyclicOptions {
         name: "stage".into(),
         modes: options.modes,
@@ -95,7 +93,5 @@ pub fn reduce_stage(options: &StageOptions, listener: Listener<'_>) -> Result<Cy
         damping_ratio: options.damping_ratio,
     };
     let StageModel { model, clamped, contact, boundary, .. } = &stage;
-    let mut reduction = reduce_cyclic(model, clamped, contact, boundary, &cyclic, listener)?;
-    reduction.timings.assembly += assembly;
-    Ok(reduction)
+    reduce_cyclic(model, clamped, contact, boundary, &cyclic, listener)
 }

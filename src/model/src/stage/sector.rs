@@ -93,7 +93,7 @@ impl SectorOptions {
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the number or length.
-    pub fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(&self) -> Result<()> {
         self.geometry.validate()?;
         let (counts, geometry) = (&self.counts, &self.geometry);
         let SectorCounts { chord, span, thickness, side, overhang, rim, web, bore } = *counts;

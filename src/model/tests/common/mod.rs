@@ -4,6 +4,7 @@
 pub mod casing;
 pub mod disk;
 
+use tiprub_model::Material;
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::{Element, Mesh};
 
@@ -81,4 +82,26 @@ pub fn wobble(amplitude: f64) -> impl Fn([usize; 3]) -> [f64; 3] {
 /// Nodes at which the given coordinate has the given value.
 pub fn nodes_at(mesh: &Mesh, direction: usize, value: f64) -> Vec<usize> {
     (0..mesh.nodes.len()).filter(|&node| (mesh.nodes[node][direction] - value).abs() < 1e-9).collect()
+}
+
+/// Steel without expansion.
+pub fn steel() -> Material {
+    Material { density: 7800.0, expansion: 0.0, ..Material::steel() }
+}
+
+/// What blades of tests of spin are made of.
+pub fn blade_steel(poisson_ratio: f64) -> Material {
+    Material { young_modulus: 200e9, poisson_ratio, ..Material::maraging_steel() }
+}
+
+/// Nodes of one element in physical space: the natural ones, scaled and bent by a smooth map without symmetry.
+pub fn distorted_nodes(kind: ElementKind) -> Vec<[f64; 3]> {
+    let map = |[x, y, z]: [f64; 3]| {
+        [
+            0.03 * x + 0.004 * y + 0.002 * z + 0.002 * y * z,
+            0.003 * x + 0.02 * y - 0.003 * z + 0.001 * x * z,
+            -0.002 * x + 0.002 * y + 0.025 * z + 0.0015 * x * y,
+        ]
+    };
+    kind.natural_nodes().iter().map(|&node| map(node)).collect()
 }

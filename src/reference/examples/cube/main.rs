@@ -1,12 +1,11 @@
-//! The cube between two rings by four independent methods: tables, CSV, and the paper's figures 3 to 6 as SVG.
+//! The cube between two rings by four independent methods: tables and CSV; `lab cube` draws the paper's figures 3 to 6.
 //!
 //! `cargo run --release -p tiprub-reference --example cube -- WHAT DIRECTORY [lumped|consistent]` with WHAT one of
-//! `figures` (methods a, b, c at 100 m/s), `energy` (50 m/s), `convergence` (in h), `outside` (a CalculiX `.dat` file, given
+//! `pairs` (methods a, b, c at 100 m/s), `convergence` (in h), `outside` (a CalculiX `.dat` file, given
 //! as third argument, beside our methods; a fourth one is its contact stiffness in Pa/m, to allow for its penetration), `files` (matrices and node tables)
 //! and `table` (the flight by method b as the small table that the FMU is tested against, `tests/python/cube_reference.csv`).
 
 mod outside;
-mod plot;
 mod tables;
 
 use std::path::{Path, PathBuf};
@@ -20,15 +19,14 @@ use tiprub_reference::surface::SurfaceKind;
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [what, directory, rest @ ..] = arguments.as_slice() else {
-        eprintln!("cube figures|energy|convergence|outside|files|table DIRECTORY [lumped|consistent, or a .dat file]");
+        eprintln!("cube pairs|convergence|outside|files|table DIRECTORY [lumped|consistent, or a .dat file]");
         std::process::exit(2);
     };
     let directory = PathBuf::from(directory);
     std::fs::create_dir_all(&directory).expect("the directory can be made");
     let mass = if rest.first().is_some_and(|word| word == "consistent") { Mass::Consistent } else { Mass::Lumped };
     match what.as_str() {
-        "figures" => figures(&directory, mass),
-        "energy" => energy(&directory),
+        "pairs" => pairs(&directory, mass),
         "convergence" => tables::convergence(mass),
         "outside" => {
             let stiffness = rest.get(1).map_or(f64::INFINITY, |text| text.parse().expect("a stiffness in Pa/m"));
@@ -36,7 +34,7 @@ fn main() {
         }
         "files" => files(&directory),
         "table" => table(&directory),
-        other => panic!("`{other}` is none of figures, energy, convergence, outside, files, table"),
+        other => panic!("`{other}` is none of pairs, convergence, outside, files, table"),
     }
 }
 
@@ -63,8 +61,8 @@ fn save(directory: &Path, name: &str, history: &History) {
     write_json(&directory.join(format!("{name}.json")), history).expect("a JSON file can be written");
 }
 
-/// Figures 3, 4 and 5: a, b, c over 3 ms.
-fn figures(directory: &Path, mass: Mass) {
+/// All pairs of a, b, c over 3 ms.
+fn pairs(directory: &Path, mass: Mass) {
     let spline = Setting { mass, ..Setting::default() };
     let facets = Setting { surface: SurfaceKind::Facets, ..spline };
     // A consistent mass lowers the limit of central differences and has to be solved for: only the contact is followed.
@@ -81,23 +79,6 @@ fn figures(directory: &Path, mass: Mass) {
     }
     tables::pairs(&named, spline.speed);
     tables::readings(&named);
-    plot::symmetry(directory, &named[0].1);
-    plot::comparison(directory, &[&named[0], &named[1]]);
-    plot::superposition(directory, &[&named[0], &named[1], &named[4]]);
-}
-
-/// Figure 6: energies at 50 m/s.
-fn energy(directory: &Path) {
-    for friction in [0.0, 0.15] {
-        let setting = Setting { speed: 50.0, friction, ..Setting::default() };
-        let film = run(Method::Film(Default::default()), setting, 5e-7, 3e-3, 4);
-        let implicit = run(Method::Bipotential, setting, 1e-6, 3e-3, 2);
-        let name = format!("energy-mu-{friction}");
-        tables::energies(&[("a, film", &film), ("b, bi-potential", &implicit)], friction);
-        save(directory, &name, &film);
-        save(directory, &format!("{name}-b"), &implicit);
-        plot::energies(directory, &name, &film);
-    }
 }
 
 /// Method b at 100 m/s until the cube has left, a record every 4 µs.

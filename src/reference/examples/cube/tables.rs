@@ -73,26 +73,6 @@ pub fn readings(named: &[(&str, History)]) {
     }
 }
 
-/// Energies at 50 m/s.
-pub fn energies(named: &[(&str, &History)], friction: f64) {
-    for (name, history) in named {
-        let total = history.total();
-        let last = total.len() - 1;
-        println!(
-            "µ = {friction}, {name}: total {:.2} J -> {:.2} J ({:.3} % lost), kinetic {:.2} J, strain {:.2} J; centre at \
-             {:.1} m/s, last touch {:.3} ms, asymmetry {:.1e}",
-            total[0],
-            total[last],
-            100.0 * (1.0 - total[last] / total[0]),
-            history.kinetic[last],
-            history.strain[last],
-            -exit_speed(history),
-            history.last_contact().unwrap_or(0.0) * 1e3,
-            asymmetry(history, f64::MAX)[0]
-        );
-    }
-}
-
 /// Errors over h, against the finest run of a, on the same mesh and spline.
 pub fn convergence(mass: Mass) {
     let setting = Setting { mass, ..Setting::default() };

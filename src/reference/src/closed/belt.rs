@@ -17,12 +17,12 @@ pub struct Belt {
 
 impl Belt {
     /// ω = √(k/m) (rad/s).
-    pub fn omega(&self) -> f64 {
+    pub(crate) fn omega(&self) -> f64 {
         (self.stiffness / self.mass).sqrt()
     }
 
     /// a = (F_s − F_k)/k (m).
-    pub fn offset(&self) -> f64 {
+    pub(crate) fn offset(&self) -> f64 {
         (self.sticking - self.sliding) / self.stiffness
     }
 

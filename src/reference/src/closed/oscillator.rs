@@ -50,7 +50,7 @@ pub struct Bilinear {
 
 impl Bilinear {
     /// ω_c (rad/s).
-    pub fn closed_omega(&self) -> f64 {
+    pub(crate) fn closed_omega(&self) -> f64 {
         self.omega * (1.0 + self.ratio).sqrt()
     }
 
@@ -64,13 +64,13 @@ impl Bilinear {
     }
 
     /// Time in contact: 2/ω_c · atan(v/(ω_c (d − x_m))) (s).
-    pub fn closed_time(&self) -> f64 {
+    pub(crate) fn closed_time(&self) -> f64 {
         let omega = self.closed_omega();
         2.0 * (self.touch_speed() / (omega * (self.distance - self.middle()))).atan() / omega
     }
 
     /// Time out of contact: 2/ω · (π − acos(d/A)) (s).
-    pub fn open_time(&self) -> f64 {
+    pub(crate) fn open_time(&self) -> f64 {
         2.0 * (PI - (self.distance / self.amplitude).acos()) / self.omega
     }
 
@@ -111,7 +111,7 @@ pub struct Ball {
 
 impl Ball {
     /// Speed at which it touches: √(2gH) (m/s).
-    pub fn speed(&self) -> f64 {
+    pub(crate) fn speed(&self) -> f64 {
         (2.0 * self.gravity * self.height).sqrt()
     }
 
@@ -121,7 +121,7 @@ impl Ball {
     }
 
     /// Time in contact: 2/ω · (π − atan(vω/g)) (s).
-    pub fn contact(&self) -> f64 {
+    pub(crate) fn contact(&self) -> f64 {
         2.0 * (PI - (self.speed() * self.omega / self.gravity).atan()) / self.omega
     }
 

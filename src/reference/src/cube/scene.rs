@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use tiprub_model::assembly::{assemble, free_dofs, lumped_masses};
 use tiprub_model::progress::silent;
 use tiprub_model::sparse::{Factor, SparseMatrix, principal_pair};
-use tiprub_model::{FeModel, Material, Mesh, Result};
+use tiprub_model::{Material, Mesh, Result};
 
 use super::{
     CENTRE, FRICTION, HALF_ARC, RING_ELEMENTS, Side, WIDTH, cube_material, cube_mesh, ring_material, ring_mesh,
@@ -63,7 +63,7 @@ impl Body {
     ///
     /// # Errors
     /// Those of assembly; a missing set.
-    pub fn new(mesh: Mesh, material: Material, mass: Mass, contact: Vec<usize>) -> Result<Self> {
+    pub(crate) fn new(mesh: Mesh, material: Material, mass: Mass, contact: Vec<usize>) -> Result<Self> {
         let matrices = assemble(&mesh, &material, &silent)?;
         let mut body =
             Self { stiffness: matrices.stiffness, mass: matrices.mass, free: Vec::new(), contact, mesh, material };
@@ -76,27 +76,9 @@ impl Body {
         Ok(body)
     }
 
-    /// The same body for a reduction by the product, without friction surfaces or clamps applied.
-    pub fn fe_model(&self, origin: &str) -> FeModel {
-        FeModel {
-            nodes: self.mesh.nodes.clone(),
-            sets: self.mesh.sets.clone(),
-            stiffness: self.stiffness.clone(),
-            mass: self.mass.clone(),
-            mesh: Some((self.mesh.clone(), self.material.clone())),
-            origin: origin.into(),
-        }
-    }
-
     /// Number of dofs.
     pub fn dofs(&self) -> usize {
         self.mass.order()
-    }
-
-    /// Positions of the contact nodes under displacements of all dofs (m).
-    pub fn contact_positions(&self, displacements: &[f64]) -> Vec<[f64; 3]> {
-        let place = |&node: &usize| core::array::from_fn(|i| self.mesh.nodes[node][i] + displacements[3 * node + i]);
-        self.contact.iter().map(place).collect()
     }
 
     /// Factor of M + c K without the clamped dofs.
@@ -176,12 +158,12 @@ impl Scene {
     }
 
     /// Displacements of the three bodies at the start: none.
-    pub fn rest(&self) -> [Vec<f64>; 3] {
+    pub(crate) fn rest(&self) -> [Vec<f64>; 3] {
         core::array::from_fn(|body| vec![0.0; self.bodies[body].dofs()])
     }
 
     /// Velocities at the start: the cube flies along −y.
-    pub fn launch(&self) -> [Vec<f64>; 3] {
+    pub(crate) fn launch(&self) -> [Vec<f64>; 3] {
         let mut velocities = self.rest();
         velocities[0].iter_mut().skip(1).step_by(3).for_each(|v| *v = -self.setting.speed);
         velocities

@@ -8,8 +8,10 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use tiprub_model::{Error, Result};
 
 use super::Run;
-use super::contact::{Contact, add_to_loads, find, surface_at_rest, surface_forces, surface_of};
-use super::operator::{Operator, SurfaceVectors, Vectors, inner};
+use super::contact::{
+    Contact, SurfaceVectors, Vectors, add_to_loads, find, surface_at_rest, surface_forces, surface_of,
+};
+use super::operator::{Operator, inner};
 use super::recorder::{Entry, Recorder};
 use crate::cube::history::History;
 use crate::cube::scene::Scene;
@@ -46,7 +48,7 @@ type Memory = Vec<(usize, usize, [f64; 3])>;
 ///
 /// # Errors
 /// As [`super::Method::run`].
-pub fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
+pub(crate) fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
     let mut recorder = Recorder::new(scene, run, "augmented");
     let h = run.step;
     let quarter = 0.25 * h * h;

@@ -13,8 +13,10 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 use tiprub_model::{Error, Result};
 
 use super::Run;
-use super::contact::{Contact, add_to_loads, find, surface_at_rest, surface_forces, surface_of};
-use super::operator::{Operator, SurfaceVectors, Vectors, inner};
+use super::contact::{
+    Contact, SurfaceVectors, Vectors, add_to_loads, find, surface_at_rest, surface_forces, surface_of,
+};
+use super::operator::{Operator, inner};
 use super::recorder::{Entry, Recorder};
 use crate::cube::history::History;
 use crate::cube::scene::Scene;
@@ -35,7 +37,7 @@ const UPDATES: usize = 30;
 ///
 /// # Errors
 /// As [`super::Method::run`].
-pub fn run(scene: &Scene, run: &Run) -> Result<History> {
+pub(crate) fn run(scene: &Scene, run: &Run) -> Result<History> {
     let mut recorder = Recorder::new(scene, run, "bipotential");
     let (h, square) = (run.step, run.step * run.step);
     let operator = Operator::new(scene, 0.25 * square)?;

@@ -1,12 +1,17 @@
 //! Where masters meet a ring's surface: gap, frame, weights; relative displacements; forces back on the bodies.
 
-use super::operator::{SurfaceVectors, Vectors};
 use crate::cube::scene::Scene;
 use crate::surface::{add_scaled, cross, dot, minus, scaled, unit};
 
+/// Displacements, forces or velocities of all dofs of cube, left ring, right ring.
+pub(super) type Vectors = [Vec<f64>; 3];
+
+/// Vectors at the masters (left face, then right) and at the carriers of the left and the right ring.
+pub(super) type SurfaceVectors = [Vec<[f64; 3]>; 3];
+
 /// A master near or inside a ring.
 #[derive(Debug, Clone)]
-pub struct Contact {
+pub(crate) struct Contact {
     /// 0 left, 1 right.
     pub side: usize,
     /// Number of the master on its face.
@@ -86,8 +91,8 @@ pub(super) fn find(scene: &Scene, rest: &SurfaceVectors, moved: &SurfaceVectors,
 pub(super) fn surface_forces(scene: &Scene, contacts: &[Contact], forces: &[[f64; 3]]) -> SurfaceVectors {
     let mut all: SurfaceVectors = [
         vec![[0.0; 3]; 2 * scene.masters],
-        vec![[0.0; 3]; scene.surfaces[0].len()],
-        vec![[0.0; 3]; scene.surfaces[1].len()],
+        vec![[0.0; 3]; scene.surfaces[0].count()],
+        vec![[0.0; 3]; scene.surfaces[1].count()],
     ];
     for (contact, force) in contacts.iter().zip(forces) {
         let force = contact.global(*force);

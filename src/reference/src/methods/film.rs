@@ -7,8 +7,10 @@ use nalgebra::{DMatrix, DVector};
 use tiprub_model::{Error, Result};
 
 use super::Run;
-use super::contact::{Contact, add_to_loads, find, surface_at_rest, surface_forces, surface_of};
-use super::operator::{Operator, SurfaceVectors, Vectors, inner};
+use super::contact::{
+    Contact, SurfaceVectors, Vectors, add_to_loads, find, surface_at_rest, surface_forces, surface_of,
+};
+use super::operator::{Operator, inner};
 use super::recorder::{Entry, Recorder};
 use crate::cube::history::History;
 use crate::cube::scene::Scene;
@@ -40,7 +42,7 @@ impl Default for Options {
 ///
 /// # Errors
 /// As [`super::Method::run`].
-pub fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
+pub(crate) fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
     let mut recorder = Recorder::new(scene, run, "film");
     let operator = Operator::new(scene, 0.0)?;
     let rest = surface_at_rest(scene);

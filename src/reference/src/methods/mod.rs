@@ -1,9 +1,9 @@
 //! Four methods for the cube between two rings, each with time stepping and contact of its own:
-//! [`film`], [`bipotential`], [`augmented`] and [`penalty`]. They share the finite-element matrices, the surfaces and
+//! [`film`], `bipotential`, [`augmented`] and [`penalty`]. They share the finite-element matrices, the surfaces and
 //! where a master meets a surface ([`contact`]), nothing else.
 
 pub mod augmented;
-pub mod bipotential;
+pub(crate) mod bipotential;
 mod blocks;
 pub mod contact;
 pub mod film;
@@ -29,7 +29,7 @@ pub struct Run {
 
 impl Run {
     /// Number of steps to the end.
-    pub fn steps(&self) -> usize {
+    pub(crate) fn steps(&self) -> usize {
         let mut steps = 0;
         while (steps as f64 + 0.5) * self.step < self.end {
             steps += 1;
@@ -43,7 +43,7 @@ impl Run {
 pub enum Method {
     /// [`film`].
     Film(film::Options),
-    /// [`bipotential`].
+    /// `bipotential`.
     Bipotential,
     /// [`augmented`].
     Augmented(augmented::Options),
@@ -52,16 +52,6 @@ pub enum Method {
 }
 
 impl Method {
-    /// Name for tables and files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Film(_) => "film",
-            Self::Bipotential => "bipotential",
-            Self::Augmented(_) => "augmented",
-            Self::Penalty(_) => "penalty",
-        }
-    }
-
     /// Run the scene.
     ///
     /// # Errors

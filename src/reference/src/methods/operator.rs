@@ -5,12 +5,9 @@ use tiprub_model::sparse::Factor;
 use tiprub_model::{Error, Result};
 
 use super::blocks::BlockMatrix;
-use super::contact::Contact;
+use super::contact::{Contact, SurfaceVectors, Vectors};
 use crate::cube::scene::{Mass, Scene};
 use crate::surface::{Surface, is_zero};
-
-/// Displacements, forces or velocities of all dofs of cube, left ring, right ring.
-pub(super) type Vectors = [Vec<f64>; 3];
 
 #[derive(Debug)]
 enum Inverse {
@@ -185,9 +182,6 @@ impl Operator {
     }
 }
 
-/// Vectors at the masters (left face, then right) and at the carriers of the left and the right ring.
-pub(super) type SurfaceVectors = [Vec<[f64; 3]>; 3];
-
 pub(super) fn inner(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -199,7 +193,7 @@ fn carriers(surface: Option<&Surface>, nodal: DMatrix<f64>) -> DMatrix<f64> {
         let mut mapped = DMatrix::zeros(matrix.nrows(), matrix.ncols());
         for column in 0..matrix.ncols() {
             let vectors: Vec<[f64; 3]> =
-                (0..surface.len()).map(|i| core::array::from_fn(|k| matrix[(3 * i + k, column)])).collect();
+                (0..surface.count()).map(|i| core::array::from_fn(|k| matrix[(3 * i + k, column)])).collect();
             for (i, vector) in surface.carriers(&vectors).into_iter().enumerate() {
                 (0..3).for_each(|k| mapped[(3 * i + k, column)] = vector[k]);
             }
@@ -214,7 +208,7 @@ fn isotropic_carriers(surface: Option<&Surface>, nodal: DMatrix<f64>) -> DMatrix
     let map = |matrix: &DMatrix<f64>| {
         let mut mapped = DMatrix::zeros(matrix.nrows(), matrix.ncols());
         for column in 0..matrix.ncols() {
-            let vectors: Vec<[f64; 3]> = (0..surface.len()).map(|i| [matrix[(i, column)], 0.0, 0.0]).collect();
+            let vectors: Vec<[f64; 3]> = (0..surface.count()).map(|i| [matrix[(i, column)], 0.0, 0.0]).collect();
             for (i, vector) in surface.carriers(&vectors).into_iter().enumerate() {
                 mapped[(i, column)] = vector[0];
             }

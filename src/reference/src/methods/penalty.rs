@@ -3,8 +3,8 @@
 use tiprub_model::Result;
 
 use super::Run;
-use super::contact::{Contact, add_to_loads, find, surface_at_rest, surface_forces, surface_of};
-use super::operator::{Operator, Vectors, inner};
+use super::contact::{Contact, Vectors, add_to_loads, find, surface_at_rest, surface_forces, surface_of};
+use super::operator::{Operator, inner};
 use super::recorder::{Entry, Recorder};
 use crate::cube::history::History;
 use crate::cube::scene::Scene;
@@ -29,7 +29,7 @@ impl Default for Options {
 ///
 /// # Errors
 /// As [`super::Method::run`].
-pub fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
+pub(crate) fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
     let mut recorder = Recorder::new(scene, run, "penalty");
     let operator = Operator::new(scene, 0.0)?;
     let rest = surface_at_rest(scene);

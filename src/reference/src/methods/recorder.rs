@@ -1,8 +1,7 @@
 //! Fills a [`History`] as a run goes on.
 
 use super::Run;
-use super::contact::Contact;
-use super::operator::Vectors;
+use super::contact::{Contact, Vectors};
 use crate::cube::history::{History, Snapshot, processor_time};
 use crate::cube::scene::Scene;
 

@@ -9,7 +9,7 @@ const SWEEPS: usize = 100_000;
 const SETTLED: f64 = 1e-13;
 
 /// Solve; `None` where neither way comes to an end.
-pub fn solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+pub(crate) fn solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let count = right.len();
     let mut closed: Vec<usize> = (0..count).filter(|i| right[*i] < 0.0).collect();
     for _ in 0..EXCHANGES {

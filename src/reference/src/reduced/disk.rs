@@ -1,7 +1,7 @@
 //! A disk of coupled sectors in a flexible casing under a line load, written from the pencils and the geometry alone.
 //!
 //! Every nodal diameter's Hermitian pencil becomes a real one of twice the size for real and imaginary part; the displacement of
-//! sector s is w_n Re(C z e^(2πi n s/N)). The casing carries a [`Ring`] through its contact grid; blade nodes seek their closest point
+//! sector s is w_n Re(C z e^(2πi n s/N)). The casing carries a `Ring` through its contact grid; blade nodes seek their closest point
 //! on it, and forces go back to the grid by the weights of that point.
 
 use std::f64::consts::TAU;

@@ -28,14 +28,14 @@ pub struct Row(pub Vec<(usize, Vec<f64>)>);
 
 impl Row {
     /// Σ row·values.
-    pub fn dot(&self, values: &[f64]) -> f64 {
+    pub(crate) fn dot(&self, values: &[f64]) -> f64 {
         let piece =
             |(start, row): &(usize, Vec<f64>)| -> f64 { row.iter().zip(&values[*start..]).map(|(a, b)| a * b).sum() };
         self.0.iter().map(piece).sum()
     }
 
     /// Σ row·weights·other.
-    pub fn weighted(&self, weights: &[f64], other: &Self) -> f64 {
+    pub(crate) fn weighted(&self, weights: &[f64], other: &Self) -> f64 {
         let mut sum = 0.0;
         for (start, row) in &self.0 {
             for (_, other) in other.0.iter().filter(|piece| piece.0 == *start) {
@@ -46,7 +46,7 @@ impl Row {
     }
 
     /// values += factor·row.
-    pub fn add_to(&self, factor: f64, values: &mut [f64]) {
+    pub(crate) fn add_to(&self, factor: f64, values: &mut [f64]) {
         for (start, row) in &self.0 {
             values[*start..].iter_mut().zip(row).for_each(|(value, row)| *value += factor * row);
         }

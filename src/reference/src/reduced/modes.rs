@@ -18,7 +18,7 @@ const RIGID: f64 = 1e-12;
 
 impl Modes {
     /// Solve K φ = ω² M φ by Cholesky's factor of the mass; `None` where the mass is not positive definite.
-    pub fn new(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>, damping: f64) -> Option<Self> {
+    pub(crate) fn new(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>, damping: f64) -> Option<Self> {
         let lower = mass.clone().cholesky()?.l();
         let half = lower.solve_lower_triangular(stiffness)?;
         let whole = lower.solve_lower_triangular(&half.transpose())?;
@@ -37,32 +37,27 @@ impl Modes {
 
     /// `count` copies side by side, without coupling; the shapes are those of one.
     #[must_use]
-    pub fn repeated(self, count: usize) -> Self {
+    pub(crate) fn repeated(self, count: usize) -> Self {
         Self { frequencies: self.frequencies.repeat(count), damping: self.damping.repeat(count), shapes: self.shapes }
     }
 
     /// Number of modes.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.frequencies.len()
     }
 
-    /// True when there is none.
-    pub fn is_empty(&self) -> bool {
-        self.frequencies.is_empty()
-    }
-
     /// Largest angular frequency (rad/s).
-    pub fn largest_frequency(&self) -> f64 {
+    pub(crate) fn largest_frequency(&self) -> f64 {
         self.frequencies.iter().fold(0.0, |largest, value| f64::max(largest, *value))
     }
 
     /// φᵀ f of forces on the coordinates.
-    pub fn force(&self, force: &DVector<f64>) -> Vec<f64> {
+    pub(crate) fn force(&self, force: &DVector<f64>) -> Vec<f64> {
         (self.shapes.transpose() * force).iter().copied().collect()
     }
 
     /// Modal amplitudes φᵀ M u of displacements or velocities of the coordinates.
-    pub fn amplitudes(&self, mass: &DMatrix<f64>, values: &DVector<f64>) -> Vec<f64> {
+    pub(crate) fn amplitudes(&self, mass: &DMatrix<f64>, values: &DVector<f64>) -> Vec<f64> {
         self.force(&(mass * values))
     }
 }

@@ -18,11 +18,11 @@ fn basis(x: f64) -> [f64; 3] {
 }
 
 /// Point, derivatives along ξ and η, and ξξ, ξη, ηη of a place.
-pub type ClosestPoint = [Vector3<f64>; 6];
+pub(crate) type ClosestPoint = [Vector3<f64>; 6];
 
 /// The interpolation problem of a grid.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Ring {
+pub(crate) struct Ring {
     around: usize,
     along: usize,
     /// Control points = interpolation · data points.
@@ -31,7 +31,7 @@ pub struct Ring {
 
 impl Ring {
     /// `around` points on each of `along` rings, ring by ring; `None` for grids without a solution.
-    pub fn new(around: usize, along: usize) -> Option<Self> {
+    pub(crate) fn new(around: usize, along: usize) -> Option<Self> {
         let ring = DMatrix::from_fn(around, around, |i, j| match (i + around - j) % around {
             0 => 4.0 / 6.0,
             1 => 1.0 / 6.0,
@@ -49,7 +49,7 @@ impl Ring {
     }
 
     /// Control points of data points.
-    pub fn control(&self, data: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    pub(crate) fn control(&self, data: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let columns = DMatrix::from_fn(data.len(), 3, |i, k| data[i][k]);
         (&self.interpolation * columns).row_iter().map(|row| Vector3::new(row[0], row[1], row[2])).collect()
     }
@@ -86,7 +86,7 @@ impl Ring {
     }
 
     /// The surface at a place in grid steps.
-    pub fn at(&self, control: &[Vector3<f64>], xi: f64, eta: f64) -> ClosestPoint {
+    pub(crate) fn at(&self, control: &[Vector3<f64>], xi: f64, eta: f64) -> ClosestPoint {
         let mut place = [Vector3::zeros(); 6];
         for (index, weights) in self.local(xi, eta) {
             for (part, weight) in place.iter_mut().zip(weights) {
@@ -97,7 +97,7 @@ impl Ring {
     }
 
     /// Weights of the data points at a place.
-    pub fn weights(&self, xi: f64, eta: f64) -> DVector<f64> {
+    pub(crate) fn weights(&self, xi: f64, eta: f64) -> DVector<f64> {
         let mut control = DVector::zeros(self.around * self.along);
         for (index, weights) in self.local(xi, eta) {
             control[index] += weights[0];
@@ -106,7 +106,7 @@ impl Ring {
     }
 
     /// Closest place to a point by Newton's method from a guess; `None` where it does not settle.
-    pub fn closest(
+    pub(crate) fn closest(
         &self,
         control: &[Vector3<f64>],
         point: Vector3<f64>,

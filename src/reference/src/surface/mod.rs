@@ -51,13 +51,8 @@ impl Surface {
     }
 
     /// Number of carriers, and of nodes.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.rows * self.columns
-    }
-
-    /// Whether there is no node.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Values of the carriers from values at the nodes (any vector quantity: positions, displacements).

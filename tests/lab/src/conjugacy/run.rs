@@ -4,7 +4,7 @@ use tiprub_core::{
     Result, Scene, Simulation,
     contact::{spline::SurfaceSpline, surface::Surface, wrench::Wrench},
     dynamics::sectors::Sectors,
-    settings::{CoatingSettings, Scheme, Shape, Solver, SplineSettings},
+    settings::{Scheme, Shape, Solver, SplineSettings},
     system::{ContactEvent, Structure, System},
 };
 
@@ -24,7 +24,7 @@ const RAMP: f64 = 4e4;
 
 /// What the contact nodes meet, and what moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Feature {
+pub(crate) enum Feature {
     /// Rigid surface of revolution.
     Revolution,
     /// Rigid surface through data points.
@@ -43,11 +43,11 @@ pub enum Feature {
 
 impl Feature {
     /// All of them.
-    pub const ALL: [Self; 7] =
+    pub(crate) const ALL: [Self; 7] =
         [Self::Revolution, Self::Spline, Self::Casing, Self::Disk, Self::DiskInCasing, Self::Coating, Self::Free];
 
     /// For the table.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Revolution => "surface of revolution",
             Self::Spline => "rigid spline",
@@ -60,7 +60,7 @@ impl Feature {
     }
 
     /// What is known of the other side.
-    pub fn side(self) -> Side {
+    pub(crate) fn side(self) -> Side {
         match self {
             Self::Revolution | Self::Disk => Side::Surface,
             Self::Coating => Side::Dented,
@@ -79,23 +79,14 @@ impl Feature {
         match self {
             Self::Spline => scene.settings.surfaces[0].spline = Some(SplineSettings::default()),
             Self::Casing | Self::DiskInCasing => on_ring(&mut scene, 0.01),
-            Self::Coating => {
-                scene.settings.contacts[0].coating = Some(CoatingSettings {
-                    thickness: 1.5e-4,
-                    modulus: 2e8,
-                    yield_stress: 1e6,
-                    hardening: 2e7,
-                    cells_around: 500,
-                    cells_along: 7,
-                });
-            }
-            _ => {}
+            Self::Coating => tiprub_test_models::coating(&mut scene),
+            Self::Revolution | Self::Disk | Self::Free => {}
         }
         Some(scene)
     }
 
     /// The scene with friction, and with whirl and axial shift where there is a shaft. A round casing for the torque.
-    pub fn scene(self, friction: f64, moves: bool, round: bool) -> Scene {
+    pub(crate) fn scene(self, friction: f64, moves: bool, round: bool) -> Scene {
         let Some(mut scene) = self.rotor() else {
             let left = Plate { stiffness: 1e7, ..Plate::left(HALF + 2e-4) };
             let right = Plate { stiffness: 0.0, radius: 0.18, ..Plate::right(HALF + 3e-4) };
@@ -125,7 +116,7 @@ impl Feature {
 
 /// What forces and moments on the slave follow from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
+pub(crate) enum Side {
     /// Forces on control points, where they stand.
     ControlPoints,
     /// The same force where the surface of revolution is.
@@ -136,7 +127,7 @@ pub enum Side {
 
 /// What a run showed; residuals are relative.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Seen {
+pub(crate) struct Seen {
     /// Contacts, summed over the steps.
     pub contacts: usize,
     /// Largest moment of a step about the axis of the casing, of Σ|F| r.
@@ -161,7 +152,7 @@ pub struct Seen {
 ///
 /// # Errors
 /// The scene is refused, or fails.
-pub fn run(scene: &Scene, step: f64) -> Result<Seen> {
+pub(crate) fn run(scene: &Scene, step: f64) -> Result<Seen> {
     let mut scene = scene.clone();
     scene.settings.time.step = step;
     let mut simulation = Simulation::new(&scene)?;

@@ -30,14 +30,14 @@ struct Loss {
 
 /// Losses with smaller and smaller steps.
 #[derive(Debug)]
-pub struct Losses(Vec<Loss>);
+pub(crate) struct Losses(Vec<Loss>);
 
 impl Losses {
     /// Fly with every step.
     ///
     /// # Errors
     /// A flight fails.
-    pub fn new(scene: &Scene) -> Result<Self> {
+    pub(super) fn new(scene: &Scene) -> Result<Self> {
         DIVISORS.into_iter().map(|divisor| loss(scene, STEP / divisor)).collect::<Result<_>>().map(Self)
     }
 
@@ -48,7 +48,7 @@ impl Losses {
     }
 
     /// Whether the loss without curvature work is the one that the loss tends to.
-    pub fn statement(&self) -> Statement {
+    pub(super) fn statement(&self) -> Statement {
         let limit = self.limit();
         let off = self.0.iter().map(|loss| (loss.without_gain / limit - 1.0).abs()).fold(0.0, f64::max);
         let told = self.0.iter().map(|loss| {
@@ -68,7 +68,7 @@ impl Losses {
     }
 
     /// As a table.
-    pub fn markdown(&self) -> String {
+    pub(super) fn markdown(&self) -> String {
         let mut text = String::from(
             "## Energy at 50 m/s without friction\n\nlcp, modal-exact; lost up to the lowest total energy.\n\n| h (µs) | lost | without \
              curvature work |\n|---|---|---|\n",
@@ -81,7 +81,7 @@ impl Losses {
     }
 
     /// For programs.
-    pub fn json(&self) -> Value {
+    pub(super) fn json(&self) -> Value {
         let rows =
             self.0.iter().map(|loss| json!({"step": loss.step, "lost": loss.lost, "without_gain": loss.without_gain}));
         json!({ "rows": rows.collect::<Vec<_>>(), "limit": self.limit() })

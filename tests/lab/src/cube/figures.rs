@@ -21,7 +21,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 const TIME: &str = "time (ms)";
 
 /// The three meshes at the start.
-pub fn scene() -> Figure {
+pub(super) fn scene() -> Figure {
     let mut whole = Surface::default();
     let mut marks = Vec::new();
     let cube = cube_mesh();
@@ -81,7 +81,7 @@ fn figure(name: &'static str, caption: String, unit: &str, curves: Vec<(String, 
 }
 
 /// Fig. 3: corners of both faces of one run.
-pub fn symmetry(name: &str, history: &History) -> Result<Vec<Figure>> {
+pub(super) fn symmetry(name: &str, history: &History) -> Result<Vec<Figure>> {
     let end = f64::MAX;
     let moved = (0..8).map(|corner| {
         let values = history.corners.iter().map(move |corners| 1e3 * corners[corner][0]);
@@ -103,7 +103,7 @@ pub fn symmetry(name: &str, history: &History) -> Result<Vec<Figure>> {
 }
 
 /// Fig. 4: node 1 over the whole run, and fig. 5: λ1 while it touches (to `touching`, s).
-pub fn node_1(outcomes: &[Outcome], speed: f64, touching: f64) -> Result<Vec<Figure>> {
+pub(super) fn node_1(outcomes: &[Outcome], speed: f64, touching: f64) -> Result<Vec<Figure>> {
     let runs: Vec<_> = outcomes.iter().filter_map(|outcome| Some((outcome.name, outcome.history()?))).collect();
     let mut figures = Vec::new();
     let files = ["fig4a-u1x", "fig4b-u1y", "fig4c-u1z"];
@@ -131,7 +131,7 @@ pub fn node_1(outcomes: &[Outcome], speed: f64, touching: f64) -> Result<Vec<Fig
 }
 
 /// Fig. 6: energies of one run.
-pub fn energies(name: &'static str, label: &str, history: &History) -> Result<Figure> {
+pub(super) fn energies(name: &'static str, label: &str, history: &History) -> Result<Figure> {
     let curve = |label: &str, values: Vec<f64>| (label.to_owned(), line(&history.times, values.into_iter(), f64::MAX));
     let curves = vec![
         curve("total", history.total()),
@@ -142,7 +142,7 @@ pub fn energies(name: &'static str, label: &str, history: &History) -> Result<Fi
 }
 
 /// All pairs: picture on a logarithmic axis, table below.
-pub fn agreement(pairs: &[Pair]) -> Result<Figure> {
+pub(super) fn agreement(pairs: &[Pair]) -> Result<Figure> {
     let mut sheet = Sheet::new(["pair", "u1x (%)", "slowing (%)", "u1z (%)", "lambda1 in windows (%)"]);
     let places = [0, 1, 2, 4];
     for (index, pair) in pairs.iter().enumerate() {

@@ -64,7 +64,7 @@ impl Flown {
 ///
 /// # Errors
 /// The models cannot be made. A method that fails is a result.
-pub fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
+pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
     let quick = arguments.quick;
     let scene = scene_source::load("builtin:cube-between-rings", &arguments.cache.cache(), console)?;
     let all = [(FAST, FRICTION), (FAST, 0.0), (SLOW, FRICTION), (SLOW, 0.0)]

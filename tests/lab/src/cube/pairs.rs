@@ -36,7 +36,7 @@ const RUN: [&str; 9] = [
 
 /// Two runs compared.
 #[derive(Debug, Clone)]
-pub struct Pair {
+pub(super) struct Pair {
     pub first: &'static str,
     pub second: &'static str,
     pub found: Agreement,
@@ -44,7 +44,7 @@ pub struct Pair {
 
 impl Pair {
     /// Shares as in [`PAIR`].
-    pub fn shares(&self) -> [f64; 10] {
+    pub(super) fn shares(&self) -> [f64; 10] {
         let Agreement { touching, contact, path, windows, peak, impulse, left_impulse, exit } = self.found;
         let [x, slowing, z] = touching;
         [x, slowing, z, path, windows, peak, impulse, left_impulse, exit, contact[0]]
@@ -59,7 +59,7 @@ impl Pair {
 }
 
 /// Every two runs that ended well, windows as those of `a`, the first of them.
-pub fn pairs(outcomes: &[Outcome], flight: &Flight) -> Vec<Pair> {
+pub(super) fn pairs(outcomes: &[Outcome], flight: &Flight) -> Vec<Pair> {
     let runs: Vec<_> = outcomes.iter().filter_map(|outcome| Some((outcome.name, outcome.history()?))).collect();
     let Some((_, a)) = runs.first() else { return Vec::new() };
     let end = a.times.last().copied().unwrap_or(0.0);
@@ -104,7 +104,7 @@ fn readings(outcome: &Outcome) -> Vec<String> {
 }
 
 /// Both tables as Markdown.
-pub fn markdown(outcomes: &[Outcome], pairs: &[Pair]) -> String {
+pub(super) fn markdown(outcomes: &[Outcome], pairs: &[Pair]) -> String {
     let mut text = String::new();
     let heading = |first: &str, columns: &[&str]| {
         format!("| {first} | {} |\n|---|{}\n", columns.join(" | "), "---|".repeat(columns.len()))
@@ -125,7 +125,7 @@ pub fn markdown(outcomes: &[Outcome], pairs: &[Pair]) -> String {
 }
 
 /// The pairs for the page.
-pub fn html(pairs: &[Pair]) -> String {
+pub(super) fn html(pairs: &[Pair]) -> String {
     let mut html = String::from("<table><thead><tr><th>pair</th>");
     for name in PAIR {
         let _ = write!(html, "<th>{name}</th>");
@@ -140,7 +140,7 @@ pub fn html(pairs: &[Pair]) -> String {
 }
 
 /// Runs and pairs for programs.
-pub fn json(outcomes: &[Outcome], pairs: &[Pair], flight: &Flight) -> Value {
+pub(super) fn json(outcomes: &[Outcome], pairs: &[Pair], flight: &Flight) -> Value {
     json!({
         "speed": flight.speed,
         "friction": flight.friction,

@@ -18,7 +18,7 @@ const FACE: usize = 36;
 
 /// How the product is asked to solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Product {
+pub(crate) struct Product {
     pub solver: Solver,
     pub scheme: Scheme,
     /// Largest internal step (s).
@@ -28,7 +28,7 @@ pub struct Product {
 
 /// A history and what only the product tells.
 #[derive(Debug, Clone)]
-pub struct ProductRun {
+pub(crate) struct ProductRun {
     pub history: History,
     /// Curvature work at every record (J).
     pub curvature: Vec<f64>,
@@ -44,7 +44,7 @@ impl Product {
     ///
     /// # Errors
     /// A scene that is refused, a state that is.
-    pub fn run(&self, scene: &Scene, flight: &Flight, end: f64, record: f64) -> Result<ProductRun> {
+    pub(super) fn run(&self, scene: &Scene, flight: &Flight, end: f64, record: f64) -> Result<ProductRun> {
         let started = processor_time();
         let mut simulation = Simulation::new(&self.scene(scene, flight))?;
         simulation.initialise(0.0)?;

@@ -18,7 +18,7 @@ use super::product::{Product, ProductRun};
 
 /// How the cube flies.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Flight {
+pub(crate) struct Flight {
     /// Speed along −y (m/s).
     pub speed: f64,
     pub friction: f64,
@@ -26,25 +26,25 @@ pub struct Flight {
 
 /// A method of either kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Competitor {
+pub(super) enum Competitor {
     Product(Product),
     Reference { method: Method, surface: SurfaceKind, step: f64, stride: usize },
 }
 
 /// One run; failures are results.
 #[derive(Debug, Clone)]
-pub struct Outcome {
+pub(super) struct Outcome {
     pub name: &'static str,
     pub competitor: Competitor,
     pub result: std::result::Result<ProductRun, String>,
 }
 
 impl Outcome {
-    pub fn history(&self) -> Option<&History> {
+    pub(super) fn history(&self) -> Option<&History> {
         self.result.as_ref().ok().map(|run| &run.history)
     }
 
-    pub fn is_product(&self) -> bool {
+    pub(crate) fn is_product(&self) -> bool {
         matches!(self.competitor, Competitor::Product(_))
     }
 }
@@ -58,16 +58,16 @@ fn reference(method: Method, surface: SurfaceKind, step: f64, stride: usize) -> 
 }
 
 /// Names of the product's runs that statements are about.
-pub const PAPER: &str = "product, film, central differences";
-pub const BEST: &str = "product, lcp, modal-exact";
-pub const STICKING: &str = "product, coulomb, modal-exact";
+pub(super) const PAPER: &str = "product, film, central differences";
+pub(crate) const BEST: &str = "product, lcp, modal-exact";
+pub(super) const STICKING: &str = "product, coulomb, modal-exact";
 /// Names of the reference methods on the same surface.
-pub const A: &str = "a, film";
-pub const B: &str = "b, bi-potential";
-pub const C: &str = "c, augmented Lagrangian";
+pub(super) const A: &str = "a, film";
+pub(super) const B: &str = "b, bi-potential";
+pub(super) const C: &str = "c, augmented Lagrangian";
 
 /// All methods of a flight; on facets as well where `facets`.
-pub fn competitors(flight: &Flight, quick: bool, facets: bool) -> Vec<(&'static str, Competitor)> {
+pub(super) fn competitors(flight: &Flight, quick: bool, facets: bool) -> Vec<(&'static str, Competitor)> {
     let (film, augmented, spline) =
         (Method::Film(Default::default()), Method::Augmented(Default::default()), SurfaceKind::Spline);
     let mut list = vec![
@@ -100,13 +100,13 @@ pub fn competitors(flight: &Flight, quick: bool, facets: bool) -> Vec<(&'static 
 }
 
 /// Interval of the records (s), the same for all.
-pub const RECORD: f64 = 1e-6;
+pub(crate) const RECORD: f64 = 1e-6;
 
 /// One run to `end` (s), alone, so that processor time is its own.
 ///
 /// # Errors
 /// The full model cannot be assembled.
-pub fn run(
+pub(super) fn run(
     (name, competitor): (&'static str, Competitor),
     scene: &Scene,
     flight: &Flight,
@@ -131,7 +131,7 @@ pub fn run(
 }
 
 /// Last time of contact of node 1 (s), as far as it has one contact: until it is free for 50 µs.
-pub fn released(history: &History) -> f64 {
+pub(super) fn released(history: &History) -> f64 {
     let mut last = None;
     for (time, force) in history.times.iter().zip(history.first_force()) {
         if force > 0.0 {

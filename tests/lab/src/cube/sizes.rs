@@ -29,7 +29,7 @@ const PRODUCT: Product = Product {
 
 /// A run with one body reduced otherwise.
 #[derive(Debug, Clone)]
-pub struct Size {
+pub(crate) struct Size {
     pub modes: usize,
     pub static_responses: usize,
     /// Size of the ROM file (bytes).
@@ -42,7 +42,7 @@ pub struct Size {
 
 /// Rings against method a, and the cube against all its modes.
 #[derive(Debug, Clone)]
-pub struct Sizes {
+pub(crate) struct Sizes {
     pub rings: Vec<Size>,
     pub cube: Vec<Size>,
 }
@@ -52,7 +52,13 @@ impl Sizes {
     ///
     /// # Errors
     /// A reduction or a run that is refused; never with what ships.
-    pub fn new(scene: &Scene, flight: &Flight, a: &History, quick: bool, tools: (&RomCache, &Console)) -> Result<Self> {
+    pub(super) fn new(
+        scene: &Scene,
+        flight: &Flight,
+        a: &History,
+        quick: bool,
+        tools: (&RomCache, &Console),
+    ) -> Result<Self> {
         let last = a.times.last().copied().unwrap_or(0.0);
         let work = Work { scene, flight, end: END.min(last), touching: released(a), tools };
         let mut rings = Vec::new();
@@ -63,7 +69,7 @@ impl Sizes {
     }
 
     /// For programs.
-    pub fn json(&self) -> Value {
+    pub(super) fn json(&self) -> Value {
         let rows = |sizes: &[Size]| -> Vec<Value> {
             let row = |size: &Size| {
                 json!({
@@ -77,7 +83,7 @@ impl Sizes {
     }
 
     /// Both tables.
-    pub fn markdown(&self) -> String {
+    pub(super) fn markdown(&self) -> String {
         let percent = |share: f64| format!("{:.3} %", 100.0 * share);
         let mut text = String::from(
             "## Reduced models\n\nRings against method a:\n\n| modes | static responses | ROM file (MB) | u1x | slowing | u1z | λ1, windows | \

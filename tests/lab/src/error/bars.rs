@@ -43,7 +43,7 @@ enum Problem {
 }
 
 /// A problem of rods at several numbers of elements.
-pub struct Bars {
+pub(crate) struct Bars {
     problem: Problem,
     sizes: Vec<Size>,
     standard: usize,
@@ -59,7 +59,7 @@ impl Bars {
     ///
     /// # Errors
     /// Never.
-    pub fn carpenter(quick: bool) -> Result<Self, String> {
+    pub(crate) fn carpenter(quick: bool) -> Result<Self, String> {
         let elements = if quick { vec![10, 20, 40] } else { vec![20, 40, 80, 160] };
         let passage = carpenter::LENGTH / carpenter::wave_speed();
         Self::new(Problem::Carpenter, &elements, 10e-6, 22, passage, quick)
@@ -69,7 +69,7 @@ impl Bars {
     ///
     /// # Errors
     /// Never.
-    pub fn bouncing(quick: bool) -> Result<Self, String> {
+    pub(crate) fn bouncing(quick: bool) -> Result<Self, String> {
         let elements = if quick { vec![10, 20, 40] } else { vec![20, 40, 80, 160] };
         let passage = bouncing_bar::LENGTH / bouncing_bar::wave_speed();
         Self::new(Problem::Bouncing, &elements, bouncing_bar::PERIOD / 64.0, 64, passage, quick)
@@ -79,7 +79,7 @@ impl Bars {
     ///
     /// # Errors
     /// Never.
-    pub fn shaken(touching: bool) -> Result<Self, String> {
+    pub(crate) fn shaken(touching: bool) -> Result<Self, String> {
         let passage = bouncing_bar::LENGTH / bouncing_bar::wave_speed();
         let mut bars = Self::new(Problem::Shaken { touching }, &[20], bouncing_bar::PERIOD / 64.0, 16, passage, false)?;
         bars.courant = vec![0.5, 0.25, 0.125, 0.0625, 0.03125];

@@ -42,7 +42,7 @@ const QUICK_REFERENCE: u32 = 64;
 const PARTING_DIVISION: u32 = 16;
 
 /// The cube with several numbers of modes of its rings.
-pub struct Cube {
+pub(crate) struct Cube {
     sizes: Vec<(usize, Scene)>,
     full: FullScene,
     quick: bool,
@@ -58,7 +58,7 @@ impl Cube {
     ///
     /// # Errors
     /// The reduction or a reference fails; never with what ships.
-    pub fn new(quick: bool, cache: &RomCache, console: &Console) -> Result<Self> {
+    pub(crate) fn new(quick: bool, cache: &RomCache, console: &Console) -> Result<Self> {
         let shipped = scene_source::load("builtin:cube-between-rings", cache, console)?;
         let mut sizes = Vec::new();
         for &modes in if quick { &QUICK_MODES[..] } else { &MODES[..] } {

@@ -11,7 +11,7 @@ use super::{
 };
 
 /// A run that is over: the methods run to the end in one go and keep a history, which is then walked through.
-pub struct FullRun {
+pub(crate) struct FullRun {
     history: History,
     step: f64,
     speed: f64,
@@ -26,7 +26,12 @@ impl FullRun {
     ///
     /// # Errors
     /// What the method refuses.
-    pub fn new(scene: &Scene, method: Full, (interval, samples): (f64, usize), division: u32) -> Result<Self, String> {
+    pub(crate) fn new(
+        scene: &Scene,
+        method: Full,
+        (interval, samples): (f64, usize),
+        division: u32,
+    ) -> Result<Self, String> {
         let method = match method {
             Full::Film => Method::Film(Default::default()),
             Full::Bipotential => Method::Bipotential,
@@ -47,7 +52,7 @@ impl FullRun {
 }
 
 /// Displacements of the nodes of a body that flies along −y, without the flight (m).
-pub fn without_flight(displacements: impl IntoIterator<Item = f64>, flown: f64) -> Vec<f64> {
+pub(crate) fn without_flight(displacements: impl IntoIterator<Item = f64>, flown: f64) -> Vec<f64> {
     let all = displacements.into_iter().enumerate();
     all.map(|(index, value)| if index % 3 == 1 { value + flown } else { value }).collect()
 }

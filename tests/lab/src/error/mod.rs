@@ -1,18 +1,18 @@
 //! Error against run time of the standard problems, beside methods that share nothing with the product.
 
-pub mod bars;
-pub mod cube;
-pub mod full;
-pub mod outside;
-pub mod rods;
-pub mod rotor;
-pub mod stage;
+pub(crate) mod bars;
+pub(crate) mod cube;
+pub(crate) mod full;
+pub(crate) mod outside;
+pub(crate) mod rods;
+pub(crate) mod rotor;
+pub(crate) mod stage;
+mod turning;
 
 use bars::Bars;
 use case::Case;
 use cube::Cube;
-use rotor::Rotor;
-use stage::Disk;
+use rotor::{Rub, rotor};
 use tiprub_gallery::rom_cache::RomCache;
 use tiprub_shell::{Failure, Result, console::Console};
 use tiprub_study::{
@@ -26,7 +26,7 @@ use crate::cli::{ErrorArguments, ErrorScene};
 ///
 /// # Errors
 /// A reference fails; never with the scenes that ship.
-pub fn study(arguments: &ErrorArguments, console: &Console) -> Result<Study> {
+pub(crate) fn study(arguments: &ErrorArguments, console: &Console) -> Result<Study> {
     let scenes = if arguments.scenes.is_empty() { ErrorScene::ALL.to_vec() } else { arguments.scenes.clone() };
     let quick = arguments.common.quick;
     let cache = arguments.common.cache.cache();
@@ -48,9 +48,9 @@ fn case_of(scene: ErrorScene, quick: bool, cache: &RomCache, console: &Console) 
     Ok(match scene {
         ErrorScene::Carpenter => Box::new(Bars::carpenter(quick).map_err(never)?),
         ErrorScene::BouncingBar => Box::new(Bars::bouncing(quick).map_err(never)?),
-        ErrorScene::Rotor37Light => Box::new(Rotor::new(false, quick, cache, console)?),
-        ErrorScene::Rotor37Heavy => Box::new(Rotor::new(true, quick, cache, console)?),
+        ErrorScene::Rotor37Light => Box::new(rotor(Rub::Light, quick, cache, console)?),
+        ErrorScene::Rotor37Heavy => Box::new(rotor(Rub::Heavy, quick, cache, console)?),
         ErrorScene::Cube => Box::new(Cube::new(quick, cache, console)?),
-        ErrorScene::Stage => Box::new(Disk::new(quick, cache, console)?),
+        ErrorScene::Stage => Box::new(stage::stage(quick, cache, console)?),
     })
 }

@@ -14,7 +14,7 @@ use super::{
 
 /// How soft contact may be: what augmented Lagrangian and penalty need to know of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Softness {
+pub(crate) struct Softness {
     /// Contact stiffness of the softer penalty (N/m); the augmented Lagrangian has ten times as much.
     pub stiffness: f64,
     /// Penetration that the augmented Lagrangian lets pass (m).
@@ -24,15 +24,13 @@ pub struct Softness {
 }
 
 /// A run of a method of the reference crate.
-pub struct OutsideRun<'a, S: Scene> {
+pub(crate) struct OutsideRun<'a, S: Scene> {
     scene: &'a S,
     method: Box<dyn Method + 'a>,
     step: f64,
     steps: u64,
     /// Internal steps per sample.
     division: u32,
-    /// Count the potential of the loads as energy.
-    potential: bool,
 }
 
 impl<'a, S: Scene> OutsideRun<'a, S> {
@@ -40,7 +38,7 @@ impl<'a, S: Scene> OutsideRun<'a, S> {
     ///
     /// # Errors
     /// A step that the method refuses; a competitor that is none of the reference crate.
-    pub fn new(
+    pub(crate) fn new(
         scene: &'a S,
         competitor: Competitor,
         interval: f64,
@@ -57,12 +55,7 @@ impl<'a, S: Scene> OutsideRun<'a, S> {
             Competitor::Penalty(times) => Box::new(Penalty::new(scene, step, f64::from(times) * stiffness)?),
             Competitor::Core(..) | Competitor::Full(_) => return Err("this is no method of the reference crate".into()),
         };
-        Ok(Self { scene, method, step, steps: 0, division, potential: true })
-    }
-
-    /// Leave the potential of the loads out of the energy, as a whole scene does.
-    pub fn without_potential(self) -> Self {
-        Self { potential: false, ..self }
+        Ok(Self { scene, method, step, steps: 0, division })
     }
 
     #[expect(clippy::cast_precision_loss, reason = "step counts are below 2^52")]
@@ -91,9 +84,6 @@ impl<S: Scene> Run for OutsideRun<'_, S> {
     }
 
     fn energy(&self) -> f64 {
-        if !self.potential {
-            return self.method.energy();
-        }
         let potential: f64 = self.scene.load().iter().zip(self.method.state().0).map(|(f, q)| f * q).sum();
         self.method.energy() - potential
     }

@@ -2,15 +2,14 @@
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::{
-    Rom,
     contact::gap::{Drive, FixedGap, GapLaw},
     dynamics::{bank::BankOptions, modal::ModalModel, sectors::SectorModel},
-    rom::{ContactNode, Frame, RomChecks, RomExtras},
     settings::{Scheme, Solver},
     stability::{self, massless},
     system::{System, SystemSettings},
 };
 use tiprub_reference::reduced::bars::Rod;
+use tiprub_test_models::{node, structure};
 
 use super::run::{Run, Seen};
 
@@ -19,7 +18,7 @@ const NORMAL: [f64; 3] = [-1.0, 0.0, 0.0];
 
 /// A rod prepared for the core.
 #[derive(Debug, Clone)]
-pub struct CoreRod {
+pub(crate) struct CoreRod {
     model: ModalModel,
     load: Vec<f64>,
     start: [Vec<f64>; 2],
@@ -34,23 +33,12 @@ impl CoreRod {
     ///
     /// # Errors
     /// Never with rods.
-    pub fn new(rod: &Rod, ends: usize, whole: bool) -> Result<Self, String> {
+    pub(crate) fn new(rod: &Rod, ends: usize, whole: bool) -> Result<Self, String> {
         let count = rod.closing.len();
         let mut contact_map = DMatrix::zeros(3, count);
         contact_map.row_mut(0).copy_from(&rod.closing.transpose());
-        let rom = Rom {
-            name: "rod".into(),
-            origin: "linear rod elements, lumped mass".into(),
-            sectors: 1,
-            frame: Frame::Cartesian,
-            mass: rod.mass.clone(),
-            stiffness: rod.stiffness.clone(),
-            damping_ratio: 0.0,
-            contact_map,
-            contact_nodes: vec![ContactNode { name: "end".into(), position: [0.0; 3], meridional_slope: 0.0 }],
-            checks: RomChecks::default(),
-            extras: RomExtras::default(),
-        };
+        let nodes = vec![node("end", [0.0; 3], 0.0)];
+        let rom = structure("rod", rod.mass.clone(), rod.stiffness.clone(), contact_map, nodes);
         let model = ModalModel::from_rom(&rom, 0.0).map_err(|error| error.to_string())?;
         let model = ModalModel { quasi_static: ends, ..model };
         let amplitudes = |values: &DVector<f64>| model.modal_load((&rod.mass * values).as_slice());
@@ -69,7 +57,7 @@ impl CoreRod {
     ///
     /// # Errors
     /// Steps beyond the limit of the scheme, with numbers.
-    pub fn run(
+    pub(crate) fn run(
         &self,
         (scheme, solver): (Scheme, Solver),
         interval: f64,
@@ -110,7 +98,7 @@ impl CoreRod {
 }
 
 /// A run of a rod.
-pub struct RodRun<'a> {
+pub(crate) struct RodRun<'a> {
     rod: &'a CoreRod,
     system: System,
     division: u32,

@@ -7,12 +7,9 @@ use tiprub_reference::reduced::rub::{BladeScene, Blades, Tip};
 use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
-    case::{Case, without_finest},
-    competitor::{Competitor, Family},
-    outside::{OutsideRun, Softness},
-    run::Run,
-    scene::SceneRun,
-    window,
+    competitor::Family,
+    outside::Softness,
+    turning::{Facts, Turning},
 };
 
 /// Component modes kept beside the contact nodes' own.
@@ -27,8 +24,7 @@ const INTERVAL: f64 = 1e-5;
 const SAMPLES: usize = 349;
 const QUICK_SAMPLES: usize = 150;
 /// Runs are followed for so many windows to see whether they part, with so many internal steps per sample.
-const LONG: usize = 3;
-const PARTING_DIVISION: u32 = 20;
+const LONG: (usize, u32) = (3, 20);
 /// Internal steps per sample; the limit of central differences is at 5.8.
 const DIVISIONS: [u32; 8] = [1, 2, 5, 6, 10, 20, 40, 80];
 const QUICK_DIVISIONS: [u32; 5] = [2, 5, 10, 20, 40];
@@ -38,40 +34,58 @@ const QUICK_REFERENCES: (u32, u32) = (320, 160);
 /// Contact stiffness of soft methods (N/m) per node, the penetration they may leave and how near a node takes part (m).
 const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 5e-6, margin: 2e-5 };
 
-/// A rub of rotor 37.
-pub struct Rotor {
-    heavy: bool,
-    sizes: Vec<(usize, Scene, BladeScene)>,
-    divisions: Vec<u32>,
-    references: (u32, u32),
-    samples: usize,
-    parting: Vec<f64>,
+/// How deep the bumps are.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Rub {
+    Light,
+    Heavy,
 }
 
-impl Rotor {
-    /// Reduce the blade (or take it from the cache) with several numbers of modes.
-    ///
-    /// # Errors
-    /// The reduction refuses; never with what ships.
-    pub fn new(heavy: bool, quick: bool, cache: &RomCache, console: &Console) -> Result<Self> {
-        let mut sizes = Vec::new();
-        for &modes in if quick { &QUICK_MODES[..] } else { &MODES[..] } {
-            let rom = blade(modes, quick, cache, console)?;
-            let mut scene = scene_source::rotor37_scene_with(rom)?;
-            if let Shape::TwoLobe { depth, .. } = &mut scene.settings.surfaces[0].shape {
-                *depth = if heavy { HEAVY } else { LIGHT };
-            }
-            let outside = outside(&scene).ok_or_else(|| Failure::new("rotor 37", "the blade has no mass", ""))?;
-            sizes.push((modes, scene, outside));
+/// Reduce the blade (or take it from the cache) with several numbers of modes.
+///
+/// # Errors
+/// The reduction refuses; never with what ships.
+pub(crate) fn rotor(rub: Rub, quick: bool, cache: &RomCache, console: &Console) -> Result<Turning<BladeScene>> {
+    let (name, figures, title, intrusion, bumps) = match rub {
+        Rub::Light => {
+            let figures = ["rotor37-light-steps", "rotor37-light-total"];
+            ("rotor37-light", figures, "Rotor 37, light rub", "a fifth of the gap", LIGHT)
         }
-        let divisions = if quick { QUICK_DIVISIONS.to_vec() } else { DIVISIONS.to_vec() };
-        let (references, samples) = if quick { (QUICK_REFERENCES, QUICK_SAMPLES) } else { (REFERENCES, SAMPLES) };
-        let mut rotor = Self { heavy, sizes, divisions, references, samples, parting: Vec::new() };
-        rotor.parting = window::parting(&rotor, PARTING_DIVISION, LONG * samples)
-            .map_err(|problem| Failure::new("rotor 37", problem, "Report this to the developers"))?;
-        rotor.samples = window::samples(&rotor.parting, samples);
-        Ok(rotor)
+        Rub::Heavy => {
+            let figures = ["rotor37-heavy-steps", "rotor37-heavy-total"];
+            ("rotor37-heavy", figures, "Rotor 37, heavy rub", "the whole gap", HEAVY)
+        }
+    };
+    let mut sizes = Vec::new();
+    for &modes in if quick { &QUICK_MODES[..] } else { &MODES[..] } {
+        let rom = blade(modes, quick, cache, console)?;
+        let mut scene = scene_source::rotor37_scene_with(rom)?;
+        if let Shape::TwoLobe { depth, .. } = &mut scene.settings.surfaces[0].shape {
+            *depth = bumps;
+        }
+        let outside = outside(&scene).ok_or_else(|| Failure::new("rotor 37", "the blade has no mass", ""))?;
+        sizes.push((modes, scene, outside));
     }
+    let description = format!(
+        "36 blades of rotor 37 at design speed rub with µ = 0.15 against a rigid casing whose two bumps intrude by {intrusion}. The truth \
+         is the reference with most component modes."
+    );
+    let facts = Facts {
+        name,
+        figures,
+        title,
+        description,
+        size_name: "component modes",
+        interval: INTERVAL,
+        samples: [if quick { QUICK_SAMPLES } else { SAMPLES }, 10],
+        long: LONG,
+        divisions: if quick { QUICK_DIVISIONS.to_vec() } else { DIVISIONS.to_vec() },
+        outside_divisions: None,
+        references: if quick { QUICK_REFERENCES } else { REFERENCES },
+        families: [vec![Family::MASSLESS, Family::STICKING, Family::BOTH], vec![Family::MASSLESS]],
+        softness: SOFTNESS,
+    };
+    Turning::new(facts, sizes)
 }
 
 fn blade(modes: usize, quick: bool, cache: &RomCache, console: &Console) -> Result<Rom> {
@@ -104,85 +118,4 @@ fn outside(scene: &Scene) -> Option<BladeScene> {
         friction: contact.friction,
         bumps: [2.0 * contact.gap * depth, width, surface.ramp_time],
     })
-}
-
-impl Case for Rotor {
-    fn name(&self) -> &'static str {
-        if self.heavy { "rotor37-heavy" } else { "rotor37-light" }
-    }
-
-    fn figures(&self) -> [&'static str; 2] {
-        match self.heavy {
-            false => ["rotor37-light-steps", "rotor37-light-total"],
-            true => ["rotor37-heavy-steps", "rotor37-heavy-total"],
-        }
-    }
-
-    fn title(&self) -> &'static str {
-        if self.heavy { "Rotor 37, heavy rub" } else { "Rotor 37, light rub" }
-    }
-
-    fn description(&self) -> String {
-        let gap = if self.heavy { "the whole gap" } else { "a fifth of the gap" };
-        format!(
-            "36 blades of rotor 37 at design speed rub with µ = 0.15 against a rigid casing whose two bumps intrude by {gap}. The truth \
-             is the reference with most component modes."
-        )
-    }
-
-    fn size_name(&self) -> &'static str {
-        "component modes"
-    }
-
-    fn sizes(&self) -> Vec<usize> {
-        self.sizes.iter().map(|size| size.0).collect()
-    }
-
-    fn interval(&self) -> f64 {
-        INTERVAL
-    }
-
-    fn samples(&self) -> usize {
-        self.samples
-    }
-
-    fn impulse_window(&self) -> usize {
-        10
-    }
-
-    /// Steps are compared at the standard size; the others leave the finest out.
-    fn divisions(&self, size: usize) -> Vec<u32> {
-        without_finest(&self.divisions, size == self.standard())
-    }
-
-    fn reference_divisions(&self, size: usize) -> (u32, u32) {
-        let (own, outside) = self.references;
-        // Only where steps are compared must the outside reference be as fine.
-        (own, if size == self.standard() { outside } else { outside / 4 })
-    }
-
-    fn families(&self, size: usize) -> Vec<Family> {
-        let all = vec![Family::MASSLESS, Family::STICKING, Family::BOTH];
-        if size == self.standard() { all } else { vec![Family::MASSLESS] }
-    }
-
-    fn parting(&self) -> &[f64] {
-        &self.parting
-    }
-
-    fn start<'a>(
-        &'a self,
-        size: usize,
-        competitor: Competitor,
-        division: u32,
-        perturbation: f64,
-    ) -> Result<Box<dyn Run + 'a>, String> {
-        let (_, scene, outside) = &self.sizes[size];
-        Ok(match competitor {
-            Competitor::Core(scheme, solver) => {
-                Box::new(SceneRun::new(scene, (scheme, solver), INTERVAL, division, perturbation)?)
-            }
-            _ => Box::new(OutsideRun::new(outside, competitor, INTERVAL, division, SOFTNESS)?),
-        })
-    }
 }

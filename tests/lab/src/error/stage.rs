@@ -8,12 +8,9 @@ use tiprub_reference::reduced::disk::{Casing, Pencil, Stage, StageScene};
 use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
-    case::{Case, without_finest},
-    competitor::{Competitor, Family},
-    outside::{OutsideRun, Softness},
-    run::Run,
-    scene::SceneRun,
-    window,
+    competitor::Family,
+    outside::Softness,
+    turning::{Facts, Turning},
 };
 
 /// Component modes per nodal diameter.
@@ -27,8 +24,7 @@ const RAMP: f64 = 1.5e-3;
 const SAMPLES: usize = 125;
 const QUICK_SAMPLES: usize = 75;
 /// Runs are followed for so many windows to see whether they part.
-const LONG: usize = 2;
-const PARTING_DIVISION: u32 = 16;
+const LONG: (usize, u32) = (2, 16);
 const DIVISIONS: [u32; 6] = [4, 8, 12, 16, 32, 64];
 const QUICK_DIVISIONS: [u32; 3] = [2, 8, 16];
 const REFERENCES: (u32, u32) = (256, 128);
@@ -38,38 +34,38 @@ const OUTSIDE_DIVISIONS: [u32; 3] = [8, 16, 32];
 /// Contact stiffness of soft methods (N/m) per node, the penetration they may leave and how near a node takes part (m).
 const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 5e-6, margin: 2e-5 };
 
-/// The stage with several numbers of component modes.
-pub struct Disk {
-    sizes: Vec<(usize, Scene, StageScene)>,
-    divisions: Vec<u32>,
-    references: (u32, u32),
-    samples: usize,
-    parting: Vec<f64>,
-}
-
-impl Disk {
-    /// Reduce the disk on its coarse mesh with several numbers of modes (or take it from the cache).
-    ///
-    /// # Errors
-    /// The reduction refuses; never with what ships.
-    pub fn new(quick: bool, cache: &RomCache, console: &Console) -> Result<Self> {
-        let coarse = scene_source::stage_scene(true, cache, console)?;
-        let mut sizes = Vec::new();
-        for &modes in if quick { &QUICK_MODES[..] } else { &MODES[..] } {
-            let mut scene = coarse.clone();
-            scene.roms[0] = disk(modes, cache, console)?;
-            scene.settings.surfaces[0].ramp_time = RAMP;
-            let outside = outside(&scene).ok_or_else(|| Failure::new("stage", "the disk has no mass", ""))?;
-            sizes.push((modes, scene, outside));
-        }
-        let divisions = if quick { QUICK_DIVISIONS.to_vec() } else { DIVISIONS.to_vec() };
-        let (references, samples) = if quick { (QUICK_REFERENCES, QUICK_SAMPLES) } else { (REFERENCES, SAMPLES) };
-        let mut disk = Self { sizes, divisions, references, samples, parting: Vec::new() };
-        disk.parting = window::parting(&disk, PARTING_DIVISION, LONG * samples)
-            .map_err(|problem| Failure::new("stage", problem, "Report this to the developers"))?;
-        disk.samples = window::samples(&disk.parting, samples);
-        Ok(disk)
+/// Reduce the disk on its coarse mesh with several numbers of modes (or take it from the cache).
+///
+/// # Errors
+/// The reduction refuses; never with what ships.
+pub(crate) fn stage(quick: bool, cache: &RomCache, console: &Console) -> Result<Turning<StageScene>> {
+    let coarse = scene_source::stage_scene(true, cache, console)?;
+    let mut sizes = Vec::new();
+    for &modes in if quick { &QUICK_MODES[..] } else { &MODES[..] } {
+        let mut scene = coarse.clone();
+        scene.roms[0] = disk(modes, cache, console)?;
+        scene.settings.surfaces[0].ramp_time = RAMP;
+        let outside = outside(&scene).ok_or_else(|| Failure::new("stage", "the disk has no mass", ""))?;
+        sizes.push((modes, scene, outside));
     }
+    let description = "56 coupled sectors (coarse mesh) in an elastic casing that goes oval until it touches, µ = 0.15. The truth is the \
+                       reference with most component modes.";
+    let facts = Facts {
+        name: "stage",
+        figures: ["stage-steps", "stage-total"],
+        title: "Stage, coupled sectors",
+        description: description.into(),
+        size_name: "modes per nodal diameter",
+        interval: INTERVAL,
+        samples: [if quick { QUICK_SAMPLES } else { SAMPLES }, 5],
+        long: LONG,
+        divisions: if quick { QUICK_DIVISIONS.to_vec() } else { DIVISIONS.to_vec() },
+        outside_divisions: (!quick).then(|| OUTSIDE_DIVISIONS.to_vec()),
+        references: if quick { QUICK_REFERENCES } else { REFERENCES },
+        families: [vec![Family::MASSLESS, Family::STICKING], Vec::new()],
+        softness: SOFTNESS,
+    };
+    Turning::new(facts, sizes)
 }
 
 fn disk(modes: usize, cache: &RomCache, console: &Console) -> Result<Rom> {
@@ -114,87 +110,4 @@ fn outside(scene: &Scene) -> Option<StageScene> {
         friction: contact.friction,
         lobes: [amplitude, f64::from(order), phase, surface.ramp_time],
     })
-}
-
-impl Case for Disk {
-    fn name(&self) -> &'static str {
-        "stage"
-    }
-
-    fn figures(&self) -> [&'static str; 2] {
-        ["stage-steps", "stage-total"]
-    }
-
-    fn title(&self) -> &'static str {
-        "Stage, coupled sectors"
-    }
-
-    fn description(&self) -> String {
-        "56 coupled sectors (coarse mesh) in an elastic casing that goes oval until it touches, µ = 0.15. The truth is the reference with most \
-         component modes."
-            .into()
-    }
-
-    fn size_name(&self) -> &'static str {
-        "modes per nodal diameter"
-    }
-
-    fn sizes(&self) -> Vec<usize> {
-        self.sizes.iter().map(|size| size.0).collect()
-    }
-
-    fn interval(&self) -> f64 {
-        INTERVAL
-    }
-
-    fn samples(&self) -> usize {
-        self.samples
-    }
-
-    fn impulse_window(&self) -> usize {
-        5
-    }
-
-    /// Steps are compared at the standard size; the others leave the finest out.
-    fn divisions(&self, size: usize) -> Vec<u32> {
-        without_finest(&self.divisions, size == self.standard())
-    }
-
-    fn divisions_of(&self, size: usize, competitor: Competitor) -> Vec<u32> {
-        if competitor.is_core() || self.divisions.len() == QUICK_DIVISIONS.len() {
-            self.divisions(size)
-        } else {
-            OUTSIDE_DIVISIONS.to_vec()
-        }
-    }
-
-    fn reference_divisions(&self, size: usize) -> (u32, u32) {
-        let (own, outside) = self.references;
-        (own, if size == self.standard() { outside } else { outside / 4 })
-    }
-
-    fn families(&self, size: usize) -> Vec<Family> {
-        let all = vec![Family::MASSLESS, Family::STICKING];
-        if size == self.standard() { all } else { Vec::new() }
-    }
-
-    fn parting(&self) -> &[f64] {
-        &self.parting
-    }
-
-    fn start<'a>(
-        &'a self,
-        size: usize,
-        competitor: Competitor,
-        division: u32,
-        perturbation: f64,
-    ) -> Result<Box<dyn Run + 'a>, String> {
-        let (_, scene, outside) = &self.sizes[size];
-        Ok(match competitor {
-            Competitor::Core(scheme, solver) => {
-                Box::new(SceneRun::new(scene, (scheme, solver), INTERVAL, division, perturbation)?)
-            }
-            _ => Box::new(OutsideRun::new(outside, competitor, INTERVAL, division, SOFTNESS)?.without_potential()),
-        })
-    }
 }

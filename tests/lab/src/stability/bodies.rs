@@ -3,26 +3,27 @@
 use nalgebra::DMatrix;
 use tiprub_core::{
     Rom, Scene, Simulation,
-    rom::{ContactGrid, ContactNode, Frame, RomChecks, RomExtras},
+    rom::ContactGrid,
     settings::{
         ContactSettings, ExperimentSettings, Motion, OutputSettings, SceneSettings, Scheme, Solver, StructureSettings,
         SurfaceSettings, TimeSettings,
     },
 };
+use tiprub_test_models::{node, structure};
 
 use super::observe::real;
 
 /// Half the side of the body (m), and half its width.
-pub const HALF: f64 = 0.02;
+pub(crate) const HALF: f64 = 0.02;
 /// Half the extent of a plate along y (m).
-pub const PLATE: f64 = 0.09;
+pub(crate) const PLATE: f64 = 0.09;
 /// Nodes that move in one step by more than this could pass a surface unseen (m): a tenth of the body.
-pub const FURTHEST: f64 = 0.1 * 2.0 * HALF;
+pub(crate) const FURTHEST: f64 = 0.1 * 2.0 * HALF;
 
 /// Lumps in a row along x, the first at the left face and the last at the right one; four contact nodes on each of these faces.
 /// One lump is a rigid body without rotation: it has both faces.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Body {
+pub(crate) struct Body {
     /// Masses of the lumps (kg).
     pub masses: Vec<f64>,
     /// Stiffness of the springs between neighbours, each direction (N/m).
@@ -35,22 +36,22 @@ pub struct Body {
 
 impl Body {
     /// One lump at the origin.
-    pub fn rigid(mass: f64) -> Self {
+    pub(crate) fn rigid(mass: f64) -> Self {
         Self { masses: vec![mass], spring: 0.0, centre: [0.0; 3], ground: 0.0 }
     }
 
     /// Lumps at the origin.
-    pub fn elastic(masses: &[f64], spring: f64) -> Self {
+    pub(crate) fn elastic(masses: &[f64], spring: f64) -> Self {
         Self { masses: masses.to_vec(), spring, ..Self::rigid(1.0) }
     }
 
     /// With its middle elsewhere.
-    pub fn at(self, centre: [f64; 3]) -> Self {
+    pub(crate) fn at(self, centre: [f64; 3]) -> Self {
         Self { centre, ..self }
     }
 
     /// Mass of all of it (kg).
-    pub fn mass(&self) -> f64 {
+    pub(crate) fn mass(&self) -> f64 {
         self.masses.iter().sum()
     }
 
@@ -95,25 +96,13 @@ fn rom(
     contact_map: DMatrix<f64>,
     nodes: Vec<(String, [f64; 3])>,
 ) -> Rom {
-    let node = |(name, position)| ContactNode { name, position, meridional_slope: 0.0 };
-    Rom {
-        name: name.into(),
-        origin: "lumps and springs".into(),
-        sectors: 1,
-        frame: Frame::Cartesian,
-        mass,
-        stiffness,
-        damping_ratio: 0.0,
-        contact_map,
-        contact_nodes: nodes.into_iter().map(node).collect(),
-        checks: RomChecks::default(),
-        extras: RomExtras::default(),
-    }
+    let nodes = nodes.into_iter().map(|(name, position)| node(name, position, 0.0)).collect();
+    structure(name, mass, stiffness, contact_map, nodes)
 }
 
 /// A plate beside the body: at x = −distance on the left, +distance on the right.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Plate {
+pub(crate) struct Plate {
     /// −1 left, 1 right.
     pub side: f64,
     /// From x = 0 (m), at the line nearest to the body.
@@ -126,12 +115,12 @@ pub struct Plate {
 
 impl Plate {
     /// Flat and rigid, to the left.
-    pub fn left(distance: f64) -> Self {
+    pub(crate) fn left(distance: f64) -> Self {
         Self { side: -1.0, distance, radius: 0.0, stiffness: 0.0 }
     }
 
     /// Flat and rigid, to the right.
-    pub fn right(distance: f64) -> Self {
+    pub(crate) fn right(distance: f64) -> Self {
         Self { side: 1.0, ..Self::left(distance) }
     }
 
@@ -159,7 +148,7 @@ impl Plate {
 
 /// A body thrown among plates.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Throw {
+pub(crate) struct Throw {
     /// The body.
     pub body: Body,
     /// Where it goes (m/s).
@@ -178,7 +167,7 @@ pub struct Throw {
 
 impl Throw {
     /// The scene.
-    pub fn scene(&self) -> Scene {
+    pub(crate) fn scene(&self) -> Scene {
         let name = |plate: &Plate| if plate.side < 0.0 { "left" } else { "right" };
         let mut structures = vec![StructureSettings {
             name: "body".into(),
@@ -223,6 +212,6 @@ impl Throw {
 }
 
 /// Three components of an output.
-pub fn vector(simulation: &Simulation, name: &str) -> [f64; 3] {
+pub(crate) fn vector(simulation: &Simulation, name: &str) -> [f64; 3] {
     ["x", "y", "z"].map(|axis| real(simulation, &format!("{name}_{axis}")))
 }

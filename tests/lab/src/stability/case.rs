@@ -9,7 +9,7 @@ const TIME_LIMIT: f64 = 120.0;
 
 /// What is expected of a case.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Expected {
+pub(crate) enum Expected {
     /// A right answer, and what it is held against.
     Right(String),
     /// A refusal that contains all words of one of these lists.
@@ -20,32 +20,32 @@ pub enum Expected {
 
 impl Expected {
     /// A right answer, and what it is held against.
-    pub fn right(against: impl Into<String>) -> Self {
+    pub(crate) fn right(against: impl Into<String>) -> Self {
         Self::Right(against.into())
     }
 
     /// A refusal that contains all of these words.
-    pub fn refused<const N: usize>(words: [&str; N]) -> Self {
+    pub(crate) fn refused<const N: usize>(words: [&str; N]) -> Self {
         Self::refused_as(&[&words])
     }
 
     /// A refusal that contains all words of one of these lists: where several are sound.
-    pub fn refused_as(lists: &[&[&str]]) -> Self {
+    pub(crate) fn refused_as(lists: &[&[&str]]) -> Self {
         Self::Refused(owned(lists))
     }
 
     /// A right answer or such a refusal.
-    pub fn either<const N: usize>(against: impl Into<String>, words: [&str; N]) -> Self {
+    pub(crate) fn either<const N: usize>(against: impl Into<String>, words: [&str; N]) -> Self {
         Self::either_as(against, &[&words])
     }
 
     /// A right answer or a refusal that contains all words of one of these lists.
-    pub fn either_as(against: impl Into<String>, lists: &[&[&str]]) -> Self {
+    pub(crate) fn either_as(against: impl Into<String>, lists: &[&[&str]]) -> Self {
         Self::Either(against.into(), owned(lists))
     }
 
     /// For tables.
-    pub fn to_text(&self) -> String {
+    pub(crate) fn to_text(&self) -> String {
         let named = |lists: &[Vec<String>]| {
             let lists: Vec<String> = lists.iter().map(|words| words.join(", ")).collect();
             format!("refusal naming {}", lists.join(" | "))
@@ -77,7 +77,7 @@ fn unnamed(message: &str, lists: &[Vec<String>]) -> Option<String> {
 
 /// One comparison: holds while `found` is a number and at most `bound`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Check {
+pub(crate) struct Check {
     /// What is compared.
     pub what: String,
     /// Size of the difference found.
@@ -88,22 +88,22 @@ pub struct Check {
 
 impl Check {
     /// Something that may be at most `bound`.
-    pub fn at_most(what: impl Into<String>, found: f64, bound: f64) -> Self {
+    pub(crate) fn at_most(what: impl Into<String>, found: f64, bound: f64) -> Self {
         Self { what: what.into(), found, bound }
     }
 
     /// Something that must be so.
-    pub fn so(what: impl Into<String>, holds: bool) -> Self {
+    pub(crate) fn so(what: impl Into<String>, holds: bool) -> Self {
         Self::at_most(what, if holds { 0.0 } else { 1.0 }, 0.0)
     }
 
     /// Relative difference of two numbers.
-    pub fn relative(what: impl Into<String>, found: f64, exact: f64, bound: f64) -> Self {
+    pub(crate) fn relative(what: impl Into<String>, found: f64, exact: f64, bound: f64) -> Self {
         Self::at_most(what, if exact == 0.0 { found.abs() } else { (found / exact - 1.0).abs() }, bound)
     }
 
     /// Whether it holds; not-a-number does not.
-    pub fn holds(&self) -> bool {
+    pub(crate) fn holds(&self) -> bool {
         self.found <= self.bound
     }
 
@@ -128,7 +128,7 @@ impl Check {
 
 /// What a case came to, when it came to an end of its own.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Happened {
+pub(crate) struct Happened {
     /// The refusal, if there was one.
     pub refusal: Option<String>,
     /// What was compared.
@@ -139,28 +139,28 @@ pub struct Happened {
 
 impl Happened {
     /// An answer with its checks.
-    pub fn answer(checks: Vec<Check>) -> Self {
+    pub(crate) fn answer(checks: Vec<Check>) -> Self {
         Self { checks, ..Self::default() }
     }
 
     /// A refusal.
-    pub fn refused(message: impl ToString) -> Self {
+    pub(crate) fn refused(message: impl ToString) -> Self {
         Self { refusal: Some(message.to_string()), ..Self::default() }
     }
 
     /// The outcome of work that may be refused by the core.
-    pub fn of(outcome: tiprub_core::Result<Vec<Check>>) -> Self {
+    pub(crate) fn of(outcome: tiprub_core::Result<Vec<Check>>) -> Self {
         outcome.map_or_else(Self::refused, Self::answer)
     }
 
     /// With a figure worth telling.
-    pub fn remark(mut self, text: impl Into<String>) -> Self {
+    pub(crate) fn remark(mut self, text: impl Into<String>) -> Self {
         self.remarks.push(text.into());
         self
     }
 
     /// For the parent process.
-    pub fn to_json(&self) -> Value {
+    pub(crate) fn to_json(&self) -> Value {
         // Numbers as bits: JSON knows neither NaN nor infinity.
         let checks = self
             .checks
@@ -170,7 +170,7 @@ impl Happened {
     }
 
     /// What a child process wrote.
-    pub fn from_json(value: &Value) -> Option<Self> {
+    pub(crate) fn from_json(value: &Value) -> Option<Self> {
         let number = |value: &Value| value.as_u64().map(f64::from_bits);
         let check = |check: &Value| {
             let what = check["what"].as_str()?.to_owned();
@@ -187,7 +187,7 @@ impl Happened {
 
 /// What a case is worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
+pub(crate) enum Verdict {
     /// A right answer.
     Right,
     /// Refused as it should be.
@@ -202,10 +202,10 @@ pub enum Verdict {
 
 impl Verdict {
     /// All of them, in the order of a table.
-    pub const ALL: [Self; 5] = [Self::Right, Self::Refused, Self::Wrong, Self::Crashed, Self::Hung];
+    pub(crate) const ALL: [Self; 5] = [Self::Right, Self::Refused, Self::Wrong, Self::Crashed, Self::Hung];
 
     /// In a word.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Right => "right",
             Self::Refused => "refused",
@@ -217,7 +217,7 @@ impl Verdict {
 }
 
 /// Verdict on what happened, and what to say about it.
-pub fn judge(expected: &Expected, happened: &Happened) -> (Verdict, String) {
+pub(crate) fn judge(expected: &Expected, happened: &Happened) -> (Verdict, String) {
     let failed: Vec<String> = happened.checks.iter().filter(|check| !check.holds()).map(Check::to_text).collect();
     let remarks = happened.remarks.iter().map(|remark| format!("; {remark}")).collect::<String>();
     let words = match expected {
@@ -254,7 +254,7 @@ fn tightest(checks: &[Check]) -> String {
 
 /// What a case may use beside its own models.
 #[derive(Debug, Clone, Default)]
-pub struct Context {
+pub(crate) struct Context {
     /// Directory with packaged FMUs, where the parent made some.
     pub fmus: Option<PathBuf>,
 }
@@ -263,7 +263,7 @@ pub struct Context {
 type Work = Box<dyn Fn(&Context) -> Happened + Send + Sync>;
 
 /// One row of the table.
-pub struct Case {
+pub(crate) struct Case {
     /// Family, slash, what sets it apart: `step-limit/central-difference/lcp/h=0.9`.
     pub name: String,
     /// What is expected.
@@ -285,7 +285,7 @@ impl std::fmt::Debug for Case {
 
 impl Case {
     /// A case of the full table.
-    pub fn new(
+    pub(crate) fn new(
         name: impl Into<String>,
         expected: Expected,
         work: impl Fn(&Context) -> Happened + Send + Sync + 'static,
@@ -295,28 +295,52 @@ impl Case {
     }
 
     /// Also in the quick table, if `so`.
-    pub fn quick(self, so: bool) -> Self {
+    pub(crate) fn quick(self, so: bool) -> Self {
         Self { quick: so, ..self }
     }
 
     /// With another time limit (s).
-    pub fn within(self, limit: f64) -> Self {
+    pub(crate) fn within(self, limit: f64) -> Self {
         Self { limit, ..self }
     }
 
     /// Needs packaged FMUs.
-    pub fn importing(self) -> Self {
+    pub(crate) fn importing(self) -> Self {
         Self { imports: true, ..self }
     }
 
     /// What comes before the first slash.
-    pub fn family(&self) -> &str {
+    pub(crate) fn family(&self) -> &str {
         self.name.split('/').next().unwrap_or(&self.name)
     }
 
     /// Do it, in this process.
-    pub fn run(&self, context: &Context) -> Happened {
+    pub(crate) fn run(&self, context: &Context) -> Happened {
         (self.work)(context)
+    }
+}
+
+/// Cases in a row.
+pub(crate) trait Cases {
+    /// One whose work finds checks, or is refused; in the quick table as well, if `quick`.
+    fn add(
+        &mut self,
+        quick: bool,
+        name: impl Into<String>,
+        expected: Expected,
+        work: impl Fn() -> tiprub_core::Result<Vec<Check>> + Send + Sync + 'static,
+    );
+}
+
+impl Cases for Vec<Case> {
+    fn add(
+        &mut self,
+        quick: bool,
+        name: impl Into<String>,
+        expected: Expected,
+        work: impl Fn() -> tiprub_core::Result<Vec<Check>> + Send + Sync + 'static,
+    ) {
+        self.push(Case::new(name, expected, move |_| Happened::of(work())).quick(quick));
     }
 }
 

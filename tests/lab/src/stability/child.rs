@@ -22,7 +22,7 @@ const LAST_WORDS: usize = 300;
 
 /// One row of the table, filled in.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub(crate) struct Row {
     /// Name of the case.
     pub name: String,
     /// What was expected.
@@ -45,7 +45,7 @@ fn program() -> std::io::Result<PathBuf> {
 ///
 /// # Errors
 /// No child process can be started.
-pub fn run(case: &Case, context: &Context) -> Result<Row> {
+pub(crate) fn run(case: &Case, context: &Context) -> Result<Row> {
     let clock = Instant::now();
     let lost = |error: std::io::Error| Failure::new("child process", error, "Free memory and try again");
     let mut command = Command::new(program().map_err(lost)?);
@@ -110,7 +110,7 @@ fn wait(child: &mut Child, limit: Duration) -> std::io::Result<Option<String>> {
 ///
 /// # Errors
 /// There is no such case.
-pub fn answer(name: &str) -> Result<serde_json::Value> {
+pub(crate) fn answer(name: &str) -> Result<serde_json::Value> {
     let case = super::named(name, false).into_iter().find(|case| case.name == name);
     let case = case.ok_or_else(|| Failure::usage("--child", format!("there is no case {name}"), ""))?;
     let context = Context { fmus: env::var_os(FMUS).map(Into::into) };

@@ -21,7 +21,7 @@ use crate::{
 ///
 /// # Errors
 /// No case of that name, files that cannot be written, or a case that is neither right nor refused as it should be.
-pub fn run(arguments: &StabilityArguments, console: &Console) -> Result<Outcome> {
+pub(crate) fn run(arguments: &StabilityArguments, console: &Console) -> Result<Outcome> {
     if let Some(name) = &arguments.child {
         let json = child::answer(name)?;
         return Ok(Outcome { text: json.to_string(), json });

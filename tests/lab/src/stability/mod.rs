@@ -4,25 +4,26 @@
 //! happened into a [`Verdict`]. Every case runs in a child process of this program with a time limit ([`child`]), so that a
 //! crash, an abort or a hang is seen as what it is. [`families`] holds the cases, [`table`] writes them down.
 
-pub mod bodies;
-pub mod case;
-pub mod child;
-pub mod command;
-pub mod families;
-pub mod models;
-pub mod observe;
-pub mod press;
-pub mod table;
+pub(crate) mod bodies;
+pub(crate) mod case;
+pub(crate) mod child;
+pub(crate) mod command;
+pub(crate) mod families;
+pub(crate) mod models;
+pub(crate) mod observe;
+pub(crate) mod press;
+pub(crate) mod table;
 
-pub use case::{Case, Check, Context, Expected, Happened, Verdict, judge};
+pub(crate) use case::{Case, Cases, Check, Context, Expected, judge};
+pub(crate) use case::{Happened, Verdict};
 
 /// All cases of the full table, or of the quick one; those that prove the judge itself come with their family's name only.
-pub fn cases(quick: bool) -> Vec<Case> {
+pub(crate) fn cases(quick: bool) -> Vec<Case> {
     families::all().into_iter().filter(|case| case.quick || !quick).collect()
 }
 
 /// Cases whose name begins with `prefix`; those of the judge's own proof are among them only here.
-pub fn named(prefix: &str, quick: bool) -> Vec<Case> {
+pub(crate) fn named(prefix: &str, quick: bool) -> Vec<Case> {
     let proof = families::proof::cases();
     cases(quick).into_iter().chain(proof).filter(|case| case.name.starts_with(prefix)).collect()
 }

@@ -1,17 +1,27 @@
 //! What is watched while a simulation runs, each time from the state and not from what the solver said.
 
 use tiprub_core::{
-    Result, Simulation,
+    Result, Scene, Simulation,
     settings::{Scheme, Shape},
 };
 
 use super::Check;
 
 /// Largest share of the energy exchanged that massless-boundary may give back in one step: its warning names it.
-pub const MASSLESS_RETURN: f64 = 2e-2;
+pub(crate) const MASSLESS_RETURN: f64 = 2e-2;
+
+/// At time 0, with what watches it.
+///
+/// # Errors
+/// The scene is refused.
+pub(crate) fn begin(scene: &Scene) -> Result<(Simulation, Watch)> {
+    let mut simulation = Simulation::new(scene)?;
+    simulation.initialise(0.0)?;
+    Ok((simulation, Watch::new(scene)))
+}
 
 /// Value of a real variable that the scene has.
-pub fn real(simulation: &Simulation, name: &str) -> f64 {
+pub(crate) fn real(simulation: &Simulation, name: &str) -> f64 {
     let row = simulation.table().find(name);
     row.and_then(|row| simulation.real(row.reference).ok()).unwrap_or(f64::NAN)
 }
@@ -20,13 +30,13 @@ pub fn real(simulation: &Simulation, name: &str) -> f64 {
 ///
 /// # Errors
 /// The value is refused.
-pub fn set(simulation: &mut Simulation, name: &str, value: f64) -> Result<()> {
+pub(crate) fn set(simulation: &mut Simulation, name: &str, value: f64) -> Result<()> {
     let Some(reference) = simulation.table().find(name).map(|row| row.reference) else { return Ok(()) };
     simulation.set_real(reference, value)
 }
 
 /// All numeric outputs, to compare two runs bit by bit.
-pub fn outputs(simulation: &Simulation) -> Vec<f64> {
+pub(crate) fn outputs(simulation: &Simulation) -> Vec<f64> {
     let mut values = Vec::new();
     for variable in simulation.table().variables() {
         for reference in (variable.reference..).take(variable.len()) {
@@ -39,13 +49,13 @@ pub fn outputs(simulation: &Simulation) -> Vec<f64> {
 }
 
 /// The same as bits.
-pub fn bits(simulation: &Simulation) -> Vec<u64> {
+pub(crate) fn bits(simulation: &Simulation) -> Vec<u64> {
     outputs(simulation).into_iter().map(f64::to_bits).collect()
 }
 
 /// Of the radial displacement of the first ring of the 36 × 3 nodes of the casing: amplitudes of cos nθ and of sin nθ, and the
 /// largest rest at any node (m).
-pub fn amplitudes(simulation: &Simulation, order: u32) -> [f64; 3] {
+pub(crate) fn amplitudes(simulation: &Simulation, order: u32) -> [f64; 3] {
     let Some(row) = simulation.table().find("casing_displacement").map(|row| row.reference) else {
         return [f64::NAN; 3];
     };
@@ -59,7 +69,7 @@ pub fn amplitudes(simulation: &Simulation, order: u32) -> [f64; 3] {
 
 /// Largest of everything that should be small, over a run.
 #[derive(Debug, Clone)]
-pub struct Watch {
+pub(crate) struct Watch {
     sectors: usize,
     slopes: Vec<f64>,
     clearances: Vec<f64>,
@@ -88,7 +98,7 @@ pub struct Watch {
 
 impl Watch {
     /// Before the first step of an initialised simulation of `scene`.
-    pub fn new(scene: &tiprub_core::Scene) -> Self {
+    pub(crate) fn new(scene: &tiprub_core::Scene) -> Self {
         let (contact, rom) = (&scene.settings.contacts[0], &scene.roms[0]);
         let clearances =
             if contact.sector_gaps.is_empty() { vec![contact.gap; rom.sectors] } else { contact.sector_gaps.clone() };
@@ -124,7 +134,7 @@ impl Watch {
     ///
     /// # Errors
     /// The step is refused.
-    pub fn step(&mut self, simulation: &mut Simulation, length: f64) -> Result<()> {
+    pub(crate) fn step(&mut self, simulation: &mut Simulation, length: f64) -> Result<()> {
         simulation.begin_step(simulation.time(), length)?;
         loop {
             let progress = simulation.advance()?;
@@ -142,7 +152,7 @@ impl Watch {
     ///
     /// # Errors
     /// The step is refused.
-    pub fn step_moving(&mut self, simulation: &mut Simulation, length: f64) -> Result<()> {
+    pub(crate) fn step_moving(&mut self, simulation: &mut Simulation, length: f64) -> Result<()> {
         self.round = false;
         self.step(simulation, length)
     }
@@ -188,7 +198,7 @@ impl Watch {
     }
 
     /// Books that close, and entries that have their physical signs: contact takes energy, friction heats.
-    pub fn laws(&self) -> Vec<Check> {
+    pub(crate) fn laws(&self) -> Vec<Check> {
         vec![
             Check::so("all outputs finite", self.finite),
             Check::at_most("ledger residual", self.residual, 1e-9),
@@ -198,7 +208,7 @@ impl Watch {
     }
 
     /// The same for a scheme: massless-boundary takes contact forces a step late, and gives back a little of what it took.
-    pub fn books_of(&self, scheme: Scheme) -> Vec<Check> {
+    pub(crate) fn books_of(&self, scheme: Scheme) -> Vec<Check> {
         let mut checks = self.laws();
         if scheme == Scheme::MasslessBoundary {
             checks[2].bound = MASSLESS_RETURN;
@@ -207,17 +217,17 @@ impl Watch {
     }
 
     /// The ledger alone.
-    pub fn ledger(&self) -> Check {
+    pub(crate) fn ledger(&self) -> Check {
         Check::at_most("ledger residual", self.residual, 1e-9)
     }
 
     /// How far the impact loss fell in a communication step, relative to the energy exchanged in all.
-    pub fn impact_drop(&self) -> f64 {
+    pub(crate) fn impact_drop(&self) -> f64 {
         self.share(self.impact_drop)
     }
 
     /// The same of the friction heat.
-    pub fn heat_drop(&self) -> f64 {
+    pub(crate) fn heat_drop(&self) -> f64 {
         self.share(self.heat_drop)
     }
 
@@ -226,7 +236,7 @@ impl Watch {
     }
 
     /// λ ≥ 0, g ≥ 0, λg = 0 at every internal step, and g again from the displacements.
-    pub fn complementarity(&self) -> Vec<Check> {
+    pub(crate) fn complementarity(&self) -> Vec<Check> {
         let mut checks = vec![
             Check::at_most("adhesion", self.adhesion, 1e-10),
             Check::at_most("penetration", self.penetration, 1e-10),
@@ -240,7 +250,7 @@ impl Watch {
 }
 
 /// The larger one; not-a-number sticks.
-pub fn worse(before: f64, now: f64) -> f64 {
+pub(crate) fn worse(before: f64, now: f64) -> f64 {
     if before >= now || before.is_nan() { before } else { now }
 }
 
@@ -251,7 +261,7 @@ fn open(simulation: &Simulation) -> f64 {
 }
 
 /// Largest difference of two histories of displacements relative to the largest of the second.
-pub fn apart(first: &[f64], second: &[f64]) -> f64 {
+pub(crate) fn apart(first: &[f64], second: &[f64]) -> f64 {
     let largest = second.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
     let square = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
     if largest == 0.0 || first.len() != second.len() {
@@ -262,7 +272,7 @@ pub fn apart(first: &[f64], second: &[f64]) -> f64 {
 }
 
 /// Displacements of all contact nodes of the sectors (m).
-pub fn displacements(simulation: &Simulation) -> Vec<f64> {
+pub(crate) fn displacements(simulation: &Simulation) -> Vec<f64> {
     let system = simulation.system();
     let rows = system.bank().rows();
     (0..system.bank().sectors()).flat_map(|sector| (0..rows).map(move |row| system.bank().row(row, sector))).collect()

@@ -11,7 +11,7 @@ use tiprub_core::{Result, Rom, Scene, Simulation, settings::Solver};
 use super::{
     Check,
     models::RADIUS,
-    observe::{Watch, real, set},
+    observe::{Watch, begin, real, set},
 };
 
 /// Damping that brings the blades to rest.
@@ -19,7 +19,7 @@ const DAMPING: f64 = 0.3;
 
 /// A casing that closes over `rise` seconds by gap and depth, and stays for `hold` seconds.
 #[derive(Debug, Clone)]
-pub struct Press {
+pub(crate) struct Press {
     /// Rotor in a round rigid casing.
     pub scene: Scene,
     /// How far beyond the clearance (m).
@@ -34,7 +34,7 @@ pub struct Press {
 
 /// What the blades are pressed with at rest.
 #[derive(Debug, Clone)]
-pub struct Static {
+pub(crate) struct Static {
     /// λ of each node of a blade (N).
     pub multipliers: Vec<f64>,
     /// Strain energy of a blade (J).
@@ -43,7 +43,7 @@ pub struct Static {
 
 impl Press {
     /// Five hundredths of a millimetre, 4 ms to close and 12 ms to come to rest.
-    pub fn new(scene: Scene) -> Self {
+    pub(crate) fn new(scene: Scene) -> Self {
         Self { scene, depth: 5e-5, rise: 4e-3, hold: 12e-3, tolerance: 1e-6 }
     }
 
@@ -57,7 +57,7 @@ impl Press {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn run(&self) -> Result<Vec<Check>> {
+    pub(crate) fn run(&self) -> Result<Vec<Check>> {
         let (simulation, watch) = self.march()?;
         let mut checks = Vec::new();
         checks.extend(watch.books_of(self.scene.settings.time.scheme));
@@ -76,9 +76,7 @@ impl Press {
         scene.settings.structures[0].damping_ratio.get_or_insert(DAMPING);
         let step = scene.settings.time.step;
         scene.settings.experiment.communication_step = step;
-        let mut simulation = Simulation::new(&scene)?;
-        simulation.initialise(0.0)?;
-        let mut watch = Watch::new(&scene);
+        let (mut simulation, mut watch) = begin(&scene)?;
         watch.scale = watch.scale.max(self.depth);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number of steps")]
         let count = ((self.rise + self.hold) / step).ceil() as u64;
@@ -159,7 +157,7 @@ fn flexibility(rom: &Rom) -> DMatrix<f64> {
 }
 
 /// Static solution with the casing `depth` (m, radial) beyond the tips; `friction` with the sign of the speed.
-pub fn pressed(rom: &Rom, friction: f64, depth: f64) -> Static {
+pub(crate) fn pressed(rom: &Rom, friction: f64, depth: f64) -> Static {
     let (along, flexible) = (directions(rom, friction), flexibility(rom));
     let count = along.len();
     let entry = |i: usize, j: usize| -> f64 {

@@ -10,23 +10,18 @@ use super::{Verdict, child::Row};
 
 /// All rows.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Table {
+pub(crate) struct Table {
     /// One row per case, in the order of the cases.
     pub rows: Vec<Row>,
 }
 
 impl Table {
     /// What [`Table::write`] writes.
-    pub const FILES: [&str; 4] = ["index.html", "results.json", "stability.csv", "stability.md"];
+    pub(crate) const FILES: [&str; 4] = ["index.html", "results.json", "stability.csv", "stability.md"];
 
     /// Number of rows of a verdict.
-    pub fn count(&self, verdict: Verdict) -> usize {
+    pub(crate) fn count(&self, verdict: Verdict) -> usize {
         self.rows.iter().filter(|row| row.verdict == verdict).count()
-    }
-
-    /// Whether every case ended in a right answer or in the refusal expected.
-    pub fn is_sound(&self) -> bool {
-        self.rows.iter().all(|row| matches!(row.verdict, Verdict::Right | Verdict::Refused))
     }
 
     fn families(&self) -> Vec<&str> {
@@ -41,7 +36,7 @@ impl Table {
     }
 
     /// Rows that are neither right nor refused.
-    pub fn unsound(&self) -> impl Iterator<Item = &Row> {
+    pub(crate) fn unsound(&self) -> impl Iterator<Item = &Row> {
         self.rows.iter().filter(|row| !matches!(row.verdict, Verdict::Right | Verdict::Refused))
     }
 
@@ -75,7 +70,7 @@ impl Table {
     }
 
     /// For programs.
-    pub fn to_json(&self) -> Value {
+    pub(crate) fn to_json(&self) -> Value {
         let counts: serde_json::Map<_, _> =
             Verdict::ALL.iter().map(|verdict| (verdict.name().to_lowercase(), json!(self.count(*verdict)))).collect();
         json!({
@@ -99,7 +94,7 @@ impl Table {
     }
 
     /// The chapter of the guide, below its fixed introduction. No times: the same sources give the same text.
-    pub fn to_markdown(&self) -> String {
+    pub(crate) fn to_markdown(&self) -> String {
         let mut text = format!("{}\n\n| family | {} |\n", self.summary(), Verdict::ALL.map(Verdict::name).join(" | "));
         text.push_str("|---|---|---|---|---|---|\n");
         for family in self.families() {
@@ -145,7 +140,7 @@ impl Table {
     ///
     /// # Errors
     /// Files cannot be written.
-    pub fn write(&self, directory: &Path) -> Result<Outcome> {
+    pub(crate) fn write(&self, directory: &Path) -> Result<Outcome> {
         output_file::create_directory(directory)?;
         let page = directory.join("index.html");
         output_file::write(&page, self.to_html())?;

@@ -13,7 +13,7 @@ use super::{CASINGS, Casing, RAMP_PERIODS, Run, SHOWN, Setup, nearest};
 const SILENT: f64 = 1e-4;
 
 /// All pictures of one casing.
-pub fn of(setup: &Setup, casing: Casing, runs: &[Run], names: &[String]) -> Result<Vec<Figure>> {
+pub(super) fn of(setup: &Setup, casing: Casing, runs: &[Run], names: &[String]) -> Result<Vec<Figure>> {
     let mut all = vec![clearances(setup, casing, nearest(setup, runs)?, names)?];
     all.extend(SHOWN.map(|number| waterfall(setup, casing, runs, number)));
     all.push(amplitudes(setup, casing, runs, names)?);
@@ -155,7 +155,7 @@ fn speeds_sheet(setup: &Setup, runs: &[Run], names: &[String]) -> Sheet {
 }
 
 /// Nodal diameter 4 relative to 2, all casings.
-pub fn shares(setup: &Setup, runs: &[Vec<Run>; 3]) -> Result<Figure> {
+pub(super) fn shares(setup: &Setup, runs: &[Vec<Run>; 3]) -> Result<Figure> {
     let share = |run: &Run| match run.ended {
         Some(_) => f64::NAN,
         None => run.effective(SHOWN[1], setup.full()) / run.effective(SHOWN[0], setup.full()),

@@ -176,7 +176,7 @@ fn flexibility(scene: &Scene) -> Result<f64> {
 ///
 /// # Errors
 /// A model or a run fails.
-pub fn study(arguments: &crate::cli::StageArguments, console: &Console) -> Result<Study> {
+pub(crate) fn study(arguments: &crate::cli::StageArguments, console: &Console) -> Result<Study> {
     let quick = arguments.common.quick;
     let scene = scene_source::stage_scene(quick, &arguments.common.cache.cache(), console)?;
     let setup = Setup::new(scene, quick)?;

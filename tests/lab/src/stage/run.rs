@@ -8,7 +8,7 @@ use super::{CLOSED, Casing, Setup};
 const MOST_POINTS: usize = 1000;
 
 /// One run.
-pub struct Run {
+pub(super) struct Run {
     pub speed: f64,
     pub times: Vec<f64>,
     /// Of the contact nodes of blade 1, node by node, at these times (m).
@@ -36,7 +36,7 @@ pub struct Run {
 
 impl Run {
     /// Nothing yet, of so many contact nodes of a blade and so many nodal diameters.
-    pub fn new(speed: f64, nodes: usize, diameters: usize) -> Self {
+    pub(super) fn new(speed: f64, nodes: usize, diameters: usize) -> Self {
         Self {
             speed,
             times: Vec::new(),
@@ -56,14 +56,14 @@ impl Run {
     }
 
     /// Root mean square of an amplitude once the oval is there.
-    pub fn effective(&self, nodal_diameter: usize, from: f64) -> f64 {
+    pub(super) fn effective(&self, nodal_diameter: usize, from: f64) -> f64 {
         let values = self.times.iter().zip(&self.amplitudes[nodal_diameter]).filter(|(time, _)| **time >= from);
         let (sum, count) = values.fold((0.0, 0_u32), |(sum, count), (_, value)| (sum + value * value, count + 1));
         (sum / f64::from(count.max(1))).sqrt()
     }
 
     /// Share of the points at which any blade touches.
-    pub fn touching(&self) -> f64 {
+    pub(super) fn touching(&self) -> f64 {
         let count = self.contacts.iter().filter(|count| **count > 0.0).count();
         count as f64 / self.contacts.len().max(1) as f64
     }
@@ -160,7 +160,7 @@ fn advance(run: &mut Run, simulation: &mut Simulation, time: f64, length: f64) -
 }
 
 /// The run at one speed; one that is refused on its way keeps what came before.
-pub fn march(setup: &Setup, scene: &Scene, casing: Casing, speed: f64) -> tiprub_core::Result<Run> {
+pub(super) fn march(setup: &Setup, scene: &Scene, casing: Casing, speed: f64) -> tiprub_core::Result<Run> {
     let mut simulation = Simulation::new(scene)?;
     let schedule = &setup.schedule;
     simulation.initialise(schedule.start)?;

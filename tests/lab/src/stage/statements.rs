@@ -13,7 +13,7 @@ const OFTEN: usize = 2;
 const LEDGER: f64 = 1e-9;
 
 /// What is said of one casing.
-pub fn of(setup: &Setup, casing: Casing, runs: &[Run], names: &[String]) -> Result<Vec<Statement>> {
+pub(super) fn of(setup: &Setup, casing: Casing, runs: &[Run], names: &[String]) -> Result<Vec<Statement>> {
     let [numerator, denominator] = [SHOWN[1], SHOWN[0]];
     let share = |run: &Run| run.effective(numerator, setup.full()) / run.effective(denominator, setup.full());
     let shares: Vec<(f64, f64)> = runs.iter().map(|run| (run.speed, share(run))).collect();
@@ -53,7 +53,7 @@ fn capital(word: &str) -> String {
 }
 
 /// The paper's curves of all three nodes come down to zero, several times each.
-pub fn all_nodes_touch(run: &Run, names: &[String], gap: f64) -> Statement {
+pub(crate) fn all_nodes_touch(run: &Run, names: &[String], gap: f64) -> Statement {
     let nodes = names.iter().zip(run.least.iter().zip(&run.touches));
     let told = nodes.map(|(name, (least, touches))| {
         format!("{} {:.3} of the clearance at rest, {touches} times in contact", name.replace('_', " "), least / gap)
@@ -93,7 +93,7 @@ fn listed(shares: &[(f64, f64)]) -> String {
 }
 
 /// Above the resonance of nodal diameter 2 alone: undecided where there is no run.
-pub fn prevails(shares: &[(f64, f64)], critical: f64) -> Statement {
+pub(crate) fn prevails(shares: &[(f64, f64)], critical: f64) -> Statement {
     let expected = format!(
         "Nodal diameter {}, that of the oval, prevails over nodal diameter {} in every run from the critical speed on",
         SHOWN[0], SHOWN[1]
@@ -110,7 +110,7 @@ pub fn prevails(shares: &[(f64, f64)], critical: f64) -> Statement {
 }
 
 /// What the paper says of its figure 12: it falls all the way, and is negligible in the end.
-pub fn becomes_negligible(shares: &[(f64, f64)], resonance: &str) -> Statement {
+pub(crate) fn becomes_negligible(shares: &[(f64, f64)], resonance: &str) -> Statement {
     let expected = format!(
         "The share of nodal diameter {} becomes negligible against that of {} as the angular velocity grows (fig. 12): their ratio \
          falls from each angular velocity to the next, and ends below {NEGLIGIBLE}",

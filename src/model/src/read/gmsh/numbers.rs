@@ -16,7 +16,7 @@ pub(super) enum Numbers<'a> {
 
 impl<'a> Numbers<'a> {
     /// What is wrong with the number just read or to be read.
-    pub fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
+    pub(super) fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
         match self {
             Self::Text { file, line, .. } => {
                 ClosestPoint { file: Arc::clone(file), line: *line }.error(problem, remedy)
@@ -28,7 +28,7 @@ impl<'a> Numbers<'a> {
     }
 
     /// Where we are, as a place for later messages.
-    pub fn place(&self) -> ClosestPoint {
+    pub(super) fn place(&self) -> ClosestPoint {
         match self {
             Self::Text { file, line, .. } => ClosestPoint { file: Arc::clone(file), line: *line },
             Self::Bytes { file, offset, .. } => ClosestPoint { file: format!("{file}, byte").into(), line: *offset },
@@ -36,7 +36,7 @@ impl<'a> Numbers<'a> {
     }
 
     /// At most this many more numbers can come; what a file says of its own length is not trusted beyond that.
-    pub fn at_most(&self) -> usize {
+    pub(super) fn at_most(&self) -> usize {
         match self {
             Self::Text { rest, .. } => rest.len() / 2 + 1,
             Self::Bytes { rest, .. } => rest.len() / 4,
@@ -71,7 +71,7 @@ impl<'a> Numbers<'a> {
     }
 
     /// An `int` of the format.
-    pub fn int(&mut self) -> Result<i64> {
+    pub(crate) fn int(&mut self) -> Result<i64> {
         let value = match self {
             Self::Text { .. } => self.word().and_then(|word| word.parse::<i32>().ok()),
             Self::Bytes { .. } => self.bytes().map(i32::from_le_bytes),
@@ -80,7 +80,7 @@ impl<'a> Numbers<'a> {
     }
 
     /// A `size_t` of the format.
-    pub fn size(&mut self) -> Result<u64> {
+    pub(super) fn size(&mut self) -> Result<u64> {
         let value = match self {
             Self::Text { .. } => self.word().and_then(|word| word.parse().ok()),
             Self::Bytes { .. } => self.bytes().map(u64::from_le_bytes),
@@ -89,7 +89,7 @@ impl<'a> Numbers<'a> {
     }
 
     /// A `size_t` that counts things of at least `each` numbers, all of which must still come.
-    pub fn count(&mut self, each: usize) -> Result<usize> {
+    pub(super) fn count(&mut self, each: usize) -> Result<usize> {
         let value = self.size()?;
         let most = self.at_most() / each.max(1) + 1;
         usize::try_from(value).ok().filter(|&count| count <= most).ok_or_else(|| {
@@ -98,7 +98,7 @@ impl<'a> Numbers<'a> {
     }
 
     /// A finite `double`.
-    pub fn real(&mut self) -> Result<f64> {
+    pub(super) fn real(&mut self) -> Result<f64> {
         let value = match self {
             Self::Text { .. } => self.word().and_then(|word| word.parse().ok()),
             Self::Bytes { .. } => self.bytes().map(f64::from_le_bytes),

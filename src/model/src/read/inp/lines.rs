@@ -34,19 +34,19 @@ pub(super) struct DataLine {
 
 impl DataLine {
     /// Values between commas; an empty last one (a comma at the end) is left out.
-    pub fn values(&self) -> impl Iterator<Item = &str> {
+    pub(super) fn values(&self) -> impl Iterator<Item = &str> {
         self.text.trim_end_matches([',', ' ', '\t']).split(',').map(str::trim)
     }
 
     /// Whether the record goes on in the next line.
-    pub fn goes_on(&self) -> bool {
+    pub(crate) fn goes_on(&self) -> bool {
         self.text.ends_with(',')
     }
 }
 
 impl Card {
     /// Value of a parameter; an error for one that is there without a value.
-    pub fn parameter(&self, name: &str) -> Result<Option<&str>> {
+    pub(super) fn parameter(&self, name: &str) -> Result<Option<&str>> {
         match self.parameters.iter().find(|(key, _)| key == name) {
             None => Ok(None),
             Some((_, Some(value))) if !value.is_empty() => Ok(Some(value)),
@@ -58,7 +58,7 @@ impl Card {
     }
 
     /// Value of a parameter that must be there.
-    pub fn required(&self, name: &str) -> Result<&str> {
+    pub(super) fn required(&self, name: &str) -> Result<&str> {
         self.parameter(name)?.ok_or_else(|| {
             let problem = format!("*{} has no parameter {name}", self.keyword);
             self.place.error(problem, format!("Write *{}, {name}=...", self.keyword))
@@ -66,7 +66,7 @@ impl Card {
     }
 
     /// Whether a parameter is there, with a value or without.
-    pub fn has(&self, name: &str) -> bool {
+    pub(super) fn has(&self, name: &str) -> bool {
         self.parameters.iter().any(|(key, _)| key == name)
     }
 }

@@ -23,21 +23,21 @@ pub(super) struct DeckMaterial {
 }
 
 impl DeckMaterial {
-    pub fn new(card: &Card) -> Result<Self> {
+    pub(super) fn new(card: &Card) -> Result<Self> {
         let name = card.required("NAME")?.to_owned();
         Ok(Self { name, place: card.place.clone(), elastic: None, density: None, expansion: None })
     }
 
-    pub fn name(&self) -> &str {
+    pub(super) fn name(&self) -> &str {
         &self.name
     }
 
-    pub fn is_named(&self, name: &str) -> bool {
+    pub(crate) fn is_named(&self, name: &str) -> bool {
         self.name.eq_ignore_ascii_case(name)
     }
 
     /// `*ELASTIC`, `*DENSITY` or `*EXPANSION` of this material.
-    pub fn read(&mut self, card: &Card) -> Result<()> {
+    pub(super) fn read(&mut self, card: &Card) -> Result<()> {
         let kind = card.parameter("TYPE")?.map(str::to_uppercase);
         if kind.as_deref().is_some_and(|kind| !matches!(kind, "ISO" | "ISOTROPIC")) || card.has("DEPENDENCIES") {
             let problem = format!("*{} of material `{}` is not plainly isotropic", card.keyword, self.name);
@@ -54,7 +54,7 @@ impl DeckMaterial {
     }
 
     /// The material at a temperature; without one, no property may be a table.
-    pub fn at(&self, temperature: Option<f64>) -> Result<Material> {
+    pub(super) fn at(&self, temperature: Option<f64>) -> Result<Material> {
         let missing = |keyword: &str| {
             let problem = format!("material `{}` has no *{keyword}", self.name);
             self.place.error(problem, "Add it, or give the material on the command line")

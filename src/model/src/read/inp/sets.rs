@@ -37,7 +37,7 @@ pub(super) struct Sets {
 
 impl Family {
     /// A member that is defined on the spot.
-    pub fn add(&mut self, set: &str, number: u64) {
+    pub(super) fn add(&mut self, set: &str, number: u64) {
         self.entry(set).push(Member::Number(number));
     }
 
@@ -47,7 +47,7 @@ impl Family {
     }
 
     /// Data of `*NSET` or `*ELSET`.
-    pub fn read(&mut self, card: &Card, set: &str) -> Result<()> {
+    pub(super) fn read(&mut self, card: &Card, set: &str) -> Result<()> {
         let mut members = Vec::new();
         if let Some(elements) = card.parameter("ELSET")?.filter(|_| card.keyword == "NSET") {
             let problem = format!("node set `{set}` is made of the elements of `{elements}`");
@@ -81,7 +81,7 @@ impl Family {
     }
 
     /// Numbers of the members of a set that exist.
-    pub fn members(&self, set: &str, place: &ClosestPoint, draft: &Draft) -> Result<BTreeSet<u64>> {
+    pub(super) fn members(&self, set: &str, place: &ClosestPoint, draft: &Draft) -> Result<BTreeSet<u64>> {
         let every: Vec<u64> = draft.elements.iter().map(|element| element.number).collect();
         self.resolve(local_name(set), place, &every, &|number| !draft.nodes_of(number).is_empty())
     }
@@ -130,7 +130,7 @@ impl Family {
 
 impl Sets {
     /// Every node set, and every element set as the set of its nodes.
-    pub fn into_node_sets(self, draft: &mut Draft) -> Result<()> {
+    pub(crate) fn into_node_sets(self, draft: &mut Draft) -> Result<()> {
         let nowhere = ClosestPoint { file: "".into(), line: 0 };
         let mut node_sets = BTreeMap::new();
         for name in self.elements.sets.keys() {

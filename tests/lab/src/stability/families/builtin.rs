@@ -9,21 +9,18 @@ use tiprub_shell::console::Console;
 
 use super::{
     super::{
-        Case, Check, Expected, Happened,
+        Case, Cases, Check, Expected, Happened,
         models::{SCHEMES, SOLVERS, Tower, round, with_methods, with_step},
-        observe::{Watch, apart, displacements, set},
+        observe::{Watch, apart, begin, displacements, set},
         press::Press,
     },
     limits::massless_step,
 };
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [rotor37(), stage(), exchanged()].into_iter().flatten().collect()
 }
-
-/// Models that cases of the full table load; made before the children need them.
-pub const MODELS: [&str; 3] = ["rotor37", builtin::STAGE_COARSE, builtin::STAGE_CASING_COARSE];
 
 fn model(name: &str) -> Option<Rom> {
     builtin::rom(name, &RomCache::of_user(), &Console::new(true, false))?.ok()
@@ -63,8 +60,9 @@ fn rotor37() -> Vec<Case> {
                 let name =
                     format!("rotor37/friction/µ={friction}/{solver_name}/{}Ω", if sense > 0.0 { '+' } else { '−' });
                 let expected = Expected::either("the same with a fourth of the step, complementarity", ["µ"]);
-                let work = move |_: &_| Happened::of(rubbed(solver, friction, sense));
-                cases.push(Case::new(name, expected, work).within(300.0));
+                cases.push(
+                    Case::new(name, expected, move |_: &_| Happened::of(rubbed(solver, friction, sense))).within(300.0),
+                );
             }
         }
     }
@@ -122,9 +120,7 @@ fn against_finer(scene: &Scene, step: f64, count: usize, bound: f64) -> Result<V
         let mut scene = scene.clone();
         scene.settings.time.step = step;
         scene.settings.experiment.communication_step = 1e-5;
-        let mut simulation = Simulation::new(&scene)?;
-        simulation.initialise(0.0)?;
-        let mut watch = Watch::new(&scene);
+        let (mut simulation, mut watch) = begin(&scene)?;
         let mut history = Vec::new();
         for _ in 0..count {
             watch.step(&mut simulation, 1e-5)?;
@@ -155,8 +151,12 @@ fn stage() -> Vec<Case> {
     for (solver, name) in SOLVERS {
         for friction in [0.0, 0.15, 1.0, 2.0] {
             let expected = Expected::either("the same with a fourth of the step, complementarity", ["µ"]);
-            let work = move |_: &_| Happened::of(on_stage(solver, friction, 1.35e5));
-            cases.push(Case::new(format!("stage/oval/µ={friction}/{name}"), expected, work).within(600.0));
+            cases.push(
+                Case::new(format!("stage/oval/µ={friction}/{name}"), expected, move |_: &_| {
+                    Happened::of(on_stage(solver, friction, 1.35e5))
+                })
+                .within(600.0),
+            );
         }
         for load in [1e7, 1e9, 1e12, 1e300] {
             let expected = Expected::refused_as(&[
@@ -166,8 +166,12 @@ fn stage() -> Vec<Case> {
                 &["casing_load_amplitude", "within"],
                 &["load.amplitude", "between"],
             ]);
-            let work = move |_: &_| Happened::of(on_stage(solver, 0.15, load));
-            cases.push(Case::new(format!("stage/load={load:e}/{name}"), expected, work).within(600.0));
+            cases.push(
+                Case::new(format!("stage/load={load:e}/{name}"), expected, move |_: &_| {
+                    Happened::of(on_stage(solver, 0.15, load))
+                })
+                .within(600.0),
+            );
         }
     }
     cases
@@ -196,8 +200,7 @@ fn exchanged() -> Vec<Case> {
         } else {
             Expected::right("it starts, and steps")
         };
-        let work = move |_: &_| Happened::of(harmonics(swap));
-        cases.push(Case::new(format!("rom/harmonics-{name}"), expected, work).quick(true));
+        cases.add(true, format!("rom/harmonics-{name}"), expected, move || harmonics(swap));
     }
     cases
 }
@@ -219,9 +222,7 @@ fn harmonics(swap: bool) -> Result<Vec<Check>> {
         rom.extras.harmonics.swap(0, 2);
     }
     let scene = with_step(round(rom), 2e-6);
-    let mut simulation = Simulation::new(&scene)?;
-    simulation.initialise(0.0)?;
-    let mut watch = Watch::new(&scene);
+    let (mut simulation, mut watch) = begin(&scene)?;
     for _ in 0..200 {
         set(&mut simulation, "casing_radius_change", -1e-5)?;
         watch.step(&mut simulation, 2e-6)?;

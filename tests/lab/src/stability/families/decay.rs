@@ -13,7 +13,7 @@ use tiprub_core::{
 };
 
 use super::super::{
-    Case, Check, Expected, Happened,
+    Case, Cases, Check, Expected,
     models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, on_ring, round, with_methods, with_step},
     observe::{amplitudes, real, set, worse},
     press::pressed,
@@ -25,26 +25,24 @@ const DEPTH: f64 = 5e-5;
 const LEFT: f64 = 1e-4;
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for (scheme, scheme_name) in SCHEMES {
         for ratio in [1e-3, 0.005, 0.05, 0.3, 0.9] {
             for (kind, turned) in [("straight", 0.0), ("turned", 0.45)] {
                 for (solver, solver_name) in SOLVERS {
                     let released = Released { scheme, solver, turned, ratio, told: ratio };
-                    let work = move |_: &_| Happened::of(released.blade());
                     let name = format!("decay/blade/{kind}/ξ={ratio}/{scheme_name}/{solver_name}");
                     let expected = Expected::right("decay of every mode from the static place, step by step");
                     let quick =
                         solver == Solver::Lcp && ratio >= if scheme == Scheme::ModalExact { 0.005 } else { 0.05 };
-                    cases.push(Case::new(name, expected, work).quick(quick));
+                    cases.add(quick, name, expected, move || released.blade());
                 }
             }
             for order in [1, 2, 3, 4] {
-                let work = move |_: &_| Happened::of(ring(scheme, order, ratio, ratio));
                 let name = format!("decay/ring/{order}/ξ={ratio}/{scheme_name}");
                 let expected = Expected::right("decay of the nodal diameter from the static amplitude, step by step");
-                cases.push(Case::new(name, expected, work).quick(order == 2 && ratio >= 0.05));
+                cases.add(order == 2 && ratio >= 0.05, name, expected, move || ring(scheme, order, ratio, ratio));
             }
         }
     }
@@ -53,7 +51,7 @@ pub fn cases() -> Vec<Case> {
 
 /// A blade with one node that is let go.
 #[derive(Debug, Clone, Copy)]
-pub struct Released {
+pub(crate) struct Released {
     /// Scheme.
     pub scheme: Scheme,
     /// Solver.
@@ -105,7 +103,7 @@ impl Decay {
 }
 
 /// Modes of a pencil with diagonal mass: frequencies (rad/s) ascending, and mass-normalised shapes.
-pub fn modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
+pub(crate) fn modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
     let order = mass.nrows();
     let scale = |i: usize| 1.0 / mass[(i, i)].sqrt();
     let eigen = DMatrix::from_fn(order, order, |i, j| scale(i) * stiffness[(i, j)] * scale(j)).symmetric_eigen();
@@ -120,7 +118,7 @@ impl Released {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn blade(self) -> Result<Vec<Check>> {
+    pub(crate) fn blade(self) -> Result<Vec<Check>> {
         let step = 2e-6;
         let tower = Tower { sectors: 1, turned: self.turned, ..Tower::default() };
         let mut scene = with_step(with_methods(round(tower.rom()), self.scheme, self.solver), step);
@@ -196,7 +194,7 @@ fn close(simulation: &mut Simulation, settle: f64) -> Result<()> {
 ///
 /// # Errors
 /// The scene is refused.
-pub fn ring(scheme: Scheme, order: u32, ratio: f64, told: f64) -> Result<Vec<Check>> {
+pub(crate) fn ring(scheme: Scheme, order: u32, ratio: f64, told: f64) -> Result<Vec<Check>> {
     let step = 2e-6;
     let mut scene = with_methods(round(Tower { slope: 0.0, ..Tower::default() }.rom()), scheme, Solver::Lcp);
     on_ring(&mut scene, ratio);

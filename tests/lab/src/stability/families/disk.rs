@@ -7,15 +7,15 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix, DVector};
 use tiprub_core::{
-    Result, Rom, Scene, Simulation,
+    Result, Rom, Scene,
     rom::Harmonic,
     settings::{Scheme, Shape, Solver},
 };
 
 use super::super::{
-    Case, Check, Expected, Happened,
+    Case, Cases, Check, Expected,
     models::{GAP, SCHEMES, SOLVERS, Tower, round, with_methods, with_step},
-    observe::{Watch, apart, displacements, set, worse},
+    observe::{apart, begin, displacements, set, worse},
 };
 
 /// Stiffness of the spring from sector to sector (N/m).
@@ -24,7 +24,7 @@ const COUPLING: f64 = 8e6;
 const DEPTH: f64 = 5e-5;
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for (scheme, scheme_name) in SCHEMES {
         for (solver, solver_name) in SOLVERS {
@@ -35,14 +35,12 @@ pub fn cases() -> Vec<Case> {
                     let name = format!("disk/flexibility/{sectors}/µ={friction}/{scheme_name}/{solver_name}");
                     let expected =
                         Expected::right("static λ and every blade's place from the matrix of the whole disk");
-                    let work = move |_: &_| Happened::of(still.run());
-                    cases.push(Case::new(name, expected, work).quick(quick && sectors == 8));
+                    cases.add(quick && sectors == 8, name, expected, move || still.run());
                 }
                 let mirrored = Mirrored { scheme, solver, sectors, conjugate: true };
                 let name = format!("disk/mirrored/{sectors}/{scheme_name}/{solver_name}");
                 let expected = Expected::right("speed, shape and disk mirrored: the mirrored answer");
-                let work = move |_: &_| Happened::of(mirrored.run());
-                cases.push(Case::new(name, expected, work).quick(quick && sectors > 2));
+                cases.add(quick && sectors > 2, name, expected, move || mirrored.run());
             }
         }
     }
@@ -88,7 +86,7 @@ fn disk(sectors: usize, mirrored: bool, conjugate: bool) -> Rom {
 
 /// Some blades of a disk pressed, the others free to follow.
 #[derive(Debug, Clone, Copy)]
-pub struct Still {
+pub(crate) struct Still {
     /// Scheme.
     pub scheme: Scheme,
     /// Solver.
@@ -125,7 +123,7 @@ impl Still {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn run(self) -> Result<Vec<Check>> {
+    pub(crate) fn run(self) -> Result<Vec<Check>> {
         let pressed: Vec<usize> = (0..self.sectors).filter(|sector| [0, 3].contains(sector)).collect();
         let rom = disk(self.sectors, false, true);
         let slope = rom.contact_nodes[0].meridional_slope;
@@ -134,9 +132,7 @@ impl Still {
         scene.settings.contacts[0].sector_gaps =
             (0..self.sectors).map(|sector| if pressed.contains(&sector) { GAP } else { 10.0 * GAP }).collect();
         scene.settings.structures[0].damping_ratio = Some(0.3);
-        let mut simulation = Simulation::new(&scene)?;
-        simulation.initialise(0.0)?;
-        let mut watch = Watch::new(&scene);
+        let (mut simulation, mut watch) = begin(&scene)?;
         for index in 0..20_000 {
             let share = (f64::from(index) / 2000.0).min(1.0);
             set(&mut simulation, "casing_radius_change", -(GAP + DEPTH) * share * share * (3.0 - 2.0 * share))?;
@@ -184,7 +180,7 @@ impl Still {
 
 /// A rub and the same in the mirror.
 #[derive(Debug, Clone, Copy)]
-pub struct Mirrored {
+pub(crate) struct Mirrored {
     /// Scheme.
     pub scheme: Scheme,
     /// Solver.
@@ -211,9 +207,7 @@ impl Mirrored {
     /// Close on the blades and follow them for 1.5 ms.
     fn history(self, mirrored: bool) -> Result<(Vec<f64>, u64)> {
         let scene = self.scene(mirrored);
-        let mut simulation = Simulation::new(&scene)?;
-        simulation.initialise(0.0)?;
-        let mut watch = Watch::new(&scene);
+        let (mut simulation, mut watch) = begin(&scene)?;
         let mut history = Vec::new();
         for index in 0..1500 {
             let share = (f64::from(index) / 800.0).min(1.0);
@@ -235,7 +229,7 @@ impl Mirrored {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn run(self) -> Result<Vec<Check>> {
+    pub(crate) fn run(self) -> Result<Vec<Check>> {
         let (first, contacts) = self.history(false)?;
         let (second, _) = self.history(true)?;
         Ok(vec![

@@ -1,21 +1,21 @@
 //! Friction from none to 2 with every solver in both senses; speeds at rest, tiny, reversed, jumping.
 
 use tiprub_core::{
-    Result, Simulation,
+    Result,
     settings::{Scheme, Shape, Solver},
 };
 
 use super::super::{
-    Case, Check, Expected, Happened,
+    Case, Cases, Check, Expected, Happened,
     models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, blade, bumps, round, with_methods, with_step},
-    observe::{Watch, apart, displacements, real, set},
+    observe::{Watch, apart, begin, displacements, real, set},
     press::{Press, pressed},
 };
 
 const COEFFICIENTS: [f64; 6] = [0.0, 0.15, 0.5, 1.0, 1.5, 2.0];
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     coefficients().into_iter().chain(speeds()).collect()
 }
 
@@ -98,26 +98,21 @@ fn speeds() -> Vec<Case> {
                     )
                 };
                 let case = format!("speed/steady/{name}/{:e}", sense * speed);
-                cases.push(
-                    Case::new(case, expected, move |_| Happened::of(steady(solver, sense * speed)))
-                        .quick(solver == Solver::Lcp && sense > 0.0),
-                );
+                cases.add(solver == Solver::Lcp && sense > 0.0, case, expected, move || steady(solver, sense * speed));
             }
         }
         let zero =
             Expected::right("static normal forces, friction at most µλ; with film and lcp a warning of sticking");
-        cases.push(
-            Case::new(format!("speed/steady/{name}/0"), zero, move |_| Happened::of(steady(solver, 0.0))).quick(true),
-        );
+        cases.add(true, format!("speed/steady/{name}/0"), zero, move || steady(solver, 0.0));
         for (course, text) in [("reversal", "torque of either sense, −µΣλr"), ("jump", "torque unchanged, −µΣλr")]
         {
-            let work = move |_: &_| Happened::of(changing(solver, course));
-            cases.push(Case::new(format!("speed/{course}/{name}"), Expected::right(text), work).quick(true));
+            cases.add(true, format!("speed/{course}/{name}"), Expected::right(text), move || changing(solver, course));
         }
         for course in ["reversal", "jump", "ramp", "stop"] {
-            let work = move |_: &_| Happened::of(on_bumps(solver, course));
             let expected = Expected::right("the same with a fourth of the step");
-            cases.push(Case::new(format!("speed/bumps/{course}/{name}"), expected, work).quick(solver == Solver::Lcp));
+            cases.add(solver == Solver::Lcp, format!("speed/bumps/{course}/{name}"), expected, move || {
+                on_bumps(solver, course)
+            });
         }
     }
     cases
@@ -130,9 +125,7 @@ fn steady(solver: Solver, speed: f64) -> Result<Vec<Check>> {
     scene.settings.contacts[0].friction = 0.15;
     scene.settings.structures[0].speed = speed;
     scene.settings.structures[0].damping_ratio = Some(0.3);
-    let mut simulation = Simulation::new(&scene)?;
-    simulation.initialise(0.0)?;
-    let mut watch = Watch::new(&scene);
+    let (mut simulation, mut watch) = begin(&scene)?;
     for index in 0..6000 {
         let share = (f64::from(index) / 2000.0).min(1.0);
         set(&mut simulation, "casing_radius_change", -(GAP + 5e-5) * share * share * (3.0 - 2.0 * share))?;
@@ -169,9 +162,7 @@ fn changing(solver: Solver, course: &str) -> Result<Vec<Check>> {
     let mut scene = with_step(with_methods(round(tower.rom()), Scheme::ModalExact, solver), 2e-6);
     scene.settings.contacts[0].friction = 0.15;
     scene.settings.structures[0].damping_ratio = Some(0.3);
-    let mut simulation = Simulation::new(&scene)?;
-    simulation.initialise(0.0)?;
-    let mut watch = Watch::new(&scene);
+    let (mut simulation, mut watch) = begin(&scene)?;
     let mut torques = Vec::new();
     let total = 12.0 * pressed(&scene.roms[0], 0.0, 5e-5).multipliers[0];
     for index in 0..20_000 {
@@ -205,9 +196,7 @@ fn on_bumps(solver: Solver, course: &'static str) -> Result<Vec<Check>> {
         let mut scene = with_step(with_methods(bumps(blade(12)), Scheme::ModalExact, solver), step);
         scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 0.7, width: 0.15, phase: 0.0 };
         scene.settings.structures[0].damping_ratio = Some(0.05);
-        let mut simulation = Simulation::new(&scene)?;
-        simulation.initialise(0.0)?;
-        let mut watch = Watch::new(&scene);
+        let (mut simulation, mut watch) = begin(&scene)?;
         let mut history = Vec::new();
         let length = 2e-5;
         for index in 0..100 {

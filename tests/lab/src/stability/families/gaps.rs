@@ -6,14 +6,14 @@ use tiprub_core::{
 };
 
 use super::super::{
-    Case, Check, Expected, Happened,
+    Case, Cases, Check, Expected, Happened,
     models::{GAP, SCHEMES, SOLVERS, Tower, on_ring, round, with_methods, with_step},
-    observe::{Watch, real, set},
+    observe::{Watch, begin, real, set},
     press::Press,
 };
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [clearances(), redundant(), sectors(), whole_casing(), scales()].into_iter().flatten().collect()
 }
 
@@ -51,12 +51,10 @@ fn clearances() -> Vec<Case> {
             } else {
                 Expected::refused(["initial clearance", "12 contact nodes"])
             };
-            let work = move |_: &_| Happened::of(offset_at_start(solver, offset));
-            cases.push(Case::new(format!("gap/{name}/{what}"), expected, work).quick(true));
+            cases.add(true, format!("gap/{name}/{what}"), expected, move || offset_at_start(solver, offset));
         }
-        let one = move |_: &_| Happened::of(one_inside(solver));
         let expected = Expected::refused(["initial clearance", "1 contact nodes", "sector 4"]);
-        cases.push(Case::new(format!("gap/{name}/one-blade-inside"), expected, one).quick(true));
+        cases.add(true, format!("gap/{name}/one-blade-inside"), expected, move || one_inside(solver));
     }
     cases
 }
@@ -145,10 +143,7 @@ fn sectors() -> Vec<Case> {
     }
     for (solver, name) in SOLVERS {
         let expected = Expected::right("no force on it, the others bit by bit as without");
-        cases.push(
-            Case::new(format!("sectors/one-blade-missing/{name}"), expected, move |_| Happened::of(missing(solver)))
-                .quick(true),
-        );
+        cases.add(true, format!("sectors/one-blade-missing/{name}"), expected, move || missing(solver));
     }
     cases
 }
@@ -191,11 +186,16 @@ fn whole_casing() -> Vec<Case> {
         for (scheme, scheme_name) in SCHEMES {
             for friction in [0.0, 0.15] {
                 for (surface, flexible) in [("rigid", false), ("ring", true)] {
-                    let work = move |_: &_| Happened::of(closed_long(scheme, solver, friction, flexible));
                     let expected = Expected::right("forces of blades and casing in equilibrium, all alike, 36 nodes");
                     let quick = solver == Solver::Lcp && scheme == Scheme::ModalExact;
                     let name = format!("whole-casing/{surface}/{scheme_name}/{solver_name}/µ={friction}");
-                    cases.push(Case::new(name, expected, work).quick(quick).within(300.0));
+                    cases.push(
+                        Case::new(name, expected, move |_: &_| {
+                            Happened::of(closed_long(scheme, solver, friction, flexible))
+                        })
+                        .quick(quick)
+                        .within(300.0),
+                    );
                 }
             }
         }
@@ -217,9 +217,7 @@ fn closed_long(scheme: Scheme, solver: Solver, friction: f64, flexible: bool) ->
     }
     let step = 2e-6;
     let scene = with_step(scene, step);
-    let mut simulation = Simulation::new(&scene)?;
-    simulation.initialise(0.0)?;
-    let mut watch = Watch::new(&scene);
+    let (mut simulation, mut watch) = begin(&scene)?;
     let depth = 5e-5;
     for index in 0..15_000 {
         let share = (f64::from(index) / 2000.0).min(1.0);
@@ -252,10 +250,10 @@ fn scales() -> Vec<Case> {
         for (solver, name) in SOLVERS {
             for friction in [0.0, 0.15] {
                 let expected = Expected::right("every λ scaled by the same power of two; time per step");
-                let work = move |_: &_| Happened::of(scaled(exponent, solver, friction));
                 let case = format!("tiny/2^{exponent}/{name}/µ={friction}");
-                let quick = solver == Solver::Lcp && (exponent % 100 == 0);
-                cases.push(Case::new(case, expected, work).quick(quick));
+                cases.add(solver == Solver::Lcp && (exponent % 100 == 0), case, expected, move || {
+                    scaled(exponent, solver, friction)
+                });
             }
         }
     }
@@ -323,7 +321,7 @@ fn small_rub(exponent: i32, solver: Solver, friction: f64) -> Result<(Vec<f64>, 
 }
 
 /// Processor time of this process's only working thread (s), as the system counts it; 0 where it does not tell.
-pub fn processor_time() -> f64 {
+pub(crate) fn processor_time() -> f64 {
     let told = std::fs::read_to_string("/proc/self/schedstat").unwrap_or_default();
     told.split_whitespace()
         .next()

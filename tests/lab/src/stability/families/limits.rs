@@ -14,12 +14,12 @@ use super::super::{
 const FACTORS: [f64; 5] = [0.9, 0.999, 1.001, 1.5, 10.0];
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [step_limit(), ratios(), massless()].into_iter().flatten().collect()
 }
 
 /// Largest usable step of massless-boundary (s), as its refusal of a long one names it.
-pub fn massless_step(scene: &Scene) -> Option<f64> {
+pub(crate) fn massless_step(scene: &Scene) -> Option<f64> {
     let scene = with_step(with_methods(scene.clone(), Scheme::MasslessBoundary, Solver::Lcp), 1e-2);
     let refusal = Simulation::new(&scene).and_then(|mut simulation| simulation.initialise(0.0)).err()?.to_string();
     refusal.split("Set the internal step below ").nth(1)?.split(' ').next()?.parse().ok()

@@ -8,13 +8,13 @@ use tiprub_core::{
 };
 
 use super::super::{
-    Case, Check, Expected, Happened,
-    models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, blade, bumps, on_ring, ring, round, with_methods, with_step},
-    observe::{Watch, amplitudes, apart, displacements, real, set},
+    Case, Cases, Check, Expected, Happened,
+    models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, blade, bumps, on_ring, round, with_methods, with_step},
+    observe::{Watch, amplitudes, apart, begin, displacements, real, set},
 };
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [loads(), coatings(), shapes()].into_iter().flatten().collect()
 }
 
@@ -51,23 +51,22 @@ fn loads() -> Vec<Case> {
                 } else {
                     Expected::right(against)
                 };
-                let work = move |_: &_| Happened::of(nodal(order, sign * amplitude));
-                let quick = order == 2 && sign > 0.0;
-                cases.push(
-                    Case::new(format!("loads/nodal/{order}/{:e}", sign * amplitude), expected, work).quick(quick),
+                cases.add(
+                    order == 2 && sign > 0.0,
+                    format!("loads/nodal/{order}/{:e}", sign * amplitude),
+                    expected,
+                    move || nodal(order, sign * amplitude),
                 );
             }
         }
     }
     for temperature in [1e-300, 1e-6, 1.0, -1.0, 300.0, 3000.0, -3000.0] {
         let expected = Expected::right("static displacement under the modal loads, linear in the temperature");
-        let work = move |_: &_| Happened::of(heated(temperature));
-        cases.push(Case::new(format!("loads/heat/{temperature:e}"), expected, work).quick(true));
+        cases.add(true, format!("loads/heat/{temperature:e}"), expected, move || heated(temperature));
     }
     for temperature in [3001.0, 1e9, -1e308, f64::INFINITY] {
-        let work = move |_: &_| Happened::of(heated(temperature));
         let expected = Expected::refused(["casing_temperature"]);
-        cases.push(Case::new(format!("loads/heat/{temperature:e}"), expected, work).quick(true));
+        cases.add(true, format!("loads/heat/{temperature:e}"), expected, move || heated(temperature));
     }
     for (scheme, name) in SCHEMES {
         for step in ["load", "heat"] {
@@ -111,7 +110,7 @@ fn heated(temperature: f64) -> Result<Vec<Check>> {
     for _ in 0..20 {
         simulation.do_step(simulation.time(), 2e-6)?;
     }
-    let ring = ring();
+    let ring = tiprub_test_models::ring(36, 3);
     let Some(loads) = ring.extras.thermal.as_ref().map(|thermal| &thermal.loads) else { return Ok(Vec::new()) };
     let Some(row) = simulation.table().find("casing_displacement").map(|row| row.reference) else {
         return Ok(Vec::new());
@@ -135,9 +134,7 @@ fn heated(temperature: f64) -> Result<Vec<Check>> {
 fn sudden(mut scene: Scene, what: &str) -> Result<Vec<Check>> {
     scene.settings.time.input_interpolation = InputInterpolation::Hold;
     scene.settings.structures[1].damping_ratio = Some(0.0);
-    let mut simulation = Simulation::new(&scene)?;
-    simulation.initialise(0.0)?;
-    let mut watch = Watch::new(&scene);
+    let (mut simulation, mut watch) = begin(&scene)?;
     let omega = TAU * 400.0;
     if what == "load" {
         set(&mut simulation, "casing_load_amplitude", 1e5)?;
@@ -167,14 +164,7 @@ fn sudden(mut scene: Scene, what: &str) -> Result<Vec<Check>> {
 
 fn coatings() -> Vec<Case> {
     let mut cases = Vec::new();
-    let plain = CoatingSettings {
-        thickness: 1.5e-4,
-        modulus: 2e8,
-        yield_stress: 1e6,
-        hardening: 2e7,
-        cells_around: 500,
-        cells_along: 7,
-    };
+    let plain = tiprub_test_models::coating_of(1.5e-4, [500, 7]);
     type Change = fn(CoatingSettings) -> CoatingSettings;
     let accepted: [(&str, Change); 13] = [
         ("plain", |c| c),
@@ -231,9 +221,7 @@ fn coatings() -> Vec<Case> {
 fn worn(mut scene: Scene, coating: CoatingSettings) -> Result<Vec<Check>> {
     scene.settings.contacts[0].friction = 0.15;
     scene.settings.structures[0].damping_ratio = Some(0.05);
-    let mut simulation = Simulation::new(&scene)?;
-    simulation.initialise(0.0)?;
-    let mut watch = Watch::new(&scene);
+    let (mut simulation, mut watch) = begin(&scene)?;
     let (mut before, mut fallen, mut deepest) = (0.0_f64, 0.0_f64, 0.0_f64);
     for index in 0..3000 {
         // Down to three tenths of a coating of 0.15 mm, and back.
@@ -282,10 +270,11 @@ fn shapes() -> Vec<Case> {
                     Expected::right(against)
                 };
                 let shape = Shape::TwoLobe { depth, width, phase: 0.0 };
-                let work = move |_: &_| Happened::of(shaped(solver, shape.clone()));
-                let quick = solver == Solver::Lcp && (depth - 0.6).abs() < 0.2;
-                cases.push(
-                    Case::new(format!("shapes/two-lobe/w={width}/d={depth}/{name}"), expected, work).quick(quick),
+                cases.add(
+                    solver == Solver::Lcp && (depth - 0.6).abs() < 0.2,
+                    format!("shapes/two-lobe/w={width}/d={depth}/{name}"),
+                    expected,
+                    move || shaped(solver, shape.clone()),
                 );
             }
         }
@@ -300,8 +289,9 @@ fn shapes() -> Vec<Case> {
                 Expected::right("the same with a fourth of the step")
             };
             let shape = Shape::Lobes { amplitude: 4e-4, order, phase: 0.3 };
-            let work = move |_: &_| Happened::of(shaped(solver, shape.clone()));
-            cases.push(Case::new(format!("shapes/lobes/{order}/{name}"), expected, work).quick(solver == Solver::Lcp));
+            cases.add(solver == Solver::Lcp, format!("shapes/lobes/{order}/{name}"), expected, move || {
+                shaped(solver, shape.clone())
+            });
         }
         for (what, height) in [("small", 3.8e-4), ("high", 4e-3), ("huge", 1.0)] {
             let expected = if height > 0.1 {
@@ -313,8 +303,9 @@ fn shapes() -> Vec<Case> {
             };
             let jump = move |index: usize| if index < 18 { -height } else { 0.0 };
             let shape = Shape::Table { radius_change: (0..36).map(jump).collect() };
-            let work = move |_: &_| Happened::of(shaped(solver, shape.clone()));
-            cases.push(Case::new(format!("shapes/jump-{what}/{name}"), expected, work).quick(solver == Solver::Lcp));
+            cases.add(solver == Solver::Lcp, format!("shapes/jump-{what}/{name}"), expected, move || {
+                shaped(solver, shape.clone())
+            });
         }
     }
     cases
@@ -328,9 +319,7 @@ fn shaped(solver: Solver, shape: Shape) -> Result<Vec<Check>> {
         scene.settings.surfaces[0].shape = shape.clone();
         scene.settings.surfaces[0].ramp_time = 5e-4;
         scene.settings.structures[0].damping_ratio = Some(0.05);
-        let mut simulation = Simulation::new(&scene)?;
-        simulation.initialise(0.0)?;
-        let mut watch = Watch::new(&scene);
+        let (mut simulation, mut watch) = begin(&scene)?;
         let mut history = Vec::new();
         for _ in 0..70 {
             watch.step(&mut simulation, 1e-5)?;

@@ -1,26 +1,26 @@
 //! The cases, family by family.
 
-pub mod builtin;
-pub mod decay;
-pub mod disk;
-pub mod free;
-pub mod friction;
-pub mod gaps;
-pub mod heat;
-pub mod limits;
-pub mod loads;
-pub mod plates;
-pub mod proof;
-pub mod random;
-pub mod stepping;
-pub mod surfaces;
-pub mod turning;
-pub mod values;
+pub(crate) mod builtin;
+pub(crate) mod decay;
+pub(crate) mod disk;
+pub(crate) mod free;
+pub(crate) mod friction;
+pub(crate) mod gaps;
+pub(crate) mod heat;
+pub(crate) mod limits;
+pub(crate) mod loads;
+pub(crate) mod plates;
+pub(crate) mod proof;
+pub(crate) mod random;
+pub(crate) mod stepping;
+pub(crate) mod surfaces;
+pub(crate) mod turning;
+pub(crate) mod values;
 
 use super::Case;
 
 /// Every case of the full table.
-pub fn all() -> Vec<Case> {
+pub(crate) fn all() -> Vec<Case> {
     let families = [
         limits::cases(),
         friction::cases(),

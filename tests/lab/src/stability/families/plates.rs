@@ -7,7 +7,7 @@ use tiprub_core::{
 
 use super::{
     super::{
-        Case, Check, Expected, Happened,
+        Case, Cases, Check, Expected,
         bodies::{Body, HALF, PLATE, Plate, Throw, vector},
         models::SOLVERS,
         observe::{outputs, real, worse},
@@ -16,13 +16,13 @@ use super::{
 };
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [balances(), mirrors(), edges(), starts()].into_iter().flatten().collect()
 }
 
 /// Between two plates that give way, one of them curved.
 #[derive(Debug, Clone, Copy)]
-pub struct Balance {
+pub(crate) struct Balance {
     /// Scheme.
     pub scheme: Scheme,
     /// Solver.
@@ -42,7 +42,6 @@ fn balances() -> Vec<Case> {
             for friction in [0.0, 0.15, 1.0] {
                 for speed in [0.01, 1.0, 10.0, 100.0] {
                     let balance = Balance { scheme, solver, friction, speed, share: 1.0 };
-                    let work = move |_: &_| Happened::of(balance.run());
                     // 100 m/s dent the plates by more than what counts as small.
                     let expected = if speed > 50.0 {
                         Expected::refused(["carries a surface is displaced", "Check positions and velocity"])
@@ -50,7 +49,7 @@ fn balances() -> Vec<Case> {
                         Expected::right("momentum and energy kept, forces of pairs add up, contact takes energy")
                     };
                     let name = format!("free/balance/µ={friction}/v={speed}/{scheme_name}/{solver_name}");
-                    cases.push(Case::new(name, expected, work).quick(scheme == Scheme::ModalExact && friction < 1.0));
+                    cases.add(scheme == Scheme::ModalExact && friction < 1.0, name, expected, move || balance.run());
                 }
             }
         }
@@ -63,7 +62,7 @@ impl Balance {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn run(self) -> Result<Vec<Check>> {
+    pub(crate) fn run(self) -> Result<Vec<Check>> {
         let body = Body::elastic(&[0.1, 0.15, 0.05], 2e7);
         let mass = body.mass() * self.share;
         let gap = 30.4 * self.speed * STEP;
@@ -117,10 +116,9 @@ fn mirrors() -> Vec<Case> {
     for (scheme, scheme_name) in SCHEMES {
         for (solver, solver_name) in SOLVERS {
             for friction in [0.0, 0.15, 0.5] {
-                let work = move |_: &_| Happened::of(symmetric(scheme, solver, friction));
                 let expected = Expected::right("left and right alike, no force across");
                 let name = format!("free/symmetric/µ={friction}/{scheme_name}/{solver_name}");
-                cases.push(Case::new(name, expected, work).quick(scheme == Scheme::ModalExact));
+                cases.add(scheme == Scheme::ModalExact, name, expected, move || symmetric(scheme, solver, friction));
             }
         }
     }
@@ -174,13 +172,15 @@ fn edges() -> Vec<Case> {
             } else {
                 Expected::right("passes without a force, velocity kept")
             };
-            let work = move |_: &_| Happened::of(edge(solver, [0.0, beyond, 0.0], HALF + front, velocity));
-            cases.push(Case::new(format!("free/edge/{what}/{name}"), expected, work).quick(true));
+            cases.add(true, format!("free/edge/{what}/{name}"), expected, move || {
+                edge(solver, [0.0, beyond, 0.0], HALF + front, velocity)
+            });
         }
         for clearance in [1e-3, 1e-9, 1e-15] {
             let expected = Expected::right("passes without a force, velocity kept");
-            let work = move |_: &_| Happened::of(edge(solver, [0.0; 3], HALF + clearance, [0.0, -40.0, 7.0]));
-            cases.push(Case::new(format!("free/grazing/{clearance:e}/{name}"), expected, work).quick(true));
+            cases.add(true, format!("free/grazing/{clearance:e}/{name}"), expected, move || {
+                edge(solver, [0.0; 3], HALF + clearance, [0.0, -40.0, 7.0])
+            });
         }
     }
     cases
@@ -260,15 +260,14 @@ fn starts() -> Vec<Case> {
         ("too-much-friction", Throw { friction: 2.1, ..rigid() }, Expected::refused(["friction", "between 0 and 2"])),
     ];
     let case = |(name, throw, expected): (&str, Throw, Expected)| {
-        let work = move |_: &_| Happened::of(begin(&throw));
-        Case::new(format!("free/start/{name}"), expected, work).quick(true)
+        Case::new(format!("free/start/{name}"), expected, move |_: &_| super::super::Happened::of(begin(&throw)))
+            .quick(true)
     };
     let mut cases: Vec<Case> = refused.into_iter().map(case).collect();
     for factor in [0.9, 0.999] {
         let throw = central(factor);
         let expected = Expected::right("momentum balance near the step limit");
-        let work = move |_: &_| Happened::of(begin(&throw));
-        cases.push(Case::new(format!("free/start/step={factor}-of-limit"), expected, work).quick(true));
+        cases.add(true, format!("free/start/step={factor}-of-limit"), expected, move || begin(&throw));
     }
     cases
 }

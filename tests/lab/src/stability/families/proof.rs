@@ -15,7 +15,7 @@ use super::{
 };
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [ways(), faults()].into_iter().flatten().collect()
 }
 

@@ -1,21 +1,21 @@
 //! A hundred scenes of random parameters within their documented ranges, each held against mechanics and a finer step.
 
 use tiprub_core::{
-    Result, Scene, Simulation,
+    Result, Scene,
     settings::{Scheme, Shape, Solver},
 };
 
 use super::super::{
     Case, Check, Expected, Happened,
     models::{GAP, Random, SCHEMES, SOLVERS, Tower, blade, on_ring, round, with_methods, with_step},
-    observe::{MASSLESS_RETURN, Watch, apart, displacements, set},
+    observe::{MASSLESS_RETURN, Watch, apart, begin, displacements, set},
 };
 
 /// Scenes in the quick table and in the full one.
 const COUNT: [u64; 2] = [12, 100];
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let case = |index: u64| {
         let against = "signs of the ledger, complementarity, the same with a fourth of the step";
         let expected = Expected::either_as(
@@ -125,9 +125,7 @@ fn run(index: u64, factor: f64) -> Result<(Vec<f64>, Watch)> {
     let (mut scene, swing, rate) = scene(index);
     scene.settings.time.step *= factor;
     scene.settings.experiment.communication_step = 1e-5;
-    let mut simulation = Simulation::new(&scene)?;
-    simulation.initialise(0.0)?;
-    let mut watch = Watch::new(&scene);
+    let (mut simulation, mut watch) = begin(&scene)?;
     watch.scale = watch.scale.max(GAP);
     let mut history = Vec::new();
     for index in 0..150 {

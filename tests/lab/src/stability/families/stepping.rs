@@ -7,16 +7,16 @@ use tiprub_core::{
 
 use super::{
     super::{
-        Case, Check, Expected, Happened,
+        Case, Cases, Check, Expected, Happened,
         models::{GAP, Random, SCHEMES, SOLVERS, Tower, blade, bumps, round, with_methods, with_step},
-        observe::{MASSLESS_RETURN, Watch, apart, bits, displacements, real, set},
+        observe::{MASSLESS_RETURN, Watch, apart, begin, bits, displacements, real, set},
     },
     gaps::processor_time,
     limits::massless_step,
 };
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [communication(), long(), jumps(), restore()].into_iter().flatten().collect()
 }
 
@@ -30,19 +30,16 @@ fn communication() -> Vec<Case> {
                 } else {
                     Expected::right("the same with H = h, one step at a time")
                 };
-                let work = move |_: &_| Happened::of(lengths(scheme, solver, ratio));
                 let name = format!("communication/H={ratio}h/{scheme_name}/{solver_name}");
                 let quick = solver == Solver::Lcp && scheme == Scheme::ModalExact;
-                cases.push(Case::new(name, expected, work).quick(quick));
+                cases.add(quick, name, expected, move || lengths(scheme, solver, ratio));
             }
-            let wild = move |_: &_| Happened::of(wildly(scheme, solver));
             let expected = Expected::right("the same with even steps a quarter as long; signs of the ledger");
             let name = format!("communication/wild/{scheme_name}/{solver_name}");
-            cases.push(Case::new(name, expected, wild).quick(solver == Solver::Lcp));
+            cases.add(solver == Solver::Lcp, name, expected, move || wildly(scheme, solver));
         }
-        let huge = move |_: &_| Happened::of(huge(scheme));
         let expected = Expected::right("energy of free blades without damping, and their phase against ω t");
-        cases.push(Case::new(format!("communication/H=1e6h/{scheme_name}"), expected, huge).quick(false));
+        cases.add(false, format!("communication/H=1e6h/{scheme_name}"), expected, move || huge(scheme));
         let refused = Expected::refused(["communicationStepSize", "internal steps"]);
         cases.push(
             Case::new(format!("communication/H=1e10h/{scheme_name}"), refused, move |_| {
@@ -58,10 +55,9 @@ fn communication() -> Vec<Case> {
             ("5e-324", 5e-324, "communicationStepSize"),
             ("1e308", 1e308, "communicationStepSize"),
         ] {
-            let case = move |_: &_| Happened::of(beyond(scheme, length));
-            cases.push(
-                Case::new(format!("communication/H={what}/{scheme_name}"), Expected::refused([word]), case).quick(true),
-            );
+            cases.add(true, format!("communication/H={what}/{scheme_name}"), Expected::refused([word]), move || {
+                beyond(scheme, length)
+            });
         }
         for length in [5e-324, 1e-310, 1e-17, 9e-13, 1e-12] {
             let expected = if length < 1e-12 {
@@ -69,10 +65,9 @@ fn communication() -> Vec<Case> {
             } else {
                 Expected::right("finite outputs")
             };
-            let case = move |_: &_| Happened::of(from(0.0, scheme, length));
-            cases.push(
-                Case::new(format!("communication/from-0/H={length:e}/{scheme_name}"), expected, case).quick(true),
-            );
+            cases.add(true, format!("communication/from-0/H={length:e}/{scheme_name}"), expected, move || {
+                from(0.0, scheme, length)
+            });
         }
     }
     cases
@@ -155,9 +150,7 @@ fn short(scheme: Scheme, solver: Solver, length: f64) -> Result<Vec<Check>> {
     let mut scene = rub(scheme, solver, STEP);
     scene.settings.surfaces[0].ramp_time = 0.0;
     scene.settings.surfaces[0].shape = tiprub_core::settings::Shape::Circular {};
-    let mut simulation = Simulation::new(&scene)?;
-    simulation.initialise(0.0)?;
-    let mut watch = Watch::new(&scene);
+    let (mut simulation, mut watch) = begin(&scene)?;
     for index in 0..700 {
         set(&mut simulation, "casing_radius_change", -1.1 * GAP * f64::from(index) / 700.0)?;
         watch.step(&mut simulation, STEP)?;
@@ -257,8 +250,10 @@ fn long() -> Vec<Case> {
     }
     for (scheme, name) in SCHEMES {
         let expected = Expected::right("energy at most what the casing did; signs of the ledger");
-        let work = move |_: &_| Happened::of(chatter(scheme));
-        cases.push(Case::new(format!("long/chatter/{name}"), expected, work).within(600.0));
+        cases.push(
+            Case::new(format!("long/chatter/{name}"), expected, move |_: &_| Happened::of(chatter(scheme)))
+                .within(600.0),
+        );
     }
     cases
 }
@@ -282,9 +277,7 @@ fn chatter(scheme: Scheme) -> Result<Vec<Check>> {
     let mut scene = with_methods(round(tower.rom()), scheme, Solver::Lcp);
     scene.settings.structures[0].damping_ratio = Some(if scheme == Scheme::MasslessBoundary { 1e-3 } else { 0.0 });
     let scene = with_step(scene, 2e-6);
-    let mut simulation = Simulation::new(&scene)?;
-    simulation.initialise(0.0)?;
-    let mut watch = Watch::new(&scene);
+    let (mut simulation, mut watch) = begin(&scene)?;
     for index in 0..500_000 {
         let share = (f64::from(index) / 500.0).min(1.0);
         set(&mut simulation, "casing_radius_change", -1.05 * GAP * share)?;
@@ -316,10 +309,11 @@ fn jumps() -> Vec<Case> {
         for (scheme, scheme_name) in SCHEMES {
             for jump in [1e-6, 1e-5, 1e-4, 1e-3, -1e-4] {
                 let expected = Expected::right("impulse = W⁻¹ jump, energy of the casing = impact loss + energy left");
-                let work = move |_: &_| Happened::of(jumped(scheme, solver, jump));
-                let quick = solver == Solver::Lcp;
-                cases.push(
-                    Case::new(format!("jump/gap-offset/{jump:e}/{scheme_name}/{name}"), expected, work).quick(quick),
+                cases.add(
+                    solver == Solver::Lcp,
+                    format!("jump/gap-offset/{jump:e}/{scheme_name}/{name}"),
+                    expected,
+                    move || jumped(scheme, solver, jump),
                 );
             }
         }
@@ -333,9 +327,7 @@ fn jumped(scheme: Scheme, solver: Solver, jump: f64) -> Result<Vec<Check>> {
     let tower = Tower { sectors: 3, slope: 0.0, ..Tower::default() };
     let mut scene = with_step(with_methods(round(tower.rom()), scheme, solver), 2e-6);
     scene.settings.structures[0].damping_ratio = Some(0.0);
-    let mut simulation = Simulation::new(&scene)?;
-    simulation.initialise(0.0)?;
-    let mut watch = Watch::new(&scene);
+    let (mut simulation, mut watch) = begin(&scene)?;
     watch.step(&mut simulation, 2e-6)?;
     set(&mut simulation, "gap_offset", -GAP - jump)?;
     watch.step(&mut simulation, 2e-6)?;
@@ -370,9 +362,10 @@ fn restore() -> Vec<Case> {
     let mut cases = Vec::new();
     for (solver, name) in SOLVERS {
         for (scheme, scheme_name) in SCHEMES {
-            let work = move |_: &_| Happened::of(elsewhere(scheme, solver));
             let expected = Expected::right("the same bits as where it was saved, whatever the parameters there were");
-            cases.push(Case::new(format!("restore/other-parameters/{scheme_name}/{name}"), expected, work).quick(true));
+            cases.add(true, format!("restore/other-parameters/{scheme_name}/{name}"), expected, move || {
+                elsewhere(scheme, solver)
+            });
         }
     }
     let expected = Expected::right("refused, set back, and then the same bits as of a fresh instance");

@@ -6,13 +6,13 @@ use tiprub_core::{
 };
 
 use super::super::{
-    Case, Check, Expected, Happened,
+    Case, Cases, Check, Expected,
     models::{GAP, RADIUS, Tower, blade, round, with_methods, with_step},
-    observe::{Watch, real, set},
+    observe::{Watch, begin, real, set},
 };
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [edges(), resolution(), curved()].into_iter().flatten().collect()
 }
 
@@ -33,9 +33,9 @@ fn edges() -> Vec<Case> {
             (0.017, Expected::right("a surface of revolution, signs of the ledger")),
             (0.024, Expected::refused(["has left the surface of the casing in z", "of sector", "axial extent"])),
         ] {
-            let work = move |_: &_| Happened::of(over_the_edge(scheme, shift));
-            let quick = scheme == Scheme::ModalExact;
-            cases.push(Case::new(format!("edge/{name}/shift={shift}"), expected, work).quick(quick));
+            cases.add(scheme == Scheme::ModalExact, format!("edge/{name}/shift={shift}"), expected, move || {
+                over_the_edge(scheme, shift)
+            });
         }
     }
     cases
@@ -45,9 +45,7 @@ fn over_the_edge(scheme: Scheme, shift: f64) -> Result<Vec<Check>> {
     let run = |spline: Option<SplineSettings>| {
         let mut scene = rubbing(scheme);
         scene.settings.surfaces[0].spline = spline;
-        let mut simulation = Simulation::new(&scene)?;
-        simulation.initialise(0.0)?;
-        let mut watch = Watch::new(&scene);
+        let (mut simulation, mut watch) = begin(&scene)?;
         for index in 0..2000 {
             let x = f64::from(index);
             set(&mut simulation, "casing_radius_change", -1.02 * GAP * (x / 1000.0).min(1.0))?;
@@ -74,9 +72,8 @@ fn resolution() -> Vec<Case> {
             } else {
                 Expected::refused(["modal-exact", "ω_max·h", "flexibility"])
             };
-            let work = move |_: &_| Happened::of(at_product(product, friction));
             let name = format!("resolution/exact/µ={friction}/ω_max·h={product}");
-            cases.push(Case::new(name, expected, work).quick(true));
+            cases.add(true, name, expected, move || at_product(product, friction));
         }
     }
     cases
@@ -111,8 +108,7 @@ fn curved() -> Vec<Case> {
         } else {
             Expected::refused(["around the axis", "u²/2r", "clearance"])
         };
-        let work = move |_: &_| Happened::of(dragged(share));
-        cases.push(Case::new(format!("curved/{what}"), expected, work).quick(true));
+        cases.add(true, format!("curved/{what}"), expected, move || dragged(share));
     }
     cases
 }

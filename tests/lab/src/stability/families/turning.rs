@@ -14,7 +14,7 @@ use tiprub_core::{
 
 use super::{
     super::{
-        Case, Check, Expected, Happened,
+        Case, Cases, Check, Expected,
         models::{GAP, RADIUS, SCHEMES, SOLVERS, Tower, on_ring, round, with_methods, with_step},
         observe::{Watch, amplitudes, real, set, worse},
     },
@@ -27,7 +27,7 @@ const STEP: f64 = 2e-6;
 const BESIDE: f64 = 5e-4;
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [loads(), lobes(), flanks()].into_iter().flatten().collect()
 }
 
@@ -56,7 +56,7 @@ fn mode(frequency: f64, ratio: f64, omega: f64) -> Complex<f64> {
 
 /// A load that travels around a ring.
 #[derive(Debug, Clone, Copy)]
-pub struct Travelling {
+pub(crate) struct Travelling {
     /// Scheme.
     pub scheme: Scheme,
     /// Nodal diameters.
@@ -78,10 +78,9 @@ fn loads() -> Vec<Case> {
         for order in [1, 2, 3, 4] {
             for ratio in [0.01, 0.3, 1.0, 1.7, 10.0, -0.3, -1.0, -1.7] {
                 let travelling = Travelling { scheme, order, ratio, early: 0.0 };
-                let work = move |_: &_| Happened::of(travelling.run());
                 let expected = Expected::right("amplitude and phase of the nodal diameter under the travelling load");
-                let case = Case::new(format!("turning/load/{order}/{ratio}/{name}"), expected, work);
-                cases.push(case.quick(order == 2 && ratio.abs() > 0.1));
+                let (quick, name) = (order == 2 && ratio.abs() > 0.1, format!("turning/load/{order}/{ratio}/{name}"));
+                cases.add(quick, name, expected, move || travelling.run());
             }
         }
     }
@@ -93,7 +92,7 @@ impl Travelling {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn run(self) -> Result<Vec<Check>> {
+    pub(crate) fn run(self) -> Result<Vec<Check>> {
         let (damping, load) = (0.05, 1e3);
         let frequency = ring_frequency(self.order);
         let omega = self.ratio * frequency;
@@ -136,7 +135,7 @@ impl Travelling {
 
 /// A rotor all of whose blades are pressed on a casing with lobes.
 #[derive(Debug, Clone, Copy)]
-pub struct Pressed {
+pub(crate) struct Pressed {
     /// Scheme.
     pub scheme: Scheme,
     /// Solver.
@@ -158,13 +157,12 @@ fn lobes() -> Vec<Case> {
             for order in [1, 3, 12, 40] {
                 for speed in [0.1, 50.0, 1300.0, -1300.0, 5000.0] {
                     let pressed = Pressed { scheme, solver, order, speed, factor: 1.0, early: 0.0 };
-                    let work = move |_: &_| Happened::of(pressed.run());
                     let expected =
                         Expected::right("λ of every blade from the dynamic stiffness, over a pass of a lobe");
                     let name = format!("turning/lobes/{order}/Ω={speed}/{scheme_name}/{solver_name}");
-                    cases.push(
-                        Case::new(name, expected, work).quick(solver == Solver::Lcp && order % 2 == 1 && speed > 1.0),
-                    );
+                    cases.add(solver == Solver::Lcp && order % 2 == 1 && speed > 1.0, name, expected, move || {
+                        pressed.run()
+                    });
                 }
             }
         }
@@ -220,7 +218,7 @@ impl Pressed {
     ///
     /// # Errors
     /// The scene is refused.
-    pub fn run(self) -> Result<Vec<Check>> {
+    pub(crate) fn run(self) -> Result<Vec<Check>> {
         let (tower, scene, amplitude) = self.scene();
         let step = scene.settings.time.step;
         let (lobes, depth) = (f64::from(self.order), 2e-5);
@@ -274,7 +272,7 @@ impl Pressed {
 
 /// A blade that stands on the flank of a lobe; nothing turns, nothing rubs.
 #[derive(Debug, Clone, Copy)]
-pub struct Flank {
+pub(crate) struct Flank {
     /// Scheme.
     pub scheme: Scheme,
     /// Solver.
@@ -291,14 +289,13 @@ fn flanks() -> Vec<Case> {
         for (solver, solver_name) in SOLVERS {
             for slope in [1e-6, -1e-3, 0.05, -0.3, 0.9, 1.1, -2.0] {
                 let flank = Flank { scheme, solver, slope, share: 1.0 };
-                let work = move |_: &_| Happened::of(flank.run());
                 let expected = if slope.abs() > 1.0 {
                     Expected::refused(["45°"])
                 } else {
                     Expected::right("static contact with the tilted normal, tangential force λ n_t")
                 };
                 let name = format!("turning/flank/{slope}/{scheme_name}/{solver_name}");
-                cases.push(Case::new(name, expected, work).quick(solver == Solver::Lcp));
+                cases.add(solver == Solver::Lcp, name, expected, move || flank.run());
             }
         }
     }
@@ -327,7 +324,7 @@ impl Flank {
     ///
     /// # Errors
     /// The scene is refused, or the flank is too steep.
-    pub fn run(self) -> Result<Vec<Check>> {
+    pub(crate) fn run(self) -> Result<Vec<Check>> {
         let tower = Tower { sectors: 1, base: [4e7, 4e7, 2e7], slope: 0.0, ..Tower::default() };
         let mut scene = with_step(with_methods(round(tower.rom()), self.scheme, self.solver), 5e-7);
         let (order, depth) = (30, 1e-5);

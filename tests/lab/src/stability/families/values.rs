@@ -15,7 +15,7 @@ use super::super::{
 };
 
 /// What is tried on every variable.
-pub const VALUES: [(&str, f64); 12] = [
+pub(crate) const VALUES: [(&str, f64); 12] = [
     ("NaN", f64::NAN),
     ("inf", f64::INFINITY),
     ("-inf", f64::NEG_INFINITY),
@@ -31,10 +31,10 @@ pub const VALUES: [(&str, f64); 12] = [
 ];
 
 /// Scenes whose tables are walked.
-pub const SCENES: [&str; 4] = ["bumps", "round", "ring", "disk"];
+pub(crate) const SCENES: [&str; 4] = ["bumps", "round", "ring", "disk"];
 
 /// One of them.
-pub fn scene(name: &str) -> Scene {
+pub(crate) fn scene(name: &str) -> Scene {
     let mut scene = match name {
         "bumps" => {
             let mut scene = bumps(blade(4));
@@ -63,7 +63,7 @@ pub fn scene(name: &str) -> Scene {
 }
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for name in SCENES {
         // The table of a scene is cheap to make, and the only list of what can be set.

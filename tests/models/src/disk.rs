@@ -1,28 +1,13 @@
 //! Disks of coupled sectors given by real matrices: as harmonics, and as one structure with all sectors in it.
 
-#![allow(dead_code, reason = "each test binary uses its part")]
-
 use nalgebra::{Complex, DMatrix};
 use tiprub_core::Scene;
-use tiprub_core::rom::{ContactNode, Frame, Harmonic, Rom, RomChecks, RomExtras};
-use tiprub_core::settings::Meridian;
+use tiprub_core::rom::{Frame, Harmonic, Rom};
 
-/// Numbers in (−1, 1) that are the same everywhere.
-pub struct Numbers(pub u64);
-
-impl Numbers {
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
-    pub fn matrix(&mut self, rows: usize, columns: usize) -> DMatrix<f64> {
-        DMatrix::from_fn(rows, columns, |_, _| self.next())
-    }
-}
+use crate::{Random, node, rub, structure};
 
 /// Sectors that are coupled to their neighbours.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub struct Disk {
     pub sectors: usize,
     pub nodes: usize,
@@ -35,7 +20,7 @@ pub struct Disk {
 impl Disk {
     /// Random matrices; `coupling` is the size of those between neighbours relative to those of a sector.
     pub fn random(sectors: usize, nodes: usize, order: usize, coupling: f64, seed: u64) -> Self {
-        let mut numbers = Numbers(seed);
+        let mut numbers = Random(seed);
         let square = numbers.matrix(order, order);
         let frequency = |i: usize| std::f64::consts::TAU * (900.0 + 1100.0 * i as f64);
         let squares = DMatrix::from_fn(order, order, |i, j| if i == j { frequency(i) * frequency(i) } else { 0.0 });
@@ -54,7 +39,7 @@ impl Disk {
             stiffness: [stiffness, numbers.matrix(order, order) * size],
             contact_map: DMatrix::from_fn(3 * nodes, order, |row, mode| {
                 let weight = if row % 3 == 0 { 0.5 } else { 0.25 };
-                weight * numbers.next() + if row == mode { 1.0 } else { 0.0 }
+                weight * numbers.signed() + if row == mode { 1.0 } else { 0.0 }
             }),
         }
     }
@@ -79,28 +64,12 @@ impl Disk {
 
     fn rom(&self, sectors: usize, mass: DMatrix<f64>, stiffness: DMatrix<f64>, contact_map: DMatrix<f64>) -> Rom {
         let copies = self.sectors / sectors;
-        let node = |copy: usize, node: usize| ContactNode {
-            name: format!("node_{copy}_{node}"),
-            position: [
-                0.25,
-                0.03 * node as f64 + std::f64::consts::TAU * copy as f64 / self.sectors as f64,
-                0.015 * node as f64,
-            ],
-            meridional_slope: -0.2,
-        };
-        Rom {
-            name: "disk".into(),
-            origin: "random matrices".into(),
-            sectors,
-            frame: Frame::Cylindrical,
-            mass,
-            stiffness,
-            damping_ratio: 0.01,
-            contact_map,
-            contact_nodes: (0..copies).flat_map(|copy| (0..self.nodes).map(move |n| node(copy, n))).collect(),
-            checks: RomChecks::default(),
-            extras: RomExtras::default(),
-        }
+        let turn = |copy: usize| std::f64::consts::TAU * copy as f64 / self.sectors as f64;
+        let place = |copy: usize, n: usize| [0.25, 0.03 * n as f64 + turn(copy), 0.015 * n as f64];
+        let all = (0..copies).flat_map(|copy| (0..self.nodes).map(move |n| (copy, n)));
+        let nodes = all.map(|(copy, n)| node(format!("node_{copy}_{n}"), place(copy, n), -0.2)).collect();
+        let rom = structure("disk", mass, stiffness, contact_map, nodes);
+        Rom { sectors, frame: Frame::Cylindrical, damping_ratio: 0.01, ..rom }
     }
 
     /// As a ROM with one pencil per nodal diameter.
@@ -139,11 +108,11 @@ impl Disk {
     }
 }
 
-/// The rub of `super::common::scene` with another rotor.
-pub fn rub(mut scene: Scene, rom: Rom) -> Scene {
+/// [`rub`] with another rotor, of coupled sectors or whole.
+pub fn with_rotor(rom: Rom) -> Scene {
+    let mut scene = rub(1);
     scene.settings.outputs.nodal_diameters = None;
     scene.settings.outputs.watched_sectors = vec![1];
-    scene.settings.contacts[0].meridian = Meridian::Contour;
     scene.roms[0] = rom;
     scene
 }

@@ -1,11 +1,11 @@
 //! A free block of masses and springs between two plates, with nothing reduced: every node is a contact node.
 
-#![allow(dead_code, reason = "each test binary uses its part")]
-
 use nalgebra::{DMatrix, Vector3};
-use tiprub_core::rom::{ContactGrid, ContactNode, Frame, Rom, RomChecks, RomExtras};
+use tiprub_core::rom::{ContactGrid, Rom};
 use tiprub_core::settings::*;
 use tiprub_core::{Scene, Simulation};
+
+use crate::{node, real, structure};
 
 /// Side of the block (m).
 pub const SIDE: f64 = 0.04;
@@ -15,20 +15,8 @@ pub const PER_SIDE: usize = 3;
 pub const RADIUS: f64 = 0.18;
 
 fn rom(name: &str, mass: DMatrix<f64>, stiffness: DMatrix<f64>, nodes: Vec<(String, [f64; 3])>) -> Rom {
-    let node = |(name, position)| ContactNode { name, position, meridional_slope: 0.0 };
-    Rom {
-        name: name.into(),
-        origin: "masses and springs".into(),
-        sectors: 1,
-        frame: Frame::Cartesian,
-        contact_map: DMatrix::identity(mass.nrows(), mass.nrows()),
-        mass,
-        stiffness,
-        damping_ratio: 0.0,
-        contact_nodes: nodes.into_iter().map(node).collect(),
-        checks: RomChecks::default(),
-        extras: RomExtras::default(),
-    }
+    let map = DMatrix::identity(mass.nrows(), mass.nrows());
+    structure(name, mass, stiffness, map, nodes.into_iter().map(|(name, place)| node(name, place, 0.0)).collect())
 }
 
 /// Spring of stiffness `k` (N/m) between two nodes along the line that joins them.
@@ -207,29 +195,6 @@ pub fn squeezed_by(interference: f64, velocity: [f64; 3]) -> Scene {
     scene(block([0.0, 0.045, 0.0], 3e6), &[(Side::Left, distance), (Side::Right, distance)], true, velocity)
 }
 
-#[track_caller]
-pub fn started(scene: &Scene) -> Simulation {
-    let mut simulation = Simulation::new(scene).unwrap();
-    simulation.initialise(0.0).unwrap();
-    simulation
-}
-
-#[track_caller]
-pub fn real(simulation: &Simulation, name: &str) -> f64 {
-    element(simulation, name, 0)
-}
-
-#[track_caller]
-pub fn element(simulation: &Simulation, name: &str, element: u32) -> f64 {
-    let reference = simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference;
-    simulation.real(reference + element).unwrap()
-}
-
 pub fn vector(simulation: &Simulation, name: &str) -> [f64; 3] {
     ["x", "y", "z"].map(|axis| real(simulation, &format!("{name}_{axis}")))
-}
-
-/// One communication step of length H (s).
-pub fn advance(simulation: &mut Simulation, length: f64) {
-    simulation.do_step(simulation.time(), length).unwrap();
 }

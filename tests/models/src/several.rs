@@ -1,7 +1,5 @@
 //! Scenes of several structures and pairs.
 
-#![allow(dead_code, reason = "each test binary uses its part")]
-
 use tiprub_core::Scene;
 use tiprub_core::settings::{Motion, Shape, Solver, StructureSettings};
 
@@ -54,7 +52,7 @@ pub fn in_one_casing(mut scene: Scene, solver: Solver, friction: f64) -> Scene {
         damping_ratio: Some(0.01),
         ..StructureSettings::default()
     });
-    scene.roms.push(super::common::casing(36, 8));
+    scene.roms.push(crate::ring(36, 8));
     for pair in 0..2 {
         scene.settings.surfaces[pair].structure = Some("ring".into());
         scene.settings.contacts[pair].solver = solver;

@@ -1,5 +1,6 @@
 //! All functions of both standards as an importer declares them: names and types from `fmi2FunctionTypes.h` (FMI 2.0.4)
 //! and `fmi3FunctionTypes.h` (FMI 3.0.2). Written apart from the library's own declarations.
+//! A boolean that a library writes is read as a byte: one that is neither 0 nor 1 is no `bool`.
 #![allow(non_snake_case, reason = "names of the standards")]
 #![allow(missing_docs, reason = "the standards document them")]
 
@@ -7,15 +8,16 @@ use std::ffi::{c_char, c_int, c_void};
 use std::path::Path;
 
 use libloading::Library;
+use tiprub_shell::{Failure, Result};
 
 /// Instance.
 pub type Instance = *mut c_void;
 /// Saved state.
 pub type State = *mut c_void;
 /// Text.
-pub type Text = *const c_char;
+pub(crate) type Text = *const c_char;
 /// Value references.
-pub type References = *const u32;
+pub(crate) type References = *const u32;
 
 /// Structs of function pointers, loaded by name, and the list of the names.
 macro_rules! api {
@@ -33,18 +35,21 @@ macro_rules! api {
             pub const NAMES: &[&str] = &[$(stringify!($name)),*];
 
             /// Load a library and look up every function.
-            #[track_caller]
-            pub fn load(path: &Path) -> Self {
-                // SAFETY: the library has no initialisers beyond those of the Rust standard library.
-                let library = unsafe { Library::new(path) }.expect("the library can be loaded");
-                Self {
-                    $($name: {
-                        // SAFETY: the type is that of the standard's header.
-                        let symbol = unsafe { library.get(stringify!($name)) };
-                        *symbol.unwrap_or_else(|error| panic!("{} is not exported: {error}", stringify!($name)))
-                    },)*
+            ///
+            /// # Errors
+            /// The file is no library of this platform, or a function is missing.
+            pub fn load(path: &Path) -> Result<Self> {
+                // SAFETY: loading runs the library's initialisers; that is what importing an FMU means, and the user named it.
+                let library = unsafe { Library::new(path) }.map_err(|error| {
+                    Failure::new(path.display(), format!("cannot be loaded: {error}"), "Is it for this machine?")
+                })?;
+                Ok(Self {
+                    // SAFETY: the types are those of the standard's header; the library is kept as long as the functions.
+                    $($name: *unsafe { library.get(stringify!($name)) }.map_err(|error| {
+                        Failure::new("FMU library", format!("does not export {}: {error}", stringify!($name)), "")
+                    })?,)*
                     _library: library,
-                }
+                })
             }
         }
     };
@@ -142,7 +147,7 @@ api! {
         fmi3GetUInt32(Instance, References, usize, *mut u32, usize) -> i32;
         fmi3GetInt64(Instance, References, usize, *mut i64, usize) -> i32;
         fmi3GetUInt64(Instance, References, usize, *mut u64, usize) -> i32;
-        fmi3GetBoolean(Instance, References, usize, *mut bool, usize) -> i32;
+        fmi3GetBoolean(Instance, References, usize, *mut u8, usize) -> i32;
         fmi3GetString(Instance, References, usize, *mut Text, usize) -> i32;
         fmi3GetBinary(Instance, References, usize, *mut usize, *mut *const u8, usize) -> i32;
         fmi3GetClock(Instance, References, usize, *mut bool) -> i32;

@@ -1,0 +1,145 @@
+//! Rotors in casings at several numbers of modes, with the methods of the reference crate beside the product.
+
+use tiprub_core::Scene;
+use tiprub_reference::reduced;
+use tiprub_shell::{Failure, Result};
+
+use super::{
+    case::{Case, without_finest},
+    competitor::{Competitor, Family},
+    outside::{OutsideRun, Softness},
+    run::Run,
+    scene::SceneRun,
+    window,
+};
+
+/// What is told of a rotor, and how it is stepped.
+pub(crate) struct Facts {
+    pub name: &'static str,
+    /// Names of its two figures.
+    pub figures: [&'static str; 2],
+    pub title: &'static str,
+    pub description: String,
+    /// What a size counts.
+    pub size_name: &'static str,
+    /// Time between samples (s).
+    pub interval: f64,
+    /// Samples of the window at most, and per window of impulses.
+    pub samples: [usize; 2],
+    /// Runs are followed for so many windows to see whether they part, with so many internal steps per sample.
+    pub long: (usize, u32),
+    /// Internal steps per sample.
+    pub divisions: Vec<u32>,
+    /// The same of the outside methods, where their steps take much longer.
+    pub outside_divisions: Option<Vec<u32>>,
+    /// The same of the references, the product's and Moreau-Jean's.
+    pub references: (u32, u32),
+    /// Equations whose limits are computed at the standard size, and at the others.
+    pub families: [Vec<Family>; 2],
+    pub softness: Softness,
+}
+
+/// A rotor with several numbers of modes: for the product, and for the reference crate.
+pub(crate) struct Turning<S> {
+    facts: Facts,
+    sizes: Vec<(usize, Scene, S)>,
+    samples: usize,
+    parting: Vec<f64>,
+}
+
+impl<S: reduced::Scene> Turning<S> {
+    /// See how long it can be followed.
+    ///
+    /// # Errors
+    /// A run fails; never with what ships.
+    pub(crate) fn new(facts: Facts, sizes: Vec<(usize, Scene, S)>) -> Result<Self> {
+        let [samples, _] = facts.samples;
+        let mut turning = Self { facts, sizes, samples, parting: Vec::new() };
+        let (windows, division) = turning.facts.long;
+        turning.parting = window::parting(&turning, division, windows * samples)
+            .map_err(|problem| Failure::new(turning.facts.name, problem, "Report this to the developers"))?;
+        turning.samples = window::samples(&turning.parting, samples);
+        Ok(turning)
+    }
+}
+
+impl<S: reduced::Scene> Case for Turning<S> {
+    fn name(&self) -> &'static str {
+        self.facts.name
+    }
+
+    fn figures(&self) -> [&'static str; 2] {
+        self.facts.figures
+    }
+
+    fn title(&self) -> &str {
+        self.facts.title
+    }
+
+    fn description(&self) -> String {
+        self.facts.description.clone()
+    }
+
+    fn size_name(&self) -> &'static str {
+        self.facts.size_name
+    }
+
+    fn sizes(&self) -> Vec<usize> {
+        self.sizes.iter().map(|size| size.0).collect()
+    }
+
+    fn interval(&self) -> f64 {
+        self.facts.interval
+    }
+
+    fn samples(&self) -> usize {
+        self.samples
+    }
+
+    fn impulse_window(&self) -> usize {
+        self.facts.samples[1]
+    }
+
+    /// Steps are compared at the standard size; the others leave the finest out.
+    fn divisions(&self, size: usize) -> Vec<u32> {
+        without_finest(&self.facts.divisions, size == self.standard())
+    }
+
+    fn divisions_of(&self, size: usize, competitor: Competitor) -> Vec<u32> {
+        let outside = self.facts.outside_divisions.as_ref().filter(|_| !competitor.is_core());
+        outside.map_or_else(|| self.divisions(size), Vec::clone)
+    }
+
+    fn reference_divisions(&self, size: usize) -> (u32, u32) {
+        let (own, outside) = self.facts.references;
+        // Only where steps are compared must the outside reference be as fine.
+        (own, if size == self.standard() { outside } else { outside / 4 })
+    }
+
+    fn families(&self, size: usize) -> Vec<Family> {
+        self.facts.families[usize::from(size != self.standard())].clone()
+    }
+
+    fn parting(&self) -> &[f64] {
+        &self.parting
+    }
+
+    fn start<'a>(
+        &'a self,
+        size: usize,
+        competitor: Competitor,
+        division: u32,
+        perturbation: f64,
+    ) -> Result<Box<dyn Run + 'a>, String> {
+        let (_, scene, outside) = &self.sizes[size];
+        let Facts { interval, softness, .. } = self.facts;
+        Ok(match competitor {
+            Competitor::Core(scheme, solver) => {
+                Box::new(SceneRun::new(scene, (scheme, solver), interval, division, perturbation)?)
+            }
+            Competitor::Moreau | Competitor::Augmented | Competitor::Penalty(_) | Competitor::Full(_) => {
+                Box::new(OutsideRun::new(outside, competitor, interval, division, softness)?)
+            }
+        })
+    }
+}
