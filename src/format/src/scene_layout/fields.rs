@@ -264,7 +264,7 @@ pub const FIELDS: [SceneField; 70] = [
         "contact.nodes",
         "text",
         Some("all nodes"),
-        "free masters only; needed where there are several pairs",
+        "needed where a structure is the master of several pairs",
         "What the names of the contact nodes of this pair start with. No node may belong to two pairs.",
     ),
     field(
