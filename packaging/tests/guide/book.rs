@@ -147,7 +147,7 @@ fn no_link_is_dead() {
     }
 }
 
-/// Paths of the sources that the pages name, such as `src/core/src/contact/solver.rs`.
+/// Paths of the sources that the pages name, such as `src/core/src/laws/film.rs`.
 #[test]
 fn no_path_is_dead() {
     let roots = ["src/", "tests/", "fmi/", "packaging/", "modelDescription/", "docs/", ".ci/"];

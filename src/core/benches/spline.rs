@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::time::Instant;
 
-use tiprub_core::contact::spline::{ClosestPoint, Projection, SurfaceSpline};
+use tiprub_core::gaps::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
 
 const RADIUS: f64 = 0.25;

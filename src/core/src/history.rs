@@ -1,6 +1,6 @@
 //! What one structure's contact nodes remember: values now, one step before, and the oldest that a step still needs.
 
-use crate::contact::gap::Geometry;
+use crate::gaps::Geometry;
 use crate::persist::{Persist, Reader, Writer, persist_fields};
 
 /// A value of the step just done, and of the step before. Only the former is part of a saved state.
@@ -89,7 +89,7 @@ pub struct History {
     pub coating_force: Vec<f64>,
     /// Contact force on each row (N). That of the step before is kept for laws that start from it.
     pub force: Two<Vec<f64>>,
-    /// Contact points as [`crate::contact::gap::GapLaw::contact_point`] tells them.
+    /// Contact points as [`crate::gaps::GapLaw::contact_point`] tells them.
     pub points: Vec<f64>,
     /// Displacement of the contact rows as predicted (m), of schemes whose contact forces act one step later.
     pub predicted: Two<Vec<f64>>,

@@ -1,7 +1,7 @@
 //! Energy ledger: kinetic + strain = initial + external work + curvature work + load work + step changes − damping −
 //! friction − impact losses − wear work.
 //!
-//! All terms are those of the discrete equations (see [`crate::dynamics::scheme`]), so the closure residual measures
+//! All terms are those of the discrete equations (see [`crate::schemes`]), so the closure residual measures
 //! rounding and programming errors, not the scheme's truncation error.
 
 use crate::persist::persist_fields;

@@ -8,9 +8,9 @@
 //! derived from, and marches the contact problem from one communication point to the next.
 #![forbid(unsafe_op_in_unsafe_fn)]
 
-pub mod contact;
 pub mod dynamics;
 mod error;
+pub mod gaps;
 mod history;
 pub mod laws;
 mod ledger;
@@ -18,6 +18,7 @@ pub mod persist;
 pub mod plausibility;
 pub mod ranges;
 pub mod rom;
+pub mod schemes;
 pub mod settings;
 pub mod simulation;
 pub mod stability;

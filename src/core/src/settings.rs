@@ -24,11 +24,6 @@ impl Scheme {
     /// All of them, in the order of the FMU's enumeration.
     pub const ALL: [Self; 3] = [Self::CentralDifference, Self::ModalExact, Self::MasslessBoundary];
 
-    /// Whether contact forces act one step after they are found.
-    pub fn acts_later(self) -> bool {
-        self == Self::MasslessBoundary
-    }
-
     /// As in scene files and in the FMU's enumeration.
     pub fn name(self) -> &'static str {
         crate::simulation::SCHEMES.items[self as usize].0

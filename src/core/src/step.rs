@@ -1,6 +1,6 @@
 //! One internal step: prediction, gaps, correction (section 4.3 of the paper), and the ledger kept on the way.
 
-use crate::contact::gap::Drive;
+use crate::gaps::Drive;
 use crate::system::{Bodies, Found, StepFailure, System};
 
 /// Denormals are flushed every this many steps.

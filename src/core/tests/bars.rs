@@ -7,8 +7,8 @@ mod rods;
 
 use guide::told;
 use rods::{NEARLY_NONE, Rod, SCHEMES, SOLVERS, ascending, quiet_step};
-use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw};
 use tiprub_core::dynamics::modal::{ModalModel, NodePair};
+use tiprub_core::gaps::{Drive, FixedGap, GapLaw};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_reference::carpenter::{self, AREA, DENSITY, GAP, LENGTH, SPEED, YOUNG};

@@ -9,10 +9,10 @@ mod guide;
 
 use guide::told;
 use nalgebra::DMatrix;
-use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw};
 use tiprub_core::dynamics::bank::BankOptions;
 use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::dynamics::sectors::SectorModel;
+use tiprub_core::gaps::{Drive, FixedGap, GapLaw};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_reference::closed::belt::Belt;

@@ -9,7 +9,7 @@ mod rods;
 
 use guide::told;
 use rods::{NEARLY_NONE, Rod, SCHEMES, SOLVERS, against_plane, orders, quiet_step, set_samples};
-use tiprub_core::contact::gap::Drive;
+use tiprub_core::gaps::Drive;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_reference::closed::bouncing_bar::{
     CONTACTS, DENSITY, GRAVITY, HEIGHT, LENGTH, PERIOD, YOUNG, displacement, energy, pressure,

@@ -12,8 +12,8 @@ mod sliding;
 use std::f64::consts::TAU;
 
 use casings::*;
-use tiprub_core::contact::gap::dot;
-use tiprub_core::contact::spline::{ClosestPoint, Evaluation, Projection, REACH, SurfaceSpline};
+use tiprub_core::gaps::dot;
+use tiprub_core::gaps::surface_spline::{ClosestPoint, Evaluation, Projection, REACH, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
 
 /// A node at a signed distance inside a place, with its closest point known by construction.

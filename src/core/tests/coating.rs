@@ -4,7 +4,7 @@ use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::cell::Cell;
 use std::f64::consts::TAU;
 
-use tiprub_core::contact::coating::{CoatedProblem, Coating};
+use tiprub_core::laws::coating::{CoatedProblem, Coating};
 use tiprub_core::settings::CoatingSettings;
 
 /// Counts allocations of this thread.

@@ -1,8 +1,8 @@
 //! Forces, moments and work agree: the normal is the gradient of the gap, the torque is conjugate to the rotor angle, every
 //! input has its work, and what acts on the master acts on the slave.
 
-use tiprub_core::contact::gap::{Drive, GapLaw};
-use tiprub_core::contact::wrench::{At, Motion};
+use tiprub_core::gaps::wrench::{At, Motion};
+use tiprub_core::gaps::{Drive, GapLaw};
 use tiprub_core::settings::{PatchSettings, Scheme, Solver, SplineSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, coating, disk, flexible, started};
@@ -82,7 +82,7 @@ fn looked(
     lanes: usize,
     drive: &Drive,
     displacement: &[f64],
-) -> (f64, [f64; 3], Vec<tiprub_core::contact::spline::ClosestPoint>) {
+) -> (f64, [f64; 3], Vec<tiprub_core::gaps::surface_spline::ClosestPoint>) {
     let mut geometry = law.geometry(lanes);
     let mut gap = vec![f64::INFINITY; law.nodes() * lanes];
     law.evaluate(drive, displacement, &[], None, &mut geometry, &mut gap);

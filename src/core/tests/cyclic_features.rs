@@ -243,7 +243,7 @@ fn a_change_of_step_keeps_the_order_of_the_scheme() {
                 bank.set_modal_state(n, mode, [amplitude, -0.5 * amplitude], [0.1 * amplitude, 0.0]);
             }
         }
-        let drive = tiprub_core::contact::gap::Drive { speed: 1300.0, ..Default::default() };
+        let drive = tiprub_core::gaps::Drive { speed: 1300.0, ..Default::default() };
         system.start(&[drive]);
         for step in steps {
             system.set_step(*step);

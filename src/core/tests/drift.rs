@@ -10,8 +10,8 @@ mod rods;
 
 use guide::told;
 use rods::{NEARLY_NONE, Rod, SCHEMES, against_plane, quiet_step, set_samples, single};
-use tiprub_core::contact::gap::Drive;
 use tiprub_core::dynamics::modal::ModalModel;
+use tiprub_core::gaps::Drive;
 use tiprub_core::persist::{Persist, Reader, Writer};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::System;

@@ -6,7 +6,7 @@ mod checks;
 mod counting;
 
 use checks::{allocates_nothing, disturb, ledger_closes, state_continues};
-use tiprub_core::contact::gap::Drive;
+use tiprub_core::gaps::Drive;
 use tiprub_core::settings::{LoadSettings, PatchSettings, Scheme, Shape, Solver, SplineSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, coating, flexible, go, real, saved, set, started, try_started};

@@ -6,8 +6,8 @@
 mod casings;
 
 use casings::{Random, assert_below, distance};
-use tiprub_core::contact::gap::dot;
-use tiprub_core::contact::spline::{ClosestPoint, Projection, SurfaceSpline};
+use tiprub_core::gaps::dot;
+use tiprub_core::gaps::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use tiprub_core::settings::Interpolation;
 use tiprub_reference::surface::{Surface, SurfaceKind};
 

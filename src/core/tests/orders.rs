@@ -9,8 +9,8 @@ mod rods;
 use guide::told;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rods::{SCHEMES, SOLVERS, against_plane, orders, set_samples, single};
-use tiprub_core::contact::gap::Drive;
 use tiprub_core::dynamics::modal::ModalModel;
+use tiprub_core::gaps::Drive;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_reference::closed::oscillator::{Bilinear, DeadStop};
 

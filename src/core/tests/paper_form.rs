@@ -1,8 +1,8 @@
 //! The paper's equations with dense matrices against the modal form of the core: the same numbers.
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw, dot};
 use tiprub_core::dynamics::modal::ModalModel;
+use tiprub_core::gaps::{Drive, FixedGap, GapLaw, dot};
 use tiprub_core::rom::Rom;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};

@@ -4,12 +4,12 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::contact::gap::{Drive, FixedGap, GapLaw};
-use tiprub_core::contact::open_gap::{OpenGap, OpenSurface};
-use tiprub_core::contact::spline::SurfaceSpline;
 use tiprub_core::dynamics::bank::BankOptions;
 use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::dynamics::sectors::SectorModel;
+use tiprub_core::gaps::open::{OpenGap, OpenSurface};
+use tiprub_core::gaps::surface_spline::SurfaceSpline;
+use tiprub_core::gaps::{Drive, FixedGap, GapLaw};
 use tiprub_core::settings::{Interpolation, LoadSettings, Scheme, Shape, Solver, SplineSettings};
 use tiprub_core::system::{Carrier, PairParts, StructureParts, System, SystemSettings};
 use tiprub_core::{Rom, Scene, Simulation};

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use tiprub_core::dynamics::bank::{BankOptions, ModalBank};
 use tiprub_core::dynamics::modal::{ModalModel, ModalSpin};
-use tiprub_core::dynamics::scheme::free_increment;
+use tiprub_core::schemes::free_increment;
 use tiprub_core::settings::Scheme;
 
 const SPEED: f64 = 1800.0;

@@ -11,8 +11,8 @@ use std::f64::consts::TAU;
 
 use casings::*;
 use guide::told;
-use tiprub_core::contact::gap::dot;
-use tiprub_core::contact::spline::{ClosestPoint, Evaluation, REACH, SurfaceSpline};
+use tiprub_core::gaps::dot;
+use tiprub_core::gaps::surface_spline::{ClosestPoint, Evaluation, REACH, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
 
 #[test]

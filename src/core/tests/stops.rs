@@ -7,8 +7,8 @@ mod rods;
 
 use guide::told;
 use rods::{SOLVERS, against_plane, set_samples, single};
-use tiprub_core::contact::gap::Drive;
 use tiprub_core::dynamics::modal::ModalModel;
+use tiprub_core::gaps::Drive;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::System;
 use tiprub_reference::closed::oscillator::{Ball, Bilinear, DeadStop};

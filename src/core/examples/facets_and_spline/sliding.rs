@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use tiprub_core::contact::spline::{Projection, SurfaceSpline};
+use tiprub_core::gaps::surface_spline::{Projection, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
 
 /// Radius of the data points of the casing (m).

@@ -5,5 +5,4 @@ pub mod cyclic;
 pub mod dispatch;
 pub mod modal;
 pub mod rigid;
-pub mod scheme;
 pub mod sectors;

@@ -4,7 +4,7 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::scheme::ModeCoefficients;
+use crate::schemes::ModeCoefficients;
 use crate::settings::Scheme;
 use crate::{Error, Result, Rom, shown};
 

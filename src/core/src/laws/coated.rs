@@ -3,8 +3,8 @@
 use nalgebra::DMatrix;
 
 use super::{ContactLaw, Prediction};
-use crate::contact::coating::{CoatedProblem, Coating};
-use crate::contact::solver::Outcome;
+use crate::laws::active_set::Outcome;
+use crate::laws::coating::{CoatedProblem, Coating};
 
 /// A coating with its wear, and the problem of the blades on it. Groups are whole blades, whose nodes share cells.
 #[derive(Debug, Clone)]

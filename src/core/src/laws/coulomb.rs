@@ -3,9 +3,9 @@
 use nalgebra::DMatrix;
 
 use super::{ContactLaw, Prediction};
-use crate::contact::coulomb::CoulombSolver;
-use crate::contact::gap::dot;
-use crate::contact::solver::Outcome;
+use crate::gaps::dot;
+use crate::laws::active_set::Outcome;
+use crate::laws::de_saxce::CoulombSolver;
 
 /// Coulomb friction, started from the forces of the last step.
 #[derive(Debug, Clone)]

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{ContactLaw, Prediction};
-use crate::contact::solver::{ContactSolver, Outcome};
+use crate::laws::active_set::{ContactSolver, Outcome};
 
 /// Penetration is detected once; neither a negative λ nor a penetration caused elsewhere is looked at again.
 #[derive(Debug, Clone)]

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{ContactLaw, Prediction};
-use crate::contact::solver::{ContactSolver, Outcome};
+use crate::laws::active_set::{ContactSolver, Outcome};
 
 /// Linear complementarity, started from what was closed one step before.
 #[derive(Debug, Clone)]

@@ -4,16 +4,19 @@
 //! Each owns its matrix, its unknowns and its state. The group that asks fills the Delassus matrix W = C_Nᵀ A⁻¹ C_NT along the
 //! directions of the law, poses the contacts one after the other, and lets the law solve.
 
+pub mod active_set;
 mod coated;
+pub mod coating;
 mod coulomb;
+pub mod de_saxce;
 mod film;
 mod lcp;
 
 use nalgebra::DMatrix;
 
-use crate::contact::coating::Coating;
-use crate::contact::gap::dot;
-use crate::contact::solver::Outcome;
+use crate::gaps::dot;
+use crate::laws::active_set::Outcome;
+use crate::laws::coating::Coating;
 use crate::persist::{Persist, Reader, Writer};
 use crate::settings::Solver;
 pub use coated::Coated;

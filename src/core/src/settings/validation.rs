@@ -245,7 +245,7 @@ impl SurfaceSettings {
                 within(&format!("{at}.shape.width"), *width, 1e-3, 0.25)
             }
             Shape::Table { radius_change } => {
-                crate::contact::surface::Surface::new(&Shape::Table { radius_change: radius_change.clone() }, 0.0)
+                crate::gaps::shape::Surface::new(&Shape::Table { radius_change: radius_change.clone() }, 0.0)
                     .map(|_| ())
             }
         }

@@ -1,16 +1,16 @@
 //! From settings to kernels: what is decided once, before anything moves.
 
-use crate::contact::coating::Coating;
-use crate::contact::gap::{GapLaw, RevolutionGap};
-use crate::contact::layout::Layout;
-use crate::contact::open_gap::{OpenGap, OpenSurface};
-use crate::contact::spline::SurfaceSpline;
-use crate::contact::surface::Surface;
 use crate::dynamics::bank::BankOptions;
 use crate::dynamics::cyclic::CyclicModel;
 use crate::dynamics::modal::{ModalModel, ModalSpin};
 use crate::dynamics::rigid::{Translations, free_modes};
 use crate::dynamics::sectors::SectorModel;
+use crate::gaps::layout::Layout;
+use crate::gaps::open::{OpenGap, OpenSurface};
+use crate::gaps::shape::Surface;
+use crate::gaps::surface_spline::SurfaceSpline;
+use crate::gaps::{GapLaw, RevolutionGap};
+use crate::laws::coating::Coating;
 use crate::settings::{ContactSettings, Motion, Scheme, Solver, StructureSettings};
 use crate::system::{Carrier, PairParts, StructureParts, System, SystemSettings};
 use crate::variables::Quantity;

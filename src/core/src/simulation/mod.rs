@@ -19,7 +19,7 @@ mod table;
 pub(crate) use table::{SCHEMES, SOLVERS};
 mod window;
 
-use crate::contact::gap::Drive;
+use crate::gaps::Drive;
 use crate::settings::Solver;
 use crate::system::System;
 use crate::variables::{Quantity, Start, VariableTable};

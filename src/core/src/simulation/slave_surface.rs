@@ -1,10 +1,10 @@
 //! The slave surface of a scene, laid through data points, and the modes of the structure that carries it.
 
-use crate::contact::layout::Layout;
-use crate::contact::spline::SurfaceSpline;
-use crate::contact::spline_gap::SplineGap;
-use crate::contact::surface::Surface;
 use crate::dynamics::modal::ModalModel;
+use crate::gaps::layout::Layout;
+use crate::gaps::shape::Surface;
+use crate::gaps::spline::SplineGap;
+use crate::gaps::surface_spline::SurfaceSpline;
 use crate::rom::Frame;
 use crate::settings::{ContactSettings, Meridian, SplineSettings, SurfaceSettings};
 use crate::{Error, Result, Rom};

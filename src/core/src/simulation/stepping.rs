@@ -3,7 +3,7 @@
 use super::drive::Input;
 use super::loads::fill_centrifugal;
 use super::{Communication, MOST_STEPS, Phase, Progress, Simulation, TIME_TOLERANCE, same_step};
-use crate::contact::coating::Coating;
+use crate::laws::coating::Coating;
 use crate::settings::Scheme;
 use crate::{Error, Result, ranges, shown};
 

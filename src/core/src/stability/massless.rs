@@ -16,9 +16,9 @@ use nalgebra::DMatrix;
 use super::{
     ContactDirections, GROWTH_NOISE, GROWTH_UP_TO, Growth, blocks, directional_modes, eigenvalues, spectral_radius,
 };
-use crate::contact::gap::dot;
 use crate::dynamics::modal::ModalModel;
-use crate::dynamics::scheme::{ModeCoefficients, damped_frequency};
+use crate::gaps::dot;
+use crate::schemes::{ModeCoefficients, damped_frequency};
 use crate::settings::Scheme;
 use crate::{Error, Result};
 

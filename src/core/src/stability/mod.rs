@@ -13,8 +13,8 @@ pub mod unresolved;
 
 use nalgebra::DMatrix;
 
-use crate::contact::gap::dot;
 use crate::dynamics::modal::ModalModel;
+use crate::gaps::dot;
 use crate::settings::Scheme;
 use crate::{Error, Result, shown};
 

@@ -2,10 +2,10 @@
 
 use super::Structure;
 use super::pair::{Carrier, at_place};
-use crate::contact::spline::{ClosestPoint, SurfaceSpline};
-use crate::contact::spline_gap::Frame;
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::sectors::Sectors;
+use crate::gaps::spline::Frame;
+use crate::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
 use nalgebra::DMatrix;
 
 /// Where a contact acts on a structure.

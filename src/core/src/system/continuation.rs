@@ -1,11 +1,11 @@
 //! What carries a running state on: another step size, saving and restoring, and ways over an edge.
 
-use super::group::Member;
 use super::pair::When;
+use super::posed::Member;
 use super::{Bodies, ContactEvent, Pair, StepFailure, Structure, System, sum_of};
-use crate::contact::gap::{GapLaw, dot};
-use crate::contact::spline::ClosestPoint;
-use crate::contact::wrench::At;
+use crate::gaps::surface_spline::ClosestPoint;
+use crate::gaps::wrench::At;
+use crate::gaps::{GapLaw, dot};
 use crate::history::History;
 use crate::persist::{Persist, Reader, Writer};
 

@@ -1,11 +1,11 @@
 //! The Delassus matrix W = C_Nᵀ A⁻¹ C_NT of the contact nodes of one structure, by its flexibility over one step.
 
-use super::group::Member;
-use crate::contact::gap::dot;
+use super::posed::Member;
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::cyclic::CyclicBank;
 use crate::dynamics::dispatch::Kernel;
 use crate::dynamics::sectors::Sectors;
+use crate::gaps::dot;
 use nalgebra::DMatrix;
 
 /// Contacts of a structure within a group, with their directions: from which row and column on they stand in the matrix.

@@ -1,8 +1,8 @@
 //! What a contact did in a step.
 
-use super::group::Member;
-use crate::contact::gap::dot;
-use crate::contact::wrench::Wrench;
+use super::posed::Member;
+use crate::gaps::dot;
+use crate::gaps::wrench::Wrench;
 
 /// One active contact of the last step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,7 +21,7 @@ pub struct ContactEvent {
     pub tangential: f64,
     /// Force on the structure (N) in the coordinates of its displacements.
     pub force: [f64; 3],
-    /// What tells the contact point, see [`GapLaw::contact_point`](crate::contact::gap::GapLaw::contact_point).
+    /// What tells the contact point, see [`GapLaw::contact_point`](crate::gaps::GapLaw::contact_point).
     pub point: [f64; 3],
     /// The force in fixed directions, its moment, and where it acts.
     pub wrench: Wrench,

@@ -1,10 +1,10 @@
 //! A contact pair: contact nodes of one structure against a surface, which another structure may carry.
 
 use super::Structure;
-use crate::contact::gap::{Drive, GapLaw};
-use crate::contact::spline::{ClosestPoint, SurfaceSpline};
-use crate::contact::spline_gap::Frame;
-use crate::contact::wrench::Motion;
+use crate::gaps::spline::Frame;
+use crate::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
+use crate::gaps::wrench::Motion;
+use crate::gaps::{Drive, GapLaw};
 use crate::history::Two;
 use crate::persist::persist_fields;
 

@@ -1,7 +1,7 @@
 //! Whether the state is still what small displacements describe.
 
 use super::{Pair, StepFailure, System};
-use crate::contact::gap::GapLaw;
+use crate::gaps::GapLaw;
 
 /// Clearances below this share of the radius are those of a press fit, in which errors as small do not matter.
 pub const LEAST_CLEARANCE: f64 = 1e-4;

@@ -1,9 +1,9 @@
 //! One structure: its modes, its contact nodes and their past, and the forces on surfaces that it carries.
 
-use crate::contact::gap::{Drive, GapLaw, Geometry, dot};
 use crate::dynamics::bank::{BankOptions, LANES, ModalBank};
 use crate::dynamics::modal::ModalModel;
 use crate::dynamics::sectors::{SectorModel, Sectors};
+use crate::gaps::{Drive, GapLaw, Geometry, dot};
 use crate::history::History;
 use crate::persist::{Persist, Reader, Writer};
 use crate::settings::Scheme;

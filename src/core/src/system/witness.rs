@@ -6,7 +6,7 @@
 
 use super::pair::When;
 use super::{ContactEvent, StepFailure, System};
-use crate::contact::gap::dot;
+use crate::gaps::dot;
 
 /// Changes below this are rounding, whatever the model (m): no length that means anything is as short.
 const ROUNDING: f64 = 1e-15;
@@ -60,8 +60,8 @@ impl System {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::gap::{Drive, FixedGap, GapLaw};
     use crate::dynamics::modal::ModalModel;
+    use crate::gaps::{Drive, FixedGap, GapLaw};
     use crate::settings::{Scheme, Solver};
     use crate::system::SystemSettings;
     use nalgebra::DMatrix;

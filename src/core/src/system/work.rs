@@ -2,8 +2,8 @@
 
 use super::pair::{When, at_place};
 use super::{ContactEvent, StepFailure, System};
-use crate::contact::gap::{Geometry, dot};
-use crate::contact::wrench::{At, Motion};
+use crate::gaps::wrench::{At, Motion};
+use crate::gaps::{Geometry, dot};
 
 /// What one contact did over a step (J).
 #[derive(Debug, Clone, Copy, Default)]

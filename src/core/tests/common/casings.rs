@@ -4,8 +4,8 @@
 
 use std::f64::consts::TAU;
 
-use tiprub_core::contact::gap::dot;
-use tiprub_core::contact::spline::{ClosestPoint, SurfaceSpline};
+use tiprub_core::gaps::dot;
+use tiprub_core::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
 pub use tiprub_test_models::Random;
 

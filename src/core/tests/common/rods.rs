@@ -3,12 +3,12 @@
 #![allow(dead_code, reason = "each test binary uses its part")]
 
 use nalgebra::DMatrix;
-use tiprub_core::contact::gap::{FixedGap, GapLaw};
 use tiprub_core::dynamics::bank::BankOptions;
 use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::dynamics::scheme::free_increment;
 use tiprub_core::dynamics::sectors::SectorModel;
+use tiprub_core::gaps::{FixedGap, GapLaw};
 use tiprub_core::rom::Rom;
+use tiprub_core::schemes::free_increment;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::stability::massless::{MasslessCheck, QUIET};
 use tiprub_core::system::{System, SystemSettings};

@@ -3,8 +3,8 @@
 use realfft::RealFftPlanner;
 use tiprub_core::{
     Scene,
-    contact::surface::Surface,
     dynamics::{cyclic::CyclicModel, modal::ModalModel},
+    gaps::shape::Surface,
     settings::{Motion, SceneSettings},
 };
 use tiprub_shell::{Failure, Result};

@@ -2,8 +2,8 @@
 
 use tiprub_core::{
     Result, Scene, Simulation,
-    contact::{spline::SurfaceSpline, surface::Surface, wrench::Wrench},
     dynamics::sectors::Sectors,
+    gaps::{shape::Surface, surface_spline::SurfaceSpline, wrench::Wrench},
     settings::{Scheme, Shape, Solver, SplineSettings},
     system::{ContactEvent, Structure, System},
 };
@@ -276,7 +276,7 @@ fn modal_residual(system: &System, expected: &[Vec<f64>]) -> f64 {
 fn surface_of<'a>(
     simulation: &'a Simulation,
     event: &ContactEvent,
-) -> Option<(&'a SurfaceSpline, tiprub_core::contact::spline::ClosestPoint, f64)> {
+) -> Option<(&'a SurfaceSpline, tiprub_core::gaps::surface_spline::ClosestPoint, f64)> {
     let system = simulation.system();
     let (structure, pair) = (&system.structures()[event.structure], &system.pairs()[event.pair]);
     let place = *structure.geometry().places.get(structure.index(event.node, event.sector))?;

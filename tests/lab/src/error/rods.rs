@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::{
-    contact::gap::{Drive, FixedGap, GapLaw},
     dynamics::{bank::BankOptions, modal::ModalModel, sectors::SectorModel},
+    gaps::{Drive, FixedGap, GapLaw},
     settings::{Scheme, Solver},
     stability::{self, massless},
     system::{System, SystemSettings},

@@ -1,7 +1,7 @@
 //! What depends on step size, scheme, damping and speed, and the state carried from one of them to the next.
 
 use super::{LaneCoefficients, ModalBank};
-use crate::dynamics::scheme::{Velocity, resample};
+use crate::schemes::{Velocity, resample};
 use crate::settings::Scheme;
 
 impl ModalBank {

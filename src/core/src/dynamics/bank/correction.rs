@@ -2,7 +2,7 @@
 
 use super::ModalBank;
 use super::predict::{Accumulate, ModalForce};
-use crate::dynamics::scheme::ModeCoefficients;
+use crate::schemes::ModeCoefficients;
 
 impl ModalBank {
     /// Add `correction` to the modes of one sector.

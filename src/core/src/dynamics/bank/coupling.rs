@@ -10,7 +10,7 @@
 //! with (q⁺ − q⁻)/2 the Coriolis term vanishes and ΔK adds ½ qᵀΔK q⁻ to the strain energy: the ledger closes as before.
 
 use crate::dynamics::modal::ModalSpin;
-use crate::dynamics::scheme::ModeCoefficients;
+use crate::schemes::ModeCoefficients;
 
 /// What of the spin couples the modes.
 #[derive(Debug, Clone)]

@@ -14,8 +14,8 @@ use nalgebra::DMatrix;
 
 use super::dispatch::InstructionSet;
 use super::modal::{ModalModel, ModalSpin};
-use super::scheme::{ModeCoefficients, Velocity, free_increment};
 use crate::persist::{Persist, Reader, Writer, persist_fields};
+use crate::schemes::{ModeCoefficients, Velocity, free_increment};
 use crate::settings::Scheme;
 use coupling::Coupling;
 use predict::Predict;

@@ -3,7 +3,7 @@
 use super::fourier::Synthesis;
 use super::pass::{Gather, modal_force};
 use super::{Complexes, CyclicBank, LANES, LaneCoefficients, NOTHING};
-use crate::dynamics::scheme::{Velocity, resample};
+use crate::schemes::{Velocity, resample};
 use crate::settings::Scheme;
 
 impl CyclicBank {

@@ -14,8 +14,8 @@ mod pass;
 
 use super::bank::{FLUSH_BELOW, LANES, lanes};
 use super::dispatch::InstructionSet;
-use super::scheme::{ModeCoefficients, Velocity, free_increment};
 use crate::persist::{Persist, Reader, Writer, persist_fields};
+use crate::schemes::{ModeCoefficients, Velocity, free_increment};
 use crate::settings::Scheme;
 use fourier::{Fourier, Synthesis};
 pub use model::{CyclicModel, DiameterModes};

@@ -9,8 +9,8 @@
 use nalgebra::{Complex, DMatrix, SymmetricEigen};
 
 use crate::dynamics::modal::{ModalModel, RIGID_FRACTION, check_semidefinite, real_modes};
-use crate::dynamics::scheme::ModeCoefficients;
 use crate::rom::{Harmonic, cholesky};
+use crate::schemes::ModeCoefficients;
 use crate::settings::Scheme;
 use crate::{Error, Result, Rom, shown};
 

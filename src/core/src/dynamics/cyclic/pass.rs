@@ -14,7 +14,7 @@ pub type Complexes = [[f64; LANES]; 2];
 /// Rows recovered in the fused pass: three contact nodes.
 const FUSED: usize = 9;
 
-/// Coefficients of one mode for the lanes of a block (see [`crate::dynamics::scheme`]); 0 where there is no such mode.
+/// Coefficients of one mode for the lanes of a block (see [`crate::schemes`]); 0 where there is no such mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LaneCoefficients {
     pub beta: [f64; LANES],

@@ -9,9 +9,9 @@
 use nalgebra::DMatrix;
 
 use super::{BodyLimits, Parameters, Sense};
-use crate::contact::gap::{GapLaw, Geometry, dot};
-use crate::contact::open_gap::{OpenGap, tangent};
 use crate::dynamics::modal::ModalModel;
+use crate::gaps::open::{OpenGap, tangent};
+use crate::gaps::{GapLaw, Geometry, dot};
 use crate::settings::Solver;
 use crate::simulation::compile::Compiled;
 use crate::stability::massless::MasslessLimit;

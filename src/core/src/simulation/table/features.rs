@@ -3,7 +3,7 @@
 use super::builder::Builder;
 use super::units::{ANGLE, ENERGY, LENGTH, LINE_LOAD, POWER, TEMPERATURE, VOLUME};
 use super::{Body, Carrier, Pair, Parts, largest_length};
-use crate::contact::coating::Coating;
+use crate::laws::coating::Coating;
 use crate::ranges;
 use crate::settings::{CoatingSettings, StructureSettings};
 use crate::simulation::outputs::{each, scalar, whole};

@@ -14,7 +14,7 @@ use super::compile::SMALL_FRACTION;
 use super::outputs::{Reader, scalar};
 use super::patches::Patches;
 use super::plan::{Plan, prefix};
-use crate::contact::surface::Surface;
+use crate::gaps::shape::Surface;
 use crate::settings::{
     ContactSettings, InputInterpolation, Motion, Scene, SceneSettings, Shape, StructureSettings, SurfaceSettings,
 };

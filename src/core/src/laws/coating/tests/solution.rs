@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
 use super::*;
-use crate::contact::solver::ContactSolver;
+use crate::laws::active_set::ContactSolver;
 
 pub fn materials() -> impl Strategy<Value = CoatingSettings> {
     let exponent = -2.0..2.0_f64;

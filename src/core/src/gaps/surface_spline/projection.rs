@@ -8,7 +8,7 @@
 
 use super::foot::{CONVEX, DEGENERATE, Foot, Held, Room, noise, solve};
 use super::{ClosestPoint, EDGE_TOLERANCE, Ends, SurfaceSpline};
-use crate::contact::gap::dot;
+use crate::gaps::dot;
 use crate::settings::Interpolation;
 
 /// Result of a projection.

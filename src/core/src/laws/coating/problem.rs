@@ -2,7 +2,7 @@
 //!
 //! g = g_p + W(NᵀF(−Ng) + λ), λ ⟂ g + h₀ ≥ 0. With every rod on one branch (F = f + kδ) and every node open or closed
 //! the equations are linear in the gaps of the open and the λ of the closed nodes. The branches are found by block
-//! exchanges as in [`ContactSolver`](crate::contact::solver::ContactSolver): every rod and node whose condition is
+//! exchanges as in [`ContactSolver`](crate::laws::active_set::ContactSolver): every rod and node whose condition is
 //! violated moves on by one branch. When the number of violated conditions stops falling, Katzenelson's method takes
 //! over (J. Katzenelson, Bell Syst. Tech. J. 44, 1965): starting without contact, the prediction is approached on a
 //! straight line, and whenever a rod or node comes to the end of its branch this one alone is exchanged. Gaps are a
@@ -14,7 +14,7 @@ mod linear;
 use nalgebra::DMatrix;
 
 use super::{Branch, CellContact, Rod, number};
-use crate::contact::solver::Outcome;
+use crate::laws::active_set::Outcome;
 
 /// Depths and forces within this fraction of their scale count as zero.
 const ZERO_FRACTION: f64 = 1e-12;

@@ -9,9 +9,9 @@
 //! tangential force there is r/(r + u_r) times the one conjugate to u_θ, and the torque r times the latter. On a surface
 //! through data points x is the contact point on the surface, where the force is handed to its control points.
 
-use super::gap::{Drive, GapLaw};
-use super::spline::ClosestPoint;
-use super::spline_gap::Frame;
+use super::spline::Frame;
+use super::surface_spline::ClosestPoint;
+use super::{Drive, GapLaw};
 
 /// A contact force on the master in fixed directions.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

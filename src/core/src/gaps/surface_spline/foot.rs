@@ -3,7 +3,7 @@
 //! f = ½|x − S|², r = x − S: gradient −(S_s·r, S_t·r), Hessian [S_s·S_s − r·S_ss, S_s·S_t − r·S_st; …].
 
 use super::{ClosestPoint, Evaluation, Projection, SurfaceSpline};
-use crate::contact::gap::dot;
+use crate::gaps::dot;
 
 /// Tangents closer to parallel than this (squared sine) are no surface.
 pub(super) const DEGENERATE: f64 = 1e-24;

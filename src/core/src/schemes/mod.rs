@@ -21,7 +21,28 @@
 //!   other modes are stepped by modal-exact and take the contact force one step later, which makes them explicit. With
 //!   the force f of time n known when q(n+1) is, f (u⁺ − u⁻)/2 changes the same E: of a static mode only ½ ω² q q⁻ is left.
 
+mod central_difference;
+mod massless_boundary;
+mod modal_exact;
+
 use crate::settings::Scheme;
+
+/// q⁺ = q + d⁺, d⁺ = β d − κ q + c f of one mode.
+struct Recurrence {
+    beta: f64,
+    kappa: f64,
+    compliance: f64,
+}
+
+impl Scheme {
+    /// Whether contact forces act one step after they are found.
+    pub fn acts_later(self) -> bool {
+        match self {
+            Self::CentralDifference | Self::ModalExact => false,
+            Self::MasslessBoundary => true,
+        }
+    }
+}
 
 /// Coefficients of one mode at one step size.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -45,14 +66,10 @@ pub struct ModeCoefficients {
 impl ModeCoefficients {
     /// Coefficients for angular frequency ω (rad/s, 0 for a rigid mode), damping ratio 0 ≤ ξ < 1, step h (s).
     pub fn new(scheme: Scheme, frequency: f64, damping_ratio: f64, step: f64) -> Self {
-        let decay = damping_ratio * frequency * step;
-        let (beta, kappa, compliance) = match scheme {
-            Scheme::CentralDifference => {
-                let divisor = 1.0 + decay;
-                let square = frequency * step;
-                ((1.0 - decay) / divisor, square * square / divisor, step * step / divisor)
-            }
-            Scheme::ModalExact | Scheme::MasslessBoundary => modal_exact(frequency, damping_ratio, step, decay),
+        let Recurrence { beta, kappa, compliance } = match scheme {
+            Scheme::CentralDifference => central_difference::recurrence(frequency, damping_ratio, step),
+            // Of its modes with inertia.
+            Scheme::ModalExact | Scheme::MasslessBoundary => modal_exact::recurrence(frequency, damping_ratio, step),
         };
         Self {
             beta,
@@ -67,52 +84,19 @@ impl ModeCoefficients {
 
     /// Coefficients of a mode that has inertia under the scheme (`dynamic`), or is quasi-static.
     pub fn of_mode(scheme: Scheme, dynamic: bool, frequency: f64, damping_ratio: f64, step: f64) -> Self {
-        if scheme != Scheme::MasslessBoundary {
-            Self::new(scheme, frequency, damping_ratio, step)
-        } else if dynamic {
-            Self::new(scheme, frequency, damping_ratio, step).delay()
-        } else {
-            Self::quasi_static(frequency)
+        match scheme {
+            Scheme::CentralDifference | Scheme::ModalExact => Self::new(scheme, frequency, damping_ratio, step),
+            Scheme::MasslessBoundary if dynamic => {
+                massless_boundary::delay(Self::new(scheme, frequency, damping_ratio, step))
+            }
+            Scheme::MasslessBoundary => massless_boundary::quasi_static(frequency),
         }
-    }
-
-    /// A mode without inertia: q = f/ω² at once.
-    pub fn quasi_static(frequency: f64) -> Self {
-        let square = frequency * frequency;
-        Self {
-            beta: 0.0,
-            kappa: 1.0,
-            compliance: 1.0 / square,
-            delayed: 0.0,
-            loss: 0.0,
-            inertia: 0.0,
-            spring: 0.5 * square,
-        }
-    }
-
-    /// Take contact forces one step after they were found.
-    pub fn delay(self) -> Self {
-        Self { compliance: 0.0, delayed: self.compliance, ..self }
     }
 
     /// Displacement per unit of a modal force that is known beforehand (s²).
     pub fn load_compliance(&self) -> f64 {
         self.compliance + self.delayed
     }
-}
-
-fn modal_exact(frequency: f64, damping_ratio: f64, step: f64, decay: f64) -> (f64, f64, f64) {
-    if frequency <= 0.0 {
-        return (1.0, 0.0, step * step);
-    }
-    let beta = libm::exp(-2.0 * decay);
-    // 1 − 2e^(−x) cos θ + e^(−2x) without cancellation.
-    let fallen = libm::expm1(-decay);
-    let sine = libm::sin(0.5 * damped_frequency(frequency, damping_ratio) * step);
-    let kappa = fallen * fallen + 4.0 * libm::exp(-decay) * sine * sine;
-    // Written through (ωh)² so that neither tiny nor huge frequencies overflow.
-    let angle = frequency * step;
-    (beta, kappa, step * step * (kappa / (angle * angle)))
 }
 
 /// ω_d = ω √(1 − ξ²).

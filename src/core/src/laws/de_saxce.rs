@@ -24,7 +24,7 @@ use nalgebra::DMatrix;
 
 use self::newton::Newton;
 use self::problem::Problem;
-use super::solver::Outcome;
+use super::active_set::Outcome;
 
 /// Residual at which a problem counts as solved, relative to the terms that displacements and forces are made of.
 const TOLERANCE: f64 = 1e-12;

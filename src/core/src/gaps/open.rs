@@ -3,9 +3,9 @@
 //! A node stands at x = X + u, rigid flight included, and meets the closest point of its surface: g = (x − S)·n with
 //! n = S_t × S_s/|S_t × S_s|. A node beyond a free edge has nothing to touch: its gap is infinite and its normal zero.
 
-use super::gap::{Geometry, dot};
-use super::spline::{ClosestPoint, Projection, SurfaceSpline};
-use super::spline_gap::NOTHING_TO_TOUCH;
+use super::spline::NOTHING_TO_TOUCH;
+use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
+use super::{Geometry, dot};
 
 /// Displacements and penetrations beyond this share of the extent of the contact nodes are not small.
 const SMALL_FRACTION: f64 = 0.1;

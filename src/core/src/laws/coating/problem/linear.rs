@@ -1,7 +1,7 @@
 //! The linear equations of one combination of branches.
 
 use super::CoatedProblem;
-use crate::contact::coating::{Branch, CellContact};
+use crate::laws::coating::{Branch, CellContact};
 
 /// Pivots below this fraction of their column belong to redundant contacts (coincident nodes).
 const REDUNDANT_PIVOT: f64 = 1e-12;

@@ -4,7 +4,7 @@
 
 use super::foot::{Foot, Held, noise};
 use super::{ClosestPoint, Ends, SurfaceSpline};
-use crate::contact::gap::dot;
+use crate::gaps::dot;
 use crate::settings::Interpolation;
 
 /// The eight sheets around one.

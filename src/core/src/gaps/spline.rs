@@ -1,9 +1,9 @@
 //! Gaps to a surface through data points: closest point, normal, and the place where the force is handed over.
 
-use super::gap::{Drive, Geometry, dot};
 use super::layout::Layout;
-use super::spline::{ClosestPoint, Projection, SurfaceSpline};
+use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use super::wrench::{At, Motion};
+use super::{Drive, Geometry, dot};
 use crate::persist::{Persist, Reader, Writer};
 
 /// Gap of a node that has nothing to touch: infinite, so that no distance can be made of it.
@@ -41,7 +41,7 @@ pub struct SplineGap {
     /// Revolutions of the rotor over the step under way.
     pub turned: f64,
     /// The first node, `node · lanes + lane`, that is further beyond the edge than the surface goes on
-    /// ([`super::spline::REACH`]).
+    /// ([`super::surface_spline::REACH`]).
     pub out_of_reach: Option<usize>,
 }
 

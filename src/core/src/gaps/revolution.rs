@@ -1,0 +1,232 @@
+//! Sectors around an axis inside a rigid surface of revolution with a shape around the circumference.
+//!
+//! For a surface of revolution with shape s(θ) and meridional slope m,
+//! F = r_c(θ + u_θ/r, z) − r − u_r + m u_z has the gradient (−1, s'/r, m) with respect to (radial, tangential, axial)
+//! displacement; dividing by its length N gives the unit normal from the casing to the blade and the gap F/N. The
+//! slope is what lets a frictionless lobe draw power from the shaft: r n_θ λ is the torque conjugate to θ_r.
+//!
+//! u_θ is an arc: the node stands at φ = θ_node + θ_r + u_θ/r and the radius r + u_r, so that what is conjugate to u_θ is
+//! (1 + u_r/r) times the tangential force there. With the shaft's centre at (e_r, e_t, e_z), seen along the directions at φ, the node is at the
+//! radius ρ = √(a² + e_t²), a = r + u_r + e_r, and at φ + δ, tan δ = e_t/a, from the axis of the casing:
+//!
+//! F = r_c(φ + δ) − ρ + m (u_z + e_z),  ∇F = (−cos δ − s' sin δ/ρ, (1 + u_r/r)(−sin δ + s' cos δ/ρ), m).
+
+use super::layout::Layout;
+use super::shape::Surface;
+use super::spline::Frame;
+use super::wrench::{At, Motion};
+use super::{Drive, Geometry};
+use crate::dynamics::dispatch::{InstructionSet, Kernel};
+use crate::settings::Meridian;
+use crate::{Result, Rom};
+
+/// Contact nodes of equally spaced sectors facing a surface of revolution.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RevolutionGap {
+    pub(super) surface: Surface,
+    instruction_set: InstructionSet,
+    /// Where the contact nodes of the structure are.
+    pub layout: Layout,
+    /// Those that meet the surface.
+    pub(super) nodes: Vec<usize>,
+    /// Meridional slope per contact node of the structure.
+    slopes: Vec<f64>,
+    /// The shaft's centre moves.
+    shaft_moves: bool,
+    /// Scratch of one row where it does: the node's place from the axis of the casing along its own directions (m).
+    arms: [Vec<f64>; 2],
+}
+
+impl RevolutionGap {
+    /// Place `rom.sectors` sectors around the axis, all contact nodes facing the surface; `clearances` holds one radial clearance
+    /// (m) per sector.
+    ///
+    /// # Errors
+    /// Wrong number of clearances.
+    pub fn new(rom: &Rom, surface: Surface, clearances: &[f64], meridian: Meridian, lanes: usize) -> Result<Self> {
+        let slope = |slope: f64| if meridian == Meridian::Contour { slope } else { 0.0 };
+        Ok(Self {
+            surface,
+            instruction_set: InstructionSet::detect(),
+            layout: Layout::new(rom, clearances, lanes)?,
+            nodes: (0..rom.contact_nodes.len()).collect(),
+            slopes: rom.contact_nodes.iter().map(|node| slope(node.meridional_slope)).collect(),
+            shaft_moves: false,
+            arms: [Vec::new(), Vec::new()],
+        })
+    }
+
+    /// Only these contact nodes of the structure.
+    pub fn of_nodes(self, nodes: Vec<usize>) -> Self {
+        Self { nodes, ..self }
+    }
+
+    /// Let whirl and axial shift of the shaft act.
+    pub fn with_moving_shaft(self, shaft_moves: bool) -> Self {
+        let room = || vec![0.0; if shaft_moves { self.layout.lanes } else { 0 }];
+        Self { shaft_moves, arms: [room(), room()], ..self }
+    }
+
+    pub(super) fn evaluate(&mut self, drive: &Drive, displacement: &[f64], geometry: &mut Geometry, gap: &mut [f64]) {
+        if !self.shaft_moves {
+            let law = Evaluate::<false> { law: self, drive, displacement, geometry, gap, arms: [&mut [], &mut []] };
+            return self.instruction_set.run(law);
+        }
+        let [mut outwards, mut sideways] = std::mem::take(&mut self.arms);
+        let arms = [&mut outwards[..], &mut sideways[..]];
+        self.instruction_set.run(Evaluate::<true> { law: self, drive, displacement, geometry, gap, arms });
+        self.arms = [outwards, sideways];
+    }
+}
+
+impl RevolutionGap {
+    /// How far prescribed motion of the surface has taken it along the normal at a node displaced by `moved` (m), whose
+    /// normal has the radial part `facing`: the share n_r/(n_r N) of what it has moved outwards.
+    pub fn surface_motion(&self, at: At<'_>, moved: [f64; 3], facing: f64, motion: &Motion) -> f64 {
+        if motion.casing_rests() {
+            return 0.0;
+        }
+        let (angle, drive) = (self.angle(at, moved), at.drive);
+        let [outwards, sideways] = self.shaft_offset(angle, drive);
+        let arm = self.layout.radii[at.node] + moved[0] + outwards;
+        let distance = libm::hypot(arm, sideways);
+        let seen = angle + libm::atan2(sideways, arm) - drive.shape_rotation;
+        let (shape, slope) = self.surface.evaluate(seen);
+        let tilt = arm / distance + drive.shape_factor * slope * sideways / (distance * distance);
+        let turned = drive.shape_factor * slope * motion.shape_rotation;
+        facing / tilt * (motion.opening + motion.shape_factor * shape - turned)
+    }
+
+    /// Angle of a displaced node about the shaft's centre (rad).
+    fn angle(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
+        self.layout.angles[at.index] + at.drive.rotor_angle + moved[1] * self.layout.per_radius[at.node]
+    }
+
+    /// Displacement of the shaft's centre across and along the circumference at an angle (m).
+    fn shaft_offset(&self, angle: f64, drive: &Drive) -> [f64; 2] {
+        if !self.shaft_moves {
+            return [0.0; 2];
+        }
+        let [outwards, sideways, _] = Frame::new(angle).local(drive.shaft);
+        [outwards, sideways]
+    }
+
+    /// Angle at which a displaced node faces the casing (rad), in the fixed frame.
+    pub fn angle_on_casing(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
+        let angle = self.angle(at, moved);
+        let [outwards, sideways] = self.shaft_offset(angle, at.drive);
+        angle + libm::atan2(sideways, self.layout.radii[at.node] + moved[0] + outwards)
+    }
+}
+
+/// arctan t for |t| ≤ 0.2 (truncation below 1e-16 of t), without branches or calls.
+#[inline(always)]
+fn small_arc_tangent(t: f64) -> f64 {
+    let square = t * t;
+    let series = [19.0, 17.0, 15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0].into_iter();
+    t * (1.0 - square * series.fold(1.0 / 21.0, |sum, odd: f64| 1.0 / odd - square * sum))
+}
+
+/// Gaps and normals of all nodes and lanes on a surface of revolution. `SHAFT`: the shaft's centre moves.
+struct Evaluate<'a, const SHAFT: bool> {
+    law: &'a RevolutionGap,
+    drive: &'a Drive,
+    displacement: &'a [f64],
+    geometry: &'a mut Geometry,
+    gap: &'a mut [f64],
+    arms: [&'a mut [f64]; 2],
+}
+
+impl<const SHAFT: bool> Kernel for Evaluate<'_, SHAFT> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { law, drive, displacement, geometry, gap, arms: [arms, offsets] } = self;
+        let opening = drive.gap_offset + drive.radius_change;
+        let turned = drive.rotor_angle - drive.shape_rotation;
+        let factor = drive.shape_factor;
+        let lanes = law.layout.lanes;
+        for &node in &law.nodes {
+            let (slope, radius, per_radius) = (law.slopes[node], law.layout.radii[node], law.layout.per_radius[node]);
+            let span = node * lanes..(node + 1) * lanes;
+            let [radial, tangential, axial] =
+                std::array::from_fn(|component| &displacement[(3 * node + component) * lanes..][..lanes]);
+            let (angles, clearances) = (&law.layout.angles[span.clone()], &law.layout.clearances[..lanes]);
+            let [normal_0, normal_1, normal_2] = &mut geometry.normal;
+            let normal_0 = &mut normal_0[span.clone()];
+            let (normal_1, normal_2) = (&mut normal_1[span.clone()], &mut normal_2[span.clone()]);
+            let gap = &mut gap[span];
+            // The normal arrays hold angle, shape and slope of the shape until they are overwritten.
+            for lane in 0..lanes {
+                normal_0[lane] = angles[lane] + turned + tangential[lane] * per_radius;
+                if SHAFT {
+                    let (sine, cosine) = libm::sincos(normal_0[lane] + drive.shape_rotation);
+                    let outwards = drive.shaft[0] * cosine + drive.shaft[1] * sine;
+                    let offset = drive.shaft[1] * cosine - drive.shaft[0] * sine;
+                    let arm = radius + radial[lane] + outwards;
+                    let distance = (arm * arm + offset * offset).sqrt();
+                    normal_0[lane] += small_arc_tangent(offset / arm);
+                    (arms[lane], offsets[lane]) = (arm, offset);
+                    // ρ − r − u_r without cancellation: what the shaft closes of the gap; set before the gap is written.
+                    gap[lane] = outwards + offset * offset / (distance + arm) - slope * drive.shaft[2];
+                }
+            }
+            law.surface.evaluate_row(normal_0, normal_1, normal_2);
+            for lane in 0..lanes {
+                let (mut facing, mut sideways) = (1.0, factor * normal_2[lane] * per_radius);
+                let mut clearance = clearances[lane] + opening + factor * normal_1[lane];
+                if SHAFT {
+                    let (arm, offset) = (arms[lane], offsets[lane]);
+                    let per_distance = 1.0 / (arm * arm + offset * offset).sqrt();
+                    let (sine, cosine) = (offset * per_distance, arm * per_distance);
+                    let steepness = factor * normal_2[lane] * per_distance;
+                    facing = cosine + steepness * sine;
+                    sideways = (1.0 + radial[lane] * per_radius) * (steepness * cosine - sine);
+                    clearance -= gap[lane];
+                }
+                let per_length = 1.0 / (facing * facing + sideways * sideways + slope * slope).sqrt();
+                gap[lane] = (clearance - radial[lane] + slope * axial[lane]) * per_length;
+                normal_0[lane] = -facing * per_length;
+                normal_1[lane] = sideways * per_length;
+                normal_2[lane] = slope * per_length;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Shape;
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let lanes = 16;
+        let shape = Shape::TwoLobe { depth: 0.6, width: 0.15, phase: 0.3 };
+        let law = |instruction_set| RevolutionGap {
+            surface: Surface::new(&shape, 3.56e-4).unwrap(),
+            instruction_set,
+            layout: Layout {
+                lanes,
+                angles: (0..16).map(|lane| 0.41 * f64::from(lane)).collect(),
+                radii: vec![0.25],
+                per_radius: vec![4.0],
+                axial: vec![0.0],
+                clearances: vec![3.56e-4; 16],
+            },
+            nodes: vec![0],
+            slopes: vec![-0.26],
+            shaft_moves: false,
+            arms: [Vec::new(), Vec::new()],
+        };
+        let displacement: Vec<f64> = (0..48).map(|i| 1e-4 * f64::from(i).sin()).collect();
+        let drive = Drive { rotor_angle: 1.1, shape_factor: 1.0, ..Drive::default() };
+        let run = |instruction_set| {
+            let mut law = crate::gaps::GapLaw::Revolution(law(instruction_set));
+            let (mut geometry, mut gap) = (Geometry::new(lanes, false), vec![0.0; 16]);
+            law.evaluate(&drive, &displacement, &[], None, &mut geometry, &mut gap);
+            let all = geometry.normal.iter().flatten().chain(&gap);
+            all.map(|value| value.to_bits()).collect::<Vec<_>>()
+        };
+        assert_eq!(run(InstructionSet::Baseline), run(InstructionSet::detect()));
+    }
+}

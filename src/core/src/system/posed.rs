@@ -1,0 +1,162 @@
+//! A contact about to be solved, with what it belongs to: what is known of it before its force is.
+
+use super::carrier::Spot;
+use super::pair::When;
+use super::{Pair, StepFailure, Structure};
+use crate::gaps::wrench::At;
+use crate::laws::Prediction;
+
+/// A contact node of one sector of a structure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Member {
+    /// Structure.
+    pub structure: usize,
+    /// Pair that the node belongs to.
+    pub pair: usize,
+    /// Contact node.
+    pub node: usize,
+    /// Sector.
+    pub sector: usize,
+    /// `node · lanes + sector`.
+    pub index: usize,
+}
+
+/// What groups work on.
+pub struct Bodies<'a> {
+    /// All structures.
+    pub structures: &'a mut [Structure],
+    /// All pairs.
+    pub pairs: &'a [Pair],
+    /// Contact forces act one step after they are found.
+    pub acts_later: bool,
+    /// Losses are gathered.
+    pub ledger: bool,
+}
+
+/// A member with what it belongs to, as its law sees it.
+pub struct Posed<'a> {
+    bodies: &'a Bodies<'a>,
+    structure: &'a Structure,
+    pair: &'a Pair,
+    member: Member,
+}
+
+impl Bodies<'_> {
+    /// A member with what it belongs to.
+    #[inline(always)]
+    pub fn pose(&self, member: Member) -> Posed<'_> {
+        Posed { bodies: self, structure: &self.structures[member.structure], pair: &self.pairs[member.pair], member }
+    }
+}
+
+impl Posed<'_> {
+    /// Displacement as predicted (m), in its own directions.
+    #[inline(always)]
+    fn displacement(&self) -> [f64; 3] {
+        self.structure.three(self.structure.modes().displacement(), self.member.node, self.member.sector)
+    }
+
+    /// Displacement relative to its surface over the step, prediction included (m), without rigid motion.
+    #[inline(always)]
+    pub fn slip_of_deformation(&self) -> [f64; 3] {
+        let modes = self.structure.modes();
+        self.slip_between(modes.displacement(), modes.displacement_before())
+    }
+
+    /// The same of the modes with inertia alone. A prediction whose contact forces act later is without the forces that deform
+    /// quasi-static modes, however short the step is: taken for a slip over h it would grow without bounds.
+    fn slip_of_inertia(&self) -> [f64; 3] {
+        let predicted = &self.structure.history.predicted;
+        self.slip_between(&predicted.now, &predicted.before)
+    }
+
+    #[inline(always)]
+    fn slip_between(&self, now: &[f64], before: &[f64]) -> [f64; 3] {
+        let Member { node, sector, .. } = self.member;
+        let (now, before) = (self.structure.three(now, node, sector), self.structure.three(before, node, sector));
+        let moved: [f64; 3] = std::array::from_fn(|i| now[i] - before[i]);
+        if self.pair.carrier().is_none() { moved } else { self.less_of_carrier(moved) }
+    }
+
+    /// Out of line: on rigid surfaces contacts never get here.
+    #[inline(never)]
+    fn less_of_carrier(&self, moved: [f64; 3]) -> [f64; 3] {
+        let Some(spot) = self.spot() else { return moved };
+        let modes = self.bodies.structures[spot.surface.1.structure].modes();
+        let (now, before) = (modes.displacement(), modes.displacement_before());
+        let carried = super::pair::at_place(spot.surface, spot.place, spot.frame, |row| now[row] - before[row]);
+        std::array::from_fn(|i| moved[i] - carried[i])
+    }
+
+    /// Where it acts on the structure that carries its surface, if one does.
+    #[inline(always)]
+    pub fn spot(&self) -> Option<Spot<'_>> {
+        let surface = self.pair.carried()?;
+        let frame = self.pair.frame(self.member.index, self.pair.drive(When::Now).rotor_angle);
+        Some(Spot { surface, place: self.structure.history.geometry.now.places[self.member.index], frame })
+    }
+
+    /// Prescribed velocity relative to the surface (m/s).
+    #[inline(always)]
+    fn sliding(&self) -> [f64; 3] {
+        let Member { node, index, .. } = self.member;
+        self.pair.gap().sliding_velocity(node, index, self.pair.drive(When::Now), self.displacement())
+    }
+
+    /// Unit normal.
+    #[inline(always)]
+    pub fn normal(&self) -> [f64; 3] {
+        self.structure.history.geometry.now.normal_at(self.member.index)
+    }
+
+    /// Unit direction of slip from the predicted relative velocity; 0 where nothing slides.
+    #[inline(always)]
+    pub fn slip_direction(&self, normal: [f64; 3]) -> [f64; 3] {
+        let (mut velocity, step) = (self.sliding(), self.structure.modes().step());
+        let moved = if self.bodies.acts_later { self.slip_of_inertia() } else { self.slip_of_deformation() };
+        for (value, moved) in velocity.iter_mut().zip(moved) {
+            *value += moved / step;
+        }
+        self.pair.gap().slip_direction(velocity, normal)
+    }
+
+    /// It must be one that small displacements can describe.
+    #[inline(always)]
+    pub fn check(&self) -> Result<(), StepFailure> {
+        let Member { structure, node, sector, .. } = self.member;
+        let gap = self.gap();
+        if !gap.is_finite() {
+            return Err(StepFailure::NonFinite);
+        }
+        if gap < 0.0 && !self.pair.gap().is_plausible(node, gap, self.normal()) {
+            return Err(StepFailure::Implausible { structure, sector });
+        }
+        Ok(())
+    }
+}
+
+impl Prediction for Posed<'_> {
+    #[inline(always)]
+    fn gap(&self) -> f64 {
+        self.structure.history.gap.now[self.member.index]
+    }
+    #[inline(always)]
+    fn gap_before(&self) -> f64 {
+        self.structure.history.gap.before[self.member.index]
+    }
+    fn friction(&self) -> f64 {
+        self.pair.friction()
+    }
+    fn slip(&self) -> [f64; 3] {
+        let (sliding, step) = (self.sliding(), self.structure.modes().step());
+        let moved = self.slip_of_deformation();
+        std::array::from_fn(|i| sliding[i] * step + moved[i])
+    }
+    fn last_force(&self) -> [f64; 3] {
+        self.structure.three(&self.structure.history.force.before, self.member.node, self.member.sector)
+    }
+    fn angle(&self) -> f64 {
+        let Member { node, index, .. } = self.member;
+        self.pair.gap().angle_on_casing(At { node, index, drive: self.pair.drive(When::Now) }, self.displacement())
+    }
+}
