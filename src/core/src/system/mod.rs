@@ -1,4 +1,4 @@
-//! Structures and contact pairs put together: everything that moves in a scene. [`crate::step`] is what one step does with it.
+//! Structures and contact pairs put together: everything that moves in a scene. `step.rs` has what one step does with it.
 
 mod carrier;
 mod continuation;

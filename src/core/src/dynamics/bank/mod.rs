@@ -361,7 +361,7 @@ impl ModalBank {
         self.coupling = Some(coupling);
     }
 
-    /// Kinetic and strain energy of all sectors (J), in the quantity the scheme conserves (see [`super::scheme`]).
+    /// Kinetic and strain energy of all sectors (J), in the quantity the scheme conserves (see [`crate::schemes`]).
     pub fn energies(&self) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
         for sector in 0..self.sectors {

@@ -355,7 +355,7 @@ impl CyclicBank {
         }
     }
 
-    /// Kinetic and strain energy of the disk (J), in the quantity the scheme conserves (see [`super::scheme`]).
+    /// Kinetic and strain energy of the disk (J), in the quantity the scheme conserves (see [`crate::schemes`]).
     pub fn energies(&self) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
         for nodal_diameter in 0..self.model.diameters.len() {
