@@ -5,53 +5,8 @@ mod validation;
 use serde::{Deserialize, Serialize};
 
 use crate::Rom;
-
-/// Time-stepping scheme of the modal equations.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Scheme {
-    /// Explicit central differences, the paper's scheme (eq. 9); stable for ωh < 2.
-    CentralDifference,
-    /// Two-step recurrence that is exact in free flight and at rest under constant force (default).
-    #[default]
-    ModalExact,
-    /// The highest modes, three per contact node, are quasi-static: contact acts through their residual flexibility
-    /// (Monjaraz-Tec, Gross, Krack, Computers & Structures 260, 2022); the other modes take the contact force one step later.
-    MasslessBoundary,
-}
-
-impl Scheme {
-    /// All of them, in the order of the FMU's enumeration.
-    pub const ALL: [Self; 3] = [Self::CentralDifference, Self::ModalExact, Self::MasslessBoundary];
-
-    /// As in scene files and in the FMU's enumeration.
-    pub fn name(self) -> &'static str {
-        crate::simulation::SCHEMES.items[self as usize].0
-    }
-}
-
-/// Solver of the unilateral contact problem of one step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Solver {
-    /// The paper's forward-increment Lagrange multipliers (eqs 10-11): penetration detected once, equality there.
-    Film,
-    /// Linear complementarity over all contact nodes (default).
-    #[default]
-    Lcp,
-    /// Coulomb friction with sticking: De Saxcé's form by Gauss-Seidel with exact local solutions.
-    Coulomb,
-}
-
-impl Solver {
-    /// All of them, in the order of the FMU's enumeration.
-    pub const ALL: [Self; 3] = [Self::Film, Self::Lcp, Self::Coulomb];
-
-    /// As in scene files and in the FMU's enumeration.
-    pub fn name(self) -> &'static str {
-        crate::simulation::SOLVERS.items[self as usize].0
-    }
-}
+pub use crate::laws::Solver;
+pub use crate::schemes::Scheme;
 
 /// Shape of a rigid surface of revolution: radial clearance change around the circumference.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

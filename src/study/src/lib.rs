@@ -14,7 +14,7 @@ pub mod output;
 pub mod stability;
 
 use serde_json::{Value, json};
-use tiprub_core::Scene;
+use tiprub_core::{Scene, settings::SceneSettings};
 use tiprub_figure::{plots::Plot, waterfall::Waterfall};
 use tiprub_shell::{Failure, Result, recording::shortest};
 
@@ -22,6 +22,29 @@ use tiprub_shell::{Failure, Result, recording::shortest};
 pub fn master(scene: &Scene) -> usize {
     let name = &scene.settings.contacts[0].master;
     scene.settings.structures.iter().position(|structure| structure.name == *name).unwrap_or(0)
+}
+
+/// Refuse scenes in which what a study varies is not one thing: the speed of one rotor, one friction coefficient, one ROM.
+///
+/// # Errors
+/// Several structures touch, or pairs differ in friction.
+pub fn one_rotor(settings: &SceneSettings) -> Result<()> {
+    let first = &settings.contacts[0];
+    let refuse = |problem: String| {
+        let remedy =
+            "Give a scene with one of the rotors or pairs; `tiprub study error` and `tiprub run` take all together";
+        Err(Failure::usage(format!("scene `{}`", settings.name), problem, remedy))
+    };
+    if let Some(other) = settings.contacts.iter().find(|contact| contact.master != first.master) {
+        return refuse(format!(
+            "`{}` and `{}` both touch, and this study varies one structure",
+            first.master, other.master
+        ));
+    }
+    if settings.contacts.iter().any(|contact| contact.friction.to_bits() != first.friction.to_bits()) {
+        return refuse("its contacts differ in friction, and this study varies one coefficient".to_owned());
+    }
+    Ok(())
 }
 
 /// A finished study.

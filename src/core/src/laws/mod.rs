@@ -13,16 +13,51 @@ mod film;
 mod lcp;
 
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 use crate::gaps::dot;
 use crate::laws::active_set::Outcome;
 use crate::laws::coating::Coating;
 use crate::persist::{Persist, Reader, Writer};
-use crate::settings::Solver;
+use crate::variables::Enumeration;
 pub use coated::Coated;
 pub use coulomb::Coulomb;
 pub use film::Film;
 pub use lcp::Lcp;
+
+/// Solver of the unilateral contact problem of one step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Solver {
+    /// The paper's forward-increment Lagrange multipliers (eqs 10-11): penetration detected once, equality there.
+    Film,
+    /// Linear complementarity over all contact nodes (default).
+    #[default]
+    Lcp,
+    /// Coulomb friction with sticking: De Saxcé's form by Gauss-Seidel with exact local solutions.
+    Coulomb,
+}
+
+impl Solver {
+    /// All of them, in the order of the FMU's enumeration.
+    pub const ALL: [Self; 3] = [Self::Film, Self::Lcp, Self::Coulomb];
+
+    /// As in scene files and in the FMU's enumeration.
+    pub fn name(self) -> &'static str {
+        SOLVERS.items[self as usize].0
+    }
+}
+
+/// As importers see it.
+pub(crate) static SOLVERS: Enumeration = Enumeration {
+    name: "Solver",
+    description: "Contact solver",
+    items: &[
+        ("film", "Forward-increment Lagrange multipliers: equality on the nodes that penetrate in the prediction"),
+        ("lcp", "Complementarity over all contact nodes"),
+        ("coulomb", "Coulomb friction with sticking"),
+    ],
+};
 
 /// What is known of a contact before its force is.
 pub trait Prediction {

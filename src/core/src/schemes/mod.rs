@@ -25,7 +25,43 @@ mod central_difference;
 mod massless_boundary;
 mod modal_exact;
 
-use crate::settings::Scheme;
+use crate::variables::Enumeration;
+use serde::{Deserialize, Serialize};
+
+/// Time-stepping scheme of the modal equations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scheme {
+    /// Explicit central differences, the paper's scheme (eq. 9); stable for ωh < 2.
+    CentralDifference,
+    /// Two-step recurrence that is exact in free flight and at rest under constant force (default).
+    #[default]
+    ModalExact,
+    /// The highest modes, three per contact node, are quasi-static: contact acts through their residual flexibility
+    /// (Monjaraz-Tec, Gross, Krack, Computers & Structures 260, 2022); the other modes take the contact force one step later.
+    MasslessBoundary,
+}
+
+impl Scheme {
+    /// All of them, in the order of the FMU's enumeration.
+    pub const ALL: [Self; 3] = [Self::CentralDifference, Self::ModalExact, Self::MasslessBoundary];
+
+    /// As in scene files and in the FMU's enumeration.
+    pub fn name(self) -> &'static str {
+        SCHEMES.items[self as usize].0
+    }
+}
+
+/// As importers see it.
+pub(crate) static SCHEMES: Enumeration = Enumeration {
+    name: "Scheme",
+    description: "Time-stepping scheme",
+    items: &[
+        ("central-difference", "Explicit central differences (eq. 9), stable for omega h < 2"),
+        ("modal-exact", "Exact in free flight and under constant force"),
+        ("massless-boundary", "Highest modes quasi-static; the others take contact forces one step later"),
+    ],
+};
 
 /// q⁺ = q + d⁺, d⁺ = β d − κ q + c f of one mode.
 struct Recurrence {

@@ -16,7 +16,6 @@ mod slave_surface;
 mod state;
 mod stepping;
 mod table;
-pub(crate) use table::{SCHEMES, SOLVERS};
 mod window;
 
 use crate::gaps::Drive;

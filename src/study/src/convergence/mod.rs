@@ -20,6 +20,7 @@ use crate::{
         case::Case,
         own::{Own, refuse_compared},
     },
+    one_rotor,
 };
 
 /// One direction with the runs of its levels.
@@ -52,6 +53,7 @@ pub fn study(arguments: &ConvergenceArguments, source: Option<&dyn Source>, cons
     refuse_compared(&arguments.set)?;
     let quick = arguments.common.quick;
     let scene = scene_source::load(&arguments.scene, &arguments.common.cache.cache(), console)?;
+    one_rotor(&scene.settings)?;
     let case = Own::of(&arguments.scene, scene.clone(), &arguments.set, (arguments.window, quick), console)?;
     let interval = case.interval();
     let own = divisions(interval, scene.settings.time.step);

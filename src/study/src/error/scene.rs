@@ -108,8 +108,10 @@ impl Run for SceneRun {
     }
 
     fn displacements(&self) -> Vec<f64> {
-        let bank = self.simulation.system().bank();
-        (0..bank.rows()).flat_map(|row| (0..bank.sectors()).map(move |sector| bank.row(row, sector))).collect()
+        let touching = self.simulation.system().structures().iter().filter(|structure| structure.nodes() > 0);
+        let rows =
+            touching.flat_map(|structure| (0..structure.modes().rows()).map(move |row| (structure.modes(), row)));
+        rows.flat_map(|(modes, row)| (0..modes.sectors()).map(move |sector| modes.row(row, sector))).collect()
     }
 
     fn energy(&self) -> f64 {

@@ -19,6 +19,7 @@ use tiprub_shell::{Failure, Result, console::Console, sweep};
 
 use super::{Statement, Study};
 use crate::arguments::{MapArguments, Speeds};
+use crate::one_rotor;
 pub use run::{Response, Run, Setup};
 use start::Start;
 
@@ -72,7 +73,9 @@ struct Map {
 pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
     let name = arguments.scene.as_str();
     // Before models are reduced for nothing.
-    prediction::master(&scene_source::settings(name)?)?;
+    let settings = scene_source::settings(name)?;
+    prediction::master(&settings)?;
+    one_rotor(&settings)?;
     let scene = scene_source::load(name, &arguments.common.cache.cache(), console)?;
     let request = Request {
         quick: arguments.common.quick,

@@ -1,8 +1,10 @@
 //! Rows of the variable table, and those that every scene has.
 
-use super::units::{ANGLE, INPUT_INTERPOLATIONS, SCHEMES, SOLVERS, TIME};
+use super::units::{ANGLE, INPUT_INTERPOLATIONS, TIME};
 use crate::Result;
+use crate::laws::SOLVERS;
 use crate::ranges::{DAMPING, FRICTION, LONGEST_STEP, SHORTEST_STEP};
+use crate::schemes::SCHEMES;
 use crate::settings::{ContactSettings, SceneSettings};
 use crate::simulation::outputs::Reader;
 use crate::variables::{

@@ -21,8 +21,8 @@ use crate::settings::{
 use crate::variables::{Quantity, Span, Variability, VariableTable};
 use crate::{Error, Result, Rom, ranges};
 use builder::{Builder, RAMPED};
+pub use units::LENGTH;
 use units::{ANGLE, ANGULAR_SPEED, FORCE, TIME, TORQUE};
-pub use units::{LENGTH, SCHEMES, SOLVERS};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 

@@ -28,26 +28,6 @@ pub static POWER: Unit = Unit { name: "W", exponents: [1, 2, -3, 0, 0], display:
 /// J.
 pub static ENERGY: Unit = Unit { name: "J", exponents: [1, 2, -2, 0, 0], display: &[("mJ", 1e3)] };
 
-pub static SCHEMES: Enumeration = Enumeration {
-    name: "Scheme",
-    description: "Time-stepping scheme",
-    items: &[
-        ("central-difference", "Explicit central differences (eq. 9), stable for omega h < 2"),
-        ("modal-exact", "Exact in free flight and under constant force"),
-        ("massless-boundary", "Highest modes quasi-static; the others take contact forces one step later"),
-    ],
-};
-
-pub static SOLVERS: Enumeration = Enumeration {
-    name: "Solver",
-    description: "Contact solver",
-    items: &[
-        ("film", "Forward-increment Lagrange multipliers: equality on the nodes that penetrate in the prediction"),
-        ("lcp", "Complementarity over all contact nodes"),
-        ("coulomb", "Coulomb friction with sticking"),
-    ],
-};
-
 pub static INPUT_INTERPOLATIONS: Enumeration = Enumeration {
     name: "InputInterpolation",
     description: "Inputs between communication points",

@@ -1,0 +1,411 @@
+//! A structure that turns at one set of parameters: solvability, growth of sliding contact, and what casings add.
+
+use super::{Parameters, Sense};
+use crate::dynamics::cyclic::CyclicModel;
+use crate::dynamics::modal::ModalModel;
+use crate::gaps::spline::{Frame, SplineGap};
+use crate::gaps::{GapLaw, dot};
+use crate::settings::{Meridian, Scheme, Solver};
+use crate::simulation::SAME_STEP;
+use crate::simulation::compile::Compiled;
+use crate::simulation::plan::PairPlan;
+use crate::stability::massless::MasslessLimit;
+use crate::stability::{self, ContactDirections, Growth, massless};
+use crate::system::System;
+use crate::{Error, Result, shown};
+use nalgebra::DMatrix;
+
+/// Contact nodes up to this number are looked at in every combination; beyond, alone, in neighbouring pairs, and all.
+const ALL_COMBINATIONS_UP_TO: usize = 3;
+
+/// Angles at which the flexible slave is looked at.
+const SLAVE_ANGLES: u32 = 48;
+
+fn slave_angle(place: u32) -> f64 {
+    std::f64::consts::TAU * f64::from(place) / f64::from(SLAVE_ANGLES)
+}
+
+/// The slave's modes along normals and tangents of `nodes` of a blade at `angle` (rad), nodes × modes; 0 for nodes that do not face
+/// it.
+fn slave_at(law: &SplineGap, modes: &ModalModel, nodes: &[usize], angle: f64) -> (DMatrix<f64>, DMatrix<f64>) {
+    let zeros = || DMatrix::zeros(nodes.len(), modes.len());
+    let mut seen = (zeros(), zeros());
+    for (row, &node) in nodes.iter().enumerate().filter(|(_, node)| law.nodes.contains(node)) {
+        let turned = angle + law.layout.angles[node * law.layout.lanes];
+        let frame = Frame::new(turned);
+        let place = law.surface.locate(frame.fixed([law.layout.radii[node], 0.0, law.layout.axial[node]]));
+        for (index, weight) in law.surface.weights(place).iter() {
+            for mode in 0..modes.len() {
+                let shape = frame.local(std::array::from_fn(|i| modes.contact_modes[(3 * index + i, mode)]));
+                seen.0[(row, mode)] -= weight * dot([1.0, 0.0, 0.0], shape);
+                seen.1[(row, mode)] += weight * dot([0.0, 1.0, 0.0], shape);
+            }
+        }
+    }
+    seen
+}
+
+/// Lowest eigenvalue of the symmetric part of the slave's Delassus matrix relative to the largest.
+fn lowest_ratio(
+    (normals, tangents): &(DMatrix<f64>, DMatrix<f64>),
+    modes: &ModalModel,
+    scheme: Scheme,
+    step: f64,
+    friction: f64,
+) -> f64 {
+    let scheme = if scheme == Scheme::MasslessBoundary { Scheme::ModalExact } else { scheme };
+    let compliance: Vec<f64> = modes.coefficients(scheme, step).iter().map(|mode| mode.compliance).collect();
+    let forces = normals - tangents * friction;
+    let weighted = DMatrix::from_fn(forces.nrows(), forces.ncols(), |i, mode| forces[(i, mode)] * compliance[mode]);
+    let matrix = normals * weighted.transpose();
+    let eigenvalues = ((&matrix + matrix.transpose()) * 0.5).symmetric_eigenvalues();
+    if eigenvalues.max() > 0.0 { eigenvalues.min() / eigenvalues.max() } else { 0.0 }
+}
+
+/// A casing need not be alike all around: the check at the place where it yields most.
+fn yielding_most<'a>(
+    check: massless::MasslessCheck<'a>,
+    places: impl Iterator<Item = DMatrix<f64>>,
+    modes: &'a ModalModel,
+    step: f64,
+) -> massless::MasslessCheck<'a> {
+    let (mut most, mut chosen) = (f64::NEG_INFINITY, check.clone());
+    for seen in places {
+        let tried = massless::MasslessCheck { slave: Some((seen, modes)), ..check.clone() };
+        if let Some((_, found)) = tried.eigenvalues(step).filter(|(_, found)| *found > most) {
+            (most, chosen) = (found, tried);
+        }
+    }
+    chosen
+}
+
+/// The step to expect was looked at by itself: it bounds a range of its own.
+fn with_expected<T>(mut ranges: Vec<(f64, Option<T>)>, expected: f64, found: Option<T>) -> Vec<(f64, Option<T>)> {
+    ranges.retain(|(step, _)| (step - expected).abs() > SAME_STEP * expected);
+    ranges.push((expected, found));
+    ranges.sort_by(|a, b| b.0.total_cmp(&a.0));
+    ranges
+}
+
+/// What a look at growth is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Telling {
+    /// Refusals and warnings of flutter.
+    Flutter,
+    /// Refusals alone.
+    Refusals,
+}
+
+/// A structure of a scene with some parameters, about to be checked with all it touches.
+pub(super) struct Checking<'a> {
+    compiled: &'a Compiled,
+    system: &'a System,
+    body: usize,
+    /// Contact nodes that meet a surface.
+    nodes: Vec<usize>,
+    /// What the contact problem with all sectors closed decouples into: one uncoupled sector, or the nodal diameters as
+    /// real structures; seen at these nodes.
+    pub(super) models: Vec<ModalModel>,
+    parameters: &'a Parameters,
+    /// Largest friction coefficient.
+    pub(super) friction: f64,
+    /// Per sense of slip (+, −) and combination of nodes the model that grows most at the step to expect. At other steps
+    /// only this one is looked at: with all nodal diameters of a disk at all steps the check would take a minute.
+    watched: [Vec<usize>; 2],
+}
+
+impl<'a> Checking<'a> {
+    pub(super) fn new(
+        compiled: &'a Compiled,
+        system: &'a System,
+        body: usize,
+        models: Vec<ModalModel>,
+        parameters: &'a Parameters,
+    ) -> Self {
+        let own = compiled.body(body).1.contact_nodes.len();
+        let meets = |node: &usize| compiled.plan.pairs_of(body).any(|(_, pair)| pair.nodes.contains(node));
+        let nodes: Vec<usize> = (0..own).filter(meets).collect();
+        let seen = |model: ModalModel| {
+            let parts = model.contact_modes.nrows() / (3 * own);
+            let places = (0..parts).flat_map(|part| nodes.iter().map(move |node| part * own + node));
+            if nodes.len() == own { model } else { model.with_nodes(&places.collect::<Vec<_>>()) }
+        };
+        Self {
+            models: models.into_iter().map(seen).collect(),
+            friction: parameters.friction_of(compiled, body),
+            watched: [Vec::new(), Vec::new()],
+            compiled,
+            system,
+            body,
+            nodes,
+            parameters,
+        }
+    }
+
+    fn disk(&self) -> Option<&CyclicModel> {
+        self.compiled.bodies[self.body].disk.as_ref()
+    }
+
+    /// Surfaces that carriers deform: their gap functions, and the carriers' modes at their control points.
+    fn carried(&self) -> Vec<(&SplineGap, usize, ModalModel)> {
+        let carried = |(index, pair): (usize, &PairPlan)| {
+            let (gap, carrier) = (self.system.pairs()[index].gap(), pair.carrier?);
+            let GapLaw::Spline(spline) = gap else { return None };
+            Some((&**spline, carrier, self.compiled.control_modes_of(carrier, gap)?))
+        };
+        self.compiled.plan.pairs_of(self.body).filter_map(carried).collect()
+    }
+
+    /// All warnings at the step to expect, whatever the sense of slip; `casing` and `more` come last.
+    pub(super) fn warnings(&self, step: f64, casing: Option<String>, more: Vec<String>) -> Result<Vec<String>> {
+        let mut warnings = self.expected(step)?;
+        for carrier in self.compiled.carriers_of(self.body) {
+            let frequency = self.compiled.carriers[carrier].model.largest_frequency();
+            let warning = stability::check_step(frequency, self.parameters.scheme, step)?;
+            let name = self.compiled.carrier_name(self.compiled.bodies.len() + carrier);
+            warnings.extend(warning.map(|warning| format!("{name}: {warning}")));
+        }
+        warnings.extend(casing);
+        warnings.extend(more);
+        Ok(warnings)
+    }
+
+    /// Growth of sliding contact at the step to expect and at all others, in one sense.
+    pub(super) fn sense(&mut self, sense: usize, expected: f64) -> Sense {
+        if self.friction == 0.0 {
+            return Sense { outcome: Ok(Vec::new()), ranges: Vec::new() };
+        }
+        let sign = [1.0, -1.0][sense];
+        let outcome = self.growth(expected, sign, Telling::Flutter);
+        let steps = stability::growth_steps(self.largest_frequency(), self.parameters.step);
+        let ranges = steps.map(|step| (step, self.growth(step, sign, Telling::Refusals).err())).collect();
+        Sense { ranges: with_expected(ranges, expected, outcome.as_ref().err().cloned()), outcome }
+    }
+
+    /// Everything about the rotor at the step to expect; returns warnings.
+    fn expected(&self, step: f64) -> Result<Vec<String>> {
+        let Parameters { scheme, step: largest, .. } = *self.parameters;
+        let warnings = stability::check_step(self.largest_frequency(), scheme, step)?.into_iter().collect();
+        let senses: Vec<Vec<ContactDirections>> =
+            self.models.iter().map(|model| [1.0, -1.0].map(|sense| self.directions(model, sense)).into()).collect();
+        if self.disk().is_some() {
+            stability::check_solvable_together(&self.models, scheme, largest, self.friction, &senses)?;
+        } else {
+            stability::check_solvable(&self.models[0], scheme, largest, self.friction, &senses[0])?;
+        }
+        Ok(warnings)
+    }
+
+    /// Whether the part that the structures under the surfaces have in the contact problem can spoil solvability, at the step to
+    /// expect and at all others.
+    pub(super) fn casing(&self, expected: f64) -> Vec<(f64, Option<String>)> {
+        let carried = self.carried();
+        if self.friction == 0.0 || carried.is_empty() || self.parameters.solver == Solver::Coulomb {
+            return Vec::new();
+        }
+        let places = |(gap, _, modes): &(&SplineGap, usize, ModalModel)| {
+            (0..SLAVE_ANGLES).map(|place| slave_at(gap, modes, &gap.nodes, slave_angle(place))).collect()
+        };
+        let places: Vec<Vec<_>> = carried.iter().map(places).collect();
+        let worst_at = |step: f64| {
+            let (mut worst, mut at) = (0.0, 0.0);
+            for ((_, _, modes), places) in carried.iter().zip(&places) {
+                for (place, seen) in (0..).zip(places) {
+                    for sense in [1.0, -1.0] {
+                        let ratio = lowest_ratio(seen, modes, self.parameters.scheme, step, sense * self.friction);
+                        if ratio < worst {
+                            (worst, at) = (ratio, slave_angle(place));
+                        }
+                    }
+                }
+            }
+            (worst < -1e-9).then(|| {
+                format!(
+                    "with µ = {friction} and an internal step of {step:.3e} s the casing's part of the Delassus matrix is not \
+                     positive semidefinite (lowest eigenvalue {worst:.2e} of the largest, at θ = {at:.2} rad): where the blades \
+                     add less flexibility than that, a step may have no unique solution and is then refused",
+                    friction = shown(self.friction)
+                )
+            })
+        };
+        let largest = carried.iter().map(|(_, _, modes)| modes.largest_frequency()).fold(0.0, f64::max);
+        let steps = stability::growth_steps(largest, self.parameters.step);
+        let ranges = steps.map(|step| (step, worst_at(step))).collect();
+        with_expected(ranges, expected, worst_at(expected))
+    }
+
+    /// Largest step of massless-boundary, and a warning where many blades in contact at once may lower it.
+    pub(super) fn massless(&self, step: f64) -> Result<(Vec<String>, MasslessLimit)> {
+        if self.parameters.scheme != Scheme::MasslessBoundary {
+            return Ok((Vec::new(), MasslessLimit::NONE));
+        }
+        // One at most: more are refused.
+        let carried = self.carried();
+        let largest = 1.01 * self.parameters.step.max(step) / massless::USABLE_STIFF;
+        let (mut limit, mut worst) = (MasslessLimit::NONE, (0.0, 0.0));
+        for (diameter, model) in self.models.iter().enumerate() {
+            let normals = self.normals(model);
+            let mut check = massless::MasslessCheck { model, normals, slave: None };
+            if let Some((gap, _, modes)) = carried.first() {
+                let at = |place| slave_at(gap, modes, &self.nodes, slave_angle(place)).0;
+                check =
+                    yielding_most(check, (0..SLAVE_ANGLES).map(|place| self.seen_by(diameter, at(place))), modes, step);
+            }
+            // Of several only the tightest counts.
+            let own = check.limit(largest.min(limit.closed))?;
+            limit = MasslessLimit { closed: limit.closed.min(own.closed), usable: limit.usable.min(own.usable) };
+            let found = check.eigenvalues(step).unwrap_or(worst);
+            worst = (found.0.max(worst.0), found.1.max(worst.1));
+        }
+        if step >= limit.usable {
+            return Err(massless::refusal(step, limit));
+        }
+        let mut warnings: Vec<String> = massless::warning(step, limit).into_iter().collect();
+        let sectors = self.compiled.body(self.body).1.sectors;
+        let sectors = f64::from(u32::try_from(sectors).unwrap_or(u32::MAX));
+        let (master, slave) = worst;
+        if master + sectors * slave >= 4.0 {
+            warnings.push(format!(
+                "massless-boundary is shown stable for up to {:.0} blades in contact with the casing at once, not for all \
+                 {sectors}",
+                ((4.0 - master) / slave).floor()
+            ));
+        }
+        Ok((warnings, limit))
+    }
+
+    /// The slave's modes as the real part of a nodal diameter sees them. One blade in contact has an equal share of all
+    /// nodal diameters, so that the softest of them bounds what the slave adds.
+    fn seen_by(&self, diameter: usize, seen: DMatrix<f64>) -> DMatrix<f64> {
+        let Some(disk) = self.disk() else { return seen };
+        let rows = self.models[diameter].contact_modes.nrows() / 3;
+        let weight = disk.weight(diameter);
+        DMatrix::from_fn(rows, seen.ncols(), |i, j| if i < seen.nrows() { weight * seen[(i, j)] } else { 0.0 })
+    }
+
+    pub(super) fn largest_frequency(&self) -> f64 {
+        self.models.iter().fold(0.0, |largest, model| f64::max(largest, model.largest_frequency()))
+    }
+
+    /// Normals and slip directions of the contact nodes of one of the models on a round casing, as long as friction there is against
+    /// the largest; both parts of a nodal diameter have the same.
+    fn directions(&self, model: &ModalModel, sense: f64) -> ContactDirections {
+        let rom = self.compiled.body(self.body).1;
+        let nodes = self.nodes.iter().cycle().take(model.contact_modes.nrows() / 3);
+        nodes
+            .map(|node| {
+                let contour = self.compiled.contact(self.pair_at(*node)).meridian == Meridian::Contour;
+                let slope = if contour { rom.contact_nodes[*node].meridional_slope } else { 0.0 };
+                let length = (1.0 + slope * slope).sqrt();
+                let friction = self.friction_at(*node);
+                let share = if friction < self.friction { friction / self.friction } else { 1.0 };
+                ([-1.0 / length, 0.0, slope / length], [0.0, share * sense, 0.0])
+            })
+            .collect()
+    }
+
+    /// The pair of a contact node.
+    fn pair_at(&self, node: usize) -> usize {
+        let pair = self.compiled.plan.pairs_of(self.body).find(|(_, pair)| pair.nodes.contains(&node));
+        pair.map_or(0, |(pair, _)| pair)
+    }
+
+    fn friction_at(&self, node: usize) -> f64 {
+        self.parameters.friction[self.pair_at(node)]
+    }
+
+    fn normals(&self, model: &ModalModel) -> Vec<[f64; 3]> {
+        self.directions(model, 1.0).into_iter().map(|(normal, _)| normal).collect()
+    }
+
+    /// Sets of closed contact nodes: all combinations of a few; of many every one alone, neighbours, and all; of a disk,
+    /// on all sectors, every one alone and all.
+    fn combinations(&self) -> Vec<Vec<usize>> {
+        let nodes = self.nodes.len();
+        if self.disk().is_some() {
+            return (0..nodes).map(|node| vec![node]).chain([(0..nodes).collect()]).collect();
+        }
+        if nodes <= ALL_COMBINATIONS_UP_TO {
+            let members = |set: usize| (0..nodes).filter(|node| set >> node & 1 == 1).collect();
+            return (1..1 << nodes).map(members).collect();
+        }
+        let alone = (0..nodes).map(|node| vec![node]);
+        let pairs = (1..nodes).map(|node| vec![node - 1, node]);
+        alone.chain(pairs).chain([(0..nodes).collect()]).collect()
+    }
+
+    /// Growth of closed sliding contact at one step size and sense of slip; returns warnings of flutter.
+    fn growth(&mut self, step: f64, sense: f64, telling: Telling) -> Result<Vec<String>> {
+        let mut warnings = Vec::new();
+        for (combination, nodes) in self.combinations().iter().enumerate() {
+            let watched = self.watched[usize::from(sense < 0.0)].get(combination).copied();
+            let models = watched.map_or(0..self.models.len(), |model| model..model + 1);
+            let (mut flutter, mut most) = (0.0_f64, (0, f64::NEG_INFINITY));
+            for model in models {
+                let Some(found) = self.growth_of(model, nodes, step, sense) else { continue };
+                if found.is_added() {
+                    return Err(self.refusal(nodes, sense, step, found));
+                }
+                if found.is_flutter() {
+                    flutter = flutter.max(found.continuous);
+                }
+                if found.stepped > most.1 {
+                    most = (model, found.stepped);
+                }
+            }
+            if watched.is_none() {
+                self.watched[usize::from(sense < 0.0)].push(most.0);
+            }
+            if telling == Telling::Flutter && flutter > 0.0 {
+                warnings.push(format!(
+                    "{} is physically unstable (flutter), growth rate {flutter:.3e} 1/s",
+                    self.contact(nodes, sense)
+                ));
+            }
+        }
+        Ok(warnings)
+    }
+
+    /// Growth of one of the models with contact closed at some nodes (of both parts of a nodal diameter).
+    fn growth_of(&self, model: usize, nodes: &[usize], step: f64, sense: f64) -> Option<Growth> {
+        let model = &self.models[model];
+        let all = self.directions(model, sense);
+        let own = self.nodes.len();
+        let places = (0..all.len() / own).flat_map(|part| nodes.iter().map(move |node| part * own + node));
+        let places: Vec<usize> = places.collect();
+        let directions = places.iter().map(|place| all[*place]).collect();
+        stability::growth(&model.with_nodes(&places), self.parameters.scheme, step, self.friction, &directions)
+    }
+
+    /// Which contact is meant.
+    fn contact(&self, nodes: &[usize], sense: f64) -> String {
+        let all = &self.compiled.body(self.body).1.contact_nodes;
+        let names: Vec<&str> = nodes.iter().map(|node| all[self.nodes[*node]].name.as_str()).collect();
+        let direction = if sense > 0.0 { "+θ" } else { "−θ" };
+        let where_closed = if self.disk().is_some() { " of all sectors" } else { "" };
+        let mut frictions: Vec<f64> = nodes.iter().map(|node| self.friction_at(self.nodes[*node])).collect();
+        frictions.sort_by(f64::total_cmp);
+        frictions.dedup();
+        let frictions: Vec<String> = frictions.into_iter().map(|friction| shown(friction).to_string()).collect();
+        format!(
+            "with µ = {}, contact closed at {}{where_closed} and sliding in {direction}",
+            frictions.join(" and "),
+            names.join(", ")
+        )
+    }
+
+    fn refusal(&self, nodes: &[usize], sense: f64, step: f64, found: Growth) -> Error {
+        Error::Unstable {
+            problem: format!(
+                "{} grows by {:.3e} 1/s when stepped with h = {step:.3e} s, by {:.3e} 1/s without time discretisation",
+                self.contact(nodes, sense),
+                found.stepped,
+                found.continuous
+            ),
+            remedy:
+                "Use a smaller internal step (internal_step_max, or a shorter communication step), less friction or \
+                     more damping"
+                    .to_owned(),
+        }
+    }
+}
