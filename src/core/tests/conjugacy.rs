@@ -3,9 +3,9 @@
 
 use tiprub_core::gaps::wrench::{At, Motion};
 use tiprub_core::gaps::{Drive, GapLaw};
-use tiprub_core::settings::{PatchSettings, Scheme, Solver, SplineSettings};
+use tiprub_core::settings::{PatchSettings, Scheme, Shape, Solver, SplineSettings};
 use tiprub_core::{Scene, Simulation};
-use tiprub_test_models::{self as models, coating, disk, flexible, started};
+use tiprub_test_models::{self as models, coating, disk, flexible, real, started};
 
 fn set(simulation: &mut Simulation, name: &str, value: f64, slope: f64) {
     let Some(reference) = simulation.table().find(name).map(|row| row.reference) else { return };
@@ -74,6 +74,32 @@ fn drive(simulation: &mut Simulation) -> f64 {
     set(simulation, "casing_shape_rotation", 3.0 * time, 3.0);
     set(simulation, "casing_shape_factor", 1.0 + 0.1 * sine, 0.1 * rate * cosine);
     speed
+}
+
+/// The shaft's centre is off the axis: a force through the axis of the casing has the moment e × F about it. Works of all inputs sum
+/// to the external work.
+#[test]
+fn whirl_turns_the_shaft_and_its_work_is_one_of_all_inputs() {
+    for feature in FEATURES.into_iter().filter(|feature| feature.0.contains("whirl")) {
+        let mut scene = scene(feature, Scheme::ModalExact, Solver::Lcp, 0.0, 1e-6);
+        scene.settings.surfaces[0].shape = Shape::Circular {};
+        let mut simulation = started(&scene);
+        let mut turned = 0.0_f64;
+        for _ in 0..110 {
+            drive(&mut simulation);
+            simulation.do_step(simulation.time(), LENGTH).unwrap();
+            for event in simulation.system().events() {
+                turned = turned.max(event.wrench.moment[2].abs() / (0.25 * event.normal));
+            }
+        }
+        assert!(turned > 5e-5, "{}: {turned:e}", feature.0);
+        let inputs = ["shaft_work", "whirl_work", "shift_work", "casing_motion_work"];
+        let works = inputs.iter().filter(|name| simulation.table().find(name).is_some());
+        let sum: f64 = works.map(|name| real(&simulation, name)).sum();
+        let scale = simulation.system().ledger().scale();
+        assert!(sum.abs() > 1e-3 * scale, "{}: {sum} J of {scale} J", feature.0);
+        assert!((sum - real(&simulation, "external_work")).abs() < 1e-13 * scale, "{}", feature.0);
+    }
 }
 
 /// Gap and normal of the first node of a law at a state.
