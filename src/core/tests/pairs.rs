@@ -6,7 +6,7 @@ mod counting;
 use tiprub_core::settings::{Motion, Scheme, Shape, Solver, StructureSettings};
 use tiprub_core::variables::{Causality, Kind};
 use tiprub_core::{Scene, Simulation};
-use tiprub_test_models::{lattice, real, rich_blade, rub, several};
+use tiprub_test_models::{lattice, real, rich_blade, rub, several, spin};
 
 const SCHEMES: [Scheme; 3] = Scheme::ALL;
 const SOLVERS: [Solver; 3] = Solver::ALL;
@@ -286,6 +286,42 @@ fn a_saved_state_of_two_rotors_continues_with_the_same_bits() {
     for ((name, value), (_, other)) in outputs(&simulation).into_iter().zip(outputs(&elsewhere)) {
         assert_eq!(value.to_bits(), other.to_bits(), "{name}");
     }
+}
+
+/// Bytes with a right checksum that one of two rotors refuses: its speed is beyond what its stiffness was fitted for. The other
+/// rotor would take its own.
+#[test]
+fn a_state_that_one_of_two_rotors_refuses_changes_nothing() {
+    let mut scene = rub(6);
+    scene.roms[0] = rich_blade(6);
+    scene.roms[0].extras.spin = Some(spin(scene.roms[0].order()));
+    let mut scene = several::two_rotors(scene, 0.1, |rear| rear.speed = -1100.0);
+    scene.settings.structures.iter_mut().for_each(|structure| structure.spin.stiffening = true);
+    let mut simulation = run(&scene, 25, |_, _| ());
+    let mut own = vec![0; simulation.state_size()];
+    simulation.save_state(&mut own).unwrap();
+    let mut refused = 0;
+    for at in 0..own.len() - 24 {
+        // Reference speeds of both stand side by side, and so do the values that were set.
+        if own[at..at + 16] != [1300.0_f64.to_le_bytes(), (-1100.0_f64).to_le_bytes()].concat()[..] {
+            continue;
+        }
+        let mut damaged = own.clone();
+        damaged[at..at + 16].copy_from_slice(&[1200.0_f64.to_le_bytes(), (-1e5_f64).to_le_bytes()].concat());
+        let end = damaged.len() - 8;
+        let checksum = tiprub_core::persist::fingerprint(&damaged[..end], 0);
+        damaged[end..].copy_from_slice(&checksum.to_le_bytes());
+        let Err(error) = simulation.restore_state(&damaged) else {
+            simulation.restore_state(&own).unwrap();
+            continue;
+        };
+        assert!(error.to_string().contains("fitted for"), "{error}");
+        refused += 1;
+        let mut now = vec![0; own.len()];
+        simulation.save_state(&mut now).unwrap();
+        assert!(now == own, "the refused state has changed the instance");
+    }
+    assert_eq!(refused, 1);
 }
 
 #[test]

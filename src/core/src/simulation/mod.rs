@@ -295,19 +295,21 @@ impl Simulation {
         })
     }
 
-    /// With stiffening, the modes are those at the speeds of the start, one per structure that touches.
+    /// With stiffening, the modes are those at the speeds of the start, one per structure that touches. A refusal of one leaves all
+    /// as they were.
     fn follow_reference_speeds(&mut self, speeds: &[f64]) -> Result<()> {
-        for (body, speed) in speeds.iter().enumerate() {
-            let before = self.compiled.bodies[body].reference_speed;
-            if !self.compiled.spins(body) || before.to_bits() == speed.to_bits() {
-                continue;
-            }
-            self.compiled.set_reference_speed(body, *speed)?;
-            // The speed before was accepted before.
-            let system = self.compiled.system();
-            self.system = system.inspect_err(|_| drop(self.compiled.set_reference_speed(body, before)))?;
-            self.limits = None;
+        let before: Vec<f64> = self.compiled.bodies.iter().map(|body| body.reference_speed).collect();
+        let differs = |body: &usize| self.compiled.spins(*body) && before[*body].to_bits() != speeds[*body].to_bits();
+        let changed: Vec<usize> = (0..before.len()).filter(differs).collect();
+        if changed.is_empty() {
+            return Ok(());
         }
+        let taken = changed.iter().try_for_each(|body| self.compiled.set_reference_speed(*body, speeds[*body]));
+        self.system = taken.and_then(|()| self.compiled.system()).inspect_err(|_| {
+            // The speeds before were accepted before.
+            changed.iter().for_each(|body| drop(self.compiled.set_reference_speed(*body, before[*body])));
+        })?;
+        self.limits = None;
         Ok(())
     }
 

@@ -302,9 +302,8 @@ impl Simulation {
         let parameters = self.parameters();
         self.compiled.check_methods(parameters.scheme, parameters.solver)?;
         let orders: Vec<u32> = self.compiled.carriers.iter().map(|carrier| carrier.load_order).collect();
-        self.follow_load_orders()?;
         // The orders before were accepted before.
-        self.follow_reference_speeds(reference_speeds).inspect_err(|_| {
+        self.follow_load_orders().and_then(|()| self.follow_reference_speeds(reference_speeds)).inspect_err(|_| {
             for (carrier, order) in orders.into_iter().enumerate() {
                 drop(self.compiled.set_load_order(carrier, f64::from(order)));
             }
