@@ -82,6 +82,9 @@ impl Layout {
         moved: [f64; 3],
         shaft: [f64; 3],
     ) -> [f64; 3] {
+        if shaft == [0.0; 3] {
+            return shaft;
+        }
         let [outwards, around, along] = self.displaced_frame(node, index, rotor_angle, moved[1]).local(shaft);
         [outwards, around / (1.0 + moved[0] * self.per_radius[node]), along]
     }

@@ -265,14 +265,18 @@ impl ContactSolver {
         for (row, i) in self.members.iter().enumerate() {
             self.right[row] = -driven.map_or(self.gaps[*i], |driven| self.delassus[(*i, driven)]);
         }
-        for (column, j) in self.members.iter().enumerate() {
-            for (row, i) in self.members.iter().enumerate() {
-                self.factor[(row, column)] = self.delassus[(*i, *j)];
+        let order = self.delassus.nrows();
+        let columns = self.factor.as_mut_slice().chunks_exact_mut(order);
+        for (column, j) in columns.zip(&self.members) {
+            let flexibility = &self.delassus.as_slice()[j * order..][..order];
+            for (entry, i) in column.iter_mut().zip(&self.members) {
+                *entry = flexibility[*i];
             }
         }
         let rank = self.eliminate(count);
         for row in (0..rank).rev() {
-            let known: f64 = (row + 1..rank).map(|column| self.factor[(row, column)] * self.right[column]).sum();
+            let factors = self.factor.as_slice()[row..].iter().step_by(order);
+            let known: f64 = factors.zip(&self.right[..rank]).skip(row + 1).map(|(f, known)| f * known).sum();
             self.right[row] = (self.right[row] - known) / self.factor[(row, row)];
             self.multipliers[self.members[row]] = self.right[row];
         }

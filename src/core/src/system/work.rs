@@ -13,15 +13,31 @@ struct Work {
     shift: f64,
     casing: f64,
     heat: f64,
-    /// Half of what the gap has closed by over two steps (m).
-    approach: f64,
     /// Of the node that stops at the surface.
     closing: f64,
+    /// The part of it that a coating takes.
+    worn: f64,
     /// By the scheme, on both structures.
     exact: f64,
+    /// Magnitudes of the work of all inputs.
+    turnover: f64,
 }
 
 impl Work {
+    /// Sums over the contacts of one step need no compensation: those over all steps have it.
+    #[inline(always)]
+    fn add(&mut self, other: &Self) {
+        self.shaft += other.shaft;
+        self.whirl += other.whirl;
+        self.shift += other.shift;
+        self.casing += other.casing;
+        self.heat += other.heat;
+        self.closing += other.closing;
+        self.worn += other.worn;
+        self.exact += other.exact;
+        self.turnover += other.turnover;
+    }
+
     /// What has no other name.
     fn curvature(&self) -> f64 {
         self.exact + self.heat + self.closing - (self.shaft + self.whirl + self.shift + self.casing)
@@ -38,6 +54,7 @@ impl System {
         let when = self.when_acted();
         let mut events = std::mem::take(self.acted_mut(when));
         let (mut of, mut motion, mut explained, mut outcome) = (usize::MAX, Motion::default(), 0.0, Ok(()));
+        let mut total = Work::default();
         for event in &mut events {
             if event.pair != of {
                 of = event.pair;
@@ -49,7 +66,12 @@ impl System {
             if outcome.is_err() {
                 break;
             }
-            event.friction_heat = self.enter(event, moved, &motion, when);
+            let work = self.work_of(event, moved, &motion, when);
+            event.friction_heat = work.heat;
+            total.add(&work);
+        }
+        if !events.is_empty() {
+            self.enter(&total);
         }
         *self.acted_mut(when) = events;
         self.enter_loads();
@@ -79,21 +101,18 @@ impl System {
         }
     }
 
-    /// Enter one contact's work into the ledger; returns its friction heat (J).
-    fn enter(&mut self, event: &ContactEvent, moved: [f64; 3], motion: &Motion, when: When) -> f64 {
-        let work = self.work_of(event, moved, motion, when);
-        let (curvature, worn) = (work.curvature(), event.coating * work.approach);
+    /// Enter the work of all contacts of a step into the ledger.
+    fn enter(&mut self, work: &Work) {
         let ledger = &mut self.counted.ledger;
-        ledger.wear_work.add(worn);
-        ledger.impact_loss.add(work.closing - worn);
+        ledger.wear_work.add(work.worn);
+        ledger.impact_loss.add(work.closing - work.worn);
         ledger.friction_loss.add(work.heat);
         ledger.shaft_work.add(work.shaft);
         ledger.whirl_work.add(work.whirl);
         ledger.shift_work.add(work.shift);
         ledger.casing_work.add(work.casing);
-        ledger.curvature_work.add(curvature);
-        ledger.turnover.add(work.shaft.abs() + work.whirl.abs() + work.shift.abs() + work.casing.abs());
-        work.heat
+        ledger.curvature_work.add(work.curvature());
+        ledger.turnover.add(work.turnover);
     }
 
     /// The work on both structures is f·(u⁺ − u⁻)/2 with u the relative displacement. It is what inputs do, force times
@@ -113,16 +132,19 @@ impl System {
         // A node that comes over a free edge had no gap to close: its motion is the approach.
         let (now, oldest) = (gaps.now[index], gaps.oldest[index]);
         let approach = if oldest.is_finite() { -0.5 * (now - oldest) } else { -dot(normal, moved) };
-        let [x, y, z] = event.wrench.force;
+        let ([x, y, z], across) = (event.wrench.force, motion.shaft);
+        let (shaft, casing) = (-dot(event.force, spin), event.normal * surface);
+        let (whirl, shift) = (-(x * across[0] + y * across[1]), -z * across[2]);
         Work {
-            shaft: -dot(event.force, spin),
-            whirl: -(x * motion.shaft[0] + y * motion.shaft[1]),
-            shift: -z * motion.shaft[2],
-            casing: event.normal * surface,
+            shaft,
+            whirl,
+            shift,
+            casing,
             heat: -dot(tangential, slip),
-            approach,
             closing: event.normal * approach,
+            worn: event.coating * approach,
             exact: dot(event.force, moved),
+            turnover: shaft.abs() + whirl.abs() + shift.abs() + casing.abs(),
         }
     }
 
