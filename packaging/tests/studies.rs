@@ -110,39 +110,44 @@ fn own_scene(root: &Path) {
     fs::write(root.join("own.toml"), text).unwrap();
 }
 
+/// What the study of stability finds on a scene at two frictions, speeds and steps.
+fn stability(root: &Path, scene: &str) -> Value {
+    let arguments = ["study", "stability", scene, "--friction", "0.15:0.9:2", "--speeds=-1800:1800:2"];
+    let more = ["--steps", "1e-6:1.6e-5:2", "--json", "--quiet", "--out", "out"];
+    serde_json::from_str(&tiprub(root, "", &[&arguments[..], &more].concat()).0).unwrap()
+}
+
+/// A run of three steps of the scene with a friction coefficient, a speed, a step and `scheme + solver`.
+fn three_steps(root: &Path, [friction, speed, step]: [f64; 3], method: &str) -> Value {
+    let (scheme, solver) = method.split_once(" + ").unwrap();
+    let values = [
+        format!("--set=friction_coefficient={friction:?}"),
+        format!("--set=speed={speed:?}"),
+        format!("--set=internal_step_max={step:?}"),
+        format!("--set=scheme={scheme}"),
+        format!("--set=solver={solver}"),
+        format!("--step={step:?}"),
+        format!("--stop={:?}", 3.0 * step),
+    ];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+    let output = command.current_dir(root).args(["run", "own.toml", "--json", "--quiet"]).args(values).output();
+    serde_json::from_slice(&output.unwrap().stdout).unwrap()
+}
+
 /// Every answer of the study is that of a run with the same start values and step, and the largest usable steps part what is accepted
 /// from what is refused.
 #[test]
 fn the_study_of_stability_answers_as_runs_do() {
     let root = tempfile::tempdir().unwrap();
     own_scene(root.path());
-    let run = |friction: f64, speed: f64, step: f64, method: &str| {
-        let (scheme, solver) = method.split_once(" + ").unwrap();
-        let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
-        let values = [
-            format!("--set=friction_coefficient={friction:?}"),
-            format!("--set=speed={speed:?}"),
-            format!("--set=internal_step_max={step:?}"),
-            format!("--set=scheme={scheme}"),
-            format!("--set=solver={solver}"),
-            format!("--step={step:?}"),
-            format!("--stop={:?}", 3.0 * step),
-        ];
-        let output =
-            command.current_dir(root.path()).args(["run", "own.toml", "--json", "--quiet"]).args(values).output();
-        serde_json::from_slice::<Value>(&output.unwrap().stdout).unwrap()
-    };
-    let arguments = ["study", "stability", "own.toml", "--friction", "0.15:0.9:2", "--speeds=-1800:1800:2"];
-    let more = ["--steps", "1e-6:1.6e-5:2", "--json", "--quiet", "--out", "out"];
-    let (stdout, _) = tiprub(root.path(), "", &[&arguments[..], &more].concat());
-    let json: Value = serde_json::from_str(&stdout).unwrap();
+    let json = stability(root.path(), "own.toml");
     only_no(&json, &[]);
     let number = |value: &Value, name: &str| value[name].as_f64().unwrap();
     let points = json["results"]["points"].as_array().unwrap();
     assert_eq!(points.len(), 8);
     for point in points {
         let [friction, speed, step] = ["friction", "speed", "internal_step"].map(|name| number(point, name));
-        let told = run(friction, speed, step, "modal-exact + lcp");
+        let told = three_steps(root.path(), [friction, speed, step], "modal-exact + lcp");
         match point["refusal"].as_str() {
             // What and where stand apart in JSON.
             Some(text) => {
@@ -158,24 +163,42 @@ fn the_study_of_stability_answers_as_runs_do() {
     assert_eq!(limits.len(), 9);
     for limit in limits.iter().filter(|limit| !limit["method"].as_str().unwrap().ends_with("coulomb")) {
         for (factor, accepted) in [(0.999, true), (1.02, false)] {
-            let told = run(0.15, 1800.0, factor * number(limit, "step"), limit["method"].as_str().unwrap());
+            let step = factor * number(limit, "step");
+            let told = three_steps(root.path(), [0.15, 1800.0, step], limit["method"].as_str().unwrap());
             assert_eq!(told["error"].is_null(), accepted, "{limit:#} {told:#}");
         }
     }
-    // A scene without friction is asked what it would take.
+    for row in columns(&root.path().join("out/answers.csv")).1 {
+        assert_eq!(row[6].is_finite(), row[4] > 0.0, "what flutters has a frequency: {row:?}");
+    }
+    let page = fs::read_to_string(root.path().join("out/index.html")).unwrap();
+    assert!(page.contains("Largest usable internal step") && page.contains("Read a column"));
+}
+
+#[test]
+fn the_study_of_stability_asks_a_scene_without_friction_what_it_would_take() {
+    let root = tempfile::tempdir().unwrap();
+    own_scene(root.path());
     let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
     fs::write(root.path().join("dry.toml"), scene.replace("friction = 0.15", "friction = 0.0")).unwrap();
-    let arguments = ["study", "stability", "dry.toml", "--friction", "0.15:0.9:2", "--speeds=-1800:1800:2"];
-    let dry: Value = serde_json::from_str(&tiprub(root.path(), "", &[&arguments[..], &more].concat()).0).unwrap();
+    let (own, dry) = (stability(root.path(), "own.toml"), stability(root.path(), "dry.toml"));
     assert_eq!(dry["results"]["own"]["friction"], 0.0);
     let rubbing = |point: &&Value| point["friction"] != 0.0;
     let (with, without) = dry["results"]["points"].as_array().unwrap().iter().partition::<Vec<_>, _>(rubbing);
-    assert!(with.iter().zip(points).all(|(a, b)| *a == b) && without.len() == 4, "{with:#?}");
+    assert!(
+        with.iter().zip(own["results"]["points"].as_array().unwrap()).all(|(a, b)| *a == b) && without.len() == 4,
+        "{with:#?}"
+    );
     assert!(
         without.iter().all(|point| point["refusal"].is_null() && point["growth_of_steps"].is_null()),
         "{without:#?}"
     );
-    // A step far too long is no reason to show nothing but refusals.
+}
+
+#[test]
+fn the_study_of_stability_shows_more_than_refusals_where_the_step_is_too_long() {
+    let root = tempfile::tempdir().unwrap();
+    own_scene(root.path());
     let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
     let text = scene
         .replace("step = 1.0e-6 ", "step = 1.0e-4 ")
@@ -186,11 +209,14 @@ fn the_study_of_stability_answers_as_runs_do() {
     only_no(&long, &["The scene as it stands is accepted", "Its internal step lies within"]);
     let accepted = ["right", "warned"].map(|kind| long["results"]["counts"][kind].as_u64().unwrap());
     assert!(accepted[0] + accepted[1] > 0, "{}", long["results"]["counts"]);
-    for row in columns(&root.path().join("out/answers.csv")).1 {
-        assert_eq!(row[6].is_finite(), row[4] > 0.0, "what flutters has a frequency: {row:?}");
-    }
-    let page = fs::read_to_string(root.path().join("out/index.html")).unwrap();
-    assert!(page.contains("Largest usable internal step") && page.contains("Read a column"));
+}
+
+/// Where the ROM of `own.toml` comes from.
+const MESH: [&str; 6] = ["--mesh", "blade.inp", "--contact-set", "TIP", "--clamp-set", "HUB"];
+
+fn convergence(root: &Path, more: &[&str]) -> Value {
+    let own = ["study", "convergence", "own.toml", "--quick", "--json", "--quiet", "--out", "out"];
+    serde_json::from_str(&tiprub(root, "", &[&own[..], more].concat()).0).unwrap()
 }
 
 /// Steps of any scene, fewer modes of any ROM; more modes and other contact nodes where the mesh is named, and it is the ROM's.
@@ -198,11 +224,7 @@ fn the_study_of_stability_answers_as_runs_do() {
 fn the_study_of_convergence_refines_what_it_can_and_says_what_it_cannot() {
     let root = tempfile::tempdir().unwrap();
     own_scene(root.path());
-    let own = ["study", "convergence", "own.toml", "--quick", "--json", "--quiet", "--out", "out"];
-    let mesh = ["--mesh", "blade.inp", "--contact-set", "TIP", "--clamp-set", "HUB"];
-    let study = |more: &[&str]| -> Value {
-        serde_json::from_str(&tiprub(root.path(), "", &[&own[..], more].concat()).0).unwrap()
-    };
+    let study = |more: &[&str]| convergence(root.path(), more);
     let values = |direction: &Value| -> Vec<f64> {
         direction["levels"].as_array().unwrap().iter().map(|level| level["value"].as_f64().unwrap()).collect()
     };
@@ -212,7 +234,7 @@ fn the_study_of_convergence_refines_what_it_can_and_says_what_it_cannot() {
     for direction in [1, 2] {
         assert!(alone[direction]["not_refined"].as_str().unwrap().contains("--mesh FILE"), "{alone:#}");
     }
-    let whole = study(&[&mesh[..], &["--sectors", "36"]].concat());
+    let whole = study(&[&MESH[..], &["--sectors", "36"]].concat());
     let found = &whole["results"]["directions"];
     assert_eq!([values(&found[1]), values(&found[2])], [vec![2.0, 4.0, 6.0], vec![2.0, 3.0]]);
     assert!(found.as_array().unwrap().iter().all(|direction| direction["not_refined"].is_null()), "{found:#}");
@@ -238,7 +260,13 @@ fn the_study_of_convergence_refines_what_it_can_and_says_what_it_cannot() {
     let expected = (impulse(1) - impulse(2)).abs() / impulse(1).max(impulse(2));
     assert!((change(&found[1], 1, "impulse") / expected - 1.0).abs() < 1e-9);
     assert!(fs::read_to_string(root.path().join("out/levels.csv")).unwrap().lines().count() == 1 + 3 + 3 + 2);
-    // Just below the limit of central differences, models with more modes or nodes are refused: their direction takes half the step.
+}
+
+/// Just below the limit of central differences, models with more modes or nodes are refused.
+#[test]
+fn a_direction_whose_models_are_refused_takes_half_the_step() {
+    let root = tempfile::tempdir().unwrap();
+    own_scene(root.path());
     let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
     let replaced = |line: &str| match line.split(' ').next() {
         Some("scheme") => "scheme = \"central-difference\"".to_owned(),
@@ -247,13 +275,19 @@ fn the_study_of_convergence_refines_what_it_can_and_says_what_it_cannot() {
         _ => line.to_owned(),
     };
     fs::write(root.path().join("own.toml"), scene.lines().map(replaced).collect::<Vec<_>>().join("\n")).unwrap();
-    let limited = study(&[&mesh[..], &["--sectors", "36"]].concat());
+    let limited = convergence(root.path(), &[&MESH[..], &["--sectors", "36"]].concat());
     let found = limited["results"]["directions"].as_array().unwrap();
     let divided: Vec<u64> = found.iter().map(|one| one["step_divided_by"].as_u64().unwrap()).collect();
     assert_eq!(divided, [1, 2, 2]);
     let refused =
         |one: &Value| one["levels"].as_array().unwrap().iter().filter(|level| level["refused"].is_string()).count();
     assert_eq!(found.iter().map(refused).collect::<Vec<_>>(), [1, 0, 0], "{limited:#}");
+}
+
+#[test]
+fn the_study_of_convergence_refuses_another_mesh() {
+    let root = tempfile::tempdir().unwrap();
+    own_scene(root.path());
     let refuse = |more: &[&str], code: i32| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
         let output = command.current_dir(root.path()).args(["study", "convergence", "own.toml", "--quick"]).args(more);
@@ -261,11 +295,11 @@ fn the_study_of_convergence_refines_what_it_can_and_says_what_it_cannot() {
         assert_eq!(output.status.code(), Some(code), "{more:?}");
         String::from_utf8(output.stderr).unwrap()
     };
-    let other = refuse(&[&mesh[..], &["--sectors", "36", "--material", "steel"]].concat(), 1);
+    let other = refuse(&[&MESH[..], &["--sectors", "36", "--material", "steel"]].concat(), 1);
     assert!(other.contains("it does not give the ROM `rotor37` of the scene: first frequency"), "{other}");
-    assert!(refuse(&mesh, 1).contains("1 sectors instead of"), "sectors");
-    assert!(refuse(&mesh[2..], 2).contains("--mesh: an option given describes a mesh, and there is none"));
-    assert!(refuse(&[&mesh[..], &["--modes", "9"]].concat(), 2).contains("unexpected argument '--modes'"));
+    assert!(refuse(&MESH, 1).contains("1 sectors instead of"), "sectors");
+    assert!(refuse(&MESH[2..], 2).contains("--mesh: an option given describes a mesh, and there is none"));
+    assert!(refuse(&[&MESH[..], &["--modes", "9"]].concat(), 2).contains("unexpected argument '--modes'"));
 }
 
 /// Told at once: nothing is reduced for it, and no directory stays.
