@@ -82,7 +82,7 @@ impl Layout {
         moved: [f64; 3],
         shaft: [f64; 3],
     ) -> [f64; 3] {
-        if shaft == [0.0; 3] {
+        if shaft.iter().all(|along| *along == 0.0) {
             return shaft;
         }
         let [outwards, around, along] = self.displaced_frame(node, index, rotor_angle, moved[1]).local(shaft);
