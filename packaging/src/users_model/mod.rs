@@ -141,6 +141,7 @@ fn general(
     let title = format!("Reducing {name}");
     let options = ReductionOptions {
         name,
+        kind: ReductionKind::FixedInterface,
         fixed_interface_modes: source.kept.modes.unwrap_or(MODES),
         checked_modes: CHECKED_MODES,
         sectors: asked.sectors.unwrap_or(1) as usize,

@@ -147,7 +147,7 @@ fn constraint_modes(
 }
 
 /// TᵀAT.
-fn projected(matrix: &SparseMatrix, transformation: &Mat<f64>) -> Mat<f64> {
+pub(crate) fn projected(matrix: &SparseMatrix, transformation: &Mat<f64>) -> Mat<f64> {
     let size = transformation.ncols();
     let mut product = Mat::zeros(size, size);
     for first in (0..size).step_by(COLUMNS) {
@@ -249,7 +249,7 @@ fn interior_dofs(order: usize, interface: &[usize]) -> Result<Vec<usize>> {
     Ok((0..order).filter(|&dof| !held[dof]).collect())
 }
 
-fn reduced_stiffness(boundary: &Mat<f64>, squares: &[f64]) -> DMatrix<f64> {
+pub(crate) fn reduced_stiffness(boundary: &Mat<f64>, squares: &[f64]) -> DMatrix<f64> {
     let size = boundary.nrows();
     let mut matrix = DMatrix::zeros(size + squares.len(), size + squares.len());
     matrix.view_mut((0, 0), (size, size)).copy_from(&symmetrised(size, |i, j| boundary[(i, j)]));
@@ -259,7 +259,7 @@ fn reduced_stiffness(boundary: &Mat<f64>, squares: &[f64]) -> DMatrix<f64> {
     matrix
 }
 
-fn symmetrised(order: usize, entry: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+pub(crate) fn symmetrised(order: usize, entry: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
     DMatrix::from_fn(order, order, |i, j| 0.5 * (entry(i, j) + entry(j, i)))
 }
 

@@ -12,6 +12,7 @@ use crate::assembly::{Assembled, free_dofs};
 use crate::craig_bampton::{CraigBampton, craig_bampton, dense_modes};
 use crate::eigen::{Modes, lowest_modes, positive_factor};
 use crate::fe_model::FeModel;
+use crate::free_interface::free_interface;
 use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report, silent};
@@ -19,18 +20,57 @@ use crate::sparse::{Factor, SparseMatrix, principal_pair};
 use crate::spin::{ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, SpinningStates, reduced_spin};
 use crate::{Error, Result};
 
-use outcome::{build_rom, rotated};
+use outcome::{build_rom, direction, rotated};
 pub(crate) use outcome::{description, element_names};
 
-/// A contact node before the reduction.
+/// A contact node or patch before the reduction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactPoint {
     /// Name, for example `leading_edge`.
     pub name: String,
-    /// Node index in the mesh (from 0).
+    /// Node index in the mesh (from 0); of a patch the node nearest to its middle.
     pub node: usize,
+    /// Nodes and weights (sum 1) of a patch: it moves and stands as their mean does, and spreads its force over them. Empty for
+    /// the node alone.
+    pub patch: Vec<(usize, f64)>,
     /// Slope dr/dz of the structure's contour in the meridional plane.
     pub meridional_slope: f64,
+}
+
+impl ContactPoint {
+    /// A node alone.
+    pub fn at(name: impl Into<String>, node: usize, meridional_slope: f64) -> Self {
+        Self { name: name.into(), node, patch: Vec::new(), meridional_slope }
+    }
+
+    /// Nodes and weights.
+    pub fn weights(&self) -> impl Iterator<Item = (usize, f64)> {
+        let alone = self.patch.is_empty().then_some((self.node, 1.0));
+        self.patch.iter().copied().chain(alone)
+    }
+
+    /// Mean radius (m), angle (rad) and axial position (m) of its nodes.
+    pub(crate) fn cylindrical(&self, nodes: &[[f64; 3]]) -> [f64; 3] {
+        if self.patch.is_empty() {
+            let [x, y, z] = nodes[self.node];
+            return [x.hypot(y), y.atan2(x), z];
+        }
+        let mean = |pick: &dyn Fn([f64; 3]) -> f64| self.weights().map(|(node, w)| w * pick(nodes[node])).sum::<f64>();
+        let (sin, cos) = mean(&|[_, y, _]| y).atan2(mean(&|[x, ..]| x)).sin_cos();
+        // Angles from the middle do not jump.
+        let turned = mean(&|[x, y, _]| (y * cos - x * sin).atan2(x * cos + y * sin));
+        [mean(&|[x, y, _]| x.hypot(y)), sin.atan2(cos) + turned, mean(&|[_, _, z]| z)]
+    }
+}
+
+/// How the motion of a structure is described beside its static responses to contact forces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ReductionKind {
+    /// Modes of the structure with its contact nodes held (Craig and Bampton): the paper's.
+    #[default]
+    FixedInterface,
+    /// Modes of the structure as it is supported, with exact residual flexibility (MacNeal, Rubin).
+    FreeInterface,
 }
 
 /// What to reduce to, and what to call it.
@@ -38,7 +78,9 @@ pub struct ContactPoint {
 pub struct ReductionOptions {
     /// Name of the structure.
     pub name: String,
-    /// Number of fixed-interface modes.
+    /// Which modes are kept.
+    pub kind: ReductionKind,
+    /// How many.
     pub fixed_interface_modes: usize,
     /// Number of modes of the full model that are computed and compared with the reduced ones.
     pub checked_modes: usize,
@@ -130,10 +172,17 @@ pub fn reduce_model(
     let free = free_dofs(model.nodes.len(), clamped);
     let (stiffness, mass) = principal_pair(&model.stiffness, &model.mass, &free);
     let full = full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)?;
-    let interface = interface_dofs(&free, contact)?;
-    let component_modes = |stiffness: &SparseMatrix, modes: usize, listener: Listener<'_>| {
-        let cartesian = craig_bampton(stiffness, &mass, &interface, modes, listener);
-        cartesian.map(|found| rotated(found, &model.nodes, contact, options.frame))
+    let loads = contact_loads(&free, &model.nodes, contact, options.frame)?;
+    let interface = match options.kind {
+        ReductionKind::FixedInterface => interface_dofs(&free, contact)?,
+        ReductionKind::FreeInterface => Vec::new(),
+    };
+    let component_modes = |stiffness: &SparseMatrix, modes: usize, listener: Listener<'_>| match options.kind {
+        ReductionKind::FixedInterface => {
+            let cartesian = craig_bampton(stiffness, &mass, &interface, modes, listener);
+            cartesian.map(|found| rotated(found, &model.nodes, contact, options.frame))
+        }
+        ReductionKind::FreeInterface => free_interface(stiffness, &mass, loads.as_ref(), modes, listener),
     };
     let craig_bampton = component_modes(&stiffness, options.fixed_interface_modes, listener)?;
     report(listener, Stage::Checks, 0, 1);
@@ -141,9 +190,9 @@ pub fn reduce_model(
     let checks = compare(&full, &mass, &craig_bampton, &squares, &vectors);
     report(listener, Stage::Checks, 1, 1);
     let spin = |speed| -> Result<ReducedSpin> {
-        let resting = Resting { model: &craig_bampton, mass: &mass, free: &free, interface: &interface };
+        let resting = Resting { model: &craig_bampton, mass: &mass, free: &free, contact: loads.as_ref() };
         let states = spinning_states(&model, &free, &stiffness, speed, listener)?;
-        let modes = (options.fixed_interface_modes + SPARE_MODES).min(free.len() - interface.len());
+        let modes = (options.fixed_interface_modes + SPARE_MODES).min(free.len() - loads.ncols());
         let middle = component_modes(&states.middle.stiffness, modes, &silent)?;
         report(listener, Stage::Spin, 4, 6);
         let largest = component_modes(&states.largest.stiffness, modes, &silent)?;
@@ -271,7 +320,8 @@ pub(crate) fn compare(
 }
 
 pub(crate) fn check_nodes(nodes: &[[f64; 3]], clamped: &[usize], contact: &[ContactPoint], frame: Frame) -> Result<()> {
-    for &node in clamped.iter().chain(contact.iter().map(|point| &point.node)) {
+    let touching = contact.iter().flat_map(ContactPoint::weights).map(|(node, _)| node);
+    for node in clamped.iter().copied().chain(touching) {
         if node >= nodes.len() {
             let problem = format!("node {} does not exist; there are {}", node + 1, nodes.len());
             return Err(Error::invalid("clamped or contact nodes", problem, "Name nodes of the mesh"));
@@ -279,19 +329,52 @@ pub(crate) fn check_nodes(nodes: &[[f64; 3]], clamped: &[usize], contact: &[Cont
     }
     for (index, point) in contact.iter().enumerate() {
         let what = || format!("contact node `{}`", point.name);
-        if clamped.contains(&point.node) {
-            return Err(Error::invalid(what(), "it is clamped", "Choose a node that can move"));
+        if point.weights().any(|(node, _)| clamped.contains(&node)) {
+            return Err(clamped_point(point));
         }
-        let [x, y, _] = nodes[point.node];
-        if frame == Frame::Cylindrical && x.hypot(y) <= 0.0 {
+        let on_axis = |(node, _): (usize, f64)| nodes[node][0].hypot(nodes[node][1]) <= 0.0;
+        if frame == Frame::Cylindrical && point.weights().any(on_axis) {
             let problem = "it lies on the z axis, where the radial direction is undefined";
             return Err(Error::invalid(what(), problem, "Choose another node or the Cartesian frame"));
         }
-        if contact[..index].iter().any(|other| other.node == point.node || other.name == point.name) {
+        let same = |other: &ContactPoint| other.patch.is_empty() && point.patch.is_empty() && other.node == point.node;
+        if contact[..index].iter().any(|other| same(other) || other.name == point.name) {
             return Err(Error::invalid(what(), "its node or name appears twice", "Name every contact node once"));
         }
     }
     Ok(())
+}
+
+/// Unit forces on the contact coordinates, free dofs × 3·points: node by node its three directions in `frame`, spread over the nodes of a
+/// patch with each node's own directions.
+fn contact_loads(free: &[usize], nodes: &[[f64; 3]], contact: &[ContactPoint], frame: Frame) -> Result<Mat<f64>> {
+    let mut loads = Mat::zeros(free.len(), 3 * contact.len());
+    for (index, point) in contact.iter().enumerate() {
+        for (node, weight) in point.weights() {
+            let (cos, sin) = if frame == Frame::Cylindrical { direction(nodes[node]) } else { (1.0, 0.0) };
+            for (component, unit) in [[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]].into_iter().enumerate() {
+                for (axis, share) in unit.into_iter().enumerate() {
+                    let row = free.binary_search(&(3 * node + axis)).map_err(|_| clamped_point(point))?;
+                    loads[(row, 3 * index + component)] = weight * share;
+                }
+            }
+        }
+    }
+    Ok(loads)
+}
+
+fn clamped_point(point: &ContactPoint) -> Error {
+    Error::invalid(format!("contact node `{}`", point.name), "it is clamped", "Choose a node that can move")
+}
+
+/// Patches have no degrees of freedom of their own that could be held.
+pub(crate) fn patch_held(point: &ContactPoint) -> Error {
+    let what = format!("contact patch `{}`", point.name);
+    Error::invalid(
+        what,
+        "this reduction holds contact nodes one by one",
+        "Ask for contact nodes, or for free-interface modes of blades on a rigid hub",
+    )
 }
 
 /// Rows of the contact nodes' dofs among the free ones, node by node.
@@ -299,10 +382,9 @@ pub(crate) fn interface_dofs(free: &[usize], contact: &[ContactPoint]) -> Result
     contact
         .iter()
         .flat_map(|point| (0..3).map(move |component| (point, 3 * point.node + component)))
-        .map(|(point, dof)| {
-            free.binary_search(&dof).map_err(|_| {
-                Error::invalid(format!("contact node `{}`", point.name), "it is clamped", "Choose a node that can move")
-            })
+        .map(|(point, dof)| match point.patch.as_slice() {
+            [] => free.binary_search(&dof).map_err(|_| clamped_point(point)),
+            _ => Err(patch_held(point)),
         })
         .collect()
 }

@@ -112,7 +112,7 @@ fn contact_on_a_face_and_loose_structures_are_refused() {
     let refusal = |clamped: &[usize], contact: &[ContactPoint]| {
         reduce_cyclic(&model(mesh.clone()), clamped, contact, &faces, &options, &silent).unwrap_err().to_string()
     };
-    let at = |node| vec![ContactPoint { name: "edge".into(), node, meridional_slope: 0.0 }];
+    let at = |node| vec![ContactPoint::at("edge", node, 0.0)];
     let rim = *mesh.set("LOW").unwrap().iter().find(|node| !bore.contains(node)).unwrap();
     assert!(refusal(&bore, &at(rim)).contains("cyclic face"));
     assert!(refusal(&bore, &at(bore[1])).contains("clamped"));

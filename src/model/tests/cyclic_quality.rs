@@ -11,7 +11,7 @@ use tiprub_model::cyclic::{
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Mesh;
 use tiprub_model::progress::{Progress, silent};
-use tiprub_model::reduce::{ContactPoint, ReductionOptions, reduce};
+use tiprub_model::reduce::{ContactPoint, ReductionKind, ReductionOptions, reduce};
 
 fn options(modes: ModeSelection, checked_modes: usize) -> CyclicOptions {
     CyclicOptions { name: "disk".into(), modes, checked_modes, damping_ratio: 0.005 }
@@ -46,6 +46,7 @@ fn reduced_whole(mesh: &Mesh, sectors: usize, modes: usize, checked_modes: usize
         .collect();
     let options = ReductionOptions {
         name: "whole".into(),
+        kind: ReductionKind::FixedInterface,
         fixed_interface_modes: modes,
         checked_modes,
         sectors: 1,

@@ -30,6 +30,7 @@ fn rom(imported: &Imported) -> Rom {
     let contact = choose_contact_nodes(&model.nodes, model.set("TIP").unwrap(), &ContactChoice::default()).unwrap();
     let options = ReductionOptions {
         name: "bar".into(),
+        kind: ReductionKind::FixedInterface,
         fixed_interface_modes: 8,
         checked_modes: 6,
         sectors: 1,

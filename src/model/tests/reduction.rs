@@ -12,7 +12,7 @@ use tiprub_model::craig_bampton::{craig_bampton, dense_modes};
 use tiprub_model::eigen::lowest_modes;
 use tiprub_model::element::ElementKind;
 use tiprub_model::progress::{Progress, Stage, silent};
-use tiprub_model::reduce::{ContactPoint, Reduction, ReductionOptions, full_modes, reduce};
+use tiprub_model::reduce::{ContactPoint, Reduction, ReductionKind, ReductionOptions, full_modes, reduce};
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::{Error, Mesh};
 
@@ -167,6 +167,7 @@ fn constraint_modes_keep_the_static_answer_whatever_the_number_of_modes() {
 fn options(modes: usize, frame: Frame) -> ReductionOptions {
     ReductionOptions {
         name: "beam".into(),
+        kind: ReductionKind::FixedInterface,
         fixed_interface_modes: modes,
         checked_modes: 8,
         sectors: 1,
@@ -181,7 +182,7 @@ fn contact(mesh: &Mesh) -> Vec<ContactPoint> {
         mesh.nodes.iter().position(near).unwrap()
     };
     [("low", corner(0.0, 0.0)), ("high", corner(SIZE[1], SIZE[2]))]
-        .map(|(name, node)| ContactPoint { name: name.into(), node, meridional_slope: 0.0 })
+        .map(|(name, node)| ContactPoint::at(name, node, 0.0))
         .to_vec()
 }
 
@@ -265,7 +266,7 @@ fn a_free_structure_keeps_its_rigid_modes() {
     let mesh = beam();
     let mut points = contact(&mesh);
     let far = mesh.nodes.iter().position(|p| p[0] == 0.0 && p[1] == 0.0 && p[2] == SIZE[2]).unwrap();
-    points.push(ContactPoint { name: "far".into(), node: far, meridional_slope: 0.0 });
+    points.push(ContactPoint::at("far", far, 0.0));
     let reduction = reduce(mesh, &steel(), &[], &points, &options(10, Frame::Cartesian), &silent).unwrap();
     let omega = &reduction.reduced_angular_frequencies;
     assert!(omega[5] < 1e-3 * omega[6], "{:?}", &omega[..8]);
@@ -295,7 +296,7 @@ fn wrong_contact_nodes_are_refused_by_name() {
 fn a_contact_node_on_the_axis_has_no_cylindrical_frame() {
     let mesh = straight_box(ElementKind::Hex8, [2, 1, 1], [0.2, 0.1, 0.1]);
     let clamped = nodes_at(&mesh, 0, 0.2);
-    let contact = [ContactPoint { name: "centre".into(), node: 0, meridional_slope: 0.0 }];
+    let contact = [ContactPoint::at("centre", 0, 0.0)];
     let error = reduce(mesh, &steel(), &clamped, &contact, &options(3, Frame::Cylindrical), &silent).unwrap_err();
     assert!(error.to_string().starts_with("contact node `centre`: it lies on the z axis"), "{error}");
 }

@@ -6,8 +6,9 @@ use nalgebra::{DMatrix, DVector};
 use tiprub_model::assembly::{Assembled, assemble, free_dofs};
 use tiprub_model::craig_bampton::dense_modes;
 use tiprub_model::progress::silent;
+use tiprub_model::reduce::ReductionKind;
 use tiprub_model::reduce::full_modes;
-use tiprub_model::rotor37::{DESIGN_SPEED, MeshCounts, blade_mesh};
+use tiprub_model::rotor37::{DESIGN_SPEED, MeshCounts, Tip, blade_mesh};
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::spin::{
     Rotating, SpinningState, frequencies_at, gyroscopic_frequencies, static_growth, stiffness_at, turned_about_axis,
@@ -258,9 +259,16 @@ fn the_spin_arrays_have_the_same_bits_on_any_number_of_threads() {
 /// Named cases in which an earlier way to align the modes failed: more contact nodes, other numbers of modes.
 #[test]
 fn other_reductions_hold_as_well() {
-    for (contact_nodes, fixed_interface_modes) in [(7, 20), (3, 40)] {
+    use ReductionKind::{FixedInterface, FreeInterface};
+    for (tip, kind, fixed_interface_modes) in [
+        (Tip::Nodes(7), FixedInterface, 20),
+        (Tip::Nodes(3), FixedInterface, 40),
+        (Tip::Patches(5), FreeInterface, 20),
+        (Tip::Nodes(3), FreeInterface, 20),
+    ] {
         let options = Rotor37Options {
-            contact_nodes,
+            tip,
+            kind,
             fixed_interface_modes,
             checked_modes: 6,
             spin: Some(DESIGN_SPEED),
@@ -269,7 +277,7 @@ fn other_reductions_hold_as_well() {
         for check in reduce_rotor37(&options, &silent).unwrap().spin_checks {
             let (frequencies, growth) = (check.frequency_deviation(), check.growth_deviation());
             println!(
-                "{contact_nodes} nodes, {fixed_interface_modes} modes, {} rad/s: {frequencies:.3?} %, {growth:.3} %",
+                "{tip:?}, {kind:?}, {fixed_interface_modes} modes, {} rad/s: {frequencies:.3?} %, {growth:.3} %",
                 check.speed
             );
             assert!(frequencies.iter().all(|deviation| deviation.abs() < 0.2) && growth < 0.5);

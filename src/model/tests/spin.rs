@@ -10,7 +10,7 @@ use tiprub_model::assembly::{Assembled, assemble, free_dofs};
 use tiprub_model::craig_bampton::dense_modes;
 use tiprub_model::element::ElementKind;
 use tiprub_model::progress::silent;
-use tiprub_model::reduce::{ContactPoint, ReductionOptions, full_modes};
+use tiprub_model::reduce::{ContactPoint, ReductionKind, ReductionOptions, full_modes};
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::spin::{
     Rotating, SpinningState, frequencies_at, gyroscopic_frequencies, turned_about_axis, without_axial,
@@ -202,7 +202,7 @@ fn blade() -> (Mesh, Vec<usize>, Vec<ContactPoint>) {
         *tip.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
     };
     let contact = [("front", near(0.0, 0.0)), ("rear", near(0.0, 0.05))]
-        .map(|(name, node)| ContactPoint { name: name.into(), node, meridional_slope: 0.0 })
+        .map(|(name, node)| ContactPoint::at(name, node, 0.0))
         .to_vec();
     for [x, y, z] in &mut mesh.nodes {
         let angle = 0.5 + 0.6 * *x / length;
@@ -227,6 +227,7 @@ fn spinning(
 fn options(frame: Frame) -> ReductionOptions {
     ReductionOptions {
         name: "blade".into(),
+        kind: ReductionKind::FixedInterface,
         fixed_interface_modes: 12,
         checked_modes: 6,
         sectors: 1,
@@ -291,7 +292,7 @@ fn with_all_modes_the_fitted_speed_is_exact() {
     mesh.nodes.iter_mut().for_each(|x| x[0] += 0.2);
     let clamped = nodes_at(&mesh, 0, 0.2);
     let tip = nodes_at(&mesh, 0, 0.32)[0];
-    let contact = [ContactPoint { name: "tip".into(), node: tip, meridional_slope: 0.0 }];
+    let contact = [ContactPoint::at("tip", tip, 0.0)];
     let free = 3 * (mesh.nodes.len() - clamped.len());
     let options = ReductionOptions { fixed_interface_modes: free - 3, ..options(Frame::Cylindrical) };
     let reduction = spinning(mesh, &clamped, &contact, &options, 1500.0).unwrap();

@@ -153,11 +153,8 @@ impl GridNodes {
 
     /// The contact nodes before the reduction.
     pub fn contact_points(&self) -> Vec<ContactPoint> {
-        let point = |(index, node): (usize, &usize)| ContactPoint {
-            name: self.name(index),
-            node: *node,
-            meridional_slope: self.slopes[index / self.around],
-        };
+        let slope = |index: usize| self.slopes[index / self.around];
+        let point = |(index, node): (usize, &usize)| ContactPoint::at(self.name(index), *node, slope(index));
         self.nodes.iter().enumerate().map(point).collect()
     }
 

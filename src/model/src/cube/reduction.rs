@@ -129,11 +129,12 @@ fn model(mesh: Mesh, material: &Material, mass: MassMatrix, origin: &str, listen
 pub(crate) fn master_points(mesh: &Mesh) -> Result<Vec<ContactPoint>> {
     let mut points = Vec::new();
     for (set, name) in [("MASTER_LEFT", "left"), ("MASTER_RIGHT", "right")] {
-        points.extend(mesh.set(set)?.iter().zip(1..).map(|(&node, number)| ContactPoint {
-            name: format!("{name}_{number}"),
-            node,
-            meridional_slope: 0.0,
-        }));
+        points.extend(
+            mesh.set(set)?
+                .iter()
+                .zip(1..)
+                .map(|(&node, number)| ContactPoint::at(format!("{name}_{number}"), node, 0.0)),
+        );
     }
     Ok(points)
 }

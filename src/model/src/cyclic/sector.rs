@@ -13,7 +13,7 @@ use std::sync::Arc;
 use nalgebra::Matrix3;
 
 use super::{CyclicBoundary, boundary::turned};
-use crate::reduce::ContactPoint;
+use crate::reduce::{ContactPoint, patch_held};
 use crate::sparse::{Pattern, SparseMatrix};
 use crate::{Error, FeModel, Result};
 
@@ -69,6 +69,9 @@ impl Sector {
             inner[high] = false;
         }
         for point in contact {
+            if !point.patch.is_empty() {
+                return Err(patch_held(point));
+            }
             if !inner[point.node] {
                 return Err(Error::invalid(
                     format!("contact node `{}`", point.name),

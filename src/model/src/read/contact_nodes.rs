@@ -43,16 +43,12 @@ pub fn choose_contact_nodes(nodes: &[[f64; 3]], set: &[usize], choice: &ContactC
     let places = Places::new(nodes, set);
     let chosen = places.evenly(count);
     let name = |index: usize| choice.names.get(index).cloned().unwrap_or_else(|| format!("tip_{}", index + 1));
-    let point = |(index, place): (usize, usize)| ContactPoint {
-        name: name(index),
-        node: set[place],
-        meridional_slope: places.slope(place),
-    };
+    let point = |(index, place): (usize, usize)| ContactPoint::at(name(index), set[place], places.slope(place));
     Ok(chosen.into_iter().enumerate().map(point).collect())
 }
 
 /// The nodes of a set in the meridional plane, and on the developed surface in the direction of the chord and across it.
-struct Places {
+pub(crate) struct Places {
     axial: Vec<f64>,
     radius: Vec<f64>,
     /// Along the chord, by growing z (m).
@@ -61,6 +57,10 @@ struct Places {
     across: Vec<f64>,
     /// Whether the set lies in one plane across the axis.
     flat: bool,
+    /// Of the chord on the developed surface, z and rθ.
+    chord: [f64; 2],
+    /// Cosine and sine of the angle that rθ is counted from.
+    middle: [f64; 2],
 }
 
 fn extent(values: &[f64]) -> [f64; 2] {
@@ -81,23 +81,42 @@ fn chord_direction(axial: &[f64], arc: &[f64]) -> [f64; 2] {
     if cos < -1e-9 || (cos.abs() <= 1e-9 && sin < 0.0) { [-cos, -sin] } else { [cos, sin] }
 }
 
+/// rθ of a point (m), θ counted from the direction `middle`, a cosine and a sine.
+fn arc_from([cos, sin]: [f64; 2], [x, y, _]: [f64; 3]) -> f64 {
+    x.hypot(y) * (y * cos - x * sin).atan2(x * cos + y * sin)
+}
+
 impl Places {
-    fn new(nodes: &[[f64; 3]], set: &[usize]) -> Self {
+    pub(crate) fn new(nodes: &[[f64; 3]], set: &[usize]) -> Self {
         let points: Vec<[f64; 3]> = set.iter().map(|&node| nodes[node]).collect();
         let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point[0], y + point[1]));
         let (sin, cos) = y.atan2(x).sin_cos();
+        let middle = [cos, sin];
         let radius: Vec<f64> = points.iter().map(|point| point[0].hypot(point[1])).collect();
-        let arc = points
-            .iter()
-            .zip(&radius)
-            .map(|(point, radius)| radius * (point[1] * cos - point[0] * sin).atan2(point[0] * cos + point[1] * sin));
-        let (arc, axial): (Vec<f64>, Vec<f64>) = (arc.collect(), points.iter().map(|point| point[2]).collect());
+        let arc: Vec<f64> = points.iter().map(|point| arc_from(middle, *point)).collect();
+        let axial: Vec<f64> = points.iter().map(|point| point[2]).collect();
         let [low, high] = extent(&axial);
         let flat = high - low <= FLAT * extent(&radius)[1].max(f64::MIN_POSITIVE);
-        let [cz, cs] = chord_direction(&axial, &arc);
+        let chord = chord_direction(&axial, &arc);
+        let [cz, cs] = chord;
         let along = axial.iter().zip(&arc).map(|(z, s)| cz * z + cs * s).collect();
         let across = axial.iter().zip(&arc).map(|(z, s)| cz * s - cs * z).collect();
-        Self { axial, radius, along, across, flat }
+        Self { axial, radius, along, across, flat, chord, middle }
+    }
+
+    /// How far along the chord of the set a point stands, 0 to 1 between its ends.
+    pub(crate) fn share_along(&self, point: [f64; 3]) -> f64 {
+        let [low, high] = extent(&self.along);
+        let [cz, cs] = self.chord;
+        (cz * point[2] + cs * arc_from(self.middle, point) - low) / (high - low)
+    }
+
+    /// Number of places along the chord that differ.
+    pub(crate) fn stations(&self) -> usize {
+        let mut along = self.along.clone();
+        along.sort_by(f64::total_cmp);
+        let [low, high] = extent(&along);
+        1 + along.windows(2).filter(|pair| pair[1] - pair[0] > SAME_PLACE * (high - low)).count()
     }
 
     /// Places in the set by growing z, as evenly along the chord as its nodes allow, in the middle of the thickness.
@@ -138,7 +157,7 @@ impl Places {
     }
 
     /// dr/dz at a node: parabola through the nearest third of the axial positions (at least three), by least squares.
-    fn slope(&self, place: usize) -> f64 {
+    pub(crate) fn slope(&self, place: usize) -> f64 {
         let mut levels = self.levels();
         let here = self.axial[place];
         levels.sort_by(|a, b| (a.0 - here).abs().total_cmp(&(b.0 - here).abs()));

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use tiprub_core::Rom;
 use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
 
-use super::{ContactPoint, Mode, Reduction, ReductionOptions};
+use super::{ContactPoint, Mode, Reduction, ReductionKind, ReductionOptions};
 use crate::Result;
 use crate::craig_bampton::CraigBampton;
 use crate::eigen::Modes;
@@ -14,7 +14,7 @@ use crate::material::Material;
 use crate::mesh::Mesh;
 
 /// (cos θ, sin θ) of a point about the z axis.
-fn direction([x, y, _]: [f64; 3]) -> (f64, f64) {
+pub(super) fn direction([x, y, _]: [f64; 3]) -> (f64, f64) {
     let radius = x.hypot(y);
     (x / radius, y / radius)
 }
@@ -48,10 +48,11 @@ pub(super) fn rotated(
 }
 
 fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: Frame) -> ContactNode {
-    let [x, y, z] = nodes[point.node];
     let position = match frame {
-        Frame::Cartesian => [x, y, z],
-        Frame::Cylindrical => [x.hypot(y), y.atan2(x), z],
+        Frame::Cartesian => {
+            std::array::from_fn(|i| point.weights().map(|(node, weight)| weight * nodes[node][i]).sum())
+        }
+        Frame::Cylindrical => point.cylindrical(nodes),
     };
     ContactNode { name: point.name.clone(), position, meridional_slope: point.meridional_slope }
 }
@@ -109,11 +110,24 @@ pub(super) fn build_rom(
     checks: RomChecks,
 ) -> Rom {
     let (boundary, order) = (3 * contact.len(), model.mass.nrows());
-    let origin = format!(
-        "{}; Craig-Bampton with {boundary} interface degrees of freedom and {} fixed-interface modes",
-        description(full, clamped),
-        order - boundary,
-    );
+    let (before, modes) = (description(full, clamped), order - boundary);
+    let patches = contact.iter().filter(|point| !point.patch.is_empty()).count();
+    let origin = match options.kind {
+        ReductionKind::FixedInterface => {
+            format!(
+                "{before}; Craig-Bampton with {boundary} interface degrees of freedom and {modes} fixed-interface modes"
+            )
+        }
+        ReductionKind::FreeInterface if patches > 0 => {
+            format!("{before}; static responses to forces on {patches} patches and {modes} free-interface modes")
+        }
+        ReductionKind::FreeInterface => {
+            format!(
+                "{before}; static responses to forces on {} contact nodes and {modes} free-interface modes",
+                contact.len()
+            )
+        }
+    };
     Rom {
         name: options.name.clone(),
         origin,

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::{Section, SurfacePoint, sections};
 use crate::element::ElementKind;
 use crate::mesh::{Element, Mesh};
+use crate::patches::contact_patches;
 use crate::reduce::ContactPoint;
 use crate::{Error, Result};
 
@@ -78,6 +79,14 @@ pub fn blade_mesh(counts: MeshCounts) -> Result<BladeMesh> {
 }
 
 impl BladeMesh {
+    /// `count` contact patches over the whole tip, named as contact nodes are.
+    ///
+    /// # Errors
+    /// Those of [`contact_patches`].
+    pub fn contact_patches(&self, count: usize) -> Result<Vec<ContactPoint>> {
+        contact_patches(&self.mesh, self.mesh.set("tip")?, count, |index| place_name(index, count))
+    }
+
     /// `count` contact nodes spread along the tip's mid-thickness line: `leading_edge`, `tip_2`, ..., `trailing_edge`,
     /// the middle one of an odd count being `mid_chord`.
     ///
@@ -101,15 +110,19 @@ pub(crate) fn spread_contact(line: &[usize], slopes: &[f64], count: usize) -> Re
     let point = |index: usize| {
         // Rounded to the nearest node of the line.
         let place = (2 * index * (available - 1) + count - 1) / (2 * (count - 1));
-        let name = match index {
-            0 => "leading_edge".to_owned(),
-            _ if index + 1 == count => "trailing_edge".to_owned(),
-            _ if 2 * index + 1 == count => "mid_chord".to_owned(),
-            _ => format!("tip_{}", index + 1),
-        };
-        ContactPoint { name, node: line[place], meridional_slope: slopes[place] }
+        ContactPoint::at(place_name(index, count), line[place], slopes[place])
     };
     Ok((0..count).map(point).collect())
+}
+
+/// Of the contact node or patch `index` of `count` from leading to trailing edge.
+pub(crate) fn place_name(index: usize, count: usize) -> String {
+    match index {
+        0 => "leading_edge".to_owned(),
+        _ if index + 1 == count => "trailing_edge".to_owned(),
+        _ if 2 * index + 1 == count => "mid_chord".to_owned(),
+        _ => format!("tip_{}", index + 1),
+    }
 }
 
 fn ratio(index: usize, count: usize) -> f64 {

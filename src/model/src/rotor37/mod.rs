@@ -26,7 +26,7 @@ use tiprub_core::rom::Frame;
 
 use crate::material::Material;
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{Reduction, ReductionOptions, reduce_model};
+use crate::reduce::{Reduction, ReductionKind, ReductionOptions, reduce_model};
 use crate::{FeModel, Result};
 
 /// Number of blades.
@@ -46,14 +46,25 @@ pub fn sections() -> &'static [Section] {
     &sections::SECTIONS
 }
 
+/// What of the tip touches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tip {
+    /// So many nodes along the mid-thickness line, ends included (at least 2).
+    Nodes(usize),
+    /// So many patches along the chord, over the whole thickness.
+    Patches(usize),
+}
+
 /// What to build.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rotor37Options {
     /// Number of elements along chord, thickness and span.
     pub mesh: MeshCounts,
-    /// Number of contact nodes along the tip's mid-thickness line, ends included (at least 2).
-    pub contact_nodes: usize,
-    /// Number of fixed-interface modes.
+    /// What touches.
+    pub tip: Tip,
+    /// Which modes are kept.
+    pub kind: ReductionKind,
+    /// How many.
     pub fixed_interface_modes: usize,
     /// Number of modes compared with the full model.
     pub checked_modes: usize,
@@ -69,7 +80,8 @@ impl Default for Rotor37Options {
     fn default() -> Self {
         Self {
             mesh: MeshCounts::default(),
-            contact_nodes: 3,
+            tip: Tip::Nodes(3),
+            kind: ReductionKind::FixedInterface,
             fixed_interface_modes: 20,
             checked_modes: 10,
             damping_ratio: 0.005,
@@ -87,11 +99,15 @@ impl Default for Rotor37Options {
 pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Result<Reduction> {
     report(listener, Stage::Mesh, 0, 1);
     let blade = blade_mesh(options.mesh)?;
-    let contact = blade.contact_points(options.contact_nodes)?;
+    let contact = match options.tip {
+        Tip::Nodes(count) => blade.contact_points(count)?,
+        Tip::Patches(count) => blade.contact_patches(count)?,
+    };
     report(listener, Stage::Mesh, 1, 1);
     let clamped = blade.mesh.set("hub")?.to_vec();
     let reduction_options = ReductionOptions {
         name: "rotor37".into(),
+        kind: options.kind,
         fixed_interface_modes: options.fixed_interface_modes,
         checked_modes: options.checked_modes,
         sectors: BLADES,

@@ -1,6 +1,6 @@
 //! Effects of spin in reduced coordinates: states aligned with the resting one, the fit over the speed, and its checks.
 
-use faer::Mat;
+use faer::{Mat, MatRef};
 use nalgebra::DMatrix;
 use tiprub_core::rom::Spin;
 
@@ -102,8 +102,8 @@ pub(crate) struct Resting<'a> {
     pub mass: &'a SparseMatrix,
     /// The free dofs (3·node + component), ascending.
     pub free: &'a [usize],
-    /// Which of them are the contact displacements.
-    pub interface: &'a [usize],
+    /// Unit forces on the contact coordinates, free dofs × coordinates.
+    pub contact: MatRef<'a, f64>,
 }
 
 /// What one speed says of the arrays, in the coordinates and with the mass matrix of the resting model.
@@ -126,7 +126,7 @@ struct AtSpeed {
 
 impl AtSpeed {
     fn new(state: &SpinningState, spinning: &CraigBampton, resting: Resting<'_>) -> Result<Self> {
-        let (boundary, order, wide) = (resting.interface.len(), resting.model.mass.nrows(), spinning.mass.nrows());
+        let (boundary, order, wide) = (resting.contact.ncols(), resting.model.mass.nrows(), spinning.mass.nrows());
         let (inner, wide_inner) = (order - boundary, wide - boundary);
         let resting_modes = resting.model.transformation.get(.., boundary..);
         let overlap = spinning.transformation.get(.., boundary..).transpose() * resting.mass.times(resting_modes);
@@ -208,11 +208,10 @@ pub(crate) fn reduced_spin(
     Ok(ReducedSpin { checks: checks.into_iter().collect::<Result<_>>()?, spin })
 }
 
-/// A state's displacements at the contact in the ROM's frame. There the transformation is the rotation into that frame.
+/// A state's contact coordinates, in the ROM's frame.
 fn contact_growth(state: &SpinningState, resting: Resting<'_>) -> Vec<f64> {
-    let (rows, rotation) = (resting.interface, &resting.model.transformation);
-    let component = |j: usize| rows.iter().map(|&row| rotation[(row, j)] * state.displacement[(row, 0)]).sum();
-    (0..rows.len()).map(component).collect()
+    let growth = resting.contact.transpose() * &state.displacement;
+    (0..resting.contact.ncols()).map(|j| growth[(j, 0)]).collect()
 }
 
 fn check(state: &SpinningState, resting: Resting<'_>, spin: &Spin, modes: usize) -> Result<SpinCheck> {
@@ -226,6 +225,6 @@ fn check(state: &SpinningState, resting: Resting<'_>, spin: &Spin, modes: usize)
         reduced_frequencies: squares.iter().take(full_frequencies.len()).map(to_hertz).collect(),
         full_frequencies,
         full_growth: contact_growth(state, resting),
-        reduced_growth: growth.iter().take(resting.interface.len()).copied().collect(),
+        reduced_growth: growth.iter().take(resting.contact.ncols()).copied().collect(),
     })
 }

@@ -97,11 +97,8 @@ pub fn boundary(mesh: &Mesh, sectors: usize) -> CyclicBoundary {
 /// Some of the tip's nodes.
 pub fn tips(mesh: &Mesh, count: usize) -> Vec<ContactPoint> {
     let tip = mesh.set("TIP").unwrap();
-    let point = |i: usize| ContactPoint {
-        name: format!("tip_{i}"),
-        node: tip[i * (tip.len() - 1) / (count - 1).max(1)],
-        meridional_slope: 0.0,
-    };
+    let node = |i: usize| tip[i * (tip.len() - 1) / (count - 1).max(1)];
+    let point = |i: usize| ContactPoint::at(format!("tip_{i}"), node(i), 0.0);
     (0..count).map(point).collect()
 }
 

@@ -1,0 +1,161 @@
+//! Contact patches: a tip divided along its chord, force spread consistently over the faces of the mesh.
+//!
+//! With hat functions h_k(s) over the chord, which add up to one, the patch k has the weights w_kp = ∫ h_k N_p dA / ∫ h_k dA
+//! over the nodes p of the tip, N_p their shape functions. Its displacement is Σ w_kp u_p, each node's in its own directions, and its
+//! force is spread with the same weights, so that the work of both is one. Its position is the mean of radii, angles and axial
+//! positions: a mean of Cartesian ones would lie inside the arc of the chord. Point forces do not converge as the mesh is refined,
+//! since their flexibility grows without bounds; forces per length do.
+
+use std::collections::HashMap;
+
+use crate::element::ElementKind;
+use crate::mesh::{Element, Mesh};
+use crate::read::Places;
+use crate::reduce::ContactPoint;
+use crate::{Error, Result};
+
+/// Every face is divided into so many parts in both directions: hat functions have kinks.
+const PARTS: usize = 4;
+/// Gauss-Legendre points and weights of a part, on 0 to 1.
+const GAUSS: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
+
+/// `count` patches along the chord of the tip whose nodes are `set`, by growing z as contact nodes are; `name` of each.
+///
+/// # Errors
+/// [`Error::Invalid`] for no patches, more than the tip has nodes along its chord, or a set without a whole outer face of an element.
+pub fn contact_patches(
+    mesh: &Mesh,
+    set: &[usize],
+    count: usize,
+    name: impl Fn(usize) -> String,
+) -> Result<Vec<ContactPoint>> {
+    let faces = faces_within(mesh, set);
+    if faces.is_empty() {
+        let problem = "no outer face of an element has all of its nodes in the contact set";
+        return Err(Error::invalid(
+            "contact patches",
+            problem,
+            "Give all nodes of the tip's faces, or ask for contact nodes",
+        ));
+    }
+    let places = Places::new(&mesh.nodes, set);
+    let within: HashMap<usize, usize> = set.iter().enumerate().map(|(place, &node)| (node, place)).collect();
+    let stations = places.stations();
+    if count == 0 || count > stations {
+        let problem =
+            format!("{count} is outside 1..={stations}, the places along the chord that the set has nodes at");
+        return Err(Error::invalid("number of contact patches", problem, "Ask for another number, or refine the tip"));
+    }
+    let mut weights = vec![vec![0.0; set.len()]; count];
+    for (element, corners) in faces {
+        let coordinates = mesh.coordinates(element);
+        for (point, share) in quadrature(element.kind, corners) {
+            let (values, area, position) = on_face(element.kind, &coordinates, point);
+            let hats = hats(places.share_along(position), count);
+            for (&node, value) in element.nodes.iter().zip(values) {
+                // Nodes off the face have shape functions of zero on it.
+                let Some(&place) = within.get(&node) else { continue };
+                for (patch, hat) in hats {
+                    weights[patch][place] += hat * value * area * share;
+                }
+            }
+        }
+    }
+    Ok(weights
+        .into_iter()
+        .enumerate()
+        .map(|(patch, weights)| point(mesh, set, &places, weights, name(patch)))
+        .collect())
+}
+
+/// The hat functions that are not zero at a place along the chord, 0 to 1.
+fn hats(along: f64, count: usize) -> [(usize, f64); 2] {
+    if count == 1 {
+        return [(0, 1.0), (0, 0.0)];
+    }
+    let scaled = along.clamp(0.0, 1.0) * (count - 1) as f64;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the number of patches")]
+    let first = (scaled as usize).min(count - 2);
+    let share = scaled - first as f64;
+    [(first, 1.0 - share), (first + 1, share)]
+}
+
+fn point(mesh: &Mesh, set: &[usize], places: &Places, weights: Vec<f64>, name: String) -> ContactPoint {
+    let total: f64 = weights.iter().sum();
+    let patch: Vec<(usize, f64)> = set
+        .iter()
+        .zip(&weights)
+        .filter(|(_, weight)| **weight != 0.0)
+        .map(|(&node, weight)| (node, weight / total))
+        .collect();
+    let slopes = weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
+    let meridional_slope = slopes.map(|(place, weight)| weight / total * places.slope(place)).sum();
+    let point = ContactPoint { name, node: 0, patch, meridional_slope };
+    let [radius, angle, axial] = point.cylindrical(&mesh.nodes);
+    let middle = [radius * angle.cos(), radius * angle.sin(), axial];
+    let distance = |node: usize| -> f64 { mesh.nodes[node].iter().zip(middle).map(|(a, b)| (a - b) * (a - b)).sum() };
+    let nearest = set.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+    ContactPoint { node: nearest.unwrap_or_default(), ..point }
+}
+
+/// Natural coordinates and the vectors along the two directions of a face there.
+type FacePoint = ([f64; 3], [[f64; 3]; 2]);
+
+/// Points of a face, given by its corners, with shares of the parameters' area.
+fn quadrature(kind: ElementKind, corners: &[usize]) -> impl Iterator<Item = (FacePoint, f64)> {
+    let at: Vec<[f64; 3]> = corners.iter().map(|&corner| kind.natural_nodes()[corner]).collect();
+    // Of a triangle the third and the fourth corner are one: its sides degenerate, its area does not.
+    let at: [[f64; 3]; 4] = std::array::from_fn(|corner| at[corner.min(at.len() - 1)]);
+    let line = || (0..PARTS).flat_map(|part| GAUSS.map(|(x, w)| ((part as f64 + x) / PARTS as f64, w / PARTS as f64)));
+    line().flat_map(move |first| line().map(move |second| (first, second))).map(move |((a, wa), (b, wb))| {
+        let mix =
+            |weights: [f64; 4]| std::array::from_fn(|i| (0..4).map(|corner| weights[corner] * at[corner][i]).sum());
+        let natural = mix([(1.0 - a) * (1.0 - b), a * (1.0 - b), a * b, (1.0 - a) * b]);
+        let along = [mix([b - 1.0, 1.0 - b, b, -b]), mix([a - 1.0, -a, a, 1.0 - a])];
+        ((natural, along), wa * wb)
+    })
+}
+
+/// Shape functions of an element at a point of a face, area per parameters' area (m²), and the position (m).
+fn on_face(kind: ElementKind, coordinates: &[[f64; 3]], (natural, along): FacePoint) -> (Vec<f64>, f64, [f64; 3]) {
+    let shape = kind.shape(natural);
+    let tangent = |direction: [f64; 3]| -> [f64; 3] {
+        let rate = |gradient: [f64; 3]| -> f64 { gradient.iter().zip(direction).map(|(g, d)| g * d).sum() };
+        std::array::from_fn(|i| {
+            coordinates.iter().zip(shape.gradients).map(|(x, gradient)| x[i] * rate(gradient)).sum()
+        })
+    };
+    let [[ax, ay, az], [bx, by, bz]] = along.map(tangent);
+    let normal = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
+    let area = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
+    let position = std::array::from_fn(|i| coordinates.iter().zip(shape.values).map(|(x, value)| x[i] * value).sum());
+    (shape.values[..coordinates.len()].to_vec(), area, position)
+}
+
+/// Outer faces whose nodes, mid-side ones too, are all in the set; with the element's own numbers of their corners.
+fn faces_within<'a>(mesh: &'a Mesh, set: &[usize]) -> Vec<(&'a Element, &'static [usize])> {
+    let mut chosen = vec![false; mesh.nodes.len()];
+    set.iter().for_each(|&node| chosen[node] = true);
+    let mut found: HashMap<Vec<usize>, (usize, &Element, &'static [usize])> = HashMap::new();
+    for element in &mesh.elements {
+        for &corners in element.kind.faces() {
+            let mut key: Vec<usize> = corners.iter().map(|&corner| element.nodes[corner]).collect();
+            if key.iter().all(|&node| chosen[node]) && middles(element, corners).all(|node| chosen[node]) {
+                key.sort_unstable();
+                found.entry(key).or_insert((0, element, corners)).0 += 1;
+            }
+        }
+    }
+    let mut outer: Vec<_> = found.into_iter().filter(|(_, (count, ..))| *count == 1).collect();
+    // The order of sums must not depend on that of a hash table.
+    outer.sort_by(|a, b| a.0.cmp(&b.0));
+    outer.into_iter().map(|(_, (_, element, corners))| (element, corners)).collect()
+}
+
+/// Mid-side nodes on the sides of a face.
+fn middles<'a>(element: &'a Element, corners: &'static [usize]) -> impl Iterator<Item = usize> + 'a {
+    let first = element.kind.corner_count();
+    let sides = element.kind.edges().iter().enumerate();
+    let on_face = move |(_, ends): &(usize, &[usize; 2])| ends.iter().all(|end| corners.contains(end));
+    sides.filter(on_face).filter_map(move |(side, _)| element.nodes.get(first + side).copied())
+}

@@ -1,0 +1,197 @@
+//! Contact patches and free-interface modes: consistent weights, exact statics, exact low frequencies.
+
+mod common;
+
+use common::{distorted_box, nodes_at, steel, straight_box, wobble};
+use nalgebra::DMatrix;
+use tiprub_core::rom::Frame;
+use tiprub_model::assembly::{assemble, free_dofs};
+use tiprub_model::craig_bampton::dense_modes;
+use tiprub_model::element::ElementKind;
+use tiprub_model::patches::contact_patches;
+use tiprub_model::progress::silent;
+use tiprub_model::reduce::{ContactPoint, Reduction, ReductionKind, ReductionOptions, reduce};
+use tiprub_model::rotor37::{MeshCounts, Tip, blade_mesh};
+use tiprub_model::sparse::{SparseMatrix, principal_pair};
+use tiprub_model::{Mesh, Rotor37Options, reduce_rotor37};
+
+const SIZE: [f64; 3] = [0.3, 0.02, 0.06];
+
+/// Along z, the longer side of its tip at x = 0.3.
+fn beam() -> Mesh {
+    distorted_box(ElementKind::Hex20, [4, 1, 4], SIZE, wobble(0.1))
+}
+
+fn tip(mesh: &Mesh, count: usize) -> Vec<ContactPoint> {
+    contact_patches(mesh, &nodes_at(mesh, 0, SIZE[0]), count, |index| format!("patch_{index}")).unwrap()
+}
+
+fn reduced(mesh: Mesh, contact: &[ContactPoint], kind: ReductionKind, modes: usize) -> tiprub_model::Result<Reduction> {
+    let options = ReductionOptions {
+        name: "beam".into(),
+        kind,
+        fixed_interface_modes: modes,
+        checked_modes: 6,
+        sectors: 1,
+        frame: Frame::Cylindrical,
+        damping_ratio: 0.01,
+    };
+    let clamped = nodes_at(&mesh, 0, 0.0);
+    reduce(mesh, &steel(), &clamped, contact, &options, &silent)
+}
+
+fn dense(matrix: &SparseMatrix) -> DMatrix<f64> {
+    let all: Vec<usize> = (0..matrix.order()).collect();
+    let block = matrix.block(&all, &all);
+    DMatrix::from_fn(all.len(), all.len(), |i, j| block[(i, j)])
+}
+
+/// Hat functions over the length 1 have their middles at 1/6, 1/2 and 5/6, whatever the elements.
+#[test]
+fn a_patch_stands_in_the_middle_of_its_hat_function() {
+    for kind in ElementKind::ALL {
+        let mesh = straight_box(kind, [2, 2, 4], SIZE);
+        let patches = tip(&mesh, 3);
+        for (patch, expected) in patches.iter().zip([1.0 / 6.0, 0.5, 5.0 / 6.0]) {
+            let total: f64 = patch.weights().map(|(_, weight)| weight).sum();
+            let mean = |axis: usize| patch.weights().map(|(node, w)| w * mesh.nodes[node][axis]).sum::<f64>();
+            assert!((total - 1.0).abs() < 1e-13 && (mean(1) / SIZE[1] - 0.5).abs() < 1e-12, "{kind:?} {patch:?}");
+            assert!(
+                (mean(2) / SIZE[2] - expected).abs() < 1e-12,
+                "{kind:?}: {} instead of {expected}",
+                mean(2) / SIZE[2]
+            );
+        }
+        // One patch is the whole face.
+        assert!(tip(&mesh, 1)[0].patch.len() <= nodes_at(&mesh, 0, SIZE[0]).len());
+    }
+}
+
+/// Displacements at rest by forces on patches are those of the full model, with any number of modes.
+#[test]
+fn responses_at_rest_to_patch_forces_are_exact() {
+    let mesh = beam();
+    let contact = tip(&mesh, 3);
+    let assembled = assemble(&mesh, &steel(), &silent).unwrap();
+    let free = free_dofs(mesh.nodes.len(), &nodes_at(&mesh, 0, 0.0));
+    let (stiffness, _) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
+    let mut loads = DMatrix::zeros(free.len(), 9);
+    for (index, patch) in contact.iter().enumerate() {
+        for (node, weight) in patch.weights() {
+            let angle = mesh.nodes[node][1].atan2(mesh.nodes[node][0]);
+            let directions = [[angle.cos(), angle.sin(), 0.0], [-angle.sin(), angle.cos(), 0.0], [0.0, 0.0, 1.0]];
+            for (component, direction) in directions.into_iter().enumerate() {
+                for (axis, share) in direction.into_iter().enumerate() {
+                    let row = free.binary_search(&(3 * node + axis)).unwrap();
+                    loads[(row, 3 * index + component)] += weight * share;
+                }
+            }
+        }
+    }
+    let exact = loads.transpose() * dense(&stiffness).cholesky().unwrap().solve(&loads);
+    for modes in [0, 3, 12] {
+        let rom = reduced(mesh.clone(), &contact, ReductionKind::FreeInterface, modes).unwrap().rom;
+        let found = &rom.contact_map * rom.stiffness.clone().cholesky().unwrap().solve(&rom.contact_map.transpose());
+        let error = (&found - &exact).amax() / exact.amax();
+        assert!(error < 1e-10, "{modes} modes: {error:e}");
+    }
+}
+
+/// Kept modes are those of the full model; the others, one per contact coordinate, lie above them.
+#[test]
+fn free_interface_modes_are_those_of_the_full_model() {
+    let mesh = beam();
+    for contact in [tip(&mesh, 2), vec![ContactPoint::at("corner", nodes_at(&mesh, 0, SIZE[0])[0], 0.0)]] {
+        let reduction = reduced(mesh.clone(), &contact, ReductionKind::FreeInterface, 8).unwrap();
+        let checks = &reduction.rom.checks;
+        assert!(checks.frequency_deviation.iter().all(|deviation| deviation.abs() < 1e-7), "{checks:?}");
+        assert!(checks.residual_criterion.iter().all(|rcc| rcc.abs() < 1e-7), "{checks:?}");
+        let (squares, _) = dense_modes(&reduction.rom.stiffness, &reduction.rom.mass).unwrap();
+        assert_eq!(squares.len(), 8 + 3 * contact.len());
+        assert!(squares[8] > 1.05 * squares[7], "{squares:?}");
+        let held = reduced(mesh.clone(), &contact[..0], ReductionKind::FreeInterface, 8);
+        assert!(held.is_err(), "nothing touches");
+    }
+}
+
+/// Point forces dig in as the mesh is refined; forces on patches do not.
+#[test]
+fn the_flexibility_of_a_patch_converges_and_that_of_a_point_does_not() {
+    let own = |tip: Tip, chord: usize| -> f64 {
+        let mesh = MeshCounts { chord, thickness: (chord / 8).max(1), span: chord };
+        let options = Rotor37Options {
+            tip,
+            mesh,
+            kind: ReductionKind::FreeInterface,
+            fixed_interface_modes: 4,
+            checked_modes: 2,
+            ..Rotor37Options::default()
+        };
+        let rom = reduce_rotor37(&options, &silent).unwrap().rom;
+        rom.stiffness.cholesky().unwrap().inverse()[(6, 6)]
+    };
+    let grows = |tip: Tip| [6, 12, 24].map(|chord| own(tip, chord));
+    let (points, patches) = (grows(Tip::Nodes(5)), grows(Tip::Patches(5)));
+    println!("radial flexibility at mid-chord (m/N): points {points:?}, patches {patches:?}");
+    let change = |values: [f64; 3]| (values[2] / values[1] - 1.0).abs();
+    assert!(change(patches) < 0.05 && change(points) > 3.0 * change(patches), "{points:?} {patches:?}");
+}
+
+/// A mean of Cartesian positions would lie inside the arc of the chord.
+#[test]
+fn a_patch_of_rotor_37_stands_on_the_arc_of_its_chord() {
+    let blade = blade_mesh(MeshCounts { chord: 8, thickness: 1, span: 4 }).unwrap();
+    let patches = blade.contact_patches(3).unwrap();
+    assert_eq!(
+        patches.iter().map(|patch| patch.name.as_str()).collect::<Vec<_>>(),
+        ["leading_edge", "mid_chord", "trailing_edge"]
+    );
+    let options = Rotor37Options {
+        tip: Tip::Patches(3),
+        kind: ReductionKind::FreeInterface,
+        mesh: MeshCounts { chord: 8, thickness: 1, span: 4 },
+        fixed_interface_modes: 4,
+        checked_modes: 2,
+        ..Rotor37Options::default()
+    };
+    let rom = reduce_rotor37(&options, &silent).unwrap().rom;
+    for (patch, node) in patches.iter().zip(&rom.contact_nodes) {
+        let mean = |pick: &dyn Fn([f64; 3]) -> f64| -> f64 {
+            patch.weights().map(|(node, weight)| weight * pick(blade.mesh.nodes[node])).sum()
+        };
+        let radius = mean(&|[x, y, _]| x.hypot(y));
+        let inside = radius - mean(&|[x, ..]| x).hypot(mean(&|[_, y, _]| y));
+        assert!((node.position[0] - radius).abs() < 1e-15 && (1e-5..3e-4).contains(&inside), "{inside:e}");
+        let slope = (
+            blade.tip_slopes.iter().fold(f64::INFINITY, |a, b| a.min(*b)),
+            blade.tip_slopes.iter().fold(-1.0, |a: f64, b| a.max(*b)),
+        );
+        assert!(
+            (slope.0 - 0.02..slope.1 + 0.02).contains(&node.meridional_slope),
+            "{} {slope:?}",
+            node.meridional_slope
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_divided_or_held_is_refused() {
+    let mesh = beam();
+    let all = nodes_at(&mesh, 0, SIZE[0]);
+    let refused =
+        |set: &[usize], count: usize| contact_patches(&mesh, set, count, |i| i.to_string()).unwrap_err().to_string();
+    assert!(refused(&all, 0).contains("0 is outside 1..=9"), "{}", refused(&all, 0));
+    assert!(refused(&all, 10).contains("10 is outside 1..=9"));
+    assert!(refused(&all[..3], 2).contains("no outer face of an element has all of its nodes in the contact set"));
+    let contact = tip(&mesh, 3);
+    let told =
+        |contact: &[ContactPoint], kind, modes| reduced(mesh.clone(), contact, kind, modes).unwrap_err().to_string();
+    assert!(told(&contact, ReductionKind::FixedInterface, 4).contains("holds contact nodes one by one"));
+    let twice = [contact[0].clone(), ContactPoint { name: "again".into(), ..contact[0].clone() }];
+    assert!(told(&twice, ReductionKind::FreeInterface, 4).contains("flexibility of the contact coordinates"));
+    let free = 3 * (mesh.nodes.len() - nodes_at(&mesh, 0, 0.0).len());
+    assert!(told(&contact, ReductionKind::FreeInterface, free - 8).contains("are left beside 9 contact coordinates"));
+    assert!(
+        told(&contact, ReductionKind::FreeInterface, free - 9).contains("leave no flexibility to the static responses")
+    );
+}
