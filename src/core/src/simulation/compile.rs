@@ -11,6 +11,7 @@ use crate::gaps::shape::Surface;
 use crate::gaps::surface_spline::SurfaceSpline;
 use crate::gaps::{GapLaw, RevolutionGap};
 use crate::laws::coating::Coating;
+use crate::ranges::SMALL;
 use crate::settings::{ContactSettings, Motion, Scheme, Solver, StructureSettings};
 use crate::system::{Carrier, PairParts, StructureParts, System, SystemSettings};
 use crate::variables::Quantity;
@@ -22,8 +23,6 @@ use super::patches::Patches;
 use super::plan::{PairPlan, Plan};
 use super::slave_surface::{CarrierModes, Share, spline_gap};
 
-/// Gaps, casing shapes and displacements beyond this share of the radius are not what the model describes.
-pub const SMALL_FRACTION: f64 = 0.1;
 /// Most contact nodes of all sectors together that a flexible slave or the disk couples: their Delassus matrix is dense.
 pub const MOST_COUPLED: usize = 2000;
 
@@ -469,7 +468,7 @@ fn check_lengths(rom: &Rom, clearances: &[f64], surface: &Surface) -> Result<()>
     let smallest = rom.contact_nodes.iter().fold(f64::INFINITY, |low, node| low.min(node.position[0]));
     let largest_gap = clearances.iter().fold(0.0, |largest: f64, gap| largest.max(*gap));
     for (what, value) in [("contact.gap", largest_gap), ("surface.shape", surface.largest_change())] {
-        if value > SMALL_FRACTION * smallest {
+        if value > SMALL * smallest {
             return Err(Error::invalid(
                 what,
                 format!("{value:.3e} m is not small against the radius {smallest:.3e} m of the contact nodes"),

@@ -16,6 +16,7 @@ mod slave_surface;
 mod state;
 mod stepping;
 mod table;
+mod units;
 mod window;
 
 use crate::gaps::Drive;
