@@ -12,7 +12,7 @@ use crate::gaps::surface_spline::SurfaceSpline;
 use crate::gaps::{GapLaw, RevolutionGap};
 use crate::laws::coating::Coating;
 use crate::ranges::SMALL;
-use crate::settings::{ContactSettings, Motion, Scheme, Solver, StructureSettings};
+use crate::settings::{ContactSettings, Motion, StructureSettings};
 use crate::system::{Carrier, PairParts, StructureParts, System, SystemSettings};
 use crate::variables::Quantity;
 use crate::{Error, Result, Rom, Scene, shown};
@@ -108,14 +108,6 @@ impl Body {
         };
         frequencies.into_iter().copied().filter(|value| *value > 0.0).fold(f64::INFINITY, f64::min)
     }
-
-    /// Modes with inertia under a scheme, of the nodal diameter that has fewest.
-    pub fn fewest_dynamic_modes(&self, scheme: Scheme) -> usize {
-        match &self.disk {
-            Some(disk) => disk.diameters.iter().map(|diameter| diameter.dynamic_modes(scheme)).min().unwrap_or(0),
-            None => self.model.dynamic_modes(scheme),
-        }
-    }
 }
 
 impl Compiled {
@@ -194,11 +186,6 @@ impl Compiled {
             Some(carrier) if self.carriers.len() > 1 => &self.carrier(carrier).0.name,
             _ => "casing",
         }
-    }
-
-    /// Whether a structure carries the surfaces of several pairs.
-    pub fn shares_carrier(&self) -> bool {
-        (0..self.carriers.len()).any(|carrier| self.uses(carrier) > 1)
     }
 
     /// How many pairs have their surface on a carrier.
@@ -452,15 +439,6 @@ impl Compiled {
             Coating::with_extent(settings, &axial, &radii, [low - half, high + half], rom.sectors)?
         };
         Ok(Some(coating))
-    }
-
-    /// Whether `coulomb` can be chosen: a coupled problem of all sectors has room for it only if the scene says so.
-    pub fn may_stick(&self) -> bool {
-        let contacts = &self.scene.settings.contacts;
-        let small = self.bodies.iter().all(|body| body.disk.is_none() && body.translations.is_none());
-        let rubs = contacts.iter().any(|contact| contact.friction > 0.0);
-        let coated = contacts.iter().any(|contact| contact.coating.is_some());
-        contacts[0].solver == Solver::Coulomb || (small && self.carriers.is_empty() && rubs && !coated)
     }
 }
 
