@@ -38,7 +38,7 @@ fn scenes_that_make_no_sense_are_refused_with_the_reason() {
         ("meridian", |scene| scene.settings.contacts[0].meridian = Meridian::Cylinder),
         ("heat_to_slave", |scene| scene.settings.contacts[0].heat_to_slave = Some(0.5)),
         ("needs that of contact[1]", |scene| scene.settings.contacts[1].solver = Solver::Film),
-        ("needs to know where it is", |scene| scene.settings.surfaces[0].structure = None),
+        ("needs to know where its surface is", |scene| scene.settings.surfaces[0].structure = None),
         ("shape", |scene| scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order: 2, phase: 0.0 }),
         ("moving", |scene| scene.settings.surfaces[0].moving = true),
         ("named by 0 contacts", |scene| drop(scene.settings.contacts.pop())),

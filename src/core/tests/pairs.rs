@@ -369,7 +369,7 @@ fn what_does_not_go_together_is_refused_by_name() {
     refused(&scene, "structure[2].name: `rear` takes no part");
     let mut scene = several::split(&rub(6));
     scene.settings.contacts[1].nodes = None;
-    refused(&scene, "contact[1].master: a structure of several contacts needs `contact.nodes`");
+    refused(&scene, "contact[2].master: a structure of several contacts needs `contact.nodes`");
     scene.settings.contacts[1].nodes = Some("leading".into());
     refused(&scene, "claims the node `leading_edge`, which contact[1] claims as well");
     scene.settings.contacts[1].nodes = Some("tip".into());

@@ -46,11 +46,11 @@ impl SceneSettings {
         for (index, contact) in self.contacts.iter().enumerate() {
             contact.validate_names(self, &format!("contact[{}]", index + 1))?;
         }
+        self.validate_pairs()?;
         self.check_rules()?;
         for (index, contact) in self.contacts.iter().enumerate() {
             contact.validate(self, &format!("contact[{}]", index + 1))?;
         }
-        self.validate_pairs()?;
         within("time.step", self.time.step, ranges::SHORTEST_STEP, ranges::LONGEST_STEP)?;
         let experiment = &self.experiment;
         at_most("experiment.start", experiment.start, ranges::TIME)?;
