@@ -36,8 +36,8 @@ const FREE: Other = ("a free master", |at| at.is_free());
 const ALL_FREE: Other = ("a scene of free masters only", |at| at.contacts().all(|at| at.is_free()));
 const COUPLED: Other = ("a ROM whose sectors are coupled by harmonics", |at| at.rom().is_cyclic());
 
-/// Of keys of the scene file.
-static KEYS: &[Rule] = &[
+/// Of structures, surfaces and contacts.
+static PARTS: &[Rule] = &[
     needs(
         &[SPEED, FACTORS, STIFFENING, GROWTH, CORIOLIS, WHIRL, AXIAL_SHIFT],
         ("`motion = \"rotating\"`", |at| at.structure().motion == Motion::Rotating),
@@ -124,6 +124,10 @@ static KEYS: &[Rule] = &[
         "a scene has one solver",
         "Give all pairs the same solver",
     ),
+];
+
+/// Of outputs and inputs.
+static VARIABLES: &[Rule] = &[
     needs(
         &[WEAR],
         ("`contact.coating`", |at| at.contacts().any(|at| at.is_coated())),
@@ -259,7 +263,7 @@ static ROMS: &[Rule] = &[
 
 /// All rows, in the order of the guide.
 pub fn all() -> impl Iterator<Item = &'static Rule> {
-    KEYS.iter().chain(METHODS).chain(ROMS)
+    PARTS.iter().chain(VARIABLES).chain(METHODS).chain(ROMS)
 }
 
 impl Rule {
@@ -275,19 +279,26 @@ impl Rule {
 }
 
 impl SceneSettings {
-    /// Of a scene whose names are checked.
-    pub(super) fn check_rules(&self) -> Result<()> {
+    /// What structures, surfaces and contacts need and exclude, whose names are checked.
+    pub(super) fn check_parts(&self) -> Result<()> {
+        check(PARTS, self.place(), path)
+    }
+
+    /// The same of outputs, inputs, scheme and solver.
+    pub(super) fn check_whole(&self) -> Result<()> {
+        check(VARIABLES, self.place(), path).and_then(|()| check(METHODS, self.place(), path))
+    }
+
+    fn place(&self) -> Place<'_> {
         let (scheme, solver) = (self.time.scheme, self.contacts[0].solver);
-        let place = Place { settings: self, roms: &[], scheme, solver, index: 0 };
-        check(KEYS, place, path).and_then(|()| check(METHODS, place, path))
+        Place { settings: self, roms: &[], scheme, solver, index: 0 }
     }
 }
 
 impl Scene {
     /// What a validated scene needs of its ROMs, and what they exclude.
     pub(crate) fn check_roms(&self) -> Result<()> {
-        let (scheme, solver) = (self.settings.time.scheme, self.settings.contacts[0].solver);
-        check(ROMS, self.place(scheme, solver), path)
+        check(ROMS, Place { roms: &self.roms, ..self.settings.place() }, path)
     }
 
     /// Whether a validated scene can be stepped with a scheme and a solver.
@@ -296,11 +307,7 @@ impl Scene {
     /// Naming parameter and remedy.
     pub fn check_methods(&self, scheme: Scheme, solver: Solver) -> Result<()> {
         let parameter = |_: &Place, key: &str| format!("parameter `{}`", key.rsplit('.').next().unwrap_or(key));
-        check(METHODS, self.place(scheme, solver), parameter)
-    }
-
-    fn place(&self, scheme: Scheme, solver: Solver) -> Place<'_> {
-        Place { settings: &self.settings, roms: &self.roms, scheme, solver, index: 0 }
+        check(METHODS, Place { roms: &self.roms, scheme, solver, ..self.settings.place() }, parameter)
     }
 }
 

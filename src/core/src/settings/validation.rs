@@ -46,8 +46,9 @@ impl SceneSettings {
         for (index, contact) in self.contacts.iter().enumerate() {
             contact.validate_names(self, &format!("contact[{}]", index + 1))?;
         }
+        self.check_parts()?;
         self.validate_pairs()?;
-        self.check_rules()?;
+        self.check_whole()?;
         for (index, contact) in self.contacts.iter().enumerate() {
             contact.validate(self, &format!("contact[{}]", index + 1))?;
         }

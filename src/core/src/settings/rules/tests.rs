@@ -173,7 +173,8 @@ const OF_FREE_MASTERS: &[(&str, Change)] = &[
 ];
 
 fn check(scene: &Scene, solver: Solver) -> crate::Result<()> {
-    scene.settings.check_rules()?;
+    scene.settings.check_parts()?;
+    scene.settings.check_whole()?;
     scene.check_roms()?;
     scene.check_methods(scene.settings.time.scheme, solver)
 }
