@@ -1,9 +1,9 @@
 //! Options of `tiprub reduce casing`: a ring described on the command line.
 
-use crate::reduce_arguments::{MeshSize, Written};
+use crate::shared_arguments::{MaterialChoice, MeshSize, Written, axial, pair};
 use clap::{Args, ValueEnum};
 use tiprub_model::{
-    CasingOptions, Material,
+    CasingOptions,
     casing::{ContactRings, Contour, Flange, RingCounts, Support},
     element::ElementKind,
 };
@@ -79,17 +79,6 @@ pub enum SupportChoice {
     Free,
 }
 
-/// Materials by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MaterialChoice {
-    /// E = 210 GPa, ρ = 7850 kg/m³, α = 11.7e-6 1/K.
-    Steel,
-    /// Ti-6Al-4V: E = 113.8 GPa, ρ = 4430 kg/m³, α = 8.6e-6 1/K.
-    Titanium,
-    /// E = 180 GPa, ρ = 8000 kg/m³, α = 10.1e-6 1/K.
-    MaragingSteel,
-}
-
 /// Elements by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ElementChoice {
@@ -146,17 +135,6 @@ impl SupportChoice {
     }
 }
 
-impl MaterialChoice {
-    /// The material of this name.
-    pub fn material(self) -> Material {
-        match self {
-            Self::Steel => Material::steel(),
-            Self::Titanium => Material::titanium(),
-            Self::MaragingSteel => Material::maraging_steel(),
-        }
-    }
-}
-
 impl ElementChoice {
     fn kind(self) -> ElementKind {
         match self {
@@ -191,29 +169,5 @@ fn flange(text: &str) -> Result<FlangeChoice, String> {
     match lengths.as_deref() {
         Ok([thickness, height]) => Ok(FlangeChoice(Some(Flange { thickness: *thickness, height: *height }))),
         _ => Err("give axial thickness and radial height in m as TxH, for example 0.005x0.010, or `none`".into()),
-    }
-}
-
-/// Two counts.
-///
-/// # Errors
-/// What is wrong with the text.
-pub fn pair(text: &str) -> Result<[usize; 2], String> {
-    let counts: Result<Vec<usize>, _> = text.split(['x', 'X']).map(str::parse).collect();
-    match counts.as_deref() {
-        Ok([around, along]) if *around <= 360 && *along <= 100 => Ok([*around, *along]),
-        _ => Err("give two counts, at most 360 around and 100 along, as AROUNDxALONG, for example 24x3".into()),
-    }
-}
-
-/// Two axial positions (m).
-///
-/// # Errors
-/// What is wrong with the text.
-pub fn axial(text: &str) -> Result<[f64; 2], String> {
-    let ends = text.split_once(':').map(|(from, to)| [from, to].map(|end| end.trim().parse::<f64>().ok()));
-    match ends {
-        Some([Some(from), Some(to)]) if from < to => Ok([from, to]),
-        _ => Err("give two growing axial positions in m as FROM:TO, for example 0.002:0.038".into()),
     }
 }

@@ -207,7 +207,7 @@ mod tests {
     use clap::CommandFactory;
 
     use super::*;
-    use crate::reduce_arguments::{MeshSize, Model};
+    use crate::{reduce_arguments::Model, shared_arguments::MeshSize};
 
     fn parse(line: &str) -> Result<Cli, clap::Error> {
         Cli::try_parse_from(std::iter::once("tiprub").chain(line.split_whitespace()))

@@ -12,7 +12,7 @@ use crate::{
     cli::{Command, StudyCommand},
     commands::demo,
     own_arguments::KeptOptions,
-    reduce_arguments::Written,
+    shared_arguments::Written,
 };
 
 /// Extensions of what a study writes.

@@ -10,10 +10,7 @@ use tiprub_model::{
 use tiprub_shell::{Failure, Result, places::Named};
 use tiprub_study::arguments::ConvergenceArguments;
 
-use crate::{
-    casing_arguments::{MaterialChoice, axial, pair},
-    reduce_arguments::Written,
-};
+use crate::shared_arguments::{MaterialChoice, Written, axial, pair};
 
 /// Arguments of `tiprub reduce blade`.
 #[derive(Debug, Clone, PartialEq, Args)]

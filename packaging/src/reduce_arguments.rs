@@ -1,16 +1,15 @@
 //! What `tiprub reduce` is asked for: a subcommand per kind of model, each with its own options.
 
-use std::path::PathBuf;
-
 use clap::{Args, Subcommand, ValueEnum};
 use tiprub_gallery::builtin;
 use tiprub_model::{Rotor37Options, cube::MassMatrix, rotor37::MeshCounts};
-use tiprub_shell::{Result, places::Named};
+use tiprub_shell::places::Named;
 use tiprub_study::arguments::positive;
 
 use crate::{
-    casing_arguments::{CasingArguments, MaterialChoice, pair},
+    casing_arguments::CasingArguments,
     own_arguments::{BladeArguments, CasingMeshArguments, SectorArguments},
+    shared_arguments::{MaterialChoice, MeshSize, Written, pair},
 };
 
 /// Arguments of `tiprub reduce`.
@@ -66,23 +65,6 @@ pub enum Model {
     /// The ring at its right.
     #[command(after_help = "Example:\n  tiprub reduce ring-right --modes 50 --static-responses 12")]
     RingRight(RingArguments),
-}
-
-/// What every reduction writes.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Args)]
-pub struct Written {
-    /// ROM file to write [default: NAME.rom.safetensors with the name of the model].
-    #[arg(long, short, value_name = "FILE")]
-    pub output: Option<PathBuf>,
-    /// Replace files that are there already.
-    #[arg(long)]
-    pub force: bool,
-    /// Also write the mesh as a CalculiX/Abaqus input file that computes its frequencies.
-    #[arg(long, value_name = "FILE")]
-    pub inp: Option<PathBuf>,
-    /// Also write mesh, sets and mode shapes for ParaView (.vtu).
-    #[arg(long, value_name = "FILE")]
-    pub vtk: Option<PathBuf>,
 }
 
 /// Arguments of `tiprub reduce rotor37`.
@@ -210,26 +192,6 @@ impl From<MassChoice> for MassMatrix {
         match choice {
             MassChoice::Lumped => Self::Lumped,
             MassChoice::Consistent => Self::Consistent,
-        }
-    }
-}
-
-/// Three element counts: chord, thickness and span of a blade; around, through and along of a casing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MeshSize(pub [usize; 3]);
-
-impl std::str::FromStr for MeshSize {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let counts: Result<Vec<usize>, _> = text.split(['x', 'X']).map(str::parse).collect();
-        match counts.as_deref() {
-            Ok([a, b, c]) if [a, b, c].iter().all(|count| (1..=200).contains(*count)) => Ok(Self([*a, *b, *c])),
-            _ => {
-                Err("give three element counts from 1 to 200: CHORDxTHICKNESSxSPAN of the blade, for example 10x1x14, \
-                      AROUNDxTHROUGHxALONG of the casing, for example 72x1x12"
-                    .into())
-            }
         }
     }
 }

@@ -7,7 +7,10 @@ use tiprub_core::{
 use tiprub_gallery::{reduction, scene_source::rotor37_scene_with};
 use tiprub_model::{Rotor37Options, rotor37::MeshCounts};
 use tiprub_packaging::{
-    report::page::{ImportedSummary, ReportFile, ReportInput, render},
+    report::{
+        input::{ImportedSummary, ReportFile, ReportInput},
+        page::render,
+    },
     rom_facts::RomFacts,
 };
 use tiprub_shell::{console::Console, native, schedule::Schedule};

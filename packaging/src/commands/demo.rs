@@ -27,7 +27,10 @@ use crate::{
     cli::DemoArguments,
     fmu::{FmiVersion, Package},
     library,
-    report::page::{self, ImportedSummary, ReportFile, ReportInput},
+    report::{
+        input::{ImportedSummary, ReportFile, ReportInput},
+        page,
+    },
     rom_facts::RomFacts,
 };
 

@@ -17,11 +17,12 @@ use tiprub_shell::{
 };
 
 use crate::{
-    casing_arguments::{CasingArguments, MaterialChoice},
+    casing_arguments::CasingArguments,
     cube_models,
-    reduce_arguments::{Model, ReduceArguments, StageArguments, StageCasingArguments, Written},
+    reduce_arguments::{Model, ReduceArguments, StageArguments, StageCasingArguments},
     reduced::Reduced,
     rom_facts::RomFacts,
+    shared_arguments::{MaterialChoice, Written},
     users_model,
 };
 

@@ -1,4 +1,5 @@
 //! The report of a run: one HTML file that opens offline.
 
+pub mod input;
 pub mod page;
 pub mod sections;

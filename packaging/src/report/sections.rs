@@ -12,7 +12,7 @@ use tiprub_model::Reduction;
 use tiprub_shell::{Failure, Result, recording::Recording};
 use tiprub_study::error_study::{self, ErrorStudy, METHODS};
 
-use super::page::ReportInput;
+use super::input::ReportInput;
 
 /// Azimuth and elevation of the blade pictures (rad): suction side, leading edge to the left, a little from above.
 const AZIMUTH: f64 = 1.1;

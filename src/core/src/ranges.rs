@@ -8,6 +8,9 @@ use crate::{Error, Result, shown};
 pub const POSITION: f64 = 1e3;
 /// Smallest radius of a contact node (m): a hair's.
 pub const SMALLEST_RADIUS: f64 = 1e-5;
+/// Gaps, casing shapes and displacements beyond this share of the radius, or of the extent of open surfaces, are not what the
+/// model describes.
+pub const SMALL: f64 = 0.1;
 /// Largest slope of a tip contour (-): 0.06° off a plane face.
 pub const SLOPE: f64 = 1e3;
 /// Largest entry of mass and stiffness, with spin or without, in any unit of the coordinates. Squares stay numbers.

@@ -1,5 +1,6 @@
 //! The scene: every setting with its unit, default and range. `tiprub-format` reads it from TOML.
 
+pub mod rules;
 mod validation;
 
 use serde::{Deserialize, Serialize};

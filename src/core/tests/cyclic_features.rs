@@ -272,12 +272,12 @@ fn what_coupled_sectors_do_not_take_is_refused() {
         started.err().map_or_else(|| "accepted".to_owned(), |error| error.to_string())
     };
     let cases: [Feature; 5] = [
-        ("structure.frequency_factors", |scene| scene.settings.structures[0].frequency_factors = vec![1.0; 6]),
-        ("structure.spin.stiffening", |scene| {
+        ("structure[1].frequency_factors", |scene| scene.settings.structures[0].frequency_factors = vec![1.0; 6]),
+        ("structure[1].spin.stiffening", |scene| {
             scene.roms[0].extras.spin = Some(models::spin(5));
             scene.settings.structures[0].spin.stiffening = true;
         }),
-        ("structure.spin.coriolis", |scene| {
+        ("structure[1].spin.coriolis", |scene| {
             scene.roms[0].extras.spin = Some(models::spin(5));
             scene.settings.structures[0].spin.coriolis = true;
         }),

@@ -37,20 +37,20 @@ fn scenes_that_make_no_sense_are_refused_with_the_reason() {
         ("sector_gaps", |scene| scene.settings.contacts[0].sector_gaps = vec![1e-3]),
         ("meridian", |scene| scene.settings.contacts[0].meridian = Meridian::Cylinder),
         ("heat_to_slave", |scene| scene.settings.contacts[0].heat_to_slave = Some(0.5)),
-        ("differs from that of contact[1]", |scene| scene.settings.contacts[1].solver = Solver::Film),
-        ("needs to know where it is", |scene| scene.settings.surfaces[0].structure = None),
+        ("needs that of contact[1]", |scene| scene.settings.contacts[1].solver = Solver::Film),
+        ("needs to know where its surface is", |scene| scene.settings.surfaces[0].structure = None),
         ("shape", |scene| scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order: 2, phase: 0.0 }),
         ("moving", |scene| scene.settings.surfaces[0].moving = true),
         ("named by 0 contacts", |scene| drop(scene.settings.contacts.pop())),
         ("massless-boundary", |scene| scene.settings.time.scheme = Scheme::MasslessBoundary),
         ("all_sectors", |scene| scene.settings.outputs.all_sectors = true),
         ("nodal_diameters", |scene| scene.settings.outputs.nodal_diameters = Some(0)),
-        ("no open contact grid", |scene| scene.roms[1].extras.grid = None),
+        ("an open contact grid in its ROM", |scene| scene.roms[1].extras.grid = None),
         ("at the same place", |scene| {
             scene.roms[1].contact_nodes[1].position = scene.roms[1].contact_nodes[0].position
         }),
-        ("only a free structure has it", |scene| scene.settings.structures[1].velocity = [1.0, 0.0, 0.0]),
-        ("only a rotating structure has it", |scene| scene.settings.structures[0].whirl = true),
+        ("velocity: needs `motion = \"free\"`", |scene| scene.settings.structures[1].velocity = [1.0, 0.0, 0.0]),
+        ("whirl: needs `motion = \"rotating\"`", |scene| scene.settings.structures[0].whirl = true),
         ("takes no part", |scene| scene.settings.surfaces[1].structure = Some("left_plate".into())),
         ("ω_max·h", |scene| {
             (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::CentralDifference, 1e-5)

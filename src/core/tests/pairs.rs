@@ -349,7 +349,7 @@ fn what_does_not_go_together_is_refused_by_name() {
     let both = several::in_one_casing(rub(6), Solver::Lcp, 0.15);
     let mut scene = both.clone();
     scene.settings.contacts[1].solver = Solver::Film;
-    refused(&scene, "contact[2].solver: differs from that of contact[1]");
+    refused(&scene, "contact[2].solver: needs that of contact[1]: a scene has one solver");
     let mut scene = both.clone();
     scene.settings.contacts[1].coating = Some(tiprub_core::settings::CoatingSettings {
         thickness: 1e-4,
@@ -359,7 +359,7 @@ fn what_does_not_go_together_is_refused_by_name() {
         cells_around: 500,
         cells_along: 3,
     });
-    refused(&scene, "contact[2].coating: its contacts are solved together");
+    refused(&scene, "contact[2].coating: excludes contacts solved together");
     let mut scene = both.clone();
     scene.settings.contacts[1].slave = "front_casing".into();
     refused(&scene, "surface[1].name: `front_casing` is named by 2 contacts");
@@ -369,7 +369,7 @@ fn what_does_not_go_together_is_refused_by_name() {
     refused(&scene, "structure[2].name: `rear` takes no part");
     let mut scene = several::split(&rub(6));
     scene.settings.contacts[1].nodes = None;
-    refused(&scene, "contact[2].nodes: of several pairs of one structure one claims all");
+    refused(&scene, "contact[2].master: a structure of several contacts needs `contact.nodes`");
     scene.settings.contacts[1].nodes = Some("leading".into());
     refused(&scene, "claims the node `leading_edge`, which contact[1] claims as well");
     scene.settings.contacts[1].nodes = Some("tip".into());
@@ -382,5 +382,10 @@ fn what_does_not_go_together_is_refused_by_name() {
         Err(error) => error.to_string(),
         Ok(()) => String::new(),
     };
-    assert!(message.contains("the largest step of `massless-boundary` is not known"), "{message}");
+    assert!(
+        message.contains(
+            "`massless-boundary` excludes several surfaces on one flexible structure: the largest step is not known"
+        ),
+        "{message}"
+    );
 }

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 use nalgebra::{Complex, DMatrix};
 use tiprub_core::rom::{ContactNode, Frame};
-use tiprub_core::settings::{SceneSettings, Shape};
+use tiprub_core::settings::{SceneSettings, Shape, rules};
 use tiprub_format::{ARRAYS, FIELDS, METADATA, SceneField, parse_scene, read_rom, write_scene};
 
 fn chapter(name: &str) -> PathBuf {
@@ -124,6 +124,15 @@ fn the_chapter_on_scenes_lists_every_key() {
         );
     }
     compare("scene-file.md", "keys", &text);
+}
+
+#[test]
+fn the_chapter_on_scenes_lists_what_needs_or_excludes_what() {
+    let mut text = String::from("| what | needs or excludes | because | remedy |\n|---|---|---|---|\n");
+    for rule in rules::all() {
+        let _ = writeln!(text, "| {} |", rule.columns().join(" | "));
+    }
+    compare("scene-file.md", "rules", &text);
 }
 
 #[test]

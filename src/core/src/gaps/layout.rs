@@ -1,7 +1,7 @@
 //! Where the contact nodes of all sectors stand around the axis, and how they move as a whole.
 
 use super::Drive;
-use super::spline::Frame;
+use super::frame::Frame;
 use crate::{Error, Result, Rom};
 
 /// Contact nodes of equally spaced sectors, arrays `[node · lanes + lane]` where they differ by sector.

@@ -7,6 +7,7 @@
 //! Displacements are those of the structure: along fixed axes, or along (r, θ, z) of a sector that turns. Forces of contacts are in
 //! the same coordinates; [`wrench`] gives them in fixed directions.
 
+pub mod frame;
 pub mod layout;
 pub mod open;
 pub mod plane;
@@ -17,6 +18,7 @@ pub mod surface_spline;
 pub mod wrench;
 
 use crate::persist::persist_fields;
+use crate::ranges::SMALL;
 use layout::Layout;
 pub use layout::sector_angle;
 use open::{OpenGap, tangent};
@@ -230,7 +232,7 @@ impl GapLaw {
             return law.largest();
         }
         let radii = self.layout().map(|layout| layout.radii.iter());
-        radii.map_or(f64::INFINITY, |radii| 0.1 * radii.fold(f64::INFINITY, |low: f64, radius| low.min(*radius)))
+        radii.map_or(f64::INFINITY, |radii| SMALL * radii.fold(f64::INFINITY, |low: f64, radius| low.min(*radius)))
     }
 
     /// Whether a contact is within what small displacements and a casing seen from inside can describe: less deep than
@@ -238,8 +240,8 @@ impl GapLaw {
     pub fn is_plausible(&self, node: usize, gap: f64, normal: [f64; 3]) -> bool {
         match self {
             Self::Fixed(_) => true,
-            Self::Revolution(law) => gap > -0.1 * law.layout.radii[node] && normal[1].abs() <= -normal[0],
-            Self::Spline(law) => gap > -0.1 * law.layout.radii[node] && faces_inwards(normal),
+            Self::Revolution(law) => gap > -SMALL * law.layout.radii[node] && normal[1].abs() <= -normal[0],
+            Self::Spline(law) => gap > -SMALL * law.layout.radii[node] && faces_inwards(normal),
             Self::Open(law) => gap > -law.largest(),
         }
     }

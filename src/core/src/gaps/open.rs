@@ -6,9 +6,7 @@
 use super::spline::NOTHING_TO_TOUCH;
 use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use super::{Geometry, dot};
-
-/// Displacements and penetrations beyond this share of the extent of the contact nodes are not small.
-const SMALL_FRACTION: f64 = 0.1;
+use crate::ranges::SMALL;
 
 /// A surface through the contact grid of a structure, in fixed directions.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,12 +61,12 @@ impl OpenGap {
     /// `nodes` of those at `positions` (m) face the surface.
     pub fn new(positions: Vec<[f64; 3]>, nodes: Vec<usize>, surface: OpenSurface) -> Self {
         let smallest = surface.extent().min(extent(&positions));
-        Self { positions, nodes, surface, largest: SMALL_FRACTION * smallest }
+        Self { positions, nodes, surface, largest: SMALL * smallest }
     }
 
     /// With another pair of the same structure, whose surface has this extent (m).
     pub fn beside(self, extent: f64) -> Self {
-        Self { largest: self.largest.min(SMALL_FRACTION * extent), ..self }
+        Self { largest: self.largest.min(SMALL * extent), ..self }
     }
 
     /// The contact nodes of the pair.

@@ -11,9 +11,9 @@
 //!
 //! F = r_c(φ + δ) − ρ + m (u_z + e_z),  ∇F = (−cos δ − s' sin δ/ρ, (1 + u_r/r)(−sin δ + s' cos δ/ρ), m).
 
+use super::frame::Frame;
 use super::layout::Layout;
 use super::shape::Surface;
-use super::spline::Frame;
 use super::wrench::{At, Motion};
 use super::{Drive, Geometry};
 use crate::dynamics::dispatch::{InstructionSet, Kernel};

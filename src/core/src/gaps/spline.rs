@@ -1,5 +1,6 @@
 //! Gaps to a surface through data points: closest point, normal, and the place where the force is handed over.
 
+use super::frame::Frame;
 use super::layout::Layout;
 use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use super::wrench::{At, Motion};
@@ -213,34 +214,6 @@ impl SplineGap {
     /// Radial, tangential and axial directions of a node at a rotor angle (rad), in the fixed frame.
     pub fn frame(&self, index: usize, rotor_angle: f64) -> Frame {
         Frame::new(self.layout.angles[index] + rotor_angle)
-    }
-}
-
-/// Radial and tangential direction at an angle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
-    sine: f64,
-    cosine: f64,
-}
-
-impl Frame {
-    /// That of a structure described in fixed directions.
-    pub const FIXED: Self = Self { sine: 0.0, cosine: 1.0 };
-
-    /// At `angle` (rad).
-    pub fn new(angle: f64) -> Self {
-        let (sine, cosine) = libm::sincos(angle);
-        Self { sine, cosine }
-    }
-
-    /// (radial, tangential, axial) of a vector given in fixed directions.
-    pub fn local(self, v: [f64; 3]) -> [f64; 3] {
-        [v[0] * self.cosine + v[1] * self.sine, v[1] * self.cosine - v[0] * self.sine, v[2]]
-    }
-
-    /// Fixed directions of a vector given as (radial, tangential, axial).
-    pub fn fixed(self, v: [f64; 3]) -> [f64; 3] {
-        [v[0] * self.cosine - v[1] * self.sine, v[0] * self.sine + v[1] * self.cosine, v[2]]
     }
 }
 

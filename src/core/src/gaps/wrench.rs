@@ -9,7 +9,7 @@
 //! tangential force there is r/(r + u_r) times the one conjugate to u_θ, and the torque r times the latter. On a surface
 //! through data points x is the contact point on the surface, where the force is handed to its control points.
 
-use super::spline::Frame;
+use super::frame::Frame;
 use super::surface_spline::ClosestPoint;
 use super::{Drive, GapLaw};
 

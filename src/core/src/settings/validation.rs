@@ -1,10 +1,9 @@
-//! The documented range of every setting, and how settings go together.
+//! The documented range of every setting, and the names of a scene. What goes together is in [`super::rules`].
 
 mod pairs;
 
 use super::{
-    CoatingSettings, ContactSettings, Motion, SceneSettings, Scheme, Shape, Solver, SplineSettings, StructureSettings,
-    SurfaceSettings,
+    CoatingSettings, ContactSettings, Motion, SceneSettings, Shape, SplineSettings, StructureSettings, SurfaceSettings,
 };
 use crate::ranges::{self, at_most, within};
 use crate::{Error, Result, shown};
@@ -45,10 +44,14 @@ impl SceneSettings {
         }
         self.validate_unique_names()?;
         for (index, contact) in self.contacts.iter().enumerate() {
+            contact.validate_names(self, &format!("contact[{}]", index + 1))?;
+        }
+        self.check_parts()?;
+        self.validate_pairs()?;
+        self.check_whole()?;
+        for (index, contact) in self.contacts.iter().enumerate() {
             contact.validate(self, &format!("contact[{}]", index + 1))?;
         }
-        self.validate_pairs()?;
-        self.validate_scheme()?;
         within("time.step", self.time.step, ranges::SHORTEST_STEP, ranges::LONGEST_STEP)?;
         let experiment = &self.experiment;
         at_most("experiment.start", experiment.start, ranges::TIME)?;
@@ -79,27 +82,7 @@ impl SceneSettings {
         if seen.windows(2).any(|pair| pair[0] == pair[1]) {
             return Err(Error::invalid("outputs.watched_sectors", "a sector is listed twice", "List each sector once"));
         }
-        if outputs.wear && self.contacts.iter().all(|contact| contact.coating.is_none()) {
-            let remedy = "Add a `coating` to the contact, or remove the line";
-            return Err(Error::invalid("outputs.wear", "no contact has a coating that could wear", remedy));
-        }
-        if outputs.slave_displacement && self.surfaces.iter().all(|surface| surface.structure.is_none()) {
-            let remedy = "Give the surface a `structure`, or remove the line";
-            return Err(Error::invalid("outputs.slave_displacement", "every surface is rigid", remedy));
-        }
         Ok(())
-    }
-
-    fn validate_scheme(&self) -> Result<()> {
-        let coriolis = self.structures.iter().position(|structure| structure.spin.coriolis);
-        match coriolis {
-            Some(index) if self.time.scheme == Scheme::MasslessBoundary => Err(Error::invalid(
-                format!("structure[{}].spin.coriolis", index + 1),
-                "the Coriolis force is not available with time.scheme = \"massless-boundary\"",
-                "Use scheme = \"modal-exact\", or leave the Coriolis force out",
-            )),
-            _ => Ok(()),
-        }
     }
 
     fn validate_unique_names(&self) -> Result<()> {
@@ -123,25 +106,6 @@ impl StructureSettings {
         if let Some(ratio) = self.damping_ratio {
             within(&format!("{at}.damping_ratio"), ratio, 0.0, ranges::DAMPING)?;
         }
-        let other = match self.motion {
-            Motion::Rotating => None,
-            Motion::Still => Some("stands still"),
-            Motion::Free => Some("flies freely"),
-        };
-        if let Some(other) = other.filter(|_| self.speed != 0.0) {
-            return Err(Error::invalid(
-                format!("{at}.speed"),
-                format!("{} rad/s for a structure that {other}", shown(self.speed)),
-                "Remove the speed, or set motion = \"rotating\"",
-            ));
-        }
-        if let Some(other) = other.filter(|_| !self.frequency_factors.is_empty()) {
-            return Err(Error::invalid(
-                format!("{at}.frequency_factors"),
-                format!("a structure that {other} has no blades to mistune"),
-                "Remove the line, or give it to the rotor",
-            ));
-        }
         for (index, factor) in self.frequency_factors.iter().enumerate() {
             let [low, high] = ranges::FREQUENCY_FACTORS;
             within(&format!("{at}.frequency_factors[{}]", index + 1), *factor, low, high)?;
@@ -150,39 +114,8 @@ impl StructureSettings {
             at_most(&format!("{at}.load.amplitude"), load.amplitude, ranges::LINE_LOAD)?;
             at_most(&format!("{at}.load.phase"), load.phase, ranges::ANGLE)?;
         }
-        self.validate_motion(at)
-    }
-
-    /// What only rotating structures have, only those that stand still, and only free ones.
-    fn validate_motion(&self, at: &str) -> Result<()> {
-        let (rotating, still, free) = (Motion::Rotating, Motion::Still, Motion::Free);
-        let moves = self.velocity.iter().any(|component| *component != 0.0);
-        let asked = [
-            ("spin.stiffening", self.spin.stiffening, rotating),
-            ("spin.growth", self.spin.growth, rotating),
-            ("spin.coriolis", self.spin.coriolis, rotating),
-            ("whirl", self.whirl, rotating),
-            ("axial_shift", self.axial_shift, rotating),
-            ("thermal", self.thermal, still),
-            ("load", self.load.is_some(), still),
-            ("velocity", moves, free),
-        ];
-        let Some((field, _, owner)) = asked.into_iter().find(|(_, asked, owner)| *asked && *owner != self.motion)
-        else {
-            let field = format!("{at}.velocity");
-            return self.velocity.iter().try_for_each(|component| at_most(&field, *component, ranges::VELOCITY));
-        };
-        let who = |motion: Motion| match motion {
-            Motion::Rotating => ("a rotating structure", "this one rotates", "rotating"),
-            Motion::Still => ("a structure that stands still", "this one stands still", "still"),
-            Motion::Free => ("a free structure", "this one flies freely", "free"),
-        };
-        let ((owner, _, word), (_, this, _)) = (who(owner), who(self.motion));
-        Err(Error::invalid(
-            format!("{at}.{field}"),
-            format!("only {owner} has it, and {this}"),
-            format!("Remove `{field}`, or set motion = \"{word}\""),
-        ))
+        let field = format!("{at}.velocity");
+        self.velocity.iter().try_for_each(|component| at_most(&field, *component, ranges::VELOCITY))
     }
 }
 
@@ -207,24 +140,17 @@ impl SurfaceSettings {
     /// The structure that carries the surface.
     fn validate_carrier(&self, scene: &SceneSettings, at: &str) -> Result<()> {
         let Some(name) = &self.structure else { return Ok(()) };
-        let still = |structure: &&StructureSettings| structure.motion == Motion::Still;
-        let candidates: Vec<&str> = scene.structures.iter().filter(still).map(|s| s.name.as_str()).collect();
-        let problem = match scene.structures.iter().find(|structure| structure.name == *name) {
-            None => format!("`{name}` is not defined"),
-            Some(structure) if structure.motion == Motion::Rotating => {
-                format!("`{name}` rotates, and a surface stands still")
-            }
-            Some(structure) if structure.motion == Motion::Free => {
-                format!("`{name}` flies freely, and a surface stands still")
-            }
-            Some(_) => return Ok(()),
-        };
+        if scene.structures.iter().any(|structure| structure.name == *name) {
+            return Ok(());
+        }
+        let still = scene.structures.iter().filter(|structure| structure.motion == Motion::Still);
+        let candidates: Vec<&str> = still.map(|structure| structure.name.as_str()).collect();
         let remedy = if candidates.is_empty() {
             "Add a [[structure]] with motion = \"still\", or remove the line for a rigid surface".to_owned()
         } else {
             format!("Use one of: {}; or remove the line for a rigid surface", candidates.join(", "))
         };
-        Err(Error::invalid(format!("{at}.structure"), problem, remedy))
+        Err(Error::invalid(format!("{at}.structure"), format!("`{name}` is not defined"), remedy))
     }
 
     fn validate_shape(&self, at: &str) -> Result<()> {
@@ -253,7 +179,7 @@ impl SurfaceSettings {
 }
 
 impl ContactSettings {
-    fn validate(&self, scene: &SceneSettings, at: &str) -> Result<()> {
+    fn validate_names(&self, scene: &SceneSettings, at: &str) -> Result<()> {
         let structures: Vec<&str> = scene.structures.iter().map(|s| s.name.as_str()).collect();
         let surfaces: Vec<&str> = scene.surfaces.iter().map(|s| s.name.as_str()).collect();
         for (field, name, known) in [("master", &self.master, &structures), ("slave", &self.slave, &surfaces)] {
@@ -265,24 +191,24 @@ impl ContactSettings {
                 ));
             }
         }
-        let slave = scene.surfaces.iter().find(|surface| surface.name == self.slave);
-        if slave.and_then(|surface| surface.structure.as_ref()) == Some(&self.master) {
-            return Err(Error::invalid(
-                format!("{at}.slave"),
-                format!("`{}` is the surface of `{}`, which is the master of this contact", self.slave, self.master),
-                "Give the surface of another structure, or a rigid one",
-            ));
-        }
+        Ok(())
+    }
+
+    /// The numbers, of a scene that has what they need.
+    fn validate(&self, scene: &SceneSettings, at: &str) -> Result<()> {
         if self.nodes.as_ref().is_some_and(String::is_empty) {
             let remedy = "Give the beginning of the names, or remove the line for all nodes";
             return Err(Error::invalid(format!("{at}.nodes"), "an empty text", remedy));
         }
-        if scene.master_of(self).is_some_and(|master| master.motion == Motion::Free) {
-            return self.validate_free(scene, at);
+        within(&format!("{at}.friction"), self.friction, 0.0, ranges::FRICTION)?;
+        if let Some(share) = self.heat_to_slave {
+            within(&format!("{at}.heat_to_slave"), share, 0.0, 1.0)?;
         }
-        if slave.is_some_and(|surface| surface.rigid) {
-            let remedy = "Remove the line; without `structure` the surface around a rotor is rigid";
-            return Err(Error::invalid(format!("{at}.slave"), format!("surface `{}` is `rigid`", self.slave), remedy));
+        if let Some(coating) = &self.coating {
+            coating.validate(&format!("{at}.coating"))?;
+        }
+        if scene.master_of(self).is_some_and(|master| master.motion == Motion::Free) {
+            return Ok(());
         }
         if self.gap == 0.0 && self.sector_gaps.is_empty() {
             let remedy = "Add the radial tip clearance to [[contact]]: number, m (> 0, up to a tenth of the radius); only a free master has none";
@@ -291,26 +217,7 @@ impl ContactSettings {
         if self.gap != 0.0 || self.sector_gaps.is_empty() {
             gap(&format!("{at}.gap"), self.gap)?;
         }
-        self.sector_gaps.iter().try_for_each(|value| gap(&format!("{at}.sector_gaps"), *value))?;
-        within(&format!("{at}.friction"), self.friction, 0.0, ranges::FRICTION)?;
-        if let Some(share) = self.heat_to_slave {
-            let field = format!("{at}.heat_to_slave");
-            within(&field, share, 0.0, 1.0)?;
-            if self.friction == 0.0 {
-                let remedy = "Give the contact a friction coefficient (friction > 0), or remove the line";
-                return Err(Error::invalid(field, "without friction there is no heat to share", remedy));
-            }
-        }
-        let Some(coating) = &self.coating else { return Ok(()) };
-        if self.solver != Solver::Lcp {
-            let name = if self.solver == Solver::Film { "film" } else { "coulomb" };
-            return Err(Error::invalid(
-                format!("{at}.solver"),
-                format!("\"{name}\" cannot solve a contact with a coating"),
-                "Use solver = \"lcp\", or remove the coating",
-            ));
-        }
-        coating.validate(&format!("{at}.coating"))
+        self.sector_gaps.iter().try_for_each(|value| gap(&format!("{at}.sector_gaps"), *value))
     }
 }
 

@@ -1,12 +1,10 @@
-//! What a scene asks of its ROMs, its methods and its start.
+//! What a scene asks of its start, and of what it hands out.
 
 use super::Simulation;
 use super::compile::Compiled;
-use crate::rom::Frame;
-use crate::settings::{Scheme, Solver, StructureSettings};
 use crate::system::StepFailure;
 use crate::variables::Causality;
-use crate::{Error, Result, Rom, Scene, plausibility, shown};
+use crate::{Error, Result, plausibility, shown};
 
 /// How far a surface around an axis goes on ([`crate::gaps::surface_spline::REACH`]), and what to do about a node further out.
 pub const OUT_OF_REACH: &str = "a quarter of its axial extent, as far as it goes on along its tangents";
@@ -14,43 +12,6 @@ pub const OUT_OF_REACH_REMEDY: &str = "Give a casing whose contact grid covers t
                                        shift, loads and speed";
 
 impl Compiled {
-    /// Combinations of scheme and solver that this scene cannot be stepped with.
-    ///
-    /// # Errors
-    /// Naming parameter and remedy.
-    pub fn check_methods(&self, scheme: Scheme, solver: Solver) -> Result<()> {
-        let refuse = |what: &str, problem: &str, remedy: &str| Err(Error::invalid(what, problem, remedy));
-        if solver == Solver::Coulomb && !self.may_stick() {
-            let remedy = "Package the scene with friction and contact.solver = \"coulomb\", without coating";
-            return refuse("parameter `solver`", "`coulomb` is not prepared in this scene", remedy);
-        }
-        if self.scene.settings.contacts.iter().any(|contact| contact.coating.is_some()) && solver != Solver::Lcp {
-            return refuse("parameter `solver`", "a coating is solved with `lcp` only", "Use lcp, or no coating");
-        }
-        if scheme != Scheme::MasslessBoundary {
-            return Ok(());
-        }
-        if self.bodies.iter().any(|body| body.translations.is_some()) {
-            let problem = "`massless-boundary` is not made for a master that flies freely";
-            return refuse("parameter `scheme`", problem, "Use modal-exact or central-difference");
-        }
-        if self.scene.settings.structures.iter().any(|structure| structure.spin.coriolis) {
-            let remedy = "Use modal-exact, or leave coriolis out";
-            return refuse("parameter `scheme`", "`massless-boundary` does not take the Coriolis force", remedy);
-        }
-        if self.bodies.iter().any(|body| body.fewest_dynamic_modes(scheme) == 0) {
-            let problem =
-                "`massless-boundary` makes the highest modes quasi-static, three per contact node: none is left";
-            return refuse("parameter `scheme`", problem, "Use more modes or fewer contact nodes, or modal-exact");
-        }
-        if self.shares_carrier() {
-            let problem = "the largest step of `massless-boundary` is not known where a flexible structure carries the surfaces of \
-                           several contact pairs";
-            return refuse("parameter `scheme`", problem, "Use modal-exact or central-difference, or rigid surfaces");
-        }
-        Ok(())
-    }
-
     /// What is legal in the ROMs and at the start, and hardly meant.
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
@@ -70,65 +31,6 @@ impl Compiled {
         }
         doubts
     }
-}
-
-/// What coupled sectors do not take, and where they cannot be.
-pub fn check_coupling(scene: &Scene, master: usize, carrier: Option<usize>) -> Result<()> {
-    let refuse = |what: &str, problem: String, remedy: &str| Err(Error::invalid(what, problem, remedy));
-    if let Some(index) = carrier.filter(|index| scene.roms[*index].is_cyclic()) {
-        let problem = format!("the sectors of ROM `{}` are coupled by harmonics", scene.roms[index].name);
-        let remedy = "Give a structure of its own, reduced as a whole (sectors = 1), to carry the surface";
-        return refuse("surface.structure", problem, remedy);
-    }
-    let (structure, rom) = (&scene.settings.structures[master], &scene.roms[master]);
-    if !rom.is_cyclic() {
-        return Ok(());
-    }
-    let of = |feature: &str| format!("{feature} with the coupled sectors of ROM `{}`", rom.name);
-    let uncoupled = "Leave it out, or use a ROM of uncoupled sectors (without harmonics)";
-    let asked = [
-        ("frequency_factors", !structure.frequency_factors.is_empty(), "mistuning of single sectors"),
-        ("spin.stiffening", structure.spin.stiffening, "stiffening"),
-        ("spin.coriolis", structure.spin.coriolis, "Coriolis force"),
-    ];
-    match asked.into_iter().find(|(_, asked, _)| *asked) {
-        Some((field, _, feature)) => refuse(&format!("structure.{field}"), of(feature), uncoupled),
-        None => Ok(()),
-    }
-}
-
-/// What a structure asks of its ROM.
-pub fn check_rom(structure: &StructureSettings, rom: &Rom) -> Result<()> {
-    let what = format!("ROM `{}`", rom.name);
-    if rom.frame != Frame::Cylindrical {
-        return Err(Error::invalid(
-            what,
-            "its contact displacements are Cartesian; surfaces around an axis need (radial, tangential, axial)",
-            "Write the ROM with frame = cylindrical",
-        ));
-    }
-    let spin = structure.spin.stiffening || structure.spin.growth || structure.spin.coriolis;
-    if spin && rom.extras.spin.is_none() {
-        let problem = format!("it has no spin matrices, which `spin` of structure `{}` needs", structure.name);
-        return Err(Error::invalid(what, problem, "Reduce it with `tiprub reduce --spin`, or leave spin out"));
-    }
-    if structure.thermal && rom.extras.thermal.is_none() {
-        let problem = format!("it has no thermal loads, which `thermal` of structure `{}` needs", structure.name);
-        return Err(Error::invalid(what, problem, "Reduce it with thermal patches, or leave thermal out"));
-    }
-    if structure.load.is_some() && rom.extras.grid.is_none() {
-        let problem = format!("it has no contact grid, which `load` of structure `{}` needs", structure.name);
-        return Err(Error::invalid(what, problem, "Give a ROM with a contact grid, or leave the load out"));
-    }
-    let factors = structure.frequency_factors.len();
-    if factors != 0 && factors != rom.sectors {
-        return Err(Error::invalid(
-            "structure.frequency_factors",
-            format!("{factors} values for {} sectors", rom.sectors),
-            "Give one factor per sector, or remove the line",
-        ));
-    }
-    Ok(())
 }
 
 impl Simulation {

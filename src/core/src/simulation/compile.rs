@@ -11,7 +11,8 @@ use crate::gaps::shape::Surface;
 use crate::gaps::surface_spline::SurfaceSpline;
 use crate::gaps::{GapLaw, RevolutionGap};
 use crate::laws::coating::Coating;
-use crate::settings::{ContactSettings, Motion, Scheme, Solver, StructureSettings};
+use crate::ranges::SMALL;
+use crate::settings::{ContactSettings, Motion, StructureSettings};
 use crate::system::{Carrier, PairParts, StructureParts, System, SystemSettings};
 use crate::variables::Quantity;
 use crate::{Error, Result, Rom, Scene, shown};
@@ -22,8 +23,6 @@ use super::patches::Patches;
 use super::plan::{PairPlan, Plan};
 use super::slave_surface::{CarrierModes, Share, spline_gap};
 
-/// Gaps, casing shapes and displacements beyond this share of the radius are not what the model describes.
-pub const SMALL_FRACTION: f64 = 0.1;
 /// Most contact nodes of all sectors together that a flexible slave or the disk couples: their Delassus matrix is dense.
 pub const MOST_COUPLED: usize = 2000;
 
@@ -109,14 +108,6 @@ impl Body {
         };
         frequencies.into_iter().copied().filter(|value| *value > 0.0).fold(f64::INFINITY, f64::min)
     }
-
-    /// Modes with inertia under a scheme, of the nodal diameter that has fewest.
-    pub fn fewest_dynamic_modes(&self, scheme: Scheme) -> usize {
-        match &self.disk {
-            Some(disk) => disk.diameters.iter().map(|diameter| diameter.dynamic_modes(scheme)).min().unwrap_or(0),
-            None => self.model.dynamic_modes(scheme),
-        }
-    }
 }
 
 impl Compiled {
@@ -195,11 +186,6 @@ impl Compiled {
             Some(carrier) if self.carriers.len() > 1 => &self.carrier(carrier).0.name,
             _ => "casing",
         }
-    }
-
-    /// Whether a structure carries the surfaces of several pairs.
-    pub fn shares_carrier(&self) -> bool {
-        (0..self.carriers.len()).any(|carrier| self.uses(carrier) > 1)
     }
 
     /// How many pairs have their surface on a carrier.
@@ -454,22 +440,13 @@ impl Compiled {
         };
         Ok(Some(coating))
     }
-
-    /// Whether `coulomb` can be chosen: a coupled problem of all sectors has room for it only if the scene says so.
-    pub fn may_stick(&self) -> bool {
-        let contacts = &self.scene.settings.contacts;
-        let small = self.bodies.iter().all(|body| body.disk.is_none() && body.translations.is_none());
-        let rubs = contacts.iter().any(|contact| contact.friction > 0.0);
-        let coated = contacts.iter().any(|contact| contact.coating.is_some());
-        contacts[0].solver == Solver::Coulomb || (small && self.carriers.is_empty() && rubs && !coated)
-    }
 }
 
 fn check_lengths(rom: &Rom, clearances: &[f64], surface: &Surface) -> Result<()> {
     let smallest = rom.contact_nodes.iter().fold(f64::INFINITY, |low, node| low.min(node.position[0]));
     let largest_gap = clearances.iter().fold(0.0, |largest: f64, gap| largest.max(*gap));
     for (what, value) in [("contact.gap", largest_gap), ("surface.shape", surface.largest_change())] {
-        if value > SMALL_FRACTION * smallest {
+        if value > SMALL * smallest {
             return Err(Error::invalid(
                 what,
                 format!("{value:.3e} m is not small against the radius {smallest:.3e} m of the contact nodes"),

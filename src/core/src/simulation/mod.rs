@@ -16,6 +16,7 @@ mod slave_surface;
 mod state;
 mod stepping;
 mod table;
+mod units;
 mod window;
 
 use crate::gaps::Drive;
@@ -213,7 +214,7 @@ impl Simulation {
         self.phase = Phase::Created;
         self.warnings.clear();
         self.notes.clear();
-        self.compiled.check_methods(parameters.scheme, parameters.solver)?;
+        self.compiled.scene.check_methods(parameters.scheme, parameters.solver)?;
         self.follow_load_orders()?;
         self.follow_reference_speeds(&self.speeds())?;
         self.warnings = self.check_limits(&parameters)?;

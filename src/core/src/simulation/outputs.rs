@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use super::table::LENGTH;
+use super::units::LENGTH;
 use super::window::Window;
 use super::{Phase, Simulation};
 use crate::dynamics::sectors::Sectors;

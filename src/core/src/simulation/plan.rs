@@ -1,10 +1,7 @@
 //! Which structures and surfaces of a scene meet: found once, from names.
 
-use crate::rom::{ContactGrid, Frame};
 use crate::settings::{ContactSettings, Motion, SceneSettings, StructureSettings, SurfaceSettings};
 use crate::{Error, Result, Rom, Scene};
-
-use super::checks;
 
 /// A contact pair of a scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,6 +45,8 @@ impl Plan {
             let problem = format!("{} structures with {} ROMs", settings.structures.len(), scene.roms.len());
             return Err(Error::invalid("scene", problem, "Give one ROM per structure"));
         }
+        scene.check_roms()?;
+        check_factors(scene)?;
         let structure = |name: &str| settings.structures.iter().position(|structure| structure.name == name);
         let touches =
             |index: &usize| settings.contacts.iter().any(|one| one.master == settings.structures[*index].name);
@@ -60,7 +59,6 @@ impl Plan {
             };
             let under = settings.surfaces[surface].structure.as_deref().and_then(structure);
             let open = settings.structures[master].motion == Motion::Free;
-            check_roms(scene, master, under, open)?;
             let body = plan.bodies.iter().position(|body| *body == master).unwrap_or(0);
             let carrier = under.filter(|_| !settings.surfaces[surface].rigid).map(|under| plan.carrier(under));
             let nodes = nodes_of(contact, &scene.roms[master], index)?;
@@ -137,42 +135,16 @@ fn claimed<'a>(mut pairs: impl Iterator<Item = (usize, &'a PairPlan)>, nodes: &[
     pairs.find_map(|(index, pair)| both(pair).map(|node| (index, node)))
 }
 
-fn check_roms(scene: &Scene, master: usize, under: Option<usize>, open: bool) -> Result<()> {
-    if open {
-        check_cartesian(&scene.roms[master])?;
-        return under.map_or(Ok(()), |under| {
-            check_cartesian(&scene.roms[under])?;
-            check_open_grid(&scene.roms[under])
-        });
-    }
-    for structure in [Some(master), under].into_iter().flatten() {
-        checks::check_rom(&scene.settings.structures[structure], &scene.roms[structure])?;
-    }
-    checks::check_coupling(scene, master, under)
-}
-
-fn refuse(rom: &Rom, problem: &str, remedy: &str) -> Result<()> {
-    Err(Error::invalid(format!("ROM `{}`", rom.name), problem, remedy))
-}
-
-/// A structure that flies freely, or that such a one meets.
-fn check_cartesian(rom: &Rom) -> Result<()> {
-    if rom.frame != Frame::Cartesian {
-        let problem =
-            "its contact displacements are cylindrical; a free master and what it meets are described along x, y, z";
-        return refuse(rom, problem, "Write the ROM with frame = cartesian");
-    }
-    if rom.sectors != 1 || rom.is_cyclic() {
-        let problem = "it has several sectors; a free master and what it meets are single structures";
-        return refuse(rom, problem, "Use sectors = 1");
+fn check_factors(scene: &Scene) -> Result<()> {
+    for (index, (structure, rom)) in scene.settings.structures.iter().zip(&scene.roms).enumerate() {
+        let factors = structure.frequency_factors.len();
+        if factors != 0 && factors != rom.sectors {
+            return Err(Error::invalid(
+                format!("structure[{}].frequency_factors", index + 1),
+                format!("{factors} values for {} sectors", rom.sectors),
+                "Give one factor per sector, or remove the line",
+            ));
+        }
     }
     Ok(())
-}
-
-fn check_open_grid(rom: &Rom) -> Result<()> {
-    if matches!(rom.extras.grid, Some(ContactGrid { closed: false, .. })) {
-        return Ok(());
-    }
-    let remedy = "Add the metadata `contact_grid` for an open grid, its contact nodes row after row";
-    refuse(rom, "it has no open contact grid for a surface", remedy)
 }

@@ -6,7 +6,7 @@ use crate::gaps::shape::Surface;
 use crate::gaps::spline::SplineGap;
 use crate::gaps::surface_spline::SurfaceSpline;
 use crate::rom::Frame;
-use crate::settings::{ContactSettings, Meridian, SplineSettings, SurfaceSettings};
+use crate::settings::{ContactSettings, SplineSettings, SurfaceSettings};
 use crate::{Error, Result, Rom};
 use nalgebra::DMatrix;
 
@@ -48,13 +48,6 @@ pub fn spline_gap(
     surface: &SurfaceSettings,
     carrier: Option<(&Rom, Share)>,
 ) -> Result<SplineGap> {
-    if contact.meridian == Meridian::Cylinder {
-        return Err(Error::invalid(
-            "contact.meridian",
-            "`cylinder` with a surface spline, whose normal follows from its closest point",
-            "Remove the line",
-        ));
-    }
     let settings = surface.spline.unwrap_or_default();
     let contour = Contour::new(master, nodes);
     let grid = match carrier {
@@ -126,13 +119,7 @@ pub enum Share {
 }
 
 fn carried_grid(rom: &Rom, share: Share, contour: &Contour) -> Result<Grid> {
-    let Some(grid) = rom.extras.grid else {
-        return Err(Error::invalid(
-            format!("ROM `{}`", rom.name),
-            "it has no contact grid for a surface",
-            "Reduce the casing with `tiprub reduce casing`, or add the metadata `contact_grid`",
-        ));
-    };
+    let Some(grid) = rom.extras.grid else { unreachable!("checked") };
     let mut rings: Vec<f64> = rom.contact_nodes.chunks(grid.around).map(|ring| ring[0].position[2]).collect();
     let (low, high) = (rings[0], rings[rings.len() - 1]);
     let [first, last] = contour.extent();

@@ -300,7 +300,7 @@ impl Simulation {
 
     fn adopt(&mut self, reference_speeds: &[f64]) -> Result<()> {
         let parameters = self.parameters();
-        self.compiled.check_methods(parameters.scheme, parameters.solver)?;
+        self.compiled.scene.check_methods(parameters.scheme, parameters.solver)?;
         let orders: Vec<u32> = self.compiled.carriers.iter().map(|carrier| carrier.load_order).collect();
         // The orders before were accepted before.
         self.follow_load_orders().and_then(|()| self.follow_reference_speeds(reference_speeds)).inspect_err(|_| {

@@ -4,7 +4,7 @@ use super::Structure;
 use super::pair::{Carrier, at_place};
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::sectors::Sectors;
-use crate::gaps::spline::Frame;
+use crate::gaps::frame::Frame;
 use crate::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
 use nalgebra::DMatrix;
 

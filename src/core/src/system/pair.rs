@@ -1,7 +1,7 @@
 //! A contact pair: contact nodes of one structure against a surface, which another structure may carry.
 
 use super::Structure;
-use crate::gaps::spline::Frame;
+use crate::gaps::frame::Frame;
 use crate::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
 use crate::gaps::wrench::Motion;
 use crate::gaps::{Drive, GapLaw};

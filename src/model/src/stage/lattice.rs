@@ -1,4 +1,9 @@
-//! The lattice of a sector: which cells there are, their prisms, node numbers and sets.
+//! Mesh of one sector: triangles in the meridional plane, swept along the circumference into prisms.
+//!
+//! A lattice of columns (along the axis), rows (along the radius) and layers (around) has cells where the sector has
+//! material; each is cut into two prisms by a diagonal of its meridional face. The blade takes the middle layers, so that it
+//! grows out of the disk node for node, and the lowest and highest layer end in faces that differ by one pitch exactly. The
+//! cut between sectors follows the camber line at the rim and is flat at the bore.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -28,7 +33,7 @@ pub(super) struct Lattice<'a> {
 const ALIKE: f64 = 0.05;
 
 impl<'a> Lattice<'a> {
-    pub(super) fn new(options: &'a SectorOptions) -> Result<Self> {
+    fn new(options: &'a SectorOptions) -> Result<Self> {
         options.validate()?;
         let (counts, kind) = (options.counts, options.kind);
         let (web, rim) = (counts.bore[1], counts.bore[1] + counts.web[1]);
@@ -99,7 +104,7 @@ impl<'a> Lattice<'a> {
         places
     }
 
-    pub(super) fn mesh(&self, first_row: usize) -> Result<SectorMesh> {
+    fn mesh(&self, first_row: usize) -> Result<SectorMesh> {
         let prisms = self.prisms(first_row);
         let places: BTreeSet<ClosestPoint> = prisms.iter().flatten().copied().collect();
         let numbers: BTreeMap<ClosestPoint, usize> =
@@ -136,4 +141,21 @@ impl<'a> Lattice<'a> {
         sector.mesh.sets.insert("CONTACT".to_owned(), contact);
         Ok(sector)
     }
+}
+
+/// Mesh of one sector of the bladed disk.
+///
+/// # Errors
+/// [`Error::Invalid`] for lengths that make no bladed disk, and numbers of elements that do not fit each other or the shape.
+pub fn sector_mesh(options: &SectorOptions) -> Result<SectorMesh> {
+    Lattice::new(options)?.mesh(0)
+}
+
+/// Mesh of the blade alone, clamped at its root.
+///
+/// # Errors
+/// Those of [`sector_mesh`].
+pub fn blade_mesh(options: &SectorOptions) -> Result<SectorMesh> {
+    let lattice = Lattice::new(options)?;
+    lattice.mesh(lattice.hub)
 }

@@ -8,8 +8,9 @@ mod reduction;
 mod sector;
 
 pub use geometry::{BladeGeometry, DiskGeometry, SectorGeometry};
+pub use lattice::{blade_mesh, sector_mesh};
 pub use reduction::{StageModel, StageOptions, reduce_stage, stage_model};
-pub use sector::{SectorCounts, SectorMesh, SectorOptions, blade_mesh, sector_mesh};
+pub use sector::{SectorCounts, SectorMesh, SectorOptions};
 
 /// Blades, and sectors of the disk.
 pub const SECTORS: usize = 56;

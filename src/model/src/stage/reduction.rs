@@ -1,6 +1,7 @@
 //! The reduced-order model of the stage's bladed disk.
 
-use super::sector::{SectorMesh, SectorOptions, sector_mesh};
+use super::lattice::sector_mesh;
+use super::sector::{SectorMesh, SectorOptions};
 use crate::cyclic::{CyclicBoundary, CyclicOptions, CyclicReduction, ModeSelection, PairingReport, reduce_cyclic};
 use crate::material::Material;
 use crate::progress::{Listener, Stage, report};

@@ -1,12 +1,6 @@
-//! Mesh of one sector: triangles in the meridional plane, swept along the circumference into prisms.
-//!
-//! A lattice of columns (along the axis), rows (along the radius) and layers (around) has cells where the sector has
-//! material; each is cut into two prisms by a diagonal of its meridional face. The blade takes the middle layers, so that it
-//! grows out of the disk node for node, and the lowest and highest layer end in faces that differ by one pitch exactly. The
-//! cut between sectors follows the camber line at the rim and is flat at the bore.
+//! What a sector is meshed with, and its mesh.
 
 use super::geometry::SectorGeometry;
-use super::lattice::Lattice;
 use crate::element::ElementKind;
 use crate::mesh::Mesh;
 use crate::reduce::ContactPoint;
@@ -178,21 +172,4 @@ impl SectorMesh {
     pub fn contact_points(&self, count: usize) -> Result<Vec<ContactPoint>> {
         spread_contact(&self.tip_line, &vec![0.0; self.tip_line.len()], count)
     }
-}
-
-/// Mesh of one sector of the bladed disk.
-///
-/// # Errors
-/// [`Error::Invalid`] for lengths that make no bladed disk, and numbers of elements that do not fit each other or the shape.
-pub fn sector_mesh(options: &SectorOptions) -> Result<SectorMesh> {
-    Lattice::new(options)?.mesh(0)
-}
-
-/// Mesh of the blade alone, clamped at its root.
-///
-/// # Errors
-/// Those of [`sector_mesh`].
-pub fn blade_mesh(options: &SectorOptions) -> Result<SectorMesh> {
-    let lattice = Lattice::new(options)?;
-    lattice.mesh(lattice.hub)
 }

@@ -5,9 +5,9 @@ use tiprub_core::{Scene, dynamics::modal::ModalModel};
 use tiprub_shell::{Failure, Result};
 
 use super::{
-    prediction::{self, Crossing, Prediction},
+    prediction::{Crossing, Prediction},
     run::Run,
-    spectrum,
+    spectrum, start,
 };
 use crate::Sheet;
 
@@ -159,7 +159,7 @@ fn resonance(curve: &[(f64, f64)], window: [f64; 2]) -> Option<(f64, f64)> {
 /// # Errors
 /// A ROM whose eigenproblem cannot be solved.
 pub fn static_displacement(scene: &Scene, depth: f64) -> Result<Option<f64>> {
-    let rom = &scene.roms[prediction::master(&scene.settings)?];
+    let rom = &scene.roms[start::master(&scene.settings)?];
     if rom.is_cyclic() || depth <= 0.0 {
         return Ok(None);
     }

@@ -74,7 +74,7 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
     let name = arguments.scene.as_str();
     // Before models are reduced for nothing.
     let settings = scene_source::settings(name)?;
-    prediction::master(&settings)?;
+    start::master(&settings)?;
     one_rotor(&settings)?;
     let scene = scene_source::load(name, &arguments.common.cache.cache(), console)?;
     let request = Request {
@@ -150,7 +150,7 @@ impl Map {
         }
         let mut setup =
             Setup { scene, settings: request.settings.clone(), samples: 0, transient: 0, revolutions: 0, top: 0.0 };
-        let master = prediction::master(&setup.scene.settings)?;
+        let master = start::master(&setup.scene.settings)?;
         let fastest = setup.scene.roms[master].extras.spin.as_ref().map_or(0.0, |spin| spin.largest_speed);
         // At its own speed: those of the study may be refused.
         let probe = setup.simulation(setup.scene.settings.structures[master].speed.abs())?;
@@ -274,7 +274,7 @@ impl Map {
     /// What was studied.
     fn facts_of_scene(&self) -> Result<Vec<(String, String)>> {
         let (setup, settings) = (&self.setup, &self.setup.scene.settings);
-        let rom = &setup.scene.roms[prediction::master(&setup.scene.settings)?];
+        let rom = &setup.scene.roms[start::master(&setup.scene.settings)?];
         let ([low, high], without) = (self.start.clearance, self.start.without());
         let middle = self.runs[self.runs.len() / 2].speed;
         let modes = self.prediction.modes(self.prediction.base_order.max(1), middle);

@@ -5,11 +5,10 @@ use tiprub_core::{
     Scene,
     dynamics::{cyclic::CyclicModel, modal::ModalModel},
     gaps::shape::Surface,
-    settings::{Motion, SceneSettings},
 };
 use tiprub_shell::{Failure, Result};
 
-use super::start::Start;
+use super::start::{Start, master};
 
 /// The nodal diameter that an engine order excites among `sectors` blades, and whether the wave runs backwards.
 ///
@@ -132,28 +131,6 @@ impl Prediction {
         found.sort_by(|a, b| (a.mode, a.speed).partial_cmp(&(b.mode, b.speed)).unwrap_or(std::cmp::Ordering::Equal));
         found
     }
-}
-
-/// The structure that is master of the first contact, which must be one that can turn.
-///
-/// # Errors
-/// There is none, or it flies freely or stands still.
-pub fn master(settings: &SceneSettings) -> Result<usize> {
-    let what = || format!("scene `{}`", settings.name);
-    let name = settings.contacts.first().map(|contact| &contact.master);
-    let found = settings.structures.iter().position(|structure| Some(&structure.name) == name);
-    let master = found.ok_or_else(|| Failure::new(what(), "it has no contact with a master", "Add one"))?;
-    let instead = match settings.structures[master].motion {
-        Motion::Rotating => return Ok(master),
-        Motion::Free => "flies freely",
-        Motion::Still => "stands still",
-    };
-    let name = &settings.structures[master].name;
-    Err(Failure::usage(
-        what(),
-        format!("an interaction map is over angular velocities, and the master of its contact, `{name}`, {instead}"),
-        "Give a scene whose first contact has a rotating master, such as builtin:rotor37; `tiprub run` runs this one",
-    ))
 }
 
 /// The casing's rigid shape at equally spaced angles (m), `factor` times that of the scene.

@@ -6,8 +6,8 @@ use tiprub_core::{Scene, Simulation, shown, system::System, variables::Quantity}
 use tiprub_shell::{Failure, Result, native};
 
 use super::{
-    prediction,
     spectrum::{Analyser, Decimator},
+    start,
 };
 
 /// Most numbers of recorded displacements in memory per run; beyond it not every blade is recorded.
@@ -113,7 +113,7 @@ impl Setup {
     /// A refused scene, unknown or wrong settings.
     pub fn simulation(&self, speed: f64) -> Result<Simulation> {
         let mut scene = self.scene.clone();
-        let master = prediction::master(&scene.settings)?;
+        let master = start::master(&scene.settings)?;
         scene.settings.structures[master].speed = self.sense() * speed;
         let mut simulation = Simulation::new(&scene).map_err(|error| self.at(speed, error))?;
         for (name, value) in &self.settings {
@@ -124,7 +124,7 @@ impl Setup {
 
     /// −1 where the scene's own speed is negative, else 1.
     pub fn sense(&self) -> f64 {
-        let master = prediction::master(&self.scene.settings);
+        let master = start::master(&self.scene.settings);
         if master.is_ok_and(|master| self.scene.settings.structures[master].speed < 0.0) { -1.0 } else { 1.0 }
     }
 

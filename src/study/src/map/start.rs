@@ -1,9 +1,11 @@
-//! What the runs start with, after the start values that were changed: clearances, the casing's shape, and what else acts.
+//! What the runs start with, after the start values that were changed: the master that turns, clearances, the casing's shape, and what else acts.
 
-use tiprub_core::{Scene, Simulation, variables::Quantity};
-use tiprub_shell::Result;
-
-use super::prediction;
+use tiprub_core::{
+    Scene, Simulation,
+    settings::{Motion, SceneSettings},
+    variables::Quantity,
+};
+use tiprub_shell::{Failure, Result};
 
 /// Start values that the prediction and the facts depend on.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,7 +62,7 @@ impl Start {
         let order = order.and_then(|variable| usize::try_from(simulation.integer(variable.reference).ok()?).ok());
         let whirls = [0, 1].iter().any(|component| or_nothing(Quantity::ShaftDisplacement(*component)) != 0.0);
         let temperatures = values(simulation, Quantity::CasingTemperature);
-        let growth = scene.settings.structures[prediction::master(&scene.settings)?].spin.growth;
+        let growth = scene.settings.structures[master(&scene.settings)?].spin.growth;
         let acting = [
             ("load", amplitude != 0.0),
             ("heat", temperatures.iter().any(|temperature| *temperature != 0.0)),
@@ -88,6 +90,28 @@ impl Start {
             Some((last, others)) => format!(", without {} and {last}", others.join(", ")),
         }
     }
+}
+
+/// The structure that is master of the first contact, which must be one that can turn.
+///
+/// # Errors
+/// There is none, or it flies freely or stands still.
+pub fn master(settings: &SceneSettings) -> Result<usize> {
+    let what = || format!("scene `{}`", settings.name);
+    let name = settings.contacts.first().map(|contact| &contact.master);
+    let found = settings.structures.iter().position(|structure| Some(&structure.name) == name);
+    let master = found.ok_or_else(|| Failure::new(what(), "it has no contact with a master", "Add one"))?;
+    let instead = match settings.structures[master].motion {
+        Motion::Rotating => return Ok(master),
+        Motion::Free => "flies freely",
+        Motion::Still => "stands still",
+    };
+    let name = &settings.structures[master].name;
+    Err(Failure::usage(
+        what(),
+        format!("an interaction map is over angular velocities, and the master of its contact, `{name}`, {instead}"),
+        "Give a scene whose first contact has a rotating master, such as builtin:rotor37; `tiprub run` runs this one",
+    ))
 }
 
 /// All elements of a real variable; none where the scene does not have it.

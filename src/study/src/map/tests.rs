@@ -220,7 +220,7 @@ fn scenes_with_more_than_one_thing_to_vary_are_refused() {
 #[test]
 fn a_master_that_does_not_turn_is_refused_before_anything_is_reduced() {
     let settings = scene_source::settings("builtin:cube-between-rings").unwrap();
-    let failure = prediction::master(&settings).unwrap_err();
+    let failure = start::master(&settings).unwrap_err();
     assert!(failure.usage && failure.problem.contains("`cube`, flies freely"), "{failure}");
     assert!(failure.remedy.contains("builtin:rotor37"), "{failure}");
     let without = Scene { settings, roms: Vec::new() };

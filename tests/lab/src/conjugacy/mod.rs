@@ -45,16 +45,14 @@ struct Row {
 
 impl Case {
     fn exists(&self, quick: bool) -> bool {
-        let massless = self.scheme.0 == Scheme::MasslessBoundary;
-        let refused = (self.feature == Feature::Coating && self.solver.0 != Solver::Lcp)
-            || (self.feature == Feature::Free && massless)
-            || (self.friction == 0.0 && self.solver.0 == Solver::Coulomb);
         let shown = match self.scheme.0 {
             Scheme::CentralDifference => self.solver.0 == Solver::Film,
             Scheme::ModalExact => self.solver.0 == Solver::Lcp || self.solver.0 == Solver::Coulomb,
             Scheme::MasslessBoundary => self.solver.0 == Solver::Lcp,
         };
-        !refused && (!quick || (shown && self.friction > 0.0))
+        let asked =
+            if quick { shown && self.friction > 0.0 } else { self.friction > 0.0 || self.solver.0 != Solver::Coulomb };
+        asked && self.scene(self.friction, false).check_methods(self.scheme.0, self.solver.0).is_ok()
     }
 
     fn scene(&self, friction: f64, round: bool) -> Scene {

@@ -12,10 +12,10 @@ pub(crate) use tiprub_test_models::{GAP, RADIUS, Random, bumps, rich_blade as bl
 use tiprub_test_models::{node, ring, structure};
 
 /// All schemes with their names.
-pub(crate) const SCHEMES: [(Scheme, &str); 3] =
+pub(crate) const SCHEMES: [(Scheme, &str); Scheme::ALL.len()] =
     [(Scheme::CentralDifference, "central"), (Scheme::ModalExact, "exact"), (Scheme::MasslessBoundary, "massless")];
 /// All contact solvers with their names.
-pub(crate) const SOLVERS: [(Solver, &str); 3] =
+pub(crate) const SOLVERS: [(Solver, &str); Solver::ALL.len()] =
     [(Solver::Film, "film"), (Solver::Lcp, "lcp"), (Solver::Coulomb, "coulomb")];
 
 /// A contact node on a spring on a mass on a spring, in each direction: six degrees of freedom per sector.

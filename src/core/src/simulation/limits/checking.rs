@@ -3,7 +3,8 @@
 use super::{Parameters, Sense};
 use crate::dynamics::cyclic::CyclicModel;
 use crate::dynamics::modal::ModalModel;
-use crate::gaps::spline::{Frame, SplineGap};
+use crate::gaps::frame::Frame;
+use crate::gaps::spline::SplineGap;
 use crate::gaps::{GapLaw, dot};
 use crate::settings::{Meridian, Scheme, Solver};
 use crate::simulation::SAME_STEP;

@@ -1,12 +1,12 @@
 //! Rows of the variable table, and those that every scene has.
 
-use super::units::{ANGLE, INPUT_INTERPOLATIONS, TIME};
 use crate::Result;
 use crate::laws::SOLVERS;
 use crate::ranges::{DAMPING, FRICTION, LONGEST_STEP, SHORTEST_STEP};
 use crate::schemes::SCHEMES;
 use crate::settings::{ContactSettings, SceneSettings};
 use crate::simulation::outputs::Reader;
+use crate::simulation::units::{ANGLE, INPUT_INTERPOLATIONS, TIME};
 use crate::variables::{
     Causality, Enumeration, Kind, Quantity, Span, Start, Unit, Variability, Variable, VariableTable,
 };

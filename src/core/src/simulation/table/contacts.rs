@@ -1,10 +1,11 @@
 //! Outputs that every scene has.
 
 use super::builder::Builder;
-use super::units::{ENERGY, FORCE, IMPULSE, POWER, TIME};
-use super::{Body, Parts, features};
+use super::features;
+use super::parts::{Body, Parts};
 use crate::settings::{Motion, SceneSettings};
 use crate::simulation::outputs::{View, scalar};
+use crate::simulation::units::{ENERGY, FORCE, IMPULSE, POWER, TIME};
 use crate::variables::{Kind, Quantity, Span, Unit, Variability};
 
 pub fn smallest_clearance(table: &mut Builder, unit: Option<(&'static Unit, f64)>, text: &str) {

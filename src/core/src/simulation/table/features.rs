@@ -1,12 +1,12 @@
 //! Rows of what only some scenes ask for.
 
 use super::builder::Builder;
-use super::units::{ANGLE, ENERGY, LENGTH, LINE_LOAD, POWER, TEMPERATURE, VOLUME};
-use super::{Body, Carrier, Pair, Parts, largest_length};
+use super::parts::{Body, Carrier, Pair, Parts, largest_length};
 use crate::laws::coating::Coating;
 use crate::ranges;
 use crate::settings::{CoatingSettings, StructureSettings};
 use crate::simulation::outputs::{each, scalar, whole};
+use crate::simulation::units::{ANGLE, ENERGY, LENGTH, LINE_LOAD, POWER, TEMPERATURE, VOLUME};
 use crate::variables::{Kind, Quantity, Span, Start, Variability};
 
 /// Temperatures beyond this are not what a linear expansion describes (K).

@@ -1,12 +1,12 @@
 //! Rows of structures that fly freely.
 
 use super::builder::Builder;
+use super::parts::{AXES, Body, Parts};
 use super::rotor::watched_rows;
-use super::units::{FORCE, LENGTH, LINEAR_SPEED};
-use super::{AXES, Body, Parts};
 use crate::Rom;
 use crate::ranges;
 use crate::simulation::outputs::{each, scalar};
+use crate::simulation::units::{FORCE, LENGTH, LINEAR_SPEED};
 use crate::variables::{Quantity, Span, Unit};
 
 /// Velocity at the start.

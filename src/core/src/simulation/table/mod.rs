@@ -7,120 +7,18 @@ mod builder;
 mod contacts;
 mod features;
 mod free;
+mod parts;
 mod rotor;
-mod units;
 
-use super::compile::SMALL_FRACTION;
 use super::outputs::{Reader, scalar};
-use super::patches::Patches;
-use super::plan::{Plan, prefix};
+use super::plan::Plan;
+use super::units::{ANGLE, ANGULAR_SPEED, FORCE, LENGTH, TIME, TORQUE};
 use crate::gaps::shape::Surface;
-use crate::settings::{
-    ContactSettings, InputInterpolation, Motion, Scene, SceneSettings, Shape, StructureSettings, SurfaceSettings,
-};
+use crate::settings::{InputInterpolation, Motion, Scene, SceneSettings, Shape};
 use crate::variables::{Quantity, Span, Variability, VariableTable};
-use crate::{Error, Result, Rom, ranges};
+use crate::{Result, Rom, ranges};
 use builder::{Builder, RAMPED};
-pub use units::LENGTH;
-use units::{ANGLE, ANGULAR_SPEED, FORCE, TIME, TORQUE};
-
-const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// What of a scene the variables depend on.
-struct Parts<'a> {
-    scene: &'a Scene,
-    settings: &'a SceneSettings,
-    plan: Plan,
-}
-
-/// A structure that touches.
-#[derive(Clone, Copy)]
-struct Body<'a> {
-    index: usize,
-    structure: &'a StructureSettings,
-    rom: &'a Rom,
-    free: bool,
-}
-
-/// A contact pair.
-struct Pair<'a> {
-    index: usize,
-    contact: &'a ContactSettings,
-    surface: &'a SurfaceSettings,
-    body: Body<'a>,
-    /// Structure that deforms the surface.
-    carrier: Option<usize>,
-    /// Patches that friction power is gathered for.
-    patches: usize,
-}
-
-/// A structure that carries surfaces.
-struct Carrier<'a> {
-    index: usize,
-    structure: &'a StructureSettings,
-    rom: &'a Rom,
-    /// Of open surfaces.
-    open: bool,
-}
-
-impl<'a> Parts<'a> {
-    fn bodies(&self) -> Vec<Body<'a>> {
-        let body = |index: usize| {
-            let (structure, rom) = self.plan.structure(self.scene, index);
-            Body { index, structure, rom, free: self.plan.is_free(self.scene, index) }
-        };
-        (0..self.plan.bodies.len()).map(body).collect()
-    }
-
-    fn pairs(&self) -> Vec<Pair<'a>> {
-        let bodies = self.bodies();
-        let pair = |(index, plan): (usize, &super::plan::PairPlan)| Pair {
-            index,
-            contact: &self.settings.contacts[index],
-            surface: &self.settings.surfaces[plan.surface],
-            body: bodies[plan.body],
-            carrier: plan.carrier,
-            patches: Patches::new(self.scene, &self.plan, plan).as_ref().map_or(0, Patches::len),
-        };
-        self.plan.pairs.iter().enumerate().map(pair).collect()
-    }
-
-    fn carriers(&self) -> Vec<Carrier<'a>> {
-        let carrier = |(index, structure): (usize, &usize)| Carrier {
-            index,
-            structure: &self.settings.structures[*structure],
-            rom: &self.scene.roms[*structure],
-            open: self
-                .plan
-                .pairs
-                .iter()
-                .any(|pair| pair.carrier == Some(index) && self.plan.is_free(self.scene, pair.body)),
-        };
-        self.plan.carriers.iter().enumerate().map(carrier).collect()
-    }
-
-    /// A scene that gives no friction coefficient has no friction variables.
-    fn has_friction(&self) -> bool {
-        self.settings.contacts.iter().any(|contact| contact.friction > 0.0)
-    }
-
-    fn of_body(&self, body: &Body) -> String {
-        prefix(self.plan.bodies.len(), &body.structure.name)
-    }
-
-    fn of_pair(&self, pair: &Pair) -> String {
-        prefix(self.plan.pairs.len(), &pair.surface.name)
-    }
-
-    fn of_carrier(&self, carrier: &Carrier) -> String {
-        prefix(self.plan.carriers.len(), &carrier.structure.name)
-    }
-
-    /// The structure that a text speaks of: the rotor, or its name.
-    fn rotor(&self, body: &Body) -> String {
-        if body.free || self.plan.bodies.len() > 1 { body.structure.name.clone() } else { "the rotor".to_owned() }
-    }
-}
+use parts::{AXES, Body, Pair, Parts, largest_length};
 
 /// Build the table of a validated scene, and what fills its outputs, in their order.
 ///
@@ -145,12 +43,6 @@ pub fn build(scene: &Scene) -> Result<(VariableTable, Vec<Reader>)> {
     }
     contacts::internal_steps(&mut table, parts.settings);
     table.finish()
-}
-
-/// Lengths beyond this are not small against the radius of the contact nodes (m).
-fn largest_length(rom: &Rom) -> f64 {
-    let radii = rom.contact_nodes.iter().map(|node| node.position[0]);
-    SMALL_FRACTION * radii.fold(f64::INFINITY, f64::min)
 }
 
 fn inputs(table: &mut Builder, parts: &Parts) -> Result<()> {
@@ -377,9 +269,4 @@ fn pair_forces(table: &mut Builder, pair: &Pair) {
         let read = scalar(move |view| view.mean * view.window.pairs[index].force_impulse[axis]);
         table.output(format!("{surface}.force_{letter}"), Span::Mean, Some((&FORCE, 100.0)), text, read);
     }
-}
-
-/// Refuse what no structure has.
-fn refuse<T>(field: &str, problem: String, remedy: String) -> Result<T> {
-    Err(Error::invalid(format!("outputs.{field}"), problem, remedy))
 }

@@ -1,10 +1,10 @@
 //! Outputs of a rotor, one row each with what fills it.
 
 use super::builder::Builder;
-use super::units::{ANGLE, FORCE, LENGTH};
-use super::{Body, Parts, refuse};
+use super::parts::{Body, Parts, refuse};
 use crate::Result;
 use crate::simulation::outputs::{Reader, each, scalar, whole};
+use crate::simulation::units::{ANGLE, FORCE, LENGTH};
 use crate::variables::{Quantity, Span, Unit};
 
 pub fn angle(table: &mut Builder, parts: &Parts, body: &Body) {

@@ -8,14 +8,17 @@ use tiprub_core::{
 use super::super::{
     Case, Cases, Check, Expected, Happened,
     bodies::{Body, FURTHEST, HALF, Plate, Throw, vector},
-    models::SOLVERS,
+    models::{SCHEMES, SOLVERS},
     observe::{real, worse},
 };
 
 /// Internal step of most cases (s).
 pub(crate) const STEP: f64 = 1e-6;
-/// Schemes of free bodies.
-pub(crate) const SCHEMES: [(Scheme, &str); 2] = [(Scheme::CentralDifference, "central"), (Scheme::ModalExact, "exact")];
+/// Schemes of free bodies: those that the table of what goes together does not exclude.
+pub(crate) fn schemes() -> impl Iterator<Item = (Scheme, &'static str)> {
+    let scene = throw(Body::rigid(1.0), [-1.0, 0.0, 0.0], vec![Plate::left(0.021)]).scene();
+    SCHEMES.into_iter().filter(move |(scheme, _)| scene.check_methods(*scheme, Solver::Lcp).is_ok())
+}
 
 /// All of them.
 pub(crate) fn cases() -> Vec<Case> {
@@ -51,7 +54,7 @@ pub(crate) fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 fn flights() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (scheme, name) in SCHEMES {
+    for (scheme, name) in schemes() {
         for speed in [1e-100, 1e-12, 1e-6, 1.0, 1e3, 0.999 * FURTHEST / STEP] {
             for mass in [1e-12, 1e-3, 1.0, 1e12] {
                 let expected = Expected::right("x = vt, velocity and energy kept, nothing touched");
@@ -137,7 +140,7 @@ pub(crate) struct Impact {
 
 fn impacts() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (scheme, scheme_name) in SCHEMES {
+    for (scheme, scheme_name) in schemes() {
         for (solver, solver_name) in SOLVERS {
             for speed in [1e-6, 1e-3, 1.0, 100.0, 0.9 * FURTHEST / STEP] {
                 for mass in [1e-12, 1.0, 1e12] {
@@ -218,7 +221,7 @@ impl Impact {
 
 fn rebounds() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (scheme, scheme_name) in SCHEMES {
+    for (scheme, scheme_name) in schemes() {
         for (solver, solver_name) in SOLVERS {
             for ratio in [1e-6, 1e-2, 1.0, 10.0] {
                 for speed in [1e-6, 1.0, 10.0] {

@@ -12,7 +12,7 @@ use super::{
         models::SOLVERS,
         observe::{outputs, real, worse},
     },
-    free::{SCHEMES, STEP, apart, size, started, throw},
+    free::{STEP, apart, schemes, size, started, throw},
 };
 
 /// All of them.
@@ -37,7 +37,7 @@ pub(crate) struct Balance {
 
 fn balances() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (scheme, scheme_name) in SCHEMES {
+    for (scheme, scheme_name) in schemes() {
         for (solver, solver_name) in SOLVERS {
             for friction in [0.0, 0.15, 1.0] {
                 for speed in [0.01, 1.0, 10.0, 100.0] {
@@ -113,7 +113,7 @@ impl Balance {
 
 fn mirrors() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (scheme, scheme_name) in SCHEMES {
+    for (scheme, scheme_name) in schemes() {
         for (solver, solver_name) in SOLVERS {
             for friction in [0.0, 0.15, 0.5] {
                 let expected = Expected::right("left and right alike, no force across");

@@ -1,0 +1,54 @@
+//! What the report is made from.
+
+use tiprub_core::{Scene, VariableTable};
+use tiprub_model::Reduction;
+use tiprub_shell::{native::NativeRun, recording::Agreement, schedule::Schedule};
+use tiprub_study::error_study::ErrorStudy;
+
+use crate::rom_facts::RomFacts;
+
+/// What an imported run has to say in the report.
+#[derive(Debug, Clone)]
+pub struct ImportedSummary {
+    /// For example `FMI 2.0`.
+    pub label: String,
+    /// Time spent in doStep (s).
+    pub stepping: f64,
+    /// Comparison with the native run.
+    pub agreement: Agreement,
+}
+
+/// A file beside the report.
+#[derive(Debug, Clone)]
+pub struct ReportFile {
+    /// File name, relative to the report.
+    pub name: String,
+    /// What it is.
+    pub meaning: String,
+    /// Size in bytes.
+    pub bytes: u64,
+}
+
+/// Everything the report shows.
+pub struct ReportInput<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its variables.
+    pub table: &'a VariableTable,
+    /// Full model and modes, where they are at hand.
+    pub reduction: Option<&'a Reduction>,
+    /// Facts of the ROMs.
+    pub facts: &'a [RomFacts],
+    /// Communication points.
+    pub schedule: &'a Schedule,
+    /// The native run.
+    pub native: &'a NativeRun,
+    /// The runs through the C ABIs.
+    pub imported: &'a [ImportedSummary],
+    /// Error against run time, where it was studied.
+    pub study: Option<&'a ErrorStudy>,
+    /// Files beside the report.
+    pub files: &'a [ReportFile],
+    /// Wall times of the parts of the work (what, s).
+    pub durations: &'a [(String, f64)],
+}

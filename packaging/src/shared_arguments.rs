@@ -1,0 +1,89 @@
+//! Options that several kinds of `tiprub reduce` have.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use tiprub_model::Material;
+
+/// What every reduction writes.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Args)]
+pub struct Written {
+    /// ROM file to write [default: NAME.rom.safetensors with the name of the model].
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Replace files that are there already.
+    #[arg(long)]
+    pub force: bool,
+    /// Also write the mesh as a CalculiX/Abaqus input file that computes its frequencies.
+    #[arg(long, value_name = "FILE")]
+    pub inp: Option<PathBuf>,
+    /// Also write mesh, sets and mode shapes for ParaView (.vtu).
+    #[arg(long, value_name = "FILE")]
+    pub vtk: Option<PathBuf>,
+}
+
+/// Materials by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MaterialChoice {
+    /// E = 210 GPa, ρ = 7850 kg/m³, α = 11.7e-6 1/K.
+    Steel,
+    /// Ti-6Al-4V: E = 113.8 GPa, ρ = 4430 kg/m³, α = 8.6e-6 1/K.
+    Titanium,
+    /// E = 180 GPa, ρ = 8000 kg/m³, α = 10.1e-6 1/K.
+    MaragingSteel,
+}
+
+impl MaterialChoice {
+    /// The material of this name.
+    pub fn material(self) -> Material {
+        match self {
+            Self::Steel => Material::steel(),
+            Self::Titanium => Material::titanium(),
+            Self::MaragingSteel => Material::maraging_steel(),
+        }
+    }
+}
+
+/// Three element counts: chord, thickness and span of a blade; around, through and along of a casing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MeshSize(pub [usize; 3]);
+
+impl std::str::FromStr for MeshSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let counts: Result<Vec<usize>, _> = text.split(['x', 'X']).map(str::parse).collect();
+        match counts.as_deref() {
+            Ok([a, b, c]) if [a, b, c].iter().all(|count| (1..=200).contains(*count)) => Ok(Self([*a, *b, *c])),
+            _ => {
+                Err("give three element counts from 1 to 200: CHORDxTHICKNESSxSPAN of the blade, for example 10x1x14, \
+                      AROUNDxTHROUGHxALONG of the casing, for example 72x1x12"
+                    .into())
+            }
+        }
+    }
+}
+
+/// Two counts.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn pair(text: &str) -> Result<[usize; 2], String> {
+    let counts: Result<Vec<usize>, _> = text.split(['x', 'X']).map(str::parse).collect();
+    match counts.as_deref() {
+        Ok([around, along]) if *around <= 360 && *along <= 100 => Ok([*around, *along]),
+        _ => Err("give two counts, at most 360 around and 100 along, as AROUNDxALONG, for example 24x3".into()),
+    }
+}
+
+/// Two axial positions (m).
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn axial(text: &str) -> Result<[f64; 2], String> {
+    let ends = text.split_once(':').map(|(from, to)| [from, to].map(|end| end.trim().parse::<f64>().ok()));
+    match ends {
+        Some([Some(from), Some(to)]) if from < to => Ok([from, to]),
+        _ => Err("give two growing axial positions in m as FROM:TO, for example 0.002:0.038".into()),
+    }
+}

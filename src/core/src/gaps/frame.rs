@@ -1,0 +1,29 @@
+//! Directions of a place around the axis, and vectors in them.
+
+/// Radial and tangential direction at an angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    sine: f64,
+    cosine: f64,
+}
+
+impl Frame {
+    /// That of a structure described in fixed directions.
+    pub const FIXED: Self = Self { sine: 0.0, cosine: 1.0 };
+
+    /// At `angle` (rad).
+    pub fn new(angle: f64) -> Self {
+        let (sine, cosine) = libm::sincos(angle);
+        Self { sine, cosine }
+    }
+
+    /// (radial, tangential, axial) of a vector given in fixed directions.
+    pub fn local(self, v: [f64; 3]) -> [f64; 3] {
+        [v[0] * self.cosine + v[1] * self.sine, v[1] * self.cosine - v[0] * self.sine, v[2]]
+    }
+
+    /// Fixed directions of a vector given as (radial, tangential, axial).
+    pub fn fixed(self, v: [f64; 3]) -> [f64; 3] {
+        [v[0] * self.cosine - v[1] * self.sine, v[0] * self.sine + v[1] * self.cosine, v[2]]
+    }
+}

@@ -1,0 +1,325 @@
+//! What features, schemes and solvers need and exclude: one table. Validation refuses by it, messages are made of its rows,
+//! and the guide prints them.
+
+mod facts;
+mod place;
+#[cfg(test)]
+mod tests;
+
+use super::{ContactSettings, Motion, Scene, SceneSettings, Scheme, Solver};
+use crate::rom::Frame;
+use crate::{Error, Result, Rom};
+use facts::*;
+use place::{Place, path};
+
+/// What a feature may need or exclude, at the same place.
+type Other = (&'static str, fn(&Place) -> bool);
+
+/// One row.
+pub struct Rule {
+    features: &'static [Fact],
+    needed: bool,
+    other: Other,
+    because: &'static str,
+    remedy: &'static str,
+}
+
+const fn needs(features: &'static [Fact], other: Other, because: &'static str, remedy: &'static str) -> Rule {
+    Rule { features, needed: true, other, because, remedy }
+}
+
+const fn excludes(features: &'static [Fact], other: Other, because: &'static str, remedy: &'static str) -> Rule {
+    Rule { features, needed: false, other, because, remedy }
+}
+
+const FREE: Other = ("a free master", |at| at.is_free());
+const ALL_FREE: Other = ("a scene of free masters only", |at| at.contacts().all(|at| at.is_free()));
+const COUPLED: Other = ("a ROM whose sectors are coupled by harmonics", |at| at.rom().is_cyclic());
+
+/// Of structures, surfaces and contacts.
+static PARTS: &[Rule] = &[
+    needs(
+        &[SPEED, FACTORS, STIFFENING, GROWTH, CORIOLIS, WHIRL, AXIAL_SHIFT],
+        ("`motion = \"rotating\"`", |at| at.structure().motion == Motion::Rotating),
+        "only a rotating structure has a speed, blades and a shaft",
+        "Remove the line, or set motion = \"rotating\"",
+    ),
+    needs(
+        &[THERMAL, LOAD],
+        ("`motion = \"still\"`", |at| at.structure().motion == Motion::Still),
+        "only a structure that stands still has heat and loads of its own",
+        "Remove the line, or set motion = \"still\"",
+    ),
+    needs(
+        &[VELOCITY],
+        ("`motion = \"free\"`", |at| at.structure().motion == Motion::Free),
+        "only a free structure starts with one",
+        "Remove the line, or set motion = \"free\"",
+    ),
+    needs(
+        &[CARRIED],
+        ("a structure with `motion = \"still\"`", |at| at.carrier().is_some_and(|own| own.motion == Motion::Still)),
+        "a surface stands still",
+        "Name a structure that stands still, or remove the line for a rigid surface",
+    ),
+    excludes(
+        &[CARRIED],
+        ("a structure that is the master of a contact", |at| at.carrier().is_some_and(|own| at.touches(own))),
+        "contact nodes and control points of one structure together are not made for",
+        "Let it be the master of both contacts, with surfaces on what it meets",
+    ),
+    needs(
+        &[RIGID],
+        FREE,
+        "the surface around a rotor is rigid without `structure`",
+        "Remove the line, and `structure` for a rigid surface",
+    ),
+    excludes(
+        &[SHAPE, MOVING, RAMP_TIME, PATCHES, CLOSURE],
+        FREE,
+        "only a surface around an axis has it, and this one is the open contact grid of a structure",
+        "Remove the line",
+    ),
+    excludes(
+        &[GAP, SECTOR_GAPS, MERIDIAN, COATING, HEAT],
+        FREE,
+        "its gaps and normals follow from the positions in both ROMs",
+        "Remove the line",
+    ),
+    needs(
+        &[FREE_MASTER],
+        ("`surface.structure`", |at| at.surface().structure.is_some()),
+        "it needs to know where its surface is",
+        "Give the surface a `structure` that stands still; `rigid = true` leaves out its deformation",
+    ),
+    needs(
+        &[ONE_OF_SEVERAL],
+        ("`contact.nodes`", |at| at.contact().nodes.is_some()),
+        "without it one contact claims all its contact nodes",
+        "Give every contact `nodes`: what the names of its contact nodes start with",
+    ),
+    excludes(
+        &[MERIDIAN],
+        ("a surface spline", |at| at.surface().spline.is_some() || at.carrier().is_some()),
+        "its normal follows from the closest point",
+        "Remove the line",
+    ),
+    needs(
+        &[HEAT],
+        ("`contact.friction` above 0", |at| at.contact().friction > 0.0),
+        "without friction there is no heat to share",
+        "Give the contact a friction coefficient (friction > 0), or remove the line",
+    ),
+    excludes(
+        &[COATING],
+        ("contacts solved together with another pair's", |at| {
+            at.settings.contacts.iter().any(|other| at.settings.are_together(at.contact(), other))
+        }),
+        "pairs of one structure, or of surfaces on one flexible structure, push each other",
+        "Leave out the coating, or give the pair a structure and a surface of its own",
+    ),
+    needs(
+        &[SOLVER],
+        ("that of contact[1]", |at| at.contact().solver == at.settings.contacts[0].solver),
+        "a scene has one solver",
+        "Give all pairs the same solver",
+    ),
+];
+
+/// Of outputs and inputs.
+static VARIABLES: &[Rule] = &[
+    needs(
+        &[WEAR],
+        ("`contact.coating`", |at| at.contacts().any(|at| at.is_coated())),
+        "nothing else wears",
+        "Add a `coating` to the contact, or remove the line",
+    ),
+    needs(
+        &[DISPLACEMENT],
+        ("`surface.structure`", |at| at.settings.surfaces.iter().any(|surface| surface.structure.is_some())),
+        "a rigid surface does not deform",
+        "Give the surface a `structure`, or remove the line",
+    ),
+    excludes(
+        &[OTHER_SECTORS, ALL_SECTORS, DIAMETERS],
+        ALL_FREE,
+        "a free structure has one sector",
+        "Remove the line; `watched_sectors` may be [1] or []",
+    ),
+    excludes(&[DISPLACEMENT], ALL_FREE, "it is radial, and open surfaces have no axis", "Remove the line"),
+    excludes(&[INTERPOLATION], ALL_FREE, "such a scene has no inputs", "Remove the line"),
+];
+
+/// Of schemes and solvers: those of the scene, and those chosen by parameters.
+static METHODS: &[Rule] = &[
+    needs(
+        &[COULOMB],
+        ("a scene packaged with it, or with rotors of uncoupled sectors, rigid surfaces and friction", |at| {
+            at.may_stick()
+        }),
+        "larger problems are prepared only where the scene says so",
+        "Package the scene with contact.solver = \"coulomb\"",
+    ),
+    excludes(
+        &[FILM, COULOMB],
+        ("a coating", |at| at.contacts().any(|at| at.is_coated())),
+        "its rods yield within the complementarity problem",
+        "Use solver = \"lcp\", or remove the coating",
+    ),
+    excludes(
+        &[MASSLESS],
+        ("a free master", |at| at.contacts().any(|at| at.is_free())),
+        "it is not made for structures that fly",
+        "Use \"modal-exact\" or \"central-difference\"",
+    ),
+    excludes(
+        &[MASSLESS],
+        ("`structure.spin.coriolis`", |at| at.settings.structures.iter().any(|own| own.spin.coriolis)),
+        "quasi-static modes have no velocity for the Coriolis force",
+        "Use \"modal-exact\", or leave the Coriolis force out",
+    ),
+    needs(
+        &[MASSLESS],
+        ("more than three modes per contact node", |at| at.has_modes_left()),
+        "it makes the highest modes quasi-static, three per contact node, and else none is left",
+        "Use more modes or fewer contact nodes, or \"modal-exact\"",
+    ),
+    excludes(
+        &[MASSLESS],
+        ("several surfaces on one flexible structure", |at| {
+            let one = |pair: &ContactSettings| at.settings.contacts.iter().any(|other| at.settings.share(pair, other));
+            at.settings.contacts.iter().any(one)
+        }),
+        "the largest step is not known there",
+        "Use \"modal-exact\" or \"central-difference\", or rigid surfaces",
+    ),
+];
+
+/// Of ROMs.
+static ROMS: &[Rule] = &[
+    needs(
+        &[ROM_AROUND],
+        ("`frame = cylindrical`", |at| at.rom().frame == Frame::Cylindrical),
+        "surfaces around an axis meet displacements along (r, θ, z)",
+        "Write the ROM with frame = cylindrical",
+    ),
+    needs(
+        &[ROM_FREE],
+        ("`frame = cartesian`", |at| at.rom().frame == Frame::Cartesian),
+        "a free master and what it meets are described along x, y, z",
+        "Write the ROM with frame = cartesian",
+    ),
+    needs(
+        &[ROM_FREE],
+        ("`sectors = 1`", |at| at.rom().sectors == 1 && !at.rom().is_cyclic()),
+        "a free master and what it meets are single structures",
+        "Use sectors = 1",
+    ),
+    needs(
+        &[STIFFENING, GROWTH, CORIOLIS],
+        ("spin matrices in the ROM", |at| at.rom().extras.spin.is_some()),
+        "they hold what the speed does to the structure",
+        "Reduce it with `tiprub reduce --spin`, or leave spin out",
+    ),
+    excludes(
+        &[FACTORS, STIFFENING, CORIOLIS],
+        COUPLED,
+        "nodal diameters are modes of equal sectors, and the same at every speed",
+        "Leave it out, or use a ROM of uncoupled sectors (without harmonics)",
+    ),
+    needs(
+        &[THERMAL],
+        ("thermal loads in the ROM", |at| at.rom().extras.thermal.is_some()),
+        "they say how each patch expands the structure",
+        "Reduce it with thermal patches, or leave thermal out",
+    ),
+    needs(
+        &[LOAD],
+        ("a contact grid in the ROM", |at| at.rom().extras.grid.is_some()),
+        "the load acts on its rings",
+        "Give a ROM with a contact grid, or leave the load out",
+    ),
+    excludes(
+        &[CARRIED],
+        ("a structure whose sectors are coupled by harmonics", |at| at.carrier_rom().is_some_and(Rom::is_cyclic)),
+        "the surface is laid through the contact grid of a structure that was reduced as a whole",
+        "Give a structure of its own (sectors = 1) to carry the surface",
+    ),
+    needs(
+        &[CARRIED_AROUND],
+        ("a contact grid in its ROM", |at| at.carrier_rom().is_some_and(|rom| rom.extras.grid.is_some())),
+        "the surface is laid through it",
+        "Reduce the casing with `tiprub reduce casing`, or add the metadata `contact_grid`",
+    ),
+    needs(
+        &[CARRIED_OPEN],
+        ("an open contact grid in its ROM", |at| {
+            at.carrier_rom().and_then(|rom| rom.extras.grid).is_some_and(|grid| !grid.closed)
+        }),
+        "the surface is laid through it",
+        "Add the metadata `contact_grid` for an open grid, its contact nodes row after row",
+    ),
+];
+
+/// All rows, in the order of the guide.
+pub fn all() -> impl Iterator<Item = &'static Rule> {
+    PARTS.iter().chain(VARIABLES).chain(METHODS).chain(ROMS)
+}
+
+impl Rule {
+    fn relation(&self) -> String {
+        format!("{} {}", if self.needed { "needs" } else { "excludes" }, self.other.0)
+    }
+
+    /// As the guide prints it: features, what they need or exclude, why, what to do.
+    pub fn columns(&self) -> [String; 4] {
+        let features: Vec<String> = self.features.iter().map(Fact::shown).collect();
+        [features.join(", "), self.relation(), self.because.to_owned(), self.remedy.to_owned()]
+    }
+}
+
+impl SceneSettings {
+    /// What structures, surfaces and contacts need and exclude, whose names are checked.
+    pub(super) fn check_parts(&self) -> Result<()> {
+        check(PARTS, self.place(), path)
+    }
+
+    /// The same of outputs, inputs, scheme and solver.
+    pub(super) fn check_whole(&self) -> Result<()> {
+        check(VARIABLES, self.place(), path).and_then(|()| check(METHODS, self.place(), path))
+    }
+
+    fn place(&self) -> Place<'_> {
+        let (scheme, solver) = (self.time.scheme, self.contacts[0].solver);
+        Place { settings: self, roms: &[], scheme, solver, index: 0 }
+    }
+}
+
+impl Scene {
+    /// What a validated scene needs of its ROMs, and what they exclude.
+    pub(crate) fn check_roms(&self) -> Result<()> {
+        check(ROMS, Place { roms: &self.roms, ..self.settings.place() }, path)
+    }
+
+    /// Whether a validated scene can be stepped with a scheme and a solver.
+    ///
+    /// # Errors
+    /// Naming parameter and remedy.
+    pub fn check_methods(&self, scheme: Scheme, solver: Solver) -> Result<()> {
+        let parameter = |_: &Place, key: &str| format!("parameter `{}`", key.rsplit('.').next().unwrap_or(key));
+        check(METHODS, Place { roms: &self.roms, scheme, solver, ..self.settings.place() }, parameter)
+    }
+}
+
+/// Refuse what breaks a row; `name` tells of a key at a place what it is called.
+fn check(rules: &[Rule], scene: Place, name: impl Fn(&Place, &str) -> String) -> Result<()> {
+    for (rule, feature) in rules.iter().flat_map(|rule| rule.features.iter().map(move |feature| (rule, feature))) {
+        let breaks = |at: &Place| (feature.holds)(at) && (rule.other.1)(at) != rule.needed;
+        if let Some(at) = scene.all_of(feature.key).find(breaks) {
+            let words = if feature.words.is_empty() { String::new() } else { format!("{} ", feature.words) };
+            let problem = format!("{words}{}: {}", rule.relation(), rule.because);
+            return Err(Error::invalid(name(&at, feature.key), problem, rule.remedy));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,79 @@
+//! What a scene can have, so that something else is needed or excluded.
+
+use super::place::Place;
+use crate::settings::{Closure, InputInterpolation, Meridian, Motion, Scheme, Shape, Solver};
+
+/// Something a scene can have at a place.
+pub struct Fact {
+    /// Key of the scene file, whose first word says which places there are.
+    pub(super) key: &'static str,
+    /// What it is there, where the key alone does not say it.
+    pub(super) words: &'static str,
+    pub(super) holds: fn(&Place) -> bool,
+}
+
+const fn fact(key: &'static str, words: &'static str, holds: fn(&Place) -> bool) -> Fact {
+    Fact { key, words, holds }
+}
+
+impl Fact {
+    /// As the guide prints it.
+    pub(super) fn shown(&self) -> String {
+        if self.words.is_empty() { format!("`{}`", self.key) } else { format!("`{}`: {}", self.key, self.words) }
+    }
+}
+
+pub(super) const SPEED: Fact = fact("structure.speed", "", |at| at.structure().speed != 0.0);
+pub(super) const VELOCITY: Fact =
+    fact("structure.velocity", "", |at| at.structure().velocity.iter().any(|one| *one != 0.0));
+pub(super) const FACTORS: Fact =
+    fact("structure.frequency_factors", "", |at| !at.structure().frequency_factors.is_empty());
+pub(super) const STIFFENING: Fact = fact("structure.spin.stiffening", "", |at| at.structure().spin.stiffening);
+pub(super) const GROWTH: Fact = fact("structure.spin.growth", "", |at| at.structure().spin.growth);
+pub(super) const CORIOLIS: Fact = fact("structure.spin.coriolis", "", |at| at.structure().spin.coriolis);
+pub(super) const WHIRL: Fact = fact("structure.whirl", "", |at| at.structure().whirl);
+pub(super) const AXIAL_SHIFT: Fact = fact("structure.axial_shift", "", |at| at.structure().axial_shift);
+pub(super) const THERMAL: Fact = fact("structure.thermal", "", |at| at.structure().thermal);
+pub(super) const LOAD: Fact = fact("structure.load", "", |at| at.structure().load.is_some());
+pub(super) const ROM_AROUND: Fact =
+    fact("structure.rom", "around an axis", |at| at.meets(|motion| motion != Motion::Free));
+pub(super) const ROM_FREE: Fact =
+    fact("structure.rom", "of a free structure, or of what it meets", |at| at.meets(|motion| motion == Motion::Free));
+
+pub(super) const SHAPE: Fact = fact("surface.shape", "", |at| at.surface().shape != Shape::default());
+pub(super) const MOVING: Fact = fact("surface.moving", "", |at| at.surface().moving);
+pub(super) const RAMP_TIME: Fact = fact("surface.ramp_time", "", |at| at.surface().ramp_time != 0.0);
+pub(super) const CARRIED: Fact = fact("surface.structure", "", |at| at.surface().structure.is_some());
+pub(super) const CARRIED_AROUND: Fact =
+    fact("surface.structure", "around an axis", |at| at.surface().structure.is_some() && !at.is_free());
+pub(super) const CARRIED_OPEN: Fact =
+    fact("surface.structure", "under a free master", |at| at.surface().structure.is_some() && at.is_free());
+pub(super) const RIGID: Fact = fact("surface.rigid", "", |at| at.surface().rigid);
+pub(super) const PATCHES: Fact = fact("surface.patches", "", |at| at.surface().patches.is_some());
+pub(super) const CLOSURE: Fact = fact("surface.spline.closure", "", |at| {
+    at.surface().spline.is_some_and(|spline| spline.closure != Closure::default())
+});
+
+pub(super) const FREE_MASTER: Fact = fact("contact.master", "a free structure", |at| at.is_free());
+pub(super) const ONE_OF_SEVERAL: Fact = fact("contact.master", "a structure of several contacts", |at| {
+    at.settings.contacts.iter().filter(|other| other.master == at.contact().master).count() > 1
+});
+pub(super) const GAP: Fact = fact("contact.gap", "", |at| at.contact().gap != 0.0);
+pub(super) const SECTOR_GAPS: Fact = fact("contact.sector_gaps", "", |at| !at.contact().sector_gaps.is_empty());
+pub(super) const MERIDIAN: Fact = fact("contact.meridian", "", |at| at.contact().meridian != Meridian::default());
+pub(super) const COATING: Fact = fact("contact.coating", "", |at| at.is_coated());
+pub(super) const HEAT: Fact = fact("contact.heat_to_slave", "", |at| at.contact().heat_to_slave.is_some());
+pub(super) const SOLVER: Fact = fact("contact.solver", "", |_| true);
+pub(super) const FILM: Fact = fact("contact.solver", "`film`", |at| at.solver == Solver::Film);
+pub(super) const COULOMB: Fact = fact("contact.solver", "`coulomb`", |at| at.solver == Solver::Coulomb);
+
+pub(super) const MASSLESS: Fact =
+    fact("time.scheme", "`massless-boundary`", |at| at.scheme == Scheme::MasslessBoundary);
+pub(super) const INTERPOLATION: Fact =
+    fact("time.input_interpolation", "", |at| at.settings.time.input_interpolation != InputInterpolation::default());
+pub(super) const OTHER_SECTORS: Fact =
+    fact("outputs.watched_sectors", "beyond 1", |at| at.outputs().watched_sectors.iter().any(|sector| *sector != 1));
+pub(super) const ALL_SECTORS: Fact = fact("outputs.all_sectors", "", |at| at.outputs().all_sectors);
+pub(super) const DIAMETERS: Fact = fact("outputs.nodal_diameters", "", |at| at.outputs().nodal_diameters.is_some());
+pub(super) const WEAR: Fact = fact("outputs.wear", "", |at| at.outputs().wear);
+pub(super) const DISPLACEMENT: Fact = fact("outputs.slave_displacement", "", |at| at.outputs().slave_displacement);

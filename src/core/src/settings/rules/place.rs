@@ -1,0 +1,125 @@
+//! Where rules are asked for: structures and contacts of a scene, and the scene as a whole.
+
+use crate::Rom;
+use crate::settings::{
+    ContactSettings, Motion, OutputSettings, SceneSettings, Scheme, Solver, StructureSettings, SurfaceSettings,
+};
+
+/// A place of a scene: one of its structures or contacts, or the scene as a whole.
+#[derive(Clone, Copy)]
+pub struct Place<'a> {
+    pub(super) settings: &'a SceneSettings,
+    /// As the structures; empty before ROMs are known.
+    pub(super) roms: &'a [Rom],
+    pub(super) scheme: Scheme,
+    pub(super) solver: Solver,
+    /// Structure or contact.
+    pub(super) index: usize,
+}
+
+/// The key with the number of its structure, surface or contact.
+pub(super) fn path(at: &Place, key: &str) -> String {
+    let (table, rest) = key.split_once('.').unwrap_or((key, ""));
+    let number = match table {
+        "structure" | "contact" => at.index,
+        "surface" => at.settings.surfaces.iter().position(|one| one.name == at.contact().slave).unwrap_or(0),
+        _ => return key.to_owned(),
+    };
+    format!("{table}[{}].{rest}", number + 1)
+}
+
+impl<'a> Place<'a> {
+    /// The places of a key: structures, contacts, or the scene.
+    pub(super) fn all_of(self, key: &str) -> impl Iterator<Item = Self> {
+        let count = match key.split('.').next() {
+            Some("structure") => self.settings.structures.len(),
+            Some("surface" | "contact") => self.settings.contacts.len(),
+            _ => 1,
+        };
+        (0..count).map(move |index| Self { index, ..self })
+    }
+
+    pub(super) fn structure(&self) -> &'a StructureSettings {
+        &self.settings.structures[self.index]
+    }
+
+    /// Of a structure; ROMs are known.
+    pub(super) fn rom(&self) -> &'a Rom {
+        &self.roms[self.index]
+    }
+
+    pub(super) fn contact(&self) -> &'a ContactSettings {
+        &self.settings.contacts[self.index]
+    }
+
+    /// Of a contact, whose names are checked.
+    pub(super) fn surface(&self) -> &'a SurfaceSettings {
+        let own = self.settings.surfaces.iter().find(|surface| surface.name == self.contact().slave);
+        own.unwrap_or_else(|| unreachable!("validated"))
+    }
+
+    pub(super) fn outputs(&self) -> &'a OutputSettings {
+        &self.settings.outputs
+    }
+
+    pub(super) fn contacts(self) -> impl Iterator<Item = Self> {
+        self.all_of("contact")
+    }
+
+    /// Whether the master of the contact flies freely.
+    pub(super) fn is_free(&self) -> bool {
+        self.settings.master_of(self.contact()).is_some_and(|master| master.motion == Motion::Free)
+    }
+
+    pub(super) fn is_coated(&self) -> bool {
+        self.contact().coating.is_some()
+    }
+
+    /// Place among the structures of the one under the surface of the contact.
+    fn under(&self) -> Option<usize> {
+        let name = self.surface().structure.as_ref()?;
+        self.settings.structures.iter().position(|structure| structure.name == *name)
+    }
+
+    pub(super) fn carrier(&self) -> Option<&'a StructureSettings> {
+        self.under().map(|index| &self.settings.structures[index])
+    }
+
+    pub(super) fn carrier_rom(&self) -> Option<&'a Rom> {
+        self.under().map(|index| &self.roms[index])
+    }
+
+    pub(super) fn touches(&self, structure: &StructureSettings) -> bool {
+        self.settings.touches(structure)
+    }
+
+    /// Whether the structure takes part in a contact whose master moves like this.
+    pub(super) fn meets(&self, moves: fn(Motion) -> bool) -> bool {
+        let own = self.index;
+        self.contacts().any(|at| {
+            let Some(master) = at.settings.master_of(at.contact()) else { return false };
+            (master.name == self.structure().name || at.under() == Some(own)) && moves(master.motion)
+        })
+    }
+
+    /// Whether there is room for `coulomb`: a coupled problem of all sectors has it only if the scene says so.
+    pub(super) fn may_stick(&self) -> bool {
+        let settings = self.settings;
+        let rotors = settings.contacts.iter().filter_map(|contact| settings.master_of(contact));
+        let small =
+            rotors.zip(self.contacts()).all(|(rotor, at)| rotor.motion != Motion::Free && at.carrier().is_none());
+        let uncoupled = self.roms.iter().all(|rom| !rom.is_cyclic());
+        let rubs = settings.contacts.iter().any(|contact| contact.friction > 0.0);
+        settings.contacts[0].solver == Solver::Coulomb
+            || (small && uncoupled && rubs && self.contacts().all(|at| !at.is_coated()))
+    }
+
+    /// Whether every structure that touches keeps modes with inertia; before ROMs are known it may.
+    pub(super) fn has_modes_left(&self) -> bool {
+        let structures = self.settings.structures.iter().zip(self.roms);
+        structures.filter(|(structure, _)| self.touches(structure)).all(|(_, rom)| {
+            let harmonics = rom.extras.harmonics.iter().map(|harmonic| harmonic.mass.nrows());
+            harmonics.chain([rom.order()]).all(|modes| modes > 3 * rom.contact_nodes.len())
+        })
+    }
+}

@@ -1,0 +1,202 @@
+use nalgebra::{Complex, DMatrix};
+
+use super::all;
+use crate::rom::{ContactGrid, ContactNode, Frame, Harmonic, RomChecks, RomExtras};
+use crate::settings::*;
+use crate::{Rom, Scene};
+
+fn rom(frame: Frame) -> Rom {
+    let node = ContactNode { name: "tip".into(), position: [0.25, 0.0, 0.0], meridional_slope: 0.0 };
+    let grid = Some(ContactGrid { around: 8, along: 2, closed: frame == Frame::Cylindrical });
+    Rom {
+        name: "rom".into(),
+        origin: String::new(),
+        sectors: 1,
+        frame,
+        mass: DMatrix::identity(4, 4),
+        stiffness: DMatrix::identity(4, 4),
+        damping_ratio: 0.01,
+        contact_map: DMatrix::identity(3, 4),
+        contact_nodes: vec![node],
+        checks: RomChecks::default(),
+        extras: RomExtras { grid, ..RomExtras::default() },
+    }
+}
+
+/// `master` before a surface of `under`, which stands still.
+fn scene(motion: Motion, frame: Frame) -> Scene {
+    let structure = |name: &str, motion| StructureSettings { name: name.into(), motion, ..Default::default() };
+    let settings = SceneSettings {
+        name: "scene".into(),
+        structures: vec![structure("master", motion), structure("under", Motion::Still)],
+        surfaces: vec![SurfaceSettings {
+            name: "surface".into(),
+            structure: Some("under".into()),
+            ..Default::default()
+        }],
+        contacts: vec![contact("surface")],
+        description: String::new(),
+        time: TimeSettings::default(),
+        outputs: OutputSettings::default(),
+        experiment: ExperimentSettings { start: 0.0, stop: 1.0, communication_step: 1e-3 },
+    };
+    Scene { settings, roms: vec![rom(frame), rom(frame)] }
+}
+
+fn contact(surface: &str) -> ContactSettings {
+    ContactSettings { master: "master".into(), slave: surface.into(), friction: 0.1, ..Default::default() }
+}
+
+fn rotor() -> Scene {
+    scene(Motion::Rotating, Frame::Cylindrical)
+}
+
+fn flight() -> Scene {
+    scene(Motion::Free, Frame::Cartesian)
+}
+
+fn coating() -> Option<CoatingSettings> {
+    let (thickness, modulus, yield_stress, hardening) = (1e-4, 2e8, 1e6, 2e7);
+    Some(CoatingSettings { thickness, modulus, yield_stress, hardening, cells_around: 500, cells_along: 3 })
+}
+
+/// A second contact of the same master, on a surface of the same structure.
+fn second(settings: &mut SceneSettings) {
+    settings.surfaces.push(SurfaceSettings { name: "other".into(), ..settings.surfaces[0].clone() });
+    settings.contacts.push(contact("other"));
+    for (contact, nodes) in settings.contacts.iter_mut().zip(["a", "b"]) {
+        contact.nodes = Some(nodes.into());
+    }
+}
+
+fn couple(rom: &mut Rom) {
+    let matrix = DMatrix::<Complex<f64>>::identity(4, 4);
+    rom.extras.harmonics =
+        vec![Harmonic { mass: matrix.clone(), stiffness: matrix.clone(), contact_map: matrix.rows(0, 3).into() }];
+}
+
+type Change = fn(&mut Scene);
+
+/// What breaks a row in a scene with a rotor, and how the refusal begins.
+const OF_ROTORS: &[(&str, Change)] = &[
+    ("structure[2].whirl: needs `motion = \"rotating\"`", |scene| scene.settings.structures[1].whirl = true),
+    ("structure[1].thermal: needs `motion = \"still\"`", |scene| scene.settings.structures[0].thermal = true),
+    ("structure[2].velocity: needs `motion = \"free\"`", |scene| {
+        scene.settings.structures[1].velocity = [0.0, 1.0, 0.0];
+    }),
+    ("surface[1].structure: needs a structure with", |scene| {
+        scene.settings.surfaces[0].structure = Some("master".into());
+    }),
+    ("surface[1].structure: excludes a structure that is the master", |scene| {
+        scene.settings.contacts[0].master = "under".into();
+    }),
+    ("surface[1].rigid: needs a free master", |scene| scene.settings.surfaces[0].rigid = true),
+    ("contact[1].master: a structure of several contacts needs", |scene| {
+        second(&mut scene.settings);
+        scene.settings.contacts[0].nodes = None;
+    }),
+    ("contact[1].meridian: excludes a surface spline", |scene| {
+        scene.settings.contacts[0].meridian = Meridian::Cylinder;
+    }),
+    ("contact[1].heat_to_slave: needs `contact.friction`", |scene| {
+        (scene.settings.contacts[0].friction, scene.settings.contacts[0].heat_to_slave) = (0.0, Some(0.5));
+    }),
+    ("contact[2].coating: excludes contacts solved together", |scene| {
+        second(&mut scene.settings);
+        scene.settings.contacts[1].coating = coating();
+    }),
+    ("contact[2].solver: needs that of contact[1]", |scene| {
+        second(&mut scene.settings);
+        scene.settings.contacts[1].solver = Solver::Film;
+    }),
+    ("outputs.wear: needs `contact.coating`", |scene| scene.settings.outputs.wear = true),
+    ("outputs.slave_displacement: needs `surface.structure`", |scene| {
+        scene.settings.surfaces[0].structure = None;
+        scene.settings.outputs.slave_displacement = true;
+    }),
+    ("contact[1].solver: `film` excludes a coating", |scene| {
+        (scene.settings.contacts[0].coating, scene.settings.contacts[0].solver) = (coating(), Solver::Film);
+    }),
+    ("time.scheme: `massless-boundary` excludes `structure.spin.coriolis`", |scene| {
+        scene.settings.structures[0].spin.coriolis = true;
+        scene.settings.time.scheme = Scheme::MasslessBoundary;
+    }),
+    ("time.scheme: `massless-boundary` excludes several surfaces", |scene| {
+        second(&mut scene.settings);
+        scene.settings.time.scheme = Scheme::MasslessBoundary;
+    }),
+    ("parameter `scheme`: `massless-boundary` needs more than three modes", |scene| {
+        scene.settings.time.scheme = Scheme::MasslessBoundary;
+        scene.roms[0].mass = DMatrix::identity(3, 3);
+    }),
+    ("structure[1].rom: around an axis needs `frame = cylindrical`", |scene| scene.roms[0].frame = Frame::Cartesian),
+    ("structure[1].spin.growth: needs spin matrices", |scene| scene.settings.structures[0].spin.growth = true),
+    ("structure[1].frequency_factors: excludes a ROM whose sectors", |scene| {
+        scene.settings.structures[0].frequency_factors = vec![1.0];
+        couple(&mut scene.roms[0]);
+    }),
+    ("structure[2].thermal: needs thermal loads", |scene| scene.settings.structures[1].thermal = true),
+    ("structure[2].load: needs a contact grid", |scene| {
+        scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 1.0, phase: 0.0 });
+        scene.roms[1].extras.grid = None;
+    }),
+    ("surface[1].structure: excludes a structure whose sectors", |scene| couple(&mut scene.roms[1])),
+    ("surface[1].structure: around an axis needs a contact grid", |scene| scene.roms[1].extras.grid = None),
+];
+
+/// The same of a scene with a free master.
+const OF_FREE_MASTERS: &[(&str, Change)] = &[
+    ("surface[1].moving: excludes a free master", |scene| scene.settings.surfaces[0].moving = true),
+    ("contact[1].gap: excludes a free master", |scene| scene.settings.contacts[0].gap = 1e-3),
+    ("contact[1].master: a free structure needs `surface.structure`", |scene| {
+        scene.settings.surfaces[0].structure = None;
+    }),
+    ("outputs.all_sectors: excludes a scene of free masters only", |scene| scene.settings.outputs.all_sectors = true),
+    ("outputs.slave_displacement: excludes a scene of free masters only", |scene| {
+        scene.settings.outputs.slave_displacement = true;
+    }),
+    ("time.input_interpolation: excludes a scene of free masters only", |scene| {
+        scene.settings.time.input_interpolation = InputInterpolation::Hold;
+    }),
+    ("time.scheme: `massless-boundary` excludes a free master", |scene| {
+        scene.settings.time.scheme = Scheme::MasslessBoundary;
+    }),
+    ("structure[2].rom: of a free structure, or of what it meets needs `frame = cartesian`", |scene| {
+        scene.roms[1].frame = Frame::Cylindrical;
+    }),
+    ("structure[1].rom: of a free structure, or of what it meets needs `sectors = 1`", |scene| {
+        scene.roms[0].sectors = 2;
+    }),
+    ("surface[1].structure: under a free master needs an open contact grid", |scene| {
+        scene.roms[1].extras.grid = Some(ContactGrid { around: 8, along: 2, closed: true });
+    }),
+];
+
+fn check(scene: &Scene, solver: Solver) -> crate::Result<()> {
+    scene.settings.check_parts()?;
+    scene.settings.check_whole()?;
+    scene.check_roms()?;
+    scene.check_methods(scene.settings.time.scheme, solver)
+}
+
+#[test]
+fn every_row_refuses_what_breaks_it_and_tells_it() {
+    let mut told = Vec::new();
+    for (whole, changes) in [(rotor(), OF_ROTORS), (flight(), OF_FREE_MASTERS)] {
+        check(&whole, Solver::Lcp).unwrap();
+        for (beginning, change) in changes {
+            let mut scene = whole.clone();
+            change(&mut scene);
+            let error = check(&scene, scene.settings.contacts[0].solver).unwrap_err().to_string();
+            assert!(error.starts_with(beginning), "{error:?} instead of {beginning:?}");
+            told.push(error);
+        }
+    }
+    told.push(check(&rotor(), Solver::Coulomb).unwrap_err().to_string());
+    for rule in all() {
+        let [features, relation, because, remedy] = rule.columns();
+        let whole =
+            |error: &String| [&relation, &because, &remedy].into_iter().all(|part| error.contains(part.as_str()));
+        assert!(told.iter().any(whole), "{features} {relation}: no case here breaks it");
+    }
+}

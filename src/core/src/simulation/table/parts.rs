@@ -1,0 +1,115 @@
+//! What of a scene the variables depend on: structures that touch, contact pairs, structures that carry surfaces.
+
+use crate::settings::{ContactSettings, Scene, SceneSettings, StructureSettings, SurfaceSettings};
+use crate::simulation::patches::Patches;
+use crate::simulation::plan::{PairPlan, Plan, prefix};
+use crate::{Error, Result, Rom, ranges};
+
+pub const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// What of a scene the variables depend on.
+pub struct Parts<'a> {
+    pub scene: &'a Scene,
+    pub settings: &'a SceneSettings,
+    pub plan: Plan,
+}
+
+/// A structure that touches.
+#[derive(Clone, Copy)]
+pub struct Body<'a> {
+    pub index: usize,
+    pub structure: &'a StructureSettings,
+    pub rom: &'a Rom,
+    pub free: bool,
+}
+
+/// A contact pair.
+pub struct Pair<'a> {
+    pub index: usize,
+    pub contact: &'a ContactSettings,
+    pub surface: &'a SurfaceSettings,
+    pub body: Body<'a>,
+    /// Structure that deforms the surface.
+    pub carrier: Option<usize>,
+    /// Patches that friction power is gathered for.
+    pub patches: usize,
+}
+
+/// A structure that carries surfaces.
+pub struct Carrier<'a> {
+    pub index: usize,
+    pub structure: &'a StructureSettings,
+    pub rom: &'a Rom,
+    /// Of open surfaces.
+    pub open: bool,
+}
+
+impl<'a> Parts<'a> {
+    pub fn bodies(&self) -> Vec<Body<'a>> {
+        let body = |index: usize| {
+            let (structure, rom) = self.plan.structure(self.scene, index);
+            Body { index, structure, rom, free: self.plan.is_free(self.scene, index) }
+        };
+        (0..self.plan.bodies.len()).map(body).collect()
+    }
+
+    pub fn pairs(&self) -> Vec<Pair<'a>> {
+        let bodies = self.bodies();
+        let pair = |(index, plan): (usize, &PairPlan)| Pair {
+            index,
+            contact: &self.settings.contacts[index],
+            surface: &self.settings.surfaces[plan.surface],
+            body: bodies[plan.body],
+            carrier: plan.carrier,
+            patches: Patches::new(self.scene, &self.plan, plan).as_ref().map_or(0, Patches::len),
+        };
+        self.plan.pairs.iter().enumerate().map(pair).collect()
+    }
+
+    pub fn carriers(&self) -> Vec<Carrier<'a>> {
+        let carrier = |(index, structure): (usize, &usize)| Carrier {
+            index,
+            structure: &self.settings.structures[*structure],
+            rom: &self.scene.roms[*structure],
+            open: self
+                .plan
+                .pairs
+                .iter()
+                .any(|pair| pair.carrier == Some(index) && self.plan.is_free(self.scene, pair.body)),
+        };
+        self.plan.carriers.iter().enumerate().map(carrier).collect()
+    }
+
+    /// A scene that gives no friction coefficient has no friction variables.
+    pub fn has_friction(&self) -> bool {
+        self.settings.contacts.iter().any(|contact| contact.friction > 0.0)
+    }
+
+    pub fn of_body(&self, body: &Body) -> String {
+        prefix(self.plan.bodies.len(), &body.structure.name)
+    }
+
+    pub fn of_pair(&self, pair: &Pair) -> String {
+        prefix(self.plan.pairs.len(), &pair.surface.name)
+    }
+
+    pub fn of_carrier(&self, carrier: &Carrier) -> String {
+        prefix(self.plan.carriers.len(), &carrier.structure.name)
+    }
+
+    /// The structure that a text speaks of: the rotor, or its name.
+    pub fn rotor(&self, body: &Body) -> String {
+        if body.free || self.plan.bodies.len() > 1 { body.structure.name.clone() } else { "the rotor".to_owned() }
+    }
+}
+
+/// Lengths beyond this are not small against the radius of the contact nodes (m).
+pub fn largest_length(rom: &Rom) -> f64 {
+    let radii = rom.contact_nodes.iter().map(|node| node.position[0]);
+    ranges::SMALL * radii.fold(f64::INFINITY, f64::min)
+}
+
+/// Refuse what no structure has.
+pub fn refuse<T>(field: &str, problem: String, remedy: String) -> Result<T> {
+    Err(Error::invalid(format!("outputs.{field}"), problem, remedy))
+}
