@@ -10,7 +10,7 @@ use tiprub_model::{
 use tiprub_shell::{Failure, Result, places::Named};
 use tiprub_study::arguments::ConvergenceArguments;
 
-use crate::shared_arguments::{MaterialChoice, Written, axial, pair};
+use crate::shared_arguments::{KindChoice, MaterialChoice, Written, axial, pair};
 
 /// Arguments of `tiprub reduce blade`.
 #[derive(Debug, Clone, PartialEq, Args)]
@@ -41,6 +41,9 @@ pub struct BladeOptions {
     /// Also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s); from a mesh only.
     #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true, conflicts_with = "stiffness")]
     pub spin: Option<f64>,
+    /// Which modes are kept [default: craig-bampton; free-interface with --contact-patches].
+    #[arg(long, value_enum)]
+    pub kind: Option<KindChoice>,
     /// What is read.
     #[command(flatten)]
     pub model: ModelOptions,
@@ -155,7 +158,10 @@ pub struct TipOptions {
     /// Number of contact nodes, chosen evenly along the chord out of the contact set.
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
-    /// Names of the contact nodes, by growing z [default: tip_1,tip_2,...].
+    /// Number of patches along the chord that the faces within the contact set are divided into, instead of nodes.
+    #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
+    pub contact_patches: Option<usize>,
+    /// Names of the contact nodes or patches, by growing z [default: tip_1,tip_2,...].
     #[arg(long, value_name = "NAME,NAME,...", value_delimiter = ',', value_parser = identifier)]
     pub contact_names: Vec<String>,
 }

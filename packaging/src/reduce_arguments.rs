@@ -2,14 +2,18 @@
 
 use clap::{Args, Subcommand, ValueEnum};
 use tiprub_gallery::builtin;
-use tiprub_model::{Rotor37Options, cube::MassMatrix, rotor37::MeshCounts};
+use tiprub_model::{
+    Rotor37Options,
+    cube::MassMatrix,
+    rotor37::{MeshCounts, Tip},
+};
 use tiprub_shell::places::Named;
 use tiprub_study::arguments::positive;
 
 use crate::{
     casing_arguments::CasingArguments,
     own_arguments::{BladeArguments, CasingMeshArguments, SectorArguments},
-    shared_arguments::{MaterialChoice, MeshSize, Written, pair},
+    shared_arguments::{KindChoice, MaterialChoice, MeshSize, Written, pair},
 };
 
 /// Arguments of `tiprub reduce`.
@@ -70,12 +74,18 @@ pub enum Model {
 /// Arguments of `tiprub reduce rotor37`.
 #[derive(Debug, Args)]
 pub struct Rotor37Arguments {
-    /// Fixed-interface modes kept [default: 20].
+    /// Modes kept [default: 20].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
     /// Contact nodes along the tip chord, leading edge to trailing edge (≥ 2) [default: 3].
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
+    /// Contact patches along the tip chord, over the whole thickness, instead of nodes.
+    #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
+    pub contact_patches: Option<usize>,
+    /// Which modes are kept [default: craig-bampton; free-interface with --contact-patches].
+    #[arg(long, value_enum)]
+    pub kind: Option<KindChoice>,
     /// Elements along the chord, through the thickness and along the span [default: 16x2x20].
     #[arg(long, value_name = "CxTxS")]
     pub mesh: Option<MeshSize>,
@@ -96,8 +106,13 @@ impl Rotor37Arguments {
                 let [chord, thickness, span] = size.0;
                 MeshCounts { chord, thickness, span }
             }),
-            contact_nodes: self.contact_nodes.unwrap_or(defaults.contact_nodes),
-            fixed_interface_modes: self.modes.unwrap_or(defaults.fixed_interface_modes),
+            tip: match (self.contact_nodes, self.contact_patches) {
+                (_, Some(patches)) => Tip::Patches(patches),
+                (Some(nodes), None) => Tip::Nodes(nodes),
+                (None, None) => defaults.tip,
+            },
+            kind: KindChoice::kind(self.kind, self.contact_patches.is_some()),
+            modes: self.modes.unwrap_or(defaults.modes),
             spin: self.spin,
             ..defaults
         }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use tiprub_model::Material;
+use tiprub_model::{Material, reduce::ReductionKind};
 
 /// What every reduction writes.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Args)]
@@ -20,6 +20,28 @@ pub struct Written {
     /// Also write mesh, sets and mode shapes for ParaView (.vtu).
     #[arg(long, value_name = "FILE")]
     pub vtk: Option<PathBuf>,
+}
+
+/// Which modes a reduction keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum KindChoice {
+    /// Modes with the contact nodes held (Craig and Bampton): the paper's. Contact nodes have mass.
+    CraigBampton,
+    /// Modes with the contact nodes free, and exact responses at rest to contact forces (MacNeal, Rubin): fewer modes for the
+    /// same error; with the scheme massless-boundary contact nodes have no mass.
+    FreeInterface,
+}
+
+impl KindChoice {
+    /// The kind asked for; contact patches ask for free-interface modes.
+    pub fn kind(choice: Option<Self>, patches: bool) -> ReductionKind {
+        match choice {
+            Some(Self::CraigBampton) => ReductionKind::FixedInterface,
+            Some(Self::FreeInterface) => ReductionKind::FreeInterface,
+            None if patches => ReductionKind::FreeInterface,
+            None => ReductionKind::FixedInterface,
+        }
+    }
 }
 
 /// Materials by name.

@@ -12,10 +12,13 @@ use guide::{blocks, holds, missing, numbers, pages, told};
 
 /// Output of `tiprub ...`, line by line.
 fn run(command: &str) -> Vec<String> {
+    run_in(tempfile::tempdir().unwrap().path(), command)
+}
+
+fn run_in(directory: &Path, command: &str) -> Vec<String> {
     let mut words = command.split(' ').skip(1);
-    let root = tempfile::tempdir().unwrap();
     let mut tiprub = Command::new(env!("CARGO_BIN_EXE_tiprub"));
-    tiprub.current_dir(root.path()).env("TIPRUB_CACHE", env!("CARGO_TARGET_TMPDIR")).args(&mut words).arg("--quiet");
+    tiprub.current_dir(directory).env("TIPRUB_CACHE", env!("CARGO_TARGET_TMPDIR")).args(&mut words).arg("--quiet");
     let output = tiprub.output().unwrap();
     assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap().lines().map(String::from).collect()
@@ -76,6 +79,33 @@ fn the_first_run_at_halved_steps() {
         told!("| {step} | {sum} | {node} | {heat} | {curvature} |");
     }
     guide::hold("cargo test -p tiprub --test guide halved");
+}
+
+/// The rub of the first run after two revolutions, without mass at the contact: points along the tip, and patches.
+#[test]
+fn the_first_run_with_points_and_patches() {
+    let root = tempfile::tempdir().unwrap();
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37.toml");
+    let scene = fs::read_to_string(shipped).unwrap();
+    for (text, replaced) in [("modal-exact", "massless-boundary"), ("step = 1.0e-6 ", "step = 5.0e-7 ")] {
+        assert!(scene.contains(text), "{text} instead of {replaced}");
+    }
+    let scene = scene.replace("modal-exact", "massless-boundary").replace("step = 1.0e-6 ", "step = 5.0e-7 ");
+    for what in ["nodes", "patches"] {
+        for count in [3, 5, 9] {
+            let rom = format!("{what}-{count}.rom.safetensors");
+            let reduce = format!("tiprub reduce rotor37 --contact-{what} {count} --kind free-interface -o {rom}");
+            run_in(root.path(), &reduce);
+            fs::write(root.path().join("scene.toml"), scene.replace("builtin:rotor37", &rom)).unwrap();
+            let rows = run_in(root.path(), "tiprub run scene.toml --stop 0.007 --csv -");
+            let last = |name: &str| {
+                let at = rows[0].split(',').position(|known| known == name).unwrap();
+                rows.last().unwrap().split(',').nth(at).unwrap().parse::<f64>().unwrap()
+            };
+            told!("| {count} {what} | {} | {} |", last("strain_energy"), last("friction_loss"));
+        }
+    }
+    guide::hold("cargo test -p tiprub --test guide patches");
 }
 
 /// Tables with decimals stand in a block, in a part that is generated, or behind a mark that says who wrote them and when, or

@@ -192,6 +192,54 @@ fn an_exported_mesh_is_read_back_to_the_same_frequencies() {
     assert!(a.iter().zip(&b).all(|(a, b)| (a / b - 1.0).abs() < 1e-9), "{a:?} {b:?}");
 }
 
+/// Patches over the whole tip of an exported mesh: those of the blade itself; a scene runs with them.
+#[test]
+fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
+    let project = Project::new(&[]);
+    let own = project.succeed("reduce rotor37 --mesh 6x1x6 --inp blade.inp --contact-patches 4 -o own.rom.safetensors");
+    assert!(
+        own["rom"]["origin"].as_str().unwrap().contains("forces on 4 patches and 20 free-interface modes"),
+        "{own:#}"
+    );
+    let line = "reduce blade blade.inp --contact-set TIP --clamp-set HUB --sectors 36 --contact-patches 4 --modes 20 \
+                --contact-names leading_edge,tip_2,tip_3,trailing_edge -o read.rom.safetensors";
+    let read = project.succeed(line);
+    assert_eq!(
+        read["model"]["contact_nodes"][1]["patch_nodes"].as_u64().map(|nodes| nodes > 9),
+        Some(true),
+        "{read:#}"
+    );
+    let [own, read] = ["own.rom.safetensors", "read.rom.safetensors"].map(|name| project.rom(name));
+    for (own, read) in own.contact_nodes.iter().zip(&read.contact_nodes) {
+        assert_eq!(own.name, read.name);
+        let near = own.position.iter().zip(read.position).all(|(a, b)| (a - b).abs() < 1e-9);
+        assert!(near && (own.meridional_slope - read.meridional_slope).abs() < 1e-6, "{own:?} {read:?}");
+    }
+    let flexibility = |rom: &tiprub_core::Rom| rom.stiffness.clone().try_inverse().unwrap();
+    let (own, read) = (flexibility(&own), flexibility(&read));
+    assert!((own.view((0, 0), (12, 12)) - read.view((0, 0), (12, 12))).amax() < 1e-7 * own.amax());
+    let scene =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37.toml")).unwrap();
+    project.write(
+        "scene.toml",
+        scene.replace("builtin:rotor37", "read.rom.safetensors").replace("modal-exact", "massless-boundary"),
+    );
+    let run = project.succeed("run scene.toml --stop 0.003");
+    assert!(run["last"]["friction_loss"].as_f64().unwrap() > 100.0, "{run:#}");
+    for (line, told) in [
+        ("reduce rotor37 --contact-patches 4 --contact-nodes 3", "cannot be used with"),
+        ("reduce rotor37 --mesh 6x1x6 --contact-patches 4 --kind craig-bampton", "holds contact nodes one by one"),
+        ("reduce rotor37 --mesh 6x1x6 --contact-patches 40", "40 is outside 1..=16"),
+        (
+            "reduce blade blade.inp --contact-set TIP --clamp-set HUB --contact-patches 2 --contact-names a",
+            "1 names for 2 contact patches",
+        ),
+    ] {
+        let code = if told.contains("cannot") || told.contains("names") { 2 } else { 1 };
+        assert!(project.fail(line, code).contains(told), "{line}: {}", project.fail(line, code));
+    }
+}
+
 #[test]
 fn effects_of_spin_are_computed_for_a_mesh_of_ones_own() {
     let project = Project::new(&["blade_tet10.msh"]);

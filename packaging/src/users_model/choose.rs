@@ -3,6 +3,7 @@
 use tiprub_model::{
     casing::GridNodes,
     cyclic::{CyclicBoundary, PairingReport},
+    patches::contact_patches,
     read::{ContactChoice, Imported, choose_contact_nodes, set_counts},
     reduce::ContactPoint,
 };
@@ -46,11 +47,33 @@ pub fn tips(
         fixed.sort_unstable();
     }
     let (free, by_number) = free_contact_nodes(imported, asked, &fixed)?;
+    if let Some(count) = tips.contact_patches {
+        return Ok(Chosen {
+            clamped,
+            contact: patches(imported, &free, count, &tips.contact_names)?,
+            faces,
+            grid: None,
+        });
+    }
     // Nodes given one by one are all meant.
     let count = tips.contact_nodes.or(by_number.then_some(free.len()));
     let choice = ContactChoice { count, names: tips.contact_names.clone() };
     let contact = choose_contact_nodes(&imported.model.nodes, &free, &choice).map_err(failure)?;
     Ok(Chosen { clamped, contact, faces, grid: None })
+}
+
+/// Patches of the faces whose nodes are all in the contact set.
+fn patches(imported: &Imported, set: &[usize], count: usize, names: &[String]) -> Result<Vec<ContactPoint>> {
+    let Some((mesh, _)) = &imported.model.mesh else {
+        let problem = "patches are made of the faces of a mesh";
+        return Err(Failure::usage("--contact-patches", problem, "Give a mesh file, or ask for --contact-nodes"));
+    };
+    if !names.is_empty() && names.len() != count {
+        let problem = format!("{} names for {count} contact patches", names.len());
+        return Err(Failure::usage("--contact-names", problem, "Give one name for each, by growing z"));
+    }
+    let name = |index: usize| names.get(index).cloned().unwrap_or_else(|| format!("tip_{}", index + 1));
+    contact_patches(mesh, set, count, name).map_err(failure)
 }
 
 /// For a casing.

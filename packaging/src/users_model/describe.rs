@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use tiprub_model::{
     cyclic::PairingReport,
     read::{Imported, bounding_box, set_counts, total_mass},
+    reduce::ContactPoint,
 };
 
 use super::choose::Chosen;
@@ -37,13 +38,18 @@ pub fn describe(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> (
     );
     let _ = write!(text, "\n  clamped                   {} nodes", chosen.clamped.len());
     let contact_set = asked.contact_set.as_deref().unwrap_or_default();
-    let _ = write!(text, "\n  contact nodes             {} from {contact_set}", chosen.contact.len());
+    let is_patch = |point: &ContactPoint| !point.patch.is_empty();
+    let what = if chosen.contact.iter().any(is_patch) { "contact patches" } else { "contact nodes  " };
+    let _ = write!(text, "\n  {what}           {} from {contact_set}", chosen.contact.len());
     if let Some(grid) = &chosen.grid {
         let _ = write!(text, ": {} around x {} along", grid.around, grid.along());
     }
     for point in chosen.contact.iter().filter(|_| chosen.grid.is_none()) {
         let number = imported.node_numbers[point.node];
-        let _ = write!(text, "\n    {:<24}node {number} of the file", point.name);
+        let _ = match point.patch.len() {
+            0 => write!(text, "\n    {:<24}node {number} of the file", point.name),
+            nodes => write!(text, "\n    {:<24}{nodes} nodes around node {number} of the file", point.name),
+        };
     }
     if let Some((boundary, report)) = &chosen.faces {
         let PairingReport { largest_mismatch, typical_mismatch, .. } = report;
@@ -74,7 +80,7 @@ pub fn describe(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> (
             "swapped": report.swapped,
         })),
         "contact_nodes": chosen.contact.iter().map(|point| json!({
-            "name": point.name, "node": imported.node_numbers[point.node], "slope": point.meridional_slope,
+            "name": point.name, "patch_nodes": point.patch.len(), "node": imported.node_numbers[point.node], "slope": point.meridional_slope,
         })).collect::<Vec<_>>(),
         "notes": imported.notes,
     });

@@ -22,6 +22,7 @@ use tiprub_model::{
 use tiprub_shell::{Failure, Result, console::Console};
 use tiprub_study::convergence::refine;
 
+use crate::shared_arguments::KindChoice;
 use crate::{
     own_arguments::{BladeOptions, CasingMeshArguments, KeptOptions, SectorArguments, Source, TipOptions},
     reduced::Reduced,
@@ -141,8 +142,8 @@ fn general(
     let title = format!("Reducing {name}");
     let options = ReductionOptions {
         name,
-        kind: ReductionKind::FixedInterface,
-        fixed_interface_modes: source.kept.modes.unwrap_or(MODES),
+        kind: KindChoice::kind(asked.kind, chosen.contact.iter().any(|point| !point.patch.is_empty())),
+        modes: source.kept.modes.unwrap_or(MODES),
         checked_modes: CHECKED_MODES,
         sectors: asked.sectors.unwrap_or(1) as usize,
         frame: Frame::Cylindrical,

@@ -6,7 +6,7 @@ use tiprub_model::{
     casing::CASING37,
     cube::{CubeOptions, RingOptions, Side},
     cyclic::{CyclicOptions, CyclicReduction, ModeSelection, reduce_cyclic},
-    rotor37::DESIGN_SPEED,
+    rotor37::{DESIGN_SPEED, Tip},
     stage::{
         StageOptions,
         casing::{StageCasingOptions, reduce_stage_casing},
@@ -101,8 +101,8 @@ pub fn refined(name: &str, factor: f64, contact_nodes: usize, console: &Console)
     };
     let blade = |spin| {
         let defaults = Rotor37Options::default();
-        let fixed_interface_modes = times(defaults.fixed_interface_modes);
-        Rotor37Options { spin, contact_nodes, fixed_interface_modes, ..defaults }
+        let modes = times(defaults.modes);
+        Rotor37Options { spin, tip: Tip::Nodes(contact_nodes), modes, ..defaults }
     };
     Some(match name {
         "rotor37" => reduction::rotor37(&blade(None), console).map(|reduction| reduction.rom),

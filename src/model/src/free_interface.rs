@@ -58,7 +58,7 @@ pub fn free_interface(
         "K (stiffness of the supported structure)",
         "The structure can move as a rigid body: clamp at least three nodes that are not on one line",
     )?;
-    let found = lowest_modes(mass, &factor, 0.0, modes, Stage::FixedInterfaceModes, listener)?;
+    let found = lowest_modes(mass, &factor, 0.0, modes, Stage::FullModes, listener)?;
     report(listener, Stage::ConstraintModes, 0, 1);
     let responses = factor.solve(contact.to_owned());
     drop(factor);

@@ -61,11 +61,12 @@ pub fn contact_patches(
             }
         }
     }
-    Ok(weights
-        .into_iter()
-        .enumerate()
-        .map(|(patch, weights)| point(mesh, set, &places, weights, name(patch)))
-        .collect())
+    if let Some(empty) = weights.iter().position(|weights| weights.iter().sum::<f64>() <= 0.0) {
+        let problem = format!("number {} of {count} has no face under it", empty + 1);
+        return Err(Error::invalid("contact patches", problem, "Ask for fewer, or refine the tip"));
+    }
+    let patches = weights.into_iter().enumerate();
+    Ok(patches.map(|(patch, weights)| point(mesh, set, &places, &weights, name(patch))).collect())
 }
 
 /// The hat functions that are not zero at a place along the chord, 0 to 1.
@@ -80,11 +81,11 @@ fn hats(along: f64, count: usize) -> [(usize, f64); 2] {
     [(first, 1.0 - share), (first + 1, share)]
 }
 
-fn point(mesh: &Mesh, set: &[usize], places: &Places, weights: Vec<f64>, name: String) -> ContactPoint {
+fn point(mesh: &Mesh, set: &[usize], places: &Places, weights: &[f64], name: String) -> ContactPoint {
     let total: f64 = weights.iter().sum();
     let patch: Vec<(usize, f64)> = set
         .iter()
-        .zip(&weights)
+        .zip(weights)
         .filter(|(_, weight)| **weight != 0.0)
         .map(|(&node, weight)| (node, weight / total))
         .collect();

@@ -81,7 +81,7 @@ pub struct ReductionOptions {
     /// Which modes are kept.
     pub kind: ReductionKind,
     /// How many.
-    pub fixed_interface_modes: usize,
+    pub modes: usize,
     /// Number of modes of the full model that are computed and compared with the reduced ones.
     pub checked_modes: usize,
     /// Number of identical uncoupled copies around the axis.
@@ -184,7 +184,7 @@ pub fn reduce_model(
         }
         ReductionKind::FreeInterface => free_interface(stiffness, &mass, loads.as_ref(), modes, listener),
     };
-    let craig_bampton = component_modes(&stiffness, options.fixed_interface_modes, listener)?;
+    let craig_bampton = component_modes(&stiffness, options.modes, listener)?;
     report(listener, Stage::Checks, 0, 1);
     let (squares, vectors) = dense_modes(&craig_bampton.stiffness, &craig_bampton.mass)?;
     let checks = compare(&full, &mass, &craig_bampton, &squares, &vectors);
@@ -192,7 +192,7 @@ pub fn reduce_model(
     let spin = |speed| -> Result<ReducedSpin> {
         let resting = Resting { model: &craig_bampton, mass: &mass, free: &free, contact: loads.as_ref() };
         let states = spinning_states(&model, &free, &stiffness, speed, listener)?;
-        let modes = (options.fixed_interface_modes + SPARE_MODES).min(free.len() - loads.ncols());
+        let modes = (options.modes + SPARE_MODES).min(free.len() - loads.ncols());
         let middle = component_modes(&states.middle.stiffness, modes, &silent)?;
         report(listener, Stage::Spin, 4, 6);
         let largest = component_modes(&states.largest.stiffness, modes, &silent)?;

@@ -47,7 +47,7 @@ fn reduced_whole(mesh: &Mesh, sectors: usize, modes: usize, checked_modes: usize
     let options = ReductionOptions {
         name: "whole".into(),
         kind: ReductionKind::FixedInterface,
-        fixed_interface_modes: modes,
+        modes,
         checked_modes,
         sectors: 1,
         frame: Frame::Cylindrical,

@@ -1,6 +1,10 @@
 //! Contact patches and free-interface modes: consistent weights, exact statics, exact low frequencies.
 
 mod common;
+#[path = "../../../tests/guide.rs"]
+mod guide;
+
+use guide::told;
 
 use common::{distorted_box, nodes_at, steel, straight_box, wobble};
 use nalgebra::DMatrix;
@@ -30,7 +34,7 @@ fn reduced(mesh: Mesh, contact: &[ContactPoint], kind: ReductionKind, modes: usi
     let options = ReductionOptions {
         name: "beam".into(),
         kind,
-        fixed_interface_modes: modes,
+        modes,
         checked_modes: 6,
         sectors: 1,
         frame: Frame::Cylindrical,
@@ -123,7 +127,7 @@ fn the_flexibility_of_a_patch_converges_and_that_of_a_point_does_not() {
             tip,
             mesh,
             kind: ReductionKind::FreeInterface,
-            fixed_interface_modes: 4,
+            modes: 4,
             checked_modes: 2,
             ..Rotor37Options::default()
         };
@@ -132,7 +136,10 @@ fn the_flexibility_of_a_patch_converges_and_that_of_a_point_does_not() {
     };
     let grows = |tip: Tip| [6, 12, 24].map(|chord| own(tip, chord));
     let (points, patches) = (grows(Tip::Nodes(5)), grows(Tip::Patches(5)));
-    println!("radial flexibility at mid-chord (m/N): points {points:?}, patches {patches:?}");
+    for (chord, (point, patch)) in [6, 12, 24].into_iter().zip(points.into_iter().zip(patches)) {
+        told!("| {chord} | {point} | {patch} |");
+    }
+    guide::hold("cargo test -p tiprub-model --test patches");
     let change = |values: [f64; 3]| (values[2] / values[1] - 1.0).abs();
     assert!(change(patches) < 0.05 && change(points) > 3.0 * change(patches), "{points:?} {patches:?}");
 }
@@ -150,7 +157,7 @@ fn a_patch_of_rotor_37_stands_on_the_arc_of_its_chord() {
         tip: Tip::Patches(3),
         kind: ReductionKind::FreeInterface,
         mesh: MeshCounts { chord: 8, thickness: 1, span: 4 },
-        fixed_interface_modes: 4,
+        modes: 4,
         checked_modes: 2,
         ..Rotor37Options::default()
     };

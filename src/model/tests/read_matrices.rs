@@ -10,7 +10,7 @@ use tiprub_model::progress::silent;
 use tiprub_model::read::{
     Axis, ContactChoice, Imported, MatrixFiles, MeshOptions, Units, choose_contact_nodes, read_matrices, read_mesh,
 };
-use tiprub_model::reduce::ReductionOptions;
+use tiprub_model::reduce::{ReductionKind, ReductionOptions};
 use tiprub_model::{Material, reduce_model};
 
 fn data(name: &str) -> PathBuf {
@@ -31,7 +31,7 @@ fn rom(imported: &Imported) -> Rom {
     let options = ReductionOptions {
         name: "bar".into(),
         kind: ReductionKind::FixedInterface,
-        fixed_interface_modes: 8,
+        modes: 8,
         checked_modes: 6,
         sectors: 1,
         frame: Frame::Cylindrical,

@@ -168,7 +168,7 @@ fn options(modes: usize, frame: Frame) -> ReductionOptions {
     ReductionOptions {
         name: "beam".into(),
         kind: ReductionKind::FixedInterface,
-        fixed_interface_modes: modes,
+        modes,
         checked_modes: 8,
         sectors: 1,
         frame,

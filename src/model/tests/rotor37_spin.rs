@@ -178,8 +178,7 @@ fn contact_nodes_yield_under_spin_as_in_the_full_model() {
 #[test]
 fn coriolis_couples_the_modes_as_in_the_full_model() {
     let mesh = MeshCounts { chord: 8, thickness: 1, span: 10 };
-    let options =
-        Rotor37Options { mesh, fixed_interface_modes: 80, spin: Some(DESIGN_SPEED), ..Rotor37Options::default() };
+    let options = Rotor37Options { mesh, modes: 80, spin: Some(DESIGN_SPEED), ..Rotor37Options::default() };
     let (blade, rom) = (Blade::new(mesh), reduce_rotor37(&options, &silent).unwrap().rom);
     let spin = rom.extras.spin.as_ref().unwrap();
     let modes = full_modes(&blade.at(DESIGN_SPEED).stiffness, &blade.mass, false, 6, &silent).unwrap().modes;
@@ -260,7 +259,7 @@ fn the_spin_arrays_have_the_same_bits_on_any_number_of_threads() {
 #[test]
 fn other_reductions_hold_as_well() {
     use ReductionKind::{FixedInterface, FreeInterface};
-    for (tip, kind, fixed_interface_modes) in [
+    for (tip, kind, modes) in [
         (Tip::Nodes(7), FixedInterface, 20),
         (Tip::Nodes(3), FixedInterface, 40),
         (Tip::Patches(5), FreeInterface, 20),
@@ -269,17 +268,14 @@ fn other_reductions_hold_as_well() {
         let options = Rotor37Options {
             tip,
             kind,
-            fixed_interface_modes,
+            modes,
             checked_modes: 6,
             spin: Some(DESIGN_SPEED),
             ..Rotor37Options::default()
         };
         for check in reduce_rotor37(&options, &silent).unwrap().spin_checks {
             let (frequencies, growth) = (check.frequency_deviation(), check.growth_deviation());
-            println!(
-                "{tip:?}, {kind:?}, {fixed_interface_modes} modes, {} rad/s: {frequencies:.3?} %, {growth:.3} %",
-                check.speed
-            );
+            println!("{tip:?}, {kind:?}, {modes} modes, {} rad/s: {frequencies:.3?} %, {growth:.3} %", check.speed);
             assert!(frequencies.iter().all(|deviation| deviation.abs() < 0.2) && growth < 0.5);
         }
     }

@@ -228,7 +228,7 @@ fn options(frame: Frame) -> ReductionOptions {
     ReductionOptions {
         name: "blade".into(),
         kind: ReductionKind::FixedInterface,
-        fixed_interface_modes: 12,
+        modes: 12,
         checked_modes: 6,
         sectors: 1,
         frame,
@@ -276,7 +276,7 @@ fn spin_adds_its_arrays_and_changes_nothing_else() {
 #[test]
 fn a_blade_without_component_modes_still_spins() {
     let (mesh, clamped, contact) = blade();
-    let options = ReductionOptions { fixed_interface_modes: 0, ..options(Frame::Cylindrical) };
+    let options = ReductionOptions { modes: 0, ..options(Frame::Cylindrical) };
     let reduction = spinning(mesh, &clamped, &contact, &options, 1200.0).unwrap();
     assert_eq!(reduction.rom.order(), 6);
     let (checked, largest) = (&reduction.spin_checks[0], &reduction.spin_checks[1]);
@@ -294,7 +294,7 @@ fn with_all_modes_the_fitted_speed_is_exact() {
     let tip = nodes_at(&mesh, 0, 0.32)[0];
     let contact = [ContactPoint::at("tip", tip, 0.0)];
     let free = 3 * (mesh.nodes.len() - clamped.len());
-    let options = ReductionOptions { fixed_interface_modes: free - 3, ..options(Frame::Cylindrical) };
+    let options = ReductionOptions { modes: free - 3, ..options(Frame::Cylindrical) };
     let reduction = spinning(mesh, &clamped, &contact, &options, 1500.0).unwrap();
     let check = &reduction.spin_checks[1];
     for deviation in check.frequency_deviation() {

@@ -65,7 +65,7 @@ pub struct Rotor37Options {
     /// Which modes are kept.
     pub kind: ReductionKind,
     /// How many.
-    pub fixed_interface_modes: usize,
+    pub modes: usize,
     /// Number of modes compared with the full model.
     pub checked_modes: usize,
     /// Modal damping ratio proposed with the model.
@@ -82,7 +82,7 @@ impl Default for Rotor37Options {
             mesh: MeshCounts::default(),
             tip: Tip::Nodes(3),
             kind: ReductionKind::FixedInterface,
-            fixed_interface_modes: 20,
+            modes: 20,
             checked_modes: 10,
             damping_ratio: 0.005,
             material: Material::maraging_steel(),
@@ -108,7 +108,7 @@ pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Resul
     let reduction_options = ReductionOptions {
         name: "rotor37".into(),
         kind: options.kind,
-        fixed_interface_modes: options.fixed_interface_modes,
+        modes: options.modes,
         checked_modes: options.checked_modes,
         sectors: BLADES,
         frame: Frame::Cylindrical,

@@ -138,7 +138,10 @@ fn modes<T: ComplexField<RealField = f64>>(
 #[cfg(test)]
 mod tests {
     use tiprub_core::dynamics::modal::ModalModel;
-    use tiprub_model::{Rotor37Options, reduce_rotor37, rotor37::MeshCounts};
+    use tiprub_model::{
+        Rotor37Options, reduce_rotor37,
+        rotor37::{MeshCounts, Tip},
+    };
 
     use super::*;
 
@@ -147,8 +150,8 @@ mod tests {
     fn truncation_is_the_reduction_with_fewer_modes() {
         let options = |modes: usize| Rotor37Options {
             mesh: MeshCounts { chord: 4, thickness: 1, span: 6 },
-            contact_nodes: 2,
-            fixed_interface_modes: modes,
+            tip: Tip::Nodes(2),
+            modes,
             spin: Some(1000.0),
             ..Rotor37Options::default()
         };
@@ -185,8 +188,8 @@ mod tests {
     fn a_rom_with_more_contact_than_coordinates_keeps_its_lowest_modes() {
         let options = Rotor37Options {
             mesh: MeshCounts { chord: 4, thickness: 1, span: 6 },
-            contact_nodes: 2,
-            fixed_interface_modes: 8,
+            tip: Tip::Nodes(2),
+            modes: 8,
             ..Rotor37Options::default()
         };
         let mut rom = reduce_rotor37(&options, &|_| {}).unwrap().rom;
