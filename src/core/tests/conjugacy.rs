@@ -137,6 +137,12 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
         let at = At { node: 0, index: 0, drive: &drive };
         let moved = [0, 1, 2].map(|component| displacement[component * lanes]);
         let point = law.contact_point(at, moved, &places);
+        // Any force: its work on a shaft that moves is the same in both coordinates.
+        let (force, shaft) = ([0.3, -0.7, 0.4], [2e-4, 5e-4, -3e-4]);
+        let work = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let own = law.shaft_motion(at, point, &Motion { shaft, ..Motion::default() });
+        let (own, fixed) = (work(force, own), work(law.wrench(at, point, force).force, shaft));
+        assert!((own / fixed - 1.0).abs() < 1e-12, "{}: {own:e} {fixed:e}", feature.0);
         let wrench = law.wrench(at, point, normal);
         let surface = |motion: Motion| -law.surface_motion(at, point, normal, &places, &motion);
         let [opening, factor, rotation] = [

@@ -379,6 +379,25 @@ fn numbers_beyond_the_table_of_ranges_are_refused_by_name() {
 }
 
 #[test]
+fn thermal_loads_that_are_not_finite_or_not_of_the_rom_are_refused() {
+    let heated = |change: fn(&mut nalgebra::DMatrix<f64>)| {
+        let mut rom = models::ring(8, 2);
+        change(&mut rom.extras.thermal.as_mut().expect("it is heated").loads);
+        rom.validate().map_err(|refusal| refusal.to_string())
+    };
+    assert_eq!(heated(|_| {}), Ok(()));
+    let changes: [fn(&mut nalgebra::DMatrix<f64>); 3] = [
+        |loads| loads[(1, 0)] = f64::NAN,
+        |loads| *loads = loads.clone().insert_row(0, 1.0),
+        |loads| *loads = loads.clone().insert_column(0, 1.0),
+    ];
+    for change in changes {
+        let told = heated(change).unwrap_err();
+        assert!(told.contains("`thermal_loads`") && told.contains("finite values expected"), "{told}");
+    }
+}
+
+#[test]
 fn what_does_not_belong_to_the_sectors_is_refused_by_name() {
     type Change = fn(&mut Scene);
     let changes: [(&[&str], Change); 7] = [
