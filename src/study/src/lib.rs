@@ -49,7 +49,7 @@ pub fn one_rotor_and_friction(settings: &SceneSettings) -> Result<()> {
     if settings.contacts.iter().all(|contact| contact.friction.to_bits() == first) {
         return Ok(());
     }
-    Err(several(settings, "its contacts differ in friction, and this study varies one coefficient".to_owned()))
+    Err(several(settings, "its contacts differ in friction, and this study is of one coefficient".to_owned()))
 }
 
 fn several(settings: &SceneSettings, problem: String) -> Failure {
