@@ -64,7 +64,11 @@ mod tests {
     use tiprub_gallery::scene_source;
     use tiprub_model::{Rotor37Options, reduce_rotor37, rotor37::MeshCounts};
 
-    use super::{measure::apart, run::trace, scene::SceneRun};
+    use super::{
+        measure::apart,
+        run::{Trace, trace},
+        scene::SceneRun,
+    };
     use crate::stability::bodies::{Body, Plate, Throw};
 
     const METHOD: (Scheme, Solver) = (Scheme::ModalExact, Solver::Lcp);
@@ -97,9 +101,12 @@ mod tests {
         rotor
     }
 
+    fn run(scene: &Scene, division: u32) -> Trace {
+        trace(&mut SceneRun::new(scene, METHOD, INTERVAL, division, 0.0).unwrap(), 60).unwrap()
+    }
+
     fn error(scene: &Scene) -> f64 {
-        let run = |division| trace(&mut SceneRun::new(scene, METHOD, INTERVAL, division, 0.0).unwrap(), 60).unwrap();
-        apart(&run(4), &run(32))
+        apart(&run(scene, 4), &run(scene, 32))
     }
 
     #[test]
@@ -110,5 +117,19 @@ mod tests {
         // The impact has an error of its own, relative to what it changes.
         let hit = error(&beside(rotor(), 1.0));
         assert!(hit >= alone && hit < 0.5, "{hit:e} {alone:e}");
+    }
+
+    #[test]
+    fn flight_is_no_displacement_and_what_an_impact_changes_is() {
+        let last = |approach: f64| {
+            let found = run(&beside(rotor(), approach), 8);
+            found.displacements[59][found.parts[0]..].to_vec()
+        };
+        assert!(last(0.0).iter().all(|value| *value == 0.0));
+        let hit = last(1.0);
+        let largest =
+            |axis: usize| hit.iter().skip(axis).step_by(3).fold(0.0, |most: f64, value| most.max(value.abs()));
+        // It has flown 18 mm along the plate, and was sent back by it.
+        assert!(largest(1) < 1e-9 && (1e-5..2e-3).contains(&largest(0)), "{:e} {:e}", largest(0), largest(1));
     }
 }
