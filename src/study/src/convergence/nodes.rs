@@ -54,7 +54,10 @@ pub(super) fn starting_with(start: &str, mut rom: Rom) -> Rom {
 #[cfg(test)]
 mod tests {
     use tiprub_gallery::scene_source;
-    use tiprub_model::{Rotor37Options, reduce_rotor37, rotor37::MeshCounts};
+    use tiprub_model::{
+        Rotor37Options, reduce_rotor37,
+        rotor37::{MeshCounts, Tip},
+    };
     use tiprub_shell::{Result, console::Console};
 
     use super::*;
@@ -64,9 +67,10 @@ mod tests {
     struct Again;
 
     impl Source for Again {
-        fn reduce(&self, fixed_interface_modes: usize, contact_nodes: usize, _: &Console) -> Result<Rom> {
+        fn reduce(&self, modes: usize, contact_nodes: usize, _: &Console) -> Result<Rom> {
             let mesh = MeshCounts { chord: 4, thickness: 1, span: 4 };
-            let options = Rotor37Options { mesh, contact_nodes, fixed_interface_modes, ..Rotor37Options::default() };
+            let tip = Tip::Nodes(contact_nodes);
+            let options = Rotor37Options { mesh, tip, modes, ..Rotor37Options::default() };
             Ok(reduce_rotor37(&options, &|_| {}).unwrap().rom)
         }
     }
