@@ -2,7 +2,6 @@
 
 use std::{ffi::OsString, process::ExitCode};
 
-use clap::Parser;
 use tiprub_packaging::{cli::Cli, commands, spelling};
 use tiprub_shell::console::Console;
 
@@ -13,15 +12,7 @@ fn main() -> ExitCode {
         asked.fail(&failure);
         return ExitCode::from(failure.exit_code());
     }
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(error) => {
-            if let Some(failure) = spelling::failure(&error) {
-                asked.answer(&failure);
-            }
-            error.exit()
-        }
-    };
+    let cli: Cli = spelling::parsed(&asked);
     let console = Console::new(cli.quiet, cli.json);
     match commands::run(&cli.command, &console).and_then(|outcome| console.deliver(&outcome)) {
         Ok(()) => ExitCode::SUCCESS,

@@ -3,10 +3,10 @@
 use std::{ffi::OsString, fmt::Write as _};
 
 use clap::{
-    CommandFactory,
+    CommandFactory, Parser,
     error::{ContextKind, ContextValue, ErrorKind},
 };
-use tiprub_shell::Failure;
+use tiprub_shell::{Failure, console::Console};
 
 use crate::cli::Cli;
 
@@ -138,12 +138,22 @@ fn quoted(word: &str) -> String {
     }
 }
 
+/// The command line of a program. Help, and what is not understood, end it here, as JSON too where that is asked for.
+pub fn parsed<C: Parser>(asked: &Console) -> C {
+    C::try_parse().unwrap_or_else(|error| {
+        if let Some(failure) = failure(&error, C::command().get_name()) {
+            asked.answer(&failure);
+        }
+        error.exit()
+    })
+}
+
 /// A command line that clap does not understand, as what, problem and remedy; `None` of help, which is no failure.
-pub fn failure(error: &clap::Error) -> Option<Failure> {
+fn failure(error: &clap::Error, program: &str) -> Option<Failure> {
     if error.exit_code() == 0 {
         return None;
     }
-    let help = "See `tiprub --help`, or `--help` of the command";
+    let help = &format!("See `{program} --help`, or `--help` of the command");
     let text = |kind: ContextKind| match error.get(kind) {
         Some(ContextValue::String(text)) => Some(text.clone()),
         Some(ContextValue::Strings(all)) => Some(all.join(", ")),
@@ -161,16 +171,15 @@ pub fn failure(error: &clap::Error) -> Option<Failure> {
     let problem = told.split("\n\nUsage:").next().unwrap_or(&told).trim().trim_start_matches("error: ");
     // Hints of clap stand behind an empty line.
     let (problem, hints) = problem.split_once("\n\n").unwrap_or((problem, ""));
-    let hints = hints.lines().map(|line| line.trim().trim_start_matches("tip: ")).filter(|line| !line.is_empty());
-    let remedy: Vec<&str> = hints.chain([help]).collect();
+    let hints = hints.lines().map(|line| line.trim().trim_start_matches("tip: ").trim_end_matches('.'));
+    let hints = hints.filter(|line| !line.is_empty() && !line.starts_with("For more information"));
+    let remedy: Vec<&str> = hints.chain([help.as_str()]).collect();
     let lines: Vec<&str> = problem.lines().map(str::trim).collect();
     Some(Failure::usage(what, lines.join(" "), remedy.join(". ")))
 }
 
 #[cfg(test)]
 mod tests {
-    use clap::Parser;
-
     use super::*;
 
     fn words(line: &str) -> Vec<OsString> {

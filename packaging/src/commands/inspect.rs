@@ -176,8 +176,10 @@ fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
         let contact = settings.contacts.iter().find(|contact| contact.master == structure.name);
         let sliding = contact.map(|contact| Sliding { friction: contact.friction, speed: structure.speed });
         let facts = RomFacts::of(rom, sliding)?;
-        let _ = write!(text, "\n{}", facts.to_text());
-        roms.push(facts.to_json());
+        let _ = write!(text, "\nstructure {}, {}", structure.name, facts.to_text());
+        let mut json = facts.to_json();
+        json["structure"] = json!(structure.name);
+        roms.push(json);
     }
     drop(task);
     console.warn(simulation.warnings());
@@ -229,9 +231,13 @@ fn scene_text(settings: &SceneSettings) -> String {
             structure.damping_ratio.map_or("of the ROM".into(), |ratio| ratio.to_string())
         );
     }
-    let free = settings.free_master().is_some();
+    // Gaps and surfaces of what flies freely are in the ROMs.
+    let flies = |contact: &ContactSettings| {
+        settings.master_of(contact).is_some_and(|structure| structure.motion == Motion::Free)
+    };
     for surface in &settings.surfaces {
-        if let Some(structure) = surface.structure.as_ref().filter(|_| free) {
+        let mut contacts = settings.contacts.iter().filter(|contact| contact.slave == surface.name);
+        if let Some(structure) = surface.structure.as_ref().filter(|_| contacts.any(flies)) {
             let how = if surface.rigid { "rigid, at the place of" } else { "carried by" };
             let _ = writeln!(text, "  surface       {} {how} {structure}", surface.name);
             continue;
@@ -246,13 +252,13 @@ fn scene_text(settings: &SceneSettings) -> String {
         );
     }
     for contact in &settings.contacts {
-        let nodes = || contact.nodes.as_ref().map_or("all nodes".to_owned(), |start| format!("nodes {start}..."));
+        let nodes = contact.nodes.as_ref().map_or("all nodes".to_owned(), |start| format!("nodes {start}..."));
+        let gap = if flies(contact) { String::new() } else { format!(", {}", gap_text(contact)) };
         let _ = writeln!(
             text,
-            "  contact       {} against {}: {}, friction {}, solver {}",
+            "  contact       {} against {}: {nodes}{gap}, friction {}, solver {}",
             contact.master,
             contact.slave,
-            if free { nodes() } else { gap_text(contact) },
             contact.friction,
             serde_json::to_value(contact.solver)
                 .ok()

@@ -32,6 +32,11 @@ fn inspect_shows_where_contact_nodes_are_and_what_the_scene_sets() {
     for shown in ["100 rad/s (954.9 rpm)", "damping ratio of the ROM", "\"watched_sectors\":[1]"] {
         assert!(scene.contains(shown), "{shown}: {scene}");
     }
+    let named = SCENE.replace("gap = 1e-3", "gap = 1e-3\nnodes = \"ti\"");
+    fs::write(project.path("scene.toml"), named).unwrap();
+    let scene = project.succeed(&["inspect", "scene.toml"]);
+    assert!(scene.contains("rotor against casing: nodes ti..., gap 0.001 m"), "{scene}");
+    assert!(scene.contains("\nstructure rotor, ROM small: One mass"), "{scene}");
 }
 
 #[test]

@@ -71,6 +71,7 @@ fn every_error_is_one_json_object_too() {
         assert!(format!("{problem}. {remedy}").contains(words), "{line}: {error}");
         assert!(!problem.is_empty() && !problem.contains('\n') && !problem.contains("Usage:"), "{line}: {error}");
         assert!(!output.stderr.is_empty(), "{line}");
+        assert!(!remedy.contains("..") && !remedy.contains("For more information"), "{line}: {error}");
     }
     // Help is no failure, and a file may be called --json.
     assert!(String::from_utf8(project.run(&["--json", "--help"]).stdout).unwrap().contains("Usage"));

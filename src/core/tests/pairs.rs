@@ -373,7 +373,7 @@ fn what_does_not_go_together_is_refused_by_name() {
     scene.settings.contacts[1].nodes = Some("leading".into());
     refused(&scene, "claims the node `leading_edge`, which contact[1] claims as well");
     scene.settings.contacts[1].nodes = Some("tip".into());
-    refused(&scene, "no contact node of ROM `rotor` has a name that starts with \"tip\"");
+    refused(&scene, "no contact node of ROM `blade` has a name that starts with \"tip\"");
     let mut scene = both;
     scene.settings.time.scheme = Scheme::MasslessBoundary;
     scene.roms[..2].iter_mut().for_each(|rom| *rom = rich_blade(6));

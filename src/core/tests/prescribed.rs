@@ -330,6 +330,26 @@ fn a_mass_that_swings_on_a_plane_loses_the_same_amplitude_every_half_turn() {
     }
 }
 
+/// Two bumps are as deep as the mean of the clearances says, on a surface of revolution, on a spline and in the nominal values.
+#[test]
+fn clearances_of_sectors_alone_stand_for_the_clearance() {
+    for spline in [None, Some(SplineSettings::default())] {
+        let mut scene = models::rub(SECTORS);
+        (scene.settings.surfaces[0].spline, scene.settings.surfaces[0].ramp_time) = (spline, 0.0);
+        let gap = scene.settings.contacts[0].gap;
+        let mut listed = scene.clone();
+        (listed.settings.contacts[0].gap, listed.settings.contacts[0].sector_gaps) = (0.0, vec![gap; SECTORS]);
+        let [one, listed] = [scene, listed].map(|scene| started(&scene));
+        for (own, other) in one.system().gaps().zip(listed.system().gaps()).filter(|(own, _)| own.is_finite()) {
+            assert!((own - other).abs() < 1e-12, "{spline:?}: {own} and {other} m");
+        }
+        let nominal = |simulation: &Simulation| -> Vec<Option<f64>> {
+            simulation.table().variables().iter().map(|variable| variable.nominal).collect()
+        };
+        assert_eq!(nominal(&one), nominal(&listed));
+    }
+}
+
 /// Blades of different frequencies behind different gaps, grown by spin, pressed on the casing: each carries its own force.
 #[test]
 fn gaps_and_frequency_factors_belong_to_their_own_sectors() {

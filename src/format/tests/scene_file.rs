@@ -124,6 +124,7 @@ fn values_out_of_range_are_located() {
     refused("order = 2", "order = 0", ":7:45", &["surface[1].shape.order: 0 lobes"]);
     refused("stop = 1.0", "start = 2.0\nstop = 1.0", ":16:1", &["experiment.stop: 1 s is not after"]);
     refused("master = \"rotor\"", "master = \"disk\"", ":9:1", &["contact[1].master: `disk`", "rotor"]);
+    refused("name = \"casing\"", "name = \"rotor\"", ":6:1", &["surface[1].name: `rotor` is used by two"]);
     refused("\"demo\"", "\"rotor 37\"", ":1:1", &["name: `rotor 37`", "letters, digits"]);
 }
 

@@ -109,8 +109,8 @@ pub fn study(scene: &Scene, window: f64, task: &Task) -> Result<ErrorStudy> {
     Ok(ErrorStudy {
         window,
         reference_step: length / f64::from(REFERENCE_DIVISION),
-        references_apart: apart(&other.displacements, &exact.displacements),
-        massless_apart: apart(&massless.displacements, &exact.displacements),
+        references_apart: apart(&other, &exact),
+        massless_apart: apart(&massless, &exact),
         rows,
     })
 }
@@ -125,7 +125,7 @@ fn measure(scene: &Scene, method: Method, division: u32, steps: usize, exact: &T
     let seconds = run::time(&|| start(scene, method, division), steps, run::REPETITIONS, None)?;
     let impulse = |trace: &Trace| trace.impulses.iter().sum::<f64>();
     let errors = Errors {
-        displacement: apart(&last.displacements, &exact.displacements),
+        displacement: apart(&last, exact),
         impulse: (impulse(&last) / impulse(exact) - 1.0).abs(),
         penetration: last.penetration,
         adhesion: last.adhesion,

@@ -24,27 +24,38 @@ pub fn master(scene: &Scene) -> usize {
     scene.settings.structures.iter().position(|structure| structure.name == *name).unwrap_or(0)
 }
 
-/// Refuse scenes in which what a study varies is not one thing: the speed of one rotor, one friction coefficient, one ROM.
+/// Refuse scenes in which several structures touch: such a study varies one, its speed or its ROM.
+///
+/// # Errors
+/// Several structures touch.
+pub fn one_rotor(settings: &SceneSettings) -> Result<()> {
+    let first = &settings.contacts[0].master;
+    match settings.contacts.iter().find(|contact| contact.master != *first) {
+        Some(other) => {
+            let other = &other.master;
+            Err(several(settings, format!("`{first}` and `{other}` both touch, and this study varies one structure")))
+        }
+        None => Ok(()),
+    }
+}
+
+/// The same, and scenes whose pairs differ in friction.
 ///
 /// # Errors
 /// Several structures touch, or pairs differ in friction.
-pub fn one_rotor(settings: &SceneSettings) -> Result<()> {
-    let first = &settings.contacts[0];
-    let refuse = |problem: String| {
-        let remedy =
-            "Give a scene with one of the rotors or pairs; `tiprub study error` and `tiprub run` take all together";
-        Err(Failure::usage(format!("scene `{}`", settings.name), problem, remedy))
-    };
-    if let Some(other) = settings.contacts.iter().find(|contact| contact.master != first.master) {
-        return refuse(format!(
-            "`{}` and `{}` both touch, and this study varies one structure",
-            first.master, other.master
-        ));
+pub fn one_rotor_and_friction(settings: &SceneSettings) -> Result<()> {
+    one_rotor(settings)?;
+    let first = settings.contacts[0].friction.to_bits();
+    if settings.contacts.iter().all(|contact| contact.friction.to_bits() == first) {
+        return Ok(());
     }
-    if settings.contacts.iter().any(|contact| contact.friction.to_bits() != first.friction.to_bits()) {
-        return refuse("its contacts differ in friction, and this study varies one coefficient".to_owned());
-    }
-    Ok(())
+    Err(several(settings, "its contacts differ in friction, and this study is of one coefficient".to_owned()))
+}
+
+fn several(settings: &SceneSettings, problem: String) -> Failure {
+    let remedy =
+        "Give a scene with one of the rotors or pairs; `tiprub study error` and `tiprub run` take all together";
+    Failure::usage(format!("scene `{}`", settings.name), problem, remedy)
 }
 
 /// A finished study.

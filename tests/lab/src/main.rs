@@ -1,13 +1,14 @@
 //! `lab`: the studies that are evidence for the product.
 
-use std::process::ExitCode;
+use std::{ffi::OsString, process::ExitCode};
 
-use clap::Parser;
 use tiprub_lab::cli::Cli;
+use tiprub_packaging::spelling;
 use tiprub_shell::console::Console;
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
+    let cli: Cli = spelling::parsed(&Console::new(true, spelling::asks_for_json(&arguments)));
     let console = Console::new(cli.quiet, cli.json);
     match cli.run(&console).and_then(|outcome| console.deliver(&outcome)) {
         Ok(()) => ExitCode::SUCCESS,

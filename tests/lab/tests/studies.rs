@@ -223,3 +223,14 @@ fn the_guide_names_every_study_and_no_other() {
     let named: BTreeSet<&str> = pages.iter().flat_map(|page| studies_named(&page.1)).collect();
     assert_eq!(named, known);
 }
+
+#[test]
+fn command_lines_that_are_not_understood_are_json_too() {
+    for (line, what) in [("cube --jsn --json", "--jsn"), ("--json error --scene bar", "--scene"), ("--json", "lab")] {
+        let output = Command::new(env!("CARGO_BIN_EXE_lab")).args(line.split(' ')).output().unwrap();
+        let error = &serde_json::from_slice::<Value>(&output.stdout).unwrap()["error"];
+        assert_eq!((output.status.code(), error["exit_code"].as_i64()), (Some(2), Some(2)), "{line}");
+        assert!(error["what"].as_str().unwrap().contains(what), "{line}: {error}");
+        assert!(error["remedy"].as_str().unwrap().ends_with("See `lab --help`, or `--help` of the command"), "{error}");
+    }
+}

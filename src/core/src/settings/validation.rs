@@ -86,17 +86,20 @@ impl SceneSettings {
     }
 
     fn validate_unique_names(&self) -> Result<()> {
-        let names = self.structures.iter().map(|s| &s.name).chain(self.surfaces.iter().map(|s| &s.name));
-        let mut sorted: Vec<&String> = names.collect();
-        sorted.sort_unstable();
-        match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            None => Ok(()),
-            Some(pair) => Err(Error::invalid(
-                "name",
-                format!("`{}` is used by two structures or surfaces", pair[0]),
-                "Give each structure and surface a name of its own",
-            )),
+        let structures = self.structures.iter().map(|structure| ("structure", &structure.name)).zip(1..);
+        let surfaces = self.surfaces.iter().map(|surface| ("surface", &surface.name)).zip(1..);
+        let mut before = Vec::new();
+        for ((kind, name), number) in structures.chain(surfaces) {
+            if before.contains(&name) {
+                return Err(Error::invalid(
+                    format!("{kind}[{number}].name"),
+                    format!("`{name}` is used by two structures or surfaces"),
+                    "Give each structure and surface a name of its own",
+                ));
+            }
+            before.push(name);
         }
+        Ok(())
     }
 }
 

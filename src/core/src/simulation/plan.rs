@@ -121,7 +121,7 @@ fn nodes_of(contact: &ContactSettings, rom: &Rom, index: usize) -> Result<Vec<us
     if !nodes.is_empty() {
         return Ok(nodes);
     }
-    let problem = format!("no contact node of ROM `{}` has a name that starts with {start:?}", contact.master);
+    let problem = format!("no contact node of ROM `{}` has a name that starts with {start:?}", rom.name);
     let remedy = rom.contact_nodes.first().map_or_else(
         || "Give a ROM with contact nodes".to_owned(),
         |first| format!("Use the beginning of names such as `{}`", first.name),

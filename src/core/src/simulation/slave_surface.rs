@@ -49,17 +49,17 @@ pub fn spline_gap(
     carrier: Option<(&Rom, Share)>,
 ) -> Result<SplineGap> {
     let settings = surface.spline.unwrap_or_default();
-    let contour = Contour::new(master, nodes);
+    let (contour, clearance) = (Contour::new(master, nodes), contact.nominal_gap());
     let grid = match carrier {
         Some((rom, share)) => carried_grid(rom, share, &contour)?,
         None => rigid_grid(settings, &contour),
     };
-    let round = data(&grid, |z, _| contour.radius(z) + contact.gap);
+    let round = data(&grid, |z, _| contour.radius(z) + clearance);
     if let Some((rom, _)) = carrier {
         check_radii(rom, grid.first_node, &round)?;
     }
     let spline = SurfaceSpline::new(&round, grid.around, grid.rings.len(), settings.closure, settings.interpolation)?;
-    let shape = Surface::new(&surface.shape, contact.gap)?;
+    let shape = Surface::new(&surface.shape, clearance)?;
     let mut change = data(&grid, |_, angle| shape.evaluate(angle).0);
     change.iter_mut().for_each(|point| point[2] = 0.0);
     if shape == Surface::Circular {
@@ -67,7 +67,7 @@ pub fn spline_gap(
     } else {
         spline.interpolate(&mut change);
     }
-    let mut gap = SplineGap::new(layout, contact.gap, spline, change, shape.angular_scale());
+    let mut gap = SplineGap::new(layout, clearance, spline, change, shape.angular_scale());
     (gap.nodes, gap.first_node) = (nodes.to_vec(), grid.first_node);
     Ok(gap)
 }

@@ -5,7 +5,7 @@ use std::iter::zip;
 use tiprub_core::Scene;
 
 use crate::error::{
-    measure::apart,
+    measure::parts_apart,
     run::{Run, Seen},
     scene::SceneRun,
 };
@@ -13,7 +13,7 @@ use crate::error::{
 /// What a run leaves behind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marched {
-    /// Displacements of all contact nodes and sectors, sample by sample: node by node, axis by axis, sector by sector (m).
+    /// Displacements of all contact nodes and sectors, without flight, sample by sample: node by node, axis by axis, sector by sector (m).
     pub displacements: Vec<Vec<f64>>,
     /// Positions of the contact nodes, as the ROM has them.
     pub nodes: Vec<[f64; 3]>,
@@ -64,7 +64,9 @@ impl Marched {
             };
             run.displacements.iter().map(chosen).collect()
         };
-        Some(apart(&of(self, &|pair| pair.0), &of(next, &|pair| pair.1)))
+        let [own, next] = [of(self, &|pair| pair.0), of(next, &|pair| pair.1)];
+        let length = own.first().map_or(0, Vec::len);
+        Some(parts_apart(&own, &next, &[length]))
     }
 }
 
@@ -86,7 +88,7 @@ pub fn march(scene: &Scene, settings: &[(String, String)], division: u32, sample
     };
     let mut seen = Seen::nothing();
     for _ in 0..samples {
-        seen.impulse = 0.0;
+        seen.next();
         run.watch(&mut seen)?;
         found.displacements.push(run.displacements());
         found.impulse += seen.impulse;

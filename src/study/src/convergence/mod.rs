@@ -1,9 +1,10 @@
 //! What refining a scene changes: its internal step, the modes of its structures, the contact nodes of its blades, one at a time.
 //!
-//! [`refine`] finds the directions and the scenes at every level, [`truncate`] takes modes away from any ROM, [`mod@march`] runs and
+//! [`refine`] finds the directions and the scenes at every level, `nodes` which of a refined model's nodes touch, [`truncate`] takes modes away from any ROM, [`mod@march`] runs and
 //! compares, [`page`] draws and tells.
 
 pub mod march;
+mod nodes;
 pub mod page;
 pub mod refine;
 pub mod truncate;

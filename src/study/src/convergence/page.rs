@@ -15,7 +15,7 @@ use crate::{Figure, Picture, Sheet, Statement, Study};
 const SMALL: f64 = 0.05;
 
 const HOW_TO_READ: &str = "One thing is refined at a time, all else is the scene's own. A change is how far a run is from the next finer one of \
-    the same direction, relative to the larger of both: of the displacements of all contact nodes at all communication points (L2), the normal \
+    the same direction, relative to the larger of both: of the displacements of all contact nodes at all communication points (L2, without flight), the normal \
     impulse and the work of friction over the window, the largest normal force averaged over a communication step, and the mean strain energy. \
     Where changes shrink from level to level the last one bounds roughly what is left; where they do not, the scene is not converged in that \
     direction, or its contact is chaotic. The direction with the largest change at the scene's own setting is the one to refine first. Forces of \

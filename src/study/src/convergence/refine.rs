@@ -4,7 +4,10 @@ use tiprub_core::{Rom, Scene, dynamics::modal::ModalModel, rom::Frame};
 use tiprub_gallery::{builtin, scene_source::BUILTIN};
 use tiprub_shell::{Failure, Result, console::Console};
 
-use super::truncate::{Form, truncated};
+use super::{
+    nodes::{common_start, named_as, starting_with},
+    truncate::{Form, truncated},
+};
 use crate::{master, stability::asked::divided};
 
 /// Internal steps, times the scene's own, the coarsest first.
@@ -257,11 +260,14 @@ impl Refiner<'_> {
 
     fn more_modes(&self, index: usize, own: usize, factor: f64) -> Option<Result<Rom>> {
         let (nodes, master) = (self.scene.roms[index].contact_nodes.len(), index == master(self.scene));
-        if let Some(source) = self.source.filter(|_| master) {
-            return Some(self.reduced(source, count(factor * own as f64) as usize, nodes));
-        }
-        let name = self.scene.settings.structures[index].rom.strip_prefix(BUILTIN)?;
-        builtin::refined(name, factor, nodes, self.console)
+        let again = match self.source.filter(|_| master) {
+            Some(source) => self.reduced(source, count(factor * own as f64) as usize, nodes),
+            None => {
+                let name = self.scene.settings.structures[index].rom.strip_prefix(BUILTIN)?;
+                builtin::refined(name, factor, nodes, self.console)?
+            }
+        };
+        Some(again.map(|again| named_as(&self.scene.roms[index], again)))
     }
 
     /// Contact nodes of the master along its chord, each number with the ends of the others.
@@ -287,6 +293,13 @@ impl Refiner<'_> {
                 };
             return Ok(direction);
         }
+        let start = match common_start(self.scene, index) {
+            Ok(start) => start,
+            Err(why) => {
+                direction.missing = why;
+                return Ok(direction);
+            }
+        };
         let (modes, own) = self.own_counts();
         let mut counts = vec![2, own, 2 * own - 1];
         if !self.quick {
@@ -302,7 +315,13 @@ impl Refiner<'_> {
                     .unwrap_or_else(|| Err(Failure::new(&structure.rom, "no such model", ""))),
             };
             match rom {
-                Ok(rom) => direction.levels.push(self.level(nodes as f64, nodes == own, self.with_rom(index, rom))),
+                Ok(rom) if nodes == own => {
+                    direction.levels.push(self.level(nodes as f64, true, self.with_rom(index, rom)))
+                }
+                Ok(rom) => {
+                    let scene = self.with_rom(index, starting_with(&start, rom));
+                    direction.levels.push(self.level(nodes as f64, false, scene));
+                }
                 // A mesh has no more nodes than it has.
                 Err(failure) => direction.misses(format!("{nodes} nodes: {failure}")),
             }

@@ -15,7 +15,7 @@ use super::{
 pub struct Figures {
     /// Median processor time of stepping (s).
     pub seconds: f64,
-    /// Displacements against the truth: exact, or the reference of the largest size.
+    /// Displacements against the truth: exact, or the reference of the largest size. These, and impulses, of the worst structure.
     pub total: f64,
     /// Displacements against the reference of the same size: what the steps alone do.
     pub of_time: f64,
@@ -72,7 +72,7 @@ impl References {
     /// How far the limit of a family is from the first reference; `None` where it was not computed.
     pub fn away(&self, family: Family) -> Option<f64> {
         let own = self.limits.iter().find(|limit| limit.0 == family)?;
-        Some(apart(&own.1.displacements, &self.first.displacements))
+        Some(apart(&own.1, &self.first))
     }
 }
 
@@ -89,20 +89,55 @@ pub struct Measured {
 /// A run whose displacements are further away than so many times their size has failed.
 const DIVERGED: f64 = 10.0;
 
-/// |a − b| / |b| over all samples.
-pub fn apart(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
-    let (mut difference, mut size) = (0.0, 0.0);
-    for (a, b) in zip(a.iter().flatten(), b.iter().flatten()) {
-        difference += (a - b) * (a - b);
-        size += b * b;
-    }
-    (difference / f64::max(size, f64::MIN_POSITIVE)).sqrt()
+/// What moves less than this share of the largest motion is judged by that: its own norm would be that of rounding.
+pub(super) const STILL: f64 = 1e-6;
+
+/// |a − b| / |b| over all samples, of the structure of which it is largest: one that moves far would hide the errors of another.
+pub fn apart(a: &Trace, b: &Trace) -> f64 {
+    parts_apart(&a.displacements, &b.displacements, &b.parts)
 }
 
-/// |a − b| / |b| of impulses summed over windows of so many samples.
-fn windows_apart(a: &[f64], b: &[f64], window: usize) -> f64 {
-    let sums = |values: &[f64]| vec![values.chunks(window).map(|part| part.iter().sum()).collect::<Vec<f64>>()];
-    apart(&sums(a), &sums(b))
+/// The same of samples that hold so many values of each part.
+pub fn parts_apart(a: &[Vec<f64>], b: &[Vec<f64>], parts: &[usize]) -> f64 {
+    let mut from = 0;
+    let squares = parts.iter().map(|length| {
+        let own = from..from + length;
+        from += length;
+        let (mut difference, mut size) = (0.0, 0.0);
+        for (a, b) in zip(a, b) {
+            for (a, b) in zip(&a[own.clone()], &b[own.clone()]) {
+                difference += (a - b) * (a - b);
+                size += b * b;
+            }
+        }
+        [difference, size]
+    });
+    let squares: Vec<[f64; 2]> = squares.collect();
+    let least = STILL * STILL * squares.iter().fold(0.0, |most: f64, [_, size]| most.max(*size));
+    let of = |[difference, size]: &[f64; 2]| (difference / size.max(least).max(f64::MIN_POSITIVE)).sqrt();
+    worst(squares.iter().map(of))
+}
+
+/// The largest; NaN where one is.
+pub(super) fn worst(errors: impl Iterator<Item = f64>) -> f64 {
+    errors.fold(0.0, |most: f64, error| if most.is_nan() || error <= most { most } else { error })
+}
+
+/// |a − b| / |b| of impulses summed over windows of so many samples; of several structures the largest.
+fn windows_apart(a: &Trace, b: &Trace, window: usize) -> f64 {
+    if b.parts.len() < 2 || a.shares.len() != b.shares.len() {
+        let sums = |trace: &Trace| vec![sums(&trace.impulses, window)];
+        return parts_apart(&sums(a), &sums(b), &[b.impulses.len().div_ceil(window)]);
+    }
+    let each = |trace: &Trace| {
+        let of = |part: usize| trace.shares.iter().map(|shares| shares[part]).collect::<Vec<_>>();
+        vec![(0..b.parts.len()).flat_map(|part| sums(&of(part), window)).collect::<Vec<_>>()]
+    };
+    parts_apart(&each(a), &each(b), &vec![b.shares.len().div_ceil(window); b.parts.len()])
+}
+
+fn sums(values: &[f64], window: usize) -> Vec<f64> {
+    values.chunks(window).map(|part| part.iter().sum()).collect()
 }
 
 /// Number of runs of a scene, for progress.
@@ -142,7 +177,7 @@ pub fn measure(case: &dyn Case, repetitions: usize, task: &Task) -> Result<Measu
             }
         }
     }
-    let truncation = references.iter().map(|own| apart(&own.first.displacements, &truth.displacements)).collect();
+    let truncation = references.iter().map(|own| apart(&own.first, truth)).collect();
     Ok(Measured { rows, truncation, references })
 }
 
@@ -165,10 +200,7 @@ fn refer(case: &dyn Case, size: usize) -> Result<References> {
     let limits =
         case.families(size).into_iter().map(|family| Some((family, trace(family.reference(), division).ok()?)));
     Ok(References {
-        apart: [
-            apart(&second.displacements, &first.displacements),
-            windows_apart(&second.impulses, &first.impulses, case.impulse_window()),
-        ],
+        apart: [apart(&second, &first), windows_apart(&second, &first, case.impulse_window())],
         limits: limits.flatten().collect(),
         first,
         second,
@@ -189,7 +221,7 @@ fn judge(
     let found = run::trace(run.as_mut(), case.samples())?;
     // The full model has a limit of its own.
     let plain = if competitor.is_full() { truth } else { &own.first };
-    let error = apart(&found.displacements, &plain.displacements);
+    let error = apart(&found, plain);
     if error.is_nan() || error > DIVERGED {
         return Err(format!("diverged: displacements are {error:.0e} times their size away"));
     }
@@ -201,11 +233,11 @@ fn judge(
     let last = |trace: &Trace| trace.energies.last().copied().unwrap_or(0.0);
     Ok(Figures {
         seconds: run::time(&start, case.samples(), repetitions, run.own_seconds())?,
-        total: apart(&found.displacements, &truth.displacements),
+        total: apart(&found, truth),
         of_time: error,
-        of_own: apart(&found.displacements, &limit.displacements),
-        impulse: windows_apart(&found.impulses, &plain.impulses, window),
-        impulse_total: windows_apart(&found.impulses, &truth.impulses, window),
+        of_own: apart(&found, limit),
+        impulse: windows_apart(&found, plain, window),
+        impulse_total: windows_apart(&found, truth, window),
         energy: (last(&found) - last(truth)).abs() / largest,
         residual: found.residual.map(f64::abs),
         penetration: found.penetration,
@@ -227,4 +259,34 @@ fn release(case: &dyn Case, found: &Trace, truth: &Trace) -> Option<f64> {
         if found.is_nan() { 1.0 } else { (found - exact).abs() / (exact - touch) }
     });
     errors.reduce(f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two structures with one displacement each, a window of one sample.
+    fn trace(displacements: [f64; 2], shares: [f64; 2]) -> Trace {
+        Trace {
+            displacements: vec![displacements.to_vec()],
+            parts: vec![1, 1],
+            impulses: vec![shares.iter().sum()],
+            shares: vec![shares.to_vec()],
+            last_forces: Vec::new(),
+            energies: Vec::new(),
+            initial_energy: 0.0,
+            residual: None,
+            penetration: 0.0,
+            adhesion: 0.0,
+        }
+    }
+
+    #[test]
+    fn the_worst_structure_counts_by_its_own_size() {
+        let (found, truth) = (trace([1e-3, 1.2e-6], [5.0, 0.03]), trace([1e-3, 1.0e-6], [5.0, 0.02]));
+        assert!((apart(&found, &truth) - 0.2).abs() < 1e-12 && (windows_apart(&found, &truth, 1) - 0.5).abs() < 1e-12);
+        // What hardly moves is rounding; a number that is none stays so.
+        assert!(apart(&trace([1e-3, 2e-14], [1.0; 2]), &trace([1e-3, 1e-14], [1.0; 2])) < 1e-4);
+        assert!(apart(&trace([f64::NAN, 1e-6], [1.0; 2]), &truth).is_nan());
+    }
 }

@@ -26,6 +26,11 @@ pub trait Run {
     /// The displacements that are compared (m).
     fn displacements(&self) -> Vec<f64>;
 
+    /// How many of these belong to each structure that touches, in their order.
+    fn parts(&self) -> Vec<usize> {
+        vec![self.displacements().len()]
+    }
+
     /// Kinetic, strain and potential energy (J).
     fn energy(&self) -> f64;
 
@@ -43,6 +48,8 @@ pub trait Run {
 pub struct Seen {
     /// ∫ of all normal forces since the last sample (N·s).
     pub impulse: f64,
+    /// The same of every structure that touches, where a run tells them apart.
+    pub shares: Vec<f64>,
     /// Time of the last force (s); NaN before there was one.
     pub last_force: f64,
     /// Deepest penetration so far (m).
@@ -52,9 +59,15 @@ pub struct Seen {
 }
 
 impl Seen {
+    /// The next sample.
+    pub fn next(&mut self) {
+        self.impulse = 0.0;
+        self.shares.fill(0.0);
+    }
+
     /// Nothing yet.
     pub fn nothing() -> Self {
-        Self { impulse: 0.0, last_force: f64::NAN, penetration: 0.0, adhesion: 0.0 }
+        Self { impulse: 0.0, shares: Vec::new(), last_force: f64::NAN, penetration: 0.0, adhesion: 0.0 }
     }
 
     /// A step of length `step` (s) that ends at `time` (s).
@@ -78,8 +91,12 @@ impl Seen {
 pub struct Trace {
     /// Displacements, sample by sample (m).
     pub displacements: Vec<Vec<f64>>,
+    /// See [`Run::parts`].
+    pub parts: Vec<usize>,
     /// Normal impulse between samples (N·s).
     pub impulses: Vec<f64>,
+    /// The same of every structure that touches, where a run tells them apart.
+    pub shares: Vec<Vec<f64>>,
     /// Time of the last force up to every sample (s).
     pub last_forces: Vec<f64>,
     /// Energy at every sample (J).
@@ -101,6 +118,8 @@ pub struct Trace {
 pub fn trace(run: &mut dyn Run, samples: usize) -> Result<Trace, String> {
     let mut found = Trace {
         displacements: Vec::with_capacity(samples),
+        parts: Vec::new(),
+        shares: Vec::with_capacity(samples),
         impulses: Vec::with_capacity(samples),
         last_forces: Vec::with_capacity(samples),
         energies: Vec::with_capacity(samples),
@@ -111,14 +130,15 @@ pub fn trace(run: &mut dyn Run, samples: usize) -> Result<Trace, String> {
     };
     let mut seen = Seen::nothing();
     for _ in 0..samples {
-        seen.impulse = 0.0;
+        seen.next();
         run.watch(&mut seen)?;
         found.displacements.push(run.displacements());
         found.impulses.push(seen.impulse);
+        found.shares.push(seen.shares.clone());
         found.last_forces.push(seen.last_force);
         found.energies.push(run.energy());
     }
-    found.residual = run.residual();
+    (found.parts, found.residual) = (run.parts(), run.residual());
     (found.penetration, found.adhesion) = (seen.penetration, seen.adhesion);
     Ok(found)
 }

@@ -2,7 +2,8 @@
 
 use tiprub_core::{
     Scene, Simulation,
-    settings::{Scheme, Solver},
+    settings::{Motion, Scheme, Solver},
+    system::Structure,
 };
 use tiprub_shell::native;
 
@@ -15,6 +16,43 @@ pub struct SceneRun {
     interval: f64,
     division: u32,
     samples: u32,
+    /// Of every structure that touches.
+    unmoved: Vec<Unmoved>,
+}
+
+/// How a structure would move if nothing touched it: at rest where it starts, or in straight flight.
+struct Unmoved {
+    /// Displacements at the start (m).
+    start: Vec<f64>,
+    /// Their rates (m/s); empty where it does not fly.
+    rates: Vec<f64>,
+    /// Whether something has touched it.
+    touched: bool,
+}
+
+/// Displacements of all contact nodes: node by node, axis by axis, sector by sector (m).
+fn rows(structure: &Structure) -> Vec<f64> {
+    let modes = structure.modes();
+    (0..modes.rows()).flat_map(|row| (0..modes.sectors()).map(move |sector| modes.row(row, sector))).collect()
+}
+
+impl Unmoved {
+    fn of(structure: &Structure, flies: bool) -> Self {
+        let modes = structure.modes();
+        let rate = |row: usize| (modes.row(row, 0) - modes.row_before(row, 0)) / modes.step();
+        let rates = if flies { (0..modes.rows()).map(rate).collect() } else { Vec::new() };
+        Self { start: rows(structure), rates, touched: false }
+    }
+
+    /// What contact has done to the displacements up to a time since the start (s): nothing to what flies untouched, whatever
+    /// rounding says.
+    fn moved(&self, mut displacements: Vec<f64>, time: f64) -> Vec<f64> {
+        displacements.iter_mut().zip(&self.start).for_each(|(value, start)| *value -= start);
+        for (value, rate) in displacements.iter_mut().zip(&self.rates) {
+            *value = if self.touched { *value - rate * time } else { 0.0 };
+        }
+        displacements
+    }
 }
 
 impl SceneRun {
@@ -65,7 +103,16 @@ impl SceneRun {
             native::set(&mut simulation, name, value).map_err(|failure| failure.to_string())?;
         }
         simulation.initialise(start).map_err(|error| error.to_string())?;
-        Ok(Self { simulation, start, interval, division, samples: 0 })
+        let (structures, pairs) = (simulation.system().structures(), simulation.system().pairs());
+        let flies = |index: usize| {
+            let mut pairs = pairs.iter().zip(&scene.settings.contacts);
+            let master = pairs.find(|(pair, _)| pair.structure() == index).map(|(_, contact)| &contact.master);
+            let all = scene.settings.structures.iter();
+            all.filter(|structure| Some(&structure.name) == master).any(|master| master.motion == Motion::Free)
+        };
+        let touching = structures.iter().enumerate().filter(|(_, structure)| structure.nodes() > 0);
+        let unmoved = touching.map(|(index, structure)| Unmoved::of(structure, flies(index))).collect();
+        Ok(Self { simulation, start, interval, division, samples: 0, unmoved })
     }
 
     /// Strain energy of all structures (J).
@@ -76,6 +123,16 @@ impl SceneRun {
     /// Work of friction since the start (J).
     pub fn friction_work(&self) -> f64 {
         self.simulation.system().ledger().friction_loss.value()
+    }
+
+    /// Displacements of all contact nodes, flight included (m).
+    pub fn displacements_with_flight(&self) -> Vec<f64> {
+        self.touching().flat_map(rows).collect()
+    }
+
+    /// Structures with contact nodes.
+    fn touching(&self) -> impl Iterator<Item = &Structure> {
+        self.simulation.system().structures().iter().filter(|structure| structure.nodes() > 0)
     }
 
     /// Time reached (s).
@@ -101,17 +158,26 @@ impl Run for SceneRun {
             let system = self.simulation.system();
             let least = system.gaps().fold(f64::INFINITY, |least: f64, gap| least.min(*gap));
             seen.add(progress.time, step, system.events().iter().map(|event| event.normal), least);
+            seen.shares.resize(self.unmoved.len(), 0.0);
+            for event in system.events() {
+                seen.shares[event.structure] += event.normal * step;
+                self.unmoved[event.structure].touched = true;
+            }
             if progress.finished {
                 return Ok(());
             }
         }
     }
 
+    /// Of what contact did: without the start and without flight, which would hide it.
     fn displacements(&self) -> Vec<f64> {
-        let touching = self.simulation.system().structures().iter().filter(|structure| structure.nodes() > 0);
-        let rows =
-            touching.flat_map(|structure| (0..structure.modes().rows()).map(move |row| (structure.modes(), row)));
-        rows.flat_map(|(modes, row)| (0..modes.sectors()).map(move |sector| modes.row(row, sector))).collect()
+        let time = f64::from(self.samples) * self.interval;
+        let each = self.touching().zip(&self.unmoved);
+        each.flat_map(|(structure, unmoved)| unmoved.moved(rows(structure), time)).collect()
+    }
+
+    fn parts(&self) -> Vec<usize> {
+        self.unmoved.iter().map(|unmoved| unmoved.start.len()).collect()
     }
 
     fn energy(&self) -> f64 {

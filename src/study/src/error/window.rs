@@ -1,13 +1,13 @@
 //! How long a scene can be followed: runs from starts that differ by almost nothing part when contact is chaotic.
 
-use std::iter::zip;
+use std::{iter::zip, ops::Range};
 
 use tiprub_figure::table::Table;
 
 use super::{
     case::Case,
     competitor::{Competitor, DEFAULT},
-    measure::apart,
+    measure::{STILL, parts_apart, worst},
     run::{self, Trace},
 };
 use crate::Statement;
@@ -21,7 +21,7 @@ pub const PARTED: f64 = 1e-6;
 const DIVISION: u32 = 20;
 const FINE: u32 = 160;
 
-/// Difference of two runs at every sample, relative to the largest displacements, over `samples` samples.
+/// Difference of two runs at every sample, relative to the largest displacements, of the structure of which it is largest, over `samples` samples.
 ///
 /// # Errors
 /// A run fails.
@@ -32,11 +32,22 @@ pub fn parting(case: &dyn Case, division: u32, samples: usize) -> Result<Vec<f64
     };
     let (plain, perturbed) = (trace(0.0)?, trace(PERTURBATION)?);
     let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>().sqrt();
-    let sizes = plain.displacements.iter().map(|all| norm(&mut all.iter().copied()));
-    let largest = sizes.fold(f64::MIN_POSITIVE, f64::max);
-    Ok(zip(&plain.displacements, &perturbed.displacements)
-        .map(|(a, b)| norm(&mut zip(a, b).map(|(a, b)| a - b)) / largest)
-        .collect())
+    let mut from = 0;
+    let parts = plain.parts.iter().map(|length| {
+        from += length;
+        let own = from - length..from;
+        let sizes = plain.displacements.iter().map(|all| norm(&mut all[own.clone()].iter().copied()));
+        (own.clone(), sizes.fold(f64::MIN_POSITIVE, f64::max))
+    });
+    let parts: Vec<_> = parts.collect();
+    let least = STILL * parts.iter().fold(0.0, |most: f64, (_, size)| most.max(*size));
+    let at = |(a, b): (&Vec<f64>, &Vec<f64>)| {
+        let of = |(own, size): &(Range<usize>, f64)| {
+            norm(&mut zip(&a[own.clone()], &b[own.clone()]).map(|(a, b)| a - b)) / size.max(least)
+        };
+        worst(parts.iter().map(of))
+    };
+    Ok(zip(&plain.displacements, &perturbed.displacements).map(at).collect())
 }
 
 /// Samples before the runs of [`parting`] have parted, at most `most`.
@@ -106,7 +117,7 @@ pub fn statistics(case: &dyn Case) -> Option<Table> {
                 [
                     format!("{:+.2} %", 100.0 * (own_amplitude / amplitude - 1.0)),
                     format!("{:+.2} %", 100.0 * (own_force / force - 1.0)),
-                    format!("{:.1e}", apart(&late(&found), &late(&fine))),
+                    format!("{:.1e}", parts_apart(&late(&found), &late(&fine), &fine.parts)),
                 ]
             }
             Err(problem) => [shortened(&problem), String::new(), String::new()],

@@ -19,7 +19,7 @@ use tiprub_shell::{Failure, Result, console::Console, sweep};
 
 use super::{Statement, Study};
 use crate::arguments::{MapArguments, Speeds};
-use crate::one_rotor;
+use crate::one_rotor_and_friction;
 pub use run::{Response, Run, Setup};
 use start::Start;
 
@@ -75,7 +75,7 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
     // Before models are reduced for nothing.
     let settings = scene_source::settings(name)?;
     start::master(&settings)?;
-    one_rotor(&settings)?;
+    one_rotor_and_friction(&settings)?;
     let scene = scene_source::load(name, &arguments.common.cache.cache(), console)?;
     let request = Request {
         quick: arguments.common.quick,

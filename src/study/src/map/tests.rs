@@ -206,12 +206,13 @@ fn the_speeds_chosen_leave_room_above_the_resonance() {
 #[test]
 fn scenes_with_more_than_one_thing_to_vary_are_refused() {
     let mut settings = scene_source::settings("builtin:rotor37").unwrap();
-    assert_eq!(crate::one_rotor(&settings), Ok(()));
+    assert_eq!(crate::one_rotor_and_friction(&settings), Ok(()));
     let mut other = settings.contacts[0].clone();
     other.friction += 0.1;
     settings.contacts.push(other);
-    let failure = crate::one_rotor(&settings).unwrap_err();
+    let failure = crate::one_rotor_and_friction(&settings).unwrap_err();
     assert!(failure.usage && failure.problem.contains("differ in friction"), "{failure}");
+    assert_eq!(crate::one_rotor(&settings), Ok(()), "friction is not refined");
     settings.contacts[1].master = "rear".into();
     let failure = crate::one_rotor(&settings).unwrap_err();
     assert!(failure.problem.contains("`rotor` and `rear` both touch"), "{failure}");

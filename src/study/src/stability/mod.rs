@@ -23,7 +23,7 @@ use tiprub_gallery::scene_source;
 use tiprub_shell::{Failure, Result, console::Console, sweep};
 
 use super::{Study, master};
-use crate::{arguments::StabilityArguments, error::own::refuse_compared, one_rotor};
+use crate::{arguments::StabilityArguments, error::own::refuse_compared, one_rotor_and_friction};
 
 /// What makes friction a parameter of a scene; every answer sets it.
 const SOME_FRICTION: f64 = 0.1;
@@ -101,7 +101,7 @@ pub struct Found {
 pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study> {
     refuse_compared(&arguments.set)?;
     let scene = scene_source::load(&arguments.scene, &arguments.common.cache.cache(), console)?;
-    one_rotor(&scene.settings)?;
+    one_rotor_and_friction(&scene.settings)?;
     let (scene, frictionless) = with_friction(scene);
     let asked = Asked { scene: &scene, settings: &arguments.set };
     let mut own = asked.own()?;

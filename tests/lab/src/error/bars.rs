@@ -273,7 +273,9 @@ impl Case for Bars {
         };
         Some(Trace {
             displacements: (0..self.samples).map(|sample| vec![self.exact_at(time(sample))]).collect(),
+            parts: vec![1],
             impulses: (0..self.samples).map(impulse).collect(),
+            shares: Vec::new(),
             last_forces: (0..self.samples).map(last).collect(),
             energies: vec![energy; self.samples],
             initial_energy: energy,

@@ -172,7 +172,7 @@ impl Case for Cube {
         let [a, b] = if self.quick { QUICK_FULL_REFERENCES } else { FULL_REFERENCES };
         let micro = |division: u32| 1e6 * INTERVAL / f64::from(division);
         Some((
-            apart(&second.displacements, &first.displacements),
+            apart(second, first),
             format!("a at h = {:.3} µs and b at {:.3} µs, both on the full model", micro(a), micro(b)),
         ))
     }
@@ -240,7 +240,7 @@ impl Run for Flight {
     }
 
     fn displacements(&self) -> Vec<f64> {
-        without_flight(self.run.displacements(), self.speed * self.run.time())
+        without_flight(self.run.displacements_with_flight(), self.speed * self.run.time())
     }
 
     fn energy(&self) -> f64 {

@@ -54,3 +54,82 @@ fn case_of(scene: ErrorScene, quick: bool, cache: &RomCache, console: &Console) 
         ErrorScene::Stage => Box::new(stage::stage(quick, cache, console)?),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use tiprub_core::{
+        Scene,
+        settings::{Scheme, Solver},
+    };
+    use tiprub_gallery::scene_source;
+    use tiprub_model::{Rotor37Options, reduce_rotor37, rotor37::MeshCounts};
+
+    use super::{
+        measure::apart,
+        run::{Trace, trace},
+        scene::SceneRun,
+    };
+    use crate::stability::bodies::{Body, Plate, Throw};
+
+    const METHOD: (Scheme, Solver) = (Scheme::ModalExact, Solver::Lcp);
+    const INTERVAL: f64 = 1e-5;
+
+    fn rotor() -> Scene {
+        let mesh = MeshCounts { chord: 4, thickness: 1, span: 4 };
+        let options = Rotor37Options { mesh, modes: 4, ..Rotor37Options::default() };
+        let mut scene = scene_source::rotor37_scene_with(reduce_rotor37(&options, &|_| {}).unwrap().rom).unwrap();
+        scene.settings.surfaces[0].ramp_time = 2e-4;
+        scene
+    }
+
+    /// A body of two lumps that is thrown at a plate beside the rotor, along it at 30 m/s.
+    fn beside(mut rotor: Scene, approach: f64) -> Scene {
+        let throw = Throw {
+            body: Body::elastic(&[0.05, 0.05], 1e7),
+            velocity: [-approach, 30.0, 0.0],
+            plates: vec![Plate::left(0.0201)],
+            friction: 0.0,
+            scheme: METHOD.0,
+            solver: METHOD.1,
+            step: 1e-6,
+        };
+        let thrown = throw.scene();
+        rotor.settings.structures.extend(thrown.settings.structures);
+        rotor.settings.surfaces.extend(thrown.settings.surfaces);
+        rotor.settings.contacts.extend(thrown.settings.contacts);
+        rotor.roms.extend(thrown.roms);
+        rotor
+    }
+
+    fn run(scene: &Scene, division: u32) -> Trace {
+        trace(&mut SceneRun::new(scene, METHOD, INTERVAL, division, 0.0).unwrap(), 60).unwrap()
+    }
+
+    fn error(scene: &Scene) -> f64 {
+        apart(&run(scene, 4), &run(scene, 32))
+    }
+
+    #[test]
+    fn what_flies_beside_a_rotor_hides_none_of_its_error() {
+        let alone = error(&rotor());
+        assert!((1e-7..0.1).contains(&alone), "{alone:e}");
+        assert_eq!(error(&beside(rotor(), 0.0)).to_bits(), alone.to_bits(), "untouched");
+        // The impact has an error of its own, relative to what it changes.
+        let hit = error(&beside(rotor(), 1.0));
+        assert!(hit >= alone && hit < 0.5, "{hit:e} {alone:e}");
+    }
+
+    #[test]
+    fn flight_is_no_displacement_and_what_an_impact_changes_is() {
+        let last = |approach: f64| {
+            let found = run(&beside(rotor(), approach), 8);
+            found.displacements[59][found.parts[0]..].to_vec()
+        };
+        assert!(last(0.0).iter().all(|value| *value == 0.0));
+        let hit = last(1.0);
+        let largest =
+            |axis: usize| hit.iter().skip(axis).step_by(3).fold(0.0, |most: f64, value| most.max(value.abs()));
+        // It has flown 18 mm along the plate, and was sent back by it.
+        assert!(largest(1) < 1e-9 && (1e-5..2e-3).contains(&largest(0)), "{:e} {:e}", largest(0), largest(1));
+    }
+}

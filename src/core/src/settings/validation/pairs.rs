@@ -16,7 +16,7 @@ impl SceneSettings {
     }
 
     /// The structure whose contact nodes touch in a pair.
-    pub(in crate::settings) fn master_of(&self, contact: &ContactSettings) -> Option<&StructureSettings> {
+    pub fn master_of(&self, contact: &ContactSettings) -> Option<&StructureSettings> {
         self.structures.iter().find(|structure| structure.name == contact.master)
     }
 

@@ -189,7 +189,7 @@ fn totals(table: &mut Builder, parts: &Parts) {
 
 fn smallest_clearance(table: &mut Builder, parts: &Parts) {
     let free = parts.bodies().iter().any(|body| body.free);
-    let gap = if free { 1e-3 } else { parts.settings.contacts[0].gap };
+    let gap = if free { 1e-3 } else { parts.settings.contacts[0].nominal_gap() };
     let text = match (free, parts.plan.pairs.len()) {
         (true, _) => {
             "Smallest clearance of all contact nodes within the communication step, normal to their surfaces; 1e9 m where none of \

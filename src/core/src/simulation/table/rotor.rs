@@ -18,7 +18,7 @@ pub fn angle(table: &mut Builder, parts: &Parts, body: &Body) {
 /// Clearance that the outputs of a rotor are as large as (m): that of its first pair.
 fn nominal(parts: &Parts, body: &Body) -> Option<(&'static Unit, f64)> {
     let mut pairs = parts.plan.pairs_of(body.index);
-    let gap = pairs.next().map_or(0.0, |(pair, _)| parts.settings.contacts[pair].gap);
+    let gap = pairs.next().map_or(0.0, |(pair, _)| parts.settings.contacts[pair].nominal_gap());
     Some((&LENGTH, gap))
 }
 

@@ -1,0 +1,123 @@
+//! Which pair the contact nodes of a refined model belong to. Pairs claim nodes by the beginnings of their names, and a model that
+//! is reduced again names its nodes as it likes: what touches would change with what is refined.
+
+use tiprub_core::{Rom, Scene, rom::ContactNode, settings::ContactSettings};
+
+/// The model with the names of the contact nodes of `own`, which are as many and at the same places.
+pub(super) fn named_as(own: &Rom, mut again: Rom) -> Rom {
+    for (node, own) in again.contact_nodes.iter_mut().zip(&own.contact_nodes) {
+        node.name.clone_from(&own.name);
+    }
+    again
+}
+
+/// Whether a pair claims a node, which it does by the beginning of its name.
+fn claims(contact: &ContactSettings, node: &ContactNode) -> bool {
+    contact.nodes.as_ref().is_none_or(|start| node.name.starts_with(start))
+}
+
+/// What the names of all contact nodes of the structure at `index` start with, where one pair claims them all; whether a new node
+/// touches, and what, is then no question.
+///
+/// # Errors
+/// Why it is one: a new node lies between two that do not belong to the same pair.
+pub(super) fn common_start(scene: &Scene, index: usize) -> Result<String, String> {
+    let (rom, master) = (&scene.roms[index], &scene.settings.structures[index].name);
+    let pairs = scene.settings.contacts.iter().enumerate().filter(|(_, contact)| contact.master == *master);
+    let of = |node: &ContactNode| pairs.clone().find(|(_, contact)| claims(contact, node));
+    let places: Vec<Option<usize>> = rom.contact_nodes.iter().map(|node| Some(of(node)?.0)).collect();
+    if let Some(border) = places.windows(2).position(|pair| pair[0] != pair[1]) {
+        let told = |place: usize| {
+            let pair =
+                places[place].map_or("touches nothing".to_owned(), |pair| format!("is of contact[{}]", pair + 1));
+            format!("`{}` {pair}", rom.contact_nodes[place].name)
+        };
+        return Err(format!(
+            "a pair claims its contact nodes by name, and what a new one between two of them would touch is not said: {}, {}. \
+             Reduce the blade with more --contact-nodes, begin their --contact-names as `nodes` of the pairs does, and compare runs",
+            told(border),
+            told(border + 1)
+        ));
+    }
+    let start = places.first().copied().flatten().and_then(|pair| scene.settings.contacts[pair].nodes.clone());
+    Ok(start.unwrap_or_default())
+}
+
+/// The model with names of contact nodes that all begin with `start`; empty, with its own.
+pub(super) fn starting_with(start: &str, mut rom: Rom) -> Rom {
+    for (index, node) in rom.contact_nodes.iter_mut().enumerate().filter(|_| !start.is_empty()) {
+        node.name = format!("{start}{}", index + 1);
+    }
+    rom
+}
+
+#[cfg(test)]
+mod tests {
+    use tiprub_gallery::scene_source;
+    use tiprub_model::{
+        Rotor37Options, reduce_rotor37,
+        rotor37::{MeshCounts, Tip},
+    };
+    use tiprub_shell::{Result, console::Console};
+
+    use super::*;
+    use crate::convergence::refine::{Direction, Source, directions};
+
+    /// A coarse blade, its nodes named as the reduction likes.
+    struct Again;
+
+    impl Source for Again {
+        fn reduce(&self, modes: usize, contact_nodes: usize, _: &Console) -> Result<Rom> {
+            let mesh = MeshCounts { chord: 4, thickness: 1, span: 4 };
+            let tip = Tip::Nodes(contact_nodes);
+            let options = Rotor37Options { mesh, tip, modes, ..Rotor37Options::default() };
+            Ok(reduce_rotor37(&options, &|_| {}).unwrap().rom)
+        }
+    }
+
+    /// Modes and contact nodes of a blade with nodes of these names, and a pair for each beginning.
+    fn refined(names: [&str; 3], pairs: &[&str]) -> [Direction; 2] {
+        let console = Console::new(true, false);
+        let mut rom = Again.reduce(4, 3, &console).unwrap();
+        rom.contact_nodes.iter_mut().zip(names).for_each(|(node, name)| node.name = name.into());
+        let mut scene = scene_source::rotor37_scene_with(rom).unwrap();
+        let contact = scene.settings.contacts.remove(0);
+        let of = |start: &&str| ContactSettings { nodes: Some((*start).into()), ..contact.clone() };
+        scene.settings.contacts = pairs.iter().map(of).collect();
+        let [_, modes, nodes] = directions(&scene, 1, Some(&Again), true, &console).unwrap().try_into().unwrap();
+        [modes, nodes]
+    }
+
+    fn names(direction: &Direction) -> Vec<Vec<String>> {
+        let of = |rom: &Rom| rom.contact_nodes.iter().map(|node| node.name.clone()).collect();
+        direction.levels.iter().map(|level| of(&level.scene.roms[0])).collect()
+    }
+
+    #[test]
+    fn the_nodes_that_touch_stay_those_of_the_scene_with_more_modes() {
+        let own = ["tip_3", "seal", "tip_1"];
+        let [modes, _] = refined(own, &["tip", "seal"]);
+        assert_eq!(names(&modes), [own, own, own], "{:?}", modes.missing);
+    }
+
+    #[test]
+    fn new_nodes_between_those_of_one_pair_are_its_own() {
+        let [_, nodes] = refined(["tip_a", "tip_b", "tip_c"], &["tip_"]);
+        let found = names(&nodes);
+        assert_eq!(found.iter().map(Vec::len).collect::<Vec<_>>(), [2, 3, 5], "{}", nodes.missing);
+        assert!(found.iter().flatten().all(|name| name.starts_with("tip_")), "{found:?}");
+    }
+
+    #[test]
+    fn new_nodes_of_which_no_pair_is_known_are_not_made() {
+        let own = ["leading", "mid", "trailing"];
+        for (pairs, told) in [
+            (&["leading"][..], "`leading` is of contact[1], `mid` touches nothing"),
+            (&["leading", "trailing"], "`leading` is of contact[1], `mid` touches nothing"),
+            (&["trailing", "l", "m"], "`leading` is of contact[2], `mid` is of contact[3]"),
+        ] {
+            let [_, nodes] = refined(own, pairs);
+            assert!(nodes.levels.is_empty() && nodes.missing.contains(told), "{pairs:?}: {}", nodes.missing);
+        }
+    }
+}
