@@ -180,6 +180,19 @@ impl Compiled {
         if self.bodies.len() > 1 { self.body(body).0.name.clone() } else { "the rotor".to_owned() }
     }
 
+    /// A text about a structure that touches, with its name where several do.
+    pub fn named(&self, body: usize, text: String) -> String {
+        if self.bodies.len() > 1 { format!("{}: {text}", self.body(body).0.name) } else { text }
+    }
+
+    /// Name of a structure of the system.
+    pub fn structure_name(&self, structure: usize) -> &str {
+        match structure.checked_sub(self.bodies.len()) {
+            Some(carrier) => &self.carrier(carrier).0.name,
+            None => &self.body(structure).0.name,
+        }
+    }
+
     /// Name of a structure of the system, for messages: that of a rotor or casing where there is one.
     pub fn carrier_name(&self, structure: usize) -> &str {
         match structure.checked_sub(self.bodies.len()) {

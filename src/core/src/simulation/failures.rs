@@ -38,7 +38,7 @@ impl Simulation {
                     "a contact node of {} is displaced by more than a tenth of its radius, is as deep inside the casing, or meets a \
                      flank of the casing shape steeper than 45°{}",
                     self.sector_name(structure, sector),
-                    self.instability()
+                    self.instability(structure)
                 ),
                 "Check gap, casing shape, loads and inputs; small displacements cannot describe this".to_owned(),
             ),
@@ -64,10 +64,11 @@ impl Simulation {
                  there"
                     .to_owned(),
             ),
-            StepFailure::Unbalanced { work, exchanged } => (
+            StepFailure::Unbalanced { set, work, exchanged } => (
                 format!(
-                    "contact forces have added {work:.3e} J that no input brings, of {exchanged:.3e} J exchanged: normals turn and \
-                     surfaces curve too far within an internal step (curvature work)"
+                    "contact forces{} have added {work:.3e} J that no input brings, of {exchanged:.3e} J exchanged: normals turn and \
+                     surfaces curve too far within an internal step (curvature work)",
+                    self.of_set(set)
                 ),
                 "Use a smaller internal step".to_owned(),
             ),
@@ -118,7 +119,7 @@ impl Simulation {
             curved.moved,
             curved.error,
             curved.clearance,
-            self.instability()
+            self.instability(curved.structure)
         );
         let remedy = "Check casing shape, friction, loads and inputs: small displacements cannot describe this";
         (problem, remedy.to_owned())
@@ -133,10 +134,25 @@ impl Simulation {
         format!("sector {}{of}", sector + 1)
     }
 
-    /// Growth that the initialisation warned of, as the likely cause of a failure.
-    fn instability(&self) -> String {
-        let grows = |text: &&String| text.contains("physically unstable");
-        self.warnings.iter().find(grows).map_or_else(String::new, |text| format!(". {text}"))
+    /// Structures of a set by their names, where there are several sets.
+    pub(super) fn of_set(&self, set: usize) -> String {
+        let sets = self.system.sets();
+        if sets.count() == 1 {
+            return String::new();
+        }
+        let names: Vec<&str> = sets.members(set).iter().map(|member| self.compiled.structure_name(*member)).collect();
+        format!(" of {}", names.join(", "))
+    }
+
+    /// Growth of sliding contact of this structure, or of one that it feels, as the likely cause of a failure.
+    fn instability(&self, structure: usize) -> String {
+        let Some(limits) = &self.limits else { return String::new() };
+        let sets = self.system.sets();
+        let others = sets.members(sets.of(structure)).iter().copied();
+        let mut bodies = std::iter::once(structure).chain(others).filter(|body| *body < self.rotors.len());
+        let speed = |body: usize| self.inputs.rotors[body].speed.at(0.0);
+        let found = bodies.find_map(|body| limits.flutter(body, speed(body)));
+        found.map_or_else(String::new, |text| format!(". {text}"))
     }
 }
 
