@@ -180,7 +180,12 @@ fn a_flexible_slave_is_part_of_the_limit() {
             let other = model(vec![slave], [seen, 0.0, 0.0, 0.0], 0);
             let check = |slaves| MasslessCheck { model: &master, normals: vec![[-1.0, 0.0, 0.0]], slaves };
             let flexible = check(vec![(DMatrix::from_element(1, 1, seen), &other)]);
-            let (limit, alone) = (flexible.limit(100.0).unwrap().closed, check(Vec::new()).limit(100.0).unwrap().closed);
+            let (limit, alone) =
+                (flexible.limit(100.0).unwrap().closed, check(Vec::new()).limit(100.0).unwrap().closed);
+            // Two slaves that are seen as the one is are as good as it.
+            let half = || (DMatrix::from_element(1, 1, seen * std::f64::consts::FRAC_1_SQRT_2), &other);
+            let halves = check(vec![half(), half()]).limit(100.0).unwrap().closed;
+            assert!((halves / limit - 1.0).abs() < 1e-9, "{halves} and {limit}");
             let first = (1..).map(|i| 1e-3 * f64::from(i)).find(|step| joined([own, slave], [1.0, seen], *step) > 1e3);
             let first = first.unwrap();
             told!(

@@ -100,8 +100,11 @@ impl Simulation {
             pair.carrier().is_some_and(|carrier| carrier.structure == structure) && pair.gap().layout().is_none()
         });
         if open {
-            let problem = "a structure that carries a surface is displaced by more than a tenth of the extent of the contact nodes";
-            return (problem.to_owned(), BESIDE_FLIGHT.to_owned());
+            let name = self.compiled.structure_name(structure);
+            let problem = format!(
+                "{name}, which carries a surface, is displaced by more than a tenth of the extent of the contact nodes"
+            );
+            return (problem, BESIDE_FLIGHT.to_owned());
         }
         let name = self.compiled.carrier_name(structure);
         (

@@ -280,7 +280,8 @@ impl Limits {
 
     /// Flutter of a structure that turns at a speed of this sign.
     pub fn flutter(&self, body: usize, speed: f64) -> Option<&str> {
-        let found = senses_of(speed).filter_map(|sense| self.bodies[body].senses[sense].as_ref()?.outcome.as_ref().ok());
+        let found =
+            senses_of(speed).filter_map(|sense| self.bodies[body].senses[sense].as_ref()?.outcome.as_ref().ok());
         found.flatten().map(String::as_str).find(|text| text.contains(checking::FLUTTER))
     }
 }

@@ -155,7 +155,7 @@ impl Simulation {
         let passed = step * speed.at(0.0).abs().max(speed.at(step_size).abs());
         if let Some(cell) = cell.filter(|cell| passed > *cell) {
             return Err(Error::invalid(
-                "contact.coating.cells_around",
+                format!("contact[{}].coating.cells_around", pair + 1),
                 format!(
                     "the rotor turns {passed:.3e} rad in one internal step of {step:.3e} s at t = {} s, past cells of the \
                      coating {cell:.3e} rad wide, which would stay unworn",
@@ -261,7 +261,9 @@ impl Simulation {
             if self.told.curved[body] {
                 continue;
             }
-            let Some(most) = self.system.most_curved_of(body).filter(|most| most.share() >= CURVED_SHARE) else { continue };
+            let Some(most) = self.system.most_curved_of(body).filter(|most| most.share() >= CURVED_SHARE) else {
+                continue;
+            };
             self.told.curved[body] = true;
             self.notes.push(format!(
                 "at t = {} s contact node {} of {} is displaced by {:.3e} m around the axis: gaps are linear in displacements, \

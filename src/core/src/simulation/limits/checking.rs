@@ -331,7 +331,8 @@ impl<'a> Checking<'a> {
     fn combinations(&self) -> Vec<Vec<usize>> {
         let nodes = self.nodes.len();
         if self.disk().is_some() {
-            return (0..nodes).map(|node| vec![node]).chain([(0..nodes).collect()]).collect();
+            let all = (nodes > 1).then(|| (0..nodes).collect());
+            return (0..nodes).map(|node| vec![node]).chain(all).collect();
         }
         if nodes <= ALL_COMBINATIONS_UP_TO {
             let members = |set: usize| (0..nodes).filter(|node| set >> node & 1 == 1).collect();
@@ -365,10 +366,7 @@ impl<'a> Checking<'a> {
                 self.watched[usize::from(sense < 0.0)].push(most.0);
             }
             if telling == Telling::Flutter && flutter > 0.0 {
-                warnings.push(format!(
-                    "{} is {FLUTTER}, growth rate {flutter:.3e} 1/s",
-                    self.contact(nodes, sense)
-                ));
+                warnings.push(format!("{} is {FLUTTER}, growth rate {flutter:.3e} 1/s", self.contact(nodes, sense)));
             }
         }
         Ok(warnings)

@@ -110,7 +110,10 @@ impl Simulation {
         }
         for sense in senses_of(speed).filter(|_| speed != 0.0) {
             if !std::mem::replace(&mut self.told.senses[body][sense], true) {
-                let found = self.limits.as_ref().map_or(Vec::new(), |limits| limits.bodies[body].of_sense(sense, &self.compiled.rotor_name(body)));
+                let found = self
+                    .limits
+                    .as_ref()
+                    .map_or(Vec::new(), |limits| limits.bodies[body].of_sense(sense, &self.compiled.rotor_name(body)));
                 found.into_iter().for_each(|text| self.note(text));
             }
         }
