@@ -1,6 +1,6 @@
 //! Structures that do not feel each other: what concerns one is judged and told without the others.
 
-use tiprub_core::settings::{Motion, PatchSettings, Scheme, Shape, Solver, StructureSettings};
+use tiprub_core::settings::{LoadSettings, Motion, PatchSettings, Scheme, Shape, Solver, StructureSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{
     RADIUS, disk, go, lattice, real, rich_blade, ring, ring_of, rub, saved, set, several, started, try_started,
@@ -90,6 +90,8 @@ fn one_between_two() -> Scene {
     settings.surfaces.insert(1, surface);
     settings.contacts.insert(1, contact);
     scene.roms.insert(1, scene.roms[0].clone());
+    // The ring is bent from the start.
+    scene.settings.structures[3].load = Some(LoadSettings { order: 2, amplitude: 100.0, phase: 0.1 });
     scene
 }
 
@@ -111,6 +113,14 @@ fn a_state_holds_the_energies_of_every_set() {
             [2.5e-5, 1.03e-5, 2.5e-5].into_iter().for_each(|length| go(one, length));
         }
         assert_eq!(saved(&simulation), saved(&other), "{scheme:?}");
+        // The books of the scene are those of its sets.
+        let relative = real(&simulation, "energy_residual_relative").abs();
+        let largest = simulation.system().ledgers().iter().map(tiprub_core::Ledger::scale).fold(0.0, f64::max);
+        let residual = real(&simulation, "energy_residual").abs();
+        assert!(
+            relative < 1e-12 && relative >= residual / (2.0 * largest),
+            "{relative:e}, {residual:e} of {largest:e}"
+        );
     }
 }
 

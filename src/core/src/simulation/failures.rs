@@ -30,7 +30,7 @@ impl Simulation {
         let is_free = |structure: usize| self.compiled.bodies[structure].translations.is_some();
         match failure {
             StepFailure::Implausible { structure, .. } | StepFailure::Unsolved { structure, .. } if is_free(structure) => {
-                free_failure(failure)
+                free_failure(failure, self.compiled.structure_name(structure))
             }
             StepFailure::NonFinite => (String::new(), String::new()),
             StepFailure::Implausible { structure, sector } => (
@@ -72,10 +72,12 @@ impl Simulation {
                 ),
                 "Use a smaller internal step".to_owned(),
             ),
-            StepFailure::TooFast { .. } => (
-                "contact nodes of the free structure move by more than a tenth of the extent of the contact nodes in one internal \
-                 step, and could pass a surface unseen"
-                    .to_owned(),
+            StepFailure::TooFast { structure } => (
+                format!(
+                    "contact nodes of {} move by more than a tenth of the extent of the contact nodes in one internal step, and \
+                     could pass a surface unseen",
+                    self.compiled.structure_name(structure)
+                ),
                 "Use a smaller internal step or a lower velocity".to_owned(),
             ),
             StepFailure::BehindEdge { structure, node } => (
@@ -163,16 +165,18 @@ const BESIDE_FLIGHT: &str =
     "Check positions and velocity; small displacements beside rigid flight cannot describe this";
 
 /// What means something else for a structure that flies freely.
-fn free_failure(failure: StepFailure) -> (String, String) {
-    let (problem, remedy) = match failure {
-        StepFailure::Unsolved { .. } => {
-            ("the contact problem has no solution", "Use less friction, another internal step or the solver coulomb")
-        }
-        _ => (
-            "contact nodes of the free structure have moved against each other, or into a surface, by more than a tenth of the \
-             extent of the contact nodes",
-            BESIDE_FLIGHT,
+fn free_failure(failure: StepFailure, name: &str) -> (String, String) {
+    match failure {
+        StepFailure::Unsolved { .. } => (
+            format!("the contact problem of {name} has no solution"),
+            "Use less friction, another internal step or the solver coulomb".to_owned(),
         ),
-    };
-    (problem.to_owned(), remedy.to_owned())
+        _ => (
+            format!(
+                "contact nodes of {name} have moved against each other, or into a surface, by more than a tenth of the extent of \
+                 the contact nodes"
+            ),
+            BESIDE_FLIGHT.to_owned(),
+        ),
+    }
 }

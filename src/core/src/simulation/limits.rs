@@ -135,6 +135,15 @@ impl Simulation {
     /// Refuse a step size (s) whose range was found unstable, or that stiffening at one of the `speeds` of a structure (rad/s)
     /// forbids. Only looks up, so that a step does not allocate.
     pub(super) fn check_step_size(&self, body: usize, step: f64, speeds: [f64; 3]) -> Result<()> {
+        self.is_step_allowed(body, step, speeds).map_err(|error| match error {
+            Error::Unstable { problem, remedy } => {
+                Error::Unstable { problem: self.compiled.named(body, problem), remedy }
+            }
+            other => other,
+        })
+    }
+
+    fn is_step_allowed(&self, body: usize, step: f64, speeds: [f64; 3]) -> Result<()> {
         let Some(limits) = &self.limits else { return Ok(()) };
         let (scheme, own) = (limits.parameters.scheme, &limits.bodies[body]);
         let stiffened = speeds.into_iter().fold(1.0, |most: f64, speed| most.max(self.compiled.stiffened(body, speed)));

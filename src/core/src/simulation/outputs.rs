@@ -116,9 +116,15 @@ impl View<'_> {
         &self.ledger
     }
 
+    /// Of the set of structures that can feel each other where it is largest.
     pub fn relative_residual(&self) -> f64 {
-        let (residual, scale) = (self.ledger().residual(self.conserved), self.ledger().scale());
-        if scale > 0.0 { residual / scale } else { 0.0 }
+        let ledgers = self.system.ledgers().iter().zip(&self.simulation.energies);
+        let relative = ledgers.map(|(ledger, energy)| match ledger.scale() {
+            scale if scale > 0.0 => ledger.residual(energy.conserved) / scale,
+            _ => 0.0,
+        });
+        let larger = |largest: f64, one: f64| if one.abs() > largest.abs() { one } else { largest };
+        relative.reduce(larger).unwrap_or_default()
     }
 
     #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]

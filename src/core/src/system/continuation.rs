@@ -2,7 +2,7 @@
 
 use super::pair::When;
 use super::posed::Member;
-use super::{Bodies, ContactEvent, Group, Pair, StepFailure, Structure, System, sum_of};
+use super::{Bodies, ContactEvent, Pair, StepFailure, Structure, System, sum_of};
 use crate::gaps::surface_spline::ClosestPoint;
 use crate::gaps::wrench::At;
 use crate::gaps::{GapLaw, dot};
@@ -232,12 +232,10 @@ impl System {
         self.rebuild_events();
     }
 
-    /// The events of the last step follow from the saved multipliers and forces (heat is not part of the future), in the order in
-    /// which they were found.
+    /// The events of the last step follow from the saved multipliers and forces (heat is not part of the future).
     fn rebuild_events(&mut self) {
         self.events.now.clear();
-        for number in self.groups.iter().flat_map(Group::structures) {
-            let structure = &self.structures[number];
+        for (number, structure) in self.structures.iter().enumerate() {
             for sector in 0..structure.modes().sectors() {
                 for (node, pair) in structure.pair_of.iter().enumerate() {
                     let (Some(pair), index) = (*pair, structure.index(node, sector)) else { continue };
