@@ -61,7 +61,7 @@ impl System {
                 of = event.pair;
                 let own = self.sets.of(event.structure);
                 if own != set {
-                    self.enter(set, &total);
+                    self.enter(set, total);
                     (set, total) = (own, Work::default());
                 }
                 motion = self.pairs[of].motion().centred(self.pairs[of].motion_before());
@@ -77,7 +77,7 @@ impl System {
             total.add(&work);
         }
         if !events.is_empty() {
-            self.enter(set, &total);
+            self.enter(set, total);
         }
         *self.acted_mut(when) = events;
         self.enter_loads();
@@ -110,7 +110,8 @@ impl System {
     }
 
     /// Enter the work of all contacts of a set in a step into its ledger.
-    fn enter(&mut self, set: usize, work: &Work) {
+    #[inline(never)]
+    fn enter(&mut self, set: usize, work: Work) {
         let ledger = &mut self.counted.ledgers[set];
         ledger.wear_work.add(work.worn);
         ledger.impact_loss.add(work.closing - work.worn);
