@@ -53,14 +53,29 @@ impl System {
     pub(crate) fn enter_work(&mut self) -> Result<(), StepFailure> {
         let when = self.when_acted();
         let mut events = std::mem::take(self.acted_mut(when));
+        let outcome = match self.sets.count() {
+            1 => self.enter_contacts::<false>(&mut events, when),
+            _ => self.enter_contacts::<true>(&mut events, when),
+        };
+        *self.acted_mut(when) = events;
+        self.enter_loads();
+        outcome
+    }
+
+    /// The contacts of the only set, or set by set of `SEVERAL`.
+    fn enter_contacts<const SEVERAL: bool>(
+        &mut self,
+        events: &mut [ContactEvent],
+        when: When,
+    ) -> Result<(), StepFailure> {
         let (mut of, mut motion, mut explained, mut outcome) = (usize::MAX, Motion::default(), 0.0, Ok(()));
         let mut set = 0;
         let mut total = Work::default();
-        for event in &mut events {
+        for event in &mut *events {
             if event.pair != of {
                 of = event.pair;
                 let own = self.sets.of(event.structure);
-                if own != set {
+                if SEVERAL && own != set {
                     self.enter(set, total);
                     (set, total) = (own, Work::default());
                 }
@@ -79,8 +94,6 @@ impl System {
         if !events.is_empty() {
             self.enter(set, total);
         }
-        *self.acted_mut(when) = events;
-        self.enter_loads();
         outcome
     }
 
@@ -110,7 +123,6 @@ impl System {
     }
 
     /// Enter the work of all contacts of a set in a step into its ledger.
-    #[inline(never)]
     fn enter(&mut self, set: usize, work: Work) {
         let ledger = &mut self.counted.ledgers[set];
         ledger.wear_work.add(work.worn);
