@@ -54,6 +54,17 @@ impl Error {
     pub fn invalid(what: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::Invalid { what: what.into(), problem: problem.into(), remedy: remedy.into() }
     }
+
+    /// What is wrong in a `table` of the scene file, as that of the one `at` which it is: `contact` as `contact[2]`.
+    pub(crate) fn placed(self, table: &str, at: &str) -> Self {
+        let rest = |what: &str| Some(format!("{at}.{}", what.strip_prefix(table)?.strip_prefix('.')?));
+        match self {
+            Self::Invalid { what, problem, remedy } => {
+                Self::Invalid { what: rest(&what).unwrap_or(what), problem, remedy }
+            }
+            other => other,
+        }
+    }
 }
 
 /// A number for people: plain, or with an exponent where that would be long.

@@ -96,6 +96,50 @@ impl Ledger {
         [self.shaft_work, self.stiffening_work, self.whirl_work, self.shift_work, self.casing_work]
     }
 
+    /// Entries of two sets of structures together.
+    pub fn with(mut self, other: &Self) -> Self {
+        self.initial += other.initial;
+        let mut other = *other;
+        self.sums().into_iter().zip(other.sums()).for_each(|(sum, term)| sum.add(term.value()));
+        self
+    }
+
+    fn sums(&mut self) -> [&mut Sum; 14] {
+        let Self {
+            initial: _,
+            damping_loss,
+            friction_loss,
+            impact_loss,
+            wear_work,
+            wear_energy,
+            load_work,
+            shaft_work,
+            stiffening_work,
+            whirl_work,
+            shift_work,
+            casing_work,
+            curvature_work,
+            step_change,
+            turnover,
+        } = self;
+        [
+            damping_loss,
+            friction_loss,
+            impact_loss,
+            wear_work,
+            wear_energy,
+            load_work,
+            shaft_work,
+            stiffening_work,
+            whirl_work,
+            shift_work,
+            casing_work,
+            curvature_work,
+            step_change,
+            turnover,
+        ]
+    }
+
     /// Energy that should be there minus what is (J), given kinetic + strain energy now.
     pub fn residual(&self, mechanical: f64) -> f64 {
         let mut balance = Sum::default();

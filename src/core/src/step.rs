@@ -28,13 +28,9 @@ impl System {
         // Eq. 11: forces that close what penetrates, and what they do, group by group.
         self.retire_events();
         let mut bodies = Bodies { structures: &mut self.structures, pairs: &self.pairs, acts_later, ledger };
-        let mut found = Found {
-            events: &mut self.events.now,
-            factorisations: &mut self.counted.factorisations,
-            wear_energy: &mut self.counted.ledger.wear_energy,
-        };
-        for group in &mut self.groups {
-            group.solve(&mut bodies, &mut found)?;
+        for (group, ledger) in self.groups.iter_mut().zip(&mut self.counted.ledgers) {
+            let (events, factorisations) = (&mut self.events.now, &mut self.counted.factorisations);
+            group.solve(&mut bodies, &mut Found { events, factorisations, wear_energy: &mut ledger.wear_energy })?;
         }
         self.enter_work()?;
         self.counted.steps += 1;

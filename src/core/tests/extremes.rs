@@ -44,7 +44,7 @@ fn casings_that_small_displacements_cannot_describe_are_refused() {
     for depth in [100.0, 1e6, 1e12] {
         scene.settings.surfaces[0].shape = Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
         let message = refusal(&scene);
-        assert!(message.contains("surface.shape") && message.contains("metres"), "{depth}: {message}");
+        assert!(message.contains("surface[1].shape") && message.contains("metres"), "{depth}: {message}");
     }
     // Each length within its limit, together far too deep.
     scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 30.0, width: 0.15, phase: 0.0 };

@@ -88,7 +88,7 @@ fn a_bar_bounces_off_without_impact_loss() {
 fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
     let mut model = bar(12, NEARLY_NONE).clamped_model();
     model.damping_ratios.fill(damping_ratio);
-    let check = MasslessCheck { model: &model, normals: vec![[-1.0, 0.0, 0.0]], slave: None };
+    let check = MasslessCheck { model: &model, normals: vec![[-1.0, 0.0, 0.0]], slaves: Vec::new() };
     let limit = check.limit(1.0).unwrap().closed;
     told!("ξ = {damping_ratio}: limit {limit:.3e} s, {:.2} of 2/ω_max", limit * model.largest_frequency() / 2.0);
     let law = FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![-1e-4], sliding: vec![[0.0; 3]] };
@@ -131,7 +131,7 @@ fn damping_is_part_of_the_limit() {
             shapes: DMatrix::identity(4, 4),
             quasi_static: 3,
         };
-        let check = MasslessCheck { model: &model, normals: vec![[-1.0, 0.0, 0.0]], slave: None };
+        let check = MasslessCheck { model: &model, normals: vec![[-1.0, 0.0, 0.0]], slaves: Vec::new() };
         let limit = check.limit(1.0).unwrap().closed;
         let radius = |step: f64| {
             let mode = model.coefficient(0, 1.0, Scheme::MasslessBoundary, step);
@@ -178,9 +178,14 @@ fn a_flexible_slave_is_part_of_the_limit() {
             // Residual flexibility along the normal: (1000/1000)² = 1.
             let master = model(vec![own, 1e3, 1e3, 1e3], [1.0, 0.0, 0.0, 0.0], 3);
             let other = model(vec![slave], [seen, 0.0, 0.0, 0.0], 0);
-            let check = |slave| MasslessCheck { model: &master, normals: vec![[-1.0, 0.0, 0.0]], slave };
-            let flexible = check(Some((DMatrix::from_element(1, 1, seen), &other)));
-            let (limit, alone) = (flexible.limit(100.0).unwrap().closed, check(None).limit(100.0).unwrap().closed);
+            let check = |slaves| MasslessCheck { model: &master, normals: vec![[-1.0, 0.0, 0.0]], slaves };
+            let flexible = check(vec![(DMatrix::from_element(1, 1, seen), &other)]);
+            let (limit, alone) =
+                (flexible.limit(100.0).unwrap().closed, check(Vec::new()).limit(100.0).unwrap().closed);
+            // Two slaves that are seen as the one is are as good as it.
+            let half = || (DMatrix::from_element(1, 1, seen * std::f64::consts::FRAC_1_SQRT_2), &other);
+            let halves = check(vec![half(), half()]).limit(100.0).unwrap().closed;
+            assert!((halves / limit - 1.0).abs() < 1e-9, "{halves} and {limit}");
             let first = (1..).map(|i| 1e-3 * f64::from(i)).find(|step| joined([own, slave], [1.0, seen], *step) > 1e3);
             let first = first.unwrap();
             told!(

@@ -244,7 +244,8 @@ fn features_that_exclude_each_other_are_refused() {
 fn outputs_of_what_the_scene_does_not_have_are_refused() {
     let parts = ["outputs.wear: needs `contact.coating`", "Add a `coating` to the contact"];
     refused(|scene| scene.contacts[0].coating = None, &parts);
-    let parts = ["outputs.slave_displacement: needs `surface.structure`", "Give the surface a `structure`"];
+    let parts =
+        ["outputs.slave_displacement: needs `surface.structure`", "Give the surface around a rotor a `structure`"];
     let rigid = |scene: &mut SceneSettings| {
         scene.surfaces[0].structure = None;
         scene.structures.truncate(1);

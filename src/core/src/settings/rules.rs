@@ -136,9 +136,11 @@ static VARIABLES: &[Rule] = &[
     ),
     needs(
         &[DISPLACEMENT],
-        ("`surface.structure`", |at| at.settings.surfaces.iter().any(|surface| surface.structure.is_some())),
-        "a rigid surface does not deform",
-        "Give the surface a `structure`, or remove the line",
+        ("`surface.structure` of a surface around an axis", |at| {
+            at.contacts().any(|at| at.carrier().is_some() && !at.is_free())
+        }),
+        "it is radial: a rigid surface does not deform, and an open one has no axis",
+        "Give the surface around a rotor a `structure`, or remove the line",
     ),
     excludes(
         &[OTHER_SECTORS, ALL_SECTORS, DIAMETERS],
@@ -146,7 +148,6 @@ static VARIABLES: &[Rule] = &[
         "a free structure has one sector",
         "Remove the line; `watched_sectors` may be [1] or []",
     ),
-    excludes(&[DISPLACEMENT], ALL_FREE, "it is radial, and open surfaces have no axis", "Remove the line"),
     excludes(&[INTERPOLATION], ALL_FREE, "such a scene has no inputs", "Remove the line"),
 ];
 

@@ -175,7 +175,7 @@ impl SurfaceSettings {
             }
             Shape::Table { radius_change } => {
                 crate::gaps::shape::Surface::new(&Shape::Table { radius_change: radius_change.clone() }, 0.0)
-                    .map(|_| ())
+                    .map_or_else(|error| Err(error.placed("surface", at)), |_| Ok(()))
             }
         }
     }

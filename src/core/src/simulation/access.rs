@@ -90,9 +90,10 @@ impl Simulation {
         if variable.quantity == Quantity::Friction && self.phase != Phase::Created {
             let before = std::mem::replace(&mut self.values[reference as usize], value);
             let parameters = self.parameters();
-            let warnings = self.check_limits(&parameters);
+            let outcome = self.check_limits(&parameters);
             self.values[reference as usize] = before;
-            self.tell_of_friction(warnings?);
+            outcome?;
+            self.tell_of_friction(&parameters);
             self.apply_friction(&parameters);
         }
         let offset = self.offset_now();

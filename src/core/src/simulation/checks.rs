@@ -23,12 +23,23 @@ impl Compiled {
                 }
                 None => plausibility::of_rom(rom, body.model.frequencies.iter().copied()),
             });
-            doubts.extend(plausibility::of_velocity(structure.velocity));
+            let fast = plausibility::of_velocity(structure.velocity);
+            doubts.extend(fast.map(|text| self.named(index, text)));
         }
         for carrier in &self.carriers {
             let rom = &self.scene.roms[carrier.structure];
             doubts.extend(plausibility::of_rom(rom, carrier.model.frequencies.iter().copied()));
         }
+        let settings = &self.scene.settings;
+        let rubs = settings.contacts.iter().any(|contact| contact.friction > 0.0);
+        let asked = settings.surfaces.iter().position(|surface| surface.patches.is_some() && !rubs);
+        doubts.extend(asked.map(|index| {
+            format!(
+                "surface[{}].patches: no contact has friction, so that there is no friction power of patches to tell: is \
+                 `contact.friction` missing?",
+                index + 1
+            )
+        }));
         doubts
     }
 }
@@ -37,24 +48,37 @@ impl Simulation {
     /// Loads and speed at the start have displaced the structures already: by what small displacements can describe?
     pub(super) fn check_initial_state(&self) -> Result<()> {
         let Err(failure) = self.system.check_state() else { return Ok(()) };
+        let blades = |structure: usize| match self.rotors.len() {
+            1 => "blades".to_owned(),
+            _ => format!("blades of {}", self.compiled.structure_name(structure)),
+        };
         let (what, remedy) = match failure {
-            StepFailure::CarrierImplausible { .. } => (
-                "the casing is displaced at the start by more than a tenth of the radius of the contact nodes",
+            StepFailure::CarrierImplausible { structure } => (
+                format!(
+                    "the {} is displaced at the start by more than a tenth of the radius of the contact nodes",
+                    self.compiled.carrier_name(structure)
+                ),
                 "Check the start values of its loads and temperatures; small displacements cannot describe this",
             ),
-            StepFailure::NonFinite => (
-                "the displacements at the start are not finite",
-                "Check the start values of loads, temperatures and speed",
-            ),
-            StepFailure::Curved(_) => (
-                "blades are displaced at the start so far around the axis that u²/2r, which linear gaps miss, is as large as the \
-                 clearance",
+            StepFailure::Curved(curved) => (
+                format!(
+                    "{} are displaced at the start so far around the axis that u²/2r, which linear gaps miss, is as large as the \
+                     clearance",
+                    blades(curved.structure)
+                ),
                 "Check the start value of the speed and the loads of the ROM; small displacements cannot describe this",
             ),
-            _ => (
-                "blades are displaced at the start by more than a tenth of the radius of the contact nodes",
+            StepFailure::Implausible { structure, .. } => (
+                format!(
+                    "{} are displaced at the start by more than a tenth of the radius of the contact nodes",
+                    blades(structure)
+                ),
                 "Check the start value of the speed and the centrifugal loads of the ROM; small displacements cannot \
                  describe this",
+            ),
+            _ => (
+                "the displacements at the start are not finite".to_owned(),
+                "Check the start values of loads, temperatures and speed",
             ),
         };
         Err(Error::invalid("initial state", what, remedy))

@@ -13,14 +13,14 @@ use crate::gaps::{GapLaw, RevolutionGap};
 use crate::laws::coating::Coating;
 use crate::ranges::SMALL;
 use crate::settings::{ContactSettings, Motion, StructureSettings};
-use crate::system::{Carrier, PairParts, StructureParts, System, SystemSettings};
+use crate::system::{Carrier, PairParts, StructureParts, System, SystemSettings, joined};
 use crate::variables::Quantity;
 use crate::{Error, Result, Rom, Scene, shown};
 use nalgebra::DMatrix;
 
 use super::loads::{CarrierLoads, centrifugal};
 use super::patches::Patches;
-use super::plan::{PairPlan, Plan};
+use super::plan::{PairPlan, Plan, prefix};
 use super::slave_surface::{CarrierModes, Share, spline_gap};
 
 /// Most contact nodes of all sectors together that a flexible slave or the disk couples: their Delassus matrix is dense.
@@ -180,6 +180,19 @@ impl Compiled {
         if self.bodies.len() > 1 { self.body(body).0.name.clone() } else { "the rotor".to_owned() }
     }
 
+    /// A text about a structure that touches, with its name where several do.
+    pub fn named(&self, body: usize, text: String) -> String {
+        if self.bodies.len() > 1 { format!("{}: {text}", self.body(body).0.name) } else { text }
+    }
+
+    /// Name of a structure of the system.
+    pub fn structure_name(&self, structure: usize) -> &str {
+        match structure.checked_sub(self.bodies.len()) {
+            Some(carrier) => &self.carrier(carrier).0.name,
+            None => &self.body(structure).0.name,
+        }
+    }
+
     /// Name of a structure of the system, for messages: that of a rotor or casing where there is one.
     pub fn carrier_name(&self, structure: usize) -> &str {
         match structure.checked_sub(self.bodies.len()) {
@@ -246,7 +259,7 @@ impl Compiled {
         let most = u32::try_from(rom.extras.grid.map_or(0, |grid| (grid.around - 1) / 2)).unwrap_or(u32::MAX);
         if structure.load.is_some() && !(0.0..=f64::from(most)).contains(&order) {
             return Err(Error::invalid(
-                "parameter `casing_load_order`",
+                format!("parameter `{}casing_load_order`", prefix(self.carriers.len(), &structure.name)),
                 format!("{order} nodal diameters, where the contact grid of the casing resolves 0 to {most}"),
                 "Use fewer nodal diameters, or a casing with more contact nodes around",
             ));
@@ -289,7 +302,8 @@ impl Compiled {
     /// Wrong number of sector gaps or frequency factors, bad shape table, surfaces that do not fit the nodes.
     pub fn system(&self) -> Result<System> {
         self.check_size()?;
-        let gaps = (0..self.plan.pairs.len()).map(|pair| self.gap(pair)).collect::<Result<Vec<_>>>()?;
+        let gap = |pair| self.gap(pair).map_err(|error| self.of_pair(pair, error));
+        let gaps = (0..self.plan.pairs.len()).map(gap).collect::<Result<Vec<_>>>()?;
         let control = self.control_modes(&gaps);
         let touching = (0..self.bodies.len()).map(|body| {
             let uncoupled = SectorModel::Uncoupled(&self.bodies[body].model, self.body(body).1.sectors);
@@ -309,7 +323,8 @@ impl Compiled {
             });
             pairs.push(PairParts { structure: plan.body, gap, carrier, friction: self.contact(index).friction });
         }
-        let coatings = (0..pairs.len()).filter_map(|pair| Some((pair, self.coating(pair).transpose()?)));
+        let coating = |pair| self.coating(pair).map_err(|error| self.of_pair(pair, error));
+        let coatings = (0..pairs.len()).filter_map(|pair| Some((pair, coating(pair).transpose()?)));
         let coatings = coatings.map(|(pair, coating)| Ok((pair, coating?))).collect::<Result<_>>()?;
         let settings = &self.scene.settings;
         let methods = SystemSettings {
@@ -320,27 +335,39 @@ impl Compiled {
         Ok(System::of(structures, pairs, coatings, methods))
     }
 
-    /// Contacts that are solved together must not be too many.
+    /// An error of a contact or of its surface, with their numbers.
+    pub fn of_pair(&self, pair: usize, error: Error) -> Error {
+        let surface = self.plan.pairs[pair].surface + 1;
+        error.placed("contact", &format!("contact[{}]", pair + 1)).placed("surface", &format!("surface[{surface}]"))
+    }
+
+    /// Contacts that are solved together must not be too many: those of a structure, or of several that share what they touch.
     fn check_size(&self) -> Result<()> {
-        let mut together = 0;
+        let (count, pairs) = (self.bodies.len(), self.plan.pairs.iter());
+        let links = pairs.filter_map(|pair| Some((pair.body, count + pair.carrier?)));
+        let set = joined(count + self.carriers.len(), links);
+        let mut coupled = vec![0; set.len()];
         for (body, parts) in self.bodies.iter().enumerate() {
             let rom = self.body(body).1;
             let own: usize = self.plan.pairs_of(body).map(|(_, pair)| pair.nodes.len()).sum();
             let carried = self.plan.pairs_of(body).any(|(_, pair)| pair.carrier.is_some());
             if parts.disk.is_some() || parts.translations.is_some() || carried {
-                together += own * rom.sectors;
+                coupled[set[body]] += own * rom.sectors;
             }
-            if together > MOST_COUPLED && parts.translations.is_some() {
-                let problem = format!("{together} contact nodes of all pairs, more than {MOST_COUPLED}");
-                return Err(Error::invalid("contact.nodes", problem, "Choose fewer, or a coarser mesh"));
+            let (together, name) = (coupled[set[body]], &self.body(body).0.name);
+            if together <= MOST_COUPLED {
+                continue;
             }
-            if together > MOST_COUPLED {
-                return Err(Error::invalid(
-                    if parts.disk.is_some() { "ROM metadata `sectors`" } else { "surface.structure" },
-                    format!("{together} contact nodes of all sectors together, coupled, more than {MOST_COUPLED}"),
-                    "Use fewer contact nodes or sectors, or uncoupled sectors on a rigid surface",
-                ));
-            }
+            let first = self.plan.pairs_of(body).next().map_or(0, |(pair, _)| pair);
+            let (what, problem, remedy) = if parts.translations.is_some() {
+                ("contact.nodes", format!("{together} contact nodes of all pairs"), "Choose fewer, or a coarser mesh")
+            } else {
+                let what = if parts.disk.is_some() { "ROM metadata `sectors`" } else { "surface.structure" };
+                let problem = format!("{together} contact nodes of all sectors together, coupled");
+                (what, problem, "Use fewer contact nodes or sectors, or uncoupled sectors on a rigid surface")
+            };
+            let problem = format!("{problem}, of `{name}` and what it feels, more than {MOST_COUPLED}");
+            return Err(self.of_pair(first, Error::invalid(what, problem, remedy)));
         }
         Ok(())
     }

@@ -30,7 +30,7 @@ impl Simulation {
         let is_free = |structure: usize| self.compiled.bodies[structure].translations.is_some();
         match failure {
             StepFailure::Implausible { structure, .. } | StepFailure::Unsolved { structure, .. } if is_free(structure) => {
-                free_failure(failure)
+                free_failure(failure, self.compiled.structure_name(structure))
             }
             StepFailure::NonFinite => (String::new(), String::new()),
             StepFailure::Implausible { structure, sector } => (
@@ -38,7 +38,7 @@ impl Simulation {
                     "a contact node of {} is displaced by more than a tenth of its radius, is as deep inside the casing, or meets a \
                      flank of the casing shape steeper than 45°{}",
                     self.sector_name(structure, sector),
-                    self.instability()
+                    self.instability(structure)
                 ),
                 "Check gap, casing shape, loads and inputs; small displacements cannot describe this".to_owned(),
             ),
@@ -64,17 +64,20 @@ impl Simulation {
                  there"
                     .to_owned(),
             ),
-            StepFailure::Unbalanced { work, exchanged } => (
+            StepFailure::Unbalanced { set, work, exchanged } => (
                 format!(
-                    "contact forces have added {work:.3e} J that no input brings, of {exchanged:.3e} J exchanged: normals turn and \
-                     surfaces curve too far within an internal step (curvature work)"
+                    "contact forces{} have added {work:.3e} J that no input brings, of {exchanged:.3e} J exchanged: normals turn and \
+                     surfaces curve too far within an internal step (curvature work)",
+                    self.of_set(set)
                 ),
                 "Use a smaller internal step".to_owned(),
             ),
-            StepFailure::TooFast { .. } => (
-                "contact nodes of the free structure move by more than a tenth of the extent of the contact nodes in one internal \
-                 step, and could pass a surface unseen"
-                    .to_owned(),
+            StepFailure::TooFast { structure } => (
+                format!(
+                    "contact nodes of {} move by more than a tenth of the extent of the contact nodes in one internal step, and \
+                     could pass a surface unseen",
+                    self.compiled.structure_name(structure)
+                ),
                 "Use a smaller internal step or a lower velocity".to_owned(),
             ),
             StepFailure::BehindEdge { structure, node } => (
@@ -99,8 +102,11 @@ impl Simulation {
             pair.carrier().is_some_and(|carrier| carrier.structure == structure) && pair.gap().layout().is_none()
         });
         if open {
-            let problem = "a structure that carries a surface is displaced by more than a tenth of the extent of the contact nodes";
-            return (problem.to_owned(), BESIDE_FLIGHT.to_owned());
+            let name = self.compiled.structure_name(structure);
+            let problem = format!(
+                "{name}, which carries a surface, is displaced by more than a tenth of the extent of the contact nodes"
+            );
+            return (problem, BESIDE_FLIGHT.to_owned());
         }
         let name = self.compiled.carrier_name(structure);
         (
@@ -118,7 +124,7 @@ impl Simulation {
             curved.moved,
             curved.error,
             curved.clearance,
-            self.instability()
+            self.instability(curved.structure)
         );
         let remedy = "Check casing shape, friction, loads and inputs: small displacements cannot describe this";
         (problem, remedy.to_owned())
@@ -133,10 +139,25 @@ impl Simulation {
         format!("sector {}{of}", sector + 1)
     }
 
-    /// Growth that the initialisation warned of, as the likely cause of a failure.
-    fn instability(&self) -> String {
-        let grows = |text: &&String| text.contains("physically unstable");
-        self.warnings.iter().find(grows).map_or_else(String::new, |text| format!(". {text}"))
+    /// Structures of a set by their names, where there are several sets.
+    pub(super) fn of_set(&self, set: usize) -> String {
+        let sets = self.system.sets();
+        if sets.count() == 1 {
+            return String::new();
+        }
+        let names: Vec<&str> = sets.members(set).iter().map(|member| self.compiled.structure_name(*member)).collect();
+        format!(" of {}", names.join(", "))
+    }
+
+    /// Growth of sliding contact of this structure, or of one that it feels, as the likely cause of a failure.
+    fn instability(&self, structure: usize) -> String {
+        let Some(limits) = &self.limits else { return String::new() };
+        let sets = self.system.sets();
+        let others = sets.members(sets.of(structure)).iter().copied();
+        let mut bodies = std::iter::once(structure).chain(others).filter(|body| *body < self.rotors.len());
+        let speed = |body: usize| self.inputs.rotors[body].speed.at(0.0);
+        let found = bodies.find_map(|body| limits.flutter(body, speed(body)));
+        found.map_or_else(String::new, |text| format!(". {text}"))
     }
 }
 
@@ -144,16 +165,18 @@ const BESIDE_FLIGHT: &str =
     "Check positions and velocity; small displacements beside rigid flight cannot describe this";
 
 /// What means something else for a structure that flies freely.
-fn free_failure(failure: StepFailure) -> (String, String) {
-    let (problem, remedy) = match failure {
-        StepFailure::Unsolved { .. } => {
-            ("the contact problem has no solution", "Use less friction, another internal step or the solver coulomb")
-        }
-        _ => (
-            "contact nodes of the free structure have moved against each other, or into a surface, by more than a tenth of the \
-             extent of the contact nodes",
-            BESIDE_FLIGHT,
+fn free_failure(failure: StepFailure, name: &str) -> (String, String) {
+    match failure {
+        StepFailure::Unsolved { .. } => (
+            format!("the contact problem of {name} has no solution"),
+            "Use less friction, another internal step or the solver coulomb".to_owned(),
         ),
-    };
-    (problem.to_owned(), remedy.to_owned())
+        _ => (
+            format!(
+                "contact nodes of {name} have moved against each other, or into a surface, by more than a tenth of the extent of \
+                 the contact nodes"
+            ),
+            BESIDE_FLIGHT.to_owned(),
+        ),
+    }
 }

@@ -135,6 +135,15 @@ impl Simulation {
     /// Refuse a step size (s) whose range was found unstable, or that stiffening at one of the `speeds` of a structure (rad/s)
     /// forbids. Only looks up, so that a step does not allocate.
     pub(super) fn check_step_size(&self, body: usize, step: f64, speeds: [f64; 3]) -> Result<()> {
+        self.is_step_allowed(body, step, speeds).map_err(|error| match error {
+            Error::Unstable { problem, remedy } => {
+                Error::Unstable { problem: self.compiled.named(body, problem), remedy }
+            }
+            other => other,
+        })
+    }
+
+    fn is_step_allowed(&self, body: usize, step: f64, speeds: [f64; 3]) -> Result<()> {
         let Some(limits) = &self.limits else { return Ok(()) };
         let (scheme, own) = (limits.parameters.scheme, &limits.bodies[body]);
         let stiffened = speeds.into_iter().fold(1.0, |most: f64, speed| most.max(self.compiled.stiffened(body, speed)));
@@ -178,12 +187,13 @@ impl Compiled {
         (1.0 + added.max(0.0) / (largest * largest)).sqrt()
     }
 
-    /// Largest ω h of all structures, stiffening aside, below 2.
-    pub(super) fn largest_product(&self, step: f64) -> f64 {
-        let touching = self.bodies.iter().enumerate();
-        let touching = touching.map(|(index, body)| body.largest_frequency() * self.stiffest(index));
-        let carriers = self.carriers.iter().map(|carrier| carrier.model.largest_frequency());
-        let largest = touching.chain(carriers).fold(0.0, f64::max);
+    /// Largest ω h of structures of the system, stiffening aside, below 2.
+    pub(super) fn largest_product(&self, structures: &[usize], step: f64) -> f64 {
+        let frequency = |structure: &usize| match self.bodies.get(*structure) {
+            Some(body) => body.largest_frequency() * self.stiffest(*structure),
+            None => self.carriers[*structure - self.bodies.len()].model.largest_frequency(),
+        };
+        let largest = structures.iter().map(frequency).fold(0.0, f64::max);
         (largest * step).min(2.0 * (1.0 - 1e-9))
     }
 
@@ -272,17 +282,29 @@ impl Limits {
     fn warnings(&self, senses: &[f64]) -> Result<Vec<String>> {
         let mut warnings = Vec::new();
         for (body, sense) in self.bodies.iter().zip(senses) {
-            let own = body.outcome.clone()?;
-            warnings.extend(own);
-            for sense in senses_of(*sense).filter_map(|sense| body.senses[sense].as_ref()) {
-                warnings.extend(sense.outcome.clone()?);
-            }
+            warnings.extend(body.warnings(*sense)?);
         }
         Ok(warnings)
+    }
+
+    /// Flutter of a structure that turns at a speed of this sign.
+    pub fn flutter(&self, body: usize, speed: f64) -> Option<&str> {
+        let found =
+            senses_of(speed).filter_map(|sense| self.bodies[body].senses[sense].as_ref()?.outcome.as_ref().ok());
+        found.flatten().map(String::as_str).find(|text| text.contains(checking::FLUTTER))
     }
 }
 
 impl BodyLimits {
+    /// Warnings for the step expected where contact slides in the sense of this sign.
+    fn warnings(&self, sense: f64) -> Result<Vec<String>> {
+        let mut warnings = self.outcome.clone()?;
+        for sense in senses_of(sense).filter_map(|sense| self.senses[sense].as_ref()) {
+            warnings.extend(sense.outcome.clone()?);
+        }
+        Ok(warnings)
+    }
+
     /// Texts with the name of the structure.
     fn named(mut self, name: &str) -> Self {
         let texts = |texts: Vec<String>| texts.into_iter().map(|text| format!("{name}: {text}")).collect();

@@ -134,11 +134,19 @@ pub struct Simulation {
     limits: Option<limits::Limits>,
     /// Length of every saved state (bytes).
     state_size: usize,
-    /// Kinetic plus strain energy of the instant, what the scheme conserves, and the first at the start (J); where the ledger is
-    /// kept.
-    energy: f64,
+    /// Energies of each set of structures that can feel each other; where the ledger is kept.
+    energies: Vec<SetEnergy>,
+    /// Kinetic plus strain energy of each set at the start (J).
+    initial_energies: Vec<f64>,
+}
+
+/// Energies of structures that can feel each other (J).
+#[derive(Debug, Clone, Copy, Default)]
+struct SetEnergy {
+    /// Kinetic plus strain energy of the instant.
+    now: f64,
+    /// What the scheme conserves.
     conserved: f64,
-    initial_energy: f64,
 }
 
 impl Simulation {
@@ -151,7 +159,9 @@ impl Simulation {
         let (table, readers) = table::build(scene)?;
         let system = compiled.system()?;
         let window = Window::new(system.structures(), &compiled.patches);
-        let (bodies, pairs) = (compiled.bodies.len(), compiled.plan.pairs.len());
+        let sets = system.sets().count();
+        let (energies, initial_energies) = (vec![SetEnergy::default(); sets], vec![0.0; sets]);
+        let (bodies, pairs, carriers) = (compiled.bodies.len(), compiled.plan.pairs.len(), compiled.carriers.len());
         let heated = |carrier: &compile::CarrierParts| CarrierInputs {
             temperatures: vec![Input::default(); carrier.loads.thermal.len()],
             ..CarrierInputs::default()
@@ -181,12 +191,11 @@ impl Simulation {
             phase: Phase::Created,
             warnings: Vec::new(),
             notes: Vec::new(),
-            told: limits::Told::new(bodies),
+            told: limits::Told::new(bodies, carriers),
             limits: None,
             state_size: 0,
-            energy: 0.0,
-            conserved: 0.0,
-            initial_energy: 0.0,
+            energies,
+            initial_energies,
         };
         simulation.state_size = simulation.measured_state();
         simulation.reset();
@@ -241,7 +250,9 @@ impl Simulation {
         self.check_initial_gaps()?;
         self.window.open(self.system.structures());
         self.update_outputs();
-        self.initial_energy = self.energy;
+        for (initial, energy) in self.initial_energies.iter_mut().zip(&self.energies) {
+            *initial = energy.now;
+        }
         self.check_outputs(start_time)?;
         self.phase = Phase::Ready;
         self.previous.copy_from_slice(&self.values);

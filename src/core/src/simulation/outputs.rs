@@ -55,6 +55,8 @@ pub struct View<'a> {
     pub energies: (f64, f64),
     /// Energy that the scheme conserves (J), if the ledger is kept.
     pub conserved: f64,
+    /// Work and losses of all structures.
+    ledger: Ledger,
 }
 
 impl Simulation {
@@ -67,16 +69,21 @@ impl Simulation {
         let (mut energies, mut conserved) = ((0.0, 0.0), 0.0);
         if self.system.settings().ledger {
             let (kinetic, strain) = self.system.energies();
-            (energies, conserved) = (self.system.energies_now(), kinetic + strain);
+            let of_sets = &mut self.energies;
+            let now = self.system.energies_now(|set, (kinetic, strain)| of_sets[set].now = kinetic + strain);
+            (energies, conserved) = (now, kinetic + strain);
+            for (set, energy) in self.energies.iter_mut().enumerate() {
+                energy.conserved = self.system.mechanical_energy(set);
+            }
         }
-        (self.energy, self.conserved) = (energies.0 + energies.1, conserved);
         for pair in 0..self.slave_shares.len() {
             let variable = self.table.with_quantity_of(Quantity::HeatToSlave, pair);
             self.slave_shares[pair] = variable.map_or(1.0, |variable| self.values[variable.reference as usize]);
         }
         let mut values = std::mem::take(&mut self.values);
         let (system, window) = (&self.system, &self.window);
-        let view = View { simulation: self, system, window, mean, elapsed, energies, conserved };
+        let ledger = system.ledger();
+        let view = View { simulation: self, system, window, mean, elapsed, energies, conserved, ledger };
         let outputs = self.table.variables().iter().filter(|variable| variable.causality == Causality::Output);
         for (variable, read) in outputs.zip(&self.readers) {
             let start = variable.reference as usize;
@@ -106,12 +113,18 @@ impl View<'_> {
     }
 
     pub fn ledger(&self) -> &Ledger {
-        self.system.ledger()
+        &self.ledger
     }
 
+    /// Of the set of structures that can feel each other where it is largest.
     pub fn relative_residual(&self) -> f64 {
-        let (residual, scale) = (self.ledger().residual(self.conserved), self.ledger().scale());
-        if scale > 0.0 { residual / scale } else { 0.0 }
+        let ledgers = self.system.ledgers().iter().zip(&self.simulation.energies);
+        let relative = ledgers.map(|(ledger, energy)| match ledger.scale() {
+            scale if scale > 0.0 => ledger.residual(energy.conserved) / scale,
+            _ => 0.0,
+        });
+        let larger = |largest: f64, one: f64| if one.abs() > largest.abs() { one } else { largest };
+        relative.reduce(larger).unwrap_or_default()
     }
 
     #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]

@@ -11,7 +11,7 @@ use crate::variables::{Causality, Kind, Variable};
 use crate::{Error, Result, shown};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 7;
+const VERSION: u64 = 8;
 const CHECKSUM_BYTES: usize = 8;
 
 persist_fields!(Communication { start, length, count, done });
@@ -132,7 +132,7 @@ impl Simulation {
         self.phase.save(writer);
         self.time.save(writer);
         self.initial_time.save(writer);
-        self.initial_energy.save(writer);
+        self.initial_energies.save(writer);
         self.communication.save(writer);
         self.previous_length.save(writer);
         self.inputs.save(writer);
@@ -164,7 +164,7 @@ impl Simulation {
         let largest = if runs { LARGEST } else { f64::INFINITY };
         take(&mut lead.time, reader);
         self.initial_time.check(reader);
-        self.initial_energy.check(reader);
+        self.initial_energies.check(reader);
         take(&mut lead.communication, reader);
         self.previous_length.check(reader);
         // What inputs may hold is looked at where they are read.
@@ -315,7 +315,7 @@ impl Simulation {
         self.phase.restore(reader);
         self.time.restore(reader);
         self.initial_time.restore(reader);
-        self.initial_energy.restore(reader);
+        self.initial_energies.restore(reader);
         self.communication.restore(reader);
         self.previous_length.restore(reader);
         self.inputs.restore(reader);

@@ -155,7 +155,7 @@ impl Simulation {
         let passed = step * speed.at(0.0).abs().max(speed.at(step_size).abs());
         if let Some(cell) = cell.filter(|cell| passed > *cell) {
             return Err(Error::invalid(
-                "contact.coating.cells_around",
+                format!("contact[{}].coating.cells_around", pair + 1),
                 format!(
                     "the rotor turns {passed:.3e} rad in one internal step of {step:.3e} s at t = {} s, past cells of the \
                      coating {cell:.3e} rad wide, which would stay unworn",
@@ -255,55 +255,74 @@ impl Simulation {
         Ok(())
     }
 
-    /// Tell of the first displacement of the run that linear kinematics describes badly.
+    /// Tell of the first displacement of each structure that linear kinematics describes badly.
     fn note_curved(&mut self, time: f64) {
-        if self.told.curved {
-            return;
+        for body in 0..self.rotors.len() {
+            if self.told.curved[body] {
+                continue;
+            }
+            let Some(most) = self.system.most_curved_of(body).filter(|most| most.share() >= CURVED_SHARE) else {
+                continue;
+            };
+            self.told.curved[body] = true;
+            self.notes.push(format!(
+                "at t = {} s contact node {} of {} is displaced by {:.3e} m around the axis: gaps are linear in displacements, \
+                 which misses u²/2r = {:.2e} m, {:.0} % of the clearance; further on it grows with the square, and at 100 % the \
+                 run ends",
+                shown(time),
+                self.compiled.node_name(most.structure, most.node),
+                self.sector_name(most.structure, most.sector),
+                most.moved,
+                most.error,
+                100.0 * most.share()
+            ));
         }
-        let Some(most) = self.system.most_curved().filter(|most| most.share() >= CURVED_SHARE) else { return };
-        self.told.curved = true;
-        self.notes.push(format!(
-            "at t = {} s contact node {} of {} is displaced by {:.3e} m around the axis: gaps are linear in displacements, which \
-             misses u²/2r = {:.2e} m, {:.0} % of the clearance; further on it grows with the square, and at 100 % the run ends",
-            shown(time),
-            self.compiled.node_name(most.structure, most.node),
-            self.sector_name(most.structure, most.sector),
-            most.moved,
-            most.error,
-            100.0 * most.share()
-        ));
     }
 
     /// Vibration has no more energy than forces times speeds put in: what the scheme conserves leaves out what modes beyond the step
     /// hold. With massless-boundary quasi-static modes hold energy one step before its work is known; its own limit keeps it.
     fn check_energy(&mut self, time: f64) -> Result<()> {
-        let (settings, ledger) = (self.system.settings(), self.system.ledger());
-        let supplied = ledger.supplied().max(self.conserved - ledger.initial).max(0.0);
-        let factor = match settings.scheme {
-            Scheme::CentralDifference => {
-                1.0 / (1.0 - self.compiled.largest_product(self.system.step_size()).powi(2) / 4.0)
-            }
-            _ => ENERGY_FACTOR,
-        };
-        let bound = factor.max(ENERGY_FACTOR) * (self.initial_energy + supplied) + ENERGY_SLACK * ledger.scale();
-        if !settings.ledger || settings.scheme == Scheme::MasslessBoundary || self.energy <= bound {
+        let settings = self.system.settings();
+        if !settings.ledger || settings.scheme == Scheme::MasslessBoundary {
             return Ok(());
         }
+        let Some(set) = (0..self.energies.len()).find(|set| !self.has_its_energy(*set)) else { return Ok(()) };
         self.phase = Phase::Failed;
         Err(Error::Unstable {
             problem: format!(
-                "at t = {} s (last good time {} s) the structures hold {:.4e} J of kinetic and strain energy, where they had {:.4e} J \
-                 at the start and work less friction and damping supplied {:.4e} J: modes that the internal step of {:.3e} s does not \
-                 resolve have taken energy that is not there",
+                "at t = {} s (last good time {} s) the kinetic and strain energy{} is {:.4e} J, where it was {:.4e} J at the start \
+                 and work less friction and damping supplied {:.4e} J: modes that the internal step of {:.3e} s does not resolve \
+                 have taken energy that is not there",
                 shown(time),
                 shown(self.time),
-                self.energy,
-                self.initial_energy,
-                supplied,
+                self.of_set(set),
+                self.energies[set].now,
+                self.initial_energies[set],
+                self.supplied(set),
                 self.system.step_size()
             ),
             remedy: "Use a smaller internal step (internal_step_max). Restore a saved state or reset first".to_owned(),
         })
+    }
+
+    /// Whether structures that can feel each other have no more energy than they can have.
+    fn has_its_energy(&self, set: usize) -> bool {
+        let step = self.system.step_size();
+        let factor = match self.system.settings().scheme {
+            Scheme::CentralDifference => {
+                1.0 / (1.0 - self.compiled.largest_product(self.system.sets().members(set), step).powi(2) / 4.0)
+            }
+            _ => ENERGY_FACTOR,
+        };
+        let bound = factor.max(ENERGY_FACTOR) * (self.initial_energies[set] + self.supplied(set))
+            + ENERGY_SLACK * self.system.ledgers()[set].scale();
+        self.energies[set].now <= bound
+    }
+
+    /// Energy that forces times speeds have put into a set (J).
+    fn supplied(&self, set: usize) -> f64 {
+        let ledger = &self.system.ledgers()[set];
+        ledger.supplied().max(self.energies[set].conserved - ledger.initial).max(0.0)
     }
 
     /// End the communication step here, before its end (early return): outputs cover the part done.

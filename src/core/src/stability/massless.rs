@@ -4,7 +4,7 @@
 //! K_c = Φ_nᵀ G_nn⁻¹ Φ_n. Their step q⁺ − (1 + β)q + βq⁻ = −C(Λ + K_c)q, C = diag(c), is that of the masses ½(1 + β) with
 //! dashpots, and stable while the largest eigenvalue µ of D + X½ K_c X½ is below 4, with X = 2(1 + β)⁻¹C and D = XΛ.
 //!
-//! A flexible slave has its own D_s < 4 and X_s. With the modes of both, and U = L⁻¹[Φ_n X½, Ψ_n X_s½], G_nn = L Lᵀ, all
+//! A flexible slave has its own D_s < 4 and X_s, several slaves under one blade have those of all their modes. With the modes of both, and U = L⁻¹[Φ_n X½, Ψ_n X_s½], G_nn = L Lᵀ, all
 //! eigenvalues are below 4 while those of the sum over modes U(4 − D)⁻¹Uᵀ are below 1. The part of the master has none above
 //! µ/4, so that the slave adds the largest eigenvalue of G_nn⁻¹ Ψ_n X_s(1 − D_s/4)⁻¹ Ψ_nᵀ to µ, per blade in contact.
 //!
@@ -60,8 +60,8 @@ pub struct MasslessCheck<'a> {
     pub model: &'a ModalModel,
     /// Unit normal of every contact node.
     pub normals: Vec<[f64; 3]>,
-    /// Slave's modes along those normals, nodes × modes, and the slave.
-    pub slave: Option<(DMatrix<f64>, &'a ModalModel)>,
+    /// Modes along those normals, nodes × modes, of every structure under the nodes, and the structure.
+    pub slaves: Vec<(DMatrix<f64>, &'a ModalModel)>,
 }
 
 impl MasslessCheck<'_> {
@@ -91,15 +91,14 @@ impl MasslessCheck<'_> {
             matrix[(mode, mode)] += kept;
         }
         let master = if dynamic == 0 { 0.0 } else { matrix.symmetric_eigenvalues().max() };
-        let slave = match &self.slave {
-            None => 0.0,
-            Some((seen, model)) => {
-                let own: Vec<[f64; 2]> = (0..model.len()).map(|mode| worst(model, mode, step)).collect();
-                let raised = |[kept, moved]: [f64; 2]| (moved / (1.0 - 0.25 * kept)).sqrt();
-                let half = scaled(model.len(), &|node, mode| seen[(node, mode)] * raised(own[mode]))?;
-                (&half * half.transpose()).symmetric_eigenvalues().max()
-            }
-        };
+        let mut added = DMatrix::zeros(nodes, nodes);
+        for (seen, model) in &self.slaves {
+            let own: Vec<[f64; 2]> = (0..model.len()).map(|mode| worst(model, mode, step)).collect();
+            let raised = |[kept, moved]: [f64; 2]| (moved / (1.0 - 0.25 * kept)).sqrt();
+            let half = scaled(model.len(), &|node, mode| seen[(node, mode)] * raised(own[mode]))?;
+            added += &half * half.transpose();
+        }
+        let slave = if self.slaves.is_empty() { 0.0 } else { added.symmetric_eigenvalues().max() };
         Some((master, slave))
     }
 

@@ -29,7 +29,9 @@ impl System {
     pub fn set_step(&mut self, step: f64) {
         let (old, scheme) = (self.step_size(), self.settings.scheme);
         if old > 0.0 && self.counted.steps > 0 {
-            let before = self.mechanical_energy();
+            for set in 0..self.sets.count() {
+                self.mechanical[set] = self.mechanical_energy(set);
+            }
             self.find_lasting(old, step);
             self.structures.iter_mut().for_each(|structure| structure.carry_over(scheme, step));
             // The gap of the step before is continued along its own slope, not along the motion of the modes.
@@ -44,20 +46,27 @@ impl System {
                     }
                 }
             }
-            let after = self.mechanical_energy();
-            self.counted.ledger.step_change.add(after - before);
-            self.counted.ledger.turnover.add((after - before).abs());
+            for set in 0..self.sets.count() {
+                let change = self.mechanical_energy(set) - self.mechanical[set];
+                self.counted.ledgers[set].step_change.add(change);
+                self.counted.ledgers[set].turnover.add(change.abs());
+            }
         } else {
             self.structures.iter_mut().for_each(|structure| structure.set_step(scheme, step));
         }
     }
 
     /// Kinetic and strain energy of all structures at this instant (J): ½q̇ᵀMq̇ with the velocity of the instant, ½qᵀKq. Between
-    /// steps only.
-    pub fn energies_now(&mut self) -> (f64, f64) {
+    /// steps only. `each` is told those of every set.
+    pub fn energies_now(&mut self, mut each: impl FnMut(usize, (f64, f64))) -> (f64, f64) {
         let step = self.step_size();
         self.find_lasting(step, step);
-        sum_of(self.structures.iter_mut().map(Structure::energies_now))
+        let Self { sets, structures, .. } = self;
+        sum_of((0..sets.count()).map(|set| {
+            let own = sum_of(sets.members(set).iter().map(|member| structures[*member].energies_now()));
+            each(set, own);
+            own
+        }))
     }
 
     /// The contact forces without those of impacts, on all structures where the last step found them. The force of a contact that
@@ -127,16 +136,17 @@ impl System {
         Ok(())
     }
 
-    /// Whether curvature work, which no input does, is still small beside what was exchanged; at the end of a communication
-    /// step.
+    /// Whether curvature work, which no input does, is still small beside what was exchanged, set by set; at the end of a
+    /// communication step.
     ///
     /// # Errors
     /// It is not: [`StepFailure::Unbalanced`].
     pub fn check_ledger(&self) -> Result<(), StepFailure> {
-        let ledger = &self.counted.ledger;
-        let curved = ledger.curvature_work.value();
-        if curved.abs() > MOST_CURVATURE * ledger.exchanged() {
-            return Err(StepFailure::Unbalanced { work: curved, exchanged: ledger.exchanged() });
+        for (set, ledger) in self.counted.ledgers.iter().enumerate() {
+            let (work, exchanged) = (ledger.curvature_work.value(), ledger.exchanged());
+            if work.abs() > MOST_CURVATURE * exchanged {
+                return Err(StepFailure::Unbalanced { set, work, exchanged });
+            }
         }
         Ok(())
     }

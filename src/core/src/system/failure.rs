@@ -34,6 +34,8 @@ pub enum StepFailure {
     },
     /// Normals turn and surfaces curve so far within steps that this adds energy which no input brings.
     Unbalanced {
+        /// Set of structures that can feel each other.
+        set: usize,
         /// What it has added (J).
         work: f64,
         /// All energy exchanged (J).

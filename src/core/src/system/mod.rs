@@ -8,6 +8,7 @@ mod failure;
 mod group;
 mod pair;
 mod posed;
+mod sets;
 mod small;
 mod structure;
 mod witness;
@@ -29,6 +30,8 @@ pub(crate) use group::{Found, Group};
 pub use pair::{Carrier, Pair, PairParts};
 pub(crate) use posed::Bodies;
 pub use posed::Member;
+pub use sets::Sets;
+pub(crate) use sets::joined;
 pub use small::Curved;
 pub use structure::Structure;
 
@@ -59,20 +62,25 @@ pub(crate) struct Counted {
     pub factorisations: u64,
     /// Steps done when the gap two steps back was first one of steps of this size.
     pub witnessed: u64,
-    pub ledger: Ledger,
+    /// Of each set.
+    pub ledgers: Vec<Ledger>,
 }
 
-persist_fields!(Counted { steps, factorisations, witnessed, ledger });
+persist_fields!(Counted { steps, factorisations, witnessed, ledgers });
 
 /// Structures, the contact pairs between them, and which of the contacts can push each other.
 #[derive(Debug, Clone)]
 pub struct System {
     pub(crate) structures: Vec<Structure>,
     pub(crate) pairs: Vec<Pair>,
+    /// Those of the first sets, in their order.
     pub(crate) groups: Vec<Group>,
+    sets: Sets,
     pub(crate) settings: SystemSettings,
     pub(crate) events: Two<Vec<ContactEvent>>,
     pub(crate) counted: Counted,
+    /// Energy of each set before a change of the step (J).
+    mechanical: Vec<f64>,
 }
 
 impl System {
@@ -114,14 +122,17 @@ impl System {
             let coating = coated.map(|index| coatings.swap_remove(index).1);
             Group::new((reach, &touching, &carriers), &structures, (settings.solver, coating))
         };
-        let groups: Vec<Group> = reaches(&structures, &pairs).into_iter().map(group).collect();
+        let sets = Sets::new(&structures, &pairs);
+        let groups: Vec<Group> = reaches(&structures, &pairs, &sets).into_iter().map(group).collect();
         let contacts = structures.iter().map(|structure| structure.gaps().len()).sum();
         let room = || Vec::with_capacity(contacts);
         let mut system = Self {
             groups,
             settings,
             events: Two { now: room(), before: room() },
-            counted: Counted::default(),
+            counted: Counted { ledgers: vec![Ledger::default(); sets.count()], ..Counted::default() },
+            mechanical: vec![0.0; sets.count()],
+            sets,
             structures,
             pairs,
         };
@@ -207,9 +218,21 @@ impl System {
         self.counted.factorisations
     }
 
-    /// Work and losses so far.
-    pub fn ledger(&self) -> &Ledger {
-        &self.counted.ledger
+    /// Work and losses so far, of all structures.
+    pub fn ledger(&self) -> Ledger {
+        let mut ledgers = self.counted.ledgers.iter().copied();
+        let first = ledgers.next().unwrap_or_default();
+        ledgers.fold(first, |sum, one| sum.with(&one))
+    }
+
+    /// The same of each set of structures that can feel each other.
+    pub fn ledgers(&self) -> &[Ledger] {
+        &self.counted.ledgers
+    }
+
+    /// Which structures can feel each other.
+    pub fn sets(&self) -> &Sets {
+        &self.sets
     }
 
     /// Settings in use.
@@ -244,12 +267,15 @@ impl System {
         for structure in &mut self.structures {
             structure.remember_start();
         }
-        self.counted = Counted::default();
-        self.counted.ledger.initial = self.mechanical_energy();
+        let initial = |set| Ledger { initial: self.mechanical_energy(set), ..Ledger::default() };
+        let ledgers = (0..self.sets.count()).map(initial).collect();
+        self.counted = Counted { ledgers, ..Counted::default() };
     }
 
-    fn mechanical_energy(&self) -> f64 {
-        let (kinetic, strain) = self.energies();
+    /// Kinetic plus strain energy of a set (J), in the quantity the scheme conserves.
+    pub(crate) fn mechanical_energy(&self, set: usize) -> f64 {
+        let members = self.sets.members(set).iter();
+        let (kinetic, strain) = sum_of(members.map(|member| self.structures[*member].modes().energies()));
         kinetic + strain
     }
 
@@ -261,14 +287,16 @@ impl System {
     /// Follow the speed of a rotor (rad/s) where its modes depend on it; the strain energy this adds is work of the shaft.
     pub fn set_speed(&mut self, structure: usize, speed: f64) {
         let work = self.structures[structure].modes_mut().set_speed(speed);
-        self.counted.ledger.stiffening_work.add(work);
-        self.counted.ledger.turnover.add(work.abs());
+        let ledger = &mut self.counted.ledgers[self.sets.of(structure)];
+        ledger.stiffening_work.add(work);
+        ledger.turnover.add(work.abs());
     }
 
     /// Move the damping loss gathered in the step kernel to the ledger.
     pub fn close_ledger(&mut self) {
-        for structure in &mut self.structures {
-            self.counted.ledger.damping_loss.add(structure.modes_mut().collect_loss());
+        for (index, structure) in self.structures.iter_mut().enumerate() {
+            let ledger = &mut self.counted.ledgers[self.sets.of(index)];
+            ledger.damping_loss.add(structure.modes_mut().collect_loss());
         }
     }
 }
@@ -294,28 +322,19 @@ fn made(part: StructureParts, index: usize, pairs: &[PairParts]) -> Structure {
     Structure::touching(model, options, pair_of, has_places)
 }
 
-/// Which structures can push each other, and how far their contacts reach.
-fn reaches(structures: &[Structure], pairs: &[Pair]) -> Vec<(Reach, Vec<usize>)> {
-    // Structures that share a carrier, directly or through others, get the same number.
-    let mut number: Vec<usize> = (0..structures.len()).collect();
-    for pair in pairs {
-        if let Some(carrier) = pair.carrier() {
-            let (kept, lost) = (number[pair.structure()], number[carrier.structure]);
-            number.iter_mut().filter(|number| **number == lost).for_each(|number| *number = kept);
-        }
-    }
-    let touching = |index: &usize| structures[*index].nodes() > 0;
-    let mut groups: Vec<(Reach, Vec<usize>)> = Vec::new();
-    for one in 0..structures.len() {
-        let members: Vec<usize> =
-            (0..structures.len()).filter(|index| number[*index] == one).filter(touching).collect();
-        if let [first, ..] = members[..] {
-            let carried = pairs.iter().any(|pair| members.contains(&pair.structure()) && pair.carrier().is_some());
-            // Sectors turn against what stands still; a single structure is one sector with all of its contacts at once.
-            let open = pairs.iter().any(|pair| pair.structure() == first && matches!(pair.gap(), GapLaw::Open(_)));
-            let together = carried || structures[first].modes().coupled().is_some() || open;
-            groups.push((if together { Reach::All } else { Reach::Sector }, members));
-        }
-    }
-    groups
+/// Which structures push each other with their contact nodes, set by set, and how far their contacts reach.
+fn reaches(structures: &[Structure], pairs: &[Pair], sets: &Sets) -> Vec<(Reach, Vec<usize>)> {
+    let touching = |set: usize| -> Vec<usize> {
+        let members = sets.members(set).iter().copied();
+        members.filter(|member| structures[*member].nodes() > 0).collect()
+    };
+    let reach = |members: Vec<usize>| {
+        let first = *members.first()?;
+        let carried = pairs.iter().any(|pair| members.contains(&pair.structure()) && pair.carrier().is_some());
+        // Sectors turn against what stands still; a single structure is one sector with all of its contacts at once.
+        let open = pairs.iter().any(|pair| pair.structure() == first && matches!(pair.gap(), GapLaw::Open(_)));
+        let together = carried || structures[first].modes().coupled().is_some() || open;
+        Some((if together { Reach::All } else { Reach::Sector }, members))
+    };
+    (0..sets.count()).filter_map(|set| reach(touching(set))).collect()
 }

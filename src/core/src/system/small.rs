@@ -73,10 +73,16 @@ impl System {
     /// yet what turns is a blade, which draws its tip in by as much and more, and modes are straight lines: the same
     /// measure. `None` where nothing turns around an axis.
     pub fn most_curved(&self) -> Option<Curved> {
+        let more = |most: Curved, one: Curved| if one.share() > most.share() { one } else { most };
+        (0..self.structures.len()).filter_map(|structure| self.most_curved_of(structure)).reduce(more)
+    }
+
+    /// The same of the nodes of one structure.
+    pub fn most_curved_of(&self, structure: usize) -> Option<Curved> {
         let mut most: Option<Curved> = None;
-        for pair in &self.pairs {
+        for pair in self.pairs.iter().filter(|pair| pair.structure() == structure) {
             let Some(layout) = pair.gap().layout() else { continue };
-            let (structure, modes) = (pair.structure(), self.structures[pair.structure()].modes());
+            let modes = self.structures[structure].modes();
             for &node in pair.nodes() {
                 let per_radius = layout.per_radius[node];
                 let row = &modes.displacement()[(3 * node + 1) * modes.lanes()..][..modes.sectors()];

@@ -24,7 +24,7 @@ struct Work {
 }
 
 impl Work {
-    /// Sums over the contacts of one step need no compensation: those over all steps have it.
+    /// Sums over the contacts of one set in one step need no compensation: those over all steps have it.
     #[inline(always)]
     fn add(&mut self, other: &Self) {
         self.shaft += other.shaft;
@@ -53,11 +53,32 @@ impl System {
     pub(crate) fn enter_work(&mut self) -> Result<(), StepFailure> {
         let when = self.when_acted();
         let mut events = std::mem::take(self.acted_mut(when));
+        let outcome = match self.sets.count() {
+            1 => self.enter_contacts::<false>(&mut events, when),
+            _ => self.enter_contacts::<true>(&mut events, when),
+        };
+        *self.acted_mut(when) = events;
+        self.enter_loads();
+        outcome
+    }
+
+    /// The contacts of the only set, or set by set of `SEVERAL`.
+    fn enter_contacts<const SEVERAL: bool>(
+        &mut self,
+        events: &mut [ContactEvent],
+        when: When,
+    ) -> Result<(), StepFailure> {
         let (mut of, mut motion, mut explained, mut outcome) = (usize::MAX, Motion::default(), 0.0, Ok(()));
+        let mut set = 0;
         let mut total = Work::default();
-        for event in &mut events {
+        for event in &mut *events {
             if event.pair != of {
                 of = event.pair;
+                let own = self.sets.of(event.structure);
+                if SEVERAL && own != set {
+                    self.enter(set, total);
+                    (set, total) = (own, Work::default());
+                }
                 motion = self.pairs[of].motion().centred(self.pairs[of].motion_before());
                 explained = self.explained_by_drive(of);
             }
@@ -71,10 +92,8 @@ impl System {
             total.add(&work);
         }
         if !events.is_empty() {
-            self.enter(&total);
+            self.enter(set, total);
         }
-        *self.acted_mut(when) = events;
-        self.enter_loads();
         outcome
     }
 
@@ -91,19 +110,21 @@ impl System {
     }
 
     fn enter_loads(&mut self) {
-        let mut work = 0.0;
-        for structure in &mut self.structures {
-            work += structure.modes_mut().finish_loads();
-        }
-        if work != 0.0 {
-            self.counted.ledger.load_work.add(work);
-            self.counted.ledger.turnover.add(work.abs());
+        for (set, ledger) in self.counted.ledgers.iter_mut().enumerate() {
+            let mut work = 0.0;
+            for member in self.sets.members(set) {
+                work += self.structures[*member].modes_mut().finish_loads();
+            }
+            if work != 0.0 {
+                ledger.load_work.add(work);
+                ledger.turnover.add(work.abs());
+            }
         }
     }
 
-    /// Enter the work of all contacts of a step into the ledger.
-    fn enter(&mut self, work: &Work) {
-        let ledger = &mut self.counted.ledger;
+    /// Enter the work of all contacts of a set in a step into its ledger.
+    fn enter(&mut self, set: usize, work: Work) {
+        let ledger = &mut self.counted.ledgers[set];
         ledger.wear_work.add(work.worn);
         ledger.impact_loss.add(work.closing - work.worn);
         ledger.friction_loss.add(work.heat);

@@ -118,7 +118,7 @@ pub fn set_samples(system: &mut System, model: &ModalModel, mode: usize, now: f6
 
 /// Step of massless-boundary at which contact that opens and closes gains no energy, at most `largest` (s).
 pub fn quiet_step(model: &ModalModel, largest: f64) -> f64 {
-    let check = MasslessCheck { model, normals: vec![[1.0, 0.0, 0.0]], slave: None };
+    let check = MasslessCheck { model, normals: vec![[1.0, 0.0, 0.0]], slaves: Vec::new() };
     let limit = check.limit(1e3 * largest).unwrap();
     (0.95 * (QUIET * limit.closed).min(limit.usable)).min(largest)
 }

@@ -152,7 +152,7 @@ const OF_FREE_MASTERS: &[(&str, Change)] = &[
         scene.settings.surfaces[0].structure = None;
     }),
     ("outputs.all_sectors: excludes a scene of free masters only", |scene| scene.settings.outputs.all_sectors = true),
-    ("outputs.slave_displacement: excludes a scene of free masters only", |scene| {
+    ("outputs.slave_displacement: needs `surface.structure` of a surface around an axis", |scene| {
         scene.settings.outputs.slave_displacement = true;
     }),
     ("time.input_interpolation: excludes a scene of free masters only", |scene| {

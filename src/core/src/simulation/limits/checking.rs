@@ -19,6 +19,9 @@ use nalgebra::DMatrix;
 /// Contact nodes up to this number are looked at in every combination; beyond, alone, in neighbouring pairs, and all.
 const ALL_COMBINATIONS_UP_TO: usize = 3;
 
+/// Words by which flutter is known.
+pub(super) const FLUTTER: &str = "physically unstable (flutter)";
+
 /// Angles at which the flexible slave is looked at.
 const SLAVE_ANGLES: u32 = 48;
 
@@ -63,16 +66,15 @@ fn lowest_ratio(
     if eigenvalues.max() > 0.0 { eigenvalues.min() / eigenvalues.max() } else { 0.0 }
 }
 
-/// A casing need not be alike all around: the check at the place where it yields most.
+/// Casings need not be alike all around: the check at the place where those under a blade yield most.
 fn yielding_most<'a>(
     check: massless::MasslessCheck<'a>,
-    places: impl Iterator<Item = DMatrix<f64>>,
-    modes: &'a ModalModel,
+    places: impl Iterator<Item = Vec<(DMatrix<f64>, &'a ModalModel)>>,
     step: f64,
 ) -> massless::MasslessCheck<'a> {
     let (mut most, mut chosen) = (f64::NEG_INFINITY, check.clone());
-    for seen in places {
-        let tried = massless::MasslessCheck { slave: Some((seen, modes)), ..check.clone() };
+    for slaves in places {
+        let tried = massless::MasslessCheck { slaves, ..check.clone() };
         if let Some((_, found)) = tried.eigenvalues(step).filter(|(_, found)| *found > most) {
             (most, chosen) = (found, tried);
         }
@@ -240,17 +242,22 @@ impl<'a> Checking<'a> {
         if self.parameters.scheme != Scheme::MasslessBoundary {
             return Ok((Vec::new(), MasslessLimit::NONE));
         }
-        // One at most: more are refused.
+        // Each on a structure of its own: several surfaces of one are refused.
         let carried = self.carried();
         let largest = 1.01 * self.parameters.step.max(step) / massless::USABLE_STIFF;
         let (mut limit, mut worst) = (MasslessLimit::NONE, (0.0, 0.0));
         for (diameter, model) in self.models.iter().enumerate() {
             let normals = self.normals(model);
-            let mut check = massless::MasslessCheck { model, normals, slave: None };
-            if let Some((gap, _, modes)) = carried.first() {
-                let at = |place| slave_at(gap, modes, &self.nodes, slave_angle(place)).0;
-                check =
-                    yielding_most(check, (0..SLAVE_ANGLES).map(|place| self.seen_by(diameter, at(place))), modes, step);
+            let mut check = massless::MasslessCheck { model, normals, slaves: Vec::new() };
+            if !carried.is_empty() {
+                let under = |angle: f64, gap: &SplineGap, modes: &ModalModel| {
+                    self.seen_by(diameter, slave_at(gap, modes, &self.nodes, angle).0)
+                };
+                let at = |place| {
+                    let all = carried.iter();
+                    all.map(|(gap, _, modes)| (under(slave_angle(place), gap, modes), modes)).collect()
+                };
+                check = yielding_most(check, (0..SLAVE_ANGLES).map(at), step);
             }
             // Of several only the tightest counts.
             let own = check.limit(largest.min(limit.closed))?;
@@ -324,7 +331,8 @@ impl<'a> Checking<'a> {
     fn combinations(&self) -> Vec<Vec<usize>> {
         let nodes = self.nodes.len();
         if self.disk().is_some() {
-            return (0..nodes).map(|node| vec![node]).chain([(0..nodes).collect()]).collect();
+            let all = (nodes > 1).then(|| (0..nodes).collect());
+            return (0..nodes).map(|node| vec![node]).chain(all).collect();
         }
         if nodes <= ALL_COMBINATIONS_UP_TO {
             let members = |set: usize| (0..nodes).filter(|node| set >> node & 1 == 1).collect();
@@ -358,10 +366,7 @@ impl<'a> Checking<'a> {
                 self.watched[usize::from(sense < 0.0)].push(most.0);
             }
             if telling == Telling::Flutter && flutter > 0.0 {
-                warnings.push(format!(
-                    "{} is physically unstable (flutter), growth rate {flutter:.3e} 1/s",
-                    self.contact(nodes, sense)
-                ));
+                warnings.push(format!("{} is {FLUTTER}, growth rate {flutter:.3e} 1/s", self.contact(nodes, sense)));
             }
         }
         Ok(warnings)

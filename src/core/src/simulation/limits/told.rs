@@ -14,24 +14,30 @@ const MATERIAL: f64 = 1.5;
 const KINDS: usize = 4;
 
 /// What was told since the start.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Told {
-    /// Longest step told about (s), per kind.
-    steps: [f64; KINDS],
+    /// Longest step told about (s), per kind and structure: kinds of those that touch, and one of those that carry surfaces.
+    steps: [Vec<f64>; KINDS],
     /// Senses of slip, + and −, of each structure that touches.
     senses: Vec<[bool; 2]>,
     /// Speed beyond which its tips are too fast (rad/s); infinite once that was told.
     fastest: Vec<f64>,
-    /// Most warnings at once of one friction coefficient.
-    friction: usize,
-    /// A displacement that linear kinematics describes badly.
-    pub(in crate::simulation) curved: bool,
+    /// Most warnings at once of one friction coefficient, of each structure that touches.
+    friction: Vec<usize>,
+    /// Whether a displacement was that linear kinematics describes badly, of each structure that touches.
+    pub(in crate::simulation) curved: Vec<bool>,
 }
 
 impl Told {
-    /// Nothing, of so many structures that touch.
-    pub(in crate::simulation) fn new(bodies: usize) -> Self {
-        Self { senses: vec![[false; 2]; bodies], fastest: vec![0.0; bodies], ..Self::default() }
+    /// Nothing, of so many structures that touch, and that carry surfaces.
+    pub(in crate::simulation) fn new(bodies: usize, carriers: usize) -> Self {
+        Self {
+            steps: [bodies, carriers, bodies, bodies].map(|count| vec![0.0; count]),
+            senses: vec![[false; 2]; bodies],
+            fastest: vec![0.0; bodies],
+            friction: vec![0; bodies],
+            curved: vec![false; bodies],
+        }
     }
 }
 
@@ -39,31 +45,39 @@ impl Simulation {
     /// Warnings of the start are told; those of the step to expect among them.
     pub(in crate::simulation) fn begin_telling(&mut self, parameters: &Parameters) {
         let expected = self.compiled.expected_step(parameters.step);
-        self.told = Told::new(self.rotors.len());
+        self.told = Told::new(self.rotors.len(), self.compiled.carriers.len());
         for kind in 0..KINDS {
-            self.told.steps[kind] = if self.doubt(kind, expected).is_some() { expected } else { 0.0 };
+            for of in 0..self.told.steps[kind].len() {
+                self.told.steps[kind][of] = if self.doubt(kind, of, expected).is_some() { expected } else { 0.0 };
+            }
         }
-        let limits = self.limits.as_ref();
-        let warnings = limits.and_then(|limits| limits.warnings(&parameters.senses).ok());
-        self.told.friction = warnings.map_or(0, |warnings| warnings.len());
         let mut doubts = self.compiled.doubts();
         for (body, speed) in self.speeds().into_iter().enumerate() {
             let mut told = [false; 2];
             senses_of(parameters.senses[body]).for_each(|sense| told[sense] = true);
             self.told.senses[body] = told;
+            self.told.friction[body] = self.warnings_of(body, parameters.senses[body]).len();
             let rom = self.compiled.body(body).1;
             let fast = plausibility::of_speed(rom, speed);
             self.told.fastest[body] = if fast.is_some() { f64::INFINITY } else { plausibility::fastest(rom) };
-            doubts.extend(fast);
+            doubts.extend(fast.map(|text| self.compiled.named(body, text)));
         }
         self.warnings.extend(doubts);
     }
 
-    /// Warnings of another friction coefficient, unless as many were told before.
-    pub(in crate::simulation) fn tell_of_friction(&mut self, warnings: Vec<String>) {
-        if warnings.len() > self.told.friction {
-            self.told.friction = warnings.len();
-            warnings.into_iter().for_each(|text| self.note(text));
+    /// What limits warn of for a structure whose contact slides in the sense of this sign.
+    fn warnings_of(&self, body: usize, sense: f64) -> Vec<String> {
+        self.limits.as_ref().and_then(|limits| limits.bodies[body].warnings(sense).ok()).unwrap_or_default()
+    }
+
+    /// Warnings of another friction coefficient, of each structure unless as many of it were told before.
+    pub(in crate::simulation) fn tell_of_friction(&mut self, parameters: &Parameters) {
+        for (body, sense) in parameters.senses.iter().enumerate() {
+            let warnings = self.warnings_of(body, *sense);
+            if warnings.len() > self.told.friction[body] {
+                self.told.friction[body] = warnings.len();
+                warnings.into_iter().for_each(|text| self.note(text));
+            }
         }
     }
 
@@ -71,11 +85,13 @@ impl Simulation {
     /// told about. Allocates only to tell.
     pub(in crate::simulation) fn tell(&mut self, step: f64, length: f64) {
         for kind in 0..KINDS {
-            if step > MATERIAL * self.told.steps[kind]
-                && let Some(text) = self.doubt(kind, step)
-            {
-                self.told.steps[kind] = step;
-                self.note(text);
+            for of in 0..self.told.steps[kind].len() {
+                if step > MATERIAL * self.told.steps[kind][of]
+                    && let Some(text) = self.doubt(kind, of, step)
+                {
+                    self.told.steps[kind][of] = step;
+                    self.note(text);
+                }
             }
         }
         for body in 0..self.rotors.len() {
@@ -90,33 +106,36 @@ impl Simulation {
             && let Some(text) = plausibility::of_speed(self.compiled.body(body).1, speed)
         {
             self.told.fastest[body] = f64::INFINITY;
-            self.note(text);
+            self.note(self.compiled.named(body, text));
         }
         for sense in senses_of(speed).filter(|_| speed != 0.0) {
             if !std::mem::replace(&mut self.told.senses[body][sense], true) {
-                let found = self.limits.as_ref().map_or(Vec::new(), |limits| limits.bodies[body].of_sense(sense));
+                let found = self
+                    .limits
+                    .as_ref()
+                    .map_or(Vec::new(), |limits| limits.bodies[body].of_sense(sense, &self.compiled.rotor_name(body)));
                 found.into_iter().for_each(|text| self.note(text));
             }
         }
     }
 
-    /// A warning of one kind at a step (s).
-    fn doubt(&self, kind: usize, step: f64) -> Option<String> {
+    /// A warning of one kind about a structure at a step (s).
+    fn doubt(&self, kind: usize, of: usize, step: f64) -> Option<String> {
         let limits = self.limits.as_ref()?;
         let scheme = limits.parameters.scheme;
         let unresolved = |frequency: f64| stability::check_step(frequency, scheme, step).ok().flatten();
         match kind {
             0 => {
-                let of = |body: usize| self.compiled.bodies[body].largest_frequency() * self.compiled.stiffest(body);
-                unresolved((0..self.compiled.bodies.len()).map(of).fold(0.0, f64::max))
+                let highest = self.compiled.bodies[of].largest_frequency() * self.compiled.stiffest(of);
+                unresolved(highest).map(|text| self.compiled.named(of, text))
             }
             1 => {
-                let models = self.compiled.carriers.iter().map(|carrier| &carrier.model);
-                let highest = models.map(|model| model.largest_frequency()).fold(0.0, f64::max);
-                unresolved(highest).map(|text| format!("casing: {text}"))
+                let name = self.compiled.carrier_name(self.compiled.bodies.len() + of);
+                let highest = self.compiled.carriers[of].model.largest_frequency();
+                unresolved(highest).map(|text| format!("{name}: {text}"))
             }
-            2 => limits.bodies.iter().find_map(|body| massless::warning(step, body.massless)),
-            _ => limits.bodies.iter().find_map(|body| in_range(&body.casing, step).cloned()),
+            2 => massless::warning(step, limits.bodies[of].massless).map(|text| self.compiled.named(of, text)),
+            _ => in_range(&limits.bodies[of].casing, step).cloned(),
         }
     }
 
@@ -133,25 +152,25 @@ impl Simulation {
     pub fn if_reversed(&self) -> Vec<String> {
         let Some(limits) = &self.limits else { return Vec::new() };
         let mut found = Vec::new();
-        for (body, told) in limits.bodies.iter().zip(&self.told.senses) {
+        for (index, (body, told)) in limits.bodies.iter().zip(&self.told.senses).enumerate() {
             let other = [0, 1].into_iter().filter(|sense| !told[*sense] && body.senses[*sense].is_some());
-            found.extend(other.flat_map(|sense| body.of_sense(sense)));
+            let rotor = self.compiled.rotor_name(index);
+            found.extend(other.flat_map(|sense| body.of_sense(sense, &rotor)));
         }
         found
     }
 }
 
 impl BodyLimits {
-    /// What contact that slides in a sense does at the step expected.
-    fn of_sense(&self, sense: usize) -> Vec<String> {
+    /// What contact of a `rotor` that slides in a sense does at the step expected.
+    fn of_sense(&self, sense: usize, rotor: &str) -> Vec<String> {
         match self.senses[sense].as_ref().map(|sense| &sense.outcome) {
             Some(Ok(warnings)) => warnings.clone(),
             Some(Err(refusal)) => vec![refusal.to_string()],
-            None => vec![
-                "the rotor turns the other way than at the start: whether contact that slides that way grows was not looked at, \
+            None => vec![format!(
+                "{rotor} turns the other way than at the start: whether contact that slides that way grows was not looked at, \
                  because of coupled sectors it takes long; a start with a speed of that sign looks"
-                    .to_owned(),
-            ],
+            )],
         }
     }
 }

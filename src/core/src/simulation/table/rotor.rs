@@ -29,12 +29,19 @@ pub fn clearances(table: &mut Builder, parts: &Parts, body: &Body) {
         Span::Window,
         nominal(parts, body),
         format!(
-            "Smallest clearance over all sectors within the communication step, per contact node ({})",
-            node_list(body)
+            "Smallest clearance over all sectors within the communication step, per contact node ({}){}",
+            node_list(body),
+            untouched(parts, body)
         ),
         each(move |view, node| view.lowest_of_node(index, node)),
     );
     (each_node.dimension, each_node.display) = (Some(body.rom.contact_nodes.len()), Some(1));
+}
+
+/// What clearances are where there is nothing to touch.
+fn untouched(parts: &Parts, body: &Body) -> &'static str {
+    let paired: usize = parts.plan.pairs_of(body.index).map(|(_, pair)| pair.nodes.len()).sum();
+    if paired < body.rom.contact_nodes.len() { "; 1e9 m at nodes of no contact" } else { "" }
 }
 
 fn node_list(body: &Body) -> String {
@@ -66,7 +73,8 @@ fn watch(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
     let list = node_list(body);
     for row in watched_rows(body.index, sector - 1, [nominal(parts, body), Some((&FORCE, 100.0))]) {
         if row.exists(parts.settings.outputs.instantaneous_forces, parts.has_friction()) {
-            let text = format!("{} ({list})", row.text);
+            let untouched = if row.is_length() { untouched(parts, body) } else { "" };
+            let text = format!("{} ({list}){untouched}", row.text);
             row.add(table, format!("blade[{sector}].{}", row.name), text, body.rom.contact_nodes.len());
         }
     }
@@ -90,10 +98,14 @@ impl NodeRow {
         (friction || !needs_friction) && (instantaneous || !needs_instantaneous)
     }
 
+    fn is_length(&self) -> bool {
+        self.unit.is_some_and(|(unit, _)| *unit == LENGTH)
+    }
+
     pub fn add(&self, table: &mut Builder, name: String, text: String, nodes: usize) {
         let row = table.output(name, self.span, self.unit, text, self.read.clone());
         (row.dimension, row.quantity) = (Some(nodes), self.quantity);
-        row.display = self.unit.filter(|(unit, _)| **unit == LENGTH).map(|_| 1);
+        row.display = self.is_length().then_some(1);
     }
 }
 

@@ -1,0 +1,56 @@
+//! Which structures can feel each other.
+
+use super::pair::Pair;
+use super::structure::Structure;
+
+/// Structures that feel each other through the surfaces they touch and carry, directly or through others. Nothing passes between
+/// two sets: each keeps a ledger of its own, so that what one exchanges does not hide what another gets out of nothing.
+#[derive(Debug, Clone)]
+pub struct Sets {
+    /// Structures of each set, ascending.
+    members: Vec<Vec<usize>>,
+    /// Set of each structure.
+    of: Vec<usize>,
+}
+
+impl Sets {
+    /// Those whose contact nodes touch come first.
+    pub(super) fn new(structures: &[Structure], pairs: &[Pair]) -> Self {
+        let links = pairs.iter().filter_map(|pair| Some((pair.structure(), pair.carrier()?.structure)));
+        let number = joined(structures.len(), links);
+        let all = 0..structures.len();
+        let members = all.clone().map(|one| all.clone().filter(|index| number[*index] == one).collect());
+        let members = members.filter(|members: &Vec<usize>| !members.is_empty());
+        let touches = |members: &Vec<usize>| members.iter().any(|member| structures[*member].nodes() > 0);
+        let (mut members, others): (Vec<_>, Vec<_>) = members.partition(touches);
+        members.extend(others);
+        let place = |structure| members.iter().position(|members| members.contains(&structure));
+        Self { of: all.filter_map(place).collect(), members }
+    }
+
+    /// How many.
+    pub fn count(&self) -> usize {
+        self.members.len()
+    }
+
+    /// Structures of a set, ascending.
+    pub fn members(&self, set: usize) -> &[usize] {
+        &self.members[set]
+    }
+
+    /// Set of a structure.
+    #[inline(always)]
+    pub fn of(&self, structure: usize) -> usize {
+        self.of[structure]
+    }
+}
+
+/// The same number for all of `count` things that `links` join, directly or through others.
+pub fn joined(count: usize, links: impl Iterator<Item = (usize, usize)>) -> Vec<usize> {
+    let mut number: Vec<usize> = (0..count).collect();
+    for (one, other) in links {
+        let (kept, lost) = (number[one], number[other]);
+        number.iter_mut().filter(|number| **number == lost).for_each(|number| *number = kept);
+    }
+    number
+}

@@ -1,0 +1,338 @@
+//! Structures that do not feel each other: what concerns one is judged and told without the others.
+
+use tiprub_core::settings::{LoadSettings, Motion, PatchSettings, Scheme, Shape, Solver, StructureSettings};
+use tiprub_core::{Scene, Simulation};
+use tiprub_test_models::{
+    RADIUS, disk, go, lattice, real, rich_blade, ring, ring_of, rub, saved, set, several, started, try_started,
+};
+
+/// Rotors `front` and `rear`, each in a rigid casing of its own.
+fn two(change: impl Fn(&mut Scene)) -> Scene {
+    let mut scene = rub(6);
+    scene.roms[0] = rich_blade(6);
+    let mut scene = several::two_rotors(scene, 0.1, |rear| rear.speed = -900.0);
+    change(&mut scene);
+    scene
+}
+
+/// The first rotor by itself.
+fn alone(scene: &Scene) -> Scene {
+    let mut alone = scene.clone();
+    alone.settings.structures.truncate(1);
+    alone.settings.surfaces.truncate(1);
+    alone.settings.contacts.truncate(1);
+    alone.roms.truncate(1);
+    alone
+}
+
+fn lobes(amplitude: f64, order: u32) -> Shape {
+    Shape::Lobes { amplitude, order, phase: 0.0 }
+}
+
+/// Runs until it is refused, and why.
+fn refused(scene: &Scene) -> (Simulation, String) {
+    let mut simulation = started(scene);
+    let length = scene.settings.experiment.communication_step;
+    while simulation.time() < 3e-3 {
+        if let Err(error) = simulation.do_step(simulation.time(), length) {
+            return (simulation, error.to_string());
+        }
+    }
+    panic!("ran to its end: {:?}", simulation.system().ledger())
+}
+
+/// Normals that turn too far within a step, and modes that the step does not resolve, of the front rotor; the rear one exchanges a
+/// hundred times as much.
+#[test]
+fn energy_out_of_nothing_ends_a_run_whatever_turns_beside() {
+    let rubbing = |scene: &mut Scene| {
+        scene.settings.surfaces[1].shape = lobes(4.2e-4, 3);
+        scene.settings.surfaces[1].ramp_time = 1e-4;
+        scene.settings.contacts[0].friction = 0.0;
+    };
+    let curved = two(|scene| {
+        rubbing(scene);
+        scene.settings.surfaces[0].shape = lobes(3.6e-4, 200);
+        scene.settings.experiment.communication_step = 2.4e-5;
+    });
+    let unresolved = two(|scene| {
+        rubbing(scene);
+        scene.settings.structures[0].damping_ratio = Some(0.0);
+        scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 1.0, width: 0.05, phase: 0.0 };
+        (scene.settings.time.step, scene.settings.experiment.communication_step) = (4e-6, 4e-6);
+    });
+    for (scene, word) in [(curved, "no input brings"), (unresolved, "energy that is not there")] {
+        let ((single, why), (both, told)) = (refused(&alone(&scene)), refused(&scene));
+        assert!(why.contains(word) && !why.contains("of front"), "{why}");
+        assert!(told.contains(word) && told.contains(" of front ") && !told.contains("rear"), "{told}");
+        assert_eq!(single.time().to_bits(), both.time().to_bits(), "{why}\n{told}");
+        // Taken together, the two are within all bounds.
+        let (ledger, energy) = (both.system().ledger(), real(&both, "kinetic_energy") + real(&both, "strain_energy"));
+        println!("{word}: {} J of {} J, {energy} J", ledger.curvature_work.value(), ledger.exchanged());
+        assert!(ledger.curvature_work.value().abs() < 0.3 * ledger.exchanged(), "{ledger:?}");
+        assert!(energy < ledger.supplied().max(0.0) + 0.01 * ledger.scale(), "{energy} J, {ledger:?}");
+        // What is told of the scene is the sum.
+        let sum: f64 = both.system().ledgers().iter().map(|ledger| ledger.friction_loss.value()).sum();
+        assert!(both.system().ledgers().len() == 2 && (sum / ledger.friction_loss.value() - 1.0).abs() < 1e-15);
+    }
+}
+
+/// Two rotors in one casing, and between them, in the order of the scene, a third in its own.
+fn one_between_two() -> Scene {
+    let mut scene = several::in_one_casing(rub(6), Solver::Lcp, 0.15);
+    let settings = &mut scene.settings;
+    let mut middle = settings.structures[0].clone();
+    middle.name = "middle".into();
+    let (mut surface, mut contact) = (settings.surfaces[0].clone(), settings.contacts[0].clone());
+    (surface.name, surface.structure) = ("middle_casing".into(), None);
+    (contact.master, contact.slave) = ("middle".into(), "middle_casing".into());
+    settings.structures.insert(1, middle);
+    settings.surfaces.insert(1, surface);
+    settings.contacts.insert(1, contact);
+    scene.roms.insert(1, scene.roms[0].clone());
+    // The ring is bent from the start.
+    scene.settings.structures[3].load = Some(LoadSettings { order: 2, amplitude: 100.0, phase: 0.1 });
+    scene
+}
+
+/// A scene of two sets continues from its state with the same bits, ledgers and energies of the start included.
+#[test]
+fn a_state_holds_the_energies_of_every_set() {
+    let all = Scheme::ALL.into_iter().flat_map(|scheme| [(scheme, two(|_| ())), (scheme, one_between_two())]);
+    for (scheme, mut scene) in all.filter(|(scheme, scene)| *scheme != Scheme::MasslessBoundary || scene.roms.len() < 3)
+    {
+        scene.settings.time.scheme = scheme;
+        scene.settings.surfaces.iter_mut().for_each(|surface| surface.ramp_time = 1e-4);
+        let mut simulation = started(&scene);
+        (0..20).for_each(|_| go(&mut simulation, 2.5e-5));
+        assert_eq!(simulation.system().ledgers().len(), 2);
+        assert!(simulation.system().ledgers().iter().all(|ledger| ledger.friction_loss.value() > 0.0), "{scheme:?}");
+        let mut other = Simulation::new(&scene).unwrap();
+        other.restore_state(&saved(&simulation)).unwrap();
+        for one in [&mut simulation, &mut other] {
+            [2.5e-5, 1.03e-5, 2.5e-5].into_iter().for_each(|length| go(one, length));
+        }
+        assert_eq!(saved(&simulation), saved(&other), "{scheme:?}");
+        // The books of the scene are those of its sets.
+        let relative = real(&simulation, "energy_residual_relative").abs();
+        let largest = simulation.system().ledgers().iter().map(tiprub_core::Ledger::scale).fold(0.0, f64::max);
+        let residual = real(&simulation, "energy_residual").abs();
+        assert!(
+            relative < 1e-12 && relative >= residual / (2.0 * largest),
+            "{relative:e}, {residual:e} of {largest:e}"
+        );
+    }
+}
+
+/// A tip that meets a stiff ring, and a seal that meets a lighter one: the step of massless-boundary is that of both together, in
+/// whichever order they are written.
+#[test]
+fn massless_boundary_looks_at_every_structure_under_a_blade() {
+    let scene = |light: f64, seal_first: bool| {
+        let mut scene = rub(6);
+        scene.roms[0] = rich_blade(6);
+        let mut scene = several::tip_and_seal(scene, Solver::Lcp);
+        scene.roms[0].contact_nodes[2].position[0] = RADIUS;
+        scene.settings.time.scheme = Scheme::MasslessBoundary;
+        for (surface, (name, size)) in [("tip_ring", 1.0), ("seal_ring", light)].into_iter().enumerate() {
+            scene.settings.surfaces[surface].structure = Some(name.into());
+            let (name, motion) = (name.to_owned(), Motion::Still);
+            let structure = StructureSettings { name, motion, damping_ratio: Some(0.01), ..Default::default() };
+            scene.settings.structures.push(structure);
+            let mut ring = ring(36, 3);
+            ring.contact_map *= size;
+            scene.roms.push(ring);
+        }
+        if seal_first {
+            scene.settings.surfaces.swap(0, 1);
+            scene.settings.contacts.swap(0, 1);
+        }
+        scene
+    };
+    for seal_first in [false, true] {
+        assert!(try_started(&scene(10.0, seal_first)).is_ok());
+        let told = try_started(&scene(30.0, seal_first)).unwrap_err().to_string();
+        assert!(told.contains("massless-boundary with internal step") && told.contains("2.910109e-7"), "{told}");
+    }
+}
+
+/// As many contacts as are solved together at most are counted where they push each other.
+#[test]
+fn contacts_are_counted_where_they_push_each_other() {
+    let both = several::in_one_casing(rub(350), Solver::Lcp, 0.0);
+    let told = Simulation::new(&both).unwrap_err().to_string();
+    assert!(told.starts_with("surface[2].structure: 2100 contact nodes") && told.contains("`rear`"), "{told}");
+    let mut apart = both;
+    let mut second = apart.settings.structures[2].clone();
+    second.name = "second".into();
+    apart.settings.structures.push(second);
+    apart.roms.push(ring(36, 8));
+    apart.settings.surfaces[1].structure = Some("second".into());
+    let simulation = Simulation::new(&apart).unwrap();
+    assert_eq!(simulation.system().sets().count(), 2);
+}
+
+fn flutter(texts: &[String], name: &str) -> usize {
+    texts.iter().filter(|text| text.starts_with(&format!("{name}: ")) && text.contains("flutter")).count()
+}
+
+/// Turning backwards either rotor flutters with friction; the front one starts with it, the rear one gets it later.
+#[test]
+fn flutter_of_each_rotor_is_told() {
+    let scene = two(|scene| {
+        scene.settings.structures[0].speed = -1300.0;
+        scene.settings.contacts[1].friction = 0.001;
+    });
+    let mut simulation = started(&scene);
+    let front = flutter(simulation.warnings(), "front");
+    assert!(front > 0 && flutter(simulation.warnings(), "rear") == 0, "{:?}", simulation.warnings());
+    go(&mut simulation, 1e-6);
+    set(&mut simulation, "front_casing.friction_coefficient", 0.001);
+    assert!(simulation.take_notes().is_empty());
+    set(&mut simulation, "rear_casing.friction_coefficient", 0.15);
+    let told = simulation.take_notes();
+    assert!(flutter(&told, "rear") == front && flutter(&told, "front") == 0, "{told:?}");
+    // Once.
+    for friction in [0.001, 0.15] {
+        set(&mut simulation, "rear_casing.friction_coefficient", friction);
+    }
+    assert!(simulation.take_notes().is_empty());
+}
+
+/// Rotors bent aside by their rub, each in its turn: what linear gaps miss is told of each.
+#[test]
+fn what_linear_gaps_miss_is_told_of_each_rotor() {
+    let scene = two(|scene| {
+        for (surface, ramp_time) in scene.settings.surfaces.iter_mut().zip([2e-3, 4e-3]) {
+            (surface.shape, surface.ramp_time) = (lobes(2e-3, 3), ramp_time);
+        }
+    });
+    let mut simulation = started(&scene);
+    let mut told = Vec::new();
+    let why = loop {
+        let outcome = simulation.do_step(simulation.time(), 2e-5);
+        told.extend(simulation.take_notes());
+        if let Err(error) = outcome {
+            break error.to_string();
+        }
+        if simulation.time() > 1e-2 {
+            panic!("{told:?}")
+        }
+    };
+    let of = |name: &str| told.iter().filter(|text| text.contains(&format!("of {name} is displaced"))).count();
+    assert!(of("front") == 1 && of("rear") == 1 && told.len() == 2, "{told:?}\n{why}");
+}
+
+/// A rotor that fails is not told to flutter because another one does.
+#[test]
+fn a_failure_is_put_down_to_flutter_of_the_same_structure() {
+    let fails = |front: f64| {
+        let scene = two(|scene| {
+            scene.settings.structures[0].speed = -1300.0;
+            (scene.settings.surfaces[0].shape, scene.settings.surfaces[0].ramp_time) = (lobes(5e-3, 3), 2e-3);
+            scene.settings.surfaces[1].shape = lobes(1e-4, 3);
+            scene.settings.contacts[0].friction = front;
+        });
+        assert!(flutter(started(&scene).warnings(), "rear") > 0);
+        refused(&scene).1
+    };
+    let (quiet, fluttering) = (fails(0.001), fails(0.15));
+    assert!(quiet.contains("of front") && !quiet.contains("flutter") && !quiet.contains("rear"), "{quiet}");
+    assert!(fluttering.contains("front: ") && fluttering.contains("flutter"), "{fluttering}");
+}
+
+/// A warning that holds for the step is told of each structure that it holds for.
+#[test]
+fn steps_that_modes_do_not_resolve_are_told_of_each_structure() {
+    let mut scene = two(|scene| {
+        scene.settings.contacts.iter_mut().for_each(|contact| contact.friction = 0.0);
+        scene.settings.time.step = 8e-6;
+        scene.settings.experiment.communication_step = 1e-6;
+    });
+    // The highest mode of the rear is half as fast.
+    scene.roms[1].stiffness *= 0.25;
+    let mut simulation = started(&scene);
+    let told = [1e-6, 3e-6, 6e-6].map(|length| {
+        go(&mut simulation, length);
+        simulation.take_notes()
+    });
+    let of = |texts: &[String], name: &str| texts.iter().filter(|text| text.starts_with(name)).count();
+    assert_eq!(told.each_ref().map(|texts| [of(texts, "front: "), of(texts, "rear: ")]), [[0, 0], [1, 0], [1, 1]]);
+}
+
+/// Radial displacement of a flexible casing is an output of rotors; another pair's open surface has none.
+#[test]
+fn an_output_that_no_pair_has_is_refused() {
+    let mut scene = lattice::squeezed();
+    let rotor = rub(3);
+    scene.settings.structures.extend(rotor.settings.structures);
+    scene.settings.surfaces.extend(rotor.settings.surfaces);
+    scene.settings.contacts.extend(rotor.settings.contacts);
+    scene.settings.outputs = Default::default();
+    scene.roms.extend(rotor.roms);
+    Simulation::new(&scene).unwrap();
+    scene.settings.outputs.slave_displacement = true;
+    let told = Simulation::new(&scene).unwrap_err().to_string();
+    assert!(told.starts_with("outputs.slave_displacement: needs"), "{told}");
+    let place = scene.settings.surfaces.len() - 1;
+    scene.settings.surfaces[place].structure = Some("ring".into());
+    let (name, motion) = ("ring".into(), Motion::Still);
+    scene.settings.structures.push(StructureSettings { name, motion, ..Default::default() });
+    scene.roms.push(ring_of(36, 3, 4));
+    let simulation = Simulation::new(&scene).unwrap();
+    let rows = simulation.table().variables().iter().filter(|row| row.name.ends_with("casing_displacement"));
+    assert_eq!(rows.map(|row| row.name.as_str()).collect::<Vec<_>>(), ["ring.casing_displacement"]);
+}
+
+/// What is wrong is told with its number or its name.
+#[test]
+fn messages_say_which_contact_surface_or_structure_is_meant() {
+    let told = |change: fn(&mut Scene)| Simulation::new(&two(change)).unwrap_err().to_string();
+    for (beginning, change) in [
+        ("contact[2].gap: ", (|scene| scene.settings.contacts[1].gap = 0.03) as fn(&mut Scene)),
+        ("contact[2].sector_gaps: ", |scene| scene.settings.contacts[1].sector_gaps = vec![1e-4; 2]),
+        ("surface[2].shape: ", |scene| scene.settings.surfaces[1].shape = lobes(0.03, 3)),
+        ("surface[2].shape.radius_change: ", |scene| {
+            scene.settings.surfaces[1].shape = Shape::Table { radius_change: vec![0.0; 2] };
+        }),
+        ("structure[2].frequency_factors: ", |scene| scene.settings.structures[1].frequency_factors = vec![1.0; 2]),
+    ] {
+        let told = told(change);
+        assert!(told.starts_with(beginning), "{told}");
+    }
+    let mut simulation = started(&two(|scene| {
+        scene.settings.contacts.iter_mut().for_each(|contact| contact.friction = 0.0);
+        scene.settings.structures[1].speed = 7000.0;
+        scene.settings.surfaces.iter_mut().for_each(|surface| surface.shape = Shape::Circular {});
+    }));
+    assert!(simulation.warnings().iter().any(|text| text.starts_with("rear: at speed 7000")));
+    set(&mut simulation, "front.speed", 7000.0);
+    go(&mut simulation, 1e-6);
+    go(&mut simulation, 1e-6);
+    assert!(simulation.take_notes().iter().any(|text| text.starts_with("front: at speed 7000")));
+    // Patches without friction tell nothing.
+    let scene = two(|scene| {
+        scene.settings.contacts.iter_mut().for_each(|contact| contact.friction = 0.0);
+        scene.settings.surfaces[1].patches = Some(PatchSettings { around: 4, along: 1 });
+    });
+    let warnings = started(&scene).warnings().join("; ");
+    assert!(warnings.contains("surface[2].patches: no contact has friction"), "{warnings}");
+    // Nodes of no contact are told of.
+    let mut scene = several::tip_and_seal(rub(3), Solver::Lcp);
+    scene.settings.contacts.truncate(1);
+    scene.settings.surfaces.truncate(1);
+    let simulation = started(&scene);
+    let rows = simulation.table().variables().iter().filter(|row| row.description.contains("1e9 m at nodes of no"));
+    let names: Vec<&str> = rows.map(|row| row.name.as_str()).collect();
+    assert!(names.contains(&"node_clearance_minimum") && names.contains(&"blade[1].clearance"), "{names:?}");
+    assert!(real(&simulation, "clearance_minimum") < 1.0 && !names.contains(&"clearance_minimum"));
+}
+
+/// A disk with one node per blade: that node alone is all of them.
+#[test]
+fn flutter_of_a_disk_with_one_node_per_blade_is_told_once() {
+    let mut scene = disk::with_rotor(disk::Disk::random(6, 1, 9, 0.25, 6).cyclic());
+    scene.settings.contacts[0].friction = 0.5;
+    let warnings = started(&scene).warnings().to_vec();
+    assert_eq!(warnings.iter().filter(|text| text.contains("flutter")).count(), 1, "{warnings:?}");
+}
