@@ -333,7 +333,7 @@ fn refusals(field: &str) -> &'static [&'static [&'static str]] {
         "time.step" => &[&["time.step", "between 1e-12 and 1"]],
         "communication_step" => &[&["experiment.communication_step", "between 1e-12 and 1e9"]],
         "start" => &[&["experiment.start", "between -1e9 and 1e9"], &["experiment.stop", "after"]],
-        "shape.depth" => &[&["surface.shape", "in metres"], &["surface[1].shape.depth", "between"]],
+        "shape.depth" => &[&["surface[1].shape", "in metres"], &["surface[1].shape.depth", "between"]],
         "shape.phase" => &[&["surface[1].shape.phase", "between -1e6 and 1e6"]],
         "rom.radius" => &[&["`contact_positions`", "between 1e-5 and 1000"], &["`contact_positions`", "not positive"]],
         "rom.axial" => &[&["`contact_positions`", "between -1000 and 1000"]],
