@@ -37,20 +37,7 @@ pub fn describe(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> (
         set_counts(&model.sets)
     );
     let _ = write!(text, "\n  clamped                   {} nodes", chosen.clamped.len());
-    let contact_set = asked.contact_set.as_deref().unwrap_or_default();
-    let is_patch = |point: &ContactPoint| !point.patch.is_empty();
-    let what = if chosen.contact.iter().any(is_patch) { "contact patches" } else { "contact nodes  " };
-    let _ = write!(text, "\n  {what}           {} from {contact_set}", chosen.contact.len());
-    if let Some(grid) = &chosen.grid {
-        let _ = write!(text, ": {} around x {} along", grid.around, grid.along());
-    }
-    for point in chosen.contact.iter().filter(|_| chosen.grid.is_none()) {
-        let number = imported.node_numbers[point.node];
-        let _ = match point.patch.len() {
-            0 => write!(text, "\n    {:<24}node {number} of the file", point.name),
-            nodes => write!(text, "\n    {:<24}{nodes} nodes around node {number} of the file", point.name),
-        };
-    }
+    text.push_str(&contact(imported, asked, chosen));
     if let Some((boundary, report)) = &chosen.faces {
         let PairingReport { largest_mismatch, typical_mismatch, .. } = report;
         let (pairs, pitch) = (boundary.pairs.len(), boundary.pitch().to_degrees());
@@ -85,4 +72,24 @@ pub fn describe(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> (
         "notes": imported.notes,
     });
     (text, json)
+}
+
+/// Contact nodes or patches, each with its node in the file; of a grid its size.
+fn contact(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> String {
+    let mut text = String::new();
+    let contact_set = asked.contact_set.as_deref().unwrap_or_default();
+    let is_patch = |point: &ContactPoint| !point.patch.is_empty();
+    let what = if chosen.contact.iter().any(is_patch) { "contact patches" } else { "contact nodes  " };
+    let _ = write!(text, "\n  {what}           {} from {contact_set}", chosen.contact.len());
+    if let Some(grid) = &chosen.grid {
+        let _ = write!(text, ": {} around x {} along", grid.around, grid.along());
+    }
+    for point in chosen.contact.iter().filter(|_| chosen.grid.is_none()) {
+        let number = imported.node_numbers[point.node];
+        let _ = match point.patch.len() {
+            0 => write!(text, "\n    {:<24}node {number} of the file", point.name),
+            nodes => write!(text, "\n    {:<24}{nodes} nodes around node {number} of the file", point.name),
+        };
+    }
+    text
 }

@@ -39,6 +39,28 @@ fn events() -> Vec<(&'static str, Scene, usize)> {
     ]
 }
 
+/// What counts as a small displacement is so beside the smallest surface that the body meets, for both of its pairs.
+#[test]
+fn displacements_are_small_beside_the_smallest_surface() {
+    let mut both = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.06), (Side::Right, 0.06)], false, [0.0; 3]);
+    let wide = largest_of_pairs(&both);
+    assert!(wide[0] > 0.0 && wide[0].to_bits() == wide[1].to_bits(), "{wide:?}");
+    let plate = both.roms.last_mut().unwrap();
+    for node in &mut plate.contact_nodes {
+        node.position = [node.position[0], 0.01 * node.position[1], 0.01 * node.position[2]];
+    }
+    let narrow = largest_of_pairs(&both);
+    assert!(narrow[0] < 0.2 * wide[0] && narrow[0].to_bits() == narrow[1].to_bits(), "{narrow:?} {wide:?}");
+}
+
+fn largest_of_pairs(scene: &Scene) -> Vec<f64> {
+    let largest = |pair: &tiprub_core::system::Pair| match pair.gap() {
+        tiprub_core::gaps::GapLaw::Open(gap) => gap.largest(),
+        other => panic!("{other:?}"),
+    };
+    started(scene).system().pairs().iter().map(largest).collect()
+}
+
 #[test]
 fn momentum_and_energy_are_kept_by_every_scheme_and_solver() {
     println!("| scene | scheme | solver | µ | momentum | residual / energy |\n|---|---|---|---|---|---|");

@@ -101,6 +101,8 @@ fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
         if pressed.step(&[Drive::default()]).is_err() {
             return (f64::INFINITY, f64::INFINITY);
         }
+        // Fixed obstacles have no axis: the force is the one on the node, as it is.
+        assert!(pressed.events().iter().all(|event| event.wrench.force == event.force && event.force[0] < 0.0));
         let (kinetic, strain) = pressed.energies();
         most = most.max((kinetic + strain).abs());
         if step >= 3900 {

@@ -78,6 +78,7 @@ fn features_that_are_off_are_not_written() {
     for key in ["stiffening", "coriolis", "along", "closure", "interpolation"] {
         assert!(!text.contains(&format!("{key} =")), "{key} in:\n{text}");
     }
+    assert_eq!(text.matches("around =").count(), 1, "that of the patches alone:\n{text}");
     assert_eq!(parse_scene(&text, "written").unwrap(), scene);
 }
 
