@@ -141,8 +141,14 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
         let (force, shaft) = ([0.3, -0.7, 0.4], [2e-4, 5e-4, -3e-4]);
         let work = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let own = law.shaft_motion(at, point, &Motion { shaft, ..Motion::default() });
-        let (own, fixed) = (work(force, own), work(law.wrench(at, point, force).force, shaft));
+        let acting = law.wrench(at, point, force);
+        let (own, fixed) = (work(force, own), work(acting.force, shaft));
         assert!((own / fixed - 1.0).abs() < 1e-12, "{}: {own:e} {fixed:e}", feature.0);
+        // Its moment is that of the force at the contact point, about the shaft's centre.
+        let ([x, y, z], [fx, fy, fz]) = (std::array::from_fn(|i| acting.point[i] - drive.shaft[i]), acting.force);
+        for (told, found) in acting.moment.into_iter().zip([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx]) {
+            assert!((told - found).abs() < 1e-12, "{}: {:?}, {found}", feature.0, acting.moment);
+        }
         let wrench = law.wrench(at, point, normal);
         let surface = |motion: Motion| -law.surface_motion(at, point, normal, &places, &motion);
         let [opening, factor, rotation] = [
