@@ -70,3 +70,32 @@ fn part(share: f64, parts: usize) -> usize {
     let index = place.max(0.0) as usize;
     index.min(parts - 1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Quarters in two rows, listed from −45° on, as a structure gives them: every place is in the one whose bounds hold it.
+    #[test]
+    fn a_place_is_in_the_patch_whose_bounds_hold_it() {
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let patch = |index: usize| {
+            let (around, along) =
+                (f64::from(u32::try_from(index % 4).unwrap()), f64::from(u32::try_from(index / 4).unwrap()));
+            let from = (around - 0.5) * quarter;
+            Patch { angle: [from, from + quarter], axial: [0.02 * along, 0.02 * (along + 1.0)] }
+        };
+        let listed = Patches::Listed((0..8).map(patch).collect());
+        let equal = Patches::Equal { parts: PatchSettings { around: 4, along: 2 }, extent: [0.0, 0.04] };
+        for turns in [-1.0, 0.0, 2.0] {
+            for (index, quarters) in [0.1, 0.9, 2.2, 3.4].into_iter().enumerate() {
+                let angle = (4.0 * turns + quarters) * quarter;
+                for (row, axial) in [(0, -0.01), (0, 0.015), (1, 0.025), (1, 0.06)] {
+                    assert_eq!(listed.find(angle, axial), 4 * row + index, "{angle} {axial}");
+                    assert_eq!(equal.find(angle + 0.5 * quarter, axial), 4 * row + index, "{angle} {axial}");
+                }
+            }
+        }
+        assert_eq!((listed.len(), equal.len()), (8, 8));
+    }
+}

@@ -82,7 +82,7 @@ impl BladeMesh {
     /// `count` contact patches over the whole tip, named as contact nodes are.
     ///
     /// # Errors
-    /// Those of [`contact_patches`].
+    /// Those of [`contact_patches`](crate::patches::contact_patches).
     pub fn contact_patches(&self, count: usize) -> Result<Vec<ContactPoint>> {
         contact_patches(&self.mesh, self.mesh.set("tip")?, count, |index| place_name(index, count))
     }

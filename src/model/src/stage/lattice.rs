@@ -146,7 +146,7 @@ impl<'a> Lattice<'a> {
 /// Mesh of one sector of the bladed disk.
 ///
 /// # Errors
-/// [`Error::Invalid`] for lengths that make no bladed disk, and numbers of elements that do not fit each other or the shape.
+/// [`crate::Error::Invalid`] for lengths that make no bladed disk, and numbers of elements that do not fit each other or the shape.
 pub fn sector_mesh(options: &SectorOptions) -> Result<SectorMesh> {
     Lattice::new(options)?.mesh(0)
 }
