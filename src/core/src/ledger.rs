@@ -66,8 +66,21 @@ pub struct Ledger {
     pub turnover: Sum,
 }
 
-persist_fields!(Ledger {
-    initial,
+/// Every sum by its name, once: a field that is missing here does not compile.
+macro_rules! sums_of_ledger {
+    ($count:literal: $($sum:ident),* $(,)?) => {
+        persist_fields!(Ledger { initial, $($sum),* });
+
+        impl Ledger {
+            fn sums(&mut self) -> [&mut Sum; $count] {
+                let Self { initial: _, $($sum),* } = self;
+                [$($sum),*]
+            }
+        }
+    };
+}
+
+sums_of_ledger! { 14:
     damping_loss,
     friction_loss,
     impact_loss,
@@ -81,8 +94,8 @@ persist_fields!(Ledger {
     casing_work,
     curvature_work,
     step_change,
-    turnover
-});
+    turnover,
+}
 
 impl Ledger {
     /// Work of all inputs but loads (J): shaft, whirl, axial shift, moving casing.
@@ -102,42 +115,6 @@ impl Ledger {
         let mut other = *other;
         self.sums().into_iter().zip(other.sums()).for_each(|(sum, term)| sum.add(term.value()));
         self
-    }
-
-    fn sums(&mut self) -> [&mut Sum; 14] {
-        let Self {
-            initial: _,
-            damping_loss,
-            friction_loss,
-            impact_loss,
-            wear_work,
-            wear_energy,
-            load_work,
-            shaft_work,
-            stiffening_work,
-            whirl_work,
-            shift_work,
-            casing_work,
-            curvature_work,
-            step_change,
-            turnover,
-        } = self;
-        [
-            damping_loss,
-            friction_loss,
-            impact_loss,
-            wear_work,
-            wear_energy,
-            load_work,
-            shaft_work,
-            stiffening_work,
-            whirl_work,
-            shift_work,
-            casing_work,
-            curvature_work,
-            step_change,
-            turnover,
-        ]
     }
 
     /// Energy that should be there minus what is (J), given kinetic + strain energy now.
