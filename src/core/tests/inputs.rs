@@ -529,3 +529,31 @@ fn the_angle_is_the_integral_of_the_speed_with_whole_turns() {
     }
     assert!(real(&simulation, "rotor_angle") > 5.0 * std::f64::consts::TAU);
 }
+
+#[test]
+fn an_early_return_is_a_communication_step_of_the_length_done() {
+    let mut scene = bumps();
+    scene.settings.outputs.energies = true;
+    let mut simulation = started(&scene);
+    go(&mut simulation, 1e-5);
+    simulation.begin_step(simulation.time(), 1e-5).unwrap();
+    for _ in 0..6 {
+        simulation.advance().unwrap();
+    }
+    simulation.end_step_early().unwrap();
+    // The same six steps as a communication step of their own.
+    let mut twin = started(&scene);
+    go(&mut twin, 1e-5);
+    go(&mut twin, 6e-6);
+    let derivatives = |simulation: &Simulation| {
+        ["rotor_angle", "kinetic_energy", "torque"]
+            .map(|name| simulation.output_derivative(reference(simulation, name), 1).unwrap())
+    };
+    for (early, whole) in derivatives(&simulation).into_iter().zip(derivatives(&twin)) {
+        assert!((early - whole).abs() <= 1e-9 * whole.abs(), "{early} {whole}");
+    }
+    // Means cover the part done, however often they are asked for.
+    let before = outputs(&simulation);
+    simulation.update_outputs();
+    assert_eq!(before, outputs(&simulation));
+}

@@ -249,7 +249,7 @@ impl Simulation {
         self.check_initial_state()?;
         self.check_initial_gaps()?;
         self.window.open(self.system.structures());
-        self.update_outputs();
+        self.compute_outputs();
         for (initial, energy) in self.initial_energies.iter_mut().zip(&self.energies) {
             *initial = energy.now;
         }

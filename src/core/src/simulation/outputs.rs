@@ -60,9 +60,16 @@ pub struct View<'a> {
 }
 
 impl Simulation {
-    /// Bring the outputs up to the internal time reached (means cover the part of the step done). Done by itself
-    /// at every communication point; an importer that looks inside a step needs it.
+    /// Bring the outputs up to the internal time reached (means cover the part of the step done), for an importer that
+    /// looks inside a communication step. At communication points they are up to date, and this does nothing.
     pub fn update_outputs(&mut self) {
+        if self.phase == Phase::Stepping {
+            self.compute_outputs();
+        }
+    }
+
+    /// Compute the outputs of the internal point reached.
+    pub(super) fn compute_outputs(&mut self) {
         let elapsed = self.communication.offset(self.communication.done);
         let mean = if elapsed > 0.0 && self.communication.length > 0.0 { 1.0 / elapsed } else { 0.0 };
         self.system.close_ledger();

@@ -245,7 +245,7 @@ impl Simulation {
         for (angle, rotor) in self.rotors.iter_mut().zip(&self.inputs.rotors) {
             angle.rebase(&rotor.speed, offset);
         }
-        self.update_outputs();
+        self.compute_outputs();
         self.check_outputs(time).inspect_err(|_| self.phase = Phase::Failed)?;
         self.check_energy(time)?;
         self.rotors.iter_mut().for_each(|rotor| rotor.shift(offset));
