@@ -36,6 +36,7 @@ pub fn rom() -> Rom {
         name: name.into(),
         position: [RADIUS, angle, axial],
         meridional_slope: 0.0,
+        ..ContactNode::default()
     };
     Rom {
         name: "toy".into(),
@@ -116,6 +117,7 @@ pub fn ring() -> Rom {
         name: format!("c{}", node + 1),
         position: [RADIUS, angle(node), -0.01 + 0.06 * (node / around) as f64],
         meridional_slope: 0.0,
+        ..ContactNode::default()
     };
     Rom {
         name: "ring".into(),
@@ -129,7 +131,6 @@ pub fn ring() -> Rom {
         contact_nodes: (0..around * along).map(node).collect(),
         checks: RomChecks::default(),
         extras: RomExtras {
-            spin: None,
             thermal: Some(Thermal {
                 loads: DMatrix::from_fn(3, PATCHES, |mode, patch| [130.0, 40.0, -30.0][mode] * (1.0 + patch as f64)),
                 patches: (0..PATCHES)
@@ -140,7 +141,7 @@ pub fn ring() -> Rom {
                     .collect(),
             }),
             grid: Some(ContactGrid { around, along, closed: true }),
-            harmonics: Vec::new(),
+            ..RomExtras::default()
         },
     }
 }

@@ -105,6 +105,7 @@ pub fn rom() -> Rom {
         frequency_deviation: vec![5.3e-4, 0.0043],
         residual_criterion: vec![0.1],
         nodal_diameters: Vec::new(),
+        ..RomChecks::default()
     };
     let origin = "hex20 mesh of <many> nodes".into();
     Rom { sectors: 36, frame: Frame::Cylindrical, damping_ratio: 0.001, checks, origin, ..rom }

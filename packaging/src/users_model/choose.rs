@@ -1,6 +1,7 @@
 //! Contact nodes, held nodes and faces, out of the sets of a model that was read.
 
 use tiprub_model::{
+    FeModel,
     casing::GridNodes,
     cyclic::{CyclicBoundary, PairingReport},
     patches::contact_patches,
@@ -72,8 +73,24 @@ fn patches(imported: &Imported, set: &[usize], count: usize, names: &[String]) -
         let problem = format!("{} names for {count} contact patches", names.len());
         return Err(Failure::usage("--contact-names", problem, "Give one name for each, by growing z"));
     }
-    let name = |index: usize| names.get(index).cloned().unwrap_or_else(|| format!("tip_{}", index + 1));
+    let name = |index: usize| names.get(index).cloned().unwrap_or_else(|| format!("patch_{}", index + 1));
     contact_patches(mesh, set, count, name).map_err(failure)
+}
+
+/// Edges and middle of a tip of patches, whose displacements the ROM is to tell; none of contact nodes, which tell theirs.
+///
+/// # Errors
+/// Never for patches that were made.
+pub fn watched(model: &FeModel, contact: &[ContactPoint]) -> Result<Vec<ContactPoint>> {
+    let mut set: Vec<usize> = contact.iter().flat_map(|point| point.patch.iter().map(|(node, _)| *node)).collect();
+    set.sort_unstable();
+    set.dedup();
+    if set.is_empty() {
+        return Ok(Vec::new());
+    }
+    let names: Vec<String> = ["edge_1", "mid_chord", "edge_2"].map(String::from).to_vec();
+    let choice = ContactChoice { count: Some(names.len()), names };
+    choose_contact_nodes(&model.nodes, &set, &choice).map_err(failure)
 }
 
 /// For a casing.

@@ -147,6 +147,7 @@ fn general(
         checked_modes: CHECKED_MODES,
         sectors: asked.sectors.unwrap_or(1) as usize,
         frame: Frame::Cylindrical,
+        watched: choose::watched(&model, &chosen.contact)?,
         damping_ratio: source.kept.damping.unwrap_or(DAMPING),
     };
     let model = RefCell::new(Some(model));

@@ -7,12 +7,14 @@
 
 mod cyclic;
 mod grid;
+mod watched;
 
 use nalgebra::DMatrix;
 
 use crate::{Error, Result, ranges, shown};
 pub use cyclic::Harmonic;
 pub(crate) use cyclic::cholesky;
+pub use watched::Watched;
 
 /// Most sectors of a ROM. Bladed disks have tens to a few hundred; a damaged or hostile file must not ask for all memory,
 /// which ends the process of the importer.
@@ -27,8 +29,8 @@ pub enum Frame {
     Cartesian,
 }
 
-/// One contact node of the first sector.
-#[derive(Debug, Clone, PartialEq)]
+/// One contact node or contact patch of the first sector.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ContactNode {
     /// Name used in variable names and plots, for example `leading_edge`.
     pub name: String,
@@ -36,6 +38,20 @@ pub struct ContactNode {
     pub position: [f64; 3],
     /// Slope dr/dz of the tip contour in the meridional plane at this node (the casing runs parallel to it).
     pub meridional_slope: f64,
+    /// Area that a patch stands for, the integral of its weight over the tip (m²); 0 for a node.
+    pub area: f64,
+    /// Length along the chord that it stands for, the integral of its weight along it (m); 0 for a node.
+    pub length: f64,
+}
+
+/// What the coordinates of a ROM stand for beside static responses to contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Basis {
+    /// Modes with the contact nodes held (Craig-Bampton), or not known.
+    #[default]
+    FixedInterface,
+    /// Modes of the structure as it is supported (MacNeal, Rubin).
+    FreeInterface,
 }
 
 /// How well the reduced model stands for the full one. Empty vectors where a ROM came from elsewhere.
@@ -52,6 +68,13 @@ pub struct RomChecks {
     /// Nodal diameter of each mode of a structure with coupled sectors, else empty. A mode with 0 < 2n < sectors stands
     /// for two of the whole disk.
     pub nodal_diameters: Vec<u32>,
+    /// Deviation of the static flexibility at each contact node or patch from the full model (%).
+    pub flexibility_deviation: Vec<f64>,
+    /// Frequencies (Hz) of the forced responses that were compared, ascending.
+    pub response_frequencies: Vec<f64>,
+    /// Deviation of the forced response at the contact nodes from that of the full model at each of them (%), all contact nodes and
+    /// directions together.
+    pub response_deviation: Vec<f64>,
 }
 
 /// What a steady speed Ω about the z axis does to one structure, in its reduced coordinates.
@@ -121,6 +144,10 @@ pub struct RomExtras {
     /// Nodal diameters 1 ..= sectors/2 of coupled sectors, whose diameter 0 are the ROM's own matrices; empty for
     /// uncoupled sectors and single structures.
     pub harmonics: Vec<Harmonic>,
+    /// Points beside the contact nodes.
+    pub watched: Option<Watched>,
+    /// What the coordinates stand for.
+    pub basis: Basis,
 }
 
 /// Reduced-order model of one structure.
@@ -213,36 +240,38 @@ impl Rom {
             entries(name, matrix, if name == "contact_map" { ranges::MAP } else { ranges::MATRIX }, remedy)?;
         }
         for (index, node) in self.contact_nodes.iter().enumerate() {
-            let finite = node.position.iter().all(|value| value.is_finite()) && node.meridional_slope.is_finite();
-            let radius_positive = self.frame == Frame::Cartesian || node.position[0] > 0.0;
-            if !finite || !radius_positive {
-                return Err(Error::invalid(
-                    format!("ROM array `contact_positions`, node {}", index + 1),
-                    format!("{:?} is not finite, or its radius is not positive", node.position),
-                    remedy,
-                ));
+            self.validate_place(&format!("ROM array `contact_positions`, node {}", index + 1), node, remedy)?;
+            let what = format!("ROM array `contact_meridional_slopes`, node {}", index + 1);
+            ranges::at_most(&what, node.meridional_slope, ranges::SLOPE)?;
+            for (name, value, most) in
+                [("contact_areas", node.area, ranges::POSITION * ranges::POSITION), ("contact_lengths", node.length, ranges::POSITION)]
+            {
+                ranges::within(&format!("ROM array `{name}`, node {}", index + 1), value, 0.0, most)?;
             }
-            self.validate_place(index, node)?;
         }
         self.validate_definiteness(remedy)?;
         self.validate_spin(remedy)?;
         self.validate_thermal(remedy)?;
         self.validate_grid()?;
+        self.validate_watched(remedy)?;
         self.validate_harmonics(remedy)
     }
 
     /// Lengths in metres, of a machine.
-    fn validate_place(&self, index: usize, node: &ContactNode) -> Result<()> {
-        let what = format!("ROM array `contact_positions`, node {}", index + 1);
+    fn validate_place(&self, what: &str, node: &ContactNode, remedy: &str) -> Result<()> {
+        let finite = node.position.iter().all(|value| value.is_finite());
+        let radius_positive = self.frame == Frame::Cartesian || node.position[0] > 0.0;
+        if !finite || !radius_positive {
+            let problem = format!("{:?} is not finite, or its radius is not positive", node.position);
+            return Err(Error::invalid(what, problem, remedy));
+        }
         let mut lengths = &node.position[..];
         if self.frame == Frame::Cylindrical {
-            ranges::within(&what, node.position[0], ranges::SMALLEST_RADIUS, ranges::POSITION)?;
-            ranges::at_most(&what, node.position[1], ranges::ANGLE)?;
+            ranges::within(what, node.position[0], ranges::SMALLEST_RADIUS, ranges::POSITION)?;
+            ranges::at_most(what, node.position[1], ranges::ANGLE)?;
             lengths = &node.position[2..];
         }
-        lengths.iter().try_for_each(|length| ranges::at_most(&what, *length, ranges::POSITION))?;
-        let what = format!("ROM array `contact_meridional_slopes`, node {}", index + 1);
-        ranges::at_most(&what, node.meridional_slope, ranges::SLOPE)
+        lengths.iter().try_for_each(|length| ranges::at_most(what, *length, ranges::POSITION))
     }
 
     fn validate_spin(&self, remedy: &str) -> Result<()> {

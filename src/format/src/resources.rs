@@ -73,6 +73,9 @@ fn needed(structure: &StructureSettings, rom: &Rom, settings: &SceneSettings) ->
         // A nodal-diameter load is laid on the grid too.
         grid: rom.extras.grid.filter(|_| carries || structure.load.is_some()),
         harmonics: rom.extras.harmonics.clone(),
+        // Its displacements are outputs of watched sectors.
+        watched: rom.extras.watched.clone().filter(|_| !settings.outputs.watched_sectors.is_empty()),
+        basis: rom.extras.basis,
     }
 }
 

@@ -11,7 +11,7 @@ use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
 mod extras;
 mod harmonics;
 
-use crate::rom_layout::{ARRAYS, METADATA, NUMBER, ROM_FORMAT, ROM_FORMAT_VERSION, units_text};
+use crate::rom_layout::{ARRAYS, METADATA, NUMBER, ROM_FORMAT, ROM_FORMAT_VERSIONS, SECOND_RELEASE, units_text};
 use crate::{Error, Result, suggestion};
 
 const WRITE_AGAIN: &str = "Write the ROM again; the ROM file chapter of the user guide lists arrays and metadata";
@@ -116,10 +116,10 @@ impl Reader<'_> {
             ));
         }
         let version = metadata.get("format_version").map(String::as_str);
-        if version != Some(ROM_FORMAT_VERSION) {
+        if !version.is_some_and(|version| ROM_FORMAT_VERSIONS.contains(&version)) {
             return Err(self.error(
                 "metadata `format_version`",
-                format!("{} found, \"{ROM_FORMAT_VERSION}\" expected", quoted(version)),
+                format!("{} found, one of {ROM_FORMAT_VERSIONS:?} expected", quoted(version)),
                 "Use the tiprub release that wrote the file, or write the ROM again with this one",
             ));
         }
@@ -160,6 +160,9 @@ impl Reader<'_> {
                 frequency_deviation: self.check_values(arrays, "frequency_deviation")?,
                 residual_criterion: self.check_values(arrays, "residual_criterion")?,
                 nodal_diameters: self.nodal_diameters(arrays, sectors, harmonics.is_empty())?,
+                flexibility_deviation: self.check_values(arrays, "flexibility_deviation")?,
+                response_frequencies: self.check_values(arrays, "response_frequencies")?,
+                response_deviation: self.check_values(arrays, "response_deviation")?,
             },
             extras: RomExtras { harmonics, ..self.extras(arrays, metadata, order)? },
         })
@@ -189,32 +192,37 @@ impl Reader<'_> {
 
     fn contact_nodes(&self, arrays: &Arrays, metadata: &Metadata, positions: &Array) -> Result<Vec<ContactNode>> {
         let nodes = positions.shape[0];
-        let slopes = match arrays.get("contact_meridional_slopes") {
-            None => vec![0.0; nodes],
+        let each = |name: &str| match arrays.get(name) {
+            None => Ok(vec![0.0; nodes]),
             Some(array) => {
-                self.shape("contact_meridional_slopes", array, &[nodes], "nodes as in `contact_positions`")?;
-                array.values.clone()
+                self.shape(name, array, &[nodes], "nodes as in `contact_positions`")?;
+                Ok(array.values.clone())
             }
         };
+        let [slopes, areas, lengths] =
+            [each("contact_meridional_slopes")?, each("contact_areas")?, each("contact_lengths")?];
         let names = match metadata.get("contact_names") {
             None => (1..=nodes).map(|index| format!("node_{index}")).collect(),
-            Some(text) => self.contact_names(text, nodes)?,
+            Some(text) => self.point_names("contact_names", text, nodes)?,
         };
         let (triples, _) = positions.values.as_chunks::<3>();
-        Ok(names
-            .into_iter()
-            .zip(triples)
-            .zip(slopes)
-            .map(|((name, &position), meridional_slope)| ContactNode { name, position, meridional_slope })
-            .collect())
+        let node = |(index, name): (usize, String)| ContactNode {
+            name,
+            position: triples[index],
+            meridional_slope: slopes[index],
+            area: areas[index],
+            length: lengths[index],
+        };
+        Ok(names.into_iter().enumerate().map(node).collect())
     }
 
-    fn contact_names(&self, text: &str, nodes: usize) -> Result<Vec<String>> {
-        let what = "metadata `contact_names`";
+    fn point_names(&self, key: &str, text: &str, nodes: usize) -> Result<Vec<String>> {
+        let what = format!("metadata `{key}`");
         let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
         if names.len() != nodes {
-            let problem = format!("{} names found, {nodes} expected (nodes in `contact_positions`)", names.len());
-            return Err(self.error(what, problem, "Give one name per contact node, separated by commas"));
+            let positions = key.replace("names", "positions");
+            let problem = format!("{} names found, {nodes} expected (as in `{positions}`)", names.len());
+            return Err(self.error(what, problem, "Give one name each, separated by commas"));
         }
         for (index, name) in names.iter().enumerate() {
             let starts_well = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
@@ -226,7 +234,7 @@ impl Reader<'_> {
                 return Err(self.error(
                     what,
                     format!("{name:?} appears twice"),
-                    "Give every contact node its own name",
+                    "Give each its own name",
                 ));
             }
         }
@@ -328,10 +336,13 @@ fn rom_metadata(rom: &Rom, arrays: &Arrays) -> Metadata {
         Frame::Cylindrical => "cylindrical",
         Frame::Cartesian => "cartesian",
     };
-    let names = rom.contact_nodes.iter().map(|node| node.name.as_str()).collect::<Vec<_>>().join(",");
+    let names = names(&rom.contact_nodes);
+    let extras = extras::metadata(&rom.extras);
+    let second = arrays.keys().map(String::as_str).chain(extras.iter().map(|(key, _)| *key));
+    let version = ROM_FORMAT_VERSIONS[usize::from(second.into_iter().any(|name| SECOND_RELEASE.contains(&name)))];
     [
         ("format", ROM_FORMAT.to_owned()),
-        ("format_version", ROM_FORMAT_VERSION.to_owned()),
+        ("format_version", version.to_owned()),
         ("name", rom.name.clone()),
         ("origin", rom.origin.clone()),
         ("sectors", rom.sectors.to_string()),
@@ -341,9 +352,13 @@ fn rom_metadata(rom: &Rom, arrays: &Arrays) -> Metadata {
         ("units", units_text(|name| arrays.contains_key(&name.replace(NUMBER, "1")))),
     ]
     .into_iter()
-    .chain(extras::metadata(&rom.extras))
+    .chain(extras)
     .map(|(key, value)| (key.to_owned(), value))
     .collect()
+}
+
+fn names(points: &[ContactNode]) -> String {
+    points.iter().map(|point| point.name.as_str()).collect::<Vec<_>>().join(",")
 }
 
 /// The file stores rows, nalgebra columns.
@@ -367,12 +382,23 @@ fn rom_arrays(rom: &Rom) -> Arrays {
             list(rom.contact_nodes.iter().map(|node| node.meridional_slope).collect(), vec![nodes]),
         ),
     ];
+    let patches: [(&str, fn(&ContactNode) -> f64); 2] =
+        [("contact_areas", |node| node.area), ("contact_lengths", |node| node.length)];
+    for (name, extent) in patches {
+        let extents: Vec<f64> = rom.contact_nodes.iter().map(extent).collect();
+        if extents.iter().any(|extent| *extent > 0.0) {
+            arrays.push((name, list(extents, vec![nodes])));
+        }
+    }
     let checks = &rom.checks;
     for (name, values) in [
         ("full_frequencies", &checks.full_frequencies),
         ("reduced_frequencies", &checks.reduced_frequencies),
         ("frequency_deviation", &checks.frequency_deviation),
         ("residual_criterion", &checks.residual_criterion),
+        ("flexibility_deviation", &checks.flexibility_deviation),
+        ("response_frequencies", &checks.response_frequencies),
+        ("response_deviation", &checks.response_deviation),
     ] {
         if !values.is_empty() {
             arrays.push((name, list(values.clone(), vec![values.len()])));

@@ -2,8 +2,21 @@
 
 /// Value of the metadata entry `format`.
 pub(crate) const ROM_FORMAT: &str = "tiprub-rom";
-/// Value of the metadata entry `format_version`.
-pub(crate) const ROM_FORMAT_VERSION: &str = "1";
+/// Values of the metadata entry `format_version`: files of the first release, and with what only [`SECOND_RELEASE`] has. A file is
+/// written in the first form that holds it, for older readers.
+pub(crate) const ROM_FORMAT_VERSIONS: [&str; 2] = ["1", "2"];
+/// Arrays and metadata of format 2.
+pub(crate) const SECOND_RELEASE: [&str; 9] = [
+    "contact_areas",
+    "contact_lengths",
+    "flexibility_deviation",
+    "response_frequencies",
+    "response_deviation",
+    "watched_map",
+    "watched_positions",
+    "watched_names",
+    "basis",
+];
 
 /// One named array of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,7 +59,7 @@ const fn array(
 const GENERAL_ARRAYS: usize = 9;
 
 /// Every array.
-pub const ARRAYS: [ArrayLayout; 20] = [
+pub const ARRAYS: [ArrayLayout; 27] = [
     array("mass", "[n, n]", "kg", true, "Reduced mass matrix of one sector: symmetric, positive definite."),
     array("stiffness", "[n, n]", "N/m", true, "Reduced stiffness matrix: symmetric, positive semidefinite."),
     array(
@@ -139,11 +152,63 @@ pub const ARRAYS: [ArrayLayout; 20] = [
         false,
         "Nodal diameter of each mode in the arrays of frequencies and checks; only with coupled sectors.",
     ),
+    array(
+        "contact_areas",
+        "[nodes]",
+        "m^2",
+        false,
+        "Area that each contact patch stands for, the integral of its weight over the tip; 0 for a node.",
+    ),
+    array(
+        "contact_lengths",
+        "[nodes]",
+        "m",
+        false,
+        "Length along the chord that each contact patch stands for; 0 for a node.",
+    ),
+    array(
+        "flexibility_deviation",
+        "[nodes]",
+        "%",
+        false,
+        "Deviation of the static flexibility at each contact node or patch from the full model.",
+    ),
+    array(
+        "response_frequencies",
+        "[frequencies]",
+        "Hz",
+        false,
+        "Frequencies of the forced responses that were compared with those of the full model, ascending.",
+    ),
+    array(
+        "response_deviation",
+        "[frequencies]",
+        "%",
+        false,
+        "Deviation of the forced response at the contact nodes from that of the full model, at each of them.",
+    ),
+    array(
+        "watched_map",
+        "[points, 3, n]",
+        "m per unit coordinate",
+        false,
+        "Displacement components of points that are looked at and touch nothing; with `watched_positions` and \
+         `watched_names`, not with coupled sectors.",
+    ),
+    array(
+        "watched_positions",
+        "[points, 3]",
+        "m, rad, m (cylindrical) or m (cartesian)",
+        false,
+        "Undeformed positions of these points, as for contact nodes.",
+    ),
 ];
 
 /// The arrays of a structure that spins: all or none.
 pub(crate) const SPIN_ARRAYS: [&str; 5] =
     ["stiffness_speed2", "stiffness_speed4", "coriolis", "centrifugal_load", "centrifugal_load_speed4"];
+/// The arrays of watched points: both or none.
+pub(crate) const WATCHED_ARRAYS: [&str; 2] = ["watched_map", "watched_positions"];
 /// The arrays of a structure that heats up: both or none.
 pub(crate) const THERMAL_ARRAYS: [&str; 2] = ["thermal_loads", "thermal_patches"];
 
@@ -152,9 +217,9 @@ const fn entry(name: &'static str, default: Option<&'static str>, description: &
 }
 
 /// Every metadata entry.
-pub const METADATA: [MetadataLayout; 12] = [
+pub const METADATA: [MetadataLayout; 14] = [
     entry("format", None, "Always `tiprub-rom`."),
-    entry("format_version", None, "Always `1`."),
+    entry("format_version", None, "`1`, or `2` with anything that format 2 added, below."),
     entry("name", None, "Name of the structure."),
     entry("origin", Some(""), "Where the model came from: mesh, material, reduction; free text."),
     entry(
@@ -178,6 +243,13 @@ pub const METADATA: [MetadataLayout; 12] = [
          Node along·around + i is the i-th of its ring, rings in order of growing z, angles growing by 2π/around. \
          `around,along,open`: they form a grid with four free edges, frame `cartesian`; node along·around + i is the i-th \
          of its row.",
+    ),
+    entry("watched_names", Some(""), "Names of the watched points, separated by commas; format 2."),
+    entry(
+        "basis",
+        Some("craig-bampton"),
+        "`craig-bampton`, modes with the contact nodes held, or `free-interface`, modes of the structure as it is supported; \
+         format 2.",
     ),
     entry("units", Some(""), "Text for the reader of the file: one line per array."),
     entry("checksum", Some(""), "SHA-256 of the content, checked where present; leave it out when writing by hand."),

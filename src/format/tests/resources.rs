@@ -154,7 +154,7 @@ fn what_a_scene_leaves_off_leaves_no_data_in_the_fmu() {
     let node = |index: u32| {
         let (along, i) = (index / 4, index % 4);
         let position = [0.25, f64::from(i) * std::f64::consts::FRAC_PI_2, 0.01 * f64::from(along)];
-        ContactNode { name: format!("n{index}"), position, meridional_slope: 0.0 }
+        ContactNode { name: format!("n{index}"), position, meridional_slope: 0.0, ..ContactNode::default() }
     };
     let plain = rom();
     let mut full = Rom {
@@ -178,7 +178,7 @@ fn what_a_scene_leaves_off_leaves_no_data_in_the_fmu() {
             patches: vec![Patch { angle: [0.0, 1.0], axial: [0.0, 0.01] }],
         }),
         grid: Some(ContactGrid { around: 4, along: 2, closed: true }),
-        harmonics: Vec::new(),
+        ..RomExtras::default()
     };
     full.validate().unwrap();
     let still = StructureSettings { name: "ring".into(), motion: Motion::Still, ..StructureSettings::default() };
@@ -193,9 +193,9 @@ fn what_a_scene_leaves_off_leaves_no_data_in_the_fmu() {
     assert_eq!(resource_files(&scene, true)[1].1, write_rom(&bare), "as if the extras had never been there");
 
     let only = |spin: bool, thermal: bool, grid: bool| {
-        let RomExtras { spin: s, thermal: t, grid: g, harmonics } = full.extras.clone();
+        let RomExtras { spin: s, thermal: t, grid: g, .. } = full.extras.clone();
         let (spin, thermal, grid) = (s.filter(|_| spin), t.filter(|_| thermal), g.filter(|_| grid));
-        RomExtras { spin, thermal, grid, harmonics }
+        RomExtras { spin, thermal, grid, ..RomExtras::default() }
     };
     for spin in [
         SpinSettings { stiffening: true, ..SpinSettings::default() },

@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 use proptest::prelude::*;
 use sha2::{Digest, Sha256};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactGrid, Frame, Patch, RomExtras, Spin, Thermal};
+use tiprub_core::rom::{Basis, ContactGrid, ContactNode, Frame, Patch, RomExtras, Spin, Thermal, Watched};
 use tiprub_format::{read_rom, write_rom};
 use tiprub_test_models::{node, structure};
 
@@ -71,19 +71,88 @@ fn complete(seed: u64, order: usize, patches: usize) -> Rom {
     rom.extras.spin = Some(spin(order, &mut value));
     rom.extras.thermal = Some(thermal(order, patches, &mut value));
     rom.extras.grid = Some(ContactGrid { around: AROUND, along: ALONG, closed: true });
+    let point = |(index, name): (usize, &str)| ContactNode {
+        name: name.into(),
+        position: [0.25, 0.1 * index as f64, value()],
+        ..ContactNode::default()
+    };
+    let points: Vec<ContactNode> = ["leading_edge", "mid_chord"].into_iter().enumerate().map(point).collect();
+    rom.extras.watched = Some(Watched { map: DMatrix::from_fn(6, order, |_, _| value()), points });
+    rom.extras.basis = Basis::FreeInterface;
+    (rom.checks.response_frequencies, rom.checks.response_deviation) = (vec![100.0, 2e3], vec![0.1, value()]);
+    rom.checks.flexibility_deviation = vec![1e-9; rom.contact_nodes.len()];
+    for node in &mut rom.contact_nodes {
+        (node.area, node.length) = (value().abs(), value().abs());
+    }
     rom
+}
+
+/// What format 1 has no place for, left out.
+fn of_the_first_format(rom: &Rom) -> Rom {
+    let mut rom = rom.clone();
+    (rom.extras.watched, rom.extras.basis) = (None, Basis::default());
+    rom.checks.response_frequencies.clear();
+    rom.checks.response_deviation.clear();
+    rom.checks.flexibility_deviation.clear();
+    rom.contact_nodes.iter_mut().for_each(|node| (node.area, node.length) = (0.0, 0.0));
+    rom
+}
+
+#[test]
+fn a_file_is_of_the_first_format_that_holds_it() {
+    let full = complete(3, 4, 2);
+    let plain = of_the_first_format(&full);
+    let version = |rom: &Rom| Loose::of(rom).entries["format_version"].clone();
+    assert_eq!(version(&plain), "1");
+    let with: [fn(&mut Rom, &Rom); 6] = [
+        |rom, full| rom.extras.watched.clone_from(&full.extras.watched),
+        |rom, full| rom.extras.basis = full.extras.basis,
+        |rom, full| rom.checks.response_frequencies.clone_from(&full.checks.response_frequencies),
+        |rom, full| rom.checks.flexibility_deviation.clone_from(&full.checks.flexibility_deviation),
+        |rom, full| rom.contact_nodes[1].area = full.contact_nodes[1].area,
+        |rom, full| rom.contact_nodes[1].length = full.contact_nodes[1].length,
+    ];
+    for change in with {
+        let mut rom = plain.clone();
+        change(&mut rom, &full);
+        assert_eq!((version(&rom).as_str(), read_rom(&write_rom(&rom), "rom").unwrap()), ("2", rom));
+    }
+}
+
+#[test]
+fn watched_points_come_whole_and_only_where_they_can() {
+    let rom = complete(5, 3, 1);
+    let refused = |change: &dyn Fn(&mut Loose)| {
+        let mut file = Loose::of(&rom);
+        change(&mut file);
+        read_rom(&file.bytes(), "rom").unwrap_err().to_string()
+    };
+    let told = refused(&|file| drop(file.arrays.remove("watched_positions")));
+    assert!(told.contains("`watched_positions`") && told.contains("`watched_map`"), "{told}");
+    let told = refused(&|file| drop(file.entries.insert("watched_names".into(), "a,a".into())));
+    assert!(told.contains("`watched_names`") && told.contains("twice"), "{told}");
+    let told = refused(&|file| drop(file.entries.insert("basis".into(), "free_interface".into())));
+    assert!(told.contains("`basis`") && told.contains("free-interface"), "{told}");
+    let mut negative = rom.clone();
+    negative.contact_nodes[0].area = -1e-6;
+    let told = read_rom(&write_rom(&negative), "rom").unwrap_err().to_string();
+    assert!(told.contains("`contact_areas`, node 1"), "{told}");
 }
 
 proptest! {
     #[test]
     fn extras_survive_writing_and_reading_bit_for_bit(
-        seed in 0..u64::MAX / 2, order in 1..7usize, patches in 1..5usize, has in prop::array::uniform3(any::<bool>()),
+        seed in 0..u64::MAX / 2, order in 1..7usize, patches in 1..5usize, has in prop::array::uniform5(any::<bool>()),
     ) {
         let mut rom = complete(seed, order, patches);
-        let RomExtras { spin, thermal, grid, harmonics } = rom.extras;
+        let RomExtras { spin, thermal, grid, harmonics, watched, basis } = rom.extras;
         rom.extras = RomExtras {
             spin: spin.filter(|_| has[0]), thermal: thermal.filter(|_| has[1]), grid: grid.filter(|_| has[2]), harmonics,
+            watched: watched.filter(|_| has[3]), basis,
         };
+        if has[4] {
+            rom = of_the_first_format(&rom);
+        }
         let bytes = write_rom(&rom);
         let again = read_rom(&bytes, "rom").unwrap();
         prop_assert_eq!(&again, &rom);
@@ -150,7 +219,8 @@ fn units_are_listed_for_the_arrays_in_the_file() {
     };
     let mut rom = complete(3, 2, 2);
     assert!(units(&rom).contains("\nstiffness_speed4 [n, n]: kg s^2\n"), "{}", units(&rom));
-    assert!(units(&rom).ends_with("\nthermal_patches [patches, 4]: rad, rad, m, m"), "{}", units(&rom));
+    assert!(units(&rom).contains("\nthermal_patches [patches, 4]: rad, rad, m, m\n"), "{}", units(&rom));
+    assert!(units(&of_the_first_format(&rom)).ends_with("\nthermal_patches [patches, 4]: rad, rad, m, m"));
     rom.extras.spin = None;
     assert!(units(&rom).contains("thermal_loads") && !units(&rom).contains("speed"), "{}", units(&rom));
 }

@@ -27,6 +27,7 @@ fn random_rom(seed: u64, order: usize, nodes: usize, modes: usize, text: String)
         name: format!("node_{}", index + 1),
         position: [values[index * 4].abs() + 0.1, values[index * 4 + 1], values[index * 4 + 2]],
         meridional_slope: values[index * 4 + 3],
+        ..ContactNode::default()
     };
     Rom {
         name: "blade".into(),
@@ -44,6 +45,7 @@ fn random_rom(seed: u64, order: usize, nodes: usize, modes: usize, text: String)
             frequency_deviation: numbers(seed + 8, modes / 2),
             residual_criterion: Vec::new(),
             nodal_diameters: Vec::new(),
+            ..RomChecks::default()
         },
         extras: tiprub_core::rom::RomExtras::default(),
     }
@@ -196,7 +198,7 @@ fn a_file_written_by_hand_needs_only_the_required_parts() {
     assert_eq!(rom.stiffness, DMatrix::from_row_slice(2, 2, &[3e6, -1e6, -1e6, 4e6]));
     // Rows are (node, component), columns coordinates.
     assert_eq!(rom.contact_map, DMatrix::from_row_slice(3, 2, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));
-    let node = ContactNode { name: "node_1".into(), position: [0.25, 0.1, 0.01], meridional_slope: 0.0 };
+    let node = ContactNode { name: "node_1".into(), position: [0.25, 0.1, 0.01], meridional_slope: 0.0, ..ContactNode::default() };
     assert_eq!(rom.contact_nodes, [node]);
     assert_eq!(rom.checks, RomChecks::default());
     assert_eq!(rom.damping_ratio.to_bits(), 0);
@@ -248,7 +250,7 @@ fn values_that_are_no_structure_are_refused() {
 fn wrong_metadata_is_refused_by_key() {
     ByHand::example().with("format", "pt").refused_with(&["metadata `format`: \"pt\" found", "not a tiprub ROM file"]);
     ByHand::example().without("format").refused_with(&["metadata `format`: nothing found"]);
-    ByHand::example().with("format_version", "2").refused_with(&["metadata `format_version`: \"2\" found", "release"]);
+    ByHand::example().with("format_version", "3").refused_with(&["metadata `format_version`: \"3\" found", "release"]);
     ByHand::example().without("sectors").refused_with(&["metadata `sectors`: missing", "at least 1"]);
     ByHand::example().with("sectors", "-3").refused_with(&["metadata `sectors`: \"-3\" is not such a number"]);
     ByHand::example().with("sectors", "0").refused_with(&["`sectors`", "zero sectors"]);

@@ -79,5 +79,5 @@ pub(crate) fn reduce_free_body(
 }
 
 fn contact_node(point: &ContactPoint, position: [f64; 3]) -> ContactNode {
-    ContactNode { name: point.name.clone(), position, meridional_slope: 0.0 }
+    ContactNode { name: point.name.clone(), position, meridional_slope: 0.0, ..ContactNode::default() }
 }

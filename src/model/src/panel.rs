@@ -225,6 +225,7 @@ fn contact_nodes(model: &FeModel, grid: &PanelGrid) -> Vec<ContactNode> {
         name: format!("row_{}_{}", index / grid.around + 1, index % grid.around + 1),
         position: model.nodes[node],
         meridional_slope: 0.0,
+        ..ContactNode::default()
     };
     grid.nodes.iter().enumerate().map(named).collect()
 }

@@ -66,7 +66,8 @@ pub fn contact_patches(
         return Err(Error::invalid("contact patches", problem, "Ask for fewer, or refine the tip"));
     }
     let patches = weights.into_iter().enumerate();
-    Ok(patches.map(|(patch, weights)| point(mesh, set, &places, &weights, name(patch))).collect())
+    let length = |patch: usize| places.length() * share_of_chord(patch, count);
+    Ok(patches.map(|(patch, weights)| point(mesh, set, &places, (&weights, length(patch)), name(patch))).collect())
 }
 
 /// The hat functions that are not zero at a place along the chord, 0 to 1.
@@ -81,7 +82,22 @@ fn hats(along: f64, count: usize) -> [(usize, f64); 2] {
     [(first, 1.0 - share), (first + 1, share)]
 }
 
-fn point(mesh: &Mesh, set: &[usize], places: &Places, weights: &[f64], name: String) -> ContactPoint {
+/// Integral of the hat function of a patch over the chord, of length 1.
+fn share_of_chord(patch: usize, count: usize) -> f64 {
+    match count {
+        1 => 1.0,
+        _ if patch == 0 || patch + 1 == count => 0.5 / (count - 1) as f64,
+        _ => 1.0 / (count - 1) as f64,
+    }
+}
+
+fn point(
+    mesh: &Mesh,
+    set: &[usize],
+    places: &Places,
+    (weights, length): (&[f64], f64),
+    name: String,
+) -> ContactPoint {
     let total: f64 = weights.iter().sum();
     let patch: Vec<(usize, f64)> = set
         .iter()
@@ -91,7 +107,7 @@ fn point(mesh: &Mesh, set: &[usize], places: &Places, weights: &[f64], name: Str
         .collect();
     let slopes = weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
     let meridional_slope = slopes.map(|(place, weight)| weight / total * places.slope(place)).sum();
-    let point = ContactPoint { name, node: 0, patch, meridional_slope };
+    let point = ContactPoint { patch, area: total, length, ..ContactPoint::at(name, 0, meridional_slope) };
     let [radius, angle, axial] = point.cylindrical(&mesh.nodes);
     let middle = [radius * angle.cos(), radius * angle.sin(), axial];
     let distance = |node: usize| -> f64 { mesh.nodes[node].iter().zip(middle).map(|(a, b)| (a - b) * (a - b)).sum() };

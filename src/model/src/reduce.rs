@@ -1,11 +1,12 @@
 //! From a mesh to a checked reduced-order model.
 
 mod outcome;
+mod response;
 
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::{Frame, RomChecks};
+use tiprub_core::rom::{Frame, RomChecks, Watched};
 use tiprub_core::shown;
 
 use crate::assembly::{Assembled, free_dofs};
@@ -16,12 +17,13 @@ use crate::free_interface::free_interface;
 use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report, silent};
-use crate::sparse::{Factor, SparseMatrix, principal_pair};
+use crate::sparse::{Factor, SparseMatrix, principal_pair, tall_product};
 use crate::spin::{ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, SpinningStates, reduced_spin};
 use crate::{Error, Result};
 
-use outcome::{build_rom, direction, rotated};
+use outcome::{build_rom, contact_node, direction, rotated};
 pub(crate) use outcome::{description, element_names};
+use response::{Seen, with_responses};
 
 /// A contact node or patch before the reduction.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,12 +37,16 @@ pub struct ContactPoint {
     pub patch: Vec<(usize, f64)>,
     /// Slope dr/dz of the structure's contour in the meridional plane.
     pub meridional_slope: f64,
+    /// Area that a patch stands for (m²); 0 for a node.
+    pub area: f64,
+    /// Length along the chord that it stands for (m); 0 for a node.
+    pub length: f64,
 }
 
 impl ContactPoint {
     /// A node alone.
     pub fn at(name: impl Into<String>, node: usize, meridional_slope: f64) -> Self {
-        Self { name: name.into(), node, patch: Vec::new(), meridional_slope }
+        Self { name: name.into(), node, patch: Vec::new(), meridional_slope, area: 0.0, length: 0.0 }
     }
 
     /// Nodes and weights.
@@ -88,6 +94,8 @@ pub struct ReductionOptions {
     pub sectors: usize,
     /// Directions of the contact displacements.
     pub frame: Frame,
+    /// Points whose displacements the ROM tells beside those of the contact nodes.
+    pub watched: Vec<ContactPoint>,
     /// Modal damping ratio proposed with the model.
     pub damping_ratio: f64,
 }
@@ -188,6 +196,8 @@ pub fn reduce_model(
     report(listener, Stage::Checks, 0, 1);
     let (squares, vectors) = dense_modes(&craig_bampton.stiffness, &craig_bampton.mass)?;
     let checks = compare(&full, &mass, &craig_bampton, &squares, &vectors);
+    let seen = Seen { squares: &squares, shapes: vectors.rows(0, loads.ncols()).into_owned() };
+    let checks = with_responses(checks, &full, &mass, &loads, &seen, options.frame);
     report(listener, Stage::Checks, 1, 1);
     let spin = |speed| -> Result<ReducedSpin> {
         let resting = Resting { model: &craig_bampton, mass: &mass, free: &free, contact: loads.as_ref() };
@@ -205,6 +215,7 @@ pub fn reduce_model(
     let (spin, spin_checks) = spin.map_or((None, Vec::new()), |ReducedSpin { spin, checks }| (Some(spin), checks));
     let mut rom = build_rom(&model, clamped.len(), contact, options, &craig_bampton, checks);
     rom.extras.spin = spin;
+    rom.extras.watched = watched(&model, &free, &craig_bampton.transformation, options)?;
     let fixed_interface_frequencies = craig_bampton.fixed_interface_frequencies;
     let reduction = Reduction::new(rom, &full.modes, &free, &squares, (model.nodes.len(), model.mesh))?;
     Ok(Reduction { spin_checks, fixed_interface_frequencies, ..reduction })
@@ -315,7 +326,7 @@ pub(crate) fn compare(
         reduced_frequencies,
         frequency_deviation,
         residual_criterion,
-        nodal_diameters: Vec::new(),
+        ..RomChecks::default()
     }
 }
 
@@ -361,6 +372,25 @@ fn contact_loads(free: &[usize], nodes: &[[f64; 3]], contact: &[ContactPoint], f
         }
     }
     Ok(loads)
+}
+
+/// Displacements of the watched points per reduced coordinate, in the directions of the contact nodes.
+fn watched(
+    model: &FeModel,
+    free: &[usize],
+    transformation: &Mat<f64>,
+    options: &ReductionOptions,
+) -> Result<Option<Watched>> {
+    if options.watched.is_empty() {
+        return Ok(None);
+    }
+    let rows = contact_loads(free, &model.nodes, &options.watched, options.frame)?;
+    let map = tall_product(rows.as_ref(), transformation.as_ref());
+    let points = options.watched.iter().map(|point| contact_node(&model.nodes, point, options.frame));
+    Ok(Some(Watched {
+        map: DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]),
+        points: points.collect(),
+    }))
 }
 
 fn clamped_point(point: &ContactPoint) -> Error {

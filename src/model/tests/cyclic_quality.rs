@@ -51,6 +51,7 @@ fn reduced_whole(mesh: &Mesh, sectors: usize, modes: usize, checked_modes: usize
         checked_modes,
         sectors: 1,
         frame: Frame::Cylindrical,
+        watched: Vec::new(),
         damping_ratio: 0.005,
     };
     let clamped = disk.mesh.set("BORE").unwrap().to_vec();

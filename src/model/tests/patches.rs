@@ -38,6 +38,7 @@ fn reduced(mesh: Mesh, contact: &[ContactPoint], kind: ReductionKind, modes: usi
         checked_modes: 6,
         sectors: 1,
         frame: Frame::Cylindrical,
+        watched: Vec::new(),
         damping_ratio: 0.01,
     };
     let clamped = nodes_at(&mesh, 0, 0.0);

@@ -35,6 +35,7 @@ fn rom(imported: &Imported) -> Rom {
         checked_modes: 6,
         sectors: 1,
         frame: Frame::Cylindrical,
+        watched: Vec::new(),
         damping_ratio: 0.005,
     };
     let clamped = model.set("ROOT").unwrap().to_vec();

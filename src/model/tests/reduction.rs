@@ -172,6 +172,7 @@ fn options(modes: usize, frame: Frame) -> ReductionOptions {
         checked_modes: 8,
         sectors: 1,
         frame,
+        watched: Vec::new(),
         damping_ratio: 0.01,
     }
 }

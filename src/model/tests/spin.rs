@@ -232,6 +232,7 @@ fn options(frame: Frame) -> ReductionOptions {
         checked_modes: 6,
         sectors: 1,
         frame,
+        watched: Vec::new(),
         damping_ratio: 0.01,
     }
 }

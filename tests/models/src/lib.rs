@@ -28,7 +28,7 @@ pub const GAP: f64 = 3.56e-4;
 
 /// A contact node.
 pub fn node(name: impl Into<String>, position: [f64; 3], meridional_slope: f64) -> ContactNode {
-    ContactNode { name: name.into(), position, meridional_slope }
+    ContactNode { name: name.into(), position, meridional_slope, ..ContactNode::default() }
 }
 
 /// One structure in Cartesian coordinates, without damping.

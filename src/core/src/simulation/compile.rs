@@ -50,6 +50,8 @@ pub struct Body {
     pub stiffness_range: Option<[[f64; 2]; 2]>,
     /// Modal load by growth, per Ω² and, with stiffening, per Ω⁴; empty without.
     pub centrifugal: Vec<[f64; 2]>,
+    /// Displacement of watched points per unit of each mode, 3·points × modes; empty without.
+    pub watched: DMatrix<f64>,
 }
 
 /// A structure that carries surfaces.
@@ -92,7 +94,8 @@ impl Body {
         };
         let disk = rom.is_cyclic().then(|| CyclicModel::from_rom(rom, ratio)).transpose()?;
         let (reference_speed, stiffness_range, centrifugal) = (0.0, None, Vec::new());
-        Ok(Self { model, disk, translations, reference_speed, stiffness_range, centrifugal })
+        let watched = DMatrix::zeros(0, 0);
+        Ok(Self { model, disk, translations, reference_speed, stiffness_range, centrifugal, watched })
     }
 
     /// Largest angular frequency (rad/s), of all nodal diameters where sectors are coupled.
@@ -240,6 +243,9 @@ impl Compiled {
         let body = &mut self.bodies[body];
         body.reference_speed = speed;
         body.centrifugal = centrifugal(structure, rom, &body.model);
+        if let Some(watched) = &rom.extras.watched {
+            body.watched = &watched.map * &body.model.shapes;
+        }
         Ok(())
     }
 

@@ -14,6 +14,7 @@ pub fn of_scene(scene: &Scene) -> u64 {
             hash = fingerprint(loads.as_bytes(), hash);
         }
         matrices.extend(rom.extras.thermal.iter().map(|thermal| &thermal.loads));
+        matrices.extend(rom.extras.watched.iter().map(|watched| &watched.map));
         for matrix in matrices {
             for value in matrix.iter() {
                 hash = fingerprint(&value.to_bits().to_le_bytes(), hash);

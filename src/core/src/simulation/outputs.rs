@@ -233,6 +233,12 @@ impl View<'_> {
         }
     }
 
+    /// Displacement of a watched point of a sector along an axis of its frame (m).
+    pub fn watched_displacement(&self, body: usize, sector: usize, point: usize, axis: usize) -> f64 {
+        let (modes, shapes) = (self.modes(body), self.simulation.compiled.bodies[body].watched.row(3 * point + axis));
+        shapes.iter().enumerate().map(|(mode, shape)| shape * modes.modal_state(mode, sector).0).sum()
+    }
+
     /// |(2/N) Σ_b u_b e^(−i n θ_b)| (1/N for n = 0 and n = N/2) of the radial displacement of the middle node.
     pub fn nodal_diameters(&self, body: usize, out: &mut [f64]) {
         let modes = self.modes(body);

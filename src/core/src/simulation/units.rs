@@ -17,6 +17,8 @@ pub static LENGTH: Unit = Unit { name: "m", exponents: [0, 1, 0, 0, 0], display:
 pub static LINEAR_SPEED: Unit = Unit { name: "m/s", exponents: [0, 1, -1, 0, 0], display: &[] };
 /// s.
 pub static TIME: Unit = Unit { name: "s", exponents: [0, 0, 1, 0, 0], display: &[("ms", 1e3), ("us", 1e6)] };
+/// Pa.
+pub static PRESSURE: Unit = Unit { name: "Pa", exponents: [1, -1, -2, 0, 0], display: &[("MPa", 1e-6)] };
 /// N.
 pub static FORCE: Unit = Unit { name: "N", exponents: [1, 1, -2, 0, 0], display: &[("kN", 1e-3)] };
 /// N.m.

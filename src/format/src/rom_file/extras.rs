@@ -2,14 +2,17 @@
 //! are those of the first release.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{ContactGrid, Patch, RomExtras, Spin, Thermal};
+use tiprub_core::rom::{Basis, ContactGrid, ContactNode, Patch, RomExtras, Spin, Thermal, Watched};
 
-use super::{Array, Arrays, Metadata, Reader, WRITE_AGAIN, list, matrix};
-use crate::Result;
-use crate::rom_layout::{SPIN_ARRAYS, THERMAL_ARRAYS};
+use super::{Array, Arrays, Metadata, Reader, WRITE_AGAIN, list, matrix, names};
+use crate::rom_layout::{SPIN_ARRAYS, THERMAL_ARRAYS, WATCHED_ARRAYS};
+use crate::{Result, suggestion};
 
 /// Third word of a contact grid with free edges all around.
 const OPEN: &str = "open";
+
+/// Values of the metadata entry `basis`.
+const BASES: [(&str, Basis); 2] = [("craig-bampton", Basis::FixedInterface), ("free-interface", Basis::FreeInterface)];
 
 impl Reader<'_> {
     pub(super) fn extras(&self, arrays: &Arrays, metadata: &Metadata, order: usize) -> Result<RomExtras> {
@@ -18,7 +21,41 @@ impl Reader<'_> {
             thermal: self.thermal(arrays, order)?,
             grid: self.grid(metadata)?,
             harmonics: Vec::new(),
+            watched: self.watched(arrays, metadata, order)?,
+            basis: self.basis(metadata)?,
         })
+    }
+
+    fn basis(&self, metadata: &Metadata) -> Result<Basis> {
+        let Some(text) = metadata.get("basis") else { return Ok(Basis::default()) };
+        match BASES.iter().find(|(name, _)| name == text) {
+            Some((_, basis)) => Ok(*basis),
+            None => {
+                let remedy = suggestion::remedy(text, &BASES.map(|(name, _)| name));
+                Err(self.error("metadata `basis`", format!("{text:?} is none"), remedy))
+            }
+        }
+    }
+
+    fn watched(&self, arrays: &Arrays, metadata: &Metadata, order: usize) -> Result<Option<Watched>> {
+        if !self.group(arrays, &WATCHED_ARRAYS)? {
+            if metadata.contains_key("watched_names") {
+                let problem = format!("given without the array `{}`", WATCHED_ARRAYS[0]);
+                return Err(self.error("metadata `watched_names`", problem, "Remove the entry, or add the arrays"));
+            }
+            return Ok(None);
+        }
+        let positions = self.required(arrays, "watched_positions", 2)?;
+        let count = positions.shape[0];
+        self.shape("watched_positions", positions, &[count, 3], "three coordinates per point")?;
+        let map = self.required(arrays, "watched_map", 3)?;
+        let reason = "points as in `watched_positions`, 3 components, coordinates as in `mass`";
+        self.shape("watched_map", map, &[count, 3, order], reason)?;
+        let names = self.point_names("watched_names", self.entry(metadata, "watched_names")?, count)?;
+        let (triples, _) = positions.values.as_chunks::<3>();
+        let points = names.into_iter().zip(triples);
+        let points = points.map(|(name, position)| ContactNode { name, position: *position, ..ContactNode::default() });
+        Ok(Some(Watched { map: DMatrix::from_row_slice(3 * count, order, &map.values), points: points.collect() }))
     }
 
     /// Whether the arrays of a group are there: all or none.
@@ -118,6 +155,14 @@ pub(super) fn arrays(extras: &RomExtras) -> Vec<(&'static str, Array)> {
             ("thermal_patches", list(places, vec![thermal.patches.len(), 4])),
         ]);
     }
+    if let Some(watched) = &extras.watched {
+        let count = watched.points.len();
+        let positions = watched.points.iter().flat_map(|point| point.position).collect();
+        arrays.extend([
+            ("watched_map", Array { shape: vec![count, 3, watched.map.ncols()], ..matrix(&watched.map) }),
+            ("watched_positions", list(positions, vec![count, 3])),
+        ]);
+    }
     arrays
 }
 
@@ -127,5 +172,8 @@ pub(super) fn metadata(extras: &RomExtras) -> Vec<(&'static str, String)> {
         let edges = if closed { String::new() } else { format!(",{OPEN}") };
         ("contact_grid", format!("{around},{along}{edges}"))
     });
-    speed.into_iter().chain(grid).collect()
+    let watched = extras.watched.as_ref().map(|watched| ("watched_names", names(&watched.points)));
+    let told = BASES.iter().find(|(_, basis)| *basis == extras.basis && extras.basis != Basis::default());
+    let basis = told.map(|(name, _)| ("basis", (*name).to_owned()));
+    speed.into_iter().chain(grid).chain(watched).chain(basis).collect()
 }

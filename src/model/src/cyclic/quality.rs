@@ -93,5 +93,6 @@ fn sorted_checks(list: Vec<(u32, [f64; 4])>) -> RomChecks {
         frequency_deviation: column(2),
         residual_criterion: column(3),
         nodal_diameters: list.iter().map(|entry| entry.0).collect(),
+        ..RomChecks::default()
     }
 }

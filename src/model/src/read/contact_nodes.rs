@@ -111,6 +111,12 @@ impl Places {
         (cz * point[2] + cs * arc_from(self.middle, point) - low) / (high - low)
     }
 
+    /// Length of the chord (m).
+    pub(crate) fn length(&self) -> f64 {
+        let [low, high] = extent(&self.along);
+        high - low
+    }
+
     /// Number of places along the chord that differ.
     pub(crate) fn stations(&self) -> usize {
         let mut along = self.along.clone();
@@ -120,7 +126,7 @@ impl Places {
     }
 
     /// Places in the set by growing z, as evenly along the chord as its nodes allow, in the middle of the thickness.
-    fn evenly(&self, count: usize) -> Vec<usize> {
+    pub(crate) fn evenly(&self, count: usize) -> Vec<usize> {
         let all = self.axial.len();
         let mut chosen: Vec<usize> = if count == all { (0..all).collect() } else { Vec::with_capacity(count) };
         let [low, high] = extent(&self.along);

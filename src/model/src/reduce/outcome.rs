@@ -3,7 +3,7 @@
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
+use tiprub_core::rom::{Basis, ContactNode, Frame, RomChecks, RomExtras};
 
 use super::{ContactPoint, Mode, Reduction, ReductionKind, ReductionOptions};
 use crate::Result;
@@ -47,14 +47,15 @@ pub(super) fn rotated(
     model
 }
 
-fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: Frame) -> ContactNode {
+pub(super) fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: Frame) -> ContactNode {
     let position = match frame {
         Frame::Cartesian => {
             std::array::from_fn(|i| point.weights().map(|(node, weight)| weight * nodes[node][i]).sum())
         }
         Frame::Cylindrical => point.cylindrical(nodes),
     };
-    ContactNode { name: point.name.clone(), position, meridional_slope: point.meridional_slope }
+    let ContactPoint { meridional_slope, area, length, .. } = *point;
+    ContactNode { name: point.name.clone(), position, meridional_slope, area, length }
 }
 
 /// What the full model is made of, and how many of its nodes are clamped.
@@ -139,7 +140,13 @@ pub(super) fn build_rom(
         contact_map: DMatrix::identity(boundary, order),
         contact_nodes: contact.iter().map(|point| contact_node(&full.nodes, point, options.frame)).collect(),
         checks,
-        extras: RomExtras::default(),
+        extras: RomExtras {
+            basis: match options.kind {
+                ReductionKind::FixedInterface => Basis::FixedInterface,
+                ReductionKind::FreeInterface => Basis::FreeInterface,
+            },
+            ..RomExtras::default()
+        },
     }
 }
 

@@ -79,12 +79,12 @@ pub fn blade_mesh(counts: MeshCounts) -> Result<BladeMesh> {
 }
 
 impl BladeMesh {
-    /// `count` contact patches over the whole tip, named as contact nodes are.
+    /// `count` contact patches over the whole tip: `patch_1`, `patch_2`, ... from leading to trailing edge.
     ///
     /// # Errors
     /// Those of [`contact_patches`](crate::patches::contact_patches).
     pub fn contact_patches(&self, count: usize) -> Result<Vec<ContactPoint>> {
-        contact_patches(&self.mesh, self.mesh.set("tip")?, count, |index| place_name(index, count))
+        contact_patches(&self.mesh, self.mesh.set("tip")?, count, |index| format!("patch_{}", index + 1))
     }
 
     /// `count` contact nodes spread along the tip's mid-thickness line: `leading_edge`, `tip_2`, ..., `trailing_edge`,

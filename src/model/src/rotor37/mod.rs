@@ -46,6 +46,9 @@ pub fn sections() -> &'static [Section] {
     &sections::SECTIONS
 }
 
+/// Watched points of a tip of patches: its edges and the middle.
+const WATCHED: usize = 3;
+
 /// What of the tip touches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tip {
@@ -99,9 +102,9 @@ impl Default for Rotor37Options {
 pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Result<Reduction> {
     report(listener, Stage::Mesh, 0, 1);
     let blade = blade_mesh(options.mesh)?;
-    let contact = match options.tip {
-        Tip::Nodes(count) => blade.contact_points(count)?,
-        Tip::Patches(count) => blade.contact_patches(count)?,
+    let (contact, watched) = match options.tip {
+        Tip::Nodes(count) => (blade.contact_points(count)?, Vec::new()),
+        Tip::Patches(count) => (blade.contact_patches(count)?, blade.contact_points(WATCHED)?),
     };
     report(listener, Stage::Mesh, 1, 1);
     let clamped = blade.mesh.set("hub")?.to_vec();
@@ -112,6 +115,7 @@ pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Resul
         checked_modes: options.checked_modes,
         sectors: BLADES,
         frame: Frame::Cylindrical,
+        watched,
         damping_ratio: options.damping_ratio,
     };
     let model = FeModel::assembled(blade.mesh, &options.material, String::new(), listener)?;

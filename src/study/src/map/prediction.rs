@@ -178,7 +178,7 @@ pub(super) mod tests {
     pub fn blade(frequency: f64, sectors: usize) -> Rom {
         let square = |hertz: f64| (std::f64::consts::TAU * hertz).powi(2);
         let node =
-            |name: &str, z: f64| ContactNode { name: name.into(), position: [0.25, 0.0, z], meridional_slope: 0.0 };
+            |name: &str, z: f64| ContactNode { name: name.into(), position: [0.25, 0.0, z], meridional_slope: 0.0, ..ContactNode::default() };
         Rom {
             name: "beam".into(),
             origin: "test".into(),

@@ -6,7 +6,7 @@ use crate::settings::*;
 use crate::{Rom, Scene};
 
 fn rom(frame: Frame) -> Rom {
-    let node = ContactNode { name: "tip".into(), position: [0.25, 0.0, 0.0], meridional_slope: 0.0 };
+    let node = ContactNode { name: "tip".into(), position: [0.25, 0.0, 0.0], meridional_slope: 0.0, ..ContactNode::default() };
     let grid = Some(ContactGrid { around: 8, along: 2, closed: frame == Frame::Cylindrical });
     Rom {
         name: "rom".into(),

@@ -3,8 +3,9 @@
 use super::builder::Builder;
 use super::parts::{Body, Parts, refuse};
 use crate::Result;
+use crate::rom::{ContactNode, Frame};
 use crate::simulation::outputs::{Reader, each, scalar, whole};
-use crate::simulation::units::{ANGLE, FORCE, LENGTH};
+use crate::simulation::units::{ANGLE, FORCE, LENGTH, LINE_LOAD, PRESSURE};
 use crate::variables::{Quantity, Span, Unit};
 
 pub fn angle(table: &mut Builder, parts: &Parts, body: &Body) {
@@ -70,6 +71,8 @@ pub fn watched(table: &mut Builder, parts: &Parts) -> Result<()> {
 }
 
 fn watch(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
+    watched_points(table, parts, body, sector);
+    patches(table, body, sector);
     let list = node_list(body);
     for row in watched_rows(body.index, sector - 1, [nominal(parts, body), Some((&FORCE, 100.0))]) {
         if row.exists(parts.settings.outputs.instantaneous_forces, parts.has_friction()) {
@@ -77,6 +80,41 @@ fn watch(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
             let text = format!("{} ({list}){untouched}", row.text);
             row.add(table, format!("blade[{sector}].{}", row.name), text, body.rom.contact_nodes.len());
         }
+    }
+}
+
+/// Components of displacements in both frames.
+const COMPONENTS: [[&str; 3]; 2] = [["radial", "tangential", "axial"], ["x", "y", "z"]];
+
+/// Displacements of the points that a ROM has beside its contact nodes.
+fn watched_points(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
+    let Some(watched) = &body.rom.extras.watched else { return };
+    let names: Vec<&str> = watched.points.iter().map(|point| point.name.as_str()).collect();
+    for (axis, name) in COMPONENTS[usize::from(body.rom.frame == Frame::Cartesian)].into_iter().enumerate() {
+        let index = body.index;
+        let text = format!("Displacement of watched points, {name} ({})", names.join(", "));
+        let read = each(move |view, point| view.watched_displacement(index, sector - 1, point, axis));
+        let row = table.output(format!("blade[{sector}].{name}_displacement"), Span::Point, nominal(parts, body), text, read);
+        (row.dimension, row.display) = (Some(names.len()), Some(1));
+    }
+}
+
+/// Pressure and force per length, of contact patches.
+fn patches(table: &mut Builder, body: &Body, sector: usize) {
+    let rows: [(&str, &str, &'static Unit, f64, fn(&ContactNode) -> f64); 2] = [
+        ("normal_pressure", "pressure", &PRESSURE, 1e6, |node| node.area),
+        ("normal_line_force", "force per length along the chord", &LINE_LOAD, 1e4, |node| node.length),
+    ];
+    for (name, told, unit, nominal, extent) in rows {
+        let extents: Vec<f64> = body.rom.contact_nodes.iter().map(extent).collect();
+        if extents.contains(&0.0) {
+            continue;
+        }
+        let (index, count) = (body.index, extents.len());
+        let text = format!("Normal contact {told} in the middle of each patch ({}), mean over the communication step", node_list(body));
+        let read = each(move |view, node| view.mean * view.normal_impulse(index, node, sector - 1) / extents[node]);
+        let row = table.output(format!("blade[{sector}].{name}"), Span::Mean, Some((unit, nominal)), text, read);
+        row.dimension = Some(count);
     }
 }
 

@@ -1,0 +1,117 @@
+//! Static flexibility and forced response at the contact nodes beside those of the full model: what deviations of natural frequencies
+//! do not tell of contact.
+//!
+//! With the lowest modes Φ of the full model, (K − ω²M)⁻¹B = Φ(Λ − ω²)⁻¹ΦᵀB + Y, and Y, free of these modes, is the series
+//! Σ ω²ʲ (K⁻¹M)ʲ K⁻¹(B − MΦΦᵀB), which converges below the next frequency. With V_j its terms, BᵀV_(i+j+1) = V_iᵀMV_j: twice as
+//! many terms as solutions with K.
+
+use faer::Mat;
+use nalgebra::DMatrix;
+use tiprub_core::rom::{Frame, RomChecks};
+
+use super::FullModes;
+use crate::sparse::{SparseMatrix, add_tall, tall_product};
+
+/// Solutions with K.
+const TERMS: usize = 12;
+/// Largest ω², as a share of that of the last mode known: the series converges at least as its powers do.
+const REACH: f64 = 0.5;
+
+/// A reduced model as it is seen at the contact nodes.
+pub(super) struct Seen<'a> {
+    /// ω² of all of its modes.
+    pub squares: &'a [f64],
+    /// Its modes at the contact coordinates, 3·nodes × modes.
+    pub shapes: DMatrix<f64>,
+}
+
+/// The checks with the deviations, of a supported structure; along the radii where the frame has such.
+pub(super) fn with_responses(
+    checks: RomChecks,
+    full: &FullModes,
+    mass: &SparseMatrix,
+    loads: &Mat<f64>,
+    seen: &Seen<'_>,
+    frame: Frame,
+) -> RomChecks {
+    if full.shift != 0.0 {
+        return checks;
+    }
+    let rows: Vec<usize> = (0..loads.ncols()).filter(|row| frame == Frame::Cartesian || row % 3 == 0).collect();
+    let loads = Mat::from_fn(loads.nrows(), rows.len(), |i, k| loads[(i, rows[k])]);
+    let moments = Moments::of(full, mass, &loads);
+    let reduced = |square: f64| response(&seen.shapes.select_rows(&rows), seen.squares, square);
+    let at_rest = (moments.response(0.0), reduced(0.0));
+    let per_node = rows.len() * 3 / seen.shapes.nrows();
+    let flexibility = |node: usize| {
+        let worst = (node * per_node..(node + 1) * per_node).map(|row| {
+            let [full, own] = [&at_rest.0, &at_rest.1].map(|matrix| matrix[(row, row)]);
+            (own / full - 1.0).abs()
+        });
+        100.0 * worst.fold(0.0, f64::max)
+    };
+    let frequencies = between(&full.modes.eigenvalues);
+    let deviation = |square: &f64| {
+        let full = moments.response(*square);
+        100.0 * (&full - reduced(*square)).norm() / full.norm()
+    };
+    RomChecks {
+        flexibility_deviation: (0..rows.len() / per_node).map(flexibility).collect(),
+        response_deviation: frequencies.iter().map(deviation).collect(),
+        response_frequencies: frequencies.iter().map(|square| square.sqrt() / std::f64::consts::TAU).collect(),
+        ..checks
+    }
+}
+
+/// ω² halfway between neighbouring frequencies, as far as the series reaches.
+fn between(squares: &[f64]) -> Vec<f64> {
+    let most = REACH * squares.last().copied().unwrap_or(0.0);
+    let middles = squares.windows(2).map(|pair| (0.5 * (pair[0].sqrt() + pair[1].sqrt())).powi(2));
+    middles.filter(|square| *square <= most).collect()
+}
+
+/// Displacement at the contact coordinates per unit force, from modes seen there.
+fn response(shapes: &DMatrix<f64>, squares: &[f64], square: f64) -> DMatrix<f64> {
+    let weighted = DMatrix::from_fn(shapes.nrows(), shapes.ncols(), |i, k| shapes[(i, k)] / (squares[k] - square));
+    shapes * weighted.transpose()
+}
+
+/// The full model at the contact coordinates.
+struct Moments<'a> {
+    squares: &'a [f64],
+    /// Its lowest modes there.
+    shapes: DMatrix<f64>,
+    /// Of ω²ʲ.
+    moments: Vec<DMatrix<f64>>,
+}
+
+impl<'a> Moments<'a> {
+    fn of(full: &'a FullModes, mass: &SparseMatrix, loads: &Mat<f64>) -> Self {
+        let modes = &full.modes.shapes;
+        let carried = mass.times(modes.as_ref());
+        // X − ΦΦᵀMX.
+        let without = |mut columns: Mat<f64>| {
+            let share = tall_product(carried.as_ref(), columns.as_ref());
+            add_tall(columns.as_mut(), -1.0, modes.as_ref(), share.as_ref());
+            columns
+        };
+        let mut term = without(full.responses(loads.clone()));
+        let mut terms = vec![tall_product(loads.as_ref(), term.as_ref())];
+        for _ in 1..TERMS {
+            let carried = mass.times(term.as_ref());
+            terms.push(tall_product(term.as_ref(), carried.as_ref()));
+            let next = without(full.responses(carried.clone()));
+            terms.push(tall_product(next.as_ref(), carried.as_ref()));
+            term = next;
+        }
+        let dense = |matrix: &Mat<f64>| DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)]);
+        let shapes = dense(&tall_product(loads.as_ref(), modes.as_ref()));
+        Self { squares: &full.modes.eigenvalues, shapes, moments: terms.iter().map(dense).collect() }
+    }
+
+    fn response(&self, square: f64) -> DMatrix<f64> {
+        let known = response(&self.shapes, self.squares, square);
+        self.moments.iter().rev().fold(DMatrix::zeros(known.nrows(), known.ncols()), |sum, moment| sum * square + moment)
+            + known
+    }
+}
