@@ -52,7 +52,12 @@ impl Project {
             stiffness: DMatrix::identity(3, 3) * 1e5,
             damping_ratio: 0.01,
             contact_map: DMatrix::identity(3, 3),
-            contact_nodes: vec![ContactNode { name: "tip".into(), position: [0.25, 0.0, 0.0], meridional_slope: 0.0, ..ContactNode::default() }],
+            contact_nodes: vec![ContactNode {
+                name: "tip".into(),
+                position: [0.25, 0.0, 0.0],
+                meridional_slope: 0.0,
+                ..ContactNode::default()
+            }],
             checks: RomChecks::default(),
             extras: tiprub_core::rom::RomExtras::default(),
         };

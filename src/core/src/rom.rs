@@ -243,9 +243,10 @@ impl Rom {
             self.validate_place(&format!("ROM array `contact_positions`, node {}", index + 1), node, remedy)?;
             let what = format!("ROM array `contact_meridional_slopes`, node {}", index + 1);
             ranges::at_most(&what, node.meridional_slope, ranges::SLOPE)?;
-            for (name, value, most) in
-                [("contact_areas", node.area, ranges::POSITION * ranges::POSITION), ("contact_lengths", node.length, ranges::POSITION)]
-            {
+            for (name, value, most) in [
+                ("contact_areas", node.area, ranges::POSITION * ranges::POSITION),
+                ("contact_lengths", node.length, ranges::POSITION),
+            ] {
                 ranges::within(&format!("ROM array `{name}`, node {}", index + 1), value, 0.0, most)?;
             }
         }

@@ -432,6 +432,17 @@ pub struct ExperimentSettings {
     pub communication_step: f64,
 }
 
+/// Model and method in one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// Every setting by itself (default).
+    #[default]
+    None,
+    /// Those of the paper: central differences and the film of eq. 11, built-in models of Craig and Bampton with contact at nodes.
+    Paper,
+}
+
 /// The settings of a scene, without the ROMs it names.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -441,6 +452,9 @@ pub struct SceneSettings {
     /// One or a few sentences for the importer's catalogue.
     #[serde(default)]
     pub description: String,
+    /// Model and method.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub preset: Preset,
     /// Flexible structures.
     #[serde(rename = "structure")]
     pub structures: Vec<StructureSettings>,

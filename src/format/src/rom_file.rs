@@ -231,11 +231,7 @@ impl Reader<'_> {
                 return Err(self.error(what, format!("{name:?} cannot be part of a variable name"), remedy));
             }
             if names[..index].contains(name) {
-                return Err(self.error(
-                    what,
-                    format!("{name:?} appears twice"),
-                    "Give each its own name",
-                ));
+                return Err(self.error(what, format!("{name:?} appears twice"), "Give each its own name"));
             }
         }
         Ok(names)

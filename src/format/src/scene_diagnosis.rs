@@ -55,6 +55,11 @@ impl<'a> Document<'a> {
         self.error(span, what, problem, remedy)
     }
 
+    /// Whether the document has the key at this path, indices counted from 1.
+    pub(crate) fn holds(&self, path: &str) -> bool {
+        self.places().iter().any(|place| place.path == path)
+    }
+
     fn error(&self, span: Option<Range<usize>>, what: &str, problem: String, remedy: String) -> Error {
         Error::Scene {
             origin: self.origin.to_owned(),

@@ -2,10 +2,14 @@
 
 use toml::de::DeTable;
 
-use tiprub_core::settings::SceneSettings;
+use tiprub_core::settings::{Preset, SceneSettings, Scheme, Solver, StructureSettings};
 
+use crate::load::BUILTIN_PREFIX;
 use crate::scene_diagnosis::{Document, check_brackets, diagnose, position};
 use crate::{Error, Result};
+
+/// End of the name of a built-in model as the paper has it.
+pub const PAPER_SUFFIX: &str = "-paper";
 
 /// Read a scene; `origin` names the file in messages.
 ///
@@ -23,12 +27,35 @@ pub fn parse_scene(text: &str, origin: &str) -> Result<SceneSettings> {
     })?;
     let document = Document { text, origin, root: document.get_ref() };
     check_brackets(&document)?;
-    let settings: SceneSettings = toml::from_str(text).map_err(|error| diagnose(&document, &error))?;
+    let mut settings: SceneSettings = toml::from_str(text).map_err(|error| diagnose(&document, &error))?;
+    apply_preset(&mut settings, &document);
     settings.validate().map_err(|error| match error {
         tiprub_core::Error::Invalid { what, problem, remedy } => document.refusal(&what, problem, remedy),
         other => document.refusal("scene", other.to_string(), "Change the settings named".into()),
     })?;
     Ok(settings)
+}
+
+/// What a preset says of keys that the file leaves out.
+fn apply_preset(settings: &mut SceneSettings, document: &Document) {
+    if settings.preset != Preset::Paper {
+        return;
+    }
+    if !document.holds("time.scheme") {
+        settings.time.scheme = Scheme::CentralDifference;
+    }
+    for (index, contact) in settings.contacts.iter_mut().enumerate() {
+        if !document.holds(&format!("contact[{}].solver", index + 1)) {
+            contact.solver = Solver::Film;
+        }
+    }
+}
+
+/// Name of the built-in model that a structure asks for; `None` where it names a file.
+pub fn builtin_model(settings: &SceneSettings, structure: &StructureSettings) -> Option<String> {
+    let name = structure.rom.strip_prefix(BUILTIN_PREFIX)?;
+    let of_the_paper = settings.preset == Preset::Paper && !name.ends_with(PAPER_SUFFIX);
+    Some(if of_the_paper { format!("{name}{PAPER_SUFFIX}") } else { name.to_owned() })
 }
 
 /// A scene as TOML; reading it back gives the same settings, bit for bit.

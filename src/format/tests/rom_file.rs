@@ -198,7 +198,12 @@ fn a_file_written_by_hand_needs_only_the_required_parts() {
     assert_eq!(rom.stiffness, DMatrix::from_row_slice(2, 2, &[3e6, -1e6, -1e6, 4e6]));
     // Rows are (node, component), columns coordinates.
     assert_eq!(rom.contact_map, DMatrix::from_row_slice(3, 2, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));
-    let node = ContactNode { name: "node_1".into(), position: [0.25, 0.1, 0.01], meridional_slope: 0.0, ..ContactNode::default() };
+    let node = ContactNode {
+        name: "node_1".into(),
+        position: [0.25, 0.1, 0.01],
+        meridional_slope: 0.0,
+        ..ContactNode::default()
+    };
     assert_eq!(rom.contact_nodes, [node]);
     assert_eq!(rom.checks, RomChecks::default());
     assert_eq!(rom.damping_ratio.to_bits(), 0);

@@ -241,7 +241,12 @@ fn the_file_that_the_python_example_writes_is_a_rom() {
     let stiffness = [9e5, 1e5, 0.0, 1e5, 4e4, 0.0, 0.0, 0.0, 2e5];
     assert_eq!(rom.stiffness, DMatrix::from_row_slice(3, 3, &stiffness));
     assert_eq!(rom.contact_map, DMatrix::identity(3, 3));
-    let node = ContactNode { name: "mid_chord".into(), position: [0.25, 0.0, 0.02], meridional_slope: 0.0, ..ContactNode::default() };
+    let node = ContactNode {
+        name: "mid_chord".into(),
+        position: [0.25, 0.0, 0.02],
+        meridional_slope: 0.0,
+        ..ContactNode::default()
+    };
     assert_eq!(rom.contact_nodes, [node]);
     assert_eq!(rom.damping_ratio.to_bits(), 0.002f64.to_bits());
 }

@@ -175,7 +175,12 @@ mod tests {
             stiffness: DMatrix::identity(3, 3) * stiffness,
             damping_ratio: 0.0,
             contact_map: DMatrix::identity(3, 3),
-            contact_nodes: vec![ContactNode { name: "tip".into(), position: [0.2, 0.0, 0.0], meridional_slope: 0.0, ..ContactNode::default() }],
+            contact_nodes: vec![ContactNode {
+                name: "tip".into(),
+                position: [0.2, 0.0, 0.0],
+                meridional_slope: 0.0,
+                ..ContactNode::default()
+            }],
             checks: RomChecks::default(),
             extras: RomExtras::default(),
         }

@@ -91,13 +91,7 @@ fn share_of_chord(patch: usize, count: usize) -> f64 {
     }
 }
 
-fn point(
-    mesh: &Mesh,
-    set: &[usize],
-    places: &Places,
-    (weights, length): (&[f64], f64),
-    name: String,
-) -> ContactPoint {
+fn point(mesh: &Mesh, set: &[usize], places: &Places, (weights, length): (&[f64], f64), name: String) -> ContactPoint {
     let total: f64 = weights.iter().sum();
     let patch: Vec<(usize, f64)> = set
         .iter()

@@ -321,13 +321,7 @@ pub(crate) fn compare(
     // A rigid-body mode has no frequency to deviate from.
     let deviation = |(f, r): (&f64, &f64)| if *f > 0.0 { (r - f) / f * 100.0 } else { 0.0 };
     let frequency_deviation = full_frequencies.iter().zip(&reduced_frequencies).map(deviation).collect();
-    RomChecks {
-        full_frequencies,
-        reduced_frequencies,
-        frequency_deviation,
-        residual_criterion,
-        ..RomChecks::default()
-    }
+    RomChecks { full_frequencies, reduced_frequencies, frequency_deviation, residual_criterion, ..RomChecks::default() }
 }
 
 pub(crate) fn check_nodes(nodes: &[[f64; 3]], clamped: &[usize], contact: &[ContactPoint], frame: Frame) -> Result<()> {
@@ -387,10 +381,7 @@ fn watched(
     let rows = contact_loads(free, &model.nodes, &options.watched, options.frame)?;
     let map = tall_product(rows.as_ref(), transformation.as_ref());
     let points = options.watched.iter().map(|point| contact_node(&model.nodes, point, options.frame));
-    Ok(Some(Watched {
-        map: DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]),
-        points: points.collect(),
-    }))
+    Ok(Some(Watched { map: DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]), points: points.collect() }))
 }
 
 fn clamped_point(point: &ContactPoint) -> Error {

@@ -165,6 +165,7 @@ pub fn scene(block: Rom, plates: &[(Side, f64)], curved: bool, velocity: [f64; 3
     let settings = SceneSettings {
         name: "free_block".into(),
         description: String::new(),
+        preset: Preset::None,
         structures,
         surfaces: plates.iter().map(surface).collect(),
         contacts: plates.iter().map(contact).collect(),

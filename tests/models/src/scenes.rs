@@ -1,8 +1,8 @@
 //! Rotors in casings, and what is added to them.
 
 use tiprub_core::settings::{
-    CoatingSettings, ContactSettings, ExperimentSettings, Meridian, Motion, OutputSettings, SceneSettings, Scheme,
-    Shape, StructureSettings, SurfaceSettings, TimeSettings,
+    CoatingSettings, ContactSettings, ExperimentSettings, Meridian, Motion, OutputSettings, Preset, SceneSettings,
+    Scheme, Shape, StructureSettings, SurfaceSettings, TimeSettings,
 };
 use tiprub_core::{Rom, Scene};
 
@@ -13,6 +13,7 @@ pub fn round(rom: Rom) -> Scene {
     let settings = SceneSettings {
         name: "written_down".into(),
         description: String::new(),
+        preset: Preset::None,
         structures: vec![StructureSettings {
             name: "rotor".into(),
             rom: "rotor".into(),

@@ -330,7 +330,12 @@ mod tests {
             stiffness: &b * b.transpose() * 1e6,
             damping_ratio: 0.0,
             contact_map: DMatrix::identity(3, order),
-            contact_nodes: vec![ContactNode { name: "n".into(), position: [0.0; 3], meridional_slope: 0.0, ..ContactNode::default() }],
+            contact_nodes: vec![ContactNode {
+                name: "n".into(),
+                position: [0.0; 3],
+                meridional_slope: 0.0,
+                ..ContactNode::default()
+            }],
             checks: RomChecks::default(),
             extras: crate::rom::RomExtras::default(),
         }

@@ -6,7 +6,7 @@ mod place;
 #[cfg(test)]
 mod tests;
 
-use super::{ContactSettings, Motion, Scene, SceneSettings, Scheme, Solver};
+use super::{ContactSettings, Motion, Preset, Scene, SceneSettings, Scheme, Solver};
 use crate::rom::Frame;
 use crate::{Error, Result, Rom};
 use facts::*;
@@ -196,6 +196,14 @@ static METHODS: &[Rule] = &[
     ),
 ];
 
+/// Of a preset: what the scene file says beside it. Parameters may be set to anything.
+static PRESETS: &[Rule] = &[excludes(
+    &[OTHER_SCHEME, OTHER_SOLVER],
+    ("`preset = \"paper\"`", |at| at.settings.preset == Preset::Paper),
+    "the preset is the method of the paper whole",
+    "Remove the line, or the preset",
+)];
+
 /// Of ROMs.
 static ROMS: &[Rule] = &[
     needs(
@@ -264,7 +272,7 @@ static ROMS: &[Rule] = &[
 
 /// All rows, in the order of the guide.
 pub fn all() -> impl Iterator<Item = &'static Rule> {
-    PARTS.iter().chain(VARIABLES).chain(METHODS).chain(ROMS)
+    PARTS.iter().chain(VARIABLES).chain(METHODS).chain(PRESETS).chain(ROMS)
 }
 
 impl Rule {
@@ -287,7 +295,7 @@ impl SceneSettings {
 
     /// The same of outputs, inputs, scheme and solver.
     pub(super) fn check_whole(&self) -> Result<()> {
-        check(VARIABLES, self.place(), path).and_then(|()| check(METHODS, self.place(), path))
+        [PRESETS, VARIABLES, METHODS].into_iter().try_for_each(|rules| check(rules, self.place(), path))
     }
 
     fn place(&self) -> Place<'_> {

@@ -13,9 +13,17 @@ const fn field(
 }
 
 /// Every key, in file order.
-pub const FIELDS: [SceneField; 70] = [
+pub const FIELDS: [SceneField; 71] = [
     field("name", "text", None, "letters, digits, underscore; starts with a letter", "Name of the model."),
     field("description", "text", Some("empty"), "any", "One or a few sentences for the importer's catalogue."),
+    field(
+        "preset",
+        "text",
+        Some("`none`"),
+        "`none`, `paper`",
+        "`paper`: the paper's method and models whole. Central differences, solver `film`, and of built-in models those with \
+         Craig-Bampton modes and contact at nodes.",
+    ),
     field("structure.name", "text", None, "as `name` of the scene", "Name by which contacts refer to it."),
     field(
         "structure.rom",

@@ -146,7 +146,12 @@ impl GridNodes {
         let node = |(index, node): (usize, &usize)| {
             let [x, y, z] = mesh.nodes[*node];
             let meridional_slope = self.slopes[index / self.around];
-            ContactNode { name: self.name(index), position: [x.hypot(y), y.atan2(x), z], meridional_slope, ..ContactNode::default() }
+            ContactNode {
+                name: self.name(index),
+                position: [x.hypot(y), y.atan2(x), z],
+                meridional_slope,
+                ..ContactNode::default()
+            }
         };
         self.nodes.iter().enumerate().map(node).collect()
     }

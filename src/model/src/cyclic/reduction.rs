@@ -191,7 +191,12 @@ fn assembled(
 fn contact_node(model: &FeModel, point: &ContactPoint) -> ContactNode {
     let [x, y, z] = model.nodes[point.node];
     let position = [x.hypot(y), y.atan2(x), z];
-    ContactNode { name: point.name.clone(), position, meridional_slope: point.meridional_slope, ..ContactNode::default() }
+    ContactNode {
+        name: point.name.clone(),
+        position,
+        meridional_slope: point.meridional_slope,
+        ..ContactNode::default()
+    }
 }
 
 fn harmonic(component: &Component, order: usize) -> Harmonic {

@@ -111,7 +111,10 @@ impl<'a> Moments<'a> {
 
     fn response(&self, square: f64) -> DMatrix<f64> {
         let known = response(&self.shapes, self.squares, square);
-        self.moments.iter().rev().fold(DMatrix::zeros(known.nrows(), known.ncols()), |sum, moment| sum * square + moment)
+        self.moments
+            .iter()
+            .rev()
+            .fold(DMatrix::zeros(known.nrows(), known.ncols()), |sum, moment| sum * square + moment)
             + known
     }
 }

@@ -177,8 +177,12 @@ pub(super) mod tests {
     /// One mode of `frequency` Hz and one ten times as high, radial, one tangential component.
     pub fn blade(frequency: f64, sectors: usize) -> Rom {
         let square = |hertz: f64| (std::f64::consts::TAU * hertz).powi(2);
-        let node =
-            |name: &str, z: f64| ContactNode { name: name.into(), position: [0.25, 0.0, z], meridional_slope: 0.0, ..ContactNode::default() };
+        let node = |name: &str, z: f64| ContactNode {
+            name: name.into(),
+            position: [0.25, 0.0, z],
+            meridional_slope: 0.0,
+            ..ContactNode::default()
+        };
         Rom {
             name: "beam".into(),
             origin: "test".into(),

@@ -5,8 +5,8 @@ use tiprub_core::{
     Rom, Scene, Simulation,
     rom::ContactGrid,
     settings::{
-        ContactSettings, ExperimentSettings, Motion, OutputSettings, SceneSettings, Scheme, Solver, StructureSettings,
-        SurfaceSettings, TimeSettings,
+        ContactSettings, ExperimentSettings, Motion, OutputSettings, Preset, SceneSettings, Scheme, Solver,
+        StructureSettings, SurfaceSettings, TimeSettings,
     },
 };
 use tiprub_test_models::{node, structure};
@@ -199,6 +199,7 @@ impl Throw {
         let settings = SceneSettings {
             name: "thrown".into(),
             description: String::new(),
+            preset: Preset::None,
             structures,
             surfaces: self.plates.iter().map(surface).collect(),
             contacts: self.plates.iter().map(contact).collect(),

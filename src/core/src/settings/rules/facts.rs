@@ -67,6 +67,10 @@ pub(super) const SOLVER: Fact = fact("contact.solver", "", |_| true);
 pub(super) const FILM: Fact = fact("contact.solver", "`film`", |at| at.solver == Solver::Film);
 pub(super) const COULOMB: Fact = fact("contact.solver", "`coulomb`", |at| at.solver == Solver::Coulomb);
 
+pub(super) const OTHER_SOLVER: Fact =
+    fact("contact.solver", "other than `film`", |at| at.contact().solver != Solver::Film);
+pub(super) const OTHER_SCHEME: Fact =
+    fact("time.scheme", "other than `central-difference`", |at| at.settings.time.scheme != Scheme::CentralDifference);
 pub(super) const MASSLESS: Fact =
     fact("time.scheme", "`massless-boundary`", |at| at.scheme == Scheme::MasslessBoundary);
 pub(super) const INTERPOLATION: Fact =

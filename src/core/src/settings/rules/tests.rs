@@ -6,7 +6,8 @@ use crate::settings::*;
 use crate::{Rom, Scene};
 
 fn rom(frame: Frame) -> Rom {
-    let node = ContactNode { name: "tip".into(), position: [0.25, 0.0, 0.0], meridional_slope: 0.0, ..ContactNode::default() };
+    let node =
+        ContactNode { name: "tip".into(), position: [0.25, 0.0, 0.0], meridional_slope: 0.0, ..ContactNode::default() };
     let grid = Some(ContactGrid { around: 8, along: 2, closed: frame == Frame::Cylindrical });
     Rom {
         name: "rom".into(),
@@ -28,6 +29,7 @@ fn scene(motion: Motion, frame: Frame) -> Scene {
     let structure = |name: &str, motion| StructureSettings { name: name.into(), motion, ..Default::default() };
     let settings = SceneSettings {
         name: "scene".into(),
+        preset: Preset::None,
         structures: vec![structure("master", motion), structure("under", Motion::Still)],
         surfaces: vec![SurfaceSettings {
             name: "surface".into(),

@@ -94,7 +94,8 @@ fn watched_points(table: &mut Builder, parts: &Parts, body: &Body, sector: usize
         let index = body.index;
         let text = format!("Displacement of watched points, {name} ({})", names.join(", "));
         let read = each(move |view, point| view.watched_displacement(index, sector - 1, point, axis));
-        let row = table.output(format!("blade[{sector}].{name}_displacement"), Span::Point, nominal(parts, body), text, read);
+        let row =
+            table.output(format!("blade[{sector}].{name}_displacement"), Span::Point, nominal(parts, body), text, read);
         (row.dimension, row.display) = (Some(names.len()), Some(1));
     }
 }
@@ -111,7 +112,10 @@ fn patches(table: &mut Builder, body: &Body, sector: usize) {
             continue;
         }
         let (index, count) = (body.index, extents.len());
-        let text = format!("Normal contact {told} in the middle of each patch ({}), mean over the communication step", node_list(body));
+        let text = format!(
+            "Normal contact {told} in the middle of each patch ({}), mean over the communication step",
+            node_list(body)
+        );
         let read = each(move |view, node| view.mean * view.normal_impulse(index, node, sector - 1) / extents[node]);
         let row = table.output(format!("blade[{sector}].{name}"), Span::Mean, Some((unit, nominal)), text, read);
         row.dimension = Some(count);
