@@ -103,6 +103,9 @@ pub struct SectorArguments {
     /// largest radius].
     #[arg(long, value_name = "M", value_parser = positive)]
     pub cyclic_tolerance: Option<f64>,
+    /// Which modes are kept, per nodal diameter [default: craig-bampton; free-interface with --contact-patches].
+    #[arg(long, value_enum)]
+    pub kind: Option<KindChoice>,
     /// Contact nodes.
     #[command(flatten)]
     pub tips: TipOptions,

@@ -5,7 +5,9 @@ use tiprub_gallery::builtin;
 use tiprub_model::{
     Rotor37Options,
     cube::MassMatrix,
+    cyclic::ModeSelection,
     rotor37::{MeshCounts, Tip},
+    stage::StageOptions,
 };
 use tiprub_shell::places::Named;
 use tiprub_study::arguments::positive;
@@ -106,16 +108,30 @@ impl Rotor37Arguments {
                 let [chord, thickness, span] = size.0;
                 MeshCounts { chord, thickness, span }
             }),
-            tip: match (self.contact_nodes, self.contact_patches) {
-                (_, Some(patches)) => Tip::Patches(patches),
-                (Some(nodes), None) => Tip::Nodes(nodes),
-                (None, None) => defaults.tip,
-            },
+            tip: tip(self.contact_nodes, self.contact_patches).unwrap_or(defaults.tip),
             kind: KindChoice::kind(self.kind, self.contact_patches.is_some()),
             modes: self.modes.unwrap_or(defaults.modes),
             spin: self.spin,
             ..defaults
         }
+    }
+}
+
+fn tip(nodes: Option<usize>, patches: Option<usize>) -> Option<Tip> {
+    patches.map(Tip::Patches).or(nodes.map(Tip::Nodes))
+}
+
+impl StageArguments {
+    /// Name and options of the disk asked for.
+    pub fn options(&self) -> (&'static str, StageOptions) {
+        let (name, defaults) = builtin::stage(self.coarse);
+        let options = StageOptions {
+            tip: tip(self.contact_nodes, self.contact_patches).unwrap_or(defaults.tip),
+            kind: KindChoice::kind(self.kind, self.contact_patches.is_some()),
+            modes: self.modes.map_or(defaults.modes, ModeSelection::Families),
+            ..defaults
+        };
+        (name, options)
     }
 }
 
@@ -125,12 +141,18 @@ pub struct StageArguments {
     /// A coarse mesh and few modes, for trials.
     #[arg(long)]
     pub coarse: bool,
-    /// Fixed-interface modes kept per nodal diameter, in whole families [default: 25; 12 of the coarse mesh].
+    /// Modes kept per nodal diameter, in whole families [default: 25; 12 of the coarse mesh].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
     /// Contact nodes along the tip chord [default: 3].
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
+    /// Contact patches along the tip chord, over the whole thickness, instead of nodes.
+    #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
+    pub contact_patches: Option<usize>,
+    /// Which modes are kept [default: craig-bampton; free-interface with --contact-patches].
+    #[arg(long, value_enum)]
+    pub kind: Option<KindChoice>,
     /// What is written.
     #[command(flatten)]
     pub written: Written,

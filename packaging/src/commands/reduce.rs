@@ -6,7 +6,6 @@ use serde_json::{Value, json};
 use tiprub_gallery::{builtin, reduction};
 use tiprub_model::{
     casing::{CLAMPED, Support},
-    cyclic::ModeSelection,
     stage::sector_mesh,
 };
 use tiprub_shell::{
@@ -157,9 +156,7 @@ fn casing(arguments: &CasingArguments, console: &Console) -> Result<Reduced> {
 
 /// The bladed disk that ships.
 fn stage(arguments: &StageArguments, console: &Console) -> Result<Reduced> {
-    let (name, mut options) = builtin::stage(arguments.coarse);
-    options.contact_nodes = arguments.contact_nodes.unwrap_or(options.contact_nodes);
-    options.modes = arguments.modes.map_or(options.modes, ModeSelection::Families);
+    let (name, options) = arguments.options();
     let sector = sector_mesh(&options.sector).map_err(|error| reduction::failure("stage", error))?;
     let mut reduced = reduction::stage(&options, console)?;
     name.clone_into(&mut reduced.rom.name);

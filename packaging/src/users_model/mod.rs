@@ -79,7 +79,9 @@ pub fn sector(asked: &SectorArguments, console: &Console) -> Result<Reduced> {
     let source = asked.source();
     let imported = import(&source, console)?;
     let choose = |imported: &Imported| choose::tips(imported, source.model, &asked.tips, Some(asked));
-    told(&source, imported, choose, |model, chosen, clamped| cyclic(&source, model, chosen, clamped, console))
+    told(&source, imported, choose, |model, chosen, clamped| {
+        cyclic((&source, asked), model, chosen, clamped, console)
+    })
 }
 
 /// A casing whose contact nodes form a grid.
@@ -142,7 +144,7 @@ fn general(
     let title = format!("Reducing {name}");
     let options = ReductionOptions {
         name,
-        kind: KindChoice::kind(asked.kind, chosen.contact.iter().any(|point| !point.patch.is_empty())),
+        kind: KindChoice::kind(asked.kind, has_patches(chosen)),
         modes: source.kept.modes.unwrap_or(MODES),
         checked_modes: CHECKED_MODES,
         sectors: asked.sectors.unwrap_or(1) as usize,
@@ -188,8 +190,12 @@ fn ring(
     })
 }
 
+fn has_patches(chosen: &Chosen) -> bool {
+    chosen.contact.iter().any(|point| !point.patch.is_empty())
+}
+
 fn cyclic(
-    source: &Source,
+    (source, asked): (&Source, &SectorArguments),
     model: FeModel,
     chosen: &Chosen,
     clamped: Option<&str>,
@@ -202,6 +208,7 @@ fn cyclic(
     let title = format!("Reducing {name}");
     let options = CyclicOptions {
         name,
+        kind: KindChoice::kind(asked.kind, has_patches(chosen)),
         modes: ModeSelection::Families(source.kept.modes.unwrap_or(MODES)),
         checked_modes: CHECKED_MODES,
         damping_ratio: source.kept.damping.unwrap_or(DAMPING),

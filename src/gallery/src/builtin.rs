@@ -5,7 +5,7 @@ use tiprub_model::{
     CasingOptions, Mesh, Rotor37Options,
     casing::CASING37,
     cube::{CubeOptions, RingOptions, Side},
-    cyclic::{CyclicOptions, CyclicReduction, ModeSelection, reduce_cyclic},
+    cyclic::{CyclicReduction, ModeSelection, reduce_cyclic},
     rotor37::{DESIGN_SPEED, Tip},
     stage::{
         StageOptions,
@@ -109,7 +109,7 @@ pub fn refined(name: &str, factor: f64, contact_nodes: usize, console: &Console)
         "rotor37-spin" => reduction::rotor37(&blade(Some(DESIGN_SPEED)), console).map(|reduction| reduction.rom),
         STAGE | STAGE_COARSE => {
             let (name, options) = stage(name == STAGE_COARSE);
-            let options = StageOptions { modes: families(options.modes), contact_nodes, ..options };
+            let options = StageOptions { modes: families(options.modes), tip: Tip::Nodes(contact_nodes), ..options };
             DiskModel::with_options(name, options).reduce(console).map(|(reduction, _)| reduction.rom)
         }
         CASING37 => {
@@ -173,12 +173,7 @@ impl DiskModel {
     pub fn reduce(&self, console: &Console) -> Result<(CyclicReduction, Mesh)> {
         with_progress("Reducing the bladed disk", console, &|listener| {
             let stage = stage_model(&self.options, listener)?;
-            let options = CyclicOptions {
-                name: self.name.to_owned(),
-                modes: self.options.modes,
-                checked_modes: self.options.checked_modes,
-                damping_ratio: self.options.damping_ratio,
-            };
+            let options = self.options.cyclic(self.name);
             let (contact, boundary) = (&stage.contact, &stage.boundary);
             let reduction = reduce_cyclic(&stage.model, &stage.clamped, contact, boundary, &options, listener)?;
             let mesh = stage.model.mesh.map(|(mesh, _)| mesh).unwrap_or_default();

@@ -10,10 +10,9 @@ use tiprub_core::rom::{ContactNode, Frame, RomExtras};
 use crate::Result;
 use crate::assembly::free_dofs;
 use crate::casing::{modal_form, rigid_motions, without_rigid_motions};
-use crate::craig_bampton::craig_bampton;
 use crate::fe_model::FeModel;
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{ContactPoint, Reduction, check_nodes, compare, description, full_modes, interface_dofs};
+use crate::reduce::{ContactPoint, Held, Reduction, check_nodes, compare, description, full_modes, interface};
 
 /// What to reduce a body to, and what to call it.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,11 +43,11 @@ pub(crate) fn reduce_free_body(
     check_nodes(&model.nodes, &[], contact, Frame::Cartesian)?;
     let free = free_dofs(model.nodes.len(), &[]);
     let full = full_modes(&model.stiffness, &model.mass, true, options.checked_modes, listener)?;
-    let interface = interface_dofs(&free, contact)?;
-    let inner = free.len().saturating_sub(interface.len());
+    let held = Held::new(&free, &model.nodes, contact, Frame::Cartesian)?;
+    let inner = free.len().saturating_sub(held.interface.len());
     let count = options.fixed_interface_modes.unwrap_or(inner);
-    let points: Vec<[f64; 3]> = contact.iter().map(|point| model.nodes[point.node]).collect();
-    let reduced = craig_bampton(&model.stiffness, &model.mass, &interface, count, listener)?;
+    let points: Vec<[f64; 3]> = contact.iter().map(|point| point.cartesian(&model.nodes)).collect();
+    let reduced = held.craig_bampton(&model.stiffness, &model.mass, count, listener)?;
     let rigid = rigid_motions(&points, reduced.mass.nrows());
     let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
     report(listener, Stage::Checks, 0, 1);
@@ -59,16 +58,16 @@ pub(crate) fn reduce_free_body(
     let rom = Rom {
         name: options.name.clone(),
         origin: format!(
-            "{}, free to fly; Craig-Bampton with {} interface degrees of freedom and {count} fixed-interface modes{exact}",
+            "{}, free to fly; Craig-Bampton with {} and {count} fixed-interface modes{exact}",
             description(&model, 0),
-            interface.len()
+            interface(contact)
         ),
         sectors: 1,
         frame: Frame::Cartesian,
         mass: DMatrix::identity(order, order),
         stiffness: DMatrix::from_diagonal(&DVector::from_column_slice(&modes.squares)),
         damping_ratio: options.damping_ratio,
-        contact_map: modes.shapes.rows(0, interface.len()).into_owned(),
+        contact_map: modes.shapes.rows(0, held.interface.len()).into_owned(),
         contact_nodes: contact.iter().zip(&points).map(|(point, place)| contact_node(point, *place)).collect(),
         checks,
         extras: RomExtras::default(),

@@ -22,7 +22,7 @@ use crate::{Error, Result};
 
 /// Share of the flexibility that the modes must leave to static responses in every direction: below it both describe the same, and
 /// are told apart by rounding only.
-const LEAST_RESIDUAL: f64 = 1e-6;
+pub(crate) const LEAST_RESIDUAL: f64 = 1e-6;
 
 /// Reduce (K, M) to the contact coordinates Bᵀu, `contact` being B (full dofs × contact coordinates), and `modes` modes of the
 /// supported structure.

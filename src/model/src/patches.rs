@@ -6,6 +6,9 @@
 //! positions: a mean of Cartesian ones would lie inside the arc of the chord. Point forces do not converge as the mesh is refined,
 //! since their flexibility grows without bounds; forces per length do.
 
+mod coordinates;
+mod tip;
+
 use std::collections::HashMap;
 
 use crate::element::ElementKind;
@@ -13,6 +16,9 @@ use crate::mesh::{Element, Mesh};
 use crate::read::Places;
 use crate::reduce::ContactPoint;
 use crate::{Error, Result};
+
+pub(crate) use coordinates::PatchCoordinates;
+pub use tip::{FoundTip, find_tip, places_along};
 
 /// Every face is divided into so many parts in both directions: hat functions have kinks.
 const PARTS: usize = 4;

@@ -1,5 +1,6 @@
 //! From a mesh to a checked reduced-order model.
 
+mod held;
 mod outcome;
 mod response;
 
@@ -10,7 +11,7 @@ use tiprub_core::rom::{Frame, RomChecks, Watched};
 use tiprub_core::shown;
 
 use crate::assembly::{Assembled, free_dofs};
-use crate::craig_bampton::{CraigBampton, craig_bampton, dense_modes};
+use crate::craig_bampton::{CraigBampton, dense_modes};
 use crate::eigen::{Modes, lowest_modes, positive_factor};
 use crate::fe_model::FeModel;
 use crate::free_interface::free_interface;
@@ -21,8 +22,9 @@ use crate::sparse::{Factor, SparseMatrix, principal_pair, tall_product};
 use crate::spin::{ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, SpinningStates, reduced_spin};
 use crate::{Error, Result};
 
-use outcome::{build_rom, contact_node, direction, rotated};
-pub(crate) use outcome::{description, element_names};
+pub(crate) use held::Held;
+use outcome::{build_rom, contact_node, direction};
+pub(crate) use outcome::{description, element_names, interface, responses};
 use response::{Seen, with_responses};
 
 /// A contact node or patch before the reduction.
@@ -53,6 +55,14 @@ impl ContactPoint {
     pub fn weights(&self) -> impl Iterator<Item = (usize, f64)> {
         let alone = self.patch.is_empty().then_some((self.node, 1.0));
         self.patch.iter().copied().chain(alone)
+    }
+
+    /// Mean position (m) of its nodes in x, y, z: what a rigid motion moves as the mean of its nodes moves.
+    pub(crate) fn cartesian(&self, nodes: &[[f64; 3]]) -> [f64; 3] {
+        if self.patch.is_empty() {
+            return nodes[self.node];
+        }
+        std::array::from_fn(|i| self.weights().map(|(node, weight)| weight * nodes[node][i]).sum())
     }
 
     /// Mean radius (m), angle (rad) and axial position (m) of its nodes.
@@ -181,14 +191,10 @@ pub fn reduce_model(
     let (stiffness, mass) = principal_pair(&model.stiffness, &model.mass, &free);
     let full = full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)?;
     let loads = contact_loads(&free, &model.nodes, contact, options.frame)?;
-    let interface = match options.kind {
-        ReductionKind::FixedInterface => interface_dofs(&free, contact)?,
-        ReductionKind::FreeInterface => Vec::new(),
-    };
     let component_modes = |stiffness: &SparseMatrix, modes: usize, listener: Listener<'_>| match options.kind {
         ReductionKind::FixedInterface => {
-            let cartesian = craig_bampton(stiffness, &mass, &interface, modes, listener);
-            cartesian.map(|found| rotated(found, &model.nodes, contact, options.frame))
+            let held = Held::new(&free, &model.nodes, contact, options.frame)?;
+            held.craig_bampton(stiffness, &mass, modes, listener)
         }
         ReductionKind::FreeInterface => free_interface(stiffness, &mass, loads.as_ref(), modes, listener),
     };
@@ -384,28 +390,6 @@ fn watched(
     Ok(Some(Watched { map: DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]), points: points.collect() }))
 }
 
-fn clamped_point(point: &ContactPoint) -> Error {
+pub(crate) fn clamped_point(point: &ContactPoint) -> Error {
     Error::invalid(format!("contact node `{}`", point.name), "it is clamped", "Choose a node that can move")
-}
-
-/// Patches have no degrees of freedom of their own that could be held.
-pub(crate) fn patch_held(point: &ContactPoint) -> Error {
-    let what = format!("contact patch `{}`", point.name);
-    Error::invalid(
-        what,
-        "this reduction holds contact nodes one by one",
-        "Ask for contact nodes, or for free-interface modes of blades on a rigid hub",
-    )
-}
-
-/// Rows of the contact nodes' dofs among the free ones, node by node.
-pub(crate) fn interface_dofs(free: &[usize], contact: &[ContactPoint]) -> Result<Vec<usize>> {
-    contact
-        .iter()
-        .flat_map(|point| (0..3).map(move |component| (point, 3 * point.node + component)))
-        .map(|(point, dof)| match point.patch.as_slice() {
-            [] => free.binary_search(&dof).map_err(|_| clamped_point(point)),
-            _ => Err(patch_held(point)),
-        })
-        .collect()
 }

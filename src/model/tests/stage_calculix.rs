@@ -6,6 +6,7 @@
 use tiprub_model::cyclic::{CyclicOptions, CyclicReduction, ModeSelection, reduce_cyclic};
 use tiprub_model::progress::silent;
 use tiprub_model::sparse::SparseMatrix;
+use tiprub_model::reduce::ReductionKind;
 use tiprub_model::stage::{SectorOptions, StageOptions, stage_model};
 use tiprub_model::{Material, Mesh};
 
@@ -67,7 +68,7 @@ fn largest(reduction: &CyclicReduction, reference: &[(usize, usize, f64)]) -> f6
 fn compared(sector: SectorOptions, reference: &[(usize, usize, f64)]) -> [f64; 2] {
     let mut stage = stage_model(&StageOptions { sector, ..StageOptions::default() }, &silent).unwrap();
     let options =
-        CyclicOptions { name: "stage".into(), modes: ModeSelection::Count(1), checked_modes: 10, damping_ratio: 0.0 };
+        CyclicOptions { name: "stage".into(), kind: ReductionKind::FixedInterface, modes: ModeSelection::Count(1), checked_modes: 10, damping_ratio: 0.0 };
     let mut deviation = |mass: Option<SparseMatrix>| {
         stage.model.mass = mass.unwrap_or_else(|| stage.model.mass.clone());
         let reduction =

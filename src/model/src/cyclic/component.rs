@@ -1,6 +1,7 @@
-//! Craig-Bampton reduction of one nodal diameter, and the small matrices that its checks need.
+//! Reduction of one nodal diameter, and the small matrices that its checks need.
 //!
-//! T = [Ψ Φ] with the constraint modes Ψ of the contact and the fixed-interface modes Φ; K̂ = blkdiag(K̂_cc, Ω²), M̂ = TᴴM_nT.
+//! T = [Ψ Φ] with the constraint modes Ψ of the contact and the fixed-interface modes Φ; K̂ = blkdiag(K̂_cc, Ω²), M̂ = TᴴM_nT. In place of Φ stands
+//! what moves no contact of [free-interface modes](super::free_interface), where those are kept; K̂ is then full in its second block.
 //!
 //! Eq. 12 asks for r = x - (ω² - σ) A_n⁻¹M_n x of x = Tz for every number of modes. Split A_n⁻¹M_nT = TX + F
 //! with F orthogonal to T in A_n: then r = T(z - λXz) - λFz, λ = ω² - σ, and rᴴA_nr = dᴴÂd + λ² zᴴF̂z with d = z - λXz, Â = TᴴA_nT and
@@ -10,8 +11,10 @@ use faer::linalg::solvers::{Llt, Solve};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Mat, MatRef, Par, Side, c64};
 
+use super::free_interface::free_interface;
 use super::lanczos::{ComplexModes, hermitian_eigen, lowest_modes};
 use super::operator::Operator;
+use crate::reduce::ReductionKind;
 use crate::{Error, Result};
 
 /// One reduced nodal diameter, with all the modes that were computed.
@@ -21,7 +24,7 @@ pub(super) struct Component {
     pub real: bool,
     /// Contact dofs.
     pub contact: usize,
-    /// ω² with the contact held.
+    /// ω² of the modes that were computed: with the contact held, or of free-interface modes.
     pub squares: Vec<f64>,
     /// M̂.
     pub mass: Mat<c64>,
@@ -33,6 +36,27 @@ pub(super) struct Component {
     inner: Mat<c64>,
     /// F̂.
     defect: Mat<c64>,
+    kind: ReductionKind,
+}
+
+/// What describes the motion with the contact held.
+pub(super) struct Inner {
+    /// ω² of the modes it was made of.
+    pub squares: Vec<f64>,
+    /// (interior, face) × modes.
+    pub shapes: Mat<c64>,
+    /// K̂ of these.
+    pub stiffness: Mat<c64>,
+}
+
+/// What is kept of a nodal diameter.
+pub(super) struct Kept {
+    /// M̂.
+    pub mass: Mat<c64>,
+    /// K̂ = blkdiag(K̂_cc, Ω²).
+    pub stiffness: Mat<c64>,
+    /// Ω²: with the contact held.
+    pub squares: Vec<f64>,
 }
 
 /// Quality of the lowest modes of a reduced nodal diameter.
@@ -44,7 +68,7 @@ pub(super) struct Quality {
     pub residual_criterion: Vec<f64>,
 }
 
-/// Which fixed-interface modes are computed.
+/// Which modes are computed.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Wanted {
     Count(usize),
@@ -53,25 +77,45 @@ pub(super) enum Wanted {
 }
 
 impl Component {
-    /// Reduce. `at_rest` has no shift, `full` is the operator of the modes with free contact.
+    /// Reduce to fixed-interface modes. `at_rest` has no shift, `full` is the operator of the modes with free contact.
     ///
     /// # Errors
     /// Those of [`lowest_modes`]; [`Error::NotPositiveDefinite`] when the reduced mass is not.
-    pub(super) fn new(at_rest: &Operator<'_>, full: &Operator<'_>, wanted: Wanted) -> Result<Self> {
+    pub(super) fn fixed_interface(at_rest: &Operator<'_>, full: &Operator<'_>, wanted: Wanted) -> Result<Self> {
         let parts = at_rest.parts();
-        let fixed = fixed_interface_modes(at_rest, wanted)?;
-        let (constraint, static_stiffness) = at_rest.constraint_modes();
-        let (held, contact, count) = (parts.order() - parts.contact, parts.contact, fixed.eigenvalues.len());
+        let ComplexModes { eigenvalues, shapes } = modes(at_rest, parts.order() - parts.contact, wanted)?;
+        let mut stiffness = Mat::zeros(eigenvalues.len(), eigenvalues.len());
+        eigenvalues.iter().enumerate().for_each(|(k, &square)| stiffness[(k, k)] = c64::new(square, 0.0));
+        let inner = Inner { squares: eigenvalues, shapes, stiffness };
+        Self::new((at_rest, full), at_rest.constraint_modes(), inner, ReductionKind::FixedInterface)
+    }
+
+    /// Reduce to modes with free contact, `found` of `full`.
+    ///
+    /// # Errors
+    /// Those of [`free_interface`]; [`Error::NotPositiveDefinite`] when the reduced mass is not.
+    pub(super) fn free_interface(at_rest: &Operator<'_>, full: &Operator<'_>, found: &ComplexModes) -> Result<Self> {
+        let constraint = at_rest.constraint_modes();
+        let inner = free_interface(at_rest, full, &constraint, found)?;
+        Self::new((at_rest, full), constraint, inner, ReductionKind::FreeInterface)
+    }
+
+    fn new(
+        (at_rest, full): (&Operator<'_>, &Operator<'_>),
+        (constraint, static_stiffness): (Mat<c64>, Mat<c64>),
+        basis: Inner,
+        kind: ReductionKind,
+    ) -> Result<Self> {
+        let parts = at_rest.parts();
+        let (held, contact, count) = (parts.order() - parts.contact, parts.contact, basis.squares.len());
         let mut transformation = Mat::zeros(parts.order(), contact + count);
         transformation.get_mut(.., ..contact).copy_from(&constraint);
-        transformation.get_mut(..held, contact..).copy_from(&fixed.shapes);
+        transformation.get_mut(..held, contact..).copy_from(&basis.shapes);
         let mass_transformation = full.mass(transformation.as_ref());
         let mass = hermitian((transformation.adjoint() * &mass_transformation).as_ref());
         let mut stiffness = Mat::zeros(contact + count, contact + count);
         stiffness.get_mut(..contact, ..contact).copy_from(&hermitian(static_stiffness.as_ref()));
-        for (k, &square) in fixed.eigenvalues.iter().enumerate() {
-            stiffness[(contact + k, contact + k)] = c64::new(square, 0.0);
-        }
+        stiffness.get_mut(contact.., contact..).copy_from(&basis.stiffness);
         let shift = full.condensed.shift;
         let shifted = &stiffness - &mass * faer::Scale(c64::new(shift, 0.0));
         let factor = Llt::new(shifted.as_ref(), Side::Lower)
@@ -79,7 +123,30 @@ impl Component {
         let inner = factor.solve(&mass);
         let outside = full.solve(mass_transformation.as_ref()) - &transformation * &inner;
         let defect = hermitian((outside.adjoint() * full.shifted(outside.as_ref())).as_ref());
-        Ok(Self { real: at_rest.real, contact, squares: fixed.eigenvalues, mass, stiffness, shift, inner, defect })
+        let squares = basis.squares;
+        Ok(Self { real: at_rest.real, contact, squares, mass, stiffness, shift, inner, defect, kind })
+    }
+
+    /// The reduced model with the first `modes` modes.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`] when the reduced mass is not.
+    pub(super) fn kept(&self, modes: usize) -> Result<Kept> {
+        let (contact, size) = (self.contact, self.contact + modes);
+        let mut mass = self.mass.get(..size, ..size).to_owned();
+        let mut stiffness = self.stiffness.get(..size, ..size).to_owned();
+        if self.kind == ReductionKind::FixedInterface || modes == 0 {
+            return Ok(Kept { mass, stiffness, squares: self.squares[..modes].to_vec() });
+        }
+        // What is left of free-interface modes is described by its own modes.
+        let (squares, own) =
+            dense_modes(stiffness.get(contact.., contact..), mass.get(contact.., contact..), self.real)?;
+        let mut turn = Mat::identity(size, size);
+        turn.get_mut(contact.., contact..).copy_from(&own);
+        mass = hermitian((turn.adjoint() * mass * &turn).as_ref());
+        stiffness.get_mut(contact.., contact..).fill(c64::new(0.0, 0.0));
+        squares.iter().enumerate().for_each(|(k, &square)| stiffness[(contact + k, contact + k)] = c64::new(square, 0.0));
+        Ok(Kept { mass, stiffness, squares })
     }
 
     /// Modes of the reduced model with the first `modes` fixed-interface modes, the lowest `count` of them, and their residuals.
@@ -109,9 +176,11 @@ impl Component {
     }
 }
 
-fn fixed_interface_modes(operator: &Operator<'_>, wanted: Wanted) -> Result<ComplexModes> {
-    let parts = operator.parts();
-    let order = parts.order() - parts.contact;
+/// Modes of an operator over its first `order` rows: with free contact where these are all.
+///
+/// # Errors
+/// Those of [`lowest_modes`].
+pub(super) fn modes(operator: &Operator<'_>, order: usize, wanted: Wanted) -> Result<ComplexModes> {
     match wanted {
         Wanted::Count(count) => lowest_modes(operator, order, count),
         Wanted::UpTo(square) => {
@@ -129,7 +198,7 @@ fn fixed_interface_modes(operator: &Operator<'_>, wanted: Wanted) -> Result<Comp
 }
 
 /// ½(A + Aᴴ).
-fn hermitian(matrix: MatRef<'_, c64>) -> Mat<c64> {
+pub(super) fn hermitian(matrix: MatRef<'_, c64>) -> Mat<c64> {
     Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| (matrix[(i, j)] + matrix[(j, i)].conj()) * 0.5)
 }
 

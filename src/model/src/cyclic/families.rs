@@ -63,7 +63,8 @@ fn whole_families(modes: usize, squares: &[&[f64]]) -> Choice {
     all.sort_by(f64::total_cmp);
     let spread = (modes / 5).max(1);
     let (least, most) = ((modes - spread).max(1) * squares.len(), (modes + spread) * squares.len());
-    let width = |cut: usize| -> f64 { 0.5 * (all[cut] / all[cut - 1]).ln() };
+    // A rigid-body motion is no family.
+    let width = |cut: usize| -> f64 { if all[cut - 1] > 0.0 { 0.5 * (all[cut] / all[cut - 1]).ln() } else { 0.0 } };
     let off = |cut: usize| cut.abs_diff(modes * squares.len());
     let widest = (least.max(1)..=most.min(all.len().saturating_sub(1)))
         .max_by(|&a, &b| width(a).total_cmp(&width(b)).then(off(b).cmp(&off(a))));
@@ -72,7 +73,7 @@ fn whole_families(modes: usize, squares: &[&[f64]]) -> Choice {
             let limit = (all[cut] * all[cut - 1]).sqrt();
             let hertz = |square: f64| square.sqrt() / core::f64::consts::TAU;
             let note = format!(
-                "fixed-interface modes cut in the gap from {:.1} Hz to {:.1} Hz that all nodal diameters leave",
+                "modes cut in the gap from {:.1} Hz to {:.1} Hz that all nodal diameters leave",
                 hertz(all[cut - 1]),
                 hertz(all[cut])
             );

@@ -31,6 +31,13 @@ pub(super) struct ComplexModes {
     pub shapes: Mat<c64>,
 }
 
+impl ComplexModes {
+    /// The first `count`.
+    pub(super) fn lowest(&self, count: usize) -> Self {
+        Self { eigenvalues: self.eigenvalues[..count].to_vec(), shapes: self.shapes.get(.., ..count).to_owned() }
+    }
+}
+
 /// A growing M-orthonormal basis Q with M Q beside it.
 struct Basis<'a> {
     operator: &'a Operator<'a>,

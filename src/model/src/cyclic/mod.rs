@@ -5,6 +5,7 @@ mod component;
 mod condense;
 mod disk;
 mod families;
+mod free_interface;
 mod lanczos;
 mod operator;
 mod parallel;
@@ -14,6 +15,8 @@ mod sector;
 
 use nalgebra::Complex;
 use tiprub_core::Rom;
+
+use crate::reduce::ReductionKind;
 
 pub use boundary::PairingReport;
 pub use disk::{WholeDisk, whole_disk};
@@ -30,7 +33,7 @@ pub struct CyclicBoundary {
     pub sectors: usize,
 }
 
-/// Which fixed-interface modes are kept.
+/// Which modes are kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ModeSelection {
     /// About this many per nodal diameter: those below a gap of frequency that all nodal diameters leave, so that a
@@ -49,7 +52,9 @@ pub enum ModeSelection {
 pub struct CyclicOptions {
     /// Name of the structure.
     pub name: String,
-    /// Fixed-interface modes.
+    /// Which modes are kept.
+    pub kind: ReductionKind,
+    /// How many.
     pub modes: ModeSelection,
     /// Modes of the full model per nodal diameter that are computed and compared with the reduced ones.
     pub checked_modes: usize,
@@ -70,16 +75,16 @@ pub struct NodalDiameter {
     pub frequency_deviation: Vec<f64>,
     /// Residual convergence criterion (%), eq. 12.
     pub residual_criterion: Vec<f64>,
-    /// Frequencies with the contact nodes held (Hz), those kept.
+    /// Frequencies with the contact held (Hz), those kept; with free-interface modes of what is left of them with the contact held.
     pub fixed_interface_frequencies: Vec<f64>,
     /// Full modes as displacements (x, y, z) of every node of the first sector, mass-normalised for one sector (1/√kg).
     pub shapes: Vec<Vec<[Complex<f64>; 3]>>,
 }
 
-/// Quality of one number of fixed-interface modes per nodal diameter, over the lowest modes of the whole disk.
+/// Quality of one number of modes per nodal diameter, over the lowest modes of the whole disk.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConvergenceRow {
-    /// Fixed-interface modes per nodal diameter η.
+    /// Modes per nodal diameter η.
     pub modes: usize,
     /// Of the whole disk.
     pub total_modes: usize,

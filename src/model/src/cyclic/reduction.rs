@@ -5,14 +5,14 @@ use nalgebra::{Complex, DMatrix};
 use tiprub_core::Rom;
 use tiprub_core::rom::{ContactNode, Frame, Harmonic, RomExtras};
 
-use super::component::Component;
+use super::component::{self, Component, Kept, Wanted};
 use super::condense::Condensed;
 use super::operator::Operator;
 use super::sector::Sector;
 use super::{CyclicBoundary, CyclicOptions, CyclicReduction, ModeSelection, NodalDiameter};
 use super::{families, lanczos, parallel, quality};
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{ContactPoint, check_nodes};
+use crate::reduce::{ContactPoint, ReductionKind, check_nodes, interface, responses};
 use crate::{Error, FeModel, Result};
 
 /// What is found of one nodal diameter in parallel.
@@ -22,15 +22,15 @@ struct Found {
     shapes: Vec<Vec<[Complex<f64>; 3]>>,
 }
 
-/// Reduce one sector of a disk to its contact nodes and fixed-interface modes, for every nodal diameter.
+/// Reduce one sector of a disk to its contact nodes or patches and modes, for every nodal diameter.
 ///
-/// The reduced coordinates of nodal diameter n are the radial, tangential and axial displacements of the contact nodes, node by node, then the
-/// fixed-interface modes, so `contact_map` is \[I 0\]; see [`tiprub_core::rom::Harmonic`] for how they make the
+/// The reduced coordinates of nodal diameter n are the radial, tangential and axial displacements of the contact nodes or patches, one by
+/// one, then the modes, those of what is left of them with the contact held where they are free-interface ones, so `contact_map` is \[I 0\]; see [`tiprub_core::rom::Harmonic`] for how they make the
 /// displacements of sector s. A disk without clamped nodes keeps its rigid-body modes, in nodal diameters 0 and 1. The bits of the
 /// result do not depend on the number of threads.
 ///
 /// # Errors
-/// [`crate::Error::Invalid`] for contact nodes that are clamped, repeated, on the axis or on a face;
+/// [`crate::Error::Invalid`] for contact that is clamped, repeated, on the axis or on a face, patches that depend on each other;
 /// [`crate::Error::NotPositiveDefinite`] for parts that hang loose; and whatever the eigenvalue iteration and the ROM's validation refuse.
 pub fn reduce_cyclic(
     model: &FeModel,
@@ -91,13 +91,25 @@ fn find(
     let moving = shifted.map(|condensed| Operator::new(condensed, number, sectors, false)).transpose()?;
     let full = moving.as_ref().unwrap_or(&held);
     let checked = options.checked_modes.min(parts.order());
-    // The first mode in any case: it tells a mechanism from a structure.
-    let mut modes = lanczos::lowest_modes(full, parts.order(), checked.max(1))?;
-    modes.eigenvalues.truncate(checked);
-    let shapes = node_shapes(full, modes.shapes.get(.., ..checked), nodes);
-    step();
     let wanted = families::wanted(options.modes, parts.order() - parts.contact);
-    let component = Component::new(&held, full, wanted)?;
+    // The first mode in any case: it tells a mechanism from a structure.
+    let mut modes = match (options.kind, wanted) {
+        (ReductionKind::FixedInterface, _) => lanczos::lowest_modes(full, parts.order(), checked.max(1))?,
+        (ReductionKind::FreeInterface, Wanted::Count(count)) => {
+            lanczos::lowest_modes(full, parts.order(), count.max(checked).max(1))?
+        }
+        (ReductionKind::FreeInterface, Wanted::UpTo(_)) => component::modes(full, parts.order(), wanted)?,
+    };
+    step();
+    let component = match (options.kind, wanted) {
+        (ReductionKind::FixedInterface, _) => Component::fixed_interface(&held, full, wanted)?,
+        (ReductionKind::FreeInterface, Wanted::Count(count)) => {
+            Component::free_interface(&held, full, &modes.lowest(count))?
+        }
+        (ReductionKind::FreeInterface, Wanted::UpTo(_)) => Component::free_interface(&held, full, &modes)?,
+    };
+    modes = modes.lowest(checked);
+    let shapes = node_shapes(full, modes.shapes.as_ref(), nodes);
     step();
     Ok(Found { component, full_squares: modes.eigenvalues, shapes })
 }
@@ -117,6 +129,10 @@ fn node_shapes(operator: &Operator<'_>, shapes: MatRef<'_, c64>, nodes: usize) -
                     shape[node][i] += Complex::new(displacements[(row, k)], imaginary) * directions[(i, j)];
                 }
             }
+        }
+        if let Some(patches) = &sector.patches {
+            let own = patches.displaced(Complex::new(0.0, 0.0), |dof| shape[dof / 3][dof % 3]);
+            own.into_iter().for_each(|(dof, value)| shape[dof / 3][dof % 3] = value);
         }
         shape
     };
@@ -141,8 +157,9 @@ fn assembled(
         let order = one.component.contact + count;
         let quality = one.component.quality(count, order)?;
         largest = quality.squares.iter().copied().fold(largest, f64::max);
-        nodal_diameters.push(nodal_diameter(number, one, count, &quality));
-        harmonics.push(harmonic(&one.component, order));
+        let kept = one.component.kept(count)?;
+        nodal_diameters.push(nodal_diameter(number, one, &kept, &quality));
+        harmonics.push(harmonic(&one.component, &kept));
     }
     for (diameter, one) in nodal_diameters.iter_mut().zip(found) {
         diameter.shapes = one.shapes;
@@ -152,14 +169,18 @@ fn assembled(
         (Some(least), _) => least.to_string(),
         _ => "no".to_owned(),
     };
+    let kept = match options.kind {
+        ReductionKind::FixedInterface => {
+            format!("cyclic Craig-Bampton with {} and {counts} fixed-interface modes", interface(contact))
+        }
+        ReductionKind::FreeInterface => format!("{} and {counts} free-interface modes", responses(contact)),
+    };
     let origin = format!(
-        "{}; one of {} sectors: {} nodes, {clamped} clamped, {} on each face; cyclic Craig-Bampton with {} interface degrees of \
-         freedom and {counts} fixed-interface modes per nodal diameter",
+        "{}; one of {} sectors: {} nodes, {clamped} clamped, {} on each face; {kept} per nodal diameter",
         model.origin,
         boundary.sectors,
         model.nodes.len(),
         boundary.pairs.len(),
-        sector.parts.contact,
     );
     let checks = quality::merged(&nodal_diameters);
     let mut rest = harmonics.into_iter();
@@ -189,23 +210,19 @@ fn assembled(
 }
 
 fn contact_node(model: &FeModel, point: &ContactPoint) -> ContactNode {
-    let [x, y, z] = model.nodes[point.node];
-    let position = [x.hypot(y), y.atan2(x), z];
-    ContactNode {
-        name: point.name.clone(),
-        position,
-        meridional_slope: point.meridional_slope,
-        ..ContactNode::default()
-    }
+    let ContactPoint { meridional_slope, area, length, .. } = *point;
+    let position = point.cylindrical(&model.nodes);
+    ContactNode { name: point.name.clone(), position, meridional_slope, area, length }
 }
 
-fn harmonic(component: &Component, order: usize) -> Harmonic {
+fn harmonic(component: &Component, kept: &Kept) -> Harmonic {
+    let order = kept.mass.nrows();
     // Of a real nodal diameter every imaginary part is a zero of either sign.
     let entry = |value: c64| Complex::new(value.re, if component.real { 0.0 } else { value.im });
     let copied = |matrix: &Mat<c64>| DMatrix::from_fn(order, order, |i, j| entry(matrix[(i, j)]));
     Harmonic {
-        mass: copied(&component.mass),
-        stiffness: copied(&component.stiffness),
+        mass: copied(&kept.mass),
+        stiffness: copied(&kept.stiffness),
         contact_map: DMatrix::identity(component.contact, order),
     }
 }
@@ -214,7 +231,7 @@ fn hertz(square: f64) -> f64 {
     square.max(0.0).sqrt() / core::f64::consts::TAU
 }
 
-fn nodal_diameter(number: usize, found: &Found, kept: usize, quality: &super::component::Quality) -> NodalDiameter {
+fn nodal_diameter(number: usize, found: &Found, kept: &Kept, quality: &super::component::Quality) -> NodalDiameter {
     let count = found.full_squares.len().min(quality.squares.len());
     let full_frequencies: Vec<f64> = found.full_squares[..count].iter().map(|&square| hertz(square)).collect();
     let reduced_frequencies: Vec<f64> = quality.squares[..count].iter().map(|&square| hertz(square)).collect();
@@ -226,7 +243,7 @@ fn nodal_diameter(number: usize, found: &Found, kept: usize, quality: &super::co
         full_frequencies,
         reduced_frequencies,
         residual_criterion: quality.residual_criterion[..count].to_vec(),
-        fixed_interface_frequencies: found.component.squares[..kept].iter().map(|&square| hertz(square)).collect(),
+        fixed_interface_frequencies: kept.squares.iter().map(|&square| hertz(square)).collect(),
         shapes: Vec::new(),
     }
 }

@@ -11,9 +11,12 @@
 use std::sync::Arc;
 
 use nalgebra::Matrix3;
+use tiprub_core::rom::Frame;
 
 use super::{CyclicBoundary, boundary::turned};
-use crate::reduce::{ContactPoint, patch_held};
+use crate::assembly::free_dofs;
+use crate::patches::PatchCoordinates;
+use crate::reduce::ContactPoint;
 use crate::sparse::{Pattern, SparseMatrix};
 use crate::{Error, FeModel, Result};
 
@@ -47,13 +50,15 @@ pub(super) struct Sector {
     pub nodes: Vec<usize>,
     /// Directions of the node at each place: columns are its three unit vectors.
     pub directions: Vec<Matrix3<f64>>,
+    /// What the variables of the nodes that stand for patches are, where there are patches.
+    pub patches: Option<PatchCoordinates>,
 }
 
 impl Sector {
     /// Order and turn the matrices.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for contact nodes on a face, or when nothing is left free.
+    /// [`Error::Invalid`] for contact on a face, for patches that depend on each other, or when nothing is left free.
     pub(super) fn new(
         model: &FeModel,
         clamped: &[usize],
@@ -69,27 +74,33 @@ impl Sector {
             inner[high] = false;
         }
         for point in contact {
-            if !point.patch.is_empty() {
-                return Err(patch_held(point));
-            }
-            if !inner[point.node] {
+            if point.weights().any(|(node, _)| !inner[node]) {
                 return Err(Error::invalid(
                     format!("contact node `{}`", point.name),
                     "it lies on a cyclic face",
                     "Choose a node inside the sector, or cut the sector elsewhere",
                 ));
             }
-            inner[point.node] = false;
         }
+        let free = free_dofs(count, &[]);
+        let patches = PatchCoordinates::new(&free, &model.nodes, contact, Frame::Cylindrical)?;
+        let contact = patches.as_ref().map_or(contact, PatchCoordinates::points);
+        contact.iter().for_each(|point| inner[point.node] = false);
         let mut nodes: Vec<usize> = (0..count).filter(|&node| inner[node] && !held[node]).collect();
         let parts = Parts { interior: 3 * nodes.len(), face: 3 * pairs.len(), contact: 3 * contact.len() };
         nodes.extend(pairs.iter().map(|pair| pair[0]));
         nodes.extend(pairs.iter().map(|pair| pair[1]));
         nodes.extend(contact.iter().map(|point| point.node));
         let directions = directions(model, parts, &nodes, boundary.pitch());
-        let (stiffness, mass) = turned_pair(&model.stiffness, &model.mass, &nodes, &directions);
+        let (stiffness, mass) = match &patches {
+            None => turned_pair(&model.stiffness, &model.mass, &nodes, &directions),
+            Some(patches) => {
+                let (stiffness, mass) = patches.transformed(&model.stiffness, &model.mass)?;
+                turned_pair(&stiffness, &mass, &nodes, &directions)
+            }
+        };
         let lean_mass = without_zeros(&mass);
-        Ok(Self { parts, stiffness, mass, lean_mass, nodes, directions })
+        Ok(Self { parts, stiffness, mass, lean_mass, nodes, directions, patches })
     }
 }
 

@@ -104,6 +104,12 @@ impl Places {
         Self { axial, radius, along, across, flat, chord, middle }
     }
 
+    /// Distance of the outermost nodes along the chord (m).
+    pub(crate) fn chord_length(&self) -> f64 {
+        let [low, high] = extent(&self.along);
+        high - low
+    }
+
     /// How far along the chord of the set a point stands, 0 to 1 between its ends.
     pub(crate) fn share_along(&self, point: [f64; 3]) -> f64 {
         let [low, high] = extent(&self.along);

@@ -49,13 +49,26 @@ pub(super) fn rotated(
 
 pub(super) fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: Frame) -> ContactNode {
     let position = match frame {
-        Frame::Cartesian => {
-            std::array::from_fn(|i| point.weights().map(|(node, weight)| weight * nodes[node][i]).sum())
-        }
+        Frame::Cartesian => point.cartesian(nodes),
         Frame::Cylindrical => point.cylindrical(nodes),
     };
     let ContactPoint { meridional_slope, area, length, .. } = *point;
     ContactNode { name: point.name.clone(), position, meridional_slope, area, length }
+}
+
+/// What is held where fixed-interface modes are found, for the ROM's origin.
+pub(crate) fn interface(contact: &[ContactPoint]) -> String {
+    let patches = contact.iter().filter(|point| !point.patch.is_empty()).count();
+    let of = if patches > 0 { format!(" of {patches} patches") } else { String::new() };
+    format!("{} interface degrees of freedom{of}", 3 * contact.len())
+}
+
+/// What stands beside free-interface modes, for the ROM's origin.
+pub(crate) fn responses(contact: &[ContactPoint]) -> String {
+    match contact.iter().filter(|point| !point.patch.is_empty()).count() {
+        0 => format!("static responses to forces on {} contact nodes", contact.len()),
+        patches => format!("static responses to forces on {patches} patches"),
+    }
 }
 
 /// What the full model is made of, and how many of its nodes are clamped.
@@ -112,21 +125,13 @@ pub(super) fn build_rom(
 ) -> Rom {
     let (boundary, order) = (3 * contact.len(), model.mass.nrows());
     let (before, modes) = (description(full, clamped), order - boundary);
-    let patches = contact.iter().filter(|point| !point.patch.is_empty()).count();
     let origin = match options.kind {
         ReductionKind::FixedInterface => {
-            format!(
-                "{before}; Craig-Bampton with {boundary} interface degrees of freedom and {modes} fixed-interface modes"
-            )
-        }
-        ReductionKind::FreeInterface if patches > 0 => {
-            format!("{before}; static responses to forces on {patches} patches and {modes} free-interface modes")
+            let interface = interface(contact);
+            format!("{before}; Craig-Bampton with {interface} and {modes} fixed-interface modes")
         }
         ReductionKind::FreeInterface => {
-            format!(
-                "{before}; static responses to forces on {} contact nodes and {modes} free-interface modes",
-                contact.len()
-            )
+            format!("{before}; {} and {modes} free-interface modes", responses(contact))
         }
     };
     Rom {

@@ -18,7 +18,7 @@ mod blade_mesh;
 mod section;
 mod sections;
 
-pub(crate) use blade_mesh::spread_contact;
+pub(crate) use blade_mesh::{place_name, spread_contact};
 pub use blade_mesh::{BladeMesh, MeshCounts, blade_mesh};
 pub use section::{Section, SurfacePoint};
 

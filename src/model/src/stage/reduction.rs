@@ -5,7 +5,8 @@ use super::sector::{SectorMesh, SectorOptions};
 use crate::cyclic::{CyclicBoundary, CyclicOptions, CyclicReduction, ModeSelection, PairingReport, reduce_cyclic};
 use crate::material::Material;
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::ContactPoint;
+use crate::reduce::{ContactPoint, ReductionKind};
+use crate::rotor37::Tip;
 use crate::{FeModel, Result};
 
 /// What to build.
@@ -15,9 +16,11 @@ pub struct StageOptions {
     pub sector: SectorOptions,
     /// Material.
     pub material: Material,
-    /// Contact nodes in the middle of the tip's thickness, edges included (at least 2).
-    pub contact_nodes: usize,
-    /// Fixed-interface modes.
+    /// What touches.
+    pub tip: Tip,
+    /// Which modes are kept.
+    pub kind: ReductionKind,
+    /// How many.
     pub modes: ModeSelection,
     /// Modes per nodal diameter that are compared with the full model.
     pub checked_modes: usize,
@@ -30,7 +33,8 @@ impl Default for StageOptions {
         Self {
             sector: SectorOptions::default(),
             material: Material::titanium(),
-            contact_nodes: 3,
+            tip: Tip::Nodes(3),
+            kind: ReductionKind::FixedInterface,
             modes: ModeSelection::Families(25),
             checked_modes: 10,
             damping_ratio: 0.005,
@@ -43,6 +47,17 @@ impl StageOptions {
     pub fn coarse() -> Self {
         Self { sector: SectorOptions::coarse(), modes: ModeSelection::Families(8), checked_modes: 5, ..Self::default() }
     }
+
+    /// What its sector is reduced to.
+    pub fn cyclic(&self, name: impl Into<String>) -> CyclicOptions {
+        CyclicOptions {
+            name: name.into(),
+            kind: self.kind,
+            modes: self.modes,
+            checked_modes: self.checked_modes,
+            damping_ratio: self.damping_ratio,
+        }
+    }
 }
 
 /// One sector's model with everything its reduction needs.
@@ -52,7 +67,7 @@ pub struct StageModel {
     pub model: FeModel,
     /// Nodes of the bore.
     pub clamped: Vec<usize>,
-    /// Contact nodes, leading to trailing edge.
+    /// Contact nodes or patches, leading to trailing edge.
     pub contact: Vec<ContactPoint>,
     /// Pairs of nodes of the faces.
     pub boundary: CyclicBoundary,
@@ -66,11 +81,14 @@ const TOLERANCE: f64 = 1e-9;
 /// Mesh and assemble a sector of the stage.
 ///
 /// # Errors
-/// Those of [`sector_mesh`] and of the assembly; more contact nodes than the tip has.
+/// Those of [`sector_mesh`] and of the assembly; more contact nodes or patches than the tip has places for.
 pub fn stage_model(options: &StageOptions, listener: Listener<'_>) -> Result<StageModel> {
     report(listener, Stage::Mesh, 0, 1);
     let sector: SectorMesh = sector_mesh(&options.sector)?;
-    let contact = sector.contact_points(options.contact_nodes)?;
+    let contact = match options.tip {
+        Tip::Nodes(count) => sector.contact_points(count)?,
+        Tip::Patches(count) => sector.contact_patches(count)?,
+    };
     report(listener, Stage::Mesh, 1, 1);
     let origin = format!("Parametric stage of {} sectors, bore clamped", options.sector.geometry.sectors);
     let model = FeModel::assembled(sector.mesh, &options.material, origin, listener)?;
@@ -87,12 +105,7 @@ pub fn stage_model(options: &StageOptions, listener: Listener<'_>) -> Result<Sta
 /// Those of [`stage_model`] and [`reduce_cyclic`].
 pub fn reduce_stage(options: &StageOptions, listener: Listener<'_>) -> Result<CyclicReduction> {
     let stage = stage_model(options, listener)?;
-    let cyclic = CyclicOptions {
-        name: "stage".into(),
-        modes: options.modes,
-        checked_modes: options.checked_modes,
-        damping_ratio: options.damping_ratio,
-    };
+    let cyclic = options.cyclic("stage");
     let StageModel { model, clamped, contact, boundary, .. } = &stage;
     reduce_cyclic(model, clamped, contact, boundary, &cyclic, listener)
 }

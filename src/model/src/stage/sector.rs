@@ -3,8 +3,9 @@
 use super::geometry::SectorGeometry;
 use crate::element::ElementKind;
 use crate::mesh::Mesh;
+use crate::patches::contact_patches;
 use crate::reduce::ContactPoint;
-use crate::rotor37::spread_contact;
+use crate::rotor37::{place_name, spread_contact};
 use crate::{Error, Result};
 
 /// Numbers of elements' edges in the parts of a sector.
@@ -171,5 +172,13 @@ impl SectorMesh {
     /// [`Error::Invalid`] for fewer than two or more than the line has.
     pub fn contact_points(&self, count: usize) -> Result<Vec<ContactPoint>> {
         spread_contact(&self.tip_line, &vec![0.0; self.tip_line.len()], count)
+    }
+
+    /// `count` contact patches over the whole tip, named as contact nodes are.
+    ///
+    /// # Errors
+    /// Those of [`contact_patches`].
+    pub fn contact_patches(&self, count: usize) -> Result<Vec<ContactPoint>> {
+        contact_patches(&self.mesh, self.mesh.set("TIP")?, count, |index| place_name(index, count))
     }
 }

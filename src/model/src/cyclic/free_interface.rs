@@ -1,0 +1,62 @@
+//! Free-interface modes of one nodal diameter with exact residual flexibility: [`crate::free_interface`] for coupled sectors, free ones too.
+//!
+//! The constraint modes Ψ span the responses at rest K_n⁻¹B to contact forces; a disk that nothing holds has its rigid-body motions among
+//! them. Of the modes Φ with free contact D = Φ − ΨΦ_c moves no contact, and is K_n-orthogonal to Ψ. Nothing of a rigid-body motion is
+//! left, and in its place stands what its inertia does with the contact held, D = K_hh⁻¹(M_nΦ)_h: a force on the contact of a free disk
+//! accelerates it, and the response to force and inertia together, Pᴴ K_n⁺ P B with P = I − M_nΦΦᴴ (inertia relief), is then in the space.
+
+use faer::{Mat, Side, c64};
+
+use super::component::{Inner, hermitian};
+use super::lanczos::ComplexModes;
+use super::operator::Operator;
+use crate::free_interface::LEAST_RESIDUAL;
+use crate::{Error, Result};
+
+/// An ω² below this share of the shift σ is that of a rigid-body motion.
+const RIGID: f64 = 1e-5;
+
+/// What moves no contact of the modes `found` of `full`.
+///
+/// # Errors
+/// [`Error::Invalid`] for so many modes that no residual flexibility is left.
+pub(super) fn free_interface(
+    at_rest: &Operator<'_>,
+    full: &Operator<'_>,
+    (constraint, static_stiffness): &(Mat<c64>, Mat<c64>),
+    found: &ComplexModes,
+) -> Result<Inner> {
+    let parts = at_rest.parts();
+    let held = parts.order() - parts.contact;
+    let seen = found.shapes.get(held.., ..);
+    let mut shapes = found.shapes.get(..held, ..) - constraint.get(..held, ..) * seen;
+    let floor = RIGID * full.condensed.shift.abs();
+    let rigid = found.eigenvalues.iter().take_while(|square| **square < floor).count();
+    check_residual(static_stiffness, &seen.get(.., rigid..).to_owned(), &found.eigenvalues[rigid..])?;
+    if rigid > 0 {
+        let inertia = full.mass(found.shapes.get(.., ..rigid));
+        shapes.get_mut(.., ..rigid).copy_from(at_rest.solve(inertia.get(..held, ..)));
+    }
+    let mass = full.mass(shapes.as_ref());
+    for k in 0..shapes.ncols() {
+        let norm = (shapes.col(k).adjoint() * mass.col(k)).re.sqrt();
+        shapes.col_mut(k).iter_mut().for_each(|value| *value /= norm);
+    }
+    let stiffness = hermitian((shapes.adjoint() * at_rest.shifted(shapes.as_ref())).as_ref());
+    Ok(Inner { squares: found.eigenvalues.clone(), shapes, stiffness })
+}
+
+/// K̂_cc⁻¹ less the flexibility of the modes must be positive definite beside the whole.
+fn check_residual(static_stiffness: &Mat<c64>, seen: &Mat<c64>, squares: &[f64]) -> Result<()> {
+    let scaled = Mat::from_fn(seen.nrows(), seen.ncols(), |i, k| seen[(i, k)] / squares[k].sqrt());
+    let shares = hermitian((scaled.adjoint() * (static_stiffness * &scaled)).as_ref());
+    let eigen = shares.self_adjoint_eigen(Side::Lower).map_err(|_| {
+        Error::invalid("residual flexibility", "its eigenvalue problem did not converge", "Check mesh and material")
+    })?;
+    let largest = (0..seen.ncols()).map(|k| eigen.S()[k].re).fold(0.0, f64::max);
+    if largest <= 1.0 - LEAST_RESIDUAL {
+        return Ok(());
+    }
+    let problem = format!("{} modes leave no flexibility to the static responses in some direction", squares.len());
+    Err(Error::invalid("number of modes", problem, "Ask for fewer modes, or refine the mesh"))
+}

@@ -1,0 +1,259 @@
+//! Patches as degrees of freedom of their own: an exact change of variables u = T v of the full model.
+//!
+//! Every patch k has a node, its pivot, that gives its own displacement up for that of the patch. With the weights w, the directions R_p of
+//! node p (columns: the unit vectors of the patch's components there), pivots P and the other nodes O of patches
+//!
+//! ```text
+//! R_kᵀ v_k = Σ_p w_kp R_pᵀ u_p  (k in P),   v_p = u_p  (elsewhere),   so that   u_P = R_P W_PP⁻¹ (R_Pᵀ v_P − W_PO R_Oᵀ v_O).
+//! ```
+//!
+//! With K ← TᵀKT and M ← TᵀMT the mean displacements of patches are boundary degrees of freedom as those of contact nodes are: they can be
+//! held, condensed to, turned. Forces on patches are forces on pivots. What fills up are the rows of nodes of patches and of those beside pivots.
+
+use std::collections::BTreeSet;
+use std::ops::{Add, Mul};
+use std::sync::Arc;
+
+use faer::Mat;
+use nalgebra::{DMatrix, Matrix3};
+use tiprub_core::rom::Frame;
+
+use crate::reduce::{ContactPoint, clamped_point};
+use crate::sparse::{Pattern, SparseMatrix};
+use crate::{Error, Result};
+
+/// Share of the largest weight of a patch that must be left at a pivot once the other patches are taken out: below it patches depend on
+/// each other.
+const LEAST_PIVOT: f64 = 1e-6;
+/// Entries that patches may add to the matrices: two of these take a gigabyte.
+const MOST_ENTRIES: usize = 50_000_000;
+
+/// The change of variables u = T v.
+#[derive(Debug)]
+pub(crate) struct PatchCoordinates {
+    /// The contact, patches being nodes of their own: their pivots.
+    points: Vec<ContactPoint>,
+    /// Degrees of freedom of the pivots, point by point.
+    pivots: Vec<usize>,
+    /// Degrees of freedom of all nodes of the contact, ascending.
+    touched: Vec<usize>,
+    /// u at the pivots from v at the touched ones.
+    dependence: DMatrix<f64>,
+}
+
+impl PatchCoordinates {
+    /// Of contact in which there are patches, none without; for matrices of the degrees of freedom `free` (3·node + component, ascending).
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for patches that depend on each other, have a node that is not free, or have too many nodes.
+    pub(crate) fn new(
+        free: &[usize],
+        nodes: &[[f64; 3]],
+        contact: &[ContactPoint],
+        frame: Frame,
+    ) -> Result<Option<Self>> {
+        if contact.iter().all(|point| point.patch.is_empty()) {
+            return Ok(None);
+        }
+        let within: BTreeSet<usize> = contact.iter().flat_map(ContactPoint::weights).map(|(node, _)| node).collect();
+        let within: Vec<usize> = within.into_iter().collect();
+        let mut weights = DMatrix::zeros(contact.len(), within.len());
+        for (row, point) in contact.iter().enumerate() {
+            for (node, weight) in point.weights() {
+                weights[(row, within.partition_point(|&other| other < node))] += weight;
+            }
+        }
+        let places = pivots(&weights, contact)?;
+        let inverse = weights.select_columns(&places).try_inverse().ok_or_else(|| dependent(&contact[0]))?;
+        let mut shares = -&inverse * &weights;
+        places.iter().enumerate().for_each(|(patch, &place)| shares.set_column(place, &inverse.column(patch)));
+        let turns: Vec<Matrix3<f64>> = within.iter().map(|&node| directions(nodes[node], frame)).collect();
+        let dependence = DMatrix::from_fn(3 * contact.len(), 3 * within.len(), |i, j| {
+            let turn = turns[places[i / 3]].row(i % 3) * turns[j / 3].row(j % 3).transpose();
+            shares[(i / 3, j / 3)] * turn[0]
+        });
+        let row = |node: usize, point: &ContactPoint| {
+            let place = |axis| free.binary_search(&(3 * node + axis)).map_err(|_| clamped_point(point));
+            Ok([place(0)?, place(1)?, place(2)?])
+        };
+        let all = |chosen: &mut dyn Iterator<Item = usize>| -> Result<Vec<usize>> {
+            Ok(chosen.map(|node| row(node, &contact[0])).collect::<Result<Vec<_>>>()?.concat())
+        };
+        for point in contact {
+            point.weights().try_for_each(|(node, _)| row(node, point).map(drop))?;
+        }
+        let chosen = places.iter().zip(contact).map(|(&place, point)| ContactPoint {
+            node: within[place],
+            patch: Vec::new(),
+            ..point.clone()
+        });
+        Ok(Some(Self {
+            points: chosen.collect(),
+            pivots: all(&mut places.iter().map(|&place| within[place]))?,
+            touched: all(&mut within.iter().copied())?,
+            dependence,
+        }))
+    }
+
+    /// The contact as nodes alone, those that stand for patches.
+    pub(crate) fn points(&self) -> &[ContactPoint] {
+        &self.points
+    }
+
+    /// TᵀKT and TᵀMT, of one pattern.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for patches of more nodes than memory is meant for.
+    pub(crate) fn transformed(
+        &self,
+        stiffness: &SparseMatrix,
+        mass: &SparseMatrix,
+    ) -> Result<(SparseMatrix, SparseMatrix)> {
+        let old = &stiffness.pattern;
+        let neighbours = self.pivots.iter().flat_map(|&dof| &old.rows[old.starts[dof]..old.starts[dof + 1]]);
+        let near: BTreeSet<usize> = self.touched.iter().chain(neighbours).copied().collect();
+        let near: Vec<usize> = near.into_iter().collect();
+        if near.len() * self.touched.len() > MOST_ENTRIES {
+            let problem = format!("{} nodes would all be coupled with each other", self.touched.len() / 3);
+            let remedy = "Mesh the tip more coarsely, or ask for contact nodes; blades on a rigid hub can have more with free-interface modes";
+            return Err(Error::invalid("contact patches", problem, remedy));
+        }
+        let pattern = Arc::new(self.filled(old, &near));
+        let [stiffness, mass] = [stiffness, mass].map(|matrix| self.projected(matrix, &pattern, &near));
+        Ok((stiffness, mass))
+    }
+
+    fn filled(&self, old: &Pattern, near: &[usize]) -> Pattern {
+        let mut pattern = Pattern { starts: vec![0], rows: Vec::with_capacity(old.rows.len()) };
+        for column in 0..old.order() {
+            let own = &old.rows[old.starts[column]..old.starts[column + 1]];
+            let added: &[usize] = match (self.touched.binary_search(&column), near.binary_search(&column)) {
+                (Ok(_), _) => near,
+                (_, Ok(_)) => &self.touched,
+                _ => &[],
+            };
+            let first = pattern.rows.len();
+            pattern.rows.extend(own.iter().chain(added));
+            if !added.is_empty() {
+                let mut rows = pattern.rows.split_off(first);
+                rows.sort_unstable();
+                rows.dedup();
+                pattern.rows.append(&mut rows);
+            }
+            pattern.starts.push(pattern.rows.len());
+        }
+        pattern
+    }
+
+    /// TᵀAT: without rows and columns of pivots A is what it was, and DᵀA_P + A_PᵀD + DᵀA_PP D is added, D being the pivots' rows of T.
+    fn projected(&self, matrix: &SparseMatrix, pattern: &Arc<Pattern>, near: &[usize]) -> SparseMatrix {
+        let mut place = vec![usize::MAX; matrix.order()];
+        near.iter().enumerate().for_each(|(index, &dof)| place[dof] = index);
+        let mut is_pivot = vec![false; matrix.order()];
+        self.pivots.iter().for_each(|&dof| is_pivot[dof] = true);
+        let mut dependence = DMatrix::zeros(self.pivots.len(), near.len());
+        self.touched
+            .iter()
+            .enumerate()
+            .for_each(|(j, &dof)| dependence.set_column(place[dof], &self.dependence.column(j)));
+        let own = matrix.block(&self.pivots, &self.pivots);
+        let beside = matrix.block(&self.pivots, near);
+        let own = DMatrix::from_fn(self.pivots.len(), self.pivots.len(), |i, j| own[(i, j)]);
+        let beside = DMatrix::from_fn(self.pivots.len(), near.len(), |i, j| match is_pivot[near[j]] {
+            true => 0.0,
+            false => beside[(i, j)],
+        });
+        let half = dependence.tr_mul(&(beside + 0.5 * own * &dependence));
+        let mut values = vec![0.0; pattern.rows.len()];
+        let old = &matrix.pattern;
+        for column in 0..matrix.order() {
+            let range = pattern.starts[column]..pattern.starts[column + 1];
+            let (rows, values) = (&pattern.rows[range.clone()], &mut values[range]);
+            let mut at = 0;
+            for entry in old.starts[column]..old.starts[column + 1] {
+                let row = old.rows[entry];
+                at += rows[at..].partition_point(|&other| other < row);
+                if !is_pivot[row] && !is_pivot[column] {
+                    values[at] = matrix.values[entry];
+                }
+            }
+            if place[column] != usize::MAX {
+                for (&row, value) in rows.iter().zip(values).filter(|(row, _)| place[**row] != usize::MAX) {
+                    let (i, j) = (place[row], place[column]);
+                    *value += half[(i, j)] + half[(j, i)];
+                }
+            }
+        }
+        SparseMatrix { pattern: Arc::clone(pattern), values }
+    }
+
+    /// u at the degrees of freedom of the pivots, from v.
+    pub(crate) fn displaced<V: Copy + Add<Output = V> + Mul<f64, Output = V>>(
+        &self,
+        zero: V,
+        v: impl Fn(usize) -> V,
+    ) -> Vec<(usize, V)> {
+        let own = |(row, &dof): (usize, &usize)| {
+            let share = |(j, &other): (usize, &usize)| v(other) * self.dependence[(row, j)];
+            (dof, self.touched.iter().enumerate().map(share).fold(zero, |sum, value| sum + value))
+        };
+        self.pivots.iter().enumerate().map(own).collect()
+    }
+
+    /// Columns v become u = T v.
+    pub(crate) fn restore(&self, columns: &mut Mat<f64>) {
+        for k in 0..columns.ncols() {
+            let own = self.displaced(0.0, |dof| columns[(dof, k)]);
+            own.into_iter().for_each(|(dof, value)| columns[(dof, k)] = value);
+        }
+    }
+}
+
+/// Columns: the unit vectors of the components of contact displacements at a node.
+fn directions([x, y, _]: [f64; 3], frame: Frame) -> Matrix3<f64> {
+    match frame {
+        Frame::Cartesian => Matrix3::identity(),
+        Frame::Cylindrical => {
+            let radius = x.hypot(y);
+            let (cos, sin) = (x / radius, y / radius);
+            Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0)
+        }
+    }
+}
+
+/// Of every patch a node of its own, by elimination with complete pivoting: W_PP is as well conditioned as the weights let it be.
+fn pivots(weights: &DMatrix<f64>, contact: &[ContactPoint]) -> Result<Vec<usize>> {
+    let mut left = weights.clone();
+    left.row_iter_mut().for_each(|mut row| row /= row.amax());
+    let mut chosen = vec![usize::MAX; contact.len()];
+    for _patch in contact {
+        let open = (0..contact.len()).filter(|&row| chosen[row] == usize::MAX);
+        let entries = open.flat_map(|row| (0..left.ncols()).map(move |column| (row, column)));
+        // The first of equals, so that nothing depends on rounding of what follows.
+        let (row, column) = entries.fold((usize::MAX, 0), |best, at| match best.0 {
+            usize::MAX => at,
+            _ if left[at].abs() > left[best].abs() => at,
+            _ => best,
+        });
+        if left[(row, column)].abs() < LEAST_PIVOT {
+            return Err(dependent(&contact[row]));
+        }
+        chosen[row] = column;
+        for other in (0..contact.len()).filter(|&other| chosen[other] == usize::MAX) {
+            let factor = left[(other, column)] / left[(row, column)];
+            for k in 0..left.ncols() {
+                let part = factor * left[(row, k)];
+                left[(other, k)] -= part;
+            }
+        }
+    }
+    Ok(chosen)
+}
+
+fn dependent(point: &ContactPoint) -> Error {
+    Error::invalid(
+        format!("contact patch `{}`", point.name),
+        "its displacement follows from those of the others",
+        "Remove contact nodes or patches that coincide, or ask for fewer patches",
+    )
+}

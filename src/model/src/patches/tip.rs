@@ -1,0 +1,162 @@
+//! The tip of a blade, found in its mesh where nobody names it.
+
+use std::collections::{BTreeSet, HashMap};
+
+use tiprub_core::shown;
+
+use super::middles;
+use crate::mesh::{Element, Mesh};
+use crate::read::Places;
+use crate::{Error, Result};
+
+/// Cosine of the largest angle between the radial direction and the outward normal of a face that faces outward: 45 degrees.
+const OUTWARD: f64 = core::f64::consts::FRAC_1_SQRT_2;
+/// Share of the radius by which another face may lie below the tip at its axial position and still be as far out.
+const AS_FAR_OUT: f64 = 1e-3;
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundTip {
+    /// Its nodes, mid-side ones too, ascending.
+    pub nodes: Vec<usize>,
+    /// Number of its faces.
+    pub faces: usize,
+    /// Length along its chord (m).
+    pub chord: f64,
+    /// Smallest and largest radius of its nodes (m).
+    pub radius: [f64; 2],
+    /// Smallest and largest axial position of its nodes (m).
+    pub axial: [f64; 2],
+    /// Number of outward faces elsewhere that are as far out at their axial position: within a thousandth of the radius.
+    pub elsewhere: usize,
+}
+
+/// An outer face that faces outward.
+struct Face<'a> {
+    element: &'a Element,
+    corners: &'static [usize],
+    /// Means of its corners (m).
+    radius: f64,
+    axial: f64,
+}
+
+impl Face<'_> {
+    fn corner_nodes(&self) -> Vec<usize> {
+        self.corners.iter().map(|&corner| self.element.nodes[corner]).collect()
+    }
+}
+
+/// The outermost of all outer faces whose normals are within 45 degrees of the radial direction, and all of these that are connected with
+/// it over edges. None of their nodes may be among the `fixed` ones (ascending): clamped, or on a face to the neighbours.
+///
+/// # Errors
+/// [`Error::Invalid`] for a mesh without such faces, and where they reach fixed nodes.
+pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
+    let faces = outward_faces(mesh);
+    let first = (0..faces.len()).max_by(|&a, &b| faces[a].radius.total_cmp(&faces[b].radius).then(b.cmp(&a)));
+    let Some(first) = first else {
+        let problem = "no outer face of the mesh faces outward, within 45 degrees of the radial direction";
+        return Err(not_found(problem.to_owned(), "Check the axis of rotation (--axis)"));
+    };
+    let chosen = connected(&faces, first);
+    let own = (0..faces.len()).filter(|face| chosen[*face]);
+    let nodes: BTreeSet<usize> = own
+        .clone()
+        .flat_map(|face| {
+            let Face { element, corners, .. } = faces[face];
+            middles(element, corners).chain(faces[face].corner_nodes())
+        })
+        .collect();
+    let nodes: Vec<usize> = nodes.into_iter().collect();
+    let [radius, axial] = [|[x, y, _]: [f64; 3]| x.hypot(y), |[_, _, z]: [f64; 3]| z].map(|of| extent(mesh, &nodes, of));
+    if let Some(node) = nodes.iter().find(|node| fixed.binary_search(node).is_ok()) {
+        let problem = format!(
+            "the outermost faces, {} of them up to a radius of {} m, reach node {} (of the mesh, from 1), which is clamped or on a face to \
+             the neighbours",
+            own.count(),
+            shown(radius[1]),
+            node + 1
+        );
+        return Err(not_found(problem, "This is no tip of a blade: check clamped nodes and axis"));
+    }
+    let elsewhere = faces.iter().enumerate().filter(|(index, face)| !chosen[*index] && as_far_out(face, &faces, &chosen));
+    let elsewhere = elsewhere.count();
+    let chord = Places::new(&mesh.nodes, &nodes).chord_length();
+    Ok(FoundTip { faces: own.count(), nodes, chord, radius, axial, elsewhere })
+}
+
+/// How many places along their chord some nodes stand at.
+pub fn places_along(nodes: &[[f64; 3]], set: &[usize]) -> usize {
+    Places::new(nodes, set).stations()
+}
+
+fn not_found(problem: String, remedy: &str) -> Error {
+    Error::invalid("tip of the blade", problem, format!("{remedy}, or name the tip: --contact-set"))
+}
+
+fn extent(mesh: &Mesh, nodes: &[usize], of: fn([f64; 3]) -> f64) -> [f64; 2] {
+    let values = nodes.iter().map(|&node| of(mesh.nodes[node]));
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+}
+
+fn outward_faces(mesh: &Mesh) -> Vec<Face<'_>> {
+    let mut count: HashMap<Vec<usize>, usize> = HashMap::new();
+    let key = |element: &Element, corners: &[usize]| {
+        let mut key: Vec<usize> = corners.iter().map(|&corner| element.nodes[corner]).collect();
+        key.sort_unstable();
+        key
+    };
+    let all = || mesh.elements.iter().flat_map(|element| element.kind.faces().iter().map(move |&face| (element, face)));
+    for (element, corners) in all() {
+        *count.entry(key(element, corners)).or_default() += 1;
+    }
+    let outer = all().filter(|(element, corners)| count[&key(element, corners)] == 1);
+    outer.filter_map(|(element, corners)| outward(mesh, element, corners)).collect()
+}
+
+/// The face, where it faces outward. Corners run counter-clockwise seen from outside.
+fn outward<'a>(mesh: &Mesh, element: &'a Element, corners: &'static [usize]) -> Option<Face<'a>> {
+    let at: Vec<[f64; 3]> = corners.iter().map(|&corner| mesh.nodes[element.nodes[corner]]).collect();
+    let mean = |pick: &dyn Fn([f64; 3]) -> f64| at.iter().map(|&point| pick(point)).sum::<f64>() / at.len() as f64;
+    let [x, y] = [mean(&|[x, ..]| x), mean(&|[_, y, _]| y)];
+    let mut normal = [0.0; 3];
+    for (i, a) in at.iter().enumerate() {
+        let b = at[(i + 1) % at.len()];
+        normal[0] += a[1] * b[2] - a[2] * b[1];
+        normal[1] += a[2] * b[0] - a[0] * b[2];
+        normal[2] += a[0] * b[1] - a[1] * b[0];
+    }
+    let size = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
+    let radial = (normal[0] * x + normal[1] * y) / x.hypot(y);
+    let radius = mean(&|[x, y, _]| x.hypot(y));
+    (radial >= OUTWARD * size).then(|| Face { element, corners, radius, axial: mean(&|[_, _, z]| z) })
+}
+
+/// Which faces are connected with the first one over edges.
+fn connected(faces: &[Face], first: usize) -> Vec<bool> {
+    let mut beside: HashMap<[usize; 2], Vec<usize>> = HashMap::new();
+    let edges = |face: &Face| -> Vec<[usize; 2]> {
+        let nodes = face.corner_nodes();
+        let ends = (0..nodes.len()).map(|i| (nodes[i], nodes[(i + 1) % nodes.len()]));
+        ends.map(|(a, b)| [a.min(b), a.max(b)]).collect()
+    };
+    for (index, face) in faces.iter().enumerate() {
+        edges(face).into_iter().for_each(|edge| beside.entry(edge).or_default().push(index));
+    }
+    let mut chosen = vec![false; faces.len()];
+    let mut open = vec![first];
+    while let Some(face) = open.pop() {
+        if !core::mem::replace(&mut chosen[face], true) {
+            open.extend(edges(&faces[face]).iter().flat_map(|edge| &beside[edge]));
+        }
+    }
+    chosen
+}
+
+/// Whether a face is as far out as the chosen one that is nearest along the axis.
+fn as_far_out(face: &Face, faces: &[Face], chosen: &[bool]) -> bool {
+    let own = faces.iter().zip(chosen).filter(|(_, chosen)| **chosen).map(|(own, _)| own);
+    let apart = |own: &Face| (own.axial - face.axial).abs();
+    let nearest = own.min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    nearest.is_some_and(|own| face.radius >= (1.0 - AS_FAR_OUT) * own.radius)
+}

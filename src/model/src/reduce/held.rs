@@ -1,0 +1,64 @@
+//! Contact that is held while modes are found: nodes as they are, patches by a change of variables.
+
+use super::outcome::rotated;
+use super::{ContactPoint, clamped_point};
+use crate::Result;
+use crate::craig_bampton::{CraigBampton, craig_bampton};
+use crate::patches::PatchCoordinates;
+use crate::progress::Listener;
+use crate::sparse::SparseMatrix;
+use tiprub_core::rom::Frame;
+
+/// The contact as degrees of freedom that can be held.
+#[derive(Debug)]
+pub(crate) struct Held<'a> {
+    nodes: &'a [[f64; 3]],
+    contact: &'a [ContactPoint],
+    frame: Frame,
+    /// Where there are patches.
+    patches: Option<PatchCoordinates>,
+    /// Rows of the contact's dofs among the free ones, point by point.
+    pub interface: Vec<usize>,
+}
+
+impl<'a> Held<'a> {
+    /// Of the free dofs (3·node + component, ascending) of a model.
+    ///
+    /// # Errors
+    /// Contact that is clamped; patches that depend on each other.
+    pub(crate) fn new(
+        free: &[usize],
+        nodes: &'a [[f64; 3]],
+        contact: &'a [ContactPoint],
+        frame: Frame,
+    ) -> Result<Self> {
+        let patches = PatchCoordinates::new(free, nodes, contact, frame)?;
+        let points = patches.as_ref().map_or(contact, PatchCoordinates::points);
+        let dofs = points.iter().flat_map(|point| (0..3).map(move |component| (point, 3 * point.node + component)));
+        let place = |(point, dof): (&ContactPoint, usize)| free.binary_search(&dof).map_err(|_| clamped_point(point));
+        let interface = dofs.map(place).collect::<Result<_>>()?;
+        Ok(Self { nodes, contact, frame, patches, interface })
+    }
+
+    /// Craig-Bampton of these matrices of the free dofs, contact displacements in the frame; its transformation is to the displacements of nodes.
+    ///
+    /// # Errors
+    /// Those of [`craig_bampton`].
+    pub(crate) fn craig_bampton(
+        &self,
+        stiffness: &SparseMatrix,
+        mass: &SparseMatrix,
+        modes: usize,
+        listener: Listener<'_>,
+    ) -> Result<CraigBampton> {
+        let Some(patches) = &self.patches else {
+            let cartesian = craig_bampton(stiffness, mass, &self.interface, modes, listener)?;
+            return Ok(rotated(cartesian, self.nodes, self.contact, self.frame));
+        };
+        let (stiffness, mass) = patches.transformed(stiffness, mass)?;
+        let cartesian = craig_bampton(&stiffness, &mass, &self.interface, modes, listener)?;
+        let mut found = rotated(cartesian, self.nodes, patches.points(), self.frame);
+        patches.restore(&mut found.transformation);
+        Ok(found)
+    }
+}
