@@ -13,9 +13,6 @@
 
 use nalgebra::DMatrix;
 
-use super::{
-    ContactDirections, GROWTH_NOISE, GROWTH_UP_TO, Growth, blocks, directional_modes, eigenvalues, spectral_radius,
-};
 use crate::dynamics::modal::ModalModel;
 use crate::gaps::dot;
 use crate::schemes::{ModeCoefficients, damped_frequency};
@@ -173,46 +170,6 @@ fn worst(model: &ModalModel, mode: usize, step: f64) -> [f64; 2] {
 /// A coefficient of the recurrence over its mass ½(1 + β), which damping makes smaller than 1.
 fn per_mass(mode: &ModeCoefficients, coefficient: f64) -> f64 {
     2.0 * coefficient / (1.0 + mode.beta)
-}
-
-/// Growth with all contacts of `directions` closed and sliding: as [`stability::growth`](super::growth), with the contact
-/// forces F = −(n·G(n − µt))⁻¹ n·Φq of the quasi-static modes. `None` without friction, for models too large for dense
-/// eigenvalues, and where the contacts are redundant.
-pub fn growth(model: &ModalModel, step: f64, friction: f64, directions: &ContactDirections) -> Option<Growth> {
-    if friction == 0.0 || model.len() > GROWTH_UP_TO {
-        return None;
-    }
-    let dynamic = model.dynamic_modes(Scheme::MasslessBoundary);
-    let coefficients = model.coefficients(Scheme::MasslessBoundary, step);
-    let (normals, forces) = directional_modes(model, friction, directions);
-    let (count, fixed) = (directions.len(), model.len() - dynamic);
-    let bent = DMatrix::from_fn(count, fixed, |node, mode| {
-        coefficients[dynamic + mode].compliance * forces[(node, dynamic + mode)]
-    });
-    let residual = normals.columns(dynamic, fixed) * bent.transpose();
-    let contact = forces.columns(0, dynamic).transpose() * (residual.try_inverse()? * normals.columns(0, dynamic));
-    let identity = DMatrix::identity(dynamic, dynamic);
-
-    // q̈ = −(ω² + K_c)q − 2ξω q̇; time scaled by h keeps the matrix balanced.
-    let mut stiffness = &contact * -(step * step);
-    let mut damping = DMatrix::zeros(dynamic, dynamic);
-    for mode in 0..dynamic {
-        let angle = step * model.frequencies[mode];
-        stiffness[(mode, mode)] -= angle * angle;
-        damping[(mode, mode)] = -2.0 * model.damping_ratios[mode] * angle;
-    }
-    let flow = blocks([&DMatrix::zeros(dynamic, dynamic), &identity, &stiffness, &damping]);
-    let continuous = eigenvalues(flow)?.iter().fold(f64::MIN, |largest, value| largest.max(value.re)) / step;
-
-    // d⁺ = βd − (κ + cK_c)q, q⁺ = q + d⁺.
-    let restoring = DMatrix::from_fn(dynamic, dynamic, |row, column| {
-        let own = if row == column { coefficients[row].kappa } else { 0.0 };
-        -(own + coefficients[row].delayed * contact[(row, column)])
-    });
-    let carried =
-        DMatrix::from_fn(dynamic, dynamic, |row, column| if row == column { coefficients[row].beta } else { 0.0 });
-    let map = blocks([&(&identity + &restoring), &carried, &restoring, &carried]);
-    Some(Growth { continuous, stepped: libm::log(spectral_radius(map)?) / step, noise: GROWTH_NOISE / step })
 }
 
 /// Refusal of a step (s) at or beyond the usable one.

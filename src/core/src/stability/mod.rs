@@ -8,8 +8,13 @@
 //!   scheme adds growth: the spectral radius of the constrained step map is compared with the growth of the
 //!   constrained differential equation.
 
+mod growing;
+mod held;
 pub mod massless;
+mod secular;
 pub mod unresolved;
+
+pub use growing::{Growth, continuous, growth, growth_steps, stepped};
 
 use nalgebra::DMatrix;
 
@@ -20,14 +25,8 @@ use crate::{Error, Result, shown};
 
 /// Margin under the limit ω_max h = 2 of central differences.
 const CENTRAL_MARGIN: f64 = 1e-9;
-/// The scheme may exceed the growth rate of the continuous equations by this factor.
-const GROWTH_FACTOR: f64 = 1.05;
-/// Growth per step below this is rounding of the eigenvalue solver.
-const GROWTH_NOISE: f64 = 1e-7;
 /// Largest number of contact nodes for which all principal minors are computed.
 const MINORS_UP_TO: usize = 12;
-/// Largest number of modes for which growth rates are computed.
-const GROWTH_UP_TO: usize = 150;
 
 /// Directions of the closed contacts of one group: (normal, slip direction) per node.
 pub type ContactDirections = Vec<([f64; 3], [f64; 3])>;
@@ -228,127 +227,12 @@ fn is_definite(scaled: &DMatrix<f64>) -> bool {
     symmetric.symmetric_eigenvalues().min() > -1e-10
 }
 
-/// Growth rates of closed sliding contact.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Growth {
-    /// Of the constrained differential equations (1/s); positive means flutter.
-    pub continuous: f64,
-    /// Of the constrained step map (1/s).
-    pub stepped: f64,
-    /// Rates below this are rounding of the eigenvalue solver (1/s).
-    noise: f64,
-}
-
-impl Growth {
-    /// The scheme adds growth that the equations do not have.
-    pub fn is_added(&self) -> bool {
-        self.stepped > GROWTH_FACTOR * self.continuous.max(0.0) + self.noise
-    }
-
-    /// The equations themselves are unstable.
-    pub fn is_flutter(&self) -> bool {
-        self.continuous > self.noise
-    }
-}
-
-/// Growth with all contacts of `directions` closed and sliding; `None` without friction, for models too large for dense
-/// eigenvalues, and where the contacts are redundant.
-///
-/// Both problems are posed on the null space of the contact normals, so that the constraint adds no zero eigenvalues.
-pub fn growth(
-    model: &ModalModel,
-    scheme: Scheme,
-    step: f64,
-    friction: f64,
-    directions: &ContactDirections,
-) -> Option<Growth> {
-    if scheme == Scheme::MasslessBoundary {
-        return massless::growth(model, step, friction, directions);
-    }
-    if friction == 0.0 || model.len() > GROWTH_UP_TO {
-        return None;
-    }
-    let modes = model.len();
-    let (normals, forces) = directional_modes(model, friction, directions);
-    let tangent = null_space(&normals)?;
-    let free = tangent.ncols();
-    let scaled = |values: &dyn Fn(usize) -> f64| {
-        DMatrix::from_fn(modes, free, |mode, column| values(mode) * tangent[(mode, column)])
-    };
-
-    // q̈ = −P(ω² q + 2ξω q̇) with P = I − B_f (B_nᵀ B_f)⁻¹ B_nᵀ; time scaled by h keeps the matrix balanced.
-    let coupling = (&normals * forces.transpose()).try_inverse()?;
-    let projector = DMatrix::identity(modes, modes) - forces.transpose() * coupling * &normals;
-    let projected = tangent.transpose() * projector;
-    let stiffness = &projected * scaled(&|mode| -(step * model.frequencies[mode]).powi(2));
-    let damping = &projected * scaled(&|mode| -2.0 * step * model.damping_ratios[mode] * model.frequencies[mode]);
-    let identity = DMatrix::identity(free, free);
-    let flow = blocks([&DMatrix::zeros(free, free), &identity, &stiffness, &damping]);
-    let continuous = eigenvalues(flow)?.iter().fold(f64::MIN, |largest, value| largest.max(value.re)) / step;
-
-    // q⁺ = R(q + β d − κ q) with R = I − c B_f W⁻¹ B_nᵀ, d⁺ = q⁺ − q.
-    let coefficients = model.coefficients(scheme, step);
-    let inverse = delassus(model, scheme, step, friction, directions).try_inverse()?;
-    let response =
-        DMatrix::from_fn(modes, directions.len(), |mode, node| coefficients[mode].compliance * forces[(node, mode)]);
-    let corrected = tangent.transpose() * (DMatrix::identity(modes, modes) - response * inverse * &normals);
-    let position = &corrected * scaled(&|mode| 1.0 - coefficients[mode].kappa);
-    let increment = &corrected * scaled(&|mode| coefficients[mode].beta);
-    let map = blocks([&position, &increment, &(&position - &identity), &increment]);
-    Some(Growth { continuous, stepped: libm::log(spectral_radius(map)?) / step, noise: GROWTH_NOISE / step })
-}
-
-/// Largest modulus of the eigenvalues of a general matrix.
-fn spectral_radius(matrix: DMatrix<f64>) -> Option<f64> {
-    let size = |value: &nalgebra::Complex<f64>| libm::hypot(value.re, value.im);
-    Some(eigenvalues(matrix)?.iter().fold(0.0, |largest: f64, value| largest.max(size(value))))
-}
-
-/// Eigenvalues of a general matrix; `None` where the iteration does not end (entries of extreme size).
-fn eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<nalgebra::Complex<f64>>> {
-    // Of nothing there are none; the iteration would look for its last row.
-    if matrix.is_empty() {
-        return Some(Vec::new());
-    }
-    let iterations = 100 * matrix.nrows();
-    let schur = nalgebra::Schur::try_new(matrix, f64::EPSILON, iterations)?;
-    Some(schur.complex_eigenvalues().iter().copied().collect())
-}
-
-/// Orthonormal basis of the vectors that `rows` maps to zero; `None` if it is empty.
-fn null_space(rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let modes = rows.ncols();
-    let range = rows.transpose().qr().q();
-    let projector = DMatrix::identity(modes, modes) - &range * range.transpose();
-    let eigen = projector.symmetric_eigen();
-    let kept: Vec<usize> = (0..modes).filter(|index| eigen.eigenvalues[*index] > 0.5).collect();
-    (!kept.is_empty()).then(|| eigen.eigenvectors.select_columns(&kept))
-}
-
-/// [[a, b], [c, d]] of square blocks of one size.
-fn blocks([a, b, c, d]: [&DMatrix<f64>; 4]) -> DMatrix<f64> {
-    let size = a.nrows();
-    let mut matrix = DMatrix::zeros(2 * size, 2 * size);
-    for (block, (row, column)) in [(a, (0, 0)), (b, (0, size)), (c, (size, 0)), (d, (size, size))] {
-        matrix.view_mut((row, column), (size, size)).copy_from(block);
-    }
-    matrix
-}
-
-/// Steps at which growth is looked at, from `largest` down to where every mode is resolved well (at most 12 octaves).
-pub fn growth_steps(frequency: f64, largest: f64) -> impl Iterator<Item = f64> {
-    let resolved = 0.1 / frequency;
-    std::iter::successors(Some(largest), |step| Some(step * std::f64::consts::FRAC_1_SQRT_2))
-        .take_while(move |step| *step > resolved)
-        .take(24)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     /// Two modes whose contact node moves along both radial and tangential directions.
-    fn model(frequencies: &[f64], shapes: &[[f64; 3]], damping: f64) -> ModalModel {
+    pub fn model(frequencies: &[f64], shapes: &[[f64; 3]], damping: f64) -> ModalModel {
         let modes = frequencies.len();
         ModalModel {
             frequencies: frequencies.to_vec(),
@@ -359,7 +243,7 @@ mod tests {
         }
     }
 
-    fn radial() -> ContactDirections {
+    pub fn radial() -> ContactDirections {
         vec![([-1.0, 0.0, 0.0], [0.0, 1.0, 0.0])]
     }
 
@@ -440,44 +324,5 @@ mod tests {
         // Free masses: 1 + 0.9² − µ·0.9·2 > 0.
         assert!(refusal.contains("µ below 1.00"), "{refusal}");
         assert_eq!(steps_to_check(model.largest_frequency(), 1e-7).count(), 1);
-    }
-
-    #[test]
-    fn frictionless_contact_adds_no_growth_and_damped_contact_decays() {
-        let shapes = [[1.0, 0.2, 0.0], [0.3, -0.8, 0.1], [0.7, 0.4, 0.0]];
-        for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
-            let model = model(&[900.0, 2300.0, 8000.0], &shapes, 0.0);
-            // Friction so small that it changes nothing but makes the question asked.
-            let found = growth(&model, scheme, 1e-4, 1e-12, &radial()).unwrap();
-            assert!(found.continuous.abs() < 1e-6 && found.stepped.abs() < 1e-6, "{found:?}");
-            assert!(!found.is_added() && !found.is_flutter());
-        }
-    }
-
-    #[test]
-    fn growth_of_a_fluttering_contact_converges_to_the_continuous_rate() {
-        // Two close modes coupled by friction through the contact; 178.516 1/s is the largest real part of the
-        // eigenvalues of the constrained equations, computed independently with NumPy.
-        let shapes = [[-0.1, -0.5, 0.0], [-0.3, 1.0, 0.0], [0.9, -0.8, 0.0]];
-        let model = model(&[1000.0, 1050.0, 5000.0], &shapes, 0.0);
-        let rate = |step| growth(&model, Scheme::ModalExact, step, 0.4, &radial()).unwrap();
-        let (coarse, fine) = (rate(2e-5), rate(1e-5));
-        let continuous = fine.continuous;
-        assert!((continuous - 178.5158).abs() < 1e-3, "{continuous}");
-        let order = ((coarse.stepped - continuous) / (fine.stepped - continuous)).abs().log2();
-        println!("growth rate {continuous} 1/s, stepped {} and {}: order {order}", coarse.stepped, fine.stepped);
-        assert!(order > 3.7, "order {order}");
-        assert!(fine.is_flutter() && !fine.is_added());
-    }
-
-    #[test]
-    fn damped_contact_decays_and_says_so_at_every_step_size() {
-        // The constraint used to add zero eigenvalues, whose rounding looked like flutter at large steps.
-        let shapes = [[1.0, 0.2, 0.0], [0.3, -0.8, 0.1], [0.7, 0.4, 0.0], [0.2, 0.9, 0.0]];
-        let model = model(&[900.0, 2300.0, 8000.0, 90_000.0], &shapes, 0.005);
-        for step in [1e-7, 1e-6, 1e-5, 1e-4, 1e-3] {
-            let found = growth(&model, Scheme::ModalExact, step, 0.1, &radial()).unwrap();
-            assert!(found.continuous < -1.0 && !found.is_flutter(), "h = {step}: {found:?}");
-        }
     }
 }

@@ -99,6 +99,14 @@ enum Telling {
     Refusals,
 }
 
+/// The model that grows most at the step to expect, and its growth with time continuous (1/s), which no step changes. At other
+/// steps only this one is looked at: with all nodal diameters of a disk at all steps the check would take a minute.
+#[derive(Debug, Clone, Copy)]
+struct Watched {
+    model: usize,
+    continuous: Option<f64>,
+}
+
 /// A structure of a scene with some parameters, about to be checked with all it touches.
 pub(super) struct Checking<'a> {
     compiled: &'a Compiled,
@@ -112,9 +120,8 @@ pub(super) struct Checking<'a> {
     parameters: &'a Parameters,
     /// Largest friction coefficient.
     pub(super) friction: f64,
-    /// Per sense of slip (+, −) and combination of nodes the model that grows most at the step to expect. At other steps
-    /// only this one is looked at: with all nodal diameters of a disk at all steps the check would take a minute.
-    watched: [Vec<usize>; 2],
+    /// Per sense of slip (+, −) and combination of nodes what grows most at the step to expect.
+    watched: [Vec<Watched>; 2],
 }
 
 impl<'a> Checking<'a> {
@@ -348,10 +355,11 @@ impl<'a> Checking<'a> {
         let mut warnings = Vec::new();
         for (combination, nodes) in self.combinations().iter().enumerate() {
             let watched = self.watched[usize::from(sense < 0.0)].get(combination).copied();
-            let models = watched.map_or(0..self.models.len(), |model| model..model + 1);
-            let (mut flutter, mut most) = (0.0_f64, (0, f64::NEG_INFINITY));
+            let models = watched.map_or(0..self.models.len(), |watched| watched.model..watched.model + 1);
+            let (mut flutter, mut most) = (0.0_f64, (Watched { model: 0, continuous: None }, f64::NEG_INFINITY));
             for model in models {
-                let Some(found) = self.growth_of(model, nodes, step, sense) else { continue };
+                let known = watched.and_then(|watched| watched.continuous);
+                let Some(found) = self.growth_of(model, nodes, step, sense, known) else { continue };
                 if found.is_added() {
                     return Err(self.refusal(nodes, sense, step, found));
                 }
@@ -359,7 +367,7 @@ impl<'a> Checking<'a> {
                     flutter = flutter.max(found.continuous);
                 }
                 if found.stepped > most.1 {
-                    most = (model, found.stepped);
+                    most = (Watched { model, continuous: Some(found.continuous) }, found.stepped);
                 }
             }
             if watched.is_none() {
@@ -372,15 +380,18 @@ impl<'a> Checking<'a> {
         Ok(warnings)
     }
 
-    /// Growth of one of the models with contact closed at some nodes (of both parts of a nodal diameter).
-    fn growth_of(&self, model: usize, nodes: &[usize], step: f64, sense: f64) -> Option<Growth> {
-        let model = &self.models[model];
+    /// Growth of one of the models with contact closed at some nodes (of both parts of a nodal diameter); `known` is that with
+    /// time continuous (1/s).
+    fn growth_of(&self, model: usize, nodes: &[usize], step: f64, sense: f64, known: Option<f64>) -> Option<Growth> {
+        let (model, friction, scheme) = (&self.models[model], self.friction, self.parameters.scheme);
         let all = self.directions(model, sense);
         let own = self.nodes.len();
         let places = (0..all.len() / own).flat_map(|part| nodes.iter().map(move |node| part * own + node));
         let places: Vec<usize> = places.collect();
         let directions = places.iter().map(|place| all[*place]).collect();
-        stability::growth(&model.with_nodes(&places), self.parameters.scheme, step, self.friction, &directions)
+        let seen = model.with_nodes(&places);
+        let continuous = || stability::continuous(&seen, scheme, self.parameters.step, friction, &directions);
+        stability::stepped(&seen, scheme, step, friction, &directions, known.or_else(continuous)?)
     }
 
     /// Which contact is meant.
