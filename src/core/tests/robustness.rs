@@ -530,3 +530,71 @@ fn the_other_sense_is_told_of_when_the_rotor_turns_that_way() {
         assert_eq!(simulation.take_notes().len(), expected, "{speed}");
     }
 }
+
+/// A blade of contact nodes whose shapes are random, but for a mode that takes all of them out of the casing.
+fn crowded(nodes: usize, modes: usize, seed: u64) -> Scene {
+    let mut random = models::Random(seed);
+    let shapes = random.matrix(3 * nodes, modes);
+    let shape = |row: usize, mode: usize| if mode == 0 && row % 3 == 0 { -1.0 } else { 3.0 * shapes[(row, mode)] };
+    let frequencies: Vec<f64> = (0..modes).map(|mode| 500.0 + 37_000.0 * mode as f64 / modes as f64).collect();
+    let place = |node: usize| [models::RADIUS, 2e-3 * node as f64, 1e-3 * node as f64];
+    let nodes = (0..nodes).map(|node| models::node(format!("node_{}", node + 1), place(node), 0.0)).collect();
+    let mut rom = models::modal("crowded", &frequencies, shape, nodes);
+    rom.damping_ratio = 0.005;
+    let mut scene = models::round(rom);
+    scene.settings.experiment.communication_step = 1e-5;
+    scene
+}
+
+#[test]
+fn without_friction_more_contact_nodes_than_modes_are_no_end_of_a_run() {
+    for (nodes, seed) in [(9, 1), (9, 2), (16, 3), (16, 4), (25, 5), (33, 6)] {
+        for scheme in Scheme::ALL {
+            for (solver, coated) in
+                [(Solver::Film, false), (Solver::Lcp, false), (Solver::Coulomb, false), (Solver::Lcp, true)]
+            {
+                let modes = if scheme == Scheme::MasslessBoundary { 3 * nodes + 4 } else { nodes / 2 };
+                let mut scene = crowded(nodes, modes, seed);
+                scene.settings.time.scheme = scheme;
+                scene.settings.contacts[0].solver = solver;
+                if coated {
+                    models::coating(&mut scene);
+                }
+                let name = format!("{nodes} nodes, {modes} modes, {scheme:?}, {solver:?}, coated: {coated}");
+                let mut simulation = try_started(&scene).unwrap_or_else(|error| panic!("{name}: {error}"));
+                let mut peak: f64 = 0.0;
+                for index in 1..=60 {
+                    let inward = 5e-4 * (0.5 - 0.5 * (f64::from(index) / 10.0).cos());
+                    set(&mut simulation, "casing_radius_change", -inward);
+                    let ended = simulation.do_step(simulation.time(), 1e-5);
+                    ended.unwrap_or_else(|error| panic!("{name}, {index}: {error}"));
+                    peak = peak.max(real(&simulation, "normal_force_peak"));
+                }
+                assert!(peak > 0.0, "{name} does not touch");
+            }
+        }
+    }
+}
+
+/// Two contact nodes of which the only mode takes one out of the casing by as much as it takes the other in.
+#[test]
+fn nodes_that_no_mode_takes_out_at_once_are_named_and_friction_is_not_blamed() {
+    let shape = |row: usize, _: usize| if row % 3 == 0 { 1.0 - 2.0 * (row / 3) as f64 } else { 0.0 };
+    let place = |node: usize| [models::RADIUS, 0.02 * node as f64, 0.015 * node as f64];
+    let nodes = (0..2).map(|node| models::node(format!("node_{}", node + 1), place(node), 0.0)).collect();
+    let rom = models::modal("rocker", &[800.0], shape, nodes);
+    for (solver, coated) in [(Solver::Lcp, false), (Solver::Coulomb, false), (Solver::Lcp, true)] {
+        let mut scene = models::round(rom.clone());
+        scene.settings.contacts[0].solver = solver;
+        if coated {
+            models::coating(&mut scene);
+        }
+        let mut simulation = try_started(&scene).unwrap();
+        let error = (0..40).find_map(|index| {
+            set(&mut simulation, "casing_radius_change", -4e-5 * f64::from(index));
+            simulation.do_step(simulation.time(), 5e-5).err()
+        });
+        let message = error.expect("both nodes cannot leave the casing").to_string();
+        assert!(message.contains("no motion of the modes") && !message.contains("friction"), "{solver:?}: {message}");
+    }
+}

@@ -8,20 +8,22 @@
 //! * [`ContactSolver::lcp`]: 0 ≤ λ ⟂ g + Wλ ≥ 0 on all nodes by block principal pivoting, started from the last step's
 //!   set. When the number of infeasible nodes stops falling it continues with Murty's least-index rule, which is
 //!   finite for every P-matrix (J. J. Júdice, F. M. Pires, Computers & Operations Research 21, 1994). With more than a
-//!   few nodes finite can mean 2ⁿ, and the violated contacts are driven to closure one by one instead.
+//!   few nodes finite can mean 2ⁿ, and the violated contacts are driven to closure one by one instead. All of this needs
+//!   a P-matrix. Without friction W may be singular instead, as it is with more contacts than modes; there a solution is
+//!   approached (`laws::proximal`) when those rules do not end.
 
 mod drive;
 mod elimination;
 
 use nalgebra::DMatrix;
 
+use super::proximal::{ROUNDS, Yielding};
 use crate::dynamics::dispatch::InstructionSet;
 
 /// Pivots below this fraction of their node's own diagonal belong to redundant contacts (coincident nodes).
 const REDUNDANT_PIVOT: f64 = 1e-12;
-/// Share of its diagonal by which a node is softened when redundant contacts ask for different gaps: the deepest of
-/// them then carries the force, and the gap it is left with is this share of the predicted penetration.
-const SOFTENING: f64 = 1e-10;
+/// Share of the largest gap from which on softened contacts that are left with it are not closed.
+const PINCHED: f64 = 1e-6;
 /// Gaps and multipliers within this fraction of their scale count as zero.
 const ZERO_FRACTION: f64 = 1e-13;
 /// Block exchanges allowed without progress before Murty's rule takes over.
@@ -66,6 +68,9 @@ pub struct ContactSolver {
     size: usize,
     /// Delassus matrix (m/N), filled by the caller.
     pub delassus: DMatrix<f64>,
+    /// The symmetric part of the matrix is positive semidefinite, as it is without friction: a solution is found whenever there
+    /// is one. Set by the caller; false when made.
+    pub monotone: bool,
     /// Predicted gaps (m), filled by the caller; corrected gaps on return.
     pub gaps: Vec<f64>,
     /// Multipliers (N), set by the solvers; 0 beyond the size.
@@ -85,6 +90,7 @@ pub struct ContactSolver {
     /// Multipliers and gaps while contacts are driven to closure.
     pressure: Vec<f64>,
     slack: Vec<f64>,
+    yielding: Yielding,
     instructions: InstructionSet,
 }
 
@@ -94,6 +100,7 @@ impl ContactSolver {
         Self {
             size,
             delassus: DMatrix::zeros(size, size),
+            monotone: false,
             gaps: vec![0.0; size],
             multipliers: vec![0.0; size],
             active: vec![false; size],
@@ -106,6 +113,7 @@ impl ContactSolver {
             corrected: vec![0.0; size],
             pressure: vec![0.0; size],
             slack: vec![0.0; size],
+            yielding: Yielding::new(size),
             instructions: InstructionSet::detect(),
         }
     }
@@ -145,25 +153,39 @@ impl ContactSolver {
     /// Complementarity on all nodes; `active` is the starting guess and returns the set found.
     pub fn lcp(&mut self) -> Outcome {
         let scale = self.gaps[..self.size].iter().fold(0.0, |largest: f64, gap| largest.max(gap.abs()));
+        self.yielding.begin();
+        let mut outcome = self.exchange(scale);
+        if !outcome.solved {
+            let driven = self.drive_all(scale, drive_limit(self.size));
+            outcome = Outcome::direct(driven.solved, outcome.factorisations + driven.factorisations);
+        }
+        if !outcome.solved && self.monotone {
+            let approached = self.approach(scale);
+            outcome = Outcome::direct(approached.solved, outcome.factorisations + approached.factorisations);
+        }
+        outcome
+    }
+
+    /// Block exchanges, and the least-index rule where they make no progress.
+    fn exchange(&mut self, scale: f64) -> Outcome {
         for node in 0..self.size {
             self.active[node] |= self.gaps[node] < 0.0;
         }
-        let limit = exchange_limit(self.size);
-        let (mut best, mut patience, mut softened) = (usize::MAX, PATIENCE, false);
+        let limit = exchange_limit(self.size, self.monotone);
+        let (mut best, mut patience) = (usize::MAX, PATIENCE);
         for factorisations in 1..=limit {
             self.solve_active(None);
             self.correct_gaps();
             let largest =
                 self.multipliers[..self.size].iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
             let (count, last) = self.count_infeasible(scale, largest);
-            if count == 0 && !softened && self.redundant_contact_violated(scale) {
-                self.soften();
-                (best, patience, softened) = (usize::MAX, PATIENCE, true);
+            if count == 0 && !self.yielding.is_softened() && self.redundant_contact_violated(scale) {
+                self.yielding.soften(&mut self.delassus, self.size);
+                (best, patience) = (usize::MAX, PATIENCE);
                 continue;
             }
             if count == 0 {
-                self.settle();
-                return Outcome::direct(true, factorisations);
+                return Outcome::direct(self.settle(scale), factorisations);
             }
             if count < best {
                 (best, patience) = (count, PATIENCE);
@@ -176,8 +198,25 @@ impl ContactSolver {
                 self.active[last] = !self.active[last];
             }
         }
-        let driven = self.drive_all(scale, drive_limit(self.size));
-        Outcome::direct(driven.solved, limit + driven.factorisations)
+        Outcome::direct(false, limit)
+    }
+
+    /// Solve from the predicted gaps, whatever the rank of W. Not solved where no motion opens all contacts.
+    fn approach(&mut self, gap_scale: f64) -> Outcome {
+        let (size, mut factorisations) = (self.size, 0);
+        self.yielding.keep(&self.delassus, &self.gaps[..size], gap_scale);
+        for _ in 0..ROUNDS {
+            self.yielding.pose(&mut self.delassus, &mut self.gaps[..size]);
+            let driven = self.drive_all(gap_scale, drive_limit(size));
+            factorisations += driven.factorisations;
+            if self.yielding.advance(driven.solved, gap_scale, size, |node| self.multipliers[node]) {
+                for node in (0..size).filter(|node| !self.active[*node]) {
+                    self.gaps[node] -= self.yielding.yielded(node, 0.0);
+                }
+                return Outcome::direct(true, factorisations);
+            }
+        }
+        Outcome::direct(false, factorisations)
     }
 
     fn infeasible(&self, node: usize, gap_scale: f64, multiplier_scale: f64) -> bool {
@@ -215,21 +254,20 @@ impl ContactSolver {
         (0..self.size).filter(left_out).any(|node| self.corrected[node] < -ZERO_FRACTION * gap_scale)
     }
 
-    /// Make the contact problem regular: every node yields a little by itself.
-    fn soften(&mut self) {
-        for node in 0..self.size {
-            self.delassus[(node, node)] *= 1.0 + SOFTENING;
+    /// Remove rounding from a solution: λ ≥ 0 exactly, gap ≥ 0 exactly. False, and nothing done, where forces only look like
+    /// one: contacts that no motion opens at once, held apart by their softness.
+    fn settle(&mut self, gap_scale: f64) -> bool {
+        let left = |node: usize| self.yielding.left_soft(node, self.multipliers[node]);
+        if (0..self.size).any(|node| left(node) > PINCHED * gap_scale) {
+            return false;
         }
-    }
-
-    /// Remove rounding from the accepted solution: λ ≥ 0 exactly, gap ≥ 0 exactly.
-    fn settle(&mut self) {
         for node in 0..self.size {
             self.multipliers[node] = self.multipliers[node].max(0.0);
             self.active[node] = self.multipliers[node] > 0.0;
             // A redundant contact that carries nothing may stand open.
             self.gaps[node] = if self.active[node] { 0.0 } else { self.corrected[node].max(0.0) };
         }
+        true
     }
 
     fn correct_gaps(&mut self) {
@@ -284,9 +322,13 @@ impl ContactSolver {
     }
 }
 
-/// Factorisations of the exchange rules.
-fn exchange_limit(size: usize) -> usize {
-    if size <= ENUMERABLE { 100 + 20 * size + (1 << size) } else { BLOCK_LIMIT }
+/// Factorisations of the exchange rules. Every set is tried only where nothing else is left: with friction.
+fn exchange_limit(size: usize, monotone: bool) -> usize {
+    match size {
+        0..=ENUMERABLE if monotone => 100 + 20 * size,
+        0..=ENUMERABLE => 100 + 20 * size + (1 << size),
+        _ => BLOCK_LIMIT,
+    }
 }
 
 /// Factorisations of the drives: twenty per contact. Beyond `FULL_PATIENCE` contacts the number falls with the square of

@@ -56,6 +56,7 @@ impl ContactLaw for Coated {
 
     fn begin(&mut self, size: usize) {
         self.problem.clear();
+        self.problem.monotone = true;
         self.size = size;
     }
 
@@ -66,6 +67,7 @@ impl ContactLaw for Coated {
     fn pose(&mut self, contact: usize, _: &[[f64; 3]], at: &impl Prediction) {
         self.angles[contact] = at.angle();
         self.gaps[contact] = at.gap();
+        self.problem.monotone &= at.friction() == 0.0;
         self.closed[contact] = at.gap_before() <= -self.coating.thickness();
     }
 

@@ -22,6 +22,7 @@ impl ContactLaw for Lcp {
 
     fn begin(&mut self, size: usize) {
         self.0.set_size(size);
+        self.0.monotone = true;
     }
 
     fn matrix(&mut self) -> &mut DMatrix<f64> {
@@ -32,6 +33,7 @@ impl ContactLaw for Lcp {
         self.0.gaps[contact] = at.gap();
         // Closed in the last step: the likeliest guess for this one.
         self.0.active[contact] = at.gap_before() <= 0.0;
+        self.0.monotone &= at.friction() == 0.0;
     }
 
     fn solve(&mut self) -> Outcome {

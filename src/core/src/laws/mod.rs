@@ -11,6 +11,7 @@ mod coulomb;
 pub mod de_saxce;
 mod film;
 mod lcp;
+mod proximal;
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,7 @@
 
 use super::checks::{OUT_OF_REACH, OUT_OF_REACH_REMEDY};
 use super::{Phase, Simulation};
-use crate::system::{Curved, StepFailure};
+use crate::system::{Curved, Pair, StepFailure};
 use crate::{Error, shown};
 
 const AGAIN: &str = "Restore a saved state or reset first";
@@ -29,9 +29,14 @@ impl Simulation {
     fn told_failure(&self, failure: StepFailure) -> (String, String) {
         let is_free = |structure: usize| self.compiled.bodies[structure].translations.is_some();
         match failure {
-            StepFailure::Implausible { structure, .. } | StepFailure::Unsolved { structure, .. } if is_free(structure) => {
-                free_failure(failure, self.compiled.structure_name(structure))
+            StepFailure::Implausible { structure, .. } if is_free(structure) => {
+                free_failure(self.compiled.structure_name(structure))
             }
+            StepFailure::Unsolved { structure, .. } if is_free(structure) => self.unsolved(
+                structure,
+                self.compiled.structure_name(structure),
+                "Use less friction, another internal step or the solver coulomb",
+            ),
             StepFailure::NonFinite => (String::new(), String::new()),
             StepFailure::Implausible { structure, sector } => (
                 format!(
@@ -90,11 +95,26 @@ impl Simulation {
                  contact grid points to the master"
                     .to_owned(),
             ),
-            StepFailure::Unsolved { structure, sector } => (
-                format!("the contact problem of {} has no solution", self.sector_name(structure, sector)),
-                "Use less friction or another internal step".to_owned(),
-            ),
+            StepFailure::Unsolved { structure, sector } => {
+                self.unsolved(structure, &self.sector_name(structure, sector), "Use less friction or another internal step")
+            }
         }
+    }
+
+    /// No forces fulfil the conditions of contact. Friction can do that; without it only contacts that no motion opens at once.
+    fn unsolved(&self, structure: usize, name: &str, with_friction: &str) -> (String, String) {
+        let sets = self.system.sets();
+        let felt = |pair: &Pair| sets.of(pair.structure()) == sets.of(structure);
+        if self.system.pairs().iter().any(|pair| felt(pair) && pair.friction() > 0.0) {
+            return (format!("the contact problem of {name} has no solution"), with_friction.to_owned());
+        }
+        (
+            format!(
+                "the contact problem of {name} has no solution: contact nodes are inside the surface that no motion of the modes \
+                 takes out all at once"
+            ),
+            "Use a ROM with more modes or fewer contact nodes, or let the surfaces leave it room".to_owned(),
+        )
     }
 
     fn carrier_failure(&self, structure: usize) -> (String, String) {
@@ -165,18 +185,10 @@ const BESIDE_FLIGHT: &str =
     "Check positions and velocity; small displacements beside rigid flight cannot describe this";
 
 /// What means something else for a structure that flies freely.
-fn free_failure(failure: StepFailure, name: &str) -> (String, String) {
-    match failure {
-        StepFailure::Unsolved { .. } => (
-            format!("the contact problem of {name} has no solution"),
-            "Use less friction, another internal step or the solver coulomb".to_owned(),
-        ),
-        _ => (
-            format!(
-                "contact nodes of {name} have moved against each other, or into a surface, by more than a tenth of the extent of \
-                 the contact nodes"
-            ),
-            BESIDE_FLIGHT.to_owned(),
-        ),
-    }
+fn free_failure(name: &str) -> (String, String) {
+    let problem = format!(
+        "contact nodes of {name} have moved against each other, or into a surface, by more than a tenth of the extent of the \
+         contact nodes"
+    );
+    (problem, BESIDE_FLIGHT.to_owned())
 }

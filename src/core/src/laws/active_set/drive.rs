@@ -16,8 +16,7 @@ impl ContactSolver {
             factorisations += self.start_drive();
             let violated = |slack: &f64| *slack < -ZERO_FRACTION * gap_scale;
             if !self.slack[..self.size].iter().any(violated) {
-                self.settle();
-                return Outcome::direct(true, factorisations);
+                return Outcome::direct(self.settle(gap_scale), factorisations);
             }
             while factorisations < limit {
                 let open = (0..self.size).filter(|node| !self.active[*node] && violated(&self.slack[*node]));

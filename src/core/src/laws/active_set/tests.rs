@@ -3,6 +3,8 @@
 use super::*;
 use proptest::prelude::*;
 
+mod semidefinite;
+
 /// The solution by trying every active set: independent of pivoting rules.
 fn brute_force(w: &DMatrix<f64>, g: &[f64]) -> Vec<f64> {
     let n = g.len();
@@ -174,8 +176,9 @@ fn a_smaller_problem_in_a_larger_solver_has_the_same_bits() {
 
 #[test]
 fn effort_is_bounded_for_every_size() {
-    assert_eq!(exchange_limit(14), 100 + 280 + 16_384);
-    assert!(exchange_limit(15) == BLOCK_LIMIT && exchange_limit(2000) == BLOCK_LIMIT);
+    assert_eq!(exchange_limit(14, false), 100 + 280 + 16_384);
+    assert_eq!(exchange_limit(14, true), 100 + 280);
+    assert!(exchange_limit(15, false) == BLOCK_LIMIT && exchange_limit(2000, true) == BLOCK_LIMIT);
     assert_eq!([14, 168, 256, 2000].map(drive_limit), [380, 3460, 5220, 656]);
 }
 

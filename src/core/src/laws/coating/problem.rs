@@ -15,6 +15,7 @@ use nalgebra::DMatrix;
 
 use super::{Branch, CellContact, Rod, number};
 use crate::laws::active_set::Outcome;
+use crate::laws::proximal::{ROUNDS, Yielding};
 
 /// Depths and forces within this fraction of their scale count as zero.
 const ZERO_FRACTION: f64 = 1e-12;
@@ -44,6 +45,8 @@ pub struct CoatedProblem {
     /// Normal gap of node i per multiplier of node j (m/N), friction included; capacity × capacity, the leading
     /// `size` × `size` part in use.
     pub delassus: DMatrix<f64>,
+    /// As in [`ContactSolver::monotone`](crate::laws::active_set::ContactSolver::monotone).
+    pub monotone: bool,
     /// Predicted gaps to the unworn surface (m); corrected gaps on return.
     pub gaps: Vec<f64>,
     /// Part of each node's multiplier that the coating carries (N).
@@ -58,7 +61,7 @@ pub struct CoatedProblem {
     reached: [Vec<f64>; 2],
     /// Largest force on a node (N).
     largest: f64,
-    softened: bool,
+    yielding: Yielding,
     pub(super) factorisations: usize,
     /// Nodes that carry force, and where each is among them.
     members: Vec<usize>,
@@ -75,6 +78,7 @@ impl CoatedProblem {
             thickness,
             size: 0,
             delassus: DMatrix::zeros(nodes, nodes),
+            monotone: false,
             gaps: vec![0.0; nodes],
             coating: vec![0.0; nodes],
             hard: vec![0.0; nodes],
@@ -83,7 +87,7 @@ impl CoatedProblem {
             corrected: vec![0.0; nodes],
             reached: [vec![0.0; nodes], vec![0.0; nodes]],
             largest: 0.0,
-            softened: false,
+            yielding: Yielding::new(nodes),
             factorisations: 0,
             members: Vec::with_capacity(nodes),
             slot: vec![0; nodes],
@@ -132,7 +136,7 @@ impl CoatedProblem {
     /// Gaps, coating and hard forces of the step.
     pub fn solve(&mut self) -> Outcome {
         self.guess();
-        let solved = self.exchange_blocks() || self.follow_path();
+        let solved = self.exchange_blocks() || self.follow_path() || self.monotone && self.approach();
         Outcome { solved, factorisations: self.factorisations, ..Outcome::default() }
     }
 
@@ -145,7 +149,23 @@ impl CoatedProblem {
         for node in 0..self.size {
             self.closed[node] |= self.gaps[node] < -self.thickness;
         }
-        (self.softened, self.factorisations) = (false, 0);
+        self.yielding.begin();
+        self.factorisations = 0;
+    }
+
+    /// From the predicted gaps, whatever the rank of W ([`crate::laws::proximal`]).
+    fn approach(&mut self) -> bool {
+        let size = self.size;
+        let scale = self.gaps[..size].iter().fold(self.thickness, |most: f64, gap| most.max(gap.abs()));
+        self.yielding.keep(&self.delassus, &self.gaps[..size], scale);
+        for _ in 0..ROUNDS {
+            self.yielding.pose(&mut self.delassus, &mut self.gaps[..size]);
+            let solved = self.exchange_blocks() || self.follow_path();
+            if self.yielding.advance(solved, scale, size, |node| self.coating[node] + self.hard[node]) {
+                return true;
+            }
+        }
+        false
     }
 
     pub(super) fn exchange_blocks(&mut self) -> bool {
@@ -217,13 +237,13 @@ impl CoatedProblem {
         rods.chain(nodes).min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    fn strain(&self, contact: &CellContact, gaps: &[f64]) -> f64 {
+    pub(super) fn strain(&self, contact: &CellContact, gaps: &[f64]) -> f64 {
         let ([a, b], [share_a, share_b]) = (contact.nodes, contact.weights);
         -(share_a * gaps[a] + share_b * gaps[b]) / self.thickness
     }
 
     /// On the straight line of its branch, below zero where that branch does not hold.
-    fn force(&self, contact: &CellContact, gaps: &[f64]) -> f64 {
+    pub(super) fn force(&self, contact: &CellContact, gaps: &[f64]) -> f64 {
         let (offset, tangent) = self.rod.line(contact.branch, contact.plastic);
         let strain = self.strain(contact, gaps);
         // As a difference the elastic force keeps its digits close to zero.

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 
+mod semidefinite;
 mod solution;
 
 use solution::{materials, p_matrix};

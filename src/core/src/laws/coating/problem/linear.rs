@@ -5,20 +5,14 @@ use crate::laws::coating::{Branch, CellContact};
 
 /// Pivots below this fraction of their column belong to redundant contacts (coincident nodes).
 const REDUNDANT_PIVOT: f64 = 1e-12;
-/// Share of its diagonal by which every node is softened then.
-const SOFTENING: f64 = 1e-10;
-
 impl CoatedProblem {
     /// Gaps and forces for the present branches; redundant contacts are softened first.
     pub(super) fn solve_branches(&mut self) -> bool {
         if self.solve_linear() {
             return true;
         }
-        if !self.softened {
-            self.softened = true;
-            for node in 0..self.size {
-                self.delassus[(node, node)] *= 1.0 + SOFTENING;
-            }
+        if !self.yielding.is_softened() {
+            self.yielding.soften(&mut self.delassus, self.size);
             return self.solve_linear();
         }
         false
