@@ -54,7 +54,7 @@ pub enum Model {
     Casing(Box<CasingArguments>),
     /// The NASA rotor 37 blade that ships with tiprub.
     #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  \
-                            tiprub reduce rotor37 --modes 30 --contact-nodes 5 --mesh 10x2x16 -o fine.rom.safetensors")]
+                            tiprub reduce rotor37 --contact-patches 9 --modes 120 --mesh 32x2x40 -o fine.rom.safetensors")]
     Rotor37(Rotor37Arguments),
     /// The disk with 56 blades that ships.
     #[command(after_help = "Example:\n  tiprub reduce stage --coarse --inp sector.inp --vtk sector.vtu")]
@@ -76,19 +76,19 @@ pub enum Model {
 /// Arguments of `tiprub reduce rotor37`.
 #[derive(Debug, Args)]
 pub struct Rotor37Arguments {
-    /// Modes kept [default: 20].
+    /// Modes kept [default: 80; 20 with --contact-nodes].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
-    /// Contact nodes along the tip chord, leading edge to trailing edge (≥ 2) [default: 3].
+    /// The paper's contact nodes along the tip chord, leading edge to trailing edge (≥ 2), instead of patches.
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
-    /// Contact patches along the tip chord, over the whole thickness, instead of nodes.
+    /// Contact patches along the tip chord, over the whole thickness [default: 5].
     #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
     pub contact_patches: Option<usize>,
-    /// Which modes are kept [default: craig-bampton; free-interface with --contact-patches].
+    /// Which modes are kept [default: free-interface; craig-bampton with --contact-nodes].
     #[arg(long, value_enum)]
     pub kind: Option<KindChoice>,
-    /// Elements along the chord, through the thickness and along the span [default: 16x2x20].
+    /// Elements along the chord, through the thickness and along the span [default: 24x2x40; 16x2x20 with --contact-nodes].
     #[arg(long, value_name = "CxTxS")]
     pub mesh: Option<MeshSize>,
     /// Also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s).
@@ -102,14 +102,15 @@ pub struct Rotor37Arguments {
 impl Rotor37Arguments {
     /// The blade asked for.
     pub fn options(&self) -> Rotor37Options {
-        let defaults = Rotor37Options::default();
+        let of_the_paper = self.contact_nodes.is_some();
+        let defaults = if of_the_paper { Rotor37Options::paper() } else { Rotor37Options::default() };
         Rotor37Options {
             mesh: self.mesh.map_or(defaults.mesh, |size| {
                 let [chord, thickness, span] = size.0;
                 MeshCounts { chord, thickness, span }
             }),
             tip: tip(self.contact_nodes, self.contact_patches).unwrap_or(defaults.tip),
-            kind: KindChoice::kind(self.kind, self.contact_patches.is_some()),
+            kind: KindChoice::kind(self.kind, !of_the_paper),
             modes: self.modes.unwrap_or(defaults.modes),
             spin: self.spin,
             ..defaults

@@ -35,7 +35,7 @@ fn check(study: &ErrorStudy) {
 
 #[test]
 fn a_report_is_complete_offline_and_small() {
-    let options = Rotor37Options { mesh: MeshCounts { chord: 4, thickness: 1, span: 4 }, ..Rotor37Options::default() };
+    let options = Rotor37Options { mesh: MeshCounts { chord: 4, thickness: 1, span: 4 }, ..Rotor37Options::paper() };
     let reduction = reduction::rotor37(&options, &Console::new(true, false)).unwrap();
     let scene = rotor37_scene_with(reduction.rom.clone()).unwrap();
     let schedule = Schedule::new(&scene.settings.experiment, Some(0.004), Some(2e-6)).unwrap();

@@ -9,7 +9,7 @@ use tiprub_model::{Rotor37Options, reduce_rotor37};
 const LEADING_EDGE: [f64; 3] = [58.088e-6, -192.490e-6, -353.188e-6];
 
 fn scene() -> Scene {
-    let options = Rotor37Options { spin: Some(1800.0), ..Rotor37Options::default() };
+    let options = Rotor37Options { spin: Some(1800.0), ..Rotor37Options::paper() };
     let rom = reduce_rotor37(&options, &|_| {}).unwrap().rom;
     let mut scene = rotor37_scene_with(rom).unwrap();
     scene.settings.structures[0].spin.stiffening = true;

@@ -3,6 +3,7 @@
 use std::{path::Path, time::Instant};
 
 use serde_json::{Map, Value, json};
+use tiprub_core::Scene;
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result,
@@ -12,6 +13,8 @@ use tiprub_shell::{
     recording::shortest,
     schedule::Schedule,
 };
+
+use tiprub_study::estimate::{self, Estimate};
 
 use crate::cli::RunArguments;
 
@@ -47,7 +50,8 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
         .map(|(name, value)| (name.clone(), json!(value)))
         .collect();
     let extremes = extremes(&run.recording);
-    let json = json!({
+    let estimates = estimated(&scene, arguments, &schedule, console)?;
+    let mut json = json!({
         "model": scene.settings.name,
         "start": schedule.start,
         "stop": schedule.stop,
@@ -66,9 +70,35 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
     let text = if to_stdout {
         run.recording.to_csv()
     } else {
-        summary(&json, &extremes, &run.recording.names, run.recording.row(rows - 1))
+        summary(&json, &extremes, &run.recording.names, run.recording.row(rows - 1)) + &lines(&estimates)
     };
+    if arguments.estimate {
+        json["estimated_errors"] = Value::Object(estimates.iter().map(Estimate::json).collect());
+    }
     Ok(Outcome { text, json })
+}
+
+/// What the run leaves, where asked for.
+fn estimated(
+    scene: &Scene,
+    arguments: &RunArguments,
+    schedule: &Schedule,
+    console: &Console,
+) -> Result<Vec<Estimate>> {
+    if !arguments.estimate {
+        return Ok(Vec::new());
+    }
+    let mut scene = scene.clone();
+    (scene.settings.experiment.start, scene.settings.experiment.communication_step) = (schedule.start, schedule.step);
+    estimate::estimates(&scene, &arguments.set, schedule.count, console)
+}
+
+fn lines(estimates: &[Estimate]) -> String {
+    if estimates.is_empty() {
+        return String::new();
+    }
+    let why = estimates.iter().filter_map(|one| Some(format!("\n  {}: {}", one.direction, one.unknown.as_ref()?)));
+    format!("\n{}{}", estimate::told(estimates), why.collect::<String>())
 }
 
 /// Longer arrays are told by their range.

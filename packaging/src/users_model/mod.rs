@@ -17,6 +17,7 @@ use tiprub_model::{
     read::{Imported, MatrixFiles, MeshOptions, bounding_box, read_matrices, read_mesh},
     reduce::ReductionOptions,
     reduce_casing, reduce_model,
+    rotor37::Tip,
     thermal::equal_patches,
 };
 use tiprub_shell::{Failure, Result, console::Console};
@@ -64,8 +65,12 @@ pub struct BladeSource<'a> {
 }
 
 impl refine::Source for BladeSource<'_> {
-    fn reduce(&self, modes: usize, contact_nodes: usize, console: &Console) -> Result<Rom> {
-        let tips = TipOptions { contact_nodes: Some(contact_nodes), ..TipOptions::default() };
+    fn reduce(&self, modes: usize, tip: Tip, console: &Console) -> Result<Rom> {
+        let (contact_nodes, contact_patches) = match tip {
+            Tip::Nodes(count) => (Some(count), None),
+            Tip::Patches(count) => (None, Some(count)),
+        };
+        let tips = TipOptions { contact_nodes, contact_patches, ..TipOptions::default() };
         let kept = KeptOptions { modes: Some(modes), ..KeptOptions::default() };
         Ok(blade(self.file, self.options, (&tips, kept), console)?.rom)
     }
@@ -79,9 +84,7 @@ pub fn sector(asked: &SectorArguments, console: &Console) -> Result<Reduced> {
     let source = asked.source();
     let imported = import(&source, console)?;
     let choose = |imported: &Imported| choose::tips(imported, source.model, &asked.tips, Some(asked));
-    told(&source, imported, choose, |model, chosen, clamped| {
-        cyclic((&source, asked), model, chosen, clamped, console)
-    })
+    told(&source, imported, choose, |model, chosen, clamped| cyclic((&source, asked), model, chosen, clamped, console))
 }
 
 /// A casing whose contact nodes form a grid.

@@ -1,6 +1,7 @@
 //! Models that ship with tiprub, by the name after `builtin:` in a scene; reduced when first asked for.
 
 use tiprub_core::Rom;
+use tiprub_format::PAPER_SUFFIX;
 use tiprub_model::{
     CasingOptions, Mesh, Rotor37Options,
     casing::CASING37,
@@ -51,9 +52,10 @@ pub(crate) const NAMES: [&str; 10] = [
 
 /// The model of this name; `None` where there is no such model.
 pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom>> {
+    let (whole, name) = (name, plain(name));
     let blade = |spin| {
-        let options = Rotor37Options { spin, ..Rotor37Options::default() };
-        cache.get(name, &options, console, &|| Ok(reduction::rotor37(&options, console)?.rom))
+        let options = Rotor37Options { spin, ..rotor37(whole) };
+        cache.get(whole, &options, console, &|| Ok(reduction::rotor37(&options, console)?.rom))
     };
     let disk = |coarse| {
         let model = DiskModel::new(coarse);
@@ -86,30 +88,38 @@ pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom
     })
 }
 
-/// Whether the contact nodes of a model can be chosen anew by their number: blades along their chord.
-pub fn has_chord(name: &str) -> bool {
-    name.starts_with("rotor37") || [STAGE, STAGE_COARSE].contains(&name)
+/// Without the ending of the paper's models; those that have no other are the paper's.
+fn plain(name: &str) -> &str {
+    name.strip_suffix(PAPER_SUFFIX).unwrap_or(name)
 }
 
-/// The model of this name with another number of modes, as a factor on its own, and of contact nodes where it [has a
+/// The blade as it ships, or as the paper has it.
+fn rotor37(name: &str) -> Rotor37Options {
+    if name.ends_with(PAPER_SUFFIX) { Rotor37Options::paper() } else { Rotor37Options::default() }
+}
+
+/// Whether the contact nodes of a model can be chosen anew by their number: blades along their chord.
+pub fn has_chord(name: &str) -> bool {
+    name.starts_with("rotor37") || [STAGE, STAGE_COARSE].contains(&plain(name))
+}
+
+/// The model of this name with another number of modes, as a factor on its own, and another tip where it [has a
 /// chord](has_chord); made anew and not kept. `None` where there is no such model, or none with more modes: the cube has all.
-pub fn refined(name: &str, factor: f64, contact_nodes: usize, console: &Console) -> Option<Result<Rom>> {
+pub fn refined(name: &str, factor: f64, tip: Tip, console: &Console) -> Option<Result<Rom>> {
     let times = |modes: usize| scaled(modes, factor);
     let families = |selection: ModeSelection| match selection {
         ModeSelection::Families(modes) => ModeSelection::Families(times(modes)),
         other => other,
     };
-    let blade = |spin| {
-        let defaults = Rotor37Options::default();
-        let modes = times(defaults.modes);
-        Rotor37Options { spin, tip: Tip::Nodes(contact_nodes), modes, ..defaults }
-    };
+    let defaults = rotor37(name);
+    let blade = |spin| Rotor37Options { spin, tip, modes: times(defaults.modes), ..defaults.clone() };
+    let name = plain(name);
     Some(match name {
         "rotor37" => reduction::rotor37(&blade(None), console).map(|reduction| reduction.rom),
         "rotor37-spin" => reduction::rotor37(&blade(Some(DESIGN_SPEED)), console).map(|reduction| reduction.rom),
         STAGE | STAGE_COARSE => {
             let (name, options) = stage(name == STAGE_COARSE);
-            let options = StageOptions { modes: families(options.modes), tip: Tip::Nodes(contact_nodes), ..options };
+            let options = StageOptions { modes: families(options.modes), tip, ..options };
             DiskModel::with_options(name, options).reduce(console).map(|(reduction, _)| reduction.rom)
         }
         CASING37 => {
@@ -199,9 +209,12 @@ mod tests {
     #[test]
     fn models_are_refined_by_name() {
         let console = Console::new(true, false);
-        let order = |factor: f64| refined("ring-left", factor, 0, &console).unwrap().unwrap().order();
+        let order = |factor: f64| refined("ring-left", factor, Tip::Nodes(0), &console).unwrap().unwrap().order();
         assert_eq!(order(0.5), 50);
-        assert!(refined(CUBE, 2.0, 0, &console).is_none() && refined("none", 2.0, 0, &console).is_none());
+        assert!(
+            refined(CUBE, 2.0, Tip::Nodes(0), &console).is_none()
+                && refined("none", 2.0, Tip::Nodes(0), &console).is_none()
+        );
         assert!(has_chord("rotor37-spin") && has_chord(STAGE) && !has_chord(STAGE_CASING) && !has_chord(CUBE));
     }
 }

@@ -7,12 +7,16 @@ use std::{
 };
 
 use tiprub_core::{Rom, Scene, settings::SceneSettings};
+use tiprub_format::builtin_model;
 use tiprub_shell::{Failure, Result, console::Console};
 
 use crate::{builtin, rom_cache::RomCache};
 
 /// The scene of the demo, as a user would write it.
 pub const ROTOR37_SCENE: &str = include_str!("../scenes/rotor37.toml");
+
+/// The same rub with the paper's model and method.
+pub const ROTOR37_PAPER_SCENE: &str = include_str!("../scenes/rotor37-paper.toml");
 
 /// Coupled blades in an oval flexible casing.
 pub(crate) const STAGE_SCENE: &str = include_str!("../scenes/stage.toml");
@@ -21,8 +25,9 @@ pub(crate) const STAGE_SCENE: &str = include_str!("../scenes/stage.toml");
 pub const CUBE_SCENE: &str = include_str!("../scenes/cube-between-rings.toml");
 
 /// Scenes that ship with tiprub: what stands behind `builtin:`, and the text.
-pub const BUILTIN_SCENES: [(&str, &str); 5] = [
+pub const BUILTIN_SCENES: [(&str, &str); 6] = [
     ("rotor37", ROTOR37_SCENE),
+    ("rotor37-paper", ROTOR37_PAPER_SCENE),
     ("flexible-casing", include_str!("../scenes/flexible-casing.toml")),
     ("abradable", include_str!("../scenes/abradable.toml")),
     ("stage", STAGE_SCENE),
@@ -109,7 +114,8 @@ fn builtin_scene(name: &str, text: &str, reduce: &dyn Fn(&str) -> Option<Result<
     let settings = tiprub_format::parse_scene(text, name)?;
     let mut roms = Vec::new();
     for structure in &settings.structures {
-        let model = structure.rom.strip_prefix(BUILTIN).and_then(reduce).unwrap_or_else(|| Err("not known".into()));
+        let model = builtin_model(&settings, structure).and_then(|name| reduce(&name));
+        let model = model.unwrap_or_else(|| Err("not known".into()));
         roms.push(model.map_err(|problem| Failure::new(&structure.rom, problem, ""))?);
     }
     Ok(Scene { settings, roms })

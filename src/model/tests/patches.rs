@@ -144,7 +144,7 @@ fn the_flexibility_of_a_patch_converges_and_that_of_a_point_does_not() {
             kind: ReductionKind::FreeInterface,
             modes: 4,
             checked_modes: 2,
-            ..Rotor37Options::default()
+            ..Rotor37Options::paper()
         };
         let rom = reduce_rotor37(&options, &silent).unwrap().rom;
         rom.stiffness.cholesky().unwrap().inverse()[(6, 6)]
@@ -174,7 +174,7 @@ fn a_patch_of_rotor_37_stands_on_the_arc_of_its_chord() {
         mesh: MeshCounts { chord: 8, thickness: 1, span: 4 },
         modes: 4,
         checked_modes: 2,
-        ..Rotor37Options::default()
+        ..Rotor37Options::paper()
     };
     let rom = reduce_rotor37(&options, &silent).unwrap().rom;
     for (patch, node) in patches.iter().zip(&rom.contact_nodes) {

@@ -227,7 +227,7 @@ fn contact_nodes_are_named_and_spread_along_the_tip() {
 }
 
 fn default_reduction() -> Reduction {
-    reduce_rotor37(&Rotor37Options::default(), &silent).unwrap()
+    reduce_rotor37(&Rotor37Options::paper(), &silent).unwrap()
 }
 
 #[test]
@@ -263,7 +263,7 @@ fn default_blade_agrees_with_calculix_and_its_reduction_with_it() {
 #[test]
 fn default_mesh_is_converged_to_half_a_percent() {
     let frequencies = |mesh: MeshCounts| {
-        let options = Rotor37Options { mesh, ..Rotor37Options::default() };
+        let options = Rotor37Options { mesh, ..Rotor37Options::paper() };
         reduce_rotor37(&options, &silent).unwrap().rom.checks.full_frequencies
     };
     let (coarse, fine) = (
@@ -279,7 +279,7 @@ fn default_mesh_is_converged_to_half_a_percent() {
 #[test]
 fn exported_file_is_complete_and_nothing_is_left_behind_on_failure() {
     let blade = blade_mesh(MeshCounts { chord: 3, thickness: 1, span: 2 }).unwrap();
-    let material = Rotor37Options::default().material;
+    let material = Rotor37Options::paper().material;
     let text = inp::calculix_input(&blade.mesh, &material, Some("hub"), 10).unwrap();
     let section = |keyword: &str| -> Vec<&str> {
         text.lines()
@@ -307,7 +307,7 @@ fn exported_file_is_complete_and_nothing_is_left_behind_on_failure() {
 fn the_rom_has_the_same_bits_on_any_number_of_threads() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| reduce_rotor37(&Rotor37Options::default(), &silent)).unwrap().rom
+        pool.install(|| reduce_rotor37(&Rotor37Options::paper(), &silent)).unwrap().rom
     };
     let alone = on(1);
     for threads in [2, 5] {

@@ -53,7 +53,7 @@ impl Blade {
 fn reduced() -> &'static Reduction {
     static REDUCTION: OnceLock<Reduction> = OnceLock::new();
     REDUCTION.get_or_init(|| {
-        let options = Rotor37Options { spin: Some(DESIGN_SPEED), ..Rotor37Options::default() };
+        let options = Rotor37Options { spin: Some(DESIGN_SPEED), ..Rotor37Options::paper() };
         reduce_rotor37(&options, &silent).unwrap()
     })
 }
@@ -178,7 +178,7 @@ fn contact_nodes_yield_under_spin_as_in_the_full_model() {
 #[test]
 fn coriolis_couples_the_modes_as_in_the_full_model() {
     let mesh = MeshCounts { chord: 8, thickness: 1, span: 10 };
-    let options = Rotor37Options { mesh, modes: 80, spin: Some(DESIGN_SPEED), ..Rotor37Options::default() };
+    let options = Rotor37Options { mesh, modes: 80, spin: Some(DESIGN_SPEED), ..Rotor37Options::paper() };
     let (blade, rom) = (Blade::new(mesh), reduce_rotor37(&options, &silent).unwrap().rom);
     let spin = rom.extras.spin.as_ref().unwrap();
     let modes = full_modes(&blade.at(DESIGN_SPEED).stiffness, &blade.mass, false, 6, &silent).unwrap().modes;
@@ -228,7 +228,7 @@ fn the_checks_that_come_with_the_blade_hold() {
         assert!(check.frequency_deviation().iter().all(|deviation| deviation.abs() < 0.3));
         assert!(check.growth_deviation() < 0.5);
     }
-    let still = reduce_rotor37(&Rotor37Options::default(), &silent).unwrap();
+    let still = reduce_rotor37(&Rotor37Options::paper(), &silent).unwrap();
     let mut stripped = reduction.rom.clone();
     stripped.extras.spin = None;
     // Linear theory: the resting stiffness under Ω²c grows like a linear static step, 388.6 µm at the leading edge
@@ -246,7 +246,7 @@ fn the_spin_arrays_have_the_same_bits_on_any_number_of_threads() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let mesh = MeshCounts { chord: 8, thickness: 1, span: 10 };
-        let options = Rotor37Options { mesh, spin: Some(DESIGN_SPEED), ..Rotor37Options::default() };
+        let options = Rotor37Options { mesh, spin: Some(DESIGN_SPEED), ..Rotor37Options::paper() };
         pool.install(|| reduce_rotor37(&options, &silent)).unwrap().rom
     };
     let alone = on(1);
@@ -265,14 +265,8 @@ fn other_reductions_hold_as_well() {
         (Tip::Patches(5), FreeInterface, 20),
         (Tip::Nodes(3), FreeInterface, 20),
     ] {
-        let options = Rotor37Options {
-            tip,
-            kind,
-            modes,
-            checked_modes: 6,
-            spin: Some(DESIGN_SPEED),
-            ..Rotor37Options::default()
-        };
+        let options =
+            Rotor37Options { tip, kind, modes, checked_modes: 6, spin: Some(DESIGN_SPEED), ..Rotor37Options::paper() };
         for check in reduce_rotor37(&options, &silent).unwrap().spin_checks {
             let (frequencies, growth) = (check.frequency_deviation(), check.growth_deviation());
             println!("{tip:?}, {kind:?}, {modes} modes, {} rad/s: {frequencies:.3?} %, {growth:.3} %", check.speed);

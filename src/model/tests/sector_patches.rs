@@ -113,7 +113,10 @@ fn free_interface_modes_of_sectors_are_those_of_the_full_model() {
         }
         // Modes and convergence table agree: a row with fewer modes has the first of them.
         let row = &found.convergence[6];
-        assert!(row.frequency_deviation.iter().all(|deviation| deviation.abs() < 1e-6 || clamped.is_empty()), "{row:?}");
+        assert!(
+            row.frequency_deviation.iter().all(|deviation| deviation.abs() < 1e-6 || clamped.is_empty()),
+            "{row:?}"
+        );
     }
 }
 
@@ -179,7 +182,8 @@ fn forced_responses_of_a_patch_converge_faster_with_free_interface_modes() {
 #[test]
 fn five_patches_of_the_stage() {
     for kind in KINDS {
-        let options = StageOptions { tip: Tip::Patches(5), kind, modes: ModeSelection::Families(6), ..StageOptions::coarse() };
+        let options =
+            StageOptions { tip: Tip::Patches(5), kind, modes: ModeSelection::Families(6), ..StageOptions::coarse() };
         let stage = stage_model(&options, &silent).unwrap();
         let names: Vec<&str> = stage.contact.iter().map(|point| point.name.as_str()).collect();
         assert_eq!(names, ["leading_edge", "tip_2", "mid_chord", "tip_4", "trailing_edge"]);

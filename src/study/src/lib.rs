@@ -9,6 +9,7 @@ pub mod convergence;
 pub mod error;
 pub mod error_study;
 pub mod machine;
+pub mod estimate;
 pub mod map;
 pub mod output;
 pub mod stability;

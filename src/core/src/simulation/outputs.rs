@@ -235,8 +235,7 @@ impl View<'_> {
 
     /// Displacement of a watched point of a sector along an axis of its frame (m).
     pub fn watched_displacement(&self, body: usize, sector: usize, point: usize, axis: usize) -> f64 {
-        let (modes, shapes) = (self.modes(body), self.simulation.compiled.bodies[body].watched.row(3 * point + axis));
-        shapes.iter().enumerate().map(|(mode, shape)| shape * modes.modal_state(mode, sector).0).sum()
+        self.simulation.watched_row(body, 3 * point + axis, sector)
     }
 
     /// |(2/N) Σ_b u_b e^(−i n θ_b)| (1/N for n = 0 and n = N/2) of the radial displacement of the middle node.
@@ -259,6 +258,20 @@ impl View<'_> {
 }
 
 impl Simulation {
+    /// Displacements of the points that ROMs have beside their contact nodes (m): structure by structure, point by point, axis by
+    /// axis, sector by sector. They belong to the internal point reached.
+    pub fn watched_displacements(&self) -> Vec<f64> {
+        let bodies = self.compiled.bodies.iter().enumerate();
+        let rows = bodies.flat_map(|(body, parts)| (0..parts.watched.nrows()).map(move |row| (body, row)));
+        let sectors = |body: usize| self.system.structures()[body].modes().sectors();
+        rows.flat_map(|(body, row)| (0..sectors(body)).map(move |sector| self.watched_row(body, row, sector))).collect()
+    }
+
+    fn watched_row(&self, body: usize, row: usize, sector: usize) -> f64 {
+        let (modes, shapes) = (self.system.structures()[body].modes(), self.compiled.bodies[body].watched.row(row));
+        shapes.iter().enumerate().map(|(mode, shape)| shape * modes.modal_state(mode, sector).0).sum()
+    }
+
     pub(super) fn derivative_of(&self, variable: &Variable, element: usize, reference: u32) -> f64 {
         let (now, before) = (self.values[reference as usize], self.previous[reference as usize]);
         let length = self.communication.length;

@@ -145,7 +145,10 @@ impl Component {
         turn.get_mut(contact.., contact..).copy_from(&own);
         mass = hermitian((turn.adjoint() * mass * &turn).as_ref());
         stiffness.get_mut(contact.., contact..).fill(c64::new(0.0, 0.0));
-        squares.iter().enumerate().for_each(|(k, &square)| stiffness[(contact + k, contact + k)] = c64::new(square, 0.0));
+        squares
+            .iter()
+            .enumerate()
+            .for_each(|(k, &square)| stiffness[(contact + k, contact + k)] = c64::new(square, 0.0));
         Ok(Kept { mass, stiffness, squares })
     }
 

@@ -68,7 +68,8 @@ pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
         })
         .collect();
     let nodes: Vec<usize> = nodes.into_iter().collect();
-    let [radius, axial] = [|[x, y, _]: [f64; 3]| x.hypot(y), |[_, _, z]: [f64; 3]| z].map(|of| extent(mesh, &nodes, of));
+    let [radius, axial] =
+        [|[x, y, _]: [f64; 3]| x.hypot(y), |[_, _, z]: [f64; 3]| z].map(|of| extent(mesh, &nodes, of));
     if let Some(node) = nodes.iter().find(|node| fixed.binary_search(node).is_ok()) {
         let problem = format!(
             "the outermost faces, {} of them up to a radius of {} m, reach node {} (of the mesh, from 1), which is clamped or on a face to \
@@ -79,7 +80,8 @@ pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
         );
         return Err(not_found(problem, "This is no tip of a blade: check clamped nodes and axis"));
     }
-    let elsewhere = faces.iter().enumerate().filter(|(index, face)| !chosen[*index] && as_far_out(face, &faces, &chosen));
+    let elsewhere =
+        faces.iter().enumerate().filter(|(index, face)| !chosen[*index] && as_far_out(face, &faces, &chosen));
     let elsewhere = elsewhere.count();
     let chord = Places::new(&mesh.nodes, &nodes).chord_length();
     Ok(FoundTip { faces: own.count(), nodes, chord, radius, axial, elsewhere })

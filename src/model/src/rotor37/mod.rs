@@ -18,8 +18,8 @@ mod blade_mesh;
 mod section;
 mod sections;
 
-pub(crate) use blade_mesh::{place_name, spread_contact};
 pub use blade_mesh::{BladeMesh, MeshCounts, blade_mesh};
+pub(crate) use blade_mesh::{place_name, spread_contact};
 pub use section::{Section, SurfacePoint};
 
 use tiprub_core::rom::Frame;
@@ -80,7 +80,21 @@ pub struct Rotor37Options {
 }
 
 impl Default for Rotor37Options {
+    /// What refinement of patches, modes and mesh leaves alone as far as the chapter on trust says.
     fn default() -> Self {
+        Self {
+            mesh: MeshCounts { chord: 24, thickness: 2, span: 40 },
+            tip: Tip::Patches(5),
+            kind: ReductionKind::FreeInterface,
+            modes: 80,
+            ..Self::paper()
+        }
+    }
+}
+
+impl Rotor37Options {
+    /// The paper's kind of model: Craig and Bampton's modes, three contact nodes.
+    pub fn paper() -> Self {
         Self {
             mesh: MeshCounts::default(),
             tip: Tip::Nodes(3),

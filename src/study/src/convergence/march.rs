@@ -13,9 +13,10 @@ use crate::error::{
 /// What a run leaves behind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marched {
-    /// Displacements of all contact nodes and sectors, without flight, sample by sample: node by node, axis by axis, sector by sector (m).
+    /// Displacements of all watched points, or contact nodes without flight where there are none, of all sectors, sample by sample: node
+    /// by node, axis by axis, sector by sector (m).
     pub displacements: Vec<Vec<f64>>,
-    /// Positions of the contact nodes, as the ROM has them.
+    /// Positions of these, as the ROM has them.
     pub nodes: Vec<[f64; 3]>,
     /// Normal impulse over the window (N·s).
     pub impulse: f64,
@@ -77,10 +78,12 @@ impl Marched {
 pub fn march(scene: &Scene, settings: &[(String, String)], division: u32, samples: usize) -> Result<Marched, String> {
     let interval = scene.settings.experiment.communication_step;
     let mut run = SceneRun::with_start_values(scene, interval, division, settings)?;
-    let master = crate::master(scene);
+    let rom = &scene.roms[crate::master(scene)];
+    // Patches of another number are elsewhere; what is watched stays.
+    let points = rom.extras.watched.as_ref().map_or(&rom.contact_nodes, |watched| &watched.points);
     let mut found = Marched {
         displacements: Vec::with_capacity(samples),
-        nodes: scene.roms[master].contact_nodes.iter().map(|node| node.position).collect(),
+        nodes: points.iter().map(|point| point.position).collect(),
         impulse: 0.0,
         friction_work: 0.0,
         peak_force: 0.0,
@@ -90,7 +93,10 @@ pub fn march(scene: &Scene, settings: &[(String, String)], division: u32, sample
     for _ in 0..samples {
         seen.next();
         run.watch(&mut seen)?;
-        found.displacements.push(run.displacements());
+        found.displacements.push(match rom.extras.watched {
+            Some(_) => run.watched_displacements(),
+            None => run.displacements(),
+        });
         found.impulse += seen.impulse;
         found.peak_force = found.peak_force.max(seen.impulse / interval);
         found.strain_energy += run.strain_energy() / samples as f64;

@@ -3,6 +3,7 @@
 //! [`refine`] finds the directions and the scenes at every level, `nodes` which of a refined model's nodes touch, [`truncate`] takes modes away from any ROM, [`mod@march`] runs and
 //! compares, [`page`] draws and tells.
 
+pub mod coarsen;
 pub mod march;
 mod nodes;
 pub mod page;
@@ -81,14 +82,23 @@ pub fn study(arguments: &ConvergenceArguments, source: Option<&dyn Source>, cons
 const SHORTER: [u32; 3] = [2, 4, 8];
 
 /// How levels are run.
-struct Runner<'a> {
+pub(crate) struct Runner<'a> {
     settings: &'a [(String, String)],
     samples: usize,
     threads: usize,
     console: &'a Console,
 }
 
-impl Runner<'_> {
+impl<'a> Runner<'a> {
+    pub(crate) fn new(settings: &'a [(String, String)], samples: usize, console: &'a Console) -> Self {
+        Self { settings, samples, threads: sweep::processors(), console }
+    }
+
+    /// Run a direction with the steps that it says.
+    pub(crate) fn as_it_is(&self, direction: Direction) -> Result<Refined> {
+        Ok(Refined { runs: self.runs(&direction)?, direction })
+    }
+
     /// Run a direction. A ROM with more modes or nodes may ask for a shorter step than the scene's: then all of its levels take one.
     fn refined(&self, mut direction: Direction) -> Result<Refined> {
         let runs = self.runs(&direction)?;
@@ -119,7 +129,7 @@ impl Runner<'_> {
 
 /// Internal steps per communication step.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-fn divisions(interval: f64, step: f64) -> u32 {
+pub(crate) fn divisions(interval: f64, step: f64) -> u32 {
     (interval / step * (1.0 - 1e-9)).ceil().clamp(1.0, 1e8) as u32
 }
 

@@ -67,10 +67,9 @@ mod tests {
     struct Again;
 
     impl Source for Again {
-        fn reduce(&self, modes: usize, contact_nodes: usize, _: &Console) -> Result<Rom> {
+        fn reduce(&self, modes: usize, tip: Tip, _: &Console) -> Result<Rom> {
             let mesh = MeshCounts { chord: 4, thickness: 1, span: 4 };
-            let tip = Tip::Nodes(contact_nodes);
-            let options = Rotor37Options { mesh, tip, modes, ..Rotor37Options::default() };
+            let options = Rotor37Options { mesh, tip, modes, ..Rotor37Options::paper() };
             Ok(reduce_rotor37(&options, &|_| {}).unwrap().rom)
         }
     }
@@ -78,7 +77,7 @@ mod tests {
     /// Modes and contact nodes of a blade with nodes of these names, and a pair for each beginning.
     fn refined(names: [&str; 3], pairs: &[&str]) -> [Direction; 2] {
         let console = Console::new(true, false);
-        let mut rom = Again.reduce(4, 3, &console).unwrap();
+        let mut rom = Again.reduce(4, Tip::Nodes(3), &console).unwrap();
         rom.contact_nodes.iter_mut().zip(names).for_each(|(node, name)| node.name = name.into());
         let mut scene = scene_source::rotor37_scene_with(rom).unwrap();
         let contact = scene.settings.contacts.remove(0);

@@ -1,7 +1,9 @@
 //! In which directions a scene can be refined, and the scenes at every level of each.
 
 use tiprub_core::{Rom, Scene, dynamics::modal::ModalModel, rom::Frame};
+use tiprub_format::builtin_model;
 use tiprub_gallery::{builtin, scene_source::BUILTIN};
+use tiprub_model::rotor37::Tip;
 use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
@@ -24,11 +26,11 @@ const SAME: f64 = 1e-6;
 
 /// Where the ROM of the master comes from, if it can be reduced again.
 pub trait Source {
-    /// The ROM with `modes` fixed-interface modes and this number of contact nodes, reduced again.
+    /// The ROM with `modes` modes beside the responses to contact and this tip, reduced again.
     ///
     /// # Errors
     /// Whatever the reduction refuses.
-    fn reduce(&self, modes: usize, contact_nodes: usize, console: &Console) -> Result<Rom>;
+    fn reduce(&self, modes: usize, tip: Tip, console: &Console) -> Result<Rom>;
 }
 
 /// One setting of a direction.
@@ -145,9 +147,15 @@ impl Refiner<'_> {
         (rom.order().saturating_sub(rom.contact_map.nrows()), rom.contact_nodes.len())
     }
 
+    /// So many nodes, or patches where the master has such.
+    fn tip(&self, count: usize) -> Tip {
+        let nodes = &self.scene.roms[master(self.scene)].contact_nodes;
+        if nodes.iter().all(|node| node.area > 0.0) { Tip::Patches(count) } else { Tip::Nodes(count) }
+    }
+
     /// From the source, with the damping of the scene's ROM: a command line may propose another.
     fn reduced(&self, source: &dyn Source, modes: usize, nodes: usize) -> Result<Rom> {
-        let rom = source.reduce(modes, nodes, self.console)?;
+        let rom = source.reduce(modes, self.tip(nodes), self.console)?;
         Ok(Rom { damping_ratio: self.scene.roms[master(self.scene)].damping_ratio, ..rom })
     }
 
@@ -263,8 +271,8 @@ impl Refiner<'_> {
         let again = match self.source.filter(|_| master) {
             Some(source) => self.reduced(source, count(factor * own as f64) as usize, nodes),
             None => {
-                let name = self.scene.settings.structures[index].rom.strip_prefix(BUILTIN)?;
-                builtin::refined(name, factor, nodes, self.console)?
+                let name = builtin_model(&self.scene.settings, &self.scene.settings.structures[index])?;
+                builtin::refined(&name, factor, self.tip(nodes), self.console)?
             }
         };
         Some(again.map(|again| named_as(&self.scene.roms[index], again)))
@@ -283,7 +291,7 @@ impl Refiner<'_> {
             missing: String::new(),
             shorter: None,
         };
-        let builtin = structure.rom.strip_prefix(BUILTIN).filter(|name| builtin::has_chord(name));
+        let builtin = builtin_model(&self.scene.settings, structure).filter(|name| builtin::has_chord(name));
         if self.source.is_none() && builtin.is_none() {
             direction.missing =
                 if self.scene.roms[index].frame == Frame::Cartesian || structure.rom.starts_with(BUILTIN) {
@@ -301,17 +309,22 @@ impl Refiner<'_> {
             }
         };
         let (modes, own) = self.own_counts();
-        let mut counts = vec![2, own, 2 * own - 1];
+        let patches = matches!(self.tip(own), Tip::Patches(_));
+        if patches {
+            (direction.title, direction.unit) = (format!("contact patches of {}", structure.name), "patches");
+        }
+        let fewer = if patches { own.div_ceil(2) } else { 2 };
+        let mut counts = vec![fewer, own, 2 * own - 1];
         if !self.quick {
             counts.push(4 * own - 3);
         }
         counts.sort_unstable();
         counts.dedup();
         for nodes in counts {
-            let rom = match (self.source, builtin) {
+            let rom = match (self.source, &builtin) {
                 _ if nodes == own => Ok(self.scene.roms[index].clone()),
                 (Some(source), _) => self.reduced(source, modes, nodes),
-                (None, name) => builtin::refined(name.unwrap_or_default(), 1.0, nodes, self.console)
+                (None, name) => builtin::refined(&name.clone().unwrap_or_default(), 1.0, self.tip(nodes), self.console)
                     .unwrap_or_else(|| Err(Failure::new(&structure.rom, "no such model", ""))),
             };
             match rom {

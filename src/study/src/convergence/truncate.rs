@@ -4,7 +4,7 @@
 use nalgebra::{ComplexField, DMatrix};
 use tiprub_core::{
     Rom,
-    rom::{Harmonic, RomChecks, Spin, Thermal},
+    rom::{Basis, Harmonic, RomChecks, Spin, Thermal},
 };
 
 /// How a ROM is truncated.
@@ -12,20 +12,26 @@ use tiprub_core::{
 pub enum Form {
     /// Modes with the contact nodes held, beside the displacements of these.
     Held,
-    /// Natural modes.
+    /// Natural modes, beside the responses at rest to contact forces.
+    Free,
+    /// Natural modes alone.
     Natural,
 }
 
 impl Form {
     /// Of a ROM.
     pub fn of(rom: &Rom) -> Self {
-        if rom.contact_map.nrows() < rom.order() { Self::Held } else { Self::Natural }
+        match rom.extras.basis {
+            _ if rom.contact_map.nrows() >= rom.order() => Self::Natural,
+            Basis::FixedInterface => Self::Held,
+            Basis::FreeInterface => Self::Free,
+        }
     }
 
     /// Modes that a ROM has in this form; of coupled sectors those of nodal diameter 0.
     pub fn modes(self, rom: &Rom) -> usize {
         match self {
-            Self::Held => rom.order() - rom.contact_map.nrows(),
+            Self::Held | Self::Free => rom.order() - rom.contact_map.nrows(),
             Self::Natural => rom.order(),
         }
     }
@@ -54,6 +60,9 @@ pub fn truncated(rom: &Rom, modes: usize) -> Result<Rom, String> {
         .thermal
         .as_ref()
         .map(|thermal| Thermal { loads: basis.transpose() * &thermal.loads, patches: thermal.patches.clone() });
+    if let Some(watched) = &mut found.extras.watched {
+        watched.map = &watched.map * &basis;
+    }
     let harmonics = rom.extras.harmonics.iter().map(|harmonic| of_harmonic(form, harmonic, less));
     found.extras.harmonics = harmonics.collect::<Result<_, _>>()?;
     found.validate().map_err(|error| error.to_string())?;
@@ -100,6 +109,9 @@ fn basis<T: ComplexField<RealField = f64>>(
         let kept = order.checked_sub(less).filter(|kept| *kept > 0).ok_or("no mode would be left")?;
         return modes(&DMatrix::identity(order, order), mass, stiffness, kept);
     }
+    if form == Form::Free {
+        return free_basis([mass, stiffness, map], less);
+    }
     // Displacements of the contact nodes by the shortest coordinates, and what moves none of them.
     let gram = (map * map.adjoint()).try_inverse().ok_or("two of its contact displacements are one")?;
     let inverse = map.adjoint() * gram;
@@ -115,6 +127,25 @@ fn basis<T: ComplexField<RealField = f64>>(
     let mut basis = DMatrix::zeros(order, statics.ncols() + kept);
     basis.columns_mut(0, statics.ncols()).copy_from(&statics);
     basis.columns_mut(statics.ncols(), kept).copy_from(&modes);
+    Ok(basis)
+}
+
+/// Natural modes but the `less` highest of those that are beside the responses at rest, and these.
+fn free_basis<T: ComplexField<RealField = f64>>(
+    [mass, stiffness, map]: [&DMatrix<T>; 3],
+    less: usize,
+) -> Result<DMatrix<T>, String> {
+    let (order, rows) = (mass.nrows(), map.nrows());
+    let kept = order.checked_sub(rows + less).ok_or("no mode would be left at one of the nodal diameters")?;
+    let flexibility = stiffness.clone().try_inverse().ok_or("it moves as a rigid body, and has no response at rest")?;
+    let mut basis = DMatrix::zeros(order, rows + kept);
+    // Of the size of modes, so that neither drowns the other.
+    let responses = flexibility * map.adjoint();
+    let energies = congruent(stiffness, &responses).diagonal().map(|entry| entry.real().sqrt());
+    for (column, energy) in energies.iter().enumerate() {
+        basis.column_mut(column).copy_from(&responses.column(column).map(|entry| entry.unscale(*energy)));
+    }
+    basis.columns_mut(rows, kept).copy_from(&modes(&DMatrix::identity(order, order), mass, stiffness, kept)?);
     Ok(basis)
 }
 
@@ -153,7 +184,7 @@ mod tests {
             tip: Tip::Nodes(2),
             modes,
             spin: Some(1000.0),
-            ..Rotor37Options::default()
+            ..Rotor37Options::paper()
         };
         let [fine, coarse] = [8, 4].map(|modes| reduce_rotor37(&options(modes), &|_| {}).unwrap().rom);
         let found = truncated(&fine, 4).unwrap();
@@ -190,7 +221,7 @@ mod tests {
             mesh: MeshCounts { chord: 4, thickness: 1, span: 6 },
             tip: Tip::Nodes(2),
             modes: 8,
-            ..Rotor37Options::default()
+            ..Rotor37Options::paper()
         };
         let mut rom = reduce_rotor37(&options, &|_| {}).unwrap().rom;
         let frequencies = ModalModel::from_rom(&rom, 0.01).unwrap().frequencies;

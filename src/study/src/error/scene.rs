@@ -135,6 +135,11 @@ impl SceneRun {
         self.simulation.system().structures().iter().filter(|structure| structure.nodes() > 0)
     }
 
+    /// Displacements of watched points (m).
+    pub fn watched_displacements(&self) -> Vec<f64> {
+        self.simulation.watched_displacements()
+    }
+
     /// Time reached (s).
     pub fn time(&self) -> f64 {
         self.start + f64::from(self.samples) * self.interval

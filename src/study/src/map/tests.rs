@@ -36,7 +36,7 @@ fn run(scene: Scene, request: &Request, threads: usize) -> Study {
 
 /// One blade of rotor 37, damped enough for the free vibration to die out soon, without friction.
 fn blade37() -> Scene {
-    let (options, console) = (tiprub_model::Rotor37Options::default(), Console::new(true, false));
+    let (options, console) = (tiprub_model::Rotor37Options::paper(), Console::new(true, false));
     let mut rom = tiprub_gallery::reduction::rotor37(&options, &console).unwrap().rom;
     rom.sectors = 1;
     let mut scene = scene_source::rotor37_scene_with(rom).unwrap();

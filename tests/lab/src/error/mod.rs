@@ -76,7 +76,7 @@ mod tests {
 
     fn rotor() -> Scene {
         let mesh = MeshCounts { chord: 4, thickness: 1, span: 4 };
-        let options = Rotor37Options { mesh, modes: 4, ..Rotor37Options::default() };
+        let options = Rotor37Options { mesh, modes: 4, ..Rotor37Options::paper() };
         let mut scene = scene_source::rotor37_scene_with(reduce_rotor37(&options, &|_| {}).unwrap().rom).unwrap();
         scene.settings.surfaces[0].ramp_time = 2e-4;
         scene

@@ -89,7 +89,7 @@ pub(crate) fn rotor(rub: Rub, quick: bool, cache: &RomCache, console: &Console) 
 }
 
 fn blade(modes: usize, quick: bool, cache: &RomCache, console: &Console) -> Result<Rom> {
-    let defaults = Rotor37Options::default();
+    let defaults = Rotor37Options::paper();
     let mesh = if quick { MeshCounts { chord: 4, thickness: 1, span: 4 } } else { defaults.mesh };
     let options = Rotor37Options { modes, mesh, ..defaults };
     let name = if quick { "rotor37-study-coarse" } else { "rotor37-study" };
