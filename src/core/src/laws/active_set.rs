@@ -22,8 +22,6 @@ use crate::dynamics::dispatch::InstructionSet;
 
 /// Pivots below this fraction of their node's own diagonal belong to redundant contacts (coincident nodes).
 const REDUNDANT_PIVOT: f64 = 1e-12;
-/// Share of the largest gap from which on softened contacts that are left with it are not closed.
-const PINCHED: f64 = 1e-6;
 /// Gaps and multipliers within this fraction of their scale count as zero.
 const ZERO_FRACTION: f64 = 1e-13;
 /// Block exchanges allowed without progress before Murty's rule takes over.
@@ -254,11 +252,9 @@ impl ContactSolver {
         (0..self.size).filter(left_out).any(|node| self.corrected[node] < -ZERO_FRACTION * gap_scale)
     }
 
-    /// Remove rounding from a solution: λ ≥ 0 exactly, gap ≥ 0 exactly. False, and nothing done, where forces only look like
-    /// one: contacts that no motion opens at once, held apart by their softness.
+    /// Remove rounding from a solution: λ ≥ 0 exactly, gap ≥ 0 exactly. False, and nothing done, where it is none.
     fn settle(&mut self, gap_scale: f64) -> bool {
-        let left = |node: usize| self.yielding.left_soft(node, self.multipliers[node]);
-        if (0..self.size).any(|node| left(node) > PINCHED * gap_scale) {
+        if self.yielding.is_pinched(self.size, gap_scale, |node| self.multipliers[node]) {
             return false;
         }
         for node in 0..self.size {
