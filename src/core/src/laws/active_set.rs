@@ -31,6 +31,8 @@ const PATIENCE: usize = 8;
 const ENUMERABLE: usize = 14;
 /// Factorisations allowed to larger ones before contacts are driven one by one; block exchanges need about ten.
 const BLOCK_LIMIT: usize = 50;
+/// Factorisations allowed to approaching a solution, as a multiple of those for driving.
+const APPROACH: usize = 4;
 /// Largest problem with an unreduced limit of factorisations for driving.
 const FULL_PATIENCE: usize = 256;
 
@@ -201,11 +203,11 @@ impl ContactSolver {
 
     /// Solve from the predicted gaps, whatever the rank of W. Not solved where no motion opens all contacts.
     fn approach(&mut self, gap_scale: f64) -> Outcome {
-        let (size, mut factorisations) = (self.size, 0);
+        let (size, limit, mut factorisations) = (self.size, APPROACH * drive_limit(self.size), 0);
         self.yielding.keep(&self.delassus, &self.gaps[..size], gap_scale);
         for _ in 0..ROUNDS {
             self.yielding.pose(&mut self.delassus, &mut self.gaps[..size]);
-            let driven = self.drive_all(gap_scale, drive_limit(size));
+            let driven = self.drive_all(gap_scale, limit.saturating_sub(factorisations).min(drive_limit(size)));
             factorisations += driven.factorisations;
             if self.yielding.advance(driven.solved, gap_scale, size, |node| self.multipliers[node]) {
                 for node in (0..size).filter(|node| !self.active[*node]) {
