@@ -22,8 +22,6 @@ use crate::dynamics::dispatch::InstructionSet;
 
 /// Pivots below this fraction of their node's own diagonal belong to redundant contacts (coincident nodes).
 const REDUNDANT_PIVOT: f64 = 1e-12;
-/// Share of the largest gap from which on softened contacts that are left with it are not closed.
-const PINCHED: f64 = 1e-6;
 /// Gaps and multipliers within this fraction of their scale count as zero.
 const ZERO_FRACTION: f64 = 1e-13;
 /// Block exchanges allowed without progress before Murty's rule takes over.
@@ -33,6 +31,8 @@ const PATIENCE: usize = 8;
 const ENUMERABLE: usize = 14;
 /// Factorisations allowed to larger ones before contacts are driven one by one; block exchanges need about ten.
 const BLOCK_LIMIT: usize = 50;
+/// Factorisations allowed to approaching a solution, as a multiple of those for driving.
+const APPROACH: usize = 4;
 /// Largest problem with an unreduced limit of factorisations for driving.
 const FULL_PATIENCE: usize = 256;
 
@@ -203,11 +203,11 @@ impl ContactSolver {
 
     /// Solve from the predicted gaps, whatever the rank of W. Not solved where no motion opens all contacts.
     fn approach(&mut self, gap_scale: f64) -> Outcome {
-        let (size, mut factorisations) = (self.size, 0);
+        let (size, limit, mut factorisations) = (self.size, APPROACH * drive_limit(self.size), 0);
         self.yielding.keep(&self.delassus, &self.gaps[..size], gap_scale);
         for _ in 0..ROUNDS {
             self.yielding.pose(&mut self.delassus, &mut self.gaps[..size]);
-            let driven = self.drive_all(gap_scale, drive_limit(size));
+            let driven = self.drive_all(gap_scale, limit.saturating_sub(factorisations).min(drive_limit(size)));
             factorisations += driven.factorisations;
             if self.yielding.advance(driven.solved, gap_scale, size, |node| self.multipliers[node]) {
                 for node in (0..size).filter(|node| !self.active[*node]) {
@@ -254,11 +254,9 @@ impl ContactSolver {
         (0..self.size).filter(left_out).any(|node| self.corrected[node] < -ZERO_FRACTION * gap_scale)
     }
 
-    /// Remove rounding from a solution: λ ≥ 0 exactly, gap ≥ 0 exactly. False, and nothing done, where forces only look like
-    /// one: contacts that no motion opens at once, held apart by their softness.
+    /// Remove rounding from a solution: λ ≥ 0 exactly, gap ≥ 0 exactly. False, and nothing done, where it is none.
     fn settle(&mut self, gap_scale: f64) -> bool {
-        let left = |node: usize| self.yielding.left_soft(node, self.multipliers[node]);
-        if (0..self.size).any(|node| left(node) > PINCHED * gap_scale) {
+        if self.yielding.is_pinched(self.size, gap_scale, |node| self.multipliers[node]) {
             return false;
         }
         for node in 0..self.size {

@@ -27,7 +27,9 @@ pub const ROUNDS: usize = 60;
 const LEFT: f64 = 1e-10;
 /// Share of its flexibility by which a contact is softened once where redundant contacts ask for different gaps: the deepest of
 /// them then carries the force, and the gap it is left with is this share of the predicted penetration.
-pub const SOFTENING: f64 = 1e-10;
+const SOFTENING: f64 = 1e-10;
+/// Share of the largest gap from which on softened contacts that are left with it are not closed.
+const PINCHED: f64 = 1e-6;
 /// Golden ratio: multiples of it, without their whole part, are spread evenly.
 const GOLDEN: f64 = 1.618_033_988_749_895;
 
@@ -72,9 +74,9 @@ impl Yielding {
         }
     }
 
-    /// Gap (m) that a softened contact is left with under its force.
-    pub fn left_soft(&self, contact: usize, force: f64) -> f64 {
-        if self.softened { SOFTENING * self.own[contact] * force } else { 0.0 }
+    /// Forces only look like a solution: contacts that no motion opens at once, held apart by their softness alone.
+    pub fn is_pinched(&self, size: usize, scale: f64, force: impl Fn(usize) -> f64) -> bool {
+        self.softened && (0..size).any(|contact| SOFTENING * self.own[contact] * force(contact) > PINCHED * scale)
     }
 
     /// The problem to be approached; the first forces to yield around are different for every contact, lest two reach their ends

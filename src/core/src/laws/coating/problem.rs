@@ -156,11 +156,12 @@ impl CoatedProblem {
     /// From the predicted gaps, whatever the rank of W ([`crate::laws::proximal`]).
     fn approach(&mut self) -> bool {
         let size = self.size;
-        let scale = self.gaps[..size].iter().fold(self.thickness, |most: f64, gap| most.max(gap.abs()));
-        self.yielding.keep(&self.delassus, &self.gaps[..size], scale);
+        self.coating[..size].fill(0.0);
+        self.yielding.keep(&self.delassus, &self.gaps[..size], self.scale());
         for _ in 0..ROUNDS {
             self.yielding.pose(&mut self.delassus, &mut self.gaps[..size]);
             let solved = self.exchange_blocks() || self.follow_path();
+            let scale = self.scale();
             if self.yielding.advance(solved, scale, size, |node| self.coating[node] + self.hard[node]) {
                 return true;
             }
@@ -173,8 +174,7 @@ impl CoatedProblem {
         while patience > 0 && self.solve_branches() {
             let count = self.violated();
             if count == 0 {
-                self.settle();
-                return true;
+                return self.settle();
             }
             (best, patience) = if count < best { (count, PATIENCE) } else { (best, patience - 1) };
             self.exchange_all();
@@ -200,8 +200,7 @@ impl CoatedProblem {
                 return false;
             }
             let Some((share, change)) = self.first_end() else {
-                self.settle();
-                return true;
+                return self.settle();
             };
             for node in 0..self.size {
                 let [gap, hard] = &mut self.reached;
@@ -299,13 +298,23 @@ impl CoatedProblem {
         }
     }
 
-    /// Remove rounding from the accepted solution.
-    fn settle(&mut self) {
+    /// Remove rounding from a solution. False, and nothing done, where it is none.
+    fn settle(&mut self) -> bool {
+        if self.yielding.is_pinched(self.size, self.scale(), |node| self.hard[node]) {
+            return false;
+        }
         for node in 0..self.size {
             self.coating[node] = self.coating[node].max(0.0);
             self.hard[node] = self.hard[node].max(0.0);
             self.gaps[node] = self.corrected[node].max(-self.thickness);
             self.closed[node] = self.hard[node] > 0.0;
         }
+        true
+    }
+
+    /// Largest gap, the thickness, or the most that the coating moves a node (m): rods may be stiff beside the blade.
+    fn scale(&self) -> f64 {
+        let of = |node: usize| self.gaps[node].abs().max(self.delassus[(node, node)] * self.coating[node].abs());
+        (0..self.size).map(of).fold(self.thickness, f64::max)
     }
 }

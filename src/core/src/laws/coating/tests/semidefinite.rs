@@ -75,3 +75,17 @@ fn without_friction_what_can_be_solved_on_a_coating_is() {
     }
     assert!(failures.is_empty(), "{} of 4800:\n{}", failures.len(), failures[..failures.len().min(20)].join("\n"));
 }
+
+/// One mode takes either node out of the hard casing as far as it takes the other in.
+#[test]
+fn nodes_that_nothing_takes_off_the_hard_casing_at_once_are_not_solved() {
+    for monotone in [false, true] {
+        let coating = coating(&material(1.0, 0.05, 0.1, 4, 2), 2);
+        let mut problem = coating.problem(1);
+        coating.locate(&mut problem, &[0.1; 2]);
+        problem.monotone = monotone;
+        problem.delassus.copy_from_slice(&[1.0, -1.0, -1.0, 1.0]);
+        problem.gaps.copy_from_slice(&[-3.0 * THICKNESS, -2.0 * THICKNESS]);
+        assert!(!problem.solve().solved, "{:?}", problem.hard);
+    }
+}
