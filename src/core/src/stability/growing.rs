@@ -1,5 +1,7 @@
 //! Growth of contact that is closed and slides: of the equations, and of the scheme.
 
+use nalgebra::Complex;
+
 use super::ContactDirections;
 use super::held::Held;
 use crate::dynamics::modal::ModalModel;
@@ -59,7 +61,7 @@ pub fn continuous(
 ) -> Option<f64> {
     let held = || Held::continuous(model, scheme, step, friction, directions);
     let eigenvalues = is_looked_at(model, friction).then(held)?.eigenvalues()?;
-    Some(eigenvalues.iter().fold(f64::NEG_INFINITY, |largest, value| largest.max(value.re)) / step)
+    Some(rate(&eigenvalues) / step)
 }
 
 /// [`growth`] where that of the differential equations is known, `continuous` (1/s).
@@ -73,9 +75,19 @@ pub fn stepped(
 ) -> Option<Growth> {
     let held = || Held::stepped(model, scheme, step, friction, directions);
     let eigenvalues = is_looked_at(model, friction).then(held)?.eigenvalues()?;
+    Some(Growth { continuous, stepped: stepped_rate(&eigenvalues) / step, noise: GROWTH_NOISE / step })
+}
+
+/// Growth of motions e^st.
+fn rate(eigenvalues: &[Complex<f64>]) -> f64 {
+    eigenvalues.iter().fold(f64::NEG_INFINITY, |largest, s| largest.max(s.re))
+}
+
+/// The same of motions (1 + s)^t.
+fn stepped_rate(eigenvalues: &[Complex<f64>]) -> f64 {
     // |1 + s|² − 1.
     let gain = eigenvalues.iter().fold(-1.0, |largest: f64, s| largest.max(2.0 * s.re + s.norm_sqr()));
-    Some(Growth { continuous, stepped: 0.5 * libm::log1p(gain) / step, noise: GROWTH_NOISE / step })
+    0.5 * libm::log1p(gain)
 }
 
 fn is_looked_at(model: &ModalModel, friction: f64) -> bool {
@@ -94,6 +106,123 @@ pub fn growth_steps(frequency: f64, largest: f64) -> impl Iterator<Item = f64> {
 mod tests {
     use super::*;
     use crate::stability::tests::{model, radial};
+    use crate::stability::{delassus, directional_modes, secular};
+    use nalgebra::{DMatrix, DVector};
+    use tiprub_test_models::Random;
+
+    /// A structure of at least two modes more than `contacts`, with what makes eigenvalues hard to find: equal and rigid modes,
+    /// modes that contact does not see or hardly, damping of all sizes.
+    fn anything(random: &mut Random, contacts: usize) -> ModalModel {
+        let modes = 3 * contacts + 2 + random.below(20) + if random.unit() < 0.05 { 40 } else { 0 };
+        let mut frequencies: Vec<f64> = (0..modes).map(|_| random.scale(1e3, 1e6)).collect();
+        frequencies.sort_by(f64::total_cmp);
+        if random.unit() < 0.2 {
+            frequencies[1] = frequencies[0];
+        }
+        if random.unit() < 0.1 {
+            frequencies[0] = 0.0;
+        }
+        let mut contact_modes = random.matrix(3 * contacts, modes);
+        if random.unit() < 0.3 {
+            let size = random.of(&[0.0, 1e-12, 1e-6]);
+            contact_modes.column_mut(random.below(modes)).scale_mut(size);
+        }
+        let damping = random.of(&[0.0, 1e-6, 1e-3, 0.05, 0.9]);
+        let shapes = DMatrix::identity(modes, modes);
+        ModalModel {
+            frequencies,
+            damping_ratios: vec![damping; modes],
+            contact_modes,
+            shapes,
+            quasi_static: 3 * contacts,
+        }
+    }
+
+    /// Zeros of the small determinant against eigenvalues of the dense matrix: growth, and what is concluded from it.
+    #[test]
+    fn growth_found_by_zeros_is_that_of_the_dense_matrix() {
+        let mut random = Random(37);
+        let (mut tried, mut proven, mut verdicts) = (0.0, 0.0, [0; 4]);
+        for _ in 0..1200 {
+            let contacts = 1 + random.below(3);
+            let model = anything(&mut random, contacts);
+            let scheme = random.of(&Scheme::ALL);
+            if scheme == Scheme::MasslessBoundary && model.frequencies[0] == 0.0 {
+                continue;
+            }
+            let friction = random.scale(0.01, 3.0);
+            let step = random.scale(0.05, 1.9) / model.largest_frequency();
+            let directions: ContactDirections =
+                (0..contacts).map(|_| ([-1.0, 0.0, 0.0], [0.0, random.of(&[1.0, -1.0]), 0.0])).collect();
+            let held = [
+                Held::continuous(&model, scheme, step, friction, &directions),
+                Held::stepped(&model, scheme, step, friction, &directions),
+            ];
+            tried += 1.0;
+            let [Some(continuous), Some(stepped)] = held.each_ref().map(secular::eigenvalues) else { continue };
+            proven += 1.0;
+            let [Some(own), Some(own_stepped)] = held.each_ref().map(Held::dense_eigenvalues) else { continue };
+            let noise = GROWTH_NOISE;
+            let found = Growth { continuous: rate(&continuous), stepped: stepped_rate(&stepped), noise };
+            let dense = Growth { continuous: rate(&own), stepped: stepped_rate(&own_stepped), noise };
+            let near = |a: f64, b: f64| (a - b).abs() < 0.1 * GROWTH_NOISE + 1e-7 * b.abs();
+            assert!(
+                near(found.continuous, dense.continuous) && near(found.stepped, dense.stepped),
+                "{found:?} for {dense:?}: {scheme:?}, µ = {friction}, h = {step:e}, {model:?}"
+            );
+            assert_eq!((found.is_added(), found.is_flutter()), (dense.is_added(), dense.is_flutter()));
+            verdicts[2 * usize::from(found.is_added()) + usize::from(found.is_flutter())] += 1;
+        }
+        println!("{proven} of {tried} proven; stable, flutter, added growth, both: {verdicts:?}");
+        assert!(proven > 0.9 * tried, "{proven} of {tried}");
+        assert!(verdicts[..3].iter().all(|count| *count > 10), "{verdicts:?}");
+    }
+
+    /// Growth per step of the recurrence itself with the contacts closed, over the second half of 4000 steps.
+    fn stepped_through(model: &ModalModel, scheme: Scheme, step: f64, directions: &ContactDirections) -> f64 {
+        let dynamic = model.dynamic_modes(scheme);
+        let coefficients = model.coefficients(scheme, step);
+        let (normals, forces) = directional_modes(model, FRICTION, directions);
+        let inverse = delassus(model, scheme, step, FRICTION, directions).try_inverse().unwrap();
+        let (mut now, mut increment) = (DVector::from_element(dynamic, 1.0), DVector::zeros(dynamic));
+        let (mut contact, mut growth) = (DVector::zeros(directions.len()), 0.0);
+        for index in 0..4000 {
+            let late = forces.columns(0, dynamic).transpose() * &contact;
+            let mut next = DVector::from_fn(dynamic, |mode, _| {
+                let own = &coefficients[mode];
+                now[mode] * (1.0 - own.kappa) + own.beta * increment[mode] + own.delayed * late[mode]
+            });
+            contact = &inverse * (normals.columns(0, dynamic) * &next) * -1.0;
+            let pushed = forces.columns(0, dynamic).transpose() * &contact;
+            next += DVector::from_fn(dynamic, |mode, _| coefficients[mode].compliance * pushed[mode]);
+            increment = &next - &now;
+            let size = next.norm() + increment.norm();
+            growth += if index < 2000 { 0.0 } else { libm::log(size) / 2000.0 };
+            [&mut now, &mut increment, &mut contact].into_iter().for_each(|vector| *vector /= size);
+            now = next / size;
+        }
+        growth
+    }
+
+    const FRICTION: f64 = 2.0;
+
+    #[test]
+    fn the_recurrence_grows_as_found() {
+        let mut random = Random(8);
+        for scheme in Scheme::ALL {
+            let mut compared = 0;
+            while compared < 8 {
+                let model = anything(&mut random, 1);
+                let step = random.scale(0.3, 1.9) / model.largest_frequency();
+                let Some(found) = growth(&model, scheme, step, FRICTION, &radial()) else { continue };
+                if model.frequencies[0] > 0.0 && found.stepped * step > 0.05 {
+                    let rate = stepped_through(&model, scheme, step, &radial());
+                    assert!((rate - found.stepped * step).abs() < 2e-3, "{scheme:?}: {rate}, {found:?}, {step:e}");
+                    compared += 1;
+                }
+            }
+        }
+    }
 
     #[test]
     fn frictionless_contact_adds_no_growth_and_damped_contact_decays() {

@@ -6,8 +6,8 @@
 //! where a dense eigenvalue problem costs N³ many times over.
 //!
 //! What was found is then proven: the discs about all zeros z_i with the radii N |P(z_i)|/|P_N Π (z_i − z_j)| hold all zeros of
-//! P (B. T. Smith, Journal of the ACM 17, 1970). Rounding of E counts as part of |P|. Where a disc is too large, or a pole is
-//! real, nothing is returned.
+//! P (B. T. Smith, Journal of the ACM 17, 1970). Rounding of E counts as part of |P|. Where a disc is too large nothing is
+//! returned.
 
 use super::held::Held;
 use nalgebra::Complex;
@@ -16,8 +16,9 @@ type Number = Complex<f64>;
 
 /// Largest radius of a disc that holds an eigenvalue, of an accepted result; far below what growth per step is told from rounding.
 const RADIUS: f64 = 1e-9;
-/// Sweeps until the zeros stand still.
+/// Sweeps until the zeros stand still, and after which a pair that does not is taken for real.
 const SWEEPS: usize = 60;
+const REAL_AFTER: usize = 15;
 /// A zero that moves by less is found: the iteration is of third order.
 const STILL: f64 = 1e-11;
 /// Modes of which contact sees less than this share of the largest are apart from it.
@@ -25,8 +26,7 @@ const UNSEEN: f64 = 1e-18;
 /// A leading coefficient that cancels to less than this share of its terms is not trusted.
 const CANCELLED: f64 = 1e-6;
 
-/// Eigenvalues with a positive imaginary part (of each pair one); `None` where they are not proven, or there are more than
-/// three contacts.
+/// Eigenvalues, of complex pairs one; `None` where they are not proven, or there are more than three contacts.
 pub fn eigenvalues(held: &Held) -> Option<Vec<Number>> {
     match held.contacts() {
         1 => Secular::<1>::new(held)?.eigenvalues(),
@@ -46,9 +46,23 @@ fn size(number: Number) -> f64 {
     number.norm_sqr().sqrt()
 }
 
-/// 1/(s − z) + 1/(s − z̄), and 1/((s − z)(s − z̄)).
-fn of_pair(s: Number, z: Number) -> (Number, Number) {
-    let (down, up) = (s - z, s - z.conj());
+/// Two zeros, complex conjugates or both real.
+type Pair = [Number; 2];
+
+/// Zeros of s² + a s + b.
+fn roots(a: f64, b: f64) -> Pair {
+    let square = b - 0.25 * a * a;
+    if square > 0.0 {
+        let root = Complex::new(-0.5 * a, square.sqrt());
+        return [root, root.conj()];
+    }
+    let far = -(0.5 * a + (-square).sqrt());
+    [far, if far == 0.0 { 0.0 } else { b / far }].map(|real| Complex::new(real, 0.0))
+}
+
+/// 1/(s − y) + 1/(s − z), and 1/((s − y)(s − z)).
+fn of_pair(s: Number, [y, z]: Pair) -> (Number, Number) {
+    let (down, up) = (s - y, s - z);
     let both = inverse(down * up);
     ((down + up) * both, both)
 }
@@ -74,9 +88,9 @@ fn permanent<const K: usize>(matrix: &[[f64; K]; K]) -> f64 {
 
 /// The contact problem of K contacts.
 struct Secular<const K: usize> {
-    /// Upper poles of the modes that contact sees, with c φ_n φ_fᵀ.
-    modes: Vec<(Number, [[f64; K]; K])>,
-    /// Upper poles of the others, which are eigenvalues.
+    /// Poles of the modes that contact sees, with c φ_n φ_fᵀ.
+    modes: Vec<(Pair, [[f64; K]; K])>,
+    /// Poles of the others, which are eigenvalues.
     apart: Vec<Number>,
     residual: [[f64; K]; K],
     /// γ.
@@ -92,24 +106,19 @@ impl<const K: usize> Secular<K> {
         let mut modes = Vec::with_capacity(held.modes.len());
         let mut largest = 0.0_f64;
         for (mode, [damping, stiffness, weight]) in held.modes.iter().enumerate() {
-            let square = stiffness - 0.25 * damping * damping;
-            let pole = Complex::new(-0.5 * damping, libm::sqrt(square));
-            if !(square > 0.0) {
-                return None;
-            }
             let entry = |i: usize, j: usize| weight * held.normals[(i, mode)] * held.forces[(j, mode)];
             let seen: [[f64; K]; K] = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
             largest = seen.iter().flatten().fold(largest, |most, value| most.max(value.abs()));
-            modes.push((pole, seen));
+            modes.push((roots(*damping, *stiffness), seen));
         }
         let is_seen =
-            |(_, seen): &(Number, [[f64; K]; K])| seen.iter().flatten().any(|value| value.abs() > UNSEEN * largest);
+            |(_, seen): &(Pair, [[f64; K]; K])| seen.iter().flatten().any(|value| value.abs() > UNSEEN * largest);
         let (mut modes, apart): (Vec<_>, Vec<_>) = modes.into_iter().partition(is_seen);
-        modes.sort_by(|a, b| a.0.norm_sqr().total_cmp(&b.0.norm_sqr()));
+        modes.sort_by(|a, b| a.0[0].norm_sqr().total_cmp(&b.0[0].norm_sqr()));
         let residual =
             std::array::from_fn(|i| std::array::from_fn(|j| held.residual.as_ref().map_or(0.0, |r| r[(i, j)])));
         let pairs = if held.residual.is_some() { modes.len() } else { modes.len().checked_sub(K)? };
-        let apart = apart.into_iter().map(|(pole, _)| pole).collect();
+        let apart = apart.into_iter().flat_map(|(poles, _)| poles).collect();
         let mut problem = Self { modes, apart, residual, late: held.late, lead: 0.0, pairs };
         let (leading, sizes) = if held.residual.is_some() { (residual, residual) } else { problem.summed() };
         let lead = determinant(&leading.map(|row| row.map(|value| Complex::new(value, 0.0)))).re;
@@ -129,26 +138,30 @@ impl<const K: usize> Secular<K> {
     fn eigenvalues(mut self) -> Option<Vec<Number>> {
         let mut zeros = self.guesses();
         self.refine(&mut zeros);
-        let proven = (0..zeros.len()).all(|index| self.radius(&zeros, index) <= RADIUS);
-        self.apart.append(&mut zeros);
-        proven.then_some(self.apart)
+        let members = (0..zeros.len()).flat_map(|index| [(index, 0), (index, 1)]);
+        for (index, member) in members.filter(|(index, member)| *member == 0 || zeros[*index][1].im == 0.0) {
+            let proven = self.radius(&zeros, index, member) <= RADIUS;
+            self.apart.push(proven.then_some(zeros[index][member])?);
+        }
+        Some(self.apart)
     }
 
     /// Between the poles, that of zero i so many apart as contacts take modes away; none alike.
-    fn guesses(&self) -> Vec<Number> {
+    fn guesses(&self) -> Vec<Pair> {
         let last = self.modes.len().saturating_sub(1);
         let beyond = self.modes.len().saturating_sub(self.pairs).max(1);
         let guess = |index: usize| {
-            let (low, high) = (self.modes[index].0, self.modes[(index + beyond).min(last)].0);
+            let (low, high) = (self.modes[index].0[0], self.modes[(index + beyond).min(last)].0[0]);
             let middle = if index == last { low * 1.2 } else { (low + high) * 0.5 };
             let (sine, cosine) = libm::sincos(f64::from(u32::try_from(index).unwrap_or(u32::MAX)));
-            middle + Complex::new(sine, cosine) * (1e-3 * size(high - low).max(1e-3 * size(middle)))
+            let zero = middle + Complex::new(sine, cosine) * (1e-3 * size(high - low).max(1e-3 * size(middle)));
+            [zero, zero.conj()]
         };
         (0..self.pairs).map(guess).collect()
     }
 
-    /// P'/P.
-    fn slope(&self, s: Number) -> Number {
+    /// 1/(P'/P − `others`), the step of Newton's iteration away from the other zeros.
+    fn step(&self, s: Number, others: Number) -> Number {
         let zero = Complex::new(0.0, 0.0);
         let (mut value, mut rate) = ([[zero; K]; K], [[zero; K]; K]);
         let mut poles = zero;
@@ -176,26 +189,30 @@ impl<const K: usize> Secular<K> {
             replaced[row] = rate[row];
             turned += determinant(&replaced);
         }
-        turned * inverse(determinant(&value)) + poles
+        let found = determinant(&value);
+        found * inverse(turned + found * (poles - others))
     }
 
     /// Ehrlich's and Aberth's iteration.
-    fn refine(&self, zeros: &mut [Number]) {
+    fn refine(&self, zeros: &mut [Pair]) {
         let mut moving = vec![true; zeros.len()];
-        for _ in 0..SWEEPS {
-            for index in 0..zeros.len() {
-                if !moving[index] {
+        for sweep in 0..SWEEPS {
+            for index in (0..zeros.len()).filter(|index| moving[*index]).collect::<Vec<_>>() {
+                let first = self.correction(zeros, index, 0);
+                let moved = zeros[index][0] - first;
+                if zeros[index][0].im == 0.0 {
+                    zeros[index][0] = moved;
+                    let second = self.correction(zeros, index, 1);
+                    zeros[index][1] -= second;
+                    moving[index] = size(first) > STILL || size(second) > STILL;
                     continue;
                 }
-                let zero = zeros[index];
-                let mut slope = self.slope(zero) - inverse(zero - zero.conj());
-                for (_, other) in zeros.iter().enumerate().filter(|(other, _)| *other != index) {
-                    slope -= of_pair(zero, *other).0;
+                moving[index] = size(first) > STILL;
+                let up = Complex::new(moved.re, moved.im.abs());
+                zeros[index] = [up, up.conj()];
+                if moving[index] && sweep > REAL_AFTER && up.im < 2.0 * up.re.abs() {
+                    zeros[index] = [up.re + up.im, up.re - up.im].map(|real| Complex::new(real, 0.0));
                 }
-                let step = inverse(slope);
-                let moved = zero - step;
-                zeros[index] = Complex::new(moved.re, moved.im.abs());
-                moving[index] = step.norm_sqr() > STILL * STILL;
             }
             if !moving.contains(&true) {
                 break;
@@ -203,9 +220,20 @@ impl<const K: usize> Secular<K> {
         }
     }
 
+    /// What is to be subtracted from a member of a pair; something small where it lies on a pole or on another zero.
+    fn correction(&self, zeros: &[Pair], index: usize, member: usize) -> Number {
+        let [zero, partner] = [zeros[index][member], zeros[index][1 - member]];
+        let mut others = inverse(zero - partner);
+        for (_, other) in zeros.iter().enumerate().filter(|(other, _)| *other != index) {
+            others += of_pair(zero, *other).0;
+        }
+        let step = self.step(zero, others);
+        if step.re.is_finite() && step.im.is_finite() { step } else { zero * 1e-6 }
+    }
+
     /// Radius of the disc about a zero; not a number where there is none.
-    fn radius(&self, zeros: &[Number], index: usize) -> f64 {
-        let s = zeros[index];
+    fn radius(&self, zeros: &[Pair], index: usize, member: usize) -> f64 {
+        let s = zeros[index][member];
         let (mut value, mut sizes) = ([[Complex::new(0.0, 0.0); K]; K], [[0.0; K]; K]);
         let mut ratio = 1.0;
         for (mode, (pole, seen)) in self.modes.iter().enumerate() {
@@ -219,7 +247,7 @@ impl<const K: usize> Secular<K> {
             }
             ratio /= both.norm_sqr();
             match zeros.get(mode) {
-                Some(_) if mode == index => ratio /= (s - s.conj()).norm_sqr(),
+                Some(_) if mode == index => ratio /= (s - zeros[index][1 - member]).norm_sqr(),
                 Some(other) => ratio *= of_pair(s, *other).1.norm_sqr(),
                 None => {}
             }
@@ -233,6 +261,7 @@ impl<const K: usize> Secular<K> {
         #[expect(clippy::cast_precision_loss, reason = "mode counts are far below 2^52")]
         let (count, terms) = (2.0 * zeros.len() as f64, (K * (self.modes.len() + 20)) as f64);
         let rounding = terms * f64::EPSILON * permanent(&sizes);
-        count * (size(determinant(&value)) + rounding) * ratio.sqrt() / self.lead.abs()
+        let scale = if ratio.is_normal() { ratio.sqrt() / self.lead.abs() } else { f64::NAN };
+        count * (size(determinant(&value)) + rounding) * scale
     }
 }
