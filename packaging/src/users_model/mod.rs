@@ -79,9 +79,7 @@ pub fn sector(asked: &SectorArguments, console: &Console) -> Result<Reduced> {
     let source = asked.source();
     let imported = import(&source, console)?;
     let choose = |imported: &Imported| choose::tips(imported, source.model, &asked.tips, Some(asked));
-    told(&source, imported, choose, |model, chosen, clamped| {
-        cyclic((&source, asked), model, chosen, clamped, console)
-    })
+    told(&source, imported, choose, |model, chosen, clamped| cyclic((&source, asked), model, chosen, clamped, console))
 }
 
 /// A casing whose contact nodes form a grid.
@@ -118,6 +116,7 @@ fn told(
     let chosen = choose(&imported)?;
     let read = describe::describe(&imported, source.model, &chosen);
     warnings.extend(judge::radius_warning(&imported, &chosen));
+    warnings.extend(judge::contact_warnings(&chosen));
     let mut model = imported.model;
     let clamped = (!chosen.clamped.is_empty()).then_some(CLAMPED);
     if let Some((mesh, _)) = model.mesh.as_mut().filter(|_| clamped.is_some()) {

@@ -17,7 +17,13 @@ use tiprub_model::reduce::{ReductionKind, full_modes};
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 
 fn options(modes: ModeSelection, checked_modes: usize) -> CyclicOptions {
-    CyclicOptions { name: "disk".into(), kind: ReductionKind::FixedInterface, modes, checked_modes, damping_ratio: 0.005 }
+    CyclicOptions {
+        name: "disk".into(),
+        kind: ReductionKind::FixedInterface,
+        modes,
+        checked_modes,
+        damping_ratio: 0.005,
+    }
 }
 
 fn reduced(mesh: &Mesh, sectors: usize, contact: usize, options: &CyclicOptions) -> CyclicReduction {

@@ -107,8 +107,13 @@ fn no_tolerance_pairs_the_faces_of_another_number_of_sectors() {
 fn contact_on_a_face_and_loose_structures_are_refused() {
     let mesh = coarse();
     let (faces, bore) = (boundary(&mesh, SECTORS), mesh.set("BORE").unwrap().to_vec());
-    let options =
-        CyclicOptions { name: "w".into(), kind: ReductionKind::FixedInterface, modes: ModeSelection::Count(2), checked_modes: 2, damping_ratio: 0.0 };
+    let options = CyclicOptions {
+        name: "w".into(),
+        kind: ReductionKind::FixedInterface,
+        modes: ModeSelection::Count(2),
+        checked_modes: 2,
+        damping_ratio: 0.0,
+    };
     let refusal = |clamped: &[usize], contact: &[ContactPoint]| {
         reduce_cyclic(&model(mesh.clone()), clamped, contact, &faces, &options, &silent).unwrap_err().to_string()
     };
@@ -136,8 +141,13 @@ fn contact_on_a_face_and_loose_structures_are_refused() {
 fn clamping_one_face_node_clamps_its_partner() {
     let mesh = coarse();
     let (faces, bore) = (boundary(&mesh, SECTORS), mesh.set("BORE").unwrap().to_vec());
-    let options =
-        CyclicOptions { name: "w".into(), kind: ReductionKind::FixedInterface, modes: ModeSelection::Count(2), checked_modes: 2, damping_ratio: 0.0 };
+    let options = CyclicOptions {
+        name: "w".into(),
+        kind: ReductionKind::FixedInterface,
+        modes: ModeSelection::Count(2),
+        checked_modes: 2,
+        damping_ratio: 0.0,
+    };
     let high = mesh.set("HIGH").unwrap();
     let one_side: Vec<usize> = bore.iter().copied().filter(|node| !high.contains(node)).collect();
     assert!(one_side.len() < bore.len());
@@ -169,8 +179,13 @@ fn the_disk_is_closed() {
 #[test]
 fn two_sectors_held_at_two_points_can_turn_about_the_line_through_them() {
     let mesh = sector(ElementKind::Hex8, 2, Counts { around: 5, ..COARSE });
-    let options =
-        CyclicOptions { name: "w".into(), kind: ReductionKind::FixedInterface, modes: ModeSelection::Count(2), checked_modes: 0, damping_ratio: 0.0 };
+    let options = CyclicOptions {
+        name: "w".into(),
+        kind: ReductionKind::FixedInterface,
+        modes: ModeSelection::Count(2),
+        checked_modes: 0,
+        damping_ratio: 0.0,
+    };
     let faces = boundary(&mesh, 2);
     let inner =
         *mesh.set("BORE").unwrap().iter().find(|node| !faces.pairs.iter().flatten().any(|n| n == *node)).unwrap();

@@ -14,7 +14,13 @@ use tiprub_model::progress::{Progress, silent};
 use tiprub_model::reduce::{ContactPoint, ReductionKind, ReductionOptions, reduce};
 
 fn options(modes: ModeSelection, checked_modes: usize) -> CyclicOptions {
-    CyclicOptions { name: "disk".into(), kind: ReductionKind::FixedInterface, modes, checked_modes, damping_ratio: 0.005 }
+    CyclicOptions {
+        name: "disk".into(),
+        kind: ReductionKind::FixedInterface,
+        modes,
+        checked_modes,
+        damping_ratio: 0.005,
+    }
 }
 
 fn reduced(mesh: &Mesh, sectors: usize, clamped: bool, options: &CyclicOptions) -> CyclicReduction {

@@ -1,8 +1,12 @@
 //! Patches and free-interface modes of coupled sectors: exact statics, exact frequencies, forced responses that converge.
 
 mod common;
+#[path = "../../../tests/guide.rs"]
+mod guide;
 
 use core::f64::consts::TAU;
+
+use guide::told;
 
 use common::disk::{COARSE, Counts, boundary, copies, model, pencils, sector};
 use faer::Mat;
@@ -113,7 +117,10 @@ fn free_interface_modes_of_sectors_are_those_of_the_full_model() {
         }
         // Modes and convergence table agree: a row with fewer modes has the first of them.
         let row = &found.convergence[6];
-        assert!(row.frequency_deviation.iter().all(|deviation| deviation.abs() < 1e-6 || clamped.is_empty()), "{row:?}");
+        assert!(
+            row.frequency_deviation.iter().all(|deviation| deviation.abs() < 1e-6 || clamped.is_empty()),
+            "{row:?}"
+        );
     }
 }
 
@@ -169,17 +176,19 @@ fn forced_responses_of_a_patch_converge_faster_with_free_interface_modes() {
         let mut last = f64::INFINITY;
         for modes in [4, 8, 12, 16] {
             let [fixed, free] = KINDS.map(|kind| error(kind, modes));
-            println!("{} nodes clamped, {modes} modes: {fixed:.2e} {free:.2e}", clamped.len());
+            told!("| {} | {modes} | {fixed} | {free} |", if clamped.is_empty() { "none" } else { "bore" });
             assert!(free < 0.3 * fixed && free < 0.3 * last, "{modes}: {fixed:.2e} {free:.2e}");
             last = free;
         }
     }
+    guide::hold("cargo test -p tiprub-model --test sector_patches");
 }
 
 #[test]
 fn five_patches_of_the_stage() {
     for kind in KINDS {
-        let options = StageOptions { tip: Tip::Patches(5), kind, modes: ModeSelection::Families(6), ..StageOptions::coarse() };
+        let options =
+            StageOptions { tip: Tip::Patches(5), kind, modes: ModeSelection::Families(6), ..StageOptions::coarse() };
         let stage = stage_model(&options, &silent).unwrap();
         let names: Vec<&str> = stage.contact.iter().map(|point| point.name.as_str()).collect();
         assert_eq!(names, ["leading_edge", "tip_2", "mid_chord", "tip_4", "trailing_edge"]);

@@ -5,8 +5,8 @@
 
 use tiprub_model::cyclic::{CyclicOptions, CyclicReduction, ModeSelection, reduce_cyclic};
 use tiprub_model::progress::silent;
-use tiprub_model::sparse::SparseMatrix;
 use tiprub_model::reduce::ReductionKind;
+use tiprub_model::sparse::SparseMatrix;
 use tiprub_model::stage::{SectorOptions, StageOptions, stage_model};
 use tiprub_model::{Material, Mesh};
 
@@ -67,8 +67,13 @@ fn largest(reduction: &CyclicReduction, reference: &[(usize, usize, f64)]) -> f6
 /// Largest deviations as the model is, and with CalculiX's rule for the mass (%).
 fn compared(sector: SectorOptions, reference: &[(usize, usize, f64)]) -> [f64; 2] {
     let mut stage = stage_model(&StageOptions { sector, ..StageOptions::default() }, &silent).unwrap();
-    let options =
-        CyclicOptions { name: "stage".into(), kind: ReductionKind::FixedInterface, modes: ModeSelection::Count(1), checked_modes: 10, damping_ratio: 0.0 };
+    let options = CyclicOptions {
+        name: "stage".into(),
+        kind: ReductionKind::FixedInterface,
+        modes: ModeSelection::Count(1),
+        checked_modes: 10,
+        damping_ratio: 0.0,
+    };
     let mut deviation = |mass: Option<SparseMatrix>| {
         stage.model.mass = mass.unwrap_or_else(|| stage.model.mass.clone());
         let reduction =

@@ -96,7 +96,7 @@ impl Component {
     /// Those of [`free_interface`]; [`Error::NotPositiveDefinite`] when the reduced mass is not.
     pub(super) fn free_interface(at_rest: &Operator<'_>, full: &Operator<'_>, found: &ComplexModes) -> Result<Self> {
         let constraint = at_rest.constraint_modes();
-        let inner = free_interface(at_rest, full, &constraint, found)?;
+        let inner = free_interface(at_rest, full, &constraint.1, found)?;
         Self::new((at_rest, full), constraint, inner, ReductionKind::FreeInterface)
     }
 
@@ -145,7 +145,10 @@ impl Component {
         turn.get_mut(contact.., contact..).copy_from(&own);
         mass = hermitian((turn.adjoint() * mass * &turn).as_ref());
         stiffness.get_mut(contact.., contact..).fill(c64::new(0.0, 0.0));
-        squares.iter().enumerate().for_each(|(k, &square)| stiffness[(contact + k, contact + k)] = c64::new(square, 0.0));
+        squares
+            .iter()
+            .enumerate()
+            .for_each(|(k, &square)| stiffness[(contact + k, contact + k)] = c64::new(square, 0.0));
         Ok(Kept { mass, stiffness, squares })
     }
 

@@ -18,8 +18,8 @@ mod blade_mesh;
 mod section;
 mod sections;
 
-pub(crate) use blade_mesh::{place_name, spread_contact};
 pub use blade_mesh::{BladeMesh, MeshCounts, blade_mesh};
+pub(crate) use blade_mesh::{place_name, spread_contact};
 pub use section::{Section, SurfacePoint};
 
 use tiprub_core::rom::Frame;
