@@ -263,6 +263,12 @@ mod tests {
             (format!("reduce sector {own} --sectors 9 --cyclic-low A --cyclic-high B"), true),
             (format!("reduce sector {own} --sectors 9 --cyclic-low A --cyclic-high B --spin 900"), false),
             (format!("reduce sector {own} --cyclic-low A --cyclic-high B"), false),
+            (
+                format!(
+                    "reduce sector {own} --sectors 9 --cyclic-low A --cyclic-high B --contact-patches 5 --kind free-interface"
+                ),
+                true,
+            ),
             (format!("reduce casing-mesh {own} --contact-grid 24x3 --patches 4x1 --expansion 1e-5"), true),
             (format!("reduce casing-mesh {own}"), false),
             (format!("reduce casing-mesh {own} --contact-grid 24x3 --sectors 9"), false),
@@ -275,6 +281,10 @@ mod tests {
             ("reduce rotor37 --coarse".into(), false),
             ("reduce stage --coarse --modes 9".into(), true),
             ("reduce stage --mesh 3x3x3".into(), false),
+            ("reduce cube --contact-patches 3x2 --kind free-interface --modes 40".into(), true),
+            ("reduce cube --kind free-interface".into(), false),
+            ("reduce stage --coarse --contact-patches 5 --kind craig-bampton".into(), true),
+            ("reduce stage --contact-patches 5 --contact-nodes 3".into(), false),
             ("reduce stage-casing --coarse --contact-grid 14x3".into(), true),
             ("reduce stage-casing --thickness 0.003".into(), false),
             ("reduce cube --static-responses 3".into(), false),

@@ -7,6 +7,7 @@ use tiprub_shell::{Result, console::Console};
 use crate::{
     reduce_arguments::{CubeArguments, MassChoice, RingArguments},
     reduced::Reduced,
+    shared_arguments::KindChoice,
 };
 
 /// Set of the clamped nodes of a ring, for exported files.
@@ -17,7 +18,13 @@ const CLAMPED: &str = "CLAMPED";
 /// # Errors
 /// Whatever the reduction refuses.
 pub fn cube(arguments: &CubeArguments, console: &Console) -> Result<Reduced> {
-    let options = CubeOptions { modes: arguments.modes, mass: mass(arguments.mass_matrix), ..CubeOptions::default() };
+    let options = CubeOptions {
+        patches: arguments.contact_patches,
+        kind: KindChoice::kind(arguments.kind, arguments.contact_patches.is_some()),
+        modes: arguments.modes,
+        mass: mass(arguments.mass_matrix),
+        ..CubeOptions::default()
+    };
     Ok(Reduced::general(reduction::cube(&options, console)?, None))
 }
 

@@ -41,7 +41,7 @@ pub struct BladeOptions {
     /// Also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s); from a mesh only.
     #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true, conflicts_with = "stiffness")]
     pub spin: Option<f64>,
-    /// Which modes are kept [default: craig-bampton; free-interface with --contact-patches].
+    /// Which modes are kept [default: craig-bampton; free-interface with patches].
     #[arg(long, value_enum)]
     pub kind: Option<KindChoice>,
     /// What is read.
@@ -103,7 +103,7 @@ pub struct SectorArguments {
     /// largest radius].
     #[arg(long, value_name = "M", value_parser = positive)]
     pub cyclic_tolerance: Option<f64>,
-    /// Which modes are kept, per nodal diameter [default: craig-bampton; free-interface with --contact-patches].
+    /// Which modes are kept, per nodal diameter [default: craig-bampton; free-interface with patches].
     #[arg(long, value_enum)]
     pub kind: Option<KindChoice>,
     /// Contact nodes.
@@ -158,10 +158,11 @@ pub struct CasingMeshArguments {
 /// Contact nodes of blades.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct TipOptions {
-    /// Number of contact nodes, chosen evenly along the chord out of the contact set.
+    /// Number of contact nodes, chosen evenly along the chord out of the contact set or the tip.
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
-    /// Number of patches along the chord that the faces within the contact set are divided into, instead of nodes.
+    /// Number of patches along the chord that the faces within the contact set or the tip are divided into, instead of nodes [default:
+    /// 5 without a contact set].
     #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
     pub contact_patches: Option<usize>,
     /// Names of the contact nodes or patches, by growing z [default: tip_1,tip_2,...].
@@ -172,8 +173,8 @@ pub struct TipOptions {
 /// What every model of one's own takes.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct ModelOptions {
-    /// Set of nodes that can touch: contact nodes are taken from it. Or their numbers in the file, such as 12,57,103: then all of
-    /// them.
+    /// Set of nodes that can touch: contact nodes or patches are taken from it. Or their numbers in the file, such as 12,57,103: then all of
+    /// them. Without it the tip of a mesh of blades is found: its outermost faces.
     #[arg(long, value_name = "SET")]
     pub contact_set: Option<String>,
     /// Set of nodes that are held, or their numbers in the file; may be repeated. `none`: the structure flies freely.

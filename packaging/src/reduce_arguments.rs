@@ -34,7 +34,7 @@ pub enum Model {
         after_help = "Examples:\n  tiprub reduce blade blade.inp --contact-set TIP --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
                             tiprub reduce blade blade.msh --contact-set TIP --clamp-set ROOT --material titanium --contact-nodes 5\n  \
                             tiprub reduce blade job.inp --stiffness job.sti --mass job.mas --contact-set TIP --clamp-set ROOT\n\n\
-                            Without --contact-set or --clamp-set the sets of the file are listed."
+                            Without --contact-set the tip is found in the mesh; without --clamp-set the sets of the file are listed."
     )]
     Blade(Box<BladeArguments>),
     /// A bladed disk of your own from a mesh or matrices of one sector: coupled sectors, nodal diameter by nodal diameter.
@@ -188,9 +188,15 @@ pub struct StageCasingArguments {
 /// Arguments of `tiprub reduce cube`.
 #[derive(Debug, Args)]
 pub struct CubeArguments {
-    /// Modes kept [default: all].
+    /// Modes kept, of free-interface ones beside the rigid-body motions [default: all].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
+    /// Contact patches along y and along z on either face, instead of its nodes.
+    #[arg(long, value_name = "YxZ", value_parser = pair)]
+    pub contact_patches: Option<[usize; 2]>,
+    /// Which modes are kept [default: craig-bampton; free-interface with patches].
+    #[arg(long, value_enum, requires = "modes")]
+    pub kind: Option<KindChoice>,
     /// Mass matrix of the finite elements [default: lumped].
     #[arg(long, value_enum)]
     pub mass_matrix: Option<MassChoice>,

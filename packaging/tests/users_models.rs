@@ -228,7 +228,6 @@ fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     assert!(run["last"]["friction_loss"].as_f64().unwrap() > 100.0, "{run:#}");
     for (line, told) in [
         ("reduce rotor37 --contact-patches 4 --contact-nodes 3", "cannot be used with"),
-        ("reduce rotor37 --mesh 6x1x6 --contact-patches 4 --kind craig-bampton", "holds contact nodes one by one"),
         ("reduce rotor37 --mesh 6x1x6 --contact-patches 40", "40 is outside 1..=16"),
         (
             "reduce blade blade.inp --contact-set TIP --clamp-set HUB --contact-patches 2 --contact-names a",
@@ -238,6 +237,76 @@ fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
         let code = if told.contains("cannot") || told.contains("names") { 2 } else { 1 };
         assert!(project.fail(line, code).contains(told), "{line}: {}", project.fail(line, code));
     }
+}
+
+/// The tip is found where no set names it: the nodes of the set TIP, of every kind of element; five patches, free-interface modes.
+#[test]
+fn the_tip_of_a_mesh_is_found_and_told() {
+    let files = ["blade_tet10.inp", "blade_hex20.inp", "blade_hex8.inp", "blade_penta15.inp"];
+    let project = Project::new(&files);
+    for file in files {
+        let line =
+            format!("reduce blade {file} --clamp-set ROOT --units mm-t-s --material titanium --modes 12 --force");
+        let found = project.succeed(&format!("{line} -o found.rom.safetensors"));
+        let tip = &found["model"]["tip"];
+        assert_eq!(tip["nodes"], found["model"]["sets"]["TIP"], "{file}: {tip}");
+        assert!((tip["chord"].as_f64().unwrap() - 0.0321).abs() < 5e-4, "{file}: {tip}");
+        let radii = [0, 1].map(|end| tip["radius"][end].as_f64().unwrap());
+        assert!((radii[0] - 0.2597).abs() < 4e-4 && (radii[1] - 0.2601).abs() < 4e-4, "{file}: {tip}");
+        let patches = found["model"]["contact_nodes"].as_array().unwrap();
+        assert!(
+            patches.len() == 5 && patches.iter().all(|patch| patch["patch_nodes"].as_u64() > Some(2)),
+            "{patches:?}"
+        );
+        assert!(found["rom"]["origin"].as_str().unwrap().contains("5 patches and 12 free-interface modes"));
+        project.succeed(&format!("{line} --contact-set TIP --contact-patches 5 -o named.rom.safetensors"));
+        assert!(project.rom("found.rom.safetensors") == project.rom("named.rom.safetensors"), "{file}");
+        let told = String::from_utf8(project.run(&format!("{line} -o text.rom.safetensors")).stdout).unwrap();
+        let wanted = ["tip found", "faces, ", "chord 0.032", "contact patches           5 from the tip that was found"];
+        assert!(wanted.iter().all(|part| told.contains(part)), "{told}");
+    }
+}
+
+/// Contact at points is warned of where the mesh could carry more, and at one place always.
+#[test]
+fn contact_at_points_of_a_fine_tip_is_warned_of() {
+    let project = Project::new(&["blade_hex20.inp", "bar.inp"]);
+    let warned = |line: &str| -> String {
+        let common = "--units mm-t-s --material titanium --modes 4 --clamp-set ROOT --force -o w.rom.safetensors";
+        project.succeed(&format!("reduce blade {line} {common}"))["warnings"].to_string()
+    };
+    for (line, wanted) in [
+        ("blade_hex20.inp --contact-set TIP", Some("contact at 3 nodes of a tip about")),
+        ("blade_hex20.inp --contact-set TIP --contact-nodes 1", Some("contact at a single node of a tip")),
+        ("blade_hex20.inp --contact-patches 1", Some("contact at the single patch `tip_1`")),
+        ("blade_hex20.inp --contact-nodes 7", None),
+        ("blade_hex20.inp --contact-patches 3 --kind craig-bampton", None),
+    ] {
+        let told = warned(line);
+        match wanted {
+            Some(part) => assert!(told.contains(part), "{line}: {told}"),
+            None => assert!(!told.contains("contact at"), "{line}: {told}"),
+        }
+    }
+}
+
+/// Of a sector the tip is found as well, and both kinds take patches; static flexibility at them is one.
+#[test]
+fn a_sector_has_patches_of_both_kinds() {
+    let project = Project::new(&["sector.msh"]);
+    let line = "reduce sector sector.msh --clamp-set BORE --sectors 12 --cyclic-low LOW --cyclic-high HIGH --units mm-t-s --material steel \
+                --modes 6";
+    let free = project.succeed(&format!("{line} -o free.rom.safetensors"));
+    let count = free["model"]["contact_nodes"].as_array().unwrap().len();
+    assert!(free["rom"]["origin"].as_str().unwrap().contains(&format!("forces on {count} patches and")), "{free:#}");
+    let held =
+        format!("{line} --contact-set TIP --contact-patches {count} --kind craig-bampton -o held.rom.safetensors");
+    project.succeed(&held);
+    let [free, held] = ["free.rom.safetensors", "held.rom.safetensors"].map(|name| {
+        let rom = project.rom(name);
+        &rom.contact_map * rom.stiffness.clone().try_inverse().unwrap() * rom.contact_map.transpose()
+    });
+    assert!((&free - &held).amax() < 1e-9 * free.amax(), "{:e}", (&free - &held).amax() / free.amax());
 }
 
 #[test]
@@ -270,7 +339,9 @@ fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
         (1, format!("reduce blade bar.inp {bar}"), &["bar.inp", "no material", "--material"]),
         (1, "reduce blade blade_hex8.inp --contact-set TIP --clamp-set ROOT --material steel".into(), &["6.0", "--units mm-t-s", "--units m"]),
         (1, format!("reduce blade bar.inp {bar} --young 210e3 --poisson 0.3 --density 7.85e-9"), &["Young's modulus", "SI units"]),
-        (2, "reduce blade bar.inp --material steel --units mm-t-s".into(), &["--contact-set", "TIP (8)", "ROOT (8)"]),
+        (2, "reduce blade bar.inp --material steel --units mm-t-s".into(), &["--clamp-set", "TIP (8)", "ROOT (8)"]),
+        (2, "reduce blade bar.inp --stiffness bar.sti --mass bar.mas --clamp-set ROOT --units mm-t-s".into(), &["--contact-set", "TIP (8)", "ROOT (8)"]),
+        (1, "reduce blade bar.inp --clamp-set TIP --material steel --units mm-t-s".into(), &["tip of the blade", "are clamped", "--contact-set"]),
         (2, "reduce blade bar.inp --material steel --units mm-t-s --contact-set TIP".into(), &["--clamp-set", "ROOT (8)", "none"]),
         (1, "reduce blade bar.inp --material steel --units mm-t-s --contact-set TIPS --clamp-set ROOT".into(), &["`TIPS`", "TIP (8)"]),
         (1, "reduce blade bar.inp --material steel --units mm-t-s --contact-set ROOT --clamp-set ROOT".into(), &["ROOT", "clamped"]),

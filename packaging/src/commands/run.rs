@@ -79,12 +79,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
 }
 
 /// What the run leaves, where asked for.
-fn estimated(
-    scene: &Scene,
-    arguments: &RunArguments,
-    schedule: &Schedule,
-    console: &Console,
-) -> Result<Vec<Estimate>> {
+fn estimated(scene: &Scene, arguments: &RunArguments, schedule: &Schedule, console: &Console) -> Result<Vec<Estimate>> {
     if !arguments.estimate {
         return Ok(Vec::new());
     }

@@ -4,7 +4,7 @@ use tiprub_model::{
     FeModel,
     casing::GridNodes,
     cyclic::{CyclicBoundary, PairingReport},
-    patches::contact_patches,
+    patches::{FoundTip, contact_patches, find_tip},
     read::{ContactChoice, Imported, choose_contact_nodes, set_counts},
     reduce::ContactPoint,
 };
@@ -26,7 +26,12 @@ pub struct Chosen {
     pub faces: Option<(CyclicBoundary, PairingReport)>,
     /// Contact nodes of a casing.
     pub grid: Option<GridNodes>,
+    /// The tip of blades as the mesh shows it, and whether contact was taken from it because no set was named.
+    pub tip: Option<(FoundTip, bool)>,
 }
+
+/// Patches where neither set nor numbers are given: more change little, fewer a lot.
+pub const PATCHES: usize = 5;
 
 /// For blades, or for a sector between its faces.
 ///
@@ -38,8 +43,6 @@ pub fn tips(
     tips: &TipOptions,
     sector: Option<&SectorArguments>,
 ) -> Result<Chosen> {
-    // What is missing on the command line is said before what is wrong in the sets.
-    named_set(imported, asked.contact_set.as_deref(), "--contact-set")?;
     let clamped = clamped_nodes(imported, &asked.clamp_set)?;
     let faces = sector.map(|sector| pair_faces(imported, sector)).transpose()?;
     let mut fixed = clamped.clone();
@@ -47,20 +50,34 @@ pub fn tips(
         fixed.extend(boundary.pairs.iter().flatten());
         fixed.sort_unstable();
     }
-    let (free, by_number) = free_contact_nodes(imported, asked, &fixed)?;
-    if let Some(count) = tips.contact_patches {
-        return Ok(Chosen {
-            clamped,
-            contact: patches(imported, &free, count, &tips.contact_names)?,
-            faces,
-            grid: None,
-        });
+    let mesh = imported.model.mesh.as_ref().map(|(mesh, _)| mesh);
+    let found = mesh.map(|mesh| find_tip(mesh, &fixed).map_err(failure)).transpose();
+    let (free, by_number, tip) = if asked.contact_set.is_some() {
+        let (free, by_number) = free_contact_nodes(imported, asked, &fixed)?;
+        (free, by_number, found.ok().flatten().map(|tip| (tip, false)))
+    } else {
+        let tip = found?.ok_or_else(|| missing(imported, "--contact-set"))?;
+        (tip.nodes.clone(), false, Some((tip, true)))
+    };
+    let automatic = asked.contact_set.is_none() && tips.contact_nodes.is_none();
+    let patch_count = tips.contact_patches.or_else(|| automatic.then(|| default_patches(tips, &tip)));
+    let contact = if let Some(count) = patch_count {
+        patches(imported, &free, count, &tips.contact_names)?
+    } else {
+        // Nodes given one by one are all meant.
+        let count = tips.contact_nodes.or(by_number.then_some(free.len()));
+        let choice = ContactChoice { count, names: tips.contact_names.clone() };
+        choose_contact_nodes(&imported.model.nodes, &free, &choice).map_err(failure)?
+    };
+    Ok(Chosen { clamped, contact, faces, grid: None, tip })
+}
+
+/// As many as there are names; else five, or as many as a coarse tip can have.
+fn default_patches(tips: &TipOptions, tip: &Option<(FoundTip, bool)>) -> usize {
+    match tips.contact_names.len() {
+        0 => tip.as_ref().map_or(PATCHES, |(tip, _)| PATCHES.min(tip.places)),
+        named => named,
     }
-    // Nodes given one by one are all meant.
-    let count = tips.contact_nodes.or(by_number.then_some(free.len()));
-    let choice = ContactChoice { count, names: tips.contact_names.clone() };
-    let contact = choose_contact_nodes(&imported.model.nodes, &free, &choice).map_err(failure)?;
-    Ok(Chosen { clamped, contact, faces, grid: None })
 }
 
 /// Patches of the faces whose nodes are all in the contact set.
@@ -104,7 +121,7 @@ pub fn grid(imported: &Imported, asked: &CasingMeshArguments) -> Result<Chosen> 
     let Some((mesh, _)) = &imported.model.mesh else { return Err(super::no_mesh()) };
     let [around, along] = asked.contact_grid;
     let grid = GridNodes::chosen(mesh, &free, around, along, asked.contact_axial).map_err(failure)?;
-    Ok(Chosen { clamped, contact: grid.contact_points(), faces: None, grid: Some(grid) })
+    Ok(Chosen { clamped, contact: grid.contact_points(), faces: None, grid: Some(grid), tip: None })
 }
 
 /// Contact nodes that are not among the `fixed` ones, and whether they were given by number.
@@ -135,7 +152,11 @@ fn sets_of(imported: &Imported) -> String {
 }
 
 fn named_set<'a>(imported: &Imported, name: Option<&'a str>, option: &str) -> Result<&'a str> {
-    name.ok_or_else(|| Failure::usage(option, "it is missing", format!("Give one; {}", sets_of(imported))))
+    name.ok_or_else(|| missing(imported, option))
+}
+
+fn missing(imported: &Imported, option: &str) -> Failure {
+    Failure::usage(option, "it is missing", format!("Give one; {}", sets_of(imported)))
 }
 
 fn set<'a>(imported: &'a Imported, name: &str) -> Result<&'a [usize]> {

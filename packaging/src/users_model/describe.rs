@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 use tiprub_model::{
     cyclic::PairingReport,
+    patches::FoundTip,
     read::{Imported, bounding_box, set_counts, total_mass},
     reduce::ContactPoint,
 };
@@ -69,15 +70,26 @@ pub fn describe(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> (
         "contact_nodes": chosen.contact.iter().map(|point| json!({
             "name": point.name, "patch_nodes": point.patch.len(), "node": imported.node_numbers[point.node], "slope": point.meridional_slope,
         })).collect::<Vec<_>>(),
+        "tip": chosen.tip.as_ref().filter(|(_, found)| *found).map(|(tip, _)| json!({
+            "faces": tip.faces, "nodes": tip.nodes.len(), "chord": tip.chord, "radius": tip.radius, "axial": tip.axial,
+        })),
         "notes": imported.notes,
     });
     (text, json)
 }
 
-/// Contact nodes or patches, each with its node in the file; of a grid its size.
+/// Contact nodes or patches, each with its node in the file; of a grid its size; the tip, where it was found.
 fn contact(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> String {
     let mut text = String::new();
-    let contact_set = asked.contact_set.as_deref().unwrap_or_default();
+    let contact_set = asked.contact_set.as_deref().unwrap_or("the tip that was found");
+    if let Some((tip, true)) = &chosen.tip {
+        let FoundTip { faces, nodes, chord, radius: [low, high], axial: [from, to], .. } = tip;
+        let _ = write!(
+            text,
+            "\n  tip found                 {faces} faces, {} nodes, chord {chord:.6} m, radius {low:.6} m to {high:.6} m, z {from:.6} m to {to:.6} m",
+            nodes.len()
+        );
+    }
     let is_patch = |point: &ContactPoint| !point.patch.is_empty();
     let what = if chosen.contact.iter().any(is_patch) { "contact patches" } else { "contact nodes  " };
     let _ = write!(text, "\n  {what}           {} from {contact_set}", chosen.contact.len());

@@ -4,7 +4,7 @@ use tiprub_core::Rom;
 use tiprub_model::read::{Imported, plausibility};
 use tiprub_shell::{Failure, Result};
 
-use super::choose::Chosen;
+use super::choose::{Chosen, PATCHES};
 use crate::own_arguments::{ModelOptions, UnitChoice};
 
 /// First natural frequencies (Hz) of things that are built lie in here.
@@ -52,6 +52,45 @@ pub fn radius_warning(imported: &Imported, chosen: &Chosen) -> Option<String> {
              axis of rotation, those that are meant?"
         )
     })
+}
+
+/// Edges of the tip's faces between two contact nodes, beyond which a force at a node says little of one on the tip.
+const REFINED: f64 = 2.0;
+
+/// Contact at points where the mesh could do better, and a tip that may not be all that touches.
+pub fn contact_warnings(chosen: &Chosen) -> Vec<String> {
+    let Some((tip, automatic)) = &chosen.tip else { return single(chosen).into_iter().collect() };
+    let mut warnings = Vec::new();
+    if *automatic && tip.elsewhere > 0 {
+        warnings.push(format!(
+            "beside the tip that was found {} faces that are not connected with it are as far out: if they can touch as well, name \
+             all in a set (--contact-set)",
+            tip.elsewhere
+        ));
+    }
+    let on_tip = chosen.contact.iter().all(|point| tip.nodes.binary_search(&point.node).is_ok());
+    let (count, edges) = (chosen.contact.len(), tip.chord / tip.edge);
+    if chosen.contact.iter().any(|point| !point.patch.is_empty()) || !on_tip {
+        warnings.extend(single(chosen));
+    } else if count == 1 || edges > REFINED * (count - 1) as f64 {
+        let nodes = if count == 1 { "a single node".to_owned() } else { format!("{count} nodes") };
+        warnings.push(format!(
+            "contact at {nodes} of a tip about {edges:.0} edges of elements long: a force at a node digs in deeper the finer the mesh, and \
+             the tip between nodes passes through the casing; --contact-patches {} spreads contact over the tip",
+            PATCHES.min(tip.places)
+        ));
+    }
+    warnings
+}
+
+fn single(chosen: &Chosen) -> Option<String> {
+    let [point] = chosen.contact.as_slice() else { return None };
+    let what = if point.patch.is_empty() { "node" } else { "patch" };
+    Some(format!(
+        "contact at the single {what} `{}`: where along the chord the tip touches is not told apart, nor is it held from tilting; ask for more \
+         (--contact-patches {PATCHES})",
+        point.name
+    ))
 }
 
 /// A first frequency that no machine has; of a `free` structure the seventh.

@@ -41,6 +41,16 @@ pub struct Modes {
 }
 
 impl Modes {
+    /// The first `count`, or all where they are fewer.
+    pub(crate) fn lowest(&self, count: usize) -> Self {
+        let count = count.min(self.eigenvalues.len());
+        Self {
+            eigenvalues: self.eigenvalues[..count].to_vec(),
+            shapes: self.shapes.get(.., ..count).to_owned(),
+            residuals: self.residuals[..count].to_vec(),
+        }
+    }
+
     /// Natural frequencies (Hz); 0 where round-off made ω² negative.
     pub fn frequencies(&self) -> Vec<f64> {
         self.eigenvalues.iter().map(|square| square.max(0.0).sqrt() / core::f64::consts::TAU).collect()

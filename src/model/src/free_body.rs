@@ -1,4 +1,5 @@
-//! Reduction of a body that flies freely: Craig-Bampton on its contact nodes, delivered in its own modes.
+//! Reduction of a body that flies freely: Craig-Bampton on its contact nodes or patches, or its modes with exact residual flexibility, delivered
+//! in its own modes.
 //!
 //! The rigid-body motions are known beforehand and stay exactly at rest in the stiffness: translations of the contact
 //! nodes are combinations of them, which is what a scene with a free structure needs.
@@ -12,22 +13,29 @@ use crate::assembly::free_dofs;
 use crate::casing::{modal_form, rigid_motions, without_rigid_motions};
 use crate::fe_model::FeModel;
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{ContactPoint, Held, Reduction, check_nodes, compare, description, full_modes, interface};
+use crate::reduce::{
+    ContactPoint, Held, Reduction, ReductionKind, check_nodes, compare, description, full_modes, interface, responses,
+};
+
+/// Rigid-body motions.
+const RIGID: usize = 6;
 
 /// What to reduce a body to, and what to call it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FreeBodyOptions {
     /// Name of the structure.
     pub name: String,
-    /// Number of fixed-interface modes; all where absent, and the reduction is then exact.
-    pub fixed_interface_modes: Option<usize>,
+    /// Which modes are kept.
+    pub kind: ReductionKind,
+    /// How many: with the contact held, or beside the rigid-body motions. All where absent, and the reduction is then exact.
+    pub modes: Option<usize>,
     /// Number of modes compared with the full model, the six rigid-body motions among them.
     pub checked_modes: usize,
     /// Modal damping ratio proposed with the model.
     pub damping_ratio: f64,
 }
 
-/// Reduce an unsupported body to its contact nodes; frame Cartesian, M = I, K = Λ with six zeros first.
+/// Reduce an unsupported body to its contact nodes or patches; frame Cartesian, M = I, K = Λ with six zeros first.
 ///
 /// # Errors
 /// [`crate::Error::Invalid`] for contact nodes that are repeated or do not exist;
@@ -42,12 +50,21 @@ pub(crate) fn reduce_free_body(
     faer::set_global_parallelism(faer::Par::Seq);
     check_nodes(&model.nodes, &[], contact, Frame::Cartesian)?;
     let free = free_dofs(model.nodes.len(), &[]);
-    let full = full_modes(&model.stiffness, &model.mass, true, options.checked_modes, listener)?;
     let held = Held::new(&free, &model.nodes, contact, Frame::Cartesian)?;
     let inner = free.len().saturating_sub(held.interface.len());
-    let count = options.fixed_interface_modes.unwrap_or(inner);
+    // All modes are all of them with the contact held.
+    let kind = if options.modes.is_none() { ReductionKind::FixedInterface } else { options.kind };
+    let count = options.modes.unwrap_or(inner);
+    let own = if kind == ReductionKind::FreeInterface { count + RIGID } else { 0 };
+    let full = full_modes(&model.stiffness, &model.mass, true, options.checked_modes.max(own), listener)?;
     let points: Vec<[f64; 3]> = contact.iter().map(|point| point.cartesian(&model.nodes)).collect();
-    let reduced = held.craig_bampton(&model.stiffness, &model.mass, count, listener)?;
+    let reduced = match kind {
+        ReductionKind::FixedInterface => held.craig_bampton(&model.stiffness, &model.mass, count, listener)?,
+        ReductionKind::FreeInterface => {
+            held.free_interface(&model.stiffness, &model.mass, &full.modes.lowest(own), listener)?
+        }
+    };
+    let full = full.truncated(options.checked_modes);
     let rigid = rigid_motions(&points, reduced.mass.nrows());
     let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
     report(listener, Stage::Checks, 0, 1);
@@ -55,13 +72,17 @@ pub(crate) fn reduce_free_body(
     report(listener, Stage::Checks, 1, 1);
     let order = modes.squares.len();
     let exact = if count == inner { ", all of them" } else { "" };
+    let kept = match kind {
+        ReductionKind::FixedInterface => {
+            format!("Craig-Bampton with {} and {count} fixed-interface modes{exact}", interface(contact))
+        }
+        ReductionKind::FreeInterface => {
+            format!("{} with inertia relief and {count} free-interface modes", responses(contact))
+        }
+    };
     let rom = Rom {
         name: options.name.clone(),
-        origin: format!(
-            "{}, free to fly; Craig-Bampton with {} and {count} fixed-interface modes{exact}",
-            description(&model, 0),
-            interface(contact)
-        ),
+        origin: format!("{}, free to fly; {kept}", description(&model, 0)),
         sectors: 1,
         frame: Frame::Cartesian,
         mass: DMatrix::identity(order, order),
@@ -78,5 +99,5 @@ pub(crate) fn reduce_free_body(
 }
 
 fn contact_node(point: &ContactPoint, position: [f64; 3]) -> ContactNode {
-    ContactNode { name: point.name.clone(), position, meridional_slope: 0.0, ..ContactNode::default() }
+    ContactNode { name: point.name.clone(), position, area: point.area, ..ContactNode::default() }
 }

@@ -92,7 +92,7 @@ pub(crate) fn reduce_panel(
     let free = free_dofs(model.nodes.len(), clamped);
     let (stiffness, mass) = principal_pair(&model.stiffness, &model.mass, &free);
     let full = full_modes(&stiffness, &mass, false, options.modes.max(options.checked_modes), listener)?;
-    let kept = lowest(&full.modes, options.modes);
+    let kept = full.modes.lowest(options.modes);
     let dofs = grid_dofs(&free, grid);
     let basis = with_grid_responses(kept, &full, (&stiffness, &mass), &dofs, options, listener)?;
     let order = basis.eigenvalues.len();
@@ -103,8 +103,7 @@ pub(crate) fn reduce_panel(
         fixed_interface_frequencies: Vec::new(),
     };
     report(listener, Stage::Checks, 0, 1);
-    let mut judged = full.clone();
-    judged.modes = lowest(&full.modes, options.checked_modes);
+    let judged = full.clone().truncated(options.checked_modes);
     let checks = compare(&judged, &mass, &reduced, &basis.eigenvalues, &DMatrix::identity(order, order));
     report(listener, Stage::Checks, 1, 1);
     let rom = Rom {
@@ -135,15 +134,6 @@ pub(crate) fn reduce_panel(
     let mut reduction = Reduction::new(rom, &full.modes, &free, &basis.eigenvalues, model)?;
     reduction.modes.truncate(options.checked_modes);
     Ok(reduction)
-}
-
-fn lowest(modes: &Modes, count: usize) -> Modes {
-    let count = count.min(modes.eigenvalues.len());
-    Modes {
-        eigenvalues: modes.eigenvalues[..count].to_vec(),
-        shapes: modes.shapes.get(.., ..count).to_owned(),
-        residuals: modes.residuals[..count].to_vec(),
-    }
 }
 
 /// Rows among the free dofs of the components of grid nodes; `None` where clamped.

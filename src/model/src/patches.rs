@@ -18,7 +18,7 @@ use crate::reduce::ContactPoint;
 use crate::{Error, Result};
 
 pub(crate) use coordinates::PatchCoordinates;
-pub use tip::{FoundTip, find_tip, places_along};
+pub use tip::{FoundTip, find_tip};
 
 /// Every face is divided into so many parts in both directions: hat functions have kinks.
 const PARTS: usize = 4;
@@ -35,45 +35,107 @@ pub fn contact_patches(
     count: usize,
     name: impl Fn(usize) -> String,
 ) -> Result<Vec<ContactPoint>> {
-    let faces = faces_within(mesh, set);
-    if faces.is_empty() {
-        let problem = "no outer face of an element has all of its nodes in the contact set";
-        return Err(Error::invalid(
-            "contact patches",
-            problem,
-            "Give all nodes of the tip's faces, or ask for contact nodes",
-        ));
-    }
+    let faces = faces_within(mesh, set)?;
     let places = Places::new(&mesh.nodes, set);
-    let within: HashMap<usize, usize> = set.iter().enumerate().map(|(place, &node)| (node, place)).collect();
     let stations = places.stations();
     if count == 0 || count > stations {
         let problem =
             format!("{count} is outside 1..={stations}, the places along the chord that the set has nodes at");
         return Err(Error::invalid("number of contact patches", problem, "Ask for another number, or refine the tip"));
     }
+    let weights = weights(mesh, (set, faces), count, |position| hats(places.share_along(position), count).to_vec())?;
+    let patches = weights.into_iter().enumerate();
+    let length = |patch: usize| places.length() * share_of_chord(patch, count);
+    Ok(patches.map(|(patch, weights)| point(mesh, set, &places, (&weights, length(patch)), name(patch))).collect())
+}
+
+/// A grid of patches over a face of a body, rows along the first of two directions (unit vectors), in growing place along the second. With hat
+/// functions h_k and h_l along both, each 0 to 1 between the outermost nodes of the set, patch (k, l) has the weights
+/// w_p = ∫ h_k h_l N_p dA / ∫ h_k h_l dA over the nodes p: products of hats add up to one, as hats do.
+///
+/// # Errors
+/// [`Error::Invalid`] for no patches, more than the face has places for, or a set without a whole outer face of an element.
+pub fn face_patches(
+    mesh: &Mesh,
+    set: &[usize],
+    counts: [usize; 2],
+    directions: [[f64; 3]; 2],
+    name: impl Fn(usize) -> String,
+) -> Result<Vec<ContactPoint>> {
+    let faces = faces_within(mesh, set)?;
+    let along = |place: [f64; 3], axis: usize| -> f64 { place.iter().zip(directions[axis]).map(|(x, d)| x * d).sum() };
+    let ends = [0, 1].map(|axis| {
+        let places = set.iter().map(|&node| along(mesh.nodes[node], axis));
+        places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| [low.min(place), high.max(place)])
+    });
+    for (axis, [low, high]) in ends.into_iter().enumerate() {
+        let mut places: Vec<f64> = set.iter().map(|&node| along(mesh.nodes[node], axis)).collect();
+        places.sort_by(f64::total_cmp);
+        let stations = 1 + places.windows(2).filter(|pair| pair[1] - pair[0] > SAME_PLACE * (high - low)).count();
+        if !(1..=stations).contains(&counts[axis]) {
+            let problem =
+                format!("{} in one direction, in which the face has nodes at {stations} places", counts[axis]);
+            return Err(Error::invalid(
+                "number of contact patches",
+                problem,
+                "Ask for another number, or refine the face",
+            ));
+        }
+    }
+    let products = |position: [f64; 3]| {
+        let [first, second] = [0, 1].map(|axis| {
+            let [low, high] = ends[axis];
+            hats((along(position, axis) - low) / (high - low), counts[axis])
+        });
+        second.iter().flat_map(|(l, b)| first.map(|(k, a)| (l * counts[0] + k, a * b))).collect()
+    };
+    let weights = weights(mesh, (set, faces), counts[0] * counts[1], products)?;
+    let named = |(patch, weights): (usize, Vec<f64>)| {
+        let name = name(patch);
+        let (patch, area) = (shares(set, &weights), weights.iter().sum());
+        let point = ContactPoint { patch, area, ..ContactPoint::at(name, 0, 0.0) };
+        let middle = point.cartesian(&mesh.nodes);
+        ContactPoint { node: nearest(mesh, set, middle), ..point }
+    };
+    Ok(weights.into_iter().enumerate().map(named).collect())
+}
+
+/// Places closer than this share of a face's extent are one.
+const SAME_PLACE: f64 = 1e-3;
+
+/// Faces of elements with the element's own numbers of their corners.
+type Faces<'a> = Vec<(&'a Element, &'static [usize])>;
+
+/// ∫ h_k N_p dA over the faces, patch by patch over the nodes of the set.
+fn weights(
+    mesh: &Mesh,
+    (set, faces): (&[usize], Faces<'_>),
+    count: usize,
+    hats: impl Fn([f64; 3]) -> Vec<(usize, f64)>,
+) -> Result<Vec<Vec<f64>>> {
+    let within: HashMap<usize, usize> = set.iter().enumerate().map(|(place, &node)| (node, place)).collect();
     let mut weights = vec![vec![0.0; set.len()]; count];
     for (element, corners) in faces {
         let coordinates = mesh.coordinates(element);
         for (point, share) in quadrature(element.kind, corners) {
             let (values, area, position) = on_face(element.kind, &coordinates, point);
-            let hats = hats(places.share_along(position), count);
+            let hats = hats(position);
             for (&node, value) in element.nodes.iter().zip(values) {
                 // Nodes off the face have shape functions of zero on it.
                 let Some(&place) = within.get(&node) else { continue };
-                for (patch, hat) in hats {
+                for &(patch, hat) in &hats {
                     weights[patch][place] += hat * value * area * share;
                 }
             }
         }
     }
-    if let Some(empty) = weights.iter().position(|weights| weights.iter().sum::<f64>() <= 0.0) {
-        let problem = format!("number {} of {count} has no face under it", empty + 1);
-        return Err(Error::invalid("contact patches", problem, "Ask for fewer, or refine the tip"));
+    match weights.iter().position(|weights| weights.iter().sum::<f64>() <= 0.0) {
+        None => Ok(weights),
+        Some(empty) => {
+            let problem = format!("number {} of {count} has no face under it", empty + 1);
+            Err(Error::invalid("contact patches", problem, "Ask for fewer, or refine the tip"))
+        }
     }
-    let patches = weights.into_iter().enumerate();
-    let length = |patch: usize| places.length() * share_of_chord(patch, count);
-    Ok(patches.map(|(patch, weights)| point(mesh, set, &places, (&weights, length(patch)), name(patch))).collect())
 }
 
 /// The hat functions that are not zero at a place along the chord, 0 to 1.
@@ -88,6 +150,19 @@ fn hats(along: f64, count: usize) -> [(usize, f64); 2] {
     [(first, 1.0 - share), (first + 1, share)]
 }
 
+/// Nodes with weights other than zero, which then add up to one.
+fn shares(set: &[usize], weights: &[f64]) -> Vec<(usize, f64)> {
+    let total: f64 = weights.iter().sum();
+    let some = set.iter().zip(weights).filter(|(_, weight)| **weight != 0.0);
+    some.map(|(&node, weight)| (node, weight / total)).collect()
+}
+
+/// The node of the set that is nearest to a place.
+fn nearest(mesh: &Mesh, set: &[usize], middle: [f64; 3]) -> usize {
+    let distance = |node: usize| -> f64 { mesh.nodes[node].iter().zip(middle).map(|(a, b)| (a - b) * (a - b)).sum() };
+    set.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or_default()
+}
+
 /// Integral of the hat function of a patch over the chord, of length 1.
 fn share_of_chord(patch: usize, count: usize) -> f64 {
     match count {
@@ -99,20 +174,13 @@ fn share_of_chord(patch: usize, count: usize) -> f64 {
 
 fn point(mesh: &Mesh, set: &[usize], places: &Places, (weights, length): (&[f64], f64), name: String) -> ContactPoint {
     let total: f64 = weights.iter().sum();
-    let patch: Vec<(usize, f64)> = set
-        .iter()
-        .zip(weights)
-        .filter(|(_, weight)| **weight != 0.0)
-        .map(|(&node, weight)| (node, weight / total))
-        .collect();
     let slopes = weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
     let meridional_slope = slopes.map(|(place, weight)| weight / total * places.slope(place)).sum();
+    let patch = shares(set, weights);
     let point = ContactPoint { patch, area: total, length, ..ContactPoint::at(name, 0, meridional_slope) };
     let [radius, angle, axial] = point.cylindrical(&mesh.nodes);
     let middle = [radius * angle.cos(), radius * angle.sin(), axial];
-    let distance = |node: usize| -> f64 { mesh.nodes[node].iter().zip(middle).map(|(a, b)| (a - b) * (a - b)).sum() };
-    let nearest = set.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-    ContactPoint { node: nearest.unwrap_or_default(), ..point }
+    ContactPoint { node: nearest(mesh, set, middle), ..point }
 }
 
 /// Natural coordinates and the vectors along the two directions of a face there.
@@ -149,8 +217,8 @@ fn on_face(kind: ElementKind, coordinates: &[[f64; 3]], (natural, along): FacePo
     (shape.values[..coordinates.len()].to_vec(), area, position)
 }
 
-/// Outer faces whose nodes, mid-side ones too, are all in the set; with the element's own numbers of their corners.
-fn faces_within<'a>(mesh: &'a Mesh, set: &[usize]) -> Vec<(&'a Element, &'static [usize])> {
+/// Outer faces whose nodes, mid-side ones too, are all in the set.
+fn faces_within<'a>(mesh: &'a Mesh, set: &[usize]) -> Result<Faces<'a>> {
     let mut chosen = vec![false; mesh.nodes.len()];
     set.iter().for_each(|&node| chosen[node] = true);
     let mut found: HashMap<Vec<usize>, (usize, &Element, &'static [usize])> = HashMap::new();
@@ -166,7 +234,12 @@ fn faces_within<'a>(mesh: &'a Mesh, set: &[usize]) -> Vec<(&'a Element, &'static
     let mut outer: Vec<_> = found.into_iter().filter(|(_, (count, ..))| *count == 1).collect();
     // The order of sums must not depend on that of a hash table.
     outer.sort_by(|a, b| a.0.cmp(&b.0));
-    outer.into_iter().map(|(_, (_, element, corners))| (element, corners)).collect()
+    if outer.is_empty() {
+        let problem = "no outer face of an element has all of its nodes in the contact set";
+        let remedy = "Give all nodes of the tip's faces, or ask for contact nodes";
+        return Err(Error::invalid("contact patches", problem, remedy));
+    }
+    Ok(outer.into_iter().map(|(_, (_, element, corners))| (element, corners)).collect())
 }
 
 /// Mid-side nodes on the sides of a face.

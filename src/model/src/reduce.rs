@@ -7,7 +7,7 @@ mod response;
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::{Frame, RomChecks, Watched};
+use tiprub_core::rom::{Basis, Frame, RomChecks, Watched};
 use tiprub_core::shown;
 
 use crate::assembly::{Assembled, free_dofs};
@@ -87,6 +87,16 @@ pub enum ReductionKind {
     FixedInterface,
     /// Modes of the structure as it is supported, with exact residual flexibility (MacNeal, Rubin).
     FreeInterface,
+}
+
+impl ReductionKind {
+    /// As the ROM tells it.
+    pub(crate) fn basis(self) -> Basis {
+        match self {
+            Self::FixedInterface => Basis::FixedInterface,
+            Self::FreeInterface => Basis::FreeInterface,
+        }
+    }
 }
 
 /// What to reduce to, and what to call it.
@@ -189,12 +199,21 @@ pub fn reduce_model(
     faer::set_global_parallelism(faer::Par::Seq);
     let free = free_dofs(model.nodes.len(), clamped);
     let (stiffness, mass) = principal_pair(&model.stiffness, &model.mass, &free);
-    let full = full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)?;
+    // Nothing but modes and inertia holds a free structure in the reduced model, and they come from the same iteration.
+    let relieved = options.kind == ReductionKind::FreeInterface && clamped.is_empty();
+    let own = if relieved { options.modes } else { 0 };
+    let full = full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes.max(own), listener)?;
+    let own = full.modes.lowest(own);
+    let full = full.truncated(options.checked_modes);
     let loads = contact_loads(&free, &model.nodes, contact, options.frame)?;
     let component_modes = |stiffness: &SparseMatrix, modes: usize, listener: Listener<'_>| match options.kind {
         ReductionKind::FixedInterface => {
             let held = Held::new(&free, &model.nodes, contact, options.frame)?;
             held.craig_bampton(stiffness, &mass, modes, listener)
+        }
+        ReductionKind::FreeInterface if relieved => {
+            let held = Held::new(&free, &model.nodes, contact, options.frame)?;
+            held.free_interface(stiffness, &mass, &own, listener)
         }
         ReductionKind::FreeInterface => free_interface(stiffness, &mass, loads.as_ref(), modes, listener),
     };
@@ -265,6 +284,11 @@ pub struct FullModes {
 }
 
 impl FullModes {
+    /// With the first `count` modes only.
+    pub(crate) fn truncated(self, count: usize) -> Self {
+        Self { modes: self.modes.lowest(count), ..self }
+    }
+
     /// Displacements of the structure at rest under these loads, (K - σM)⁻¹ f, free dofs × loads.
     pub(crate) fn responses(&self, loads: Mat<f64>) -> Mat<f64> {
         self.factor.solve(loads)

@@ -11,8 +11,9 @@ use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::casing::{
     CLAMPED, CasingReductionOptions, GridNodes, ModalForm, Support, condense, modal_form, supported_ring,
 };
-use tiprub_model::craig_bampton::{InnerBasis, craig_bampton, craig_bampton_with};
+use tiprub_model::craig_bampton::{InnerBasis, craig_bampton, craig_bampton_with, dense_modes};
 use tiprub_model::element::{ElementKind, Formulation, stiffness, thermal_load};
+use tiprub_model::free_interface::free_interface;
 use tiprub_model::progress::silent;
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::thermal::{equal_patches, patch_loads};
@@ -269,6 +270,32 @@ fn condensing_keeps_low_modes_and_static_response() {
     let cut = condense(&all, 10, &DMatrix::zeros(36, 0));
     assert!((&exact - flexibility(&cut)).amax() > 1e-6 * exact.amax());
     assert_eq!(condense(&all, 36, &loads).squares, all.squares);
+}
+
+/// Of a pencil with all modes condensing leaves what free-interface modes with residual flexibility are; with fewer fixed-interface modes the
+/// response at rest is the same and the frequencies lie above.
+#[test]
+fn condensing_is_the_free_interface_reduction_of_what_it_condenses() {
+    let (_, stiffness, mass) = box_pencil();
+    let order = stiffness.order();
+    let interface: Vec<usize> = (order - 6..order).collect();
+    let loads = Mat::from_fn(order, 6, |i, k| if i == interface[k] { 1.0 } else { 0.0 });
+    let direct = free_interface(&stiffness, &mass, loads.as_ref(), 10, &silent).unwrap();
+    let (direct, _) = dense_modes(&direct.stiffness, &direct.mass).unwrap();
+    let condensed = |modes: usize| {
+        let reduced = craig_bampton(&stiffness, &mass, &interface, modes, &silent).unwrap();
+        let all = modal_form(&reduced.stiffness, &reduced.mass, &DMatrix::zeros(6 + modes, 0)).unwrap();
+        condense(&all, 10, &DMatrix::from_fn(6 + modes, 6, |i, k| if i == k { 1.0 } else { 0.0 })).squares
+    };
+    let off = |found: &[f64]| found.iter().zip(&direct).map(|(a, b)| a / b - 1.0).fold(0.0, f64::max);
+    let (all, some) = (condensed(order - 6), condensed(20));
+    println!("squares of all modes off by {:.1e}, of twenty by {:.1e}", off(&all), off(&some));
+    assert!(
+        all.len() == direct.len() && off(&all).abs() < 1e-9 && off(&some) > 1e-6,
+        "{:e} {:e}",
+        off(&all),
+        off(&some)
+    );
 }
 
 /// A mesh from elsewhere: other node numbers, contact nodes as an unordered set, prisms.

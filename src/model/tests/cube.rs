@@ -1,5 +1,9 @@
 //! The bodies of the cube between two rings: free body and open panel reduced without loss of what they must keep.
 
+#[path = "../../../tests/guide.rs"]
+mod guide;
+
+use guide::told;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
 use tiprub_core::rom::Frame;
@@ -7,7 +11,9 @@ use tiprub_model::cube::{
     CubeOptions, MassMatrix, RingOptions, Side, cube_material, cube_of, reduce_cube, reduce_cube_ring, ring_grid,
     ring_material, ring_of,
 };
+use tiprub_model::patches::face_patches;
 use tiprub_model::progress::silent;
+use tiprub_model::reduce::ReductionKind;
 use tiprub_model::{FeModel, Mesh, Reduction};
 
 const MASSES: [MassMatrix; 2] = [MassMatrix::Lumped, MassMatrix::Consistent];
@@ -136,6 +142,109 @@ fn static_responses_to_all_forces_make_the_panel_exact_at_rest_and_fewer_come_ne
     assert!(errors[1] < 0.7 * errors[0] && errors[2] < 0.5 * errors[1] && errors[2] > 1e-4, "{errors:?}");
 }
 
+fn patched(kind: ReductionKind, modes: Option<usize>) -> Reduction {
+    let options = CubeOptions { elements: 4, patches: Some([3, 2]), kind, modes, ..CubeOptions::default() };
+    reduce_cube(&options, &silent).unwrap()
+}
+
+/// Weights of the patches of [`patched`] over all dofs, row by row as the contact map.
+fn patch_rows() -> DMatrix<f64> {
+    let mesh = cube_of(4);
+    let side = |set: &str| {
+        let directions = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]];
+        face_patches(&mesh, mesh.set(set).unwrap(), [2, 3], directions, |index| format!("{index}")).unwrap()
+    };
+    let patches = [side("MASTER_LEFT"), side("MASTER_RIGHT")].concat();
+    let mut rows = DMatrix::zeros(3 * patches.len(), 3 * mesh.nodes.len());
+    for (index, patch) in patches.iter().enumerate() {
+        let total: f64 = patch.weights().map(|(_, weight)| weight).sum();
+        assert!((total - 1.0).abs() < 1e-13, "{total}");
+        for (node, weight) in patch.weights() {
+            (0..3).for_each(|axis| rows[(3 * index + axis, 3 * node + axis)] = weight);
+        }
+    }
+    rows
+}
+
+/// A grid of hats stands at thirds of a side with two of them, at a sixth, a half and five sixths with three.
+#[test]
+fn patches_of_a_face_stand_where_their_hats_do() {
+    let rom = patched(ReductionKind::FreeInterface, Some(4)).rom;
+    assert_eq!(rom.contact_nodes.len(), 12);
+    let (start, side) = (cube_of(4).nodes[0][1], 0.05);
+    for (index, node) in rom.contact_nodes.iter().enumerate() {
+        let sign = if index < 6 { -1.0 } else { 1.0 };
+        let y = start + side * [1.0 / 6.0, 0.5, 5.0 / 6.0][index % 6 / 2];
+        let z = side * [1.0 / 3.0 - 0.5, 2.0 / 3.0 - 0.5][index % 2];
+        let off = node.position.iter().zip([0.5 * sign * side, y, z]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-14, "{node:?}: {off:e}");
+    }
+    assert_eq!((rom.contact_nodes[0].name.as_str(), rom.contact_nodes[11].name.as_str()), ("left_1", "right_6"));
+}
+
+/// What contact forces do beside accelerating the cube, at rest in the frame that flies with it, is that of the full model with any number of modes.
+#[test]
+fn inertia_relief_is_exact_with_any_number_of_modes() {
+    let [stiffness, inertia] = dense(cube_of(4), &cube_material(), MassMatrix::Lumped);
+    let (rows, nodes) = (patch_rows(), cube_of(4).nodes);
+    let rigid = DMatrix::from_fn(stiffness.nrows(), 6, |dof, k| {
+        let (axis, x) = (dof % 3, nodes[dof / 3]);
+        match k {
+            0..3 => f64::from(u8::from(axis == k)),
+            // e_(k-3) × x.
+            _ if axis == (k - 2) % 3 => -x[(k - 1) % 3],
+            _ if axis == (k - 1) % 3 => x[(k - 2) % 3],
+            _ => 0.0,
+        }
+    });
+    let carried = &inertia * &rigid;
+    let weight = (rigid.transpose() * &carried).try_inverse().unwrap();
+    let shift = stiffness.trace() / inertia.trace();
+    let factor = (&stiffness + shift * &carried * &weight * carried.transpose()).cholesky().unwrap();
+    let moved = &rows * &rigid;
+    let exact = &rows * factor.solve(&rows.transpose()) - &moved * &weight * moved.transpose() / shift;
+    let elastic = |rom: &Rom| {
+        let mut scaled = rom.contact_map.clone();
+        for (mode, mut column) in scaled.column_iter_mut().enumerate() {
+            column *= if mode < 6 { 0.0 } else { 1.0 / rom.stiffness[(mode, mode)] };
+        }
+        scaled * rom.contact_map.transpose()
+    };
+    for modes in [0, 5, 30] {
+        let found = patched(ReductionKind::FreeInterface, Some(modes));
+        assert_eq!(found.rom.order(), 36 + 6 + modes);
+        equal(&elastic(&found.rom), &exact, 1e-9);
+        let kept = &found.rom.checks.frequency_deviation[..(6 + modes).min(16)];
+        assert!(kept.iter().all(|deviation| deviation.abs() < 1e-6), "{kept:?}");
+    }
+    equal(&elastic(&patched(ReductionKind::FixedInterface, None).rom), &exact, 1e-9);
+    // Without inertia relief it is not met: the test would notice.
+    let held = elastic(&patched(ReductionKind::FixedInterface, Some(5)).rom);
+    assert!((&held - &exact).amax() > 1e-4 * exact.amax());
+}
+
+/// Forced responses of a patch between two frequencies of the cube, against the reduction with all modes.
+#[test]
+fn forced_responses_of_a_free_cube_converge_faster_with_free_interface_modes() {
+    let exact = patched(ReductionKind::FixedInterface, None).rom;
+    let frequencies = &exact.checks.reduced_frequencies;
+    let angular = std::f64::consts::PI * (frequencies[9] + frequencies[12]);
+    let truth = flexibility(&exact, -angular * angular);
+    let error = |kind, modes| {
+        let found = flexibility(&patched(kind, Some(modes)).rom, -angular * angular);
+        (&found - &truth).amax() / truth.amax()
+    };
+    let mut last = f64::INFINITY;
+    for modes in [8, 16, 32, 64] {
+        let fixed = error(ReductionKind::FixedInterface, modes);
+        let free = error(ReductionKind::FreeInterface, modes);
+        told!("| {modes} | {fixed} | {free} |");
+        assert!(free < 0.5 * fixed && free < 0.5 * last, "{modes}: {fixed:e} {free:e}");
+        last = free;
+    }
+    guide::hold("cargo test -p tiprub-model --test cube");
+}
+
 /// Grids run so that S_t × S_s points to the cube, and the rings mirror each other.
 #[test]
 fn normals_point_to_the_cube() {
@@ -166,4 +275,7 @@ fn what_cannot_be_reduced_is_refused() {
     let options = CubeOptions { elements: 2, modes: Some(28), ..CubeOptions::default() };
     let error = reduce_cube(&options, &silent).unwrap_err().to_string();
     assert!(error.contains("28 asked, but only 27"), "{error}");
+    let options = CubeOptions { elements: 2, patches: Some([4, 2]), ..CubeOptions::default() };
+    let error = reduce_cube(&options, &silent).unwrap_err().to_string();
+    assert!(error.contains("4 in one direction, in which the face has nodes at 3 places"), "{error}");
 }

@@ -133,6 +133,29 @@ fn modes_with_patches_held_converge() {
     assert!(few[0] > some[0] && few[1] > some[1] && all[0] < 1e-8 && all[1] < 1e-8, "{few:?} {some:?} {all:?}");
 }
 
+/// A structure that nothing clamps keeps its rigid-body motions and its own modes beside patches and a node.
+#[test]
+fn a_free_structure_keeps_its_modes_beside_patches() {
+    let mesh = beam();
+    let root = ContactPoint::at("root", *nodes_at(&mesh, 0, 0.0).last().unwrap(), 0.0);
+    let contact = [tip(&mesh, 2), vec![root]].concat();
+    let options = ReductionOptions {
+        name: "beam".into(),
+        kind: ReductionKind::FreeInterface,
+        modes: 10,
+        checked_modes: 10,
+        sectors: 1,
+        frame: Frame::Cylindrical,
+        watched: Vec::new(),
+        damping_ratio: 0.01,
+    };
+    let rom = reduce(mesh, &steel(), &[], &contact, &options, &silent).unwrap().rom;
+    assert_eq!(rom.order(), 9 + 10);
+    let checks = &rom.checks;
+    assert!(checks.frequency_deviation[6..].iter().all(|deviation| deviation.abs() < 1e-6), "{checks:?}");
+    assert!(checks.reduced_frequencies[..6].iter().all(|f| *f < 1e-3 * checks.full_frequencies[6]), "{checks:?}");
+}
+
 /// Point forces dig in as the mesh is refined; forces on patches do not.
 #[test]
 fn the_flexibility_of_a_patch_converges_and_that_of_a_point_does_not() {

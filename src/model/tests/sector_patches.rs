@@ -1,8 +1,12 @@
 //! Patches and free-interface modes of coupled sectors: exact statics, exact frequencies, forced responses that converge.
 
 mod common;
+#[path = "../../../tests/guide.rs"]
+mod guide;
 
 use core::f64::consts::TAU;
+
+use guide::told;
 
 use common::disk::{COARSE, Counts, boundary, copies, model, pencils, sector};
 use faer::Mat;
@@ -172,11 +176,12 @@ fn forced_responses_of_a_patch_converge_faster_with_free_interface_modes() {
         let mut last = f64::INFINITY;
         for modes in [4, 8, 12, 16] {
             let [fixed, free] = KINDS.map(|kind| error(kind, modes));
-            println!("{} nodes clamped, {modes} modes: {fixed:.2e} {free:.2e}", clamped.len());
+            told!("| {} | {modes} | {fixed} | {free} |", if clamped.is_empty() { "none" } else { "bore" });
             assert!(free < 0.3 * fixed && free < 0.3 * last, "{modes}: {fixed:.2e} {free:.2e}");
             last = free;
         }
     }
+    guide::hold("cargo test -p tiprub-model --test sector_patches");
 }
 
 #[test]

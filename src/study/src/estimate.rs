@@ -44,7 +44,11 @@ impl Estimate {
         }
         let changes = refined.changes();
         let [.., before, last] = &changes[..] else { return Self::unknown(direction, "there are no coarser levels") };
-        Self { direction, left: std::array::from_fn(|quantity| rest(before[quantity]?, last[quantity]?)), unknown: None }
+        Self {
+            direction,
+            left: std::array::from_fn(|quantity| rest(before[quantity]?, last[quantity]?)),
+            unknown: None,
+        }
     }
 
     /// Name and values, `null` where they are not known, and why.
@@ -84,11 +88,7 @@ pub fn told(estimates: &[Estimate]) -> String {
 /// Directions of a scene whose coarser levels follow from it, `division` internal steps per communication step; `Err` says why one
 /// has none.
 pub(crate) fn directions(scene: &Scene, division: u32) -> Vec<(&'static str, std::result::Result<Direction, String>)> {
-    vec![
-        ("steps", steps(scene, division)),
-        ("modes", modes(scene, division)),
-        ("patches", patches(scene, division)),
-    ]
+    vec![("steps", steps(scene, division)), ("modes", modes(scene, division)), ("patches", patches(scene, division))]
 }
 
 fn direction(title: &str, unit: &'static str, levels: Vec<Level>) -> Direction {
@@ -156,7 +156,8 @@ pub fn estimates(
     console: &Console,
 ) -> Result<Vec<Estimate>> {
     let runner = crate::convergence::Runner::new(settings, samples, console);
-    let division = crate::convergence::divisions(scene.settings.experiment.communication_step, scene.settings.time.step);
+    let division =
+        crate::convergence::divisions(scene.settings.experiment.communication_step, scene.settings.time.step);
     let mut found = Vec::new();
     for (name, direction) in directions(scene, division) {
         found.push(match direction {
@@ -164,10 +165,12 @@ pub fn estimates(
             Err(why) => Estimate::unknown(name, why),
         });
     }
-    found.push(Estimate::unknown("mesh", "a ROM does not tell of other meshes: compare two with `tiprub study convergence`"));
+    found.push(Estimate::unknown(
+        "mesh",
+        "a ROM does not tell of other meshes: compare two with `tiprub study convergence`",
+    ));
     Ok(found)
 }
-
 
 #[cfg(test)]
 mod tests {

@@ -5,8 +5,9 @@ use crate::fe_model::FeModel;
 use crate::free_body::{FreeBodyOptions, reduce_free_body};
 use crate::mesh::Mesh;
 use crate::panel::{PanelGrid, PanelOptions, reduce_panel};
+use crate::patches::face_patches;
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{ContactPoint, Reduction};
+use crate::reduce::{ContactPoint, Reduction, ReductionKind};
 use crate::{Material, Result};
 
 /// Mass matrix of the finite elements.
@@ -28,7 +29,11 @@ pub struct CubeOptions {
     pub elements: usize,
     /// Mass matrix.
     pub mass: MassMatrix,
-    /// Number of fixed-interface modes; all where absent, and the reduction is then exact.
+    /// Patches along y and along z on either face; its nodes where absent.
+    pub patches: Option<[usize; 2]>,
+    /// Which modes are kept.
+    pub kind: ReductionKind,
+    /// How many: with the contact held, or beside the rigid-body motions. All where absent, and the reduction is then exact.
     pub modes: Option<usize>,
     /// Number of modes compared with the full model.
     pub checked_modes: usize,
@@ -37,7 +42,15 @@ pub struct CubeOptions {
 impl Default for CubeOptions {
     fn default() -> Self {
         let name = "cube".to_owned();
-        Self { name, elements: CUBE_ELEMENTS, mass: MassMatrix::default(), modes: None, checked_modes: 16 }
+        Self {
+            name,
+            elements: CUBE_ELEMENTS,
+            mass: MassMatrix::default(),
+            patches: None,
+            kind: ReductionKind::FixedInterface,
+            modes: None,
+            checked_modes: 16,
+        }
     }
 }
 
@@ -78,18 +91,22 @@ impl RingOptions {
     }
 }
 
-/// Mesh, reduce and check the cube: 72 contact nodes `left_1` ... and `right_1` ..., line by line along z from the leading
+/// Mesh, reduce and check the cube; where no patches are asked for: 72 contact nodes `left_1` ... and `right_1` ..., line by line along z from the leading
 /// face on.
 ///
 /// # Errors
 /// Those of `reduce_free_body`.
 pub fn reduce_cube(options: &CubeOptions, listener: Listener<'_>) -> Result<Reduction> {
     let mesh = cube_of(options.elements);
-    let contact = master_points(&mesh)?;
+    let contact = match options.patches {
+        None => master_points(&mesh)?,
+        Some(counts) => master_patches(&mesh, counts)?,
+    };
     let model = model(mesh, &cube_material(), options.mass, "Cube of the benchmark between two rings", listener)?;
     let reduction_options = FreeBodyOptions {
         name: options.name.clone(),
-        fixed_interface_modes: options.modes,
+        kind: options.kind,
+        modes: options.modes,
         checked_modes: options.checked_modes,
         damping_ratio: 0.0,
     };
@@ -135,6 +152,17 @@ pub(crate) fn master_points(mesh: &Mesh) -> Result<Vec<ContactPoint>> {
                 .zip(1..)
                 .map(|(&node, number)| ContactPoint::at(format!("{name}_{number}"), node, 0.0)),
         );
+    }
+    Ok(points)
+}
+
+/// Patches on both faces, so many along y and along z: left face, then right, named as nodes are, rows along z from the leading face on.
+fn master_patches(mesh: &Mesh, [along, across]: [usize; 2]) -> Result<Vec<ContactPoint>> {
+    let directions = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]];
+    let mut points = Vec::new();
+    for (set, side) in [("MASTER_LEFT", "left"), ("MASTER_RIGHT", "right")] {
+        let name = |patch: usize| format!("{side}_{}", patch + 1);
+        points.extend(face_patches(mesh, mesh.set(set)?, [across, along], directions, name)?);
     }
     Ok(points)
 }

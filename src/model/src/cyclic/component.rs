@@ -96,7 +96,7 @@ impl Component {
     /// Those of [`free_interface`]; [`Error::NotPositiveDefinite`] when the reduced mass is not.
     pub(super) fn free_interface(at_rest: &Operator<'_>, full: &Operator<'_>, found: &ComplexModes) -> Result<Self> {
         let constraint = at_rest.constraint_modes();
-        let inner = free_interface(at_rest, full, &constraint, found)?;
+        let inner = free_interface(at_rest, full, &constraint.1, found)?;
         Self::new((at_rest, full), constraint, inner, ReductionKind::FreeInterface)
     }
 

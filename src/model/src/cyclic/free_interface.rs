@@ -1,9 +1,10 @@
 //! Free-interface modes of one nodal diameter with exact residual flexibility: [`crate::free_interface`] for coupled sectors, free ones too.
 //!
 //! The constraint modes Ψ span the responses at rest K_n⁻¹B to contact forces; a disk that nothing holds has its rigid-body motions among
-//! them. Of the modes Φ with free contact D = Φ − ΨΦ_c moves no contact, and is K_n-orthogonal to Ψ. Nothing of a rigid-body motion is
-//! left, and in its place stands what its inertia does with the contact held, D = K_hh⁻¹(M_nΦ)_h: a force on the contact of a free disk
-//! accelerates it, and the response to force and inertia together, Pᴴ K_n⁺ P B with P = I − M_nΦΦᴴ (inertia relief), is then in the space.
+//! them. Of the modes Φ with free contact D = Φ − ΨΦ_c moves no contact, and is K_n-orthogonal to Ψ. It is the response at rest, with the
+//! contact held, to their inertia forces: K_hh D_h = (M_nΦ)_h Λ. Nothing of Φ − ΨΦ_c is left of a rigid-body motion, but K_hh⁻¹(M_nΦ)_h is
+//! there, and is what is wanted: a force on the contact of a free disk accelerates it, and the response to force and inertia together,
+//! Pᴴ K_n⁺ P B with P = I − M_nΦΦᴴ over the rigid-body motions (inertia relief), is then in the space.
 
 use faer::{Mat, Side, c64};
 
@@ -23,20 +24,17 @@ const RIGID: f64 = 1e-5;
 pub(super) fn free_interface(
     at_rest: &Operator<'_>,
     full: &Operator<'_>,
-    (constraint, static_stiffness): &(Mat<c64>, Mat<c64>),
+    static_stiffness: &Mat<c64>,
     found: &ComplexModes,
 ) -> Result<Inner> {
     let parts = at_rest.parts();
     let held = parts.order() - parts.contact;
     let seen = found.shapes.get(held.., ..);
-    let mut shapes = found.shapes.get(..held, ..) - constraint.get(..held, ..) * seen;
     let floor = RIGID * full.condensed.shift.abs();
     let rigid = found.eigenvalues.iter().take_while(|square| **square < floor).count();
     check_residual(static_stiffness, &seen.get(.., rigid..).to_owned(), &found.eigenvalues[rigid..])?;
-    if rigid > 0 {
-        let inertia = full.mass(found.shapes.get(.., ..rigid));
-        shapes.get_mut(.., ..rigid).copy_from(at_rest.solve(inertia.get(..held, ..)));
-    }
+    let inertia = full.mass(found.shapes.as_ref());
+    let mut shapes = at_rest.solve(inertia.get(..held, ..));
     let mass = full.mass(shapes.as_ref());
     for k in 0..shapes.ncols() {
         let norm = (shapes.col(k).adjoint() * mass.col(k)).re.sqrt();

@@ -200,6 +200,17 @@ impl PatchCoordinates {
         self.pivots.iter().enumerate().map(own).collect()
     }
 
+    /// Columns of forces f on u become those on v, Tᵀf.
+    pub(crate) fn project(&self, forces: &mut Mat<f64>) {
+        for k in 0..forces.ncols() {
+            let own: Vec<f64> = self.pivots.iter().map(|&dof| forces[(dof, k)]).collect();
+            self.pivots.iter().for_each(|&dof| forces[(dof, k)] = 0.0);
+            for (j, &dof) in self.touched.iter().enumerate() {
+                forces[(dof, k)] += self.dependence.column(j).iter().zip(&own).map(|(d, f)| d * f).sum::<f64>();
+            }
+        }
+    }
+
     /// Columns v become u = T v.
     pub(crate) fn restore(&self, columns: &mut Mat<f64>) {
         for k in 0..columns.ncols() {

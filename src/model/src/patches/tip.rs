@@ -21,8 +21,12 @@ pub struct FoundTip {
     pub nodes: Vec<usize>,
     /// Number of its faces.
     pub faces: usize,
+    /// Number of places along its chord that nodes stand at.
+    pub places: usize,
     /// Length along its chord (m).
     pub chord: f64,
+    /// Median length of the edges of its faces (m).
+    pub edge: f64,
     /// Smallest and largest radius of its nodes (m).
     pub radius: [f64; 2],
     /// Smallest and largest axial position of its nodes (m).
@@ -70,26 +74,37 @@ pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
     let nodes: Vec<usize> = nodes.into_iter().collect();
     let [radius, axial] =
         [|[x, y, _]: [f64; 3]| x.hypot(y), |[_, _, z]: [f64; 3]| z].map(|of| extent(mesh, &nodes, of));
-    if let Some(node) = nodes.iter().find(|node| fixed.binary_search(node).is_ok()) {
+    let held = nodes.iter().filter(|node| fixed.binary_search(node).is_ok()).count();
+    if held > 0 {
         let problem = format!(
-            "the outermost faces, {} of them up to a radius of {} m, reach node {} (of the mesh, from 1), which is clamped or on a face to \
-             the neighbours",
-            own.count(),
-            shown(radius[1]),
-            node + 1
+            "of the {} nodes of the outermost faces, at radii up to {} m, {held} are clamped or lie on faces to the neighbours",
+            nodes.len(),
+            shown(radius[1])
         );
         return Err(not_found(problem, "This is no tip of a blade: check clamped nodes and axis"));
     }
     let elsewhere =
         faces.iter().enumerate().filter(|(index, face)| !chosen[*index] && as_far_out(face, &faces, &chosen));
     let elsewhere = elsewhere.count();
-    let chord = Places::new(&mesh.nodes, &nodes).chord_length();
-    Ok(FoundTip { faces: own.count(), nodes, chord, radius, axial, elsewhere })
+    let places = Places::new(&mesh.nodes, &nodes);
+    let (places, chord) = (places.stations(), places.chord_length());
+    let mut lengths: Vec<f64> =
+        own.clone().flat_map(|face| edges(&faces[face])).map(|edge| length(mesh, edge)).collect();
+    lengths.sort_by(f64::total_cmp);
+    let edge = lengths[lengths.len() / 2];
+    Ok(FoundTip { faces: own.count(), nodes, places, chord, edge, radius, axial, elsewhere })
 }
 
-/// How many places along their chord some nodes stand at.
-pub fn places_along(nodes: &[[f64; 3]], set: &[usize]) -> usize {
-    Places::new(nodes, set).stations()
+fn length(mesh: &Mesh, [a, b]: [usize; 2]) -> f64 {
+    let [x, y, z]: [f64; 3] = core::array::from_fn(|i| mesh.nodes[a][i] - mesh.nodes[b][i]);
+    x.hypot(y).hypot(z)
+}
+
+/// Corners at the ends of a face's edges, ascending.
+fn edges(face: &Face) -> Vec<[usize; 2]> {
+    let nodes = face.corner_nodes();
+    let ends = (0..nodes.len()).map(|i| (nodes[i], nodes[(i + 1) % nodes.len()]));
+    ends.map(|(a, b)| [a.min(b), a.max(b)]).collect()
 }
 
 fn not_found(problem: String, remedy: &str) -> Error {
@@ -137,11 +152,6 @@ fn outward<'a>(mesh: &Mesh, element: &'a Element, corners: &'static [usize]) -> 
 /// Which faces are connected with the first one over edges.
 fn connected(faces: &[Face], first: usize) -> Vec<bool> {
     let mut beside: HashMap<[usize; 2], Vec<usize>> = HashMap::new();
-    let edges = |face: &Face| -> Vec<[usize; 2]> {
-        let nodes = face.corner_nodes();
-        let ends = (0..nodes.len()).map(|i| (nodes[i], nodes[(i + 1) % nodes.len()]));
-        ends.map(|(a, b)| [a.min(b), a.max(b)]).collect()
-    };
     for (index, face) in faces.iter().enumerate() {
         edges(face).into_iter().for_each(|edge| beside.entry(edge).or_default().push(index));
     }

@@ -1,13 +1,17 @@
 //! Contact that is held while modes are found: nodes as they are, patches by a change of variables.
 
+use core::f64::consts::TAU;
+
+use tiprub_core::rom::Frame;
+
 use super::outcome::rotated;
 use super::{ContactPoint, clamped_point};
 use crate::Result;
-use crate::craig_bampton::{CraigBampton, craig_bampton};
+use crate::craig_bampton::{CraigBampton, InnerBasis, craig_bampton_with};
+use crate::eigen::Modes;
 use crate::patches::PatchCoordinates;
 use crate::progress::Listener;
 use crate::sparse::SparseMatrix;
-use tiprub_core::rom::Frame;
 
 /// The contact as degrees of freedom that can be held.
 #[derive(Debug)]
@@ -43,7 +47,7 @@ impl<'a> Held<'a> {
     /// Craig-Bampton of these matrices of the free dofs, contact displacements in the frame; its transformation is to the displacements of nodes.
     ///
     /// # Errors
-    /// Those of [`craig_bampton`].
+    /// Those of [`craig_bampton_with`].
     pub(crate) fn craig_bampton(
         &self,
         stiffness: &SparseMatrix,
@@ -51,12 +55,48 @@ impl<'a> Held<'a> {
         modes: usize,
         listener: Listener<'_>,
     ) -> Result<CraigBampton> {
+        let inner = InnerBasis { modes, whole_pairs: false, loads: None };
+        self.reduced(stiffness, mass, &inner, listener)
+    }
+
+    /// Free-interface modes with exact residual flexibility, of a structure that may be free to move as a rigid body: `modes` are its own,
+    /// rigid ones among them. What is left of a mode φ once its contact is held is the response at rest to its inertia forces, K_ii⁻¹(Mφ)_i:
+    /// of an elastic one φ less the constraint modes, but for its scale; of a rigid one what inertia relief asks for.
+    ///
+    /// # Errors
+    /// Those of [`craig_bampton_with`].
+    pub(crate) fn free_interface(
+        &self,
+        stiffness: &SparseMatrix,
+        mass: &SparseMatrix,
+        modes: &Modes,
+        listener: Listener<'_>,
+    ) -> Result<CraigBampton> {
+        let mut inertia = mass.times(modes.shapes.as_ref());
+        if let Some(patches) = &self.patches {
+            patches.project(&mut inertia);
+        }
+        let inner = InnerBasis { modes: 0, whole_pairs: false, loads: Some(inertia.as_ref()) };
+        let mut found = self.reduced(stiffness, mass, &inner, listener)?;
+        let first = 3 * self.contact.len();
+        let inner = found.stiffness.diagonal().iter().skip(first).map(|square| square.sqrt() / TAU).collect();
+        found.fixed_interface_frequencies = inner;
+        Ok(found)
+    }
+
+    fn reduced(
+        &self,
+        stiffness: &SparseMatrix,
+        mass: &SparseMatrix,
+        inner: &InnerBasis<'_>,
+        listener: Listener<'_>,
+    ) -> Result<CraigBampton> {
         let Some(patches) = &self.patches else {
-            let cartesian = craig_bampton(stiffness, mass, &self.interface, modes, listener)?;
+            let cartesian = craig_bampton_with(stiffness, mass, &self.interface, inner, listener)?;
             return Ok(rotated(cartesian, self.nodes, self.contact, self.frame));
         };
         let (stiffness, mass) = patches.transformed(stiffness, mass)?;
-        let cartesian = craig_bampton(&stiffness, &mass, &self.interface, modes, listener)?;
+        let cartesian = craig_bampton_with(&stiffness, &mass, &self.interface, inner, listener)?;
         let mut found = rotated(cartesian, self.nodes, patches.points(), self.frame);
         patches.restore(&mut found.transformation);
         Ok(found)

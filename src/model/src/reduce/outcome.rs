@@ -3,7 +3,7 @@
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::{Basis, ContactNode, Frame, RomChecks, RomExtras};
+use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
 
 use super::{ContactPoint, Mode, Reduction, ReductionKind, ReductionOptions};
 use crate::Result;
@@ -145,13 +145,7 @@ pub(super) fn build_rom(
         contact_map: DMatrix::identity(boundary, order),
         contact_nodes: contact.iter().map(|point| contact_node(&full.nodes, point, options.frame)).collect(),
         checks,
-        extras: RomExtras {
-            basis: match options.kind {
-                ReductionKind::FixedInterface => Basis::FixedInterface,
-                ReductionKind::FreeInterface => Basis::FreeInterface,
-            },
-            ..RomExtras::default()
-        },
+        extras: RomExtras { basis: options.kind.basis(), ..RomExtras::default() },
     }
 }
 

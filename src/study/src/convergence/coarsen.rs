@@ -77,8 +77,9 @@ fn patch(rom: &Rom, row: usize, weights: &DMatrix<f64>, shares: &DMatrix<f64>) -
 #[cfg(test)]
 mod tests {
     use tiprub_model::{
-        Rotor37Options, reduce_rotor37,
+        Rotor37Options,
         reduce::ReductionKind,
+        reduce_rotor37,
         rotor37::{MeshCounts, Tip},
     };
 
