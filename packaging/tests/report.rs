@@ -14,7 +14,10 @@ use tiprub_packaging::{
     rom_facts::RomFacts,
 };
 use tiprub_shell::{console::Console, native, schedule::Schedule};
-use tiprub_study::error_study::{self, ErrorStudy, METHODS};
+use tiprub_study::{
+    error_study::{self, ErrorStudy, METHODS},
+    estimate::Estimate,
+};
 
 /// The references meet, errors fall with h, and what is refused is a row.
 fn check(study: &ErrorStudy) {
@@ -52,6 +55,8 @@ fn a_report_is_complete_offline_and_small() {
         schedule: &schedule,
         native: &run,
         study: Some(&study),
+        estimates: &[Estimate { direction: "steps", left: [Some(1.5e-3), None, None], unknown: None }],
+        paper: Some((Simulation::new(&scene).unwrap().table(), &run)),
         imported: &[ImportedSummary { label: "FMI 2.0".into(), stepping: 0.1, agreement }],
         files: &[ReportFile { name: "results.csv".into(), meaning: "results".into(), bytes: 1234 }],
         durations: &[("native run".into(), 0.5)],
@@ -59,6 +64,8 @@ fn a_report_is_complete_offline_and_small() {
     .unwrap();
     for wanted in [
         "mode 4:",
+        "estimated error of the displacements: steps 0.15 %",
+        "Beside the paper's model and method",
         "clearance (µm)",
         "normal force (N)",
         "friction force (N)",

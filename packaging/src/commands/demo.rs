@@ -21,7 +21,10 @@ use tiprub_shell::{
     output_file,
     schedule::Schedule,
 };
-use tiprub_study::error_study::{self, ErrorStudy, METHODS};
+use tiprub_study::{
+    error_study::{self, ErrorStudy, METHODS},
+    estimate::{self, Estimate},
+};
 
 use crate::{
     cli::DemoArguments,
@@ -104,8 +107,22 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
         let window = turn.min(schedule.stop - schedule.start);
         error_study::study(&scene, window, &task)
     })?;
+    let estimates = watch.measure("estimating errors", || estimate::estimates(&scene, &[], schedule.count, console))?;
+    let paper = watch.measure("the paper's model and method", || Paper::run(&schedule, console))?;
     let facts = scene.roms.iter().map(|rom| RomFacts::of(rom, None)).collect::<Result<Vec<_>>>()?;
-    let demo = Demo { study, directory, scene, schedule, reduction, facts, native, imported, durations: watch.0 };
+    let demo = Demo {
+        study,
+        estimates,
+        paper,
+        directory,
+        scene,
+        schedule,
+        reduction,
+        facts,
+        native,
+        imported,
+        durations: watch.0,
+    };
     demo.write_report()?;
     demo.outcome()
 }
@@ -163,7 +180,24 @@ struct Demo<'a> {
     native: NativeRun,
     imported: Vec<ImportedSummary>,
     study: ErrorStudy,
+    estimates: Vec<Estimate>,
+    paper: Paper,
     durations: Vec<(String, f64)>,
+}
+
+/// The scene that ships with the paper's model and method, run as the demo runs its own.
+struct Paper {
+    scene: Scene,
+    run: NativeRun,
+}
+
+impl Paper {
+    fn run(schedule: &Schedule, console: &Console) -> Result<Self> {
+        let scene = scene_source::load("builtin:rotor37-paper", &RomCache::off(), console)?;
+        let task = console.task("Native run of the paper's model and method", Some(schedule.count as u64));
+        let run = native::run(&scene, schedule, &[], &|done| task.at(done as u64))?;
+        Ok(Self { scene, run })
+    }
 }
 
 impl Demo<'_> {
@@ -185,7 +219,11 @@ impl Demo<'_> {
 
     fn write_report(&self) -> Result<()> {
         let simulation = Simulation::new(&self.scene).map_err(|error| Failure::from_core(SCENE_FILE, error))?;
+        let paper =
+            Simulation::new(&self.paper.scene).map_err(|error| Failure::from_core("the paper's scene", error))?;
         let html = page::render(&ReportInput {
+            estimates: &self.estimates,
+            paper: Some((paper.table(), &self.paper.run)),
             scene: &self.scene,
             table: simulation.table(),
             reduction: Some(&self.reduction),
@@ -238,7 +276,7 @@ impl Demo<'_> {
         let text = format!(
             "{}\n\nsimulated      {:.4} ms in {} communication steps, {} internal steps\n\
              per step       {per_step:.3} µs, {:.3} s of computing per simulated second\n\
-             agreement      {}: all {} outputs at all {} points, bit for bit\n{}\nopen {}",
+             agreement      {}: all {} outputs at all {} points, bit for bit\n{}{}\nopen {}",
             self.facts.iter().map(RomFacts::to_text).collect::<String>().trim_end(),
             1e3 * simulated,
             self.schedule.count,
@@ -248,6 +286,7 @@ impl Demo<'_> {
             self.native.recording.names.len(),
             self.native.recording.rows(),
             self.study_text(),
+            estimate::told(&self.estimates),
             report.display()
         );
         let json = json!({
@@ -272,6 +311,7 @@ impl Demo<'_> {
             "seconds": self.durations.iter().map(|(what, seconds)| (what.clone(), json!(seconds)))
                 .collect::<serde_json::Map<_, _>>(),
             "error_study": self.study.to_json(),
+            "estimated_errors": self.estimates.iter().map(Estimate::json).collect::<serde_json::Map<_, _>>(),
             "warnings": self.native.warnings,
         });
         Ok(Outcome { text, json })

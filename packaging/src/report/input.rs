@@ -3,7 +3,7 @@
 use tiprub_core::{Scene, VariableTable};
 use tiprub_model::Reduction;
 use tiprub_shell::{native::NativeRun, recording::Agreement, schedule::Schedule};
-use tiprub_study::error_study::ErrorStudy;
+use tiprub_study::{error_study::ErrorStudy, estimate::Estimate};
 
 use crate::rom_facts::RomFacts;
 
@@ -47,6 +47,10 @@ pub struct ReportInput<'a> {
     pub imported: &'a [ImportedSummary],
     /// Error against run time, where it was studied.
     pub study: Option<&'a ErrorStudy>,
+    /// What steps, modes, patches and mesh are estimated to leave; empty where nobody asked.
+    pub estimates: &'a [Estimate],
+    /// The same run with the paper's model and method, and its variables.
+    pub paper: Option<(&'a VariableTable, &'a NativeRun)>,
     /// Files beside the report.
     pub files: &'a [ReportFile],
     /// Wall times of the parts of the work (what, s).

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use tiprub_core::variables::Quantity;
 use tiprub_figure::{STYLE, escape};
 use tiprub_shell::Result;
+use tiprub_study::estimate;
 
 use super::input::{ReportFile, ReportInput};
 use super::sections::{Results, figures};
@@ -173,11 +174,36 @@ fn run_section(input: &ReportInput<'_>) -> String {
     for warning in &native.warnings {
         let _ = write!(html, "<p class=\"warning\">{}</p>", escape(warning));
     }
+    if !input.estimates.is_empty() {
+        let _ = write!(html, "<p>{}.</p>", escape(&estimate::told(input.estimates)));
+    }
+    html.push_str(&paper_part(input, &results));
     html.push_str("<h3>Where the time went</h3>");
     let durations: Vec<(&str, String)> =
         input.durations.iter().map(|(what, seconds)| (what.as_str(), format!("{} s", rounded(*seconds)))).collect();
     html.push_str(&table(&durations));
     html.push_str("</section>\n");
+    html
+}
+
+/// Both models and methods at the end of the same run.
+fn paper_part(input: &ReportInput<'_>, own: &Results<'_>) -> String {
+    let Some((table, run)) = input.paper else { return String::new() };
+    let paper = Results::new(table, &run.recording);
+    let mut html = String::from(
+        "<h3>Beside the paper's model and method</h3><p>The same rub with <code>preset = \"paper\"</code>: Craig-Bampton modes, \
+         three contact nodes, central differences, the film of eq. 11. Three points do not resolve the tip.</p>\
+         <table class=\"numbers\"><thead><tr><th>at the end</th><th>this run</th><th>the paper's</th></tr></thead><tbody>",
+    );
+    for (label, quantity) in
+        [("strain energy (J)", Quantity::StrainEnergy), ("friction loss (J)", Quantity::FrictionLoss)]
+    {
+        let [own, paper] = [own, &paper].map(|results| results.last(quantity).map_or("-".into(), rounded));
+        let _ = write!(html, "<tr><td>{label}</td><td>{own}</td><td>{paper}</td></tr>");
+    }
+    let times = [input.native, run].map(|run| rounded(1e6 * run.stepping.as_secs_f64() / run.internal_steps as f64));
+    let _ = write!(html, "<tr><td>time per internal step (µs)</td><td>{}</td><td>{}</td></tr>", times[0], times[1]);
+    html.push_str("</tbody></table>");
     html
 }
 
