@@ -59,9 +59,11 @@ pub fn continuous(
     friction: f64,
     directions: &ContactDirections,
 ) -> Option<f64> {
-    let held = || Held::continuous(model, scheme, step, friction, directions);
+    // Beyond ω_max h = 2 the matrix would lose its balance.
+    let unit = step.min(2.0 / model.largest_frequency());
+    let held = || Held::continuous(model, scheme, unit, friction, directions);
     let eigenvalues = is_looked_at(model, friction).then(held)?.eigenvalues()?;
-    Some(rate(&eigenvalues) / step)
+    Some(rate(&eigenvalues) / unit)
 }
 
 /// [`growth`] where that of the differential equations is known, `continuous` (1/s).
