@@ -535,7 +535,8 @@ fn the_other_sense_is_told_of_when_the_rotor_turns_that_way() {
 fn crowded(nodes: usize, modes: usize, seed: u64) -> Scene {
     let mut random = models::Random(seed);
     let shapes = random.matrix(3 * nodes, modes);
-    let shape = |row: usize, mode: usize| if mode == 0 && row % 3 == 0 { -1.0 } else { 3.0 * shapes[(row, mode)] };
+    let shape =
+        |row: usize, mode: usize| if mode == 0 && row.is_multiple_of(3) { -1.0 } else { 3.0 * shapes[(row, mode)] };
     let frequencies: Vec<f64> = (0..modes).map(|mode| 500.0 + 37_000.0 * mode as f64 / modes as f64).collect();
     let place = |node: usize| [models::RADIUS, 2e-3 * node as f64, 1e-3 * node as f64];
     let nodes = (0..nodes).map(|node| models::node(format!("node_{}", node + 1), place(node), 0.0)).collect();
@@ -579,7 +580,7 @@ fn without_friction_more_contact_nodes_than_modes_are_no_end_of_a_run() {
 /// Two contact nodes of which the only mode takes one out of the casing by as much as it takes the other in.
 #[test]
 fn nodes_that_no_mode_takes_out_at_once_are_named_and_friction_is_not_blamed() {
-    let shape = |row: usize, _: usize| if row % 3 == 0 { 1.0 - 2.0 * (row / 3) as f64 } else { 0.0 };
+    let shape = |row: usize, _: usize| if row.is_multiple_of(3) { 1.0 - 2.0 * (row / 3) as f64 } else { 0.0 };
     let place = |node: usize| [models::RADIUS, 0.02 * node as f64, 0.015 * node as f64];
     let nodes = (0..2).map(|node| models::node(format!("node_{}", node + 1), place(node), 0.0)).collect();
     let rom = models::modal("rocker", &[800.0], shape, nodes);
