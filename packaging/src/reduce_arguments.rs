@@ -54,7 +54,7 @@ pub enum Model {
     Casing(Box<CasingArguments>),
     /// The NASA rotor 37 blade that ships with tiprub.
     #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  \
-                            tiprub reduce rotor37 --contact-patches 9 --modes 120 --mesh 32x2x40 -o fine.rom.safetensors")]
+                            tiprub reduce rotor37 --contact-patches 17 --modes 120 --mesh 32x2x40 -o fine.rom.safetensors")]
     Rotor37(Rotor37Arguments),
     /// The disk with 56 blades that ships.
     #[command(after_help = "Example:\n  tiprub reduce stage --coarse --inp sector.inp --vtk sector.vtu")]
@@ -82,7 +82,7 @@ pub struct Rotor37Arguments {
     /// The paper's contact nodes along the tip chord, leading edge to trailing edge (≥ 2), instead of patches.
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
-    /// Contact patches along the tip chord, over the whole thickness [default: 5].
+    /// Contact patches along the tip chord, over the whole thickness [default: 9].
     #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
     pub contact_patches: Option<usize>,
     /// Which modes are kept [default: free-interface; craig-bampton with --contact-nodes].

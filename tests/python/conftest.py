@@ -42,7 +42,7 @@ def work(tmp_path_factory):
 @pytest.fixture(scope="session")
 def scene(tiprub, work):
     """The scene beside this file, with the ROM made once."""
-    tiprub("reduce", "rotor37", "-o", work / "rotor37.rom.safetensors")
+    tiprub("reduce", "rotor37", "--contact-nodes", "3", "-o", work / "rotor37.rom.safetensors")
     path = work / "scene.toml"
     path.write_text((Path(__file__).parent / "rotor37.toml").read_text())
     return path

@@ -37,7 +37,7 @@ def product(request, tiprub, scene, work):
     if name == "flexible":
         write_ring(scene.parent / "ring.rom.safetensors")
     if name == "spinning":
-        tiprub("reduce", "rotor37", "--spin", "1800", "-o", scene.parent / "rotor37-spin.rom.safetensors")
+        tiprub("reduce", "rotor37", "--contact-nodes", "3", "--spin", "1800", "-o", scene.parent / "rotor37-spin.rom.safetensors")
         tiprub("reduce", "casing", "-o", scene.parent / "casing37.rom.safetensors")
     library = ["--library", os.environ["TIPRUB_LIBRARY"]] if "TIPRUB_LIBRARY" in os.environ else []
     fmus = {}

@@ -13,7 +13,7 @@ use tiprub_shell::{
 use tiprub_study as study;
 use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
-use crate::{conjugacy, convergence, cube, error, inputs, modes, stability, stage};
+use crate::{conjugacy, convergence, cube, error, estimates, inputs, modes, stability, stage};
 
 /// Evidence for tiprub: studies of the models that ship and of standard problems.
 #[derive(Debug, Parser)]
@@ -58,6 +58,8 @@ pub enum Command {
     Conjugacy(StudyCommon),
     /// What the communication step does to a whirling shaft and other inputs that move, ramped, with derivatives, and held.
     Inputs(StudyCommon),
+    /// What steps, modes and patches are estimated to leave, against rubs refined far in each direction.
+    Estimates(StudyCommon),
 }
 
 /// Arguments of `lab error`.
@@ -160,6 +162,7 @@ impl Cli {
             Command::Cube(common) => ("cube", common),
             Command::Conjugacy(common) => ("conjugacy", common),
             Command::Inputs(common) => ("inputs", common),
+            Command::Estimates(common) => ("estimates", common),
         };
         let directory = commands::study::directory(name, common);
         output_file::try_directory(&directory)?;
@@ -182,6 +185,7 @@ impl Cli {
             Command::Cube(common) => cube::study(common, console),
             Command::Conjugacy(common) => conjugacy::study(common.quick),
             Command::Inputs(common) => inputs::study(common, console),
+            Command::Estimates(common) => estimates::study(common, console),
             Command::Stability(_) => unreachable!("`run` has answered it"),
         }
     }

@@ -11,6 +11,7 @@ mod conjugacy;
 mod convergence;
 mod cube;
 mod error;
+mod estimates;
 mod inputs;
 mod modes;
 mod stability;

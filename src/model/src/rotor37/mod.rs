@@ -84,7 +84,7 @@ impl Default for Rotor37Options {
     fn default() -> Self {
         Self {
             mesh: MeshCounts { chord: 24, thickness: 2, span: 40 },
-            tip: Tip::Patches(5),
+            tip: Tip::Patches(9),
             kind: ReductionKind::FreeInterface,
             modes: 80,
             ..Self::paper()

@@ -1,0 +1,196 @@
+//! Estimates of what steps, modes and patches leave, against the truth: rubs of rotor 37, each refined far in one direction.
+
+use serde_json::{Value, json};
+use tiprub_core::Scene;
+use tiprub_figure::plots::{Plot, Series};
+use tiprub_gallery::{reduction, scene_source};
+use tiprub_model::{
+    Rotor37Options,
+    rotor37::{MeshCounts, Tip},
+};
+use tiprub_shell::{Failure, Result, console::Console, sweep};
+use tiprub_study::{
+    Figure, Picture, Sheet, Statement, Study,
+    arguments::StudyCommon,
+    convergence::march::{Marched, march},
+    estimate::{self, Estimate, QUANTITIES},
+};
+
+/// Depth of the bumps, friction and speed (rad/s).
+const DEPTHS: [f64; 4] = [0.55, 0.6, 0.7, 0.85];
+const FRICTIONS: [f64; 2] = [0.0, 0.15];
+const SPEEDS: [f64; 3] = [1500.0, 1800.0, 2000.0];
+/// Communication step (s), internal steps in it, and length of the runs (s).
+const INTERVAL: f64 = 4e-6;
+const DIVISION: u32 = 8;
+const LENGTH: f64 = 5e-3;
+const QUICK_LENGTH: f64 = 2e-3;
+/// Own modes and patches, and what stands for the truth: so many times finer.
+const OWN: (usize, usize) = (40, 9);
+const TRUE_MODES: usize = 200;
+const TRUE_PATCHES: usize = 17;
+const TRUE_DIVISION: u32 = 64;
+/// An estimate is right where it is within this factor of the truth.
+const FACTOR: f64 = 3.0;
+/// Errors below this are as good as none: 1e-4 of displacements is beyond what anybody asks of a rub.
+const NONE: f64 = 1e-4;
+const DIRECTIONS: [&str; 3] = ["steps", "modes", "patches"];
+
+/// What was estimated and what is true, by quantity.
+struct Compared {
+    scene: usize,
+    direction: usize,
+    estimate: [Option<f64>; 3],
+    truth: [Option<f64>; 3],
+}
+
+/// Scenes around the own model, the finer ones behind: modes, patches.
+struct Scenes {
+    names: Vec<String>,
+    own: Vec<Scene>,
+    modes: Vec<Scene>,
+    patches: Vec<Scene>,
+}
+
+fn scenes(quick: bool, console: &Console) -> Result<Scenes> {
+    let rom = |modes: usize, patches: usize| {
+        let mesh = MeshCounts { chord: 16, thickness: 1, span: 16 };
+        let options = Rotor37Options { mesh, tip: Tip::Patches(patches), modes, ..Rotor37Options::default() };
+        reduction::rotor37(&options, console).map(|found| found.rom)
+    };
+    let roms = [rom(OWN.0, OWN.1)?, rom(TRUE_MODES, OWN.1)?, rom(OWN.0, TRUE_PATCHES)?];
+    let mut found = Scenes { names: Vec::new(), own: Vec::new(), modes: Vec::new(), patches: Vec::new() };
+    let base = scene_source::settings("builtin:rotor37")?;
+    let all = DEPTHS.iter().flat_map(|depth| FRICTIONS.map(|friction| (*depth, friction)));
+    let all = all.flat_map(|(depth, friction)| SPEEDS.map(|speed| (depth, friction, speed)));
+    for (depth, friction, speed) in all.take(if quick { 2 } else { usize::MAX }) {
+        let mut settings = base.clone();
+        settings.surfaces[0].shape = tiprub_core::settings::Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
+        (settings.contacts[0].friction, settings.structures[0].speed) = (friction, speed);
+        settings.experiment.communication_step = INTERVAL;
+        settings.time.step = INTERVAL / f64::from(DIVISION);
+        found.names.push(format!("depth {depth}, µ = {friction}, {speed} rad/s"));
+        let [own, modes, patches] =
+            roms.each_ref().map(|rom| Scene { settings: settings.clone(), roms: vec![rom.clone()] });
+        found.own.push(own);
+        found.modes.push(modes);
+        found.patches.push(patches);
+    }
+    Ok(found)
+}
+
+fn run(scene: &Scene, division: u32, samples: usize) -> Result<Marched> {
+    let mut scene = scene.clone();
+    scene.settings.time.step = INTERVAL / f64::from(division);
+    march(&scene, &[], division, samples).map_err(|why| Failure::new(&scene.settings.name, why, ""))
+}
+
+/// Of one scene in all directions.
+fn compared(scenes: &Scenes, scene: usize, samples: usize) -> Result<Vec<Compared>> {
+    let quiet = Console::new(true, false);
+    let estimates = estimate::estimates(&scenes.own[scene], &[], samples, &quiet)?;
+    let own = run(&scenes.own[scene], DIVISION, samples)?;
+    let truths = [
+        run(&scenes.own[scene], TRUE_DIVISION, samples),
+        run(&scenes.modes[scene], DIVISION, samples),
+        run(&scenes.patches[scene], DIVISION, samples),
+    ];
+    let of = |(direction, truth): (usize, Result<Marched>)| {
+        let estimate = estimates.iter().find(|one: &&Estimate| one.direction == DIRECTIONS[direction]);
+        let changes = truth.ok().map_or([None; 5], |truth| own.changes(&truth));
+        Compared {
+            scene,
+            direction,
+            estimate: estimate.map_or([None; 3], |one| one.left),
+            truth: [changes[0], changes[1], changes[2]],
+        }
+    };
+    Ok(truths.into_iter().enumerate().map(of).collect())
+}
+
+/// Estimates within the factor, all that were given, and all that could be compared.
+fn counted<'a>(all: impl Iterator<Item = &'a Compared>, quantity: usize) -> [usize; 3] {
+    let mut counts = [0; 3];
+    for one in all {
+        let Some(truth) = one.truth[quantity] else { continue };
+        counts[2] += 1;
+        let Some(estimate) = one.estimate[quantity] else { continue };
+        counts[1] += 1;
+        let (low, high) = (estimate.min(truth).max(NONE), estimate.max(truth).max(NONE));
+        counts[0] += usize::from(high <= FACTOR * low);
+    }
+    counts
+}
+
+fn statement(all: &[Compared], direction: usize, quantity: usize) -> Statement {
+    let [right, given, compared] = counted(all.iter().filter(|one| one.direction == direction), quantity);
+    Statement::tested(
+        format!("{}, {}: four of five estimates are within a factor of {FACTOR}", DIRECTIONS[direction], QUANTITIES[quantity]),
+        given > 0 && 5 * right >= 4 * given,
+        format!("{right} of {given}; {} of {compared} are unknown", compared - given),
+    )
+}
+
+fn figure(all: &[Compared]) -> Result<Figure> {
+    let logarithm = |value: f64| value.max(NONE).log10();
+    let series = DIRECTIONS.iter().enumerate().map(|(direction, name)| {
+        let own = all.iter().filter(|one| one.direction == direction);
+        let points = own.filter_map(|one| Some((logarithm(one.truth[0]?), logarithm(one.estimate[0]?))));
+        Series::line(*name, points.collect())
+    });
+    let plot = Plot {
+        marked: true,
+        ..Plot::new("log10 of the true error", "log10 of the estimate", series.collect())
+    };
+    let mut sheet = Sheet::new(["scene", "direction (0 steps, 1 modes, 2 patches)", "estimate", "truth"]);
+    for one in all {
+        let [estimate, truth] = [one.estimate[0], one.truth[0]].map(|value| value.unwrap_or(f64::NAN));
+        sheet.rows.push(vec![one.scene as f64, one.direction as f64, estimate, truth]);
+    }
+    Ok(Figure {
+        name: "estimates",
+        caption: "Estimated against true relative error of the displacements of watched points.".into(),
+        picture: Picture::plot(&plot)?,
+        sheet,
+    })
+}
+
+/// The study.
+///
+/// # Errors
+/// A model that cannot be reduced, a run of the own model that fails, a plot that cannot be drawn.
+pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
+    let scenes = scenes(arguments.quick, console)?;
+    let length = if arguments.quick { QUICK_LENGTH } else { LENGTH };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a thousand")]
+    let samples = (length / INTERVAL).round() as usize;
+    let task = console.task("Estimates against the truth", Some(scenes.names.len() as u64));
+    let indices: Vec<usize> = (0..scenes.names.len()).collect();
+    let progress = |done: usize| task.at(done as u64);
+    let found = sweep::sweep(&indices, sweep::processors(), |scene| compared(&scenes, *scene, samples), progress)?;
+    let all: Vec<Compared> = found.into_iter().flatten().collect();
+    let pairs = (0..DIRECTIONS.len()).flat_map(|direction| (0..QUANTITIES.len()).map(move |quantity| (direction, quantity)));
+    let row = |one: &Compared| {
+        json!({ "scene": scenes.names[one.scene], "direction": DIRECTIONS[one.direction], "estimate": one.estimate, "truth": one.truth })
+    };
+    Ok(Study {
+        name: "estimates",
+        title: "Estimates against the truth".into(),
+        summary: format!(
+            "Rubs of rotor 37, {} modes and {} patches on a coarse mesh. Each is estimated from coarser runs of itself, and run again with {} \
+             times shorter steps, with {TRUE_MODES} modes, and with {TRUE_PATCHES} patches.",
+            OWN.0,
+            OWN.1,
+            TRUE_DIVISION / DIVISION
+        ),
+        facts: vec![
+            ("scenes".into(), scenes.names.len().to_string()),
+            ("length of each run".into(), format!("{length} s")),
+            ("internal step".into(), format!("{:e} s", INTERVAL / f64::from(DIVISION))),
+        ],
+        statements: pairs.map(|(direction, quantity)| statement(&all, direction, quantity)).collect(),
+        figures: vec![figure(&all)?],
+        results: Value::Array(all.iter().map(row).collect()),
+        files: Vec::new(),
+    })
+}

@@ -1,0 +1,60 @@
+"""Both models of rotor 37 that ship, packaged and marched: refined, and with `preset = "paper"`."""
+
+import os
+from types import SimpleNamespace
+
+import pytest
+from fmpy import extract, read_model_description
+from fmpy.validation import validate_fmu
+
+from importers import Three, Two
+from test_cyclic import table
+from test_fmu import bits, march
+
+LIBRARY = ["--library", os.environ["TIPRUB_LIBRARY"]] if "TIPRUB_LIBRARY" in os.environ else []
+STOP = 2.0e-3
+
+
+@pytest.fixture(scope="module", params=["rotor37", "rotor37-paper"])
+def shipped(request, tiprub, tmp_path_factory):
+    """One of the scenes, as FMU and run without FMI."""
+    directory = tmp_path_factory.mktemp(request.param)
+    scene = f"builtin:{request.param}"
+    fmus = {}
+    for kind, version in ((Two, "2"), (Three, "3")):
+        file = directory / f"fmi{version}.fmu"
+        tiprub("package", scene, "--fmi", version, "-o", file, *LIBRARY)
+        unpacked = extract(str(file), unzipdir=str(directory / version))
+        fmus[kind] = SimpleNamespace(path=file, directory=unpacked, description=read_model_description(str(file)))
+    run = tiprub("run", scene, "--stop", STOP, "--csv", directory / "native.csv")
+    names, rows = table(directory / "native.csv")
+    return SimpleNamespace(name=request.param, fmus=fmus, names=names, rows=rows, last=run["last"])
+
+
+@pytest.mark.parametrize("kind", [Two, Three])
+def test_fmpy_gives_the_bits_of_the_native_run(shipped, kind):
+    assert validate_fmu(str(shipped.fmus[kind].path)) == []
+    instance = kind(shipped.fmus[kind])
+    try:
+        instance.initialise()
+        results = march(instance, shipped.names, [row[0] for row in shipped.rows])
+    finally:
+        instance.free()
+    assert results == [bits(row[1:]) for row in shipped.rows]
+
+
+def test_patches_have_pressures_and_watched_points(shipped):
+    refined = shipped.name == "rotor37"
+    assert ("blade[1].normal_pressure[9]" in shipped.last) == refined
+    assert ("blade[1].radial_displacement[3]" in shipped.last) == refined
+    force = [name for name in shipped.names if name.startswith("blade[1].normal_force[")]
+    assert len(force) == (9 if refined else 3)
+    if not refined:
+        return
+    # A force over the area and over the length that a patch stands for.
+    touching = [row for row in shipped.rows if row[1 + shipped.names.index(force[4])] > 0.0]
+    assert touching
+    for row in touching:
+        values = [row[1 + shipped.names.index(f"blade[1].{name}[5]")] for name in ("normal_force", "normal_pressure", "normal_line_force")]
+        assert values[0] / values[1] == pytest.approx(1.13e-5, rel=0.3)
+        assert values[0] / values[2] == pytest.approx(6.96e-3, rel=0.1)
