@@ -27,7 +27,9 @@ fn columns(csv: &str) -> (Vec<String>, Vec<Vec<f64>>) {
 fn run_builtin(project: &TempDir, name: &str) -> (serde_json::Value, Vec<String>, Vec<Vec<f64>>) {
     let json = succeed(project, &["run", name, "--csv", "out.csv", "--json", "--quiet"]);
     let summary: serde_json::Value = serde_json::from_str(&json).unwrap();
-    assert_eq!(summary["warnings"], serde_json::json!([]), "{name}");
+    // Contact that stays closed at some patches flutters, and that is told; nothing else is doubtful.
+    let warnings = summary["warnings"].as_array().unwrap();
+    assert!(warnings.iter().all(|warning| warning.as_str().unwrap().contains("(flutter)")), "{name}: {warnings:#?}");
     let (names, rows) = columns(&fs::read_to_string(project.path().join("out.csv")).unwrap());
     let impulse = names.iter().position(|name| name == "normal_impulse").unwrap();
     let touching = rows.iter().filter(|row| row[impulse] > 0.0).count();

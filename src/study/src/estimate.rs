@@ -2,15 +2,16 @@
 //!
 //! Three levels of a direction, each about twice as fine as the one before, the scene's own the finest: changes c₁ and c₂ from level
 //! to level. Where they shrink as a power, c₁/c₂ tells which, and c₂/(c₁/c₂ − 1) is what all further refinement would change. Where
-//! they do not shrink, nothing is known.
+//! they do not shrink, nothing is known. Longer steps may be refused: then shorter ones are tried, and c₁ + c₂/(c₁/c₂ − 1) is left.
 
 use serde_json::{Map, Value, json};
 use tiprub_core::Scene;
 use tiprub_shell::{Result, console::Console};
 
 use crate::convergence::{
-    Refined,
+    Refined, Runner,
     coarsen::coarsened,
+    divisions,
     refine::{Direction, Level},
     truncate::{Form, truncated},
 };
@@ -37,18 +38,19 @@ impl Estimate {
         Self { direction, left: [None; 3], unknown: Some(why.into()) }
     }
 
-    /// Of a direction that was run.
-    pub(crate) fn of(direction: &'static str, refined: &Refined) -> Self {
+    /// Of a direction that was run, its own level the first or the last.
+    fn of(direction: &'static str, refined: &Refined) -> Self {
         if let Some(why) = refined.runs.iter().find_map(|run| run.as_ref().err()) {
-            return Self::unknown(direction, format!("a coarser run is refused: {why}"));
+            return Self::unknown(direction, format!("another run is refused: {why}"));
         }
         let changes = refined.changes();
-        let [.., before, last] = &changes[..] else { return Self::unknown(direction, "there are no coarser levels") };
-        Self {
-            direction,
-            left: std::array::from_fn(|quantity| rest(before[quantity]?, last[quantity]?)),
-            unknown: None,
-        }
+        let [.., before, last] = &changes[..] else { return Self::unknown(direction, "there are no other levels") };
+        let own_first = refined.direction.levels.first().is_some_and(|level| level.own);
+        let left = |quantity: usize| {
+            let (before, last): (f64, f64) = (before[quantity]?, last[quantity]?);
+            Some(rest(before, last)? + if own_first { before } else { 0.0 })
+        };
+        Self { direction, left: std::array::from_fn(left), unknown: None }
     }
 
     /// Name and values, `null` where they are not known, and why.
@@ -85,30 +87,31 @@ pub fn told(estimates: &[Estimate]) -> String {
     format!("estimated error of the displacements: {}", all.join(", "))
 }
 
-/// Directions of a scene whose coarser levels follow from it, `division` internal steps per communication step; `Err` says why one
-/// has none.
-pub(crate) fn directions(scene: &Scene, division: u32) -> Vec<(&'static str, std::result::Result<Direction, String>)> {
-    vec![("steps", steps(scene, division)), ("modes", modes(scene, division)), ("patches", patches(scene, division))]
-}
-
 fn direction(title: &str, unit: &'static str, levels: Vec<Level>) -> Direction {
     Direction { name: "estimate", title: title.into(), unit, levels, missing: String::new(), shorter: None }
 }
 
-fn steps(scene: &Scene, division: u32) -> std::result::Result<Direction, String> {
+fn steps(scene: &Scene, own: u32, divisions: [u32; 3]) -> Direction {
     let interval = scene.settings.experiment.communication_step;
-    if division < 4 {
-        return Err(format!("{division} internal steps per communication step have no half and no quarter"));
-    }
-    let level = |division: u32, own: bool| {
+    let level = |division: u32| {
         let mut scene = scene.clone();
-        if !own {
+        if division != own {
             scene.settings.time.step = interval / f64::from(division);
         }
-        Level { value: interval / f64::from(division), own, scene, division }
+        Level { value: interval / f64::from(division), own: division == own, scene, division }
     };
-    let levels = vec![level(division.div_ceil(4), false), level(division.div_ceil(2), false), level(division, true)];
-    Ok(direction("internal step", "s", levels))
+    direction("internal step", "s", divisions.map(level).into())
+}
+
+/// Of the steps: from longer ones, or from shorter ones where there are no longer ones, or they are refused.
+fn of_steps(scene: &Scene, own: u32, runner: &Runner) -> Result<Estimate> {
+    if own >= 4 {
+        let coarser = runner.as_it_is(steps(scene, own, [own.div_ceil(4), own.div_ceil(2), own]))?;
+        if coarser.runs.iter().all(std::result::Result::is_ok) {
+            return Ok(Estimate::of("steps", &coarser));
+        }
+    }
+    Ok(Estimate::of("steps", &runner.as_it_is(steps(scene, own, [own, 2 * own, 4 * own]))?))
 }
 
 /// Half and a quarter of the modes of the master.
@@ -155,11 +158,16 @@ pub fn estimates(
     samples: usize,
     console: &Console,
 ) -> Result<Vec<Estimate>> {
-    let runner = crate::convergence::Runner::new(settings, samples, console);
-    let division =
-        crate::convergence::divisions(scene.settings.experiment.communication_step, scene.settings.time.step);
-    let mut found = Vec::new();
-    for (name, direction) in directions(scene, division) {
+    if let Err(several) = crate::one_rotor(&scene.settings) {
+        let why = several.to_string();
+        return Ok(["steps", "modes", "patches", "mesh"]
+            .map(|direction| Estimate::unknown(direction, why.as_str()))
+            .into());
+    }
+    let runner = Runner::new(settings, samples, console);
+    let division = divisions(scene.settings.experiment.communication_step, scene.settings.time.step);
+    let mut found = vec![of_steps(scene, division, &runner)?];
+    for (name, direction) in [("modes", modes(scene, division)), ("patches", patches(scene, division))] {
         found.push(match direction {
             Ok(direction) => Estimate::of(name, &runner.as_it_is(direction)?),
             Err(why) => Estimate::unknown(name, why),

@@ -125,7 +125,10 @@ fn counted<'a>(all: impl Iterator<Item = &'a Compared>, quantity: usize) -> [usi
 fn statement(all: &[Compared], direction: usize, quantity: usize) -> Statement {
     let [right, given, compared] = counted(all.iter().filter(|one| one.direction == direction), quantity);
     Statement::tested(
-        format!("{}, {}: four of five estimates are within a factor of {FACTOR}", DIRECTIONS[direction], QUANTITIES[quantity]),
+        format!(
+            "{}, {}: four of five estimates are within a factor of {FACTOR}",
+            DIRECTIONS[direction], QUANTITIES[quantity]
+        ),
         given > 0 && 5 * right >= 4 * given,
         format!("{right} of {given}; {} of {compared} are unknown", compared - given),
     )
@@ -138,10 +141,7 @@ fn figure(all: &[Compared]) -> Result<Figure> {
         let points = own.filter_map(|one| Some((logarithm(one.truth[0]?), logarithm(one.estimate[0]?))));
         Series::line(*name, points.collect())
     });
-    let plot = Plot {
-        marked: true,
-        ..Plot::new("log10 of the true error", "log10 of the estimate", series.collect())
-    };
+    let plot = Plot { marked: true, ..Plot::new("log10 of the true error", "log10 of the estimate", series.collect()) };
     let mut sheet = Sheet::new(["scene", "direction (0 steps, 1 modes, 2 patches)", "estimate", "truth"]);
     for one in all {
         let [estimate, truth] = [one.estimate[0], one.truth[0]].map(|value| value.unwrap_or(f64::NAN));
@@ -169,10 +169,9 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     let progress = |done: usize| task.at(done as u64);
     let found = sweep::sweep(&indices, sweep::processors(), |scene| compared(&scenes, *scene, samples), progress)?;
     let all: Vec<Compared> = found.into_iter().flatten().collect();
-    let pairs = (0..DIRECTIONS.len()).flat_map(|direction| (0..QUANTITIES.len()).map(move |quantity| (direction, quantity)));
-    let row = |one: &Compared| {
-        json!({ "scene": scenes.names[one.scene], "direction": DIRECTIONS[one.direction], "estimate": one.estimate, "truth": one.truth })
-    };
+    let pairs =
+        (0..DIRECTIONS.len()).flat_map(|direction| (0..QUANTITIES.len()).map(move |quantity| (direction, quantity)));
+    let row = |one: &Compared| json!({ "scene": scenes.names[one.scene], "direction": DIRECTIONS[one.direction], "estimate": one.estimate, "truth": one.truth });
     Ok(Study {
         name: "estimates",
         title: "Estimates against the truth".into(),
