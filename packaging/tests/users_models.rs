@@ -298,6 +298,7 @@ fn a_sector_has_patches_of_both_kinds() {
                 --modes 6";
     let free = project.succeed(&format!("{line} -o free.rom.safetensors"));
     let count = free["model"]["contact_nodes"].as_array().unwrap().len();
+    assert_eq!(count, 3, "two elements along the chord have no more than three patches");
     assert!(free["rom"]["origin"].as_str().unwrap().contains(&format!("forces on {count} patches and")), "{free:#}");
     let held =
         format!("{line} --contact-set TIP --contact-patches {count} --kind craig-bampton -o held.rom.safetensors");

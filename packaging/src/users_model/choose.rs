@@ -81,7 +81,7 @@ fn candidates(imported: &Imported, asked: &ModelOptions, fixed: &[usize]) -> Res
 /// As many as there are names; else five, or as many as a coarse tip can have.
 fn default_patches(tips: &TipOptions, tip: &Option<(FoundTip, bool)>) -> usize {
     match tips.contact_names.len() {
-        0 => tip.as_ref().map_or(PATCHES, |(tip, _)| PATCHES.min(tip.places)),
+        0 => tip.as_ref().map_or(PATCHES, |(tip, _)| tip.at_most(PATCHES)),
         named => named,
     }
 }

@@ -35,6 +35,15 @@ pub struct FoundTip {
     pub elsewhere: usize,
 }
 
+impl FoundTip {
+    /// So many patches, or as many as are no narrower than elements.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "far fewer elements than 2^52")]
+    pub fn at_most(&self, patches: usize) -> usize {
+        let elements = (self.chord / self.edge).round() as usize;
+        patches.min(elements + 1).min(self.places)
+    }
+}
+
 /// An outer face that faces outward.
 struct Face<'a> {
     element: &'a Element,
