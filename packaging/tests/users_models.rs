@@ -1,5 +1,9 @@
 //! Models of a user's own, as the user meets them: reduce, package, run, and what is said of wrong ones.
 
+#[path = "../../tests/guide.rs"]
+mod guide;
+
+use guide::told;
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -267,6 +271,29 @@ fn the_tip_of_a_mesh_is_found_and_told() {
     }
 }
 
+/// Radial flexibility (m/N) in the middle of the tip, on meshes of three kinds: patches do not depend on the elements, nodes do.
+#[test]
+fn patches_of_other_elements_are_as_soft() {
+    let kinds = ["hex20", "penta15", "tet10"];
+    let files = kinds.map(|kind| format!("blade_{kind}.inp"));
+    let project = Project::new(&files.each_ref().map(String::as_str));
+    let radial = |file: &String, contact: &str| -> f64 {
+        let line = "--clamp-set ROOT --units mm-t-s --material titanium --modes 8 --kind free-interface --force -o r.rom.safetensors";
+        project.succeed(&format!("reduce blade {file} {contact} {line}"));
+        project.rom("r.rom.safetensors").stiffness.try_inverse().unwrap()[(6, 6)]
+    };
+    let all = |contact: &str| files.each_ref().map(|file| radial(file, contact));
+    let (nodes, patches) = (all("--contact-nodes 5"), all("--contact-patches 5"));
+    for (kind, (node, patch)) in kinds.iter().zip(nodes.into_iter().zip(patches)) {
+        told!("| {kind} | {node} | {patch} |");
+    }
+    let apart = |values: [f64; 3]| {
+        values.iter().fold(0.0, |a: f64, b| a.max(*b)) / values.iter().fold(f64::INFINITY, |a, b| a.min(*b)) - 1.0
+    };
+    assert!(apart(patches) < 0.02 && apart(nodes) > 0.2, "{patches:?} {nodes:?}");
+    guide::hold("cargo test -p tiprub --test users_models");
+}
+
 /// Contact at points is warned of where the mesh could carry more, and at one place always.
 #[test]
 fn contact_at_points_of_a_fine_tip_is_warned_of() {
@@ -298,6 +325,7 @@ fn a_sector_has_patches_of_both_kinds() {
                 --modes 6";
     let free = project.succeed(&format!("{line} -o free.rom.safetensors"));
     let count = free["model"]["contact_nodes"].as_array().unwrap().len();
+    assert_eq!(count, 3, "two elements along the chord have no more than three patches");
     assert!(free["rom"]["origin"].as_str().unwrap().contains(&format!("forces on {count} patches and")), "{free:#}");
     let held =
         format!("{line} --contact-set TIP --contact-patches {count} --kind craig-bampton -o held.rom.safetensors");

@@ -50,15 +50,7 @@ pub fn tips(
         fixed.extend(boundary.pairs.iter().flatten());
         fixed.sort_unstable();
     }
-    let mesh = imported.model.mesh.as_ref().map(|(mesh, _)| mesh);
-    let found = mesh.map(|mesh| find_tip(mesh, &fixed).map_err(failure)).transpose();
-    let (free, by_number, tip) = if asked.contact_set.is_some() {
-        let (free, by_number) = free_contact_nodes(imported, asked, &fixed)?;
-        (free, by_number, found.ok().flatten().map(|tip| (tip, false)))
-    } else {
-        let tip = found?.ok_or_else(|| missing(imported, "--contact-set"))?;
-        (tip.nodes.clone(), false, Some((tip, true)))
-    };
+    let (free, by_number, tip) = candidates(imported, asked, &fixed)?;
     let automatic = asked.contact_set.is_none() && tips.contact_nodes.is_none();
     let patch_count = tips.contact_patches.or_else(|| automatic.then(|| default_patches(tips, &tip)));
     let contact = if let Some(count) = patch_count {
@@ -72,10 +64,25 @@ pub fn tips(
     Ok(Chosen { clamped, contact, faces, grid: None, tip })
 }
 
+/// Nodes that may touch, whether they were given by number, and the tip with whether they are its.
+type Candidates = (Vec<usize>, bool, Option<(FoundTip, bool)>);
+
+/// Those of the contact set, or of the tip where there is no set.
+fn candidates(imported: &Imported, asked: &ModelOptions, fixed: &[usize]) -> Result<Candidates> {
+    let mesh = imported.model.mesh.as_ref().map(|(mesh, _)| mesh);
+    let found = mesh.map(|mesh| find_tip(mesh, fixed).map_err(failure)).transpose();
+    if asked.contact_set.is_some() {
+        let (free, by_number) = free_contact_nodes(imported, asked, fixed)?;
+        return Ok((free, by_number, found.ok().flatten().map(|tip| (tip, false))));
+    }
+    let tip = found?.ok_or_else(|| missing(imported, "--contact-set"))?;
+    Ok((tip.nodes.clone(), false, Some((tip, true))))
+}
+
 /// As many as there are names; else five, or as many as a coarse tip can have.
 fn default_patches(tips: &TipOptions, tip: &Option<(FoundTip, bool)>) -> usize {
     match tips.contact_names.len() {
-        0 => tip.as_ref().map_or(PATCHES, |(tip, _)| PATCHES.min(tip.places)),
+        0 => tip.as_ref().map_or(PATCHES, |(tip, _)| tip.at_most(PATCHES)),
         named => named,
     }
 }

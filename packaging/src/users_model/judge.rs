@@ -77,7 +77,7 @@ pub fn contact_warnings(chosen: &Chosen) -> Vec<String> {
         warnings.push(format!(
             "contact at {nodes} of a tip about {edges:.0} edges of elements long: a force at a node digs in deeper the finer the mesh, and \
              the tip between nodes passes through the casing; --contact-patches {} spreads contact over the tip",
-            PATCHES.min(tip.places)
+            tip.at_most(PATCHES)
         ));
     }
     warnings

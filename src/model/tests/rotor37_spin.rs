@@ -260,7 +260,7 @@ fn the_spin_arrays_have_the_same_bits_on_any_number_of_threads() {
 fn other_reductions_hold_as_well() {
     use ReductionKind::{FixedInterface, FreeInterface};
     for (tip, kind, modes) in [
-        (Tip::Nodes(7), FixedInterface, 20),
+        (Tip::Patches(5), FixedInterface, 20),
         (Tip::Nodes(3), FixedInterface, 40),
         (Tip::Patches(5), FreeInterface, 20),
         (Tip::Nodes(3), FreeInterface, 20),

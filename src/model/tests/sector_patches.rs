@@ -15,7 +15,7 @@ use tiprub_model::Mesh;
 use tiprub_model::assembly::free_dofs;
 use tiprub_model::cyclic::{CyclicOptions, CyclicReduction, ModeSelection, reduce_cyclic, whole_disk};
 use tiprub_model::element::ElementKind;
-use tiprub_model::patches::contact_patches;
+use tiprub_model::patches::{contact_patches, find_tip};
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::{ContactPoint, ReductionKind};
 use tiprub_model::rotor37::Tip;
@@ -217,4 +217,33 @@ fn a_patch_on_a_face_and_patches_that_follow_from_others_are_refused() {
     assert!(refused(&[on_face]).contains("cyclic face"));
     let twice = [own[0].clone(), ContactPoint { name: "again".into(), ..own[0].clone() }];
     assert!(refused(&twice).contains("follows from those of the others"));
+}
+
+/// The tip is the outermost connected face: of the sector's blade as its set names it, not the rim beside it.
+#[test]
+fn the_tip_of_a_sector_is_found() {
+    for kind in ElementKind::ALL {
+        let mesh = sector(kind, 8, COARSE);
+        let mut fixed = [mesh.set("LOW").unwrap(), mesh.set("HIGH").unwrap(), mesh.set("BORE").unwrap()].concat();
+        fixed.sort_unstable();
+        let tip = find_tip(&mesh, &fixed).unwrap();
+        assert_eq!(tip.nodes, mesh.set("TIP").unwrap(), "{kind:?}");
+        assert!(
+            (tip.radius[1] - 0.25).abs() < 1e-12 && (tip.axial[1] - 0.05).abs() < 1e-12 && tip.elsewhere == 0,
+            "{tip:?}"
+        );
+        let error = find_tip(&mesh, &tip.nodes).unwrap_err().to_string();
+        assert!(error.contains("are clamped or lie on faces") && error.contains("--contact-set"), "{error}");
+    }
+    // A second blade beside the first is as far out, and is told of.
+    let one = sector(ElementKind::Hex8, 8, COARSE);
+    let mut two = one.clone();
+    let (sin, cos) = (TAU / 16.0).sin_cos();
+    two.nodes.extend(one.nodes.iter().map(|[x, y, z]| [cos * x - sin * y, sin * x + cos * y, *z]));
+    two.elements.extend(one.elements.iter().map(|element| {
+        let nodes = element.nodes.iter().map(|node| node + one.nodes.len()).collect();
+        tiprub_model::mesh::Element { nodes, ..element.clone() }
+    }));
+    let tip = find_tip(&two, &[]).unwrap();
+    assert_eq!((tip.faces, tip.elsewhere), (2, 2), "{tip:?}");
 }

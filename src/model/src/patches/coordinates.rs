@@ -55,42 +55,26 @@ impl PatchCoordinates {
         if contact.iter().all(|point| point.patch.is_empty()) {
             return Ok(None);
         }
+        check_free(free, contact)?;
         let within: BTreeSet<usize> = contact.iter().flat_map(ContactPoint::weights).map(|(node, _)| node).collect();
         let within: Vec<usize> = within.into_iter().collect();
-        let mut weights = DMatrix::zeros(contact.len(), within.len());
-        for (row, point) in contact.iter().enumerate() {
-            for (node, weight) in point.weights() {
-                weights[(row, within.partition_point(|&other| other < node))] += weight;
-            }
-        }
+        let weights = weights(contact, &within);
         let places = pivots(&weights, contact)?;
+        // [W_PP⁻¹, −W_PP⁻¹ W_PO], columns in the order of the nodes.
         let inverse = weights.select_columns(&places).try_inverse().ok_or_else(|| dependent(&contact[0]))?;
         let mut shares = -&inverse * &weights;
         places.iter().enumerate().for_each(|(patch, &place)| shares.set_column(place, &inverse.column(patch)));
         let turns: Vec<Matrix3<f64>> = within.iter().map(|&node| directions(nodes[node], frame)).collect();
         let dependence = DMatrix::from_fn(3 * contact.len(), 3 * within.len(), |i, j| {
-            let turn = turns[places[i / 3]].row(i % 3) * turns[j / 3].row(j % 3).transpose();
-            shares[(i / 3, j / 3)] * turn[0]
+            let turned = turns[places[i / 3]].row(i % 3).dot(&turns[j / 3].row(j % 3));
+            shares[(i / 3, j / 3)] * turned
         });
-        let row = |node: usize, point: &ContactPoint| {
-            let place = |axis| free.binary_search(&(3 * node + axis)).map_err(|_| clamped_point(point));
-            Ok([place(0)?, place(1)?, place(2)?])
-        };
-        let all = |chosen: &mut dyn Iterator<Item = usize>| -> Result<Vec<usize>> {
-            Ok(chosen.map(|node| row(node, &contact[0])).collect::<Result<Vec<_>>>()?.concat())
-        };
-        for point in contact {
-            point.weights().try_for_each(|(node, _)| row(node, point).map(drop))?;
-        }
-        let chosen = places.iter().zip(contact).map(|(&place, point)| ContactPoint {
-            node: within[place],
-            patch: Vec::new(),
-            ..point.clone()
-        });
+        let chosen: Vec<usize> = places.iter().map(|&place| within[place]).collect();
+        let point = |(&node, point): (&usize, &ContactPoint)| ContactPoint { node, patch: Vec::new(), ..point.clone() };
         Ok(Some(Self {
-            points: chosen.collect(),
-            pivots: all(&mut places.iter().map(|&place| within[place]))?,
-            touched: all(&mut within.iter().copied())?,
+            points: chosen.iter().zip(contact).map(point).collect(),
+            pivots: dofs(free, &chosen),
+            touched: dofs(free, &within),
             dependence,
         }))
     }
@@ -220,6 +204,29 @@ impl PatchCoordinates {
     }
 }
 
+/// All three degrees of freedom of every node must be there.
+fn check_free(free: &[usize], contact: &[ContactPoint]) -> Result<()> {
+    let moves = |(node, _): (usize, f64)| (0..3).all(|axis| free.binary_search(&(3 * node + axis)).is_ok());
+    contact.iter().find(|point| !point.weights().all(moves)).map_or(Ok(()), |point| Err(clamped_point(point)))
+}
+
+/// Places of nodes' degrees of freedom among the free ones.
+fn dofs(free: &[usize], nodes: &[usize]) -> Vec<usize> {
+    let first = |node: usize| free.partition_point(|dof| *dof < 3 * node);
+    nodes.iter().flat_map(|&node| (0..3).map(move |axis| first(node) + axis)).collect()
+}
+
+/// Patches × nodes; a contact node alone has the weight one.
+fn weights(contact: &[ContactPoint], nodes: &[usize]) -> DMatrix<f64> {
+    let mut weights = DMatrix::zeros(contact.len(), nodes.len());
+    for (row, point) in contact.iter().enumerate() {
+        for (node, weight) in point.weights() {
+            weights[(row, nodes.partition_point(|&other| other < node))] += weight;
+        }
+    }
+    weights
+}
+
 /// Columns: the unit vectors of the components of contact displacements at a node.
 fn directions([x, y, _]: [f64; 3], frame: Frame) -> Matrix3<f64> {
     match frame {
@@ -267,4 +274,77 @@ fn dependent(point: &ContactPoint) -> Error {
         "its displacement follows from those of the others",
         "Remove contact nodes or patches that coincide, or ask for fewer patches",
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn matrix(order: usize, reach: usize, entry: impl Fn(usize, usize) -> f64) -> SparseMatrix {
+        let mut pattern = Pattern { starts: vec![0], rows: Vec::new() };
+        let mut values = Vec::new();
+        for column in 0..order {
+            for row in column.saturating_sub(reach)..(column + reach + 1).min(order) {
+                pattern.rows.push(row);
+                values.push(entry(row.min(column), row.max(column)));
+            }
+            pattern.starts.push(pattern.rows.len());
+        }
+        SparseMatrix { pattern: Arc::new(pattern), values }
+    }
+
+    fn patch(name: &str, patch: &[(usize, f64)]) -> ContactPoint {
+        ContactPoint { patch: patch.to_vec(), ..ContactPoint::at(name, patch[0].0, 0.0) }
+    }
+
+    /// Two patches that share nodes, and a node: TᵀAT with T column by column, and the means of what T makes of units.
+    #[test]
+    fn the_change_of_variables_is_exact() {
+        let nodes: Vec<[f64; 3]> =
+            (0..7).map(|i| [(0.7 * f64::from(i)).cos(), (0.7 * f64::from(i)).sin(), f64::from(i)]).collect();
+        let contact = [
+            patch("a", &[(1, 0.5), (2, 0.25), (3, 0.25)]),
+            patch("b", &[(2, 0.2), (3, 0.9), (5, -0.1)]),
+            ContactPoint::at("c", 6, 0.0),
+        ];
+        // The first node is clamped.
+        let free: Vec<usize> = (3..21).collect();
+        let own = PatchCoordinates::new(&free, &nodes, &contact, Frame::Cylindrical).unwrap().unwrap();
+        let whole = matrix(18, 4, |i, j| if i == j { 9.0 } else { ((7 * i + 3 * j) as f64).sin() });
+        let (found, same) = own.transformed(&whole, &whole).unwrap();
+        assert!(found.values == same.values && found.pattern == same.pattern);
+        let mut turned = Mat::<f64>::identity(18, 18);
+        own.restore(&mut turned);
+        let all: Vec<usize> = (0..18).collect();
+        let expected = turned.transpose() * whole.block(&all, &all) * &turned;
+        assert!((found.block(&all, &all) - &expected).norm_max() < 1e-12 * expected.norm_max());
+        let mut forces = whole.block(&all, &all);
+        own.project(&mut forces);
+        assert!((forces - turned.transpose() * whole.block(&all, &all)).norm_max() < 1e-12);
+        for (index, point) in contact.iter().enumerate() {
+            let pivot = own.points()[index].node;
+            for (component, v) in (0..3).flat_map(|component| (0..18).map(move |v| (component, v))) {
+                let axis = |node: usize| directions(nodes[node], Frame::Cylindrical).column(component).into_owned();
+                let at = |node: usize, k: usize| turned[(3 * node + k - 3, v)];
+                let mean: f64 = point
+                    .weights()
+                    .map(|(node, weight)| weight * (0..3).map(|k| axis(node)[k] * at(node, k)).sum::<f64>())
+                    .sum();
+                let unit = if v / 3 + 1 == pivot { axis(pivot)[v % 3] } else { 0.0 };
+                assert!((mean - unit).abs() < 1e-13, "{}: {mean} {unit}", point.name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_tip_of_too_many_nodes_is_refused_before_memory_is_asked_for() {
+        let count = 2400;
+        let nodes: Vec<[f64; 3]> = (0..count).map(|i| [1.0, 0.0, i as f64]).collect();
+        let all: Vec<(usize, f64)> = (0..count).map(|node| (node, 1.0 / count as f64)).collect();
+        let free: Vec<usize> = (0..3 * count).collect();
+        let own = PatchCoordinates::new(&free, &nodes, &[patch("a", &all)], Frame::Cylindrical).unwrap().unwrap();
+        let whole = matrix(3 * count, 0, |_, _| 1.0);
+        let error = own.transformed(&whole, &whole).unwrap_err().to_string();
+        assert!(error.contains("2400 nodes would all be coupled"), "{error}");
+    }
 }

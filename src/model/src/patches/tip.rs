@@ -35,6 +35,15 @@ pub struct FoundTip {
     pub elsewhere: usize,
 }
 
+impl FoundTip {
+    /// So many patches, or as many as are no narrower than elements.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "far fewer elements than 2^52")]
+    pub fn at_most(&self, patches: usize) -> usize {
+        let elements = (self.chord / self.edge).round() as usize;
+        patches.min(elements + 1).min(self.places)
+    }
+}
+
 /// An outer face that faces outward.
 struct Face<'a> {
     element: &'a Element,
@@ -63,17 +72,11 @@ pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
         return Err(not_found(problem.to_owned(), "Check the axis of rotation (--axis)"));
     };
     let chosen = connected(&faces, first);
-    let own = (0..faces.len()).filter(|face| chosen[*face]);
-    let nodes: BTreeSet<usize> = own
-        .clone()
-        .flat_map(|face| {
-            let Face { element, corners, .. } = faces[face];
-            middles(element, corners).chain(faces[face].corner_nodes())
-        })
-        .collect();
-    let nodes: Vec<usize> = nodes.into_iter().collect();
-    let [radius, axial] =
-        [|[x, y, _]: [f64; 3]| x.hypot(y), |[_, _, z]: [f64; 3]| z].map(|of| extent(mesh, &nodes, of));
+    let own: Vec<&Face> = faces.iter().zip(&chosen).filter(|(_, chosen)| **chosen).map(|(face, _)| face).collect();
+    let others = faces.iter().zip(&chosen).filter(|(_, chosen)| !**chosen).map(|(face, _)| face);
+    let elsewhere = others.filter(|face| as_far_out(face, &own)).count();
+    let nodes = nodes_of(&own);
+    let radius = extent(mesh, &nodes, |[x, y, _]| x.hypot(y));
     let held = nodes.iter().filter(|node| fixed.binary_search(node).is_ok()).count();
     if held > 0 {
         let problem = format!(
@@ -83,16 +86,23 @@ pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
         );
         return Err(not_found(problem, "This is no tip of a blade: check clamped nodes and axis"));
     }
-    let elsewhere =
-        faces.iter().enumerate().filter(|(index, face)| !chosen[*index] && as_far_out(face, &faces, &chosen));
-    let elsewhere = elsewhere.count();
     let places = Places::new(&mesh.nodes, &nodes);
     let (places, chord) = (places.stations(), places.chord_length());
-    let mut lengths: Vec<f64> =
-        own.clone().flat_map(|face| edges(&faces[face])).map(|edge| length(mesh, edge)).collect();
+    let (edge, axial) = (median_edge(mesh, &own), extent(mesh, &nodes, |[_, _, z]| z));
+    Ok(FoundTip { faces: own.len(), nodes, places, chord, edge, radius, axial, elsewhere })
+}
+
+/// Corners and mid-side nodes of faces, ascending.
+fn nodes_of(faces: &[&Face]) -> Vec<usize> {
+    let of_face = |face: &&Face| middles(face.element, face.corners).chain(face.corner_nodes()).collect::<Vec<_>>();
+    faces.iter().flat_map(of_face).collect::<BTreeSet<_>>().into_iter().collect()
+}
+
+/// Median length of the edges of faces (m).
+fn median_edge(mesh: &Mesh, faces: &[&Face]) -> f64 {
+    let mut lengths: Vec<f64> = faces.iter().flat_map(|face| edges(face)).map(|edge| length(mesh, edge)).collect();
     lengths.sort_by(f64::total_cmp);
-    let edge = lengths[lengths.len() / 2];
-    Ok(FoundTip { faces: own.count(), nodes, places, chord, edge, radius, axial, elsewhere })
+    lengths[lengths.len() / 2]
 }
 
 fn length(mesh: &Mesh, [a, b]: [usize; 2]) -> f64 {
@@ -165,10 +175,9 @@ fn connected(faces: &[Face], first: usize) -> Vec<bool> {
     chosen
 }
 
-/// Whether a face is as far out as the chosen one that is nearest along the axis.
-fn as_far_out(face: &Face, faces: &[Face], chosen: &[bool]) -> bool {
-    let own = faces.iter().zip(chosen).filter(|(_, chosen)| **chosen).map(|(own, _)| own);
+/// Whether a face is as far out as that of the tip which is nearest along the axis.
+fn as_far_out(face: &Face, tip: &[&Face]) -> bool {
     let apart = |own: &Face| (own.axial - face.axial).abs();
-    let nearest = own.min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    let nearest = tip.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
     nearest.is_some_and(|own| face.radius >= (1.0 - AS_FAR_OUT) * own.radius)
 }
