@@ -206,7 +206,7 @@ pub struct ModelOptions {
 /// What a model of one's own becomes.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct KeptOptions {
-    /// Modes kept [default: 25 fixed-interface modes, of a disk per nodal diameter; 60 of a casing].
+    /// Modes kept [default: 25, of blades with patches up to 80, of a disk per nodal diameter; 60 of a casing].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
     /// Modal damping ratio proposed with the model [default: 0.005].

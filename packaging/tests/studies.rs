@@ -81,8 +81,9 @@ fn the_quick_interaction_map_sees_the_branch_lean() {
 #[test]
 fn the_quick_study_of_errors_takes_any_scene() {
     let root = tempfile::tempdir().unwrap();
+    fs::write(root.path().join("scene.toml"), around("builtin:rotor37-paper")).unwrap();
     for (scene, more) in
-        [("builtin:rotor37", ["--window", "2e-3"]), ("builtin:abradable", ["--set", "friction_coefficient=0.1"])]
+        [("scene.toml", ["--window", "2e-3"]), ("builtin:abradable", ["--set", "friction_coefficient=0.1"])]
     {
         let arguments = ["study", "error", scene, "--quick", "--json", "--quiet", "--out", "out"];
         let (stdout, _) = tiprub(root.path(), env!("CARGO_TARGET_TMPDIR"), &[&arguments[..], &more].concat());

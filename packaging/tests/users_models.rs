@@ -200,13 +200,14 @@ fn an_exported_mesh_is_read_back_to_the_same_frequencies() {
 #[test]
 fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     let project = Project::new(&[]);
-    let own = project.succeed("reduce rotor37 --mesh 6x1x6 --inp blade.inp --contact-patches 4 -o own.rom.safetensors");
+    let own = project
+        .succeed("reduce rotor37 --mesh 6x1x6 --inp blade.inp --contact-patches 4 --modes 20 -o own.rom.safetensors");
     assert!(
         own["rom"]["origin"].as_str().unwrap().contains("forces on 4 patches and 20 free-interface modes"),
         "{own:#}"
     );
     let line = "reduce blade blade.inp --contact-set TIP --clamp-set HUB --sectors 36 --contact-patches 4 --modes 20 \
-                --contact-names leading_edge,tip_2,tip_3,trailing_edge -o read.rom.safetensors";
+                -o read.rom.safetensors";
     let read = project.succeed(line);
     assert_eq!(
         read["model"]["contact_nodes"][1]["patch_nodes"].as_u64().map(|nodes| nodes > 9),
@@ -305,7 +306,7 @@ fn contact_at_points_of_a_fine_tip_is_warned_of() {
     for (line, wanted) in [
         ("blade_hex20.inp --contact-set TIP", Some("contact at 3 nodes of a tip about")),
         ("blade_hex20.inp --contact-set TIP --contact-nodes 1", Some("contact at a single node of a tip")),
-        ("blade_hex20.inp --contact-patches 1", Some("contact at the single patch `tip_1`")),
+        ("blade_hex20.inp --contact-patches 1", Some("contact at the single patch `patch_1`")),
         ("blade_hex20.inp --contact-nodes 7", None),
         ("blade_hex20.inp --contact-patches 3 --kind craig-bampton", None),
     ] {

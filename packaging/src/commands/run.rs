@@ -92,7 +92,7 @@ fn lines(estimates: &[Estimate]) -> String {
     if estimates.is_empty() {
         return String::new();
     }
-    let why = estimates.iter().filter_map(|one| Some(format!("\n  {}: {}", one.direction, one.unknown.as_ref()?)));
+    let why = estimates.iter().filter_map(|one| Some(format!("\n  {}: {}", one.direction, one.left.as_ref().err()?)));
     format!("\n{}{}", estimate::told(estimates), why.collect::<String>())
 }
 

@@ -31,7 +31,7 @@ pub struct Chosen {
 }
 
 /// Patches where neither set nor numbers are given: more change little, fewer a lot.
-pub const PATCHES: usize = 5;
+pub const PATCHES: usize = 9;
 
 /// For blades, or for a sector between its faces.
 ///

@@ -29,8 +29,11 @@ use crate::{
     reduced::Reduced,
 };
 
-/// Fixed-interface modes, modes compared with the full model, and damping ratio where none are given.
+/// Modes, of patches as many as fine meshes bear, modes compared with the full model, and damping ratio where none are given.
 pub const MODES: usize = 25;
+const MOST_MODES: usize = 80;
+/// Degrees of freedom of the full model per mode of patches: the highest modes of a coarse mesh say nothing.
+const PER_MODE: usize = 40;
 const CHECKED_MODES: usize = 10;
 const DAMPING: f64 = 0.005;
 
@@ -149,7 +152,7 @@ fn general(
     let options = ReductionOptions {
         name,
         kind: KindChoice::kind(asked.kind, has_patches(chosen)),
-        modes: source.kept.modes.unwrap_or(MODES),
+        modes: source.kept.modes.unwrap_or_else(|| default_modes(&model, has_patches(chosen))),
         checked_modes: CHECKED_MODES,
         sectors: asked.sectors.unwrap_or(1) as usize,
         frame: Frame::Cylindrical,
@@ -162,6 +165,10 @@ fn general(
         let model = model.take().ok_or_else(|| tiprub_model::Error::invalid("model", "it is reduced already", ""))?;
         reduce_model(model, &chosen.clamped, &chosen.contact, &options, asked.spin, listener)
     })
+}
+
+fn default_modes(model: &FeModel, patches: bool) -> usize {
+    if patches { (3 * model.nodes.len() / PER_MODE).clamp(MODES, MOST_MODES) } else { MODES }
 }
 
 fn ring(

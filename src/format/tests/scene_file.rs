@@ -4,7 +4,7 @@ mod common;
 
 use proptest::prelude::*;
 use tiprub_core::settings::*;
-use tiprub_format::{Error, parse_scene, write_scene};
+use tiprub_format::{Error, builtin_model, parse_scene, write_scene};
 
 const GOOD: &str = r#"name = "demo"
 [[structure]]
@@ -47,6 +47,35 @@ fn defaults_are_as_documented() {
     assert_eq!(scene.time.scheme, Scheme::ModalExact);
     assert_eq!(scene.outputs, OutputSettings::default());
     assert_eq!(scene.surfaces[0].shape, Shape::Lobes { amplitude: 1e-4, order: 2, phase: 0.0 });
+}
+
+/// `preset = "paper"` says what the file leaves out, keeps what says the same, and bears nothing else.
+#[test]
+fn the_papers_preset_is_the_method_whole() {
+    let preset = GOOD.replace("name = \"demo\"", "name = \"demo\"\npreset = \"paper\"");
+    let scene = parse_scene(&preset, "demo.toml").unwrap();
+    assert_eq!((scene.time.scheme, scene.contacts[0].solver), (Scheme::CentralDifference, Solver::Film));
+    let explicit = preset.replace("step = 1e-6", "step = 1e-6\nscheme = \"central-difference\"");
+    assert_eq!(parse_scene(&explicit, "demo.toml").unwrap(), scene);
+    assert_eq!(parse_scene(&write_scene(&scene), "again").unwrap(), scene);
+    for (key, line) in [("time.scheme", "step = 1e-6\nscheme = \"modal-exact\""), ("contact[1].solver", "step = 1e-6")]
+    {
+        let mut text = preset.replace("step = 1e-6", line);
+        if key.starts_with("contact") {
+            text = text.replace("gap = 1e-3", "gap = 1e-3\nsolver = \"lcp\"");
+        }
+        let told = parse_scene(&text, "demo.toml").unwrap_err().to_string();
+        assert!(told.contains(key) && told.contains("the method of the paper whole"), "{told}");
+    }
+    // Models that ship come as the paper has them; files are what they are.
+    let model = |rom: &str, preset: Preset| {
+        let structure = StructureSettings { rom: rom.into(), ..StructureSettings::default() };
+        builtin_model(&SceneSettings { preset, ..scene.clone() }, &structure)
+    };
+    assert_eq!(model("builtin:rotor37", Preset::Paper).as_deref(), Some("rotor37-paper"));
+    assert_eq!(model("builtin:rotor37-paper", Preset::Paper).as_deref(), Some("rotor37-paper"));
+    assert_eq!(model("builtin:rotor37", Preset::None).as_deref(), Some("rotor37"));
+    assert_eq!(model("rotor.safetensors", Preset::Paper), None);
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! What steps, modes and patches of a scene leave, estimated from coarser runs: a scene alone is needed, no mesh and no truth.
 //!
 //! Three levels of a direction, each about twice as fine as the one before, the scene's own the finest: changes c₁ and c₂ from level
-//! to level. Where they shrink as a power, c₁/c₂ tells which, and c₂/(c₁/c₂ − 1) is what all further refinement would change. Where
-//! they do not shrink, nothing is known. Longer steps may be refused: then shorter ones are tried, and c₁ + c₂/(c₁/c₂ − 1) is left.
+//! to level. Where they shrink as a power, r = c₁/c₂ tells which, and c₂/(r − 1) is what all further refinement would change; r counts
+//! as what later levels can make it. Where they hardly shrink, nothing is known. Longer steps
+//! may be refused: then shorter ones are tried, and c₁ + c₂/(r − 1) is left.
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use tiprub_core::Scene;
 use tiprub_shell::{Result, console::Console};
 
@@ -16,26 +17,27 @@ use crate::convergence::{
     truncate::{Form, truncated},
 };
 
-/// Least ratio of two changes that lets the rest be estimated: a third and all further ones are then no larger than twice the last.
-const SHRINKING: f64 = 1.5;
+/// Least ratio of two changes of the displacements that lets the rest be estimated.
+const SHRINKING: f64 = 1.3;
+/// Least and largest ratio of changes later on. Steps go at first order through contact, whatever long ones promise: all further changes
+/// together are as large as the last. Modes go at first order at least, patches at nearly the second: their hat functions follow a
+/// smooth pressure.
+const LATER: [(&str, [f64; 2]); 3] =
+    [("steps", [2.0, 2.0]), ("modes", [2.0, f64::INFINITY]), ("patches", [3.0, f64::INFINITY])];
 
-/// Quantities of an estimate.
-pub const QUANTITIES: [&str; 3] = ["displacements", "impulse", "friction work"];
-
-/// What one direction leaves, relative, in the order of [`QUANTITIES`]; `None` where it is not known, or nothing is there to compare.
+/// What one direction leaves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// `steps`, `modes`, `patches` or `mesh`.
     pub direction: &'static str,
-    /// Of each quantity.
-    pub left: [Option<f64>; 3],
-    /// Why nothing at all is known.
-    pub unknown: Option<String>,
+    /// Of the displacements (relative L2), or why it is not known. Of impulse and work the truth is too often passed by chance for
+    /// estimates to hold.
+    pub left: std::result::Result<f64, String>,
 }
 
 impl Estimate {
     fn unknown(direction: &'static str, why: impl Into<String>) -> Self {
-        Self { direction, left: [None; 3], unknown: Some(why.into()) }
+        Self { direction, left: Err(why.into()) }
     }
 
     /// Of a direction that was run, its own level the first or the last.
@@ -45,40 +47,42 @@ impl Estimate {
         }
         let changes = refined.changes();
         let [.., before, last] = &changes[..] else { return Self::unknown(direction, "there are no other levels") };
-        let own_first = refined.direction.levels.first().is_some_and(|level| level.own);
-        let left = |quantity: usize| {
-            let (before, last): (f64, f64) = (before[quantity]?, last[quantity]?);
-            Some(rest(before, last)? + if own_first { before } else { 0.0 })
+        let bounds = LATER.iter().find(|(name, _)| *name == direction).map_or(LATER[0].1, |(_, bounds)| *bounds);
+        let left = before[0].zip(last[0]).and_then(|(before, last)| Some((before, last, ratio(before, last, bounds)?)));
+        let Some((before, last, ratio)) = left else {
+            return Self::unknown(
+                direction,
+                "the displacements change from one level to the next about as much as before",
+            );
         };
-        Self { direction, left: std::array::from_fn(left), unknown: None }
+        let own_first = refined.direction.levels.first().is_some_and(|level| level.own);
+        Self { direction, left: Ok(last / (ratio - 1.0) + if own_first { before } else { 0.0 }) }
     }
 
-    /// Name and values, `null` where they are not known, and why.
+    /// Name and value, or why it is not known.
     pub fn json(&self) -> (String, Value) {
-        let mut values: Map<String, Value> =
-            QUANTITIES.iter().zip(self.left).map(|(name, left)| (name.replace(' ', "_"), json!(left))).collect();
-        if let Some(why) = &self.unknown {
-            values.insert("unknown".into(), json!(why));
-        }
-        (self.direction.to_owned(), Value::Object(values))
+        let value = match &self.left {
+            Ok(left) => json!({ "displacements": left }),
+            Err(why) => json!({ "unknown": why }),
+        };
+        (self.direction.to_owned(), value)
     }
 
-    /// "modes 1.2 %", by the displacements; "mesh unknown".
+    /// "modes 1.2 %"; "mesh unknown".
     pub fn told(&self) -> String {
-        match self.left[0] {
-            Some(left) => format!("{} {:.2} %", self.direction, 100.0 * left),
-            None => format!("{} unknown", self.direction),
+        match self.left {
+            Ok(left) => format!("{} {:.2} %", self.direction, 100.0 * left),
+            Err(_) => format!("{} unknown", self.direction),
         }
     }
 }
 
-/// What all further refinement would change, from the last two changes.
-fn rest(before: f64, last: f64) -> Option<f64> {
-    if last == 0.0 {
-        return (before == 0.0).then_some(0.0);
+/// By how much changes shrink from level to level, within bounds; `None` where they hardly do.
+fn ratio(before: f64, last: f64, [least, most]: [f64; 2]) -> Option<f64> {
+    if before <= 0.0 || last <= 0.0 {
+        return (before <= 0.0 && last <= 0.0).then_some(least);
     }
-    let ratio = before / last;
-    (ratio >= SHRINKING).then(|| last / (ratio - 1.0))
+    (before >= SHRINKING * last).then(|| (before / last).clamp(least, most))
 }
 
 /// One line for reports.
@@ -189,16 +193,21 @@ mod tests {
         // Values 1 + h^p at h = 4, 2, 1: what is left at 1 is 1.
         for order in [1.0, 2.0, 3.5_f64] {
             let value = |level: f64| level.powf(order);
-            let left = rest(value(4.0) - value(2.0), value(2.0) - value(1.0)).unwrap();
+            let (before, last) = (value(4.0) - value(2.0), value(2.0) - value(1.0));
+            let left = last / (ratio(before, last, [2.0, 99.0]).unwrap() - 1.0);
             assert!((left - 1.0).abs() < 1e-12, "{order}: {left}");
         }
-        assert_eq!([rest(1.0, 0.9), rest(0.0, 1.0), rest(1.0, 0.0), rest(0.0, 0.0)], [None, None, None, Some(0.0)]);
+        assert_eq!([ratio(1.0, 0.9, [2.0; 2]), ratio(0.0, 1.0, [2.0; 2]), ratio(1.0, 0.0, [2.0; 2])], [None; 3]);
+        assert_eq!(
+            [ratio(0.0, 0.0, [3.0, 5.0]), ratio(1.5, 1.0, [3.0, 5.0]), ratio(9.0, 1.0, [3.0, 5.0])],
+            [3.0, 3.0, 5.0].map(Some)
+        );
     }
 
     #[test]
     fn a_line_tells_what_is_known() {
-        let of = |direction, left| Estimate { direction, left: [left, None, None], unknown: None };
-        let all = [of("steps", Some(1.2e-3)), Estimate::unknown("mesh", "no other")];
+        let of = |direction, left| Estimate { direction, left: Ok(left) };
+        let all = [of("steps", 1.2e-3), Estimate::unknown("mesh", "no other")];
         assert_eq!(told(&all), "estimated error of the displacements: steps 0.12 %, mesh unknown");
     }
 }

@@ -118,7 +118,13 @@ fn courses(arguments: &StudyCommon, console: &Console) -> Result<Vec<Course>> {
     } else {
         let cache = arguments.cache.cache();
         let load = |name| scene_source::load(name, &cache, console);
-        (load("builtin:rotor37")?, load("builtin:flexible-casing")?)
+        // The page has the figures of three nodes, which the step below does.
+        let of_nodes = |name| -> Result<Scene> {
+            let mut scene = load(name)?;
+            scene.roms[0].clone_from(&load("builtin:rotor37-paper")?.roms[0]);
+            Ok(scene)
+        };
+        (of_nodes("builtin:rotor37")?, of_nodes("builtin:flexible-casing")?)
     };
     let with = |scene: &Scene, change: fn(&mut Scene)| {
         let mut scene = scene.clone();

@@ -213,6 +213,19 @@ fn studies_named(page: &str) -> impl Iterator<Item = &str> {
 }
 
 #[test]
+fn the_quick_study_of_estimates_meets_the_truth() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "estimates", &[]);
+    only_no(&json, &[]);
+    let rows = json["results"].as_array().unwrap();
+    assert_eq!(rows.len(), 2 * 3, "scenes and directions");
+    for row in rows {
+        let [estimate, truth] = ["estimate", "truth"].map(|name| row[name].as_f64().unwrap());
+        assert!(estimate > 0.0 && (1e-6..0.5).contains(&truth), "{row:#}");
+    }
+}
+
+#[test]
 fn the_guide_names_every_study_and_no_other() {
     let root = tempfile::tempdir().unwrap();
     let (help, _) = lab(root.path(), "", &["--help"]);

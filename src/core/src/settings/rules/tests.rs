@@ -127,6 +127,14 @@ const OF_ROTORS: &[(&str, Change)] = &[
         second(&mut scene.settings);
         scene.settings.time.scheme = Scheme::MasslessBoundary;
     }),
+    ("time.scheme: other than `central-difference` excludes `preset = \"paper\"`", |scene| {
+        scene.settings.preset = Preset::Paper;
+        scene.settings.contacts[0].solver = Solver::Film;
+    }),
+    ("contact[1].solver: other than `film` excludes `preset = \"paper\"`", |scene| {
+        scene.settings.preset = Preset::Paper;
+        scene.settings.time.scheme = Scheme::CentralDifference;
+    }),
     ("parameter `scheme`: `massless-boundary` needs more than three modes", |scene| {
         scene.settings.time.scheme = Scheme::MasslessBoundary;
         scene.roms[0].mass = DMatrix::identity(3, 3);

@@ -391,7 +391,9 @@ fn settings() -> Vec<Case> {
         ("rom.radius", "contact_positions", |scene, value| scene.roms[0].contact_nodes[1].position[0] = value),
         ("rom.angle", "contact_positions", |scene, value| scene.roms[0].contact_nodes[1].position[1] = value),
         ("rom.axial", "contact_positions", |scene, value| scene.roms[0].contact_nodes[1].position[2] = value),
-        ("rom.slope", "contact_positions", |scene, value| scene.roms[0].contact_nodes[1].meridional_slope = value),
+        ("rom.slope", "contact_meridional_slopes", |scene, value| {
+            scene.roms[0].contact_nodes[1].meridional_slope = value
+        }),
         ("rom.map", "contact_map", |scene, value| scene.roms[0].contact_map[(2, 2)] = value),
     ];
     let mut cases = Vec::new();
