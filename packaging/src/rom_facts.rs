@@ -181,7 +181,21 @@ impl RomFacts {
         }
         self.write_frequencies(&mut text);
         self.write_checks(&mut text);
+        self.write_responses(&mut text);
         text
+    }
+
+    /// What the reduction leaves of the response at the contact nodes.
+    fn write_responses(&self, text: &mut String) {
+        let checks = &self.rom.checks;
+        let worst = |values: &[f64]| values.iter().fold(0.0, |worst: f64, value| worst.max(*value));
+        if let Some(last) = checks.response_frequencies.last() {
+            let (rest, forced) = (worst(&checks.flexibility_deviation), worst(&checks.response_deviation));
+            let _ = writeln!(
+                text,
+                "\n  response at the contact nodes: at rest within {rest:.1e} % of the full model, up to {last:.0} Hz within {forced:.1e} %"
+            );
+        }
     }
 
     /// What the limits hold for.
@@ -271,6 +285,7 @@ impl RomFacts {
             })),
             "contact_nodes": rom.contact_nodes.iter().map(|node| json!({
                 "name": node.name, "position": node.position, "meridional_slope": node.meridional_slope,
+                "area": node.area, "length": node.length,
             })).collect::<Vec<_>>(),
             "damping_ratio": rom.damping_ratio,
             "contact_grid": rom.extras.grid.map(|grid| json!({
@@ -298,6 +313,9 @@ impl RomFacts {
                 "residual_criterion_percent": row.residual,
                 "nodal_diameter": row.nodal_diameter,
             })).collect::<Vec<_>>(),
+            "flexibility_deviation_percent": rom.checks.flexibility_deviation,
+            "response_hz": rom.checks.response_frequencies,
+            "response_deviation_percent": rom.checks.response_deviation,
         })
     }
 }

@@ -82,8 +82,8 @@ fn the_quick_interaction_map_sees_the_branch_lean() {
 fn the_quick_study_of_errors_takes_any_scene() {
     let root = tempfile::tempdir().unwrap();
     fs::write(root.path().join("scene.toml"), around("builtin:rotor37-paper")).unwrap();
-    for (scene, more) in
-        [("scene.toml", ["--window", "2e-3"]), ("builtin:abradable", ["--set", "friction_coefficient=0.1"])]
+    fs::write(root.path().join("coated.toml"), with_rom("abradable", "builtin:rotor37-paper")).unwrap();
+    for (scene, more) in [("scene.toml", ["--window", "2e-3"]), ("coated.toml", ["--set", "friction_coefficient=0.1"])]
     {
         let arguments = ["study", "error", scene, "--quick", "--json", "--quiet", "--out", "out"];
         let (stdout, _) = tiprub(root.path(), env!("CARGO_TARGET_TMPDIR"), &[&arguments[..], &more].concat());
@@ -113,7 +113,11 @@ fn own_scene(root: &Path) {
 
 /// The scene that ships around another blade, of few contact nodes, which longer steps do.
 fn around(rom: &str) -> String {
-    let shipped = tiprub_gallery::scene_source::ROTOR37_SCENE;
+    with_rom("rotor37", rom)
+}
+
+fn with_rom(scene: &str, rom: &str) -> String {
+    let (_, shipped) = tiprub_gallery::scene_source::BUILTIN_SCENES.iter().find(|(name, _)| *name == scene).unwrap();
     assert!(shipped.contains("step = 5.0e-7 "));
     shipped.replace("builtin:rotor37", rom).replace("step = 5.0e-7 ", "step = 1.0e-6 ")
 }

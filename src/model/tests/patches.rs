@@ -237,3 +237,38 @@ fn what_cannot_be_divided_or_held_is_refused() {
         told(&contact, ReductionKind::FreeInterface, free - 9).contains("leave no flexibility to the static responses")
     );
 }
+
+/// What a ROM says of its forced response is so: against dense solutions with the full matrices, between the frequencies checked.
+#[test]
+fn the_forced_response_is_off_by_as_much_as_the_rom_says() {
+    let mesh = beam();
+    let contact = tip(&mesh, 2);
+    let free = free_dofs(mesh.nodes.len(), &nodes_at(&mesh, 0, 0.0));
+    let assembled = assemble(&mesh, &steel(), &silent).unwrap();
+    let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
+    let (stiffness, mass) = (dense(&stiffness), dense(&mass));
+    let loads = DMatrix::from_fn(free.len(), contact.len(), |row, patch| {
+        let weight = |&(node, weight): &(usize, f64)| {
+            let [x, y, _] = mesh.nodes[node];
+            let along = [x / x.hypot(y), y / x.hypot(y), 0.0][free[row] % 3];
+            if free[row] / 3 == node { weight * along } else { 0.0 }
+        };
+        contact[patch].patch.iter().map(weight).sum::<f64>()
+    });
+    for (kind, modes) in [(ReductionKind::FixedInterface, 4), (ReductionKind::FreeInterface, 8)] {
+        let rom = reduced(mesh.clone(), &contact, kind, modes).unwrap().rom;
+        assert!(rom.checks.response_frequencies.len() >= 2, "{:?}", rom.checks);
+        assert!(rom.checks.flexibility_deviation.iter().all(|off| *off < 1e-6), "{:?}", rom.checks);
+        let radial = DMatrix::from_fn(contact.len(), rom.order(), |patch, column| rom.contact_map[(3 * patch, column)]);
+        for (frequency, told) in rom.checks.response_frequencies.iter().zip(&rom.checks.response_deviation) {
+            let square = (std::f64::consts::TAU * frequency).powi(2);
+            let solved = |stiffness: &DMatrix<f64>, mass: &DMatrix<f64>, map: &DMatrix<f64>| {
+                map.transpose() * (stiffness - mass * square).lu().solve(map).unwrap()
+            };
+            let (full, own) =
+                (solved(&stiffness, &mass, &loads), solved(&rom.stiffness, &rom.mass, &radial.transpose()));
+            let off = 100.0 * (&full - own).norm() / full.norm();
+            assert!((off - told).abs() <= 1e-3 * off + 1e-7, "{kind:?} at {frequency} Hz: {off:e} %, told {told:e} %");
+        }
+    }
+}
