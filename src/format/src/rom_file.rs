@@ -378,10 +378,10 @@ fn rom_arrays(rom: &Rom) -> Arrays {
             list(rom.contact_nodes.iter().map(|node| node.meridional_slope).collect(), vec![nodes]),
         ),
     ];
-    let patches: [(&str, fn(&ContactNode) -> f64); 2] =
-        [("contact_areas", |node| node.area), ("contact_lengths", |node| node.length)];
-    for (name, extent) in patches {
-        let extents: Vec<f64> = rom.contact_nodes.iter().map(extent).collect();
+    let extents = |extent: fn(&ContactNode) -> f64| rom.contact_nodes.iter().map(extent).collect::<Vec<_>>();
+    for (name, extents) in
+        [("contact_areas", extents(|node| node.area)), ("contact_lengths", extents(|node| node.length))]
+    {
         if extents.iter().any(|extent| *extent > 0.0) {
             arrays.push((name, list(extents, vec![nodes])));
         }

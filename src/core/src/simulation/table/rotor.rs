@@ -100,22 +100,25 @@ fn watched_points(table: &mut Builder, parts: &Parts, body: &Body, sector: usize
     }
 }
 
+/// A force over what a patch stands for: name, words, unit, nominal value, and the extent of a contact node.
+type PerExtent = (&'static str, &'static str, &'static Unit, f64, fn(&ContactNode) -> f64);
+
+const PER_EXTENT: [PerExtent; 2] = [
+    ("normal_pressure", "pressure", &PRESSURE, 1e6, |node| node.area),
+    ("normal_line_force", "force per length along the chord", &LINE_LOAD, 1e4, |node| node.length),
+];
+
 /// Pressure and force per length, of contact patches.
 fn patches(table: &mut Builder, body: &Body, sector: usize) {
-    let rows: [(&str, &str, &'static Unit, f64, fn(&ContactNode) -> f64); 2] = [
-        ("normal_pressure", "pressure", &PRESSURE, 1e6, |node| node.area),
-        ("normal_line_force", "force per length along the chord", &LINE_LOAD, 1e4, |node| node.length),
-    ];
-    for (name, told, unit, nominal, extent) in rows {
+    for (name, told, unit, nominal, extent) in PER_EXTENT {
         let extents: Vec<f64> = body.rom.contact_nodes.iter().map(extent).collect();
         if extents.contains(&0.0) {
             continue;
         }
         let (index, count) = (body.index, extents.len());
-        let text = format!(
-            "Normal contact {told} in the middle of each patch ({}), mean over the communication step",
-            node_list(body)
-        );
+        let list = node_list(body);
+        let text =
+            format!("Normal contact {told} in the middle of each patch ({list}), mean over the communication step");
         let read = each(move |view, node| view.mean * view.normal_impulse(index, node, sector - 1) / extents[node]);
         let row = table.output(format!("blade[{sector}].{name}"), Span::Mean, Some((unit, nominal)), text, read);
         row.dimension = Some(count);
