@@ -10,6 +10,7 @@
 
 pub mod assembly;
 pub mod casing;
+mod contact_point;
 pub mod craig_bampton;
 pub mod cube;
 pub mod cyclic;
@@ -26,6 +27,7 @@ pub mod ordering;
 pub mod panel;
 pub mod patches;
 mod pattern;
+mod places;
 pub mod progress;
 pub mod quality;
 pub mod read;

@@ -11,10 +11,10 @@ mod tip;
 
 use std::collections::HashMap;
 
+use crate::contact_point::ContactPoint;
 use crate::element::ElementKind;
 use crate::mesh::{Element, Mesh};
-use crate::read::Places;
-use crate::reduce::ContactPoint;
+use crate::places::Places;
 use crate::{Error, Result};
 
 pub(crate) use coordinates::PatchCoordinates;

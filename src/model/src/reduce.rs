@@ -11,6 +11,7 @@ use tiprub_core::rom::{Basis, Frame, RomChecks, Watched};
 use tiprub_core::shown;
 
 use crate::assembly::{Assembled, free_dofs};
+use crate::contact_point::clamped_point;
 use crate::craig_bampton::{CraigBampton, dense_modes};
 use crate::eigen::{Modes, lowest_modes, positive_factor};
 use crate::fe_model::FeModel;
@@ -22,62 +23,11 @@ use crate::sparse::{Factor, SparseMatrix, principal_pair, tall_product};
 use crate::spin::{ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, SpinningStates, reduced_spin};
 use crate::{Error, Result};
 
+pub use crate::contact_point::ContactPoint;
 pub(crate) use held::Held;
 use outcome::{build_rom, contact_node, direction};
 pub(crate) use outcome::{description, element_names, interface, responses};
 use response::{Seen, with_responses};
-
-/// A contact node or patch before the reduction.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ContactPoint {
-    /// Name, for example `leading_edge`.
-    pub name: String,
-    /// Node index in the mesh (from 0); of a patch the node nearest to its middle.
-    pub node: usize,
-    /// Nodes and weights (sum 1) of a patch: it moves and stands as their mean does, and spreads its force over them. Empty for
-    /// the node alone.
-    pub patch: Vec<(usize, f64)>,
-    /// Slope dr/dz of the structure's contour in the meridional plane.
-    pub meridional_slope: f64,
-    /// Area that a patch stands for (m²); 0 for a node.
-    pub area: f64,
-    /// Length along the chord that it stands for (m); 0 for a node.
-    pub length: f64,
-}
-
-impl ContactPoint {
-    /// A node alone.
-    pub fn at(name: impl Into<String>, node: usize, meridional_slope: f64) -> Self {
-        Self { name: name.into(), node, patch: Vec::new(), meridional_slope, area: 0.0, length: 0.0 }
-    }
-
-    /// Nodes and weights.
-    pub fn weights(&self) -> impl Iterator<Item = (usize, f64)> {
-        let alone = self.patch.is_empty().then_some((self.node, 1.0));
-        self.patch.iter().copied().chain(alone)
-    }
-
-    /// Mean position (m) of its nodes in x, y, z: what a rigid motion moves as the mean of its nodes moves.
-    pub(crate) fn cartesian(&self, nodes: &[[f64; 3]]) -> [f64; 3] {
-        if self.patch.is_empty() {
-            return nodes[self.node];
-        }
-        std::array::from_fn(|i| self.weights().map(|(node, weight)| weight * nodes[node][i]).sum())
-    }
-
-    /// Mean radius (m), angle (rad) and axial position (m) of its nodes.
-    pub(crate) fn cylindrical(&self, nodes: &[[f64; 3]]) -> [f64; 3] {
-        if self.patch.is_empty() {
-            let [x, y, z] = nodes[self.node];
-            return [x.hypot(y), y.atan2(x), z];
-        }
-        let mean = |pick: &dyn Fn([f64; 3]) -> f64| self.weights().map(|(node, w)| w * pick(nodes[node])).sum::<f64>();
-        let (sin, cos) = mean(&|[_, y, _]| y).atan2(mean(&|[x, ..]| x)).sin_cos();
-        // Angles from the middle do not jump.
-        let turned = mean(&|[x, y, _]| (y * cos - x * sin).atan2(x * cos + y * sin));
-        [mean(&|[x, y, _]| x.hypot(y)), sin.atan2(cos) + turned, mean(&|[_, _, z]| z)]
-    }
-}
 
 /// How the motion of a structure is described beside its static responses to contact forces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -412,8 +362,4 @@ fn watched(
     let map = tall_product(rows.as_ref(), transformation.as_ref());
     let points = options.watched.iter().map(|point| contact_node(&model.nodes, point, options.frame));
     Ok(Some(Watched { map: DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]), points: points.collect() }))
-}
-
-pub(crate) fn clamped_point(point: &ContactPoint) -> Error {
-    Error::invalid(format!("contact node `{}`", point.name), "it is clamped", "Choose a node that can move")
 }

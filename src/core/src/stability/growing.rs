@@ -4,6 +4,7 @@ use nalgebra::Complex;
 
 use super::ContactDirections;
 use super::held::Held;
+use super::secular;
 use crate::dynamics::modal::ModalModel;
 use crate::settings::Scheme;
 
@@ -62,7 +63,7 @@ pub fn continuous(
     // Beyond ω_max h = 2 the matrix would lose its balance.
     let unit = step.min(2.0 / model.largest_frequency());
     let held = || Held::continuous(model, scheme, unit, friction, directions);
-    let eigenvalues = is_looked_at(model, friction).then(held)?.eigenvalues()?;
+    let eigenvalues = eigenvalues(&is_looked_at(model, friction).then(held)?)?;
     Some(rate(&eigenvalues) / unit)
 }
 
@@ -76,7 +77,7 @@ pub fn stepped(
     continuous: f64,
 ) -> Option<Growth> {
     let held = || Held::stepped(model, scheme, step, friction, directions);
-    let eigenvalues = is_looked_at(model, friction).then(held)?.eigenvalues()?;
+    let eigenvalues = eigenvalues(&is_looked_at(model, friction).then(held)?)?;
     Some(Growth { continuous, stepped: stepped_rate(&eigenvalues) / step, noise: GROWTH_NOISE / step })
 }
 
@@ -102,6 +103,12 @@ pub fn growth_steps(frequency: f64, largest: f64) -> impl Iterator<Item = f64> {
     std::iter::successors(Some(largest), |step| Some(step * std::f64::consts::FRAC_1_SQRT_2))
         .take_while(move |step| *step > resolved)
         .take(24)
+}
+
+/// Of few contacts by [`secular`], else and where that proves nothing from the dense matrix. Of complex pairs at least one; `None` where
+/// the contacts are redundant.
+fn eigenvalues(held: &Held) -> Option<Vec<Complex<f64>>> {
+    secular::eigenvalues(held).or_else(|| held.dense_eigenvalues())
 }
 
 #[cfg(test)]

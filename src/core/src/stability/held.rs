@@ -2,7 +2,7 @@
 
 use nalgebra::{Complex, DMatrix};
 
-use super::{ContactDirections, directional_modes, secular};
+use super::{ContactDirections, directional_modes};
 use crate::dynamics::modal::ModalModel;
 use crate::settings::Scheme;
 
@@ -83,12 +83,6 @@ impl Held {
     /// Number of contacts.
     pub fn contacts(&self) -> usize {
         self.normals.nrows()
-    }
-
-    /// Of few contacts by [`secular`], else and where that proves nothing from the dense matrix. Of complex pairs at least one;
-    /// `None` where the contacts are redundant.
-    pub fn eigenvalues(&self) -> Option<Vec<Complex<f64>>> {
-        secular::eigenvalues(self).or_else(|| self.dense_eigenvalues())
     }
 
     /// Of the matrix of the first-order form; without inertialess modes on the null space of the contact normals, so that the

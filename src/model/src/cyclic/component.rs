@@ -11,7 +11,7 @@ use faer::linalg::solvers::{Llt, Solve};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Mat, MatRef, Par, Side, c64};
 
-use super::free_interface::free_interface;
+use super::free_interface::{Inner, free_interface, hermitian};
 use super::lanczos::{ComplexModes, hermitian_eigen, lowest_modes};
 use super::operator::Operator;
 use crate::reduce::ReductionKind;
@@ -37,16 +37,6 @@ pub(super) struct Component {
     /// F̂.
     defect: Mat<c64>,
     kind: ReductionKind,
-}
-
-/// What describes the motion with the contact held.
-pub(super) struct Inner {
-    /// ω² of the modes it was made of.
-    pub squares: Vec<f64>,
-    /// (interior, face) × modes.
-    pub shapes: Mat<c64>,
-    /// K̂ of these.
-    pub stiffness: Mat<c64>,
 }
 
 /// What is kept of a nodal diameter.
@@ -198,11 +188,6 @@ pub(super) fn modes(operator: &Operator<'_>, order: usize, wanted: Wanted) -> Re
             }
         }
     }
-}
-
-/// ½(A + Aᴴ).
-pub(super) fn hermitian(matrix: MatRef<'_, c64>) -> Mat<c64> {
-    Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| (matrix[(i, j)] + matrix[(j, i)].conj()) * 0.5)
 }
 
 /// xᴴAx of every column.

@@ -6,9 +6,8 @@
 //! there, and is what is wanted: a force on the contact of a free disk accelerates it, and the response to force and inertia together,
 //! Pᴴ K_n⁺ P B with P = I − M_nΦΦᴴ over the rigid-body motions (inertia relief), is then in the space.
 
-use faer::{Mat, Side, c64};
+use faer::{Mat, MatRef, Side, c64};
 
-use super::component::{Inner, hermitian};
 use super::lanczos::ComplexModes;
 use super::operator::Operator;
 use crate::free_interface::LEAST_RESIDUAL;
@@ -16,6 +15,16 @@ use crate::{Error, Result};
 
 /// An ω² below this share of the shift σ is that of a rigid-body motion.
 const RIGID: f64 = 1e-5;
+
+/// What describes the motion with the contact held.
+pub(super) struct Inner {
+    /// ω² of the modes it was made of.
+    pub squares: Vec<f64>,
+    /// (interior, face) × modes.
+    pub shapes: Mat<c64>,
+    /// K̂ of these.
+    pub stiffness: Mat<c64>,
+}
 
 /// What moves no contact of the modes `found` of `full`.
 ///
@@ -57,4 +66,9 @@ fn check_residual(static_stiffness: &Mat<c64>, seen: &Mat<c64>, squares: &[f64])
     }
     let problem = format!("{} modes leave no flexibility to the static responses in some direction", squares.len());
     Err(Error::invalid("number of modes", problem, "Ask for fewer modes, or refine the mesh"))
+}
+
+/// ½(A + Aᴴ).
+pub(super) fn hermitian(matrix: MatRef<'_, c64>) -> Mat<c64> {
+    Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| (matrix[(i, j)] + matrix[(j, i)].conj()) * 0.5)
 }

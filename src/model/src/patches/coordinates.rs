@@ -18,7 +18,7 @@ use faer::Mat;
 use nalgebra::{DMatrix, Matrix3};
 use tiprub_core::rom::Frame;
 
-use crate::reduce::{ContactPoint, clamped_point};
+use crate::contact_point::{ContactPoint, clamped_point};
 use crate::sparse::{Pattern, SparseMatrix};
 use crate::{Error, Result};
 

@@ -6,7 +6,7 @@ use tiprub_core::shown;
 
 use super::middles;
 use crate::mesh::{Element, Mesh};
-use crate::read::Places;
+use crate::places::Places;
 use crate::{Error, Result};
 
 /// Cosine of the largest angle between the radial direction and the outward normal of a face that faces outward: 45 degrees.

@@ -21,7 +21,6 @@ use crate::progress::Listener;
 use crate::{Error, Result};
 
 pub use crate::mesh::set_counts;
-pub(crate) use contact_nodes::Places;
 pub use contact_nodes::{ContactChoice, choose_contact_nodes};
 pub use matrices::{MatrixFiles, read_matrices};
 pub use plausibility::{Plausibility, bounding_box, plausibility, total_mass};

@@ -5,8 +5,8 @@ use core::f64::consts::TAU;
 use tiprub_core::rom::Frame;
 
 use super::outcome::rotated;
-use super::{ContactPoint, clamped_point};
 use crate::Result;
+use crate::contact_point::{ContactPoint, clamped_point};
 use crate::craig_bampton::{CraigBampton, InnerBasis, craig_bampton_with};
 use crate::eigen::Modes;
 use crate::patches::PatchCoordinates;
