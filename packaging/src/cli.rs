@@ -133,7 +133,7 @@ pub struct RunArguments {
     /// Start value of an input or parameter; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
-    /// Also estimate what steps, modes and patches leave, from coarser runs of the same scene: about two and a half more runs.
+    /// Also estimate what steps, modes and patches leave, from coarser runs of the same scene: some ten runs more.
     #[arg(long)]
     pub estimate: bool,
     /// Where built-in models are kept.

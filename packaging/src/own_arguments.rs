@@ -162,7 +162,7 @@ pub struct TipOptions {
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
     /// Number of patches along the chord that the faces within the contact set or the tip are divided into, instead of nodes [default:
-    /// 5 without a contact set].
+    /// 9 without a contact set, fewer where elements are wider].
     #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
     pub contact_patches: Option<usize>,
     /// Names of the contact nodes or patches, by growing z [default: tip_1,tip_2,...].
