@@ -599,3 +599,24 @@ fn nodes_that_no_mode_takes_out_at_once_are_named_and_friction_is_not_blamed() {
         assert!(message.contains("no motion of the modes") && !message.contains("friction"), "{solver:?}: {message}");
     }
 }
+
+/// What is too large to be looked at is told, and only where friction makes it matter.
+#[test]
+fn growth_that_is_not_looked_at_is_told() {
+    let told = |modes: usize, friction: f64| {
+        let mut scene = models::rub(2);
+        let own = scene.roms[0].order();
+        let rom = &mut scene.roms[0];
+        let frequency = |mode: usize| 2e4 + 50.0 * mode as f64;
+        let entry = |row: usize| if row < own { rom.stiffness[(row, row)] } else { frequency(row).powi(2) };
+        let stiffness = DMatrix::from_fn(modes, modes, |i, j| if i == j { entry(i) } else { 0.0 });
+        rom.contact_map = rom.contact_map.clone().resize_horizontally(modes, 0.0);
+        rom.mass = rom.mass.clone().resize(modes, modes, 0.0);
+        (own..modes).for_each(|mode| rom.mass[(mode, mode)] = 1.0);
+        rom.stiffness = stiffness;
+        scene.settings.contacts[0].friction = friction;
+        let simulation = models::started(&scene);
+        simulation.warnings().iter().any(|text| text.contains("is not looked at with"))
+    };
+    assert_eq!([told(151, 0.1), told(151, 0.0), told(150, 0.1)], [true, false, false]);
+}

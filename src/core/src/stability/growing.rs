@@ -13,7 +13,7 @@ const GROWTH_FACTOR: f64 = 1.05;
 /// Growth per step below this is rounding of the eigenvalue solver.
 const GROWTH_NOISE: f64 = 1e-7;
 /// Largest number of modes for which growth rates are computed.
-const GROWTH_UP_TO: usize = 150;
+pub const GROWTH_UP_TO: usize = 150;
 
 /// Growth rates of closed sliding contact.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -14,7 +14,7 @@ pub mod massless;
 mod secular;
 pub mod unresolved;
 
-pub use growing::{Growth, continuous, growth, growth_steps, stepped};
+pub use growing::{GROWTH_UP_TO, Growth, continuous, growth, growth_steps, stepped};
 
 use nalgebra::DMatrix;
 

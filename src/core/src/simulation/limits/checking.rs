@@ -195,7 +195,16 @@ impl<'a> Checking<'a> {
     /// Everything about the rotor at the step to expect; returns warnings.
     fn expected(&self, step: f64) -> Result<Vec<String>> {
         let Parameters { scheme, step: largest, .. } = *self.parameters;
-        let warnings = stability::check_step(self.largest_frequency(), scheme, step)?.into_iter().collect();
+        let mut warnings: Vec<String> =
+            stability::check_step(self.largest_frequency(), scheme, step)?.into_iter().collect();
+        let modes = self.models.iter().map(ModalModel::len).max().unwrap_or(0);
+        if self.friction != 0.0 && modes > stability::GROWTH_UP_TO {
+            warnings.push(format!(
+                "growth of closed, sliding contact is not looked at with {modes} modes, only up to {}: halve the internal step and \
+                 compare",
+                stability::GROWTH_UP_TO
+            ));
+        }
         let senses: Vec<Vec<ContactDirections>> =
             self.models.iter().map(|model| [1.0, -1.0].map(|sense| self.directions(model, sense)).into()).collect();
         if self.disk().is_some() {
