@@ -179,7 +179,7 @@ pub fn estimates(
     }
     found.push(Estimate::unknown(
         "mesh",
-        "a ROM does not tell of other meshes: compare two with `tiprub study convergence`",
+        "a ROM does not tell of other meshes: reduce a finer one, run the scene with it, and compare",
     ));
     Ok(found)
 }
