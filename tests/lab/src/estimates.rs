@@ -1,7 +1,7 @@
 //! Estimates of what steps, modes and patches leave, against the truth: rubs of rotor 37, each refined far in one direction.
 
 use serde_json::{Value, json};
-use tiprub_core::Scene;
+use tiprub_core::{Rom, Scene};
 use tiprub_figure::plots::{Plot, Series};
 use tiprub_gallery::{reduction, scene_source};
 use tiprub_model::{
@@ -16,17 +16,39 @@ use tiprub_study::{
     estimate::{self, Estimate},
 };
 
-/// Depth of the bumps, friction and speed (rad/s).
-const DEPTHS: [f64; 4] = [0.55, 0.6, 0.7, 0.85];
-const FRICTIONS: [f64; 2] = [0.0, 0.15];
-const SPEEDS: [f64; 3] = [1500.0, 1800.0, 2000.0];
+/// Rubs of one model: elements of the mesh, modes, and depths of the bumps, friction coefficients and speeds (rad/s), each with each.
+struct Group {
+    mesh: [usize; 3],
+    modes: usize,
+    depths: &'static [f64],
+    frictions: &'static [f64],
+    speeds: &'static [f64],
+}
+
+/// The first group is the one that the bounds of [`estimate`] were chosen with, the second is not.
+const GROUPS: [Group; 2] = [
+    Group {
+        mesh: [16, 1, 16],
+        modes: 40,
+        depths: &[0.55, 0.6, 0.7, 0.85],
+        frictions: &[0.0, 0.15],
+        speeds: &[1500.0, 1800.0, 2000.0],
+    },
+    Group {
+        mesh: [12, 2, 20],
+        modes: 60,
+        depths: &[0.53, 0.65, 0.8, 1.0],
+        frictions: &[0.05, 0.1],
+        speeds: &[1300.0, 1700.0, 2200.0],
+    },
+];
 /// Communication step (s), internal steps in it, and length of the runs (s).
 const INTERVAL: f64 = 4e-6;
 const DIVISION: u32 = 8;
 const LENGTH: f64 = 5e-3;
 const QUICK_LENGTH: f64 = 2e-3;
-/// Own modes and patches, and what stands for the truth: so many times finer.
-const OWN: (usize, usize) = (40, 9);
+/// Own patches, and what stands for the truth.
+const PATCHES: usize = 9;
 const TRUE_MODES: usize = 200;
 const TRUE_PATCHES: usize = 17;
 const TRUE_DIVISION: u32 = 64;
@@ -53,30 +75,38 @@ struct Scenes {
 }
 
 fn scenes(quick: bool, console: &Console) -> Result<Scenes> {
+    let mut found = Scenes { names: Vec::new(), own: Vec::new(), modes: Vec::new(), patches: Vec::new() };
+    let base = scene_source::settings("builtin:rotor37")?;
+    for (group, number) in GROUPS.iter().zip(1..) {
+        let roms = roms(group, console)?;
+        let all = group.depths.iter().flat_map(|depth| group.frictions.iter().map(move |friction| (*depth, *friction)));
+        let all = all.flat_map(|(depth, friction)| group.speeds.iter().map(move |speed| (depth, friction, *speed)));
+        for (depth, friction, speed) in all.take(if quick { 1 } else { usize::MAX }) {
+            let mut settings = base.clone();
+            settings.surfaces[0].shape = tiprub_core::settings::Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
+            (settings.contacts[0].friction, settings.structures[0].speed) = (friction, speed);
+            settings.experiment.communication_step = INTERVAL;
+            settings.time.step = INTERVAL / f64::from(DIVISION);
+            found.names.push(format!("group {number}, depth {depth}, µ = {friction}, {speed} rad/s"));
+            let [own, modes, patches] =
+                roms.each_ref().map(|rom| Scene { settings: settings.clone(), roms: vec![rom.clone()] });
+            found.own.push(own);
+            found.modes.push(modes);
+            found.patches.push(patches);
+        }
+    }
+    Ok(found)
+}
+
+/// The own model of a group, with more modes, and with more patches.
+fn roms(group: &Group, console: &Console) -> Result<[Rom; 3]> {
+    let [chord, thickness, span] = group.mesh;
     let rom = |modes: usize, patches: usize| {
-        let mesh = MeshCounts { chord: 16, thickness: 1, span: 16 };
+        let mesh = MeshCounts { chord, thickness, span };
         let options = Rotor37Options { mesh, tip: Tip::Patches(patches), modes, ..Rotor37Options::default() };
         reduction::rotor37(&options, console).map(|found| found.rom)
     };
-    let roms = [rom(OWN.0, OWN.1)?, rom(TRUE_MODES, OWN.1)?, rom(OWN.0, TRUE_PATCHES)?];
-    let mut found = Scenes { names: Vec::new(), own: Vec::new(), modes: Vec::new(), patches: Vec::new() };
-    let base = scene_source::settings("builtin:rotor37")?;
-    let all = DEPTHS.iter().flat_map(|depth| FRICTIONS.map(|friction| (*depth, friction)));
-    let all = all.flat_map(|(depth, friction)| SPEEDS.map(|speed| (depth, friction, speed)));
-    for (depth, friction, speed) in all.take(if quick { 2 } else { usize::MAX }) {
-        let mut settings = base.clone();
-        settings.surfaces[0].shape = tiprub_core::settings::Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
-        (settings.contacts[0].friction, settings.structures[0].speed) = (friction, speed);
-        settings.experiment.communication_step = INTERVAL;
-        settings.time.step = INTERVAL / f64::from(DIVISION);
-        found.names.push(format!("depth {depth}, µ = {friction}, {speed} rad/s"));
-        let [own, modes, patches] =
-            roms.each_ref().map(|rom| Scene { settings: settings.clone(), roms: vec![rom.clone()] });
-        found.own.push(own);
-        found.modes.push(modes);
-        found.patches.push(patches);
-    }
-    Ok(found)
+    Ok([rom(group.modes, PATCHES)?, rom(TRUE_MODES, PATCHES)?, rom(group.modes, TRUE_PATCHES)?])
 }
 
 fn run(scene: &Scene, division: u32, samples: usize) -> Result<Marched> {
@@ -159,10 +189,9 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         name: "estimates",
         title: "Estimates against the truth".into(),
         summary: format!(
-            "Rubs of rotor 37, {} modes and {} patches on a coarse mesh. Each is estimated from coarser runs of itself, and run again with {} \
-             times shorter steps, with {TRUE_MODES} modes, and with {TRUE_PATCHES} patches.",
-            OWN.0,
-            OWN.1,
+            "Rubs of rotor 37, {PATCHES} patches on coarse meshes, in two groups: one that the estimates were made with, one that they were not. \
+             Each is estimated from coarser runs of itself, and run again with {} times shorter steps, with {TRUE_MODES} modes, and with \
+             {TRUE_PATCHES} patches.",
             TRUE_DIVISION / DIVISION
         ),
         facts: vec![
