@@ -4,7 +4,7 @@ use tiprub_core::{
     Rom, Scene,
     settings::{
         CoatingSettings, ContactSettings, InputInterpolation, Motion, SceneSettings, Scheme, Solver, StructureSettings,
-        SurfaceSettings,
+        SurfaceSettings, TOLERANCE,
     },
 };
 
@@ -23,6 +23,12 @@ pub fn features(scene: &Scene) -> Vec<String> {
     }
     if settings.time.scheme == Scheme::MasslessBoundary {
         found.push("highest modes quasi-static: contact nodes have no mass (massless-boundary)".into());
+    }
+    if settings.time.scheme == Scheme::Galerkin {
+        let tolerance = settings.time.tolerance.unwrap_or(TOLERANCE);
+        found.push(format!(
+            "steps of every blade by a tolerance of {tolerance:e} of the clearance; contact nodes have no mass (galerkin)"
+        ));
     }
     if settings.time.input_interpolation == InputInterpolation::Hold {
         found.push("inputs act at once and hit like hammers where they jump (input_interpolation = \"hold\")".into());
@@ -129,7 +135,7 @@ pub fn limits(scene: &Scene) -> Vec<String> {
          at an instant of impact grows as 1/h.",
         "Sliding friction can make the structure itself flutter; a scheme that would add growth of its own is refused.",
         choose(
-            settings.time.scheme == Scheme::MasslessBoundary,
+            settings.time.scheme.is_massless(),
             "The highest modes, three per contact node, follow contact at once and have no inertia.",
             "The mass of a contact node loses its kinetic energy at impact: an error of first order in mesh size, not in h.",
         ),

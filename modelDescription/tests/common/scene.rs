@@ -8,6 +8,7 @@ use tiprub_test_models as models;
 /// Every option on.
 pub fn complete() -> Scene {
     let mut scene = rigid();
+    scene.settings.time.tolerance = Some(1e-3);
     let rotor = &mut scene.settings.structures[0];
     rotor.spin = SpinSettings { stiffening: true, growth: true, coriolis: true };
     (rotor.whirl, rotor.axial_shift) = (true, true);
@@ -54,7 +55,8 @@ pub fn rigid() -> Scene {
 pub type Switch = (&'static str, fn(&mut Scene));
 
 /// Every option that adds variables, in a scene with a flexible casing.
-pub const OPTIONS: [Switch; 18] = [
+pub const OPTIONS: [Switch; 19] = [
+    ("`tolerance`, or the scheme `galerkin`", |scene| scene.settings.time.tolerance = None),
     ("`motion = \"rotating\"`", |scene| {
         let rotor = &mut scene.settings.structures[0];
         (rotor.motion, rotor.speed, rotor.spin) = (Motion::Still, 0.0, SpinSettings::default());

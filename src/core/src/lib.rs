@@ -10,6 +10,7 @@
 
 pub mod dynamics;
 mod error;
+pub mod galerkin;
 pub mod gaps;
 mod history;
 pub mod laws;

@@ -73,6 +73,9 @@ fn two_lobe_width() -> f64 {
     0.15
 }
 
+/// Error that a step of `galerkin` may make where nothing else is said, as a share of the smallest clearance.
+pub const TOLERANCE: f64 = 1e-3;
+
 /// How a structure moves as a whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -378,6 +381,9 @@ pub struct TimeSettings {
     pub scheme: Scheme,
     /// Largest internal step h (s); the step used divides the communication step evenly.
     pub step: f64,
+    /// Error that a step of `galerkin` may make in displacements, as a share of the smallest clearance; 1e-3 where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<f64>,
     /// Inputs between communication points.
     #[serde(default, skip_serializing_if = "is_default")]
     pub input_interpolation: InputInterpolation,

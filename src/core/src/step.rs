@@ -1,6 +1,7 @@
 //! One internal step: prediction, gaps, correction (section 4.3 of the paper), and the ledger kept on the way.
 
 use crate::gaps::Drive;
+use crate::settings::Scheme;
 use crate::system::{Bodies, Found, StepFailure, System};
 
 /// Denormals are flushed every this many steps.
@@ -12,6 +13,9 @@ impl System {
     /// # Errors
     /// [`StepFailure`]; the state is then not meaningful any more.
     pub fn step(&mut self, drives: &[Drive]) -> Result<(), StepFailure> {
+        if self.settings.scheme == Scheme::Galerkin {
+            return self.march(drives);
+        }
         let (acts_later, ledger) = (self.settings.scheme.acts_later(), self.settings.ledger);
         // Eq. 9: all structures go on without new contact forces.
         for structure in &mut self.structures {

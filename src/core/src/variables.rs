@@ -180,6 +180,8 @@ pub enum Quantity {
     StepMax,
     /// Scheme, parameter.
     SchemeChoice,
+    /// Error that a step may make, parameter.
+    Tolerance,
     /// Solver, parameter.
     SolverChoice,
     /// How inputs run between communication points, parameter.

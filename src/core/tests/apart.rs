@@ -98,7 +98,7 @@ fn one_between_two() -> Scene {
 /// A scene of two sets continues from its state with the same bits, ledgers and energies of the start included.
 #[test]
 fn a_state_holds_the_energies_of_every_set() {
-    let all = Scheme::ALL.into_iter().flat_map(|scheme| [(scheme, two(|_| ())), (scheme, one_between_two())]);
+    let all = Scheme::RECURRENCES.into_iter().flat_map(|scheme| [(scheme, two(|_| ())), (scheme, one_between_two())]);
     for (scheme, mut scene) in all.filter(|(scheme, scene)| *scheme != Scheme::MasslessBoundary || scene.roms.len() < 3)
     {
         scene.settings.time.scheme = scheme;

@@ -136,7 +136,7 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
         let (gap, normal, places) = looked(&mut law, lanes, &drive, &displacement);
         let at = At { node: 0, index: 0, drive: &drive };
         let moved = [0, 1, 2].map(|component| displacement[component * lanes]);
-        let point = law.contact_point(at, moved, &places);
+        let point = law.contact_point(at, moved, places.get(at.index).copied().unwrap_or_default());
         // Any force: its work on a shaft that moves is the same in both coordinates.
         let (force, shaft) = ([0.3, -0.7, 0.4], [2e-4, 5e-4, -3e-4]);
         let work = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -150,7 +150,9 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
             assert!((told - found).abs() < 1e-12, "{}: {:?}, {found}", feature.0, acting.moment);
         }
         let wrench = law.wrench(at, point, normal);
-        let surface = |motion: Motion| -law.surface_motion(at, point, normal, &places, &motion);
+        let surface = |motion: Motion| {
+            -law.surface_motion(at, point, normal, places.get(at.index).copied().unwrap_or_default(), &motion)
+        };
         let [opening, factor, rotation] = [
             Motion { opening: 1.0, ..Motion::default() },
             Motion { shape_factor: 1.0, ..Motion::default() },

@@ -8,7 +8,7 @@ use tiprub_test_models::{
     real, started,
 };
 
-const SCHEMES: [Scheme; 3] = Scheme::ALL;
+const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
 const SOLVERS: [Solver; 3] = Solver::ALL;
 
 /// Both forms of one disk with the same settings.

@@ -17,7 +17,7 @@ use tiprub_test_models::{
     flexible, go, real, started, try_started,
 };
 
-const SCHEMES: [Scheme; 3] = Scheme::ALL;
+const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
 const SOLVERS: [Solver; 3] = Solver::ALL;
 
 type Feature = (&'static str, fn(&mut Scene));

@@ -8,7 +8,7 @@ use tiprub_core::variables::{Causality, Kind};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{lattice, real, rich_blade, rub, several, spin};
 
-const SCHEMES: [Scheme; 3] = Scheme::ALL;
+const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
 const SOLVERS: [Solver; 3] = Solver::ALL;
 
 /// Set every input and parameter whose name ends with `name`.

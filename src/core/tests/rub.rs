@@ -443,7 +443,7 @@ fn nothing_unsound_enters() {
     let friction = reference(&simulation, "friction_coefficient");
     assert!(simulation.set_real(friction, -0.1).is_err() && simulation.set_real(friction, 2.1).is_err());
     let scheme = reference(&simulation, "scheme");
-    assert!(simulation.set_integer(scheme, 0).is_err() && simulation.set_integer(scheme, 4).is_err());
+    assert!(simulation.set_integer(scheme, 0).is_err() && simulation.set_integer(scheme, 5).is_err());
     assert!(simulation.initialise(f64::NAN).is_err());
     simulation.initialise(0.0).unwrap();
     assert!(simulation.set_integer(scheme, 1).is_err(), "fixed after initialisation");

@@ -105,7 +105,7 @@ impl ModalModel {
 
     /// Number of modes with inertia under a scheme; the others are the highest.
     pub fn dynamic_modes(&self, scheme: Scheme) -> usize {
-        if scheme == Scheme::MasslessBoundary { self.len().saturating_sub(self.quasi_static) } else { self.len() }
+        if scheme.is_massless() { self.len().saturating_sub(self.quasi_static) } else { self.len() }
     }
 
     /// Coefficients of one mode at the step size `step` (s), its frequency times `factor` (mistuning; 1 = tuned).

@@ -26,6 +26,7 @@ pub use plane::FixedGap;
 pub use revolution::RevolutionGap;
 use spline::{SplineGap, faces_inwards};
 use surface_spline::{ClosestPoint, SurfaceSpline};
+use wrench::At;
 
 /// Prescribed motion of rotor and casing at one instant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -75,6 +76,12 @@ impl Geometry {
     pub fn new(len: usize, has_places: bool) -> Self {
         let places = if has_places { len } else { 0 };
         Self { normal: [vec![0.0; len], vec![0.0; len], vec![0.0; len]], places: vec![ClosestPoint::default(); places] }
+    }
+
+    /// Closest place of one node of one lane, on surfaces that have places.
+    #[inline(always)]
+    pub fn place_at(&self, index: usize) -> ClosestPoint {
+        self.places.get(index).copied().unwrap_or_default()
     }
 
     /// Unit normal of one node of one lane.
@@ -137,6 +144,27 @@ impl GapLaw {
         }
     }
 
+    /// Whether a node that stays within `reach` (m, own directions) of where it rests cannot touch while the rotor turns from where it is
+    /// to `turned` (rad) and nothing else moves. False where it is not known.
+    pub fn is_clear(&self, at: At<'_>, turned: f64, reach: [f64; 3]) -> bool {
+        match self {
+            Self::Fixed(law) => law.gaps[at.node] > dot(law.normals[at.node].map(f64::abs), reach),
+            Self::Revolution(law) => law.is_clear(at, turned, reach),
+            Self::Spline(_) | Self::Open(_) => false,
+        }
+    }
+
+    /// Smallest radial clearance, or fixed gap, above 0 (m); infinite where there is none.
+    pub fn clearance(&self) -> f64 {
+        let all = match self {
+            Self::Fixed(law) => &law.gaps,
+            Self::Revolution(law) => &law.layout.clearances,
+            Self::Spline(law) => &law.layout.clearances,
+            Self::Open(_) => return f64::INFINITY,
+        };
+        all.iter().copied().filter(|clearance| *clearance > 0.0).fold(f64::INFINITY, f64::min)
+    }
+
     /// Angle over which the casing shape changes noticeably (rad).
     pub fn angular_scale(&self) -> f64 {
         match self {
@@ -158,6 +186,18 @@ impl GapLaw {
         if let Self::Fixed(law) = self {
             law.prepare(lanes, geometry);
         }
+    }
+
+    /// Gap (m), unit normal and place of one node displaced by `moved` (m, own directions) against what nothing deforms; a place
+    /// only on surfaces around an axis through data points.
+    pub fn of_one(&mut self, at: At<'_>, moved: [f64; 3]) -> (f64, [f64; 3], ClosestPoint) {
+        let (gap, normal) = match self {
+            Self::Fixed(law) => (law.gaps[at.node] + dot(law.normals[at.node], moved), law.normals[at.node]),
+            Self::Revolution(law) => law.of_one(at, moved),
+            Self::Spline(law) => return law.of_one(at, moved),
+            Self::Open(_) => (f64::NAN, [0.0; 3]),
+        };
+        (gap, normal, ClosestPoint::default())
     }
 
     /// Gaps (m) and normals at an instant, for the displacements `[row · lanes + lane]` of the contact rows (m) and `moved` of the

@@ -97,6 +97,43 @@ impl RevolutionGap {
         facing / tilt * (motion.opening + motion.shape_factor * shape - turned)
     }
 
+    /// Gap (m) and unit normal of one node displaced by `moved` (m).
+    pub(super) fn of_one(&self, at: At<'_>, moved: [f64; 3]) -> (f64, [f64; 3]) {
+        let (node, drive, radius) = (at.node, at.drive, self.layout.radii[at.node]);
+        let (slope, per_radius) = (self.slopes[node], self.layout.per_radius[node]);
+        let angle = self.angle(at, moved);
+        let [outwards, sideways] = self.shaft_offset(angle, drive);
+        let arm = radius + moved[0] + outwards;
+        let distance = libm::hypot(arm, sideways);
+        let (shape, steepness) = self.surface.evaluate(angle - drive.shape_rotation + libm::atan2(sideways, arm));
+        // ρ − r − u_r without cancellation.
+        let shifted = outwards + sideways * sideways / (distance + arm);
+        let along = if self.shaft_moves { drive.shaft[2] } else { 0.0 };
+        let clearance = self.layout.clearances[at.index % self.layout.lanes] + drive.gap_offset + drive.radius_change;
+        let (sine, cosine) = (sideways / distance, arm / distance);
+        let per_arc = drive.shape_factor * steepness / distance;
+        let gradient = match self.shaft_moves {
+            true => [-cosine - per_arc * sine, (1.0 + moved[0] * per_radius) * (per_arc * cosine - sine), slope],
+            false => [-1.0, drive.shape_factor * steepness * per_radius, slope],
+        };
+        let per_length = 1.0 / super::dot(gradient, gradient).sqrt();
+        let open = clearance + drive.shape_factor * shape - moved[0] - shifted + slope * (moved[2] + along);
+        (open * per_length, gradient.map(|one| one * per_length))
+    }
+
+    /// See [`super::GapLaw::is_clear`].
+    pub(super) fn is_clear(&self, at: At<'_>, turned: f64, reach: [f64; 3]) -> bool {
+        let (node, drive) = (at.node, at.drive);
+        let seen = self.layout.angles[at.index] - drive.shape_rotation;
+        let (from, to) = (seen + drive.rotor_angle.min(turned), seen + drive.rotor_angle.max(turned));
+        let around = reach[1] * self.layout.per_radius[node];
+        let shape = self.surface.least_between(from - around, to + around);
+        let clearance = self.layout.clearances[at.index % self.layout.lanes] + drive.gap_offset + drive.radius_change;
+        let left = clearance + drive.shape_factor * shape - reach[0] - self.slopes[node].abs() * reach[2];
+        // On a shaft that moves, and with a shape turned inside out, nobody knows.
+        !self.shaft_moves && drive.shape_factor >= 0.0 && left > 0.0
+    }
+
     /// Angle of a displaced node about the shaft's centre (rad).
     fn angle(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
         self.layout.angles[at.index] + at.drive.rotor_angle + moved[1] * self.layout.per_radius[at.node]

@@ -32,6 +32,8 @@ pub enum Surface {
     },
     /// Periodic cubic spline through equally spaced values.
     Table {
+        /// Largest magnitude of d²s/dθ² (m/rad²).
+        curvature: f64,
         /// Values at the knots and their slopes ds/dθ (m, m/rad).
         knots: Vec<[f64; 2]>,
     },
@@ -51,7 +53,10 @@ impl Surface {
             Shape::TwoLobe { depth, width, phase } => {
                 Self::TwoLobe { height: 2.0 * gap * depth, width: std::f64::consts::PI * width, phase: *phase }
             }
-            Shape::Table { radius_change } => Self::Table { knots: periodic_spline(radius_change)? },
+            Shape::Table { radius_change } => {
+                let knots = periodic_spline(radius_change)?;
+                Self::Table { curvature: largest_curvature(&knots), knots }
+            }
         })
     }
 
@@ -61,7 +66,7 @@ impl Surface {
             Self::Circular => 0.0,
             Self::Lobes { amplitude, .. } => amplitude.abs(),
             Self::TwoLobe { height, .. } => height.abs(),
-            Self::Table { knots } => knots.iter().fold(0.0, |largest, knot| largest.max(knot[0].abs())),
+            Self::Table { knots, .. } => knots.iter().fold(0.0, |largest, knot| largest.max(knot[0].abs())),
         }
     }
 
@@ -72,7 +77,7 @@ impl Surface {
             Self::Lobes { order, .. } => 1.0 / order,
             Self::TwoLobe { width, .. } => *width,
             #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
-            Self::Table { knots } => std::f64::consts::TAU / knots.len() as f64,
+            Self::Table { knots, .. } => std::f64::consts::TAU / knots.len() as f64,
         }
     }
 
@@ -86,8 +91,22 @@ impl Surface {
                 (-amplitude * cosine, amplitude * order * sine)
             }
             Self::TwoLobe { height, width, phase } => two_lobe(*height, *width, *phase, angle),
-            Self::Table { knots } => evaluate_spline(knots, angle),
+            Self::Table { knots, .. } => evaluate_spline(knots, angle),
         }
+    }
+
+    /// A bound that s stays above between two angles (m): the lower of its values there, less what its curvature allows between.
+    pub fn least_between(&self, from: f64, to: f64) -> f64 {
+        let curvature = match self {
+            Self::Circular => return 0.0,
+            Self::Lobes { amplitude, order, .. } => amplitude.abs() * order * order,
+            // Dents take nothing away. Where two bumps meet there is a ridge, which is above any chord.
+            Self::TwoLobe { height, .. } if *height < 0.0 => return 0.0,
+            Self::TwoLobe { height, width, .. } => 2.0 * height.abs() / (width * width),
+            Self::Table { curvature, .. } => *curvature,
+        };
+        let width = to - from;
+        self.evaluate(from).0.min(self.evaluate(to).0) - 0.125 * curvature * width * width
     }
 
     /// [`Surface::evaluate`] for a row of angles, in a form that compiles to vector instructions where it can.
@@ -158,6 +177,18 @@ fn exp_of_negative(x: f64) -> f64 {
 }
 
 /// Value and slope of a periodic cubic (Hermite form) at `angle`.
+/// Largest |d²s/dθ²| (m/rad²): at a knot, from either side.
+fn largest_curvature(knots: &[[f64; 2]]) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
+    let spacing = std::f64::consts::TAU / knots.len() as f64;
+    let next = knots.iter().cycle().skip(1);
+    let both = knots.iter().zip(next).map(|([a, slope_a], [b, slope_b])| {
+        let rise = 6.0 * (b - a) / spacing;
+        (rise - 4.0 * slope_a - 2.0 * slope_b).abs().max((4.0 * slope_b + 2.0 * slope_a - rise).abs()) / spacing
+    });
+    both.fold(0.0, f64::max)
+}
+
 fn evaluate_spline(knots: &[[f64; 2]], angle: f64) -> (f64, f64) {
     #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
     let count = knots.len() as f64;
@@ -213,6 +244,25 @@ mod tests {
             Shape::TwoLobe { depth: 1.0, width: 0.15, phase: 0.2 },
             Shape::Table { radius_change: table },
         ]
+    }
+
+    #[test]
+    fn no_value_between_two_angles_is_below_the_bound() {
+        for shape in shapes().into_iter().chain([Shape::TwoLobe { depth: -0.7, width: 0.4, phase: 0.1 }]) {
+            let surface = Surface::new(&shape, 3.56e-4).unwrap();
+            let (mut tightest, mut lowest) = (f64::INFINITY, 0.0_f64);
+            for i in 0..400 {
+                let (from, width) = (-4.0 + 0.023 * f64::from(i), 0.01 * f64::from(1 + i % 17));
+                let bound = surface.least_between(from, from + width);
+                let values = (0..=40).map(|k| surface.evaluate(from + width * f64::from(k) / 40.0).0);
+                let least = values.fold(f64::INFINITY, f64::min);
+                assert!(bound <= least + 1e-15, "{shape:?}, {from}, {width}: {bound} {least}");
+                (tightest, lowest) = (tightest.min(least - bound), lowest.min(least));
+            }
+            // And it says something.
+            let dent = matches!(shape, Shape::TwoLobe { depth, .. } if depth < 0.0);
+            assert!(dent || tightest < 1e-6 && lowest <= 0.0);
+        }
     }
 
     #[test]

@@ -118,15 +118,9 @@ impl SplineGap {
         for (node, lane) in nodes.filter(|(_, lane)| self.layout.clearances[*lane].is_finite()) {
             let index = node * lanes + lane;
             let local: [f64; 3] = std::array::from_fn(|component| displacement[(3 * node + component) * lanes + lane]);
-            let angle = self.layout.angles[index] + drive.rotor_angle - drive.shape_rotation;
-            let frame = Frame::new(angle);
-            let [radial, tangential, axial] = self.shaft_offset(angle, drive);
-            let arm = self.arm(node, lane, drive, local);
-            let place = [arm[0] + radial, arm[1] + tangential, arm[2] + axial];
-            let point = frame.fixed(place);
-            let start = guess
-                .map_or_else(|| self.surface.locate(point), |places| self.surface.advance(places[index], self.turned));
-            match self.surface.project(point, start) {
+            let at = At { node, index, drive };
+            let (projection, frame) = self.project(at, local, guess.map(|places| places[index]));
+            match projection {
                 Projection::Found { place, normal, gap: found, .. } => {
                     gap[index] = found;
                     let normal = frame.local(normal);
@@ -143,6 +137,29 @@ impl SplineGap {
                 // Found out by the caller: the state is not what the model describes any more.
                 Projection::Lost => gap[index] = f64::NAN,
             }
+        }
+    }
+
+    /// The closest point of a node displaced by `moved` (m), sought from the place it had, or from its angle; and its directions.
+    #[inline(always)]
+    fn project(&self, at: At<'_>, moved: [f64; 3], guess: Option<ClosestPoint>) -> (Projection, Frame) {
+        let angle = self.layout.angles[at.index] + at.drive.rotor_angle - at.drive.shape_rotation;
+        let frame = Frame::new(angle);
+        let [radial, tangential, axial] = self.shaft_offset(angle, at.drive);
+        let arm = self.arm(at.node, at.index % self.layout.lanes, at.drive, moved);
+        let place = [arm[0] + radial, arm[1] + tangential, arm[2] + axial];
+        let point = frame.fixed(place);
+        let start = guess.map_or_else(|| self.surface.locate(point), |place| self.surface.advance(place, self.turned));
+        (self.surface.project(point, start), frame)
+    }
+
+    /// Gap (m), unit normal and place of one node displaced by `moved` (m); the surface is rigid.
+    pub(super) fn of_one(&mut self, at: At<'_>, moved: [f64; 3]) -> (f64, [f64; 3], ClosestPoint) {
+        self.follow(at.drive.shape_factor, &[]);
+        match self.project(at, moved, None) {
+            (Projection::Found { place, normal, gap, .. }, frame) => (gap, frame.local(normal), place),
+            (Projection::BeyondEdge { place }, _) => (NOTHING_TO_TOUCH, [-1.0, 0.0, 0.0], place),
+            (Projection::Lost, _) => (f64::NAN, [-1.0, 0.0, 0.0], ClosestPoint::default()),
         }
     }
 

@@ -85,6 +85,11 @@ impl Motion {
         }
     }
 
+    /// What this motion is beyond another.
+    pub fn less(&self, other: &Self) -> Self {
+        self.since(&other.over(-1.0))
+    }
+
     /// Whether no input moves the casing.
     pub fn casing_rests(&self) -> bool {
         self.opening == 0.0 && self.shape_factor == 0.0 && self.shape_rotation == 0.0
@@ -118,11 +123,11 @@ impl GapLaw {
     /// What tells the contact point of a node displaced by `moved` (m, own directions) whose closest point is `place`: the
     /// displacement itself on surfaces of revolution, else the point from the shaft's centre or the origin (m).
     #[inline(always)]
-    pub fn contact_point(&self, at: At<'_>, moved: [f64; 3], places: &[ClosestPoint]) -> [f64; 3] {
+    pub fn contact_point(&self, at: At<'_>, moved: [f64; 3], place: ClosestPoint) -> [f64; 3] {
         match self {
             Self::Fixed(_) | Self::Revolution(_) => moved,
-            Self::Spline(law) => law.contact_arm(at.index, at.drive, places[at.index]),
-            Self::Open(law) => law.contact_point(places[at.index]),
+            Self::Spline(law) => law.contact_arm(at.index, at.drive, place),
+            Self::Open(law) => law.contact_point(place),
         }
     }
 
@@ -176,13 +181,13 @@ impl GapLaw {
         at: At<'_>,
         point: [f64; 3],
         normal: [f64; 3],
-        places: &[ClosestPoint],
+        place: ClosestPoint,
         motion: &Motion,
     ) -> f64 {
         match self {
             Self::Fixed(_) | Self::Open(_) => 0.0,
             Self::Revolution(law) => law.surface_motion(at, point, normal[0], motion),
-            Self::Spline(law) => law.surface_motion(at, point, normal, places[at.index], motion),
+            Self::Spline(law) => law.surface_motion(at, point, normal, place, motion),
         }
     }
 

@@ -22,6 +22,7 @@
 //!   the force f of time n known when q(n+1) is, f (u⁺ − u⁻)/2 changes the same E: of a static mode only ½ ω² q q⁻ is left.
 
 mod central_difference;
+mod galerkin;
 mod massless_boundary;
 mod modal_exact;
 
@@ -40,11 +41,25 @@ pub enum Scheme {
     /// The highest modes, three per contact node, are quasi-static: contact acts through their residual flexibility
     /// (Monjaraz-Tec, Gross, Krack, Computers & Structures 260, 2022); the other modes take the contact force one step later.
     MasslessBoundary,
+    /// Continuous Galerkin in time with steps of each sector as long as a tolerance allows ([`crate::galerkin`]); contact acts through the
+    /// flexibility of the same quasi-static modes.
+    Galerkin,
 }
 
 impl Scheme {
     /// All of them, in the order of the FMU's enumeration.
-    pub const ALL: [Self; 3] = [Self::CentralDifference, Self::ModalExact, Self::MasslessBoundary];
+    pub const ALL: [Self; 4] = [Self::CentralDifference, Self::ModalExact, Self::MasslessBoundary, Self::Galerkin];
+
+    /// Those whose modes follow recurrences, all with one step.
+    pub const RECURRENCES: [Self; 3] = [Self::CentralDifference, Self::ModalExact, Self::MasslessBoundary];
+
+    /// Whether the highest modes, three per contact node, are quasi-static.
+    pub fn is_massless(self) -> bool {
+        match self {
+            Self::CentralDifference | Self::ModalExact => false,
+            Self::MasslessBoundary | Self::Galerkin => true,
+        }
+    }
 
     /// As in scene files and in the FMU's enumeration.
     pub fn name(self) -> &'static str {
@@ -60,6 +75,7 @@ pub(crate) static SCHEMES: Enumeration = Enumeration {
         ("central-difference", "Explicit central differences (eq. 9), stable for omega h < 2"),
         ("modal-exact", "Exact in free flight and under constant force"),
         ("massless-boundary", "Highest modes quasi-static; the others take contact forces one step later"),
+        ("galerkin", "Continuous Galerkin in time, steps of each sector by a tolerance; highest modes quasi-static"),
     ],
 };
 
@@ -74,7 +90,7 @@ impl Scheme {
     /// Whether contact forces act one step after they are found.
     pub fn acts_later(self) -> bool {
         match self {
-            Self::CentralDifference | Self::ModalExact => false,
+            Self::CentralDifference | Self::ModalExact | Self::Galerkin => false,
             Self::MasslessBoundary => true,
         }
     }
@@ -103,6 +119,7 @@ impl ModeCoefficients {
     /// Coefficients for angular frequency ω (rad/s, 0 for a rigid mode), damping ratio 0 ≤ ξ < 1, step h (s).
     pub fn new(scheme: Scheme, frequency: f64, damping_ratio: f64, step: f64) -> Self {
         let Recurrence { beta, kappa, compliance } = match scheme {
+            Scheme::Galerkin => return galerkin::state(frequency, step),
             Scheme::CentralDifference => central_difference::recurrence(frequency, damping_ratio, step),
             // Of its modes with inertia.
             Scheme::ModalExact | Scheme::MasslessBoundary => modal_exact::recurrence(frequency, damping_ratio, step),
@@ -122,10 +139,11 @@ impl ModeCoefficients {
     pub fn of_mode(scheme: Scheme, dynamic: bool, frequency: f64, damping_ratio: f64, step: f64) -> Self {
         match scheme {
             Scheme::CentralDifference | Scheme::ModalExact => Self::new(scheme, frequency, damping_ratio, step),
+            Scheme::Galerkin if dynamic => galerkin::state(frequency, step),
             Scheme::MasslessBoundary if dynamic => {
                 massless_boundary::delay(Self::new(scheme, frequency, damping_ratio, step))
             }
-            Scheme::MasslessBoundary => massless_boundary::quasi_static(frequency),
+            Scheme::MasslessBoundary | Scheme::Galerkin => massless_boundary::quasi_static(frequency),
         }
     }
 
@@ -195,6 +213,11 @@ impl Velocity {
         let half = libm::sin(0.5 * damped * step);
         let position = -rate - per_sine * (libm::expm1(-rate * step) + 2.0 * half * half);
         Self { increment: per_sine * libm::exp(-rate * step), position, force: -position / frequency / frequency }
+    }
+
+    /// Of a state (q, hq̇).
+    pub fn of_state(step: f64) -> Self {
+        Self { increment: 1.0 / step, position: 0.0, force: 0.0 }
     }
 
     /// q̇ of a mode at `now` = q that came by `increment` = d, under the modal force `force`.

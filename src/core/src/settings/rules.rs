@@ -6,7 +6,7 @@ mod place;
 #[cfg(test)]
 mod tests;
 
-use super::{ContactSettings, Motion, Preset, Scene, SceneSettings, Scheme, Solver};
+use super::{ContactSettings, Motion, Preset, Scene, SceneSettings, Scheme, Solver, SpinSettings};
 use crate::rom::Frame;
 use crate::{Error, Result, Rom};
 use facts::*;
@@ -34,6 +34,8 @@ const fn excludes(features: &'static [Fact], other: Other, because: &'static str
 
 const FREE: Other = ("a free master", |at| at.is_free());
 const ALL_FREE: Other = ("a scene of free masters only", |at| at.contacts().all(|at| at.is_free()));
+const COUPLED_SECTORS: Other =
+    ("a ROM whose sectors are coupled by harmonics", |at| at.roms.iter().any(Rom::is_cyclic));
 const COUPLED: Other = ("a ROM whose sectors are coupled by harmonics", |at| at.rom().is_cyclic());
 
 /// Of structures, surfaces and contacts.
@@ -179,8 +181,50 @@ static METHODS: &[Rule] = &[
         "quasi-static modes have no velocity for the Coriolis force",
         "Use \"modal-exact\", or leave the Coriolis force out",
     ),
+    excludes(
+        &[GALERKIN],
+        ("a free master", |at| at.contacts().any(|at| at.is_free())),
+        "closest points on open surfaces are sought from the step before, and its steps are not everybody's",
+        "Use \"modal-exact\" or \"central-difference\"",
+    ),
+    excludes(
+        &[GALERKIN],
+        ("a surface that a structure carries and deforms", |at| at.contacts().any(|at| at.carrier().is_some())),
+        "sectors step by themselves, and such a surface moves under all of them together",
+        "Use \"modal-exact\", or a rigid surface",
+    ),
+    excludes(
+        &[GALERKIN],
+        COUPLED_SECTORS,
+        "sectors step by themselves, and a disk moves all of them together",
+        "Use \"modal-exact\", or a ROM of uncoupled sectors",
+    ),
+    excludes(
+        &[GALERKIN],
+        ("`structure.spin`", |at| at.settings.structures.iter().any(|own| own.spin != SpinSettings::default())),
+        "its tables are those of modes that keep their stiffness and are loaded by contact alone",
+        "Use \"modal-exact\", or leave the effects of spin out",
+    ),
+    excludes(
+        &[GALERKIN],
+        ("`contact.coating`", |at| at.contacts().any(|at| at.is_coated())),
+        "it seeks forces for gaps that close, and a coating takes force while they do",
+        "Use \"modal-exact\", or remove the coating",
+    ),
     needs(
-        &[MASSLESS],
+        &[GALERKIN],
+        ("`contact.solver = \"lcp\"`", |at| at.solver == Solver::Lcp),
+        "it solves the complementarity of sliding contact at several instants at once",
+        "Use solver = \"lcp\"",
+    ),
+    needs(
+        &[GALERKIN],
+        ("a clearance above 0", |at| at.contacts().all(|at| at.contact().nominal_gap() > 0.0)),
+        "its tolerance is a share of the clearance",
+        "Give the contact a `gap`, or use \"modal-exact\"",
+    ),
+    needs(
+        &[QUASI_STATIC],
         ("more than three modes per contact node", |at| at.has_modes_left()),
         "it makes the highest modes quasi-static, three per contact node, and else none is left",
         "Use more modes or fewer contact nodes, or \"modal-exact\"",

@@ -52,6 +52,9 @@ impl SceneSettings {
         for (index, contact) in self.contacts.iter().enumerate() {
             contact.validate(self, &format!("contact[{}]", index + 1))?;
         }
+        if let Some(tolerance) = self.time.tolerance {
+            within("time.tolerance", tolerance, ranges::TOLERANCE[0], ranges::TOLERANCE[1])?;
+        }
         within("time.step", self.time.step, ranges::SHORTEST_STEP, ranges::LONGEST_STEP)?;
         let experiment = &self.experiment;
         at_most("experiment.start", experiment.start, ranges::TIME)?;

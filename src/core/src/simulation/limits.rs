@@ -7,7 +7,7 @@ mod told;
 use super::table::has_one_friction;
 use super::{Compiled, Simulation};
 use crate::dynamics::modal::ModalModel;
-use crate::settings::{Scheme, Solver};
+use crate::settings::{Scheme, Solver, TOLERANCE};
 use crate::stability::massless::MasslessLimit;
 use crate::stability::{self, massless};
 use crate::system::System;
@@ -26,6 +26,8 @@ pub struct Parameters {
     /// Largest internal step (s).
     pub step: f64,
     pub scheme: Scheme,
+    /// Error of a step of `galerkin`, as a share of the smallest clearance.
+    pub tolerance: f64,
     pub solver: Solver,
     /// Sign of the speed of each structure that touches at the start; 0 for a rotor that starts at rest.
     pub senses: Vec<f64>,
@@ -104,6 +106,10 @@ impl Simulation {
             friction: (0..pairs).map(friction).collect(),
             damping_ratios: damping.chain(carried).collect(),
             step: self.value_of(Quantity::StepMax, 0),
+            tolerance: self
+                .table
+                .with_quantity_of(Quantity::Tolerance, 0)
+                .map_or(TOLERANCE, |row| self.values[row.reference as usize]),
             scheme: chosen(&Scheme::ALL, self.value_of(Quantity::SchemeChoice, 0)),
             solver: chosen(&Solver::ALL, self.value_of(Quantity::SolverChoice, 0)),
             senses: self.speeds().into_iter().map(sense).collect(),
@@ -221,6 +227,10 @@ impl Compiled {
     }
 
     fn rotor_limits(&self, body: usize, parameters: &Parameters, system: &System) -> BodyLimits {
+        if parameters.scheme == Scheme::Galerkin {
+            // Its steps are as short as its contact problems and its energy ask for.
+            return BodyLimits::none();
+        }
         let parts = &self.bodies[body];
         let mut models = match &parts.disk {
             Some(disk) => (0..disk.diameters.len()).map(|diameter| disk.paired(diameter)).collect(),
@@ -296,6 +306,18 @@ impl Limits {
 }
 
 impl BodyLimits {
+    /// No step is refused.
+    fn none() -> Self {
+        let sense = || Some(Sense { outcome: Ok(Vec::new()), ranges: Vec::new() });
+        Self {
+            outcome: Ok(Vec::new()),
+            senses: [sense(), sense()],
+            massless: MasslessLimit::NONE,
+            casing: Vec::new(),
+            unresolved: f64::INFINITY,
+        }
+    }
+
     /// Warnings for the step expected where contact slides in the sense of this sign.
     fn warnings(&self, sense: f64) -> Result<Vec<String>> {
         let mut warnings = self.outcome.clone()?;

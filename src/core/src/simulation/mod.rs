@@ -240,7 +240,7 @@ impl Simulation {
         }
         self.find_drives(0.0, start_time);
         for structure in self.system.structures_mut() {
-            structure.modes_mut().set_step(parameters.scheme, parameters.step);
+            structure.set_step(parameters.scheme, parameters.step);
         }
         self.inputs.start();
         self.settle();
@@ -262,6 +262,7 @@ impl Simulation {
     /// Scheme, solver and friction of the parameters.
     fn apply_methods(&mut self, parameters: &limits::Parameters) {
         self.system.set_methods(parameters.scheme, parameters.solver);
+        self.system.prepare_spans(parameters.step, parameters.tolerance);
         self.apply_friction(parameters);
     }
 

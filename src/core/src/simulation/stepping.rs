@@ -197,8 +197,13 @@ impl Simulation {
         }
         let next = self.communication.done + 1;
         let (offset, time) = (self.communication.offset(next), self.communication.time(next));
-        self.find_drives(offset, time);
         let before = self.communication.offset(self.communication.done);
+        if self.system.settings().scheme == Scheme::Galerkin {
+            let start = self.communication.time(self.communication.done);
+            self.find_drives(0.5 * (before + offset), 0.5 * (start + time));
+            self.system.set_middle(&self.drives);
+        }
+        self.find_drives(offset, time);
         self.load(before);
         if let Err(failure) = self.system.step(&self.drives) {
             return Err(self.fail(failure, time));

@@ -95,12 +95,12 @@ impl Window {
     /// Add the internal step just done, of length `step` (s).
     pub fn add(&mut self, system: &System, patches: &[Option<Patches>], step: f64) {
         for (body, structure) in self.bodies.iter_mut().zip(system.structures()) {
-            for (lowest, gap) in body.lowest.iter_mut().zip(structure.gaps()) {
+            for (lowest, gap) in body.lowest.iter_mut().zip(structure.lowest_gaps()) {
                 *lowest = if *gap < *lowest { *gap } else { *lowest };
             }
         }
         for event in system.events() {
-            self.normal_peak = self.normal_peak.max(event.normal);
+            self.normal_peak = self.normal_peak.max(event.peak);
         }
         for event in system.acted() {
             let index = system.structures()[event.structure].index(event.node, event.sector);

@@ -17,6 +17,8 @@ pub struct ContactEvent {
     pub node: usize,
     /// Multiplier λ: normal force (N).
     pub normal: f64,
+    /// Largest λ within the step (N): a scheme may find it at several instants.
+    pub peak: f64,
     /// Magnitude of the friction force (N): µλ against slip, less where the contact sticks; 0 without slip.
     pub tangential: f64,
     /// Force on the structure (N) in the coordinates of its displacements.
@@ -43,6 +45,19 @@ impl ContactEvent {
         let square = dot(force, force) - normal * normal;
         // What rounding leaves of a frictionless contact is no friction.
         let tangential = if square > 1e-14 * normal * normal { square.sqrt() } else { 0.0 };
-        Self { structure, pair, sector, node, normal, tangential, force, point, wrench, coating, friction_heat: 0.0 }
+        Self {
+            structure,
+            pair,
+            sector,
+            node,
+            normal,
+            peak: normal,
+            tangential,
+            force,
+            point,
+            wrench,
+            coating,
+            friction_heat: 0.0,
+        }
     }
 }

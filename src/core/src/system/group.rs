@@ -413,7 +413,7 @@ impl Group {
             let gap = bodies.pairs[pair].gap();
             let at = At { node, index, drive: bodies.pairs[pair].drive(When::Now) };
             // Where the gap was evaluated, whose normal has no moment about the axis of a round casing.
-            let point = gap.contact_point(at, moved, &of.history.geometry.now.places);
+            let point = gap.contact_point(at, moved, of.history.geometry.now.place_at(index));
             let wrench = gap.wrench(at, point, force);
             let lanes = of.lanes();
             for component in 0..3 {

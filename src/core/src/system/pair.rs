@@ -49,11 +49,13 @@ pub struct Pair {
     /// Contact nodes that belong to it.
     nodes: Vec<usize>,
     prescribed: Prescribed,
+    /// Prescribed motion in the middle of the span under way, where a scheme asks for it.
+    pub(super) middle: Drive,
 }
 
 impl Pair {
     pub(super) fn new(parts: PairParts) -> Self {
-        Self { nodes: parts.gap.members(), parts, prescribed: Prescribed::default() }
+        Self { nodes: parts.gap.members(), parts, prescribed: Prescribed::default(), middle: Drive::default() }
     }
 
     /// Structure whose contact nodes touch.
@@ -79,6 +81,16 @@ impl Pair {
     /// Coulomb coefficient µ.
     pub fn friction(&self) -> f64 {
         self.parts.friction
+    }
+
+    /// The gap function, to evaluate it.
+    pub(super) fn gap_mut(&mut self) -> &mut GapLaw {
+        &mut self.parts.gap
+    }
+
+    /// Prescribed motion one step before the last.
+    pub fn drive_before(&self) -> &Drive {
+        self.drive(When::Before)
     }
 
     /// Prescribed motion at the last step.

@@ -3,10 +3,12 @@
 use crate::dynamics::bank::{BankOptions, LANES, ModalBank};
 use crate::dynamics::modal::ModalModel;
 use crate::dynamics::sectors::{SectorModel, Sectors};
+use crate::galerkin::sector::{Effort, HALVINGS};
 use crate::gaps::{Drive, GapLaw, Geometry, dot};
 use crate::history::History;
-use crate::persist::{Persist, Reader, Writer};
+use crate::persist::{Persist, Reader, Writer, persist_fields};
 use crate::settings::Scheme;
+use crate::system::march::Galerkin;
 
 /// Penetrations below this are none (m): squares of what they lead to leave the range of double precision, and modes as small
 /// are flushed to rest.
@@ -26,6 +28,32 @@ pub struct Structure {
     pub(super) lowest: Vec<f64>,
     /// Modal contact force on its surfaces found in the last step (N·√kg⁻¹); empty where it carries none.
     pub(super) delayed: Vec<f64>,
+    /// Of each sector, where sectors are marched one by one.
+    pub(super) pace: Pace,
+    /// Tables and scratch of that scheme.
+    pub(super) galerkin: Option<Box<Galerkin>>,
+}
+
+/// How sectors are marched by continuous Galerkin.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Pace {
+    /// Energy left by contacts that opened and closed (J).
+    pub bank: Vec<f64>,
+    /// How often the span is halved.
+    pub level: Vec<u64>,
+}
+
+persist_fields!(Pace { bank, level });
+
+impl Pace {
+    fn new(sectors: usize) -> Self {
+        Self { bank: vec![0.0; sectors], level: vec![0; sectors] }
+    }
+
+    /// How often the span of a sector is halved.
+    pub fn level_of(&self, sector: usize) -> usize {
+        usize::try_from(self.level[sector]).unwrap_or(HALVINGS).min(HALVINGS)
+    }
 }
 
 impl Structure {
@@ -43,6 +71,8 @@ impl Structure {
             history: History::new(Geometry::new(contacts, has_places), contacts, rows),
             lowest: vec![f64::INFINITY; modes.lanes()],
             delayed: Vec::new(),
+            pace: Pace::new(modes.sectors()),
+            galerkin: None,
             pair_of,
             lanes: modes.lanes(),
             modes,
@@ -59,6 +89,8 @@ impl Structure {
             pair_of: Vec::new(),
             lowest: Vec::new(),
             delayed: vec![0.0; model.len()],
+            pace: Pace::default(),
+            galerkin: None,
             lanes: modes.lanes(),
             modes,
         }
@@ -106,6 +138,16 @@ impl Structure {
         &self.history.gap.now
     }
 
+    /// Smallest gaps within the last step (m), as far as its scheme looked, `[node · lanes + lane]`.
+    pub fn lowest_gaps(&self) -> &[f64] {
+        self.galerkin.as_ref().map_or(&self.history.gap.now, |galerkin| galerkin.lowest())
+    }
+
+    /// What marching its sectors has taken so far.
+    pub fn effort(&self) -> Option<&Effort> {
+        Some(self.galerkin.as_ref()?.effort())
+    }
+
     /// Gap of one node of one sector (m).
     pub fn gap(&self, node: usize, sector: usize) -> f64 {
         self.history.gap.now[self.index(node, sector)]
@@ -146,6 +188,8 @@ impl Structure {
         self.modes.collect_loss();
         self.delayed.fill(0.0);
         self.history.clear();
+        self.pace.bank.fill(0.0);
+        self.pace.level.fill(0);
     }
 
     /// There was no step before: gaps and predictions are those of the start.
@@ -225,13 +269,21 @@ impl Structure {
     }
 
     /// Use a step size (s) from here, at rest or without regard to the state.
-    pub(super) fn set_step(&mut self, scheme: Scheme, step: f64) {
+    pub(crate) fn set_step(&mut self, scheme: Scheme, step: f64) {
         self.modes.set_step(scheme, step);
+        self.set_span(step);
+    }
+
+    fn set_span(&mut self, span: f64) {
+        if let Some(galerkin) = &mut self.galerkin {
+            galerkin.set_span(span);
+        }
     }
 
     /// Carry the state to another step size under the forces that last.
     pub(super) fn carry_over(&mut self, scheme: Scheme, step: f64) {
         self.modes.resample(scheme, step, &self.history.passing.lasting);
+        self.set_span(step);
     }
 
     /// Kinetic and strain energy at this instant under the forces that last (J).
@@ -249,6 +301,7 @@ impl Structure {
     pub(super) fn save(&self, writer: &mut Writer) {
         self.modes.save(writer);
         self.delayed.save(writer);
+        self.pace.save(writer);
         self.history.save(writer);
     }
 
@@ -256,6 +309,7 @@ impl Structure {
     pub(super) fn check(&self, reader: &mut Reader, saved: &mut History) {
         self.modes.check(reader);
         self.delayed.check(reader);
+        self.pace.check(reader);
         saved.restore(&mut reader.clone());
         self.history.check(reader);
     }
@@ -264,6 +318,7 @@ impl Structure {
     pub(super) fn restore(&mut self, reader: &mut Reader) {
         self.modes.restore(reader);
         self.delayed.restore(reader);
+        self.pace.restore(reader);
         self.history.restore(reader);
     }
 }

@@ -148,7 +148,7 @@ impl System {
         let tangential: [f64; 3] = std::array::from_fn(|i| event.force[i] - event.normal * normal[i]);
         let spin = pair.gap().spin_motion(at, event.point, motion);
         let shaft = pair.gap().shaft_motion(at, event.point, motion);
-        let surface = pair.gap().surface_motion(at, event.point, normal, &geometry.places, motion);
+        let surface = pair.gap().surface_motion(at, event.point, normal, geometry.place_at(index), motion);
         let slip: [f64; 3] = std::array::from_fn(|i| moved[i] + spin[i] + shaft[i]);
         // A node that comes over a free edge had no gap to close: its motion is the approach.
         let (now, oldest) = (gaps.now[index], gaps.oldest[index]);

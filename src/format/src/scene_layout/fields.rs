@@ -13,7 +13,7 @@ const fn field(
 }
 
 /// Every key, in file order.
-pub const FIELDS: [SceneField; 71] = [
+pub const FIELDS: [SceneField; 72] = [
     field("name", "text", None, "letters, digits, underscore; starts with a letter", "Name of the model."),
     field("description", "text", Some("empty"), "any", "One or a few sentences for the importer's catalogue."),
     field(
@@ -359,16 +359,23 @@ pub const FIELDS: [SceneField; 71] = [
         "time.scheme",
         "text",
         Some("`modal-exact`"),
-        "`modal-exact`, `central-difference`, `massless-boundary`",
+        "`modal-exact`, `central-difference`, `massless-boundary`, `galerkin`",
         "Time-stepping scheme of the modal equations; `massless-boundary` takes the highest modes, three per contact \
-         node, as quasi-static.",
+         node, as quasi-static, and so does `galerkin`, whose steps follow from a tolerance.",
     ),
     field(
         "time.step",
         "number, s",
         None,
         "1e-12 to 1",
-        "Largest internal step; the step used divides the communication step evenly.",
+        "Largest internal step; the step used divides the communication step evenly. Of `galerkin` the longest step of a blade.",
+    ),
+    field(
+        "time.tolerance",
+        "number",
+        Some("1e-3"),
+        "1e-9 to 0.1",
+        "Error that a step of `galerkin` may make in displacements, as a share of the smallest clearance.",
     ),
     field(
         "time.input_interpolation",

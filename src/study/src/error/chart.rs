@@ -14,7 +14,7 @@ const RIGHT: f64 = 660.0;
 const TOP: f64 = 16.0;
 const BOTTOM: f64 = 420.0;
 /// By colour index; distinguishable with colour-vision deficiency.
-const COLORS: [&str; 7] = ["#d67018", "#1f5da0", "#248c76", "#aa3474", "#6e747c", "#b9a12a", "#5b3a1e"];
+const COLORS: [&str; 8] = ["#d67018", "#1f5da0", "#248c76", "#aa3474", "#6e747c", "#b9a12a", "#5b3a1e", "#c4151c"];
 /// Errors outside of this are drawn at its edge.
 const ERRORS: [f64; 2] = [1e-7, 3.0];
 

@@ -73,7 +73,8 @@ impl Competitor {
 
     /// Everyone who steps a reduced model, the product's own first.
     pub fn reduced() -> Vec<Self> {
-        let own = Scheme::ALL.into_iter().flat_map(|scheme| Solver::ALL.map(|solver| Self::Core(scheme, solver)));
+        let own =
+            Scheme::RECURRENCES.into_iter().flat_map(|scheme| Solver::ALL.map(|solver| Self::Core(scheme, solver)));
         own.chain([Self::Moreau, Self::Augmented, Self::Penalty(1), Self::Penalty(10)]).collect()
     }
 
@@ -118,6 +119,7 @@ impl Competitor {
             Self::Augmented => 4,
             Self::Penalty(_) => 5,
             Self::Full(_) => 6,
+            Self::Core(Scheme::Galerkin, _) => 7,
         }
     }
 

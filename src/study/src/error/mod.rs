@@ -190,7 +190,7 @@ fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> Stri
 /// What every scene should show.
 fn statements(case: &dyn Case, found: &Measured) -> Vec<Statement> {
     let title = case.title();
-    let lcp = Scheme::ALL.map(|scheme| Competitor::Core(scheme, Solver::Lcp));
+    let lcp = Scheme::RECURRENCES.map(|scheme| Competitor::Core(scheme, Solver::Lcp));
     let ran = found.rows.iter().filter(|row| lcp.contains(&row.competitor));
     let ran: Vec<_> = ran.filter_map(|row| row.outcome.as_ref().ok()).collect();
     let deepest = ran.iter().map(|figures| figures.penetration).fold(0.0, f64::max);

@@ -190,7 +190,10 @@ impl Case for Own {
     }
 
     fn competitors(&self, _: usize) -> Vec<Competitor> {
-        Scheme::ALL.into_iter().flat_map(|scheme| Solver::ALL.map(|solver| Competitor::Core(scheme, solver))).collect()
+        Scheme::RECURRENCES
+            .into_iter()
+            .flat_map(|scheme| Solver::ALL.map(|solver| Competitor::Core(scheme, solver)))
+            .collect()
     }
 
     fn parting(&self) -> &[f64] {

@@ -71,7 +71,7 @@ pub fn of(asked: &Asked, own: &Own, threads: usize, quick: bool, console: &Conso
     let range = TRIED.map(|product| product / highest);
     // Quickly: from the scene's own step or the resolved one, whichever is longer; below it nothing is looked at.
     let range = if quick { [range[0].max(own.step).min(range[1]), range[1]] } else { range };
-    let task = console.task("Seeking the largest usable steps", Some(Scheme::ALL.len() as u64));
+    let task = console.task("Seeking the largest usable steps", Some(Scheme::RECURRENCES.len() as u64));
     let of_scheme = |scheme: &Scheme| {
         let ask = |solver: Solver, step: f64| -> Answer { asked.at((*scheme, solver), step, &place).remove(0) };
         let known = (*scheme == Scheme::CentralDifference).then(|| 2.0 / highest);
@@ -93,9 +93,9 @@ pub fn of(asked: &Asked, own: &Own, threads: usize, quick: bool, console: &Conso
     };
     let progress = |done: usize| {
         task.at(done as u64);
-        task.line(&format!("{done} of {} schemes", Scheme::ALL.len()));
+        task.line(&format!("{done} of {} schemes", Scheme::RECURRENCES.len()));
     };
-    Ok(sweep::sweep(&Scheme::ALL, threads, of_scheme, progress)?.concat())
+    Ok(sweep::sweep(&Scheme::RECURRENCES, threads, of_scheme, progress)?.concat())
 }
 
 /// Whether another solver answers the same just below and just above a limit, and in the same words.

@@ -205,7 +205,7 @@ impl<'a> Structure<'a> {
         let sliding = sliding.unwrap_or(Sliding { friction: 0.0, speed: 0.0 });
         // A Cartesian ROM flies freely or stands still, where massless-boundary is not made or not asked for.
         let massless = self.rom.frame != Frame::Cartesian;
-        let schemes = Scheme::ALL.into_iter().filter(|scheme| massless || *scheme != Scheme::MasslessBoundary);
+        let schemes = Scheme::RECURRENCES.into_iter().filter(|scheme| massless || *scheme != Scheme::MasslessBoundary);
         schemes.map(|scheme| StepLimit { scheme: scheme.name(), limit: self.limit(scheme, sliding) }).collect()
     }
 

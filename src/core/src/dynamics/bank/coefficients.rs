@@ -14,8 +14,11 @@ impl ModalBank {
             *coefficients = self.model.coefficient(index % modes, factor, scheme, step);
             let (frequency, ratio) = (self.model.frequencies[index % modes], self.model.damping_ratios[index % modes]);
             let dynamic = index % modes < self.model.dynamic_modes(scheme);
-            self.velocities[index] =
-                if dynamic { Velocity::new(factor * frequency, ratio, step) } else { Velocity::default() };
+            self.velocities[index] = match scheme {
+                _ if !dynamic => Velocity::default(),
+                Scheme::Galerkin => Velocity::of_state(step),
+                _ => Velocity::new(factor * frequency, ratio, step),
+            };
         }
         if !self.lane_coefficients.is_empty() {
             self.spread_coefficients();
@@ -117,6 +120,11 @@ impl ModalBank {
     /// (`forces[row · lanes + sector]`, N; none for an empty slice) and the modal loads, then use the new coefficients.
     pub fn resample(&mut self, scheme: Scheme, new_step: f64, forces: &[f64]) {
         let dynamic = self.model.dynamic_modes(self.scheme);
+        if scheme == Scheme::Galerkin {
+            let ratio = new_step / self.step;
+            self.state.increment.iter_mut().for_each(|increment| *increment *= ratio);
+            return self.set_step(scheme, new_step);
+        }
         for sector in 0..self.sectors {
             self.gather_forces(sector, forces);
             for mode in 0..dynamic {

@@ -9,6 +9,7 @@ mod coefficients;
 mod correction;
 mod coupling;
 mod predict;
+mod span;
 
 use nalgebra::DMatrix;
 
@@ -265,7 +266,10 @@ impl ModalBank {
         let (frequency, ratio, step) = (self.frequency(mode, sector), self.model.damping_ratios[mode], self.step);
         let index = self.index(mode, sector);
         self.state.position[index] = position;
-        self.state.increment[index] = free_increment(frequency, ratio, position, velocity, step);
+        self.state.increment[index] = match self.scheme {
+            Scheme::Galerkin => velocity * step,
+            _ => free_increment(frequency, ratio, position, velocity, step),
+        };
     }
 
     /// Static equilibrium under the modal loads `modal_load` for every sector: q = L/ω², rigid modes at 0.
@@ -364,11 +368,13 @@ impl ModalBank {
     /// Kinetic and strain energy of all sectors (J), in the quantity the scheme conserves (see [`crate::schemes`]).
     pub fn energies(&self) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
+        // Of an instant, or between two.
+        let lag = if self.scheme == Scheme::Galerkin { 0.0 } else { 1.0 };
         for sector in 0..self.sectors {
             for (mode, k) in self.coefficients(sector).iter().enumerate() {
                 let (position, increment) = self.modal_state(mode, sector);
                 kinetic += k.inertia * (increment * increment);
-                strain += k.spring * (position * (position - increment));
+                strain += k.spring * (position * (position - lag * increment));
             }
             if let Some(coupling) = &self.coupling {
                 let position = |mode| self.modal_state(mode, sector).0;

@@ -73,6 +73,9 @@ pub(super) const OTHER_SCHEME: Fact =
     fact("time.scheme", "other than `central-difference`", |at| at.settings.time.scheme != Scheme::CentralDifference);
 pub(super) const MASSLESS: Fact =
     fact("time.scheme", "`massless-boundary`", |at| at.scheme == Scheme::MasslessBoundary);
+pub(super) const GALERKIN: Fact = fact("time.scheme", "`galerkin`", |at| at.scheme == Scheme::Galerkin);
+pub(super) const QUASI_STATIC: Fact =
+    fact("time.scheme", "`massless-boundary` or `galerkin`", |at| at.scheme.is_massless());
 pub(super) const INTERPOLATION: Fact =
     fact("time.input_interpolation", "", |at| at.settings.time.input_interpolation != InputInterpolation::default());
 pub(super) const OTHER_SECTORS: Fact =

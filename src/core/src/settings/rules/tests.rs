@@ -71,6 +71,13 @@ fn second(settings: &mut SceneSettings) {
     }
 }
 
+/// What `galerkin` takes: a rigid surface at a distance.
+fn galerkin(settings: &mut SceneSettings) {
+    settings.surfaces[0].structure = None;
+    settings.contacts[0].gap = 1e-4;
+    settings.time.scheme = Scheme::Galerkin;
+}
+
 fn couple(rom: &mut Rom) {
     let matrix = DMatrix::<Complex<f64>>::identity(4, 4);
     rom.extras.harmonics =
@@ -135,7 +142,30 @@ const OF_ROTORS: &[(&str, Change)] = &[
         scene.settings.preset = Preset::Paper;
         scene.settings.time.scheme = Scheme::CentralDifference;
     }),
-    ("parameter `scheme`: `massless-boundary` needs more than three modes", |scene| {
+    ("time.scheme: `galerkin` excludes a surface that a structure carries", |scene| {
+        scene.settings.time.scheme = Scheme::Galerkin;
+    }),
+    ("parameter `scheme`: `galerkin` excludes a ROM whose sectors", |scene| {
+        galerkin(&mut scene.settings);
+        couple(&mut scene.roms[0]);
+    }),
+    ("time.scheme: `galerkin` excludes `structure.spin`", |scene| {
+        galerkin(&mut scene.settings);
+        scene.settings.structures[0].spin.growth = true;
+    }),
+    ("time.scheme: `galerkin` excludes `contact.coating`", |scene| {
+        galerkin(&mut scene.settings);
+        scene.settings.contacts[0].coating = coating();
+    }),
+    ("time.scheme: `galerkin` needs `contact.solver", |scene| {
+        galerkin(&mut scene.settings);
+        scene.settings.contacts[0].solver = Solver::Film;
+    }),
+    ("time.scheme: `galerkin` needs a clearance", |scene| {
+        galerkin(&mut scene.settings);
+        scene.settings.contacts[0].gap = 0.0;
+    }),
+    ("parameter `scheme`: `massless-boundary` or `galerkin` needs more than three modes", |scene| {
         scene.settings.time.scheme = Scheme::MasslessBoundary;
         scene.roms[0].mass = DMatrix::identity(3, 3);
     }),
@@ -171,6 +201,7 @@ const OF_FREE_MASTERS: &[(&str, Change)] = &[
     ("time.scheme: `massless-boundary` excludes a free master", |scene| {
         scene.settings.time.scheme = Scheme::MasslessBoundary;
     }),
+    ("time.scheme: `galerkin` excludes a free master", |scene| scene.settings.time.scheme = Scheme::Galerkin),
     ("structure[2].rom: of a free structure, or of what it meets needs `frame = cartesian`", |scene| {
         scene.roms[1].frame = Frame::Cylindrical;
     }),

@@ -1,15 +1,15 @@
 //! Rows of the variable table, and those that every scene has.
 
-use crate::Result;
 use crate::laws::SOLVERS;
 use crate::ranges::{DAMPING, FRICTION, LONGEST_STEP, SHORTEST_STEP};
 use crate::schemes::SCHEMES;
-use crate::settings::{ContactSettings, SceneSettings};
+use crate::settings::{ContactSettings, SceneSettings, Scheme, TOLERANCE};
 use crate::simulation::outputs::Reader;
 use crate::simulation::units::{ANGLE, INPUT_INTERPOLATIONS, TIME};
 use crate::variables::{
     Causality, Enumeration, Kind, Quantity, Span, Start, Unit, Variability, Variable, VariableTable,
 };
+use crate::{Result, ranges};
 
 /// How inputs run that would hit or shake something if they jumped.
 pub const RAMPED: &str = "; reached at the end of the step (input_interpolation)";
@@ -167,6 +167,13 @@ impl Builder {
         (step.min, step.max) = (Some(SHORTEST_STEP), Some(LONGEST_STEP));
         (step.nominal, step.display) = (Some(settings.time.step), Some(1));
         let (scheme, solver) = (settings.time.scheme as i32 + 1, settings.contacts[0].solver as i32 + 1);
+        if settings.time.tolerance.is_some() || settings.time.scheme == Scheme::Galerkin {
+            let text = "Error that a step of galerkin may make in displacements, as a share of the smallest clearance";
+            let start = settings.time.tolerance.unwrap_or(TOLERANCE);
+            let tolerance = self.parameter(Quantity::Tolerance, "tolerance", None, start, text);
+            (tolerance.min, tolerance.max) = (Some(ranges::TOLERANCE[0]), Some(ranges::TOLERANCE[1]));
+            tolerance.nominal = Some(start);
+        }
         self.choice(Quantity::SchemeChoice, "scheme", &SCHEMES, scheme, "Time-stepping scheme");
         self.choice(Quantity::SolverChoice, "solver", &SOLVERS, solver, "Contact solver");
     }

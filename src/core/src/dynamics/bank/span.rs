@@ -1,0 +1,56 @@
+//! State of single sectors, for a scheme that marches them one by one over a span of time.
+
+use super::ModalBank;
+
+impl ModalBank {
+    /// Sets of coefficients: one, or one per sector where they are mistuned.
+    pub fn sets(&self) -> usize {
+        if self.options.frequency_factors.is_empty() { 1 } else { self.sectors }
+    }
+
+    /// The set of a sector.
+    pub fn set_number(&self, sector: usize) -> usize {
+        self.set_of(sector)
+    }
+
+    /// Angular frequency of a mode of a sector (rad/s).
+    pub fn frequency_of(&self, mode: usize, sector: usize) -> f64 {
+        self.frequency(mode, sector)
+    }
+
+    /// Displacements of now become those before.
+    pub fn begin_span(&mut self) {
+        self.state.displacement_before.copy_from_slice(&self.state.displacement);
+    }
+
+    /// Read q and q̇ of the modes with inertia of a sector.
+    pub fn read_sector(&self, sector: usize, position: &mut [f64], velocity: &mut [f64]) {
+        for (mode, (q, v)) in position.iter_mut().zip(velocity).enumerate() {
+            let (now, increment) = self.modal_state(mode, sector);
+            (*q, *v) = (now, increment / self.step);
+        }
+    }
+
+    /// Write them, with the quasi-static modes under the forces `forces` on the rows (N) and the displacements of these (m).
+    pub fn write_sector(&mut self, sector: usize, position: &[f64], velocity: &[f64], forces: &[f64], rows: &[f64]) {
+        for (mode, (q, v)) in position.iter().zip(velocity).enumerate() {
+            let index = self.index(mode, sector);
+            (self.state.position[index], self.state.increment[index]) = (*q, v * self.step);
+        }
+        for mode in position.len()..self.modes() {
+            let shapes = &self.contact_modes[mode * self.rows..][..self.rows];
+            let force: f64 = shapes.iter().zip(forces).map(|(shape, force)| shape * force).sum();
+            let (index, frequency) = (self.index(mode, sector), self.frequency(mode, sector));
+            self.state.position[index] = force / (frequency * frequency);
+        }
+        let lanes = self.lanes();
+        for (row, moved) in rows.iter().enumerate() {
+            self.state.displacement[row * lanes + sector] = *moved;
+        }
+    }
+
+    /// Add to the damping loss of a sector (J).
+    pub fn lose(&mut self, sector: usize, loss: f64) {
+        self.state.loss[sector] += loss;
+    }
+}

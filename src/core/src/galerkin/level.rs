@@ -1,0 +1,159 @@
+//! Tables of the modes of one sector at one length of the step.
+
+use super::basis::{Basis, MOST, POINTS};
+use super::response::{Response, TERMS, by_points};
+use nalgebra::DMatrix;
+
+/// Modes with inertia and residual flexibility of a sector, seen at its contact rows (three per contact node).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Modes {
+    /// ω (rad/s).
+    pub frequencies: Vec<f64>,
+    /// ξ.
+    pub damping_ratios: Vec<f64>,
+    /// Φ of the contact rows, rows × modes (1/√kg).
+    pub shapes: DMatrix<f64>,
+    /// G: static displacement of the rows under forces there that the modes leave out, rows × rows (m/N).
+    pub residual: DMatrix<f64>,
+}
+
+impl Modes {
+    /// Number of modes.
+    pub fn len(&self) -> usize {
+        self.frequencies.len()
+    }
+
+    /// Without any mode.
+    pub fn is_empty(&self) -> bool {
+        self.frequencies.is_empty()
+    }
+
+    /// Number of contact rows.
+    pub fn rows(&self) -> usize {
+        self.shapes.nrows()
+    }
+
+    /// Σ c_m φφᵀ of the contact rows, written to `sum`.
+    fn weigh(&self, weight: impl Fn(usize) -> f64, sum: &mut DMatrix<f64>) {
+        sum.fill(0.0);
+        for (mode, shape) in self.shapes.column_iter().enumerate() {
+            let weight = weight(mode);
+            for (mut column, other) in sum.column_iter_mut().zip(shape.iter()) {
+                column.axpy(weight * other, &shape, 1.0);
+            }
+        }
+    }
+
+    /// The same, made.
+    fn weighted(&self, weight: impl Fn(usize) -> f64) -> DMatrix<f64> {
+        let mut sum = DMatrix::zeros(self.rows(), self.rows());
+        self.weigh(weight, &mut sum);
+        sum
+    }
+
+    /// The form δ² = JᵀQJ of the displacement δ (m) that an impulse J (N·s) on the contact rows leaves: the root of the mean square over
+    /// rows of what modes swing by, added up over modes as if they had nothing to do with each other. Rigid modes count by what they
+    /// move in the period of the lowest that vibrates.
+    pub fn error_form(&self) -> DMatrix<f64> {
+        let lowest =
+            self.frequencies.iter().copied().filter(|frequency| *frequency > 0.0).fold(f64::INFINITY, f64::min);
+        let lowest = if lowest.is_finite() { lowest } else { 1.0 };
+        #[expect(clippy::cast_precision_loss, reason = "few rows")]
+        let rows = self.rows() as f64;
+        let scale = |mode: usize| {
+            let shape = self.shapes.column(mode);
+            0.5 * shape.norm_squared() / rows / self.frequencies[mode].max(lowest).powi(2)
+        };
+        self.weighted(scale)
+    }
+
+    /// Largest degree whose contact problems are solvable without friction at all steps between half of `step` (s) and it: 3 where
+    /// G ⪰ 0.04 h² Σ φφᵀ over ωh < 4.25, else 2. (0.0233 is where the first counter-example was found.)
+    pub fn degree_at(&self, step: f64) -> usize {
+        let slow = |mode: usize| if self.frequencies[mode] * step < 8.5 { 0.04 * step * step } else { 0.0 };
+        let (needed, rows) = (self.weighted(slow), self.rows());
+        let rounding = DMatrix::identity(rows, rows) * (1e-12 * needed.trace());
+        if (&self.residual - needed + rounding).cholesky().is_some() { 3 } else { 2 }
+    }
+}
+
+/// What one mode does over a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModeStep {
+    /// Coefficients of q and q̇ in the displacement at points 1 … s.
+    pub points: [[f64; 2]; MOST],
+    /// q and q̇ at the end by (q, q̇, p_a).
+    pub end: [[f64; TERMS]; 2],
+    /// Damping loss (J).
+    pub loss: [[f64; TERMS]; TERMS],
+}
+
+/// Tables of one length of the step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Level {
+    /// h (s).
+    pub step: f64,
+    /// Points of the step.
+    pub basis: Basis,
+    /// Per mode.
+    pub modes: Vec<ModeStep>,
+    /// P_ik, displacement of the rows at point i = 1 … s per force at point k = 0 … s, in the order (i − 1)(s + 1) + k (m/N),
+    /// residual flexibility at the same point included.
+    pub compliance: Vec<DMatrix<f64>>,
+    /// Displacement at the end per force that is constant over the step (m/N), residual flexibility included.
+    pub constant: DMatrix<f64>,
+    /// Whether any mode is damped.
+    pub damped: bool,
+    /// Displacement of each mode at point i per force at point k.
+    scratch: Vec<[[f64; POINTS]; MOST]>,
+}
+
+impl Level {
+    /// Room for tables of degree s; [`Level::set_step`] fills them.
+    pub fn new(modes: &Modes, degree: usize) -> Self {
+        let zeros = || DMatrix::zeros(modes.rows(), modes.rows());
+        let nothing = ModeStep { points: Default::default(), end: Default::default(), loss: Default::default() };
+        Self {
+            step: 0.0,
+            modes: vec![nothing; modes.len()],
+            compliance: (0..degree * (degree + 1)).map(|_| zeros()).collect(),
+            constant: zeros(),
+            damped: false,
+            basis: Basis::new(degree),
+            scratch: vec![[[0.0; POINTS]; MOST]; modes.len()],
+        }
+    }
+
+    /// Fill the tables for step h (s). Does not allocate.
+    pub fn set_step(&mut self, modes: &Modes, step: f64) {
+        let Self { basis, compliance, constant, scratch, .. } = self;
+        self.step = step;
+        self.damped = modes.damping_ratios.iter().any(|ratio| *ratio > 0.0);
+        let ratios = modes.frequencies.iter().zip(&modes.damping_ratios);
+        for ((table, by), (frequency, ratio)) in self.modes.iter_mut().zip(scratch.iter_mut()).zip(ratios) {
+            let response = Response::new(*frequency, *ratio, step);
+            let at = response.at_points(basis);
+            *by = at.map(|terms| by_points(&terms, basis));
+            *table = ModeStep {
+                points: at.map(|terms| [terms[0], terms[1]]),
+                end: [response.position, response.velocity],
+                loss: response.loss,
+            };
+        }
+        let count = basis.count();
+        for (index, matrix) in compliance.iter_mut().enumerate() {
+            let (i, k) = (index / count, index % count);
+            modes.weigh(|mode| scratch[mode][i][k], matrix);
+            if k == i + 1 {
+                *matrix += &modes.residual;
+            }
+        }
+        modes.weigh(|mode| self.modes[mode].end[0][2], constant);
+        *constant += &modes.residual;
+    }
+
+    /// P_ik of points i = 1 … s and k = 0 … s.
+    pub fn compliance_of(&self, i: usize, k: usize) -> &DMatrix<f64> {
+        &self.compliance[(i - 1) * self.basis.count() + k]
+    }
+}

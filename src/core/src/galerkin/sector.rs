@@ -1,0 +1,369 @@
+//! One sector over a span of time: steps as long as the tolerance and the energy allow.
+
+use super::basis::{MOST, POINTS};
+use super::level::{Level, Modes};
+use super::response::TERMS;
+use super::rows::Rows;
+use super::trial::{Kind, Obstacle, Trial, Verdict};
+use nalgebra::DMatrix;
+
+/// Halvings of the span that a step may have.
+pub const HALVINGS: usize = 10;
+/// Below this share of the tolerance the next step is twice as long.
+const LENGTHEN: f64 = 1.0 / 32.0;
+/// Nearness between points is looked at down to this step (s).
+const SHORTEST_LOOK: f64 = 2.5e-6;
+
+/// Tables of one kind of sector: spans of one length halved again and again. All have one degree.
+#[derive(Debug, Clone)]
+pub struct Tables {
+    /// What all levels share.
+    pub rows: Rows,
+    /// Span, half of it, a quarter, …
+    pub levels: Vec<Level>,
+    modes: Modes,
+}
+
+impl Tables {
+    /// For spans up to `longest` (s); [`Tables::set_span`] comes before the first.
+    pub fn new(modes: Modes, longest: f64) -> Self {
+        // Spans may be shorter than the longest: all lengths down to a thousandth of the shortest step are looked at.
+        let degree = (0..2 * HALVINGS).map(|halvings| modes.degree_at(halved(longest, halvings))).min();
+        let levels = (0..=HALVINGS).map(|_| Level::new(&modes, degree.unwrap_or(MOST))).collect();
+        Self { rows: Rows::new(&modes), levels, modes }
+    }
+
+    /// Fill the tables for spans of length `span` (s). Does not allocate.
+    pub fn set_span(&mut self, span: f64) {
+        for (halvings, level) in self.levels.iter_mut().enumerate() {
+            level.set_step(&self.modes, halved(span, halvings));
+        }
+    }
+
+    /// Number of contact rows.
+    pub fn count(&self) -> usize {
+        self.rows.residual().nrows()
+    }
+}
+
+/// `span` halved so many times (s).
+fn halved(span: f64, halvings: usize) -> f64 {
+    libm::ldexp(span, -i32::try_from(halvings).unwrap_or(i32::MAX))
+}
+
+/// State of a sector between steps.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SectorState {
+    /// q.
+    pub position: Vec<f64>,
+    /// q̇.
+    pub velocity: Vec<f64>,
+    /// Contact forces on the rows (N).
+    pub forces: Vec<f64>,
+    /// λ of the nodes (N).
+    pub multipliers: Vec<f64>,
+    /// Gaps of the nodes (m).
+    pub gaps: Vec<f64>,
+    /// Normals of the nodes.
+    pub normals: Vec<f64>,
+    /// Whether gaps and normals are those of now: nobody looked at the end of free flight.
+    pub looked: bool,
+    /// Energy that contacts which opened or closed have left to those to come (J).
+    pub bank: f64,
+    /// Level of the last step.
+    pub level: usize,
+}
+
+impl SectorState {
+    /// At rest, away from everything.
+    pub fn new(modes: usize, nodes: usize) -> Self {
+        Self {
+            position: vec![0.0; modes],
+            velocity: vec![0.0; modes],
+            forces: vec![0.0; 3 * nodes],
+            multipliers: vec![0.0; nodes],
+            gaps: vec![f64::INFINITY; nodes],
+            normals: vec![0.0; 3 * nodes],
+            looked: true,
+            bank: 0.0,
+            level: 0,
+        }
+    }
+
+    /// Kinetic and strain energy (J), that of the residual flexibility included.
+    pub fn energies(&self, frequencies: &[f64], residual: &DMatrix<f64>) -> (f64, f64) {
+        let kinetic = 0.5 * self.velocity.iter().map(|v| v * v).sum::<f64>();
+        let strain = self.position.iter().zip(frequencies).map(|(q, w)| (w * q) * (w * q)).sum::<f64>();
+        let held = residual.column_iter().zip(&self.forces).filter(|(_, force)| **force != 0.0);
+        let held: f64 =
+            held.map(|(column, force)| force * column.iter().zip(&self.forces).map(|(g, f)| g * f).sum::<f64>()).sum();
+        (kinetic, 0.5 * (strain + held))
+    }
+}
+
+/// What has been done to keep the tolerance.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Effort {
+    /// Steps taken.
+    pub steps: u64,
+    /// Trials, those taken included.
+    pub trials: u64,
+    /// Contact problems without a solution found.
+    pub unsolved: u64,
+    /// Steps with a constant force.
+    pub constant: u64,
+    /// Shortest steps that miss the tolerance.
+    pub missed: u64,
+    /// Linear systems factorised.
+    pub factorisations: u64,
+}
+
+/// How exactly a sector is marched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Demand {
+    /// Error of a step in displacements (m).
+    pub tolerance: f64,
+    /// Gaps of contacts that count as closed (m).
+    pub precision: f64,
+}
+
+/// A step that is taken.
+#[derive(Debug)]
+pub struct Taken<'a> {
+    /// Tables of its length.
+    pub level: &'a Level,
+    /// Kind of its force.
+    pub kind: Kind,
+    /// Forces, gaps and displacements at its points.
+    pub trial: &'a Trial,
+    /// From where in the span, as a share of it.
+    pub from: f64,
+    /// Damping loss (J).
+    pub damping_loss: f64,
+    /// ½ΔfᵀGΔf, what a constant force loses against the one before (J).
+    pub dropped: f64,
+}
+
+/// What is told of a span while it is marched.
+pub trait Witness: Obstacle {
+    /// A step of `length` from `from` (shares of the span) is about to be tried, with forces at the points of `level`.
+    fn go(&mut self, from: f64, length: f64, level: &Level, kind: Kind);
+
+    /// Whether nodes that stay within `reach` (m, three per node) of where they rest cannot touch over a step of `length` from `from`
+    /// (shares of the span).
+    fn is_clear(&self, from: f64, length: f64, reach: &[f64]) -> bool;
+
+    /// A step has been taken in which nothing was in reach; its damping loss (J).
+    fn flew(&mut self, damping_loss: f64);
+
+    /// The step has been taken.
+    fn took(&mut self, step: &Taken);
+}
+
+/// No step is short enough for contacts to have a solution.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Unsolved;
+
+/// Marches sectors over spans, one after the other; allocates only when made.
+#[derive(Debug, Clone)]
+pub struct Marcher {
+    trial: Trial,
+    /// φᵀp_a of one mode, and scratch of forces by θᵃ.
+    coefficients: [Vec<f64>; MOST],
+    modal: [Vec<f64>; MOST],
+}
+
+impl Marcher {
+    /// Room for the modes and contact nodes of one sector.
+    pub fn new(modes: usize, nodes: usize) -> Self {
+        Self {
+            trial: Trial::new(nodes),
+            coefficients: std::array::from_fn(|_| vec![0.0; 3 * nodes]),
+            modal: std::array::from_fn(|_| vec![0.0; modes]),
+        }
+    }
+
+    /// Displacements of the rows of a sector (m).
+    pub fn displacements(&mut self, tables: &Tables, state: &SectorState) -> &[f64] {
+        self.trial.find_start(&tables.rows, state);
+        &self.trial.displacements[0][..tables.count()]
+    }
+
+    /// March `state` over a span.
+    ///
+    /// # Errors
+    /// [`Unsolved`]; the state is then where the last step taken left it.
+    pub fn march(
+        &mut self,
+        tables: &Tables,
+        state: &mut SectorState,
+        witness: &mut impl Witness,
+        demand: Demand,
+        effort: &mut Effort,
+    ) -> Result<(), Unsolved> {
+        const WHOLE: u64 = 1 << HALVINGS;
+        let mut done = 0_u64;
+        while done < WHOLE {
+            let level = state.level;
+            let units = WHOLE >> level;
+            let (from, length) = (share(done, WHOLE), share(units, WHOLE));
+            let table = &tables.levels[level];
+            let shortest = level == HALVINGS;
+            if state.multipliers.iter().all(|value| *value == 0.0)
+                && witness.is_clear(from, length, self.trial.reach(&tables.rows, state))
+            {
+                witness.flew(advance(table, state, None));
+                state.looked = false;
+                (effort.steps, done) = (effort.steps + 1, done + units);
+                state.level -= usize::from(level > 0 && done.is_multiple_of(2 * units));
+                continue;
+            }
+            let (verdict, kind) = self.try_step((table, from, length), tables, state, witness, demand, effort);
+            let refused = !verdict.solved
+                || (kind == Kind::Polynomial
+                    && (verdict.error > demand.tolerance
+                        || (verdict.near && table.step > SHORTEST_LOOK)
+                        || (verdict.switches && verdict.switched > state.bank)));
+            if refused && !shortest {
+                state.level += 1;
+                continue;
+            }
+            if !verdict.solved {
+                return Err(Unsolved);
+            }
+            effort.missed += u64::from(verdict.error > demand.tolerance);
+            self.take((table, kind), tables, state, witness, (from, &verdict));
+            effort.steps += 1;
+            done += units;
+            let even = done.is_multiple_of(2 * units);
+            if level > 0 && even && kind == Kind::Polynomial && verdict.error < LENGTHEN * demand.tolerance {
+                state.level -= 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Try one step; the shortest with a constant force where a polynomial cannot be taken.
+    fn try_step(
+        &mut self,
+        (table, from, length): (&Level, f64, f64),
+        tables: &Tables,
+        state: &SectorState,
+        witness: &mut impl Witness,
+        demand: Demand,
+        effort: &mut Effort,
+    ) -> (Verdict, Kind) {
+        let mut run = |kind: Kind, witness: &mut _, effort: &mut Effort| {
+            Witness::go(witness, from, length, table, kind);
+            let verdict = self.trial.run((table, kind), &tables.rows, state, witness, demand.precision);
+            effort.trials += 1;
+            effort.factorisations += verdict.factorisations as u64;
+            effort.unsolved += u64::from(!verdict.solved);
+            verdict
+        };
+        let verdict = run(Kind::Polynomial, witness, effort);
+        let affordable = verdict.solved && !(verdict.switches && verdict.switched > state.bank);
+        if state.level < HALVINGS || affordable {
+            return (verdict, Kind::Polynomial);
+        }
+        effort.constant += 1;
+        (run(Kind::Constant, witness, effort), Kind::Constant)
+    }
+
+    /// The state goes to the end of the step that has been tried last.
+    fn take(
+        &mut self,
+        (level, kind): (&Level, Kind),
+        tables: &Tables,
+        state: &mut SectorState,
+        witness: &mut impl Witness,
+        (from, verdict): (f64, &Verdict),
+    ) {
+        let points = self.trial.points;
+        let dropped = if kind == Kind::Constant { self.dropped(tables, state) } else { 0.0 };
+        let pushed = self.find_modal_forces(level, kind, tables);
+        let damping_loss = advance(level, state, if pushed { Some(&self.modal) } else { None });
+        state.bank += match kind {
+            Kind::Polynomial if verdict.switches => -verdict.switched,
+            Kind::Polynomial => 0.0,
+            Kind::Constant => dropped + self.closed(),
+        };
+        let trial = &self.trial;
+        state.forces.copy_from_slice(&trial.forces[points]);
+        state.multipliers.copy_from_slice(&trial.multipliers[points]);
+        state.gaps.copy_from_slice(&trial.gaps[points]);
+        state.normals.copy_from_slice(&trial.normals[points]);
+        state.looked = true;
+        witness.took(&Taken { level, kind, trial, from, damping_loss, dropped });
+    }
+
+    /// ½ΔfᵀGΔf (J).
+    fn dropped(&self, tables: &Tables, state: &SectorState) -> f64 {
+        let change = |row: usize| self.trial.forces[1][row] - state.forces[row];
+        let residual = tables.rows.residual();
+        let rows = 0..residual.nrows();
+        0.5 * rows
+            .clone()
+            .map(|i| change(i) * rows.clone().map(|k| residual[(i, k)] * change(k)).sum::<f64>())
+            .sum::<f64>()
+    }
+
+    /// What contacts that close under a constant force lose: λ times the gap there was (J).
+    fn closed(&self) -> f64 {
+        let pairs = self.trial.multipliers[1].iter().zip(self.trial.gaps[0].iter().zip(&self.trial.gaps[1]));
+        pairs.filter(|(value, _)| **value > 0.0).map(|(value, (before, now))| value * (before - now)).sum()
+    }
+
+    /// φᵀp_a of every mode; false without any force.
+    fn find_modal_forces(&mut self, level: &Level, kind: Kind, tables: &Tables) -> bool {
+        let (basis, points) = (&level.basis, self.trial.points);
+        let forces = &self.trial.forces;
+        if forces[..=points].iter().all(|forces| forces.iter().all(|force| *force == 0.0)) {
+            return false;
+        }
+        for a in 0..MOST {
+            self.modal[a].fill(0.0);
+            for row in 0..self.coefficients[a].len() {
+                let value = match kind {
+                    Kind::Constant if a == 0 => forces[1][row],
+                    Kind::Constant => 0.0,
+                    Kind::Polynomial => (0..basis.count()).map(|i| basis.projection[a][i] * forces[i][row]).sum(),
+                };
+                if value != 0.0 {
+                    self.modal[a]
+                        .iter_mut()
+                        .zip(tables.rows.row(row))
+                        .for_each(|(modal, shape)| *modal += shape * value);
+                }
+            }
+        }
+        true
+    }
+}
+
+/// q and q̇ at the end of the step, and the damping loss (J).
+fn advance(level: &Level, state: &mut SectorState, modal: Option<&[Vec<f64>; MOST]>) -> f64 {
+    let mut loss = 0.0;
+    let coordinates = state.position.iter_mut().zip(&mut state.velocity);
+    for (mode, (step, (q, v))) in level.modes.iter().zip(coordinates).enumerate() {
+        let forces = modal.map_or([0.0; MOST], |modal| [modal[0][mode], modal[1][mode], modal[2][mode]]);
+        let terms: [f64; TERMS] = [*q, *v, forces[0], forces[1], forces[2]];
+        let of = |row: &[f64; TERMS]| row.iter().zip(&terms).map(|(a, b)| a * b).sum::<f64>();
+        if level.damped {
+            loss += step.loss.iter().zip(&terms).map(|(row, term)| term * of(row)).sum::<f64>();
+        }
+        (*q, *v) = (of(&step.end[0]), of(&step.end[1]));
+    }
+    loss
+}
+
+/// Small counts as a share.
+#[expect(clippy::cast_precision_loss, reason = "below 2^HALVINGS")]
+fn share(part: u64, whole: u64) -> f64 {
+    part as f64 / whole as f64
+}
+
+/// Weighted sum of values at points.
+pub fn weighted(weights: &[f64; POINTS], value: impl Fn(usize) -> f64, count: usize) -> f64 {
+    (0..count).map(|i| weights[i] * value(i)).sum()
+}

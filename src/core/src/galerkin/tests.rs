@@ -1,0 +1,228 @@
+//! Sectors against a wall that moves: energy, order, tolerance.
+
+use super::level::{Level, Modes};
+use super::sector::{Demand, Effort, Marcher, SectorState, Tables, Taken, Witness};
+use super::trial::{Kind, Obstacle};
+use nalgebra::DMatrix;
+
+/// Numbers between −1 and 1.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        f64::from(u32::try_from(self.0 >> 33).unwrap()) / f64::from(1_u32 << 30) - 1.0
+    }
+}
+
+/// Modes from some hundred to some 10⁵ rad/s and what as many beyond leave.
+fn modes(count: usize, nodes: usize, damping: f64, random: &mut Random) -> Modes {
+    let all = 2 * count;
+    let shapes = DMatrix::from_fn(3 * nodes, all, |_, _| 3.0 * random.next());
+    let frequency = |mode: usize| 900.0 * (1.0 + f64::from(u32::try_from(mode).unwrap()).powf(1.5));
+    let mut residual = DMatrix::zeros(3 * nodes, 3 * nodes);
+    for mode in count..all {
+        residual += shapes.column(mode) * shapes.column(mode).transpose() / frequency(mode).powi(2);
+    }
+    residual += DMatrix::identity(3 * nodes, 3 * nodes) * 2e-9;
+    Modes {
+        frequencies: (0..count).map(frequency).collect(),
+        damping_ratios: vec![damping; count],
+        shapes: shapes.columns(0, count).into_owned(),
+        residual,
+    }
+}
+
+/// A plane across x that swings, along which it slides in y.
+struct Wall {
+    clearance: f64,
+    amplitude: f64,
+    frequency: f64,
+    friction: f64,
+    /// Start of the span and its length (s), times of the points of the step.
+    start: f64,
+    span: f64,
+    times: [f64; 4],
+    work: f64,
+    damping: f64,
+    dropped: f64,
+    impulse: f64,
+    lowest: f64,
+    switches: u64,
+}
+
+impl Wall {
+    fn new(clearance: f64, amplitude: f64, friction: f64) -> Self {
+        Self {
+            clearance,
+            amplitude,
+            frequency: 1700.0,
+            friction,
+            start: 0.0,
+            span: 0.0,
+            times: [0.0; 4],
+            work: 0.0,
+            damping: 0.0,
+            dropped: 0.0,
+            impulse: 0.0,
+            lowest: 0.0,
+            switches: 0,
+        }
+    }
+
+    fn place(&self, time: f64) -> f64 {
+        self.clearance - self.amplitude * (self.frequency * time).sin()
+    }
+}
+
+impl Obstacle for Wall {
+    fn gap(&mut self, _: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
+        (self.place(self.times[point]) - moved[0], [-1.0, 0.0, 0.0])
+    }
+
+    fn direction(&mut self, _: usize, _: usize, _: [f64; 3], _: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
+        [normal[0], -self.friction, 0.0]
+    }
+}
+
+impl Witness for Wall {
+    fn go(&mut self, from: f64, length: f64, level: &Level, kind: Kind) {
+        for (time, point) in self.times.iter_mut().zip(level.basis.points) {
+            *time = self.start + self.span * (from + length * point);
+        }
+        if kind == Kind::Constant {
+            self.times[1] = self.start + self.span * (from + length);
+        }
+    }
+
+    fn is_clear(&self, from: f64, length: f64, reach: &[f64]) -> bool {
+        let nearest = self.place(self.start + self.span * from).min(self.clearance - self.amplitude.abs());
+        let _ = length;
+        reach.iter().step_by(3).all(|reach| *reach < nearest)
+    }
+
+    fn flew(&mut self, damping_loss: f64) {
+        self.damping += damping_loss;
+    }
+
+    fn took(&mut self, step: &Taken) {
+        let (trial, basis) = (step.trial, &step.level.basis);
+        self.damping += step.damping_loss;
+        self.dropped += step.dropped;
+        for node in 0..trial.gaps[0].len() {
+            for row in 3 * node..3 * node + 3 {
+                if step.kind == Kind::Constant {
+                    self.work += trial.forces[1][row] * (trial.displacements[1][row] - trial.displacements[0][row]);
+                    continue;
+                }
+                for i in 0..basis.count() {
+                    for k in 0..basis.count() {
+                        self.work += trial.forces[i][row] * basis.work[i][k] * trial.displacements[k][row];
+                    }
+                }
+            }
+            let pushes: Vec<bool> = (0..=trial.points).map(|i| trial.multipliers[i][node] > 0.0).collect();
+            self.switches += u64::from(pushes.iter().any(|one| *one) && !pushes.iter().all(|one| *one));
+            for i in 0..=trial.points {
+                self.lowest = self.lowest.min(trial.gaps[i][node]);
+                if step.kind == Kind::Polynomial {
+                    self.impulse += basis.weights[i] * trial.multipliers[i][node] * step.level.step;
+                }
+            }
+        }
+    }
+}
+
+struct Run {
+    displacements: Vec<f64>,
+    effort: Effort,
+    wall: Wall,
+    /// Largest residual of the ledger, relative to the largest energy.
+    residual: f64,
+    energy: f64,
+    most: f64,
+}
+
+fn run(modes: &Modes, mut wall: Wall, span: f64, spans: usize, tolerance: f64, speed: f64) -> Run {
+    let nodes = modes.rows() / 3;
+    let mut tables = Tables::new(modes.clone(), span);
+    tables.set_span(span);
+    let (mut state, mut marcher) = (SectorState::new(modes.len(), nodes), Marcher::new(modes.len(), nodes));
+    for (mode, v) in state.velocity.iter_mut().enumerate() {
+        *v = speed / f64::from(u32::try_from(mode + 1).unwrap());
+    }
+    state.gaps.fill(wall.place(0.0));
+    let sum = |(kinetic, strain): (f64, f64)| kinetic + strain;
+    let start = sum(state.energies(&modes.frequencies, &modes.residual));
+    let (mut effort, mut displacements, mut residual, mut most) = (Effort::default(), Vec::new(), 0.0_f64, start);
+    let demand = Demand { tolerance, precision: 1e-15 };
+    let mut energy = start;
+    for n in 0..spans {
+        (wall.start, wall.span) = (span * f64::from(u32::try_from(n).unwrap()), span);
+        marcher.march(&tables, &mut state, &mut wall, demand, &mut effort).unwrap();
+        energy = sum(state.energies(&modes.frequencies, &modes.residual));
+        most = most.max(energy);
+        residual = residual.max((energy - start - wall.work + wall.damping + wall.dropped).abs() / most);
+        for row in 0..modes.rows() {
+            let of: f64 = (0..modes.len()).map(|mode| modes.shapes[(row, mode)] * state.position[mode]).sum();
+            displacements.push(of + (modes.residual.row(row) * nalgebra::DVector::from_column_slice(&state.forces))[0]);
+        }
+    }
+    Run { displacements, effort, wall, residual, energy, most }
+}
+
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "thousands")]
+    let count = a.len() as f64;
+    (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / count).sqrt()
+}
+
+#[test]
+fn energy_is_work_less_losses_with_friction_damping_and_a_wall_that_moves() {
+    let mut random = Random(3);
+    for (friction, damping) in [(0.0, 0.0), (0.15, 0.0), (0.3, 0.01)] {
+        let modes = modes(12, 2, damping, &mut random);
+        let found = run(&modes, Wall::new(2e-4, 1.5e-4, friction), 4e-5, 500, 2e-7, 0.3);
+        println!(
+            "µ {friction}, ξ {damping}: residual {:.1e}, switches {}, {:?}",
+            found.residual, found.wall.switches, found.effort
+        );
+        assert!(found.residual < 1e-12 && found.wall.switches > 20 && found.wall.lowest > -1e-12);
+    }
+}
+
+/// Statistics: single impacts may be missed by more.
+#[test]
+fn errors_are_those_asked_for() {
+    let mut random = Random(1234);
+    let mut ratios: [Vec<f64>; 3] = Default::default();
+    for _ in 0..40 {
+        let mut modes = modes(10, 2, 0.002, &mut random);
+        modes.residual += DMatrix::identity(6, 6) * (2e-9 * (1.0 + random.next()));
+        let amplitude = 2e-4 + 1e-4 * random.next().abs();
+        let of = |tolerance: f64| run(&modes, Wall::new(2e-4, amplitude, 0.1), 4e-5, 150, tolerance, 0.0);
+        let truth = of(2e-11);
+        for (ratios, tolerance) in ratios.iter_mut().zip([2e-6, 2e-7, 2e-8]) {
+            ratios.push(apart(&of(tolerance).displacements, &truth.displacements) / tolerance);
+        }
+    }
+    for ratios in &mut ratios {
+        ratios.sort_by(f64::total_cmp);
+        println!("median {:.2}, 90 % {:.2}, 95 % {:.2}, most {:.2}", ratios[20], ratios[36], ratios[38], ratios[39]);
+        assert!(ratios[20] < 1.0 && ratios[38] < 1.5);
+    }
+}
+
+#[test]
+fn an_undamped_sector_never_has_more_energy_than_it_was_given() {
+    let mut random = Random(11);
+    for tolerance in [1e-3, 1e-6] {
+        let modes = modes(10, 2, 0.0, &mut random);
+        let found = run(&modes, Wall::new(1e-4, 0.0, 0.0), 4e-5, 5000, tolerance, 0.5);
+        println!(
+            "{tolerance:e}: {:?}, switches {}, energy {} of {}",
+            found.effort, found.wall.switches, found.energy, found.most
+        );
+        assert!(found.wall.switches > 500);
+    }
+}

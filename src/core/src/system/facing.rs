@@ -1,0 +1,320 @@
+//! One sector facing its surfaces over a span of time: gaps at any instant, and what contacts did.
+
+use super::pair::Pair;
+use crate::galerkin::basis::{Basis, POINTS};
+use crate::galerkin::level::Level;
+use crate::galerkin::sector::{Taken, Witness};
+use crate::galerkin::trial::{Kind, Obstacle};
+use crate::gaps::surface_spline::ClosestPoint;
+use crate::gaps::wrench::{At, Motion, Wrench};
+use crate::gaps::{Drive, dot};
+
+/// How prescribed motion of a pair goes on over a span: from where it was, quadratic in time through the middle and the end.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Course {
+    before: Drive,
+    /// Linear and quadratic part over the whole span.
+    parts: [Motion; 2],
+}
+
+impl Course {
+    /// From `before` through `middle` to `end`, a span of length `span` (s).
+    pub fn new(before: &Drive, middle: &Drive, end: &Drive, span: f64) -> Self {
+        let half = Motion::between(before, middle, 0.5 * span);
+        let whole = Motion::between(before, end, span);
+        let linear = half.over(4.0).less(&whole);
+        let quadratic = whole.over(2.0).less(&half.over(4.0));
+        Self { before: *before, parts: [linear, quadratic] }
+    }
+
+    /// Whether nothing but the rotor moves.
+    fn only_turns(&self) -> bool {
+        self.parts.iter().all(|part| part.casing_rests() && part.shaft.iter().all(|along| *along == 0.0))
+    }
+
+    /// Motion from the start of the span to `theta` of it.
+    fn motion(&self, theta: f64) -> Motion {
+        self.parts[0].over(theta).since(&self.parts[1].over(theta * theta))
+    }
+
+    /// Prescribed motion at `theta` of the span.
+    fn at(&self, theta: f64) -> (Drive, Motion) {
+        let motion = self.motion(theta);
+        let rate =
+            |part: fn(&Motion) -> f64| (part(&self.parts[0]) + 2.0 * theta * part(&self.parts[1])) / self.parts[0].step;
+        let before = &self.before;
+        let drive = Drive {
+            rotor_angle: before.rotor_angle + motion.turn,
+            speed: rate(|motion| motion.turn),
+            gap_offset: before.gap_offset + before.radius_change + motion.opening,
+            radius_change: 0.0,
+            shape_factor: before.shape_factor + motion.shape_factor,
+            shape_rotation: before.shape_rotation + motion.shape_rotation,
+            shaft: std::array::from_fn(|i| before.shaft[i] + motion.shaft[i]),
+            shaft_velocity: [rate(|m| m.shaft[0]), rate(|m| m.shaft[1]), rate(|m| m.shaft[2])],
+        };
+        (drive, motion)
+    }
+}
+
+/// What a node did over a span.
+#[derive(Debug, Clone, Copy)]
+pub struct Tally {
+    /// ∫λ dt (N·s).
+    pub normal: f64,
+    /// ∫|F_t| dt (N·s).
+    pub tangential: f64,
+    /// ∫F dt in the coordinates of the displacements (N·s).
+    pub force: [f64; 3],
+    /// ∫ of force and moment in fixed directions (N·s, N·m·s), and λ-weighted ∫ of the point (m·N·s).
+    pub wrench: Wrench,
+    /// Largest λ (N).
+    pub peak: f64,
+    /// Friction heat (J).
+    pub heat: f64,
+    /// Smallest gap at any point (m).
+    pub lowest: f64,
+}
+
+impl Tally {
+    const NOTHING: Self = Self {
+        normal: 0.0,
+        tangential: 0.0,
+        force: [0.0; 3],
+        wrench: Wrench { point: [0.0; 3], force: [0.0; 3], moment: [0.0; 3] },
+        peak: 0.0,
+        heat: 0.0,
+        lowest: f64::INFINITY,
+    };
+}
+
+/// Work of all contacts of a sector over a span (J).
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Worked {
+    /// Of the shaft.
+    pub shaft: f64,
+    /// Of whirl and of axial shift.
+    pub whirl: f64,
+    /// Of axial shift.
+    pub shift: f64,
+    /// Of the casing.
+    pub casing: f64,
+    /// Friction heat.
+    pub heat: f64,
+    /// Of gaps that close.
+    pub closing: f64,
+    /// On the structure.
+    pub exact: f64,
+    /// Damping loss.
+    pub damping: f64,
+    /// What constant forces lose against those before.
+    pub dropped: f64,
+}
+
+/// What is kept from span to span, and scratch: allocates only when made.
+#[derive(Debug, Clone)]
+pub struct Record {
+    /// Of each node.
+    pub tallies: Vec<Tally>,
+    /// Of all nodes.
+    pub work: Worked,
+    /// Motion of each pair over the span.
+    pub courses: Vec<Course>,
+    /// At the points of the step being tried, pair by pair.
+    drives: Vec<[(Drive, Motion); POINTS]>,
+    places: [Vec<ClosestPoint>; POINTS],
+    /// A contact that small displacements cannot describe.
+    pub implausible: bool,
+}
+
+impl Record {
+    /// Room for so many nodes and pairs.
+    pub fn new(nodes: usize, pairs: usize) -> Self {
+        Self {
+            tallies: vec![Tally::NOTHING; nodes],
+            work: Worked::default(),
+            courses: vec![Course::default(); pairs],
+            drives: vec![[<(Drive, Motion)>::default(); POINTS]; pairs],
+            places: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
+            implausible: false,
+        }
+    }
+
+    /// A sector begins its span with its nodes at the places told.
+    pub fn begin(&mut self, place_of: impl Fn(usize) -> ClosestPoint) {
+        for (node, place) in self.places[0].iter_mut().enumerate() {
+            *place = place_of(node);
+        }
+        self.tallies.fill(Tally::NOTHING);
+        (self.work, self.implausible) = (Worked::default(), false);
+    }
+}
+
+/// A sector of a structure facing its surfaces.
+pub struct Facing<'a> {
+    pub pairs: &'a mut [Pair],
+    /// Pair of each node.
+    pub pair_of: &'a [Option<usize>],
+    /// Lanes of a row, and that of the sector.
+    pub lanes: usize,
+    pub sector: usize,
+    pub record: &'a mut Record,
+}
+
+impl Facing<'_> {
+    fn at<'b>(&self, node: usize, drive: &'b Drive) -> At<'b> {
+        At { node, index: node * self.lanes + self.sector, drive }
+    }
+}
+
+impl Obstacle for Facing<'_> {
+    fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
+        let Some(pair) = self.pair_of[node] else { return (f64::INFINITY, [0.0; 3]) };
+        let at = self.at(node, &self.record.drives[pair][point].0);
+        let (gap, normal, place) = self.pairs[pair].gap_mut().of_one(at, moved);
+        self.record.places[point][node] = place;
+        (gap, normal)
+    }
+
+    fn direction(
+        &mut self,
+        node: usize,
+        point: usize,
+        moved: [f64; 3],
+        velocity: [f64; 3],
+        normal: [f64; 3],
+    ) -> [f64; 3] {
+        let Some(pair) = self.pair_of[node] else { return normal };
+        let (friction, gap) = (self.pairs[pair].friction(), self.pairs[pair].gap());
+        if friction == 0.0 {
+            return normal;
+        }
+        let at = self.at(node, &self.record.drives[pair][point].0);
+        let rigid = gap.sliding_velocity(node, at.index, at.drive, moved);
+        let slip = gap.slip_direction(std::array::from_fn(|i| rigid[i] + velocity[i]), normal);
+        std::array::from_fn(|i| normal[i] - friction * slip[i])
+    }
+}
+
+impl Witness for Facing<'_> {
+    fn go(&mut self, from: f64, length: f64, level: &Level, kind: Kind) {
+        let count = if kind == Kind::Constant { 2 } else { level.basis.count() };
+        for (drives, course) in self.record.drives.iter_mut().zip(&self.record.courses) {
+            for (point, drive) in drives[..count].iter_mut().enumerate() {
+                let theta = if kind == Kind::Constant { [0.0, 1.0][point] } else { level.basis.points[point] };
+                *drive = course.at(from + length * theta);
+            }
+        }
+    }
+
+    fn is_clear(&self, from: f64, length: f64, reach: &[f64]) -> bool {
+        let ends = |pair: usize| [from, from + length].map(|theta| self.record.courses[pair].at(theta).0);
+        let pairs = self.pairs.iter().enumerate().filter(|(pair, _)| self.pair_of.contains(&Some(*pair)));
+        pairs.into_iter().all(|(pair, of)| {
+            self.record.courses[pair].only_turns() && {
+                let [start, end] = ends(pair);
+                of.nodes()
+                    .iter()
+                    .all(|node| of.gap().is_clear(self.at(*node, &start), end.rotor_angle, three(reach, *node)))
+            }
+        })
+    }
+
+    fn flew(&mut self, damping_loss: f64) {
+        self.record.work.damping += damping_loss;
+    }
+
+    fn took(&mut self, step: &Taken) {
+        self.record.work.damping += step.damping_loss;
+        self.record.work.dropped += step.dropped;
+        for (node, pair) in self.pair_of.iter().enumerate() {
+            let Some(pair) = *pair else { continue };
+            let points = step.trial.points;
+            let gaps = (1..=points).map(|point| step.trial.gaps[point][node]);
+            let tally = &mut self.record.tallies[node];
+            tally.lowest = gaps.fold(tally.lowest, f64::min);
+            if (0..=points).any(|point| step.trial.multipliers[point][node] > 0.0) {
+                self.enter(step, node, pair);
+            }
+        }
+        let [first, rest @ ..] = &mut self.record.places;
+        first.copy_from_slice(&rest[step.trial.points - 1]);
+    }
+}
+
+/// Three values of a node.
+fn three(values: &[f64], node: usize) -> [f64; 3] {
+    [values[3 * node], values[3 * node + 1], values[3 * node + 2]]
+}
+
+/// Weights of the work of forces at point i: S_ik, or those of a constant force.
+fn work_weights(basis: &Basis, kind: Kind, i: usize) -> [f64; POINTS] {
+    match kind {
+        Kind::Polynomial => basis.work[i],
+        Kind::Constant if i == 1 => [-1.0, 1.0, 0.0, 0.0],
+        Kind::Constant => [0.0; POINTS],
+    }
+}
+
+impl Facing<'_> {
+    /// Enter what a node that pushes did over a step.
+    fn enter(&mut self, step: &Taken, node: usize, pair: usize) {
+        let (trial, basis) = (step.trial, &step.level.basis);
+        let (mut tally, mut work) = (self.record.tallies[node], self.record.work);
+        let drives = self.record.drives[pair];
+        for i in 0..=trial.points {
+            let normal_force = trial.multipliers[i][node];
+            if normal_force == 0.0 {
+                continue;
+            }
+            let at = self.at(node, &drives[i].0);
+            let gap = self.pairs[pair].gap();
+            let (force, normal) = (three(&trial.forces[i], node), three(&trial.normals[i], node));
+            let moved = three(&trial.displacements[i], node);
+            let point = gap.contact_point(at, moved, self.record.places[i][node]);
+            self.record.implausible |= !gap.is_plausible(node, trial.gaps[i][node], normal);
+            let tangential: [f64; 3] = std::array::from_fn(|c| force[c] - normal_force * normal[c]);
+            let wrench = gap.wrench(at, point, force);
+            let length = step.level.step
+                * if step.kind == Kind::Constant { f64::from(u8::from(i == 1)) } else { basis.weights[i] };
+            tally.peak = tally.peak.max(normal_force);
+            tally.normal += length * normal_force;
+            tally.tangential += length * dot(tangential, tangential).sqrt();
+            for c in 0..3 {
+                tally.force[c] += length * force[c];
+                tally.wrench.force[c] += length * wrench.force[c];
+                tally.wrench.moment[c] += length * wrench.moment[c];
+                tally.wrench.point[c] += length * normal_force * wrench.point[c];
+            }
+            for (k, weight) in work_weights(basis, step.kind, i).into_iter().enumerate() {
+                if weight == 0.0 {
+                    continue;
+                }
+                let motion = drives[k].1.less(&drives[0].1);
+                let spin = gap.spin_motion(at, point, &motion);
+                let shaft = gap.shaft_motion(at, point, &motion);
+                let surface = gap.surface_motion(at, point, normal, self.record.places[i][node], &motion);
+                let there = three(&trial.displacements[k], node);
+                let slip: [f64; 3] = std::array::from_fn(|c| there[c] + spin[c] + shaft[c]);
+                let heat = -weight * dot(tangential, slip);
+                let entries = [
+                    (&mut work.shaft, -weight * dot(force, spin)),
+                    (
+                        &mut work.whirl,
+                        -weight * (wrench.force[0] * motion.shaft[0] + wrench.force[1] * motion.shaft[1]),
+                    ),
+                    (&mut work.shift, -weight * wrench.force[2] * motion.shaft[2]),
+                    (&mut work.casing, weight * normal_force * surface),
+                ];
+                for (sum, term) in entries {
+                    *sum += term;
+                }
+                work.heat += heat;
+                tally.heat += heat;
+                work.closing -= weight * normal_force * trial.gaps[k][node];
+                work.exact += weight * dot(force, there);
+            }
+        }
+        (self.record.tallies[node], self.record.work) = (tally, work);
+    }
+}
