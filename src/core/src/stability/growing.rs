@@ -2,9 +2,9 @@
 
 use nalgebra::Complex;
 
-use super::ContactDirections;
 use super::held::Held;
 use super::secular;
+use super::{ContactDirections, delassus, is_solvable};
 use crate::dynamics::modal::ModalModel;
 use crate::settings::Scheme;
 
@@ -80,8 +80,9 @@ pub fn continuous(
     Some(Fastest { rate: rate / unit, frequency: frequency / unit })
 }
 
-/// The same without the mass of the contact nodes, their highest modes quasi-static: the limit in which contact nodes are no lumps;
-/// `None` where the model leaves no mode with inertia, or a node no flexibility.
+/// The same without the mass of the contact nodes, their highest modes quasi-static: the limit in which contact nodes are no lumps.
+/// `None` where the model leaves no mode with inertia, and where the flexibility that is left to the contacts is no P-matrix with this
+/// friction: there the limit has no solution, and what grows without bounds would not show.
 pub fn without_node_mass(
     model: &ModalModel,
     step: f64,
@@ -89,7 +90,8 @@ pub fn without_node_mass(
     directions: &ContactDirections,
 ) -> Option<Fastest> {
     let scheme = Scheme::MasslessBoundary;
-    if model.dynamic_modes(scheme) == 0 {
+    let is_limit = || is_solvable(&delassus(model, scheme, step, friction, directions));
+    if model.dynamic_modes(scheme) == 0 || !is_limit() {
         return None;
     }
     continuous(model, scheme, step, friction, directions).filter(|found| found.rate.is_finite())

@@ -159,7 +159,10 @@ mod tests {
                 }
                 let Some((_, most)) = march(&model, scheme, step, friction, 3000) else { continue };
                 accepted += 1;
-                farthest = farthest.max(most);
+                if most > farthest {
+                    farthest = most;
+                    println!("{most:.3} µ = {friction} h = {step:e} {scheme:?} {judged:?}");
+                }
                 assert!(most < 0.25, "{most:.3}: {scheme:?}, µ = {friction}, h = {step:e}, {judged:?}, {model:?}");
             } else if growth.added() * closed > 20.0 {
                 let Some((opens, _)) = march(&model, scheme, step, friction, 3000) else { continue };

@@ -12,7 +12,7 @@ use crate::{Error, Result, shown};
 const GROWS: &str = "sliding contact";
 const STEP: &str = "the step makes sliding contact";
 /// A motion whose frequency (rad/s) is a smaller part of its rate grows without swinging.
-const SWINGS: f64 = 1e-2;
+const SWINGS: f64 = 0.1;
 /// Steps looked at, at most.
 const MOST_STEPS: usize = 13;
 /// Growth with and without the mass of the contact nodes within this factor is that of both.
@@ -110,7 +110,7 @@ struct Physics {
 
 impl Physics {
     fn add(&mut self, own: Flutter) {
-        // Double roots, as of coupled sectors, are apart by rounding.
+        // Of coupled sectors divergence drifts slowly around the disk, and double roots are apart by rounding.
         if own.found.frequency < SWINGS * own.found.rate {
             self.divergence = self.divergence.max(own.found.rate);
         } else if self.flutter.as_ref().is_none_or(|known| own.found.rate > known.found.rate) {
@@ -265,7 +265,7 @@ impl Checking<'_> {
         }
         if let Some(Flutter { found, nodes, with_mass, share }) = &physics.flutter {
             parts.push(format!(
-                "is physically unstable (flutter): {}, vibration at {:.4} kHz grows by {:.2e} 1/s{} and moves tips by up to {:.2} % of \
+                "is physically unstable (flutter): {}, vibration at {:.4} kHz grows by {:.2e} 1/s{} and moves tips by up to {:.1} % of \
                  what contact does",
                 self.contact(nodes, sign),
                 1e-3 * found.frequency / std::f64::consts::TAU,
