@@ -27,8 +27,9 @@ fn columns(csv: &str) -> (Vec<String>, Vec<Vec<f64>>) {
 fn run_builtin(project: &TempDir, name: &str) -> (serde_json::Value, Vec<String>, Vec<Vec<f64>>) {
     let json = succeed(project, &["run", name, "--csv", "out.csv", "--json", "--quiet"]);
     let summary: serde_json::Value = serde_json::from_str(&json).unwrap();
-    // Contact that stays closed at some patches flutters, and that is told; nothing else is doubtful.
+    // Contact that stays closed flutters, and that is told once; nothing else is doubtful.
     let warnings = summary["warnings"].as_array().unwrap();
+    assert!(warnings.len() <= 1, "{name}: {warnings:#?}");
     assert!(warnings.iter().all(|warning| warning.as_str().unwrap().contains("(flutter)")), "{name}: {warnings:#?}");
     let (names, rows) = columns(&fs::read_to_string(project.path().join("out.csv")).unwrap());
     let impulse = names.iter().position(|name| name == "normal_impulse").unwrap();
@@ -90,4 +91,11 @@ fn inspect_tells_what_a_scene_that_ships_adds() {
     ] {
         assert!(text.contains(part), "{part} is not in:\n{text}");
     }
+}
+
+#[test]
+fn inspect_names_the_model_that_a_preset_takes() {
+    let project = tempfile::tempdir().unwrap();
+    let text = succeed(&project, &["inspect", "builtin:rotor37-paper", "--quiet"]);
+    assert!(text.contains("rotor from builtin:rotor37-paper,"), "{text}");
 }

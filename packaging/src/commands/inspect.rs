@@ -47,7 +47,8 @@ pub fn run(arguments: &InspectArguments, console: &Console) -> Result<Outcome> {
         }
         FileKind::Scene => {
             let scene = scene_source::load(path, &arguments.cache.cache(), console)?;
-            let (text, json) = describe_scene(&scene, console)?;
+            let described = describe_scene(&scene, console);
+            let (text, json) = described.map_err(|failure| scene_source::located(path, failure))?;
             Ok(Outcome { text, json: json!({ "kind": "scene", "scene": json }) })
         }
     }
@@ -213,6 +214,9 @@ fn scene_text(settings: &SceneSettings) -> String {
     let colon = if settings.description.is_empty() { "" } else { ": " };
     let mut text = format!("scene {}{colon}{}\n", settings.name, settings.description);
     for structure in &settings.structures {
+        // With a preset the model is another than the one written.
+        let model =
+            tiprub_format::builtin_model(settings, structure).map(|name| format!("{}{name}", scene_source::BUILTIN));
         let motion = match structure.motion {
             Motion::Rotating => {
                 format!("speed {} rad/s ({:.1} rpm)", structure.speed, structure.speed * 30.0 / std::f64::consts::PI)
@@ -227,7 +231,7 @@ fn scene_text(settings: &SceneSettings) -> String {
             text,
             "  structure     {} from {}, {motion}, damping ratio {}",
             structure.name,
-            structure.rom,
+            model.as_ref().unwrap_or(&structure.rom),
             structure.damping_ratio.map_or("of the ROM".into(), |ratio| ratio.to_string())
         );
     }

@@ -33,7 +33,7 @@ pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
         &files,
     )?;
     let library = library::load(arguments.library.as_deref(), console)?;
-    let package = Package::new(&scene, &library)?;
+    let package = Package::new(&scene, &library).map_err(|failure| scene_source::located(&arguments.scene, failure))?;
     console.warn(package.warnings());
     for (version, path) in &targets {
         console.say(format_args!("Writing {}", path.display()));

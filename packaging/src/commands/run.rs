@@ -32,7 +32,10 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
     let clock = Instant::now();
     let run = {
         let task = console.task(&format!("Running {}", scene.settings.name), Some(schedule.count as u64));
-        native::run(&scene, &schedule, &arguments.set, &|done| task.at(done as u64))?
+        let run = native::run(&scene, &schedule, &arguments.set, &|done| task.at(done as u64));
+        // The step of the file, unless the command line has another.
+        let is_set = arguments.step.is_some() || arguments.set.iter().any(|(name, _)| name == "internal_step_max");
+        run.map_err(|failure| if is_set { failure } else { scene_source::located(&arguments.scene, failure) })?
     };
     let wall = clock.elapsed().as_secs_f64();
     console.warn(&run.warnings);

@@ -152,7 +152,7 @@ fn massless_boundary_looks_at_every_structure_under_a_blade() {
     for seal_first in [false, true] {
         assert!(try_started(&scene(10.0, seal_first)).is_ok());
         let told = try_started(&scene(30.0, seal_first)).unwrap_err().to_string();
-        assert!(told.contains("massless-boundary with internal step") && told.contains("2.910109e-7"), "{told}");
+        assert!(told.contains("massless-boundary with an internal step") && told.contains("2.910109e-7"), "{told}");
     }
 }
 

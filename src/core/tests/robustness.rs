@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 use proptest::prelude::*;
+use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::settings::{Scheme, Shape, Solver, SplineSettings, TimeSettings};
 use tiprub_core::{Result, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, go, real, reference, saved, set, try_started};
@@ -34,7 +35,7 @@ fn on_a_ring(mut scene: Scene) -> Scene {
 /// The largest usable step that a refusal names (s).
 fn usable_step(scene: Scene) -> f64 {
     let message = try_started(&with_step(scene, 1e-3)).unwrap_err().to_string();
-    let number = message.split("Set the internal step below ").nth(1).and_then(|text| text.split(' ').next());
+    let number = message.split("`internal_step_max`) below ").nth(1).and_then(|text| text.split(' ').next());
     number.and_then(|text| text.parse().ok()).unwrap_or_else(|| panic!("{message}"))
 }
 
@@ -160,9 +161,11 @@ fn flutter_is_told_with_massless_boundary_as_with_modal_exact() {
         let mut scene = with_step(round(scheme), 2e-7);
         scene.settings.contacts[0].friction = 0.15;
         let warnings = try_started(&scene).unwrap().warnings().to_vec();
-        let number = warnings.iter().find_map(|text| text.split("flutter), growth rate ").nth(1)).map(str::to_owned);
+        let number =
+            warnings.iter().find_map(|text| text.split("grows by ").nth(1)?.split(' ').next()).map(str::to_owned);
         let number = number.unwrap_or_else(|| panic!("{scheme:?}: {warnings:?}"));
-        number.trim_end_matches(" 1/s").parse::<f64>().unwrap()
+        assert_eq!(warnings.iter().filter(|text| text.contains("flutter")).count(), 1, "{warnings:?}");
+        number.parse::<f64>().unwrap()
     };
     let (massless, exact) = (rate(Scheme::MasslessBoundary), rate(Scheme::ModalExact));
     println!("growth rates {massless} and {exact} 1/s");
@@ -619,4 +622,75 @@ fn growth_that_is_not_looked_at_is_told() {
         simulation.warnings().iter().any(|text| text.contains("is not looked at with"))
     };
     assert_eq!([told(151, 0.1), told(151, 0.0), told(150, 0.1)], [true, false, false]);
+}
+
+/// What a shorter step is refused for, a longer one is too; the step that the refusal names is taken.
+#[test]
+fn steps_that_add_growth_are_refused_from_one_length_on() {
+    let mut named = 0;
+    for seed in 1..13 {
+        let plain = crowded(1 + seed as usize % 3, 12, seed);
+        let highest = ModalModel::from_rom(&plain.roms[0], 0.0).unwrap().largest_frequency();
+        for scheme in [Scheme::ModalExact, Scheme::CentralDifference] {
+            let at = |step: f64| {
+                let mut scene = with_step(plain.clone(), step);
+                scene.settings.time.scheme = scheme;
+                scene.settings.contacts[0].friction = 0.3;
+                scene.settings.structures[0].damping_ratio = Some(1e-3);
+                try_started(&scene).map(drop).map_err(|error| error.to_string())
+            };
+            let mut refused = None;
+            for octave in 0..10 {
+                let outcome = at(0.1 / highest * f64::from(1 << octave));
+                assert!(refused.is_none() || outcome.is_err(), "{seed}, {scheme:?}: {refused:?}");
+                let Err(message) = outcome else { continue };
+                if let Some((_, rest)) = message.split_once("too long for friction") {
+                    let step = rest.split("`internal_step_max`) to ").nth(1).and_then(|text| text.split(' ').next());
+                    if let Some(step) = step {
+                        named += 1;
+                        assert_eq!(at(step.parse().unwrap()), Ok(()), "{message}");
+                    }
+                    refused = Some(message);
+                }
+            }
+        }
+    }
+    assert!(named > 0);
+}
+
+/// Remedies work under the preset, and name the keys of the scene.
+#[test]
+fn remedies_are_those_that_the_preset_leaves() {
+    let mut scene = with_step(round(Scheme::CentralDifference), 1e-5);
+    let told = |scene: &Scene| try_started(scene).unwrap_err().to_string();
+    let plain = told(&scene);
+    assert!(plain.contains("`time.step`") && plain.contains("modal-exact"), "{plain}");
+    scene.settings.preset = tiprub_core::settings::Preset::Paper;
+    scene.settings.contacts[0].solver = Solver::Film;
+    let paper = told(&scene);
+    assert!(paper.contains("leave `preset` out") && !paper.contains("modal-exact"), "{paper}");
+}
+
+/// A blade that friction bends into the casing: the warning names the µ* above which it does, and there is one only.
+#[test]
+fn digging_in_is_told_with_its_friction() {
+    // A node on one leaning spring: w_nn/w_nt = cot of its lean.
+    let place = models::node("tip", [models::RADIUS, 0.0, 0.0], 0.0);
+    let shape =
+        |row: usize, mode: usize| [[0.5, 1.0, 0.0], [1.0, -0.5, 0.0], [0.0, 0.0, 1.0], [0.1, 0.1, 0.0]][mode][row];
+    let mut rom = models::modal("leaning", &[1000.0, 4000.0, 5000.0, 9000.0], shape, vec![place]);
+    rom.damping_ratio = 0.005;
+    let mut told = Vec::new();
+    for speed in [1300.0, -1300.0] {
+        let mut scene = with_step(models::round(rom.clone()), 1e-7);
+        scene.settings.structures[0].speed = speed;
+        scene.settings.contacts[0].friction = 0.9;
+        let warnings = try_started(&scene).unwrap().warnings().to_vec();
+        assert!(warnings.len() <= 1, "{warnings:?}");
+        told.extend(warnings);
+    }
+    // Σ φ_r²/ω² over Σ φ_r φ_θ/ω², in units of the first.
+    let [along, across] = [(0.25 + 1.0 / 16.0 + 0.01 / 81.0), (0.5 - 0.5 / 16.0 + 0.01 / 81.0)];
+    let expected = format!("µ* = {:.3}", along / across);
+    assert!(told.iter().any(|text| text.contains("digs in") && text.contains(&expected)), "{expected}: {told:?}");
 }

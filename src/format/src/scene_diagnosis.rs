@@ -60,6 +60,12 @@ impl<'a> Document<'a> {
         self.places().iter().any(|place| place.path == path)
     }
 
+    /// Line and column of the key at this path.
+    pub(crate) fn position(&self, path: &str) -> Option<(usize, usize)> {
+        let place = self.places().into_iter().find(|place| place.path == path)?;
+        Some(position(self.text, place.span.start))
+    }
+
     fn error(&self, span: Option<Range<usize>>, what: &str, problem: String, remedy: String) -> Error {
         Error::Scene {
             origin: self.origin.to_owned(),

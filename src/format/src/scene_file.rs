@@ -36,6 +36,12 @@ pub fn parse_scene(text: &str, origin: &str) -> Result<SceneSettings> {
     Ok(settings)
 }
 
+/// Line and column, from 1, of the key at this path (indices from 1) in the text of a scene; `None` where it is not there.
+pub fn position_of(text: &str, path: &str) -> Option<(usize, usize)> {
+    let document = DeTable::parse(text).ok()?;
+    Document { text, origin: "", root: document.get_ref() }.position(path)
+}
+
 /// What a preset says of keys that the file leaves out.
 fn apply_preset(settings: &mut SceneSettings, document: &Document) {
     if settings.preset != Preset::Paper {

@@ -73,6 +73,23 @@ pub fn files(argument: &str) -> Vec<PathBuf> {
     [path.to_path_buf()].into_iter().chain(roms.map(|structure| beside(&structure.rom))).collect()
 }
 
+/// A failure of a scene whose remedy names `time.step`, with the place of that key in the scene's file.
+pub fn located(argument: impl AsRef<OsStr>, failure: Failure) -> Failure {
+    const KEY: &str = "time.step";
+    let place = || {
+        let (name, text) = match source(argument.as_ref()).ok()? {
+            Source::Embedded(name, text) => (name.to_owned(), text.to_owned()),
+            Source::File(path) => (path.display().to_string(), std::fs::read_to_string(path).ok()?),
+        };
+        let (line, column) = tiprub_format::position_of(&text, KEY)?;
+        Some(format!("{name}:{line}:{column}: {KEY}"))
+    };
+    match failure.remedy.contains(&format!("`{KEY}`")).then(place).flatten() {
+        Some(what) => Failure { what, ..failure },
+        None => failure,
+    }
+}
+
 /// Where a scene is.
 enum Source<'a> {
     /// One of [`BUILTIN_SCENES`].
@@ -209,6 +226,20 @@ mod tests {
             assert!(failure.problem.contains(kind) && failure.remedy.contains("inspect"), "{failure}");
         }
         assert!(load("/", &console).unwrap_err().problem.contains("directory"));
+    }
+
+    #[test]
+    fn a_step_that_is_refused_is_found_in_the_scene() {
+        let failure = |remedy: &str| Failure::new("scene `a`", "refused: too long", remedy);
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("scene.toml");
+        fs::write(&path, "name = \"a\"\n[time]\nscheme = \"modal-exact\"\n step = 1e-6\n").unwrap();
+        let found = located(&path, failure("Set `time.step` below 1e-7 s"));
+        assert!(found.what.ends_with("scene.toml:4:2: time.step") && found.problem == "refused: too long", "{found}");
+        assert!(located("builtin:rotor37", failure("Set `time.step` below 1")).what.starts_with("builtin:rotor37:"));
+        for (path, remedy) in [(path.as_path(), "Use less friction"), (Path::new("/nowhere.toml"), "Set `time.step`")] {
+            assert_eq!(located(path, failure(remedy)).what, "scene `a`");
+        }
     }
 
     #[test]

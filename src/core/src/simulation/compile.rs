@@ -104,7 +104,7 @@ impl Body {
     }
 
     /// Lowest angular frequency of a mode that vibrates (rad/s); infinite without.
-    fn lowest_frequency(&self) -> f64 {
+    pub fn lowest_frequency(&self) -> f64 {
         let frequencies = match &self.disk {
             Some(disk) => disk.diameters.iter().flat_map(|diameter| &diameter.frequencies).collect(),
             None => self.model.frequencies.iter().collect::<Vec<_>>(),

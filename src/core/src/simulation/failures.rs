@@ -176,7 +176,7 @@ impl Simulation {
         let others = sets.members(sets.of(structure)).iter().copied();
         let mut bodies = std::iter::once(structure).chain(others).filter(|body| *body < self.rotors.len());
         let speed = |body: usize| self.inputs.rotors[body].speed.at(0.0);
-        let found = bodies.find_map(|body| limits.flutter(body, speed(body)));
+        let found = bodies.find_map(|body| limits.grows(body, speed(body)));
         found.map_or_else(String::new, |text| format!(". {text}"))
     }
 }

@@ -1,19 +1,23 @@
 //! Stability and solvability of a scene at the step sizes it can be stepped with.
 
 mod checking;
+mod closing;
 mod free;
+mod sliding;
 mod told;
 
 use super::table::has_one_friction;
 use super::{Compiled, Simulation};
 use crate::dynamics::modal::ModalModel;
-use crate::settings::{Scheme, Solver, TOLERANCE};
+use crate::settings::{Preset, Scheme, Solver, TOLERANCE};
 use crate::stability::massless::MasslessLimit;
 use crate::stability::{self, massless};
 use crate::system::System;
 use crate::variables::Quantity;
 use crate::{Error, Result};
 use checking::Checking;
+use closing::Closing;
+use sliding::Sense;
 pub(super) use told::Told;
 
 /// Parameters that decide stability.
@@ -29,8 +33,8 @@ pub struct Parameters {
     /// Error of a step of `galerkin`, as a share of the smallest clearance.
     pub tolerance: f64,
     pub solver: Solver,
-    /// Sign of the speed of each structure that touches at the start; 0 for a rotor that starts at rest.
-    pub senses: Vec<f64>,
+    /// Speed of each structure that touches at the start (rad/s), whose sign is the sense of slip; both senses where it is 0.
+    pub speeds: Vec<f64>,
     /// Velocities of structures that fly freely at the start (m/s).
     pub velocities: Vec<[f64; 3]>,
 }
@@ -45,7 +49,7 @@ impl Parameters {
 /// What is known about the limits with some parameters.
 #[derive(Debug, Clone)]
 pub struct Limits {
-    /// Without the senses.
+    /// Whatever the speeds.
     parameters: Parameters,
     /// Of each structure that touches.
     bodies: Vec<BodyLimits>,
@@ -58,21 +62,14 @@ struct BodyLimits {
     outcome: Result<Vec<String>>,
     /// Slip in +θ and in −θ; of a disk, for which it takes long, only what was asked for.
     senses: [Option<Sense>; 2],
+    /// How long contact stays closed.
+    closing: Closing,
     /// Steps of massless-boundary; infinite for other schemes.
     massless: MasslessLimit,
     /// Largest step of each range of step sizes, descending, and what the casing does to solvability there.
     casing: Vec<(f64, Option<String>)>,
     /// Smallest step of modal-exact that passes over what contact acts on; infinite for other schemes.
     unresolved: f64,
-}
-
-/// Growth of sliding contact in one sense.
-#[derive(Debug, Clone)]
-struct Sense {
-    /// Warnings for the step expected, or why it is refused.
-    outcome: Result<Vec<String>>,
-    /// Largest step of each range of step sizes, descending, and why it is refused, if it is.
-    ranges: Vec<(f64, Option<Error>)>,
 }
 
 /// Senses of slip of a speed or of its sign: both where it is 0.
@@ -100,7 +97,6 @@ impl Simulation {
         let damping = (0..bodies).map(|body| self.value_of(Quantity::DampingRatio, body));
         let carriers = 0..self.compiled.carriers.len();
         let carried = carriers.map(|carrier| self.value_of(Quantity::CarrierDampingRatio, carrier));
-        let sense = |speed: f64| if speed == 0.0 { 0.0 } else { speed.signum() };
         let velocity = |body: usize| [0, 1, 2].map(|axis| self.value_of(Quantity::InitialVelocity(axis), body));
         Parameters {
             friction: (0..pairs).map(friction).collect(),
@@ -112,7 +108,7 @@ impl Simulation {
                 .map_or(TOLERANCE, |row| self.values[row.reference as usize]),
             scheme: chosen(&Scheme::ALL, self.value_of(Quantity::SchemeChoice, 0)),
             solver: chosen(&Solver::ALL, self.value_of(Quantity::SolverChoice, 0)),
-            senses: self.speeds().into_iter().map(sense).collect(),
+            speeds: self.speeds(),
             velocities: (0..bodies).map(velocity).collect(),
         }
     }
@@ -120,10 +116,10 @@ impl Simulation {
     /// Check limits unless the same parameters were checked last; returns warnings. A refusal leaves what was known before.
     pub(super) fn check_limits(&mut self, parameters: &Parameters) -> Result<Vec<String>> {
         if let Some(limits) = self.limits.as_ref().filter(|limits| limits.cover(parameters)) {
-            return limits.warnings(&parameters.senses);
+            return limits.warnings(&parameters.speeds).map_err(|error| self.compiled.of_preset(error));
         }
         let limits = self.compiled.limits(parameters, &self.system);
-        let warnings = limits.warnings(&parameters.senses)?;
+        let warnings = limits.warnings(&parameters.speeds).map_err(|error| self.compiled.of_preset(error))?;
         self.limits = Some(limits);
         Ok(warnings)
     }
@@ -141,7 +137,7 @@ impl Simulation {
     /// Refuse a step size (s) whose range was found unstable, or that stiffening at one of the `speeds` of a structure (rad/s)
     /// forbids. Only looks up, so that a step does not allocate.
     pub(super) fn check_step_size(&self, body: usize, step: f64, speeds: [f64; 3]) -> Result<()> {
-        self.is_step_allowed(body, step, speeds).map_err(|error| match error {
+        self.is_step_allowed(body, step, speeds).map_err(|error| match self.compiled.of_preset(error) {
             Error::Unstable { problem, remedy } => {
                 Error::Unstable { problem: self.compiled.named(body, problem), remedy }
             }
@@ -162,9 +158,10 @@ impl Simulation {
         if step >= own.massless.usable {
             return Err(massless::refusal(step, own.massless));
         }
-        for sense in speeds.into_iter().filter(|speed| *speed != 0.0).flat_map(senses_of) {
-            let refusal = own.senses[sense].as_ref().and_then(|sense| in_range(&sense.ranges, step));
-            refusal.map_or(Ok(()), |refusal| Err(refusal.clone()))?;
+        for speed in speeds.into_iter().filter(|speed| *speed != 0.0) {
+            let closed = own.closing.time(speed);
+            let senses = senses_of(speed).filter_map(|sense| own.senses[sense].as_ref());
+            senses.map(|sense| sense.check(step, closed)).collect::<Result<()>>()?;
         }
         Ok(())
     }
@@ -175,6 +172,17 @@ impl Compiled {
     pub(super) fn expected_step(&self, largest: f64) -> f64 {
         let length = self.scene.settings.experiment.communication_step;
         length / (length / largest * (1.0 - super::SAME_STEP)).ceil().max(1.0)
+    }
+
+    /// A refusal whose remedy works with the preset of the scene.
+    fn of_preset(&self, error: Error) -> Error {
+        match error {
+            Error::Unstable { problem, remedy } if self.scene.settings.preset == Preset::Paper => {
+                let without = ", or leave `preset` out, which fixes the scheme";
+                Error::Unstable { problem, remedy: remedy.replace(stability::OTHER_SCHEME, without) }
+            }
+            other => other,
+        }
     }
 
     /// Largest factor on the frequencies of a structure.
@@ -227,10 +235,6 @@ impl Compiled {
     }
 
     fn rotor_limits(&self, body: usize, parameters: &Parameters, system: &System) -> BodyLimits {
-        if parameters.scheme == Scheme::Galerkin {
-            // Its steps are as short as its contact problems and its energy ask for.
-            return BodyLimits::none();
-        }
         let parts = &self.bodies[body];
         let mut models = match &parts.disk {
             Some(disk) => (0..disk.diameters.len()).map(|diameter| disk.paired(diameter)).collect(),
@@ -242,8 +246,19 @@ impl Compiled {
             model.damping_ratios.fill(parameters.damping_ratios[body]);
             model.frequencies.iter_mut().for_each(|frequency| *frequency *= stiffest);
         }
-        let mut at = Checking::new(self, system, body, models, parameters);
+        let at = Checking::new(self, system, body, models, parameters);
         let expected = self.expected_step(parameters.step);
+        if parameters.scheme == Scheme::Galerkin {
+            // Its steps are as short as its contact problems and its energy ask for: there is physics to tell, and nothing to refuse.
+            return BodyLimits {
+                outcome: Ok(Vec::new()),
+                senses: [Some(at.physics(0, expected)), Some(at.physics(1, expected))],
+                closing: Closing::new(self, body),
+                massless: MasslessLimit::NONE,
+                casing: Vec::new(),
+                unresolved: f64::INFINITY,
+            };
+        }
         let casing = at.casing(expected);
         // Radially: along an inclined normal the bending of the blade would hide what the tip itself yields.
         let radial = |model: &ModalModel| vec![[-1.0, 0.0, 0.0]; model.contact_modes.nrows() / 3];
@@ -251,18 +266,22 @@ impl Compiled {
         let unresolved = self.unresolved(body, masters, parameters.scheme);
         let resolved = stability::unresolved::check(expected, unresolved, at.largest_frequency());
         let (outcome, massless) = match resolved.and_then(|()| at.massless(expected)) {
-            Ok((more, limit)) => (at.warnings(expected, in_range(&casing, expected).cloned(), more), limit),
+            Ok((mut more, limit)) => {
+                more.extend(stability::unresolved::warning(expected, unresolved));
+                (at.warnings(expected, in_range(&casing, expected).cloned(), more), limit)
+            }
             Err(error) => (Err(error), MasslessLimit::NONE),
         };
         let mut senses = [None, None];
         // Of a disk the other sense takes as long again; without friction nothing slides.
         let both = parts.disk.is_none() || at.friction == 0.0;
         if outcome.is_ok() {
-            for sense in senses_of(if both { 0.0 } else { parameters.senses[body] }) {
+            for sense in senses_of(if both { 0.0 } else { parameters.speeds[body] }) {
                 senses[sense] = Some(at.sense(sense, expected));
             }
         }
-        BodyLimits { outcome, senses, massless, casing, unresolved }
+        let closing = Closing::new(self, body);
+        BodyLimits { outcome, senses, closing, massless, casing, unresolved }
     }
 
     /// Smallest step of modal-exact that passes over what contact acts on: of what touches, and of carriers.
@@ -278,51 +297,45 @@ impl Compiled {
 impl Limits {
     /// Whether they are those of the parameters, whatever the senses.
     fn are_of(&self, parameters: &Parameters) -> bool {
-        Parameters { senses: self.parameters.senses.clone(), ..parameters.clone() } == self.parameters
+        Parameters { speeds: self.parameters.speeds.clone(), ..parameters.clone() } == self.parameters
     }
 
     /// Whether they are, and the senses were looked at.
     fn cover(&self, parameters: &Parameters) -> bool {
         let looked_at =
-            |(body, sense): (&BodyLimits, &f64)| senses_of(*sense).all(|sense| body.senses[sense].is_some());
-        self.are_of(parameters) && self.bodies.iter().zip(&parameters.senses).all(looked_at)
+            |(body, speed): (&BodyLimits, &f64)| senses_of(*speed).all(|sense| body.senses[sense].is_some());
+        self.are_of(parameters) && self.bodies.iter().zip(&parameters.speeds).all(looked_at)
     }
 
-    /// Warnings for the step expected where contact slides in the senses of these signs.
-    fn warnings(&self, senses: &[f64]) -> Result<Vec<String>> {
+    /// Warnings for the step expected at these speeds (rad/s).
+    fn warnings(&self, speeds: &[f64]) -> Result<Vec<String>> {
         let mut warnings = Vec::new();
-        for (body, sense) in self.bodies.iter().zip(senses) {
-            warnings.extend(body.warnings(*sense)?);
+        for (body, speed) in self.bodies.iter().zip(speeds) {
+            warnings.extend(body.warnings(*speed)?);
         }
         Ok(warnings)
     }
 
-    /// Flutter of a structure that turns at a speed of this sign.
-    pub fn flutter(&self, body: usize, speed: f64) -> Option<&str> {
-        let found =
-            senses_of(speed).filter_map(|sense| self.bodies[body].senses[sense].as_ref()?.outcome.as_ref().ok());
-        found.flatten().map(String::as_str).find(|text| text.contains(checking::FLUTTER))
+    /// What of a structure that turns at a speed of this sign grows by itself.
+    pub fn grows(&self, body: usize, speed: f64) -> Option<&str> {
+        senses_of(speed).find_map(|sense| self.bodies[body].senses[sense].as_ref()?.grows.as_deref())
     }
 }
 
 impl BodyLimits {
-    /// No step is refused.
-    fn none() -> Self {
-        let sense = || Some(Sense { outcome: Ok(Vec::new()), ranges: Vec::new() });
-        Self {
-            outcome: Ok(Vec::new()),
-            senses: [sense(), sense()],
-            massless: MasslessLimit::NONE,
-            casing: Vec::new(),
-            unresolved: f64::INFINITY,
-        }
-    }
-
-    /// Warnings for the step expected where contact slides in the sense of this sign.
-    fn warnings(&self, sense: f64) -> Result<Vec<String>> {
+    /// Warnings for the step expected at this speed (rad/s).
+    fn warnings(&self, speed: f64) -> Result<Vec<String>> {
         let mut warnings = self.outcome.clone()?;
-        for sense in senses_of(sense).filter_map(|sense| self.senses[sense].as_ref()) {
-            warnings.extend(sense.outcome.clone()?);
+        let closed = self.closing.time(speed);
+        let found =
+            senses_of(speed).filter_map(|sense| self.senses[sense].as_ref()).map(|sense| sense.warnings(closed));
+        // Of a rotor that starts at rest both senses count; what grows in either is told once.
+        for sense in found.collect::<Result<Vec<_>>>()? {
+            for warning in sense {
+                if !warnings.iter().any(|known| sliding::are_alike(known, &warning)) {
+                    warnings.push(warning);
+                }
+            }
         }
         Ok(warnings)
     }
@@ -335,9 +348,7 @@ impl BodyLimits {
             other => other,
         };
         self.outcome = self.outcome.map(texts).map_err(refusal);
-        for sense in self.senses.iter_mut().flatten() {
-            sense.outcome = std::mem::replace(&mut sense.outcome, Ok(Vec::new())).map(texts).map_err(refusal);
-        }
+        self.senses.iter_mut().flatten().for_each(|sense| sense.name(name));
         for (_, text) in &mut self.casing {
             *text = text.take().map(|text| format!("{name}: {text}"));
         }

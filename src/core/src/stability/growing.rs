@@ -2,34 +2,46 @@
 
 use nalgebra::Complex;
 
-use super::ContactDirections;
 use super::held::Held;
 use super::secular;
+use super::{ContactDirections, delassus, is_solvable};
 use crate::dynamics::modal::ModalModel;
 use crate::settings::Scheme;
 
-/// The scheme may exceed the growth rate of the continuous equations by this factor.
-const GROWTH_FACTOR: f64 = 1.05;
 /// Growth per step below this is rounding of the eigenvalue solver.
 const GROWTH_NOISE: f64 = 1e-7;
 /// Largest number of modes for which growth rates are computed.
 pub const GROWTH_UP_TO: usize = 150;
+
+/// The motion e^(st) that grows fastest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fastest {
+    /// Re s (1/s).
+    pub rate: f64,
+    /// |Im s| (rad/s); 0: it grows without swinging.
+    pub frequency: f64,
+}
 
 /// Growth rates of closed sliding contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Growth {
     /// Of the constrained differential equations (1/s); positive means flutter.
     pub continuous: f64,
+    /// Angular frequency of that motion (rad/s); 0: it grows without swinging.
+    pub frequency: f64,
     /// Of the constrained step map (1/s).
     pub stepped: f64,
+    /// Angular frequency of that motion (rad/s), as its samples have it: at most π/h.
+    pub swing: f64,
     /// Rates below this are rounding of the eigenvalue solver (1/s).
-    noise: f64,
+    pub noise: f64,
 }
 
 impl Growth {
-    /// The scheme adds growth that the equations do not have.
-    pub fn is_added(&self) -> bool {
-        self.stepped > GROWTH_FACTOR * self.continuous.max(0.0) + self.noise
+    /// Growth that the scheme adds to that of the equations (1/s), 0 where it adds none.
+    pub fn added(&self) -> f64 {
+        let added = self.stepped - self.continuous.max(0.0);
+        if added > self.noise { added } else { 0.0 }
     }
 
     /// The equations themselves are unstable.
@@ -51,46 +63,83 @@ pub fn growth(
     stepped(model, scheme, step, friction, directions, continuous)
 }
 
-/// Growth rate (1/s) of the differential equations, exact to a small part of what counts as rounding at steps up to `step` (s);
-/// `None` as with [`growth`].
+/// Growth of the differential equations, exact to a small part of what counts as rounding at steps up to `step` (s); `None` as with
+/// [`growth`].
 pub fn continuous(
     model: &ModalModel,
     scheme: Scheme,
     step: f64,
     friction: f64,
     directions: &ContactDirections,
-) -> Option<f64> {
+) -> Option<Fastest> {
     // Beyond ω_max h = 2 the matrix would lose its balance.
     let unit = step.min(2.0 / model.largest_frequency());
     let held = || Held::continuous(model, scheme, unit, friction, directions);
     let eigenvalues = eigenvalues(&is_looked_at(model, friction).then(held)?)?;
-    Some(rate(&eigenvalues) / unit)
+    let Fastest { rate, frequency } = fastest(&eigenvalues);
+    Some(Fastest { rate: rate / unit, frequency: frequency / unit })
 }
 
-/// [`growth`] where that of the differential equations is known, `continuous` (1/s).
+/// The same without the mass of the contact nodes, their highest modes quasi-static: the limit in which contact nodes are no lumps.
+/// `None` where the model leaves no mode with inertia, and where the flexibility that is left to the contacts is no P-matrix with this
+/// friction: there the limit has no solution, and what grows without bounds would not show.
+pub fn without_node_mass(
+    model: &ModalModel,
+    step: f64,
+    friction: f64,
+    directions: &ContactDirections,
+) -> Option<Fastest> {
+    let scheme = Scheme::MasslessBoundary;
+    let is_limit = || is_solvable(&delassus(model, scheme, step, friction, directions));
+    if model.dynamic_modes(scheme) == 0 || !is_limit() {
+        return None;
+    }
+    continuous(model, scheme, step, friction, directions).filter(|found| found.rate.is_finite())
+}
+
+/// [`growth`] where that of the differential equations is known.
 pub fn stepped(
     model: &ModalModel,
     scheme: Scheme,
     step: f64,
     friction: f64,
     directions: &ContactDirections,
-    continuous: f64,
+    continuous: Fastest,
 ) -> Option<Growth> {
     let held = || Held::stepped(model, scheme, step, friction, directions);
     let eigenvalues = eigenvalues(&is_looked_at(model, friction).then(held)?)?;
-    Some(Growth { continuous, stepped: stepped_rate(&eigenvalues) / step, noise: GROWTH_NOISE / step })
+    let found = fastest_stepped(&eigenvalues);
+    Some(Growth {
+        continuous: continuous.rate,
+        frequency: continuous.frequency,
+        stepped: found.rate / step,
+        swing: found.frequency / step,
+        noise: GROWTH_NOISE / step,
+    })
 }
 
-/// Growth of motions e^st.
-fn rate(eigenvalues: &[Complex<f64>]) -> f64 {
-    eigenvalues.iter().fold(f64::NEG_INFINITY, |largest, s| largest.max(s.re))
+/// Of motions e^st.
+fn fastest(eigenvalues: &[Complex<f64>]) -> Fastest {
+    let none = Fastest { rate: f64::NEG_INFINITY, frequency: 0.0 };
+    eigenvalues.iter().fold(
+        none,
+        |most, s| {
+            if s.re > most.rate { Fastest { rate: s.re, frequency: s.im.abs() } } else { most }
+        },
+    )
 }
 
-/// The same of motions (1 + s)^t.
-fn stepped_rate(eigenvalues: &[Complex<f64>]) -> f64 {
+/// Of motions (1 + s)^t.
+fn fastest_stepped(eigenvalues: &[Complex<f64>]) -> Fastest {
     // |1 + s|² − 1.
-    let gain = eigenvalues.iter().fold(-1.0, |largest: f64, s| largest.max(2.0 * s.re + s.norm_sqr()));
-    0.5 * libm::log1p(gain)
+    let (mut gain, mut frequency) = (-1.0, 0.0);
+    for s in eigenvalues {
+        let own = 2.0 * s.re + s.norm_sqr();
+        if own > gain {
+            (gain, frequency) = (own, libm::atan2(s.im, 1.0 + s.re).abs());
+        }
+    }
+    Fastest { rate: 0.5 * libm::log1p(gain), frequency }
 }
 
 fn is_looked_at(model: &ModalModel, friction: f64) -> bool {
@@ -172,15 +221,20 @@ mod tests {
             proven += 1.0;
             let [Some(own), Some(own_stepped)] = held.each_ref().map(Held::dense_eigenvalues) else { continue };
             let noise = GROWTH_NOISE;
-            let found = Growth { continuous: rate(&continuous), stepped: stepped_rate(&stepped), noise };
-            let dense = Growth { continuous: rate(&own), stepped: stepped_rate(&own_stepped), noise };
+            let of = |continuous: &[Complex<f64>], stepped: &[Complex<f64>]| {
+                let (continuous, stepped) = (fastest(continuous), fastest_stepped(stepped));
+                let Fastest { rate, frequency } = continuous;
+                Growth { continuous: rate, frequency, stepped: stepped.rate, swing: stepped.frequency, noise }
+            };
+            let (found, dense) = (of(&continuous, &stepped), of(&own, &own_stepped));
             let near = |a: f64, b: f64| (a - b).abs() < 0.1 * GROWTH_NOISE + 1e-7 * b.abs();
             assert!(
                 near(found.continuous, dense.continuous) && near(found.stepped, dense.stepped),
                 "{found:?} for {dense:?}: {scheme:?}, µ = {friction}, h = {step:e}, {model:?}"
             );
-            assert_eq!((found.is_added(), found.is_flutter()), (dense.is_added(), dense.is_flutter()));
-            verdicts[2 * usize::from(found.is_added()) + usize::from(found.is_flutter())] += 1;
+            let verdict = |growth: &Growth| (growth.added() > 0.05 * growth.continuous.max(0.0), growth.is_flutter());
+            assert_eq!(verdict(&found), verdict(&dense));
+            verdicts[2 * usize::from(verdict(&found).0) + usize::from(found.is_flutter())] += 1;
         }
         println!("{proven} of {tried} proven; stable, flutter, added growth, both: {verdicts:?}");
         assert!(proven > 0.9 * tried, "{proven} of {tried}");
@@ -241,7 +295,7 @@ mod tests {
             // Friction so small that it changes nothing but makes the question asked.
             let found = growth(&model, scheme, 1e-4, 1e-12, &radial()).unwrap();
             assert!(found.continuous.abs() < 1e-6 && found.stepped.abs() < 1e-6, "{found:?}");
-            assert!(!found.is_added() && !found.is_flutter());
+            assert!(found.added() < 1e-6 && !found.is_flutter());
         }
     }
 
@@ -258,7 +312,10 @@ mod tests {
         let order = ((coarse.stepped - continuous) / (fine.stepped - continuous)).abs().log2();
         println!("growth rate {continuous} 1/s, stepped {} and {}: order {order}", coarse.stepped, fine.stepped);
         assert!(order > 3.7, "order {order}");
-        assert!(fine.is_flutter() && !fine.is_added());
+        assert!(fine.is_flutter() && fine.added() < 0.05 * continuous);
+        // Between the two modes that friction couples, and of the samples as of the motion.
+        assert!((1000.0..1400.0).contains(&fine.frequency), "{}", fine.frequency);
+        assert!((fine.swing / fine.frequency - 1.0).abs() < 1e-4, "{} {}", fine.swing, fine.frequency);
     }
 
     #[test]

@@ -17,6 +17,7 @@ use crate::dynamics::modal::ModalModel;
 use crate::gaps::dot;
 use crate::schemes::{ModeCoefficients, damped_frequency};
 use crate::settings::Scheme;
+use crate::stability::{OTHER_SCHEME, shorter};
 use crate::{Error, Result};
 
 /// Margin under the limit.
@@ -177,10 +178,10 @@ pub fn refusal(step: f64, limit: MasslessLimit) -> Error {
     let MasslessLimit { closed, usable } = limit;
     Error::Unstable {
         problem: format!(
-            "massless-boundary with internal step {step:.6e} s: closed contact on the residual flexibility of the contact nodes \
+            "massless-boundary with an internal step of {step:.3e} s: closed contact on the residual flexibility of the contact nodes \
              is stable below {closed:.6e} s only, and contact that opens and closes gains energy above {usable:.6e} s"
         ),
-        remedy: format!("Set the internal step below {usable:.6e} s, or use the scheme modal-exact"),
+        remedy: format!("{}{OTHER_SCHEME}", shorter(usable)),
     }
 }
 
@@ -188,8 +189,8 @@ pub fn refusal(step: f64, limit: MasslessLimit) -> Error {
 pub fn warning(step: f64, limit: MasslessLimit) -> Option<String> {
     (step >= QUIET * limit.closed).then(|| {
         format!(
-            "massless-boundary with internal step {step:.3e} s: above {:.3e} s contact that opens and closes may gain \
-             energy, which a damping ratio of 1e-3 outweighs; a falling impact_loss tells",
+            "massless-boundary with an internal step of {step:.3e} s: contact that opens and closes may gain energy, which a damping \
+             ratio of 1e-3 outweighs; a falling `impact_loss` tells. `time.step` below {:.2e} s avoids it",
             QUIET * limit.closed
         )
     })

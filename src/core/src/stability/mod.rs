@@ -8,13 +8,15 @@
 //!   scheme adds growth: the spectral radius of the constrained step map is compared with the growth of the
 //!   constrained differential equation.
 
+pub mod digging;
 mod growing;
 mod held;
+pub mod judged;
 pub mod massless;
 mod secular;
 pub mod unresolved;
 
-pub use growing::{GROWTH_UP_TO, Growth, continuous, growth, growth_steps, stepped};
+pub use growing::{Fastest, GROWTH_UP_TO, Growth, continuous, growth, growth_steps, stepped, without_node_mass};
 
 use nalgebra::DMatrix;
 
@@ -72,6 +74,14 @@ fn directional_modes(
     (normals, forces)
 }
 
+/// End of remedies that name another scheme, which a preset may not leave free.
+pub const OTHER_SCHEME: &str = ", or use the scheme modal-exact";
+
+/// The remedy of a shorter step than this (s), by the names of the scene and of the FMU.
+pub fn shorter(step: f64) -> String {
+    format!("Set `time.step` (in the FMU `internal_step_max`) below {step:.6e} s")
+}
+
 /// Refuse step sizes beyond the linear limit of the largest angular `frequency` (rad/s). Allocates only to refuse.
 ///
 /// # Errors
@@ -81,9 +91,10 @@ pub fn check_step_allowed(frequency: f64, scheme: Scheme, step: f64) -> Result<(
     match scheme {
         Scheme::CentralDifference if product >= 2.0 * (1.0 - CENTRAL_MARGIN) => Err(Error::Unstable {
             problem: format!(
-                "central-difference with internal step {step:.6e} s has ω_max·h = {product:.4} ≥ 2 (ω_max = {frequency:.6e} rad/s)"
+                "central-difference is unstable with an internal step of {step:.3e} s: ω_max·h = {product:.4}, and from 2 on every \
+                 motion grows"
             ),
-            remedy: format!("Set the internal step below {:.6e} s, or use the scheme modal-exact", 2.0 / frequency),
+            remedy: format!("{}{OTHER_SCHEME}", shorter(2.0 / frequency)),
         }),
         _ => Ok(()),
     }
@@ -98,9 +109,10 @@ pub fn check_step(frequency: f64, scheme: Scheme, step: f64) -> Result<Option<St
     let product = frequency * step;
     match scheme {
         Scheme::ModalExact if product > 2.0 => Ok(Some(format!(
-            "ω_max·h = {product:.2} > 2: modes above {:.4e} rad/s are not resolved by the internal step {step:.3e} s; \
-             free motion stays exact, contact forces on them do not",
-            2.0 / step
+            "modes above {:.4} kHz are not resolved by the internal step of {step:.3e} s: free motion stays exact, contact forces \
+             on them do not; `time.step` = {:.2e} s resolves all",
+            1e-3 * 2.0 / step / std::f64::consts::TAU,
+            2.0 / frequency
         ))),
         _ => Ok(None),
     }

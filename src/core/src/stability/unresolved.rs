@@ -20,6 +20,7 @@
 //! Steps are refused where both ω_max h ≥ [`HIGHEST`] and the share exceeds [`SHARE`].
 
 use crate::dynamics::modal::ModalModel;
+use crate::stability::shorter;
 use crate::{Error, Result};
 
 /// Steps below this ω_max h are not refused.
@@ -27,6 +28,9 @@ pub const HIGHEST: f64 = 10.0;
 /// Nor are steps where modes beyond ωh = 2 have less than this share of the flexibility that contact sees, on average over
 /// the contact nodes.
 pub const SHARE: f64 = 0.5;
+/// Share of the limit from which errors of some per cent are told. Rotor 37 with nine patches and 80 modes, µ = 0.15, has 5.8 % of the
+/// clearance in its displacements at 0.68 of the limit, 4.0 % at 0.34, 0.5 % at 0.14 and 0.1 % at 0.07.
+const NEAR: f64 = 0.2;
 /// Modes beyond this ωh are passed over.
 const PASSED_OVER: f64 = 2.0;
 
@@ -67,6 +71,17 @@ pub fn limit_along_axes(model: &ModalModel) -> f64 {
     (0..3).map(along).fold(f64::INFINITY, f64::min)
 }
 
+/// A warning for a step (s) near the `limit` (s): errors grow with its square, some four per cent at the limit.
+pub fn warning(step: f64, limit: f64) -> Option<String> {
+    (step >= NEAR * limit).then(|| {
+        format!(
+            "modal-exact with an internal step of {step:.3e} s passes over much of the flexibility that contact sees: expect errors of \
+             some per cent. `time.step` below {:.2e} s avoids it",
+            NEAR * limit
+        )
+    })
+}
+
 /// Refuse a step (s) at or beyond the `limit` (s) of a structure whose largest angular frequency (rad/s) is `frequency`.
 /// Allocates only to refuse.
 ///
@@ -78,16 +93,13 @@ pub fn check(step: f64, limit: f64, frequency: f64) -> Result<()> {
     }
     Err(Error::Unstable {
         problem: format!(
-            "modal-exact with internal step {step:.6e} s has ω_max·h = {:.4} (ω_max = {frequency:.6e} rad/s), and modes above \
-             {:.4e} rad/s, which the step passes over, have more than half of the flexibility that contact sees: forces, friction \
-             work and energies would be wrong by ten per cent, and with longer steps beyond all bounds",
+            "modal-exact with an internal step of {step:.3e} s (ω_max·h = {:.4}) passes over modes above {:.4} kHz, which have more than \
+             half of the flexibility that contact sees: forces, friction work and energies would be wrong by ten per cent, and with \
+             longer steps beyond all bounds",
             frequency * step,
-            PASSED_OVER / step
+            1e-3 * PASSED_OVER / step / std::f64::consts::TAU
         ),
-        remedy: format!(
-            "Set the internal step below {limit:.6e} s, better below {:.6e} s, or use massless-boundary",
-            PASSED_OVER / frequency
-        ),
+        remedy: format!("{}, better below {:.3e} s, or use massless-boundary", shorter(limit), PASSED_OVER / frequency),
     })
 }
 

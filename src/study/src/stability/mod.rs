@@ -57,7 +57,7 @@ pub enum Verdict {
 impl Point {
     /// The kind of the answer.
     pub fn verdict(&self) -> Verdict {
-        let flutters = self.rates.as_ref().is_some_and(|rates| rates.growth.is_flutter());
+        let flutters = self.rates.as_ref().is_some_and(structure::Rates::is_flutter);
         match &self.answer {
             Err(_) => Verdict::Refused,
             Ok(_) if flutters => Verdict::Flutter,

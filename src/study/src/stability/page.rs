@@ -154,9 +154,9 @@ fn flutter(found: &Found, point: &Point) -> Option<Statement> {
     let Some(rates) = &point.rates else {
         return Some(Statement::remark(expected, "not known: no friction, or more modes than rates are computed for"));
     };
-    let frequency = rates.frequency.map_or(String::new(), |hertz| format!(" at {hertz:.1} Hz"));
-    let text = format!("growth rate {:.3e} 1/s{frequency}, closed at {}", rates.growth.continuous, rates.closed);
-    Some(Statement::tested(expected, !rates.growth.is_flutter(), text))
+    let frequency = rates.frequency().map_or(String::new(), |hertz| format!(" at {hertz:.1} Hz"));
+    let text = format!("growth rate {:.3e} 1/s{frequency}, closed at {}", rates.physical.rate, rates.closed);
+    Some(Statement::tested(expected, !rates.is_flutter(), text))
 }
 
 fn title(speed: Option<f64>) -> String {
@@ -229,9 +229,9 @@ fn sheet(found: &Found) -> Sheet {
             known(point.place.friction),
             point.step,
             f64::from(point.verdict() as u8),
-            known(growth.map(|growth| growth.continuous)),
+            known(point.rates.as_ref().map(|rates| rates.physical.rate)),
             known(growth.map(|growth| growth.stepped)),
-            known(point.rates.as_ref().and_then(|rates| rates.frequency)),
+            known(point.rates.as_ref().and_then(|rates| rates.frequency())),
         ]);
     }
     sheet
@@ -241,13 +241,13 @@ fn sheet(found: &Found) -> Sheet {
 fn row(point: &Point) -> Vec<String> {
     let growth = point.rates.as_ref().map(|rates| rates.growth);
     let rate = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.3e}"));
-    let frequency = point.rates.as_ref().and_then(|rates| rates.frequency);
+    let frequency = point.rates.as_ref().and_then(|rates| rates.frequency());
     vec![
         point.place.speed.map_or(String::new(), shown),
         point.place.friction.map_or(String::new(), short),
         format!("{:.4e}", point.step),
         point.verdict().name().into(),
-        rate(growth.map(|growth| growth.continuous)),
+        rate(point.rates.as_ref().map(|rates| rates.physical.rate)),
         rate(growth.map(|growth| growth.stepped)),
         frequency.map_or(String::new(), |hertz| format!("{hertz:.1}")),
         point.words(),
@@ -317,7 +317,7 @@ fn growth(found: &Found) -> Result<Option<Figure>> {
             .filter_map(|point| rate(point, value))
             .collect()
     };
-    let equations = at(found.own.step, &|rates| rates.growth.continuous);
+    let equations = at(found.own.step, &|rates| rates.physical.rate);
     if equations.len() < 2 {
         return Ok(None);
     }
@@ -340,7 +340,8 @@ fn growth(found: &Found) -> Result<Option<Figure>> {
         name: "growth",
         caption: format!(
             "Growth of closed sliding contact at {}, of all sets of closed nodes the one that grows most: above 0 without time \
-             discretisation it flutters; where the steps of {} grow more than that, they are refused.",
+             discretisation (and without the mass of the contact nodes, where the model allows) it flutters. The steps are those of \
+             {}, with the mass that they give the nodes.",
             title(found.own.speed),
             found.own.method.0.name()
         ),
@@ -356,9 +357,9 @@ fn results(found: &Found) -> Value {
             "speed": point.place.speed, "friction": point.place.friction, "internal_step": point.step,
             "answer": point.verdict().name(),
             "warnings": point.answer.as_ref().ok(), "refusal": point.answer.as_ref().err(),
-            "growth_of_equations": point.rates.as_ref().map(|rates| rates.growth.continuous),
+            "growth_of_equations": point.rates.as_ref().map(|rates| rates.physical.rate),
             "growth_of_steps": point.rates.as_ref().map(|rates| rates.growth.stepped),
-            "flutter_frequency_hz": point.rates.as_ref().and_then(|rates| rates.frequency),
+            "flutter_frequency_hz": point.rates.as_ref().and_then(|rates| rates.frequency()),
         })
     };
     json!({

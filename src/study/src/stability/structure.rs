@@ -2,14 +2,13 @@
 //! scheme below which all are accepted, sought with the very checks of the core. Longer ones may be accepted too: growth by friction
 //! comes in bands.
 
-use nalgebra::{DMatrix, Schur};
 use tiprub_core::{
     Result, Rom,
     dynamics::{cyclic::CyclicModel, modal::ModalModel},
     rom::Frame,
     settings::Scheme,
     shown,
-    stability::{self, ContactDirections, Growth, massless::MasslessCheck},
+    stability::{self, ContactDirections, Fastest, Growth, judged::Judged, massless::MasslessCheck},
 };
 
 use super::seek::{Sought, TRIED, seek};
@@ -79,12 +78,24 @@ impl StepLimit {
 /// How closed sliding contact grows, of all sets of closed nodes the one that grows most.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rates {
-    /// Growth of the equations and of the scheme's steps.
+    /// Growth of the model and of the scheme's steps.
     pub growth: Growth,
-    /// Frequency of what grows by itself (Hz); where nothing flutters, none.
-    pub frequency: Option<f64>,
+    /// What grows fastest in the equations, without the mass of the contact nodes where the model allows.
+    pub physical: Fastest,
     /// Names of the closed nodes, of coupled sectors with the nodal diameter.
     pub closed: String,
+}
+
+impl Rates {
+    /// The equations themselves are unstable.
+    pub fn is_flutter(&self) -> bool {
+        self.physical.rate > self.growth.noise
+    }
+
+    /// Frequency of what grows by itself (Hz); where nothing does, none.
+    pub fn frequency(&self) -> Option<f64> {
+        self.is_flutter().then_some(self.physical.frequency / std::f64::consts::TAU)
+    }
 }
 
 /// A structure by itself.
@@ -141,25 +152,49 @@ impl<'a> Structure<'a> {
     /// Growth of sliding contact: of all sets of closed nodes and senses that of the largest rate of the steps. `None` without
     /// friction, and where it cannot be told.
     pub fn rates(&self, scheme: Scheme, step: f64, sliding: Sliding) -> Option<Rates> {
-        let mut most: Option<(Growth, usize, Vec<usize>, usize)> = None;
+        let mut most: Option<Growth> = None;
+        let mut physical: Option<(Fastest, String)> = None;
         for sense in sliding.senses() {
             for nodes in self.combinations() {
                 for model in 0..self.models.len() {
-                    let Some(found) = self.growth_of(model, &nodes, sense, scheme, step, sliding.friction) else {
+                    let (seen, directions) = self.seen(model, &nodes, sense);
+                    let Some(found) = stability::growth(&seen, scheme, step, sliding.friction, &directions) else {
                         continue;
                     };
-                    if most.as_ref().is_none_or(|most| found.stepped > most.0.stepped) {
-                        most = Some((found, model, nodes.clone(), sense));
+                    let own = self.physical(&seen, scheme, step, sliding.friction, &directions, &found);
+                    if most.as_ref().is_none_or(|most| found.stepped > most.stepped) {
+                        most = Some(found);
+                    }
+                    if physical.as_ref().is_none_or(|most| own.rate > most.0.rate) {
+                        physical = Some((own, self.named(&nodes, model)));
                     }
                 }
             }
         }
-        let (growth, model, nodes, sense) = most?;
-        let seen = growth.is_flutter().then(|| self.seen(model, &nodes, sense));
-        let frequency = seen.and_then(|(model, directions)| flutter_frequency(&model, sliding.friction, &directions));
+        let (growth, (physical, closed)) = most.zip(physical)?;
+        Some(Rates { growth, physical, closed })
+    }
+
+    /// Growth without the mass of the contact nodes where the model allows.
+    fn physical(
+        &self,
+        seen: &ModalModel,
+        scheme: Scheme,
+        step: f64,
+        friction: f64,
+        directions: &ContactDirections,
+        found: &Growth,
+    ) -> Fastest {
+        let own = Fastest { rate: found.continuous, frequency: found.frequency };
+        let without = || stability::without_node_mass(seen, step, friction, directions);
+        if scheme.acts_later() { own } else { without().unwrap_or(own) }
+    }
+
+    /// Closed nodes by their names, of coupled sectors with the nodal diameter.
+    fn named(&self, nodes: &[usize], model: usize) -> String {
         let names: Vec<&str> = nodes.iter().map(|node| self.rom.contact_nodes[*node].name.as_str()).collect();
         let diameter = if self.rom.is_cyclic() { format!(", nodal diameter {model}") } else { String::new() };
-        Some(Rates { growth, frequency, closed: format!("{}{diameter}", names.join(", ")) })
+        format!("{}{diameter}", names.join(", "))
     }
 
     /// One model and the directions of nodes closed on it: of both parts of a nodal diameter.
@@ -169,19 +204,6 @@ impl<'a> Structure<'a> {
         let places: Vec<usize> = (0..copies).flat_map(|part| nodes.iter().map(move |node| part * own + node)).collect();
         let directions = places.iter().map(|place| self.closed[sense][place % own]).collect();
         (model.with_nodes(&places), directions)
-    }
-
-    fn growth_of(
-        &self,
-        model: usize,
-        nodes: &[usize],
-        sense: usize,
-        scheme: Scheme,
-        step: f64,
-        friction: f64,
-    ) -> Option<Growth> {
-        let (model, directions) = self.seen(model, nodes, sense);
-        stability::growth(&model, scheme, step, friction, &directions)
     }
 
     /// Sets of contact nodes that are closed: all of a few; of many every one alone, neighbours, and all; of coupled sectors every
@@ -267,9 +289,11 @@ impl<'a> Structure<'a> {
         if sliding.friction == 0.0 || self.rom.is_cyclic() {
             return true;
         }
+        // However long contact stays closed.
         let grows = |nodes: &Vec<usize>, sense: usize| {
-            let found = self.growth_of(0, nodes, sense, scheme, step, sliding.friction);
-            found.is_some_and(|found| found.is_added())
+            let (seen, directions) = self.seen(0, nodes, sense);
+            let found = stability::growth(&seen, scheme, step, sliding.friction, &directions);
+            found.is_some_and(|found| Judged::new(&seen, scheme, &directions, found).allowed().is_finite())
         };
         self.combinations().iter().all(|nodes| !sliding.senses().any(|sense| grows(nodes, sense)))
     }
@@ -308,71 +332,4 @@ fn closed_contacts(rom: &Rom, slip_sign: f64) -> ContactDirections {
         (normal, [0.0, slip_sign, 0.0])
     });
     directions.collect()
-}
-
-/// Frequency (Hz) of the motion that grows fastest while all contacts of `directions` are closed and slide: the equations
-/// q̈ = −P(ω²q + 2ξωq̇) with P = I − F(NᵀF)⁻¹Nᵀ on the null space of the normals N, F = N − µT (see [`stability::growth`], which
-/// tells the rate and not the frequency).
-pub fn flutter_frequency(model: &ModalModel, friction: f64, directions: &ContactDirections) -> Option<f64> {
-    let (rate, angular) = fastest(model, friction, directions)?;
-    (rate.is_finite() && angular.is_finite()).then_some(angular / std::f64::consts::TAU)
-}
-
-/// Rate (1/s) and angular frequency (rad/s) of the fastest-growing motion.
-fn fastest(model: &ModalModel, friction: f64, directions: &ContactDirections) -> Option<(f64, f64)> {
-    let (modes, nodes) = (model.len(), directions.len());
-    let seen = |node: usize, mode: usize, along: [f64; 3]| -> f64 {
-        (0..3).map(|i| along[i] * model.contact_modes[(3 * node + i, mode)]).sum()
-    };
-    let normals = DMatrix::from_fn(modes, nodes, |mode, node| seen(node, mode, directions[node].0));
-    let slips = DMatrix::from_fn(modes, nodes, |mode, node| seen(node, mode, directions[node].1));
-    let forces = &normals - slips * friction;
-    let reaction = &forces * (normals.transpose() * &forces).try_inverse()? * normals.transpose();
-    // What stays of the motion once the normals are held: the null space of their projector.
-    let range = normals.qr().q();
-    let held = (&range * range.transpose()).symmetric_eigen();
-    let free: Vec<usize> = (0..modes).filter(|column| held.eigenvalues[*column] < 0.5).collect();
-    let tangent = held.eigenvectors.select_columns(&free);
-    let projected = tangent.transpose() * (DMatrix::identity(modes, modes) - reaction);
-    // Time in units of the highest frequency.
-    let unit = 1.0 / model.largest_frequency();
-    let scaled = |value: &dyn Fn(usize) -> f64| {
-        &projected * DMatrix::from_fn(modes, free.len(), |mode, column| value(mode) * tangent[(mode, column)])
-    };
-    let omega = |mode: usize| model.frequencies[mode] * unit;
-    let count = free.len();
-    let mut flow = DMatrix::zeros(2 * count, 2 * count);
-    flow.view_mut((0, count), (count, count)).fill_with_identity();
-    flow.view_mut((count, 0), (count, count)).copy_from(&scaled(&|mode| -omega(mode) * omega(mode)));
-    flow.view_mut((count, count), (count, count))
-        .copy_from(&scaled(&|mode| -2.0 * model.damping_ratios[mode] * omega(mode)));
-    let values = Schur::try_new(flow, f64::EPSILON, 200 * count)?.complex_eigenvalues();
-    let most = values.iter().max_by(|a, b| a.re.total_cmp(&b.re))?;
-    Some((most.re / unit, most.im.abs() / unit))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The model of the core's own test, whose rate of 178.516 1/s NumPy confirms; the frequency by hand lies between those of the
-    /// two modes that friction couples.
-    #[test]
-    fn the_frequency_belongs_to_the_rate_of_the_core() {
-        let shapes = [[-0.1, -0.5, 0.0], [-0.3, 1.0, 0.0], [0.9, -0.8, 0.0]];
-        let model = ModalModel {
-            frequencies: vec![1000.0, 1050.0, 5000.0],
-            damping_ratios: vec![0.0; 3],
-            contact_modes: DMatrix::from_fn(3, 3, |row, mode| shapes[mode][row]),
-            shapes: DMatrix::identity(3, 3),
-            quasi_static: 0,
-        };
-        let closed = vec![([-1.0, 0.0, 0.0], [0.0, 1.0, 0.0])];
-        let core = stability::growth(&model, Scheme::ModalExact, 1e-6, 0.4, &closed).unwrap();
-        let (rate, angular) = fastest(&model, 0.4, &closed).unwrap();
-        assert!((rate / core.continuous - 1.0).abs() < 1e-6, "{rate} {core:?}");
-        let own = flutter_frequency(&model, 0.4, &closed).unwrap();
-        assert!((own * std::f64::consts::TAU / angular - 1.0).abs() < 1e-12);
-        assert!((1000.0..1400.0).contains(&angular), "{angular}");
-    }
 }

@@ -1,6 +1,6 @@
 //! A structure that turns at one set of parameters: solvability, growth of sliding contact, and what casings add.
 
-use super::{Parameters, Sense};
+use super::Parameters;
 use crate::dynamics::cyclic::CyclicModel;
 use crate::dynamics::modal::ModalModel;
 use crate::gaps::frame::Frame;
@@ -11,16 +11,13 @@ use crate::simulation::SAME_STEP;
 use crate::simulation::compile::Compiled;
 use crate::simulation::plan::PairPlan;
 use crate::stability::massless::MasslessLimit;
-use crate::stability::{self, ContactDirections, Growth, massless};
+use crate::stability::{self, ContactDirections, massless};
 use crate::system::System;
-use crate::{Error, Result, shown};
+use crate::{Result, shown};
 use nalgebra::DMatrix;
 
 /// Contact nodes up to this number are looked at in every combination; beyond, alone, in neighbouring pairs, and all.
 const ALL_COMBINATIONS_UP_TO: usize = 3;
-
-/// Words by which flutter is known.
-pub(super) const FLUTTER: &str = "physically unstable (flutter)";
 
 /// Angles at which the flexible slave is looked at.
 const SLAVE_ANGLES: u32 = 48;
@@ -83,45 +80,30 @@ fn yielding_most<'a>(
 }
 
 /// The step to expect was looked at by itself: it bounds a range of its own.
-fn with_expected<T>(mut ranges: Vec<(f64, Option<T>)>, expected: f64, found: Option<T>) -> Vec<(f64, Option<T>)> {
+pub(super) fn with_expected<T>(
+    mut ranges: Vec<(f64, Option<T>)>,
+    expected: f64,
+    found: Option<T>,
+) -> Vec<(f64, Option<T>)> {
     ranges.retain(|(step, _)| (step - expected).abs() > SAME_STEP * expected);
     ranges.push((expected, found));
     ranges.sort_by(|a, b| b.0.total_cmp(&a.0));
     ranges
 }
 
-/// What a look at growth is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Telling {
-    /// Refusals and warnings of flutter.
-    Flutter,
-    /// Refusals alone.
-    Refusals,
-}
-
-/// The model that grows most at the step to expect, and its growth with time continuous (1/s), which no step changes. At other
-/// steps only this one is looked at: with all nodal diameters of a disk at all steps the check would take a minute.
-#[derive(Debug, Clone, Copy)]
-struct Watched {
-    model: usize,
-    continuous: Option<f64>,
-}
-
 /// A structure of a scene with some parameters, about to be checked with all it touches.
 pub(super) struct Checking<'a> {
-    compiled: &'a Compiled,
+    pub(super) compiled: &'a Compiled,
     system: &'a System,
-    body: usize,
+    pub(super) body: usize,
     /// Contact nodes that meet a surface.
-    nodes: Vec<usize>,
+    pub(super) nodes: Vec<usize>,
     /// What the contact problem with all sectors closed decouples into: one uncoupled sector, or the nodal diameters as
     /// real structures; seen at these nodes.
     pub(super) models: Vec<ModalModel>,
-    parameters: &'a Parameters,
+    pub(super) parameters: &'a Parameters,
     /// Largest friction coefficient.
     pub(super) friction: f64,
-    /// Per sense of slip (+, −) and combination of nodes what grows most at the step to expect.
-    watched: [Vec<Watched>; 2],
 }
 
 impl<'a> Checking<'a> {
@@ -143,7 +125,6 @@ impl<'a> Checking<'a> {
         Self {
             models: models.into_iter().map(seen).collect(),
             friction: parameters.friction_of(compiled, body),
-            watched: [Vec::new(), Vec::new()],
             compiled,
             system,
             body,
@@ -152,7 +133,7 @@ impl<'a> Checking<'a> {
         }
     }
 
-    fn disk(&self) -> Option<&CyclicModel> {
+    pub(super) fn disk(&self) -> Option<&CyclicModel> {
         self.compiled.bodies[self.body].disk.as_ref()
     }
 
@@ -178,18 +159,6 @@ impl<'a> Checking<'a> {
         warnings.extend(casing);
         warnings.extend(more);
         Ok(warnings)
-    }
-
-    /// Growth of sliding contact at the step to expect and at all others, in one sense.
-    pub(super) fn sense(&mut self, sense: usize, expected: f64) -> Sense {
-        if self.friction == 0.0 {
-            return Sense { outcome: Ok(Vec::new()), ranges: Vec::new() };
-        }
-        let sign = [1.0, -1.0][sense];
-        let outcome = self.growth(expected, sign, Telling::Flutter);
-        let steps = stability::growth_steps(self.largest_frequency(), self.parameters.step);
-        let ranges = steps.map(|step| (step, self.growth(step, sign, Telling::Refusals).err())).collect();
-        Sense { ranges: with_expected(ranges, expected, outcome.as_ref().err().cloned()), outcome }
     }
 
     /// Everything about the rotor at the step to expect; returns warnings.
@@ -313,7 +282,7 @@ impl<'a> Checking<'a> {
 
     /// Normals and slip directions of the contact nodes of one of the models on a round casing, as long as friction there is against
     /// the largest; both parts of a nodal diameter have the same.
-    fn directions(&self, model: &ModalModel, sense: f64) -> ContactDirections {
+    pub(super) fn directions(&self, model: &ModalModel, sense: f64) -> ContactDirections {
         let rom = self.compiled.body(self.body).1;
         let nodes = self.nodes.iter().cycle().take(model.contact_modes.nrows() / 3);
         nodes
@@ -334,7 +303,7 @@ impl<'a> Checking<'a> {
         pair.map_or(0, |(pair, _)| pair)
     }
 
-    fn friction_at(&self, node: usize) -> f64 {
+    pub(super) fn friction_at(&self, node: usize) -> f64 {
         self.parameters.friction[self.pair_at(node)]
     }
 
@@ -344,7 +313,7 @@ impl<'a> Checking<'a> {
 
     /// Sets of closed contact nodes: all combinations of a few; of many every one alone, neighbours, and all; of a disk,
     /// on all sectors, every one alone and all.
-    fn combinations(&self) -> Vec<Vec<usize>> {
+    pub(super) fn combinations(&self) -> Vec<Vec<usize>> {
         let nodes = self.nodes.len();
         if self.disk().is_some() {
             let all = (nodes > 1).then(|| (0..nodes).collect());
@@ -357,81 +326,5 @@ impl<'a> Checking<'a> {
         let alone = (0..nodes).map(|node| vec![node]);
         let pairs = (1..nodes).map(|node| vec![node - 1, node]);
         alone.chain(pairs).chain([(0..nodes).collect()]).collect()
-    }
-
-    /// Growth of closed sliding contact at one step size and sense of slip; returns warnings of flutter.
-    fn growth(&mut self, step: f64, sense: f64, telling: Telling) -> Result<Vec<String>> {
-        let mut warnings = Vec::new();
-        for (combination, nodes) in self.combinations().iter().enumerate() {
-            let watched = self.watched[usize::from(sense < 0.0)].get(combination).copied();
-            let models = watched.map_or(0..self.models.len(), |watched| watched.model..watched.model + 1);
-            let (mut flutter, mut most) = (0.0_f64, (Watched { model: 0, continuous: None }, f64::NEG_INFINITY));
-            for model in models {
-                let known = watched.and_then(|watched| watched.continuous);
-                let Some(found) = self.growth_of(model, nodes, step, sense, known) else { continue };
-                if found.is_added() {
-                    return Err(self.refusal(nodes, sense, step, found));
-                }
-                if found.is_flutter() {
-                    flutter = flutter.max(found.continuous);
-                }
-                if found.stepped > most.1 {
-                    most = (Watched { model, continuous: Some(found.continuous) }, found.stepped);
-                }
-            }
-            if watched.is_none() {
-                self.watched[usize::from(sense < 0.0)].push(most.0);
-            }
-            if telling == Telling::Flutter && flutter > 0.0 {
-                warnings.push(format!("{} is {FLUTTER}, growth rate {flutter:.3e} 1/s", self.contact(nodes, sense)));
-            }
-        }
-        Ok(warnings)
-    }
-
-    /// Growth of one of the models with contact closed at some nodes (of both parts of a nodal diameter); `known` is that with
-    /// time continuous (1/s).
-    fn growth_of(&self, model: usize, nodes: &[usize], step: f64, sense: f64, known: Option<f64>) -> Option<Growth> {
-        let (model, friction, scheme) = (&self.models[model], self.friction, self.parameters.scheme);
-        let all = self.directions(model, sense);
-        let own = self.nodes.len();
-        let places = (0..all.len() / own).flat_map(|part| nodes.iter().map(move |node| part * own + node));
-        let places: Vec<usize> = places.collect();
-        let directions = places.iter().map(|place| all[*place]).collect();
-        let seen = model.with_nodes(&places);
-        let continuous = || stability::continuous(&seen, scheme, self.parameters.step, friction, &directions);
-        stability::stepped(&seen, scheme, step, friction, &directions, known.or_else(continuous)?)
-    }
-
-    /// Which contact is meant.
-    fn contact(&self, nodes: &[usize], sense: f64) -> String {
-        let all = &self.compiled.body(self.body).1.contact_nodes;
-        let names: Vec<&str> = nodes.iter().map(|node| all[self.nodes[*node]].name.as_str()).collect();
-        let direction = if sense > 0.0 { "+θ" } else { "−θ" };
-        let where_closed = if self.disk().is_some() { " of all sectors" } else { "" };
-        let mut frictions: Vec<f64> = nodes.iter().map(|node| self.friction_at(self.nodes[*node])).collect();
-        frictions.sort_by(f64::total_cmp);
-        frictions.dedup();
-        let frictions: Vec<String> = frictions.into_iter().map(|friction| shown(friction).to_string()).collect();
-        format!(
-            "with µ = {}, contact closed at {}{where_closed} and sliding in {direction}",
-            frictions.join(" and "),
-            names.join(", ")
-        )
-    }
-
-    fn refusal(&self, nodes: &[usize], sense: f64, step: f64, found: Growth) -> Error {
-        Error::Unstable {
-            problem: format!(
-                "{} grows by {:.3e} 1/s when stepped with h = {step:.3e} s, by {:.3e} 1/s without time discretisation",
-                self.contact(nodes, sense),
-                found.stepped,
-                found.continuous
-            ),
-            remedy:
-                "Use a smaller internal step (internal_step_max, or a shorter communication step), less friction or \
-                     more damping"
-                    .to_owned(),
-        }
     }
 }

@@ -8,7 +8,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{BodyLimits, Parameters, Sense};
+use super::{BodyLimits, Closing, Parameters, Sense};
 use crate::dynamics::modal::ModalModel;
 use crate::gaps::open::{OpenGap, tangent};
 use crate::gaps::{GapLaw, Geometry, dot};
@@ -43,10 +43,10 @@ impl Compiled {
         let resolved = stability::unresolved::check(step, unresolved, model.largest_frequency());
         let flight = Flight { compiled: self, system, body, parameters };
         let outcome = resolved.and_then(|()| flight.warnings(step));
-        let quiet = || Some(Sense { outcome: Ok(Vec::new()), ranges: Vec::new() });
         BodyLimits {
             outcome,
-            senses: [quiet(), quiet()],
+            senses: [Some(Sense::default()), Some(Sense::default())],
+            closing: Closing::of_run(self),
             massless: MasslessLimit::NONE,
             casing: Vec::new(),
             unresolved,

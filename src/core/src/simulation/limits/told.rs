@@ -10,8 +10,8 @@ use crate::stability::{self, massless};
 const MATERIAL: f64 = 1.5;
 
 /// What depends on the step: modes of the master and of carriers that are not resolved, contact of massless-boundary that gains
-/// energy, casings that spoil solvability.
-const KINDS: usize = 4;
+/// energy, flexibility that is passed over, casings that spoil solvability.
+const KINDS: usize = 5;
 
 /// What was told since the start.
 #[derive(Debug, Clone)]
@@ -32,7 +32,7 @@ impl Told {
     /// Nothing, of so many structures that touch, and that carry surfaces.
     pub(in crate::simulation) fn new(bodies: usize, carriers: usize) -> Self {
         Self {
-            steps: [bodies, carriers, bodies, bodies].map(|count| vec![0.0; count]),
+            steps: [bodies, carriers, bodies, bodies, bodies].map(|count| vec![0.0; count]),
             senses: vec![[false; 2]; bodies],
             fastest: vec![0.0; bodies],
             friction: vec![0; bodies],
@@ -54,9 +54,9 @@ impl Simulation {
         let mut doubts = self.compiled.doubts();
         for (body, speed) in self.speeds().into_iter().enumerate() {
             let mut told = [false; 2];
-            senses_of(parameters.senses[body]).for_each(|sense| told[sense] = true);
+            senses_of(parameters.speeds[body]).for_each(|sense| told[sense] = true);
             self.told.senses[body] = told;
-            self.told.friction[body] = self.warnings_of(body, parameters.senses[body]).len();
+            self.told.friction[body] = self.warnings_of(body, parameters.speeds[body]).len();
             let rom = self.compiled.body(body).1;
             let fast = plausibility::of_speed(rom, speed);
             self.told.fastest[body] = if fast.is_some() { f64::INFINITY } else { plausibility::fastest(rom) };
@@ -72,7 +72,7 @@ impl Simulation {
 
     /// Warnings of another friction coefficient, of each structure unless as many of it were told before.
     pub(in crate::simulation) fn tell_of_friction(&mut self, parameters: &Parameters) {
-        for (body, sense) in parameters.senses.iter().enumerate() {
+        for (body, sense) in parameters.speeds.iter().enumerate() {
             let warnings = self.warnings_of(body, *sense);
             if warnings.len() > self.told.friction[body] {
                 self.told.friction[body] = warnings.len();
@@ -110,10 +110,9 @@ impl Simulation {
         }
         for sense in senses_of(speed).filter(|_| speed != 0.0) {
             if !std::mem::replace(&mut self.told.senses[body][sense], true) {
-                let found = self
-                    .limits
-                    .as_ref()
-                    .map_or(Vec::new(), |limits| limits.bodies[body].of_sense(sense, &self.compiled.rotor_name(body)));
+                let found = self.limits.as_ref().map_or(Vec::new(), |limits| {
+                    limits.bodies[body].of_sense(sense, speed, &self.compiled.rotor_name(body))
+                });
                 found.into_iter().for_each(|text| self.note(text));
             }
         }
@@ -135,6 +134,8 @@ impl Simulation {
                 unresolved(highest).map(|text| format!("{name}: {text}"))
             }
             2 => massless::warning(step, limits.bodies[of].massless).map(|text| self.compiled.named(of, text)),
+            3 => stability::unresolved::warning(step, limits.bodies[of].unresolved)
+                .map(|text| self.compiled.named(of, text)),
             _ => in_range(&limits.bodies[of].casing, step).cloned(),
         }
     }
@@ -155,17 +156,19 @@ impl Simulation {
         for (index, (body, told)) in limits.bodies.iter().zip(&self.told.senses).enumerate() {
             let other = [0, 1].into_iter().filter(|sense| !told[*sense] && body.senses[*sense].is_some());
             let rotor = self.compiled.rotor_name(index);
-            found.extend(other.flat_map(|sense| body.of_sense(sense, &rotor)));
+            let speed = limits.parameters.speeds[index];
+            found.extend(other.flat_map(|sense| body.of_sense(sense, speed, &rotor)));
         }
         found
     }
 }
 
 impl BodyLimits {
-    /// What contact of a `rotor` that slides in a sense does at the step expected.
-    fn of_sense(&self, sense: usize, rotor: &str) -> Vec<String> {
-        match self.senses[sense].as_ref().map(|sense| &sense.outcome) {
-            Some(Ok(warnings)) => warnings.clone(),
+    /// What contact of a `rotor` that slides in a sense does at the step expected and at a speed (rad/s).
+    fn of_sense(&self, sense: usize, speed: f64, rotor: &str) -> Vec<String> {
+        let closed = self.closing.time(speed);
+        match self.senses[sense].as_ref().map(|sense| sense.warnings(closed)) {
+            Some(Ok(warnings)) => warnings,
             Some(Err(refusal)) => vec![refusal.to_string()],
             None => vec![format!(
                 "{rotor} turns the other way than at the start: whether contact that slides that way grows was not looked at, \

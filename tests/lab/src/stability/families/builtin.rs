@@ -66,7 +66,26 @@ fn rotor37() -> Vec<Case> {
             }
         }
     }
+    // Steps at which growth by the mass of contact nodes goes up and down, whatever it does to the run.
+    for friction in [0.15, 0.4, 0.8] {
+        for step in [5e-7, 1e-6, 2e-6, 4e-6] {
+            let expected = Expected::either_as("the same with a fourth of the step", &[&["time.step"], &["µ below"]]);
+            let name = format!("rotor37/growth/µ={friction}/h={step:e}");
+            let work = move |_: &_| Happened::of(grown(friction, step));
+            cases.push(Case::new(name, expected, work).within(300.0));
+        }
+    }
     cases
+}
+
+/// Against bumps that nothing moves.
+fn grown(friction: f64, step: f64) -> Result<Vec<Check>> {
+    let Some(rom) = model("rotor37") else { return Ok(Vec::new()) };
+    let mut scene = super::super::models::bumps(rom);
+    scene.settings.contacts[0].friction = friction;
+    scene.settings.structures[0].speed = 1800.0;
+    scene.settings.surfaces[0].moving = false;
+    against_finer(&with_methods(scene, Scheme::ModalExact, Solver::Lcp), step, 150, 0.1)
 }
 
 fn at_limit(scheme: Scheme, solver: Solver, factor: f64) -> Happened {

@@ -22,7 +22,7 @@ pub(crate) fn cases() -> Vec<Case> {
 pub(crate) fn massless_step(scene: &Scene) -> Option<f64> {
     let scene = with_step(with_methods(scene.clone(), Scheme::MasslessBoundary, Solver::Lcp), 1e-2);
     let refusal = Simulation::new(&scene).and_then(|mut simulation| simulation.initialise(0.0)).err()?.to_string();
-    refusal.split("Set the internal step below ").nth(1)?.split(' ').next()?.parse().ok()
+    refusal.split("`internal_step_max`) below ").nth(1)?.split(' ').next()?.parse().ok()
 }
 
 fn step_limit() -> Vec<Case> {

@@ -1,0 +1,93 @@
+//! How long a contact stays closed, as far as the start tells.
+
+use std::f64::consts::{PI, TAU};
+
+use crate::gaps::shape::Surface;
+use crate::settings::SpinSettings;
+use crate::simulation::compile::Compiled;
+
+/// Angles at which a shape is looked at.
+const ANGLES: u32 = 3600;
+/// Contact that may stay closed for long is taken to do so for the run of the scene, and for this (s) at least: importers run on.
+const A_WHILE: f64 = 1.0;
+
+/// Bounds on the time that a contact of one structure stays closed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Closing {
+    /// Widest angle over which the undeformed structure is inside a shape that nothing moves (rad); infinite where inputs, loads or a
+    /// flexible surface may hold contact for long.
+    arc: f64,
+    /// Half a period of the slowest mode (s): for so long a blade that swings may press on after it has passed the shape.
+    after: f64,
+    /// The run of the scene, or longer (s).
+    run: f64,
+}
+
+impl Closing {
+    /// Of what flies freely.
+    pub fn of_run(compiled: &Compiled) -> Self {
+        let experiment = &compiled.scene.settings.experiment;
+        Self { arc: f64::INFINITY, after: 0.0, run: (experiment.stop - experiment.start).max(A_WHILE) }
+    }
+
+    /// Of a structure that turns.
+    pub fn new(compiled: &Compiled, body: usize) -> Self {
+        let (structure, _) = compiled.body(body);
+        let pairs = compiled.plan.pairs_of(body);
+        let is_held = structure.whirl || structure.axial_shift || structure.spin != SpinSettings::default();
+        let arc = |(pair, plan): (usize, &crate::simulation::plan::PairPlan)| {
+            let surface = compiled.plan.surface(&compiled.scene.settings, pair);
+            let contact = compiled.contact(pair);
+            if is_held || surface.moving || plan.carrier.is_some() {
+                return f64::INFINITY;
+            }
+            let closest = contact.sector_gaps.iter().copied().fold(contact.nominal_gap(), f64::min);
+            Surface::new(&surface.shape, contact.nominal_gap()).map_or(f64::INFINITY, |shape| widest(&shape, closest))
+        };
+        let arc = pairs.map(arc).fold(0.0, f64::max);
+        Self { arc, after: PI / compiled.bodies[body].lowest_frequency(), ..Self::of_run(compiled) }
+    }
+
+    /// Longest time (s) at a speed (rad/s).
+    pub fn time(&self, speed: f64) -> f64 {
+        // 0/0 where nothing is inside and nothing turns.
+        let passing = if speed == 0.0 { f64::INFINITY } else { self.arc / speed.abs() };
+        (passing + self.after).min(self.run)
+    }
+}
+
+/// Widest angle (rad) over which a shape reaches further in than `gap` (m); infinite where it does all around.
+fn widest(shape: &Surface, gap: f64) -> f64 {
+    let spacing = TAU / f64::from(ANGLES);
+    let is_inside = |place: u32| gap + shape.evaluate(spacing * f64::from(place)).0 <= 0.0;
+    let (mut widest, mut now) = (0_u32, 0_u32);
+    // Twice around: arcs may lie across the start.
+    for place in 0..2 * ANGLES {
+        now = if is_inside(place) { now + 1 } else { 0 };
+        widest = widest.max(now);
+    }
+    if widest >= ANGLES { f64::INFINITY } else { spacing * f64::from(widest + 1) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Shape;
+
+    #[test]
+    fn arcs_are_those_of_the_shape() {
+        let lobes = |amplitude| Surface::new(&Shape::Lobes { amplitude, order: 2, phase: 0.3 }, 1e-3).unwrap();
+        // −A cos 2θ reaches A/√2 over half a right angle, one spacing more at most.
+        let found = widest(&lobes(1e-3), 1e-3 / 2.0_f64.sqrt());
+        assert!((PI / 4.0..PI / 4.0 + 0.005).contains(&found), "{found}");
+        assert!(widest(&lobes(1e-3), 2e-3) < 0.002);
+        assert!(widest(&Surface::Circular, 0.0).is_infinite());
+        // Across the start of the angle.
+        let across = Surface::new(&Shape::Lobes { amplitude: 1e-3, order: 1, phase: 0.0 }, 1e-3).unwrap();
+        assert!((widest(&across, 0.0) - PI).abs() < 0.005);
+        let closing = Closing { arc: 0.1, after: 1e-4, run: 1e-2 };
+        assert!(
+            (closing.time(-1000.0) - 2e-4).abs() < 1e-18 && closing.time(0.0) == 1e-2 && closing.time(1e-3) == 1e-2
+        );
+    }
+}

@@ -1,0 +1,374 @@
+//! Growth of closed sliding contact: what the equations make of it is told in one warning, what the step adds is refused where it
+//! matters.
+
+use super::checking::{Checking, with_expected};
+use super::in_range;
+use crate::dynamics::modal::ModalModel;
+use crate::settings::Scheme;
+use crate::stability::judged::{self, Judged};
+use crate::stability::{self, ContactDirections, Fastest, digging};
+use crate::{Error, Result, shown};
+
+/// Beginnings of warnings, by which those of both senses are known as one.
+const GROWS: &str = "sliding contact";
+const STEP: &str = "the step makes sliding contact";
+/// A motion whose frequency (rad/s) is a smaller part of its rate grows without swinging.
+const SWINGS: f64 = 0.1;
+/// Steps looked at, at most.
+const MOST_STEPS: usize = 13;
+/// Growth with and without the mass of the contact nodes within this factor is that of both.
+const ALIKE: f64 = 1.25;
+
+/// Contact that slides in one sense.
+#[derive(Debug, Clone, Default)]
+pub struct Sense {
+    /// What the equations make of it, where it grows.
+    pub grows: Option<String>,
+    /// Step to expect (s).
+    expected: f64,
+    /// Largest step of each range of step sizes (s), descending, and what it adds.
+    ranges: Vec<(f64, Option<Added>)>,
+}
+
+/// Growth that steps of one range, or shorter ones, add.
+#[derive(Debug, Clone)]
+struct Added {
+    /// How long contact may stay closed (s): without a refusal, and without a warning.
+    allowed: f64,
+    quiet: f64,
+    refusal: Error,
+    warning: String,
+}
+
+impl Sense {
+    /// Refuse a step (s) that adds growth which matters while contact stays closed for a time (s). Allocates only to refuse.
+    ///
+    /// # Errors
+    /// [`Error::Unstable`] with numbers.
+    pub fn check(&self, step: f64, closed: f64) -> Result<()> {
+        match in_range(&self.ranges, step).filter(|added| closed > added.allowed) {
+            Some(added) => Err(added.refusal.clone()),
+            None => Ok(()),
+        }
+    }
+
+    /// Warnings for the step to expect.
+    ///
+    /// # Errors
+    /// As [`Sense::check`].
+    pub fn warnings(&self, closed: f64) -> Result<Vec<String>> {
+        self.check(self.expected, closed)?;
+        let added = in_range(&self.ranges, self.expected).filter(|added| closed > added.quiet);
+        Ok(self.grows.iter().cloned().chain(added.map(|added| added.warning.clone())).collect())
+    }
+
+    /// Put the name of the structure before all texts.
+    pub fn name(&mut self, name: &str) {
+        let named = |text: &mut String| *text = format!("{name}: {text}");
+        self.grows.iter_mut().for_each(named);
+        for added in self.ranges.iter_mut().filter_map(|(_, added)| added.as_mut()) {
+            named(&mut added.warning);
+            if let Error::Unstable { problem, .. } = &mut added.refusal {
+                named(problem);
+            }
+        }
+    }
+}
+
+/// Whether two warnings are of one kind, told of both senses of one structure.
+pub fn are_alike(one: &str, other: &str) -> bool {
+    let kind = |text: &str| [STEP, GROWS].into_iter().find_map(|kind| Some(text[..text.find(kind)?].to_owned() + kind));
+    kind(one).is_some_and(|own| kind(other) == Some(own))
+}
+
+/// The model that grows most at the step to expect with some nodes closed, and its growth with time continuous, which no step changes.
+/// At other steps only this one is looked at: with all nodal diameters of a disk at all steps the check would take a minute.
+struct Watched {
+    nodes: Vec<usize>,
+    model: usize,
+    continuous: Fastest,
+    judged: Judged,
+}
+
+/// The motion that grows fastest by the equations.
+struct Flutter {
+    found: Fastest,
+    nodes: Vec<usize>,
+    /// With the mass of the contact nodes, where that was left out.
+    with_mass: Option<Fastest>,
+    /// Share of what contact displaces that it moves until contact opens.
+    share: f64,
+}
+
+/// What grows by the equations.
+#[derive(Default)]
+struct Physics {
+    flutter: Option<Flutter>,
+    /// Least friction with which the tip digs in, where it is closed, and the fastest growth without swinging (1/s).
+    digging: Option<(f64, Vec<usize>)>,
+    divergence: f64,
+}
+
+impl Physics {
+    fn add(&mut self, own: Flutter) {
+        // Of coupled sectors divergence drifts slowly around the disk, and double roots are apart by rounding.
+        if own.found.frequency < SWINGS * own.found.rate {
+            self.divergence = self.divergence.max(own.found.rate);
+        } else if self.flutter.as_ref().is_none_or(|known| own.found.rate > known.found.rate) {
+            self.flutter = Some(own);
+        }
+    }
+
+    fn digs(&mut self, least: f64, nodes: &[usize]) {
+        if self.digging.as_ref().is_none_or(|known| least < known.0) {
+            self.digging = Some((least, nodes.to_vec()));
+        }
+    }
+}
+
+impl Checking<'_> {
+    /// Growth of sliding contact in one sense, at the step to expect (s) and at all others.
+    pub(super) fn sense(&self, sense: usize, expected: f64) -> Sense {
+        if self.friction == 0.0 {
+            return Sense::default();
+        }
+        let sign = [1.0, -1.0][sense];
+        let (watched, physics) = self.watched(expected, sign);
+        let steps = looked_at(self.largest_frequency(), self.parameters.step).into_iter();
+        let most = |of: &dyn Fn(&Watched) -> Option<Judged>| {
+            let judged = watched.iter().filter_map(|watched| Some((watched.nodes.as_slice(), of(watched)?)));
+            judged.fold(None, |most: Option<(&[usize], Judged)>, found| match most {
+                Some(known) if known.1.within(judged::TOLD) <= found.1.within(judged::TOLD) => Some(known),
+                _ => Some(found),
+            })
+        };
+        let at = |step: f64| most(&|watched| self.judged(watched, step, sign));
+        let ranges: Vec<_> = steps.map(|step| (step, at(step))).collect();
+        let ranges = with_expected(ranges, expected, most(&|watched| Some(watched.judged)));
+        Sense { grows: self.grows(&physics, sign), expected, ranges: self.added(&ranges, sign) }
+    }
+
+    /// What the equations make of contact that slides in one sense, whatever the step.
+    pub(super) fn physics(&self, sense: usize, expected: f64) -> Sense {
+        if self.friction == 0.0 {
+            return Sense::default();
+        }
+        let sign = [1.0, -1.0][sense];
+        let (_, physics) = self.watched(expected, sign);
+        Sense { grows: self.grows(&physics, sign), expected, ranges: Vec::new() }
+    }
+
+    /// Everything at the step to expect.
+    fn watched(&self, expected: f64, sign: f64) -> (Vec<Watched>, Physics) {
+        let (mut watched, mut physics) = (Vec::new(), Physics::default());
+        // The equations of galerkin are those of massless-boundary.
+        let scheme = match self.parameters.scheme {
+            Scheme::Galerkin => Scheme::MasslessBoundary,
+            scheme => scheme,
+        };
+        let noise = 1e-7 / self.parameters.step;
+        for nodes in self.combinations() {
+            let mut most: Option<Watched> = None;
+            for model in 0..self.models.len() {
+                let (seen, directions) = self.closed_at(model, &nodes, sign);
+                let largest = self.parameters.step;
+                let Some(continuous) = stability::continuous(&seen, scheme, largest, self.friction, &directions) else {
+                    continue;
+                };
+                let without = if scheme.acts_later() {
+                    Some(continuous)
+                } else {
+                    stability::without_node_mass(&seen, largest, self.friction, &directions)
+                };
+                let physical = without.unwrap_or(continuous);
+                if physical.rate > noise {
+                    let with_mass = without.filter(|_| !scheme.acts_later()).map(|_| continuous);
+                    let share = judged::share_of(&seen, &directions, physical.frequency);
+                    physics.add(Flutter { found: physical, nodes: nodes.clone(), with_mass, share });
+                }
+                let least = digging::least_friction(&seen, &directions).filter(|least| *least < self.friction);
+                least.into_iter().for_each(|least| physics.digs(least, &nodes));
+                let found = stability::stepped(&seen, scheme, expected, self.friction, &directions, continuous);
+                let Some(growth) = found else { continue };
+                if most.as_ref().is_none_or(|most| growth.stepped > most.judged.growth.stepped) {
+                    let judged = Judged::new(&seen, scheme, &directions, growth);
+                    most = Some(Watched { nodes: nodes.clone(), model, continuous, judged });
+                }
+            }
+            watched.extend(most);
+        }
+        (watched, physics)
+    }
+
+    fn judged(&self, watched: &Watched, step: f64, sign: f64) -> Option<Judged> {
+        let (seen, directions) = self.closed_at(watched.model, &watched.nodes, sign);
+        let (scheme, friction) = (self.parameters.scheme, self.friction);
+        let growth = stability::stepped(&seen, scheme, step, friction, &directions, watched.continuous)?;
+        Some(Judged::new(&seen, scheme, &directions, growth))
+    }
+
+    /// One of the models seen at closed nodes (at both parts of a nodal diameter), and their directions.
+    fn closed_at(&self, model: usize, nodes: &[usize], sign: f64) -> (ModalModel, ContactDirections) {
+        let all = self.directions(&self.models[model], sign);
+        let own = self.nodes.len();
+        let places = (0..all.len() / own).flat_map(|part| nodes.iter().map(move |node| part * own + node));
+        let places: Vec<usize> = places.collect();
+        (self.models[model].with_nodes(&places), places.iter().map(|place| all[*place]).collect())
+    }
+
+    /// Limits of every range: what a shorter step is refused or told for, a longer one is too.
+    fn added(&self, ranges: &[(f64, Option<(&[usize], Judged)>)], sign: f64) -> Vec<(f64, Option<Added>)> {
+        let mut added: Vec<(f64, Option<Added>)> = Vec::new();
+        let (mut allowed, mut quiet) = (f64::INFINITY, f64::INFINITY);
+        let (mut accepted, mut silent) = (None, None);
+        let mut worst: Option<(f64, &[usize], Judged)> = None;
+        for (step, found) in ranges.iter().rev() {
+            if let Some((nodes, judged)) = found {
+                let own = judged.within(judged::TOLD);
+                if own < quiet {
+                    (quiet, worst) = (own, Some((*step, *nodes, *judged)));
+                }
+                allowed = allowed.min(judged.allowed());
+            }
+            if allowed.is_infinite() {
+                accepted = Some(*step);
+            }
+            if quiet.is_infinite() {
+                silent = Some(*step);
+            }
+            let text = worst.map(|worst| Added {
+                allowed,
+                quiet,
+                refusal: self.refusal(worst, accepted, sign),
+                warning: self.warning(worst, silent, sign),
+            });
+            added.push((*step, text));
+        }
+        added.reverse();
+        added
+    }
+
+    /// Which contact is meant.
+    fn contact(&self, nodes: &[usize], sign: f64) -> String {
+        let all = &self.compiled.body(self.body).1.contact_nodes;
+        let names: Vec<&str> = nodes.iter().map(|node| all[self.nodes[*node]].name.as_str()).collect();
+        let names = match names.as_slice() {
+            [first, .., last] if names.len() > 3 => format!("{first} to {last}"),
+            names => names.join(", "),
+        };
+        let where_closed = if self.disk().is_some() { " of all sectors" } else { "" };
+        let mut frictions: Vec<f64> = nodes.iter().map(|node| self.friction_at(self.nodes[*node])).collect();
+        frictions.sort_by(f64::total_cmp);
+        frictions.dedup();
+        let frictions: Vec<String> = frictions.into_iter().map(|friction| shown(friction).to_string()).collect();
+        let sense = if sign > 0.0 { "+θ" } else { "−θ" };
+        format!("closed at {names}{where_closed}, sliding in {sense} with µ = {}", frictions.join(" and "))
+    }
+
+    /// What grows by the equations, in words.
+    fn grows(&self, physics: &Physics, sign: f64) -> Option<String> {
+        let mut parts = Vec::new();
+        if let Some((least, nodes)) = &physics.digging {
+            let rate = match physics.divergence {
+                0.0 => String::new(),
+                rate => format!(", at {rate:.2e} 1/s and 0 Hz"),
+            };
+            parts.push(format!(
+                "digs in: above µ* = {least:.3} ({}) the tip turns into the casing faster than it yields, and its force grows \
+                 without end{rate}",
+                self.contact(nodes, sign)
+            ));
+        }
+        if let Some(Flutter { found, nodes, with_mass, share }) = &physics.flutter {
+            parts.push(format!(
+                "is physically unstable (flutter): {}, vibration at {:.4} kHz grows by {:.2e} 1/s{} and moves tips by up to {:.1} % of \
+                 what contact does",
+                self.contact(nodes, sign),
+                1e-3 * found.frequency / std::f64::consts::TAU,
+                found.rate,
+                confirmed(found, with_mass.as_ref()),
+                100.0 * share
+            ));
+        }
+        if parts.is_empty() {
+            return None;
+        }
+        let remedy = if physics.digging.is_some() {
+            "Use less friction, a casing that gives way, or a coating"
+        } else {
+            "Use less friction or more damping, or see to it that contact opens sooner than that"
+        };
+        Some(format!(
+            "{GROWS} {}. It is in the equations, and no shorter step helps. {remedy}",
+            parts.join("; and it ")
+        ))
+    }
+
+    fn warning(&self, (step, nodes, judged): (f64, &[usize], Judged), silent: Option<f64>, sign: f64) -> String {
+        format!(
+            "{STEP} grow: {} at {:.2e} 1/s with steps of {} s, where the equations have {:.2e} 1/s; that may displace the tips by \
+             {:.0} % of what contact does{}",
+            self.contact(nodes, sign),
+            judged.growth.stepped,
+            shown(rounded(step)),
+            judged.growth.continuous.max(0.0),
+            100.0 * judged.error(f64::INFINITY),
+            silent.map_or(String::new(), |step| format!(". Set `time.step` to {} or less", shown(below(step))))
+        )
+    }
+
+    fn refusal(&self, (step, nodes, judged): (f64, &[usize], Judged), accepted: Option<f64>, sign: f64) -> Error {
+        let step_remedy = accepted.map_or(String::new(), |step| {
+            format!("Set `time.step` (in the FMU `internal_step_max`) to {} or less, or use", shown(below(step)))
+        });
+        let step_remedy = if step_remedy.is_empty() { "Use".to_owned() } else { step_remedy };
+        Error::Unstable {
+            problem: format!(
+                "`time.step` is too long for friction: sliding contact {} grows by {:.2e} 1/s in steps of {} s, by {:.2e} 1/s in the \
+                 equations, and this alone may displace the tips by {:.0} % of what contact does",
+                self.contact(nodes, sign),
+                judged.growth.stepped,
+                shown(rounded(step)),
+                judged.growth.continuous,
+                100.0 * judged.error(f64::INFINITY)
+            ),
+            remedy: format!("{step_remedy} less friction or more damping"),
+        }
+    }
+}
+
+/// Whether the growth of a motion without the mass of the contact nodes is there with it too.
+fn confirmed(found: &Fastest, with_mass: Option<&Fastest>) -> String {
+    match with_mass {
+        Some(other) if other.rate < ALIKE * found.rate && found.rate < ALIKE * other.rate => {
+            " (with and without the mass of the contact nodes alike, so that more modes will hardly change it)"
+                .to_owned()
+        }
+        Some(other) => format!(
+            " (without the mass of the contact nodes; {:.2e} 1/s with it, so that more modes may change it)",
+            other.rate.max(0.0)
+        ),
+        None => String::new(),
+    }
+}
+
+/// Steps at which growth is looked at, descending from the largest (s): octaves from where every mode is resolved well, the same ones
+/// whatever the largest.
+fn looked_at(frequency: f64, largest: f64) -> Vec<f64> {
+    let octaves = (0..64).map(|octave| 0.1 / frequency * libm::exp2(f64::from(octave)));
+    let mut steps: Vec<f64> = octaves.take_while(|step| *step < largest * (1.0 - 1e-9)).chain([largest]).collect();
+    steps.reverse();
+    steps.truncate(MOST_STEPS);
+    steps
+}
+
+/// A step to three digits.
+fn rounded(step: f64) -> f64 {
+    format!("{step:.2e}").parse().unwrap_or(step)
+}
+
+/// The same, not above it.
+fn below(step: f64) -> f64 {
+    let near = rounded(step);
+    if near <= step { near } else { rounded(0.995 * step) }
+}

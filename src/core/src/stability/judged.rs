@@ -1,0 +1,194 @@
+//! What growth that the step adds does to a run.
+//!
+//! A motion that grows moves contact until contact opens: then its contact force is as large as what presses the contact, and it
+//! is displaced by no more than the share of the static flexibility that modes of its frequency and above have. Growth of a
+//! contact node on its own small mass at hundreds of kilohertz therefore displaces nothing to speak of, whatever its rate, and
+//! growth of bending moves the blade. What is smaller than [`TOLERANCE`] of the clearance does not matter: so growth at a rate σ
+//! is of interest for ln(1/tolerance)/σ, and shorter where contact opens sooner.
+
+use super::{ContactDirections, Growth, directional_modes};
+use crate::dynamics::modal::ModalModel;
+use crate::settings::Scheme;
+
+/// Share of the clearance below which displacements do not matter.
+pub const TOLERANCE: f64 = 1e-3;
+/// Errors beyond this share of what contact displaces are told.
+pub const TOLD: f64 = 0.01;
+/// Errors beyond this share are refused where the step makes more of the growth than the equations.
+pub const REFUSED: f64 = 0.05;
+/// Modes that take part in a motion may lie so much below its frequency: half an octave.
+const BELOW: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// Growth of one set of closed contacts at one step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Judged {
+    /// Its rates.
+    pub growth: Growth,
+    /// Share of the static flexibility that modes of the stepped motion's frequency and above have.
+    pub share: f64,
+}
+
+impl Judged {
+    /// The growth of a model under a scheme, with all contacts of `directions` closed.
+    pub fn new(model: &ModalModel, scheme: Scheme, directions: &ContactDirections, growth: Growth) -> Self {
+        // Contact forces that act a step late make motions of their own, beyond the frequencies of all modes; samples of central
+        // differences swing faster than what they are of.
+        let frequency = growth.swing.min(model.largest_frequency());
+        let share = if scheme.acts_later() { 1.0 } else { share_of(model, directions, frequency) };
+        Self { growth, share }
+    }
+
+    /// What the step makes of the motion at most, as a share of what contact displaces, while contact stays closed for a time (s).
+    pub fn error(&self, closed: f64) -> f64 {
+        -self.share * libm::expm1(-self.growth.added() * closed.min(self.grown()))
+    }
+
+    /// Time in which growth takes what does not matter to where contact opens (s).
+    fn grown(&self) -> f64 {
+        -libm::log(TOLERANCE) / self.growth.stepped.max(f64::MIN_POSITIVE)
+    }
+
+    /// Longest time (s) that contact may stay closed with this error at most; infinite where the error never exceeds it.
+    pub fn within(&self, error: f64) -> f64 {
+        if self.error(f64::INFINITY) <= error {
+            return f64::INFINITY;
+        }
+        -libm::log1p(-error / self.share) / self.growth.added()
+    }
+
+    /// Longest time (s) that contact may stay closed without a refusal; infinite where nothing is refused.
+    pub fn allowed(&self) -> f64 {
+        let by_equations = self.growth.added() <= self.growth.continuous.max(0.0);
+        if by_equations { f64::INFINITY } else { self.within(REFUSED) }
+    }
+}
+
+/// Share of the static flexibility along the normals that modes of an angular frequency (rad/s) and above have, those half an octave
+/// below included: of the contact with most.
+pub fn share_of(model: &ModalModel, directions: &ContactDirections, frequency: f64) -> f64 {
+    let frequency = BELOW * frequency;
+    if frequency <= 0.0 || model.frequencies.contains(&0.0) {
+        return 1.0;
+    }
+    let (normals, _) = directional_modes(model, 0.0, directions);
+    let share = |node: usize| {
+        let seen = |mode: usize| (normals[(node, mode)] / model.frequencies[mode]).powi(2);
+        let all: f64 = (0..model.len()).map(seen).sum();
+        let from: f64 = (0..model.len()).filter(|mode| model.frequencies[*mode] >= frequency).map(seen).sum();
+        if all > 0.0 { from / all } else { 0.0 }
+    };
+    (0..directions.len()).map(share).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stability::tests::radial;
+    use crate::stability::{delassus, growth};
+    use nalgebra::{DMatrix, DVector};
+    use tiprub_test_models::Random;
+
+    /// One contact node on modes of all frequencies, damped.
+    fn anything(random: &mut Random) -> ModalModel {
+        let modes = 5 + random.below(12);
+        let mut frequencies: Vec<f64> = (0..modes).map(|_| random.scale(1e3, 1e6)).collect();
+        frequencies.sort_by(f64::total_cmp);
+        ModalModel {
+            damping_ratios: vec![random.of(&[1e-3, 5e-3, 0.05]); modes],
+            contact_modes: random.matrix(3, modes),
+            shapes: DMatrix::identity(modes, modes),
+            quasi_static: 3,
+            frequencies,
+        }
+    }
+
+    /// The contact pressed by 1 at rest, and disturbed by a tolerance: whether it ever opens, and how far the node goes from its place,
+    /// as a share of what contact displaces it, over so many steps. `None` where the contact problem has no solution.
+    fn march(model: &ModalModel, scheme: Scheme, step: f64, friction: f64, steps: usize) -> Option<(bool, f64)> {
+        let coefficients = model.coefficients(scheme, step);
+        let (normals, forces) = directional_modes(model, friction, &radial());
+        let square = |mode: usize| model.frequencies[mode] * model.frequencies[mode];
+        let bent = DVector::from_fn(model.len(), |mode, _| forces[(0, mode)] / square(mode));
+        let (yielding, within) = ((&normals * &bent)[0], delassus(model, scheme, step, friction, &radial())[0]);
+        if yielding <= 0.0 || within <= 0.0 {
+            return None;
+        }
+        let rest = bent / yielding;
+        let size = (&model.contact_modes * &rest).amax();
+        let kicked = |mode: usize| TOLERANCE * rest[mode] * (step * model.frequencies[mode]).min(1.0);
+        let (mut now, mut increment) = (rest.clone(), DVector::from_fn(model.len(), |mode, _| kicked(mode)));
+        let mut contact = 1.0 / yielding;
+        let (mut opens, mut most) = (false, 0.0_f64);
+        for _ in 0..steps {
+            let mut next = DVector::from_fn(model.len(), |mode, _| {
+                let own = &coefficients[mode];
+                now[mode] * (1.0 - own.kappa) + own.beta * increment[mode] + own.delayed * forces[(0, mode)] * contact
+            });
+            contact = ((1.0 - (&normals * &next)[0]) / within).max(0.0);
+            opens |= contact == 0.0;
+            next +=
+                DVector::from_fn(model.len(), |mode, _| coefficients[mode].compliance * forces[(0, mode)] * contact);
+            increment = &next - &now;
+            now = next;
+            most = most.max((&model.contact_modes * (&now - &rest)).amax() / size);
+        }
+        Some((opens, most))
+    }
+
+    /// Contact that the equations bring to rest: steps that are accepted leave it there, and those that are refused let it go.
+    #[test]
+    fn what_is_accepted_stays_closed_and_what_is_refused_does_not() {
+        let mut random = Random(11);
+        let (mut accepted, mut refused, mut farthest) = (0, 0, 0.0_f64);
+        for _ in 0..4000 {
+            let model = anything(&mut random);
+            let scheme = random.of(&Scheme::RECURRENCES);
+            let (friction, product) = (random.scale(0.02, 1.5), random.scale(0.1, 1.9));
+            let step = product / model.largest_frequency()
+                * if scheme == Scheme::ModalExact { random.scale(1.0, 5.0) } else { 1.0 };
+            let Some(growth) = growth(&model, scheme, step, friction, &radial()) else { continue };
+            if growth.continuous > -1e-3 / step / 5e3 {
+                continue;
+            }
+            let judged = Judged::new(&model, scheme, &radial(), growth);
+            let steps = 3000;
+            let closed = step * f64::from(steps);
+            if judged.allowed() > closed {
+                if growth.added() == 0.0 && accepted > 200 {
+                    continue;
+                }
+                let Some((_, most)) = march(&model, scheme, step, friction, 3000) else { continue };
+                accepted += 1;
+                if most > farthest {
+                    farthest = most;
+                    println!("{most:.3} µ = {friction} h = {step:e} {scheme:?} {judged:?}");
+                }
+                assert!(most < 0.25, "{most:.3}: {scheme:?}, µ = {friction}, h = {step:e}, {judged:?}, {model:?}");
+            } else if growth.added() * closed > 20.0 {
+                let Some((opens, _)) = march(&model, scheme, step, friction, 3000) else { continue };
+                refused += 1;
+                assert!(opens, "{scheme:?}, µ = {friction}, h = {step:e}, {judged:?}, {model:?}");
+            }
+        }
+        println!("{accepted} accepted, displaced by {farthest:.3} at most; {refused} refused");
+        assert!(accepted > 100 && refused > 20, "{accepted} {refused}");
+    }
+
+    #[test]
+    fn a_longer_time_and_more_growth_are_a_larger_error() {
+        let of = |continuous: f64, stepped: f64, share: f64| Judged {
+            growth: Growth { continuous, frequency: 1e4, stepped, swing: 1e4, noise: 0.0 },
+            share,
+        };
+        // Small: share · a · T.
+        assert!((of(-5.0, 10.0, 0.5).error(1e-4) / 5e-4 - 1.0).abs() < 1e-3);
+        assert!(of(-5.0, 10.0, 1.0).allowed() < of(-5.0, 1.0, 1.0).allowed());
+        assert!((of(-5.0, 10.0, 1.0).error(of(-5.0, 10.0, 1.0).allowed()) / REFUSED - 1.0).abs() < 1e-9);
+        // What has no flexibility displaces nothing, and what the equations make most of is told only.
+        assert!(of(-5.0, 1e5, 0.9 * REFUSED).allowed().is_infinite());
+        let flutter = of(1000.0, 1500.0, 1.0);
+        assert!(flutter.allowed().is_infinite() && flutter.within(TOLD) < 1e-4);
+        assert!(of(1000.0, 2500.0, 1.0).allowed() < 1e-4);
+        assert!(of(1000.0, 900.0, 1.0).within(TOLD).is_infinite());
+    }
+}
