@@ -7,6 +7,7 @@
 
 #![warn(unreachable_pub)]
 pub mod cli;
+mod bases;
 mod conjugacy;
 mod convergence;
 mod cube;
@@ -16,3 +17,4 @@ mod inputs;
 mod modes;
 mod stability;
 mod stage;
+mod witness;
