@@ -69,6 +69,8 @@ const QUICK: Size = Size {
 enum Touching {
     Nodes(usize),
     Patches(usize),
+    /// Means across the thickness at Gauss's points along the chord.
+    Lines,
     /// Gauss's points of its faces.
     Points,
 }
@@ -78,6 +80,7 @@ impl Touching {
         match self {
             Self::Nodes(count) => format!("{count} nodes"),
             Self::Patches(count) => format!("{count} patches"),
+            Self::Lines => format!("{EACH} lines across per element"),
             Self::Points => format!("{EACH} × {EACH} points of every face"),
         }
     }
@@ -122,7 +125,7 @@ impl Size {
         let ([few, many], finest) = (self.patches.map(Touching::Patches), self.divisions[2]);
         let refined = self.divisions.iter().map(|division| (few, *division));
         let points = self.divisions[1..].iter().map(|division| (Touching::Points, *division));
-        refined.chain(points).chain([(many, finest), (Touching::Nodes(3), finest)]).collect()
+        refined.chain(points).chain([(many, finest), (Touching::Lines, finest), (Touching::Nodes(3), finest)]).collect()
     }
 }
 
@@ -156,11 +159,10 @@ impl Setting {
 
     fn parts(&self, touching: Touching) -> Result<Vec<Part>> {
         let told = |error| failure("the tip of the full blade", error);
+        let points = || Ok(Part::points(&self.blade.mesh, self.blade.mesh.set("tip").map_err(told)?, EACH));
         let contact = match touching {
-            Touching::Points => {
-                let tip = self.blade.mesh.set("tip").map_err(told)?;
-                return Ok(Part::points(&self.blade.mesh, tip, EACH));
-            }
+            Touching::Points => return points(),
+            Touching::Lines => return Ok(self.across(&points()?)),
             Touching::Nodes(count) => self.blade.contact_points(count),
             Touching::Patches(count) => self.blade.contact_patches(count),
         };
@@ -172,12 +174,24 @@ impl Setting {
             .collect())
     }
 
+    /// Points of the tip's faces as means across the thickness.
+    fn across(&self, points: &[Part]) -> Vec<Part> {
+        // Elements follow each other along the chord, then across; in a face the second parameter runs across.
+        let MeshCounts { chord, thickness, .. } = self.size.mesh;
+        let line = |place: usize| {
+            let one = |(other, across): (usize, usize)| points[(other * chord * EACH + place) * EACH + across].clone();
+            let all = (0..thickness).flat_map(|other| (0..EACH).map(move |across| (other, across)));
+            Part::together(&all.map(one).collect::<Vec<_>>())
+        };
+        (0..chord * EACH).map(line).collect()
+    }
+
     /// The scene around a reduced model.
     fn scene(&self, reduced: &Reduced, console: &Console) -> Result<Scene> {
         let (tip, kind) = match reduced.touching {
             Touching::Nodes(count) => (Tip::Nodes(count), ReductionKind::FixedInterface),
             Touching::Patches(count) => (Tip::Patches(count), ReductionKind::FreeInterface),
-            Touching::Points => return Err(Failure::new("study witness", "no model is reduced to points of faces", "")),
+            Touching::Lines | Touching::Points => return Err(Failure::new("study witness", "no model is reduced to lines or points", "")),
         };
         let options = Rotor37Options { tip, kind, modes: reduced.modes, ..self.options.clone() };
         let mut rom = reduction::rotor37(&options, console)?.rom;

@@ -4,7 +4,8 @@
 //! M(v⁺ − v) = −h K (u + h (v + v⁺)/4) + Σ p F,   u⁺ = u + h (v + v⁺)/2,   0 ≤ p ⟂ g/h + N v⁺ + r ≥ 0
 //!
 //! with gap g, its gradient N, the force row F = N − µT and the prescribed rate r at u + h v/2, t + h/2. The work of the forces over
-//! h (v + v⁺)/2 is what the energy changes by, to rounding. M + h²K/4 is factorised once; what tip forces do to the tip is kept.
+//! h (v + v⁺)/2 is what the energy changes by, to rounding. A = M + h²K/4 is factorised once; what tip forces do to the tip is kept.
+//! Without contact v⁺ = A⁻¹M(2v + 4u/h) − v − 4u/h.
 
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
@@ -174,7 +175,7 @@ impl Blade {
             found.friction_work.push(friction);
             found.displacements.push(self.watch(&watched, &u));
             found.strain.push(0.5 * dot(&u, &product(&self.stiffness, &u)));
-            let energy = found.strain[sample] + 0.5 * dot(&v, &product(&self.mass, &v));
+            let energy = found.strain[sample] + 0.5 * dot(&v, &self.momentum(&v));
             largest = largest.max(energy);
             off = off.max((energy - work).abs());
         }
@@ -184,10 +185,11 @@ impl Blade {
 
     /// Velocity after a step without contact.
     fn free(&self, factor: &Factor, u: &[f64], v: &[f64], h: f64) -> Vec<f64> {
-        let ahead: Vec<f64> = u.iter().zip(v).map(|(u, v)| h * (u + 0.25 * h * v)).collect();
-        let (momentum, pull) = (product(&self.mass, v), product(&self.stiffness, &ahead));
-        let solved = factor.solve(Mat::from_fn(self.order(), 1, |row, _| momentum[row] - pull[row]));
-        (0..self.order()).map(|row| solved[(row, 0)]).collect()
+        let past: Vec<f64> = u.iter().zip(v).map(|(u, v)| v + 4.0 / h * u).collect();
+        let both: Vec<f64> = past.iter().zip(v).map(|(past, v)| past + v).collect();
+        let momentum = self.momentum(&both);
+        let solved = factor.solve(Mat::from_fn(self.order(), 1, |row, _| momentum[row]));
+        past.iter().enumerate().map(|(row, past)| solved[(row, 0)] - past).collect()
     }
 
     fn watch(&self, watched: &[Part], u: &[f64]) -> Vec<f64> {

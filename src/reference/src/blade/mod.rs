@@ -22,6 +22,8 @@ pub struct Blade {
     rows: Vec<Option<usize>>,
     stiffness: SparseMatrix,
     mass: SparseMatrix,
+    /// Of every node that moves the others with their masses (kg): the same along x, y and z.
+    masses: Vec<Vec<(usize, f64)>>,
 }
 
 impl Blade {
@@ -35,7 +37,8 @@ impl Blade {
         let (stiffness, mass) = principal_pair(&model.stiffness, &model.mass, &free);
         let mut rows = vec![None; model.nodes.len()];
         free.iter().enumerate().step_by(3).for_each(|(row, dof)| rows[dof / 3] = Some(row));
-        Ok(Self { nodes: model.nodes, rows, stiffness, mass })
+        let masses = (0..free.len() / 3).map(|node| masses(&mass, node)).collect();
+        Ok(Self { nodes: model.nodes, rows, stiffness, mass, masses })
     }
 
     /// Degrees of freedom that move.
@@ -43,10 +46,28 @@ impl Blade {
         self.mass.order()
     }
 
+    /// M x.
+    fn momentum(&self, x: &[f64]) -> Vec<f64> {
+        let mut found = vec![0.0; x.len()];
+        for (node, row) in self.masses.iter().enumerate() {
+            for (other, mass) in row {
+                (0..3).for_each(|i| found[3 * node + i] += mass * x[3 * other + i]);
+            }
+        }
+        found
+    }
+
     /// M + c K.
     fn factor(&self, c: f64) -> Result<Factor> {
         self.mass.plus_scaled(c, &self.stiffness).factor("M + c K of the blade", "Clamp it, and mesh it soundly")
     }
+}
+
+/// Row of a node in the mass matrix, node by node.
+fn masses(mass: &SparseMatrix, node: usize) -> Vec<(usize, f64)> {
+    let range = mass.pattern.starts[3 * node]..mass.pattern.starts[3 * node + 1];
+    let entries = mass.pattern.rows[range.clone()].iter().zip(&mass.values[range]);
+    entries.filter(|(row, _)| **row % 3 == 0).map(|(row, value)| (row / 3, *value)).collect()
 }
 
 /// A x of a symmetric matrix.

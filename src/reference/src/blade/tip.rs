@@ -65,6 +65,15 @@ impl Part {
         Self { tip: Tip { radius, angle, slope }, shares: nodes.map(|(node, value)| (*node, value, angle)).collect() }
     }
 
+    /// Several as one: their mean.
+    pub fn together(parts: &[Self]) -> Self {
+        let share = 1.0 / parts.len() as f64;
+        let mean = |of: fn(&Tip) -> f64| share * parts.iter().map(|part| of(&part.tip)).sum::<f64>();
+        let tip = Tip { radius: mean(|tip| tip.radius), angle: mean(|tip| tip.angle), slope: mean(|tip| tip.slope) };
+        let shares = parts.iter().flat_map(|part| &part.shares);
+        Self { tip, shares: shares.map(|(node, weight, angle)| (*node, share * weight, *angle)).collect() }
+    }
+
     /// With the tip's angles counted from elsewhere (rad).
     #[must_use]
     pub fn turned(mut self, by: f64) -> Self {
