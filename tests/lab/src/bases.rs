@@ -31,12 +31,14 @@ const INTERVAL: f64 = 1e-5;
 const TRUE_DIVISION: u32 = 80;
 const MODEL_DIVISION: u32 = 40;
 /// Errors at which costs are compared.
-const EQUAL: [f64; 2] = [1e-2, 3e-3];
+const EQUAL: [f64; 2] = [3e-2, 1e-2];
 
 /// How big it is.
 struct Size {
     mesh: MeshCounts,
     modes: &'static [usize],
+    /// With fewer of them responses go beyond the frequencies that are kept.
+    covered: usize,
     /// Of the truth, and modes of the full model that responses are compared between.
     true_modes: usize,
     checked: usize,
@@ -52,6 +54,7 @@ const TYPICAL: u32 = 20;
 const FULL: Size = Size {
     mesh: MeshCounts { chord: 16, thickness: 2, span: 20 },
     modes: &[8, 12, 20, 40, 80],
+    covered: 20,
     true_modes: 320,
     checked: 30,
     patches: 9,
@@ -60,7 +63,8 @@ const FULL: Size = Size {
 };
 const QUICK: Size = Size {
     mesh: MeshCounts { chord: 4, thickness: 1, span: 5 },
-    modes: &[8, 24],
+    modes: &[6, 12],
+    covered: 12,
     true_modes: 60,
     checked: 12,
     patches: 3,
@@ -79,9 +83,8 @@ struct Basis {
 impl Basis {
     /// All, the paper's first and the default last.
     fn all(patches: usize) -> [Self; 4] {
-        let of = |patches| {
-            [ReductionKind::FixedInterface, ReductionKind::FreeInterface].map(|kind| Self { patches, kind })
-        };
+        let of =
+            |patches| [ReductionKind::FixedInterface, ReductionKind::FreeInterface].map(|kind| Self { patches, kind });
         let ([a, b], [c, d]) = (of(None), of(Some(patches)));
         [a, b, c, d]
     }
@@ -162,7 +165,8 @@ fn timed(scene: &Scene, modes: usize, truth: &Marched, size: &Size) -> Vec<Timed
     let of = |(scheme, division): (Scheme, u32)| {
         let scene = with(scene, scheme, division);
         let found = march(&scene, &[], division, samples).ok()?;
-        let start = || SceneRun::with_start_values(&scene, INTERVAL, division, &[]).map(|run| Box::new(run) as Box<dyn Run>);
+        let start =
+            || SceneRun::with_start_values(&scene, INTERVAL, division, &[]).map(|run| Box::new(run) as Box<dyn Run>);
         let seconds = run::time(&start, samples, 1, None).ok()?;
         Some(Timed {
             modes,
@@ -203,7 +207,7 @@ fn cheapest(all: &[Found], basis: Basis, error: f64) -> Option<Timed> {
 fn table(all: &[Found], frequency: f64) -> String {
     let mut text = format!(
         "| contact, basis | modes | flexibility | response to {:.1} kHz | rub | rub, massless | rub, against patches | largest step: central \
-         differences | massless-boundary | µs per step |\n|---|---|---|---|---|---|---|---|---|---|\n",
+         differences | modal-exact | massless-boundary | µs per step |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
         1e-3 * frequency
     );
     for one in all {
@@ -212,7 +216,7 @@ fn table(all: &[Found], frequency: f64) -> String {
             found.map_or("refused".to_owned(), |limit| format!("{:.2} µs", 1e6 * limit))
         };
         text.push_str(&format!(
-            "| {} | {} | {:.0e} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {} | {} | {:.0} |\n",
+            "| {} | {} | {:.0e} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {} | {} | {} | {:.0} |\n",
             one.basis.name(),
             one.modes,
             one.flexibility,
@@ -221,6 +225,7 @@ fn table(all: &[Found], frequency: f64) -> String {
             one.massless,
             one.patches,
             limit(Scheme::CentralDifference.name()),
+            limit(Scheme::ModalExact.name()),
             limit(Scheme::MasslessBoundary.name()),
             1e6 * one.step_time,
         ));
@@ -254,7 +259,8 @@ fn figure(all: &[Found], bases: &[Basis]) -> Result<Figure> {
     let line = |basis: &Basis| of(*basis).map(|one| (one.modes as f64, one.same.log10())).collect();
     let series = bases.iter().map(|basis| Series::line(basis.name(), line(basis))).collect();
     let plot = Plot { marked: true, ..Plot::new("modes", "log10 of the error of displacements", series) };
-    let mut sheet = Sheet::new(["basis", "modes", "flexibility", "response", "rub", "rub, massless", "rub, against patches"]);
+    let mut sheet =
+        Sheet::new(["basis", "modes", "flexibility", "response", "rub", "rub, massless", "rub, against patches"]);
     for (index, basis) in bases.iter().enumerate() {
         let row = |one: &Found| {
             vec![index as f64, one.modes as f64, one.flexibility, one.response, one.same, one.massless, one.patches]
@@ -269,7 +275,7 @@ fn figure(all: &[Found], bases: &[Basis]) -> Result<Figure> {
     })
 }
 
-fn statements(all: &[Found], bases: &[Basis]) -> Vec<Statement> {
+fn statements(all: &[Found], bases: &[Basis], covered: usize) -> Vec<Statement> {
     let pairs = || {
         bases.chunks(2).flat_map(|pair| {
             let of = |basis: Basis| all.iter().filter(move |one| one.basis == basis);
@@ -282,7 +288,7 @@ fn statements(all: &[Found], bases: &[Basis]) -> Vec<Statement> {
         each.collect::<Vec<_>>().join("; ")
     };
     let last = |basis: Basis| all.iter().rfind(|one| one.basis == basis);
-    let halves = bases.chunks(2).all(|pair| match (last(pair[0]), last(pair[1])) {
+    let smaller = bases.chunks(2).all(|pair| match (last(pair[0]), last(pair[1])) {
         (Some(held), Some(free)) => free.same < held.same,
         _ => false,
     });
@@ -298,15 +304,13 @@ fn statements(all: &[Found], bases: &[Basis]) -> Vec<Statement> {
             format!("largest deviation {flexibility:.0e}"),
         ),
         Statement::tested(
-            "Free-interface modes have a smaller error of the forced response than as many held ones",
-            pairs().all(|(held, free)| free.response < held.response),
+            format!(
+                "From {covered} modes on free-interface modes have a smaller error of the forced response than as many held ones"
+            ),
+            pairs().filter(|(held, _)| held.modes >= covered).all(|(held, free)| free.response < held.response),
             told(&|one| one.response),
         ),
-        Statement::tested(
-            "Of a light rub too, with most modes of either",
-            halves,
-            told(&|one| one.same),
-        ),
+        Statement::tested("Of a light rub too, with most modes of either", smaller, told(&|one| one.same)),
         Statement::tested(
             "Without inertia at the contact (massless-boundary) free-interface modes have a smaller error, with most modes",
             bases.chunks(2).all(|pair| match (last(pair[0]), last(pair[1])) {
@@ -320,9 +324,7 @@ fn statements(all: &[Found], bases: &[Basis]) -> Vec<Statement> {
 }
 
 fn results(all: &[Found]) -> Value {
-    let run = |one: &Timed| {
-        json!({ "scheme": one.scheme.name(), "step": one.step, "error": one.error, "seconds_per_ms": one.seconds })
-    };
+    let run = |one: &Timed| json!({ "scheme": one.scheme.name(), "step": one.step, "error": one.error, "seconds_per_ms": one.seconds });
     let row = |one: &Found| {
         json!({
             "basis": one.basis.name(), "modes": one.modes, "flexibility": one.flexibility, "response": one.response,
@@ -368,7 +370,7 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
             ("window".into(), format!("{:.2} ms", 1e3 * INTERVAL * size.samples as f64)),
             ("forced response up to".into(), format!("{frequency:.0} Hz")),
         ],
-        statements: statements(&all, &bases),
+        statements: statements(&all, &bases, size.covered),
         figures: vec![figure(&all, &bases)?],
         results: results(&all),
         files: vec![("bases.md".into(), "the tables of the guide".into(), tables.into_bytes())],

@@ -83,3 +83,48 @@ fn product(matrix: &SparseMatrix, x: &[f64]) -> Vec<f64> {
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use tiprub_model::rotor37::{MeshCounts, blade_mesh};
+
+    use super::*;
+    use crate::reduced::rub::Obstacle;
+
+    /// Points of faces see a displacement of the whole tip along the axis as it is, and slope as the tip does; nothing touches a casing
+    /// that is far away, and what touches is pushed inwards.
+    #[test]
+    fn parts_of_a_tip_see_what_it_does() {
+        let blade = blade_mesh(MeshCounts { chord: 3, thickness: 1, span: 2 }).unwrap();
+        let tip = blade.mesh.set("tip").unwrap();
+        let [low, high] = blade
+            .tip_slopes
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], slope| [low.min(*slope), high.max(*slope)]);
+        for each in 1..=3 {
+            let parts = Part::points(&blade.mesh, tip, each);
+            assert_eq!(parts.len(), 3 * each * each);
+            for part in &parts {
+                let total: f64 = part.seen().map(|(_, rows)| rows[2][2]).sum();
+                assert!((total - 1.0).abs() < 1e-12, "{total}");
+                assert!((low - 0.02..high + 0.02).contains(&part.tip.slope), "{part:?}, {low} to {high}");
+            }
+        }
+        let full = Blade::new(&blade.mesh, &Material::steel(), blade.mesh.set("hub").unwrap()).unwrap();
+        let parts = Part::points(&blade.mesh, tip, 1);
+        let steps = Steps { interval: 1e-5, division: 4, samples: 40 };
+        let run = |clearance: f64| {
+            let obstacle = Obstacle { clearance, speed: 1800.0, friction: 0.0, bumps: [4e-4, 0.15, 1e-4] };
+            full.march(&parts, &obstacle, steps, &tip[..1]).unwrap()
+        };
+        let far = run(1e-3);
+        assert!(far.displacements.iter().flatten().all(|u| *u == 0.0) && far.pushed == 0);
+        let near = run(3.5e-4);
+        let turned = Part::points(&blade.mesh, tip, 1).into_iter().map(|part| part.turned(1.0)).collect::<Vec<_>>();
+        let obstacle = Obstacle { clearance: 3.5e-4, speed: 1800.0, friction: 0.15, bumps: [4e-4, 0.15, 1e-4] };
+        let rubbed = full.march(&turned, &obstacle, steps, &tip[..1]).unwrap();
+        assert!(rubbed.pushed > 0 && rubbed.residual < 1e-8 && near.residual < 1e-8, "{near:?} {rubbed:?}");
+        assert!(rubbed.displacements.iter().any(|u| u[0] < -1e-6) && rubbed.friction_work[39] > 0.01);
+        assert!(rubbed.impulses.iter().all(|impulse| *impulse >= 0.0));
+    }
+}

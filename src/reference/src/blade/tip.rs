@@ -16,8 +16,11 @@ pub struct Part {
 }
 
 /// Points on [0, 1] and weights of Gauss's rules with one, two and three points.
-const GAUSS: [&[f64]; 3] =
-    [&[0.5], &[0.211_324_865_405_187_1, 0.788_675_134_594_812_9], &[0.112_701_665_379_258_3, 0.5, 0.887_298_334_620_741_7]];
+const GAUSS: [&[f64]; 3] = [
+    &[0.5],
+    &[0.211_324_865_405_187_1, 0.788_675_134_594_812_9],
+    &[0.112_701_665_379_258_3, 0.5, 0.887_298_334_620_741_7],
+];
 
 impl Part {
     /// The mean over nodes with weights (sum 1), each along directions of its own, on a contour that slopes so much.
@@ -63,15 +66,6 @@ impl Part {
         let slope = total(|[dr, dz]| dr * dz) / total(|[_, dz]| dz * dz);
         let nodes = element.nodes.iter().zip(shape.values).filter(|(_, value)| value.abs() > 1e-12);
         Self { tip: Tip { radius, angle, slope }, shares: nodes.map(|(node, value)| (*node, value, angle)).collect() }
-    }
-
-    /// Several as one: their mean.
-    pub fn together(parts: &[Self]) -> Self {
-        let share = 1.0 / parts.len() as f64;
-        let mean = |of: fn(&Tip) -> f64| share * parts.iter().map(|part| of(&part.tip)).sum::<f64>();
-        let tip = Tip { radius: mean(|tip| tip.radius), angle: mean(|tip| tip.angle), slope: mean(|tip| tip.slope) };
-        let shares = parts.iter().flat_map(|part| &part.shares);
-        Self { tip, shares: shares.map(|(node, weight, angle)| (*node, share * weight, *angle)).collect() }
     }
 
     /// With the tip's angles counted from elsewhere (rad).
