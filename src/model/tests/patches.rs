@@ -87,7 +87,8 @@ fn rows_of_patches_across_the_thickness_add_up() {
         assert!(across[..3].iter().all(|place| (place - across[0]).abs() < 1e-12), "{kind:?}: {across:?}");
         let mut both = [across[0], across[3]];
         both.sort_by(f64::total_cmp);
-        assert!((both[0] - 1.0 / 3.0).abs() < 1e-12 && (both[1] - 2.0 / 3.0).abs() < 1e-12, "{kind:?}: {both:?}");
+        // The tip is flat, and arcs around the axis are not quite its heights.
+        assert!((both[0] - 1.0 / 3.0).abs() < 1e-3 && (both[1] - 2.0 / 3.0).abs() < 1e-3, "{kind:?}: {both:?}");
         for (refused, told) in [([3, 0], "0 rows of 3"), ([3, 40], "40 rows of 3"), ([99, 1], "99 is outside")] {
             let error = tip_patches(&mesh, &set, refused, name).unwrap_err().to_string();
             assert!(error.contains(told), "{error}");

@@ -192,7 +192,7 @@ fn model(basis: Basis, modes: usize, size: &Size, truths: [&Marched; 2], console
     let massless = massless.ok().and_then(|run| run.changes(truths[0])[0]).unwrap_or(f64::NAN);
     let timed = timed(&scene, modes, truths[0], size);
     let typical = INTERVAL / f64::from(TYPICAL);
-    let judged = timed.iter().find(|one| one.scheme == Scheme::ModalExact && one.step == typical);
+    let judged = timed.iter().find(|one| one.scheme == Scheme::ModalExact && (one.step / typical - 1.0).abs() < 1e-9);
     let step_time = judged.map_or(f64::NAN, |one| one.seconds * one.step * 1e3);
     let limits = limits.iter().map(|limit| (limit.scheme, limit.below())).collect();
     Ok(Found { basis, modes, flexibility, response, same, patches, massless, limits, step_time, timed })

@@ -38,7 +38,7 @@ impl Outline {
             if (along - a) * (along - b) > 0.0 {
                 continue;
             }
-            let share = if a == b { 0.5 } else { (along - a) / (b - a) };
+            let share = if (b - a).abs() < f64::MIN_POSITIVE { 0.5 } else { (along - a) / (b - a) };
             let across = low + share * (high - low);
             found = [found[0].min(across), found[1].max(across)];
         }
