@@ -247,7 +247,14 @@ fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
 /// The tip is found where no set names it: the nodes of the set TIP, of every kind of element; five patches, free-interface modes.
 #[test]
 fn the_tip_of_a_mesh_is_found_and_told() {
-    let files = ["blade_tet10.inp", "blade_hex20.inp", "blade_hex8.inp", "blade_penta15.inp"];
+    let files = [
+        "blade_tet10.inp",
+        "blade_hex20.inp",
+        "blade_hex8.inp",
+        "blade_penta15.inp",
+        "blade_tet10.msh",
+        "blade_hex20_binary.msh",
+    ];
     let project = Project::new(&files);
     for file in files {
         let line =
@@ -303,7 +310,7 @@ fn patches_of_other_elements_are_as_soft() {
 /// Contact at points is warned of where the mesh could carry more, and at one place always.
 #[test]
 fn contact_at_points_of_a_fine_tip_is_warned_of() {
-    let project = Project::new(&["blade_hex20.inp", "bar.inp"]);
+    let project = Project::new(&["blade_hex20.inp", "bar.inp", "blade_tet10.msh"]);
     let warned = |line: &str| -> String {
         let common = "--units mm-t-s --material titanium --modes 4 --clamp-set ROOT --force -o w.rom.safetensors";
         project.succeed(&format!("reduce blade {line} {common}"))["warnings"].to_string()
@@ -314,12 +321,78 @@ fn contact_at_points_of_a_fine_tip_is_warned_of() {
         ("blade_hex20.inp --contact-patches 1", Some("contact at the single patch `patch_1`")),
         ("blade_hex20.inp --contact-nodes 7", None),
         ("blade_hex20.inp --contact-patches 3 --kind craig-bampton", None),
+        ("blade_hex20.inp --contact-patches 7", None),
+        ("blade_hex20.inp --contact-patches 9", Some("9 contact patches along about 6 edges of elements")),
+        ("blade_tet10.msh --contact-set TIP --contact-patches 12", Some("12 contact patches along about")),
     ] {
         let told = warned(line);
         match wanted {
             Some(part) => assert!(told.contains(part), "{line}: {told}"),
-            None => assert!(!told.contains("contact at"), "{line}: {told}"),
+            None => assert!(!told.contains("contact at") && !told.contains("contact patches"), "{line}: {told}"),
         }
+    }
+    let own = |patches: usize| -> String {
+        let line =
+            format!("reduce rotor37 --mesh 6x1x4 --modes 6 --contact-patches {patches} --force -o r.rom.safetensors");
+        project.succeed(&line)["warnings"].to_string()
+    };
+    assert!(own(9).contains("9 contact patches along about 6 edges"), "{}", own(9));
+    assert!(!own(7).contains("contact patches"), "{}", own(7));
+}
+
+/// The mesh of the tests twice: the same blade again, turned about the axis and a little farther in or as far out.
+fn two_blades(farther_in: f64) -> String {
+    const NEXT: usize = 5000;
+    let text = fs::read_to_string(data("blade_hex20.inp")).unwrap();
+    let second = text.split_once("*NODE\n").unwrap().1;
+    let (sine, cosine) = 0.4_f64.sin_cos();
+    let mut found = format!("{}*NODE\n", text);
+    let mut nodes = true;
+    for line in second.lines() {
+        let words: Vec<&str> = line.split(',').map(str::trim).filter(|word| !word.is_empty()).collect();
+        if let Some(keyword) = line.strip_prefix('*') {
+            nodes = false;
+            let suffix = if keyword.contains("ELSET") { "_TWO" } else { "" };
+            found.push_str(&format!("*{keyword}{suffix}\n"));
+        } else if nodes {
+            let [x, y, z] = [1, 2, 3].map(|place| words[place].parse::<f64>().unwrap());
+            let number = words[0].parse::<usize>().unwrap() + NEXT;
+            let (x, y) = (x - farther_in, y);
+            found.push_str(&format!("{number}, {}, {}, {z}\n", cosine * x - sine * y, sine * x + cosine * y));
+        } else {
+            let next = words.iter().map(|word| (word.parse::<usize>().unwrap() + NEXT).to_string());
+            let comma = if line.trim_end().ends_with(',') { "," } else { "" };
+            found.push_str(&format!("{}{comma}\n", next.collect::<Vec<_>>().join(", ")));
+        }
+    }
+    found
+}
+
+/// A second surface as far out is told of, one well inside is not; the tip is that of one blade. The texts are those of the guide.
+#[test]
+fn a_second_surface_as_far_out_is_told_of() {
+    let project = Project::new(&[]);
+    let reduce = |farther_in: f64| -> Value {
+        project.write("two.inp", two_blades(farther_in));
+        let line = "reduce blade two.inp --clamp-set ROOT --clamp-set ROOT_TWO --units mm-t-s --material titanium --modes 8 --force";
+        project.succeed(&format!("{line} -o two.rom.safetensors"))
+    };
+    let found = reduce(0.0);
+    let warnings = found["warnings"].to_string();
+    assert!(
+        warnings.contains("beside the tip that was found 12 faces that are not connected with it are as far out"),
+        "{warnings}"
+    );
+    assert_eq!(found["model"]["tip"]["faces"], 12, "{found:#}");
+    let inside = reduce(3.0);
+    assert!(!inside["warnings"].to_string().contains("as far out"), "{inside:#}");
+    let guide = guide();
+    for told in [
+        "beside the tip that was found 12 faces that are not connected with it are as far out",
+        "contact at a single node of a tip about 6 edges of elements long",
+        "9 contact patches along about 6 edges of elements",
+    ] {
+        assert!(guide.contains(told), "{told}");
     }
 }
 

@@ -157,14 +157,33 @@ fn line(scene: &Scene) -> String {
     text
 }
 
+/// What a file holds, written anew where that is asked for.
+fn held(name: &str, found: &str) -> String {
+    let path = root().join("tests/data").join(name);
+    if std::env::var_os("GOLDEN").is_some_and(|value| value == "write") {
+        fs::write(&path, found).unwrap();
+    }
+    fs::read_to_string(&path).unwrap()
+}
+
+/// `preset = "paper"` is what it was: settings as they are read, and the same settings and bits as spelled out.
+#[test]
+fn the_papers_preset_is_what_it_was() {
+    let preset = scenes::around_blades(scenes::PRESET);
+    let written = tiprub_format::write_scene(&preset.settings);
+    assert_eq!(written, held("preset_paper.toml", &written), "see the head of this file");
+    let text = scenes::PRESET.replace("preset = \"paper\"\n", "");
+    let text = text.replace("[time]\n", "[time]\nscheme = \"central-difference\"\n");
+    let mut spelled = scenes::around_blades(&text.replace("friction = 0.15\n", "friction = 0.15\nsolver = \"film\"\n"));
+    assert_eq!(native(&spelled, true).0, native(&preset, true).0);
+    spelled.settings.preset = preset.settings.preset;
+    assert_eq!(spelled.settings, preset.settings);
+}
+
 #[test]
 fn every_scene_gives_the_bits_it_gave() {
-    let path = root().join("tests/data/golden.txt");
     let found: String = scenes::all().iter().map(|scene| line(scene) + "\n").collect();
-    if std::env::var_os("GOLDEN").is_some_and(|value| value == "write") {
-        fs::write(&path, &found).unwrap();
-    }
-    let expected = fs::read_to_string(&path).unwrap();
+    let expected = held("golden.txt", &found);
     for (found, expected) in found.lines().zip(expected.lines()) {
         assert_eq!(found, expected, "see the head of this file");
     }

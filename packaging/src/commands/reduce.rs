@@ -5,7 +5,9 @@ use std::{fmt::Write as _, path::Path, time::Instant};
 use serde_json::{Value, json};
 use tiprub_gallery::{builtin, reduction};
 use tiprub_model::{
+    Rotor37Options,
     casing::{CLAMPED, Support},
+    rotor37::Tip,
     stage::sector_mesh,
 };
 use tiprub_shell::{
@@ -139,7 +141,7 @@ fn reduced(model: &Model, console: &Console) -> Result<Reduced> {
         Model::Sector(own) => users_model::sector(own, console),
         Model::CasingMesh(own) => users_model::casing(own, console),
         Model::Casing(own) => casing(own, console),
-        Model::Rotor37(own) => Ok(Reduced::general(reduction::rotor37(&own.options(), console)?, Some("hub"))),
+        Model::Rotor37(own) => rotor37(&own.options(), console),
         Model::Stage(own) => stage(own, console),
         Model::StageCasing(own) => stage_casing(own, console),
         Model::Cube(own) => cube_models::cube(own, console),
@@ -173,6 +175,17 @@ fn stage_casing(arguments: &StageCasingArguments, console: &Console) -> Result<R
     options.modes = arguments.modes.unwrap_or(options.modes);
     options.material = arguments.material.map_or(options.material.clone(), MaterialChoice::material);
     Ok(Reduced::general(reduction::stage_casing(&options, console)?, Some(CLAMPED)))
+}
+
+fn rotor37(options: &Rotor37Options, console: &Console) -> Result<Reduced> {
+    let reduced = Reduced::general(reduction::rotor37(options, console)?, Some("hub"));
+    let (chord, most) = (options.mesh.chord, options.mesh.chord + 1);
+    let narrow = |patches: usize| users_model::narrow(patches, chord as f64, most);
+    let warning = match options.tip {
+        Tip::Patches(patches) if patches > most => Some(narrow(patches)),
+        _ => None,
+    };
+    Ok(Reduced { warnings: warning.into_iter().collect(), ..reduced })
 }
 
 /// Share (%) by which frequencies or growth at speed may be off without a warning.

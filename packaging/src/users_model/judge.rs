@@ -70,8 +70,12 @@ pub fn contact_warnings(chosen: &Chosen) -> Vec<String> {
     }
     let on_tip = chosen.contact.iter().all(|point| tip.nodes.binary_search(&point.node).is_ok());
     let (count, edges) = (chosen.contact.len(), tip.chord / tip.edge);
-    if chosen.contact.iter().any(|point| !point.patch.is_empty()) || !on_tip {
+    let patches = chosen.contact.iter().filter(|point| !point.patch.is_empty()).count();
+    if patches > 0 || !on_tip {
         warnings.extend(single(chosen));
+        if on_tip && patches > tip.at_most(patches) {
+            warnings.push(narrow(patches, edges.round(), tip.at_most(patches)));
+        }
     } else if count == 1 || edges > REFINED * (count - 1) as f64 {
         let nodes = if count == 1 { "a single node".to_owned() } else { format!("{count} nodes") };
         warnings.push(format!(
@@ -81,6 +85,14 @@ pub fn contact_warnings(chosen: &Chosen) -> Vec<String> {
         ));
     }
     warnings
+}
+
+/// More patches than the elements of a tip tell apart.
+pub fn narrow(patches: usize, edges: f64, most: usize) -> String {
+    format!(
+        "{patches} contact patches along about {edges:.0} edges of elements: patches narrower than elements share what these can do, and their \
+         forces say more than the mesh knows; ask for {most} at most (--contact-patches {most}), or refine the tip"
+    )
 }
 
 fn single(chosen: &Chosen) -> Option<String> {

@@ -4,6 +4,8 @@ mod choose;
 mod describe;
 mod judge;
 
+pub use judge::narrow;
+
 use std::{cell::RefCell, fmt::Write as _, path::Path};
 
 use choose::Chosen;

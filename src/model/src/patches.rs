@@ -7,6 +7,7 @@
 //! since their flexibility grows without bounds; forces per length do.
 
 mod coordinates;
+mod outline;
 mod tip;
 
 use std::collections::HashMap;
@@ -18,6 +19,7 @@ use crate::places::Places;
 use crate::{Error, Result};
 
 pub(crate) use coordinates::PatchCoordinates;
+use outline::Outline;
 pub use tip::{FoundTip, find_tip};
 
 /// Every face is divided into so many parts in both directions: hat functions have kinks.
@@ -35,6 +37,21 @@ pub fn contact_patches(
     count: usize,
     name: impl Fn(usize) -> String,
 ) -> Result<Vec<ContactPoint>> {
+    tip_patches(mesh, set, [count, 1], name)
+}
+
+/// The same in rows across the thickness, one row after the other. A tip that tilts touches with one of its sides: the mean over the
+/// thickness does not see it, and forces on that mean do not bend the blade. With hat functions h_k along the chord and h_l across, 0 to 1
+/// between the sides of the tip's outline, the weights are w_p = ∫ h_k h_l N_p dA / ∫ h_k h_l dA.
+///
+/// # Errors
+/// Those of [`contact_patches`]; no rows, or more than the tip has nodes across.
+pub fn tip_patches(
+    mesh: &Mesh,
+    set: &[usize],
+    [count, rows]: [usize; 2],
+    name: impl Fn(usize) -> String,
+) -> Result<Vec<ContactPoint>> {
     let faces = faces_within(mesh, set)?;
     let places = Places::new(&mesh.nodes, set);
     let stations = places.stations();
@@ -43,9 +60,23 @@ pub fn contact_patches(
             format!("{count} is outside 1..={stations}, the places along the chord that the set has nodes at");
         return Err(Error::invalid("number of contact patches", problem, "Ask for another number, or refine the tip"));
     }
-    let weights = weights(mesh, (set, faces), count, |position| hats(places.share_along(position), count).to_vec())?;
+    if rows == 0 || count * rows > set.len() {
+        let problem = format!("{rows} rows of {count} are none, or more than the {} nodes of the tip", set.len());
+        return Err(Error::invalid("rows of contact patches", problem, "Ask for another number, or refine the tip"));
+    }
+    let outline = Outline::new(mesh, &faces, &places);
+    let products = |position: [f64; 3]| -> Vec<(usize, f64)> {
+        let along = hats(places.share_along(position), count);
+        if rows == 1 {
+            return along.to_vec();
+        }
+        let across = hats(outline.share_across(places.developed(position)), rows);
+        across.iter().flat_map(|(l, b)| along.map(|(k, a)| (l * count + k, a * b))).collect()
+    };
+    let weights = weights(mesh, (set, faces), count * rows, products)?;
     let patches = weights.into_iter().enumerate();
-    let length = |patch: usize| places.length() * share_of_chord(patch, count);
+    let length =
+        |patch: usize| places.length() * share_of_chord(patch % count, count) * share_of_chord(patch / count, rows);
     Ok(patches.map(|(patch, weights)| point(mesh, set, &places, (&weights, length(patch)), name(patch))).collect())
 }
 

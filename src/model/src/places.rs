@@ -77,6 +77,12 @@ impl Places {
         (cz * point[2] + cs * arc_from(self.middle, point) - low) / (high - low)
     }
 
+    /// Where a point stands along the chord of the set and across it (m).
+    pub(crate) fn developed(&self, point: [f64; 3]) -> [f64; 2] {
+        let ([cz, cs], arc) = (self.chord, arc_from(self.middle, point));
+        [cz * point[2] + cs * arc, cz * arc - cs * point[2]]
+    }
+
     /// Length of the chord (m).
     pub(crate) fn length(&self) -> f64 {
         let [low, high] = extent(&self.along);

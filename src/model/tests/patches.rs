@@ -12,7 +12,7 @@ use tiprub_core::rom::Frame;
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::craig_bampton::dense_modes;
 use tiprub_model::element::ElementKind;
-use tiprub_model::patches::contact_patches;
+use tiprub_model::patches::{contact_patches, tip_patches};
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::{ContactPoint, Reduction, ReductionKind, ReductionOptions, reduce};
 use tiprub_model::rotor37::{MeshCounts, Tip, blade_mesh};
@@ -69,6 +69,49 @@ fn a_patch_stands_in_the_middle_of_its_hat_function() {
         }
         // One patch is the whole face.
         assert!(tip(&mesh, 1)[0].patch.len() <= nodes_at(&mesh, 0, SIZE[0]).len());
+    }
+}
+
+/// Two rows stand at thirds of the thickness and together are the patches over the whole of it, on boxes and on rotor 37.
+#[test]
+fn rows_of_patches_across_the_thickness_add_up() {
+    let name = |index: usize| format!("patch_{index}");
+    for kind in ElementKind::ALL {
+        let mesh = straight_box(kind, [2, 2, 4], SIZE);
+        let set = nodes_at(&mesh, 0, SIZE[0]);
+        let rows = tip_patches(&mesh, &set, [3, 2], name).unwrap();
+        let across: Vec<f64> = rows
+            .iter()
+            .map(|patch| patch.weights().map(|(node, weight)| weight * mesh.nodes[node][1]).sum::<f64>() / SIZE[1])
+            .collect();
+        assert!(across[..3].iter().all(|place| (place - across[0]).abs() < 1e-12), "{kind:?}: {across:?}");
+        let mut both = [across[0], across[3]];
+        both.sort_by(f64::total_cmp);
+        // The tip is flat, and arcs around the axis are not quite its heights.
+        assert!((both[0] - 1.0 / 3.0).abs() < 1e-3 && (both[1] - 2.0 / 3.0).abs() < 1e-3, "{kind:?}: {both:?}");
+        for (refused, told) in [([3, 0], "0 rows of 3"), ([3, 40], "40 rows of 3"), ([99, 1], "99 is outside")] {
+            let error = tip_patches(&mesh, &set, refused, name).unwrap_err().to_string();
+            assert!(error.contains(told), "{error}");
+        }
+    }
+    let blade = blade_mesh(MeshCounts { chord: 8, thickness: 2, span: 2 }).unwrap();
+    let tip = blade.mesh.set("tip").unwrap();
+    let (whole, rows) = (blade.contact_patches(5).unwrap(), tip_patches(&blade.mesh, tip, [5, 2], name).unwrap());
+    let all = |patches: &[&ContactPoint], node: usize| -> f64 {
+        let of =
+            |patch: &&ContactPoint| patch.weights().filter(|at| at.0 == node).map(|at| patch.area * at.1).sum::<f64>();
+        patches.iter().map(of).sum()
+    };
+    let area: f64 = whole.iter().map(|patch| patch.area).sum();
+    let length = |patches: &[ContactPoint]| patches.iter().map(|patch| patch.length).sum::<f64>();
+    assert!((length(&whole) / length(&rows) - 1.0).abs() < 1e-12);
+    for (index, patch) in whole.iter().enumerate() {
+        let both = [&rows[index], &rows[5 + index]];
+        for &node in tip {
+            assert!((all(&both, node) - all(&[patch], node)).abs() < 1e-12 * area, "patch {index}, node {node}");
+        }
+        // Neither side has more of the area than the other by far.
+        assert!((both[0].area / both[1].area - 1.0).abs() < 0.1, "{} {}", both[0].area, both[1].area);
     }
 }
 

@@ -2,6 +2,8 @@
 //! goes into the FMU, and nothing here uses the product's stepping or contact code; meshes, element matrices and sparse factors are those of `tiprub-model`.
 
 #![warn(unreachable_pub)]
+#[cfg(feature = "cube")]
+pub mod blade;
 pub mod carpenter;
 pub mod closed;
 #[cfg(feature = "cube")]

@@ -13,7 +13,7 @@ use tiprub_shell::{
 use tiprub_study as study;
 use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
-use crate::{conjugacy, convergence, cube, error, estimates, inputs, modes, stability, stage};
+use crate::{bases, conjugacy, convergence, cube, error, estimates, inputs, modes, stability, stage, witness};
 
 /// Evidence for tiprub: studies of the models that ship and of standard problems.
 #[derive(Debug, Parser)]
@@ -60,6 +60,10 @@ pub enum Command {
     Inputs(StudyCommon),
     /// What steps, modes and patches are estimated to leave, against rubs refined far in each direction.
     Estimates(StudyCommon),
+    /// Modes with the contact held or free, contact at nodes or patches: error, largest steps and cost against the number of modes.
+    Bases(StudyCommon),
+    /// Reduced blades against a full finite-element model with steps and contact of its own, without any reduction.
+    Witness(StudyCommon),
 }
 
 /// Arguments of `lab error`.
@@ -163,6 +167,8 @@ impl Cli {
             Command::Conjugacy(common) => ("conjugacy", common),
             Command::Inputs(common) => ("inputs", common),
             Command::Estimates(common) => ("estimates", common),
+            Command::Bases(common) => ("bases", common),
+            Command::Witness(common) => ("witness", common),
         };
         let directory = commands::study::directory(name, common);
         output_file::try_directory(&directory)?;
@@ -186,6 +192,8 @@ impl Cli {
             Command::Conjugacy(common) => conjugacy::study(common.quick),
             Command::Inputs(common) => inputs::study(common, console),
             Command::Estimates(common) => estimates::study(common, console),
+            Command::Bases(common) => bases::study(common, console),
+            Command::Witness(common) => witness::study(common, console),
             Command::Stability(_) => unreachable!("`run` has answered it"),
         }
     }

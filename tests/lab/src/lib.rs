@@ -3,9 +3,11 @@
 //! - `error`: error against run time of the standard problems, beside methods that share no code with the product;
 //! - `stability`: stiff and extreme cases, each in a process of its own, judged;
 //! - `cube`, `stage`, `convergence`, `modes`: what the paper's figures show of the models that ship;
+//! - `witness`: reduced blades against full finite elements; `bases`: what a blade is reduced to;
 //! - `conjugacy`: forces, moments and work on both sides of contacts; `inputs`: what the communication step does.
 
 #![warn(unreachable_pub)]
+mod bases;
 pub mod cli;
 mod conjugacy;
 mod convergence;
@@ -16,3 +18,4 @@ mod inputs;
 mod modes;
 mod stability;
 mod stage;
+mod witness;

@@ -140,6 +140,11 @@ fn the_quick_study_of_the_cube_meets_independent_methods() {
     assert!((0.5..1.0).contains(&crest), "{crest} mm");
     let tables = fs::read_to_string(root.path().join("out/tables.md")).unwrap();
     assert!(tables.contains("| product, lcp, modal-exact / a, film |"), "{tables}");
+    let patches = json["results"]["patches"].as_array().unwrap();
+    assert_eq!(patches.len(), 2);
+    for one in patches {
+        assert!((4.0..6.0).contains(&one["left_impulse"].as_f64().unwrap()), "{one}");
+    }
 }
 
 #[test]
@@ -198,7 +203,7 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1, "something stays");
         told
     };
-    for name in ["convergence", "modes", "cube", "stage", "error", "inputs"] {
+    for name in ["convergence", "modes", "cube", "stage", "error", "inputs", "witness", "bases"] {
         let told = refuse(&[name, "--quick", "--out", "file/out"], 1);
         assert!(told.contains("file/out: cannot create the directory"), "{told}");
     }
@@ -223,6 +228,47 @@ fn the_quick_study_of_estimates_meets_the_truth() {
         let [estimate, truth] = ["estimate", "truth"].map(|name| row[name].as_f64().unwrap());
         assert!(estimate > 0.0 && (1e-6..0.5).contains(&truth), "{row:#}");
     }
+}
+
+/// The full model, which nothing was reduced of, and the product on reduced models: with the same contact they are one, with another they
+/// are not. Three patches on this coarse mesh are too few to be better than three nodes.
+#[test]
+fn the_quick_study_of_the_witness_meets_reduced_models() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "witness", &[]);
+    only_no(&json, &["The default model is nearer"]);
+    let rows = json["results"]["runs"].as_array().unwrap();
+    assert_eq!(rows.len(), 8 + 4);
+    let row = |start: &str| rows.iter().find(|row| row["run"].as_str().unwrap().starts_with(start)).unwrap();
+    for name in ["more modes", "two rows, more modes"] {
+        let own = &row(name)["same_contact"];
+        assert!(own["displacements"].as_f64().unwrap() < 0.01 && own["impulse"].as_f64().unwrap() < 0.01, "{own}");
+        assert!(row(name)["points"]["displacements"].as_f64().unwrap() > 0.1, "{rows:#?}");
+    }
+    assert!(row("full model")["friction_work"].as_f64().unwrap() > 5.0);
+    assert!(json["results"]["refused"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn the_quick_study_of_bases_tells_free_from_held_modes() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "bases", &[]);
+    only_no(&json, &[]);
+    let rows = json["results"].as_array().unwrap();
+    assert_eq!(rows.len(), 4 * 2);
+    for row in rows {
+        let limit =
+            |name: &str| row["limits"].as_array().unwrap().iter().find(|limit| limit[0] == name).unwrap()[1].as_f64();
+        let [central, massless] = ["central-difference", "massless-boundary"].map(|name| limit(name).unwrap());
+        assert!(massless > 2.0 * central, "{row:#}");
+        // A step beyond the limit is refused, and so not timed.
+        for run in row["runs"].as_array().unwrap().iter().filter(|run| run["scheme"] == "central-difference") {
+            assert!(run["step"].as_f64().unwrap() < central, "{run}");
+        }
+        assert!(row["step_seconds"].as_f64().unwrap() > 0.0, "{row:#}");
+    }
+    let tables = fs::read_to_string(root.path().join("out/bases.md")).unwrap();
+    assert_eq!(tables.lines().count(), (2 + 8) + 1 + (2 + 2 * 4), "{tables}");
 }
 
 #[test]

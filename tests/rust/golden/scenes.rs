@@ -176,7 +176,17 @@ fn several() -> Vec<Scene> {
     ]
 }
 
+/// The scene that ships with `preset = "paper"`.
+pub const PRESET: &str = include_str!("../../../src/gallery/scenes/rotor37-paper.toml");
+
+/// A scene as text around blades of analytic modes: no bit of it depends on a reduction.
+#[track_caller]
+pub fn around_blades(text: &str) -> Scene {
+    let settings = tiprub_format::parse_scene(text, "golden.toml").unwrap_or_else(|error| panic!("{error}"));
+    Scene { settings, roms: vec![rich_blade(SECTORS)] }
+}
+
 /// All of them.
 pub fn all() -> Vec<Scene> {
-    rotors().into_iter().chain(bodies()).chain(several()).collect()
+    rotors().into_iter().chain(bodies()).chain(several()).chain([around_blades(PRESET)]).collect()
 }

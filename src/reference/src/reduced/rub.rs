@@ -20,6 +20,66 @@ pub struct Tip {
     pub slope: f64,
 }
 
+/// A rigid casing with two bumps half a turn apart, and how blades pass it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Obstacle {
+    /// Radial clearance (m).
+    pub clearance: f64,
+    /// Angular velocity (rad/s).
+    pub speed: f64,
+    /// Coulomb coefficient.
+    pub friction: f64,
+    /// Height of the bumps (m), their width (of half a turn) and the time over which they grow (s).
+    pub bumps: [f64; 3],
+}
+
+/// A point of a tip beside the casing; directions are radial, tangential, axial.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Touch {
+    /// Gap (m).
+    pub(crate) gap: f64,
+    /// Gradient of the gap with respect to displacements.
+    pub(crate) normal: [f64; 3],
+    /// Force per unit multiplier, friction included.
+    pub(crate) force: [f64; 3],
+    /// What turning and growth add to the rate of the gap (m/s).
+    pub(crate) rate: f64,
+}
+
+impl Obstacle {
+    /// Change of the casing's radius at a fixed angle, its slope and its rate of growth, with the ramp in it.
+    fn shape(&self, angle: f64, time: f64) -> [f64; 3] {
+        use std::f64::consts::PI;
+        let [height, width, ramp] = self.bumps;
+        let away = (angle.rem_euclid(PI) / PI - 0.5) / width;
+        let bump = -height * (-away * away).exp();
+        let slope = -2.0 * away / (PI * width) * bump;
+        if time >= ramp {
+            return [bump, slope, 0.0];
+        }
+        let phase = PI * time / ramp;
+        let (grown, growing) = (0.5 * (1.0 - phase.cos()), 0.5 * PI / ramp * phase.sin());
+        [grown * bump, grown * slope, growing * bump]
+    }
+
+    /// A point of the tip displaced by `moved` (m), at a time (s).
+    pub(crate) fn meets(&self, tip: &Tip, time: f64, [radial, tangential, axial]: [f64; 3]) -> Touch {
+        let [shape, slope, growth] = self.shape(tip.angle + self.speed * time + tangential / tip.radius, time);
+        let gradient = [-1.0, slope / tip.radius, tip.slope];
+        let length = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
+        let normal = gradient.map(|g| g / length);
+        // Along the circumference, within the tangent plane.
+        let along = [-normal[1] * normal[0], 1.0 - normal[1] * normal[1], -normal[1] * normal[2]];
+        let size = along.iter().map(|t| t * t).sum::<f64>().sqrt();
+        Touch {
+            gap: (self.clearance + shape - radial + tip.slope * axial) / length,
+            normal,
+            force: std::array::from_fn(|i| normal[i] - self.friction * along[i] / size),
+            rate: (slope * self.speed + growth) / length,
+        }
+    }
+}
+
 /// One blade's matrices and its surroundings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Blades {
@@ -35,14 +95,8 @@ pub struct Blades {
     pub sectors: usize,
     /// Modal damping ratio.
     pub damping: f64,
-    /// Radial clearance (m).
-    pub clearance: f64,
-    /// Angular velocity (rad/s).
-    pub speed: f64,
-    /// Coulomb coefficient.
-    pub friction: f64,
-    /// Height of the bumps (m), their width (of half a turn) and the time over which they grow (s).
-    pub bumps: [f64; 3],
+    /// What they rub against.
+    pub obstacle: Obstacle,
 }
 
 /// Blades in their modes.
@@ -74,39 +128,15 @@ impl BladeScene {
         self.rows[row].iter().zip(&position[sector * each..]).map(|(a, b)| a * b).sum()
     }
 
-    /// Change of the casing's radius at a fixed angle, its slope and its rate of growth, with the ramp in it.
-    fn shape(&self, angle: f64, time: f64) -> [f64; 3] {
-        use std::f64::consts::PI;
-        let [height, width, ramp] = self.blades.bumps;
-        let away = (angle.rem_euclid(PI) / PI - 0.5) / width;
-        let bump = -height * (-away * away).exp();
-        let slope = -2.0 * away / (PI * width) * bump;
-        if time >= ramp {
-            return [bump, slope, 0.0];
-        }
-        let phase = PI * time / ramp;
-        let (grown, growing) = (0.5 * (1.0 - phase.cos()), 0.5 * PI / ramp * phase.sin());
-        [grown * bump, grown * slope, growing * bump]
-    }
-
     fn contact(&self, node: usize, sector: usize, time: f64, position: &[f64], within: f64) -> Option<Contact> {
         let (tip, blades) = (self.blades.tips[node], &self.blades);
-        let [radial, tangential, axial]: [f64; 3] =
-            std::array::from_fn(|component| self.moved(3 * node + component, sector, position));
+        let moved = std::array::from_fn(|component| self.moved(3 * node + component, sector, position));
         let pitch = std::f64::consts::TAU * sector as f64 / blades.sectors as f64;
-        let [shape, slope, growth] =
-            self.shape(tip.angle + pitch + blades.speed * time + tangential / tip.radius, time);
-        let gradient = [-1.0, slope / tip.radius, tip.slope];
-        let length = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
-        let gap = (blades.clearance + shape - radial + tip.slope * axial) / length;
+        let tip = Tip { angle: tip.angle + pitch, ..tip };
+        let Touch { gap, normal, force, rate } = blades.obstacle.meets(&tip, time, moved);
         if gap > within {
             return None;
         }
-        let normal = gradient.map(|g| g / length);
-        // Along the circumference, within the tangent plane.
-        let along = [-normal[1] * normal[0], 1.0 - normal[1] * normal[1], -normal[1] * normal[2]];
-        let size = along.iter().map(|t| t * t).sum::<f64>().sqrt();
-        let force: [f64; 3] = std::array::from_fn(|i| normal[i] - blades.friction * along[i] / size);
         let row = |direction: [f64; 3]| {
             let entry = |mode: usize| (0..3).map(|i| direction[i] * self.rows[3 * node + i][mode]).sum();
             Row(vec![(sector * self.each(), (0..self.each()).map(entry).collect())])
@@ -115,7 +145,7 @@ impl BladeScene {
             node: node * blades.sectors + sector,
             group: sector,
             gap,
-            rate: (slope * blades.speed + growth) / length,
+            rate,
             normal: row(normal),
             force: row(force),
         })

@@ -4,11 +4,13 @@
 mod energy;
 mod figures;
 mod pairs;
+mod patches;
 mod product;
 mod runs;
 mod sizes;
 
 use pairs::Pair;
+use patches::Patches;
 use runs::{A, B, BEST, C, Flight, Outcome, PAPER, STICKING, competitors, released};
 use serde_json::json;
 use sizes::Sizes;
@@ -80,7 +82,9 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     drop(task);
     let a = flown[0].outcome(A)?.history().ok_or_else(|| Failure::new("study cube", "method a failed", ""))?;
     let sizes = Sizes::new(&scene, &all[0], a, quick, (&arguments.cache.cache(), console))?;
-    report(&scene, &flown, &sizes, quick)
+    let end = quick.then_some(QUICK_END);
+    let patches = Patches::new(&scene, (&all[0], FRICTIONLESS), end, (&arguments.cache.cache(), console))?;
+    report(&scene, &flown, &sizes, &patches, quick)
 }
 
 fn fly(flight: &Flight, scene: &Scene, quick: bool, facets: bool, (task, done): (&Task, &mut u64)) -> Result<Flown> {
@@ -95,7 +99,7 @@ fn fly(flight: &Flight, scene: &Scene, quick: bool, facets: bool, (task, done): 
     Ok(Flown { flight: *flight, outcomes, pairs })
 }
 
-fn report(scene: &Scene, flown: &[Flown], sizes: &Sizes, quick: bool) -> Result<Study> {
+fn report(scene: &Scene, flown: &[Flown], sizes: &Sizes, patches: &Patches, quick: bool) -> Result<Study> {
     let main = flown.first().ok_or_else(|| Failure::new("study cube", "no flight", ""))?;
     let best = main.outcome(BEST)?;
     let mut figures = vec![figures::scene()];
@@ -118,11 +122,13 @@ fn report(scene: &Scene, flown: &[Flown], sizes: &Sizes, quick: bool) -> Result<
         flown.iter().map(|flown| format!("## {}\n\n{}", flown.title(), pairs::markdown(&flown.outcomes, &flown.pairs)));
     tables.extend(flights);
     tables.push(sizes.markdown());
+    tables.push(patches.markdown());
     let all = flown.iter().map(|flown| pairs::json(&flown.outcomes, &flown.pairs, &flown.flight));
     let mut energies = serde_json::Value::Null;
     let mut statements = meeting(main);
     statements.extend(at_any_speed(flown));
     statements.push(truncation(sizes));
+    statements.extend(patches.statements());
     if !quick {
         let losses = energy::Losses::new(scene)?;
         statements.extend(slow(flown)?);
@@ -142,7 +148,7 @@ fn report(scene: &Scene, flown: &[Flown], sizes: &Sizes, quick: bool) -> Result<
         facts: scene.roms.iter().map(|rom| (rom.name.clone(), rom.origin.clone())).collect(),
         statements,
         figures,
-        results: json!({ "flights": all.collect::<Vec<_>>(), "sizes": sizes.json(), "energies": energies }),
+        results: json!({ "flights": all.collect::<Vec<_>>(), "sizes": sizes.json(), "patches": patches.json(), "energies": energies }),
         files: vec![("tables.md".into(), "all pairs and runs, as Markdown".into(), tables.join("\n").into_bytes())],
     })
 }

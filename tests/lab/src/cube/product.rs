@@ -11,10 +11,12 @@ use tiprub_reference::cube::history::{History, processor_time};
 
 use super::Flight;
 
-/// Corners 1, 6, 85, 90 and 31, 36, 91, 96 of the paper's figure 2 among the 72 contact nodes.
-const CORNERS: [usize; 8] = [0, 5, 30, 35, 36, 41, 66, 71];
-/// Contact nodes of one face.
-const FACE: usize = 36;
+/// Corners 1, 6, 85, 90 and 31, 36, 91, 96 of the paper's figure 2 among the contact nodes of two faces, each a square of `face` nodes.
+fn corners(face: usize) -> [usize; 8] {
+    let side = face.isqrt();
+    let own = [0, side - 1, face - side, face - 1];
+    std::array::from_fn(|corner| own[corner % 4] + corner / 4 * face)
+}
 
 /// How the product is asked to solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,7 +50,7 @@ impl Product {
         let started = processor_time();
         let mut simulation = Simulation::new(&self.scene(scene, flight))?;
         simulation.initialise(0.0)?;
-        let columns = Columns::new(&simulation);
+        let columns = Columns::new(&simulation, scene.roms[0].contact_nodes.len() / 2);
         let mut run = ProductRun {
             history: History { method: "product".into(), step: self.step, ..History::default() },
             curvature: Vec::new(),
@@ -101,11 +103,13 @@ struct Columns {
     strain: u32,
     curvature: u32,
     residual: u32,
+    /// Contact nodes or patches of one face.
+    face: usize,
 }
 
 impl Columns {
     /// All of them exist in the scene that ships.
-    fn new(simulation: &Simulation) -> Self {
+    fn new(simulation: &Simulation, face: usize) -> Self {
         let first = |quantity| simulation.table().with_quantity(quantity).map_or(0, |variable| variable.reference);
         Self {
             displacement: [0, 1, 2].map(|axis| first(Quantity::NodeDisplacement(axis))),
@@ -115,16 +119,18 @@ impl Columns {
             strain: first(Quantity::StrainEnergy),
             curvature: first(Quantity::CurvatureWork),
             residual: first(Quantity::EnergyResidualRelative),
+            face,
         }
     }
 
     fn record(&self, simulation: &Simulation, time: f64, run: &mut ProductRun) -> Result<()> {
         let element = |reference: u32, node: usize| simulation.real((reference..).nth(node).unwrap_or(reference));
         let history = &mut run.history;
-        let forces: Vec<f64> = (0..2 * FACE).map(|node| element(self.force, node)).collect::<Result<_>>()?;
-        let (left, right) = forces.split_at(FACE);
+        let forces: Vec<f64> = (0..2 * self.face).map(|node| element(self.force, node)).collect::<Result<_>>()?;
+        let (left, right) = forces.split_at(self.face);
+        let places = corners(self.face);
         let mut corners = [[0.0; 3]; 8];
-        for (corner, node) in corners.iter_mut().zip(CORNERS) {
+        for (corner, node) in corners.iter_mut().zip(places) {
             for (value, reference) in corner.iter_mut().zip(self.displacement) {
                 *value = element(reference, node)?;
             }
@@ -135,7 +141,7 @@ impl Columns {
         }
         history.times.push(time);
         history.corners.push(corners);
-        history.corner_forces.push(CORNERS.map(|node| forces[node]));
+        history.corner_forces.push(places.map(|node| forces[node]));
         history.forces.push([left.iter().sum(), right.iter().sum()]);
         history.kinetic.push(simulation.real(self.kinetic)?);
         history.strain.push(simulation.real(self.strain)?);

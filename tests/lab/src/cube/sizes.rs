@@ -1,13 +1,14 @@
 //! What modes the bodies need: cube and rings reduced further and less far than those that ship.
 
 use serde_json::{Value, json};
-use tiprub_core::{Rom, Scene, settings::Interpolation, settings::Scheme, settings::Solver};
+use tiprub_core::{Scene, settings::Interpolation, settings::Scheme, settings::Solver};
 use tiprub_gallery::{reduction, rom_cache::RomCache};
 use tiprub_model::cube::{CubeOptions, RingOptions, Side};
 use tiprub_reference::{compare::agreement, cube::history::History};
 use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
+    patches::replace,
     product::{Product, ProductRun},
     runs::{Flight, RECORD, released},
 };
@@ -125,7 +126,7 @@ impl Work<'_> {
             let file = format!("ring-{name}-study-{modes}-{static_responses}");
             let rom = cache.get(&file, &options, console, &|| Ok(reduction::cube_ring(&options, console)?.rom))?;
             bytes = tiprub_format::write_rom(&rom).len();
-            self.replace(&mut scene, rom)?;
+            replace(&mut scene, rom)?;
         }
         let run = self.run(&scene)?;
         Ok(self.size([modes, static_responses], bytes, &run, a))
@@ -140,19 +141,11 @@ impl Work<'_> {
             let rom = cache.get(&file, &options, console, &|| Ok(reduction::cube(&options, console)?.rom))?;
             let bytes = tiprub_format::write_rom(&rom).len();
             let mut scene = self.scene.clone();
-            self.replace(&mut scene, rom)?;
+            replace(&mut scene, rom)?;
             runs.push((modes, bytes, self.run(&scene)?));
         }
         let Some((.., all)) = runs.last() else { return Ok(Vec::new()) };
         Ok(runs.iter().map(|(modes, bytes, run)| self.size([*modes, 0], *bytes, run, &all.history)).collect())
-    }
-
-    /// Put a ROM in the place of that of the same name.
-    fn replace(&self, scene: &mut Scene, rom: Rom) -> Result<()> {
-        let missing = || Failure::new("study cube", format!("the scene has no structure `{}`", rom.name), "");
-        let place = scene.roms.iter().position(|old| old.name == rom.name).ok_or_else(missing)?;
-        scene.roms[place] = rom;
-        Ok(())
     }
 
     fn run(&self, scene: &Scene) -> Result<ProductRun> {

@@ -3,7 +3,7 @@
 use tiprub_core::{Rom, Scene, settings::Shape};
 use tiprub_gallery::{reduction, rom_cache::RomCache, scene_source};
 use tiprub_model::{Rotor37Options, rotor37::MeshCounts};
-use tiprub_reference::reduced::rub::{BladeScene, Blades, Tip};
+use tiprub_reference::reduced::rub::{BladeScene, Blades, Obstacle, Tip};
 use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
@@ -113,9 +113,11 @@ fn outside(scene: &Scene) -> Option<BladeScene> {
         tips: tips.collect(),
         sectors: rom.sectors,
         damping: rotor.damping_ratio.unwrap_or(rom.damping_ratio),
-        clearance: contact.gap,
-        speed: rotor.speed,
-        friction: contact.friction,
-        bumps: [2.0 * contact.gap * depth, width, surface.ramp_time],
+        obstacle: Obstacle {
+            clearance: contact.gap,
+            speed: rotor.speed,
+            friction: contact.friction,
+            bumps: [2.0 * contact.gap * depth, width, surface.ramp_time],
+        },
     })
 }

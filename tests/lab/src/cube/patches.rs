@@ -1,0 +1,224 @@
+//! The faces of the cube as patches: means of gaps over hat functions in place of nodes. Global quantities against finer meshes,
+//! symmetry, energy, and GetFEM's table of the same flight.
+
+use serde_json::{Value, json};
+use tiprub_core::{
+    Rom, Scene,
+    settings::{Interpolation, Scheme, Solver},
+};
+use tiprub_gallery::{reduction, rom_cache::RomCache};
+use tiprub_model::cube::{CubeOptions, MassMatrix, RingOptions, Side};
+use tiprub_reference::{
+    compare::{asymmetry, exit_speed, windowed},
+    cube::{history::History, outside},
+};
+use tiprub_shell::{Failure, Result, console::Console};
+use tiprub_study::Statement;
+
+use super::{
+    LEDGER, SYMMETRIC,
+    product::{Product, ProductRun},
+    runs::{Flight, RECORD},
+};
+
+/// GetFEM's flight: facets, consistent mass, forces that hold the gaps of nodes.
+const GETFEM: &str = include_str!("../../../../src/reference/tests/data/cube_getfem_held.csv");
+/// Elements along a side of the cube, patches along a side of its faces; its nodes where there are none.
+const CASES: [(usize, Option<usize>); 6] =
+    [(5, None), (5, Some(3)), (5, Some(4)), (5, Some(6)), (7, None), (7, Some(6))];
+const QUICK_CASES: [(usize, Option<usize>); 2] = [(5, None), (5, Some(3))];
+/// Ends (s): of the fast flight, which is over then, and of the slow one.
+const FAST_END: f64 = 1.2e-3;
+const SLOW_END: f64 = 2.1e-3;
+
+fn product(interpolation: Interpolation) -> Product {
+    Product { solver: Solver::Lcp, scheme: Scheme::ModalExact, step: 5e-7, interpolation }
+}
+
+/// One kind of contact.
+#[derive(Debug, Clone)]
+pub(super) struct Patched {
+    name: String,
+    /// Impulse of the left face (N·s) and speed in the end (m/s) of the fast flight.
+    impulse: f64,
+    exit: f64,
+    /// Left and right: displacements and forces.
+    apart: [f64; 2],
+    residual: f64,
+    /// Deepest penetration of what touches (m).
+    deepest: f64,
+    /// Energy lost without friction at most (share), and speed in the end (m/s), of the slow flight.
+    slow: Option<[f64; 2]>,
+    /// Beside GetFEM: relative difference of the left face's impulse, and of what the centre of the cube has lost of its speed (L2).
+    getfem: Option<[f64; 2]>,
+}
+
+/// All of them.
+#[derive(Debug, Clone)]
+pub(super) struct Patches(Vec<Patched>);
+
+struct Work<'a> {
+    scene: &'a Scene,
+    fast: &'a Flight,
+    slow: Flight,
+    end: Option<f64>,
+    tools: (&'a RomCache, &'a Console),
+}
+
+impl Patches {
+    /// Reduce, fly. Quick ones end early (`end`, s) and have the fast flight only.
+    ///
+    /// # Errors
+    /// A reduction or a run that is refused; never with what ships.
+    pub(super) fn new(
+        scene: &Scene,
+        (fast, slow): (&Flight, Flight),
+        end: Option<f64>,
+        tools: (&RomCache, &Console),
+    ) -> Result<Self> {
+        let work = Work { scene, fast, slow, end, tools };
+        let cases = if end.is_some() { &QUICK_CASES[..] } else { &CASES[..] };
+        Ok(Self(cases.iter().map(|(elements, patches)| work.patched(*elements, *patches)).collect::<Result<_>>()?))
+    }
+
+    pub(super) fn statements(&self) -> Vec<Statement> {
+        let apart: Vec<f64> = self.0.iter().flat_map(|one| one.apart).collect();
+        let residual = self.0.iter().map(|one| one.residual).fold(0.0, f64::max);
+        let mut found = vec![Statement::tested(
+            format!("With patches left and right are equal, to {SYMMETRIC:e}, and the ledger closes, to {LEDGER:e}"),
+            apart.iter().all(|apart| *apart < SYMMETRIC) && residual < LEDGER,
+            format!("largest difference {:.0e}, residual {residual:.0e}", apart.iter().fold(0.0_f64, |a, b| a.max(*b))),
+        )];
+        // The first touch of the corners tells nothing of the whole.
+        if self.0.iter().all(|one| one.slow.is_some()) {
+            let impulse = |start: &str| self.0.iter().find(|one| one.name.starts_with(start)).map(|one| one.impulse);
+            let nodes = impulse("5, nodes").unwrap_or(f64::NAN);
+            let patches = ["5, 3 ×", "5, 4 ×", "5, 6 ×"].map(|start| impulse(start).unwrap_or(f64::NAN) / nodes - 1.0);
+            let told = patches.map(|share| format!("{:+.1} %", 100.0 * share));
+            found.push(Statement::tested(
+                "More patches on the flat faces, which meet a curved surface, come nearer to its nodes: impulse of the left face",
+                patches.is_sorted_by(|a, b| a.abs() > b.abs()),
+                told.join(", "),
+            ));
+        }
+        found
+    }
+
+    pub(super) fn json(&self) -> Value {
+        let row = |one: &Patched| {
+            json!({
+                "contact": one.name, "left_impulse": one.impulse, "exit_speed": one.exit, "asymmetry": one.apart,
+                "ledger_residual": one.residual, "deepest": one.deepest, "slow": one.slow, "getfem": one.getfem,
+            })
+        };
+        self.0.iter().map(row).collect()
+    }
+
+    pub(super) fn markdown(&self) -> String {
+        let mut text = String::from(
+            "## Patches\n\n| elements, contact | left face, impulse (N·s) | exit (m/s) | left/right: ux, λ | ledger | deepest (m) | 50 m/s, µ = 0: \
+             lost | exit (m/s) | GetFEM: left face, impulse | lost speed |\n|---|---|---|---|---|---|---|---|---|---|\n",
+        );
+        let shares = |pair: Option<[f64; 2]>, digits: usize, second: &dyn Fn(f64) -> String| match pair {
+            Some([a, b]) => format!("{:.digits$} % | {}", 100.0 * a, second(b)),
+            None => "– | –".to_owned(),
+        };
+        for one in &self.0 {
+            let [moved, force] = one.apart;
+            text.push_str(&format!(
+                "| {} | {:.2} | {:.3} | {moved:.0e}, {force:.0e} | {:.0e} | {:.0e} | {} | {} |\n",
+                one.name,
+                one.impulse,
+                one.exit,
+                one.residual,
+                one.deepest,
+                shares(one.slow, 3, &|exit| format!("{exit:.3}")),
+                shares(one.getfem, 2, &|lost| format!("{:.2} %", 100.0 * lost)),
+            ));
+        }
+        text
+    }
+}
+
+impl Work<'_> {
+    fn patched(&self, elements: usize, patches: Option<usize>) -> Result<Patched> {
+        let lumped = self.with(elements, patches, MassMatrix::Lumped)?;
+        let fast = self.run(&lumped, self.fast, Interpolation::Spline, self.end.unwrap_or(FAST_END))?;
+        let slow = match self.end {
+            Some(_) => None,
+            None => {
+                let run = self.run(&lumped, &self.slow, Interpolation::Spline, SLOW_END)?;
+                let total = run.history.total();
+                let least =
+                    total.iter().zip(&run.curvature).map(|(total, gain)| total - gain).fold(f64::INFINITY, f64::min);
+                Some([1.0 - least / total[0], exit_speed(&run.history)])
+            }
+        };
+        let touching = patches.map_or("nodes".to_owned(), |side| format!("{side} × {side} patches"));
+        Ok(Patched {
+            name: format!("{elements}, {touching}"),
+            impulse: impulse(&fast.history, fast.history.times[fast.history.times.len() - 1]),
+            exit: exit_speed(&fast.history),
+            apart: asymmetry(&fast.history, f64::MAX),
+            residual: fast.residual,
+            deepest: fast.history.penetration.iter().fold(0.0, |most: f64, depth| most.max(*depth)),
+            slow,
+            getfem: if self.end.is_some() || elements != 5 { None } else { Some(self.beside_getfem(patches)?) },
+        })
+    }
+
+    fn beside_getfem(&self, patches: Option<usize>) -> Result<[f64; 2]> {
+        let theirs =
+            outside::read(GETFEM, self.fast.speed).map_err(|error| Failure::from_below("study cube", error))?;
+        let end = theirs.times[theirs.times.len() - 1];
+        let mut scene = self.with(5, patches, MassMatrix::Consistent)?;
+        for side in Side::BOTH {
+            let options = RingOptions { mass: MassMatrix::Consistent, ..RingOptions::new(side) };
+            let rom = self.tools.0.get(
+                &format!("{}-study-consistent", options.name.replace('_', "-")),
+                &options,
+                self.tools.1,
+                &|| Ok(reduction::cube_ring(&options, self.tools.1)?.rom),
+            )?;
+            replace(&mut scene, rom)?;
+        }
+        let own = self.run(&scene, self.fast, Interpolation::Facets, end)?.history;
+        let times: Vec<f64> = (1..=100).map(|sample| end * f64::from(sample) / 100.0).collect();
+        let lost = |history: &History| history.velocity.iter().map(|v| v[1] + self.fast.speed).collect::<Vec<f64>>();
+        let lost =
+            tiprub_reference::compare::relative_l2((&own.times, &lost(&own)), (&theirs.times, &lost(&theirs)), &times);
+        Ok([impulse(&own, end) / impulse(&theirs, end) - 1.0, lost])
+    }
+
+    /// The scene with this cube, all of its modes kept.
+    fn with(&self, elements: usize, patches: Option<usize>, mass: MassMatrix) -> Result<Scene> {
+        let (cache, console) = self.tools;
+        let options = CubeOptions { elements, mass, patches: patches.map(|side| [side; 2]), ..CubeOptions::default() };
+        let mut scene = self.scene.clone();
+        if options != CubeOptions::default() {
+            let kind = if mass == MassMatrix::Lumped { "" } else { "-consistent" };
+            let file = format!("cube-study-{elements}-patches-{}{kind}", patches.unwrap_or(0));
+            replace(&mut scene, cache.get(&file, &options, console, &|| Ok(reduction::cube(&options, console)?.rom))?)?;
+        }
+        Ok(scene)
+    }
+
+    fn run(&self, scene: &Scene, flight: &Flight, interpolation: Interpolation, end: f64) -> Result<ProductRun> {
+        let run = product(interpolation).run(scene, flight, end, RECORD);
+        run.map_err(|error| Failure::from_below("study cube", error))
+    }
+}
+
+/// Impulse of the left face up to a time (s).
+fn impulse(history: &History, end: f64) -> f64 {
+    let left: Vec<f64> = history.forces.iter().map(|sides| sides[0]).collect();
+    windowed(&history.times, &left, end, end)[0] * end
+}
+
+/// Put a ROM in the place of that of the same name.
+pub(super) fn replace(scene: &mut Scene, rom: Rom) -> Result<()> {
+    let missing = || Failure::new("study cube", format!("the scene has no structure `{}`", rom.name), "");
+    let place = scene.roms.iter().position(|old| old.name == rom.name).ok_or_else(missing)?;
+    scene.roms[place] = rom;
+    Ok(())
+}
