@@ -13,7 +13,7 @@ use tiprub_shell::{
 use tiprub_study as study;
 use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
-use crate::{conjugacy, convergence, cube, error, estimates, inputs, modes, stability, stage};
+use crate::{conjugacy, convergence, cube, error, estimates, inputs, modes, refinement, stability, stage};
 
 /// Evidence for tiprub: studies of the models that ship and of standard problems.
 #[derive(Debug, Parser)]
@@ -60,6 +60,22 @@ pub enum Command {
     Inputs(StudyCommon),
     /// What steps, modes and patches are estimated to leave, against rubs refined far in each direction.
     Estimates(StudyCommon),
+    /// What refining rubs of rotor 37 and of the stage changes: patches, mesh, modes, steps; limits, and the errors of what ships.
+    Refinement(RefinementArguments),
+}
+
+/// Arguments of `lab refinement`.
+#[derive(Debug, Args)]
+pub struct RefinementArguments {
+    /// Only this scene, such as rotor37-light or stage-smooth; may be given several times.
+    #[arg(long = "scene", value_name = "SCENE")]
+    pub scenes: Vec<String>,
+    /// Runs at the same time [default: one per processor].
+    #[arg(long, value_name = "N")]
+    pub threads: Option<std::num::NonZero<usize>>,
+    /// What all studies take.
+    #[command(flatten)]
+    pub common: StudyCommon,
 }
 
 /// Arguments of `lab error`.
@@ -163,6 +179,7 @@ impl Cli {
             Command::Conjugacy(common) => ("conjugacy", common),
             Command::Inputs(common) => ("inputs", common),
             Command::Estimates(common) => ("estimates", common),
+            Command::Refinement(arguments) => ("refinement", &arguments.common),
         };
         let directory = commands::study::directory(name, common);
         output_file::try_directory(&directory)?;
@@ -186,6 +203,7 @@ impl Cli {
             Command::Conjugacy(common) => conjugacy::study(common.quick),
             Command::Inputs(common) => inputs::study(common, console),
             Command::Estimates(common) => estimates::study(common, console),
+            Command::Refinement(arguments) => refinement::study(arguments, console),
             Command::Stability(_) => unreachable!("`run` has answered it"),
         }
     }

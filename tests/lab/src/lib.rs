@@ -14,5 +14,6 @@ mod error;
 mod estimates;
 mod inputs;
 mod modes;
+mod refinement;
 mod stability;
 mod stage;

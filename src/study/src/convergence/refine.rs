@@ -2,7 +2,11 @@
 
 use tiprub_core::{Rom, Scene, dynamics::modal::ModalModel, rom::Frame};
 use tiprub_format::builtin_model;
-use tiprub_gallery::{builtin, scene_source::BUILTIN};
+use tiprub_gallery::{
+    builtin::{self, Other},
+    rom_cache::RomCache,
+    scene_source::BUILTIN,
+};
 use tiprub_model::rotor37::Tip;
 use tiprub_shell::{Failure, Result, console::Console};
 
@@ -24,19 +28,32 @@ const QUICK_MORE: [f64; 1] = [1.5];
 /// Two models are one where their frequencies and contact nodes agree to this (relative).
 const SAME: f64 = 1e-6;
 
+/// A ROM and what it was reduced from.
+#[derive(Debug, Clone)]
+pub struct Meshed {
+    /// The ROM.
+    pub rom: Rom,
+    /// Nodes of the finite-element model.
+    pub nodes: usize,
+}
+
 /// Where the ROM of the master comes from, if it can be reduced again.
 pub trait Source {
-    /// The ROM with `modes` modes beside the responses to contact and this tip, reduced again.
+    /// The ROM with `modes` modes beside the responses to contact and this tip, reduced again: from its own mesh, or from one of
+    /// the [others](Self::others).
     ///
     /// # Errors
     /// Whatever the reduction refuses.
-    fn reduce(&self, modes: usize, tip: Tip, console: &Console) -> Result<Rom>;
+    fn reduce(&self, other: Option<usize>, modes: usize, tip: Tip, console: &Console) -> Result<Meshed>;
+
+    /// How many other meshes of the same structure there are.
+    fn others(&self) -> usize;
 }
 
 /// One setting of a direction.
 #[derive(Debug, Clone)]
 pub struct Level {
-    /// Internal step (s), number of modes or of contact nodes.
+    /// Internal step (s), number of modes, of contact nodes or of nodes of the mesh.
     pub value: f64,
     /// Whether the scene is as it stands.
     pub own: bool,
@@ -64,6 +81,21 @@ pub struct Direction {
 }
 
 impl Direction {
+    fn new(name: &'static str, title: String, unit: &'static str) -> Self {
+        Self { name, title, unit, levels: Vec::new(), missing: String::new(), shorter: None }
+    }
+
+    /// What the error of a level goes with a power of: the step, one over the number of modes, the length of a patch, the edge of an
+    /// element.
+    pub fn size(&self, value: f64) -> f64 {
+        match self.unit {
+            SECONDS => value,
+            MESH_NODES => value.powf(-0.5),
+            MODES_KEPT => 1.0 / value,
+            _ => 1.0 / (value - 1.0).max(0.5),
+        }
+    }
+
     /// Say what cannot be refined, once.
     fn misses(&mut self, why: String) {
         if !self.missing.contains(&why) {
@@ -74,7 +106,7 @@ impl Direction {
 
     /// The same with shorter steps.
     pub fn stepped(&self, shorter: u32) -> Self {
-        let mut finer = self.clone();
+        let mut finer = Self { shorter: Some(shorter), ..self.clone() };
         for level in &mut finer.levels {
             level.division = level.division.saturating_mul(shorter);
             level.scene.settings.time.step /= f64::from(shorter);
@@ -85,25 +117,41 @@ impl Direction {
 
 /// Name of the direction of steps.
 pub const STEP: &str = "step";
+/// Name of the direction of contact nodes or patches.
+pub const NODES: &str = "nodes";
+/// Name of the direction of meshes.
+pub const MESH: &str = "mesh";
+/// Units of values.
+pub const SECONDS: &str = "s";
+const MODES_KEPT: &str = "modes";
+const MESH_NODES: &str = "mesh nodes";
 
 /// Names of the directions of structures, for files.
 const MODES: [&str; 8] = ["modes", "modes-2", "modes-3", "modes-4", "modes-5", "modes-6", "modes-7", "modes-8"];
 
-/// All directions of a scene whose master comes from `source`; steps are in multiples of `own` per communication step.
+/// Name of the direction of the modes of a structure.
+pub fn modes_of(structure: usize) -> Option<&'static str> {
+    MODES.get(structure).copied()
+}
+
+/// How models are reduced again.
+pub struct Again<'a> {
+    /// Where the ROM of the master comes from, if that is a file and known.
+    pub source: Option<&'a dyn Source>,
+    /// Where models that ship are kept.
+    pub cache: &'a RomCache,
+    /// Few levels.
+    pub quick: bool,
+    /// For progress.
+    pub console: &'a Console,
+}
+
+/// All directions of a scene; steps are in multiples of `own` per communication step.
 ///
 /// # Errors
 /// A source that does not give the ROM of the scene, and what its reduction refuses.
-pub fn directions(
-    scene: &Scene,
-    own: u32,
-    source: Option<&dyn Source>,
-    quick: bool,
-    console: &Console,
-) -> Result<Vec<Direction>> {
-    let refiner = Refiner { scene, own, source, quick, console };
-    if let Some(source) = source {
-        refiner.check(source)?;
-    }
+pub fn directions(scene: &Scene, own: u32, again: &Again) -> Result<Vec<Direction>> {
+    let refiner = Refiner::checked(scene, own, again)?;
     let mut all = vec![refiner.steps()];
     for (index, name) in (0..scene.roms.len()).zip(MODES) {
         all.push(refiner.modes(index, name)?);
@@ -111,26 +159,65 @@ pub fn directions(
     all.push(refiner.nodes()?);
     if let Some(structure) = scene.settings.structures.get(MODES.len()) {
         all.push(Direction {
-            name: "modes-more",
-            title: format!("modes of {} and those after it", structure.name),
-            unit: "modes",
-            levels: Vec::new(),
             missing: format!("the study refines {} structures", MODES.len()),
-            shorter: None,
+            ..Direction::new("modes-more", format!("modes of {} and those after it", structure.name), MODES_KEPT)
         });
     }
+    all.push(refiner.meshes()?);
     Ok(all)
 }
 
-struct Refiner<'a> {
+/// Makes other models of a scene.
+pub(crate) struct Refiner<'a> {
     scene: &'a Scene,
+    /// Internal steps per communication step.
     own: u32,
-    source: Option<&'a dyn Source>,
-    quick: bool,
-    console: &'a Console,
+    again: &'a Again<'a>,
+    /// Of the mesh of the master, where it can be reduced again.
+    mesh_nodes: Option<usize>,
 }
 
-impl Refiner<'_> {
+impl<'a> Refiner<'a> {
+    /// With a source that gives what the scene has.
+    ///
+    /// # Errors
+    /// It does not, or its reduction refuses.
+    pub(crate) fn checked(scene: &'a Scene, own: u32, again: &'a Again<'a>) -> Result<Self> {
+        let mut refiner = Self { scene, own, again, mesh_nodes: None };
+        refiner.mesh_nodes = match again.source {
+            Some(source) => Some(refiner.check(source)?),
+            None => refiner.with_chord().and_then(|name| builtin::mesh_nodes(&name, 1.0)).transpose()?,
+        };
+        Ok(refiner)
+    }
+
+    /// The scene with so many times its modes and spaces between contact points, factor by factor as far as its mesh has them; none where the
+    /// master cannot be reduced again.
+    pub(crate) fn finer(&self, factors: &[usize]) -> Vec<Scene> {
+        let index = master(self.scene);
+        let own = &self.scene.roms[index];
+        let (modes, points) = self.own_counts();
+        let start = common_start(self.scene, index);
+        let with = |factor: &usize| {
+            let tip = self.tip(if start.is_ok() { factor * (points - 1) + 1 } else { points });
+            let found = match (self.again.source, self.with_chord()) {
+                (Some(source), _) => source.reduce(None, factor * modes, tip, self.again.console).map(|found| found.rom),
+                (None, Some(name)) => {
+                    let other = Other { modes: *factor as f64, tip, mesh: 1.0 };
+                    builtin::refined(&name, other, self.again.cache, self.again.console)?
+                }
+                (None, None) => return None,
+            };
+            let rom = Rom { damping_ratio: own.damping_ratio, ..found.ok()? };
+            let rom = match &start {
+                Ok(start) => starting_with(start, rom),
+                Err(_) => named_as(own, rom),
+            };
+            Some(self.with_rom(index, rom))
+        };
+        factors.iter().map_while(with).collect()
+    }
+
     fn level(&self, value: f64, own: bool, scene: Scene) -> Level {
         Level { value, own, scene, division: self.own }
     }
@@ -154,16 +241,23 @@ impl Refiner<'_> {
     }
 
     /// From the source, with the damping of the scene's ROM: a command line may propose another.
-    fn reduced(&self, source: &dyn Source, modes: usize, nodes: usize) -> Result<Rom> {
-        let rom = source.reduce(modes, self.tip(nodes), self.console)?;
-        Ok(Rom { damping_ratio: self.scene.roms[master(self.scene)].damping_ratio, ..rom })
+    fn reduced(&self, source: &dyn Source, other: Option<usize>, [modes, nodes]: [usize; 2]) -> Result<Meshed> {
+        let found = source.reduce(other, modes, self.tip(nodes), self.again.console)?;
+        let damping_ratio = self.scene.roms[master(self.scene)].damping_ratio;
+        Ok(Meshed { rom: Rom { damping_ratio, ..found.rom }, ..found })
     }
 
-    /// The source must give what the scene has; anything else would be a study of another model.
-    fn check(&self, source: &dyn Source) -> Result<()> {
+    /// The master where it is a model that ships and whose contact nodes and mesh can be chosen anew.
+    fn with_chord(&self) -> Option<String> {
+        let structure = &self.scene.settings.structures[master(self.scene)];
+        builtin_model(&self.scene.settings, structure).filter(|name| builtin::has_chord(name))
+    }
+
+    /// The source must give what the scene has; anything else would be a study of another model. Nodes of its mesh.
+    fn check(&self, source: &dyn Source) -> Result<usize> {
         let rom = &self.scene.roms[master(self.scene)];
         let (modes, nodes) = self.own_counts();
-        let again = self.reduced(source, modes, nodes)?;
+        let Meshed { rom: again, nodes: of_mesh } = self.reduced(source, None, [modes, nodes])?;
         let differs = |problem: String| {
             let remedy = "Give the mesh and the options that the ROM was reduced with (its sets, material, units, axis, sectors)";
             Err(Failure::new(
@@ -188,7 +282,7 @@ impl Refiner<'_> {
         let first = |all: &[f64]| all.first().copied().unwrap_or(f64::NAN) / std::f64::consts::TAU;
         let close = own.iter().zip(&other).all(|(a, b)| (a - b).abs() <= SAME * a.abs().max(b.abs()));
         if own.len() == other.len() && close {
-            Ok(())
+            Ok(of_mesh)
         } else {
             differs(format!(
                 "first frequency {:.3} Hz instead of {:.3} Hz, {} coordinates instead of {}",
@@ -201,7 +295,7 @@ impl Refiner<'_> {
     }
 
     fn steps(&self) -> Direction {
-        let shares = if self.quick { &QUICK_STEPS[..] } else { &STEPS[..] };
+        let shares = if self.again.quick { &QUICK_STEPS[..] } else { &STEPS[..] };
         let interval = self.scene.settings.experiment.communication_step;
         let step = divided(interval, self.scene.settings.time.step);
         let mut divisions: Vec<u32> = shares.iter().map(|share| count(f64::from(self.own) / share)).collect();
@@ -216,14 +310,7 @@ impl Refiner<'_> {
             Level { value, own: division == self.own, scene, division }
         };
         let levels = divisions.into_iter().map(level).collect();
-        Direction {
-            name: STEP,
-            title: "internal step".into(),
-            unit: "s",
-            levels,
-            missing: String::new(),
-            shorter: None,
-        }
+        Direction { levels, ..Direction::new(STEP, "internal step".into(), SECONDS) }
     }
 
     /// Modes of one structure: fewer of the ROM's own, more where it can be reduced again.
@@ -231,15 +318,8 @@ impl Refiner<'_> {
         let (rom, structure) = (&self.scene.roms[index], &self.scene.settings.structures[index]);
         let form = Form::of(rom);
         let own = form.modes(rom);
-        let mut direction = Direction {
-            name,
-            title: format!("modes of {}", structure.name),
-            unit: "modes",
-            levels: Vec::new(),
-            missing: String::new(),
-            shorter: None,
-        };
-        let fewer = if self.quick { &QUICK_FEWER[..] } else { &FEWER[..] };
+        let mut direction = Direction::new(name, format!("modes of {}", structure.name), MODES_KEPT);
+        let fewer = if self.again.quick { &QUICK_FEWER[..] } else { &FEWER[..] };
         let mut counts: Vec<usize> = fewer.iter().map(|share| count(share * own as f64) as usize).collect();
         counts.retain(|count| *count < own);
         counts.dedup();
@@ -250,7 +330,7 @@ impl Refiner<'_> {
             }
         }
         direction.levels.push(self.level(own as f64, true, self.scene.clone()));
-        let more = if self.quick { &QUICK_MORE[..] } else { &MORE[..] };
+        let more = if self.again.quick { &QUICK_MORE[..] } else { &MORE[..] };
         for factor in more {
             match self.more_modes(index, own, *factor) {
                 Some(rom) => {
@@ -268,11 +348,14 @@ impl Refiner<'_> {
 
     fn more_modes(&self, index: usize, own: usize, factor: f64) -> Option<Result<Rom>> {
         let (nodes, master) = (self.scene.roms[index].contact_nodes.len(), index == master(self.scene));
-        let again = match self.source.filter(|_| master) {
-            Some(source) => self.reduced(source, count(factor * own as f64) as usize, nodes),
+        let again = match self.again.source.filter(|_| master) {
+            Some(source) => {
+                self.reduced(source, None, [count(factor * own as f64) as usize, nodes]).map(|found| found.rom)
+            }
             None => {
                 let name = builtin_model(&self.scene.settings, &self.scene.settings.structures[index])?;
-                builtin::refined(&name, factor, self.tip(nodes), self.console)?
+                let other = Other { modes: factor, tip: self.tip(nodes), mesh: 1.0 };
+                builtin::refined(&name, other, self.again.cache, self.again.console)?
             }
         };
         Some(again.map(|again| named_as(&self.scene.roms[index], again)))
@@ -283,16 +366,9 @@ impl Refiner<'_> {
         let index = master(self.scene);
         let structure = &self.scene.settings.structures[index];
         let title = format!("contact nodes of {}", structure.name);
-        let mut direction = Direction {
-            name: "nodes",
-            title,
-            unit: "nodes",
-            levels: Vec::new(),
-            missing: String::new(),
-            shorter: None,
-        };
-        let builtin = builtin_model(&self.scene.settings, structure).filter(|name| builtin::has_chord(name));
-        if self.source.is_none() && builtin.is_none() {
+        let mut direction = Direction::new(NODES, title, "nodes");
+        let builtin = self.with_chord();
+        if self.again.source.is_none() && builtin.is_none() {
             direction.missing =
                 if self.scene.roms[index].frame == Frame::Cartesian || structure.rom.starts_with(BUILTIN) {
                     "contact nodes are chosen anew of blades only".into()
@@ -315,17 +391,18 @@ impl Refiner<'_> {
         }
         let fewer = if patches { own.div_ceil(2) } else { 2 };
         let mut counts = vec![fewer, own, 2 * own - 1];
-        if !self.quick {
+        if !self.again.quick {
+            counts.extend(patches.then(|| fewer.div_ceil(2)));
             counts.push(4 * own - 3);
         }
+        counts.retain(|count| *count >= 2);
         counts.sort_unstable();
         counts.dedup();
         for nodes in counts {
-            let rom = match (self.source, &builtin) {
+            let rom = match (self.again.source, &builtin) {
                 _ if nodes == own => Ok(self.scene.roms[index].clone()),
-                (Some(source), _) => self.reduced(source, modes, nodes),
-                (None, name) => builtin::refined(&name.clone().unwrap_or_default(), 1.0, self.tip(nodes), self.console)
-                    .unwrap_or_else(|| Err(Failure::new(&structure.rom, "no such model", ""))),
+                (Some(source), _) => self.reduced(source, None, [modes, nodes]).map(|found| found.rom),
+                (None, name) => self.built_in(&name.clone().unwrap_or_default(), nodes, 1.0),
             };
             match rom {
                 Ok(rom) if nodes == own => {
@@ -339,6 +416,62 @@ impl Refiner<'_> {
                 Err(failure) => direction.misses(format!("{nodes} nodes: {failure}")),
             }
         }
+        Ok(direction)
+    }
+
+    /// A model that ships, with another tip or mesh.
+    fn built_in(&self, name: &str, nodes: usize, mesh: f64) -> Result<Rom> {
+        let other = Other { modes: 1.0, tip: self.tip(nodes), mesh };
+        let found = builtin::refined(name, other, self.again.cache, self.again.console);
+        found.unwrap_or_else(|| Err(Failure::new(name, "no such model", "")))
+    }
+
+    /// Meshes of the master with its number of modes and contact nodes.
+    ///
+    /// # Errors
+    /// A mesh that cannot be reduced.
+    pub(crate) fn meshes(&self) -> Result<Direction> {
+        let index = master(self.scene);
+        let (rom, structure) = (&self.scene.roms[index], &self.scene.settings.structures[index]);
+        let mut direction = Direction::new(MESH, format!("mesh of {}", structure.name), MESH_NODES);
+        let Some(own_nodes) = self.mesh_nodes else {
+            direction.missing = if structure.rom.starts_with(BUILTIN) || rom.frame == Frame::Cartesian {
+                "meshes are chosen anew of blades only".into()
+            } else {
+                no_source("what the mesh leaves out", rom)
+            };
+            return Ok(direction);
+        };
+        let (modes, nodes) = self.own_counts();
+        let mut found = Vec::new();
+        match (self.again.source, self.with_chord()) {
+            (Some(source), _) => {
+                for other in 0..source.others() {
+                    found.push(self.reduced(source, Some(other), [modes, nodes])?);
+                }
+                if found.is_empty() {
+                    direction.missing = "one mesh does not tell what meshes leave: give others of the same blade, coarser or finer, with \
+                                         --other-mesh FILE"
+                        .into();
+                    return Ok(direction);
+                }
+            }
+            (None, name) => {
+                let name = name.unwrap_or_default();
+                let factors = if self.again.quick { &builtin::MESHES[..1] } else { &builtin::MESHES[..] };
+                for factor in factors {
+                    let rom = self.built_in(&name, nodes, *factor)?;
+                    let of_mesh = builtin::mesh_nodes(&name, *factor).transpose()?.unwrap_or_default();
+                    found.push(Meshed { rom, nodes: of_mesh });
+                }
+            }
+        }
+        direction.levels.push(self.level(own_nodes as f64, true, self.scene.clone()));
+        for Meshed { rom: again, nodes } in found {
+            let again = named_as(rom, Rom { damping_ratio: rom.damping_ratio, ..again });
+            direction.levels.push(self.level(nodes as f64, false, self.with_rom(index, again)));
+        }
+        direction.levels.sort_by(|a, b| a.value.total_cmp(&b.value));
         Ok(direction)
     }
 }
