@@ -111,15 +111,13 @@ fn totals(total: &Value, cheapest: &str) {
     assert!(total["truth"].as_str().unwrap().starts_with("5 nodes and 40 modes"), "{total:#}");
     let rows = total["rows"].as_array().unwrap();
     let ran: Vec<&Value> = rows.iter().filter(|row| row["refused"].is_null()).collect();
-    let with = |modes: f64| ran.iter().filter(move |row| number(row, "modes") == modes);
-    let least = |modes: f64| with(modes).map(|row| number(row, "total_error")).fold(f64::INFINITY, f64::min);
-    assert!(least(20.0) < least(10.0) && least(20.0) > 1e-3, "fewer modes are worse: {total:#}");
-    // Fewer modes are cheaper at the same step and scheme.
-    let time = |modes: f64| {
-        let same = |row: &&&Value| row["competitor"] == "modal-exact + lcp" && number(row, "internal_step") < 1.1e-6;
-        with(modes).filter(same).map(|row| number(row, "seconds")).sum::<f64>()
+    let of = |modes: f64| {
+        let own = |row: &&&Value| row["competitor"] == "modal-exact + lcp" && number(row, "internal_step") < 1.1e-6;
+        let found = ran.iter().filter(own).find(|row| number(row, "modes") == modes);
+        number(found.unwrap_or_else(|| panic!("{total:#}")), "total_error")
     };
-    assert!(time(10.0) > 0.0 && time(10.0) < time(20.0), "{total:#}");
+    assert!(of(20.0) < of(10.0) && of(20.0) > 1e-2, "fewer modes are worse, and so are three nodes: {total:#}");
+    assert!(ran.iter().all(|row| number(row, "seconds") > 0.0), "{total:#}");
     assert_eq!(ran.iter().filter(|row| row["own"] == true).count(), 1);
     // The cheapest is the cheapest of those that are good enough.
     let own = &total["cheapest"][0];
@@ -128,7 +126,10 @@ fn totals(total: &Value, cheapest: &str) {
     let hidden = total["readable"].as_f64().is_some_and(|least| number(own, "error") < least);
     assert!(hidden || best.is_infinite() || number(&own["setting"], "seconds") == best, "{own:#}");
     let lines: Vec<&str> = cheapest.lines().collect();
-    assert!(lines.len() == 7 && lines[1].starts_with("steps,0.01,") && lines[4].starts_with("total,1e-1,"), "{cheapest}");
+    assert!(
+        lines.len() == 7 && lines[1].starts_with("steps,0.01,") && lines[4].starts_with("total,1e-1,"),
+        "{cheapest}"
+    );
 }
 
 /// A scene of one's own around a coarse blade.

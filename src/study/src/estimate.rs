@@ -269,8 +269,14 @@ mod tests {
         let all = all.map(|estimate| estimate.or_of(&rom));
         assert_eq!(all[1], known, "what the run tells stays");
         let told = told(&all);
-        assert!(told.ends_with("modes unknown, patches 1.00 %, mesh 5.00 % (mesh as the ROM has it, found on a light rub)"), "{told}");
+        assert!(
+            told.ends_with("modes unknown, patches 1.00 %, mesh 5.00 % (mesh as the ROM has it, found on a light rub)"),
+            "{told}"
+        );
         let told = super::told(&of_rom(&rom));
-        assert!(told.contains("steps unknown, modes unknown, patches 2.00 %, mesh 5.00 % (patches and mesh as"), "{told}");
+        assert!(
+            told.contains("steps unknown, modes unknown, patches 2.00 %, mesh 5.00 % (patches and mesh as"),
+            "{told}"
+        );
     }
 }

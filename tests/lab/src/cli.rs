@@ -58,10 +58,21 @@ pub enum Command {
     Conjugacy(StudyCommon),
     /// What the communication step does to a whirling shaft and other inputs that move, ramped, with derivatives, and held.
     Inputs(StudyCommon),
-    /// What steps, modes and patches are estimated to leave, against rubs refined far in each direction.
-    Estimates(StudyCommon),
+    /// What steps, modes, patches and the mesh are estimated to leave, against rubs refined far in each direction.
+    Estimates(EstimatesArguments),
     /// What refining rubs of rotor 37 and of the stage changes: patches, mesh, modes, steps; limits, and the errors of what ships.
     Refinement(RefinementArguments),
+}
+
+/// Arguments of `lab estimates`.
+#[derive(Debug, Args)]
+pub struct EstimatesArguments {
+    /// Only what the mesh leaves: minutes instead of an hour.
+    #[arg(long)]
+    pub mesh_only: bool,
+    /// What all studies take.
+    #[command(flatten)]
+    pub common: StudyCommon,
 }
 
 /// Arguments of `lab refinement`.
@@ -178,7 +189,7 @@ impl Cli {
             Command::Cube(common) => ("cube", common),
             Command::Conjugacy(common) => ("conjugacy", common),
             Command::Inputs(common) => ("inputs", common),
-            Command::Estimates(common) => ("estimates", common),
+            Command::Estimates(arguments) => ("estimates", &arguments.common),
             Command::Refinement(arguments) => ("refinement", &arguments.common),
         };
         let directory = commands::study::directory(name, common);
@@ -202,7 +213,7 @@ impl Cli {
             Command::Cube(common) => cube::study(common, console),
             Command::Conjugacy(common) => conjugacy::study(common.quick),
             Command::Inputs(common) => inputs::study(common, console),
-            Command::Estimates(common) => estimates::study(common, console),
+            Command::Estimates(arguments) => estimates::study(arguments, console),
             Command::Refinement(arguments) => refinement::study(arguments, console),
             Command::Stability(_) => unreachable!("`run` has answered it"),
         }

@@ -12,13 +12,14 @@ use tiprub_model::{
 use tiprub_shell::{Failure, Result, console::Console, sweep};
 use tiprub_study::{
     Figure, Picture, Sheet, Statement, Study,
-    arguments::StudyCommon,
     convergence::{
         limit,
         march::{Marched, march},
     },
     estimate::{self, Estimate},
 };
+
+use crate::cli::EstimatesArguments;
 
 /// Rubs of one model: elements of its mesh, of two coarser ones (the coarsest first) and of the true one, modes, and depths of the bumps, friction coefficients and speeds (rad/s), each with each.
 struct Group {
@@ -32,7 +33,7 @@ struct Group {
 }
 
 /// The first group is the one that the bounds of [`estimate`] were chosen with, the second is not.
-const GROUPS: [Group; 2] = [
+static GROUPS: [Group; 2] = [
     Group {
         mesh: [16, 1, 16],
         coarser: [[8, 1, 8], [12, 1, 12]],
@@ -71,6 +72,7 @@ const DIRECTIONS: [&str; 5] = ["steps", "modes", "patches", "mesh, from one coar
 const OF_SCENE: usize = 3;
 
 /// What was estimated of the displacements, and what is true.
+#[derive(Debug, Clone, Copy)]
 struct Compared {
     scene: usize,
     direction: usize,
@@ -154,8 +156,17 @@ fn of_mesh(rub: &Rub, own: &Marched, samples: usize) -> [Option<f64>; 2] {
     [Some(limit::of_two([second, own_edge], last).rest), three.map(|limit| limit.rest)]
 }
 
-/// One rub in all directions.
-fn compared(rubs: &[Rub], scene: usize, samples: usize) -> Result<Vec<Compared>> {
+/// One rub over its mesh.
+fn compared_over_meshes(rubs: &[Rub], scene: usize, samples: usize) -> Result<Vec<Compared>> {
+    let rub = &rubs[scene];
+    let own = run(&rub.own, DIVISION, samples)?;
+    let truth = run(&rub.finer, DIVISION, samples).ok().and_then(|truth| own.displacement_change(&truth));
+    let of = |(at, estimate): (usize, Option<f64>)| Compared { scene, direction: OF_SCENE + at, estimate, truth };
+    Ok(of_mesh(rub, &own, samples).into_iter().enumerate().map(of).collect())
+}
+
+/// The same in the directions that a scene tells of itself.
+fn compared_by_itself(rubs: &[Rub], scene: usize, samples: usize) -> Result<Vec<Compared>> {
     let quiet = Console::new(true, false);
     let rub = &rubs[scene];
     let estimates = estimate::estimates(&rub.own, &[], samples, &quiet)?;
@@ -164,21 +175,15 @@ fn compared(rubs: &[Rub], scene: usize, samples: usize) -> Result<Vec<Compared>>
         run(&rub.own, TRUE_DIVISION, samples),
         run(&rub.modes, DIVISION, samples),
         run(&rub.patches, DIVISION, samples),
-        run(&rub.finer, DIVISION, samples),
     ];
     let truths = truths.map(|truth| truth.ok().and_then(|truth| own.changes(&truth)[0]));
     let of_scene = DIRECTIONS[..OF_SCENE].iter().map(|direction| {
         let estimate = estimates.iter().find(|one: &&Estimate| one.direction == *direction);
         estimate.and_then(|one| one.left.clone().ok())
     });
-    let estimates = of_scene.chain(of_mesh(rub, &own, samples)).enumerate();
-    let of = |(direction, estimate): (usize, Option<f64>)| Compared {
-        scene,
-        direction,
-        estimate,
-        truth: truths[direction.min(OF_SCENE)],
-    };
-    Ok(estimates.map(of).collect())
+    let of =
+        |(direction, estimate): (usize, Option<f64>)| Compared { scene, direction, estimate, truth: truths[direction] };
+    Ok(of_scene.enumerate().map(of).collect())
 }
 
 fn statement(all: &[Compared], direction: usize) -> Statement {
@@ -191,6 +196,31 @@ fn statement(all: &[Compared], direction: usize) -> Statement {
         !given.is_empty() && 10 * right >= 9 * given.len(),
         format!("{right} of {}; {} are unknown", given.len(), compared.count() - given.len()),
     )
+}
+
+/// The same of every group, with true errors and ratios.
+fn groups(rubs: &[Rub], all: &[Compared], direction: usize) -> Vec<Statement> {
+    let of = |(group, number): (&'static Group, usize)| {
+        let own = |one: &&Compared| one.direction == direction && core::ptr::eq(rubs[one.scene].group, group);
+        let own: Vec<&Compared> = all.iter().filter(own).collect();
+        let truths: Vec<f64> = own.iter().filter_map(|one| one.truth).collect();
+        let given: Vec<(f64, f64)> = own.iter().filter_map(|one| one.estimate.zip(one.truth)).collect();
+        let ends = |values: &mut dyn Iterator<Item = f64>| {
+            values.fold([f64::INFINITY, 0.0_f64], |[low, high], value| [low.min(value), high.max(value)])
+        };
+        let [least, most] = ends(&mut truths.iter().map(|truth| 100.0 * truth));
+        let [low, high] = ends(&mut given.iter().map(|(estimate, truth)| estimate / truth));
+        let right = given.iter().filter(|(a, b)| a.max(*b).max(NONE) <= FACTOR * a.min(*b).max(NONE)).count();
+        Statement::remark(
+            format!("{}, group {number}", DIRECTIONS[direction]),
+            format!(
+                "true error {least:.2} to {most:.2} %, estimate over truth {low:.2} to {high:.2}, {right} of {} within a factor of {FACTOR}, {} unknown",
+                given.len(),
+                truths.len() - given.len()
+            ),
+        )
+    };
+    GROUPS.iter().zip(1..).map(of).collect()
 }
 
 fn figure(all: &[Compared]) -> Result<Figure> {
@@ -218,7 +248,8 @@ fn figure(all: &[Compared]) -> Result<Figure> {
 ///
 /// # Errors
 /// A model that cannot be reduced, a run of the own model that fails, a plot that cannot be drawn.
-pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
+pub(crate) fn study(arguments: &EstimatesArguments, console: &Console) -> Result<Study> {
+    let (arguments, mesh_only) = (&arguments.common, arguments.mesh_only);
     let rubs = rubs(arguments.quick, console)?;
     let length = if arguments.quick { QUICK_LENGTH } else { LENGTH };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a thousand")]
@@ -229,7 +260,11 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         task.at(done as u64);
         task.line(&format!("{done} of {} rubs", rubs.len()));
     };
-    let found = sweep::sweep(&indices, sweep::processors(), |scene| compared(&rubs, *scene, samples), progress)?;
+    let compared = |scene: &usize| {
+        let by_itself = if mesh_only { Vec::new() } else { compared_by_itself(&rubs, *scene, samples)? };
+        Ok([by_itself, compared_over_meshes(&rubs, *scene, samples)?].concat())
+    };
+    let found = sweep::sweep(&indices, sweep::processors(), compared, progress)?;
     let all: Vec<Compared> = found.into_iter().flatten().collect();
     let row = |one: &Compared| json!({ "scene": rubs[one.scene].name, "direction": DIRECTIONS[one.direction], "estimate": one.estimate, "truth": one.truth });
     Ok(Study {
@@ -246,7 +281,10 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
             ("length of each run".into(), format!("{length} s")),
             ("internal step".into(), format!("{:e} s", INTERVAL / f64::from(DIVISION))),
         ],
-        statements: (0..DIRECTIONS.len()).map(|direction| statement(&all, direction)).collect(),
+        statements: (0..DIRECTIONS.len())
+            .filter(|direction| all.iter().any(|one| one.direction == *direction))
+            .flat_map(|direction| [statement(&all, direction)].into_iter().chain(groups(&rubs, &all, direction)))
+            .collect(),
         figures: vec![figure(&all)?],
         results: Value::Array(all.iter().map(row).collect()),
         files: Vec::new(),

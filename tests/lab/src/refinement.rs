@@ -29,16 +29,17 @@ const LIGHT: f64 = 0.6;
 const HEAVY: f64 = 1.0;
 /// Friction coefficient of the scenes with friction.
 const FRICTION: f64 = 0.15;
-/// Patches of a blade of the stage, which ships with three nodes.
-const STAGE_PATCHES: usize = 5;
+/// Patches of a blade of the stage, which ships with three nodes, and the mesh of its sector, so that the one that ships is the finest of four: to
+/// reduce a finer one takes many minutes.
+const STAGE: (usize, f64) = (5, core::f64::consts::FRAC_1_SQRT_2);
 
 /// One scene of the study.
 struct Standard {
     name: &'static str,
     title: &'static str,
     settings: SceneSettings,
-    /// Models instead of those that the scene names.
-    patches: Option<usize>,
+    /// Patches and mesh of the structure that touches, instead of what the scene names.
+    other: Option<(usize, f64)>,
 }
 
 fn standards() -> Result<Vec<Standard>> {
@@ -52,14 +53,12 @@ fn standards() -> Result<Vec<Standard>> {
         let mut settings = scene_source::settings("builtin:rotor37")?;
         settings.contacts[0].friction = friction;
         settings.surfaces[0].shape = Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
-        all.push(Standard { name, title, settings, patches: None });
+        all.push(Standard { name, title, settings, other: None });
     }
-    for (friction, name, title) in
-        [(0.0, "stage-smooth", "stage, µ = 0"), (FRICTION, "stage", "stage, µ = 0.15")]
-    {
+    for (friction, name, title) in [(0.0, "stage-smooth", "stage, µ = 0"), (FRICTION, "stage", "stage, µ = 0.15")] {
         let mut settings = scene_source::settings("builtin:stage")?;
         settings.contacts[0].friction = friction;
-        all.push(Standard { name, title, settings, patches: Some(STAGE_PATCHES) });
+        all.push(Standard { name, title, settings, other: Some(STAGE) });
     }
     Ok(all)
 }
@@ -69,9 +68,9 @@ impl Standard {
         let rom = |(index, structure): (usize, &tiprub_core::settings::StructureSettings)| -> Result<Rom> {
             let missing = || Failure::new(&structure.rom, "no such model", "");
             let name = tiprub_format::builtin_model(&self.settings, structure).ok_or_else(missing)?;
-            let found = match self.patches.filter(|_| index == 0) {
-                Some(patches) => {
-                    let other = Other { modes: 1.0, tip: Tip::Patches(patches), mesh: 1.0 };
+            let found = match self.other.filter(|_| index == 0) {
+                Some((patches, mesh)) => {
+                    let other = Other { modes: 1.0, tip: Tip::Patches(patches), mesh };
                     builtin::refined(&name, other, cache, console)
                 }
                 None => builtin::rom(&name, cache, console),
@@ -98,7 +97,8 @@ struct Case {
 pub(crate) fn study(arguments: &RefinementArguments, console: &Console) -> Result<Study> {
     let cache = arguments.common.cache.cache();
     let quick = arguments.common.quick;
-    let asked = |standard: &Standard| arguments.scenes.is_empty() || arguments.scenes.iter().any(|one| one == standard.name);
+    let asked =
+        |standard: &Standard| arguments.scenes.is_empty() || arguments.scenes.iter().any(|one| one == standard.name);
     let mut cases = Vec::new();
     for standard in standards()?.iter().filter(|standard| asked(standard)) {
         console.say(standard.title);
@@ -111,6 +111,7 @@ pub(crate) fn study(arguments: &RefinementArguments, console: &Console) -> Resul
             threads: arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get),
             source: None,
             cache: cache.clone(),
+            mesh: standard.other.map_or(1.0, |(_, mesh)| mesh),
         };
         let found = convergence::found(standard.name, &scene, &of, console).map_err(|failure| failure.to_string());
         let seconds = clock.elapsed().as_secs_f64();
@@ -172,8 +173,8 @@ fn percent(error: Option<f64>, to_finest: Option<f64>) -> String {
     };
     match (error, to_finest) {
         (Some(error), _) => told(error),
-        (None, Some(other)) => format!("({})", told(other)),
-        (None, None) => "-".into(),
+        (None, Some(other)) if other > 0.0 => format!("({})", told(other)),
+        (None, _) => "-".into(),
     }
 }
 
@@ -187,7 +188,8 @@ fn rows(refined: &Refined) -> Vec<Vec<String>> {
     let energy = energy(refined);
     let direction = &refined.direction;
     let title = direction.title.clone();
-    let value = |value: f64| if direction.unit == "s" { format!("{:.3} µs", 1e6 * value) } else { format!("{value:.0}") };
+    let value =
+        |value: f64| if direction.unit == "s" { format!("{:.3} µs", 1e6 * value) } else { format!("{value:.0}") };
     let levels = direction.levels.iter().zip(&refined.runs).map(|(level, run)| {
         let own = if level.own { " (the scene)" } else { "" };
         let step = 1e6 * level.scene.settings.experiment.communication_step / f64::from(level.division);
@@ -199,7 +201,9 @@ fn rows(refined: &Refined) -> Vec<Vec<String>> {
                 row.extend([error(0), format!("{:.5e}", quantities[0]), error(1)]);
                 row.extend([format!("{:.5e}", quantities[energy - 1]), error(energy)]);
             }
-            Err(why) => row.extend(std::iter::once(format!("refused: {}", first_words(why))).chain(["", "", "", ""].map(String::from))),
+            Err(why) => row.extend(
+                std::iter::once(format!("refused: {}", first_words(why))).chain(["", "", "", ""].map(String::from)),
+            ),
         }
         row.push(format!("{step:.3}"));
         row
@@ -210,7 +214,8 @@ fn rows(refined: &Refined) -> Vec<Vec<String>> {
         Some((limit, finest)) => format!("{:.5e}", finest[index] + limit.rest),
         None => "not to be read".into(),
     };
-    let order = |limit: Option<Limit>| limit.map_or("not to be read".into(), |limit| format!("order {:.1}", limit.order));
+    let order =
+        |limit: Option<Limit>| limit.map_or("not to be read".into(), |limit| format!("order {:.1}", limit.order));
     let short = |limit: Option<Limit>| limit.map_or("-".into(), |limit| format!("order {:.1}", limit.order));
     let last = vec![
         title.clone(),
@@ -233,13 +238,8 @@ fn first_words(why: &str) -> String {
 
 fn tables(case: &Case) -> Vec<Table> {
     let Ok(found) = &case.found else { return Vec::new() };
-    let caption = format!(
-        "{}: {}, {:.2} ms, {:.0} s for all",
-        case.title,
-        found.method,
-        1e3 * found.window.0,
-        case.seconds
-    );
+    let caption =
+        format!("{}: {}, {:.2} ms, {:.0} s for all", case.title, found.method, 1e3 * found.window.0, case.seconds);
     let directions = found.refined.iter().filter(|refined| refined.direction.levels.len() > 1);
     vec![Table { rows: directions.flat_map(rows).collect(), ..Table::new(caption, HEADINGS) }]
 }
@@ -276,10 +276,13 @@ fn pictures(cases: &[Case]) -> Result<Vec<Figure>> {
         ("mesh", "refinement-mesh", "mesh nodes (-)"),
         ("step", "refinement-step", "internal step (s)"),
     ] {
-        let (mut series, mut sheet) = (Vec::new(), Sheet::new(["scene", "value", "displacements", "impulse", "work or energy"]));
+        let (mut series, mut sheet) =
+            (Vec::new(), Sheet::new(["scene", "value", "displacements", "impulse", "work or energy"]));
         for (case, number) in cases.iter().zip(0_u32..) {
             let Ok(found) = &case.found else { continue };
-            let Some(refined) = found.refined.iter().find(|refined| refined.direction.name == direction) else { continue };
+            let Some(refined) = found.refined.iter().find(|refined| refined.direction.name == direction) else {
+                continue;
+            };
             let mut points = Vec::new();
             for (level, run) in refined.ran() {
                 let errors = page::drawn(refined, run);
@@ -298,7 +301,9 @@ fn pictures(cases: &[Case]) -> Result<Vec<Figure>> {
             marked: true,
             ..Plot::new(label, "error of the displacements (L2)", series)
         };
-        let caption = format!("Error of the displacements against the limit: {label}; numbers of the scenes from 0 in the order of the legend.");
+        let caption = format!(
+            "Error of the displacements against the limit: {label}; numbers of the scenes from 0 in the order of the legend."
+        );
         figures.push(Figure { name, caption, picture: Picture::plot(&plot)?, sheet });
     }
     Ok(figures)

@@ -33,7 +33,11 @@ impl Reader<'_> {
                 }
                 _ => {
                     let problem = format!("{part:?} is not one number from 0 on");
-                    return Err(self.error(format!("metadata `{ERRORS}`"), problem, "Write modes=0.01,mesh=0.02, each once"));
+                    return Err(self.error(
+                        format!("metadata `{ERRORS}`"),
+                        problem,
+                        "Write modes=0.01,mesh=0.02, each once",
+                    ));
                 }
             }
         }

@@ -162,7 +162,11 @@ mod tests {
             displacements: vec![nodes.iter().flat_map(|node| [displacement * node, 0.0, 0.0]).collect()],
             points: nodes
                 .iter()
-                .map(|node| ContactNode { name: format!("at_{node}"), position: [1.0, 0.0, *node], ..ContactNode::default() })
+                .map(|node| ContactNode {
+                    name: format!("at_{node}"),
+                    position: [1.0, 0.0, *node],
+                    ..ContactNode::default()
+                })
                 .collect(),
             impulse,
             friction_work: 0.0,

@@ -1,7 +1,7 @@
 //! What refining a scene changes: its internal step, the modes of its structures, the contact nodes and the mesh of its blades, one at a
 //! time; where each sequence goes, and with it the error of the scene as it stands.
 //!
-//! [`refine`] finds the directions and the scenes at every level, `nodes` which of a refined model's nodes touch, [`truncate`] takes modes
+//! [`refine`] finds the directions, `refiner` the scenes at every level, `nodes` which of a refined model's nodes touch, [`truncate`] takes modes
 //! away from any ROM, [`mod@march`] runs and compares, [`limit`] extrapolates, [`page`] draws and tells.
 
 pub mod coarsen;
@@ -10,6 +10,7 @@ pub mod march;
 mod nodes;
 pub mod page;
 pub mod refine;
+pub(crate) mod refiner;
 pub mod truncate;
 
 use std::time::Instant;
@@ -76,16 +77,13 @@ impl Found {
 ///
 /// # Errors
 /// The scene cannot be read or does not run, or a model cannot be reduced again.
-pub fn study(
-    arguments: &ConvergenceArguments,
-    source: Option<&dyn Source>,
-    console: &Console,
-) -> Result<(Study, Rom)> {
+pub fn study(arguments: &ConvergenceArguments, source: Option<&dyn Source>, console: &Console) -> Result<(Study, Rom)> {
     refuse_compared(&arguments.set)?;
     let cache = arguments.common.cache.cache();
     let scene = scene_source::load(&arguments.scene, &cache, console)?;
     let asked = Asked {
         cache,
+        mesh: 1.0,
         settings: &arguments.set,
         window: arguments.window,
         quick: arguments.common.quick,
@@ -110,6 +108,8 @@ pub struct Asked<'a> {
     pub source: Option<&'a dyn Source>,
     /// Where models that ship are kept.
     pub cache: RomCache,
+    /// Mesh of the master where it ships: 1, or what its elements along the edges are multiplied with.
+    pub mesh: f64,
 }
 
 /// Everything about the scene called `name`.
@@ -131,7 +131,7 @@ pub fn found(name: &str, scene: &Scene, asked: &Asked, console: &Console) -> Res
     let directions = refine::directions(
         scene,
         own,
-        &Again { source: asked.source, cache: &asked.cache, quick: asked.quick, console },
+        &Again { source: asked.source, cache: &asked.cache, mesh: asked.mesh, quick: asked.quick, console },
     )?;
     announce(&directions, scene, (own, seconds), &runner);
     let mut refined = Vec::new();
@@ -265,8 +265,7 @@ impl Refined {
     pub fn errors(&self, run: &Marched) -> [Option<f64>; 5] {
         let Some((_, finest)) = self.ran().last().copied() else { return [None; 5] };
         let mut found = [None; 5];
-        found[0] =
-            self.rest().and_then(|rest| Some(run.displacement_change(finest)? + rest.rest));
+        found[0] = self.rest().and_then(|rest| Some(run.displacement_change(finest)? + rest.rest));
         for (index, limit) in self.limits().into_iter().enumerate() {
             let limit = limit.map(|limit| finest.quantities()[index] + limit.rest).filter(|limit| *limit != 0.0);
             found[index + 1] = limit.map(|limit| (run.quantities()[index] / limit - 1.0).abs());

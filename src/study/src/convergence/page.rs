@@ -46,10 +46,12 @@ pub fn study(found: &Found) -> Result<Study> {
         statements: statements(found),
         figures: figures.map(figure).collect::<Result<_>>()?,
         results: results(found),
-        files: [("levels.csv", "every level of every direction in one table", csv(found)),
-                ("limits.csv", "where every direction goes, and the error of the scene", limits_csv(found))]
-            .map(|(name, meaning, text)| (name.into(), meaning.into(), text.into_bytes()))
-            .into(),
+        files: [
+            ("levels.csv", "every level of every direction in one table", csv(found)),
+            ("limits.csv", "where every direction goes, and the error of the scene", limits_csv(found)),
+        ]
+        .map(|(name, meaning, text)| (name.into(), meaning.into(), text.into_bytes()))
+        .into(),
     })
 }
 
@@ -64,7 +66,8 @@ pub fn compared() -> impl Iterator<Item = &'static str> {
 
 /// "displacements 1.2 %, impulse ...".
 fn told(changes: &[Option<f64>; 5]) -> String {
-    let known = compared().zip(changes).filter_map(|(name, change)| Some(format!("{name} {:.2} %", 100.0 * (*change)?)));
+    let known =
+        compared().zip(changes).filter_map(|(name, change)| Some(format!("{name} {:.2} %", 100.0 * (*change)?)));
     known.collect::<Vec<_>>().join(", ")
 }
 
@@ -198,7 +201,8 @@ pub fn limit_rows(refined: &Refined) -> Vec<Vec<String>> {
     let title = &refined.direction.title;
     let error = |index: usize| errors[index].map_or("not to be read".into(), |error| format!("{error:.3e}"));
     let order = |limit: Option<super::limit::Limit>| limit.map_or(String::new(), |limit| format!("{:.2}", limit.order));
-    let first = vec![title.clone(), "displacements".into(), order(refined.rest()), String::new(), String::new(), error(0)];
+    let first =
+        vec![title.clone(), "displacements".into(), order(refined.rest()), String::new(), String::new(), error(0)];
     let limits = refined.limits().into_iter().enumerate().map(|(index, limit)| {
         let to = limit.map_or(String::new(), |limit| format!("{:.6e}", finest.quantities()[index] + limit.rest));
         let (name, unit) = QUANTITIES[index];

@@ -227,7 +227,13 @@ mod tests {
             .into_iter()
             .map(|competitor| Points { competitor, points: vec![(1e-3, 1e-2), (1e-1, 1e-4)] })
             .collect();
-        let svg = Chart { error_label: "error".into(), all, joined: true, readable: Some((1e-3, "distance of the two".into())) }.to_svg();
+        let svg = Chart {
+            error_label: "error".into(),
+            all,
+            joined: true,
+            readable: Some((1e-3, "distance of the two".into())),
+        }
+        .to_svg();
         for competitor in Competitor::all() {
             assert!(svg.contains(&escape(&competitor.name())), "{}", competitor.name());
         }

@@ -49,7 +49,7 @@ pub fn study(arguments: &ErrorArguments, source: Option<&dyn Source>, console: &
     let (title, all) = (case.title().to_owned(), measure::count(&case));
     case.announce(if quick { 1 } else { run::REPETITIONS }, console);
     // First: what cannot be reduced again is told before the long work.
-    let total = total::measure(&case, &Again { source, cache: &cache, quick, console })?;
+    let total = total::measure(&case, &Again { source, cache: &cache, mesh: 1.0, quick, console })?;
     let summary = format!(
         "Every time scheme and contact solver on {}, at steps on both sides of the one it asks for ({all} runs); and other numbers of contact \
          points and modes, against one truth with more of both.",

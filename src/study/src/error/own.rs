@@ -182,10 +182,7 @@ impl Case for Own {
 
     fn description(&self) -> String {
         let settings = &self.scene.settings;
-        format!(
-            "{} Inputs keep their start values.",
-            settings.description
-        )
+        format!("{} Inputs keep their start values.", settings.description)
     }
 
     fn size_name(&self) -> &'static str {

@@ -10,20 +10,14 @@ use tiprub_core::{
 };
 use tiprub_shell::{Result, console::Task};
 
-use super::{
-    case::Case as _,
-    clock,
-    competitor::Competitor,
-    own::Own,
-    run::Run as _,
-    scene::SceneRun,
-};
+use super::{case::Case as _, clock, competitor::Competitor, own::Own, run::Run as _, scene::SceneRun};
 use crate::{
     convergence::{
         Runner,
         coarsen::coarsened,
         march::{Marched, Observed},
-        refine::{Again, Refiner},
+        refine::Again,
+        refiner::Refiner,
         truncate::{Form, truncated},
     },
     master,
@@ -123,7 +117,8 @@ pub fn measure(case: &Own, again: &Again) -> Result<std::result::Result<Total, S
     let rows = rows(case, &models, &truth, &task, again.quick);
     drop(task);
     let mesh = mesh(case, &refiner, again)?;
-    let touching = if scene.roms[master(scene)].contact_nodes.iter().all(|node| node.area > 0.0) { "patches" } else { "nodes" };
+    let touching =
+        if scene.roms[master(scene)].contact_nodes.iter().all(|node| node.area > 0.0) { "patches" } else { "nodes" };
     let Model { points, modes, .. } = Model::of(truth_scene, false);
     let step = 1e6 * case.interval() / f64::from(division);
     let whose = if of_source { "" } else { ", the scene's own model, which is not reduced again" };

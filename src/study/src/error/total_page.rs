@@ -45,7 +45,8 @@ impl Total {
     }
 
     fn winners(&self, title: &str) -> Table {
-        let columns = ["total error", "cheapest setting", "time", "its error", "with that of the mesh", "the paper's method"];
+        let columns =
+            ["total error", "cheapest setting", "time", "its error", "with that of the mesh", "the paper's method"];
         let mut table = Table::new(format!("{title}: cheapest setting for a total error"), columns);
         for target in TARGETS {
             let paper = self.cheapest(target, Some(PAPER));
@@ -142,20 +143,31 @@ impl Total {
         let mut all = Vec::new();
         if let Some((row, time, error)) = self.ran().find(|(row, ..)| row.own) {
             let found = format!("{error:.1e} in {} of stepping ({})", seconds(time), self.setting(row));
-            all.push(Statement::remark(format!("{title}: total error of the scene as it stands, without the mesh"), found));
+            all.push(Statement::remark(
+                format!("{title}: total error of the scene as it stands, without the mesh"),
+                found,
+            ));
         }
         for target in TARGETS {
             let found = match self.cheapest(target, None) {
                 _ if self.hidden(target) => {
-                    format!("not to be read: the last refinement to the truth changed {:.1e}", self.readable.unwrap_or(0.0))
+                    format!(
+                        "not to be read: the last refinement to the truth changed {:.1e}",
+                        self.readable.unwrap_or(0.0)
+                    )
                 }
                 None => "nobody".into(),
                 Some((row, time, error)) => format!("{}: {}, error {error:.1e}", seconds(time), self.setting(row)),
             };
-            all.push(Statement::remark(format!("{title}: cheapest for a total error of {target:.0e}, without the mesh"), found));
+            all.push(Statement::remark(
+                format!("{title}: cheapest for a total error of {target:.0e}, without the mesh"),
+                found,
+            ));
         }
         let found = match &self.mesh {
-            Ok(mesh) => format!("{mesh:.1e} of the displacements; no setting of a run changes that: reduce with a finer mesh"),
+            Ok(mesh) => {
+                format!("{mesh:.1e} of the displacements; no setting of a run changes that: reduce with a finer mesh")
+            }
             Err(why) => format!("not known: {why}"),
         };
         all.push(Statement::remark(format!("{title}: what the mesh leaves"), found));
@@ -168,7 +180,8 @@ impl Total {
         let mut text = format!("competitor,{},modes,h (s),time (s),total error,remark\n", self.touching);
         for row in &self.rows {
             let model = &self.models[row.model];
-            let start = format!("\"{}\",{},{},{}", row.competitor.name(), model.points, model.modes, shortest(row.step));
+            let start =
+                format!("\"{}\",{},{},{}", row.competitor.name(), model.points, model.modes, shortest(row.step));
             text.push_str(&match &row.outcome {
                 Ok((time, error)) => format!("{start},{time:.4e},{error:.4e},\n"),
                 Err(why) => format!("{start},,,\"{}\"\n", why.replace('"', "'")),
@@ -214,7 +227,8 @@ pub fn cheapest_csv(of_steps: &[Value], total: &Total) -> String {
         let number = |name: &str| row[name].as_f64().map_or_else(String::new, shortest);
         let name = row["competitor"].as_str().map_or_else(String::new, |name| format!("\"{name}\""));
         let own = total.models.iter().find(|model| model.own).filter(|_| !name.is_empty());
-        let [points, modes] = own.map_or([String::new(), String::new()], |own| [own.points, own.modes].map(|n| n.to_string()));
+        let [points, modes] =
+            own.map_or([String::new(), String::new()], |own| [own.points, own.modes].map(|n| n.to_string()));
         let [target, step, time, error] = ["error", "internal_step", "seconds", "error_of_steps"].map(number);
         text.push_str(&format!("steps,{target},{name},{points},{modes},{step},{time},{error}\n"));
     }
