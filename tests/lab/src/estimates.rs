@@ -145,15 +145,16 @@ fn edge([chord, _, span]: [usize; 3]) -> f64 {
 
 /// What the mesh leaves, from one coarser mesh and from two.
 fn of_mesh(rub: &Rub, own: &Marched, samples: usize) -> [Option<f64>; 2] {
-    let coarser = rub.coarser.each_ref().map(|scene| run(scene, DIVISION, samples).ok());
-    let [Some(coarsest), Some(coarse)] = coarser else { return [None; 2] };
+    let [coarsest, coarse] = rub.coarser.each_ref().map(|scene| run(scene, DIVISION, samples).ok());
     let [first, second] = rub.group.coarser.map(edge);
     let own_edge = edge(rub.group.mesh);
-    let (Some(before), Some(last)) = (coarsest.displacement_change(&coarse), coarse.displacement_change(own)) else {
-        return [None; 2];
-    };
-    let three = limit::of_changes([first, second, own_edge], [before, last]);
-    [Some(limit::of_two([second, own_edge], last).rest), three.map(|limit| limit.rest)]
+    let last = coarse.as_ref().and_then(|coarse| coarse.displacement_change(own));
+    let before = coarsest.zip(coarse).and_then(|(coarsest, coarse)| coarsest.displacement_change(&coarse));
+    let three = before.zip(last).and_then(|(before, last)| {
+        limit::of_changes([first, second, own_edge], [before, last], limit::LEAST_OF_MESHES)
+    });
+    let two = last.map(|last| limit::of_two_meshes([second, own_edge], last));
+    [two, three].map(|limit| limit.map(|limit| limit.rest))
 }
 
 /// One rub over its mesh.

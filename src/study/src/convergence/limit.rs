@@ -8,8 +8,11 @@
 pub const MOST: f64 = 2.0;
 /// Least order that is read.
 pub const LEAST: f64 = 0.5;
-/// Order that two levels alone are read with: between one and two, so that neither is missed by more than a factor of two.
-const ASSUMED: f64 = 1.4;
+/// Least order that three meshes are read with. Displacements of rubs of rotor 37 go to their limit with orders from 1.7 to 2 on meshes that
+/// are fine enough to tell; changes between coarse ones fall slower at first, and would say too much (`lab estimates`).
+pub const LEAST_OF_MESHES: f64 = 1.5;
+/// Order that two meshes alone are read with.
+const OF_TWO_MESHES: f64 = 1.75;
 /// Sizes of levels that are read together are so far apart, or less where there are no such three.
 const SPREAD: [f64; 3] = [1.9, 1.35, 1.0];
 /// Changes below this share of a value are rounding.
@@ -24,9 +27,9 @@ pub struct Limit {
     pub rest: f64,
 }
 
-/// Order and rest of a value whose changes from the first of three levels to the second and from that to the third are `changes`;
-/// `sizes` fall from level to level. `None` where it is not to be read.
-pub fn of_changes(sizes: [f64; 3], changes: [f64; 2]) -> Option<Limit> {
+/// Order, `least` or more, and rest of a value whose changes from the first of three levels to the second and from that to the third are
+/// `changes`; `sizes` fall from level to level. `None` where it is not to be read.
+pub fn of_changes(sizes: [f64; 3], changes: [f64; 2], least: f64) -> Option<Limit> {
     let [before, last] = changes;
     if before == 0.0 && last == 0.0 {
         return Some(Limit { order: MOST, rest: 0.0 });
@@ -35,7 +38,7 @@ pub fn of_changes(sizes: [f64; 3], changes: [f64; 2]) -> Option<Limit> {
     if !(ratio.is_finite() && ratio >= falls(sizes, LEAST)) {
         return None;
     }
-    let order = order(sizes, ratio);
+    let order = order(sizes, ratio).max(least);
     let [_, middle, fine] = sizes.map(|size| size.powf(order));
     Some(Limit { order, rest: last * fine / (middle - fine) })
 }
@@ -44,13 +47,13 @@ pub fn of_changes(sizes: [f64; 3], changes: [f64; 2]) -> Option<Limit> {
 pub fn of_values(sizes: [f64; 3], values: [f64; 3]) -> Option<Limit> {
     let least = ROUNDING * values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
     let change = |from: f64, to: f64| if (to - from).abs() <= least { 0.0 } else { to - from };
-    of_changes(sizes, [change(values[0], values[1]), change(values[1], values[2])])
+    of_changes(sizes, [change(values[0], values[1]), change(values[1], values[2])], LEAST)
 }
 
-/// What two levels alone tell, when the first is coarser than the second: the last change as that of an order between one and two.
-pub fn of_two([coarse, fine]: [f64; 2], change: f64) -> Limit {
-    let [coarse, fine] = [coarse, fine].map(|size| size.powf(ASSUMED));
-    Limit { order: ASSUMED, rest: change * fine / (coarse - fine) }
+/// What two meshes alone tell, the first of them coarser than the second.
+pub fn of_two_meshes([coarse, fine]: [f64; 2], change: f64) -> Limit {
+    let [coarse, fine] = [coarse, fine].map(|size| size.powf(OF_TWO_MESHES));
+    Limit { order: OF_TWO_MESHES, rest: change * fine / (coarse - fine) }
 }
 
 /// The finest of levels with these falling sizes, and two before it that are far enough away to tell an order; fewer where there are fewer.
@@ -114,12 +117,15 @@ mod tests {
         assert_eq!(chosen(&[2.0, 1.41, 1.0, 0.71]), [1, 2, 3]);
         assert_eq!(chosen(&[2.0, 1.0]), [0, 1]);
         assert!(chosen(&[]).is_empty());
-        // Orders from one to two are not missed by more than a factor of two.
+        // Orders from one to two are not missed by more than a factor of three by two meshes, nor by three.
         for order in [1.0, 2.0_f64] {
             for coarse in [1.414, 2.0_f64] {
                 let truth = 1.0 / (coarse.powf(order) - 1.0);
-                let found = of_two([coarse, 1.0], 1.0).rest;
-                assert!(found < 2.0 * truth && truth < 2.0 * found, "{order} {coarse}: {found} {truth}");
+                let two = of_two_meshes([coarse, 1.0], 1.0).rest;
+                let three = of_changes([coarse * coarse, coarse, 1.0], [coarse.powf(order), 1.0], LEAST_OF_MESHES);
+                for found in [two, three.unwrap().rest] {
+                    assert!(found < 3.0 * truth && truth < 3.0 * found, "{order} {coarse}: {found} {truth}");
+                }
             }
         }
     }
@@ -127,12 +133,12 @@ mod tests {
     #[test]
     fn what_falls_faster_is_read_as_second_order_and_what_does_not_fall_is_not_read() {
         let sizes = [4.0, 2.0, 1.0];
-        let fast = of_changes(sizes, [100.0, 1.0]).unwrap();
+        let fast = of_changes(sizes, [100.0, 1.0], LEAST).unwrap();
         assert_eq!((fast.order, fast.rest), (MOST, 1.0 / 3.0));
         for changes in [[1.0, 1.0], [1.0, 1.2], [-1.0, 0.2], [0.0, 1.0], [1.0, 0.0], [f64::NAN, 1.0]] {
-            assert_eq!(of_changes(sizes, changes), None, "{changes:?}");
+            assert_eq!(of_changes(sizes, changes, LEAST), None, "{changes:?}");
         }
         let still = Limit { order: MOST, rest: 0.0 };
-        assert_eq!([of_changes(sizes, [0.0; 2]), of_values(sizes, [5.0, 5.0, 5.0 + 1e-14])], [Some(still); 2]);
+        assert_eq!([of_changes(sizes, [0.0; 2], LEAST), of_values(sizes, [5.0, 5.0, 5.0 + 1e-14])], [Some(still); 2]);
     }
 }

@@ -243,10 +243,11 @@ impl Refined {
         match &self.read()[..] {
             [a, b, c] => {
                 let changes = [a.1.displacement_change(b.1)?, b.1.displacement_change(c.1)?];
-                limit::of_changes([a.0, b.0, c.0], changes)
+                let least = if self.direction.name == refine::MESH { limit::LEAST_OF_MESHES } else { limit::LEAST };
+                limit::of_changes([a.0, b.0, c.0], changes, least)
             }
             [a, b] if self.direction.name == refine::MESH => {
-                Some(limit::of_two([a.0, b.0], a.1.displacement_change(b.1)?))
+                Some(limit::of_two_meshes([a.0, b.0], a.1.displacement_change(b.1)?))
             }
             _ => None,
         }
