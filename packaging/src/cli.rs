@@ -3,9 +3,12 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use tiprub_study::arguments::{CacheArguments, ErrorArguments, MapArguments, StabilityArguments, assignment, positive};
+use tiprub_study::arguments::{CacheArguments, MapArguments, StabilityArguments, assignment, positive};
 
-use crate::{own_arguments::ConvergenceCommand, reduce_arguments::ReduceArguments};
+use crate::{
+    own_arguments::{ConvergenceCommand, ErrorCommand},
+    reduce_arguments::ReduceArguments,
+};
 
 /// Blade-tip/casing contact (rub) as an FMU.
 #[derive(Debug, Parser)]
@@ -133,7 +136,8 @@ pub struct RunArguments {
     /// Start value of an input or parameter; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
-    /// Also estimate what steps, modes and patches leave, from coarser runs of the same scene: some ten runs more.
+    /// Also estimate what steps, modes and patches leave, from coarser runs of the same scene: some ten runs more. What the mesh leaves is told
+    /// where the ROM has it (`tiprub study convergence --into`).
     #[arg(long)]
     pub estimate: bool,
     /// Where built-in models are kept.
@@ -167,13 +171,16 @@ pub enum StudyCommand {
     #[command(after_help = "Examples:\n  tiprub study map\n  tiprub study map scene.toml --speeds 1200:1500:61\n  \
                             tiprub study map --set friction_coefficient=0 --set gap_offset=6e-5")]
     Map(MapArguments),
-    /// Error against run time of every scheme and solver on a scene, and the cheapest for an error of 1e-2, 1e-3 and 1e-4.
+    /// Error against run time of every scheme and solver on a scene, of the steps and in total, with other numbers of patches and modes;
+    /// and what is cheapest for an error.
     #[command(
         after_help = "Examples:\n  tiprub study error scene.toml\n  tiprub study error builtin:flexible-casing --quick\n  \
                             tiprub study error scene.toml --window 2e-3 --set speed=1700\n\n\
-                            The errors are those of the steps, against two fine runs by different schemes that must meet."
+                            Errors of the steps are against two fine runs by different schemes that must meet; total errors against a \
+                            finer model, which needs what the ROM was reduced from: a model that ships, or --mesh with the options of \
+                            `tiprub reduce blade`."
     )]
-    Error(ErrorArguments),
+    Error(Box<ErrorCommand>),
     /// Over friction, speed and internal step: what is right, warned of or refused and why, growth rates of sliding contact, and the
     /// largest usable step of every scheme and solver.
     #[command(
@@ -182,13 +189,13 @@ pub enum StudyCommand {
                             The answers are those of `tiprub run`, without the run. Of coupled sectors each takes long: by default few are asked."
     )]
     Stability(StabilityArguments),
-    /// What another internal step, more or fewer modes, and other contact nodes change: displacements, impulse, friction work, peak
-    /// force and strain energy.
+    /// What another internal step, more or fewer modes, other contact nodes and other meshes change: displacements, impulse, friction work,
+    /// peak force and strain energy; where that goes, and the error of the scene.
     #[command(
         after_help = "Examples:\n  tiprub study convergence scene.toml\n  tiprub study convergence builtin:rotor37 --quick\n  \
                             tiprub study convergence scene.toml --mesh blade.inp --contact-set TIP --clamp-set ROOT --sectors 36 --units mm-t-s\n\n\
                             Modes are taken away from any ROM; more modes and other contact nodes need what it was reduced from: a model that \
-                            ships, or --mesh with the options of `tiprub reduce blade`."
+                            ships, or --mesh with the options of `tiprub reduce blade`. Other meshes are given with --other-mesh."
     )]
     Convergence(Box<ConvergenceCommand>),
 }

@@ -11,7 +11,6 @@ use tiprub_shell::{
 use crate::{
     cli::{Command, StudyCommand},
     commands::demo,
-    own_arguments::KeptOptions,
     shared_arguments::Written,
 };
 
@@ -37,12 +36,12 @@ pub fn check(command: &Command) -> Result<()> {
         Command::Study(arguments) => match &arguments.study {
             StudyCommand::Map(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),
             StudyCommand::Convergence(own) => {
-                let (common, source) =
-                    (&own.study.common, own.blade.source(own.file.as_deref(), KeptOptions::default()).files());
-                study(&own.study.scene, common.out.as_deref(), source)
+                let read = scene(&own.study.scene).into_iter().chain(own.from.files()).collect::<Vec<_>>();
+                apart(&read, &Vec::from_iter(Named::option("--into", &own.study.into)))?;
+                study(&own.study.scene, own.study.common.out.as_deref(), own.from.files())
             }
             StudyCommand::Stability(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),
-            StudyCommand::Error(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),
+            StudyCommand::Error(own) => study(&own.study.scene, own.study.common.out.as_deref(), own.from.files()),
         },
         // Names follow from the scene: see the command.
         Command::Package(_) | Command::Inspect(_) => Ok(()),

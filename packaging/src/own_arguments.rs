@@ -8,7 +8,7 @@ use tiprub_model::{
     read::{Axis, Units},
 };
 use tiprub_shell::{Failure, Result, places::Named};
-use tiprub_study::arguments::ConvergenceArguments;
+use tiprub_study::arguments::{ConvergenceArguments, ErrorArguments};
 
 use crate::shared_arguments::{KindChoice, MaterialChoice, Written, axial, pair};
 
@@ -58,10 +58,33 @@ pub struct ConvergenceCommand {
     /// Scene and window.
     #[command(flatten)]
     pub study: ConvergenceArguments,
+    /// Where the ROM is from.
+    #[command(flatten)]
+    pub from: FromMesh,
+}
+
+/// Arguments of `tiprub study error`.
+#[derive(Debug, Args)]
+pub struct ErrorCommand {
+    /// Scene and window.
+    #[command(flatten)]
+    pub study: ErrorArguments,
+    /// Where the ROM is from.
+    #[command(flatten)]
+    pub from: FromMesh,
+}
+
+/// Where the ROM of a scene is from.
+#[derive(Debug, Args)]
+pub struct FromMesh {
     /// Mesh (or, with --stiffness, nodes and sets) that the ROM of the blades was reduced from, with the options of `tiprub reduce
     /// blade`: more modes and other contact nodes are then tried.
     #[arg(long = "mesh", value_name = "FILE", help_heading = MESH)]
     pub file: Option<PathBuf>,
+    /// Another mesh of the same blades, coarser or finer, with the same sets, in the same units: what meshes change is then told. May be
+    /// repeated; two or more let the error of the mesh be read.
+    #[arg(long = "other-mesh", value_name = "FILE", help_heading = MESH, requires = "file", conflicts_with = "stiffness")]
+    pub others: Vec<PathBuf>,
     /// Its options.
     #[command(flatten, next_help_heading = MESH)]
     pub blade: BladeOptions,
@@ -69,18 +92,24 @@ pub struct ConvergenceCommand {
 
 const MESH: &str = "Where the ROM is from, as for `tiprub reduce blade`";
 
-impl ConvergenceCommand {
+impl FromMesh {
     /// Whether a mesh or matrices are given.
     ///
     /// # Errors
     /// Options of a mesh without one.
-    pub fn has_source(&self) -> Result<bool> {
+    pub fn is_given(&self) -> Result<bool> {
         let given = self.file.is_some() || self.blade.matrices.stiffness.is_some();
         if given || self.blade == BladeOptions::default() {
             return Ok(given);
         }
         let problem = "an option given describes a mesh, and there is none";
         Err(Failure::usage("--mesh", problem, "Give --mesh FILE, or leave the options of `tiprub reduce blade` out"))
+    }
+
+    /// All files that are read.
+    pub fn files(&self) -> Vec<Named> {
+        let own = self.blade.source(self.file.as_deref(), KeptOptions::default()).files();
+        own.into_iter().chain(self.others.iter().map(|path| Named::new("--other-mesh", path))).collect()
     }
 }
 

@@ -5,7 +5,10 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 use tiprub_core::{Rom, plausibility, rom::Frame, stability};
 use tiprub_shell::{Failure, Result};
-use tiprub_study::stability::structure::{Sliding, StepLimit, Structure};
+use tiprub_study::{
+    estimate,
+    stability::structure::{Sliding, StepLimit, Structure},
+};
 
 /// Modes that a warning of the checks is about: those that blade-tip contact excites most. Of coupled sectors the first
 /// family: as many modes of the disk as there are sectors.
@@ -182,6 +185,10 @@ impl RomFacts {
         self.write_frequencies(&mut text);
         self.write_checks(&mut text);
         self.write_responses(&mut text);
+        let estimates = estimate::of_rom(rom);
+        if !estimates.is_empty() {
+            let _ = writeln!(text, "\n  {}", estimate::told(&estimates));
+        }
         text
     }
 
@@ -316,6 +323,9 @@ impl RomFacts {
             "flexibility_deviation_percent": rom.checks.flexibility_deviation,
             "response_hz": rom.checks.response_frequencies,
             "response_deviation_percent": rom.checks.response_deviation,
+            "rub_errors": rom.checks.rub_errors.as_ref().map(|errors| json!({
+                "found_on": errors.found_on, "modes": errors.modes, "patches": errors.patches, "mesh": errors.mesh,
+            })),
         })
     }
 }

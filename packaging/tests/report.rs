@@ -55,7 +55,7 @@ fn a_report_is_complete_offline_and_small() {
         schedule: &schedule,
         native: &run,
         study: Some(&study),
-        estimates: &[Estimate { direction: "steps", left: Ok(1.5e-3) }],
+        estimates: &[Estimate { direction: "steps", left: Ok(1.5e-3), found_on: None }],
         paper: Some((Simulation::new(&scene).unwrap().table(), &run)),
         imported: &[ImportedSummary { label: "FMI 2.0".into(), stepping: 0.1, agreement }],
         files: &[ReportFile { name: "results.csv".into(), meaning: "results".into(), bytes: 1234 }],

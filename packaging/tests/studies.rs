@@ -101,7 +101,35 @@ fn the_quick_study_of_errors_takes_any_scene() {
         assert!(errors.len() == 4 && errors[3] < 0.6 * errors[1], "{errors:?}");
         let table = fs::read_to_string(root.path().join("out/tables.md")).unwrap();
         assert!(table.contains("| 1e-2 |") && table.contains("| modal-exact + lcp |"), "{table}");
+        totals(&json["results"]["total"], &fs::read_to_string(root.path().join("out/cheapest.csv")).unwrap());
     }
+}
+
+/// Total errors of the model of the scene and of one with half of its modes, against one with twice as many and more nodes.
+fn totals(total: &Value, cheapest: &str) {
+    let number = |row: &Value, name: &str| row[name].as_f64().unwrap();
+    assert!(total["truth"].as_str().unwrap().starts_with("5 nodes and 40 modes"), "{total:#}");
+    let rows = total["rows"].as_array().unwrap();
+    let ran: Vec<&Value> = rows.iter().filter(|row| row["refused"].is_null()).collect();
+    let of = |modes: u64| {
+        let own = |row: &&&Value| row["competitor"] == "modal-exact + lcp" && number(row, "internal_step") < 1.1e-6;
+        let found = ran.iter().filter(own).find(|row| row["modes"] == modes);
+        number(found.unwrap_or_else(|| panic!("{total:#}")), "total_error")
+    };
+    assert!(of(20) < of(10) && of(20) > 1e-2, "fewer modes are worse, and so are three nodes: {total:#}");
+    assert!(ran.iter().all(|row| number(row, "seconds") > 0.0), "{total:#}");
+    assert_eq!(ran.iter().filter(|row| row["own"] == true).count(), 1);
+    // The cheapest is the cheapest of those that are good enough.
+    let own = &total["cheapest"][0];
+    let good = ran.iter().filter(|row| number(row, "total_error") <= number(own, "error"));
+    let best = good.map(|row| number(row, "seconds")).fold(f64::INFINITY, f64::min);
+    let hidden = total["readable"].as_f64().is_some_and(|least| number(own, "error") < least);
+    assert!(hidden || best.is_infinite() || own["setting"]["seconds"] == best, "{own:#}");
+    let lines: Vec<&str> = cheapest.lines().collect();
+    assert!(
+        lines.len() == 7 && lines[1].starts_with("steps,0.01,") && lines[4].starts_with("total,1e-1,"),
+        "{cheapest}"
+    );
 }
 
 /// A scene of one's own around a coarse blade.
@@ -243,13 +271,15 @@ fn the_study_of_convergence_refines_what_it_can_and_says_what_it_cannot() {
     let alone = study(&[])["results"]["directions"].clone();
     assert_eq!([values(&alone[0]), values(&alone[1])], [vec![2e-6, 1e-6, 5e-7], vec![2.0, 4.0]]);
     assert!(values(&alone[2]).is_empty());
-    for direction in [1, 2] {
+    for direction in [1, 2, 3] {
         assert!(alone[direction]["not_refined"].as_str().unwrap().contains("--mesh FILE"), "{alone:#}");
     }
     let whole = study(&[&MESH[..], &["--sectors", "36"]].concat());
     let found = &whole["results"]["directions"];
     assert_eq!([values(&found[1]), values(&found[2])], [vec![2.0, 4.0, 6.0], vec![2.0, 3.0]]);
-    assert!(found.as_array().unwrap().iter().all(|direction| direction["not_refined"].is_null()), "{found:#}");
+    let all = found.as_array().unwrap();
+    assert!(all[..3].iter().all(|direction| direction["not_refined"].is_null()), "{found:#}");
+    assert!(all[3]["not_refined"].as_str().unwrap().contains("--other-mesh FILE"), "{found:#}");
     // The scene as it stands is the same run in every direction, and that of the scene without a mesh.
     let standing = |directions: &Value| -> Vec<Value> {
         let levels = directions.as_array().unwrap().iter().flat_map(|one| one["levels"].as_array().unwrap());
@@ -290,10 +320,55 @@ fn a_direction_whose_models_are_refused_takes_half_the_step() {
     let limited = convergence(root.path(), &[&MESH[..], &["--sectors", "36"]].concat());
     let found = limited["results"]["directions"].as_array().unwrap();
     let divided: Vec<u64> = found.iter().map(|one| one["step_divided_by"].as_u64().unwrap()).collect();
-    assert_eq!(divided, [1, 2, 2]);
+    assert_eq!(divided, [1, 2, 2, 1]);
     let refused =
         |one: &Value| one["levels"].as_array().unwrap().iter().filter(|level| level["refused"].is_string()).count();
-    assert_eq!(found.iter().map(refused).collect::<Vec<_>>(), [1, 0, 0], "{limited:#}");
+    assert_eq!(found.iter().map(refused).collect::<Vec<_>>(), [1, 0, 0, 0], "{limited:#}");
+}
+
+/// Two other meshes of the blade tell where the sequence goes; the ROM that is written with it tells whoever runs it.
+#[test]
+fn what_the_mesh_leaves_is_found_and_goes_with_the_rom() {
+    let root = tempfile::tempdir().unwrap();
+    own_scene(root.path());
+    for mesh in ["4x1x6", "8x1x12"] {
+        let reduce = ["reduce", "rotor37", "--mesh", mesh, "--modes", "4", "--contact-nodes", "2", "--quiet"];
+        let written = ["-o", &format!("{mesh}.rom.safetensors"), "--inp", &format!("{mesh}.inp")];
+        tiprub(root.path(), "", &[&reduce[..], &written].concat());
+    }
+    let into = ["--sectors", "36", "--into", "known.rom.safetensors"];
+    let others = ["--other-mesh", "8x1x12.inp", "--other-mesh", "4x1x6.inp"];
+    let json = convergence(root.path(), &[&MESH[..], &others, &into].concat());
+    let mesh = &json["results"]["directions"][3];
+    let levels = mesh["levels"].as_array().unwrap();
+    let values: Vec<f64> = levels.iter().map(|level| level["value"].as_f64().unwrap()).collect();
+    assert!(levels.len() == 3 && levels[1]["own"] == true && values.is_sorted(), "{mesh:#}");
+    // The contact nodes are the edges of the tip on every mesh, so that displacements are compared.
+    let changes = [0, 1].map(|level| levels[level]["changes_to_next"]["displacements"].as_f64().unwrap());
+    assert!(changes.iter().all(|change| (1e-4..0.5).contains(change)), "{mesh:#}");
+    let limits = fs::read_to_string(root.path().join("out/limits.csv")).unwrap();
+    assert!(limits.lines().filter(|line| line.starts_with("mesh of rotor,")).count() == 5, "{limits}");
+    let found = mesh["error"]["displacements"].as_f64();
+    // What falls from level to level has a limit, and the scene is farther from it than from the finest mesh.
+    assert_eq!(found.is_some(), changes[0] > 1.2 * changes[1], "{mesh:#}");
+    assert!(found.is_none_or(|found| found > changes[1]), "{mesh:#}");
+    let told = |command: &[&str]| tiprub(root.path(), "", command).0;
+    let inspected: Value = serde_json::from_str(&told(&["inspect", "known.rom.safetensors", "--json"])).unwrap();
+    let errors = &inspected["rom"]["rub_errors"];
+    assert_eq!(errors["mesh"].as_f64(), found, "{errors}");
+    assert!(errors["found_on"].as_str().unwrap().starts_with("rotor37_rub, "), "{errors}");
+    fs::write(root.path().join("known.toml"), around("known.rom.safetensors")).unwrap();
+    let run = told(&["run", "known.toml", "--stop", "1e-4", "--quiet"]);
+    let last = run.lines().rfind(|line| line.starts_with("estimated error")).unwrap();
+    let mesh = found.map_or("mesh unknown".to_owned(), |found| format!("mesh {:.2} %", 100.0 * found));
+    assert!(last.contains("steps unknown") && last.contains(&mesh), "{run}");
+    // A ROM that nobody asked about tells nothing, and is the file that it was.
+    assert!(!told(&["run", "own.toml", "--stop", "1e-4", "--quiet"]).contains("estimated error"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+    let again = ["study", "convergence", "own.toml", "--quick", "--into", "known.rom.safetensors"];
+    let output = command.current_dir(root.path()).args(again).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8(output.stderr).unwrap().contains("known.rom.safetensors: is there already"));
 }
 
 #[test]

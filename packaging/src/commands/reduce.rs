@@ -39,7 +39,7 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     let targets = [("--output", Some(output)), ("--inp", written.inp.as_ref()), ("--vtk", written.vtk.as_ref())];
     let names: Vec<Named> = targets.into_iter().filter_map(|(role, path)| Some(Named::new(role, path?))).collect();
     places::apart(&arguments.model.files(), &names)?;
-    targets.into_iter().filter_map(|(_, path)| path).try_for_each(|path| check_target(path, written))?;
+    targets.into_iter().filter_map(|(_, path)| path).try_for_each(|path| check_target(path, written.force))?;
     let start = Instant::now();
     let mut reduced = reduced(&arguments.model, console)?;
     reduced.seconds = start.elapsed().as_secs_f64();
@@ -63,8 +63,11 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
 }
 
 /// Whether a file can be written there, and replaces none without being told to. Devices and pipes take whatever comes.
-fn check_target(path: &Path, written: &Written) -> Result<()> {
-    if path.is_file() && !written.force {
+///
+/// # Errors
+/// It is there already, or cannot be written.
+pub fn check_target(path: &Path, force: bool) -> Result<()> {
+    if path.is_file() && !force {
         let remedy = "Choose another file, or replace it with --force";
         return Err(Failure::new(path.display(), "is there already", remedy));
     }

@@ -14,7 +14,10 @@ use tiprub_shell::{
     schedule::Schedule,
 };
 
-use tiprub_study::estimate::{self, Estimate};
+use tiprub_study::{
+    estimate::{self, Estimate},
+    stability::limits::same_reason,
+};
 
 use crate::cli::RunArguments;
 
@@ -73,18 +76,19 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
     let text = if to_stdout {
         run.recording.to_csv()
     } else {
-        summary(&json, &extremes, &run.recording.names, run.recording.row(rows - 1)) + &lines(&estimates)
+        let outputs = outputs(&run.recording.names, run.recording.row(rows - 1));
+        format!("{outputs}\n{}", summary(&json, &extremes, &run.warnings) + &lines(&estimates))
     };
-    if arguments.estimate {
+    if !estimates.is_empty() {
         json["estimated_errors"] = Value::Object(estimates.iter().map(Estimate::json).collect());
     }
     Ok(Outcome { text, json })
 }
 
-/// What the run leaves, where asked for.
+/// What the run leaves, where asked for; else what the ROM of the master says of itself.
 fn estimated(scene: &Scene, arguments: &RunArguments, schedule: &Schedule, console: &Console) -> Result<Vec<Estimate>> {
     if !arguments.estimate {
-        return Ok(Vec::new());
+        return Ok(estimate::of_rom(&scene.roms[tiprub_study::master(scene)]));
     }
     let mut scene = scene.clone();
     (scene.settings.experiment.start, scene.settings.experiment.communication_step) = (schedule.start, schedule.step);
@@ -102,7 +106,8 @@ fn lines(estimates: &[Estimate]) -> String {
 /// Longer arrays are told by their range.
 const MOST_LISTED: usize = 12;
 
-fn summary(json: &Value, extremes: &[Extreme], names: &[String], last: &[f64]) -> String {
+/// What a user looks for, last, where the eye is: extremes, warnings, files.
+fn summary(json: &Value, extremes: &[Extreme], warnings: &[String]) -> String {
     let number = |name: &str| json[name].as_f64().unwrap_or(f64::NAN);
     let mut text = format!(
         "{}: t = {} s to {} s, communication steps: {}, internal steps: {}\n\
@@ -120,7 +125,35 @@ fn summary(json: &Value, extremes: &[Extreme], names: &[String], last: &[f64]) -
         text.push_str("\nover the run:\n");
         text.extend(extremes.iter().map(|extreme| format!("  {}\n", extreme.line())));
     }
-    text.push_str("\nat the end:\n");
+    if !warnings.is_empty() {
+        text.push_str("\nwarnings:\n");
+        text.extend(merged(warnings).iter().map(|warning| format!("  {warning}\n")));
+    }
+    if let Some(path) = json["csv"].as_str() {
+        text.push_str(&format!("\nwritten: {path}"));
+    }
+    text
+}
+
+/// Warnings that differ in their numbers only are one, with how many more there are.
+fn merged(warnings: &[String]) -> Vec<String> {
+    let mut all: Vec<(&String, usize)> = Vec::new();
+    for warning in warnings {
+        match all.iter_mut().find(|(first, _)| same_reason(first, warning)) {
+            Some((_, more)) => *more += 1,
+            None => all.push((warning, 0)),
+        }
+    }
+    let told = |(warning, more): &(&String, usize)| match more {
+        0 => (*warning).clone(),
+        more => format!("{warning} (and {more} more like it, above)"),
+    };
+    all.iter().map(told).collect()
+}
+
+/// All outputs at the end of the run.
+fn outputs(names: &[String], last: &[f64]) -> String {
+    let mut text = "at the end:\n".to_owned();
     let width = names.iter().map(String::len).max().unwrap_or(0);
     let array = |name: &str| name.rsplit_once('[').map_or(name, |(array, _)| array).to_owned();
     let mut rest = names.iter().zip(last).peekable();
@@ -141,8 +174,17 @@ fn summary(json: &Value, extremes: &[Extreme], names: &[String], last: &[f64]) -
             }
         }
     }
-    if let Some(path) = json["csv"].as_str() {
-        text.push_str(&format!("\nwritten: {path}"));
-    }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::merged;
+
+    #[test]
+    fn warnings_alike_but_for_numbers_are_one() {
+        let all = ["node 1 grows by 2 1/s", "the step is long", "node 7 grows by 3e4 1/s"].map(String::from);
+        assert_eq!(merged(&all), ["node 1 grows by 2 1/s (and 1 more like it, above)", "the step is long"]);
+        assert!(merged(&[]).is_empty());
+    }
 }

@@ -4,18 +4,20 @@ use std::path::PathBuf;
 
 use tiprub_shell::{
     Result,
-    console::{Console, Outcome},
+    console::{Console, Outcome, shown_path},
     output_file,
 };
 use tiprub_study::{
     Study,
     arguments::StudyCommon,
     convergence::{self, refine::Source},
-    error, map, output, stability,
+    error, estimate, map, output, stability,
 };
 
 use crate::{
     cli::{StudyArguments, StudyCommand},
+    commands::reduce::check_target,
+    own_arguments::ConvergenceCommand,
     users_model::BladeSource,
 };
 
@@ -27,20 +29,39 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
     type Work<'a> = Box<dyn Fn(&Console) -> Result<Study> + 'a>;
     let (name, common, work): (_, _, Work) = match &arguments.study {
         StudyCommand::Map(own) => ("map", &own.common, Box::new(|console| map::study(own, console))),
-        StudyCommand::Error(own) => ("error", &own.common, Box::new(|console| error::study(own, console))),
-        StudyCommand::Convergence(own) => {
-            let has_source = own.has_source()?;
+        StudyCommand::Error(own) => {
+            let given = own.from.is_given()?;
             let of = move |console: &Console| {
-                let source = BladeSource { file: own.file.as_deref(), options: &own.blade };
-                convergence::study(&own.study, has_source.then_some(&source as &dyn Source), console)
+                let source = BladeSource::of(&own.from);
+                error::study(&own.study, given.then_some(&source as &dyn Source), console)
             };
-            ("convergence", &own.study.common, Box::new(of))
+            ("error", &own.study.common, Box::new(of))
         }
+        StudyCommand::Convergence(own) => return convergence(own, console),
         StudyCommand::Stability(own) => ("stability", &own.common, Box::new(|console| stability::study(own, console))),
     };
     let directory = directory(name, common);
     output_file::try_directory(&directory)?;
     output::write(&work(console)?, &directory)
+}
+
+/// The study that may also write a ROM.
+fn convergence(own: &ConvergenceCommand, console: &Console) -> Result<Outcome> {
+    let given = own.from.is_given()?;
+    let directory = directory("convergence", &own.study.common);
+    output_file::try_directory(&directory)?;
+    if let Some(path) = &own.study.into {
+        check_target(path, own.study.force)?;
+    }
+    let source = BladeSource::of(&own.from);
+    let (study, rom) = convergence::study(&own.study, given.then_some(&source as &dyn Source), console)?;
+    let mut outcome = output::write(&study, &directory)?;
+    if let Some(path) = &own.study.into {
+        output_file::write(path, tiprub_format::write_rom(&rom))?;
+        outcome.json["rom"] = shown_path(path).into();
+        outcome.text.push_str(&format!("\nwritten: {}\n{}", path.display(), estimate::told(&estimate::of_rom(&rom))));
+    }
+    Ok(outcome)
 }
 
 /// Where everything goes.

@@ -6,10 +6,14 @@ mod judge;
 
 pub use judge::narrow;
 
-use std::{cell::RefCell, fmt::Write as _, path::Path};
+use std::{
+    cell::RefCell,
+    fmt::Write as _,
+    path::{Path, PathBuf},
+};
 
 use choose::Chosen;
-use tiprub_core::{Rom, rom::Frame};
+use tiprub_core::rom::Frame;
 use tiprub_gallery::reduction::{self, with_progress};
 use tiprub_model::{
     CasingOptions, FeModel, Reduction,
@@ -23,11 +27,11 @@ use tiprub_model::{
     thermal::equal_patches,
 };
 use tiprub_shell::{Failure, Result, console::Console};
-use tiprub_study::convergence::refine;
+use tiprub_study::convergence::refine::{self, Meshed};
 
 use crate::shared_arguments::KindChoice;
 use crate::{
-    own_arguments::{BladeOptions, CasingMeshArguments, KeptOptions, SectorArguments, Source, TipOptions},
+    own_arguments::{BladeOptions, CasingMeshArguments, FromMesh, KeptOptions, SectorArguments, Source, TipOptions},
     reduced::Reduced,
 };
 
@@ -65,19 +69,34 @@ pub fn blade(
 pub struct BladeSource<'a> {
     /// Mesh file.
     pub file: Option<&'a Path>,
+    /// Other meshes of the same blade, with the same sets.
+    pub others: &'a [PathBuf],
     /// Options.
     pub options: &'a BladeOptions,
 }
 
+impl<'a> BladeSource<'a> {
+    /// As the command line has it.
+    pub fn of(from: &'a FromMesh) -> Self {
+        Self { file: from.file.as_deref(), others: &from.others, options: &from.blade }
+    }
+}
+
 impl refine::Source for BladeSource<'_> {
-    fn reduce(&self, modes: usize, tip: Tip, console: &Console) -> Result<Rom> {
+    fn reduce(&self, other: Option<usize>, modes: usize, tip: Tip, console: &Console) -> Result<Meshed> {
         let (contact_nodes, contact_patches) = match tip {
             Tip::Nodes(count) => (Some(count), None),
             Tip::Patches(count) => (None, Some(count)),
         };
         let tips = TipOptions { contact_nodes, contact_patches, ..TipOptions::default() };
         let kept = KeptOptions { modes: Some(modes), ..KeptOptions::default() };
-        Ok(blade(self.file, self.options, (&tips, kept), console)?.rom)
+        let file = other.and_then(|other| self.others.get(other)).map(PathBuf::as_path).or(self.file);
+        let found = blade(file, self.options, (&tips, kept), console)?;
+        Ok(Meshed { rom: found.rom, nodes: found.nodes })
+    }
+
+    fn others(&self) -> usize {
+        self.others.len()
     }
 }
 

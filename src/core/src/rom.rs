@@ -54,6 +54,19 @@ pub enum Basis {
     FreeInterface,
 }
 
+/// What a reduction leaves of a rub: errors of the displacements of the tip (relative L2) against the limit of refinements.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RubErrors {
+    /// The scene that they were found on, in words.
+    pub found_on: String,
+    /// By the number of modes; `None` where it is not known.
+    pub modes: Option<f64>,
+    /// By the number of contact patches or nodes.
+    pub patches: Option<f64>,
+    /// By the mesh.
+    pub mesh: Option<f64>,
+}
+
 /// How well the reduced model stands for the full one. Empty vectors where a ROM came from elsewhere.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RomChecks {
@@ -75,6 +88,8 @@ pub struct RomChecks {
     /// Deviation of the forced response at the contact nodes from that of the full model at each of them (%), all contact nodes and
     /// directions together.
     pub response_deviation: Vec<f64>,
+    /// What is left of a rub, where somebody has found it.
+    pub rub_errors: Option<RubErrors>,
 }
 
 /// What a steady speed Ω about the z axis does to one structure, in its reduced coordinates.

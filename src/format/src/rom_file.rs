@@ -10,6 +10,7 @@ use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
 
 mod extras;
 mod harmonics;
+mod rub_errors;
 
 use crate::rom_layout::{ARRAYS, METADATA, NUMBER, ROM_FORMAT, ROM_FORMAT_VERSIONS, SECOND_RELEASE, units_text};
 use crate::{Error, Result, suggestion};
@@ -163,6 +164,7 @@ impl Reader<'_> {
                 flexibility_deviation: self.check_values(arrays, "flexibility_deviation")?,
                 response_frequencies: self.check_values(arrays, "response_frequencies")?,
                 response_deviation: self.check_values(arrays, "response_deviation")?,
+                rub_errors: self.rub_errors(metadata)?,
             },
             extras: RomExtras { harmonics, ..self.extras(arrays, metadata, order)? },
         })
@@ -333,7 +335,8 @@ fn rom_metadata(rom: &Rom, arrays: &Arrays) -> Metadata {
         Frame::Cartesian => "cartesian",
     };
     let names = names(&rom.contact_nodes);
-    let extras = extras::metadata(&rom.extras);
+    let mut extras = extras::metadata(&rom.extras);
+    extras.extend(rom.checks.rub_errors.iter().flat_map(rub_errors::metadata));
     let second = arrays.keys().map(String::as_str).chain(extras.iter().map(|(key, _)| *key));
     let version = ROM_FORMAT_VERSIONS[usize::from(second.into_iter().any(|name| SECOND_RELEASE.contains(&name)))];
     [

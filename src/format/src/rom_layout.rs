@@ -6,7 +6,7 @@ pub(crate) const ROM_FORMAT: &str = "tiprub-rom";
 /// written in the first form that holds it, for older readers.
 pub(crate) const ROM_FORMAT_VERSIONS: [&str; 2] = ["1", "2"];
 /// Arrays and metadata of format 2.
-pub(crate) const SECOND_RELEASE: [&str; 9] = [
+pub(crate) const SECOND_RELEASE: [&str; 11] = [
     "contact_areas",
     "contact_lengths",
     "flexibility_deviation",
@@ -16,6 +16,8 @@ pub(crate) const SECOND_RELEASE: [&str; 9] = [
     "watched_positions",
     "watched_names",
     "basis",
+    "rub_errors",
+    "rub_errors_found_on",
 ];
 
 /// One named array of the file.
@@ -217,7 +219,7 @@ const fn entry(name: &'static str, default: Option<&'static str>, description: &
 }
 
 /// Every metadata entry.
-pub const METADATA: [MetadataLayout; 14] = [
+pub const METADATA: [MetadataLayout; 16] = [
     entry("format", None, "Always `tiprub-rom`."),
     entry("format_version", None, "`1`, or `2` with anything that format 2 added, below."),
     entry("name", None, "Name of the structure."),
@@ -251,6 +253,13 @@ pub const METADATA: [MetadataLayout; 14] = [
         "`craig-bampton`, modes with the contact nodes held, or `free-interface`, modes of the structure as it is supported; \
          format 2.",
     ),
+    entry(
+        "rub_errors",
+        Some(""),
+        "What the reduction leaves of a rub, as far as it is known: `modes=0.01,patches=0.02,mesh=0.03`, relative errors of the \
+         displacements of the tip; format 2.",
+    ),
+    entry("rub_errors_found_on", Some(""), "The scene that these were found on, in words; format 2."),
     entry("units", Some(""), "Text for the reader of the file: one line per array."),
     entry("checksum", Some(""), "SHA-256 of the content, checked where present; leave it out when writing by hand."),
 ];

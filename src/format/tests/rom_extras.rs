@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 use proptest::prelude::*;
 use sha2::{Digest, Sha256};
 use tiprub_core::Rom;
-use tiprub_core::rom::{Basis, ContactGrid, ContactNode, Frame, Patch, RomExtras, Spin, Thermal, Watched};
+use tiprub_core::rom::{Basis, ContactGrid, ContactNode, Frame, Patch, RomExtras, RubErrors, Spin, Thermal, Watched};
 use tiprub_format::{read_rom, write_rom};
 use tiprub_test_models::{node, structure};
 
@@ -98,19 +98,52 @@ fn of_the_first_format(rom: &Rom) -> Rom {
     rom
 }
 
+fn rub_errors() -> RubErrors {
+    RubErrors { found_on: "a light rub, 4 ms".into(), modes: Some(0.0125), patches: None, mesh: Some(1.0 / 3.0) }
+}
+
+#[test]
+fn what_a_reduction_leaves_of_a_rub_is_kept_as_far_as_it_is_known() {
+    let with = |errors: Option<RubErrors>| {
+        let mut rom = of_the_first_format(&complete(3, 4, 2));
+        rom.checks.rub_errors = errors;
+        rom
+    };
+    let plain = write_rom(&with(None));
+    // Nothing known is nothing written.
+    assert_eq!(write_rom(&with(Some(RubErrors { found_on: "nothing".into(), ..RubErrors::default() }))), plain);
+    let none = RubErrors { found_on: String::new(), patches: Some(0.0), ..rub_errors() };
+    for errors in [rub_errors(), none] {
+        let rom = with(Some(errors));
+        assert_eq!(read_rom(&write_rom(&rom), "rom").unwrap(), rom);
+    }
+    for (text, told) in [
+        ("modes=0.1,nodes=0.2", "\"nodes=0.2\" names nothing"),
+        ("modes=0.1,modes=0.2", "\"modes=0.2\" is not one number from 0 on"),
+        ("mesh=-1", "\"mesh=-1\" is not one number"),
+        ("mesh=NaN", "\"mesh=NaN\" is not one number"),
+        ("patches", "\"patches\" is not one number"),
+    ] {
+        refused(|file| drop(file.entries.insert("rub_errors".into(), text.into())), &["metadata `rub_errors`", told]);
+    }
+    let alone = |file: &mut Loose| drop(file.entries.insert("rub_errors_found_on".into(), "a rub".into()));
+    refused(alone, &["metadata `rub_errors_found_on`: given without `rub_errors`"]);
+}
+
 #[test]
 fn a_file_is_of_the_first_format_that_holds_it() {
     let full = complete(3, 4, 2);
     let plain = of_the_first_format(&full);
     let version = |rom: &Rom| Loose::of(rom).entries["format_version"].clone();
     assert_eq!(version(&plain), "1");
-    let with: [fn(&mut Rom, &Rom); 6] = [
+    let with: [fn(&mut Rom, &Rom); 7] = [
         |rom, full| rom.extras.watched.clone_from(&full.extras.watched),
         |rom, full| rom.extras.basis = full.extras.basis,
         |rom, full| rom.checks.response_frequencies.clone_from(&full.checks.response_frequencies),
         |rom, full| rom.checks.flexibility_deviation.clone_from(&full.checks.flexibility_deviation),
         |rom, full| rom.contact_nodes[1].area = full.contact_nodes[1].area,
         |rom, full| rom.contact_nodes[1].length = full.contact_nodes[1].length,
+        |rom, _| rom.checks.rub_errors = Some(rub_errors()),
     ];
     for change in with {
         let mut rom = plain.clone();

@@ -7,11 +7,12 @@ use tiprub_model::{
     casing::CASING37,
     cube::{CubeOptions, RingOptions, Side},
     cyclic::{CyclicReduction, ModeSelection, reduce_cyclic},
-    rotor37::{DESIGN_SPEED, Tip},
+    reduce::ReductionKind,
+    rotor37::{DESIGN_SPEED, MeshCounts, Tip, blade_mesh},
     stage::{
-        StageOptions,
+        SectorCounts, SectorOptions, StageOptions,
         casing::{StageCasingOptions, reduce_stage_casing},
-        stage_model,
+        sector_mesh, stage_model,
     },
 };
 use tiprub_shell::{Result, console::Console};
@@ -103,44 +104,125 @@ pub fn has_chord(name: &str) -> bool {
     name.starts_with("rotor37") || [STAGE, STAGE_COARSE].contains(&plain(name))
 }
 
-/// The model of this name with another number of modes, as a factor on its own, and another tip where it [has a
-/// chord](has_chord); made anew and not kept. `None` where there is no such model, or none with more modes: the cube has all.
-pub fn refined(name: &str, factor: f64, tip: Tip, console: &Console) -> Option<Result<Rom>> {
-    let times = |modes: usize| scaled(modes, factor);
+/// Meshes of blades beside the one that ships: numbers of elements along the edges, as factors on its own, the coarsest first.
+pub const MESHES: [f64; 3] = [0.5, core::f64::consts::FRAC_1_SQRT_2, core::f64::consts::SQRT_2];
+
+/// In what a model differs from the one that ships.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Other {
+    /// Number of modes, as a factor on its own.
+    pub modes: f64,
+    /// What touches, where it [has a chord](has_chord).
+    pub tip: Tip,
+    /// Elements along the edges, as a factor on its own, where it has a chord: the number through the thickness stays.
+    pub mesh: f64,
+}
+
+impl Other {
+    /// For the name of what is kept.
+    fn told(&self, name: &str) -> String {
+        let tip = match self.tip {
+            Tip::Nodes(count) => format!("nodes-{count}"),
+            Tip::Patches(count) => format!("patches-{count}"),
+        };
+        format!("{name}-modes-{:.3}-{tip}-mesh-{:.3}", self.modes, self.mesh)
+    }
+}
+
+/// The model of this name in another form, as kept or made anew. `None` where there is no such model, or none with more modes: the
+/// cube has all.
+pub fn refined(name: &str, other: Other, cache: &RomCache, console: &Console) -> Option<Result<Rom>> {
+    let times = |modes: usize| scaled(modes, other.modes);
     let families = |selection: ModeSelection| match selection {
         ModeSelection::Families(modes) => ModeSelection::Families(times(modes)),
         other => other,
     };
-    let defaults = rotor37(name);
-    let blade = |spin| Rotor37Options { spin, tip, modes: times(defaults.modes), ..defaults.clone() };
-    let name = plain(name);
-    Some(match name {
-        "rotor37" => reduction::rotor37(&blade(None), console).map(|reduction| reduction.rom),
-        "rotor37-spin" => reduction::rotor37(&blade(Some(DESIGN_SPEED)), console).map(|reduction| reduction.rom),
-        STAGE | STAGE_COARSE => {
+    let keep = |options: &dyn core::fmt::Debug, make: &dyn Fn() -> Result<Rom>| {
+        cache.get(&other.told(name), options, console, make)
+    };
+    let of_blade = |spin| {
+        let defaults = rotor37(name);
+        let mesh = rotor37_mesh(defaults.mesh, other.mesh);
+        let options = Rotor37Options { spin, mesh, tip: other.tip, modes: times(defaults.modes), ..defaults };
+        keep(&options, &|| Ok(reduction::rotor37(&options, console)?.rom))
+    };
+    Some(match plain(name) {
+        "rotor37" => of_blade(None),
+        "rotor37-spin" => of_blade(Some(DESIGN_SPEED)),
+        name @ (STAGE | STAGE_COARSE) => {
             let (name, options) = stage(name == STAGE_COARSE);
-            let options = StageOptions { modes: families(options.modes), tip, ..options };
-            DiskModel::with_options(name, options).reduce(console).map(|(reduction, _)| reduction.rom)
+            let kind = match other.tip {
+                Tip::Nodes(_) => options.kind,
+                Tip::Patches(_) => ReductionKind::FreeInterface,
+            };
+            let sector = SectorOptions { counts: stage_mesh(options.sector.counts, other.mesh), ..options.sector };
+            let options = StageOptions { modes: families(options.modes), tip: other.tip, kind, sector, ..options };
+            let model = DiskModel::with_options(name, options);
+            keep(&model, &|| Ok(model.reduce(console)?.0.rom))
         }
         CASING37 => {
             let defaults = CasingOptions::default();
             let fixed_interface_modes = times(defaults.fixed_interface_modes);
             let options = CasingOptions { modes: times(defaults.modes), fixed_interface_modes, ..defaults };
-            reduction::casing(&options, console).map(|reduction| reduction.rom)
+            keep(&options, &|| Ok(reduction::casing(&options, console)?.rom))
         }
-        STAGE_CASING | STAGE_CASING_COARSE => {
+        name @ (STAGE_CASING | STAGE_CASING_COARSE) => {
             let defaults = stage_casing(name == STAGE_CASING_COARSE);
             let fixed_interface_modes = times(defaults.fixed_interface_modes);
             let options = StageCasingOptions { modes: times(defaults.modes), fixed_interface_modes, ..defaults };
-            reduction::stage_casing(&options, console).map(|reduction| reduction.rom)
+            keep(&options, &|| Ok(reduction::stage_casing(&options, console)?.rom))
         }
-        _ => {
+        name => {
             let (_, side) = RINGS.iter().find(|(ring, _)| *ring == name)?;
             let defaults = RingOptions::new(*side);
             let options = RingOptions { modes: times(defaults.modes), ..defaults };
-            reduction::cube_ring(&options, console).map(|reduction| reduction.rom)
+            keep(&options, &|| Ok(reduction::cube_ring(&options, console)?.rom))
         }
     })
+}
+
+/// Nodes of the mesh of a model that [has a chord](has_chord), with so many times its elements along the edges; `None` of another.
+///
+/// # Errors
+/// A factor that leaves no element.
+pub fn mesh_nodes(name: &str, mesh: f64) -> Option<Result<usize>> {
+    let nodes = match plain(name) {
+        "rotor37" | "rotor37-spin" => {
+            blade_mesh(rotor37_mesh(rotor37(name).mesh, mesh)).map(|blade| blade.mesh.nodes.len())
+        }
+        name @ (STAGE | STAGE_COARSE) => {
+            let sector = stage(name == STAGE_COARSE).1.sector;
+            let options = SectorOptions { counts: stage_mesh(sector.counts, mesh), ..sector };
+            sector_mesh(&options).map(|sector| sector.mesh.nodes.len())
+        }
+        _ => return None,
+    };
+    Some(nodes.map_err(|error| reduction::failure(name, error)))
+}
+
+/// Elements along chord and span times a factor; along the chord they stay even, so that there is a middle.
+fn rotor37_mesh(own: MeshCounts, factor: f64) -> MeshCounts {
+    MeshCounts { chord: even(own.chord, factor), span: even(own.span, factor), ..own }
+}
+
+/// The same of a sector; through the thickness of the blade they stay.
+fn stage_mesh(own: SectorCounts, factor: f64) -> SectorCounts {
+    let times = |count: usize| if count == 0 { 0 } else { scaled(count, factor).max(1) };
+    SectorCounts {
+        chord: even(own.chord, factor),
+        span: times(own.span),
+        thickness: own.thickness,
+        side: times(own.side),
+        overhang: times(own.overhang),
+        rim: times(own.rim),
+        web: [even(own.web[0], factor), times(own.web[1])],
+        bore: own.bore.map(times),
+    }
+}
+
+/// As a factor that is 1 leaves it; else the next even number.
+fn even(count: usize, factor: f64) -> usize {
+    if (factor - 1.0).abs() < 1e-9 { count } else { 2 * scaled(count, 0.5 * factor).max(1) }
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred modes at most")]
@@ -209,12 +291,28 @@ mod tests {
     #[test]
     fn models_are_refined_by_name() {
         let console = Console::new(true, false);
-        let order = |factor: f64| refined("ring-left", factor, Tip::Nodes(0), &console).unwrap().unwrap().order();
+        let with = |modes: f64| Other { modes, tip: Tip::Nodes(0), mesh: 1.0 };
+        let off = RomCache::off();
+        let order = |modes: f64| refined("ring-left", with(modes), &off, &console).unwrap().unwrap().order();
         assert_eq!(order(0.5), 50);
-        assert!(
-            refined(CUBE, 2.0, Tip::Nodes(0), &console).is_none()
-                && refined("none", 2.0, Tip::Nodes(0), &console).is_none()
-        );
+        for name in [CUBE, "none"] {
+            assert!(refined(name, with(2.0), &off, &console).is_none(), "{name}");
+        }
         assert!(has_chord("rotor37-spin") && has_chord(STAGE) && !has_chord(STAGE_CASING) && !has_chord(CUBE));
+    }
+
+    /// Every other mesh is one: its nodes grow with the factor, and a factor of 1 is the mesh that ships.
+    #[test]
+    fn other_meshes_are_coarser_and_finer() {
+        for (name, own) in [("rotor37", rotor37("rotor37").mesh), ("rotor37-paper", rotor37("rotor37-paper").mesh)] {
+            assert_eq!(rotor37_mesh(own, 1.0), own, "{name}");
+        }
+        assert_eq!(stage_mesh(SectorCounts::default(), 1.0), SectorCounts::default());
+        for name in ["rotor37", "rotor37-paper", STAGE] {
+            let [coarsest, coarse, fine] = MESHES.map(|factor| mesh_nodes(name, factor).unwrap().unwrap());
+            let own = mesh_nodes(name, 1.0).unwrap().unwrap();
+            assert!(coarsest < coarse && coarse < own && own < fine, "{name}: {coarsest} {coarse} {own} {fine}");
+        }
+        assert!(mesh_nodes(CASING37, 1.0).is_none());
     }
 }

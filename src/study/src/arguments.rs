@@ -97,6 +97,12 @@ pub struct ConvergenceArguments {
     /// Scene file (TOML), or one that ships, such as `builtin:rotor37`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
+    /// Also write the ROM of what touches with the errors that were found, for `tiprub run` and `tiprub inspect` to tell.
+    #[arg(long, value_name = "FILE")]
+    pub into: Option<PathBuf>,
+    /// Replace that file if it is there already.
+    #[arg(long, requires = "into")]
+    pub force: bool,
     /// Time from the start of the experiment that is compared (s), at most until runs that differ by almost nothing part [default: 400
     /// communication steps beyond the first contact].
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]

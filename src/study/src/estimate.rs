@@ -1,4 +1,5 @@
-//! What steps, modes and patches of a scene leave, estimated from coarser runs: a scene alone is needed, no mesh and no truth.
+//! What steps, modes and patches of a scene leave, estimated from coarser runs: a scene alone is needed, no mesh and no truth. What the mesh
+//! leaves stands in the ROM, where somebody has found it (`tiprub study convergence --into`).
 //!
 //! Three levels of a direction, each about twice as fine as the one before, the scene's own the finest: changes c₁ and c₂ from level
 //! to level. Where they shrink as a power, r = c₁/c₂ tells which, and c₂/(r − 1) is what all further refinement would change; r counts
@@ -6,7 +7,7 @@
 //! may be refused: then shorter ones are tried, and c₁ + c₂/(r − 1) is left.
 
 use serde_json::{Value, json};
-use tiprub_core::Scene;
+use tiprub_core::{Rom, Scene};
 use tiprub_shell::{Result, console::Console};
 
 use crate::convergence::{
@@ -33,11 +34,28 @@ pub struct Estimate {
     /// Of the displacements (relative L2), or why it is not known. Of impulse and work the truth is too often passed by chance for
     /// estimates to hold.
     pub left: std::result::Result<f64, String>,
+    /// The scene it was found on, where the ROM tells it.
+    pub found_on: Option<String>,
 }
 
 impl Estimate {
     fn unknown(direction: &'static str, why: impl Into<String>) -> Self {
-        Self { direction, left: Err(why.into()) }
+        Self { direction, left: Err(why.into()), found_on: None }
+    }
+
+    /// Where it is not known here, what the ROM says of it.
+    fn or_of(self, rom: &Rom) -> Self {
+        let Some(errors) = rom.checks.rub_errors.as_ref().filter(|_| self.left.is_err()) else { return self };
+        let known = match self.direction {
+            "modes" => errors.modes,
+            "patches" => errors.patches,
+            "mesh" => errors.mesh,
+            _ => None,
+        };
+        match known {
+            Some(left) => Self { left: Ok(left), found_on: Some(errors.found_on.clone()), ..self },
+            None => self,
+        }
     }
 
     /// Of a direction that was run, its own level the first or the last.
@@ -56,13 +74,14 @@ impl Estimate {
             );
         };
         let own_first = refined.direction.levels.first().is_some_and(|level| level.own);
-        Self { direction, left: Ok(last / (ratio - 1.0) + if own_first { before } else { 0.0 }) }
+        let left = last / (ratio - 1.0) + if own_first { before } else { 0.0 };
+        Self { direction, left: Ok(left), found_on: None }
     }
 
     /// Name and value, or why it is not known.
     pub fn json(&self) -> (String, Value) {
         let value = match &self.left {
-            Ok(left) => json!({ "displacements": left }),
+            Ok(left) => json!({ "displacements": left, "found_on": self.found_on }),
             Err(why) => json!({ "unknown": why }),
         };
         (self.direction.to_owned(), value)
@@ -88,7 +107,26 @@ fn ratio(before: f64, last: f64, [least, most]: [f64; 2]) -> Option<f64> {
 /// One line for reports.
 pub fn told(estimates: &[Estimate]) -> String {
     let all: Vec<String> = estimates.iter().map(Estimate::told).collect();
-    format!("estimated error of the displacements: {}", all.join(", "))
+    let mut text = format!("estimated error of the displacements: {}", all.join(", "));
+    let of_rom = |one: &&Estimate| one.found_on.is_some();
+    if let Some(found_on) = estimates.iter().find_map(|one| one.found_on.as_ref()) {
+        let which: Vec<&str> = estimates.iter().filter(of_rom).map(|one| one.direction).collect();
+        let found_on = if found_on.is_empty() { "an unnamed rub" } else { found_on };
+        text.push_str(&format!(" ({} as the ROM has it, found on {found_on})", which.join(" and ")));
+    }
+    text
+}
+
+/// What a ROM says of itself; empty where it says nothing.
+pub fn of_rom(rom: &Rom) -> Vec<Estimate> {
+    if rom.checks.rub_errors.is_none() {
+        return Vec::new();
+    }
+    let steps = Estimate::unknown("steps", "they are of a run, not of a ROM: `tiprub run --estimate` tells");
+    let others = ["modes", "patches", "mesh"].map(|direction| {
+        Estimate::unknown(direction, "nobody has found it: `tiprub study convergence --into` does").or_of(rom)
+    });
+    [steps].into_iter().chain(others).collect()
 }
 
 fn direction(title: &str, unit: &'static str, levels: Vec<Level>) -> Direction {
@@ -145,7 +183,7 @@ fn patches(scene: &Scene, division: u32) -> std::result::Result<Direction, Strin
     Ok(direction("contact patches", "patches", levels))
 }
 
-fn with_rom(scene: &Scene, index: usize, value: usize, rom: tiprub_core::Rom, division: u32) -> Level {
+fn with_rom(scene: &Scene, index: usize, value: usize, rom: Rom, division: u32) -> Level {
     let mut scene = scene.clone();
     scene.roms[index] = rom;
     Level { value: value as f64, own: false, scene, division }
@@ -179,13 +217,20 @@ pub fn estimates(
     }
     found.push(Estimate::unknown(
         "mesh",
-        "a ROM does not tell of other meshes: reduce a finer one, run the scene with it, and compare",
+        "a ROM does not tell of other meshes: `tiprub study convergence SCENE --into ROM` finds it and writes it there",
     ));
-    Ok(found)
+    let rom = &scene.roms[crate::master(scene)];
+    Ok(found.into_iter().map(|estimate| estimate.or_of(rom)).collect())
 }
 
 #[cfg(test)]
 mod tests {
+    use tiprub_core::rom::RubErrors;
+    use tiprub_model::{
+        Rotor37Options, reduce_rotor37,
+        rotor37::{MeshCounts, Tip},
+    };
+
     use super::*;
 
     #[test]
@@ -206,8 +251,32 @@ mod tests {
 
     #[test]
     fn a_line_tells_what_is_known() {
-        let of = |direction, left| Estimate { direction, left: Ok(left) };
+        let of = |direction, left| Estimate { direction, left: Ok(left), found_on: None };
         let all = [of("steps", 1.2e-3), Estimate::unknown("mesh", "no other")];
         assert_eq!(told(&all), "estimated error of the displacements: steps 0.12 %, mesh unknown");
+    }
+
+    #[test]
+    fn what_is_not_known_here_is_what_the_rom_says() {
+        let mesh = MeshCounts { chord: 2, thickness: 1, span: 2 };
+        let options = Rotor37Options { mesh, tip: Tip::Nodes(2), modes: 2, ..Rotor37Options::paper() };
+        let mut rom = reduce_rotor37(&options, &|_| {}).unwrap().rom;
+        assert!(of_rom(&rom).is_empty());
+        let found_on = "a light rub".to_owned();
+        rom.checks.rub_errors = Some(RubErrors { found_on, modes: None, patches: Some(0.02), mesh: Some(0.05) });
+        let known = Estimate { direction: "patches", left: Ok(0.01), found_on: None };
+        let all = [Estimate::unknown("modes", "refused"), known.clone(), Estimate::unknown("mesh", "no other")];
+        let all = all.map(|estimate| estimate.or_of(&rom));
+        assert_eq!(all[1], known, "what the run tells stays");
+        let told = told(&all);
+        assert!(
+            told.ends_with("modes unknown, patches 1.00 %, mesh 5.00 % (mesh as the ROM has it, found on a light rub)"),
+            "{told}"
+        );
+        let told = super::told(&of_rom(&rom));
+        assert!(
+            told.contains("steps unknown, modes unknown, patches 2.00 %, mesh 5.00 % (patches and mesh as"),
+            "{told}"
+        );
     }
 }

@@ -13,7 +13,9 @@ use tiprub_shell::{
 use tiprub_study as study;
 use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
-use crate::{bases, conjugacy, convergence, cube, error, estimates, inputs, modes, stability, stage, witness};
+use crate::{
+    bases, conjugacy, convergence, cube, error, estimates, inputs, modes, refinement, stability, stage, witness,
+};
 
 /// Evidence for tiprub: studies of the models that ship and of standard problems.
 #[derive(Debug, Parser)]
@@ -58,12 +60,39 @@ pub enum Command {
     Conjugacy(StudyCommon),
     /// What the communication step does to a whirling shaft and other inputs that move, ramped, with derivatives, and held.
     Inputs(StudyCommon),
-    /// What steps, modes and patches are estimated to leave, against rubs refined far in each direction.
-    Estimates(StudyCommon),
+    /// What steps, modes, patches and the mesh are estimated to leave, against rubs refined far in each direction.
+    Estimates(EstimatesArguments),
+    /// What refining rubs of rotor 37 and of the stage changes: patches, mesh, modes, steps; limits, and the errors of what ships.
+    Refinement(RefinementArguments),
     /// Modes with the contact held or free, contact at nodes or patches: error, largest steps and cost against the number of modes.
     Bases(StudyCommon),
     /// Reduced blades against a full finite-element model with steps and contact of its own, without any reduction.
     Witness(StudyCommon),
+}
+
+/// Arguments of `lab estimates`.
+#[derive(Debug, Args)]
+pub struct EstimatesArguments {
+    /// Only what the mesh leaves: minutes instead of an hour.
+    #[arg(long)]
+    pub mesh_only: bool,
+    /// What all studies take.
+    #[command(flatten)]
+    pub common: StudyCommon,
+}
+
+/// Arguments of `lab refinement`.
+#[derive(Debug, Args)]
+pub struct RefinementArguments {
+    /// Only this scene, such as rotor37-light or stage-smooth; may be given several times.
+    #[arg(long = "scene", value_name = "SCENE")]
+    pub scenes: Vec<String>,
+    /// Runs at the same time [default: one per processor].
+    #[arg(long, value_name = "N")]
+    pub threads: Option<std::num::NonZero<usize>>,
+    /// What all studies take.
+    #[command(flatten)]
+    pub common: StudyCommon,
 }
 
 /// Arguments of `lab error`.
@@ -166,7 +195,8 @@ impl Cli {
             Command::Cube(common) => ("cube", common),
             Command::Conjugacy(common) => ("conjugacy", common),
             Command::Inputs(common) => ("inputs", common),
-            Command::Estimates(common) => ("estimates", common),
+            Command::Estimates(arguments) => ("estimates", &arguments.common),
+            Command::Refinement(arguments) => ("refinement", &arguments.common),
             Command::Bases(common) => ("bases", common),
             Command::Witness(common) => ("witness", common),
         };
@@ -191,7 +221,8 @@ impl Cli {
             Command::Cube(common) => cube::study(common, console),
             Command::Conjugacy(common) => conjugacy::study(common.quick),
             Command::Inputs(common) => inputs::study(common, console),
-            Command::Estimates(common) => estimates::study(common, console),
+            Command::Estimates(arguments) => estimates::study(arguments, console),
+            Command::Refinement(arguments) => refinement::study(arguments, console),
             Command::Bases(common) => bases::study(common, console),
             Command::Witness(common) => witness::study(common, console),
             Command::Stability(_) => unreachable!("`run` has answered it"),

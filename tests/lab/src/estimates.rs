@@ -1,4 +1,5 @@
-//! Estimates of what steps, modes and patches leave, against the truth: rubs of rotor 37, each refined far in one direction.
+//! Estimates of what steps, modes, patches and the mesh leave, against the truth: rubs of rotor 37, each refined far in one direction. Those of
+//! the mesh are made from one coarser mesh, and from two, as `tiprub study convergence` does it.
 
 use serde_json::{Value, json};
 use tiprub_core::{Rom, Scene};
@@ -11,14 +12,20 @@ use tiprub_model::{
 use tiprub_shell::{Failure, Result, console::Console, sweep};
 use tiprub_study::{
     Figure, Picture, Sheet, Statement, Study,
-    arguments::StudyCommon,
-    convergence::march::{Marched, march},
+    convergence::{
+        limit,
+        march::{Marched, march},
+    },
     estimate::{self, Estimate},
 };
 
-/// Rubs of one model: elements of the mesh, modes, and depths of the bumps, friction coefficients and speeds (rad/s), each with each.
+use crate::cli::EstimatesArguments;
+
+/// Rubs of one model: elements of its mesh, of two coarser ones (the coarsest first) and of the true one, modes, and depths of the bumps, friction coefficients and speeds (rad/s), each with each.
 struct Group {
     mesh: [usize; 3],
+    coarser: [[usize; 3]; 2],
+    finer: [usize; 3],
     modes: usize,
     depths: &'static [f64],
     frictions: &'static [f64],
@@ -26,9 +33,11 @@ struct Group {
 }
 
 /// The first group is the one that the bounds of [`estimate`] were chosen with, the second is not.
-const GROUPS: [Group; 2] = [
+static GROUPS: [Group; 2] = [
     Group {
         mesh: [16, 1, 16],
+        coarser: [[8, 1, 8], [12, 1, 12]],
+        finer: [32, 1, 32],
         modes: 40,
         depths: &[0.55, 0.6, 0.7, 0.85],
         frictions: &[0.0, 0.15],
@@ -36,6 +45,8 @@ const GROUPS: [Group; 2] = [
     },
     Group {
         mesh: [12, 2, 20],
+        coarser: [[6, 2, 10], [8, 2, 14]],
+        finer: [24, 2, 40],
         modes: 60,
         depths: &[0.53, 0.65, 0.8, 1.0],
         frictions: &[0.05, 0.1],
@@ -56,9 +67,12 @@ const TRUE_DIVISION: u32 = 64;
 const FACTOR: f64 = 3.0;
 /// Errors below this are as good as none: 1e-4 of displacements is beyond what anybody asks of a rub.
 const NONE: f64 = 1e-4;
-const DIRECTIONS: [&str; 3] = ["steps", "modes", "patches"];
+const DIRECTIONS: [&str; 5] = ["steps", "modes", "patches", "mesh, from one coarser", "mesh, from two coarser"];
+/// Those that the product estimates from the scene alone.
+const OF_SCENE: usize = 3;
 
 /// What was estimated of the displacements, and what is true.
+#[derive(Debug, Clone, Copy)]
 struct Compared {
     scene: usize,
     direction: usize,
@@ -66,16 +80,20 @@ struct Compared {
     truth: Option<f64>,
 }
 
-/// Scenes around the own model, the finer ones behind: modes, patches.
-struct Scenes {
-    names: Vec<String>,
-    own: Vec<Scene>,
-    modes: Vec<Scene>,
-    patches: Vec<Scene>,
+/// One rub: its group, and with its own model and others.
+struct Rub {
+    name: String,
+    group: &'static Group,
+    own: Scene,
+    modes: Scene,
+    patches: Scene,
+    /// The coarsest first.
+    coarser: [Scene; 2],
+    finer: Scene,
 }
 
-fn scenes(quick: bool, console: &Console) -> Result<Scenes> {
-    let mut found = Scenes { names: Vec::new(), own: Vec::new(), modes: Vec::new(), patches: Vec::new() };
+fn rubs(quick: bool, console: &Console) -> Result<Vec<Rub>> {
+    let mut found = Vec::new();
     let base = scene_source::settings("builtin:rotor37")?;
     for (group, number) in GROUPS.iter().zip(1..) {
         let roms = roms(group, console)?;
@@ -87,26 +105,31 @@ fn scenes(quick: bool, console: &Console) -> Result<Scenes> {
             (settings.contacts[0].friction, settings.structures[0].speed) = (friction, speed);
             settings.experiment.communication_step = INTERVAL;
             settings.time.step = INTERVAL / f64::from(DIVISION);
-            found.names.push(format!("group {number}, depth {depth}, µ = {friction}, {speed} rad/s"));
-            let [own, modes, patches] =
-                roms.each_ref().map(|rom| Scene { settings: settings.clone(), roms: vec![rom.clone()] });
-            found.own.push(own);
-            found.modes.push(modes);
-            found.patches.push(patches);
+            let name = format!("group {number}, depth {depth}, µ = {friction}, {speed} rad/s");
+            let with = |rom: &Rom| Scene { settings: settings.clone(), roms: vec![rom.clone()] };
+            let [own, modes, patches, coarsest, coarser, finer] = roms.each_ref().map(with);
+            found.push(Rub { name, group, own, modes, patches, coarser: [coarsest, coarser], finer });
         }
     }
     Ok(found)
 }
 
-/// The own model of a group, with more modes, and with more patches.
-fn roms(group: &Group, console: &Console) -> Result<[Rom; 3]> {
-    let [chord, thickness, span] = group.mesh;
-    let rom = |modes: usize, patches: usize| {
+/// The own model of a group, with more modes, with more patches, on the coarser meshes and on the true one.
+fn roms(group: &Group, console: &Console) -> Result<[Rom; 6]> {
+    let rom = |[chord, thickness, span]: [usize; 3], modes: usize, patches: usize| {
         let mesh = MeshCounts { chord, thickness, span };
         let options = Rotor37Options { mesh, tip: Tip::Patches(patches), modes, ..Rotor37Options::default() };
         reduction::rotor37(&options, console).map(|found| found.rom)
     };
-    Ok([rom(group.modes, PATCHES)?, rom(TRUE_MODES, PATCHES)?, rom(group.modes, TRUE_PATCHES)?])
+    let (mesh, modes) = (group.mesh, group.modes);
+    Ok([
+        rom(mesh, modes, PATCHES)?,
+        rom(mesh, TRUE_MODES, PATCHES)?,
+        rom(mesh, modes, TRUE_PATCHES)?,
+        rom(group.coarser[0], modes, PATCHES)?,
+        rom(group.coarser[1], modes, PATCHES)?,
+        rom(group.finer, modes, PATCHES)?,
+    ])
 }
 
 fn run(scene: &Scene, division: u32, samples: usize) -> Result<Marched> {
@@ -115,26 +138,53 @@ fn run(scene: &Scene, division: u32, samples: usize) -> Result<Marched> {
     march(&scene, &[], division, samples).map_err(|why| Failure::new(&scene.settings.name, why, ""))
 }
 
-/// Of one scene in all directions.
-fn compared(scenes: &Scenes, scene: usize, samples: usize) -> Result<Vec<Compared>> {
+/// Edges of the elements, up to a factor.
+fn edge([chord, _, span]: [usize; 3]) -> f64 {
+    1.0 / ((chord * span) as f64).sqrt()
+}
+
+/// What the mesh leaves, from one coarser mesh and from two.
+fn of_mesh(rub: &Rub, own: &Marched, samples: usize) -> [Option<f64>; 2] {
+    let [coarsest, coarse] = rub.coarser.each_ref().map(|scene| run(scene, DIVISION, samples).ok());
+    let [first, second] = rub.group.coarser.map(edge);
+    let own_edge = edge(rub.group.mesh);
+    let last = coarse.as_ref().and_then(|coarse| coarse.displacement_change(own));
+    let before = coarsest.zip(coarse).and_then(|(coarsest, coarse)| coarsest.displacement_change(&coarse));
+    let three = before.zip(last).and_then(|(before, last)| {
+        limit::of_changes([first, second, own_edge], [before, last], limit::LEAST_OF_MESHES)
+    });
+    let two = last.map(|last| limit::of_two_meshes([second, own_edge], last));
+    [two, three].map(|limit| limit.map(|limit| limit.rest))
+}
+
+/// One rub over its mesh.
+fn compared_over_meshes(rubs: &[Rub], scene: usize, samples: usize) -> Result<Vec<Compared>> {
+    let rub = &rubs[scene];
+    let own = run(&rub.own, DIVISION, samples)?;
+    let truth = run(&rub.finer, DIVISION, samples).ok().and_then(|truth| own.displacement_change(&truth));
+    let of = |(at, estimate): (usize, Option<f64>)| Compared { scene, direction: OF_SCENE + at, estimate, truth };
+    Ok(of_mesh(rub, &own, samples).into_iter().enumerate().map(of).collect())
+}
+
+/// The same in the directions that a scene tells of itself.
+fn compared_by_itself(rubs: &[Rub], scene: usize, samples: usize) -> Result<Vec<Compared>> {
     let quiet = Console::new(true, false);
-    let estimates = estimate::estimates(&scenes.own[scene], &[], samples, &quiet)?;
-    let own = run(&scenes.own[scene], DIVISION, samples)?;
+    let rub = &rubs[scene];
+    let estimates = estimate::estimates(&rub.own, &[], samples, &quiet)?;
+    let own = run(&rub.own, DIVISION, samples)?;
     let truths = [
-        run(&scenes.own[scene], TRUE_DIVISION, samples),
-        run(&scenes.modes[scene], DIVISION, samples),
-        run(&scenes.patches[scene], DIVISION, samples),
+        run(&rub.own, TRUE_DIVISION, samples),
+        run(&rub.modes, DIVISION, samples),
+        run(&rub.patches, DIVISION, samples),
     ];
-    let of = |(direction, truth): (usize, Result<Marched>)| {
-        let estimate = estimates.iter().find(|one: &&Estimate| one.direction == DIRECTIONS[direction]);
-        Compared {
-            scene,
-            direction,
-            estimate: estimate.and_then(|one| one.left.clone().ok()),
-            truth: truth.ok().and_then(|truth| own.changes(&truth)[0]),
-        }
-    };
-    Ok(truths.into_iter().enumerate().map(of).collect())
+    let truths = truths.map(|truth| truth.ok().and_then(|truth| own.changes(&truth)[0]));
+    let of_scene = DIRECTIONS[..OF_SCENE].iter().map(|direction| {
+        let estimate = estimates.iter().find(|one: &&Estimate| one.direction == *direction);
+        estimate.and_then(|one| one.left.clone().ok())
+    });
+    let of =
+        |(direction, estimate): (usize, Option<f64>)| Compared { scene, direction, estimate, truth: truths[direction] };
+    Ok(of_scene.enumerate().map(of).collect())
 }
 
 fn statement(all: &[Compared], direction: usize) -> Statement {
@@ -149,6 +199,31 @@ fn statement(all: &[Compared], direction: usize) -> Statement {
     )
 }
 
+/// The same of every group, with true errors and ratios.
+fn groups(rubs: &[Rub], all: &[Compared], direction: usize) -> Vec<Statement> {
+    let of = |(group, number): (&'static Group, usize)| {
+        let own = |one: &&Compared| one.direction == direction && core::ptr::eq(rubs[one.scene].group, group);
+        let own: Vec<&Compared> = all.iter().filter(own).collect();
+        let truths: Vec<f64> = own.iter().filter_map(|one| one.truth).collect();
+        let given: Vec<(f64, f64)> = own.iter().filter_map(|one| one.estimate.zip(one.truth)).collect();
+        let ends = |values: &mut dyn Iterator<Item = f64>| {
+            values.fold([f64::INFINITY, 0.0_f64], |[low, high], value| [low.min(value), high.max(value)])
+        };
+        let [least, most] = ends(&mut truths.iter().map(|truth| 100.0 * truth));
+        let [low, high] = ends(&mut given.iter().map(|(estimate, truth)| estimate / truth));
+        let right = given.iter().filter(|(a, b)| a.max(*b).max(NONE) <= FACTOR * a.min(*b).max(NONE)).count();
+        Statement::remark(
+            format!("{}, group {number}", DIRECTIONS[direction]),
+            format!(
+                "true error {least:.2} to {most:.2} %, estimate over truth {low:.2} to {high:.2}, {right} of {} within a factor of {FACTOR}, {} unknown",
+                given.len(),
+                truths.len() - given.len()
+            ),
+        )
+    };
+    GROUPS.iter().zip(1..).map(of).collect()
+}
+
 fn figure(all: &[Compared]) -> Result<Figure> {
     let logarithm = |value: f64| value.max(NONE).log10();
     let series = DIRECTIONS.iter().enumerate().map(|(direction, name)| {
@@ -157,7 +232,7 @@ fn figure(all: &[Compared]) -> Result<Figure> {
         Series::line(*name, points.collect())
     });
     let plot = Plot { marked: true, ..Plot::new("log10 of the true error", "log10 of the estimate", series.collect()) };
-    let mut sheet = Sheet::new(["scene", "direction (0 steps, 1 modes, 2 patches)", "estimate", "truth"]);
+    let mut sheet = Sheet::new(["scene", "direction (0 steps, 1 modes, 2 patches, 3 and 4 mesh)", "estimate", "truth"]);
     for one in all {
         let [estimate, truth] = [one.estimate, one.truth].map(|value| value.unwrap_or(f64::NAN));
         sheet.rows.push(vec![one.scene as f64, one.direction as f64, estimate, truth]);
@@ -174,32 +249,43 @@ fn figure(all: &[Compared]) -> Result<Figure> {
 ///
 /// # Errors
 /// A model that cannot be reduced, a run of the own model that fails, a plot that cannot be drawn.
-pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
-    let scenes = scenes(arguments.quick, console)?;
+pub(crate) fn study(arguments: &EstimatesArguments, console: &Console) -> Result<Study> {
+    let (arguments, mesh_only) = (&arguments.common, arguments.mesh_only);
+    let rubs = rubs(arguments.quick, console)?;
     let length = if arguments.quick { QUICK_LENGTH } else { LENGTH };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a thousand")]
     let samples = (length / INTERVAL).round() as usize;
-    let task = console.task("Estimates against the truth", Some(scenes.names.len() as u64));
-    let indices: Vec<usize> = (0..scenes.names.len()).collect();
-    let progress = |done: usize| task.at(done as u64);
-    let found = sweep::sweep(&indices, sweep::processors(), |scene| compared(&scenes, *scene, samples), progress)?;
+    let task = console.task("Estimates against the truth", Some(rubs.len() as u64));
+    let indices: Vec<usize> = (0..rubs.len()).collect();
+    let progress = |done: usize| {
+        task.at(done as u64);
+        task.line(&format!("{done} of {} rubs", rubs.len()));
+    };
+    let compared = |scene: &usize| {
+        let by_itself = if mesh_only { Vec::new() } else { compared_by_itself(&rubs, *scene, samples)? };
+        Ok([by_itself, compared_over_meshes(&rubs, *scene, samples)?].concat())
+    };
+    let found = sweep::sweep(&indices, sweep::processors(), compared, progress)?;
     let all: Vec<Compared> = found.into_iter().flatten().collect();
-    let row = |one: &Compared| json!({ "scene": scenes.names[one.scene], "direction": DIRECTIONS[one.direction], "estimate": one.estimate, "truth": one.truth });
+    let row = |one: &Compared| json!({ "scene": rubs[one.scene].name, "direction": DIRECTIONS[one.direction], "estimate": one.estimate, "truth": one.truth });
     Ok(Study {
         name: "estimates",
         title: "Estimates against the truth".into(),
         summary: format!(
             "Rubs of rotor 37, {PATCHES} patches on coarse meshes, in two groups: one that the estimates were made with, one that they were not. \
-             Each is estimated from coarser runs of itself, and run again with {} times shorter steps, with {TRUE_MODES} modes, and with \
-             {TRUE_PATCHES} patches.",
+             Each is estimated from coarser runs of itself, and run again with {} times shorter steps, with {TRUE_MODES} modes, with \
+             {TRUE_PATCHES} patches, and on a mesh of half the edges.",
             TRUE_DIVISION / DIVISION
         ),
         facts: vec![
-            ("scenes".into(), scenes.names.len().to_string()),
+            ("scenes".into(), rubs.len().to_string()),
             ("length of each run".into(), format!("{length} s")),
             ("internal step".into(), format!("{:e} s", INTERVAL / f64::from(DIVISION))),
         ],
-        statements: (0..DIRECTIONS.len()).map(|direction| statement(&all, direction)).collect(),
+        statements: (0..DIRECTIONS.len())
+            .filter(|direction| all.iter().any(|one| one.direction == *direction))
+            .flat_map(|direction| [statement(&all, direction)].into_iter().chain(groups(&rubs, &all, direction)))
+            .collect(),
         figures: vec![figure(&all)?],
         results: Value::Array(all.iter().map(row).collect()),
         files: Vec::new(),

@@ -16,6 +16,7 @@ mod error;
 mod estimates;
 mod inputs;
 mod modes;
+mod refinement;
 mod stability;
 mod stage;
 mod witness;

@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use serde_json::{Value, json};
 use tiprub_core::{
     Rom, Scene,
-    rom::Frame,
+    rom::{ContactNode, Frame},
     settings::{Scheme, Shape, Solver},
 };
 use tiprub_figure::plots::{Plot, Series};
@@ -259,10 +259,10 @@ impl Setting {
         let found = self.full.march(&parts, &obstacle, steps, &nodes).map_err(told)?;
         let place = |node: &usize| {
             let [x, y, z] = self.blade.mesh.nodes[*node];
-            [x.hypot(y), y.atan2(x), z]
+            ContactNode { position: [x.hypot(y), y.atan2(x), z], ..ContactNode::default() }
         };
         let marched = Marched {
-            nodes: nodes.iter().map(place).collect(),
+            points: nodes.iter().map(place).collect(),
             impulse: found.impulses.iter().sum(),
             friction_work: found.friction_work.last().copied().unwrap_or_default(),
             peak_force: found.impulses.iter().fold(0.0, |most: f64, impulse| most.max(impulse / INTERVAL)),

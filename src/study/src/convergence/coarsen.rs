@@ -20,16 +20,8 @@ pub fn coarsened(rom: &Rom) -> Result<Rom, String> {
         return Err(format!("{} patches have no half: 3, 5, 7, ... do", patches.len()));
     }
     let kept = patches.len().div_ceil(2);
-    let shares = DMatrix::from_fn(kept, patches.len(), |row, column| match column.abs_diff(2 * row) {
-        0 => 1.0,
-        1 => 0.5,
-        _ => 0.0,
-    });
-    let mut weights = shares.clone();
-    for (mut row, shares) in weights.row_iter_mut().zip(shares.row_iter()) {
-        let area: f64 = shares.iter().zip(patches).map(|(share, patch)| share * patch.area).sum();
-        row.iter_mut().zip(patches).for_each(|(weight, patch)| *weight *= patch.area / area);
-    }
+    let areas: Vec<f64> = patches.iter().map(|patch| patch.area).collect();
+    let (shares, weights) = (shares(patches.len()), weights(&areas));
     let mut found = rom.clone();
     found.contact_map = mapped(&weights, &rom.contact_map);
     found.extras.harmonics = rom
@@ -41,8 +33,46 @@ pub fn coarsened(rom: &Rom) -> Result<Rom, String> {
     found.contact_nodes = (0..kept).map(|row| patch(rom, row, &weights, &shares)).collect();
     found.origin = format!("{}; {kept} patches of its {}", rom.origin, patches.len());
     found.checks.flexibility_deviation.clear();
+    found.checks.rub_errors = None;
     found.validate().map_err(|error| error.to_string())?;
     Ok(found)
+}
+
+/// Shares of patches in every other one, which has half of its two neighbours.
+fn shares(patches: usize) -> DMatrix<f64> {
+    DMatrix::from_fn(patches.div_ceil(2), patches, |row, column| match column.abs_diff(2 * row) {
+        0 => 1.0,
+        1 => 0.5,
+        _ => 0.0,
+    })
+}
+
+/// Displacements of every other patch of those with these areas (m²).
+fn weights(areas: &[f64]) -> DMatrix<f64> {
+    let mut weights = shares(areas.len());
+    for mut row in weights.row_iter_mut() {
+        let area: f64 = row.iter().zip(areas).map(|(share, area)| share * area).sum();
+        row.iter_mut().zip(areas).for_each(|(weight, own)| *weight *= own / area);
+    }
+    weights
+}
+
+/// Patches that models with 3, 5, 9, 17, ... of them have in common.
+pub(super) const COMMON: usize = 3;
+
+/// Displacements of the [`COMMON`] patches from those of a tip; `None` of contact nodes and of other numbers of patches.
+pub(super) fn common(patches: &[ContactNode]) -> Option<DMatrix<f64>> {
+    let mut areas: Vec<f64> = patches.iter().map(|patch| patch.area).collect();
+    if areas.iter().any(|area| *area <= 0.0) {
+        return None;
+    }
+    let mut map = DMatrix::identity(areas.len(), areas.len());
+    while areas.len() > COMMON && !areas.len().is_multiple_of(2) {
+        map = weights(&areas) * map;
+        let shares = shares(areas.len());
+        areas = shares.row_iter().map(|row| row.iter().zip(&areas).map(|(share, area)| share * area).sum()).collect();
+    }
+    (areas.len() == COMMON).then_some(map)
 }
 
 /// Rows (patch, component) of the map of coarser patches.
@@ -112,5 +142,12 @@ mod tests {
         let off = (flexibility(&found) - flexibility(&coarse)).amax() / flexibility(&coarse).amax();
         assert!(off < 5e-3, "{off:e}");
         assert!(coarsened(&of(2)).unwrap_err().contains("2 patches"));
+        // What patches have in common is the same by one step or by two.
+        let [of_fine, of_coarse] = [&fine, &found].map(|rom| common(&rom.contact_nodes).unwrap());
+        let areas: Vec<f64> = fine.contact_nodes.iter().map(|patch| patch.area).collect();
+        assert_eq!(of_fine.shape(), (COMMON, 9));
+        assert!((&of_fine - of_coarse * weights(&areas)).amax() < 1e-14);
+        assert!(of_fine.row_iter().all(|row| (row.sum() - 1.0).abs() < 1e-14));
+        assert!(common(&fine.contact_nodes[..8]).is_none() && common(&fine.contact_nodes[..7]).is_none());
     }
 }

@@ -2,8 +2,10 @@
 
 use std::iter::zip;
 
-use tiprub_core::Scene;
+use nalgebra::DMatrix;
+use tiprub_core::{Rom, Scene, rom::ContactNode};
 
+use super::coarsen::{COMMON, common};
 use crate::error::{
     measure::parts_apart,
     run::{Run, Seen},
@@ -13,11 +15,11 @@ use crate::error::{
 /// What a run leaves behind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marched {
-    /// Displacements of all watched points, or contact nodes without flight where there are none, of all sectors, sample by sample: node
-    /// by node, axis by axis, sector by sector (m).
+    /// Displacements of all watched points, of all sectors, sample by sample: point by point, axis by axis, sector by sector (m). Where
+    /// there are no watched points, those of the patches that other numbers of patches have in common, or of contact nodes, without flight.
     pub displacements: Vec<Vec<f64>>,
-    /// Positions of these, as the ROM has them.
-    pub nodes: Vec<[f64; 3]>,
+    /// These points, as the ROM has them.
+    pub points: Vec<ContactNode>,
     /// Normal impulse over the window (N·s).
     pub impulse: f64,
     /// Work of friction over the window (J).
@@ -33,6 +35,12 @@ pub const QUANTITIES: [(&str, &str); 4] =
     [("impulse", "N·s"), ("friction work", "J"), ("peak force", "N"), ("strain energy", "J")];
 
 impl Marched {
+    /// A run of which nothing else is known.
+    pub(crate) fn of_displacements(points: Vec<ContactNode>, displacements: Vec<Vec<f64>>) -> Self {
+        let (impulse, friction_work, peak_force, strain_energy) = (0.0, 0.0, 0.0, 0.0);
+        Self { displacements, points, impulse, friction_work, peak_force, strain_energy }
+    }
+
     /// In the order of [`QUANTITIES`].
     pub fn quantities(&self) -> [f64; 4] {
         [self.impulse, self.friction_work, self.peak_force, self.strain_energy]
@@ -49,25 +57,77 @@ impl Marched {
         found
     }
 
-    fn displacement_change(&self, next: &Self) -> Option<f64> {
-        let size = next.nodes.iter().flatten().fold(0.0, |most: f64, value| most.max(value.abs()));
-        let same = |a: &[f64; 3], b: &[f64; 3]| zip(a, b).all(|(a, b)| (a - b).abs() <= 1e-9 * size);
-        let place = |node: &[f64; 3]| next.nodes.iter().position(|other| same(node, other));
-        let pairs: Vec<(usize, usize)> =
-            self.nodes.iter().enumerate().filter_map(|(index, node)| Some((index, place(node)?))).collect();
+    /// How far the displacements of the points that both have are from those of another run, relative to these (L2); `None` where there are
+    /// none.
+    pub fn displacement_change(&self, next: &Self) -> Option<f64> {
+        let pairs = self.pairs(next);
         if pairs.is_empty() {
             return None;
         }
-        let of = |run: &Self, nodes: &dyn Fn(&(usize, usize)) -> usize| -> Vec<Vec<f64>> {
-            let per_node = run.displacements.first().map_or(0, |all| all.len() / run.nodes.len());
+        let of = |run: &Self, points: &dyn Fn(&(usize, usize)) -> usize| -> Vec<Vec<f64>> {
+            let per_point = run.displacements.first().map_or(0, |all| all.len() / run.points.len());
             let chosen = |all: &Vec<f64>| {
-                pairs.iter().flat_map(|pair| all[nodes(pair) * per_node..][..per_node].to_vec()).collect()
+                pairs.iter().flat_map(|pair| all[points(pair) * per_point..][..per_point].to_vec()).collect()
             };
             run.displacements.iter().map(chosen).collect()
         };
         let [own, next] = [of(self, &|pair| pair.0), of(next, &|pair| pair.1)];
         let length = own.first().map_or(0, Vec::len);
         Some(parts_apart(&own, &next, &[length]))
+    }
+
+    /// Points that both have. The same names are the same points, which another mesh has nearly where they were; else the place tells.
+    fn pairs(&self, next: &Self) -> Vec<(usize, usize)> {
+        if self.points.iter().map(|point| &point.name).eq(next.points.iter().map(|point| &point.name)) {
+            return (0..self.points.len()).map(|index| (index, index)).collect();
+        }
+        let coordinates = next.points.iter().flat_map(|point| point.position);
+        let size = coordinates.fold(0.0, |most: f64, value| most.max(value.abs()));
+        let same =
+            |a: &ContactNode, b: &ContactNode| zip(a.position, b.position).all(|(a, b)| (a - b).abs() <= 1e-9 * size);
+        let place = |point: &ContactNode| next.points.iter().position(|other| same(point, other));
+        self.points.iter().enumerate().filter_map(|(index, point)| Some((index, place(point)?))).collect()
+    }
+}
+
+/// What is compared of a run.
+pub(crate) enum Observed {
+    /// Watched points.
+    Watched,
+    /// Displacements of common patches from those of the ROM's own.
+    Patches(DMatrix<f64>),
+    /// All contact nodes.
+    Nodes,
+}
+
+impl Observed {
+    /// Of a ROM, and which points these are.
+    pub(crate) fn of(rom: &Rom) -> (Self, Vec<ContactNode>) {
+        if let Some(watched) = &rom.extras.watched {
+            return (Self::Watched, watched.points.clone());
+        }
+        match common(&rom.contact_nodes) {
+            Some(map) => {
+                let name = |number: usize| format!("patch_{number}_of_{COMMON}");
+                let points = (1..=COMMON).map(|number| ContactNode { name: name(number), ..ContactNode::default() });
+                (Self::Patches(map), points.collect())
+            }
+            None => (Self::Nodes, rom.contact_nodes.clone()),
+        }
+    }
+
+    /// Displacements now (m): point by point, axis by axis, sector by sector.
+    pub(crate) fn displacements(&self, run: &SceneRun) -> Vec<f64> {
+        match self {
+            Self::Watched => run.watched_displacements(),
+            Self::Nodes => run.displacements(),
+            Self::Patches(map) => {
+                let own = run.displacements();
+                let per_patch = own.len() / map.ncols();
+                let own = DMatrix::from_column_slice(per_patch, map.ncols(), &own);
+                (own * map.transpose()).as_slice().to_vec()
+            }
+        }
     }
 }
 
@@ -78,25 +138,13 @@ impl Marched {
 pub fn march(scene: &Scene, settings: &[(String, String)], division: u32, samples: usize) -> Result<Marched, String> {
     let interval = scene.settings.experiment.communication_step;
     let mut run = SceneRun::with_start_values(scene, interval, division, settings)?;
-    let rom = &scene.roms[crate::master(scene)];
-    // Patches of another number are elsewhere; what is watched stays.
-    let points = rom.extras.watched.as_ref().map_or(&rom.contact_nodes, |watched| &watched.points);
-    let mut found = Marched {
-        displacements: Vec::with_capacity(samples),
-        nodes: points.iter().map(|point| point.position).collect(),
-        impulse: 0.0,
-        friction_work: 0.0,
-        peak_force: 0.0,
-        strain_energy: 0.0,
-    };
+    let (observed, points) = Observed::of(&scene.roms[crate::master(scene)]);
+    let mut found = Marched::of_displacements(points, Vec::with_capacity(samples));
     let mut seen = Seen::nothing();
     for _ in 0..samples {
         seen.next();
         run.watch(&mut seen)?;
-        found.displacements.push(match rom.extras.watched {
-            Some(_) => run.watched_displacements(),
-            None => run.displacements(),
-        });
+        found.displacements.push(observed.displacements(&run));
         found.impulse += seen.impulse;
         found.peak_force = found.peak_force.max(seen.impulse / interval);
         found.strain_energy += run.strain_energy() / samples as f64;
@@ -112,7 +160,14 @@ mod tests {
     fn marched(nodes: &[f64], displacement: f64, impulse: f64) -> Marched {
         Marched {
             displacements: vec![nodes.iter().flat_map(|node| [displacement * node, 0.0, 0.0]).collect()],
-            nodes: nodes.iter().map(|node| [1.0, 0.0, *node]).collect(),
+            points: nodes
+                .iter()
+                .map(|node| ContactNode {
+                    name: format!("at_{node}"),
+                    position: [1.0, 0.0, *node],
+                    ..ContactNode::default()
+                })
+                .collect(),
             impulse,
             friction_work: 0.0,
             peak_force: 1.0,
@@ -127,5 +182,9 @@ mod tests {
         assert!((moved.unwrap() - 0.2).abs() < 1e-12, "{moved:?}");
         assert_eq!([impulse, friction, peak, strain], [Some(0.5), None, Some(0.0), Some(0.0)]);
         assert_eq!(few.changes(&marched(&[0.5], 1.0, 2.0))[0], None);
+        // Another mesh has its nodes nearly there.
+        let mut moved = marched(&[0.1, 0.3], 2.0, 2.0);
+        moved.points[1].position[2] += 1e-4;
+        assert_eq!(few.changes(&moved)[0], Some(0.5));
     }
 }

@@ -1,18 +1,25 @@
-//! What refining a scene changes: its internal step, the modes of its structures, the contact nodes of its blades, one at a time.
+//! What refining a scene changes: its internal step, the modes of its structures, the contact nodes and the mesh of its blades, one at a
+//! time; where each sequence goes, and with it the error of the scene as it stands.
 //!
-//! [`refine`] finds the directions and the scenes at every level, `nodes` which of a refined model's nodes touch, [`truncate`] takes modes away from any ROM, [`mod@march`] runs and
-//! compares, [`page`] draws and tells.
+//! [`refine`] finds the directions, `refiner` the scenes at every level, `nodes` which of a refined model's nodes touch, [`truncate`] takes modes
+//! away from any ROM, [`mod@march`] runs and compares, [`limit`] extrapolates, [`page`] draws and tells.
 
 pub mod coarsen;
+pub mod limit;
 pub mod march;
 mod nodes;
 pub mod page;
 pub mod refine;
+pub(crate) mod refiner;
 pub mod truncate;
 
+use std::time::Instant;
+
+use limit::Limit;
 use march::{Marched, march};
-use refine::{Direction, Level, Source};
-use tiprub_gallery::scene_source;
+use refine::{Again, Direction, Level, Source};
+use tiprub_core::{Rom, Scene, rom::RubErrors};
+use tiprub_gallery::{rom_cache::RomCache, scene_source};
 use tiprub_shell::{Failure, Result, console::Console, sweep};
 
 use super::Study;
@@ -22,7 +29,7 @@ use crate::{
         case::Case,
         own::{Own, refuse_compared},
     },
-    one_rotor,
+    master, one_rotor,
 };
 
 /// One direction with the runs of its levels.
@@ -47,35 +54,107 @@ pub struct Found {
     pub refined: Vec<Refined>,
 }
 
-/// The study of a scene; `source` is where the ROM of its master comes from, if that is a file and known.
+impl Found {
+    /// The ROM of the master with its errors on this scene.
+    pub fn with_errors(&self, scene: &Scene) -> Rom {
+        let index = master(scene);
+        let of = |name: &str| {
+            let refined = self.refined.iter().find(|refined| refined.direction.name == name)?;
+            refined.own_errors()?[0]
+        };
+        let mut rom = scene.roms[index].clone();
+        rom.checks.rub_errors = Some(RubErrors {
+            found_on: format!("{}, {:.2} ms", self.names[1], 1e3 * self.window.0),
+            modes: refine::modes_of(index).and_then(of),
+            patches: of(refine::NODES),
+            mesh: of(refine::MESH),
+        });
+        rom
+    }
+}
+
+/// The study of a scene, and the ROM of its master with what was found of it; `source` is where that comes from, if it is a file and known.
 ///
 /// # Errors
 /// The scene cannot be read or does not run, or a model cannot be reduced again.
-pub fn study(arguments: &ConvergenceArguments, source: Option<&dyn Source>, console: &Console) -> Result<Study> {
+pub fn study(arguments: &ConvergenceArguments, source: Option<&dyn Source>, console: &Console) -> Result<(Study, Rom)> {
     refuse_compared(&arguments.set)?;
-    let quick = arguments.common.quick;
-    let scene = scene_source::load(&arguments.scene, &arguments.common.cache.cache(), console)?;
+    let cache = arguments.common.cache.cache();
+    let scene = scene_source::load(&arguments.scene, &cache, console)?;
+    let asked = Asked {
+        cache,
+        mesh: 1.0,
+        settings: &arguments.set,
+        window: arguments.window,
+        quick: arguments.common.quick,
+        threads: arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get),
+        source,
+    };
+    let found = found(&arguments.scene, &scene, &asked, console)?;
+    Ok((page::study(&found)?, found.with_errors(&scene)))
+}
+
+/// What is asked of a scene.
+pub struct Asked<'a> {
+    /// Start values that replace its own (name, value as text).
+    pub settings: &'a [(String, String)],
+    /// Time that is compared (s); where none is given, that of a quick study or of a whole one.
+    pub window: Option<f64>,
+    /// Few and short runs.
+    pub quick: bool,
+    /// Runs at the same time.
+    pub threads: usize,
+    /// Where the ROM of the master comes from, if that is a file and known.
+    pub source: Option<&'a dyn Source>,
+    /// Where models that ship are kept.
+    pub cache: RomCache,
+    /// Mesh of the master where it ships: 1, or what its elements along the edges are multiplied with.
+    pub mesh: f64,
+}
+
+/// Everything about the scene called `name`.
+///
+/// # Errors
+/// The scene does not run, or a model cannot be reduced again.
+pub fn found(name: &str, scene: &Scene, asked: &Asked, console: &Console) -> Result<Found> {
     one_rotor(&scene.settings)?;
-    let case = Own::of(&arguments.scene, scene.clone(), &arguments.set, (arguments.window, quick), console)?;
+    let case = Own::of(name, scene.clone(), asked.settings, (asked.window, asked.quick), console)?;
     let interval = case.interval();
     let own = divisions(interval, scene.settings.time.step);
-    let directions = refine::directions(&scene, own, source, quick, console)?;
-    let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
-    let runner = Runner { settings: &arguments.set, samples: case.samples(), threads, console };
+    let mut runner =
+        Runner { settings: asked.settings, samples: case.samples(), threads: asked.threads, console, own: None };
+    let clock = Instant::now();
+    let standing = march(scene, asked.settings, own, case.samples())
+        .map_err(|why| Failure::new(name, format!("the scene as it stands does not run: {why}"), ""))?;
+    let seconds = clock.elapsed().as_secs_f64();
+    runner.own = Some(standing);
+    let directions = refine::directions(
+        scene,
+        own,
+        &Again { source: asked.source, cache: &asked.cache, mesh: asked.mesh, quick: asked.quick, console },
+    )?;
+    announce(&directions, scene, (own, seconds), &runner);
     let mut refined = Vec::new();
     for direction in directions {
         refined.push(runner.refined(direction)?);
     }
-    let method = crate::error_study::name((scene.settings.time.scheme, scene.settings.contacts[0].solver));
-    if let Some(why) = refined.iter().find_map(own_refused) {
-        return Err(Failure::new(&arguments.scene, format!("the scene as it stands does not run: {why}"), ""));
-    }
-    page::study(&Found {
-        names: [arguments.scene.clone(), scene.settings.name.clone()],
+    Ok(Found {
+        names: [name.to_owned(), scene.settings.name.clone()],
         window: (interval * case.samples() as f64, case.samples()),
-        method,
+        method: crate::error_study::name((scene.settings.time.scheme, scene.settings.contacts[0].solver)),
         refined,
     })
+}
+
+/// Say how long the runs will take, where that is long: as steps times sizes of the models, against the run of the scene as it stands.
+fn announce(directions: &[Direction], scene: &Scene, (own, seconds): (u32, f64), runner: &Runner) {
+    let size = |scene: &Scene| scene.roms.iter().map(|rom| rom.total_order() as f64).sum::<f64>();
+    let cost = |level: &Level| f64::from(level.division) / f64::from(own) * size(&level.scene) / size(scene);
+    let levels = directions.iter().flat_map(|direction| &direction.levels).filter(|level| !level.own);
+    let runs: Vec<f64> = levels.map(cost).collect();
+    let longest = runs.iter().fold(0.0, |most: f64, run| most.max(*run));
+    let expected = seconds * (runs.iter().sum::<f64>() / runner.threads as f64).max(longest);
+    crate::announce(runner.console, &format!("{} runs", runs.len()), expected);
 }
 
 /// Shares of the step at which a direction is run once more where one of its levels is refused.
@@ -87,11 +166,13 @@ pub(crate) struct Runner<'a> {
     samples: usize,
     threads: usize,
     console: &'a Console,
+    /// The scene as it stands, where it has been run.
+    own: Option<Marched>,
 }
 
 impl<'a> Runner<'a> {
     pub(crate) fn new(settings: &'a [(String, String)], samples: usize, console: &'a Console) -> Self {
-        Self { settings, samples, threads: sweep::processors(), console }
+        Self { settings, samples, threads: sweep::processors(), console, own: None }
     }
 
     /// Run a direction with the steps that it says.
@@ -108,7 +189,6 @@ impl<'a> Runner<'a> {
             let runs = self.runs(&finer)?;
             if runs.iter().all(std::result::Result::is_ok) {
                 direction = finer;
-                direction.shorter = Some(shorter);
                 return Ok(Refined { direction, runs });
             }
         }
@@ -118,7 +198,12 @@ impl<'a> Runner<'a> {
     fn runs(&self, direction: &Direction) -> Result<Vec<std::result::Result<Marched, String>>> {
         let count = direction.levels.len();
         let task = self.console.task(&format!("Refining {}", direction.title), Some(count as u64));
-        let run = |level: &Level| Ok(march(&level.scene, self.settings, level.division, self.samples));
+        let run = |level: &Level| {
+            Ok(match &self.own {
+                Some(own) if level.own && direction.shorter.is_none() => Ok(own.clone()),
+                _ => march(&level.scene, self.settings, level.division, self.samples),
+            })
+        };
         let progress = |done: usize| {
             task.at(done as u64);
             task.line(&format!("{done} of {count} runs"));
@@ -133,12 +218,6 @@ pub(crate) fn divisions(interval: f64, step: f64) -> u32 {
     (interval / step * (1.0 - 1e-9)).ceil().clamp(1.0, 1e8) as u32
 }
 
-fn own_refused(refined: &Refined) -> Option<String> {
-    let levels = refined.direction.levels.iter().zip(&refined.runs);
-    let own = levels.filter(|(level, _)| level.own);
-    own.filter_map(|(_, run)| run.as_ref().err().cloned()).next()
-}
-
 impl Refined {
     /// Levels that ran, with their runs.
     pub fn ran(&self) -> Vec<(&Level, &Marched)> {
@@ -149,6 +228,56 @@ impl Refined {
     /// Change from every level that ran to the next that did.
     pub fn changes(&self) -> Vec<[Option<f64>; 5]> {
         self.ran().windows(2).map(|pair| pair[0].1.changes(pair[1].1)).collect()
+    }
+
+    /// Levels that are read: the finest of those that ran, the last, and those before it that are far enough apart; sizes go with a power
+    /// of the error.
+    fn read(&self) -> Vec<(f64, &Marched)> {
+        let ran = self.ran();
+        let sizes: Vec<f64> = ran.iter().map(|(level, _)| self.direction.size(level.value)).collect();
+        limit::chosen(&sizes).into_iter().map(|index| (sizes[index], ran[index].1)).collect()
+    }
+
+    /// What further refinement would still do to the displacements of the finest level (relative L2). Of two meshes the order is assumed.
+    pub fn rest(&self) -> Option<Limit> {
+        match &self.read()[..] {
+            [a, b, c] => {
+                let changes = [a.1.displacement_change(b.1)?, b.1.displacement_change(c.1)?];
+                let least = if self.direction.name == refine::MESH { limit::LEAST_OF_MESHES } else { limit::LEAST };
+                limit::of_changes([a.0, b.0, c.0], changes, least)
+            }
+            [a, b] if self.direction.name == refine::MESH => {
+                Some(limit::of_two_meshes([a.0, b.0], a.1.displacement_change(b.1)?))
+            }
+            _ => None,
+        }
+    }
+
+    /// Where the quantities go, and what the finest level lacks of that; `None` of one that is not to be read.
+    pub fn limits(&self) -> [Option<Limit>; 4] {
+        let read = self.read();
+        let [a, b, c] = &read[..] else { return [None; 4] };
+        let [x, y, z] = [a.1, b.1, c.1].map(Marched::quantities);
+        std::array::from_fn(|index| limit::of_values([a.0, b.0, c.0], [x[index], y[index], z[index]]))
+    }
+
+    /// Error of a run of this direction: displacements (L2) and every quantity, relative to the limit; `None` where that is not to be
+    /// read. Displacements are as far from the limit as from the finest level, and what that one lacks.
+    pub fn errors(&self, run: &Marched) -> [Option<f64>; 5] {
+        let Some((_, finest)) = self.ran().last().copied() else { return [None; 5] };
+        let mut found = [None; 5];
+        found[0] = self.rest().and_then(|rest| Some(run.displacement_change(finest)? + rest.rest));
+        for (index, limit) in self.limits().into_iter().enumerate() {
+            let limit = limit.map(|limit| finest.quantities()[index] + limit.rest).filter(|limit| *limit != 0.0);
+            found[index + 1] = limit.map(|limit| (run.quantities()[index] / limit - 1.0).abs());
+        }
+        found
+    }
+
+    /// Error of the scene as it stands.
+    pub fn own_errors(&self) -> Option<[Option<f64>; 5]> {
+        let own = self.ran().into_iter().find(|(level, _)| level.own)?.1;
+        Some(self.errors(own))
     }
 
     /// What the next refinement changes of the scene as it stands, and whether that is the step from it; where it is the finest, the

@@ -53,7 +53,7 @@ pub(super) fn starting_with(start: &str, mut rom: Rom) -> Rom {
 
 #[cfg(test)]
 mod tests {
-    use tiprub_gallery::scene_source;
+    use tiprub_gallery::{rom_cache::RomCache, scene_source};
     use tiprub_model::{
         Rotor37Options, reduce_rotor37,
         rotor37::{MeshCounts, Tip},
@@ -61,30 +61,37 @@ mod tests {
     use tiprub_shell::{Result, console::Console};
 
     use super::*;
-    use crate::convergence::refine::{Direction, Source, directions};
+    use crate::convergence::refine::{Again, Direction, Meshed, Source, directions};
 
     /// A coarse blade, its nodes named as the reduction likes.
-    struct Again;
+    struct Blade;
 
-    impl Source for Again {
-        fn reduce(&self, modes: usize, tip: Tip, _: &Console) -> Result<Rom> {
-            let mesh = MeshCounts { chord: 4, thickness: 1, span: 4 };
+    impl Source for Blade {
+        fn reduce(&self, other: Option<usize>, modes: usize, tip: Tip, _: &Console) -> Result<Meshed> {
+            let mesh = MeshCounts { chord: 4, thickness: 1, span: if other.is_some() { 8 } else { 4 } };
             let options = Rotor37Options { mesh, tip, modes, ..Rotor37Options::paper() };
-            Ok(reduce_rotor37(&options, &|_| {}).unwrap().rom)
+            let found = reduce_rotor37(&options, &|_| {}).unwrap();
+            Ok(Meshed { rom: found.rom, nodes: found.nodes })
+        }
+
+        fn others(&self) -> usize {
+            1
         }
     }
 
     /// Modes and contact nodes of a blade with nodes of these names, and a pair for each beginning.
-    fn refined(names: [&str; 3], pairs: &[&str]) -> [Direction; 2] {
+    fn refined(names: [&str; 3], pairs: &[&str]) -> [Direction; 3] {
         let console = Console::new(true, false);
-        let mut rom = Again.reduce(4, Tip::Nodes(3), &console).unwrap();
+        let mut rom = Blade.reduce(None, 4, Tip::Nodes(3), &console).unwrap().rom;
         rom.contact_nodes.iter_mut().zip(names).for_each(|(node, name)| node.name = name.into());
         let mut scene = scene_source::rotor37_scene_with(rom).unwrap();
         let contact = scene.settings.contacts.remove(0);
         let of = |start: &&str| ContactSettings { nodes: Some((*start).into()), ..contact.clone() };
         scene.settings.contacts = pairs.iter().map(of).collect();
-        let [_, modes, nodes] = directions(&scene, 1, Some(&Again), true, &console).unwrap().try_into().unwrap();
-        [modes, nodes]
+        let (cache, source) = (RomCache::off(), Some(&Blade as &dyn Source));
+        let again = Again { source, cache: &cache, mesh: 1.0, quick: true, console: &console };
+        let [_, modes, nodes, mesh] = directions(&scene, 1, &again).unwrap().try_into().unwrap();
+        [modes, nodes, mesh]
     }
 
     fn names(direction: &Direction) -> Vec<Vec<String>> {
@@ -93,15 +100,18 @@ mod tests {
     }
 
     #[test]
-    fn the_nodes_that_touch_stay_those_of_the_scene_with_more_modes() {
+    fn the_nodes_that_touch_stay_those_of_the_scene_with_more_modes_and_on_another_mesh() {
         let own = ["tip_3", "seal", "tip_1"];
-        let [modes, _] = refined(own, &["tip", "seal"]);
+        let [modes, _, mesh] = refined(own, &["tip", "seal"]);
         assert_eq!(names(&modes), [own, own, own], "{:?}", modes.missing);
+        assert_eq!(names(&mesh), [own, own], "{:?}", mesh.missing);
+        assert!(mesh.levels[0].own && mesh.levels[0].value < mesh.levels[1].value && !mesh.levels[1].own);
+        assert!(mesh.size(mesh.levels[0].value) > mesh.size(mesh.levels[1].value));
     }
 
     #[test]
     fn new_nodes_between_those_of_one_pair_are_its_own() {
-        let [_, nodes] = refined(["tip_a", "tip_b", "tip_c"], &["tip_"]);
+        let [_, nodes, _] = refined(["tip_a", "tip_b", "tip_c"], &["tip_"]);
         let found = names(&nodes);
         assert_eq!(found.iter().map(Vec::len).collect::<Vec<_>>(), [2, 3, 5], "{}", nodes.missing);
         assert!(found.iter().flatten().all(|name| name.starts_with("tip_")), "{found:?}");
@@ -115,7 +125,7 @@ mod tests {
             (&["leading", "trailing"], "`leading` is of contact[1], `mid` touches nothing"),
             (&["trailing", "l", "m"], "`leading` is of contact[2], `mid` is of contact[3]"),
         ] {
-            let [_, nodes] = refined(own, pairs);
+            let [_, nodes, _] = refined(own, pairs);
             assert!(nodes.levels.is_empty() && nodes.missing.contains(told), "{pairs:?}: {}", nodes.missing);
         }
     }

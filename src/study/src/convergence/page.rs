@@ -8,7 +8,11 @@ use tiprub_figure::{
 };
 use tiprub_shell::Result;
 
-use super::{Found, Refined, march::QUANTITIES, refine::Direction};
+use super::{
+    Found, Refined,
+    march::{Marched, QUANTITIES},
+    refine::{Direction, SECONDS},
+};
 use crate::{Figure, Picture, Sheet, Statement, Study};
 
 /// Largest change by the next refinement that is called small.
@@ -17,8 +21,9 @@ const SMALL: f64 = 0.05;
 const HOW_TO_READ: &str = "One thing is refined at a time, all else is the scene's own. A change is how far a run is from the next finer one of \
     the same direction, relative to the larger of both: of the displacements of all contact nodes at all communication points (L2, without flight), the normal \
     impulse and the work of friction over the window, the largest normal force averaged over a communication step, and the mean strain energy. \
-    Where changes shrink from level to level the last one bounds roughly what is left; where they do not, the scene is not converged in that \
-    direction, or its contact is chaotic. The direction with the largest change at the scene's own setting is the one to refine first. Forces of \
+    Where changes shrink from level to level the three finest tell where the sequence goes (Richardson, with the order that they show, at most \
+    two), and with it the error of every level; where they do not, the scene is not converged in that \
+    direction, or its contact is chaotic, and no limit is read. The direction with the largest change at the scene's own setting is the one to refine first. Forces of \
     single internal steps are not compared: an impact of a node gives the larger a force the shorter the step.";
 
 /// The study from everything that was found.
@@ -41,27 +46,51 @@ pub fn study(found: &Found) -> Result<Study> {
         statements: statements(found),
         figures: figures.map(figure).collect::<Result<_>>()?,
         results: results(found),
-        files: vec![(
-            "levels.csv".into(),
-            "every level of every direction in one table".into(),
-            csv(found).into_bytes(),
-        )],
+        files: [
+            ("levels.csv", "every level of every direction in one table", csv(found)),
+            ("limits.csv", "where every direction goes, and the error of the scene", limits_csv(found)),
+        ]
+        .map(|(name, meaning, text)| (name.into(), meaning.into(), text.into_bytes()))
+        .into(),
     })
 }
 
 fn value(refined: &Refined, value: f64) -> String {
-    if refined.direction.unit == "s" { format!("{value:.4e} s") } else { format!("{value:.0}") }
+    if refined.direction.unit == SECONDS { format!("{value:.4e} s") } else { format!("{value:.0}") }
+}
+
+/// What is compared: displacements and the quantities.
+pub fn compared() -> impl Iterator<Item = &'static str> {
+    std::iter::once("displacements").chain(QUANTITIES.iter().map(|(name, _)| *name))
 }
 
 /// "displacements 1.2 %, impulse ...".
 fn told(changes: &[Option<f64>; 5]) -> String {
-    let names = std::iter::once("displacements").chain(QUANTITIES.iter().map(|(name, _)| *name));
-    let known = names.zip(changes).filter_map(|(name, change)| Some(format!("{name} {:.2} %", 100.0 * (*change)?)));
+    let known =
+        compared().zip(changes).filter_map(|(name, change)| Some(format!("{name} {:.2} %", 100.0 * (*change)?)));
     known.collect::<Vec<_>>().join(", ")
 }
 
-fn statements(found: &Found) -> Vec<Statement> {
-    let mut all: Vec<Statement> = found.refined.iter().filter_map(small).collect();
+/// The error of the scene in a direction, as far as the levels tell it.
+fn error(refined: &Refined) -> Option<Statement> {
+    if refined.direction.levels.len() < 2 {
+        return None;
+    }
+    let own = refined.ran().into_iter().find(|(level, _)| level.own)?.1;
+    let (errors, finest) = (refined.errors(own), refined.ran().last()?.1);
+    let to_finest = own.changes(finest);
+    let unread: [Option<f64>; 5] =
+        std::array::from_fn(|index| if errors[index].is_none() { to_finest[index] } else { None });
+    let parts = [("", told(&errors)), ("no limit is read, but to the finest level ", told(&unread))];
+    let found = parts.iter().filter(|(_, told)| !told.is_empty()).map(|(what, told)| format!("{what}{told}"));
+    let found = found.collect::<Vec<_>>().join("; ");
+    Some(Statement::remark(format!("Error of the scene by {}", title(refined)), found))
+}
+
+/// What was found, in words.
+pub fn statements(found: &Found) -> Vec<Statement> {
+    let mut all: Vec<Statement> = found.refined.iter().filter_map(error).collect();
+    all.extend(found.refined.iter().filter_map(small));
     all.extend(worst(found));
     for refined in found.refined.iter().filter(|refined| !refined.direction.missing.is_empty()) {
         let title = &refined.direction.title;
@@ -159,59 +188,111 @@ fn table(refined: &Refined) -> Table {
     Table { rows: rows(refined), ..Table::new(caption, HEADINGS) }
 }
 
+const LIMIT_HEADINGS: [&str; 6] =
+    ["direction", "quantity", "order (at most 2)", "limit", "of the scene", "error of the scene"];
+
+/// Where a direction goes: a row for displacements and for every quantity; cells are empty where nothing is to be read.
+pub fn limit_rows(refined: &Refined) -> Vec<Vec<String>> {
+    let ran = refined.ran();
+    let (Some((_, own)), Some((_, finest))) = (ran.iter().find(|(level, _)| level.own), ran.last()) else {
+        return Vec::new();
+    };
+    let (errors, quantities) = (refined.errors(own), own.quantities());
+    let title = &refined.direction.title;
+    let error = |index: usize| errors[index].map_or("not to be read".into(), |error| format!("{error:.3e}"));
+    let order = |limit: Option<super::limit::Limit>| limit.map_or(String::new(), |limit| format!("{:.2}", limit.order));
+    let first =
+        vec![title.clone(), "displacements".into(), order(refined.rest()), String::new(), String::new(), error(0)];
+    let limits = refined.limits().into_iter().enumerate().map(|(index, limit)| {
+        let to = limit.map_or(String::new(), |limit| format!("{:.6e}", finest.quantities()[index] + limit.rest));
+        let (name, unit) = QUANTITIES[index];
+        let name = format!("{name} ({unit})");
+        vec![title.clone(), name, order(limit), to, format!("{:.6e}", quantities[index]), error(index + 1)]
+    });
+    std::iter::once(first).chain(limits).collect()
+}
+
+fn limit_table(refined: &Refined) -> Table {
+    let caption = format!("{}: where the three finest levels go", title(refined));
+    Table { rows: limit_rows(refined), ..Table::new(caption, LIMIT_HEADINGS) }
+}
+
+fn limits_csv(found: &Found) -> String {
+    let head = LIMIT_HEADINGS.join(",") + "\n";
+    let lines = found.refined.iter().flat_map(limit_rows).map(|cells| cells.join(",") + "\n");
+    [head].into_iter().chain(lines).collect()
+}
+
 fn csv(found: &Found) -> String {
     let head = HEADINGS.join(",") + "\n";
     let lines = found.refined.iter().flat_map(rows).map(|cells| cells.join(",") + "\n");
     [head].into_iter().chain(lines).collect()
 }
 
-fn figure(refined: &Refined) -> Result<Figure> {
-    let (ran, changes) = (refined.ran(), refined.changes());
-    let direction = &refined.direction;
-    let names = std::iter::once("displacements (L2)").chain(QUANTITIES.iter().map(|(name, _)| *name));
-    let curve = |quantity: usize| {
-        let points = ran.iter().zip(&changes);
-        let mut points: Vec<(f64, f64)> =
-            points.filter_map(|((level, _), changes)| Some((level.value, changes[quantity]?))).collect();
+/// Errors of a run for a picture: where no limit is read, how far it is from the finest level.
+pub fn drawn(refined: &Refined, run: &Marched) -> [Option<f64>; 5] {
+    let finest = refined.ran().last().map(|(_, finest)| run.changes(finest)).unwrap_or([None; 5]);
+    let errors = refined.errors(run);
+    std::array::from_fn(|index| errors[index].or(finest[index]))
+}
+
+/// Errors of all levels, both axes logarithmic.
+///
+/// # Errors
+/// The plot cannot be drawn.
+pub fn picture(refined: &Refined) -> Result<Picture> {
+    let (direction, ran) = (&refined.direction, refined.ran());
+    let read = refined.own_errors().unwrap_or([None; 5]);
+    let curve = |(index, name): (usize, &str)| {
+        let points = ran.iter().filter_map(|(level, run)| Some((level.value, drawn(refined, run)[index]?)));
+        let mut points: Vec<(f64, f64)> = points.collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        points
+        let how = if read[index].is_some() { "" } else { ", to the finest" };
+        Series::line(format!("{name}{how}"), points)
     };
-    let series = names.enumerate().map(|(quantity, name)| Series::line(name, curve(quantity))).collect();
-    let x_label = format!("{} ({})", direction.title, if direction.unit == "s" { "s" } else { "-" });
-    let plot = Plot {
+    let x_label = match direction.unit {
+        SECONDS => format!("{} (s)", direction.title),
+        unit if direction.title.starts_with(unit) => format!("{} (-)", direction.title),
+        unit => format!("{unit}: {} (-)", direction.title),
+    };
+    let series = compared().enumerate().map(curve).collect();
+    Picture::plot(&Plot {
         height: 300,
         logarithmic: true,
         logarithmic_x: true,
         marked: true,
-        ..Plot::new(x_label, "relative change to the next finer", series)
-    };
-    let picture = Picture::plot(&plot)?;
-    let html = format!("{}{}", picture.html, table(refined).to_html(false));
-    let mut sheet = Sheet::new([
-        "value",
-        "scene's own (1 yes)",
-        "impulse (N·s)",
-        "friction work (J)",
-        "peak force (N)",
-        "strain energy (J)",
-        "change of displacements (L2)",
-        "change of impulse",
-        "change of friction work",
-        "change of peak force",
-        "change of strain energy",
-    ]);
+        ..Plot::new(x_label, "relative error", series)
+    })
+}
+
+fn figure(refined: &Refined) -> Result<Figure> {
+    let (ran, changes, direction) = (refined.ran(), refined.changes(), &refined.direction);
+    let picture = picture(refined)?;
+    let tables = format!("{}{}", limit_table(refined).to_html(false), table(refined).to_html(false));
+    let mut sheet = Sheet { columns: vec!["value".into(), "scene's own (1 yes)".into()], rows: Vec::new() };
+    sheet.columns.extend(QUANTITIES.map(|(name, unit)| format!("{name} ({unit})")));
+    for what in ["change of", "error of"] {
+        sheet.columns.extend(compared().map(|name| format!("{what} {name}")));
+    }
     for (index, (level, run)) in ran.iter().enumerate() {
-        let changes = changes.get(index).copied().unwrap_or([None; 5]).map(|change| change.unwrap_or(f64::NAN));
+        let known = |values: [Option<f64>; 5]| values.map(|value| value.unwrap_or(f64::NAN));
+        let changes = known(changes.get(index).copied().unwrap_or([None; 5]));
         let own = f64::from(u8::from(level.own));
-        sheet.rows.push([level.value, own].into_iter().chain(run.quantities()).chain(changes).collect());
+        let start = [level.value, own].into_iter().chain(run.quantities());
+        sheet.rows.push(start.chain(changes).chain(known(refined.errors(run))).collect());
     }
     let own =
         direction.levels.iter().find(|level| level.own).map_or(String::new(), |level| value(refined, level.value));
-    let caption = format!("{}: change of a run to the next finer one; the scene has {own}.", title(refined));
+    let caption = format!(
+        "{}: error of a run against the limit of the sequence, or how far it is from the finest where none is read; the scene has {own}.",
+        title(refined)
+    );
+    let html = format!("{}{tables}", picture.html);
     Ok(Figure { name: direction.name, caption, picture: Picture { html, ..picture }, sheet })
 }
 
-fn results(found: &Found) -> Value {
+/// For programs.
+pub fn results(found: &Found) -> Value {
     let level = |refined: &Refined| {
         let mut changes = refined.changes().into_iter();
         let levels = refined.direction.levels.iter().zip(&refined.runs);
@@ -230,7 +311,10 @@ fn results(found: &Found) -> Value {
     };
     let direction = |refined: &Refined| {
         json!({
-            "direction": refined.direction.title, "step_divided_by": refined.direction.shorter.unwrap_or(1), "unit": refined.direction.unit, "levels": level(refined),
+            "direction": refined.direction.title, "name": refined.direction.name, "step_divided_by": refined.direction.shorter.unwrap_or(1), "unit": refined.direction.unit, "levels": level(refined),
+            "error": refined.own_errors().map(|errors| json!({
+                "displacements": errors[0], "impulse": errors[1], "friction_work": errors[2], "peak_force": errors[3], "strain_energy": errors[4],
+            })),
             "not_refined": (!refined.direction.missing.is_empty()).then_some(&refined.direction.missing),
         })
     };

@@ -1,42 +1,38 @@
-//! In which directions a scene can be refined, and the scenes at every level of each.
+//! In which directions a scene can be refined; `refiner` makes the scenes at every level of each.
 
-use tiprub_core::{Rom, Scene, dynamics::modal::ModalModel, rom::Frame};
-use tiprub_format::builtin_model;
-use tiprub_gallery::{builtin, scene_source::BUILTIN};
+use tiprub_core::{Rom, Scene};
+use tiprub_gallery::rom_cache::RomCache;
 use tiprub_model::rotor37::Tip;
-use tiprub_shell::{Failure, Result, console::Console};
+use tiprub_shell::{Result, console::Console};
 
-use super::{
-    nodes::{common_start, named_as, starting_with},
-    truncate::{Form, truncated},
-};
-use crate::{master, stability::asked::divided};
+use super::refiner::Refiner;
 
-/// Internal steps, times the scene's own, the coarsest first.
-const STEPS: [f64; 5] = [4.0, 2.0, 1.0, 0.5, 0.25];
-const QUICK_STEPS: [f64; 3] = [2.0, 1.0, 0.5];
-/// Shares of the ROM's own modes.
-const FEWER: [f64; 3] = [0.25, 0.5, 0.75];
-const QUICK_FEWER: [f64; 1] = [0.5];
-/// More of them, where the model can be reduced again.
-const MORE: [f64; 2] = [1.5, 2.0];
-const QUICK_MORE: [f64; 1] = [1.5];
-/// Two models are one where their frequencies and contact nodes agree to this (relative).
-const SAME: f64 = 1e-6;
+/// A ROM and what it was reduced from.
+#[derive(Debug, Clone)]
+pub struct Meshed {
+    /// The ROM.
+    pub rom: Rom,
+    /// Nodes of the finite-element model.
+    pub nodes: usize,
+}
 
 /// Where the ROM of the master comes from, if it can be reduced again.
 pub trait Source {
-    /// The ROM with `modes` modes beside the responses to contact and this tip, reduced again.
+    /// The ROM with `modes` modes beside the responses to contact and this tip, reduced again: from its own mesh, or from one of
+    /// the [others](Self::others).
     ///
     /// # Errors
     /// Whatever the reduction refuses.
-    fn reduce(&self, modes: usize, tip: Tip, console: &Console) -> Result<Rom>;
+    fn reduce(&self, other: Option<usize>, modes: usize, tip: Tip, console: &Console) -> Result<Meshed>;
+
+    /// How many other meshes of the same structure there are.
+    fn others(&self) -> usize;
 }
 
 /// One setting of a direction.
 #[derive(Debug, Clone)]
 pub struct Level {
-    /// Internal step (s), number of modes or of contact nodes.
+    /// Internal step (s), number of modes, of contact nodes or of nodes of the mesh.
     pub value: f64,
     /// Whether the scene is as it stands.
     pub own: bool,
@@ -64,8 +60,23 @@ pub struct Direction {
 }
 
 impl Direction {
+    pub(super) fn new(name: &'static str, title: String, unit: &'static str) -> Self {
+        Self { name, title, unit, levels: Vec::new(), missing: String::new(), shorter: None }
+    }
+
+    /// What the error of a level goes with a power of: the step, one over the number of modes, the length of a patch, the edge of an
+    /// element.
+    pub fn size(&self, value: f64) -> f64 {
+        match self.unit {
+            SECONDS => value,
+            MESH_NODES => value.powf(-0.5),
+            MODES_KEPT => 1.0 / value,
+            _ => 1.0 / (value - 1.0).max(0.5),
+        }
+    }
+
     /// Say what cannot be refined, once.
-    fn misses(&mut self, why: String) {
+    pub(super) fn misses(&mut self, why: String) {
         if !self.missing.contains(&why) {
             let between = if self.missing.is_empty() { "" } else { "; " };
             self.missing = format!("{}{between}{why}", self.missing);
@@ -74,7 +85,7 @@ impl Direction {
 
     /// The same with shorter steps.
     pub fn stepped(&self, shorter: u32) -> Self {
-        let mut finer = self.clone();
+        let mut finer = Self { shorter: Some(shorter), ..self.clone() };
         for level in &mut finer.levels {
             level.division = level.division.saturating_mul(shorter);
             level.scene.settings.time.step /= f64::from(shorter);
@@ -85,25 +96,43 @@ impl Direction {
 
 /// Name of the direction of steps.
 pub const STEP: &str = "step";
+/// Name of the direction of contact nodes or patches.
+pub const NODES: &str = "nodes";
+/// Name of the direction of meshes.
+pub const MESH: &str = "mesh";
+/// Units of values.
+pub const SECONDS: &str = "s";
+pub(super) const MODES_KEPT: &str = "modes";
+pub(super) const MESH_NODES: &str = "mesh nodes";
 
 /// Names of the directions of structures, for files.
 const MODES: [&str; 8] = ["modes", "modes-2", "modes-3", "modes-4", "modes-5", "modes-6", "modes-7", "modes-8"];
 
-/// All directions of a scene whose master comes from `source`; steps are in multiples of `own` per communication step.
+/// Name of the direction of the modes of a structure.
+pub fn modes_of(structure: usize) -> Option<&'static str> {
+    MODES.get(structure).copied()
+}
+
+/// How models are reduced again.
+pub struct Again<'a> {
+    /// Where the ROM of the master comes from, if that is a file and known.
+    pub source: Option<&'a dyn Source>,
+    /// Where models that ship are kept.
+    pub cache: &'a RomCache,
+    /// Mesh of the scene's model where it ships: 1, or what its elements along the edges are multiplied with.
+    pub mesh: f64,
+    /// Few levels.
+    pub quick: bool,
+    /// For progress.
+    pub console: &'a Console,
+}
+
+/// All directions of a scene; steps are in multiples of `own` per communication step.
 ///
 /// # Errors
 /// A source that does not give the ROM of the scene, and what its reduction refuses.
-pub fn directions(
-    scene: &Scene,
-    own: u32,
-    source: Option<&dyn Source>,
-    quick: bool,
-    console: &Console,
-) -> Result<Vec<Direction>> {
-    let refiner = Refiner { scene, own, source, quick, console };
-    if let Some(source) = source {
-        refiner.check(source)?;
-    }
+pub fn directions(scene: &Scene, own: u32, again: &Again) -> Result<Vec<Direction>> {
+    let refiner = Refiner::checked(scene, own, again)?;
     let mut all = vec![refiner.steps()];
     for (index, name) in (0..scene.roms.len()).zip(MODES) {
         all.push(refiner.modes(index, name)?);
@@ -111,257 +140,10 @@ pub fn directions(
     all.push(refiner.nodes()?);
     if let Some(structure) = scene.settings.structures.get(MODES.len()) {
         all.push(Direction {
-            name: "modes-more",
-            title: format!("modes of {} and those after it", structure.name),
-            unit: "modes",
-            levels: Vec::new(),
             missing: format!("the study refines {} structures", MODES.len()),
-            shorter: None,
+            ..Direction::new("modes-more", format!("modes of {} and those after it", structure.name), MODES_KEPT)
         });
     }
+    all.push(refiner.meshes()?);
     Ok(all)
-}
-
-struct Refiner<'a> {
-    scene: &'a Scene,
-    own: u32,
-    source: Option<&'a dyn Source>,
-    quick: bool,
-    console: &'a Console,
-}
-
-impl Refiner<'_> {
-    fn level(&self, value: f64, own: bool, scene: Scene) -> Level {
-        Level { value, own, scene, division: self.own }
-    }
-
-    fn with_rom(&self, index: usize, rom: Rom) -> Scene {
-        let mut scene = self.scene.clone();
-        scene.roms[index] = rom;
-        scene
-    }
-
-    /// Fixed-interface modes and contact nodes of the master.
-    fn own_counts(&self) -> (usize, usize) {
-        let rom = &self.scene.roms[master(self.scene)];
-        (rom.order().saturating_sub(rom.contact_map.nrows()), rom.contact_nodes.len())
-    }
-
-    /// So many nodes, or patches where the master has such.
-    fn tip(&self, count: usize) -> Tip {
-        let nodes = &self.scene.roms[master(self.scene)].contact_nodes;
-        if nodes.iter().all(|node| node.area > 0.0) { Tip::Patches(count) } else { Tip::Nodes(count) }
-    }
-
-    /// From the source, with the damping of the scene's ROM: a command line may propose another.
-    fn reduced(&self, source: &dyn Source, modes: usize, nodes: usize) -> Result<Rom> {
-        let rom = source.reduce(modes, self.tip(nodes), self.console)?;
-        Ok(Rom { damping_ratio: self.scene.roms[master(self.scene)].damping_ratio, ..rom })
-    }
-
-    /// The source must give what the scene has; anything else would be a study of another model.
-    fn check(&self, source: &dyn Source) -> Result<()> {
-        let rom = &self.scene.roms[master(self.scene)];
-        let (modes, nodes) = self.own_counts();
-        let again = self.reduced(source, modes, nodes)?;
-        let differs = |problem: String| {
-            let remedy = "Give the mesh and the options that the ROM was reduced with (its sets, material, units, axis, sectors)";
-            Err(Failure::new(
-                "--mesh",
-                format!("it does not give the ROM `{}` of the scene: {problem}", rom.name),
-                remedy,
-            ))
-        };
-        if (again.sectors, again.contact_nodes.len()) != (rom.sectors, rom.contact_nodes.len()) {
-            let of = |rom: &Rom| format!("{} contact nodes and {} sectors", rom.contact_nodes.len(), rom.sectors);
-            return differs(format!("{} instead of {}", of(&again), of(rom)));
-        }
-        let size =
-            rom.contact_nodes.iter().flat_map(|node| node.position).fold(0.0, |most: f64, value| most.max(value.abs()));
-        for (own, other) in rom.contact_nodes.iter().zip(&again.contact_nodes) {
-            if own.position.iter().zip(other.position).any(|(a, b)| (a - b).abs() > SAME * size) {
-                return differs(format!("contact node `{}` is elsewhere", own.name));
-            }
-        }
-        let frequencies = |rom: &Rom| ModalModel::from_rom(rom, 0.0).map(|model| model.frequencies).unwrap_or_default();
-        let (own, other) = (frequencies(rom), frequencies(&again));
-        let first = |all: &[f64]| all.first().copied().unwrap_or(f64::NAN) / std::f64::consts::TAU;
-        let close = own.iter().zip(&other).all(|(a, b)| (a - b).abs() <= SAME * a.abs().max(b.abs()));
-        if own.len() == other.len() && close {
-            Ok(())
-        } else {
-            differs(format!(
-                "first frequency {:.3} Hz instead of {:.3} Hz, {} coordinates instead of {}",
-                first(&other),
-                first(&own),
-                other.len(),
-                own.len()
-            ))
-        }
-    }
-
-    fn steps(&self) -> Direction {
-        let shares = if self.quick { &QUICK_STEPS[..] } else { &STEPS[..] };
-        let interval = self.scene.settings.experiment.communication_step;
-        let step = divided(interval, self.scene.settings.time.step);
-        let mut divisions: Vec<u32> = shares.iter().map(|share| count(f64::from(self.own) / share)).collect();
-        divisions.dedup();
-        let level = |division: u32| {
-            let mut scene = self.scene.clone();
-            // As it stands, to the last bit.
-            if division != self.own {
-                scene.settings.time.step = interval / f64::from(division);
-            }
-            let value = step * f64::from(self.own) / f64::from(division);
-            Level { value, own: division == self.own, scene, division }
-        };
-        let levels = divisions.into_iter().map(level).collect();
-        Direction {
-            name: STEP,
-            title: "internal step".into(),
-            unit: "s",
-            levels,
-            missing: String::new(),
-            shorter: None,
-        }
-    }
-
-    /// Modes of one structure: fewer of the ROM's own, more where it can be reduced again.
-    fn modes(&self, index: usize, name: &'static str) -> Result<Direction> {
-        let (rom, structure) = (&self.scene.roms[index], &self.scene.settings.structures[index]);
-        let form = Form::of(rom);
-        let own = form.modes(rom);
-        let mut direction = Direction {
-            name,
-            title: format!("modes of {}", structure.name),
-            unit: "modes",
-            levels: Vec::new(),
-            missing: String::new(),
-            shorter: None,
-        };
-        let fewer = if self.quick { &QUICK_FEWER[..] } else { &FEWER[..] };
-        let mut counts: Vec<usize> = fewer.iter().map(|share| count(share * own as f64) as usize).collect();
-        counts.retain(|count| *count < own);
-        counts.dedup();
-        for modes in counts {
-            match truncated(rom, modes) {
-                Ok(rom) => direction.levels.push(self.level(modes as f64, false, self.with_rom(index, rom))),
-                Err(why) => direction.misses(format!("{modes} modes: {why}")),
-            }
-        }
-        direction.levels.push(self.level(own as f64, true, self.scene.clone()));
-        let more = if self.quick { &QUICK_MORE[..] } else { &MORE[..] };
-        for factor in more {
-            match self.more_modes(index, own, *factor) {
-                Some(rom) => {
-                    let rom = rom?;
-                    let modes = Form::of(&rom).modes(&rom);
-                    if modes > own {
-                        direction.levels.push(self.level(modes as f64, false, self.with_rom(index, rom)));
-                    }
-                }
-                None => direction.misses(no_more(&structure.rom, rom, index == master(self.scene))),
-            }
-        }
-        Ok(direction)
-    }
-
-    fn more_modes(&self, index: usize, own: usize, factor: f64) -> Option<Result<Rom>> {
-        let (nodes, master) = (self.scene.roms[index].contact_nodes.len(), index == master(self.scene));
-        let again = match self.source.filter(|_| master) {
-            Some(source) => self.reduced(source, count(factor * own as f64) as usize, nodes),
-            None => {
-                let name = builtin_model(&self.scene.settings, &self.scene.settings.structures[index])?;
-                builtin::refined(&name, factor, self.tip(nodes), self.console)?
-            }
-        };
-        Some(again.map(|again| named_as(&self.scene.roms[index], again)))
-    }
-
-    /// Contact nodes of the master along its chord, each number with the ends of the others.
-    fn nodes(&self) -> Result<Direction> {
-        let index = master(self.scene);
-        let structure = &self.scene.settings.structures[index];
-        let title = format!("contact nodes of {}", structure.name);
-        let mut direction = Direction {
-            name: "nodes",
-            title,
-            unit: "nodes",
-            levels: Vec::new(),
-            missing: String::new(),
-            shorter: None,
-        };
-        let builtin = builtin_model(&self.scene.settings, structure).filter(|name| builtin::has_chord(name));
-        if self.source.is_none() && builtin.is_none() {
-            direction.missing =
-                if self.scene.roms[index].frame == Frame::Cartesian || structure.rom.starts_with(BUILTIN) {
-                    "contact nodes are chosen anew of blades only".into()
-                } else {
-                    no_source("contact nodes", &self.scene.roms[index])
-                };
-            return Ok(direction);
-        }
-        let start = match common_start(self.scene, index) {
-            Ok(start) => start,
-            Err(why) => {
-                direction.missing = why;
-                return Ok(direction);
-            }
-        };
-        let (modes, own) = self.own_counts();
-        let patches = matches!(self.tip(own), Tip::Patches(_));
-        if patches {
-            (direction.title, direction.unit) = (format!("contact patches of {}", structure.name), "patches");
-        }
-        let fewer = if patches { own.div_ceil(2) } else { 2 };
-        let mut counts = vec![fewer, own, 2 * own - 1];
-        if !self.quick {
-            counts.push(4 * own - 3);
-        }
-        counts.sort_unstable();
-        counts.dedup();
-        for nodes in counts {
-            let rom = match (self.source, &builtin) {
-                _ if nodes == own => Ok(self.scene.roms[index].clone()),
-                (Some(source), _) => self.reduced(source, modes, nodes),
-                (None, name) => builtin::refined(&name.clone().unwrap_or_default(), 1.0, self.tip(nodes), self.console)
-                    .unwrap_or_else(|| Err(Failure::new(&structure.rom, "no such model", ""))),
-            };
-            match rom {
-                Ok(rom) if nodes == own => {
-                    direction.levels.push(self.level(nodes as f64, true, self.with_rom(index, rom)))
-                }
-                Ok(rom) => {
-                    let scene = self.with_rom(index, starting_with(&start, rom));
-                    direction.levels.push(self.level(nodes as f64, false, scene));
-                }
-                // A mesh has no more nodes than it has.
-                Err(failure) => direction.misses(format!("{nodes} nodes: {failure}")),
-            }
-        }
-        Ok(direction)
-    }
-}
-
-/// Why a ROM from a file stays as it is; coupled sectors are chosen in whole families, which a ROM does not tell.
-fn no_source(what: &str, rom: &Rom) -> String {
-    if rom.is_cyclic() {
-        return format!(
-            "{what} are fixed in the ROM file; of coupled sectors only the disk that ships is reduced again"
-        );
-    }
-    format!("{what} are fixed in the ROM file: give the mesh it was reduced from with --mesh FILE and its options")
-}
-
-fn no_more(name: &str, rom: &Rom, master: bool) -> String {
-    match (name.starts_with(BUILTIN), master) {
-        (true, _) => "it has all of its modes".into(),
-        (false, true) => no_source("more modes than the ROM has", rom),
-        (false, false) => "more modes than the ROM has: only the master can be reduced again, from --mesh FILE".into(),
-    }
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-fn count(value: f64) -> u32 {
-    value.round().clamp(1.0, 1e8) as u32
 }

@@ -36,8 +36,8 @@ pub struct Chart {
     pub all: Vec<Points>,
     /// Join the points of a competitor by lines.
     pub joined: bool,
-    /// Below this error the references do not tell any more.
-    pub readable: Option<f64>,
+    /// Below this error the references do not tell any more, and what it is.
+    pub readable: Option<(f64, String)>,
 }
 
 /// The points that no other point beats in time and error, by time.
@@ -127,13 +127,14 @@ impl Chart {
             BOTTOM + 40.0,
             escape(&self.error_label)
         );
-        if let Some(readable) = self.readable.filter(|error| error.log10() > frame.error[0]) {
-            let y = frame.y(readable);
+        if let Some((readable, meaning)) = self.readable.as_ref().filter(|(error, _)| error.log10() > frame.error[0]) {
+            let y = frame.y(*readable);
             let _ = write!(
                 svg,
-                r##"<path d="M{LEFT} {y}L{RIGHT} {y}" stroke="#343a42" stroke-dasharray="6 5" fill="none"/><text x="{}" y="{}" text-anchor="end" font-size="12">distance of the two references</text>"##,
+                r##"<path d="M{LEFT} {y}L{RIGHT} {y}" stroke="#343a42" stroke-dasharray="6 5" fill="none"/><text x="{}" y="{}" text-anchor="end" font-size="12">{}</text>"##,
                 RIGHT - 4.0,
-                y - 5.0
+                y - 5.0,
+                escape(meaning)
             );
         }
     }
@@ -226,12 +227,18 @@ mod tests {
             .into_iter()
             .map(|competitor| Points { competitor, points: vec![(1e-3, 1e-2), (1e-1, 1e-4)] })
             .collect();
-        let svg = Chart { error_label: "error".into(), all, joined: true, readable: Some(1e-3) }.to_svg();
+        let svg = Chart {
+            error_label: "error".into(),
+            all,
+            joined: true,
+            readable: Some((1e-3, "distance of the two".into())),
+        }
+        .to_svg();
         for competitor in Competitor::all() {
             assert!(svg.contains(&escape(&competitor.name())), "{}", competitor.name());
         }
         // Two points and the legend, for each of the three schemes with lcp and for the bi-potential on the full model.
         assert_eq!(svg.matches("<circle").count(), 12);
-        assert!(svg.contains("1e-4") && svg.contains("distance of the two references") && !svg.contains("NaN"));
+        assert!(svg.contains("1e-4") && svg.contains("distance of the two") && !svg.contains("NaN"));
     }
 }

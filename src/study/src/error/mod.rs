@@ -14,6 +14,8 @@ pub mod ranking;
 pub mod run;
 pub mod scene;
 pub mod sheets;
+pub mod total;
+mod total_page;
 pub mod window;
 
 use std::iter::zip;
@@ -29,22 +31,50 @@ use tiprub_figure::table::Table;
 use tiprub_shell::{Result, console::Console};
 
 use super::{Figure, Picture, Statement, Study};
-use crate::arguments::ErrorArguments;
+use crate::{
+    arguments::ErrorArguments,
+    convergence::refine::{Again, Source},
+};
 
 /// How far apart the two references of a scene may be.
 const MEET: f64 = 2e-3;
 
-/// The study of a scene of one's own.
+/// The study of a scene of one's own; `source` is where the ROM of its master comes from, if that is a file and known.
 ///
 /// # Errors
-/// The scene cannot be read or stepped, or a reference fails.
-pub fn study(arguments: &ErrorArguments, console: &Console) -> Result<Study> {
+/// The scene cannot be read or stepped, a reference fails, or the source does not give the ROM of the scene.
+pub fn study(arguments: &ErrorArguments, source: Option<&dyn Source>, console: &Console) -> Result<Study> {
     let case = own::Own::new(arguments, console)?;
+    let (quick, cache) = (arguments.common.quick, arguments.common.cache.cache());
+    let (title, all) = (case.title().to_owned(), measure::count(&case));
+    case.announce(if quick { 1 } else { run::REPETITIONS }, console);
+    // First: what cannot be reduced again is told before the long work.
+    let total = total::measure(&case, &Again { source, cache: &cache, mesh: 1.0, quick, console })?;
     let summary = format!(
-        "Every time scheme and contact solver on {}, at steps on both sides of the one it asks for.",
+        "Every time scheme and contact solver on {}, at steps on both sides of the one it asks for ({all} runs); and other numbers of contact \
+         points and modes, against one truth with more of both.",
         arguments.scene
     );
-    of_cases(vec![Box::new(case)], &[], (arguments.common.quick, summary), console)
+    let mut study = of_cases(vec![Box::new(case)], &[], (quick, summary), console)?;
+    match total {
+        Err(why) => study.statements.push(Statement::remark(format!("{title}: total errors are not told"), why)),
+        Ok(total) => {
+            let mut statements = total.statements(&title);
+            statements.append(&mut study.statements);
+            study.statements = statements;
+            study.figures.push(total.figure(&title));
+            study.results["total"] = total.to_json();
+            let of_steps = study.results["scenes"][0]["cheapest"].as_array().cloned().unwrap_or_default();
+            let cheapest = total_page::cheapest_csv(&of_steps, &total);
+            for (name, meaning, text) in [
+                ("total.csv", "every setting with its total error", total.csv()),
+                ("cheapest.csv", "the cheapest setting for errors of the steps and in total", cheapest),
+            ] {
+                study.files.push((name.into(), meaning.into(), text.into_bytes()));
+            }
+        }
+    }
+    Ok(study)
 }
 
 /// The study of several cases; `smooth` are further ones, of which only orders are told.
@@ -102,7 +132,7 @@ fn guide_page(facts: &[(String, String)]) -> String {
 /// A scene's part of it.
 fn section(case: &dyn Case, tables: &[Table]) -> String {
     let title = case.title();
-    let pictures = case.figures().map(|figure| format!("![{title}]({figure}.svg)\n\n")).concat();
+    let pictures: String = case.figures().iter().map(|figure| format!("![{title}]({figure}.svg)\n\n")).collect();
     // Captions on the page of all scenes begin with the scene.
     let own = |table: &Table| {
         let caption =
@@ -125,13 +155,16 @@ fn orders(smooth: &[&dyn Case], measured: &[(Box<dyn Case>, Measured)], console:
 fn add(study: &mut Study, case: &dyn Case, found: &Measured) -> Vec<Table> {
     let about = sheets::references(case, found);
     let mut all = vec![about.clone()];
-    for (kind, name) in zip([Kind::OfTime, Kind::Total], case.figures()) {
+    // With one size and no exact solution both are one.
+    let kinds: &[Kind] =
+        if case.sizes().len() > 1 || case.exact().is_some() { &[Kind::OfTime, Kind::Total] } else { &[Kind::OfTime] };
+    for (&kind, name) in zip(kinds, case.figures()) {
         let (chart, sheet) = sheets::chart(case, found, kind);
         let (winners, costs) = (ranking::winners(case, found, kind), ranking::costs(case, found, kind));
         let mut html = chart.to_svg();
         html.push_str(&winners.to_html(false));
         html.push_str(&costs.to_html(false));
-        if kind == Kind::Total {
+        if Some(&kind) == kinds.last() {
             html.push_str(&about.to_html(false));
             if let Some(statistics) = window::statistics(case) {
                 html.push_str(&statistics.to_html(false));

@@ -15,7 +15,7 @@ use super::{
     scene::SceneRun,
     window,
 };
-use crate::arguments::ErrorArguments;
+use crate::{arguments::ErrorArguments, convergence::divisions};
 
 /// Internal steps tried, as multiples of the number that the scene asks for.
 const SHARES: [f64; 7] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
@@ -112,6 +112,41 @@ impl Own {
 }
 
 impl Own {
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Start values that replace its own.
+    pub fn settings(&self) -> &[(String, String)] {
+        &self.settings
+    }
+
+    /// Internal steps per communication step that the scene asks for.
+    pub fn own_division(&self) -> u32 {
+        divisions(self.interval, self.scene.settings.time.step)
+    }
+
+    /// Its scheme and solver.
+    pub fn method(&self) -> Competitor {
+        Competitor::Core(self.scene.settings.time.scheme, self.scene.settings.contacts[0].solver)
+    }
+
+    /// Say how long the study will take, where that is long: by a run of the scene as it stands, in internal steps.
+    pub fn announce(&self, repetitions: usize, console: &Console) {
+        let clock = std::time::Instant::now();
+        let run = self.start(0, self.method(), self.own_division(), 0.0);
+        let Ok(mut run) = run else { return };
+        if (0..self.samples).any(|_| run.advance().is_err()) {
+            return;
+        }
+        let own = clock.elapsed().as_secs_f64() / f64::from(self.own_division());
+        let tried: u32 = self.divisions.iter().sum();
+        let of_references = f64::from(self.reference_divisions(0).0) * (2 + self.families(0).len()) as f64;
+        let of_competitors = f64::from(tried) * (self.competitors(0).len() * (1 + repetitions)) as f64;
+        crate::announce(console, "errors of the steps", own * (of_references + of_competitors));
+    }
+
     /// Communication steps before the first contact, at most `most`.
     fn first_touch(&self, division: u32, most: usize) -> Result<usize, String> {
         let mut run = self.start(0, DEFAULT, division, 0.0)?;
@@ -127,7 +162,7 @@ impl Own {
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-fn count(value: f64) -> u32 {
+pub(super) fn count(value: f64) -> u32 {
     value.round().clamp(1.0, 1e8) as u32
 }
 
@@ -136,6 +171,7 @@ impl Case for Own {
         "scene"
     }
 
+    /// The second is that of [`super::total`].
     fn figures(&self) -> [&'static str; 2] {
         ["scene-steps", "scene-total"]
     }
@@ -146,10 +182,7 @@ impl Case for Own {
 
     fn description(&self) -> String {
         let settings = &self.scene.settings;
-        format!(
-            "{} Inputs keep their start values; errors are those of the steps, of modes and contact nodes nothing is said here.",
-            settings.description
-        )
+        format!("{} Inputs keep their start values.", settings.description)
     }
 
     fn size_name(&self) -> &'static str {

@@ -11,7 +11,7 @@ use super::{
     chart::{Chart, Points},
     competitor::{Competitor, Family},
     measure::{Figures, Measured, Row},
-    ranking::{Kind, seconds},
+    ranking::{self, Kind, TARGETS, readable, seconds},
 };
 use crate::Sheet;
 
@@ -25,7 +25,8 @@ pub fn chart(case: &dyn Case, found: &Measured, kind: Kind) -> (Chart, Sheet) {
         },
         all: Vec::new(),
         joined: kind == Kind::OfTime,
-        readable: (kind == Kind::OfTime).then(|| found.references[case.standard()].apart[0]),
+        readable: (kind == Kind::OfTime)
+            .then(|| (found.references[case.standard()].apart[0], "distance of the two references".into())),
     };
     let competitors: Vec<Competitor> = Competitor::all()
         .into_iter()
@@ -161,6 +162,19 @@ pub fn references(case: &dyn Case, found: &Measured) -> Table {
     table
 }
 
+/// The cheapest of the steps alone for an error, where it can be read.
+fn cheapest(case: &dyn Case, found: &Measured, target: f64) -> Value {
+    let rows = Kind::OfTime.rows(case, found);
+    let read = target >= readable(case, found, Kind::OfTime);
+    match ranking::cheapest(&rows, Kind::OfTime, None, target).filter(|_| read) {
+        None => json!({ "error": target }),
+        Some((row, figures)) => json!({
+            "error": target, "competitor": row.competitor.name(), "internal_step": row.step, "seconds": figures.seconds,
+            "error_of_steps": figures.of_time,
+        }),
+    }
+}
+
 /// For programs.
 pub fn to_json(case: &dyn Case, found: &Measured) -> Value {
     let rows = found.rows.iter().map(|row| {
@@ -199,6 +213,7 @@ pub fn to_json(case: &dyn Case, found: &Measured) -> Value {
         "massless_boundary_away": found.references.iter().map(|own| own.away(Family::MASSLESS)).collect::<Vec<_>>(),
         "coulomb_away": found.references.iter().map(|own| own.away(Family::STICKING)).collect::<Vec<_>>(),
         "reference_from_truth": found.truncation,
+        "cheapest": TARGETS.map(|target| cheapest(case, found, target)),
         "rows": rows.collect::<Vec<_>>(),
     })
 }

@@ -12,6 +12,9 @@ use super::{
     seek::{Sought, TRIED, seek},
 };
 
+/// Answers that are asked for, about: doublings from end to end of the range and halvings, of every scheme, and two of each further solver.
+pub const ANSWERS: usize = 72;
+
 /// How far a scheme goes with a solver.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Usable {

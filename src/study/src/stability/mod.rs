@@ -110,8 +110,9 @@ pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study>
     }
     let coupled = scene.roms[master(&scene)].is_cyclic();
     // Ranges that are wrong are refused before the work.
-    Grid::new(arguments, &own, coupled, None)?;
+    let first = Grid::new(arguments, &own, coupled, None)?;
     let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
+    announce(&asked, &own, first.places().len() * first.steps.len() + limits::ANSWERS, threads, console);
     let limits = limits::of(&asked, &own, threads, arguments.common.quick, console)?;
     let usable = limits.iter().find(|usable| usable.method == own.method).and_then(limits::Usable::step);
     let grid = Grid::new(arguments, &own, coupled, usable)?;
@@ -121,6 +122,14 @@ pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study>
     let points = points(&asked, &own, &grid, &structures, threads, console)?;
     let found = Found { name: arguments.scene.clone(), own, grid, points, limits, no_rates, scene: scene.clone() };
     page::study(&found)
+}
+
+/// Say how long so many answers will take, where that is long, by the one of the scene as it stands.
+fn announce(asked: &Asked, own: &Own, answers: usize, threads: usize, console: &Console) {
+    let clock = std::time::Instant::now();
+    asked.at(own.method, own.step, &[Place { friction: own.friction, speed: own.speed }]);
+    let expected = clock.elapsed().as_secs_f64() * answers as f64 / threads as f64;
+    crate::announce(console, &format!("some {answers} answers"), expected);
 }
 
 /// Where a scene has no friction, the same with the parameter, so that more than none can be asked about; and whether it had none.

@@ -48,7 +48,7 @@ impl Case {
         let shown = match self.scheme.0 {
             Scheme::CentralDifference => self.solver.0 == Solver::Film,
             Scheme::ModalExact => self.solver.0 == Solver::Lcp || self.solver.0 == Solver::Coulomb,
-            Scheme::MasslessBoundary => self.solver.0 == Solver::Lcp,
+            Scheme::MasslessBoundary | Scheme::Galerkin => self.solver.0 == Solver::Lcp,
         };
         let asked =
             if quick { shown && self.friction > 0.0 } else { self.friction > 0.0 || self.solver.0 != Solver::Coulomb };

@@ -115,7 +115,7 @@ fn ratio(kind: &str, ratio: f64, scheme: Scheme, solver: Solver) -> Happened {
     scene.settings.contacts[0].friction = 0.15;
     let step = match scheme {
         Scheme::CentralDifference => 0.9 * 2.0 / tower.largest_frequency(),
-        Scheme::ModalExact => 5e-6,
+        Scheme::ModalExact | Scheme::Galerkin => 5e-6,
         Scheme::MasslessBoundary => {
             scene.settings.structures[0].damping_ratio = Some(0.3);
             match massless_step(&scene) {

@@ -197,7 +197,7 @@ fn kicked(scheme: Scheme, step: f64) -> Result<(Simulation, f64)> {
     scene.settings.outputs.all_sectors = false;
     let step = match scheme {
         Scheme::CentralDifference => 0.9 * 2.0 / tower.largest_frequency(),
-        Scheme::ModalExact => step,
+        Scheme::ModalExact | Scheme::Galerkin => step,
         Scheme::MasslessBoundary => 0.5 * massless_step(&scene).unwrap_or(step),
     };
     let scene = with_step(scene, step);

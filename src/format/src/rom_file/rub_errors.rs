@@ -1,0 +1,58 @@
+//! What a reduction leaves of a rub, where somebody has found it.
+
+use tiprub_core::rom::RubErrors;
+
+use super::{Metadata, Reader};
+use crate::{Result, suggestion};
+
+/// Entries of the metadata.
+const ERRORS: &str = "rub_errors";
+const FOUND_ON: &str = "rub_errors_found_on";
+/// What leaves an error.
+const DIRECTIONS: [&str; 3] = ["modes", "patches", "mesh"];
+
+impl Reader<'_> {
+    pub(super) fn rub_errors(&self, metadata: &Metadata) -> Result<Option<RubErrors>> {
+        let Some(text) = metadata.get(ERRORS) else {
+            if metadata.contains_key(FOUND_ON) {
+                let problem = format!("given without `{ERRORS}`");
+                return Err(self.error(format!("metadata `{FOUND_ON}`"), problem, "Remove it, or add the errors"));
+            }
+            return Ok(None);
+        };
+        let mut found = [None; 3];
+        for part in text.split(',') {
+            let (name, value) = part.split_once('=').unwrap_or((part, ""));
+            let place = DIRECTIONS.iter().position(|direction| *direction == name.trim());
+            let value = value.trim().parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 0.0);
+            match (place, value) {
+                (Some(place), Some(value)) if found[place].is_none() => found[place] = Some(value),
+                (None, _) => {
+                    let remedy = suggestion::remedy(name.trim(), &DIRECTIONS);
+                    return Err(self.error(format!("metadata `{ERRORS}`"), format!("{part:?} names nothing"), remedy));
+                }
+                _ => {
+                    let problem = format!("{part:?} is not one number from 0 on");
+                    return Err(self.error(
+                        format!("metadata `{ERRORS}`"),
+                        problem,
+                        "Write modes=0.01,mesh=0.02, each once",
+                    ));
+                }
+            }
+        }
+        let [modes, patches, mesh] = found;
+        Ok(Some(RubErrors { found_on: metadata.get(FOUND_ON).cloned().unwrap_or_default(), modes, patches, mesh }))
+    }
+}
+
+/// The entries; none where nothing is known.
+pub(super) fn metadata(errors: &RubErrors) -> Vec<(&'static str, String)> {
+    let known = DIRECTIONS.iter().zip([errors.modes, errors.patches, errors.mesh]);
+    let known: Vec<String> = known.filter_map(|(name, error)| Some(format!("{name}={}", error?))).collect();
+    if known.is_empty() {
+        return Vec::new();
+    }
+    let on = (!errors.found_on.is_empty()).then(|| (FOUND_ON, errors.found_on.clone()));
+    std::iter::once((ERRORS, known.join(","))).chain(on).collect()
+}

@@ -1,0 +1,387 @@
+//! Scenes at every level of a direction: other steps, modes, contact nodes, patches and meshes.
+
+use tiprub_core::{Rom, Scene, dynamics::modal::ModalModel, rom::Frame};
+use tiprub_format::builtin_model;
+use tiprub_gallery::{
+    builtin::{self, Other},
+    scene_source::BUILTIN,
+};
+use tiprub_model::rotor37::Tip;
+use tiprub_shell::{Failure, Result};
+
+use super::{
+    coarsen::coarsened,
+    nodes::{common_start, named_as, starting_with},
+    refine::{Again, Direction, Level, MESH, MESH_NODES, MODES_KEPT, Meshed, NODES, SECONDS, STEP, Source},
+    truncate::{Form, truncated},
+};
+use crate::{master, stability::asked::divided};
+
+/// Internal steps, times the scene's own, the coarsest first.
+const STEPS: [f64; 5] = [4.0, 2.0, 1.0, 0.5, 0.25];
+const QUICK_STEPS: [f64; 3] = [2.0, 1.0, 0.5];
+/// Shares of the ROM's own modes.
+const FEWER: [f64; 3] = [0.25, 0.5, 0.75];
+const QUICK_FEWER: [f64; 1] = [0.5];
+/// More of them, where the model can be reduced again.
+const MORE: [f64; 2] = [1.5, 2.0];
+const QUICK_MORE: [f64; 1] = [1.5];
+/// Two models are one where their frequencies and contact nodes agree to this (relative).
+const SAME: f64 = 1e-6;
+/// Makes other models of a scene.
+pub(crate) struct Refiner<'a> {
+    scene: &'a Scene,
+    /// Internal steps per communication step.
+    own: u32,
+    again: &'a Again<'a>,
+    /// Of the mesh of the master, where it can be reduced again.
+    mesh_nodes: Option<usize>,
+}
+
+impl<'a> Refiner<'a> {
+    /// With a source that gives what the scene has.
+    ///
+    /// # Errors
+    /// It does not, or its reduction refuses.
+    pub(crate) fn checked(scene: &'a Scene, own: u32, again: &'a Again<'a>) -> Result<Self> {
+        let mut refiner = Self { scene, own, again, mesh_nodes: None };
+        refiner.mesh_nodes = match again.source {
+            Some(source) => Some(refiner.check(source)?),
+            None => refiner.with_chord().and_then(|name| builtin::mesh_nodes(&name, again.mesh)).transpose()?,
+        };
+        Ok(refiner)
+    }
+
+    /// The scene with so many times its modes and spaces between contact points, factor by factor as far as its mesh has them; none where the
+    /// master cannot be reduced again.
+    pub(crate) fn finer(&self, factors: &[usize]) -> Vec<Scene> {
+        let index = master(self.scene);
+        let own = &self.scene.roms[index];
+        let (modes, points) = self.own_counts();
+        let start = common_start(self.scene, index);
+        let with = |factor: &usize| {
+            let tip = self.tip(if start.is_ok() { factor * (points - 1) + 1 } else { points });
+            let found = match (self.again.source, self.with_chord()) {
+                (Some(source), _) => {
+                    source.reduce(None, factor * modes, tip, self.again.console).map(|found| found.rom)
+                }
+                (None, Some(name)) => {
+                    let other = Other { modes: *factor as f64, tip, mesh: self.again.mesh };
+                    builtin::refined(&name, other, self.again.cache, self.again.console)?
+                }
+                (None, None) => return None,
+            };
+            let rom = Rom { damping_ratio: own.damping_ratio, ..found.ok()? };
+            let rom = match &start {
+                Ok(start) => starting_with(start, rom),
+                Err(_) => named_as(own, rom),
+            };
+            Some(self.with_rom(index, rom))
+        };
+        factors.iter().map_while(with).collect()
+    }
+
+    fn level(&self, value: f64, own: bool, scene: Scene) -> Level {
+        Level { value, own, scene, division: self.own }
+    }
+
+    fn with_rom(&self, index: usize, rom: Rom) -> Scene {
+        let mut scene = self.scene.clone();
+        scene.roms[index] = rom;
+        scene
+    }
+
+    /// Fixed-interface modes and contact nodes of the master.
+    fn own_counts(&self) -> (usize, usize) {
+        let rom = &self.scene.roms[master(self.scene)];
+        (rom.order().saturating_sub(rom.contact_map.nrows()), rom.contact_nodes.len())
+    }
+
+    /// So many nodes, or patches where the master has such.
+    fn tip(&self, count: usize) -> Tip {
+        let nodes = &self.scene.roms[master(self.scene)].contact_nodes;
+        if nodes.iter().all(|node| node.area > 0.0) { Tip::Patches(count) } else { Tip::Nodes(count) }
+    }
+
+    /// From the source, with the damping of the scene's ROM: a command line may propose another.
+    fn reduced(&self, source: &dyn Source, other: Option<usize>, [modes, nodes]: [usize; 2]) -> Result<Meshed> {
+        let found = source.reduce(other, modes, self.tip(nodes), self.again.console)?;
+        let damping_ratio = self.scene.roms[master(self.scene)].damping_ratio;
+        Ok(Meshed { rom: Rom { damping_ratio, ..found.rom }, ..found })
+    }
+
+    /// The master where it is a model that ships and whose contact nodes and mesh can be chosen anew.
+    fn with_chord(&self) -> Option<String> {
+        let structure = &self.scene.settings.structures[master(self.scene)];
+        builtin_model(&self.scene.settings, structure).filter(|name| builtin::has_chord(name))
+    }
+
+    /// The source must give what the scene has; anything else would be a study of another model. Nodes of its mesh.
+    fn check(&self, source: &dyn Source) -> Result<usize> {
+        let rom = &self.scene.roms[master(self.scene)];
+        let (modes, nodes) = self.own_counts();
+        let Meshed { rom: again, nodes: of_mesh } = self.reduced(source, None, [modes, nodes])?;
+        let differs = |problem: String| {
+            let remedy = "Give the mesh and the options that the ROM was reduced with (its sets, material, units, axis, sectors)";
+            Err(Failure::new(
+                "--mesh",
+                format!("it does not give the ROM `{}` of the scene: {problem}", rom.name),
+                remedy,
+            ))
+        };
+        if (again.sectors, again.contact_nodes.len()) != (rom.sectors, rom.contact_nodes.len()) {
+            let of = |rom: &Rom| format!("{} contact nodes and {} sectors", rom.contact_nodes.len(), rom.sectors);
+            return differs(format!("{} instead of {}", of(&again), of(rom)));
+        }
+        let size =
+            rom.contact_nodes.iter().flat_map(|node| node.position).fold(0.0, |most: f64, value| most.max(value.abs()));
+        for (own, other) in rom.contact_nodes.iter().zip(&again.contact_nodes) {
+            if own.position.iter().zip(other.position).any(|(a, b)| (a - b).abs() > SAME * size) {
+                return differs(format!("contact node `{}` is elsewhere", own.name));
+            }
+        }
+        let frequencies = |rom: &Rom| ModalModel::from_rom(rom, 0.0).map(|model| model.frequencies).unwrap_or_default();
+        let (own, other) = (frequencies(rom), frequencies(&again));
+        let first = |all: &[f64]| all.first().copied().unwrap_or(f64::NAN) / std::f64::consts::TAU;
+        let close = own.iter().zip(&other).all(|(a, b)| (a - b).abs() <= SAME * a.abs().max(b.abs()));
+        if own.len() == other.len() && close {
+            Ok(of_mesh)
+        } else {
+            differs(format!(
+                "first frequency {:.3} Hz instead of {:.3} Hz, {} coordinates instead of {}",
+                first(&other),
+                first(&own),
+                other.len(),
+                own.len()
+            ))
+        }
+    }
+
+    pub(super) fn steps(&self) -> Direction {
+        let shares = if self.again.quick { &QUICK_STEPS[..] } else { &STEPS[..] };
+        let interval = self.scene.settings.experiment.communication_step;
+        let step = divided(interval, self.scene.settings.time.step);
+        let mut divisions: Vec<u32> = shares.iter().map(|share| count(f64::from(self.own) / share)).collect();
+        divisions.dedup();
+        let level = |division: u32| {
+            let mut scene = self.scene.clone();
+            // As it stands, to the last bit.
+            if division != self.own {
+                scene.settings.time.step = interval / f64::from(division);
+            }
+            let value = step * f64::from(self.own) / f64::from(division);
+            Level { value, own: division == self.own, scene, division }
+        };
+        let levels = divisions.into_iter().map(level).collect();
+        Direction { levels, ..Direction::new(STEP, "internal step".into(), SECONDS) }
+    }
+
+    /// Modes of one structure: fewer of the ROM's own, more where it can be reduced again.
+    pub(super) fn modes(&self, index: usize, name: &'static str) -> Result<Direction> {
+        let (rom, structure) = (&self.scene.roms[index], &self.scene.settings.structures[index]);
+        let form = Form::of(rom);
+        let own = form.modes(rom);
+        let mut direction = Direction::new(name, format!("modes of {}", structure.name), MODES_KEPT);
+        let fewer = if self.again.quick { &QUICK_FEWER[..] } else { &FEWER[..] };
+        let mut counts: Vec<usize> = fewer.iter().map(|share| count(share * own as f64) as usize).collect();
+        counts.retain(|count| *count < own);
+        counts.dedup();
+        for modes in counts {
+            match truncated(rom, modes) {
+                Ok(rom) => direction.levels.push(self.level(modes as f64, false, self.with_rom(index, rom))),
+                Err(why) => direction.misses(format!("{modes} modes: {why}")),
+            }
+        }
+        direction.levels.push(self.level(own as f64, true, self.scene.clone()));
+        let more = if self.again.quick { &QUICK_MORE[..] } else { &MORE[..] };
+        for factor in more {
+            match self.more_modes(index, own, *factor) {
+                Some(rom) => {
+                    let rom = rom?;
+                    let modes = Form::of(&rom).modes(&rom);
+                    if modes > own {
+                        direction.levels.push(self.level(modes as f64, false, self.with_rom(index, rom)));
+                    }
+                }
+                None => direction.misses(no_more(&structure.rom, rom, index == master(self.scene))),
+            }
+        }
+        Ok(direction)
+    }
+
+    fn more_modes(&self, index: usize, own: usize, factor: f64) -> Option<Result<Rom>> {
+        let (nodes, master) = (self.scene.roms[index].contact_nodes.len(), index == master(self.scene));
+        let again = match self.again.source.filter(|_| master) {
+            Some(source) => {
+                self.reduced(source, None, [count(factor * own as f64) as usize, nodes]).map(|found| found.rom)
+            }
+            None => {
+                let name = builtin_model(&self.scene.settings, &self.scene.settings.structures[index])?;
+                let mesh = if master { self.again.mesh } else { 1.0 };
+                let other = Other { modes: factor, tip: self.tip(nodes), mesh };
+                builtin::refined(&name, other, self.again.cache, self.again.console)?
+            }
+        };
+        Some(again.map(|again| named_as(&self.scene.roms[index], again)))
+    }
+
+    /// Contact nodes of the master along its chord, each number with the ends of the others.
+    pub(super) fn nodes(&self) -> Result<Direction> {
+        let index = master(self.scene);
+        let structure = &self.scene.settings.structures[index];
+        let title = format!("contact nodes of {}", structure.name);
+        let mut direction = Direction::new(NODES, title, "nodes");
+        let builtin = self.with_chord();
+        let (modes, own) = self.own_counts();
+        let patches = matches!(self.tip(own), Tip::Patches(_));
+        if patches {
+            (direction.title, direction.unit) = (format!("contact patches of {}", structure.name), "patches");
+            self.fewer_patches(&mut direction);
+        }
+        if self.again.source.is_none() && builtin.is_none() {
+            direction.misses(
+                if self.scene.roms[index].frame == Frame::Cartesian || structure.rom.starts_with(BUILTIN) {
+                    "contact nodes are chosen anew of blades only".into()
+                } else {
+                    no_source(if patches { "more patches" } else { "contact nodes" }, &self.scene.roms[index])
+                },
+            );
+            if !direction.levels.is_empty() {
+                direction.levels.push(self.level(own as f64, true, self.scene.clone()));
+            }
+            return Ok(direction);
+        }
+        let start = match common_start(self.scene, index) {
+            Ok(start) => start,
+            Err(why) => {
+                direction.levels.clear();
+                direction.missing = why;
+                return Ok(direction);
+            }
+        };
+        let mut counts = vec![own, 2 * own - 1];
+        if !patches {
+            counts.push(2);
+        }
+        if !self.again.quick {
+            counts.push(4 * own - 3);
+        }
+        counts.sort_unstable();
+        counts.dedup();
+        for nodes in counts {
+            let rom = match (self.again.source, &builtin) {
+                _ if nodes == own => Ok(self.scene.roms[index].clone()),
+                (Some(source), _) => self.reduced(source, None, [modes, nodes]).map(|found| found.rom),
+                (None, name) => self.built_in(&name.clone().unwrap_or_default(), nodes, 1.0),
+            };
+            match rom {
+                Ok(rom) if nodes == own => {
+                    direction.levels.push(self.level(nodes as f64, true, self.with_rom(index, rom)))
+                }
+                Ok(rom) => {
+                    let scene = self.with_rom(index, starting_with(&start, rom));
+                    direction.levels.push(self.level(nodes as f64, false, scene));
+                }
+                // A mesh has no more nodes than it has.
+                Err(failure) => direction.misses(format!("{nodes} nodes: {failure}")),
+            }
+        }
+        Ok(direction)
+    }
+
+    /// Half and a quarter of the patches, which follow from the ROM itself; the fewest first.
+    fn fewer_patches(&self, direction: &mut Direction) {
+        let index = master(self.scene);
+        let mut rom = self.scene.roms[index].clone();
+        for _ in 0..if self.again.quick { 1 } else { 2 } {
+            match coarsened(&rom) {
+                Ok(found) => rom = found,
+                Err(why) => {
+                    direction.misses(why);
+                    return;
+                }
+            }
+            let patches = rom.contact_nodes.len();
+            direction.levels.insert(0, self.level(patches as f64, false, self.with_rom(index, rom.clone())));
+        }
+    }
+
+    /// A model that ships, with another tip or mesh.
+    fn built_in(&self, name: &str, nodes: usize, mesh: f64) -> Result<Rom> {
+        let other = Other { modes: 1.0, tip: self.tip(nodes), mesh: mesh * self.again.mesh };
+        let found = builtin::refined(name, other, self.again.cache, self.again.console);
+        found.unwrap_or_else(|| Err(Failure::new(name, "no such model", "")))
+    }
+
+    /// Meshes of the master with its number of modes and contact nodes.
+    ///
+    /// # Errors
+    /// A mesh that cannot be reduced.
+    pub(crate) fn meshes(&self) -> Result<Direction> {
+        let index = master(self.scene);
+        let (rom, structure) = (&self.scene.roms[index], &self.scene.settings.structures[index]);
+        let mut direction = Direction::new(MESH, format!("mesh of {}", structure.name), MESH_NODES);
+        let Some(own_nodes) = self.mesh_nodes else {
+            direction.missing = if structure.rom.starts_with(BUILTIN) || rom.frame == Frame::Cartesian {
+                "meshes are chosen anew of blades only".into()
+            } else {
+                no_source("what the mesh leaves out", rom)
+            };
+            return Ok(direction);
+        };
+        let (modes, nodes) = self.own_counts();
+        let mut found = Vec::new();
+        match (self.again.source, self.with_chord()) {
+            (Some(source), _) => {
+                for other in 0..source.others() {
+                    found.push(self.reduced(source, Some(other), [modes, nodes])?);
+                }
+                if found.is_empty() {
+                    direction.missing = "one mesh does not tell what meshes leave: give others of the same blade, coarser or finer, with \
+                                         --other-mesh FILE"
+                        .into();
+                    return Ok(direction);
+                }
+            }
+            (None, name) => {
+                let name = name.unwrap_or_default();
+                let factors = if self.again.quick { &builtin::MESHES[..1] } else { &builtin::MESHES[..] };
+                for factor in factors {
+                    let rom = self.built_in(&name, nodes, *factor)?;
+                    let of_mesh = builtin::mesh_nodes(&name, factor * self.again.mesh).transpose()?.unwrap_or_default();
+                    found.push(Meshed { rom, nodes: of_mesh });
+                }
+            }
+        }
+        direction.levels.push(self.level(own_nodes as f64, true, self.scene.clone()));
+        for Meshed { rom: again, nodes } in found {
+            let again = named_as(rom, Rom { damping_ratio: rom.damping_ratio, ..again });
+            direction.levels.push(self.level(nodes as f64, false, self.with_rom(index, again)));
+        }
+        direction.levels.sort_by(|a, b| a.value.total_cmp(&b.value));
+        Ok(direction)
+    }
+}
+
+/// Why a ROM from a file stays as it is; coupled sectors are chosen in whole families, which a ROM does not tell.
+fn no_source(what: &str, rom: &Rom) -> String {
+    if rom.is_cyclic() {
+        return format!(
+            "{what} are fixed in the ROM file; of coupled sectors only the disk that ships is reduced again"
+        );
+    }
+    format!("{what} are fixed in the ROM file: give the mesh it was reduced from with --mesh FILE and its options")
+}
+
+fn no_more(name: &str, rom: &Rom, master: bool) -> String {
+    match (name.starts_with(BUILTIN), master) {
+        (true, _) => "it has all of its modes".into(),
+        (false, true) => no_source("more modes than the ROM has", rom),
+        (false, false) => "more modes than the ROM has: only the master can be reduced again, from --mesh FILE".into(),
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+fn count(value: f64) -> u32 {
+    value.round().clamp(1.0, 1e8) as u32
+}

@@ -1,0 +1,244 @@
+//! Total error against run time of a scene: other steps, schemes, numbers of patches and of modes, against one truth with more of all.
+//!
+//! Models with fewer patches and modes follow from the ROM itself; those with more are reduced again, where that is possible. All are held
+//! against one truth, by what their tips have in common (watched points, or patches that all have). Time is that of the steps: a
+//! model is as cheap as it is small. A mesh costs no run time: what it leaves is told beside the others.
+
+use tiprub_core::{
+    Scene,
+    settings::{Scheme, Solver},
+};
+use tiprub_shell::{Result, console::Task};
+
+use super::{case::Case as _, clock, competitor::Competitor, own::Own, run::Run as _, scene::SceneRun};
+use crate::{
+    convergence::{
+        Runner,
+        coarsen::coarsened,
+        march::{Marched, Observed},
+        refine::Again,
+        refiner::Refiner,
+        truncate::{Form, truncated},
+    },
+    master,
+};
+
+/// Internal steps, times the number that the scene asks for.
+const SHARES: [f64; 5] = [0.125, 0.25, 0.5, 1.0, 2.0];
+const QUICK_SHARES: [f64; 2] = [0.5, 1.0];
+/// Internal steps of the truth, times the number that the scene asks for: more where fewer are refused.
+const TRUE_SHARES: [u32; 3] = [4, 8, 16];
+/// Models finer than the scene's: so many times its modes and spaces between contact points. The last is the truth.
+const FINER: [usize; 2] = [2, 4];
+/// Halvings of patches and of modes.
+const COARSER: usize = 2;
+/// Timed runs add up to so much at least (s), and are no more than so many.
+const LEAST_TIME: f64 = 5e-3;
+const MOST_RUNS: usize = 5;
+
+/// A model of the scene.
+#[derive(Debug)]
+pub struct Model {
+    /// Contact patches or nodes.
+    pub points: usize,
+    /// Modes of the structure that touches.
+    pub modes: usize,
+    /// Whether it is the scene's.
+    pub own: bool,
+    scene: Scene,
+}
+
+impl Model {
+    fn of(scene: Scene, own: bool) -> Self {
+        let rom = &scene.roms[master(&scene)];
+        Self { points: rom.contact_nodes.len(), modes: Form::of(rom).modes(rom), own, scene }
+    }
+}
+
+/// One setting and what became of it.
+#[derive(Debug)]
+pub struct Row {
+    /// Index of the model.
+    pub model: usize,
+    /// Who.
+    pub competitor: Competitor,
+    /// Internal step (s).
+    pub step: f64,
+    /// Whether it is the scene as it stands.
+    pub own: bool,
+    /// Processor time of the steps (s) and error of the displacements (relative L2), or why it is refused.
+    pub outcome: std::result::Result<(f64, f64), String>,
+}
+
+/// Everything that was found.
+#[derive(Debug)]
+pub struct Total {
+    /// The models that ran, the truth not among them.
+    pub models: Vec<Model>,
+    /// All settings.
+    pub rows: Vec<Row>,
+    /// What the truth is, in words.
+    pub truth: String,
+    /// What the last refinement on the way to the truth changed: errors below are not to be read. `None` where the truth is the scene's own model.
+    pub readable: Option<f64>,
+    /// `patches` or `nodes`.
+    pub touching: &'static str,
+    /// What the mesh leaves, or why that is not known.
+    pub mesh: std::result::Result<f64, String>,
+}
+
+/// Measure a case of one's own; the inner error says why there is nothing to measure.
+///
+/// # Errors
+/// A model that is reduced again and does not give the scene's.
+pub fn measure(case: &Own, again: &Again) -> Result<std::result::Result<Total, String>> {
+    let scene = case.scene();
+    if let Err(several) = crate::one_rotor(&scene.settings) {
+        return Ok(Err(several.to_string()));
+    }
+    let refiner = Refiner::checked(scene, case.own_division(), again)?;
+    let mut finer = refiner.finer(if again.quick { &FINER[..1] } else { &FINER });
+    let mut models = coarser(scene, again.quick);
+    let truth = finer.pop();
+    let of_source = truth.is_some();
+    if models.len() == 1 && !of_source {
+        return Ok(Err("no coarser model follows from its ROM, and no finer one can be reduced".into()));
+    }
+    let truth_scene = truth.unwrap_or_else(|| scene.clone());
+    let (division, truth) = match true_run(case, &truth_scene) {
+        Ok(found) => found,
+        Err(why) => return Ok(Err(format!("the truth does not run: {why}"))),
+    };
+    let before = finer.last().unwrap_or(scene);
+    let before = of_source.then(|| observed(case, before, case.method(), division)).and_then(std::result::Result::ok);
+    let readable = before.and_then(|(_, run)| run.displacement_change(&truth));
+    models.extend(finer.into_iter().map(|scene| Model::of(scene, false)));
+    let task = again.console.task("Total errors", None);
+    let rows = rows(case, &models, &truth, &task, again.quick);
+    drop(task);
+    let mesh = mesh(case, &refiner, again)?;
+    let touching =
+        if scene.roms[master(scene)].contact_nodes.iter().all(|node| node.area > 0.0) { "patches" } else { "nodes" };
+    let Model { points, modes, .. } = Model::of(truth_scene, false);
+    let step = 1e6 * case.interval() / f64::from(division);
+    let whose = if of_source { "" } else { ", the scene's own model, which is not reduced again" };
+    let method = case.method().name();
+    let truth = format!("{points} {touching} and {modes} modes with {method} at h = {step:.3} µs{whose}");
+    Ok(Ok(Total { models, rows, truth, readable, touching, mesh }))
+}
+
+/// The scene's model and coarser ones: patches and modes halved, and halved again, each with each.
+fn coarser(scene: &Scene, quick: bool) -> Vec<Model> {
+    let index = master(scene);
+    let halvings = if quick { 1 } else { COARSER };
+    let halved = (0..halvings).scan(scene.roms[index].clone(), |rom, _| {
+        *rom = coarsened(rom).ok()?;
+        Some(rom.clone())
+    });
+    let mut tips = vec![scene.roms[index].clone()];
+    tips.extend(halved);
+    let mut models = Vec::new();
+    for (tip, rom) in tips.into_iter().enumerate() {
+        let modes = Form::of(&rom).modes(&rom);
+        for halving in 0..=halvings {
+            let own = (tip, halving) == (0, 0);
+            let kept = modes >> halving;
+            let found = if halving == 0 { Ok(rom.clone()) } else { truncated(&rom, kept) };
+            if let (Ok(rom), true) = (found, kept > 0) {
+                let mut scene = scene.clone();
+                scene.roms[index] = rom;
+                models.push(Model::of(scene, own));
+            }
+        }
+    }
+    models
+}
+
+/// The truth with the longest of its steps that are accepted, and their number per communication step.
+fn true_run(case: &Own, scene: &Scene) -> std::result::Result<(u32, Marched), String> {
+    let mut refused = String::new();
+    for share in TRUE_SHARES {
+        let division = share.saturating_mul(case.own_division());
+        match observed(case, scene, case.method(), division) {
+            Ok((_, found)) => return Ok((division, found)),
+            Err(why) => refused = why,
+        }
+    }
+    Err(refused)
+}
+
+/// Who takes part: the schemes with the solver of the scene's law, and the paper's method.
+fn competitors(case: &Own) -> Vec<Competitor> {
+    let Competitor::Core(_, solver) = case.method() else { return Vec::new() };
+    let solvers = if solver == Solver::Coulomb { &[Solver::Coulomb][..] } else { &[Solver::Lcp, Solver::Film] };
+    let all = Scheme::ALL.into_iter().flat_map(|scheme| solvers.iter().map(move |solver| (scheme, *solver)));
+    all.map(|(scheme, solver)| Competitor::Core(scheme, solver)).collect()
+}
+
+fn rows(case: &Own, models: &[Model], truth: &Marched, task: &Task, quick: bool) -> Vec<Row> {
+    let shares = if quick { &QUICK_SHARES[..] } else { &SHARES[..] };
+    let own = case.own_division();
+    let mut divisions: Vec<u32> = shares.iter().map(|share| super::own::count(share * f64::from(own))).collect();
+    divisions.dedup();
+    let competitors = competitors(case);
+    let mut rows = Vec::new();
+    for (index, model) in models.iter().enumerate() {
+        for &competitor in &competitors {
+            for &division in &divisions {
+                let found = observed(case, &model.scene, competitor, division);
+                let outcome = found.and_then(|(seconds, run)| match run.displacement_change(truth) {
+                    Some(error) if error.is_finite() => Ok((seconds, error)),
+                    _ => Err("its displacements cannot be compared with the truth".into()),
+                });
+                let own = model.own && competitor == case.method() && division == own;
+                rows.push(Row { model: index, competitor, step: case.interval() / f64::from(division), own, outcome });
+            }
+        }
+        task.line(&format!("{} of {} models", index + 1, models.len()));
+    }
+    rows
+}
+
+/// Displacements of a run, and the processor time of its steps (s): the median of several where it is short.
+fn observed(
+    case: &Own,
+    scene: &Scene,
+    competitor: Competitor,
+    division: u32,
+) -> std::result::Result<(f64, Marched), String> {
+    let Competitor::Core(scheme, solver) = competitor else { return Err("not on a scene of one's own".into()) };
+    let scene = SceneRun::changed(scene, (scheme, solver), case.interval() / f64::from(division), 0.0);
+    let (observer, points) = Observed::of(&scene.roms[master(&scene)]);
+    let mut times: Vec<f64> = Vec::new();
+    loop {
+        let mut run = SceneRun::with_start_values(&scene, case.interval(), division, case.settings())?;
+        let (mut taken, mut displacements) = (0.0, Vec::with_capacity(case.samples()));
+        for _ in 0..case.samples() {
+            let before = clock::now();
+            run.advance()?;
+            taken += (clock::now() - before).as_secs_f64();
+            displacements.push(observer.displacements(&run));
+        }
+        times.push(taken);
+        if times.iter().sum::<f64>() >= LEAST_TIME || times.len() == MOST_RUNS {
+            times.sort_by(f64::total_cmp);
+            return Ok((times[times.len() / 2], Marched::of_displacements(points, displacements)));
+        }
+    }
+}
+
+/// Error of the scene by its mesh, from others.
+fn mesh(case: &Own, refiner: &Refiner, again: &Again) -> Result<std::result::Result<f64, String>> {
+    if again.quick {
+        return Ok(Err("other meshes are left out of a quick study".into()));
+    }
+    let direction = refiner.meshes()?;
+    if direction.levels.len() < 3 {
+        let few = "three meshes are needed, the scene's among them".to_owned();
+        return Ok(Err(if direction.missing.is_empty() { few } else { direction.missing }));
+    }
+    let runner = Runner::new(case.settings(), case.samples(), again.console);
+    let refined = runner.as_it_is(direction)?;
+    let error = refined.own_errors().and_then(|errors| errors[0]);
+    Ok(error.ok_or_else(|| "changes from mesh to mesh do not shrink, or a run is refused".into()))
+}

@@ -1,0 +1,236 @@
+//! Total errors as a picture, tables, files and statements.
+
+use serde_json::{Value, json};
+use tiprub_figure::table::Table;
+use tiprub_shell::recording::shortest;
+
+use super::{
+    chart::{Chart, Points, front},
+    competitor::{Competitor, PAPER},
+    ranking::seconds,
+    total::{Model, Row, Total},
+};
+use crate::{Figure, Picture, Sheet, Statement};
+
+/// Errors that are asked for.
+pub const TARGETS: [f64; 3] = [1e-1, 1e-2, 1e-3];
+
+impl Total {
+    /// Settings that ran, with time (s) and error.
+    fn ran(&self) -> impl Iterator<Item = (&Row, f64, f64)> {
+        self.rows.iter().filter_map(|row| row.outcome.as_ref().ok().map(|(seconds, error)| (row, *seconds, *error)))
+    }
+
+    /// The setting of least time with at most this error.
+    pub fn cheapest(&self, error: f64, only: Option<Competitor>) -> Option<(&Row, f64, f64)> {
+        let good = self.ran().filter(|(row, _, own)| *own <= error && only.is_none_or(|only| row.competitor == only));
+        good.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// "5 patches, 40 modes, modal-exact + lcp, h = 1.000 µs".
+    fn setting(&self, row: &Row) -> String {
+        let model = &self.models[row.model];
+        let (points, modes, touching) = (model.points, model.modes, self.touching);
+        format!("{points} {touching}, {modes} modes, {}, h = {:.3} µs", row.competitor.name(), 1e6 * row.step)
+    }
+
+    /// Whether an error is too small to be told from that of the truth.
+    fn hidden(&self, error: f64) -> bool {
+        self.readable.is_some_and(|least| error < least)
+    }
+
+    /// With what the mesh leaves.
+    fn with_mesh(&self, error: f64) -> String {
+        self.mesh.as_ref().map_or("not known".into(), |mesh| format!("{:.1e}", error + mesh))
+    }
+
+    fn winners(&self, title: &str) -> Table {
+        let columns =
+            ["total error", "cheapest setting", "time", "its error", "with that of the mesh", "the paper's method"];
+        let mut table = Table::new(format!("{title}: cheapest setting for a total error"), columns);
+        for target in TARGETS {
+            let paper = self.cheapest(target, Some(PAPER));
+            let paper = paper.map_or("does not reach it".into(), |(_, time, _)| seconds(time));
+            let cells = match self.cheapest(target, None) {
+                _ if self.hidden(target) => vec!["not to be read: the truth itself is not as good".into()],
+                None => vec!["nobody".into()],
+                Some((row, time, error)) => {
+                    vec![self.setting(row), seconds(time), format!("{error:.1e}"), self.with_mesh(error), paper]
+                }
+            };
+            let mut cells: Vec<String> = std::iter::once(format!("{target:.0e}")).chain(cells).collect();
+            cells.resize(columns.len(), String::new());
+            table.rows.push(cells);
+        }
+        table
+    }
+
+    /// Settings that no other beats in both time and error.
+    fn best(&self, title: &str) -> Table {
+        let points: Vec<(f64, f64)> = self.ran().map(|(_, time, error)| (time, error)).collect();
+        let mut table = Table::new(
+            format!("{title}: settings that no other beats in both time and total error"),
+            ["setting", "time", "total error"],
+        );
+        for (time, error) in front(&points) {
+            let row = self.ran().find(|(_, own_time, own_error)| (*own_time, *own_error) == (time, error));
+            table.rows.extend(row.map(|(row, ..)| vec![self.setting(row), seconds(time), format!("{error:.2e}")]));
+        }
+        table
+    }
+
+    fn all(&self, title: &str) -> Table {
+        let mut table = Table::new(format!("{title}: all settings"), ["setting", "time", "total error", "remark"]);
+        for row in &self.rows {
+            let own = if row.own { "the scene as it stands" } else { "" };
+            table.rows.push(match &row.outcome {
+                Ok((time, error)) => vec![self.setting(row), seconds(*time), format!("{error:.2e}"), own.into()],
+                Err(why) => vec![self.setting(row), String::new(), String::new(), why.clone()],
+            });
+        }
+        table
+    }
+
+    fn chart(&self) -> Chart {
+        let mut all: Vec<Points> = Vec::new();
+        for (row, time, error) in self.ran() {
+            match all.iter_mut().find(|points| points.competitor == row.competitor) {
+                Some(points) => points.points.push((time, error)),
+                None => all.push(Points { competitor: row.competitor, points: vec![(time, error)] }),
+            }
+        }
+        Chart {
+            error_label: "total error, displacements (relative L2)".into(),
+            all,
+            joined: false,
+            readable: self.readable.map(|least| (least, "what the truth leaves".into())),
+        }
+    }
+
+    fn sheet(&self) -> Sheet {
+        let mut sheet = Sheet::new(["time (s)", "total error", "points", "modes", "h (s)", "scene's own (1 yes)"]);
+        for (row, time, error) in self.ran() {
+            let (model, own) = (&self.models[row.model], f64::from(u8::from(row.own)));
+            sheet.rows.push(vec![time, error, model.points as f64, model.modes as f64, row.step, own]);
+        }
+        sheet
+    }
+
+    /// Picture and tables.
+    pub fn figure(&self, title: &str) -> Figure {
+        let chart = self.chart();
+        let mut html = chart.to_svg();
+        html.push_str(&self.winners(title).to_html(false));
+        html.push_str(&self.best(title).to_html(false));
+        html.push_str(&self.all(title).to_html(true));
+        let mesh = match &self.mesh {
+            Ok(mesh) => format!("The mesh leaves {mesh:.1e} more, whatever the setting"),
+            Err(why) => format!("What the mesh leaves is not in it ({why})"),
+        };
+        Figure {
+            name: "scene-total",
+            caption: format!(
+                "{title}: total error of the displacements at other steps, schemes, numbers of {} and of modes, against {}. {mesh}.",
+                self.touching, self.truth
+            ),
+            picture: Picture { svg: chart.to_svg(), html },
+            sheet: self.sheet(),
+        }
+    }
+
+    /// What was found, in words.
+    pub fn statements(&self, title: &str) -> Vec<Statement> {
+        let mut all = Vec::new();
+        if let Some((row, time, error)) = self.ran().find(|(row, ..)| row.own) {
+            let found = format!("{error:.1e} in {} of stepping ({})", seconds(time), self.setting(row));
+            all.push(Statement::remark(
+                format!("{title}: total error of the scene as it stands, without the mesh"),
+                found,
+            ));
+        }
+        for target in TARGETS {
+            let found = match self.cheapest(target, None) {
+                _ if self.hidden(target) => {
+                    format!(
+                        "not to be read: the last refinement to the truth changed {:.1e}",
+                        self.readable.unwrap_or(0.0)
+                    )
+                }
+                None => "nobody".into(),
+                Some((row, time, error)) => format!("{}: {}, error {error:.1e}", seconds(time), self.setting(row)),
+            };
+            all.push(Statement::remark(
+                format!("{title}: cheapest for a total error of {target:.0e}, without the mesh"),
+                found,
+            ));
+        }
+        let found = match &self.mesh {
+            Ok(mesh) => {
+                format!("{mesh:.1e} of the displacements; no setting of a run changes that: reduce with a finer mesh")
+            }
+            Err(why) => format!("not known: {why}"),
+        };
+        all.push(Statement::remark(format!("{title}: what the mesh leaves"), found));
+        all.push(Statement::remark(format!("{title}: the truth of total errors"), self.truth.clone()));
+        all
+    }
+
+    /// Every setting as comma-separated values; refusals with their reason.
+    pub fn csv(&self) -> String {
+        let mut text = format!("competitor,{},modes,h (s),time (s),total error,remark\n", self.touching);
+        for row in &self.rows {
+            let model = &self.models[row.model];
+            let start =
+                format!("\"{}\",{},{},{}", row.competitor.name(), model.points, model.modes, shortest(row.step));
+            text.push_str(&match &row.outcome {
+                Ok((time, error)) => format!("{start},{time:.4e},{error:.4e},\n"),
+                Err(why) => format!("{start},,,\"{}\"\n", why.replace('"', "'")),
+            });
+        }
+        text
+    }
+
+    /// The cheapest setting for a target as comma-separated values.
+    fn cheapest_row(&self, target: f64) -> String {
+        let Some((row, time, error)) = self.cheapest(target, None).filter(|_| !self.hidden(target)) else {
+            return format!("total,{target:e},,,,,,\n");
+        };
+        let (Model { points, modes, .. }, name) = (&self.models[row.model], row.competitor.name());
+        format!("total,{target:e},\"{name}\",{points},{modes},{},{time:.4e},{error:.4e}\n", shortest(row.step))
+    }
+
+    /// For programs.
+    pub fn to_json(&self) -> Value {
+        let row = |row: &Row| {
+            let model = &self.models[row.model];
+            let (time, error) = row.outcome.as_ref().map_or((None, None), |(time, error)| (Some(time), Some(error)));
+            json!({
+                "competitor": row.competitor.name(), self.touching: model.points, "modes": model.modes, "internal_step": row.step,
+                "own": row.own, "seconds": time, "total_error": error, "refused": row.outcome.as_ref().err(),
+            })
+        };
+        let cheapest = |target: f64| {
+            let found = self.cheapest(target, None).filter(|_| !self.hidden(target));
+            json!({ "error": target, "setting": found.map(|(found, ..)| row(found)) })
+        };
+        json!({
+            "truth": self.truth, "readable": self.readable, "mesh": self.mesh.as_ref().ok(), "mesh_unknown": self.mesh.as_ref().err(),
+            "cheapest": TARGETS.map(cheapest), "rows": self.rows.iter().map(row).collect::<Vec<_>>(),
+        })
+    }
+}
+
+/// The cheapest settings for errors of the steps, as [`super::sheets::to_json`] has them, and in total.
+pub fn cheapest_csv(of_steps: &[Value], total: &Total) -> String {
+    let mut text = format!("error of,at most,competitor,{},modes,h (s),time (s),error\n", total.touching);
+    for row in of_steps {
+        let number = |name: &str| row[name].as_f64().map_or_else(String::new, shortest);
+        let name = row["competitor"].as_str().map_or_else(String::new, |name| format!("\"{name}\""));
+        let own = total.models.iter().find(|model| model.own).filter(|_| !name.is_empty());
+        let [points, modes] =
+            own.map_or([String::new(), String::new()], |own| [own.points, own.modes].map(|n| n.to_string()));
+        let [target, step, time, error] = ["error", "internal_step", "seconds", "error_of_steps"].map(number);
+        text.push_str(&format!("steps,{target},{name},{points},{modes},{step},{time},{error}\n"));
+    }
+    text + &TARGETS.map(|target| total.cheapest_row(target)).concat()
+}
