@@ -14,7 +14,8 @@ use tiprub_study as study;
 use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
 use crate::{
-    bases, conjugacy, convergence, cube, error, estimates, inputs, modes, refinement, stability, stage, witness,
+    bases, conjugacy, convergence, cube, error, estimates, inputs, modes, refinement, stability, stage, tolerance,
+    witness,
 };
 
 /// Evidence for tiprub: studies of the models that ship and of standard problems.
@@ -66,6 +67,8 @@ pub enum Command {
     Refinement(RefinementArguments),
     /// Modes with the contact held or free, contact at nodes or patches: error, largest steps and cost against the number of modes.
     Bases(StudyCommon),
+    /// Error against run time of steps by a tolerance, beside steps of one length, on rubs of rotor 37.
+    Tolerance(StudyCommon),
     /// Reduced blades against a full finite-element model with steps and contact of its own, without any reduction.
     Witness(StudyCommon),
 }
@@ -198,6 +201,7 @@ impl Cli {
             Command::Estimates(arguments) => ("estimates", &arguments.common),
             Command::Refinement(arguments) => ("refinement", &arguments.common),
             Command::Bases(common) => ("bases", common),
+            Command::Tolerance(common) => ("tolerance", common),
             Command::Witness(common) => ("witness", common),
         };
         let directory = commands::study::directory(name, common);
@@ -224,6 +228,7 @@ impl Cli {
             Command::Estimates(arguments) => estimates::study(arguments, console),
             Command::Refinement(arguments) => refinement::study(arguments, console),
             Command::Bases(common) => bases::study(common, console),
+            Command::Tolerance(common) => tolerance::study(common, console),
             Command::Witness(common) => witness::study(common, console),
             Command::Stability(_) => unreachable!("`run` has answered it"),
         }

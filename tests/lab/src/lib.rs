@@ -4,6 +4,7 @@
 //! - `stability`: stiff and extreme cases, each in a process of its own, judged;
 //! - `cube`, `stage`, `convergence`, `modes`: what the paper's figures show of the models that ship;
 //! - `witness`: reduced blades against full finite elements; `bases`: what a blade is reduced to;
+//! - `tolerance`: steps by a tolerance beside steps of one length;
 //! - `conjugacy`: forces, moments and work on both sides of contacts; `inputs`: what the communication step does.
 
 #![warn(unreachable_pub)]
@@ -19,4 +20,5 @@ mod modes;
 mod refinement;
 mod stability;
 mod stage;
+mod tolerance;
 mod witness;

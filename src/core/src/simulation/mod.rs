@@ -21,7 +21,7 @@ mod window;
 
 use crate::gaps::Drive;
 use crate::settings::Solver;
-use crate::system::System;
+use crate::system::{Growth, System};
 use crate::variables::{Quantity, Start, VariableTable};
 use crate::{Result, Scene, ranges, shown};
 use compile::Compiled;
@@ -424,8 +424,16 @@ impl Simulation {
     /// Share of the casing shape that has grown in: ½(1 − cos(πt/T)) until T.
     fn ramp(&self, pair: usize, time: f64) -> f64 {
         let Some(reference) = self.compiled.references.ramp_times[pair] else { return 1.0 };
-        let (length, elapsed) = (self.values[reference], time - self.initial_time);
-        if elapsed >= length { 1.0 } else { 0.5 * (1.0 - libm::cos(std::f64::consts::PI * elapsed / length)) }
+        Growth::share(time - self.initial_time, self.values[reference])
+    }
+
+    /// How the shape of a pair grows between two offsets and times (s).
+    fn growth(&self, pair: usize, offsets: [f64; 2], times: [f64; 2]) -> Growth {
+        Growth {
+            factors: offsets.map(|offset| self.inputs.pairs[pair].shape_factor.at(offset)),
+            elapsed: times.map(|time| time - self.initial_time),
+            length: self.compiled.references.ramp_times[pair].map_or(0.0, |reference| self.values[reference]),
+        }
     }
 
     /// Back to the state after [`Simulation::new`]: start values everywhere.

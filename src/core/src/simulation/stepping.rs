@@ -200,8 +200,10 @@ impl Simulation {
         let before = self.communication.offset(self.communication.done);
         if self.system.settings().scheme == Scheme::Galerkin {
             let start = self.communication.time(self.communication.done);
-            self.find_drives(0.5 * (before + offset), 0.5 * (start + time));
-            self.system.set_middle(&self.drives);
+            for pair in 0..self.drives.len() {
+                let middle = self.drive(pair, 0.5 * (before + offset), 0.5 * (start + time));
+                self.system.set_middle(pair, &middle, self.growth(pair, [before, offset], [start, time]));
+            }
         }
         self.find_drives(offset, time);
         self.load(before);

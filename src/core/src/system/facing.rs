@@ -9,22 +9,47 @@ use crate::gaps::surface_spline::ClosestPoint;
 use crate::gaps::wrench::{At, Motion, Wrench};
 use crate::gaps::{Drive, dot};
 
-/// How prescribed motion of a pair goes on over a span: from where it was, quadratic in time through the middle and the end.
+/// How the shape of a surface grows over a span: a factor that is linear in time, times ½(1 − cos(πt/T)) until T.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Growth {
+    /// Factor at the start and the end.
+    pub factors: [f64; 2],
+    /// Time since the growth began (s), at the start and the end.
+    pub elapsed: [f64; 2],
+    /// T (s), 0 for a shape that is there at once.
+    pub length: f64,
+}
+
+impl Growth {
+    /// Share of a shape that has grown in after a time (s) of `length` (s).
+    pub fn share(elapsed: f64, length: f64) -> f64 {
+        if elapsed >= length { 1.0 } else { 0.5 * (1.0 - libm::cos(std::f64::consts::PI * elapsed / length)) }
+    }
+
+    fn at(&self, theta: f64) -> f64 {
+        let between = |ends: [f64; 2]| ends[0] + theta * (ends[1] - ends[0]);
+        between(self.factors) * Self::share(between(self.elapsed), self.length)
+    }
+}
+
+/// How prescribed motion of a pair goes on over a span: from where it was, quadratic in time through the middle and the end. Inputs
+/// are linear in time and the angle of the rotor quadratic, so that this is exact; what grows in otherwise is the shape.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Course {
     before: Drive,
     /// Linear and quadratic part over the whole span.
     parts: [Motion; 2],
+    growth: Growth,
 }
 
 impl Course {
     /// From `before` through `middle` to `end`, a span of length `span` (s).
-    pub fn new(before: &Drive, middle: &Drive, end: &Drive, span: f64) -> Self {
+    pub fn new(before: &Drive, (middle, growth): (&Drive, Growth), end: &Drive, span: f64) -> Self {
         let half = Motion::between(before, middle, 0.5 * span);
         let whole = Motion::between(before, end, span);
         let linear = half.over(4.0).less(&whole);
         let quadratic = whole.over(2.0).less(&half.over(4.0));
-        Self { before: *before, parts: [linear, quadratic] }
+        Self { before: *before, parts: [linear, quadratic], growth }
     }
 
     /// Whether nothing but the rotor moves.
@@ -34,7 +59,8 @@ impl Course {
 
     /// Motion from the start of the span to `theta` of it.
     fn motion(&self, theta: f64) -> Motion {
-        self.parts[0].over(theta).since(&self.parts[1].over(theta * theta))
+        let motion = self.parts[0].over(theta).since(&self.parts[1].over(theta * theta));
+        Motion { shape_factor: self.growth.at(theta) - self.before.shape_factor, ..motion }
     }
 
     /// Prescribed motion at `theta` of the span.

@@ -1,6 +1,6 @@
 //! One span of time by continuous Galerkin: each sector by itself, in steps of its own.
 
-use super::facing::{Course, Facing, Record};
+use super::facing::{Course, Facing, Growth, Record};
 use super::posed::Member;
 use super::{ContactEvent, Pair, StepFailure, Structure, System};
 use crate::dynamics::bank::ModalBank;
@@ -94,9 +94,9 @@ impl System {
         }
     }
 
-    /// Prescribed motion in the middle of the span to come, one per pair.
-    pub fn set_middle(&mut self, drives: &[Drive]) {
-        self.pairs.iter_mut().zip(drives).for_each(|(pair, drive)| pair.middle = *drive);
+    /// Prescribed motion of a pair in the middle of the span to come, and how its shape grows.
+    pub fn set_middle(&mut self, pair: usize, drive: &Drive, growth: Growth) {
+        self.pairs[pair].middle = (*drive, growth);
     }
 
     /// One span to the instant described by `drives`, one per pair.
@@ -137,7 +137,7 @@ impl System {
         let structure = &mut structures[index];
         structure.begin_span();
         for (course, pair) in galerkin.record.courses.iter_mut().zip(pairs.iter()) {
-            *course = Course::new(pair.drive_before(), &pair.middle, pair.drive_now(), span);
+            *course = Course::new(pair.drive_before(), (&pair.middle.0, pair.middle.1), pair.drive_now(), span);
         }
         let factorisations = galerkin.effort.factorisations;
         for sector in 0..structure.modes().sectors() {

@@ -26,6 +26,7 @@ use crate::ledger::Ledger;
 use crate::persist::persist_fields;
 use crate::settings::{Scheme, Solver};
 pub use event::ContactEvent;
+pub use facing::Growth;
 pub use failure::StepFailure;
 use group::Reach;
 pub(crate) use group::{Found, Group};

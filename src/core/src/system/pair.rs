@@ -1,6 +1,7 @@
 //! A contact pair: contact nodes of one structure against a surface, which another structure may carry.
 
 use super::Structure;
+use super::facing::Growth;
 use crate::gaps::frame::Frame;
 use crate::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
 use crate::gaps::wrench::Motion;
@@ -49,13 +50,13 @@ pub struct Pair {
     /// Contact nodes that belong to it.
     nodes: Vec<usize>,
     prescribed: Prescribed,
-    /// Prescribed motion in the middle of the span under way, where a scheme asks for it.
-    pub(super) middle: Drive,
+    /// Prescribed motion in the middle of the span under way, and how the shape grows, where a scheme asks for it.
+    pub(super) middle: (Drive, Growth),
 }
 
 impl Pair {
     pub(super) fn new(parts: PairParts) -> Self {
-        Self { nodes: parts.gap.members(), parts, prescribed: Prescribed::default(), middle: Drive::default() }
+        Self { nodes: parts.gap.members(), parts, prescribed: Prescribed::default(), middle: Default::default() }
     }
 
     /// Structure whose contact nodes touch.
