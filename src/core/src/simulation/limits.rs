@@ -160,8 +160,8 @@ impl Simulation {
         }
         for speed in speeds.into_iter().filter(|speed| *speed != 0.0) {
             let closed = own.closing.time(speed);
-            let senses = senses_of(speed).filter_map(|sense| own.senses[sense].as_ref());
-            senses.map(|sense| sense.check(step, closed)).collect::<Result<()>>()?;
+            let mut senses = senses_of(speed).filter_map(|sense| own.senses[sense].as_ref());
+            senses.try_for_each(|sense| sense.check(step, closed))?;
         }
         Ok(())
     }

@@ -28,13 +28,17 @@ pub struct Judged {
     pub share: f64,
 }
 
+/// Samples that turn by more than this per step (rad) are of no motion of the equations.
+const ALTERNATES: f64 = 0.9 * std::f64::consts::PI;
+
 impl Judged {
-    /// The growth of a model under a scheme, with all contacts of `directions` closed.
-    pub fn new(model: &ModalModel, scheme: Scheme, directions: &ContactDirections, growth: Growth) -> Self {
-        // Contact forces that act a step late make motions of their own, beyond the frequencies of all modes; samples of central
-        // differences swing faster than what they are of.
+    /// The growth of a model under a scheme with a step (s), with all contacts of `directions` closed.
+    pub fn new(model: &ModalModel, scheme: Scheme, step: f64, directions: &ContactDirections, growth: Growth) -> Self {
+        // Contact forces that act a step late make motions of their own, beyond the frequencies of all modes. So do those that
+        // change sign from step to step. Samples of central differences swing faster than what they are of.
+        let is_of_step = scheme.acts_later() || growth.swing * step > ALTERNATES;
         let frequency = growth.swing.min(model.largest_frequency());
-        let share = if scheme.acts_later() { 1.0 } else { share_of(model, directions, frequency) };
+        let share = if is_of_step { 1.0 } else { share_of(model, directions, frequency) };
         Self { growth, share }
     }
 
@@ -150,7 +154,7 @@ mod tests {
             if growth.continuous > -1e-3 / step / 5e3 {
                 continue;
             }
-            let judged = Judged::new(&model, scheme, &radial(), growth);
+            let judged = Judged::new(&model, scheme, step, &radial(), growth);
             let steps = 3000;
             let closed = step * f64::from(steps);
             if judged.allowed() > closed {
@@ -159,11 +163,8 @@ mod tests {
                 }
                 let Some((_, most)) = march(&model, scheme, step, friction, 3000) else { continue };
                 accepted += 1;
-                if most > farthest {
-                    farthest = most;
-                    println!("{most:.3} µ = {friction} h = {step:e} {scheme:?} {judged:?}");
-                }
-                assert!(most < 0.25, "{most:.3}: {scheme:?}, µ = {friction}, h = {step:e}, {judged:?}, {model:?}");
+                farthest = farthest.max(most);
+                assert!(most < REFUSED, "{most:.3}: {scheme:?}, µ = {friction}, h = {step:e}, {judged:?}, {model:?}");
             } else if growth.added() * closed > 20.0 {
                 let Some((opens, _)) = march(&model, scheme, step, friction, 3000) else { continue };
                 refused += 1;

@@ -293,7 +293,7 @@ impl<'a> Structure<'a> {
         let grows = |nodes: &Vec<usize>, sense: usize| {
             let (seen, directions) = self.seen(0, nodes, sense);
             let found = stability::growth(&seen, scheme, step, sliding.friction, &directions);
-            found.is_some_and(|found| Judged::new(&seen, scheme, &directions, found).allowed().is_finite())
+            found.is_some_and(|found| Judged::new(&seen, scheme, step, &directions, found).allowed().is_finite())
         };
         self.combinations().iter().all(|nodes| !sliding.senses().any(|sense| grows(nodes, sense)))
     }

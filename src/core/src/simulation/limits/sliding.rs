@@ -30,6 +30,9 @@ pub struct Sense {
     ranges: Vec<(f64, Option<Added>)>,
 }
 
+/// A step (s), and of the sets of closed nodes the one to which it adds most.
+type Looked<'a> = (f64, Option<(&'a [usize], Judged)>);
+
 /// Growth that steps of one range, or shorter ones, add.
 #[derive(Debug, Clone)]
 struct Added {
@@ -191,7 +194,7 @@ impl Checking<'_> {
                 let found = stability::stepped(&seen, scheme, expected, self.friction, &directions, continuous);
                 let Some(growth) = found else { continue };
                 if most.as_ref().is_none_or(|most| growth.stepped > most.judged.growth.stepped) {
-                    let judged = Judged::new(&seen, scheme, &directions, growth);
+                    let judged = Judged::new(&seen, scheme, expected, &directions, growth);
                     most = Some(Watched { nodes: nodes.clone(), model, continuous, judged });
                 }
             }
@@ -204,7 +207,7 @@ impl Checking<'_> {
         let (seen, directions) = self.closed_at(watched.model, &watched.nodes, sign);
         let (scheme, friction) = (self.parameters.scheme, self.friction);
         let growth = stability::stepped(&seen, scheme, step, friction, &directions, watched.continuous)?;
-        Some(Judged::new(&seen, scheme, &directions, growth))
+        Some(Judged::new(&seen, scheme, step, &directions, growth))
     }
 
     /// One of the models seen at closed nodes (at both parts of a nodal diameter), and their directions.
@@ -217,7 +220,7 @@ impl Checking<'_> {
     }
 
     /// Limits of every range: what a shorter step is refused or told for, a longer one is too.
-    fn added(&self, ranges: &[(f64, Option<(&[usize], Judged)>)], sign: f64) -> Vec<(f64, Option<Added>)> {
+    fn added(&self, ranges: &[Looked<'_>], sign: f64) -> Vec<(f64, Option<Added>)> {
         let mut added: Vec<(f64, Option<Added>)> = Vec::new();
         let (mut allowed, mut quiet) = (f64::INFINITY, f64::INFINITY);
         let (mut accepted, mut silent) = (None, None);
