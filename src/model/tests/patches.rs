@@ -111,8 +111,9 @@ fn rows_of_patches_across_the_thickness_add_up() {
         for &node in tip {
             assert!((all(&both, node) - all(&[patch], node)).abs() < 1e-12 * area, "patch {index}, node {node}");
         }
-        // Sides are chords between corners of elements, so that the round nose gives one row a tenth more.
-        assert!((both[0].area / both[1].area - 1.0).abs() < 0.2, "{} {}", both[0].area, both[1].area);
+        // The camber slants the ends of the tip against its chord, which gives one row more there.
+        let (share, end) = (both[0].area / both[1].area, index == 0 || index == 4);
+        assert!((share - 1.0).abs() < if end { 0.4 } else { 0.15 }, "patch {index}: {share}");
     }
 }
 
