@@ -84,11 +84,12 @@ fn rows_of_patches_across_the_thickness_add_up() {
             .iter()
             .map(|patch| patch.weights().map(|(node, weight)| weight * mesh.nodes[node][1]).sum::<f64>() / SIZE[1])
             .collect();
-        assert!(across[..3].iter().all(|place| (place - across[0]).abs() < 1e-12), "{kind:?}: {across:?}");
-        let mut both = [across[0], across[3]];
-        both.sort_by(f64::total_cmp);
         // The tip is flat, and arcs around the axis are not quite its heights.
-        assert!((both[0] - 1.0 / 3.0).abs() < 1e-3 && (both[1] - 2.0 / 3.0).abs() < 1e-3, "{kind:?}: {both:?}");
+        let mut thirds = [&across[..3], &across[3..]].map(|row| (row[0], row));
+        thirds.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for ((_, row), expected) in thirds.into_iter().zip([1.0 / 3.0, 2.0 / 3.0]) {
+            assert!(row.iter().all(|place| (place - expected).abs() < 1e-3), "{kind:?}: {across:?}");
+        }
         for (refused, told) in [([3, 0], "0 rows of 3"), ([3, 40], "40 rows of 3"), ([99, 1], "99 is outside")] {
             let error = tip_patches(&mesh, &set, refused, name).unwrap_err().to_string();
             assert!(error.contains(told), "{error}");
@@ -110,8 +111,9 @@ fn rows_of_patches_across_the_thickness_add_up() {
         for &node in tip {
             assert!((all(&both, node) - all(&[patch], node)).abs() < 1e-12 * area, "patch {index}, node {node}");
         }
-        // Neither side has more of the area than the other by far.
-        assert!((both[0].area / both[1].area - 1.0).abs() < 0.1, "{} {}", both[0].area, both[1].area);
+        // The camber slants the ends of the tip against its chord, which gives one row more there.
+        let (share, end) = (both[0].area / both[1].area, index == 0 || index == 4);
+        assert!((share - 1.0).abs() < if end { 0.4 } else { 0.15 }, "patch {index}: {share}");
     }
 }
 
