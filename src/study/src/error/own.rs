@@ -78,7 +78,7 @@ impl Own {
     ) -> Result<Self> {
         let schedule = Schedule::new(&scene.settings.experiment, None, None)?;
         let (interval, step) = (scene.settings.experiment.communication_step, scene.settings.time.step);
-        let own = (interval / step).ceil().max(1.0);
+        let own = f64::from(divisions(interval, step));
         let shares = if quick { &QUICK_SHARES[..] } else { &SHARES[..] };
         let mut divisions: Vec<u32> = shares.iter().map(|share| count(share * own)).collect();
         divisions.dedup();

@@ -137,17 +137,17 @@ fn coarser(scene: &Scene, quick: bool) -> Vec<Model> {
     });
     let mut tips = vec![scene.roms[index].clone()];
     tips.extend(halved);
+    let own_modes = Form::of(&tips[0]).modes(&tips[0]);
     let mut models = Vec::new();
     for (tip, rom) in tips.into_iter().enumerate() {
-        let modes = Form::of(&rom).modes(&rom);
         for halving in 0..=halvings {
-            let own = (tip, halving) == (0, 0);
-            let kept = modes >> halving;
-            let found = if halving == 0 { Ok(rom.clone()) } else { truncated(&rom, kept) };
+            // A coarser tip leaves its coordinates behind as modes.
+            let kept = own_modes >> halving;
+            let found = if Form::of(&rom).modes(&rom) == kept { Ok(rom.clone()) } else { truncated(&rom, kept) };
             if let (Ok(rom), true) = (found, kept > 0) {
                 let mut scene = scene.clone();
                 scene.roms[index] = rom;
-                models.push(Model::of(scene, own));
+                models.push(Model::of(scene, (tip, halving) == (0, 0)));
             }
         }
     }
