@@ -203,7 +203,7 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1, "something stays");
         told
     };
-    for name in ["convergence", "modes", "cube", "stage", "error", "inputs", "witness", "bases"] {
+    for name in ["convergence", "modes", "cube", "stage", "error", "inputs", "witness", "bases", "tolerance"] {
         let told = refuse(&[name, "--quick", "--out", "file/out"], 1);
         assert!(told.contains("file/out: cannot create the directory"), "{told}");
     }
@@ -247,6 +247,19 @@ fn the_quick_study_of_the_witness_meets_reduced_models() {
     }
     assert!(row("full model")["friction_work"].as_f64().unwrap() > 5.0);
     assert!(json["results"]["refused"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn the_quick_study_of_tolerances_keeps_them() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "tolerance", &[]);
+    only_no(&json, &[]);
+    for rub in ["light", "heavy"] {
+        let rows = json["results"].as_array().unwrap().iter().filter(|row| row["rub"] == rub);
+        let errors: Vec<f64> =
+            rows.filter(|row| row["method"] == "galerkin").map(|row| row["error"].as_f64().unwrap()).collect();
+        assert!(errors.len() == 4 && errors.windows(2).all(|pair| pair[1] < 0.7 * pair[0]), "{rub}: {errors:?}");
+    }
 }
 
 #[test]
