@@ -1,7 +1,7 @@
 //! One blade by full finite elements, without a reduction of any kind, rubbing against a rigid casing with two bumps.
 //!
-//! M ü + K u = Σ p F over all nodes of the mesh, undamped. [`tip`] says where contact is asked for: means over patches, or points of
-//! the tip's faces. [`march`] goes on in time. Mesh, element matrices and sparse factor are those of `tiprub-model`; contact and stepping
+//! M ü + K u = Σ p F over all nodes of the mesh, undamped. `tip` says where contact is asked for: means over patches, or points of
+//! the tip's faces. `march` goes on in time. Mesh, element matrices and sparse factor are those of `tiprub-model`; contact and stepping
 //! share nothing with the product.
 
 mod march;
