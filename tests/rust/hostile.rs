@@ -286,11 +286,11 @@ fn texts_enumerations_and_booleans() {
         assert_eq!(number, 2, "modal-exact");
         three.expect((api3.fmi3GetInt64)(three.handle, &raw const scheme, 1, &raw mut long, 1));
         assert_eq!(long, 2);
-        for value in [0_i64, 4, -1, i64::MAX] {
+        for value in [0_i64, 5, -1, i64::MAX] {
             let status = (api3.fmi3SetInt64)(three.handle, &raw const scheme, 1, &raw const value, 1);
             refused(status, &three.log(), "no item of Scheme");
         }
-        for value in [0, 4, i32::MIN] {
+        for value in [0, 5, i32::MIN] {
             let status = (api2.fmi2SetInteger)(two.handle, &raw const scheme, 1, &raw const value);
             refused(status, &two.log(), "1 = central-difference");
         }

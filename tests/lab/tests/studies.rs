@@ -223,10 +223,12 @@ fn the_quick_study_of_estimates_meets_the_truth() {
     let json = study(root.path(), "estimates", &[]);
     only_no(&json, &[]);
     let rows = json["results"].as_array().unwrap();
-    assert_eq!(rows.len(), 2 * 3, "scenes and directions");
-    for row in rows {
-        let [estimate, truth] = ["estimate", "truth"].map(|name| row[name].as_f64().unwrap());
-        assert!(estimate > 0.0 && (1e-6..0.5).contains(&truth), "{row:#}");
+    assert_eq!(rows.len(), 2 * (3 + 2), "scenes and directions, the mesh from one coarser and from two");
+    for (index, row) in rows.iter().enumerate() {
+        let truth = row["truth"].as_f64().unwrap();
+        let estimate = row["estimate"].as_f64();
+        // What the mesh leaves may be unknown.
+        assert!(estimate.map_or(index >= 6, |estimate| estimate > 0.0) && (1e-6..0.5).contains(&truth), "{row:#}");
     }
 }
 

@@ -291,7 +291,7 @@ impl Outcome {
     fn of(row: &Row) -> Self {
         match &row.outcome {
             Ok(_) => Self::Ran,
-            Err(reason) if reason.contains("≥ 2") => Self::Unstable,
+            Err(reason) if reason.contains("ω_max·h = ") => Self::Unstable,
             Err(_) => Self::Failed,
         }
     }
