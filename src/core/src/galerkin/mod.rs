@@ -9,6 +9,7 @@ pub mod level;
 pub mod response;
 pub mod rows;
 pub mod sector;
+pub mod state;
 #[cfg(test)]
 mod tests;
 pub mod trial;

@@ -1,7 +1,7 @@
 //! Shapes of the modes at the contact rows, laid out for sums over modes.
 
 use super::level::{ModeStep, Modes};
-use super::sector::SectorState;
+use super::state::SectorState;
 use crate::dynamics::bank::LANES;
 use crate::dynamics::dispatch::{InstructionSet, Kernel};
 use nalgebra::DMatrix;

@@ -4,8 +4,8 @@ use super::basis::{MOST, POINTS};
 use super::level::{Level, Modes};
 use super::response::TERMS;
 use super::rows::Rows;
+use super::state::SectorState;
 use super::trial::{Kind, Obstacle, Trial, Verdict};
-use nalgebra::DMatrix;
 
 /// Halvings of the span that a step may have.
 pub const HALVINGS: usize = 10;
@@ -49,56 +49,6 @@ impl Tables {
 /// `span` halved so many times (s).
 fn halved(span: f64, halvings: usize) -> f64 {
     libm::ldexp(span, -i32::try_from(halvings).unwrap_or(i32::MAX))
-}
-
-/// State of a sector between steps.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct SectorState {
-    /// q.
-    pub position: Vec<f64>,
-    /// q̇.
-    pub velocity: Vec<f64>,
-    /// Contact forces on the rows (N).
-    pub forces: Vec<f64>,
-    /// λ of the nodes (N).
-    pub multipliers: Vec<f64>,
-    /// Gaps of the nodes (m).
-    pub gaps: Vec<f64>,
-    /// Normals of the nodes.
-    pub normals: Vec<f64>,
-    /// Whether gaps and normals are those of now: nobody looked at the end of free flight.
-    pub looked: bool,
-    /// Energy that contacts which opened or closed have left to those to come (J).
-    pub bank: f64,
-    /// Level of the last step.
-    pub level: usize,
-}
-
-impl SectorState {
-    /// At rest, away from everything.
-    pub fn new(modes: usize, nodes: usize) -> Self {
-        Self {
-            position: vec![0.0; modes],
-            velocity: vec![0.0; modes],
-            forces: vec![0.0; 3 * nodes],
-            multipliers: vec![0.0; nodes],
-            gaps: vec![f64::INFINITY; nodes],
-            normals: vec![0.0; 3 * nodes],
-            looked: true,
-            bank: 0.0,
-            level: 0,
-        }
-    }
-
-    /// Kinetic and strain energy (J), that of the residual flexibility included.
-    pub fn energies(&self, frequencies: &[f64], residual: &DMatrix<f64>) -> (f64, f64) {
-        let kinetic = 0.5 * self.velocity.iter().map(|v| v * v).sum::<f64>();
-        let strain = self.position.iter().zip(frequencies).map(|(q, w)| (w * q) * (w * q)).sum::<f64>();
-        let held = residual.column_iter().zip(&self.forces).filter(|(_, force)| **force != 0.0);
-        let held: f64 =
-            held.map(|(column, force)| force * column.iter().zip(&self.forces).map(|(g, f)| g * f).sum::<f64>()).sum();
-        (kinetic, 0.5 * (strain + held))
-    }
 }
 
 /// What has been done to keep the tolerance.

@@ -1,7 +1,8 @@
 //! Sectors against a wall that moves: energy, order, tolerance.
 
 use super::level::{Level, Modes};
-use super::sector::{Demand, Effort, Marcher, SectorState, Tables, Taken, Witness};
+use super::sector::{Demand, Effort, Marcher, Tables, Taken, Witness};
+use super::state::SectorState;
 use super::trial::{Kind, Obstacle};
 use nalgebra::DMatrix;
 

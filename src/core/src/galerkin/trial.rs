@@ -3,7 +3,7 @@
 use super::basis::{MOST, POINTS};
 use super::level::Level;
 use super::rows::Rows;
-use super::sector::SectorState;
+use super::state::SectorState;
 use crate::dynamics::bank::LANES;
 use crate::dynamics::dispatch::{InstructionSet, Kernel};
 use crate::laws::active_set::ContactSolver;

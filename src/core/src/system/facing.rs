@@ -1,5 +1,6 @@
 //! One sector facing its surfaces over a span of time: gaps at any instant, and what contacts did.
 
+use super::growth::Growth;
 use super::pair::Pair;
 use crate::galerkin::basis::{Basis, POINTS};
 use crate::galerkin::level::Level;
@@ -8,29 +9,6 @@ use crate::galerkin::trial::{Kind, Obstacle};
 use crate::gaps::surface_spline::ClosestPoint;
 use crate::gaps::wrench::{At, Motion, Wrench};
 use crate::gaps::{Drive, dot};
-
-/// How the shape of a surface grows over a span: a factor that is linear in time, times ½(1 − cos(πt/T)) until T.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Growth {
-    /// Factor at the start and the end.
-    pub factors: [f64; 2],
-    /// Time since the growth began (s), at the start and the end.
-    pub elapsed: [f64; 2],
-    /// T (s), 0 for a shape that is there at once.
-    pub length: f64,
-}
-
-impl Growth {
-    /// Share of a shape that has grown in after a time (s) of `length` (s).
-    pub fn share(elapsed: f64, length: f64) -> f64 {
-        if elapsed >= length { 1.0 } else { 0.5 * (1.0 - libm::cos(std::f64::consts::PI * elapsed / length)) }
-    }
-
-    fn at(&self, theta: f64) -> f64 {
-        let between = |ends: [f64; 2]| ends[0] + theta * (ends[1] - ends[0]);
-        between(self.factors) * Self::share(between(self.elapsed), self.length)
-    }
-}
 
 /// How prescribed motion of a pair goes on over a span: from where it was, quadratic in time through the middle and the end. Inputs
 /// are linear in time and the angle of the rotor quadratic, so that this is exact; what grows in otherwise is the shape.

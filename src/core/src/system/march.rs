@@ -1,12 +1,14 @@
 //! One span of time by continuous Galerkin: each sector by itself, in steps of its own.
 
-use super::facing::{Course, Facing, Growth, Record};
+use super::facing::{Course, Facing, Record};
+use super::growth::Growth;
 use super::posed::Member;
 use super::{ContactEvent, Pair, StepFailure, Structure, System};
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::sectors::Sectors;
 use crate::galerkin::level::Modes;
-use crate::galerkin::sector::{Demand, Effort, Marcher, SectorState, Tables};
+use crate::galerkin::sector::{Demand, Effort, Marcher, Tables};
+use crate::galerkin::state::SectorState;
 use crate::gaps::Drive;
 use crate::gaps::wrench::Wrench;
 use crate::settings::Scheme;

@@ -1,7 +1,7 @@
 //! A contact pair: contact nodes of one structure against a surface, which another structure may carry.
 
 use super::Structure;
-use super::facing::Growth;
+use super::growth::Growth;
 use crate::gaps::frame::Frame;
 use crate::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
 use crate::gaps::wrench::Motion;
