@@ -68,11 +68,6 @@ impl Rows {
         }
     }
 
-    /// Rows, filled up to whole registers.
-    pub fn stride(&self) -> usize {
-        self.stride
-    }
-
     /// Shapes of a row in all modes.
     pub fn row(&self, row: usize) -> &[f64] {
         &self.by_row[row * self.rates.len()..][..self.rates.len()]
@@ -89,7 +84,7 @@ impl Rows {
     }
 
     /// Write the displacements of the modes alone and their velocities, and for `N` points the sums Σ φ (A q + B q̇) with the tables
-    /// told. All slices have [`Rows::stride`] entries.
+    /// told. All slices are filled up to whole registers.
     pub fn free<const N: usize>(
         &self,
         modes: &[ModeStep],
@@ -105,7 +100,7 @@ impl Rows {
         self.add_up(&self.by_mode, coefficients, sums);
     }
 
-    /// Displacements and velocities of the modes with inertia, [`Rows::stride`] entries each.
+    /// Displacements and velocities of the modes with inertia, filled up to whole registers.
     pub fn now(&self, state: &SectorState, sums: &mut [&mut [f64]; 2]) {
         sums.iter_mut().for_each(|sums| sums.fill(0.0));
         self.add_up(&self.by_mode, |mode| [state.position[mode], state.velocity[mode]], sums);

@@ -1,6 +1,6 @@
 //! One sector over a span of time: steps as long as the tolerance and the energy allow.
 
-use super::basis::{MOST, POINTS};
+use super::basis::MOST;
 use super::level::{Level, Modes};
 use super::response::TERMS;
 use super::rows::Rows;
@@ -86,8 +86,6 @@ pub struct Taken<'a> {
     pub kind: Kind,
     /// Forces, gaps and displacements at its points.
     pub trial: &'a Trial,
-    /// From where in the span, as a share of it.
-    pub from: f64,
     /// Damping loss (J).
     pub damping_loss: f64,
     /// ½ΔfᵀGΔf, what a constant force loses against the one before (J).
@@ -182,7 +180,7 @@ impl Marcher {
                 return Err(Unsolved);
             }
             effort.missed += u64::from(verdict.error > demand.tolerance);
-            self.take((table, kind), tables, state, witness, (from, &verdict));
+            self.take((table, kind), tables, state, witness, &verdict);
             effort.steps += 1;
             done += units;
             let even = done.is_multiple_of(2 * units);
@@ -227,7 +225,7 @@ impl Marcher {
         tables: &Tables,
         state: &mut SectorState,
         witness: &mut impl Witness,
-        (from, verdict): (f64, &Verdict),
+        verdict: &Verdict,
     ) {
         let points = self.trial.points;
         let dropped = if kind == Kind::Constant { self.dropped(tables, state) } else { 0.0 };
@@ -244,7 +242,7 @@ impl Marcher {
         state.gaps.copy_from_slice(&trial.gaps[points]);
         state.normals.copy_from_slice(&trial.normals[points]);
         state.looked = true;
-        witness.took(&Taken { level, kind, trial, from, damping_loss, dropped });
+        witness.took(&Taken { level, kind, trial, damping_loss, dropped });
     }
 
     /// ½ΔfᵀGΔf (J).
@@ -311,9 +309,4 @@ fn advance(level: &Level, state: &mut SectorState, modal: Option<&[Vec<f64>; MOS
 #[expect(clippy::cast_precision_loss, reason = "below 2^HALVINGS")]
 fn share(part: u64, whole: u64) -> f64 {
     part as f64 / whole as f64
-}
-
-/// Weighted sum of values at points.
-pub fn weighted(weights: &[f64; POINTS], value: impl Fn(usize) -> f64, count: usize) -> f64 {
-    (0..count).map(|i| weights[i] * value(i)).sum()
 }

@@ -6,6 +6,7 @@ use super::rows::Rows;
 use super::state::SectorState;
 use crate::dynamics::bank::LANES;
 use crate::dynamics::dispatch::{InstructionSet, Kernel};
+use crate::gaps::dot;
 use crate::laws::active_set::ContactSolver;
 use nalgebra::DMatrix;
 
@@ -93,12 +94,9 @@ pub enum Kind {
     Constant,
 }
 
-fn three(values: &[f64], node: usize) -> [f64; 3] {
+/// Three values of a node.
+pub fn three(values: &[f64], node: usize) -> [f64; 3] {
     [values[3 * node], values[3 * node + 1], values[3 * node + 2]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// y += A x for the entries of x that are not 0.

@@ -5,7 +5,7 @@ use super::pair::Pair;
 use crate::galerkin::basis::{Basis, POINTS};
 use crate::galerkin::level::Level;
 use crate::galerkin::sector::{Taken, Witness};
-use crate::galerkin::trial::{Kind, Obstacle};
+use crate::galerkin::trial::{Kind, Obstacle, three};
 use crate::gaps::surface_spline::ClosestPoint;
 use crate::gaps::wrench::{At, Motion, Wrench};
 use crate::gaps::{Drive, dot};
@@ -244,11 +244,6 @@ impl Witness for Facing<'_> {
         let [first, rest @ ..] = &mut self.record.places;
         first.copy_from_slice(&rest[step.trial.points - 1]);
     }
-}
-
-/// Three values of a node.
-fn three(values: &[f64], node: usize) -> [f64; 3] {
-    [values[3 * node], values[3 * node + 1], values[3 * node + 2]]
 }
 
 /// Weights of the work of forces at point i: S_ik, or those of a constant force.
