@@ -1,6 +1,7 @@
 //! Tables of the modes of one sector at one length of the step.
 
 use super::basis::{Basis, MOST, POINTS};
+use super::compliance::{Compliance, Lanes};
 use super::response::{Response, TERMS, by_points};
 use nalgebra::DMatrix;
 
@@ -77,15 +78,38 @@ impl Modes {
     }
 }
 
-/// What one mode does over a step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ModeStep {
-    /// Coefficients of q and q̇ in the displacement at points 1 … s.
-    pub points: [[f64; 2]; MOST],
+/// What the modes do over a step, mode by mode in each array.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModeSteps {
+    /// `[i][0, 1]`: coefficients of q and q̇ in the displacement at point i + 1.
+    pub points: [[Vec<f64>; 2]; MOST],
     /// q and q̇ at the end by (q, q̇, p_a).
-    pub end: [[f64; TERMS]; 2],
-    /// Damping loss (J).
-    pub loss: [[f64; TERMS]; TERMS],
+    pub end: [[Vec<f64>; TERMS]; 2],
+    /// Damping loss (J): a symmetric form of the same.
+    pub loss: [[Vec<f64>; TERMS]; TERMS],
+}
+
+impl ModeSteps {
+    fn new(count: usize) -> Self {
+        let zeros = || vec![0.0; count];
+        Self {
+            points: std::array::from_fn(|_| [zeros(), zeros()]),
+            end: std::array::from_fn(|_| std::array::from_fn(|_| zeros())),
+            loss: std::array::from_fn(|_| std::array::from_fn(|_| zeros())),
+        }
+    }
+
+    fn set(&mut self, mode: usize, response: &Response, at: &[[f64; TERMS]; MOST]) {
+        for (point, terms) in self.points.iter_mut().zip(at) {
+            (point[0][mode], point[1][mode]) = (terms[0], terms[1]);
+        }
+        for (rows, terms) in self.end.iter_mut().zip([&response.position, &response.velocity]) {
+            rows.iter_mut().zip(terms).for_each(|(row, term)| row[mode] = *term);
+        }
+        for (rows, terms) in self.loss.iter_mut().zip(&response.loss) {
+            rows.iter_mut().zip(terms).for_each(|(row, term)| row[mode] = *term);
+        }
+    }
 }
 
 /// Tables of one length of the step.
@@ -95,65 +119,60 @@ pub struct Level {
     pub step: f64,
     /// Points of the step.
     pub basis: Basis,
-    /// Per mode.
-    pub modes: Vec<ModeStep>,
-    /// P_ik, displacement of the rows at point i = 1 … s per force at point k = 0 … s, in the order (i − 1)(s + 1) + k (m/N),
-    /// residual flexibility at the same point included.
-    pub compliance: Vec<DMatrix<f64>>,
-    /// Displacement at the end per force that is constant over the step (m/N), residual flexibility included.
-    pub constant: DMatrix<f64>,
+    /// Of all modes.
+    pub modes: ModeSteps,
+    /// Displacements at the points per force at the points, residual flexibility included.
+    pub compliance: Compliance,
+    /// Displacement at the end per force that is constant over the step, residual flexibility included.
+    pub constant: Compliance,
     /// Whether any mode is damped.
     pub damped: bool,
-    /// Displacement of each mode at point i per force at point k.
-    scratch: Vec<[[f64; POINTS]; MOST]>,
+    /// Displacement of each mode at point i per force at point k, and at the end per constant force.
+    scratch: Vec<([[f64; POINTS]; MOST], f64)>,
+    block: DMatrix<f64>,
 }
 
 impl Level {
     /// Room for tables of degree s; [`Level::set_step`] fills them.
     pub fn new(modes: &Modes, degree: usize) -> Self {
-        let zeros = || DMatrix::zeros(modes.rows(), modes.rows());
-        let nothing = ModeStep { points: Default::default(), end: Default::default(), loss: Default::default() };
+        let nodes = modes.rows() / 3;
         Self {
             step: 0.0,
-            modes: vec![nothing; modes.len()],
-            compliance: (0..degree * (degree + 1)).map(|_| zeros()).collect(),
-            constant: zeros(),
+            modes: ModeSteps::new(modes.len()),
+            compliance: Compliance::new(Lanes { points: degree, nodes }),
+            constant: Compliance::new(Lanes { points: 1, nodes }),
             damped: false,
             basis: Basis::new(degree),
-            scratch: vec![[[0.0; POINTS]; MOST]; modes.len()],
+            scratch: vec![([[0.0; POINTS]; MOST], 0.0); modes.len()],
+            block: DMatrix::zeros(modes.rows(), modes.rows()),
         }
     }
 
     /// Fill the tables for step h (s). Does not allocate.
     pub fn set_step(&mut self, modes: &Modes, step: f64) {
-        let Self { basis, compliance, constant, scratch, .. } = self;
+        let Self { basis, scratch, block, .. } = self;
         self.step = step;
         self.damped = modes.damping_ratios.iter().any(|ratio| *ratio > 0.0);
         let ratios = modes.frequencies.iter().zip(&modes.damping_ratios);
-        for ((table, by), (frequency, ratio)) in self.modes.iter_mut().zip(scratch.iter_mut()).zip(ratios) {
+        for (mode, (by, (frequency, ratio))) in scratch.iter_mut().zip(ratios).enumerate() {
             let response = Response::new(*frequency, *ratio, step);
             let at = response.at_points(basis);
-            *by = at.map(|terms| by_points(&terms, basis));
-            *table = ModeStep {
-                points: at.map(|terms| [terms[0], terms[1]]),
-                end: [response.position, response.velocity],
-                loss: response.loss,
-            };
+            *by = (at.map(|terms| by_points(&terms, basis)), response.position[2]);
+            self.modes.set(mode, &response, &at);
         }
-        let count = basis.count();
-        for (index, matrix) in compliance.iter_mut().enumerate() {
-            let (i, k) = (index / count, index % count);
-            modes.weigh(|mode| scratch[mode][i][k], matrix);
-            if k == i + 1 {
-                *matrix += &modes.residual;
+        for i in 1..=basis.degree {
+            for k in 0..basis.count() {
+                modes.weigh(|mode| scratch[mode].0[i - 1][k], block);
+                if k == i {
+                    *block += &modes.residual;
+                }
+                self.compliance.set(i, k, block);
             }
         }
-        modes.weigh(|mode| self.modes[mode].end[0][2], constant);
-        *constant += &modes.residual;
-    }
-
-    /// P_ik of points i = 1 … s and k = 0 … s.
-    pub fn compliance_of(&self, i: usize, k: usize) -> &DMatrix<f64> {
-        &self.compliance[(i - 1) * self.basis.count() + k]
+        modes.weigh(|mode| scratch[mode].1, block);
+        *block += &modes.residual;
+        self.constant.set(1, 1, block);
+        self.compliance.hold();
+        self.constant.hold();
     }
 }

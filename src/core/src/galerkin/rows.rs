@@ -1,48 +1,66 @@
-//! Shapes of the modes at the contact rows, laid out for sums over modes.
+//! Shapes of the modes at the contact rows, laid out for sums over modes and over rows.
 
-use super::level::{ModeStep, Modes};
+use super::kernels::{Combine, PADDED};
+use super::level::{Level, Modes};
 use super::state::SectorState;
-use crate::dynamics::bank::LANES;
 use crate::dynamics::dispatch::{InstructionSet, Kernel};
 use nalgebra::DMatrix;
 
 /// What all lengths of the step share.
 #[derive(Debug, Clone)]
 pub struct Rows {
-    /// Mode by mode, filled up with zeros to whole registers.
+    /// Mode by mode: all nodes of the first component, of the second, of the third, filled up with zeros.
     by_mode: Vec<f64>,
     /// The same without signs.
     magnitudes: Vec<f64>,
     stride: usize,
-    instructions: InstructionSet,
-    /// Row by row.
+    /// Row by row (3·node + component), filled up with zeros.
     by_row: Vec<f64>,
+    instructions: InstructionSet,
     residual: DMatrix<f64>,
     error_form: DMatrix<f64>,
     /// ξω and 1/ω_d of each mode; the latter infinite of rigid ones.
     rates: Vec<[f64; 2]>,
+    /// 0, 1, 2, …
+    all: Vec<usize>,
 }
 
-/// Sums over modes for `N` sets of coefficients.
-struct AddUp<'a, 'b, F, const N: usize> {
-    shapes: &'a [f64],
-    stride: usize,
-    count: usize,
-    coefficients: F,
-    sums: &'a mut [&'b mut [f64]; N],
+/// Coefficients of all modes, and what they add up to; made once.
+#[derive(Debug, Clone)]
+pub struct Sums<const N: usize> {
+    coefficients: [Vec<f64>; N],
+    /// Of each set: all nodes of the first component, of the second, of the third.
+    pub rows: [Vec<f64>; N],
 }
 
-impl<F: FnMut(usize) -> [f64; N], const N: usize> Kernel for AddUp<'_, '_, F, N> {
+impl<const N: usize> Sums<N> {
+    /// For so many modes and contact nodes.
+    pub fn new(modes: usize, nodes: usize) -> Self {
+        Self {
+            coefficients: std::array::from_fn(|_| vec![0.0; modes]),
+            rows: std::array::from_fn(|_| vec![0.0; (3 * nodes).next_multiple_of(PADDED)]),
+        }
+    }
+
+    /// Three components of a node in a set.
+    pub fn three(&self, set: usize, node: usize, nodes: usize) -> [f64; 3] {
+        [0, 1, 2].map(|component| self.rows[set][component * nodes + node])
+    }
+}
+
+/// `to` = `a`·q + `b`·v of all modes.
+struct Weigh<'a> {
+    tables: [&'a [f64]; 2],
+    state: [&'a [f64]; 2],
+    to: &'a mut [f64],
+}
+
+impl Kernel for Weigh<'_> {
     #[inline(always)]
-    fn run(mut self) {
-        for mode in 0..self.count {
-            let coefficients = (self.coefficients)(mode);
-            let shape = &self.shapes[mode * self.stride..][..self.stride];
-            for (sums, coefficient) in self.sums.iter_mut().zip(coefficients) {
-                for (sum, shape) in sums[..shape.len()].iter_mut().zip(shape) {
-                    *sum += shape * coefficient;
-                }
-            }
+    fn run(self) {
+        let Self { tables: [a, b], state: [q, v], to } = self;
+        for (to, ((a, b), (q, v))) in to.iter_mut().zip(a.iter().zip(b).zip(q.iter().zip(v))) {
+            *to = a * q + b * v;
         }
     }
 }
@@ -50,30 +68,34 @@ impl<F: FnMut(usize) -> [f64; N], const N: usize> Kernel for AddUp<'_, '_, F, N>
 impl Rows {
     /// Of the modes of a sector.
     pub fn new(modes: &Modes) -> Self {
-        let stride = modes.rows().next_multiple_of(LANES);
-        let mut by_mode = vec![0.0; stride * modes.len()];
-        for (row, shape) in by_mode.chunks_exact_mut(stride).zip(modes.shapes.column_iter()) {
-            row[..shape.len()].copy_from_slice(shape.as_slice());
+        let (nodes, count) = (modes.rows() / 3, modes.len());
+        let stride = modes.rows().next_multiple_of(PADDED);
+        let mut by_mode = vec![0.0; stride * count];
+        for (entries, shape) in by_mode.chunks_exact_mut(stride).zip(modes.shapes.column_iter()) {
+            for (row, value) in shape.iter().enumerate() {
+                entries[(row % 3) * nodes + row / 3] = *value;
+            }
+        }
+        let padded = count.next_multiple_of(PADDED);
+        let mut by_row = vec![0.0; padded * modes.rows()];
+        for (entries, shapes) in by_row.chunks_exact_mut(padded).zip(modes.shapes.row_iter()) {
+            entries.iter_mut().zip(shapes.iter()).for_each(|(entry, shape)| *entry = *shape);
         }
         let rates = modes.frequencies.iter().zip(&modes.damping_ratios);
         Self {
             magnitudes: by_mode.iter().map(|shape| shape.abs()).collect(),
             by_mode,
             stride,
+            by_row,
             instructions: InstructionSet::detect(),
-            by_row: modes.shapes.transpose().as_slice().to_vec(),
             residual: modes.residual.clone(),
             error_form: modes.error_form(),
             rates: rates.map(|(w, ratio)| [ratio * w, 1.0 / (w * (1.0 - ratio * ratio).sqrt())]).collect(),
+            all: (0..count).collect(),
         }
     }
 
-    /// Shapes of a row in all modes.
-    pub fn row(&self, row: usize) -> &[f64] {
-        &self.by_row[row * self.rates.len()..][..self.rates.len()]
-    }
-
-    /// G (m/N).
+    /// G (m/N), rows 3·node + component.
     pub fn residual(&self) -> &DMatrix<f64> {
         &self.residual
     }
@@ -83,47 +105,46 @@ impl Rows {
         &self.error_form
     }
 
-    /// Write the displacements of the modes alone and their velocities, and for `N` points the sums Σ φ (A q + B q̇) with the tables
-    /// told. All slices are filled up to whole registers.
-    pub fn free<const N: usize>(
-        &self,
-        modes: &[ModeStep],
-        state: &SectorState,
-        points: [usize; N],
-        sums: &mut [&mut [f64]; N],
-    ) {
-        sums.iter_mut().for_each(|sums| sums.fill(0.0));
-        let coefficients = |mode: usize| {
-            let (table, q, v) = (&modes[mode].points, state.position[mode], state.velocity[mode]);
-            points.map(|point| table[point][0] * q + table[point][1] * v)
-        };
-        self.add_up(&self.by_mode, coefficients, sums);
+    /// For the first `points` points of the step, or for its end alone, the sums Σ φ (A q + B q̇).
+    pub fn free(&self, level: &Level, state: &SectorState, points: std::ops::Range<usize>, sums: &mut Sums<3>) {
+        for (point, to) in points.clone().zip(&mut sums.coefficients) {
+            let [a, b] = &level.modes.points[point];
+            self.instructions.run(Weigh { tables: [a, b], state: [&state.position, &state.velocity], to });
+        }
+        let [first, second, third] = &sums.coefficients;
+        let [one, two, three] = &mut sums.rows;
+        match points.len() {
+            3 => self.add_up(&self.by_mode, [first, second, third], [one, two, three]),
+            2 => self.add_up(&self.by_mode, [first, second], [one, two]),
+            _ => self.add_up(&self.by_mode, [first], [one]),
+        }
     }
 
-    /// Displacements and velocities of the modes with inertia, filled up to whole registers.
-    pub fn now(&self, state: &SectorState, sums: &mut [&mut [f64]; 2]) {
-        sums.iter_mut().for_each(|sums| sums.fill(0.0));
-        self.add_up(&self.by_mode, |mode| [state.position[mode], state.velocity[mode]], sums);
+    /// Displacements and velocities of the modes with inertia.
+    pub fn now(&self, state: &SectorState, sums: &mut Sums<2>) {
+        let [one, two] = &mut sums.rows;
+        self.add_up(&self.by_mode, [&state.position, &state.velocity], [one, two]);
     }
 
     /// How far each row can be from where it rests, whenever, as long as nothing pushes (m): the amplitudes of all modes together.
-    pub fn reach(&self, state: &SectorState, sums: &mut [&mut [f64]; 1]) {
-        sums[0].fill(0.0);
-        let amplitude = |mode: usize| {
-            let ([rate, per_frequency], q) = (self.rates[mode], state.position[mode]);
-            let turned = (state.velocity[mode] + rate * q) * per_frequency;
-            [(q * q + turned * turned).sqrt()]
-        };
-        self.add_up(&self.magnitudes, amplitude, sums);
+    pub fn reach(&self, state: &SectorState, sums: &mut Sums<1>) {
+        let [amplitudes] = &mut sums.coefficients;
+        let modes = self.rates.iter().zip(state.position.iter().zip(&state.velocity));
+        for (amplitude, ([rate, per_frequency], (q, v))) in amplitudes.iter_mut().zip(modes) {
+            let turned = (v + rate * q) * per_frequency;
+            *amplitude = (q * q + turned * turned).sqrt();
+        }
+        let [one] = &mut sums.rows;
+        self.add_up(&self.magnitudes, [&sums.coefficients[0]], [one]);
     }
 
-    fn add_up<const N: usize>(
-        &self,
-        shapes: &[f64],
-        coefficients: impl FnMut(usize) -> [f64; N],
-        sums: &mut [&mut [f64]; N],
-    ) {
-        let (stride, count) = (self.stride, self.rates.len());
-        self.instructions.run(AddUp { shapes, stride, count, coefficients, sums });
+    /// Forces on all modes, filled up to whole registers, for sets of forces on the rows `rows` (N).
+    pub fn modal_forces<const N: usize>(&self, rows: &[usize], forces: [&[f64]; N], sums: [&mut [f64]; N]) {
+        let stride = self.all.len().next_multiple_of(PADDED);
+        self.instructions.run(Combine { table: &self.by_row, stride, columns: rows, coefficients: forces, sums });
+    }
+
+    fn add_up<const N: usize>(&self, shapes: &[f64], coefficients: [&[f64]; N], sums: [&mut [f64]; N]) {
+        self.instructions.run(Combine { table: shapes, stride: self.stride, columns: &self.all, coefficients, sums });
     }
 }

@@ -1,8 +1,8 @@
 //! One sector over a span of time: steps as long as the tolerance and the energy allow.
 
+use super::advance::Advance;
 use super::basis::MOST;
 use super::level::{Level, Modes};
-use super::response::TERMS;
 use super::rows::Rows;
 use super::state::SectorState;
 use super::trial::{Kind, Obstacle, Trial, Verdict};
@@ -38,11 +38,6 @@ impl Tables {
         for (halvings, level) in self.levels.iter_mut().enumerate() {
             level.set_step(&self.modes, halved(span, halvings));
         }
-    }
-
-    /// Number of contact rows.
-    pub fn count(&self) -> usize {
-        self.rows.residual().nrows()
     }
 }
 
@@ -116,25 +111,19 @@ pub struct Unsolved;
 #[derive(Debug, Clone)]
 pub struct Marcher {
     trial: Trial,
-    /// φᵀp_a of one mode, and scratch of forces by θᵃ.
-    coefficients: [Vec<f64>; MOST],
-    modal: [Vec<f64>; MOST],
+    advance: Advance,
 }
 
 impl Marcher {
     /// Room for the modes and contact nodes of one sector.
     pub fn new(modes: usize, nodes: usize) -> Self {
-        Self {
-            trial: Trial::new(nodes),
-            coefficients: std::array::from_fn(|_| vec![0.0; 3 * nodes]),
-            modal: std::array::from_fn(|_| vec![0.0; modes]),
-        }
+        Self { trial: Trial::new(modes, nodes), advance: Advance::new(modes, nodes) }
     }
 
     /// Displacements of the rows of a sector (m).
     pub fn displacements(&mut self, tables: &Tables, state: &SectorState) -> &[f64] {
-        self.trial.find_start(&tables.rows, state);
-        &self.trial.displacements[0][..tables.count()]
+        self.trial.forget();
+        self.trial.find_start(&tables.rows, state)
     }
 
     /// March `state` over a span.
@@ -151,6 +140,7 @@ impl Marcher {
     ) -> Result<(), Unsolved> {
         const WHOLE: u64 = 1 << HALVINGS;
         let mut done = 0_u64;
+        self.trial.forget();
         while done < WHOLE {
             let level = state.level;
             let units = WHOLE >> level;
@@ -160,7 +150,8 @@ impl Marcher {
             if state.multipliers.iter().all(|value| *value == 0.0)
                 && witness.is_clear(from, length, self.trial.reach(&tables.rows, state))
             {
-                witness.flew(advance(table, state, None));
+                witness.flew(self.advance.freely(table, state));
+                self.trial.forget();
                 state.looked = false;
                 (effort.steps, done) = (effort.steps + 1, done + units);
                 state.level -= usize::from(level > 0 && done.is_multiple_of(2 * units));
@@ -227,27 +218,21 @@ impl Marcher {
         witness: &mut impl Witness,
         verdict: &Verdict,
     ) {
-        let points = self.trial.points;
         let dropped = if kind == Kind::Constant { self.dropped(tables, state) } else { 0.0 };
-        let pushed = self.find_modal_forces(level, kind, tables);
-        let damping_loss = advance(level, state, if pushed { Some(&self.modal) } else { None });
+        let (trial, basis) = (&self.trial, &level.basis);
+        let damping_loss = self.advance.under((level, &tables.rows), state, |node| trial.polynomial(basis, kind, node));
         state.bank += match kind {
             Kind::Polynomial if verdict.switches => -verdict.switched,
             Kind::Polynomial => 0.0,
             Kind::Constant => dropped + self.closed(),
         };
-        let trial = &self.trial;
-        state.forces.copy_from_slice(&trial.forces[points]);
-        state.multipliers.copy_from_slice(&trial.multipliers[points]);
-        state.gaps.copy_from_slice(&trial.gaps[points]);
-        state.normals.copy_from_slice(&trial.normals[points]);
-        state.looked = true;
-        witness.took(&Taken { level, kind, trial, damping_loss, dropped });
+        witness.took(&Taken { level, kind, trial: &self.trial, damping_loss, dropped });
+        self.trial.leave(state);
     }
 
     /// ½ΔfᵀGΔf (J).
     fn dropped(&self, tables: &Tables, state: &SectorState) -> f64 {
-        let change = |row: usize| self.trial.forces[1][row] - state.forces[row];
+        let change = |row: usize| self.trial.force(1, row / 3)[row % 3] - state.forces[row];
         let residual = tables.rows.residual();
         let rows = 0..residual.nrows();
         0.5 * rows
@@ -258,51 +243,10 @@ impl Marcher {
 
     /// What contacts that close under a constant force lose: λ times the gap there was (J).
     fn closed(&self) -> f64 {
-        let pairs = self.trial.multipliers[1].iter().zip(self.trial.gaps[0].iter().zip(&self.trial.gaps[1]));
-        pairs.filter(|(value, _)| **value > 0.0).map(|(value, (before, now))| value * (before - now)).sum()
+        let trial = &self.trial;
+        let lost = |node: usize| trial.multiplier(1, node) * (trial.gap(0, node) - trial.gap(1, node));
+        (0..trial.nodes()).filter(|node| trial.multiplier(1, *node) > 0.0).map(lost).sum()
     }
-
-    /// φᵀp_a of every mode; false without any force.
-    fn find_modal_forces(&mut self, level: &Level, kind: Kind, tables: &Tables) -> bool {
-        let (basis, points) = (&level.basis, self.trial.points);
-        let forces = &self.trial.forces;
-        if forces[..=points].iter().all(|forces| forces.iter().all(|force| *force == 0.0)) {
-            return false;
-        }
-        for a in 0..MOST {
-            self.modal[a].fill(0.0);
-            for row in 0..self.coefficients[a].len() {
-                let value = match kind {
-                    Kind::Constant if a == 0 => forces[1][row],
-                    Kind::Constant => 0.0,
-                    Kind::Polynomial => (0..basis.count()).map(|i| basis.projection[a][i] * forces[i][row]).sum(),
-                };
-                if value != 0.0 {
-                    self.modal[a]
-                        .iter_mut()
-                        .zip(tables.rows.row(row))
-                        .for_each(|(modal, shape)| *modal += shape * value);
-                }
-            }
-        }
-        true
-    }
-}
-
-/// q and q̇ at the end of the step, and the damping loss (J).
-fn advance(level: &Level, state: &mut SectorState, modal: Option<&[Vec<f64>; MOST]>) -> f64 {
-    let mut loss = 0.0;
-    let coordinates = state.position.iter_mut().zip(&mut state.velocity);
-    for (mode, (step, (q, v))) in level.modes.iter().zip(coordinates).enumerate() {
-        let forces = modal.map_or([0.0; MOST], |modal| [modal[0][mode], modal[1][mode], modal[2][mode]]);
-        let terms: [f64; TERMS] = [*q, *v, forces[0], forces[1], forces[2]];
-        let of = |row: &[f64; TERMS]| row.iter().zip(&terms).map(|(a, b)| a * b).sum::<f64>();
-        if level.damped {
-            loss += step.loss.iter().zip(&terms).map(|(row, term)| term * of(row)).sum::<f64>();
-        }
-        (*q, *v) = (of(&step.end[0]), of(&step.end[1]));
-    }
-    loss
 }
 
 /// Small counts as a share.

@@ -110,24 +110,29 @@ impl Witness for Wall {
         let (trial, basis) = (step.trial, &step.level.basis);
         self.damping += step.damping_loss;
         self.dropped += step.dropped;
-        for node in 0..trial.gaps[0].len() {
-            for row in 3 * node..3 * node + 3 {
+        for node in 0..trial.nodes() {
+            for component in 0..3 {
+                let force = |point: usize| trial.force(point, node)[component];
+                let moved = |point: usize| trial.displacement(point, node)[component];
+                if (0..=trial.points()).all(|point| force(point) == 0.0) {
+                    continue;
+                }
                 if step.kind == Kind::Constant {
-                    self.work += trial.forces[1][row] * (trial.displacements[1][row] - trial.displacements[0][row]);
+                    self.work += force(1) * (moved(1) - moved(0));
                     continue;
                 }
                 for i in 0..basis.count() {
                     for k in 0..basis.count() {
-                        self.work += trial.forces[i][row] * basis.work[i][k] * trial.displacements[k][row];
+                        self.work += force(i) * basis.work[i][k] * moved(k);
                     }
                 }
             }
-            let pushes: Vec<bool> = (0..=trial.points).map(|i| trial.multipliers[i][node] > 0.0).collect();
+            let pushes: Vec<bool> = (0..=trial.points()).map(|i| trial.multiplier(i, node) > 0.0).collect();
             self.switches += u64::from(pushes.iter().any(|one| *one) && !pushes.iter().all(|one| *one));
-            for i in 0..=trial.points {
-                self.lowest = self.lowest.min(trial.gaps[i][node]);
+            for i in 0..=trial.points() {
+                self.lowest = self.lowest.min(trial.gap(i, node));
                 if step.kind == Kind::Polynomial {
-                    self.impulse += basis.weights[i] * trial.multipliers[i][node] * step.level.step;
+                    self.impulse += basis.weights[i] * trial.multiplier(i, node) * step.level.step;
                 }
             }
         }
@@ -216,17 +221,22 @@ fn errors_are_those_asked_for() {
     }
 }
 
+/// Whatever the tolerance, none ever has more. What is lost depends on chance: the lossy switches that come with a step. Half of the
+/// sectors lose little where the tolerance is small.
 #[test]
 fn an_undamped_sector_never_has_more_energy_than_it_was_given() {
     let mut random = Random(11);
-    for tolerance in [1e-3, 1e-6] {
-        let modes = modes(10, 2, 0.0, &mut random);
-        let found = run(&modes, Wall::new(1e-4, 0.0, 0.0), 4e-5, 5000, tolerance, 0.5);
-        println!(
-            "{tolerance:e}: {:?}, switches {}, energy {} of {}",
-            found.effort, found.wall.switches, found.energy, found.most
-        );
-        assert!(found.wall.switches > 500 && found.most <= found.start * (1.0 + 1e-11));
-        assert!(found.energy < found.start && found.energy > 0.9 * found.start);
-    }
+    let mut kept = [1e-3, 1e-6].map(|tolerance| -> Vec<f64> {
+        let run = || {
+            let modes = modes(10, 2, 0.0, &mut random);
+            let found = run(&modes, Wall::new(1e-4, 0.0, 0.0), 4e-5, 5000, tolerance, 0.5);
+            assert!(found.wall.switches > 100 && found.most <= found.start * (1.0 + 1e-11));
+            assert!(found.energy < found.start);
+            found.energy / found.start
+        };
+        std::iter::repeat_with(run).take(11).collect()
+    });
+    kept.iter_mut().for_each(|kept| kept.sort_by(f64::total_cmp));
+    println!("share of the energy that is left: {kept:.4?}");
+    assert!(kept[1][5] > 0.99 && kept[1][5] > kept[0][5] && kept[0][0] > 0.5);
 }

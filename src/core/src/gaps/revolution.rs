@@ -164,6 +164,94 @@ fn small_arc_tangent(t: f64) -> f64 {
     t * (1.0 - square * series.fold(1.0 / 21.0, |sum, odd: f64| 1.0 / odd - square * sum))
 }
 
+/// Nodes of one sector at several instants, each a lane, before a surface that nothing but the rotor's angle moves past a shaft that
+/// stays: what their gaps depend on beside displacements. Allocates only when made.
+#[derive(Debug, Clone, Default)]
+pub struct Instants {
+    /// Angle of the undisplaced node, from where the shape starts (rad).
+    angles: Vec<f64>,
+    /// Clearance without the shape (m), and factor of the shape.
+    clearances: Vec<f64>,
+    factors: Vec<f64>,
+    per_radius: Vec<f64>,
+    slopes: Vec<f64>,
+    /// Shape and its slope.
+    shape: [Vec<f64>; 2],
+}
+
+impl Instants {
+    /// Room for so many lanes, all infinitely far away.
+    pub fn new(lanes: usize) -> Self {
+        let zeros = || vec![0.0; lanes];
+        Self {
+            angles: zeros(),
+            clearances: vec![f64::INFINITY; lanes],
+            factors: zeros(),
+            per_radius: zeros(),
+            slopes: zeros(),
+            shape: [zeros(), zeros()],
+        }
+    }
+}
+
+impl RevolutionGap {
+    /// A lane is this node at this instant. False, and nothing done, where gaps depend on more than [`Instants`].
+    pub fn enter(&self, at: At<'_>, lane: usize, instants: &mut Instants) -> bool {
+        if self.shaft_moves {
+            return false;
+        }
+        let (layout, drive) = (&self.layout, at.drive);
+        instants.angles[lane] = layout.angles[at.index] + (drive.rotor_angle - drive.shape_rotation);
+        instants.clearances[lane] = layout.clearances[at.index % layout.lanes] + drive.gap_offset + drive.radius_change;
+        instants.factors[lane] = drive.shape_factor;
+        instants.per_radius[lane] = layout.per_radius[at.node];
+        instants.slopes[lane] = self.slopes[at.node];
+        true
+    }
+
+    /// Gaps (m) and unit normals of all lanes for the displacements `moved` (m): three rows of lanes of `moved` and of `normals`.
+    pub fn of_lanes(&self, instants: &mut Instants, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
+        self.instruction_set.run(EvaluateLanes { surface: &self.surface, instants, moved, gaps, normals });
+    }
+}
+
+/// Gaps and normals of lanes.
+struct EvaluateLanes<'a> {
+    surface: &'a Surface,
+    instants: &'a mut Instants,
+    moved: &'a [f64],
+    gaps: &'a mut [f64],
+    normals: &'a mut [f64],
+}
+
+impl Kernel for EvaluateLanes<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { surface, instants, moved, gaps, normals } = self;
+        let width = gaps.len();
+        let Instants { angles, clearances, factors, per_radius, slopes, shape: [shape, steepness] } = instants;
+        let (shape, steepness) = (&mut shape[..width], &mut steepness[..width]);
+        let (radial, rest) = moved.split_at(width);
+        let (tangential, axial) = rest.split_at(width);
+        let (outwards, rest) = normals.split_at_mut(width);
+        let (around, along) = rest.split_at_mut(width);
+        let (angles, per_radius) = (&angles[..width], &per_radius[..width]);
+        for lane in 0..width {
+            outwards[lane] = angles[lane] + tangential[lane] * per_radius[lane];
+        }
+        surface.evaluate_row(outwards, shape, steepness);
+        let (clearances, factors, slopes) = (&clearances[..width], &factors[..width], &slopes[..width]);
+        let (along, axial) = (&mut along[..width], &axial[..width]);
+        for lane in 0..width {
+            let (slope, sideways) = (slopes[lane], factors[lane] * steepness[lane] * per_radius[lane]);
+            let per_length = 1.0 / (1.0 + sideways * sideways + slope * slope).sqrt();
+            let open = clearances[lane] + factors[lane] * shape[lane] - radial[lane] + slope * axial[lane];
+            gaps[lane] = open * per_length;
+            (outwards[lane], around[lane], along[lane]) = (-per_length, sideways * per_length, slope * per_length);
+        }
+    }
+}
+
 /// Gaps and normals of all nodes and lanes on a surface of revolution. `SHAFT`: the shaft's centre moves.
 struct Evaluate<'a, const SHAFT: bool> {
     law: &'a RevolutionGap,

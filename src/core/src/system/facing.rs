@@ -2,10 +2,13 @@
 
 use super::growth::Growth;
 use super::pair::Pair;
-use crate::galerkin::basis::{Basis, POINTS};
+use crate::galerkin::basis::{Basis, MOST, POINTS};
+use crate::galerkin::compliance::Lanes;
 use crate::galerkin::level::Level;
 use crate::galerkin::sector::{Taken, Witness};
 use crate::galerkin::trial::{Kind, Obstacle, three};
+use crate::gaps::GapLaw;
+use crate::gaps::revolution::Instants;
 use crate::gaps::surface_spline::ClosestPoint;
 use crate::gaps::wrench::{At, Motion, Wrench};
 use crate::gaps::{Drive, dot};
@@ -126,7 +129,12 @@ pub struct Record {
     pub courses: Vec<Course>,
     /// At the points of the step being tried, pair by pair.
     drives: Vec<[(Drive, Motion); POINTS]>,
+    /// Motion that forces at each point of the step taken work on, pair by pair.
+    motions: Vec<[Motion; POINTS]>,
     places: [Vec<ClosestPoint>; POINTS],
+    instants: Instants,
+    /// All nodes at all points are in `instants`, before the surface of this pair.
+    lanes_of: Option<usize>,
     /// A contact that small displacements cannot describe.
     pub implausible: bool,
 }
@@ -139,7 +147,10 @@ impl Record {
             work: Worked::default(),
             courses: vec![Course::default(); pairs],
             drives: vec![[<(Drive, Motion)>::default(); POINTS]; pairs],
+            motions: vec![[Motion::default(); POINTS]; pairs],
             places: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
+            instants: Instants::new(Lanes { points: MOST, nodes }.width()),
+            lanes_of: None,
             implausible: false,
         }
     }
@@ -171,6 +182,27 @@ impl Facing<'_> {
     }
 }
 
+impl Facing<'_> {
+    /// All nodes at all points as lanes, where they face one surface of revolution and the shaft stays.
+    fn enter_lanes(&mut self, lanes: Lanes) -> Option<usize> {
+        let pair = (*self.pair_of.first()?)?;
+        let GapLaw::Revolution(law) = self.pairs[pair].gap() else { return None };
+        for (node, other) in self.pair_of.iter().enumerate() {
+            if *other != Some(pair) {
+                return None;
+            }
+            for point in 1..=lanes.points {
+                let drive = &self.record.drives[pair][point].0;
+                let at = At { node, index: node * self.lanes + self.sector, drive };
+                if !law.enter(at, lanes.at(point, node), &mut self.record.instants) {
+                    return None;
+                }
+            }
+        }
+        Some(pair)
+    }
+}
+
 impl Obstacle for Facing<'_> {
     fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
         let Some(pair) = self.pair_of[node] else { return (f64::INFINITY, [0.0; 3]) };
@@ -178,6 +210,20 @@ impl Obstacle for Facing<'_> {
         let (gap, normal, place) = self.pairs[pair].gap_mut().of_one(at, moved);
         self.record.places[point][node] = place;
         (gap, normal)
+    }
+
+    fn gaps(&mut self, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
+        if let Some(pair) = self.record.lanes_of
+            && let GapLaw::Revolution(law) = self.pairs[pair].gap()
+        {
+            return law.of_lanes(&mut self.record.instants, moved, gaps, normals);
+        }
+        for lane in 0..lanes.len() {
+            let (point, node) = lanes.place(lane);
+            let (gap, normal) = self.gap(node, point, lanes.three(moved, lane));
+            gaps[lane] = gap;
+            lanes.set(normals, lane, normal);
+        }
     }
 
     fn direction(
@@ -209,6 +255,7 @@ impl Witness for Facing<'_> {
                 *drive = course.at(from + length * theta);
             }
         }
+        self.record.lanes_of = self.enter_lanes(Lanes { points: count - 1, nodes: self.pair_of.len() });
     }
 
     fn is_clear(&self, from: f64, length: f64, reach: &[f64]) -> bool {
@@ -231,18 +278,19 @@ impl Witness for Facing<'_> {
     fn took(&mut self, step: &Taken) {
         self.record.work.damping += step.damping_loss;
         self.record.work.dropped += step.dropped;
+        self.weigh_motions(step);
         for (node, pair) in self.pair_of.iter().enumerate() {
             let Some(pair) = *pair else { continue };
-            let points = step.trial.points;
-            let gaps = (1..=points).map(|point| step.trial.gaps[point][node]);
+            let points = step.trial.points();
+            let gaps = (1..=points).map(|point| step.trial.gap(point, node));
             let tally = &mut self.record.tallies[node];
             tally.lowest = gaps.fold(tally.lowest, f64::min);
-            if (0..=points).any(|point| step.trial.multipliers[point][node] > 0.0) {
+            if (0..=points).any(|point| step.trial.multiplier(point, node) > 0.0) {
                 self.enter(step, node, pair);
             }
         }
         let [first, rest @ ..] = &mut self.record.places;
-        first.copy_from_slice(&rest[step.trial.points - 1]);
+        first.copy_from_slice(&rest[step.trial.points() - 1]);
     }
 }
 
@@ -256,22 +304,31 @@ fn work_weights(basis: &Basis, kind: Kind, i: usize) -> [f64; POINTS] {
 }
 
 impl Facing<'_> {
-    /// Enter what a node that pushes did over a step.
+    /// Σ_k S_ik of the prescribed motion of a pair at the points, for each point i of the step.
+    fn weigh_motions(&mut self, step: &Taken) {
+        let points = 0..=step.trial.points();
+        for (motions, drives) in self.record.motions.iter_mut().zip(&self.record.drives) {
+            for i in points.clone() {
+                let weights = work_weights(&step.level.basis, step.kind, i);
+                let terms = points.clone().map(|k| drives[k].1.less(&drives[0].1).over(weights[k]));
+                motions[i] = terms.fold(Motion::default(), |sum, term| sum.since(&term));
+            }
+        }
+    }
+
+    /// Enter what a node that pushes did over a step. All work is linear in displacements and motion, which are weighted first.
     fn enter(&mut self, step: &Taken, node: usize, pair: usize) {
         let (trial, basis) = (step.trial, &step.level.basis);
         let (mut tally, mut work) = (self.record.tallies[node], self.record.work);
-        let drives = self.record.drives[pair];
-        for i in 0..=trial.points {
-            let normal_force = trial.multipliers[i][node];
-            if normal_force == 0.0 {
-                continue;
-            }
+        let (drives, motions) = (&self.record.drives[pair], &self.record.motions[pair]);
+        let gap = self.pairs[pair].gap();
+        for i in (0..=trial.points()).filter(|i| trial.multiplier(*i, node) != 0.0) {
+            let normal_force = trial.multiplier(i, node);
             let at = self.at(node, &drives[i].0);
-            let gap = self.pairs[pair].gap();
-            let (force, normal) = (three(&trial.forces[i], node), three(&trial.normals[i], node));
-            let moved = three(&trial.displacements[i], node);
-            let point = gap.contact_point(at, moved, self.record.places[i][node]);
-            self.record.implausible |= !gap.is_plausible(node, trial.gaps[i][node], normal);
+            let (force, normal, moved) = (trial.force(i, node), trial.normal(i, node), trial.displacement(i, node));
+            let (place, motion) = (self.record.places[i][node], &motions[i]);
+            let point = gap.contact_point(at, moved, place);
+            self.record.implausible |= !gap.is_plausible(node, trial.gap(i, node), normal);
             let tangential: [f64; 3] = std::array::from_fn(|c| force[c] - normal_force * normal[c]);
             let wrench = gap.wrench(at, point, force);
             let length = step.level.step
@@ -285,34 +342,24 @@ impl Facing<'_> {
                 tally.wrench.moment[c] += length * wrench.moment[c];
                 tally.wrench.point[c] += length * normal_force * wrench.point[c];
             }
-            for (k, weight) in work_weights(basis, step.kind, i).into_iter().enumerate() {
-                if weight == 0.0 {
-                    continue;
-                }
-                let motion = drives[k].1.less(&drives[0].1);
-                let spin = gap.spin_motion(at, point, &motion);
-                let shaft = gap.shaft_motion(at, point, &motion);
-                let surface = gap.surface_motion(at, point, normal, self.record.places[i][node], &motion);
-                let there = three(&trial.displacements[k], node);
-                let slip: [f64; 3] = std::array::from_fn(|c| there[c] + spin[c] + shaft[c]);
-                let heat = -weight * dot(tangential, slip);
-                let entries = [
-                    (&mut work.shaft, -weight * dot(force, spin)),
-                    (
-                        &mut work.whirl,
-                        -weight * (wrench.force[0] * motion.shaft[0] + wrench.force[1] * motion.shaft[1]),
-                    ),
-                    (&mut work.shift, -weight * wrench.force[2] * motion.shaft[2]),
-                    (&mut work.casing, weight * normal_force * surface),
-                ];
-                for (sum, term) in entries {
-                    *sum += term;
-                }
-                work.heat += heat;
-                tally.heat += heat;
-                work.closing -= weight * normal_force * trial.gaps[k][node];
-                work.exact += weight * dot(force, there);
+            let weights = work_weights(basis, step.kind, i);
+            let (mut there, mut open) = ([0.0; 3], 0.0);
+            for k in (0..=trial.points()).filter(|k| weights[*k] != 0.0) {
+                let displaced = trial.displacement(k, node);
+                there = std::array::from_fn(|c| there[c] + weights[k] * displaced[c]);
+                open += weights[k] * trial.gap(k, node);
             }
+            let (spin, shaft) = (gap.spin_motion(at, point, motion), gap.shaft_motion(at, point, motion));
+            let slip: [f64; 3] = std::array::from_fn(|c| there[c] + spin[c] + shaft[c]);
+            let heat = -dot(tangential, slip);
+            work.shaft -= dot(force, spin);
+            work.whirl -= wrench.force[0] * motion.shaft[0] + wrench.force[1] * motion.shaft[1];
+            work.shift -= wrench.force[2] * motion.shaft[2];
+            work.casing += normal_force * gap.surface_motion(at, point, normal, place, motion);
+            work.heat += heat;
+            tally.heat += heat;
+            work.closing -= normal_force * open;
+            work.exact += dot(force, there);
         }
         (self.record.tallies[node], self.record.work) = (tally, work);
     }

@@ -1,0 +1,142 @@
+//! The modes of a sector from the start of a step to its end.
+
+use super::basis::MOST;
+use super::kernels::PADDED;
+use super::level::{Level, ModeSteps};
+use super::response::TERMS;
+use super::rows::Rows;
+use super::state::SectorState;
+use crate::dynamics::dispatch::{InstructionSet, Kernel};
+
+/// Scratch; made once.
+#[derive(Debug, Clone)]
+pub struct Advance {
+    /// Rows under a force, and the coefficients of θᵃ of what acts on them (N).
+    rows: Vec<usize>,
+    forces: [Vec<f64>; MOST],
+    /// φᵀp_a of every mode.
+    modal: [Vec<f64>; MOST],
+    losses: Vec<f64>,
+    instructions: InstructionSet,
+}
+
+/// All modes to the end of a step, `TERMS` of them with forces and 2 without, and their damping losses (J).
+struct End<'a, const COUNT: usize> {
+    tables: &'a ModeSteps,
+    state: [&'a mut [f64]; 2],
+    modal: [&'a [f64]; MOST],
+    /// None where nothing is damped.
+    losses: Option<&'a mut [f64]>,
+}
+
+impl<const COUNT: usize> Kernel for End<'_, COUNT> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { tables, state: [position, velocity], modal, losses } = self;
+        let count = position.len();
+        let velocity = &mut velocity[..count];
+        let modal = modal.map(|modal| &modal[..count]);
+        let end: [[&[f64]; COUNT]; 2] = [0, 1].map(|row| std::array::from_fn(|term| &tables.end[row][term][..count]));
+        let z = |mode: usize, q: f64, v: f64| -> [f64; COUNT] {
+            std::array::from_fn(|term| match term {
+                0 => q,
+                1 => v,
+                _ => modal[term - 2][mode],
+            })
+        };
+        if let Some(losses) = losses {
+            let losses = &mut losses[..count];
+            let forms: [[&[f64]; COUNT]; COUNT] =
+                std::array::from_fn(|row| std::array::from_fn(|term| &tables.loss[row][term][..count]));
+            for mode in 0..count {
+                let z = z(mode, position[mode], velocity[mode]);
+                let mut loss = 0.0;
+                for row in 0..COUNT {
+                    let mut sum = 0.0;
+                    for term in 0..COUNT {
+                        sum += forms[row][term][mode] * z[term];
+                    }
+                    loss += z[row] * sum;
+                }
+                losses[mode] = loss;
+            }
+        }
+        for mode in 0..count {
+            let z = z(mode, position[mode], velocity[mode]);
+            let mut sums = [0.0; 2];
+            for (sum, rows) in sums.iter_mut().zip(&end) {
+                for (row, z) in rows.iter().zip(&z) {
+                    *sum += row[mode] * z;
+                }
+            }
+            [position[mode], velocity[mode]] = sums;
+        }
+    }
+}
+
+impl Advance {
+    /// Room for so many modes and contact nodes.
+    pub fn new(modes: usize, nodes: usize) -> Self {
+        let padded = || vec![0.0; modes.next_multiple_of(PADDED)];
+        Self {
+            rows: Vec::with_capacity(3 * nodes),
+            forces: std::array::from_fn(|_| vec![0.0; 3 * nodes]),
+            modal: std::array::from_fn(|_| padded()),
+            losses: padded(),
+            instructions: InstructionSet::detect(),
+        }
+    }
+
+    /// q and q̇ at the end of a step without any force, and the damping loss (J).
+    pub fn freely(&mut self, level: &Level, state: &mut SectorState) -> f64 {
+        self.finish::<2>(level, state)
+    }
+
+    /// The same under forces: `forces(node)` has the coefficients of θᵃ of those on a node (N), if there are any.
+    pub fn under(
+        &mut self,
+        (level, rows): (&Level, &Rows),
+        state: &mut SectorState,
+        forces: impl Fn(usize) -> Option<[[f64; 3]; MOST]>,
+    ) -> f64 {
+        self.rows.clear();
+        for node in 0..self.forces[0].len() / 3 {
+            let Some(coefficients) = forces(node) else { continue };
+            for component in 0..3 {
+                for (forces, values) in self.forces.iter_mut().zip(coefficients) {
+                    forces[self.rows.len()] = values[component];
+                }
+                self.rows.push(3 * node + component);
+            }
+        }
+        if self.rows.is_empty() {
+            return self.freely(level, state);
+        }
+        let [a, b, c] = &self.forces;
+        let [one, two, three] = &mut self.modal;
+        rows.modal_forces(&self.rows, [a, b, c], [one, two, three]);
+        self.finish::<TERMS>(level, state)
+    }
+
+    fn finish<const COUNT: usize>(&mut self, level: &Level, state: &mut SectorState) -> f64 {
+        let [a, b, c] = &self.modal;
+        let losses = level.damped.then_some(&mut self.losses[..]);
+        let end = End::<COUNT> {
+            tables: &level.modes,
+            state: [&mut state.position, &mut state.velocity],
+            modal: [a, b, c],
+            losses,
+        };
+        self.instructions.run(end);
+        if level.damped { sum(&self.losses[..state.position.len()]) } else { 0.0 }
+    }
+}
+
+/// Sum in eight parts, whatever registers there are.
+fn sum(values: &[f64]) -> f64 {
+    let mut parts = [0.0; PADDED];
+    for chunk in values.chunks(PADDED) {
+        parts.iter_mut().zip(chunk).for_each(|(part, value)| *part += value);
+    }
+    parts.iter().sum()
+}

@@ -1,0 +1,119 @@
+//! How contact forces at the points of a step move the contact rows at these points.
+
+use super::kernels::PADDED;
+use nalgebra::DMatrix;
+
+/// Lanes of a step: points 1 … s one after the other, nodes within them, filled up to whole registers. What has three components has
+/// one row of lanes for each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Lanes {
+    /// s.
+    pub points: usize,
+    /// Contact nodes.
+    pub nodes: usize,
+}
+
+impl Lanes {
+    /// Those in use.
+    pub fn len(self) -> usize {
+        self.points * self.nodes
+    }
+
+    /// Without any.
+    pub fn is_empty(self) -> bool {
+        self.len() == 0
+    }
+
+    /// Length of a row.
+    pub fn width(self) -> usize {
+        self.len().next_multiple_of(PADDED)
+    }
+
+    /// Lane of a node at point 1 … s.
+    pub fn at(self, point: usize, node: usize) -> usize {
+        (point - 1) * self.nodes + node
+    }
+
+    /// Point 1 … s and node of a lane.
+    pub fn place(self, lane: usize) -> (usize, usize) {
+        (lane / self.nodes + 1, lane % self.nodes)
+    }
+
+    /// Three components of a lane.
+    pub fn three(self, values: &[f64], lane: usize) -> [f64; 3] {
+        [0, 1, 2].map(|component| values[component * self.width() + lane])
+    }
+
+    /// Set them.
+    pub fn set(self, values: &mut [f64], lane: usize, to: [f64; 3]) {
+        for (component, value) in to.into_iter().enumerate() {
+            values[component * self.width() + lane] = value;
+        }
+    }
+}
+
+/// Displacements (m) of all lanes per force (N), a column of three rows of lanes for each component of force.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Compliance {
+    lanes: Lanes,
+    /// Forces at point 0 and at points 1 … s: column 3(k·nodes + node) + component.
+    columns: Vec<f64>,
+    /// Forces that are the same at points 1 … s: column 3·node + component.
+    held: Vec<f64>,
+}
+
+impl Compliance {
+    /// All zero.
+    pub fn new(lanes: Lanes) -> Self {
+        let stride = 3 * lanes.width();
+        let column = 3 * lanes.nodes * stride;
+        Self { lanes, columns: vec![0.0; (lanes.points + 1) * column], held: vec![0.0; column] }
+    }
+
+    /// Lanes.
+    pub fn lanes(&self) -> Lanes {
+        self.lanes
+    }
+
+    /// Length of a column.
+    pub fn stride(&self) -> usize {
+        3 * self.lanes.width()
+    }
+
+    /// Columns of forces at points 0 … s.
+    pub fn columns(&self) -> &[f64] {
+        &self.columns
+    }
+
+    /// Columns of forces that stay from point 1 on.
+    pub fn held(&self) -> &[f64] {
+        &self.held
+    }
+
+    /// Three columns, of a force at lane `lane`.
+    pub fn of_lane(&self, lane: usize) -> [&[f64]; 3] {
+        let stride = self.stride();
+        let first = 3 * (lane + self.lanes.nodes);
+        [0, 1, 2].map(|component| &self.columns[(first + component) * stride..][..stride])
+    }
+
+    /// Enter P_ik (rows × rows, m/N) of points i = 1 … s and k = 0 … s. After the last the columns that are held follow with
+    /// [`Compliance::hold`].
+    pub fn set(&mut self, i: usize, k: usize, block: &DMatrix<f64>) {
+        let (lanes, stride) = (self.lanes, self.stride());
+        for (force, column) in block.column_iter().enumerate() {
+            let target = &mut self.columns[(3 * k * lanes.nodes + force) * stride..][..stride];
+            for (row, value) in column.iter().enumerate() {
+                target[(row % 3) * lanes.width() + lanes.at(i, row / 3)] = *value;
+            }
+        }
+    }
+
+    /// Add up the columns of points 1 … s.
+    pub fn hold(&mut self) {
+        self.held.fill(0.0);
+        for columns in self.columns.chunks_exact(self.held.len()).skip(1) {
+            self.held.iter_mut().zip(columns).for_each(|(held, column)| *held += column);
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Loops over columns and lanes, compiled for every set of instructions.
+
+use crate::dynamics::dispatch::Kernel;
+use nalgebra::DMatrix;
+
+/// Tables have columns of a multiple of so many entries, filled up with zeros.
+pub const PADDED: usize = 8;
+
+/// `sums[a][i]` = Σ_t `coefficients[a][t]` · `table[columns[t]·stride + i]` for `N` sets of coefficients, in the order of t.
+pub struct Combine<'a, const N: usize> {
+    /// Columns one after the other.
+    pub table: &'a [f64],
+    /// Length of a column, a multiple of [`PADDED`].
+    pub stride: usize,
+    /// Which columns.
+    pub columns: &'a [usize],
+    /// As many as columns, for each set.
+    pub coefficients: [&'a [f64]; N],
+    /// One column each.
+    pub sums: [&'a mut [f64]; N],
+}
+
+impl<const N: usize> Combine<'_, N> {
+    /// `K` registers of all sums, from entry `from` on. Loops of fixed length over arrays: what compiles to registers.
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "iterators over these arrays do not stay in registers")]
+    fn registers<const K: usize>(&mut self, from: usize) {
+        let mut sums = [[[0.0; PADDED]; K]; N];
+        for place in 0..self.columns.len() {
+            let entries = self.table[self.columns[place] * self.stride + from..].as_chunks::<PADDED>().0;
+            let entries: &[[f64; PADDED]; K] = entries.first_chunk().expect("columns are as long as told");
+            for k in 0..K {
+                for a in 0..N {
+                    let coefficient = self.coefficients[a][place];
+                    for i in 0..PADDED {
+                        sums[a][k][i] += entries[k][i] * coefficient;
+                    }
+                }
+            }
+        }
+        for (target, sums) in self.sums.iter_mut().zip(&sums) {
+            target[from..from + K * PADDED].copy_from_slice(sums.as_flattened());
+        }
+    }
+}
+
+impl<const N: usize> Kernel for Combine<'_, N> {
+    #[inline(always)]
+    fn run(mut self) {
+        let mut from = 0;
+        while from + 4 * PADDED <= self.stride {
+            self.registers::<4>(from);
+            from += 4 * PADDED;
+        }
+        while from < self.stride {
+            self.registers::<1>(from);
+            from += PADDED;
+        }
+    }
+}
+
+/// `to` = a + b.
+pub struct Add<'a> {
+    pub(super) a: &'a [f64],
+    pub(super) b: &'a [f64],
+    pub(super) to: &'a mut [f64],
+}
+
+impl Kernel for Add<'_> {
+    #[inline(always)]
+    fn run(self) {
+        for (to, (a, b)) in self.to.iter_mut().zip(self.a.iter().zip(self.b)) {
+            *to = a + b;
+        }
+    }
+}
+
+/// `to` = `base` − n·u, lane by lane.
+pub struct Withdraw<'a> {
+    pub(super) base: &'a [f64],
+    pub(super) normals: &'a [f64],
+    pub(super) moved: &'a [f64],
+    pub(super) to: &'a mut [f64],
+}
+
+/// Three rows of lanes.
+#[inline(always)]
+fn split(values: &[f64], width: usize) -> [&[f64]; 3] {
+    [0, 1, 2].map(|component| &values[component * width..][..width])
+}
+
+impl Kernel for Withdraw<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let width = self.to.len();
+        let ([n0, n1, n2], [u0, u1, u2]) = (split(self.normals, width), split(self.moved, width));
+        let base = &self.base[..width];
+        for i in 0..width {
+            self.to[i] = base[i] - (n0[i] * u0[i] + n1[i] * u1[i] + n2[i] * u2[i]);
+        }
+    }
+}
+
+/// Displacements of all lanes per λ of one, from those per force: column = Σ d_c Z_c, and closing = n·column.
+pub struct Column<'a> {
+    pub(super) parts: [&'a [f64]; 3],
+    pub(super) direction: [f64; 3],
+    pub(super) normals: &'a [f64],
+    pub(super) column: &'a mut [f64],
+    pub(super) closing: &'a mut [f64],
+}
+
+impl Kernel for Column<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { parts: [x, y, z], direction: [a, b, c], normals, column, closing } = self;
+        for (column, ((x, y), z)) in column.iter_mut().zip(x.iter().zip(y).zip(z)) {
+            *column = a * x + b * y + c * z;
+        }
+        let width = closing.len();
+        let ([n0, n1, n2], [u0, u1, u2]) = (split(normals, width), split(column, width));
+        for i in 0..width {
+            closing[i] = n0[i] * u0[i] + n1[i] * u1[i] + n2[i] * u2[i];
+        }
+    }
+}
+
+/// y += A x for the entries of x that are not 0.
+pub struct AddProduct<'a> {
+    pub(super) matrix: &'a DMatrix<f64>,
+    pub(super) x: &'a [f64],
+    pub(super) y: &'a mut [f64],
+}
+
+impl Kernel for AddProduct<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let rows = self.matrix.nrows();
+        for (column, value) in self.matrix.as_slice().chunks_exact(rows).zip(self.x) {
+            if *value != 0.0 {
+                for (y, entry) in self.y[..rows].iter_mut().zip(column) {
+                    *y += entry * value;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! How good a step is that has been solved: its error, what switches leave, and what came near between the points.
+
+use super::Trial;
+use crate::galerkin::basis::{Basis, POINTS};
+use crate::galerkin::kernels::AddProduct;
+use crate::galerkin::level::Level;
+use crate::galerkin::rows::Rows;
+
+/// Largest change of slope of a force within a step counts by this share of it: what the highest divided difference does not see of a
+/// contact that opens or closes. Measured on forty random sectors: with 0.02 errors are up to six times the tolerance, with 0.1 five in a
+/// hundred are beyond 0.9 of it.
+const KINK: f64 = 0.1;
+/// Gap of a node between points may be so many times what the polynomial leaves out, or the step is shortened.
+const NEAR: f64 = 4.0;
+/// How a trial came out.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Verdict {
+    /// The contact problem has been solved.
+    pub solved: bool,
+    /// Estimate of the error it makes in displacements (m).
+    pub error: f64,
+    /// A contact opens or closes.
+    pub switches: bool,
+    /// Σ λ_i S_ik g_k of those nodes (J): energy that this adds.
+    pub switched: f64,
+    /// A node may have touched between the points.
+    pub near: bool,
+    /// Linear systems factorised.
+    pub factorisations: usize,
+}
+
+impl Trial {
+    /// Error, switches, and near misses of a step that is solved.
+    pub(super) fn judge(&mut self, level: &Level, rows: &Rows, verdict: &mut Verdict) {
+        let (basis, count) = (&level.basis, level.basis.count());
+        self.impulses.fill(0.0);
+        let mut pushed = false;
+        for node in 0..self.nodes() {
+            let pushes = |point: usize| self.multiplier(point, node) > 0.0;
+            let (any, all) = ((0..count).any(pushes), (0..count).all(pushes));
+            if !any {
+                verdict.near |= self.comes_near(basis, node);
+                continue;
+            }
+            pushed = true;
+            let mut forces = [[0.0; 3]; POINTS];
+            forces[..count].iter_mut().enumerate().for_each(|(point, force)| *force = self.force(point, node));
+            for component in 0..3 {
+                let force = |point: usize| forces[point][component];
+                let left = (0..count).map(|point| basis.left_out[point] * force(point)).sum::<f64>() * level.step;
+                self.impulses[3 * node + component] =
+                    if all { left } else { left.abs().max(KINK * level.step * kink(basis, force)) };
+            }
+            if !all {
+                verdict.switches = true;
+                let terms = (0..count).flat_map(|i| (0..count).map(move |k| (i, k)));
+                verdict.switched +=
+                    terms.map(|(i, k)| self.multiplier(i, node) * basis.work[i][k] * self.gap(k, node)).sum::<f64>();
+            }
+        }
+        if pushed {
+            self.left.fill(0.0);
+            self.instructions.run(AddProduct { matrix: rows.error_form(), x: &self.impulses, y: &mut self.left });
+            let square: f64 = self.left.iter().zip(&self.impulses).map(|(a, b)| a * b).sum();
+            verdict.error = square.max(0.0).sqrt();
+        }
+    }
+
+    /// Whether the gap of an open node comes near zero between the points.
+    fn comes_near(&self, basis: &Basis, node: usize) -> bool {
+        let mut gaps = [0.0; POINTS];
+        let gaps = &mut gaps[..basis.count()];
+        gaps.iter_mut().enumerate().for_each(|(point, gap)| *gap = self.gap(point, node));
+        if !gaps[0].is_finite() || !gaps[1].is_finite() {
+            return false;
+        }
+        // Between its points a cubic leaves their range by less than half of it, and what it leaves out is less than all of it.
+        let extremes = |(low, high): (f64, f64), gap: &f64| (gap.min(low), gap.max(high));
+        let (low, high) = gaps.iter().fold((f64::INFINITY, f64::NEG_INFINITY), extremes);
+        if low > (0.5 + NEAR) * (high - low) {
+            return false;
+        }
+        let sum = |weights: &[f64; POINTS]| gaps.iter().zip(weights).map(|(gap, weight)| gap * weight).sum::<f64>();
+        let left = NEAR * sum(&basis.left_out).abs();
+        basis.between.iter().any(|weights| sum(weights) < left)
+    }
+}
+
+/// Largest change of slope of values at the points, over the step.
+fn kink(basis: &Basis, value: impl Fn(usize) -> f64) -> f64 {
+    if basis.degree == 1 {
+        return (value(1) - value(0)).abs();
+    }
+    let slope = |i: usize| (value(i + 1) - value(i)) / (basis.points[i + 1] - basis.points[i]);
+    (1..basis.degree).map(|i| (slope(i) - slope(i - 1)).abs()).fold(0.0, f64::max)
+}

@@ -1,0 +1,455 @@
+//! One step of one sector, tried: contact forces at the points, gaps there, and how good they are.
+
+mod judgement;
+
+use super::basis::{Basis, MOST};
+use super::compliance::{Compliance, Lanes};
+use super::kernels::{Add, AddProduct, Column, Combine, Withdraw};
+use super::level::Level;
+use super::rows::{Rows, Sums};
+use super::state::SectorState;
+use crate::dynamics::dispatch::InstructionSet;
+use crate::laws::active_set::ContactSolver;
+pub use judgement::Verdict;
+
+/// Most evaluations of the gaps of one trial.
+const PASSES: usize = 6;
+/// Gaps this far below zero, as a share of the largest, are rounding.
+const ROUNDING: f64 = 1e-13;
+
+/// What the nodes of a sector may touch, at the points of the step that is tried.
+pub trait Obstacle {
+    /// Gap (m; infinite where there is nothing to touch) and unit normal to the node displaced by `moved` (m), at a point of the step.
+    fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]);
+
+    /// Gaps (m) and normals at all points but the first; arrays of [`Lanes`].
+    fn gaps(&mut self, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
+        for lane in 0..lanes.len() {
+            let (point, node) = lanes.place(lane);
+            let (gap, normal) = self.gap(node, point, lanes.three(moved, lane));
+            gaps[lane] = gap;
+            lanes.set(normals, lane, normal);
+        }
+    }
+
+    /// Force per unit of λ on the node, friction included, at velocity `velocity` of its vibration (m/s).
+    fn direction(
+        &mut self,
+        node: usize,
+        point: usize,
+        moved: [f64; 3],
+        velocity: [f64; 3],
+        normal: [f64; 3],
+    ) -> [f64; 3];
+}
+
+/// What is used to step: all points, or a constant force and the end alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The force is a polynomial of degree s.
+    Polynomial,
+    /// The force is what it is at the end: dissipative whatever opens or closes.
+    Constant,
+}
+
+/// Three values of a node.
+pub fn three(values: &[f64], node: usize) -> [f64; 3] {
+    [values[3 * node], values[3 * node + 1], values[3 * node + 2]]
+}
+
+/// Scratch of a trial and what it found, for one number of contact nodes.
+#[derive(Debug, Clone)]
+pub struct Trial {
+    lanes: Lanes,
+    /// Displacements of rows and velocities there at the start; whether they are those of the state.
+    start: Vec<f64>,
+    velocities: Vec<f64>,
+    known: bool,
+    now: Sums<2>,
+    /// Contacts at the start.
+    begun: Contacts,
+    /// Displacements of the lanes without forces after the start (m), what forces add, and the sum.
+    free: Vec<f64>,
+    pushed: Vec<f64>,
+    moved: Vec<f64>,
+    gaps: Vec<f64>,
+    normals: Vec<f64>,
+    /// Gaps without the forces, linear from where they are; gaps with them.
+    without: Vec<f64>,
+    with: Vec<f64>,
+    multipliers: Vec<f64>,
+    /// Forces per λ, and forces.
+    directions: Vec<f64>,
+    forces: Vec<f64>,
+    /// Displacements and gaps of all lanes per λ of each.
+    columns: Vec<f64>,
+    closing: Vec<f64>,
+    solver: ContactSolver,
+    instructions: InstructionSet,
+    /// Unknowns of the problem: lanes.
+    members: Vec<usize>,
+    chosen: Vec<bool>,
+    /// Columns taken of a table, and how much of each.
+    taken: Vec<usize>,
+    amounts: Vec<f64>,
+    sums: Sums<MOST>,
+    reach: (Sums<1>, Vec<f64>),
+    /// Impulses left out (N·s), and what the error makes of them (m²/(N·s)).
+    impulses: Vec<f64>,
+    left: Vec<f64>,
+}
+
+/// Forces, λ, gaps and normals of the nodes at the start.
+#[derive(Debug, Clone, PartialEq)]
+struct Contacts {
+    forces: Vec<f64>,
+    multipliers: Vec<f64>,
+    gaps: Vec<f64>,
+    normals: Vec<f64>,
+}
+
+impl Trial {
+    /// Room for `nodes` contact nodes of a sector with so many modes.
+    pub fn new(modes: usize, nodes: usize) -> Self {
+        let lanes = Lanes { points: MOST, nodes };
+        let (width, three) = (|| vec![0.0; lanes.width()], || vec![0.0; 3 * lanes.width()]);
+        let rows = || vec![0.0; 3 * nodes];
+        Self {
+            lanes,
+            start: rows(),
+            velocities: rows(),
+            known: false,
+            now: Sums::new(modes, nodes),
+            begun: Contacts { forces: rows(), multipliers: vec![0.0; nodes], gaps: vec![0.0; nodes], normals: rows() },
+            free: three(),
+            pushed: three(),
+            moved: three(),
+            gaps: width(),
+            normals: three(),
+            without: width(),
+            with: width(),
+            multipliers: width(),
+            directions: three(),
+            forces: three(),
+            columns: vec![0.0; lanes.len() * 3 * lanes.width()],
+            closing: vec![0.0; lanes.len() * lanes.width()],
+            solver: ContactSolver::new(lanes.len()),
+            instructions: InstructionSet::detect(),
+            members: Vec::with_capacity(lanes.len()),
+            chosen: vec![false; lanes.len()],
+            taken: Vec::with_capacity(3 * lanes.len()),
+            amounts: Vec::with_capacity(3 * lanes.len()),
+            sums: Sums::new(modes, nodes),
+            reach: (Sums::new(modes, nodes), rows()),
+            impulses: rows(),
+            left: rows(),
+        }
+    }
+
+    /// Number of points at which forces are sought: s, or 1 where the force is constant.
+    pub fn points(&self) -> usize {
+        self.lanes.points
+    }
+
+    /// Number of contact nodes.
+    pub fn nodes(&self) -> usize {
+        self.lanes.nodes
+    }
+
+    /// λ of a node at point 0 … s (N).
+    pub fn multiplier(&self, point: usize, node: usize) -> f64 {
+        if point == 0 { self.begun.multipliers[node] } else { self.multipliers[self.lanes.at(point, node)] }
+    }
+
+    /// Force on it (N).
+    pub fn force(&self, point: usize, node: usize) -> [f64; 3] {
+        if point == 0 { three(&self.begun.forces, node) } else { self.lane(&self.forces, point, node) }
+    }
+
+    /// Its gap (m).
+    pub fn gap(&self, point: usize, node: usize) -> f64 {
+        if point == 0 { self.begun.gaps[node] } else { self.gaps[self.lanes.at(point, node)] }
+    }
+
+    /// Its unit normal.
+    pub fn normal(&self, point: usize, node: usize) -> [f64; 3] {
+        if point == 0 { three(&self.begun.normals, node) } else { self.lane(&self.normals, point, node) }
+    }
+
+    /// Its displacement (m); at the start only where something pushes.
+    pub fn displacement(&self, point: usize, node: usize) -> [f64; 3] {
+        if point == 0 { three(&self.start, node) } else { self.lane(&self.moved, point, node) }
+    }
+
+    fn lane(&self, values: &[f64], point: usize, node: usize) -> [f64; 3] {
+        self.lanes.three(values, self.lanes.at(point, node))
+    }
+
+    /// The state is another one than that of the last trial.
+    pub fn forget(&mut self) {
+        self.known = false;
+    }
+
+    /// Try a step from `state`; `precision`: gaps of contacts that count as closed (m).
+    pub fn run(
+        &mut self,
+        (level, kind): (&Level, Kind),
+        rows: &Rows,
+        state: &SectorState,
+        obstacle: &mut impl Obstacle,
+        precision: f64,
+    ) -> Verdict {
+        let compliance = if kind == Kind::Constant { &level.constant } else { &level.compliance };
+        self.lanes = compliance.lanes();
+        self.begin((level, kind), rows, state);
+        if !state.looked {
+            self.find_start(rows, state);
+            for node in 0..self.nodes() {
+                (self.begun.gaps[node], _) = obstacle.gap(node, 0, three(&self.start, node));
+            }
+        }
+        let mut verdict = Verdict::default();
+        for pass in 0..PASSES {
+            let (lowest, largest) = self.find_gaps(obstacle);
+            let rests = self.multipliers[..self.lanes.len()].iter().all(|value| *value == 0.0);
+            if lowest.is_nan() {
+                return verdict;
+            }
+            // Nothing pushes and nothing is pushed; or what was solved holds on the curved gaps as well.
+            if (rests && lowest >= 0.0) || (pass > 0 && lowest >= -precision && largest <= precision) {
+                verdict.solved = true;
+                break;
+            }
+            self.find_start(rows, state);
+            if pass + 1 == PASSES || !self.solve(compliance, obstacle, &mut verdict) {
+                return verdict;
+            }
+        }
+        if kind == Kind::Polynomial {
+            self.judge(level, rows, &mut verdict);
+        }
+        verdict
+    }
+
+    /// Displacements and velocities of the rows at the start.
+    pub fn find_start(&mut self, rows: &Rows, state: &SectorState) -> &[f64] {
+        if self.known {
+            return &self.start;
+        }
+        self.known = true;
+        rows.now(state, &mut self.now);
+        let nodes = self.lanes.nodes;
+        for node in 0..nodes {
+            let [moved, velocity] = [0, 1].map(|set| self.now.three(set, node, nodes));
+            self.start[3 * node..3 * node + 3].copy_from_slice(&moved);
+            self.velocities[3 * node..3 * node + 3].copy_from_slice(&velocity);
+        }
+        let (matrix, y) = (rows.residual(), &mut self.start);
+        self.instructions.run(AddProduct { matrix, x: &state.forces, y });
+        &self.start
+    }
+
+    /// How far each row can be from where it rests while nothing pushes (m).
+    pub fn reach(&mut self, rows: &Rows, state: &SectorState) -> &[f64] {
+        let (sums, reach) = &mut self.reach;
+        rows.reach(state, sums);
+        let nodes = self.lanes.nodes;
+        for (node, reach) in reach.chunks_exact_mut(3).enumerate() {
+            reach.copy_from_slice(&sums.three(0, node, nodes));
+        }
+        reach
+    }
+
+    /// Where the rows go without forces at points 1 … s, and a guess of these: as at the start.
+    fn begin(&mut self, (level, kind): (&Level, Kind), rows: &Rows, state: &SectorState) {
+        let (begun, lanes) = (&mut self.begun, self.lanes);
+        begun.forces.copy_from_slice(&state.forces);
+        begun.multipliers.copy_from_slice(&state.multipliers);
+        begun.gaps.copy_from_slice(&state.gaps);
+        begun.normals.copy_from_slice(&state.normals);
+        let degree = level.basis.degree;
+        let points = if kind == Kind::Constant { degree - 1..degree } else { 0..degree };
+        rows.free(level, state, points, &mut self.sums);
+        let (nodes, width) = (lanes.nodes, lanes.width());
+        for (point, sums) in self.sums.rows[..lanes.points].iter().enumerate() {
+            for component in 0..3 {
+                let target = &mut self.free[component * width + point * nodes..][..nodes];
+                target.copy_from_slice(&sums[component * nodes..][..nodes]);
+            }
+        }
+        let stride = 3 * width;
+        self.pushed[..stride].fill(0.0);
+        self.forces[..stride].fill(0.0);
+        self.taken.clear();
+        self.amounts.clear();
+        for (column, force) in state.forces.iter().enumerate().filter(|(_, force)| **force != 0.0) {
+            self.taken.push(column);
+            self.amounts.push(*force);
+        }
+        if !self.taken.is_empty() {
+            let compliance = if kind == Kind::Constant { &level.constant } else { &level.compliance };
+            if kind == Kind::Polynomial {
+                self.combine(compliance.columns(), stride);
+                self.free[..stride].iter_mut().zip(&self.pushed).for_each(|(free, pushed)| *free += pushed);
+            }
+            self.combine(compliance.held(), stride);
+        }
+        for point in 0..lanes.points {
+            self.multipliers[point * nodes..][..nodes].copy_from_slice(&state.multipliers);
+        }
+    }
+
+    /// What `taken` columns of a table, as much as told, push.
+    fn combine(&mut self, table: &[f64], stride: usize) {
+        let Self { taken, amounts, pushed, instructions, .. } = self;
+        let sums = [&mut pushed[..stride]];
+        instructions.run(Combine { table, stride, columns: taken, coefficients: [amounts], sums });
+    }
+
+    /// Displacements under the forces of now, and gaps there: the smallest, and the largest of a contact that pushes.
+    fn find_gaps(&mut self, obstacle: &mut impl Obstacle) -> (f64, f64) {
+        let (lanes, stride) = (self.lanes, 3 * self.lanes.width());
+        let Self { free, pushed, moved, gaps, normals, .. } = self;
+        self.instructions.run(Add { a: &free[..stride], b: &pushed[..stride], to: &mut moved[..stride] });
+        obstacle.gaps(lanes, &moved[..stride], &mut gaps[..lanes.width()], &mut normals[..stride]);
+        let (mut lowest, mut largest) = (f64::INFINITY, 0.0_f64);
+        for (gap, multiplier) in self.gaps[..lanes.len()].iter().zip(&self.multipliers) {
+            lowest = if gap.is_nan() || lowest.is_nan() { f64::NAN } else { lowest.min(*gap) };
+            if *multiplier > 0.0 {
+                largest = largest.max(gap.abs());
+            }
+        }
+        (lowest, largest)
+    }
+
+    /// 0 ≤ λ ⟂ g ≥ 0 at all points and nodes: of those that penetrate or push first, then of those that these make penetrate.
+    fn solve(&mut self, compliance: &Compliance, obstacle: &mut impl Obstacle, verdict: &mut Verdict) -> bool {
+        let (lanes, width) = (self.lanes, self.lanes.width());
+        let Self { gaps, normals, pushed, without, .. } = self;
+        self.instructions.run(Withdraw {
+            base: gaps,
+            normals: &normals[..3 * width],
+            moved: &pushed[..3 * width],
+            to: &mut without[..width],
+        });
+        self.members.clear();
+        for lane in 0..lanes.len() {
+            self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
+            if self.chosen[lane] {
+                self.choose(lane, compliance, obstacle);
+            }
+        }
+        loop {
+            self.pose();
+            let outcome = self.solver.lcp();
+            verdict.factorisations += outcome.factorisations;
+            if !outcome.solved || self.solver.multipliers.iter().any(|value| !value.is_finite()) {
+                return false;
+            }
+            self.multipliers[..width].fill(0.0);
+            self.taken.clear();
+            self.amounts.clear();
+            for (lane, value) in self.members.iter().zip(&self.solver.multipliers) {
+                self.multipliers[*lane] = *value;
+                if *value != 0.0 {
+                    self.taken.push(*lane);
+                    self.amounts.push(*value);
+                }
+            }
+            if !self.choose_violated(compliance, obstacle) {
+                break;
+            }
+        }
+        let columns = std::mem::take(&mut self.columns);
+        self.combine(&columns, 3 * width);
+        self.columns = columns;
+        for component in 0..3 {
+            let row = component * width;
+            let directions = self.directions[row..][..width].iter().zip(&self.multipliers);
+            let forces = self.forces[row..][..width].iter_mut();
+            forces.zip(directions).for_each(|(force, (direction, value))| *force = direction * value);
+        }
+        true
+    }
+
+    /// A lane becomes an unknown: the direction of its force, and what that moves.
+    fn choose(&mut self, lane: usize, compliance: &Compliance, obstacle: &mut impl Obstacle) {
+        let (lanes, width) = (self.lanes, self.lanes.width());
+        let (point, node) = lanes.place(lane);
+        let (moved, normal) = (lanes.three(&self.moved, lane), lanes.three(&self.normals, lane));
+        let direction = obstacle.direction(node, point, moved, three(&self.velocities, node), normal);
+        lanes.set(&mut self.directions, lane, direction);
+        self.members.push(lane);
+        self.instructions.run(Column {
+            parts: compliance.of_lane(lane),
+            direction,
+            normals: &self.normals[..3 * width],
+            column: &mut self.columns[lane * 3 * width..][..3 * width],
+            closing: &mut self.closing[lane * width..][..width],
+        });
+    }
+
+    /// The problem of the members.
+    fn pose(&mut self) {
+        let width = self.lanes.width();
+        self.solver.set_size(self.members.len());
+        for (column, lane) in self.members.iter().enumerate() {
+            let closing = &self.closing[lane * width..][..width];
+            let mut entries = self.solver.delassus.column_mut(column);
+            entries.iter_mut().zip(&self.members).for_each(|(entry, row)| *entry = closing[*row]);
+            self.solver.gaps[column] = self.without[*lane];
+            self.solver.active[column] = self.multipliers[*lane] > 0.0;
+        }
+    }
+
+    /// Choose lanes that the forces found push into what they may touch.
+    fn choose_violated(&mut self, compliance: &Compliance, obstacle: &mut impl Obstacle) -> bool {
+        let (lanes, width) = (self.lanes, self.lanes.width());
+        let scale = self.members.iter().fold(0.0_f64, |most, lane| most.max(self.gaps[*lane].abs()));
+        let (columns, coefficients) = (&self.taken[..], [&self.amounts[..]]);
+        let sums = [&mut self.with[..width]];
+        self.instructions.run(Combine { table: &self.closing, stride: width, columns, coefficients, sums });
+        let mut found = false;
+        for lane in 0..lanes.len() {
+            let after = self.without[lane] + self.with[lane];
+            if !self.chosen[lane] && self.gaps[lane].is_finite() && after < -ROUNDING * scale {
+                self.chosen[lane] = true;
+                self.choose(lane, compliance, obstacle);
+                found = true;
+            }
+        }
+        found
+    }
+
+    /// Coefficients of θᵃ of the force on a node (N), projected on degree s − 1; none where nothing pushes.
+    pub fn polynomial(&self, basis: &Basis, kind: Kind, node: usize) -> Option<[[f64; 3]; MOST]> {
+        let mut sums = [[0.0; 3]; MOST];
+        if kind == Kind::Constant {
+            sums[0] = self.force(1, node);
+            return (self.multiplier(1, node) > 0.0).then_some(sums);
+        }
+        let mut pushed = false;
+        for point in (0..basis.count()).filter(|point| self.multiplier(*point, node) > 0.0) {
+            pushed = true;
+            let force = self.force(point, node);
+            for (sum, weights) in sums.iter_mut().zip(&basis.projection) {
+                sum.iter_mut().zip(force).for_each(|(sum, force)| *sum += weights[point] * force);
+            }
+        }
+        pushed.then_some(sums)
+    }
+
+    /// The state goes to the end of the step: forces, gaps and normals there.
+    pub fn leave(&mut self, state: &mut SectorState) {
+        let points = self.points();
+        for node in 0..self.nodes() {
+            let (force, normal) = (self.force(points, node), self.normal(points, node));
+            state.forces[3 * node..3 * node + 3].copy_from_slice(&force);
+            state.normals[3 * node..3 * node + 3].copy_from_slice(&normal);
+            state.multipliers[node] = self.multiplier(points, node);
+            state.gaps[node] = self.gap(points, node);
+        }
+        state.looked = true;
+        self.forget();
+    }
+}
