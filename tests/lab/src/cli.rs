@@ -14,8 +14,8 @@ use tiprub_study as study;
 use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
 use crate::{
-    bases, conjugacy, convergence, cube, error, estimates, inputs, modes, refinement, stability, stage, tolerance,
-    witness,
+    bases, beside, conjugacy, convergence, cube, error, estimates, inputs, modes, refinement, stability, stage,
+    tolerance, witness,
 };
 
 /// Evidence for tiprub: studies of the models that ship and of standard problems.
@@ -69,6 +69,8 @@ pub enum Command {
     Bases(StudyCommon),
     /// Error against run time of steps by a tolerance, beside steps of one length, on rubs of rotor 37.
     Tolerance(StudyCommon),
+    /// Any scene of blades without coupling in a rigid casing beside a stepper that shares only the matrices with the product.
+    Beside(BesideArguments),
     /// Reduced blades against a full finite-element model with steps and contact of its own, without any reduction.
     Witness(StudyCommon),
 }
@@ -79,6 +81,17 @@ pub struct EstimatesArguments {
     /// Only what the mesh leaves: minutes instead of an hour.
     #[arg(long)]
     pub mesh_only: bool,
+    /// What all studies take.
+    #[command(flatten)]
+    pub common: StudyCommon,
+}
+
+/// Arguments of `lab beside`.
+#[derive(Debug, Args)]
+pub struct BesideArguments {
+    /// Scene file (TOML), or one that ships.
+    #[arg(value_name = "SCENE", default_value = "builtin:rotor37-paper")]
+    pub scene: String,
     /// What all studies take.
     #[command(flatten)]
     pub common: StudyCommon,
@@ -202,6 +215,7 @@ impl Cli {
             Command::Refinement(arguments) => ("refinement", &arguments.common),
             Command::Bases(common) => ("bases", common),
             Command::Tolerance(common) => ("tolerance", common),
+            Command::Beside(arguments) => ("beside", &arguments.common),
             Command::Witness(common) => ("witness", common),
         };
         let directory = commands::study::directory(name, common);
@@ -229,6 +243,7 @@ impl Cli {
             Command::Refinement(arguments) => refinement::study(arguments, console),
             Command::Bases(common) => bases::study(common, console),
             Command::Tolerance(common) => tolerance::study(common, console),
+            Command::Beside(arguments) => beside::study(arguments, console),
             Command::Witness(common) => witness::study(common, console),
             Command::Stability(_) => unreachable!("`run` has answered it"),
         }
@@ -257,6 +272,7 @@ mod tests {
             ("modes --scene carpenter", false),
             ("convergence --threads 2", false),
             ("stage scene.toml", false),
+            ("beside scene.toml --quick", true),
         ] {
             assert_eq!(Cli::try_parse_from(["lab"].into_iter().chain(line.split(' '))).is_ok(), right, "{line}");
         }

@@ -3,12 +3,14 @@
 //! - `error`: error against run time of the standard problems, beside methods that share no code with the product;
 //! - `stability`: stiff and extreme cases, each in a process of its own, judged;
 //! - `cube`, `stage`, `convergence`, `modes`: what the paper's figures show of the models that ship;
+//! - `beside`: any scene of blades beside an independent stepper;
 //! - `witness`: reduced blades against full finite elements; `bases`: what a blade is reduced to;
 //! - `tolerance`: steps by a tolerance beside steps of one length;
 //! - `conjugacy`: forces, moments and work on both sides of contacts; `inputs`: what the communication step does.
 
 #![warn(unreachable_pub)]
 mod bases;
+mod beside;
 pub mod cli;
 mod conjugacy;
 mod convergence;

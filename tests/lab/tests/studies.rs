@@ -264,6 +264,38 @@ fn the_quick_study_of_tolerances_keeps_them() {
     }
 }
 
+/// Blades of different clearances and frequencies, bumps that begin elsewhere, a cylinder: own geometry, modes, contact and steps agree. What
+/// the witness does not know it says.
+#[test]
+fn any_scene_of_blades_meets_a_witness_of_its_own() {
+    let root = tempfile::tempdir().unwrap();
+    let list =
+        |value: &dyn Fn(i32) -> f64| (0..36).map(|blade| format!("{:e}", value(blade))).collect::<Vec<_>>().join(", ");
+    let file = |name: &str, structure: &str, contact: &str| {
+        let text = format!(
+            "name = \"{name}\"\n[[structure]]\nname = \"rotor\"\nrom = \"builtin:rotor37-paper\"\nspeed = 1800.0\ndamping_ratio = 2e-3\n{structure}\n\
+             [[surface]]\nname = \"casing\"\nramp_time = 2e-4\n[surface.shape]\nkind = \"two-lobe\"\ndepth = 0.8\nwidth = 0.2\nphase = 0.4\n\
+             [[contact]]\nmaster = \"rotor\"\nslave = \"casing\"\n{contact}\nfriction = 0.1\n\
+             [time]\nscheme = \"modal-exact\"\nstep = 2.5e-7\n[experiment]\nstop = 1.5e-3\ncommunication_step = 1e-5\n"
+        );
+        fs::write(root.path().join(format!("{name}.toml")), text).unwrap();
+        format!("{name}.toml")
+    };
+    let factors = format!("frequency_factors = [{}]", list(&|blade| 1.0 + 0.01 * f64::from(blade % 5 - 2)));
+    let gaps =
+        format!("sector_gaps = [{}]\nmeridian = \"cylinder\"", list(&|blade| 3e-4 + 1e-5 * f64::from(blade % 7)));
+    let uneven = file("uneven", &factors, &gaps);
+    let json = study(root.path(), "beside", &[&uneven]);
+    only_no(&json, &[]);
+    let found = |name: &str| json["results"][name].as_f64().unwrap();
+    assert!(found("displacements") < 0.02 && found("impulse") < 0.005, "{:#}", json["results"]);
+    let whirl = file("whirl", "whirl = true", "gap = 3.56e-4");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lab"));
+    let output = command.current_dir(root.path()).args(["beside", &whirl, "--out", "none"]).output().unwrap();
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && told.contains("whirl") && told.contains("a shaft that moves"), "{told}");
+}
+
 #[test]
 fn the_quick_study_of_bases_tells_free_from_held_modes() {
     let root = tempfile::tempdir().unwrap();

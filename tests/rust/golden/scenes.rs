@@ -84,6 +84,15 @@ fn all_of(changes: &[fn(&mut Scene)]) -> impl Fn(&mut Scene) {
     move |scene| changes.iter().for_each(|change| change(scene))
 }
 
+/// Blades whose steps go by a tolerance.
+fn galerkin(name: &str, changes: &[fn(&mut Scene)]) -> Scene {
+    let changes = changes.to_vec();
+    rotor(name, Scheme::Galerkin, Solver::Lcp, |scene| {
+        (scene.settings.time.step, scene.settings.time.tolerance) = (4e-5, Some(1e-3));
+        changes.iter().for_each(|change| change(scene));
+    })
+}
+
 fn rotors() -> Vec<Scene> {
     use Scheme::{CentralDifference, MasslessBoundary, ModalExact};
     use Solver::{Coulomb, Film, Lcp};
@@ -124,6 +133,9 @@ fn rotors() -> Vec<Scene> {
             coating(scene);
             scene.settings.outputs.wear = true;
         }),
+        galerkin("galerkin", &[]),
+        galerkin("galerkin_whirl_spline", &[spline, shaft]),
+        galerkin("galerkin_mistuned_lobes", &[mistuned, lobes]),
         rotor("coupled_lcp", ModalExact, Lcp, coupled),
         rotor("coupled_flexible_film", CentralDifference, Film, all_of(&[coupled, flexible, shaft])),
         rotor("coupled_massless", MasslessBoundary, Lcp, coupled),

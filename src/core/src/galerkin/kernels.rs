@@ -145,3 +145,63 @@ impl Kernel for AddProduct<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::dispatch::InstructionSet;
+
+    /// Numbers that no order of summation leaves alone.
+    fn numbers(count: usize) -> Vec<f64> {
+        (0..count).map(|i| f64::from(u32::try_from(i * 7919 % 1009).unwrap()).sqrt() - 15.0).collect()
+    }
+
+    #[test]
+    fn sums_of_columns_are_those_sums_with_every_instruction_set() {
+        let (stride, columns) = (5 * PADDED, [3, 0, 7, 7, 2]);
+        let (table, coefficients) = (numbers(8 * stride), [numbers(5), numbers(9)[4..].to_vec()]);
+        let run = |instructions: InstructionSet| {
+            let mut sums = [vec![f64::NAN; stride], vec![f64::NAN; stride]];
+            let [a, b] = &mut sums;
+            let coefficients = [&coefficients[0][..], &coefficients[1][..]];
+            instructions.run(Combine { table: &table, stride, columns: &columns, coefficients, sums: [a, b] });
+            sums
+        };
+        let found = run(InstructionSet::Baseline);
+        assert_eq!(found, run(InstructionSet::detect()));
+        for (sums, coefficients) in found.iter().zip(&coefficients) {
+            for (i, sum) in sums.iter().enumerate() {
+                let terms = columns.iter().zip(coefficients).map(|(column, c)| table[column * stride + i] * c);
+                assert_eq!(sum.to_bits(), terms.fold(0.0, |sum: f64, term| sum + term).to_bits());
+            }
+        }
+    }
+
+    #[test]
+    fn gaps_without_forces_and_columns_are_projections() {
+        let width = 2 * PADDED;
+        let (parts, normals) = ([0, 1, 2].map(|i| numbers(3 * width + i)[i..].to_vec()), numbers(3 * width));
+        let run = |instructions: InstructionSet| {
+            let (mut column, mut closing, mut to) = (vec![0.0; 3 * width], vec![0.0; width], vec![0.0; width]);
+            let parts = [&parts[0][..], &parts[1][..], &parts[2][..]];
+            let direction = [0.3, -1.1, 0.7];
+            instructions.run(Column {
+                parts,
+                direction,
+                normals: &normals,
+                column: &mut column,
+                closing: &mut closing,
+            });
+            instructions.run(Withdraw { base: &parts[0][..width], normals: &normals, moved: &column, to: &mut to });
+            (column, closing, to)
+        };
+        let (column, closing, to) = run(InstructionSet::Baseline);
+        assert_eq!((column.clone(), closing.clone(), to.clone()), run(InstructionSet::detect()));
+        for lane in 0..width {
+            let along: f64 = (0..3).map(|c| normals[c * width + lane] * column[c * width + lane]).sum();
+            assert!((closing[lane] - along).abs() < 1e-12 && (to[lane] - (parts[0][lane] - along)).abs() < 1e-12);
+            let expected = 0.3 * parts[0][lane] - 1.1 * parts[1][lane] + 0.7 * parts[2][lane];
+            assert!((column[lane] - expected).abs() < 1e-12);
+        }
+    }
+}

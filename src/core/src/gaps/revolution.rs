@@ -323,6 +323,55 @@ mod tests {
     use super::*;
     use crate::settings::Shape;
 
+    /// Lanes are nodes at instants: what one node's gap is at one of them.
+    #[test]
+    fn lanes_are_single_nodes_at_their_instants() {
+        let shape = Shape::TwoLobe { depth: 0.6, width: 0.15, phase: 0.3 };
+        let law = |instruction_set| RevolutionGap {
+            surface: Surface::new(&shape, 3.56e-4).unwrap(),
+            instruction_set,
+            layout: Layout {
+                lanes: 2,
+                angles: vec![0.1, 0.6, 0.2, 0.7],
+                radii: vec![0.25, 0.24],
+                per_radius: vec![1.0 / 0.25, 1.0 / 0.24],
+                axial: vec![0.0; 2],
+                clearances: vec![3.56e-4, 3.4e-4],
+            },
+            nodes: vec![0, 1],
+            slopes: vec![-0.26, 0.1],
+            shaft_moves: false,
+            arms: [Vec::new(), Vec::new()],
+        };
+        let drive = |rotor_angle| Drive {
+            rotor_angle,
+            shape_factor: 0.9,
+            shape_rotation: 0.05,
+            gap_offset: 1e-5,
+            ..Drive::default()
+        };
+        let (drives, width) = ([0.0, 0.4, 1.3].map(drive), 8);
+        let moved: Vec<f64> = (0..24).map(|i| 1e-4 * f64::from(i).sin()).collect();
+        // Lane: both nodes of the second sector at three instants.
+        let at = |lane: usize| At { node: lane % 2, index: 2 * (lane % 2) + 1, drive: &drives[lane / 2] };
+        let run = |set: InstructionSet| {
+            let (law, mut instants) = (law(set), Instants::new(width));
+            assert!((0..6).all(|lane| law.enter(at(lane), lane, &mut instants)));
+            let (mut gaps, mut normals) = (vec![0.0; width], vec![0.0; 3 * width]);
+            law.of_lanes(&mut instants, &moved, &mut gaps, &mut normals);
+            (gaps, normals)
+        };
+        let (gaps, normals) = run(InstructionSet::detect());
+        assert_eq!((gaps.clone(), normals.clone()), run(InstructionSet::Baseline));
+        for lane in 0..6 {
+            let three = |values: &[f64]| [0, 1, 2].map(|component| values[component * width + lane]);
+            let (gap, normal) = law(InstructionSet::Baseline).of_one(at(lane), three(&moved));
+            assert!((gaps[lane] - gap).abs() < 1e-18, "{lane}: {} {gap}", gaps[lane]);
+            assert!(three(&normals).iter().zip(normal).all(|(a, b)| (a - b).abs() < 1e-15), "{lane}");
+        }
+        assert!(!law(InstructionSet::Baseline).with_moving_shaft(true).enter(at(0), 0, &mut Instants::new(width)));
+    }
+
     #[test]
     fn every_instruction_set_gives_the_same_bits() {
         let lanes = 16;

@@ -95,6 +95,10 @@ pub struct Blades {
     pub sectors: usize,
     /// Modal damping ratio.
     pub damping: f64,
+    /// Factor on the frequencies of each blade; empty: 1.
+    pub frequency_factors: Vec<f64>,
+    /// Radial clearance of each blade (m); empty: that of the obstacle.
+    pub clearances: Vec<f64>,
     /// What they rub against.
     pub obstacle: Obstacle,
 }
@@ -115,7 +119,10 @@ impl BladeScene {
         let modes = Modes::new(&blades.mass, &blades.stiffness, blades.damping)?;
         let seen = &blades.contact_map * &modes.shapes;
         let rows = seen.row_iter().map(|row| row.iter().copied().collect()).collect();
-        let modes = modes.repeated(blades.sectors);
+        let mut modes = modes.repeated(blades.sectors);
+        for (own, factor) in modes.frequencies.chunks_mut(seen.ncols()).zip(&blades.frequency_factors) {
+            own.iter_mut().for_each(|frequency| *frequency *= factor);
+        }
         Some(Self { load: vec![0.0; modes.len()], rows, modes, blades })
     }
 
@@ -133,7 +140,8 @@ impl BladeScene {
         let moved = std::array::from_fn(|component| self.moved(3 * node + component, sector, position));
         let pitch = std::f64::consts::TAU * sector as f64 / blades.sectors as f64;
         let tip = Tip { angle: tip.angle + pitch, ..tip };
-        let Touch { gap, normal, force, rate } = blades.obstacle.meets(&tip, time, moved);
+        let clearance = blades.clearances.get(sector).copied().unwrap_or(blades.obstacle.clearance);
+        let Touch { gap, normal, force, rate } = Obstacle { clearance, ..blades.obstacle }.meets(&tip, time, moved);
         if gap > within {
             return None;
         }

@@ -1,10 +1,12 @@
 //! Scenes 4 and 5: the blades of rotor 37 rubbing against a casing with two bumps, lightly and heavily.
 
-use tiprub_core::{Rom, Scene, settings::Shape};
+use tiprub_core::{Rom, settings::Shape};
 use tiprub_gallery::{reduction, rom_cache::RomCache, scene_source};
 use tiprub_model::{Rotor37Options, rotor37::MeshCounts};
-use tiprub_reference::reduced::rub::{BladeScene, Blades, Obstacle, Tip};
-use tiprub_shell::{Failure, Result, console::Console};
+use tiprub_reference::reduced::rub::BladeScene;
+use tiprub_shell::{Result, console::Console};
+
+use crate::beside::blades_of;
 
 use super::{
     competitor::Family,
@@ -63,7 +65,7 @@ pub(crate) fn rotor(rub: Rub, quick: bool, cache: &RomCache, console: &Console) 
         if let Shape::TwoLobe { depth, .. } = &mut scene.settings.surfaces[0].shape {
             *depth = bumps;
         }
-        let outside = outside(&scene).ok_or_else(|| Failure::new("rotor 37", "the blade has no mass", ""))?;
+        let outside = blades_of(&scene)?;
         sizes.push((modes, scene, outside));
     }
     let description = format!(
@@ -94,30 +96,4 @@ fn blade(modes: usize, quick: bool, cache: &RomCache, console: &Console) -> Resu
     let options = Rotor37Options { modes, mesh, ..defaults };
     let name = if quick { "rotor37-study-coarse" } else { "rotor37-study" };
     cache.get(&format!("{name}-{modes}"), &options, console, &|| Ok(reduction::rotor37(&options, console)?.rom))
-}
-
-/// The scene's data for the reference crate; what it does not know of (spin, whirl, mistuning) is off in this scene.
-fn outside(scene: &Scene) -> Option<BladeScene> {
-    let (rom, settings) = (&scene.roms[0], &scene.settings);
-    let (rotor, surface, contact) = (&settings.structures[0], &settings.surfaces[0], &settings.contacts[0]);
-    let Shape::TwoLobe { depth, width, .. } = surface.shape else { return None };
-    let tips = rom.contact_nodes.iter().map(|node| Tip {
-        radius: node.position[0],
-        angle: node.position[1],
-        slope: node.meridional_slope,
-    });
-    BladeScene::new(Blades {
-        mass: rom.mass.clone(),
-        stiffness: rom.stiffness.clone(),
-        contact_map: rom.contact_map.clone(),
-        tips: tips.collect(),
-        sectors: rom.sectors,
-        damping: rotor.damping_ratio.unwrap_or(rom.damping_ratio),
-        obstacle: Obstacle {
-            clearance: contact.gap,
-            speed: rotor.speed,
-            friction: contact.friction,
-            bumps: [2.0 * contact.gap * depth, width, surface.ramp_time],
-        },
-    })
 }
