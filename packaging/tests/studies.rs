@@ -427,9 +427,9 @@ fn built_in_models_are_reduced_once_unless_asked_otherwise() {
     let root = tempfile::tempdir().unwrap();
     let kept = root.path().join("kept");
     let kept = kept.to_str().unwrap();
+    fs::write(root.path().join("scene.toml"), around("builtin:rotor37-paper")).unwrap();
     let run = |cache: &str, more: &[&str]| {
-        tiprub(root.path(), cache, &[&["run", "builtin:rotor37", "--stop", "1e-4", "--csv", "out.csv"], more].concat())
-            .1
+        tiprub(root.path(), cache, &[&["run", "scene.toml", "--stop", "1e-4", "--csv", "out.csv"], more].concat()).1
     };
     assert!(run(kept, &[]).contains("Reducing"));
     let first = fs::read(root.path().join("out.csv")).unwrap();

@@ -1,9 +1,10 @@
 //! Structures that do not feel each other: what concerns one is judged and told without the others.
 
 use tiprub_core::settings::{LoadSettings, Motion, PatchSettings, Scheme, Shape, Solver, StructureSettings};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::{
-    RADIUS, disk, go, lattice, real, rich_blade, ring, ring_of, rub, saved, set, several, started, try_started,
+    RADIUS, disk, go, lattice, modal, node, real, rich_blade, ring, ring_of, round, rub, saved, set, several, started,
+    try_started,
 };
 
 /// Rotors `front` and `rear`, each in a rigid casing of its own.
@@ -335,4 +336,32 @@ fn flutter_of_a_disk_with_one_node_per_blade_is_told_once() {
     scene.settings.contacts[0].friction = 0.5;
     let warnings = started(&scene).warnings().to_vec();
     assert_eq!(warnings.iter().filter(|text| text.contains("flutter")).count(), 1, "{warnings:?}");
+}
+
+/// A node that leans digs in beyond µ = 0.5; that of the other pair does not, and may have more.
+#[test]
+fn friction_of_one_pair_is_not_that_of_the_other() {
+    let outcome = |leaning: f64, upright: f64| {
+        // Both nodes on springs of their own, along all axes.
+        let shape = |row: usize, mode: usize| match (mode, row) {
+            (0, 0) => 0.5,
+            (0, 1) | (1, 3) => 1.0,
+            _ if mode == row + 2 => 0.05,
+            _ => 0.0,
+        };
+        let nodes = [("leaning", 0.0), ("upright", 0.015)].map(|(name, z)| node(name, [RADIUS, 0.0, z], 0.0));
+        let frequencies = [1000.0, 1500.0, 4e4, 4.1e4, 4.2e4, 4.3e4, 4.4e4, 4.5e4];
+        let rom = modal("pair", &frequencies, shape, nodes.into());
+        let mut scene = several::split(&round(Rom { sectors: 3, damping_ratio: 0.01, ..rom }));
+        (scene.settings.contacts[0].friction, scene.settings.contacts[1].friction) = (leaning, upright);
+        (scene.settings.time.step, scene.settings.experiment.communication_step) = (1e-7, 1e-6);
+        let turned = [1.0, -1.0].map(|sense| {
+            scene.settings.structures[0].speed = sense * 1300.0;
+            try_started(&scene).map(drop).map_err(|error| error.to_string())
+        });
+        turned.into_iter().collect::<Result<Vec<_>, _>>()
+    };
+    assert!(outcome(0.45, 0.9).is_ok(), "{:?}", outcome(0.45, 0.9));
+    let told = outcome(0.9, 0.45).unwrap_err();
+    assert!(told.contains("no unique solution"), "{told}");
 }

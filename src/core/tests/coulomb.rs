@@ -379,3 +379,23 @@ fn solving_does_not_allocate() {
     assert!(first.solved && first.fallback && second.fallback && third.solved);
     assert_eq!(allocations, 0);
 }
+
+/// Blades are stiffer along than across, and casings sideways hardly yield: the law holds as well as elsewhere.
+#[test]
+fn contacts_that_hardly_yield_sideways_are_solved() {
+    let mut lcg = Lcg(31);
+    for case in 0..200 {
+        let (contacts, stiff) = (1 + lcg.below(12), 10.0_f64.powi(-1 - case % 6));
+        let (mut w, mut free) = random_problem(&mut lcg, contacts, 0);
+        let sideways = |row: usize| if row % 3 == 0 { 1.0 } else { stiff };
+        for i in 0..3 * contacts {
+            free[i] *= sideways(i);
+            (0..3 * contacts).for_each(|j| w[(i, j)] *= sideways(i) * sideways(j));
+        }
+        let friction = vec![lcg.between(0.05, 1.0); contacts];
+        let mut solver = solver(&w, &free, &friction);
+        let outcome = solver.solve(contacts);
+        let worst = violation(&w, &free, &friction, &solver.reactions);
+        assert!(outcome.solved && worst <= 2e-12, "case {case}, {stiff:e}: {worst:e}, {outcome:?}");
+    }
+}

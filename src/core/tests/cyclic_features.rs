@@ -134,6 +134,22 @@ fn without_coupling_a_disk_is_its_sectors() {
     println!("worst {worst:.1e}");
 }
 
+/// Blades without coupling, on a ring that yields as they do: written as a disk they have the same largest step.
+#[test]
+fn without_coupling_a_disk_has_the_steps_of_its_sectors() {
+    let rom = models::rich_blade(12);
+    let named = [without_coupling(&rom), rom].map(|rom| {
+        let mut scene = scene_with(rom, ("flexible casing", flexible), Scheme::MasslessBoundary, Solver::Lcp);
+        scene.settings.contacts[0].friction = 0.0;
+        scene.roms[1].contact_map *= 30.0;
+        (scene.settings.time.step, scene.settings.experiment.communication_step) = (1e-5, 1e-5);
+        let told = try_started(&scene).unwrap_err().to_string();
+        let step = told.split("`internal_step_max`) below ").nth(1).and_then(|text| text.split(' ').next());
+        step.and_then(|step| step.parse::<f64>().ok()).unwrap_or_else(|| panic!("{told}"))
+    });
+    assert!((named[0] / named[1] - 1.0).abs() < 1e-6, "{named:?}");
+}
+
 /// Every combination that is not refused, by its name.
 fn every_combination(mut check: impl FnMut(&str, Scene)) {
     let disk = Disk::random(7, 2, 9, 0.25, 5);

@@ -9,7 +9,7 @@ use checks::{allocates_nothing, disturb, ledger_closes, state_continues};
 use tiprub_core::gaps::Drive;
 use tiprub_core::settings::{LoadSettings, PatchSettings, Scheme, Shape, Solver, SplineSettings};
 use tiprub_core::{Scene, Simulation};
-use tiprub_test_models::{self as models, coating, flexible, go, real, saved, set, started, try_started};
+use tiprub_test_models::{self as models, coating, element, flexible, go, real, saved, set, started, try_started};
 
 /// Twelve blades that rub the two-lobe casing, with one thing added.
 type Feature = (&'static str, fn(&mut Scene));
@@ -273,4 +273,49 @@ fn wearing_takes_at_least_the_yield_stress_times_the_worn_volume() {
     let (volume, strain) = (real(&simulation, "worn_volume"), real(&simulation, "wear_depth_maximum") / 1.5e-4);
     assert!(volume > 0.0);
     assert!(before >= 1e6 * volume * (1.0 - 1e-12) && before <= (1e6 + 2e7 * strain) * volume, "{before:e} J");
+}
+
+/// Friction heat goes where the scene says: into the patches of the casing and into the blades, all of it.
+#[test]
+fn friction_power_is_shared_between_blades_and_patches() {
+    let (share, length) = (0.3, 5e-5);
+    let mut scene = scene_with(("plain", |_| {}), Scheme::ModalExact, Solver::Lcp);
+    scene.settings.contacts[0].heat_to_slave = Some(share);
+    let mut simulation = started(&scene);
+    let mut before = 0.0;
+    for _ in 0..40 {
+        go(&mut simulation, length);
+        let loss = real(&simulation, "friction_loss");
+        let (power, blades) = ((loss - before) / length, real(&simulation, "blade_friction_power"));
+        let patches: f64 = (0..16).map(|patch| element(&simulation, "casing_friction_power", patch)).sum();
+        let scale = 1e-12 * power.max(1.0);
+        assert!((blades - (1.0 - share) * power).abs() < scale, "{blades} of {power} W");
+        assert!((patches - share * power).abs() < scale, "{patches} of {power} W");
+        before = loss;
+    }
+    assert!(before > 0.01, "{before} J");
+}
+
+/// Friction forces where there is friction, forces of the last step where they are asked for.
+#[test]
+fn a_blade_has_the_outputs_that_its_scene_asks_for() {
+    let of = |friction: f64, instantaneous: bool| {
+        let mut scene = scene_with(("plain", |_| {}), Scheme::ModalExact, Solver::Lcp);
+        scene.settings.contacts[0].friction = friction;
+        scene.settings.outputs.instantaneous_forces = instantaneous;
+        let simulation = Simulation::new(&scene).unwrap();
+        [
+            "clearance",
+            "clearance_minimum",
+            "normal_force",
+            "tangential_force",
+            "normal_force_now",
+            "tangential_force_now",
+        ]
+        .map(|name| simulation.table().find(&format!("blade[1].{name}")).is_some())
+    };
+    assert_eq!(of(0.0, false), [true, true, true, false, false, false]);
+    assert_eq!(of(0.15, false), [true, true, true, true, false, false]);
+    assert_eq!(of(0.0, true), [true, true, true, false, true, false]);
+    assert_eq!(of(0.15, true), [true; 6]);
 }

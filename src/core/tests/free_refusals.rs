@@ -2,7 +2,7 @@
 
 use lattice::*;
 use tiprub_core::settings::*;
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::{go, lattice, real, started};
 
 #[test]
@@ -65,11 +65,8 @@ fn scenes_that_make_no_sense_are_refused_with_the_reason() {
     }
 }
 
-/// The block before a rigid plate, with a light mode of its own that moves some contact nodes by some vectors.
-fn with_local_mode(shape: &[(usize, [f64; 3])]) -> Scene {
-    let mut scene = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.0203)], false, [-15.0, 3.0, 0.0]);
-    scene.settings.surfaces[0].rigid = true;
-    let rom = &mut scene.roms[0];
+/// A light mode of its own that moves some contact nodes by some vectors.
+fn with_mode(mut rom: Rom, shape: impl IntoIterator<Item = (usize, [f64; 3])>) -> Rom {
     let order = rom.order();
     let grown = |matrix: &nalgebra::DMatrix<f64>, rows: usize| matrix.clone().resize(rows, order + 1, 0.0);
     (rom.mass, rom.stiffness) = (grown(&rom.mass, order + 1), grown(&rom.stiffness, order + 1));
@@ -79,25 +76,58 @@ fn with_local_mode(shape: &[(usize, [f64; 3])]) -> Scene {
     for (node, vector) in shape {
         (0..3).for_each(|i| rom.contact_map[(3 * node + i, order)] = vector[i]);
     }
+    rom
+}
+
+/// The block flies at a plate a distance (m) away.
+fn at_plate(distance: f64) -> Scene {
+    let scene = scene(block([0.0; 3], 3e6), &[(Side::Left, distance)], false, [-15.0, 3.0, 0.0]);
     with(scene, 1.5, Solver::Lcp, Scheme::ModalExact)
+}
+
+/// That plate rigid, and the block with such a mode.
+fn with_local_mode(distance: f64, shape: &[(usize, [f64; 3])]) -> Scene {
+    let mut scene = at_plate(distance);
+    scene.settings.surfaces[0].rigid = true;
+    scene.roms[0] = with_mode(scene.roms[0].clone(), shape.iter().copied());
+    scene
 }
 
 #[test]
 fn friction_that_jams_a_contact_on_the_flight_is_refused() {
-    // Pushed in, the node moves along its slip: friction against the slip pushes it in further.
-    let mut simulation = Simulation::new(&with_local_mode(&[(0, [1.0, 1.0, 0.0])])).unwrap();
-    let error = simulation.initialise(0.0).unwrap_err().to_string();
-    assert!(error.contains("contact of left_000 alone has no unique solution"), "{error}");
-    let other = started(&with_local_mode(&[(0, [1.0, -1.0, 0.0])]));
+    // Near, and after two lengths of the block.
+    for distance in [0.0203, 0.1] {
+        // Pushed in, the node moves along its slip: friction against the slip pushes it in further.
+        let mut simulation = Simulation::new(&with_local_mode(distance, &[(0, [1.0, 1.0, 0.0])])).unwrap();
+        let error = simulation.initialise(0.0).unwrap_err().to_string();
+        assert!(error.contains("contact of left_000 alone has no unique solution"), "{error}");
+        let other = started(&with_local_mode(distance, &[(0, [1.0, -1.0, 0.0])]));
+        assert!(other.warnings().is_empty(), "{:?}", other.warnings());
+    }
+}
+
+/// The same where it is the plate that yields along its slip.
+#[test]
+fn friction_that_jams_a_contact_on_a_plate_is_refused() {
+    let with_plate = |sideways: f64| {
+        let mut scene = at_plate(0.0203);
+        let nodes = scene.roms[1].contact_nodes.len();
+        scene.roms[1] = with_mode(scene.roms[1].clone(), (0..nodes).map(|node| (node, [1.0, sideways, 0.0])));
+        scene
+    };
+    let mut jams = Simulation::new(&with_plate(1.0)).unwrap();
+    let error = jams.initialise(0.0).unwrap_err().to_string();
+    assert!(error.contains("alone has no unique solution"), "{error}");
+    let other = started(&with_plate(-1.0));
     assert!(other.warnings().is_empty(), "{:?}", other.warnings());
 }
 
 #[test]
 fn friction_that_may_leave_the_flight_without_one_solution_is_warned_of() {
-    let simulation = started(&with_local_mode(&[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]));
+    let simulation = started(&with_local_mode(0.0203, &[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]));
     let told = simulation.warnings().join(" ");
     assert!(told.contains("cannot be shown to have one solution"), "{told}");
-    let mut frictionless = with_local_mode(&[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]);
+    let mut frictionless = with_local_mode(0.0203, &[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]);
     frictionless.settings.contacts[0].friction = 0.0;
     let simulation = started(&frictionless);
     assert!(simulation.warnings().is_empty(), "{:?}", simulation.warnings());

@@ -11,7 +11,7 @@ use guide::told;
 use tiprub_core::settings::{OutputSettings, Scheme, Shape, SplineSettings, TimeSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{
-    bits, blade, bumps, element, flexible, go, real, rich_blade, saved, set, started, try_started,
+    bits, blade, bumps, element, flexible, go, real, rich_blade, saved, set, several, started, try_started,
 };
 
 const SECTORS: usize = 4;
@@ -222,7 +222,83 @@ fn free_flight_takes_spans_as_they_are() {
     scene.settings.surfaces[0].shape = Shape::Circular {};
     scene.settings.surfaces[0].ramp_time = 0.0;
     let mut simulation = started(&scene);
-    (0..50).for_each(|_| go(&mut simulation, H));
+    for _ in 0..50 {
+        go(&mut simulation, H);
+        let least = least_clearance(&simulation);
+        let lowest = real(&simulation, "clearance_minimum");
+        assert!(lowest <= least && lowest > 0.9 * least, "{lowest:e} m, {least:e} m at the end");
+    }
     let effort = simulation.system().structures()[0].effort().copied().unwrap();
     assert_eq!((effort.steps, effort.trials), (50 * SECTORS as u64, 0), "{effort:?}");
+}
+
+/// Of all watched nodes now (m).
+fn least_clearance(simulation: &Simulation) -> f64 {
+    let of = |sector: usize, node: u32| element(simulation, &format!("blade[{sector}].clearance"), node);
+    (1..=SECTORS).flat_map(|sector| (0..NODES).map(move |node| of(sector, node))).fold(f64::INFINITY, f64::min)
+}
+
+/// From far away onto blades at rest within one span: it does not pass for free flight.
+#[test]
+fn a_casing_that_closes_within_a_span_is_met() {
+    let mut scene = scene(Scheme::Galerkin, H, 1e-3);
+    scene.settings.surfaces[0].shape = Shape::Circular {};
+    scene.settings.surfaces[0].ramp_time = 0.0;
+    let (mut simulation, mut impulse) = (started(&scene), 0.0);
+    for n in 0..10 {
+        set(&mut simulation, "casing_radius_change", if n < 5 { 0.0 } else { -4.2e-4 });
+        go(&mut simulation, H);
+        let least = least_clearance(&simulation);
+        assert!(least > -1e-8, "span {n}: {least:e} m");
+        impulse += real(&simulation, "normal_impulse");
+    }
+    assert!(impulse > 0.0);
+}
+
+/// Peaks and means over a span are those of a thousand short steps.
+#[test]
+fn outputs_of_a_span_are_those_of_many_steps() {
+    let of = |scheme: Scheme, step: f64| {
+        let mut simulation = started(&scene(scheme, step, 1e-5));
+        let (mut peaks, mut sliding) = (0.0, 0.0);
+        for _ in 0..STEPS {
+            go(&mut simulation, H);
+            peaks += real(&simulation, "normal_force_peak");
+            for sector in 1..=SECTORS {
+                for node in 0..NODES {
+                    let force = |name: &str| element(&simulation, &format!("blade[{sector}].{name}"), node);
+                    let (normal, tangential) = (force("normal_force"), force("tangential_force"));
+                    assert!((tangential - 0.15 * normal).abs() <= 1e-6 * normal, "{tangential} of {normal} N");
+                    sliding += tangential;
+                }
+            }
+            let (least, lowest) = (least_clearance(&simulation), real(&simulation, "clearance_minimum"));
+            assert!(lowest <= least, "{lowest:e} m, {least:e} m at the end");
+        }
+        [peaks, sliding]
+    };
+    let (long, short) = (of(Scheme::Galerkin, H), of(Scheme::MasslessBoundary, 1e-7));
+    for (name, (long, short)) in ["peaks", "friction"].into_iter().zip(long.into_iter().zip(short)) {
+        println!("{name}: {long:.4e}, {short:.4e} N");
+        assert!((long / short - 1.0).abs() < 0.01 && short > 100.0, "{name}: {long} and {short} N");
+    }
+}
+
+/// A second surface, never met: the tolerance is a share of the smallest clearance, whatever the others are.
+#[test]
+fn a_wide_clearance_does_not_loosen_the_tolerance() {
+    let run = |gap: f64| {
+        let scene = scene(Scheme::Galerkin, H, 1e-3);
+        let solver = scene.settings.contacts[0].solver;
+        let mut scene = several::tip_and_seal(scene, solver);
+        scene.settings.surfaces[1].shape = Shape::Circular {};
+        scene.settings.contacts[1].gap = gap;
+        let mut simulation = started(&scene);
+        (0..STEPS).for_each(|_| go(&mut simulation, H));
+        let effort = simulation.system().structures()[0].effort().copied().unwrap();
+        (effort.steps, effort.trials, simulation.system().bank().displacement().to_vec())
+    };
+    let (near, far) = (run(1e-3), run(1e-2));
+    assert!(near.1 > STEPS.into(), "{} trials", near.1);
+    assert_eq!(near, far);
 }

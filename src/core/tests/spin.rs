@@ -1,10 +1,12 @@
-//! Spin in modal coordinates against closed forms.
+//! Spin in modal coordinates against closed forms, and in scenes whose speed changes.
 
 use nalgebra::DMatrix;
 use tiprub_core::dynamics::bank::{BankOptions, ModalBank};
 use tiprub_core::dynamics::modal::{ModalModel, ModalSpin};
 use tiprub_core::schemes::free_increment;
-use tiprub_core::settings::Scheme;
+use tiprub_core::settings::{InputInterpolation, Scheme, Shape};
+use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_test_models::{self as models, real, saved, set, slope, started};
 
 const SPEED: f64 = 1800.0;
 const RESTING: f64 = 5000.0;
@@ -116,4 +118,136 @@ fn whirl_goes_on_over_changes_of_step() {
         );
         assert!(alone < 8e-5, "{alone:e}");
     }
+}
+
+fn held(mut scene: Scene) -> Scene {
+    scene.settings.time.input_interpolation = InputInterpolation::Hold;
+    scene
+}
+
+/// A round casing around a shaft that whirls.
+fn whirling() -> Scene {
+    let mut scene = models::rub(6);
+    (scene.settings.time.step, scene.settings.surfaces[0].ramp_time) = (1e-6, 0.0);
+    scene.settings.surfaces[0].shape = Shape::Circular {};
+    scene.settings.structures[0].whirl = true;
+    scene
+}
+
+fn spinning_rom() -> Rom {
+    let mut rom = models::rich_blade(6);
+    rom.extras.spin = Some(models::spin(rom.order()));
+    rom
+}
+
+/// Growth: one blade under Ω²c, as a speed that jumps and as the same speed ramped.
+#[test]
+fn growth_and_stiffening_follow_a_speed_without_its_jumps() {
+    let mut scene = whirling();
+    scene.roms[0] = spinning_rom();
+    (scene.settings.structures[0].spin.growth, scene.settings.structures[0].spin.stiffening) = (true, true);
+    scene.settings.contacts[0].friction = 0.0;
+    let shaken = |scene: &Scene, line: bool| {
+        let (mut simulation, length, mut most) = (started(scene), 4e-3, 0.0_f64);
+        for index in 0..3 {
+            let speed = 1300.0 + 100.0 * f64::from(index);
+            set(&mut simulation, "speed", speed);
+            if line {
+                slope(&mut simulation, "speed", 100.0 / length);
+            }
+            simulation.begin_step(simulation.time(), length).unwrap();
+            while !simulation.advance().unwrap().finished {
+                most = most.max(simulation.system().energies().0);
+            }
+        }
+        (most, real(&simulation, "energy_residual_relative").abs())
+    };
+    let [(ramp, closed), (line, _), (hold, _)] =
+        [(&scene, false), (&scene, true), (&held(scene.clone()), false)].map(|(scene, line)| shaken(scene, line));
+    println!("kinetic energy of the blades: ramp {ramp:.3e} J, derivatives {line:.3e} J, hold {hold:.3e} J");
+    assert!(ramp < 0.1 * hold && (ramp / line - 1.0).abs() < 0.5 && closed < 1e-9, "{ramp} {line} {hold} {closed}");
+}
+
+/// Blades stretched by a speed stand where K(Ω)u = Ω²c₂ + Ω⁴c₄ says, solved in the coordinates of the ROM, and stay there.
+#[test]
+fn blades_grow_by_the_forces_of_their_speed_over_the_stiffness_of_their_speed() {
+    let mut scene = whirling();
+    scene.roms[0] = spinning_rom();
+    scene.settings.contacts[0].gap = 5e-3;
+    for (speed, stiffening) in [(300.0, true), (1300.0, true), (1300.0, false), (-1900.0, true)] {
+        let structure = &mut scene.settings.structures[0];
+        (structure.speed, structure.spin.growth, structure.spin.stiffening) = (speed, true, stiffening);
+        // Both powers count: they are alike at 1000 rad/s.
+        let mut spin = models::spin(scene.roms[0].order());
+        let loads = spin.centrifugal_load.iter().enumerate();
+        spin.centrifugal_load_speed4 = loads.map(|(i, load)| load * (1e-6 - 1e-7 * i as f64)).collect();
+        scene.roms[0].extras.spin = Some(spin.clone());
+        let rom = &scene.roms[0];
+        let square = speed * speed;
+        // With the stiffness of a resting blade the force of a resting blade.
+        let (fourth, share) = (square * square, if stiffening { 1.0 } else { 0.0 });
+        let stiffness = &rom.stiffness + (&spin.stiffness_speed2 * square + &spin.stiffness_speed4 * fourth) * share;
+        let force = |i: usize| square * spin.centrifugal_load[i] + share * fourth * spin.centrifugal_load_speed4[i];
+        let load = nalgebra::DVector::from_fn(rom.order(), |i, _| force(i));
+        let expected = &rom.contact_map * stiffness.lu().solve(&load).unwrap();
+        let mut simulation = started(&scene);
+        let error = |simulation: &Simulation| {
+            let bank = simulation.system().bank();
+            let off = |row: usize, sector: usize| (bank.row(row, sector) - expected[row]).abs();
+            (0..9)
+                .flat_map(|row| (0..6).map(move |sector| (row, sector)))
+                .map(|(row, sector)| off(row, sector))
+                .fold(0.0, f64::max)
+        };
+        let at_start = error(&simulation);
+        (0..100).for_each(|_| simulation.do_step(simulation.time(), 1e-5).unwrap());
+        let (later, size) = (error(&simulation), expected.amax());
+        println!(
+            "{speed} rad/s: grown by {size:.2e} m, off by {at_start:.1e} m, and {later:.1e} m a millisecond later"
+        );
+        assert!(size > 1e-7 && at_start < 1e-9 * size && later < 1e-8 * size, "{at_start:e}, {later:e} of {size:e}");
+    }
+}
+
+/// A blade left vibrating while its rotor speeds up, its stiffness that of the middle of each step: of second order in H.
+#[test]
+fn held_inputs_follow_a_speed_by_its_mean_over_the_step() {
+    let mut scene = held(models::rub(1));
+    let order = scene.roms[0].order();
+    let mut spin = models::spin(order);
+    spin.stiffness_speed2 = nalgebra::DMatrix::identity(order, order) * 3.0;
+    spin.stiffness_speed4.fill(0.0);
+    scene.roms[0].extras.spin = Some(spin);
+    scene.settings.structures[0].spin.stiffening = true;
+    (scene.settings.outputs.watched_sectors, scene.settings.outputs.nodal_diameters) = (vec![1], None);
+    let mut rubbed = started(&scene);
+    while rubbed.time() < 2e-3 {
+        rubbed.do_step(rubbed.time(), 5e-5).unwrap();
+    }
+    // No casing in the way from here on.
+    set(&mut rubbed, "casing_shape_factor", 0.0);
+    set(&mut rubbed, "casing_radius_change", 5e-3);
+    let left = saved(&rubbed);
+    let end = |steps: u32| {
+        let mut simulation = Simulation::new(&scene).unwrap();
+        simulation.restore_state(&left).unwrap();
+        let (start, length, rate) = (simulation.time(), 8e-4 / f64::from(steps), 5e5);
+        for index in 0..steps {
+            set(&mut simulation, "speed", 1300.0 + rate * length * f64::from(index));
+            slope(&mut simulation, "speed", rate);
+            simulation.do_step(start + f64::from(index) * length, length).unwrap();
+        }
+        assert!(simulation.system().events().is_empty());
+        (0..order).map(|mode| simulation.system().bank().modal_state(mode, 0).0).collect::<Vec<_>>()
+    };
+    let exact = end(800);
+    let error = |steps| {
+        let found = end(steps);
+        let off = found.iter().zip(&exact).map(|(found, exact)| (found - exact).powi(2)).sum::<f64>();
+        (off / exact.iter().map(|value| value * value).sum::<f64>()).sqrt()
+    };
+    let [coarse, middle, fine] = [8, 16, 32].map(error);
+    let orders = [coarse / middle, middle / fine].map(f64::log2);
+    println!("errors {coarse:.1e}, {middle:.1e}, {fine:.1e}: orders {orders:.2?}");
+    assert!(orders.iter().all(|order| *order > 1.7) && fine < 1e-3, "{orders:?}");
 }

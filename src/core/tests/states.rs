@@ -1,9 +1,13 @@
-//! States whose checksum is right and whose content is not: refused with nothing changed, or run on to an end.
+//! States that are restored go on as if nothing had been; those whose content is none are refused with nothing changed, or run on to an
+//! end.
+
+use std::collections::BTreeMap;
 
 use tiprub_core::persist::fingerprint;
 use tiprub_core::settings::{LoadSettings, Scheme, Solver, SplineSettings};
+use tiprub_core::variables::{Causality, Variability};
 use tiprub_core::{Error, Scene, Simulation};
-use tiprub_test_models::{self as models, coating, disk, flexible, go, lattice, saved};
+use tiprub_test_models::{self as models, bits, coating, disk, flexible, go, lattice, real, reference, saved, started};
 
 /// Magic, format version and fingerprint of the scene, in front of what is damaged here.
 const HEADER: usize = 24;
@@ -181,5 +185,89 @@ fn what_was_saved_is_restored_whatever_was_there() {
                 assert!(to == 0 || saved(&twin) == *second, "{name}, {from} to {to}");
             }
         }
+    }
+}
+
+fn run(simulation: &mut Simulation, steps: u32, length: f64) {
+    for _ in 0..steps {
+        go(simulation, length);
+    }
+}
+
+/// Every element of every continuous output: its derivative (1/s), as bits.
+fn derivatives(simulation: &Simulation) -> BTreeMap<u32, u64> {
+    let rows = simulation.table().variables().iter();
+    let rows = rows.filter(|row| row.causality == Causality::Output && row.variability == Variability::Continuous);
+    rows.flat_map(|row| (0..row.len()).map(|i| row.reference + u32::try_from(i).unwrap()))
+        .map(|reference| (reference, simulation.output_derivative(reference, 1).unwrap().to_bits()))
+        .collect()
+}
+
+/// Steps of other lengths lie behind the instance that takes the state over: none of them counts.
+#[test]
+fn a_restored_state_gives_the_derivatives_of_its_own_steps() {
+    let scene = models::rub(12);
+    let names = ["force_x", "torque", "kinetic_energy", "external_work"];
+    let read = |simulation: &Simulation| names.map(|name| real(simulation, name));
+    let mut simulation = started(&scene);
+    run(&mut simulation, 40, 5e-5);
+    run(&mut simulation, 1, 3e-5);
+    let before = read(&simulation);
+    run(&mut simulation, 1, 7e-5);
+    let now = read(&simulation);
+    let state = saved(&simulation);
+    let at_save = derivatives(&simulation);
+    // Means belong to the middles of their steps.
+    for (index, length) in [5e-5, 5e-5, 7e-5, 7e-5].into_iter().enumerate() {
+        let exact = (now[index] - before[index]) / length;
+        let found = simulation.output_derivative(reference(&simulation, names[index]), 1).unwrap();
+        assert!(exact != 0.0 && (found / exact - 1.0).abs() < 1e-12, "{}: {found}, exactly {exact}", names[index]);
+    }
+    run(&mut simulation, 1, 4e-5);
+    let after = derivatives(&simulation);
+    for lengths in [&[][..], &[9e-5], &[1.1e-5, 6e-5], &[5e-5, 2e-5, 8e-5]] {
+        let mut other = started(&scene);
+        for length in lengths {
+            run(&mut other, 1, *length);
+        }
+        other.restore_state(&state).unwrap();
+        assert_eq!(derivatives(&other), at_save, "after steps of {lengths:?}");
+        run(&mut other, 1, 4e-5);
+        assert_eq!(derivatives(&other), after, "a step after steps of {lengths:?}");
+        // And into an instance that has stepped since, or was never started.
+        other.restore_state(&state).unwrap();
+        assert_eq!(derivatives(&other), at_save);
+    }
+    let mut fresh = Simulation::new(&scene).unwrap();
+    fresh.restore_state(&state).unwrap();
+    assert_eq!(derivatives(&fresh), at_save);
+}
+
+#[test]
+fn states_of_another_scene_are_refused_and_change_nothing() {
+    let mut simulation = started(&models::rub(12));
+    run(&mut simulation, 30, 5e-5);
+    let (mut state, before) = (saved(&simulation), bits(&simulation));
+    assert!(simulation.restore_state(&state[1..]).is_err());
+    assert!(simulation.save_state(&mut state[1..]).is_err());
+    let mut foreign_scene = models::rub(12);
+    foreign_scene.settings.contacts[0].gap = 4e-4;
+    let message = simulation.restore_state(&saved(&started(&foreign_scene))).unwrap_err().to_string();
+    assert!(message.contains("another scene"), "{message}");
+    assert_eq!(bits(&simulation), before);
+}
+
+#[test]
+fn a_thousand_resets_give_identical_bits() {
+    let scene = models::rub(6);
+    let mut simulation = Simulation::new(&scene).unwrap();
+    let mut first = None;
+    for _ in 0..1000 {
+        simulation.initialise(0.0).unwrap();
+        run(&mut simulation, 3, 4e-4);
+        let now = bits(&simulation);
+        assert_eq!(*first.get_or_insert_with(|| now.clone()), now);
+        simulation.set_real(reference(&simulation, "speed"), 77.0).unwrap();
+        simulation.reset();
     }
 }

@@ -49,6 +49,12 @@ impl Blade {
     }
 }
 
+/// The full blade, made once.
+fn full() -> &'static Blade {
+    static BLADE: OnceLock<Blade> = OnceLock::new();
+    BLADE.get_or_init(|| Blade::new(MeshCounts::default()))
+}
+
 /// The reduced blade, made once for all tests of this file.
 fn reduced() -> &'static Reduction {
     static REDUCTION: OnceLock<Reduction> = OnceLock::new();
@@ -60,7 +66,7 @@ fn reduced() -> &'static Reduction {
 
 #[test]
 fn the_full_model_under_spin_agrees_with_calculix() {
-    let blade = Blade::new(MeshCounts::default());
+    let blade = full();
     for speed in [900.0, 1300.0, 1800.0] {
         let state = blade.at(speed);
         println!("{speed} rad/s: {} corrections, residual {:.1e}", state.iterations, state.residual);
@@ -148,7 +154,7 @@ fn the_reduced_model_under_spin_agrees_with_calculix() {
 /// Unit forces on the contact nodes: the reduced model yields as the full one does about the same spinning state.
 #[test]
 fn contact_nodes_yield_under_spin_as_in_the_full_model() {
-    let (blade, rom) = (Blade::new(MeshCounts::default()), &reduced().rom);
+    let (blade, rom) = (full(), &reduced().rom);
     let spin = rom.extras.spin.as_ref().unwrap();
     let nodes = [103, 1927, 3751].map(|number: usize| number - 1);
     let rows: Vec<usize> = nodes
@@ -259,14 +265,22 @@ fn the_spin_arrays_have_the_same_bits_on_any_number_of_threads() {
 #[test]
 fn other_reductions_hold_as_well() {
     use ReductionKind::{FixedInterface, FreeInterface};
+    let mesh = MeshCounts { chord: 8, thickness: 1, span: 10 };
     for (tip, kind, modes) in [
         (Tip::Patches(5), FixedInterface, 20),
         (Tip::Nodes(3), FixedInterface, 40),
         (Tip::Patches(5), FreeInterface, 20),
         (Tip::Nodes(3), FreeInterface, 20),
     ] {
-        let options =
-            Rotor37Options { tip, kind, modes, checked_modes: 6, spin: Some(DESIGN_SPEED), ..Rotor37Options::paper() };
+        let options = Rotor37Options {
+            mesh,
+            tip,
+            kind,
+            modes,
+            checked_modes: 6,
+            spin: Some(DESIGN_SPEED),
+            ..Rotor37Options::paper()
+        };
         for check in reduce_rotor37(&options, &silent).unwrap().spin_checks {
             let (frequencies, growth) = (check.frequency_deviation(), check.growth_deviation());
             println!("{tip:?}, {kind:?}, {modes} modes, {} rad/s: {frequencies:.3?} %, {growth:.3} %", check.speed);

@@ -59,6 +59,12 @@ fn several(settings: &SceneSettings, problem: String) -> Failure {
     Failure::usage(format!("scene `{}`", settings.name), problem, remedy)
 }
 
+/// Internal steps of at most `step` (s) in a communication step of length `interval` (s).
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+pub(crate) fn divisions(interval: f64, step: f64) -> u32 {
+    (interval / step * (1.0 - 1e-9)).ceil().clamp(1.0, 1e8) as u32
+}
+
 /// Shorter work is not announced (s).
 const LONG: f64 = 20.0;
 

@@ -176,3 +176,42 @@ impl Level {
         self.constant.hold();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All combinations of closed points of one node have one solution, with as little residual flexibility as degree 3 is taken for.
+    #[test]
+    fn contact_problems_of_the_degree_taken_are_solvable() {
+        let (frequency, mut threes) = (1e4, 0);
+        for place in 1..=84 {
+            let step = 0.1 * f64::from(place) / frequency;
+            let of = |flexibility: f64| Modes {
+                frequencies: vec![frequency],
+                damping_ratios: vec![0.0],
+                shapes: DMatrix::from_element(1, 1, 1.0),
+                residual: DMatrix::from_element(1, 1, flexibility),
+            };
+            let (mut low, mut high) = (0.0, step * step);
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                *(if of(middle).degree_at(step) == 3 { &mut high } else { &mut low }) = middle;
+            }
+            let modes = of(high);
+            threes += usize::from(high > 1e-6 * step * step);
+            for share in [0.5, 0.6, 0.75, 0.9, 1.0] {
+                let mut level = Level::new(&modes, 3);
+                level.set_step(&modes, share * step);
+                for set in 1..8_usize {
+                    let members: Vec<usize> = (1..=3).filter(|point| set >> (point - 1) & 1 == 1).collect();
+                    let minor = DMatrix::from_fn(members.len(), members.len(), |i, k| {
+                        level.compliance_of(members[i], members[k])[(0, 0)]
+                    });
+                    assert!(minor.determinant() > 0.0, "ωh = {:.1}, {members:?}", frequency * share * step);
+                }
+            }
+        }
+        assert!(threes > 80, "{threes}");
+    }
+}

@@ -148,3 +148,44 @@ impl Rows {
         self.instructions.run(Combine { table: shapes, stride: self.stride, columns: &self.all, coefficients, sums });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::galerkin::level::Level;
+    use tiprub_test_models::Random;
+
+    /// Decaying vibration stays within reach, and without damping goes there.
+    #[test]
+    fn free_motion_goes_as_far_as_its_reach_and_no_farther() {
+        let mut random = Random(6);
+        for case in 0..200 {
+            let ratio = random.of(&[0.0, 0.02, 0.3, 0.7]);
+            let count = 1 + random.below(3);
+            let frequencies: Vec<f64> = (0..count).map(|_| random.scale(1e3, 1e4)).collect();
+            let (damping_ratios, shapes) = (vec![ratio; count], random.matrix(3, count));
+            let modes = Modes { frequencies, damping_ratios, shapes, residual: DMatrix::zeros(3, 3) };
+            let (rows, mut level) = (Rows::new(&modes), Level::new(&modes, 1));
+            level.set_step(&modes, 5e-6);
+            let mut state = SectorState::new(count, 1);
+            state.position.iter_mut().for_each(|q| *q = random.signed());
+            state.velocity.iter_mut().for_each(|v| *v = 3e3 * random.signed());
+            let (mut reach, mut now, mut rate) = (vec![0.0; LANES], vec![0.0; LANES], vec![0.0; LANES]);
+            rows.reach(&state, &mut [&mut reach]);
+            let mut most = [0.0_f64; 3];
+            for _ in 0..1500 {
+                rows.now(&state, &mut [&mut now, &mut rate]);
+                (0..3).for_each(|row| most[row] = most[row].max(now[row].abs()));
+                for (mode, table) in level.modes.iter().enumerate() {
+                    let (q, v) = (state.position[mode], state.velocity[mode]);
+                    let of = |row: [f64; 5]| row[0] * q + row[1] * v;
+                    (state.position[mode], state.velocity[mode]) = (of(table.end[0]), of(table.end[1]));
+                }
+            }
+            for (most, reach) in most.into_iter().zip(&reach) {
+                assert!(most <= reach * (1.0 + 1e-12), "case {case}: {most} beyond {reach}");
+                assert!(count > 1 || ratio > 0.0 || most > 0.999 * reach, "case {case}: {most} of {reach}");
+            }
+        }
+    }
+}

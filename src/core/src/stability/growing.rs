@@ -328,4 +328,12 @@ mod tests {
             assert!(found.continuous < -1.0 && !found.is_flutter(), "h = {step}: {found:?}");
         }
     }
+
+    /// What is left without the mass of the node leans: with µ > 0.5 it gives way to no force, and there is no such limit.
+    #[test]
+    fn without_its_mass_a_node_that_digs_in_has_no_motion() {
+        let leaning = ModalModel { quasi_static: 1, ..model(&[1e3, 1e5], &[[1.0, 0.2, 0.0], [0.5, -1.0, 0.0]], 0.01) };
+        let found = |friction: f64| without_node_mass(&leaning, 1e-5, friction, &radial());
+        assert!(found(0.49).is_some() && found(0.51).is_none(), "{:?}, {:?}", found(0.49), found(0.51));
+    }
 }

@@ -175,6 +175,20 @@ mod tests {
         assert!(accepted > 100 && refused > 20, "{accepted} {refused}");
     }
 
+    /// Two modes along the normal, of 1000 rad/s with 4/5 of the flexibility and 2000 rad/s with 1/5.
+    #[test]
+    fn a_motion_is_shared_by_the_modes_from_half_an_octave_below_it() {
+        let model = ModalModel { quasi_static: 0, ..crate::stability::tests::model(&[1e3, 2e3], &[[1.0; 3]; 2], 0.0) };
+        for (frequency, share) in [(1400.0, 1.0), (1430.0, 0.2), (2800.0, 0.2), (2850.0, 0.0)] {
+            assert!((share_of(&model, &radial(), frequency) - share).abs() < 1e-15, "{frequency}");
+        }
+        // A force that acts a step late makes motions of its own: no mode bounds them.
+        let growth = Growth { continuous: -1.0, frequency: 0.0, stepped: 1.0, swing: 1430.0, noise: 0.0 };
+        let share = |scheme: Scheme| Judged::new(&model, scheme, 1e-5, &radial(), growth).share;
+        let [exact, massless] = [Scheme::ModalExact, Scheme::MasslessBoundary].map(share);
+        assert!((exact - 0.2).abs() < 1e-15 && (massless - 1.0).abs() < 1e-15, "{exact}, {massless}");
+    }
+
     #[test]
     fn a_longer_time_and_more_growth_are_a_larger_error() {
         let of = |continuous: f64, stepped: f64, share: f64| Judged {

@@ -32,6 +32,9 @@ const MINORS_UP_TO: usize = 12;
 /// Minors and eigenvalues of a matrix with unit diagonal below this are zero up to rounding.
 const SINGULAR: f64 = 1e-10;
 
+/// Less friction than this is not proposed: nothing slides with so little.
+const LEAST_FRICTION: f64 = 1e-4;
+
 /// Directions of the closed contacts of one group: (normal, slip direction) per node.
 pub type ContactDirections = Vec<([f64; 3], [f64; 3])>;
 
@@ -204,7 +207,7 @@ fn refuse_unsolvable(solvable: impl Fn(f64) -> bool, exact: bool, step: f64, fri
             "with friction_coefficient µ = {friction} and internal steps up to h = {step:.3e} s the contact problem {what} ({why})",
             friction = shown(friction)
         ),
-        remedy: if low > 1e-9 * friction {
+        remedy: if low >= LEAST_FRICTION {
             format!("Use µ below {low:.4} for this structure, or another internal step")
         } else {
             "Use no friction, or fewer contact nodes or more modes: with more contacts than modes no friction is safe"
@@ -335,6 +338,18 @@ mod tests {
         twice.contact_modes.fill_row(0, -1.0);
         twice.contact_modes.fill_row(3, -1.0);
         assert!(check_solvable(&twice, Scheme::ModalExact, step, 0.0, &closed(MINORS_UP_TO + 1)).is_ok());
+    }
+
+    /// Two nodes on one mode, of which one leans: the symmetric part of W, 1 − (µτ)²/8 at most, is definite without friction alone.
+    #[test]
+    fn less_friction_than_there_is_anywhere_is_not_proposed() {
+        let model = ModalModel {
+            contact_modes: DMatrix::from_column_slice(6, 1, &[-1.0, 0.0, 0.0, -1.0, 1.0, 0.0]),
+            ..model(&[1000.0], &[[0.0; 3]], 0.0)
+        };
+        let senses = [vec![vec![radial()[0]; 2]]];
+        let told = check_solvable_together(&[model], Scheme::ModalExact, 1e-5, 0.3, &senses).unwrap_err().to_string();
+        assert!(told.contains("no friction is safe"), "{told}");
     }
 
     /// A definite symmetric part spares the minors: what it lets pass they do, and they alone decide on the rest.

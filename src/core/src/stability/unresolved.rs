@@ -135,5 +135,18 @@ mod tests {
         // Nothing is seen along other directions.
         assert!(limit(&model(&[(1e3, 1.0)]), &[[0.0, 1.0, 0.0]]).is_infinite());
         near(limit_along_axes(&model(&[(1e3, 1.0)])), 1e-2);
+        // Any axis counts.
+        for axis in 0..3 {
+            let mut along = model(&[(1e3, 1.0)]);
+            along.contact_modes.swap_rows(0, axis);
+            near(limit_along_axes(&along), 1e-2);
+        }
+    }
+
+    /// Errors go with the square of the step: some four per cent at the limit, a tenth of that is not worth telling.
+    #[test]
+    fn a_fifth_of_the_limit_is_near_it() {
+        let near = |share: f64| warning(share * 1e-5, 1e-5).is_some();
+        assert!(near(0.21) && near(0.9) && !near(0.19));
     }
 }

@@ -364,3 +364,37 @@ impl Facing<'_> {
         (self.record.tallies[node], self.record.work) = (tally, work);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rotor that is run up on a shaft that is accelerated: places are those of the motion at any time, velocities its rates.
+    #[test]
+    fn a_course_moves_at_the_rates_that_it_tells() {
+        let span = 4e-5;
+        let at = |time: f64| Drive {
+            rotor_angle: 0.3 + 1300.0 * time + 4e6 * time * time,
+            speed: 1300.0 + 8e6 * time,
+            gap_offset: 2e-4 - 3.0 * time,
+            shaft: [0.2 * time, 1e-5 - 0.1 * time + 500.0 * time * time, -0.3 * time],
+            shaft_velocity: [0.2, -0.1 + 1000.0 * time, -0.3],
+            ..Drive::default()
+        };
+        let course = Course::new(&at(0.0), (&at(0.5 * span), Growth::default()), &at(span), span);
+        for place in 0..=8 {
+            let theta = 0.125 * f64::from(place);
+            let (found, expected) = (course.at(theta).0, at(theta * span));
+            let pairs = [
+                (found.rotor_angle, expected.rotor_angle, 1.0),
+                (found.speed, expected.speed, 1300.0),
+                (found.gap_offset, expected.gap_offset, 1e-4),
+            ];
+            let shaft = (0..3).map(|i| (found.shaft[i], expected.shaft[i], 1e-5));
+            let velocity = (0..3).map(|i| (found.shaft_velocity[i], expected.shaft_velocity[i], 0.1));
+            for (found, expected, size) in pairs.into_iter().chain(shaft).chain(velocity) {
+                assert!((found - expected).abs() < 1e-9 * size, "θ = {theta}: {found}, {expected}");
+            }
+        }
+    }
+}

@@ -1,10 +1,11 @@
 //! What refining a scene changes: its internal step, the modes of its structures, the contact nodes and the mesh of its blades, one at a
 //! time; where each sequence goes, and with it the error of the scene as it stands.
 //!
-//! [`refine`] finds the directions, `refiner` the scenes at every level, `nodes` which of a refined model's nodes touch, [`truncate`] takes modes
+//! [`mod@directions`] finds the directions ([`refine`] says what one is), `refiner` the scenes at every level, `nodes` which of a refined model's nodes touch, [`truncate`] takes modes
 //! away from any ROM, [`mod@march`] runs and compares, [`limit`] extrapolates, [`page`] draws and tells.
 
 pub mod coarsen;
+pub mod directions;
 pub mod limit;
 pub mod march;
 mod nodes;
@@ -15,6 +16,7 @@ pub mod truncate;
 
 use std::time::Instant;
 
+use directions::directions;
 use limit::Limit;
 use march::{Marched, march};
 use refine::{Again, Direction, Level, Source};
@@ -25,6 +27,7 @@ use tiprub_shell::{Failure, Result, console::Console, sweep};
 use super::Study;
 use crate::{
     arguments::ConvergenceArguments,
+    divisions,
     error::{
         case::Case,
         own::{Own, refuse_compared},
@@ -128,7 +131,7 @@ pub fn found(name: &str, scene: &Scene, asked: &Asked, console: &Console) -> Res
         .map_err(|why| Failure::new(name, format!("the scene as it stands does not run: {why}"), ""))?;
     let seconds = clock.elapsed().as_secs_f64();
     runner.own = Some(standing);
-    let directions = refine::directions(
+    let directions = directions(
         scene,
         own,
         &Again { source: asked.source, cache: &asked.cache, mesh: asked.mesh, quick: asked.quick, console },
@@ -210,12 +213,6 @@ impl<'a> Runner<'a> {
         };
         sweep::sweep(&direction.levels, self.threads, run, progress)
     }
-}
-
-/// Internal steps per communication step.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-pub(crate) fn divisions(interval: f64, step: f64) -> u32 {
-    (interval / step * (1.0 - 1e-9)).ceil().clamp(1.0, 1e8) as u32
 }
 
 impl Refined {

@@ -61,7 +61,10 @@ mod tests {
     use tiprub_shell::{Result, console::Console};
 
     use super::*;
-    use crate::convergence::refine::{Again, Direction, Meshed, Source, directions};
+    use crate::convergence::{
+        directions::directions,
+        refine::{Again, Direction, Meshed, Source},
+    };
 
     /// A coarse blade, its nodes named as the reduction likes.
     struct Blade;

@@ -1,11 +1,9 @@
-//! In which directions a scene can be refined; `refiner` makes the scenes at every level of each.
+//! What a direction is in which a scene can be refined, its levels, and where models that are reduced again come from.
 
 use tiprub_core::{Rom, Scene};
 use tiprub_gallery::rom_cache::RomCache;
 use tiprub_model::rotor37::Tip;
 use tiprub_shell::{Result, console::Console};
-
-use super::refiner::Refiner;
 
 /// A ROM and what it was reduced from.
 #[derive(Debug, Clone)]
@@ -106,7 +104,8 @@ pub(super) const MODES_KEPT: &str = "modes";
 pub(super) const MESH_NODES: &str = "mesh nodes";
 
 /// Names of the directions of structures, for files.
-const MODES: [&str; 8] = ["modes", "modes-2", "modes-3", "modes-4", "modes-5", "modes-6", "modes-7", "modes-8"];
+pub(super) const MODES: [&str; 8] =
+    ["modes", "modes-2", "modes-3", "modes-4", "modes-5", "modes-6", "modes-7", "modes-8"];
 
 /// Name of the direction of the modes of a structure.
 pub fn modes_of(structure: usize) -> Option<&'static str> {
@@ -125,25 +124,4 @@ pub struct Again<'a> {
     pub quick: bool,
     /// For progress.
     pub console: &'a Console,
-}
-
-/// All directions of a scene; steps are in multiples of `own` per communication step.
-///
-/// # Errors
-/// A source that does not give the ROM of the scene, and what its reduction refuses.
-pub fn directions(scene: &Scene, own: u32, again: &Again) -> Result<Vec<Direction>> {
-    let refiner = Refiner::checked(scene, own, again)?;
-    let mut all = vec![refiner.steps()];
-    for (index, name) in (0..scene.roms.len()).zip(MODES) {
-        all.push(refiner.modes(index, name)?);
-    }
-    all.push(refiner.nodes()?);
-    if let Some(structure) = scene.settings.structures.get(MODES.len()) {
-        all.push(Direction {
-            missing: format!("the study refines {} structures", MODES.len()),
-            ..Direction::new("modes-more", format!("modes of {} and those after it", structure.name), MODES_KEPT)
-        });
-    }
-    all.push(refiner.meshes()?);
-    Ok(all)
 }

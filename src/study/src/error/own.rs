@@ -15,7 +15,7 @@ use super::{
     scene::SceneRun,
     window,
 };
-use crate::{arguments::ErrorArguments, convergence::divisions};
+use crate::{arguments::ErrorArguments, divisions};
 
 /// Internal steps tried, as multiples of the number that the scene asks for.
 const SHARES: [f64; 7] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];

@@ -8,9 +8,12 @@
 
 mod coefficients;
 mod contact;
+mod energy;
 mod fourier;
 mod model;
 mod pass;
+#[cfg(test)]
+mod tests;
 
 use super::bank::{FLUSH_BELOW, LANES, lanes};
 use super::dispatch::InstructionSet;
@@ -355,59 +358,6 @@ impl CyclicBank {
         }
     }
 
-    /// Kinetic and strain energy of the disk (J), in the quantity the scheme conserves (see [`crate::schemes`]).
-    pub fn energies(&self) -> (f64, f64) {
-        let (mut kinetic, mut strain) = (0.0, 0.0);
-        for nodal_diameter in 0..self.model.diameters.len() {
-            let (own, stored) = self.diameter_energies(nodal_diameter);
-            kinetic += own;
-            strain += stored;
-        }
-        (kinetic, strain)
-    }
-
-    /// Kinetic and strain energy of the disk at this instant (J), ½q̇² and ½ω²q² of every mode, under the contact forces
-    /// that last (`forces[row · lanes + sector]`, N) and the modal loads.
-    pub fn energies_now(&mut self, forces: &[f64]) -> (f64, f64) {
-        self.gather_forces(forces);
-        let (mut kinetic, mut strain) = (0.0, 0.0);
-        for nodal_diameter in 0..self.model.diameters.len() {
-            for mode in 0..self.model.diameters[nodal_diameter].len() {
-                let force = self.gathered_force(nodal_diameter, mode);
-                let (position, increment) = self.modal_state(nodal_diameter, mode);
-                let index = nodal_diameter * self.modes + mode;
-                for part in 0..2 {
-                    let velocity = self.velocities[index].of(position[part], increment[part], force[part]);
-                    kinetic += 0.5 * velocity * velocity;
-                    strain += self.coefficients[index].spring * (position[part] * position[part]);
-                }
-            }
-        }
-        (kinetic, strain)
-    }
-
-    /// Kinetic and strain energy of the modes of one nodal diameter (J).
-    pub fn diameter_energies(&self, nodal_diameter: usize) -> (f64, f64) {
-        let (mut kinetic, mut strain) = (0.0, 0.0);
-        for mode in 0..self.model.diameters[nodal_diameter].len() {
-            let k = &self.coefficients[nodal_diameter * self.modes + mode];
-            let (position, increment) = self.modal_state(nodal_diameter, mode);
-            for part in 0..2 {
-                kinetic += k.inertia * (increment[part] * increment[part]);
-                strain += k.spring * (position[part] * (position[part] - increment[part]));
-            }
-        }
-        (kinetic, strain)
-    }
-
-    /// Damping loss since the last call (J).
-    pub fn collect_loss(&mut self) -> f64 {
-        self.finish();
-        let loss = self.state.loss.iter().sum();
-        self.state.loss.fill(0.0);
-        loss
-    }
-
     /// Set amplitudes that have decayed to nothing to exactly zero, so that no denormals arise.
     pub fn flush(&mut self) {
         for values in [&mut self.state.position, &mut self.state.increment, &mut self.state.older] {
@@ -437,165 +387,5 @@ impl CyclicBank {
     /// Restore a saved state, after [`CyclicBank::set_step`].
     pub fn restore(&mut self, reader: &mut Reader) {
         self.state.restore(reader);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::{Complex, DMatrix};
-
-    fn model(sectors: usize, nodes: usize) -> CyclicModel {
-        let diameter = |n: usize| {
-            // Fewer modes for some nodal diameters than for others.
-            let modes = 3 * nodes + 4 - n % 3;
-            let real = n == 0 || 2 * n == sectors;
-            let shape = |row: usize, mode: usize| {
-                let x = 1.7 * row as f64 + 0.9 * mode as f64 + 0.4 * n as f64;
-                Complex::new(x.sin(), if real { 0.0 } else { (1.3 * x).cos() })
-            };
-            DiameterModes {
-                nodal_diameter: n,
-                frequencies: (1..=modes).map(|mode| 700.0 * (mode * mode) as f64 + 50.0 * n as f64).collect(),
-                damping_ratios: vec![0.005; modes],
-                contact_modes: DMatrix::from_fn(3 * nodes, modes, shape),
-                shapes: DMatrix::identity(modes, modes),
-                quasi_static: 3 * nodes,
-            }
-        };
-        CyclicModel { sectors, diameters: (0..=sectors / 2).map(diameter).collect() }
-    }
-
-    /// Free motion keeps ½q̇² + ½ω²q² of every nodal diameter, which the energy that is conserved does not tell.
-    #[test]
-    fn the_energy_of_the_instant_is_that_of_the_motion() {
-        let mut undamped = model(11, 2);
-        undamped.set_damping_ratio(0.0);
-        let mut bank = CyclicBank::new(&undamped, false);
-        bank.set_step(Scheme::ModalExact, 2e-5);
-        let mut expected = 0.0;
-        for (n, diameter) in undamped.diameters.iter().enumerate() {
-            for (mode, frequency) in diameter.frequencies.iter().enumerate() {
-                let (q, v) = (1e-4 / (1.0 + mode as f64), 0.3 - 0.1 * n as f64);
-                bank.set_modal_state(n, mode, [q, -0.5 * q], [v, 0.2 * v]);
-                let parts = if undamped.is_real(n) { [1.0, 0.0] } else { [1.0, 1.0] };
-                let square = |a: f64, b: f64| parts[0] * a * a + parts[1] * b * b;
-                expected += 0.5 * square(v, 0.2 * v) + 0.5 * frequency * frequency * square(q, 0.5 * q);
-            }
-        }
-        let none = vec![0.0; bank.rows() * bank.lanes()];
-        for _ in 0..200 {
-            bank.predict(false);
-            let (kinetic, strain) = bank.energies_now(&none);
-            let off = (kinetic + strain - expected).abs() / expected;
-            assert!(off < 1e-9 && kinetic >= 0.0 && strain >= 0.0, "{off:e}");
-        }
-    }
-
-    #[test]
-    fn at_rest_nothing_of_the_run_before_acts() {
-        for scheme in [Scheme::ModalExact, Scheme::CentralDifference, Scheme::MasslessBoundary] {
-            let mut bank = CyclicBank::new(&model(11, 2), true);
-            bank.set_step(scheme, 1e-6);
-            for step in 0..5 {
-                bank.loads_mut()[1] = 1e3;
-                bank.predict(true);
-                bank.ask([(3, 0, [1.0, 0.3, -0.2]), (step, 1, [-2.0, 0.0, 0.5])].into_iter());
-                bank.act();
-                assert!(bank.finish_loads() != 0.0);
-            }
-            bank.rest();
-            let none = vec![0.0; bank.rows() * bank.lanes()];
-            assert_eq!((bank.energies_now(&none), bank.collect_loss()), ((0.0, 0.0), 0.0), "{scheme:?}");
-            bank.resample(scheme, 7e-7, &none);
-            for _ in 0..2 {
-                bank.predict(true);
-                assert_eq!((bank.finish_loads(), bank.energies_now(&none)), (0.0, (0.0, 0.0)), "{scheme:?}");
-                assert!(bank.displacement().iter().chain(bank.displacement_before()).all(|value| *value == 0.0));
-            }
-            assert_eq!(bank.collect_loss().to_bits(), 0.0_f64.to_bits());
-        }
-    }
-
-    #[test]
-    fn quasi_static_modes_have_no_motion_to_start_with() {
-        let mut undamped = model(8, 1);
-        undamped.set_damping_ratio(0.0);
-        let mut bank = CyclicBank::new(&undamped, false);
-        bank.set_step(Scheme::MasslessBoundary, 1e-6);
-        let mut expected = 0.0;
-        for (n, diameter) in undamped.diameters.iter().enumerate() {
-            for (mode, frequency) in diameter.frequencies.iter().enumerate() {
-                bank.set_modal_state(n, mode, [1e-4, 0.0], [0.3, 0.0]);
-                let dynamic = mode + diameter.quasi_static < diameter.len();
-                expected += if dynamic { 0.5 * (0.09 + (1e-4 * frequency).powi(2)) } else { 0.0 };
-            }
-        }
-        let none = vec![0.0; bank.rows() * bank.lanes()];
-        let (kinetic, strain) = bank.energies_now(&none);
-        assert!(((kinetic + strain) / expected - 1.0).abs() < 1e-12, "{kinetic} + {strain} of {expected} J");
-    }
-
-    /// The widest set against the baseline; a processor without wider registers compares the baseline with itself.
-    #[test]
-    fn every_instruction_set_gives_the_same_bits() {
-        for (sectors, nodes) in [(13, 1), (20, 2), (36, 5)] {
-            for scheme in [Scheme::ModalExact, Scheme::MasslessBoundary] {
-                let run = |instruction_set| {
-                    let mut bank = CyclicBank::new(&model(sectors, nodes), true);
-                    bank.instruction_set = instruction_set;
-                    bank.set_step(scheme, 1e-6);
-                    for step in 0..300 {
-                        bank.loads_mut()[1] = 1e3;
-                        bank.predict(true);
-                        if step % 3 > 0 {
-                            let force = [f64::from(step).cos(), 0.3, -0.2];
-                            let index = usize::try_from(step).unwrap();
-                            let forces = [(index % sectors, index % nodes, force), (index * 5 % sectors, 0, force)];
-                            bank.ask(forces.into_iter());
-                            bank.act();
-                        }
-                        if step % 50 == 0 {
-                            bank.collect_loss();
-                        }
-                    }
-                    let loss = bank.collect_loss().to_bits();
-                    let state = &bank.state;
-                    let modes = state.position.iter().chain(&state.increment).flatten().flatten();
-                    let bits = modes.chain(&state.displacement).map(|value| value.to_bits());
-                    (bits.collect::<Vec<_>>(), loss)
-                };
-                assert!(
-                    run(InstructionSet::Baseline) == run(InstructionSet::detect()),
-                    "{sectors} x {nodes} {scheme:?}"
-                );
-                #[cfg(target_arch = "x86_64")]
-                if InstructionSet::detect() == InstructionSet::Avx512 {
-                    assert!(
-                        run(InstructionSet::Avx2) == run(InstructionSet::Baseline),
-                        "{sectors} x {nodes} {scheme:?}"
-                    );
-                }
-            }
-        }
-    }
-
-    /// Contact displacements that were corrected at once are those of the modes corrected one by one later.
-    #[test]
-    fn displacements_and_modes_agree_after_contact() {
-        let mut bank = CyclicBank::new(&model(11, 2), false);
-        bank.set_step(Scheme::ModalExact, 1e-4);
-        for step in 0..200_usize {
-            bank.predict(true);
-            bank.ask([(step % 11, step % 2, [1.0, -0.4, 0.1]), (3, 0, [0.2, 0.5, -1.0])].into_iter());
-            bank.act();
-            if step % 20 == 7 {
-                let found = bank.displacement().to_vec();
-                bank.recover();
-                let size = found.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-                let off = found.iter().zip(bank.displacement()).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
-                assert!(size > 0.0 && off < 1e-13 * size, "step {step}: {off:e} of {size:e}");
-            }
-        }
     }
 }

@@ -346,6 +346,40 @@ mod tests {
         assert!(off < 1e-15, "{off:e}");
     }
 
+    /// u = Ψq and p = Ψᴴf, whatever the amplitudes and the forces.
+    #[test]
+    fn a_paired_nodal_diameter_moves_and_is_pushed_as_the_complex_one() {
+        let (sectors, modes) = (5, 4);
+        let of = |nodal_diameter: usize| {
+            let Harmonic { contact_map, .. } = pencil(modes, 8);
+            let shapes = hermitian_modes(&pencil(modes, 9), "_1").unwrap();
+            DiameterModes::new(nodal_diameter, 0.01, weight(nodal_diameter, sectors), &contact_map, shapes)
+        };
+        let disk = CyclicModel { sectors, diameters: vec![of(0), of(1)] };
+        let (paired, own) = (disk.paired(1), &disk.diameters[1]);
+        let mut seed = 10;
+        let mut random =
+            |count: usize| DMatrix::from_fn(count, 1, |_, _| Complex::new(number(&mut seed), number(&mut seed)));
+        // Amplitudes in pairs; of patterns first all real parts.
+        let in_pairs = |z: &DMatrix<Complex<f64>>| z.iter().flat_map(|z| [z.re, z.im]).collect::<Vec<_>>();
+        let in_parts =
+            |z: &DMatrix<Complex<f64>>| z.iter().map(|z| z.re).chain(z.iter().map(|z| z.im)).collect::<Vec<_>>();
+        let near = |found: &DMatrix<f64>, expected: &[f64]| {
+            let off = found.iter().zip(expected).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+            assert!(found.len() == expected.len() && off < 1e-14, "{off:e}");
+        };
+        let (amplitudes, forces) = (random(modes), random(3));
+        let moved = &paired.contact_modes * DMatrix::from_vec(2 * modes, 1, in_pairs(&amplitudes));
+        near(&moved, &in_parts(&(&own.contact_modes * &amplitudes)));
+        let pushed = paired.contact_modes.transpose() * DMatrix::from_vec(6, 1, in_parts(&forces));
+        near(&pushed, &in_pairs(&(own.contact_modes.adjoint() * &forces)));
+        for (mode, frequency) in own.frequencies.iter().enumerate() {
+            let alike = [0, 1].map(|part| paired.frequencies[2 * mode + part].to_bits());
+            assert_eq!(alike, [frequency.to_bits(); 2]);
+        }
+        assert_eq!((paired.quasi_static, disk.paired(0).contact_modes.shape()), (2 * own.quasi_static, (3, modes)));
+    }
+
     #[test]
     fn a_rigid_rotation_of_a_free_pair_is_exactly_rigid() {
         // Two masses tied by a spring of complex direction: rank one, so one mode is rigid.

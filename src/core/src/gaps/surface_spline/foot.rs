@@ -152,20 +152,16 @@ pub(super) fn solve([a, b, c]: [f64; 3], per_determinant: f64, gradient: [f64; 2
     [(b * gradient[1] - c * gradient[0]) * per_determinant, (b * gradient[0] - a * gradient[1]) * per_determinant]
 }
 
-/// On top of a maximum or a saddle of f, where the gradient vanishes: half a patch along the negative curvature.
+/// On top of a maximum or a saddle of f, where the gradient vanishes: half a patch along the lowest curvature.
 fn escape(gradient: [f64; 2], hessian: [f64; 3], metric: [f64; 3], determinant: f64) -> Option<[f64; 2]> {
     let size = gradient[0] * gradient[0] * metric[2] + gradient[1] * gradient[1] * metric[0];
-    if size > STATIONARY * STATIONARY * metric[0] * metric[0] * metric[2] || !(hessian[0] < 0.0 || determinant < 0.0) {
+    let [a, b, c] = hessian;
+    let leads_down = a < 0.0 || c < 0.0 || determinant < 0.0;
+    if size > STATIONARY * STATIONARY * metric[0] * metric[0] * metric[2] || !leads_down {
         return None;
     }
-    if hessian[0] < 0.0 {
-        return Some([0.5, 0.0]);
-    }
-    if hessian[2] < 0.0 {
-        return Some([0.0, 0.5]);
-    }
-    // Both curvatures are positive and the mixed one exceeds them.
-    let step = [hessian[2], -hessian[1]];
+    let lowest = 0.5 * (a + c) - libm::hypot(0.5 * (a - c), b);
+    let step = if lowest < c { [c - lowest, -b] } else { [0.0, 1.0] };
     let largest = step[0].abs().max(step[1].abs());
     Some(step.map(|value| 0.5 * value / largest))
 }
@@ -173,4 +169,28 @@ fn escape(gradient: [f64; 2], hessian: [f64; 3], metric: [f64; 3], determinant: 
 /// Rounding error of ½|x − S|² for an error of the coordinates.
 pub(super) fn noise(foot: &Foot, rounding: f64) -> f64 {
     rounding * ((2.0 * foot.half_square).sqrt() + rounding)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All signs of the second derivatives, zeros included: where any direction leads down, half a patch along one that does.
+    #[test]
+    fn an_escape_leads_down_from_hills_and_saddles_alone() {
+        let metric = [2.0, 0.3, 0.7];
+        let values = [-3.0, -0.4, 0.0, 0.4, 3.0];
+        let all = values.iter().flat_map(|a| values.iter().flat_map(move |b| values.map(|c| [*a, *b, c])));
+        for hessian @ [a, b, c] in all {
+            let determinant = a * c - b * b;
+            let step = escape([1e-12, -1e-12], hessian, metric, determinant);
+            let leads_down = a < 0.0 || c < 0.0 || determinant < 0.0;
+            assert_eq!(step.is_some(), leads_down, "{hessian:?}");
+            if let Some([s, t]) = step {
+                let bend = a * s * s + 2.0 * b * s * t + c * t * t;
+                assert!(bend < 0.0 && (s.abs().max(t.abs()) - 0.5).abs() < 1e-15, "{hessian:?}: {s}, {t}, {bend}");
+            }
+            assert_eq!(escape([1e-3, 0.0], hessian, metric, determinant), None, "{hessian:?} on a slope");
+        }
+    }
 }

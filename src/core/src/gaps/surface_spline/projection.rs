@@ -238,3 +238,36 @@ impl SurfaceSpline {
         None
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Closure;
+    use tiprub_test_models::Random;
+
+    /// Nodes of a run start from where they were a step ago: the short way ends there, and where the long one does.
+    #[test]
+    fn nodes_that_have_hardly_moved_take_the_short_way() {
+        let ring = |ring: u32| {
+            (0..24).map(move |i| {
+                let (sine, cosine) = libm::sincos(std::f64::consts::TAU * f64::from(i) / 24.0);
+                [0.25 * cosine, 0.25 * sine, 0.01 * f64::from(ring)]
+            })
+        };
+        let points: Vec<[f64; 3]> = (0..4).flat_map(ring).collect();
+        let surface = SurfaceSpline::new(&points, 24, 4, Closure::Smooth, Interpolation::Spline).unwrap();
+        let mut random = Random(4);
+        for _ in 0..500 {
+            let patch = [random.below(24), random.below(3)];
+            let mut within = || random.within(0.1, 0.9);
+            let guess = ClosestPoint { patch, s: within(), t: within() };
+            let foot = Foot::at(&surface, [0.0; 3], guess);
+            let (normal, moved) = (foot.normal(), random.vector(2e-4));
+            let x = std::array::from_fn(|i| foot.evaluation.point[i] + 3e-4 * normal[i] + moved[i]);
+            let Some(Projection::Found { gap, .. }) = surface.project_nearby(x, guess) else { panic!("{guess:?}") };
+            let slowly = surface.descend(x, guess).unwrap().found();
+            let Projection::Found { gap: expected, .. } = slowly else { panic!("{slowly:?}") };
+            assert!((gap - expected).abs() < 1e-16, "{gap:e}, {expected:e}");
+        }
+    }
+}

@@ -223,6 +223,21 @@ mod tests {
         }
     }
 
+    /// Nothing yields sideways: the force is µ times the normal one against the slip, however far that goes beside the penetration.
+    #[test]
+    fn a_slide_is_solved_however_little_it_is_pressed() {
+        let (a, friction) = ([[1.0, 0.5, 0.0], [0.5, 0.25, 0.0], [0.0, 0.0, 0.0]], 0.6);
+        for exponent in [0, -9, -30, -50, -70, -90] {
+            let pressed = 10.0_f64.powi(exponent);
+            let r = solve(&a, [-pressed, 1.0, 0.0], friction);
+            // u_N = −p + r_N − 0.5 µ r_N = 0.
+            let normal = pressed / (1.0 - 0.5 * friction);
+            for (found, expected) in r.into_iter().zip([normal, -friction * normal, 0.0]) {
+                assert!((found - expected).abs() <= 1e-14 * normal, "{pressed:e}: {r:?}");
+            }
+        }
+    }
+
     #[test]
     fn limits_between_the_cases() {
         let a = [[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];

@@ -46,7 +46,7 @@ fn slave_at(law: &SplineGap, modes: &ModalModel, nodes: &[usize], angle: f64) ->
     seen
 }
 
-/// Lowest eigenvalue of the symmetric part of the slave's Delassus matrix relative to the largest.
+/// Lowest eigenvalue of the symmetric part of the slave's Delassus matrix relative to the largest in size.
 fn lowest_ratio(
     (normals, tangents): &(DMatrix<f64>, DMatrix<f64>),
     modes: &ModalModel,
@@ -60,7 +60,8 @@ fn lowest_ratio(
     let weighted = DMatrix::from_fn(forces.nrows(), forces.ncols(), |i, mode| forces[(i, mode)] * compliance[mode]);
     let matrix = normals * weighted.transpose();
     let eigenvalues = ((&matrix + matrix.transpose()) * 0.5).symmetric_eigenvalues();
-    if eigenvalues.max() > 0.0 { eigenvalues.min() / eigenvalues.max() } else { 0.0 }
+    let largest = eigenvalues.amax();
+    if largest > 0.0 { eigenvalues.min() / largest } else { 0.0 }
 }
 
 /// Casings need not be alike all around: the check at the place where those under a blade yield most.

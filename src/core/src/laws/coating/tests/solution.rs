@@ -5,6 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::laws::active_set::ContactSolver;
+use tiprub_test_models::Random;
 
 pub fn materials() -> impl Strategy<Value = CoatingSettings> {
     let exponent = -2.0..2.0_f64;
@@ -298,4 +299,79 @@ fn redundant_nodes_share_the_hard_contact() {
     assert!(problem.solve().solved);
     let total: f64 = problem.coating.iter().chain(&problem.hard).sum();
     assert!((total - (5.0 - THICKNESS) / 0.5).abs() < 1e-8, "{total}");
+}
+
+/// Lengths across the coating a power of two as long: the same way, to the last bit.
+#[test]
+fn the_path_does_not_know_the_unit_of_length() {
+    let mut random = Random(12);
+    for _ in 0..100 {
+        let plastic: Vec<f64> = (0..9).map(|_| 0.2 * random.unit()).collect();
+        let (w, gaps) = (p_matrix(random.matrix(6, 6).as_slice(), 6), random.matrix(6, 1) * 1.5);
+        let found = [1.0, 2.0_f64.powi(-13), 2.0_f64.powi(20)].map(|unit| {
+            let settings = CoatingSettings { thickness: unit * THICKNESS, ..material(5.0, 0.4, 0.6, 8, 9) };
+            let mut coating = Coating::new(&settings, &[0.0, 0.5, 1.0], &[1.0; 3], 2).unwrap();
+            set_wear(&mut coating, &plastic);
+            let mut problem = coating.problem(2);
+            (0..2).for_each(|blade| coating.locate(&mut problem, &[3.0 * number(blade); 3]));
+            problem.delassus.copy_from(&(&w * unit));
+            problem.gaps.copy_from_slice((&gaps * unit).as_slice());
+            problem.guess();
+            assert!(problem.follow_path());
+            let bits =
+                |values: &[f64], unit: f64| values.iter().map(|value| (value / unit).to_bits()).collect::<Vec<_>>();
+            (problem.factorisations, bits(&problem.gaps, unit), bits(&problem.coating, 1.0), bits(&problem.hard, 1.0))
+        });
+        assert!(found[1] == found[0] && found[2] == found[0], "{found:?}");
+    }
+}
+
+/// Nodes in a ring, alike and pressed alike, that push one neighbour out and draw the other in: many rods end together, again and again.
+#[test]
+fn rods_that_move_alike_do_not_lead_the_path_in_circles() {
+    for (n, modulus, yields, pushes, draws) in [(3, 8.0, 0.25, 1.25, -0.75), (4, 64.0, 0.5, 1.75, -2.25)] {
+        for (worn, depth) in [0.0, 0.25, 0.5].into_iter().flat_map(|worn| [0.25, 0.5, 1.0, 4.0, 8.0].map(|d| (worn, d)))
+        {
+            let axial: Vec<f64> = (0..n).map(number).collect();
+            let settings = material(modulus, yields * modulus, 0.0, 8, 3);
+            let mut coating =
+                Coating::with_extent(&settings, &axial, &vec![1.0; n], [-0.5, number(n) - 0.5], 1).unwrap();
+            set_wear(&mut coating, &[worn]);
+            let mut problem = coating.problem(1);
+            coating.locate(&mut problem, &vec![0.1; n]);
+            problem.delassus.copy_from(&DMatrix::from_fn(n, n, |i, j| match (j + n - i) % n {
+                0 => 1.0,
+                1 => pushes,
+                away if away + 1 == n => draws,
+                _ => 0.0,
+            }));
+            problem.gaps.fill(-depth);
+            problem.guess();
+            assert!(problem.follow_path(), "{n} nodes, worn {worn}, {depth} deep: {}", problem.factorisations);
+        }
+    }
+}
+
+/// Rods that load and unload again: more exchanges than they have branches.
+#[test]
+fn a_path_back_and_forth_is_followed_to_its_end() {
+    let mut random = Random(77);
+    let mut most = 0.0_f64;
+    for _ in 0..4 {
+        let modulus = random.scale(1e-4, 1e2);
+        let settings = material(modulus, random.unit() * 0.4 * modulus, random.unit() * 0.3 * modulus, 8, 1500);
+        let mut coating = Coating::new(&settings, &[0.0, 0.3, 0.7, 1.0], &[1.0; 4], 1).unwrap();
+        let worn: Vec<f64> = (0..64).map(|_| if random.unit() < 0.5 { 0.0 } else { 0.8 * random.unit() }).collect();
+        set_wear(&mut coating, &worn);
+        let (a, skew) = (random.matrix(4, 4), random.matrix(4, 4) * random.scale(0.1, 10.0));
+        let w = &a * a.transpose() + DMatrix::identity(4, 4) * random.scale(1e-2, 1.0) + (&skew - skew.transpose());
+        let mut problem = coating.problem(1);
+        coating.locate(&mut problem, &[0.1; 4]);
+        problem.delassus.copy_from(&w);
+        problem.gaps.copy_from_slice((random.matrix(4, 1) * 2.0).as_slice());
+        problem.guess();
+        assert!(problem.follow_path(), "{}", problem.factorisations);
+        most = most.max(number(problem.factorisations) / number(4 + 2 * problem.contacts.len()));
+    }
+    assert!(most > 1.2, "{most}");
 }

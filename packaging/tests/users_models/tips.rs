@@ -1,0 +1,202 @@
+//! The tip of a mesh of one's own: where it is found, patches over it, and what is said of contact at points.
+
+use std::{fs, path::Path};
+
+use super::{Project, data};
+
+/// Patches over the whole tip of an exported mesh: those of the blade itself; a scene runs with them.
+#[test]
+fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
+    let project = Project::new(&[]);
+    let own = project
+        .succeed("reduce rotor37 --mesh 6x1x6 --inp blade.inp --contact-patches 4 --modes 20 -o own.rom.safetensors");
+    assert!(
+        own["rom"]["origin"].as_str().unwrap().contains("forces on 4 patches and 20 free-interface modes"),
+        "{own:#}"
+    );
+    let line = "reduce blade blade.inp --contact-set TIP --clamp-set HUB --sectors 36 --contact-patches 4 --modes 20 \
+                -o read.rom.safetensors";
+    let read = project.succeed(line);
+    assert_eq!(
+        read["model"]["contact_nodes"][1]["patch_nodes"].as_u64().map(|nodes| nodes > 9),
+        Some(true),
+        "{read:#}"
+    );
+    let [own, read] = ["own.rom.safetensors", "read.rom.safetensors"].map(|name| project.rom(name));
+    for (own, read) in own.contact_nodes.iter().zip(&read.contact_nodes) {
+        assert_eq!(own.name, read.name);
+        let near = own.position.iter().zip(read.position).all(|(a, b)| (a - b).abs() < 1e-9);
+        assert!(near && (own.meridional_slope - read.meridional_slope).abs() < 1e-6, "{own:?} {read:?}");
+    }
+    let flexibility = |rom: &tiprub_core::Rom| rom.stiffness.clone().try_inverse().unwrap();
+    let (own, read) = (flexibility(&own), flexibility(&read));
+    assert!((own.view((0, 0), (12, 12)) - read.view((0, 0), (12, 12))).amax() < 1e-7 * own.amax());
+    let scene =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37.toml")).unwrap();
+    project.write(
+        "scene.toml",
+        scene.replace("builtin:rotor37", "read.rom.safetensors").replace("modal-exact", "massless-boundary"),
+    );
+    let run = project.succeed("run scene.toml --stop 0.003");
+    assert!(run["last"]["friction_loss"].as_f64().unwrap() > 100.0, "{run:#}");
+    for (line, told) in [
+        ("reduce rotor37 --contact-patches 4 --contact-nodes 3", "cannot be used with"),
+        ("reduce rotor37 --mesh 6x1x6 --contact-patches 40", "40 is outside 1..=16"),
+        (
+            "reduce blade blade.inp --contact-set TIP --clamp-set HUB --contact-patches 2 --contact-names a",
+            "1 names for 2 contact patches",
+        ),
+    ] {
+        let code = if told.contains("cannot") || told.contains("names") { 2 } else { 1 };
+        assert!(project.fail(line, code).contains(told), "{line}: {}", project.fail(line, code));
+    }
+}
+
+/// The tip is found where no set names it: the nodes of the set TIP, of every kind of element; five patches, free-interface modes.
+#[test]
+fn the_tip_of_a_mesh_is_found_and_told() {
+    let files = [
+        "blade_tet10.inp",
+        "blade_hex20.inp",
+        "blade_hex8.inp",
+        "blade_penta15.inp",
+        "blade_tet10.msh",
+        "blade_hex20_binary.msh",
+    ];
+    let project = Project::new(&files);
+    for file in files {
+        let line =
+            format!("reduce blade {file} --clamp-set ROOT --units mm-t-s --material titanium --modes 12 --force");
+        let found = project.succeed(&format!("{line} -o found.rom.safetensors"));
+        let tip = &found["model"]["tip"];
+        assert_eq!(tip["nodes"], found["model"]["sets"]["TIP"], "{file}: {tip}");
+        assert!((tip["chord"].as_f64().unwrap() - 0.0321).abs() < 5e-4, "{file}: {tip}");
+        let radii = [0, 1].map(|end| tip["radius"][end].as_f64().unwrap());
+        assert!((radii[0] - 0.2597).abs() < 4e-4 && (radii[1] - 0.2601).abs() < 4e-4, "{file}: {tip}");
+        let patches = found["model"]["contact_nodes"].as_array().unwrap();
+        // Nine, or as many as the elements are wide.
+        let count = patches.len();
+        assert!(
+            (5..=9).contains(&count) && patches.iter().all(|patch| patch["patch_nodes"].as_u64() > Some(2)),
+            "{patches:?}"
+        );
+        assert!(
+            found["rom"]["origin"].as_str().unwrap().contains(&format!("{count} patches and 12 free-interface modes"))
+        );
+        project.succeed(&format!("{line} --contact-set TIP --contact-patches {count} -o named.rom.safetensors"));
+        assert!(project.rom("found.rom.safetensors") == project.rom("named.rom.safetensors"), "{file}");
+        let told = String::from_utf8(project.run(&format!("{line} -o text.rom.safetensors")).stdout).unwrap();
+        let patches = format!("contact patches           {count} from the tip that was found");
+        let wanted = ["tip found", "faces, ", "chord 0.032", &patches];
+        assert!(wanted.iter().all(|part| told.contains(part)), "{told}");
+    }
+}
+
+/// Contact at points is warned of where the mesh could carry more, and at one place always.
+#[test]
+fn contact_at_points_of_a_fine_tip_is_warned_of() {
+    let project = Project::new(&["blade_hex20.inp", "bar.inp", "blade_tet10.msh"]);
+    let warned = |line: &str| -> String {
+        let common = "--units mm-t-s --material titanium --modes 4 --clamp-set ROOT --force -o w.rom.safetensors";
+        project.succeed(&format!("reduce blade {line} {common}"))["warnings"].to_string()
+    };
+    for (line, wanted) in [
+        ("blade_hex20.inp --contact-set TIP", Some("contact at 3 nodes of a tip about")),
+        ("blade_hex20.inp --contact-set TIP --contact-nodes 1", Some("contact at a single node of a tip")),
+        ("blade_hex20.inp --contact-patches 1", Some("contact at the single patch `patch_1`")),
+        ("blade_hex20.inp --contact-nodes 7", None),
+        ("blade_hex20.inp --contact-patches 3 --kind craig-bampton", None),
+        ("blade_hex20.inp --contact-patches 7", None),
+        ("blade_hex20.inp --contact-patches 9", Some("9 contact patches along about 6 edges of elements")),
+        ("blade_tet10.msh --contact-set TIP --contact-patches 12", Some("12 contact patches along about")),
+    ] {
+        let told = warned(line);
+        match wanted {
+            Some(part) => assert!(told.contains(part), "{line}: {told}"),
+            None => assert!(!told.contains("contact at") && !told.contains("contact patches"), "{line}: {told}"),
+        }
+    }
+    let own = |patches: usize| -> String {
+        let line =
+            format!("reduce rotor37 --mesh 6x1x4 --modes 6 --contact-patches {patches} --force -o r.rom.safetensors");
+        project.succeed(&line)["warnings"].to_string()
+    };
+    assert!(own(9).contains("9 contact patches along about 6 edges"), "{}", own(9));
+    assert!(!own(7).contains("contact patches"), "{}", own(7));
+}
+
+/// The mesh of the tests twice: the same blade again, turned about the axis and a little farther in or as far out.
+fn two_blades(farther_in: f64) -> String {
+    const NEXT: usize = 5000;
+    let text = fs::read_to_string(data("blade_hex20.inp")).unwrap();
+    let second = text.split_once("*NODE\n").unwrap().1;
+    let (sine, cosine) = 0.4_f64.sin_cos();
+    let mut found = format!("{}*NODE\n", text);
+    let mut nodes = true;
+    for line in second.lines() {
+        let words: Vec<&str> = line.split(',').map(str::trim).filter(|word| !word.is_empty()).collect();
+        if let Some(keyword) = line.strip_prefix('*') {
+            nodes = false;
+            let suffix = if keyword.contains("ELSET") { "_TWO" } else { "" };
+            found.push_str(&format!("*{keyword}{suffix}\n"));
+        } else if nodes {
+            let [x, y, z] = [1, 2, 3].map(|place| words[place].parse::<f64>().unwrap());
+            let number = words[0].parse::<usize>().unwrap() + NEXT;
+            let (x, y) = (x - farther_in, y);
+            found.push_str(&format!("{number}, {}, {}, {z}\n", cosine * x - sine * y, sine * x + cosine * y));
+        } else {
+            let next = words.iter().map(|word| (word.parse::<usize>().unwrap() + NEXT).to_string());
+            let comma = if line.trim_end().ends_with(',') { "," } else { "" };
+            found.push_str(&format!("{}{comma}\n", next.collect::<Vec<_>>().join(", ")));
+        }
+    }
+    found
+}
+
+/// A second surface as far out is told of, one well inside is not; the tip is that of one blade. The texts are those of the guide.
+#[test]
+fn a_second_surface_as_far_out_is_told_of() {
+    let project = Project::new(&[]);
+    let reduce = |farther_in: f64| -> Value {
+        project.write("two.inp", two_blades(farther_in));
+        let line = "reduce blade two.inp --clamp-set ROOT --clamp-set ROOT_TWO --units mm-t-s --material titanium --modes 8 --force";
+        project.succeed(&format!("{line} -o two.rom.safetensors"))
+    };
+    let found = reduce(0.0);
+    let warnings = found["warnings"].to_string();
+    assert!(
+        warnings.contains("beside the tip that was found 12 faces that are not connected with it are as far out"),
+        "{warnings}"
+    );
+    assert_eq!(found["model"]["tip"]["faces"], 12, "{found:#}");
+    let inside = reduce(3.0);
+    assert!(!inside["warnings"].to_string().contains("as far out"), "{inside:#}");
+    let guide = guide();
+    for told in [
+        "beside the tip that was found 12 faces that are not connected with it are as far out",
+        "contact at a single node of a tip about 6 edges of elements long",
+        "9 contact patches along about 6 edges of elements",
+    ] {
+        assert!(guide.contains(told), "{told}");
+    }
+}
+
+/// Of a sector the tip is found as well, and both kinds take patches; static flexibility at them is one.
+#[test]
+fn a_sector_has_patches_of_both_kinds() {
+    let project = Project::new(&["sector.msh"]);
+    let line = "reduce sector sector.msh --clamp-set BORE --sectors 12 --cyclic-low LOW --cyclic-high HIGH --units mm-t-s --material steel \
+                --modes 6";
+    let free = project.succeed(&format!("{line} -o free.rom.safetensors"));
+    let count = free["model"]["contact_nodes"].as_array().unwrap().len();
+    assert_eq!(count, 3, "two elements along the chord have no more than three patches");
+    assert!(free["rom"]["origin"].as_str().unwrap().contains(&format!("forces on {count} patches and")), "{free:#}");
+    let held =
+        format!("{line} --contact-set TIP --contact-patches {count} --kind craig-bampton -o held.rom.safetensors");
+    project.succeed(&held);
+    let [free, held] = ["free.rom.safetensors", "held.rom.safetensors"].map(|name| {
+        let rom = project.rom(name);
+        &rom.contact_map * rom.stiffness.clone().try_inverse().unwrap() * rom.contact_map.transpose()
+    });
+    assert!((&free - &held).amax() < 1e-9 * free.amax(), "{:e}", (&free - &held).amax() / free.amax());
+}

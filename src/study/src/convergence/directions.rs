@@ -1,0 +1,30 @@
+//! In which directions a scene can be refined; `refiner` makes the scenes at every level of each.
+
+use tiprub_core::Scene;
+use tiprub_shell::Result;
+
+use super::{
+    refine::{Again, Direction, MODES, MODES_KEPT},
+    refiner::Refiner,
+};
+
+/// All directions of a scene; steps are in multiples of `own` per communication step.
+///
+/// # Errors
+/// A source that does not give the ROM of the scene, and what its reduction refuses.
+pub fn directions(scene: &Scene, own: u32, again: &Again) -> Result<Vec<Direction>> {
+    let refiner = Refiner::checked(scene, own, again)?;
+    let mut all = vec![refiner.steps()];
+    for (index, name) in (0..scene.roms.len()).zip(MODES) {
+        all.push(refiner.modes(index, name)?);
+    }
+    all.push(refiner.nodes()?);
+    if let Some(structure) = scene.settings.structures.get(MODES.len()) {
+        all.push(Direction {
+            missing: format!("the study refines {} structures", MODES.len()),
+            ..Direction::new("modes-more", format!("modes of {} and those after it", structure.name), MODES_KEPT)
+        });
+    }
+    all.push(refiner.meshes()?);
+    Ok(all)
+}
