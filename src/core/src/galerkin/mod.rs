@@ -2,9 +2,11 @@
 //!
 //! The road: [`level`] makes tables of all modes at one length of the step, from the [`response`] of each and the points of a [`basis`];
 //! [`trial`] solves contact at these points and judges the step; [`sector`] takes it, or tries one half as long. What a sector may touch
-//! is an [`trial::Obstacle`], and who keeps the books a [`sector::Witness`]: nothing here knows a scene.
+//! is an [`trial::Obstacle`], and who keeps the books a [`sector::Witness`]: nothing here knows a scene. A [`flight`] is as long as
+//! nothing comes near.
 
 pub mod basis;
+pub mod flight;
 pub mod level;
 pub mod response;
 pub mod rows;

@@ -378,6 +378,14 @@ pub const FIELDS: [SceneField; 72] = [
         "Error that a step of `galerkin` may make in displacements, as a share of the smallest clearance.",
     ),
     field(
+        "time.steps_at_most",
+        "whole number",
+        Some("0: any number"),
+        "0 to 1000000000",
+        "Most internal steps of one communication step. A step that would take more is not done, and can be repeated. Of `galerkin` \
+         steps of all blades together, those tried in vain included.",
+    ),
+    field(
         "time.input_interpolation",
         "text",
         Some("`ramp`"),
