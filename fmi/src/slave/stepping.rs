@@ -112,6 +112,7 @@ impl Slave {
     /// As [`Slave::begin_step`] and [`Slave::advance`].
     pub(crate) fn step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
         self.begin_step(current_time, step_size, false)?;
+        self.simulation.fly_ahead();
         while !self.advance()?.finished {}
         self.end_step(false)
     }
@@ -122,6 +123,7 @@ impl Slave {
     /// As [`Slave::step`]; where not even one internal step is allowed, [`Status::Discard`].
     pub(crate) fn step_partially(&mut self, current_time: f64, step_size: f64) -> Result<bool> {
         self.begin_step(current_time, step_size, true)?;
+        self.simulation.fly_ahead();
         loop {
             match self.advance_partially()? {
                 None => return Ok(true),

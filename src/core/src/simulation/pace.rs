@@ -110,11 +110,12 @@ impl Simulation {
         ));
     }
 
-    /// At the start of a communication step: fly over all of its internal steps but the last, where nothing is near and nothing moves.
-    /// The last is taken as ever, so that rates at its end are those of an internal step.
-    pub(super) fn fly_ahead(&mut self) {
-        let last = self.communication.count - 1;
-        if !self.is_marched() || self.communication.done > 0 || last < 2 {
+    /// After the start of a communication step, for who does not look at internal steps: fly over all of them but the last, where sectors
+    /// take steps of their own, rest, and nothing comes near. The last is taken as ever, so that rates at its end are those of an
+    /// internal step. Else this does nothing.
+    pub fn fly_ahead(&mut self) {
+        let last = self.communication.count.saturating_sub(1);
+        if !self.is_stepping() || !self.is_marched() || self.communication.done > 0 || last < 2 {
             return;
         }
         let (offset, time) = (self.communication.offset(last), self.communication.time(last));

@@ -208,7 +208,7 @@ impl Simulation {
         ))
     }
 
-    /// March one internal step of the communication step begun, or fly over many and march the last. Inputs may be set between calls.
+    /// March one internal step of the communication step begun. Inputs may be set between calls.
     ///
     /// # Errors
     /// Non-finite state; the simulation must then be reset or restored. [`Error::Exhausted`] where the internal steps allowed are used
@@ -219,7 +219,10 @@ impl Simulation {
             return Err(Error::invalid("doStep", "no communication step is under way", "Begin a step first"));
         }
         self.allow_steps()?;
-        self.fly_ahead();
+        if self.partial && self.communication.done > 0 {
+            // With the inputs set meanwhile.
+            self.set_mark();
+        }
         let next = self.communication.done + 1;
         let (offset, time) = (self.communication.offset(next), self.communication.time(next));
         let before = self.communication.offset(self.communication.done);
@@ -242,8 +245,6 @@ impl Simulation {
         let finished = next == self.communication.count;
         if finished {
             self.finish(offset, time)?;
-        } else if self.partial {
-            self.set_mark();
         }
         Ok(Progress { time, finished })
     }
@@ -377,12 +378,13 @@ impl Simulation {
         self.finish(offset, time)
     }
 
-    /// `begin_step`, then `advance` to the end.
+    /// `begin_step`, [`Simulation::fly_ahead`], then `advance` to the end.
     ///
     /// # Errors
     /// As those two.
     pub fn do_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
         self.begin_step(current_time, step_size)?;
+        self.fly_ahead();
         while !self.advance()?.finished {}
         Ok(())
     }
