@@ -369,7 +369,7 @@ fn a_step_that_takes_too_many_steps_is_as_if_it_had_not_been_tried() {
 fn every_scheme_keeps_the_bound_and_wrong_ones_are_refused() {
     for scheme in [Scheme::ModalExact, Scheme::MasslessBoundary, Scheme::CentralDifference] {
         let mut scene = scene(scheme, 1e-7, 1e-3);
-        scene.settings.time.steps_at_most = 400;
+        scene.settings.time.steps_at_most = Some(400);
         let (mut simulation, mut other) = (started(&scene), started(&scene));
         let state = everything(&simulation);
         let error = simulation.do_step(0.0, 401e-7).unwrap_err();
@@ -403,7 +403,7 @@ fn every_scheme_keeps_the_bound_and_wrong_ones_are_refused() {
         go(&mut other, 1000e-7);
     }
     let mut wrong = scene(Scheme::Galerkin, H, 1e-3);
-    wrong.settings.time.steps_at_most = u32::MAX;
+    wrong.settings.time.steps_at_most = Some(u32::MAX);
     assert!(try_started(&wrong).unwrap_err().to_string().contains("time.steps_at_most"));
 }
 

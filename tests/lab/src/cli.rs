@@ -14,8 +14,8 @@ use tiprub_study as study;
 use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
 use crate::{
-    bases, conjugacy, convergence, cube, error, estimates, inputs, modes, refinement, stability, stage, tolerance,
-    witness,
+    bases, conjugacy, convergence, cube, error, estimates, inputs, modes, refinement, scatter, stability, stage,
+    tolerance, witness,
 };
 
 /// Evidence for tiprub: studies of the models that ship and of standard problems.
@@ -69,6 +69,8 @@ pub enum Command {
     Bases(StudyCommon),
     /// Error against run time of steps by a tolerance, beside steps of one length, on rubs of rotor 37.
     Tolerance(StudyCommon),
+    /// Errors of steps by a tolerance on random rubs, energy over very many switches, random contact problems.
+    Scatter(StudyCommon),
     /// Reduced blades against a full finite-element model with steps and contact of its own, without any reduction.
     Witness(StudyCommon),
 }
@@ -202,6 +204,7 @@ impl Cli {
             Command::Refinement(arguments) => ("refinement", &arguments.common),
             Command::Bases(common) => ("bases", common),
             Command::Tolerance(common) => ("tolerance", common),
+            Command::Scatter(common) => ("scatter", common),
             Command::Witness(common) => ("witness", common),
         };
         let directory = commands::study::directory(name, common);
@@ -229,6 +232,7 @@ impl Cli {
             Command::Refinement(arguments) => refinement::study(arguments, console),
             Command::Bases(common) => bases::study(common, console),
             Command::Tolerance(common) => tolerance::study(common, console),
+            Command::Scatter(common) => scatter::study(common, console),
             Command::Witness(common) => witness::study(common, console),
             Command::Stability(_) => unreachable!("`run` has answered it"),
         }

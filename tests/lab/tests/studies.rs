@@ -203,7 +203,8 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1, "something stays");
         told
     };
-    for name in ["convergence", "modes", "cube", "stage", "error", "inputs", "witness", "bases", "tolerance"] {
+    for name in ["convergence", "modes", "cube", "stage", "error", "inputs", "witness", "bases", "tolerance", "scatter"]
+    {
         let told = refuse(&[name, "--quick", "--out", "file/out"], 1);
         assert!(told.contains("file/out: cannot create the directory"), "{told}");
     }
@@ -262,6 +263,18 @@ fn the_quick_study_of_tolerances_keeps_them() {
             rows.filter(|row| row["method"] == "galerkin").map(|row| row["error"].as_f64().unwrap()).collect();
         assert!(errors.len() == 4 && errors.windows(2).all(|pair| pair[1] < 0.7 * pair[0]), "{rub}: {errors:?}");
     }
+}
+
+#[test]
+fn the_quick_study_of_random_rubs_keeps_tolerance_and_energy() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "scatter", &[]);
+    only_no(&json, &[]);
+    let results = &json["results"];
+    assert!(results["rubs"].as_u64().unwrap() >= 6, "{results:#}");
+    assert!(results["energy"].as_array().unwrap().iter().all(|one| one["switches"].as_u64() >= Some(2000)));
+    assert!(results["problems"].as_array().unwrap().iter().all(|one| one["trials"].as_u64() >= Some(5000)));
+    assert_eq!(fs::read_to_string(root.path().join("out/scatter.md")).unwrap().lines().count(), 6 + 5 + 5 + 10 + 3);
 }
 
 #[test]

@@ -380,7 +380,7 @@ pub const FIELDS: [SceneField; 73] = [
     field(
         "time.steps_at_most",
         "whole number",
-        Some("0: any number"),
+        Some("0, any number"),
         "0 to 1000000000",
         "Most internal steps of one communication step. A step that would take more is not done, and can be repeated. Of `galerkin` \
          steps of all blades together, those tried in vain included.",

@@ -174,14 +174,21 @@ impl Builder {
             (tolerance.min, tolerance.max) = (Some(ranges::TOLERANCE[0]), Some(ranges::TOLERANCE[1]));
             tolerance.nominal = Some(start);
         }
+        if settings.bounds_steps() {
+            self.steps_at_most(settings);
+        }
+        self.choice(Quantity::SchemeChoice, "scheme", &SCHEMES, scheme, "Time-stepping scheme");
+        self.choice(Quantity::SolverChoice, "solver", &SOLVERS, solver, "Contact solver");
+    }
+
+    /// Most internal steps, which may change between communication steps.
+    fn steps_at_most(&mut self, settings: &SceneSettings) {
         let text = "Most internal steps of one communication step, those tried in vain included (0: any number); a step that takes \
                     more is discarded";
         let most = self.parameter(Quantity::StepsAtMost, "steps_at_most", None, 0.0, text);
         (most.kind, most.variability) = (Kind::Integer, Variability::Tunable);
         (most.min, most.max) = (Some(0.0), Some(ranges::STEPS));
-        most.start = Some(Start::Integer(i32::try_from(settings.time.steps_at_most).unwrap_or(i32::MAX)));
-        self.choice(Quantity::SchemeChoice, "scheme", &SCHEMES, scheme, "Time-stepping scheme");
-        self.choice(Quantity::SolverChoice, "solver", &SOLVERS, solver, "Contact solver");
+        most.start = Some(Start::Integer(i32::try_from(settings.time.steps_at_most.unwrap_or(0)).unwrap_or(i32::MAX)));
     }
 
     /// How inputs run between communication points.
