@@ -14,7 +14,7 @@ use tiprub_shell::{
     console::Console,
     sweep::{self, processors},
 };
-use tiprub_study::{Statement, Study, arguments::StudyCommon, machine};
+use tiprub_study::{Statement, Study, arguments::StudyCommon, error::clock, machine};
 use tiprub_test_models::{GAP, Random, bumps, rich_blade};
 
 /// Sectors of the random rotors.
@@ -31,7 +31,7 @@ const LONGEST: [f64; 3] = [8e-5, 4e-5, 2e-5];
 const PERTURBATION: f64 = 1e-12;
 const GROWN: f64 = 10.0;
 /// Rubs, switches, contact problems: of a quick study, and of a whole one.
-const RUBS: [usize; 2] = [12, 200];
+const RUBS: [usize; 2] = [8, 340];
 const SWITCHES: [u64; 2] = [2_000, 100_000];
 const TRIALS: [u64; 2] = [5_000, 1_000_000];
 
@@ -149,6 +149,8 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         .into_iter()
         .flat_map(|degree| [0.0, 0.15, 0.3, 0.6].map(|friction| sectors::problems(degree, friction, TRIALS[which])))
         .collect();
+    let mission = mission(if arguments.quick { 1 } else { 10 })
+        .map_err(|error| tiprub_shell::Failure::from_core("a mission", error))?;
     Ok(Study {
         name: "scatter",
         title: "A tolerance on what nobody chose".into(),
@@ -160,6 +162,7 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         figures: Vec::new(),
         results: json!({
             "rubs": followed.len(),
+            "milliseconds_of_long_steps": mission,
             "error_over_tolerance": of_ratios,
             "left": left.iter().map(|(longest, tolerance, error, steps)| json!([longest, tolerance, error, steps])).collect::<Vec<_>>(),
             "energy": kept.iter().flatten().map(|one| json!({
@@ -174,7 +177,7 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         files: vec![(
             "scatter.md".into(),
             "the tables of the guide".into(),
-            tables(&of_ratios, &left, &kept, &problems).into_bytes(),
+            tables(&of_ratios, &left, (&kept, &problems), mission).into_bytes(),
         )],
     })
 }
@@ -194,6 +197,40 @@ fn left() -> Result<Vec<Left>> {
         }
     }
     Ok(all)
+}
+
+/// Length of a communication step of a mission (s), how far the casing is open (m), and where it rubs.
+const LONG: f64 = 0.1;
+const WIDE: [f64; 2] = [5e-4, 5e-5];
+
+/// Milliseconds of a communication step of 36 blades: flown over, span by span, and with a rub.
+fn mission(steps: u32) -> tiprub_core::Result<[f64; 3]> {
+    let mut scene = bumps(rich_blade(36));
+    scene.settings.surfaces[0].ramp_time = 0.0;
+    (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::Galerkin, H);
+    let mut simulation = Simulation::new(&scene)?;
+    let open = |simulation: &mut Simulation, wide: f64| match simulation.table().find("casing_radius_change") {
+        Some(row) => simulation.set_real(row.reference, wide),
+        None => Ok(()),
+    };
+    open(&mut simulation, WIDE[0])?;
+    simulation.initialise(0.0)?;
+    let (mut step, mut taken) = (0_u32, [0.0; 3]);
+    for (which, (wide, count)) in [(WIDE[0], 100 * steps), (WIDE[0], steps), (WIDE[1], steps)].into_iter().enumerate() {
+        open(&mut simulation, wide)?;
+        let before = clock::now();
+        for _ in 0..count {
+            if which == 1 {
+                simulation.begin_step(f64::from(step) * LONG, LONG)?;
+                while !simulation.advance()?.finished {}
+            } else {
+                simulation.do_step(f64::from(step) * LONG, LONG)?;
+            }
+            step += 1;
+        }
+        taken[which] = 1e3 * (clock::now() - before).as_secs_f64() / f64::from(count);
+    }
+    Ok(taken)
 }
 
 fn statements(ratios: &[[f64; 3]; 4], kept: &[Option<Kept>], problems: &[Problems]) -> Vec<Statement> {
@@ -222,7 +259,12 @@ fn statements(ratios: &[[f64; 3]; 4], kept: &[Option<Kept>], problems: &[Problem
     ]
 }
 
-fn tables(ratios: &[[f64; 3]; 4], left: &[Left], kept: &[Option<Kept>], problems: &[Problems]) -> String {
+fn tables(
+    ratios: &[[f64; 3]; 4],
+    left: &[Left],
+    (kept, problems): (&[Option<Kept>], &[Problems]),
+    mission: [f64; 3],
+) -> String {
     let ratios: Vec<Vec<String>> = TOLERANCES
         .iter()
         .zip(ratios)
@@ -261,6 +303,7 @@ fn tables(ratios: &[[f64; 3]; 4], left: &[Left], kept: &[Option<Kept>], problems
             &kept,
         ),
         table(&["degree", "µ", "problems", "unsolved at first", "given up"], &problems),
+        table(&["flown over", "by spans", "with a rub"], &[mission.map(|time| format!("{time:.3} ms")).to_vec()]),
     ]
     .join("\n")
 }
