@@ -138,7 +138,7 @@ impl RevolutionGap {
     pub(super) fn least(&self, at: At<'_>, end: &Drive, turn: f64, reach: [f64; 3]) -> Option<f64> {
         let (node, start) = (at.node, at.drive);
         let factors = [start.shape_factor, end.shape_factor];
-        let round = self.surface == Surface::Circular || factors == [0.0; 2];
+        let round = self.surface == Surface::Circular || factors.iter().all(|one| *one == 0.0);
         if self.shaft_moves || !(round || turn.abs() >= std::f64::consts::TAU && factors.iter().all(|one| *one >= 0.0))
         {
             return None;

@@ -64,7 +64,9 @@ impl Simulation {
             return Err(self.exhausted(step_size, most));
         }
         self.partial = partial;
-        self.set_mark();
+        if most > 0 {
+            self.set_mark();
+        }
         // Nothing is refused from here on.
         if !keeps {
             self.system.set_step(step);
@@ -219,7 +221,7 @@ impl Simulation {
             return Err(Error::invalid("doStep", "no communication step is under way", "Begin a step first"));
         }
         self.allow_steps()?;
-        if self.partial && self.communication.done > 0 {
+        if self.partial && self.communication.done > 0 && self.communication.most > 0 {
             // With the inputs set meanwhile.
             self.set_mark();
         }

@@ -31,7 +31,7 @@ const LONGEST: [f64; 3] = [8e-5, 4e-5, 2e-5];
 const PERTURBATION: f64 = 1e-12;
 const GROWN: f64 = 10.0;
 /// Rubs, switches, contact problems: of a quick study, and of a whole one.
-const RUBS: [usize; 2] = [8, 340];
+const RUBS: [usize; 2] = [12, 200];
 const SWITCHES: [u64; 2] = [2_000, 100_000];
 const TRIALS: [u64; 2] = [5_000, 1_000_000];
 
@@ -97,19 +97,18 @@ fn apart(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     (square / size).sqrt()
 }
 
-/// Errors of a rub over its tolerances; `None` where nothing touches, or not for long enough to be followed.
+/// Errors of a rub over its tolerances; `None` where nothing touches, a run is refused, or it cannot be followed for long enough.
 fn errors(number: &usize) -> Result<Option<[f64; 4]>> {
     let scene = random_rub(*number);
-    let told = |error: tiprub_core::Error| tiprub_shell::Failure::from_core(format!("random rub {number}"), error);
     let Ok(window) = followed(&scene) else { return Ok(None) };
-    let truth = run(&scene, TRUTH, 0.0).map_err(told)?;
+    let Ok(truth) = run(&scene, TRUTH, 0.0) else { return Ok(None) };
     let Some(first) = truth.displacements.iter().position(|all| all.iter().any(|u| *u != 0.0)) else { return Ok(None) };
     if window < first + 3 {
         return Ok(None);
     }
     let mut found = [0.0; 4];
     for (found, tolerance) in found.iter_mut().zip(TOLERANCES) {
-        let ran = run(&scene, (H, tolerance), 0.0).map_err(told)?;
+        let Ok(ran) = run(&scene, (H, tolerance), 0.0) else { return Ok(None) };
         *found = apart(&ran.displacements[..window], &truth.displacements[..window]) / tolerance;
     }
     Ok(Some(found))

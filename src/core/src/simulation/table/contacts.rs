@@ -202,8 +202,11 @@ fn exists(parts: &Parts, name: &str) -> bool {
     }
 }
 
-/// What the longest step, and what a tolerance, has cost since the start.
-const EFFORTS: [(&str, &str, fn(&View) -> f64); 3] = [
+/// Name, text, and the count.
+type Count = (&'static str, &'static str, fn(&View) -> f64);
+
+/// What a tolerance has taken since the start.
+const EFFORTS: [Count; 3] = [
     ("internal_trials", "Internal steps tried since the start, those taken included, of all blades together", |view| {
         view.trials()
     }),
