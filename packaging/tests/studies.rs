@@ -91,9 +91,9 @@ fn the_quick_study_of_errors_takes_any_scene() {
         only_no(&json, &[]);
         let found = &json["results"]["scenes"][0];
         let rows = found["rows"].as_array().unwrap();
-        assert_eq!(rows.len(), 9 * 4, "every scheme and solver at every step");
+        assert_eq!(rows.len(), 9 * 4 + 4, "every scheme and solver at every step, and four tolerances");
         // The scene's own step is among them, whatever rounding says of 10 µs over 1 µs.
-        let own = |row: &&Value| (row["internal_step"].as_f64().unwrap() / 1e-6 - 1.0).abs() < 1e-9;
+        let own = |row: &&Value| row["internal_step"].as_f64().is_some_and(|step| (step / 1e-6 - 1.0).abs() < 1e-9);
         assert_eq!(rows.iter().filter(own).count(), 9, "{found:#}");
         // Half the step, and about half the error or less.
         let errors: Vec<f64> = rows
@@ -106,6 +106,51 @@ fn the_quick_study_of_errors_takes_any_scene() {
         assert!(table.contains("| 1e-2 |") && table.contains("| modal-exact + lcp |"), "{table}");
         totals(&json["results"]["total"], &fs::read_to_string(root.path().join("out/cheapest.csv")).unwrap());
     }
+}
+
+/// Its tolerance is what is refined, beside the steps of other schemes; each is held against the limit of its own equations.
+#[test]
+fn a_scene_that_goes_by_a_tolerance_is_studied_like_others() {
+    let root = tempfile::tempdir().unwrap();
+    let scene = around("builtin:rotor37-paper").replace("step = 1.0e-6 ", "scheme = \"galerkin\"\nstep = 8.0e-5 ");
+    fs::write(root.path().join("scene.toml"), scene).unwrap();
+    let run = |arguments: &[&str]| -> Value {
+        let all = [arguments, &["--json", "--quiet"]].concat();
+        serde_json::from_str(&tiprub(root.path(), env!("CARGO_TARGET_TMPDIR"), &all).0).unwrap()
+    };
+    let json = run(&["study", "error", "scene.toml", "--quick", "--window", "1.5e-3", "--out", "out"]);
+    only_no(&json, &[]);
+    let found = &json["results"]["scenes"][0];
+    let rows = found["rows"].as_array().unwrap();
+    let errors = |name: &str, which: &str| -> Vec<f64> {
+        rows.iter().filter(|row| row["competitor"] == name).filter_map(|row| row[which].as_f64()).collect()
+    };
+    // Limits with mass and without are far apart, and neither scheme is blamed for that.
+    let away = found["massless_boundary_away"][0].as_f64().unwrap();
+    let (own, plain) = (errors("galerkin", "error_of_own_limit"), errors("galerkin", "error_of_steps"));
+    assert!(own.len() == 4 && own[0] < 2e-2 && own[3] < 1e-4 && own[3] < 0.1 * own[0], "{own:?}");
+    assert!(away > 1e-3 && (plain[3] / away - 1.0).abs() < 0.05, "{away} {plain:?}");
+    assert!(found["massless_apart"][0].as_f64().unwrap() < 2e-3, "{found:#}");
+    let massless = errors("massless-boundary + lcp", "error_of_own_limit");
+    assert!(massless.last().is_some_and(|error| *error < 0.2 * away), "{massless:?}");
+    for cheapest in found["cheapest"].as_array().unwrap().iter().filter(|one| one["seconds"].is_number()) {
+        assert!(cheapest["error_of_steps"].as_f64() <= cheapest["error"].as_f64(), "{cheapest:#}");
+    }
+    let total = &json["results"]["total"]["rows"];
+    assert_eq!(total.as_array().unwrap().iter().filter(|row| row["own"] == true).count(), 1, "{total:#}");
+    // Refined, and estimated for a run, by its tolerance.
+    let json = run(&["study", "convergence", "scene.toml", "--quick", "--window", "1.5e-3", "--out", "out"]);
+    let levels = json["results"]["directions"][0]["levels"].as_array().unwrap();
+    let values: Vec<f64> = levels.iter().map(|level| level["value"].as_f64().unwrap()).collect();
+    assert!(values.iter().zip([1e-2, 1e-3, 1e-4]).all(|(found, own)| (found / own - 1.0).abs() < 1e-9), "{values:?}");
+    let changes = [0, 1].map(|level: usize| levels[level]["changes_to_next"]["displacements"].as_f64().unwrap());
+    assert!(changes[1] < changes[0] && (1e-5..2e-2).contains(&changes[0]), "{changes:?}");
+    let json = run(&["run", "scene.toml", "--stop", "1.5e-3", "--estimate"]);
+    let steps = json["estimated_errors"]["steps"].as_f64();
+    assert!(steps.is_none_or(|error| (1e-6..1e-2).contains(&error)), "{:#}", json["estimated_errors"]);
+    let per_step = &json["milliseconds_per_communication_step"];
+    assert!(per_step["most"].as_f64() >= per_step["mean"].as_f64() && json["missed_steps"] == 0, "{json:#}");
+    assert!(json["internal_trials"].as_u64() >= json["internal_steps"].as_u64(), "{json:#}");
 }
 
 /// Total errors of the model of the scene and of one with half of its modes, against one with twice as many and more nodes.

@@ -74,6 +74,23 @@ def whirling(tiprub, scene, work):
 
 
 @pytest.fixture(scope="session")
+def marched(tiprub, scene, work):
+    """FMUs of the same rotor in a casing that moves, with a tolerance in place of a step, unpacked."""
+    library = ["--library", os.environ["TIPRUB_LIBRARY"]] if "TIPRUB_LIBRARY" in os.environ else []
+    text = scene.read_text().replace("step = 1.0e-6", 'scheme = "galerkin"\nstep = 8.0e-5\ntolerance = 1.0e-3')
+    text = text.replace("ramp_time = 0.5e-3", "moving = true").replace("damping_ratio = 1.0e-3", "damping_ratio = 5.0e-3")
+    path = work / "marched.toml"
+    path.write_text(text)
+    found = SimpleNamespace()
+    for name, version in [("two", "2"), ("three", "3")]:
+        file = work / f"marched{version}.fmu"
+        tiprub("package", path, "--fmi", version, "-o", file, *library)
+        directory = extract(str(file), unzipdir=str(work / file.stem))
+        setattr(found, name, SimpleNamespace(directory=directory, description=read_model_description(str(file))))
+    return found
+
+
+@pytest.fixture(scope="session")
 def native(tiprub, scene, work):
     """The native run: column names and rows, time first."""
     path = work / "native.csv"
@@ -101,7 +118,8 @@ def two(unpacked):
     made = []
 
     def make(**arguments):
-        made.append(Two(unpacked.two, **arguments))
+        fmu = arguments.pop("fmu", unpacked.two)
+        made.append(Two(fmu, **arguments))
         return made[-1]
 
     yield make

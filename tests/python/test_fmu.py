@@ -12,6 +12,7 @@ import fmpy
 import numpy
 import pytest
 from fmpy import simulate_fmu
+from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
 H = 1.17e-5
@@ -263,6 +264,79 @@ def test_early_return_after_an_intermediate_update(three):
     assert all(flags[1:] == (True, True, True, True) for flags in seen)
     assert instance.get("time") == reached
     instance.step(reached, 1e-5)
+
+
+LONG = 4e-4
+WIDE = 3e-4
+
+
+def into_the_rub(instance, count):
+    """A casing that closes over so many long steps."""
+    instance.set(casing_radius_change=WIDE)
+    instance.initialise()
+    for step in range(count):
+        instance.set(casing_radius_change=WIDE * (1 - (step + 1) / count))
+        instance.step(step * LONG, LONG)
+
+
+@pytest.mark.parametrize("make", ["two", "three"])
+def test_a_step_that_takes_too_many_internal_steps_is_discarded_and_can_be_repeated(request, make, marched):
+    def instance(**arguments):
+        return request.getfixturevalue(make)(fmu=getattr(marched, make), **arguments)
+
+    outputs = ["clearance_minimum", "normal_impulse", "torque", "internal_steps", "internal_trials", "missed_steps"]
+    free, bounded = instance(), instance()
+    for one in (free, bounded):
+        into_the_rub(one, 12)
+    time, before = 12 * LONG, free.get("internal_trials")
+    free.step(time, LONG)
+    needed = int(free.get("internal_trials") - before)
+    assert needed > 100 and free.get("normal_impulse") > 0 and free.get("internal_steps_most") >= needed
+    unchanged = bounded.read(outputs)
+    for most in (needed - 1, 1):
+        bounded.set(steps_at_most=most)
+        with pytest.raises(FMICallException) as caught:
+            bounded.step(time, LONG)
+        assert caught.value.status == 2 and f"steps_at_most = {most}" in bounded.log
+        assert bounded.read(outputs) == unchanged
+        if make == "two":
+            assert bounded.fmu.getRealStatus(2) == pytest.approx(time, abs=1e-12)
+            assert not bounded.fmu.getBooleanStatus(3)
+    for wrong in (-1, 2**31 - 1):
+        assert "steps_at_most" in bounded.refused(lambda value: bounded.set(steps_at_most=value), wrong)
+    bounded.set(steps_at_most=needed)
+    bounded.step(time, LONG)
+    assert bits(bounded.read(outputs)) == bits(free.read(outputs))
+    if make == "three":
+        early = instance(earlyReturnAllowed=True)
+        into_the_rub(early, 12)
+        early.set(steps_at_most=needed - 1)
+        event, terminate, returned, reached = early.step(time, LONG)
+        assert (event, terminate, returned) == (False, False, True) and time < reached < time + LONG
+        assert early.get("time") == reached
+        assert not early.step(reached, time + LONG - reached)[2]
+
+
+@pytest.mark.parametrize("make", ["two", "three"])
+def test_a_long_mission_flies_from_communication_point_to_communication_point(request, make, marched):
+    instance = request.getfixturevalue(make)(fmu=getattr(marched, make))
+    instance.set(casing_radius_change=WIDE)
+    instance.initialise()
+    size, steps, taken, lowest = 0.1, 30, [], []
+    for step in range(steps):
+        # Closed at the end of one step, open at that of the next.
+        instance.set(casing_radius_change=WIDE - (2.6e-4 if step == 9 else 0.0))
+        before = instance.get("internal_steps")
+        instance.step(step * size, size)
+        taken.append(instance.get("internal_steps") - before)
+        lowest.append(instance.get("clearance_minimum"))
+    flown = [step for step, count in enumerate(taken) if count == 2 * 36]
+    assert set(range(9)) <= set(flown) and set(range(20, 30)) <= set(flown), taken
+    assert instance.get("friction_loss") > 0 and min(taken[9], taken[10]) > 1000, taken
+    # The bumps' tops, wherever the blades are at communication points.
+    open_casing = WIDE + 3.56e-4 * (1 - 2 * 0.6)
+    assert all(abs(lowest[step] / open_casing - 1) < 0.05 for step in range(25, 30)), lowest
+    assert lowest[9] < 1e-7
 
 
 def test_both_fmus_in_two_threads(two, three, native):

@@ -2,10 +2,11 @@
 
 use std::ffi::c_void;
 
-use tiprub_core::Simulation;
+use tiprub_core::settings::Scheme;
+use tiprub_core::{Scene, Simulation};
 use tiprub_fmi_host::api::Fmi3Api;
 use tiprub_tests::scene::{Resources, scene};
-use tiprub_tests::{ERROR, OK, WARNING, fmi2, fmi3, shipped};
+use tiprub_tests::{DISCARD, ERROR, OK, WARNING, fmi2, fmi3, shipped};
 
 /// Communication step (s): not a multiple of the internal step of 2 µs.
 const H: f64 = 1.0137e-4;
@@ -433,4 +434,152 @@ fn values_refused_together_within_a_step_leave_the_ramps_as_they_were() {
     assert!(asked.notes().len() > 20, "nothing was refused");
     assert_eq!(bits(&plain.reals(&[clearance], 1)), bits(&asked.reals(&[clearance], 1)));
     assert_eq!(plain.reals(&whirl, 2), asked.reals(&whirl, 2));
+}
+
+/// The scene with a bound on its internal steps, which an importer may change.
+fn bounded() -> Scene {
+    let mut scene = scene();
+    scene.settings.time.steps_at_most = Some(0);
+    scene
+}
+
+/// The scene with a tolerance in place of a step.
+fn marched() -> Scene {
+    let mut scene = scene();
+    (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::Galerkin, 8e-5);
+    scene.settings.time.tolerance = Some(1e-4);
+    scene
+}
+
+/// Communication step of these tests (s): five spans of the longest step.
+const LONG: f64 = 4e-4;
+
+/// What a scene does without a bound: the communication step that takes most, how many internal steps that is, and the values there.
+struct Free {
+    scene: Scene,
+    references: Vec<u32>,
+    bound: u32,
+    step: u32,
+    needed: i32,
+    before: Vec<u64>,
+    after: Vec<u64>,
+}
+
+fn free(scene: Scene) -> Free {
+    let mut core = Simulation::new(&scene).unwrap();
+    core.initialise(0.0).unwrap();
+    let references = all_reals(&core);
+    let mut found = (0, 0, Vec::new(), Vec::new());
+    for step in 0..60 {
+        let (tried, before) = (core.system().steps_tried(), native(&core, &references));
+        core.do_step(f64::from(step) * LONG, LONG).unwrap();
+        let needed = i32::try_from(core.system().steps_tried() - tried).unwrap();
+        if needed > found.1 {
+            found = (step, needed, before, native(&core, &references));
+        }
+    }
+    let (step, needed, before, after) = found;
+    Free { bound: reference_of(&core, "steps_at_most"), scene, references, step, needed, before, after }
+}
+
+#[test]
+fn too_many_internal_steps_are_discarded_by_fmi2_and_the_step_can_be_repeated() {
+    let (path, scenes) = (shipped(), [bounded(), marched()]);
+    let api = fmi2::load(&path);
+    for found in scenes.map(free) {
+        let resources = Resources::of(&found.scene, false);
+        let slave = fmi2::Slave::new(&api, &resources);
+        // SAFETY: arrays of one element.
+        let set = |most: i32| unsafe { (api.fmi2SetInteger)(slave.handle, &raw const found.bound, 1, &raw const most) };
+        // Hostile values, in every mode.
+        let refused =
+            || [-1, i32::MIN, i32::MAX, 1_000_000_001].into_iter().for_each(|most| assert_eq!(set(most), ERROR));
+        refused();
+        slave.expect(set(1_000_000_000));
+        slave.initialise();
+        refused();
+        for step in 0..found.step {
+            slave.expect(slave.step(f64::from(step) * LONG, LONG));
+        }
+        let time = f64::from(found.step) * LONG;
+        assert_eq!(bits(&slave.reals(&found.references)), found.before);
+        for most in [found.needed - 1, 1, found.needed / 2] {
+            slave.expect(set(most));
+            let state = slave.serialise(slave.save());
+            assert_eq!(slave.step(time, LONG), DISCARD, "{}", slave.log());
+            let (mut last, mut terminated) = (0.0, 7);
+            // SAFETY: places for the answers.
+            unsafe {
+                slave.expect((api.fmi2GetRealStatus)(slave.handle, 2, &raw mut last));
+                slave.expect((api.fmi2GetBooleanStatus)(slave.handle, 3, &raw mut terminated));
+            }
+            assert!((last - time).abs() < 1e-12 && terminated == 0, "{last} {terminated}");
+            assert!(slave.log().contains(&format!("steps_at_most = {most}")), "{}", slave.log());
+            assert_eq!(bits(&slave.reals(&found.references)), found.before);
+            assert!(slave.serialise(slave.save()) == state, "as if it had not been tried");
+        }
+        // A shorter one from here, and back; then the whole step with as many as it takes.
+        let here = slave.save();
+        slave.expect(slave.step(time, 1e-6));
+        slave.expect(slave.restore(here));
+        slave.expect(set(found.needed));
+        slave.expect(slave.step(time, LONG));
+        assert_eq!(bits(&slave.reals(&found.references)), found.after);
+    }
+}
+
+#[test]
+fn too_many_internal_steps_end_a_step_of_fmi3_early_or_discard_it() {
+    let (path, scenes) = (shipped(), [bounded(), marched()]);
+    let api = fmi3::load(&path);
+    for found in scenes.map(free) {
+        let (resources, count) = (Resources::of(&found.scene, false), found.references.len());
+        let time = f64::from(found.step) * LONG;
+        let arguments = fmi3::Arguments::new(&resources);
+        let all = [
+            arguments.clone(),
+            fmi3::Arguments { early_return: true, ..arguments },
+            watched(&resources, false),
+            watched(&resources, true),
+        ];
+        for (early, arguments) in [false, true, false, true].into_iter().zip(all) {
+            let slave = fmi3::Slave::try_new(&api, &arguments).unwrap_or_else(|log| panic!("{log}"));
+            let set = |most: i32| {
+                // SAFETY: arrays of one element.
+                let status = unsafe { (api.fmi3SetInt32)(slave.handle, &raw const found.bound, 1, &raw const most, 1) };
+                slave.expect(status);
+            };
+            slave.initialise();
+            set(1_000_000);
+            for step in 0..found.step {
+                assert_eq!(slave.step(f64::from(step) * LONG, LONG).status, OK);
+            }
+            set(found.needed - 1);
+            let answer = slave.step(time, LONG);
+            assert!(!answer.event && !answer.terminate);
+            if !early {
+                assert_eq!((answer.status, answer.early), (DISCARD, false), "{}", slave.log());
+                assert!((answer.time - time).abs() < 1e-12, "{}", answer.time);
+                assert_eq!(bits(&slave.reals(&found.references, count)), found.before);
+                assert!(slave.log().contains("was not done"), "{}", slave.log());
+                set(0);
+                assert_eq!(slave.step(time, LONG).status, OK);
+                assert_eq!(bits(&slave.reals(&found.references, count)), found.after);
+                continue;
+            }
+            assert_eq!((answer.status, answer.early), (OK, true), "{}", slave.log());
+            assert!(answer.time > time && answer.time < time + LONG * (1.0 - 1e-6), "{}", answer.time);
+            assert_eq!(slave.reals(&[0], 1)[0].to_bits(), answer.time.to_bits());
+            // The rest takes no more than what is left.
+            let rest = slave.step(answer.time, time + LONG - answer.time);
+            assert_eq!((rest.status, rest.early), (OK, false), "{}", slave.log());
+            // Not even one internal step of a marched scene.
+            set(1);
+            let answer = slave.step(rest.time, LONG);
+            let marched = found.scene.settings.time.scheme == Scheme::Galerkin;
+            let expected = if marched { (DISCARD, false, rest.time) } else { (OK, true, rest.time + 2e-6) };
+            assert_eq!((answer.status, answer.early), (expected.0, expected.1), "{}", slave.log());
+            assert!((answer.time - expected.2).abs() < 1e-12);
+        }
+    }
 }

@@ -2,6 +2,8 @@
 //!
 //! With a callback the communication step is marched internal step by internal step, each in its own passage through the
 //! guard: while the callback runs nothing of the instance is borrowed, and it may get and set variables.
+//!
+//! Where the internal steps allowed are used up, the step returns early if the importer allows that, else it is discarded.
 
 use tiprub_core::simulation::Progress;
 
@@ -51,16 +53,21 @@ fn step(instance: Handle, current: f64, size: f64, missing: Option<&str>) -> Out
         if let Some(name) = missing {
             return Err(Refusal::error(format!("argument {name} is NULL. Pass a place for it")));
         }
+        let partial = instance.callbacks.is_some_and(|callbacks| callbacks.early_return_allowed);
         let Some(callbacks @ Callbacks { update: Some(update), .. }) = instance.callbacks else {
-            slave.step(current, size)?;
-            return Ok((Status::Ok, (None, slave.time())));
+            let early = if partial {
+                slave.step_partially(current, size)?
+            } else {
+                slave.step(current, size).map(|()| false)?
+            };
+            return Ok((Status::Ok, (None, early, slave.time())));
         };
-        slave.begin_step(current, size)?;
-        Ok((Status::Ok, (Some((callbacks, update)), slave.time())))
+        slave.begin_step(current, size, partial)?;
+        Ok((Status::Ok, (Some((callbacks, update)), false, slave.time())))
     });
     match begun {
-        Some((Some((callbacks, update)), start)) => march(instance, callbacks, update, start),
-        Some((None, time)) => Outcome { status, early: false, time: Some(time) },
+        Some((Some((callbacks, update)), _, start)) => march(instance, callbacks, update, start),
+        Some((None, early, time)) => Outcome { status, early, time: Some(time) },
         None => Outcome { status, early: false, time: before },
     }
 }
@@ -78,8 +85,15 @@ fn march(instance: Handle, callbacks: Callbacks, update: IntermediateUpdate, sta
     let mut return_at: Option<f64> = None;
     let mut worst = Status::Ok;
     loop {
-        let (status, advanced) = enter(instance, &order::CONTINUE_STEP, |slave, _| Ok((Status::Ok, slave.advance()?)));
-        let Some(progress) = advanced else { return Outcome { status, early: false, time: Some(start) } };
+        let (status, advanced) = enter(instance, &order::CONTINUE_STEP, |slave, _| {
+            let progress = slave.advance_partially()?;
+            Ok((Status::Ok, (progress, slave.time())))
+        });
+        let progress = match advanced {
+            None => return Outcome { status, early: false, time: Some(start) },
+            Some((None, time)) => return Outcome { status: worst.max(status), early: true, time: Some(time) },
+            Some((Some(progress), _)) => progress,
+        };
         let may_return = callbacks.early_return_allowed && !progress.finished;
         let request = intermediate_update(update, callbacks.environment, progress.time, !progress.finished, may_return);
         let (status, settled) = enter(instance, &order::CONTINUE_STEP, |slave, _| {

@@ -63,7 +63,11 @@ impl Refusal {
 
 impl From<tiprub_core::Error> for Refusal {
     fn from(error: tiprub_core::Error) -> Self {
-        Self::error(error.to_string())
+        match error {
+            // Nothing is lost: the importer may go on.
+            tiprub_core::Error::Exhausted { .. } => Self::discard(error.to_string()),
+            _ => Self::error(error.to_string()),
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use tiprub_core::simulation::Progress;
 
-use super::{Phase, Refusal, Result, Slave};
+use super::{Phase, Refusal, Result, Slave, Status};
 
 /// How far beyond the stop time a step may end, as a fraction of the step: importers add up their communication points,
 /// and the sum of many steps misses the stop time by rounding.
@@ -15,11 +15,12 @@ const STOP_ROUNDING: f64 = 1e-9;
 const PANIC_STEP_SIZE: f64 = 1.234_567_890_123e-5;
 
 impl Slave {
-    /// Begin a communication step; the phase becomes [`Phase::Updating`] until it is ended.
+    /// Begin a communication step, which may end early (`partial`) where the internal steps allowed are used up; the phase becomes
+    /// [`Phase::Updating`] until it is ended.
     ///
     /// # Errors
-    /// Wrong time, bad step size, a step beyond the stop time; the state is as before.
-    pub(crate) fn begin_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
+    /// Wrong time, bad step size, a step beyond the stop time, too many internal steps; the state is as before.
+    pub(crate) fn begin_step(&mut self, current_time: f64, step_size: f64, partial: bool) -> Result<()> {
         let Phase::Stepping { stop } = self.phase else {
             return Err(Refusal::error("no step can begin in this phase"));
         };
@@ -33,7 +34,11 @@ impl Slave {
                 )));
             }
         }
-        self.simulation.begin_step(current_time, step_size)?;
+        if partial {
+            self.simulation.begin_partial_step(current_time, step_size)?;
+        } else {
+            self.simulation.begin_step(current_time, step_size)?;
+        }
         self.hear();
         #[cfg(feature = "test-panic")]
         assert!(step_size.to_bits() != PANIC_STEP_SIZE.to_bits(), "panic asked for by the test of panics");
@@ -44,15 +49,45 @@ impl Slave {
     /// March one internal step. When it finishes the communication step, the phase is [`Phase::Stepping`] again.
     ///
     /// # Errors
-    /// The state became non-finite; the phase is [`Phase::Failed`] then.
+    /// The state became non-finite; the phase is [`Phase::Failed`] then. Or the internal steps allowed are used up: the phase is
+    /// [`Phase::Stepping`] as if the step had not begun, or [`Phase::Updating`] where it may end at the internal step reached.
     pub(crate) fn advance(&mut self) -> Result<Progress> {
         let last_good = self.simulation.time();
         let Phase::Updating { stop, .. } = self.phase else {
             return Err(Refusal::error("no step is under way"));
         };
-        let progress = self.simulation.advance().inspect_err(|_| self.phase = Phase::Failed { last_good })?;
+        let progress = match self.simulation.advance() {
+            Ok(progress) => progress,
+            Err(error @ tiprub_core::Error::Exhausted { .. }) => {
+                match &mut self.phase {
+                    Phase::Updating { fresh, .. } if self.simulation.is_stepping() => *fresh = false,
+                    phase => *phase = Phase::Stepping { stop },
+                }
+                return Err(error.into());
+            }
+            Err(error) => {
+                self.phase = Phase::Failed { last_good };
+                return Err(error.into());
+            }
+        };
         self.phase = Phase::Updating { stop, reached: progress.time, fresh: progress.finished };
         Ok(progress)
+    }
+
+    /// March one internal step; `None` where the internal steps allowed are used up, and the communication step has ended early.
+    ///
+    /// # Errors
+    /// As [`Slave::advance`] and [`Slave::end_step`].
+    pub(crate) fn advance_partially(&mut self) -> Result<Option<Progress>> {
+        match self.advance() {
+            Err(refusal) if refusal.status == Status::Discard && matches!(self.phase, Phase::Updating { .. }) => {
+                self.end_step(true)?;
+                let time = self.simulation.time();
+                self.note(Status::Ok, format!("ended early at t = {time} s: {refusal}"));
+                Ok(None)
+            }
+            outcome => outcome.map(Some),
+        }
     }
 
     /// End the communication step: at its end, or at the internal step reached (early return).
@@ -66,6 +101,7 @@ impl Slave {
                 self.simulation.end_step_early().inspect_err(|_| self.phase = Phase::Failed { last_good })?;
             }
             self.phase = Phase::Stepping { stop };
+            self.hear();
         }
         Ok(())
     }
@@ -75,8 +111,27 @@ impl Slave {
     /// # Errors
     /// As [`Slave::begin_step`] and [`Slave::advance`].
     pub(crate) fn step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
-        self.begin_step(current_time, step_size)?;
+        self.begin_step(current_time, step_size, false)?;
+        self.simulation.fly_ahead();
         while !self.advance()?.finished {}
         self.end_step(false)
+    }
+
+    /// A communication step, or as much of it as the internal steps allowed are enough for; whether it ended early.
+    ///
+    /// # Errors
+    /// As [`Slave::step`]; where not even one internal step is allowed, [`Status::Discard`].
+    pub(crate) fn step_partially(&mut self, current_time: f64, step_size: f64) -> Result<bool> {
+        self.begin_step(current_time, step_size, true)?;
+        self.simulation.fly_ahead();
+        loop {
+            match self.advance_partially()? {
+                None => return Ok(true),
+                Some(progress) if progress.finished => break,
+                Some(_) => {}
+            }
+        }
+        self.end_step(false)?;
+        Ok(false)
     }
 }

@@ -67,6 +67,12 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
         "seconds": wall,
         "stepping_seconds": stepping,
         "microseconds_per_internal_step": 1e6 * stepping / run.internal_steps as f64,
+        "milliseconds_per_communication_step": {
+            "mean": 1e3 * stepping / schedule.count as f64,
+            "most": 1e3 * run.slowest.as_secs_f64(),
+        },
+        "missed_steps": run.effort.map(|effort| effort.missed),
+        "internal_trials": run.effort.map(|effort| effort.tried()),
         "real_time_factor": stepping / simulated,
         "warnings": run.warnings,
         "csv": arguments.csv.as_deref().map(shown_path),
@@ -109,9 +115,11 @@ const MOST_LISTED: usize = 12;
 /// What a user looks for, last, where the eye is: extremes, warnings, files.
 fn summary(json: &Value, extremes: &[Extreme], warnings: &[String]) -> String {
     let number = |name: &str| json[name].as_f64().unwrap_or(f64::NAN);
+    let per_step = |name: &str| json["milliseconds_per_communication_step"][name].as_f64().unwrap_or(f64::NAN);
     let mut text = format!(
         "{}: t = {} s to {} s, communication steps: {}, internal steps: {}\n\
-         stepping took {:.3} s: {:.3} µs per internal step, {:.3} s of computing per simulated second\n",
+         stepping took {:.3} s: {:.3} µs per internal step, {:.3} s of computing per simulated second\n\
+         one communication step took {:.3} ms, at most {:.3} ms\n",
         json["model"].as_str().unwrap_or_default(),
         json["start"],
         json["stop"],
@@ -120,7 +128,12 @@ fn summary(json: &Value, extremes: &[Extreme], warnings: &[String]) -> String {
         number("stepping_seconds"),
         number("microseconds_per_internal_step"),
         number("real_time_factor"),
+        per_step("mean"),
+        per_step("most"),
     );
+    if let (Some(missed), Some(trials)) = (json["missed_steps"].as_u64(), json["internal_trials"].as_u64()) {
+        text.push_str(&format!("steps of all blades: {trials} tried, {missed} of the shortest missed the tolerance\n"));
+    }
     if !extremes.is_empty() {
         text.push_str("\nover the run:\n");
         text.extend(extremes.iter().map(|extreme| format!("  {}\n", extreme.line())));

@@ -41,6 +41,14 @@ pub enum Error {
         /// What to do about it.
         remedy: String,
     },
+    /// A communication step takes more internal steps than are allowed; nothing is lost.
+    #[error("{problem}. {remedy}")]
+    Exhausted {
+        /// How many, from when on.
+        problem: String,
+        /// What to do about it.
+        remedy: String,
+    },
     /// A saved state does not belong to this scene, or is damaged.
     #[error("the saved state cannot be restored: {problem}")]
     State {

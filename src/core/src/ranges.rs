@@ -39,6 +39,8 @@ pub const TIME: f64 = 1e9;
 pub const SHORTEST_STEP: f64 = 1e-12;
 /// Longest internal step (s): far above the period of any mode of a blade.
 pub const LONGEST_STEP: f64 = 1.0;
+/// Most internal steps of one communication step.
+pub const STEPS: f64 = 1e9;
 /// Smallest and largest error of a step, as a share of the clearance: below, rounding is most of it.
 pub const TOLERANCE: [f64; 2] = [1e-9, 0.1];
 /// Largest friction coefficient.

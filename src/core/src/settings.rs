@@ -384,6 +384,9 @@ pub struct TimeSettings {
     /// Error that a step of `galerkin` may make in displacements, as a share of the smallest clearance; 1e-3 where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
+    /// Most internal steps of one communication step, those tried in vain included; 0, or absent: any number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steps_at_most: Option<u32>,
     /// Inputs between communication points.
     #[serde(default, skip_serializing_if = "is_default")]
     pub input_interpolation: InputInterpolation,
@@ -477,6 +480,18 @@ pub struct SceneSettings {
     pub outputs: OutputSettings,
     /// Default experiment.
     pub experiment: ExperimentSettings,
+}
+
+impl SceneSettings {
+    /// Whether the importer may bound the number of internal steps: where the scene does, or where a tolerance leaves it open.
+    pub fn bounds_steps(&self) -> bool {
+        self.time.steps_at_most.is_some() || self.takes_a_tolerance()
+    }
+
+    /// Whether the importer may give a tolerance in place of a step.
+    pub fn takes_a_tolerance(&self) -> bool {
+        self.time.tolerance.is_some() || self.time.scheme == Scheme::Galerkin
+    }
 }
 
 /// A complete scene: settings and one ROM per structure, in the same order.

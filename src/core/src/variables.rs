@@ -182,6 +182,8 @@ pub enum Quantity {
     SchemeChoice,
     /// Error that a step may make, parameter.
     Tolerance,
+    /// Most internal steps of a communication step, parameter.
+    StepsAtMost,
     /// Solver, parameter.
     SolverChoice,
     /// How inputs run between communication points, parameter.

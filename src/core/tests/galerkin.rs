@@ -67,7 +67,7 @@ fn run(scene: &Scene, drive: impl Fn(&mut Simulation, f64)) -> Found {
     }
     let ledger = simulation.system().ledger();
     let (kinetic, strain) = simulation.system().energies();
-    let steps = simulation.system().structures()[0].effort().map_or(0, |effort| effort.steps / SECTORS as u64);
+    let steps = simulation.system().effort().steps / SECTORS as u64;
     let residual = ledger.residual(kinetic + strain).abs() / ledger.scale();
     Found { displacements, impulse, by_torque, shaft: ledger.shaft_work.value(), residual, lowest, steps }
 }
@@ -228,8 +228,241 @@ fn free_flight_takes_spans_as_they_are() {
         let lowest = real(&simulation, "clearance_minimum");
         assert!(lowest <= least && lowest > 0.9 * least, "{lowest:e} m, {least:e} m at the end");
     }
-    let effort = simulation.system().structures()[0].effort().copied().unwrap();
-    assert_eq!((effort.steps, effort.trials), (50 * SECTORS as u64, 0), "{effort:?}");
+    let effort = *simulation.system().effort();
+    assert_eq!(
+        (effort.steps, effort.flights, effort.trials),
+        (50 * SECTORS as u64, 50 * SECTORS as u64, 0),
+        "{effort:?}"
+    );
+}
+
+#[test]
+fn damping_is_that_of_the_parameter() {
+    let of = |ratio: f64, by_importer: bool| {
+        let mut scene = scene(Scheme::Galerkin, H, 1e-4);
+        scene.settings.structures[0].damping_ratio = Some(if by_importer { 0.001 } else { ratio });
+        let mut simulation = Simulation::new(&scene).unwrap();
+        if by_importer {
+            set(&mut simulation, "damping_ratio", ratio);
+        }
+        simulation.initialise(0.0).unwrap();
+        (0..60).for_each(|_| go(&mut simulation, H));
+        let loss = real(&simulation, "damping_loss");
+        let state = saved(&simulation);
+        // A state brings its damping with it.
+        let mut other = Simulation::new(&scene).unwrap();
+        other.restore_state(&state).unwrap();
+        [&mut simulation, &mut other].into_iter().for_each(|one| (0..20).for_each(|_| go(one, H)));
+        assert_eq!(bits(&simulation), bits(&other));
+        loss
+    };
+    assert_eq!(of(0.05, true).to_bits(), of(0.05, false).to_bits());
+    assert!(of(0.05, true) > 2.0 * of(0.001, true));
+}
+
+#[test]
+fn a_tolerance_that_is_missed_is_counted_and_told_once() {
+    let run = |tolerance: f64| {
+        let mut simulation = started(&scene(Scheme::Galerkin, 8e-5, tolerance));
+        let notes: Vec<String> = (0..40)
+            .flat_map(|_| {
+                go(&mut simulation, 8e-5);
+                simulation.take_notes()
+            })
+            .collect();
+        let counts = ["internal_steps", "internal_trials", "internal_steps_most", "missed_steps"];
+        let of_start = simulation.warnings().iter().filter(|text| text.contains("whatever the tolerance")).count();
+        (counts.map(|name| real(&simulation, name)), notes, (*simulation.system().effort(), of_start))
+    };
+    let ([steps, trials, most, missed], notes, (effort, told)) = run(1e-3);
+    assert!(missed == 0.0 && notes.is_empty() && told == 0, "{notes:?}");
+    let sectors = 4.0;
+    assert!(steps >= 40.0 * sectors && trials > steps && most >= trials / 40.0 && most < trials, "{effort:?}");
+    let ([_, _, _, missed], notes, (effort, told)) = run(1e-9);
+    assert!(
+        told == 1 && missed > 0.0 && (effort.missed as f64).to_bits() == missed.to_bits() && notes.len() == 1,
+        "{effort:?} {notes:?}"
+    );
+    assert!(
+        ["missed the tolerance of 1e-9", "7.8125e-8 s", "time.step", "larger tolerance"]
+            .iter()
+            .all(|words| notes[0].contains(words)),
+        "{}",
+        notes[0]
+    );
+}
+
+fn bound(simulation: &mut Simulation, most: i32) -> tiprub_core::Result<()> {
+    let reference = simulation.table().find("steps_at_most").unwrap().reference;
+    simulation.set_integer(reference, most)
+}
+
+/// All that can be read, and all that is saved.
+fn everything(simulation: &Simulation) -> (Vec<u64>, Vec<u8>) {
+    (bits(simulation), saved(simulation))
+}
+
+#[test]
+fn a_step_that_takes_too_many_steps_is_as_if_it_had_not_been_tried() {
+    let scene = scene(Scheme::Galerkin, H, 1e-4);
+    let mut free = started(&scene);
+    let mut bounded = started(&scene);
+    bound(&mut bounded, 1_000_000).unwrap();
+    let mut most = 0;
+    for _ in 0..60 {
+        let before = free.system().steps_tried();
+        go(&mut free, H);
+        go(&mut bounded, H);
+        most = most.max(free.system().steps_tried() - before);
+        assert_eq!(real(&free, "internal_steps_most").to_bits(), (most as f64).to_bits());
+    }
+    assert!(most > 20, "{most}");
+    // The next three spans at once, with inputs that change.
+    let length = 3.0 * H;
+    for simulation in [&mut free, &mut bounded] {
+        set(simulation, "speed", 1.01 * real(simulation, "speed"));
+    }
+    let before = free.system().steps_tried();
+    let here = saved(&free);
+    go(&mut free, length);
+    let (expected, needed) = (bits(&free), free.system().steps_tried() - before);
+    for allowed in [1, needed / 2, needed - 1] {
+        bound(&mut bounded, i32::try_from(allowed).unwrap()).unwrap();
+        let state = everything(&bounded);
+        let mut message = String::new();
+        let count = allocations_of(|| {
+            let error = bounded.do_step(bounded.time(), length).unwrap_err();
+            assert!(matches!(error, tiprub_core::Error::Exhausted { .. }));
+            message = error.to_string();
+        });
+        assert!(count < 30, "only the message: {count}");
+        assert!(
+            message.contains(&format!("steps_at_most = {allowed}"))
+                && message.contains("was not done")
+                && message.contains("shorter communication step"),
+            "{message}"
+        );
+        assert_eq!(everything(&bounded), state, "{allowed}");
+    }
+    // A shorter step, withdrawn again by the importer's own means, and the same with enough steps: the same bits.
+    bound(&mut bounded, i32::try_from(needed).unwrap()).unwrap();
+    let state = saved(&bounded);
+    go(&mut bounded, 0.25 * H);
+    bounded.restore_state(&state).unwrap();
+    assert_eq!(allocations_of(|| go(&mut bounded, length)), 0);
+    assert_eq!(bits(&bounded), expected);
+    free.restore_state(&here).unwrap();
+    // What may end early ends where the last span left it.
+    bound(&mut free, i32::try_from(needed - 1).unwrap()).unwrap();
+    free.begin_partial_step(free.time(), length).unwrap();
+    let mut done = 0;
+    let error = loop {
+        match free.advance() {
+            Ok(_) => done += 1,
+            Err(error) => break error,
+        }
+    };
+    assert!(
+        matches!(error, tiprub_core::Error::Exhausted { .. }) && free.is_stepping() && (1..3).contains(&done),
+        "{done}"
+    );
+    let start = free.time();
+    free.end_step_early().unwrap();
+    assert!((free.time() - start - f64::from(done) * H).abs() < 1e-12);
+    bound(&mut free, 0).unwrap();
+    go(&mut free, length);
+}
+
+#[test]
+fn every_scheme_keeps_the_bound_and_wrong_ones_are_refused() {
+    for scheme in [Scheme::ModalExact, Scheme::MasslessBoundary, Scheme::CentralDifference] {
+        let mut scene = scene(scheme, 1e-7, 1e-3);
+        scene.settings.time.steps_at_most = Some(400);
+        let (mut simulation, mut other) = (started(&scene), started(&scene));
+        let state = everything(&simulation);
+        let error = simulation.do_step(0.0, 401e-7).unwrap_err();
+        assert!(
+            matches!(error, tiprub_core::Error::Exhausted { .. }) && error.to_string().contains("internal_step_max"),
+            "{error}"
+        );
+        assert_eq!(everything(&simulation), state);
+        for one in [&mut simulation, &mut other] {
+            go(one, 400e-7);
+        }
+        assert_eq!(bits(&simulation), bits(&other));
+        assert_eq!(real(&simulation, "internal_steps_most").to_bits(), 400.0_f64.to_bits());
+        // What may end early does as many as are allowed.
+        simulation.begin_partial_step(simulation.time(), 1000e-7).unwrap();
+        while simulation.advance().is_ok() {}
+        simulation.end_step_early().unwrap();
+        assert!((simulation.time() - 800e-7).abs() < 1e-15, "{}", simulation.time());
+        // Set while a step is under way it holds from the next on.
+        bound(&mut other, 0).unwrap();
+        other.begin_step(other.time(), 1000e-7).unwrap();
+        bound(&mut other, 1).unwrap();
+        while !other.advance().unwrap().finished {}
+        assert!(other.do_step(other.time(), 2e-7).is_err());
+        go(&mut other, 1e-7);
+        for (value, words) in [(-1, "outside 0"), (i32::MIN, "outside 0"), (i32::MAX, "outside 0")] {
+            let message = bound(&mut other, value).unwrap_err().to_string();
+            assert!(message.contains("steps_at_most") && message.contains(words), "{message}");
+        }
+        bound(&mut other, 1_000_000_000).unwrap();
+        go(&mut other, 1000e-7);
+    }
+    let mut wrong = scene(Scheme::Galerkin, H, 1e-3);
+    wrong.settings.time.steps_at_most = Some(u32::MAX);
+    assert!(try_started(&wrong).unwrap_err().to_string().contains("time.steps_at_most"));
+}
+
+/// A casing that closes and opens in the middle of long communication steps, against spans of the longest step.
+#[test]
+fn what_rests_far_away_flies_over_whole_communication_steps() {
+    let mut scene = scene(Scheme::Galerkin, 8e-5, 1e-3);
+    scene.settings.structures[0].damping_ratio = Some(0.05);
+    scene.settings.surfaces[0].ramp_time = 0.0;
+    let long = 0.05;
+    let lengths = |count: usize| std::iter::repeat_n(long / count as f64, count);
+    let run = |parts: usize| {
+        // Wide at first; then lobes rub.
+        let mut simulation = Simulation::new(&scene).unwrap();
+        set(&mut simulation, "casing_radius_change", 5e-4);
+        simulation.initialise(0.0).unwrap();
+        let (mut outputs, mut flown) = (Vec::new(), Vec::new());
+        for step in 0..8 {
+            let radius = if step == 3 { 0.0 } else { 5e-4 };
+            let before = *simulation.system().effort();
+            let mut lowest = f64::INFINITY;
+            let start = real(&simulation, "casing_radius_change");
+            for (part, length) in lengths(parts).enumerate() {
+                let share = (part + 1) as f64 / parts as f64;
+                set(&mut simulation, "casing_radius_change", start + share * (radius - start));
+                go(&mut simulation, length);
+                lowest = lowest.min(real(&simulation, "clearance_minimum"));
+            }
+            let effort = *simulation.system().effort();
+            flown.push((effort.steps - before.steps, effort.trials - before.trials));
+            outputs.push([lowest, real(&simulation, "friction_loss"), real(&simulation, "blade[1].clearance")]);
+        }
+        let ledger = simulation.system().ledger();
+        let (kinetic, strain) = simulation.system().energies();
+        (outputs, flown, ledger.residual(kinetic + strain).abs() / ledger.scale())
+    };
+    let (long, flown, residual) = run(1);
+    let (short, marched, _) = run(625);
+    println!("{long:?}\n{short:?}\n{flown:?}\n{marched:?} {residual:e}");
+    let sectors = SECTORS as u64;
+    assert!(flown[0] == (2 * sectors, 0) && flown[1] == (2 * sectors, 0), "{flown:?}");
+    assert!(marched[0].0 == 625 * sectors && flown[3].1 > 1000 && residual < 1e-12);
+    assert!(flown[7] == (2 * sectors, 0), "at rest again: {flown:?}");
+    for (long, short) in long.iter().zip(&short) {
+        // The narrowest place, where spans look every 80 µs; the tolerance of either.
+        assert!(long[0] <= short[0] + 4e-7 && long[0] > short[0] - 3e-6, "{long:?} {short:?}");
+        assert!(
+            (long[1] - short[1]).abs() <= 5e-2 * short[1].abs() && (long[2] - short[2]).abs() < 4e-6,
+            "{long:?} {short:?}"
+        );
+    }
 }
 
 /// Of all watched nodes now (m).
@@ -295,7 +528,7 @@ fn a_wide_clearance_does_not_loosen_the_tolerance() {
         scene.settings.contacts[1].gap = gap;
         let mut simulation = started(&scene);
         (0..STEPS).for_each(|_| go(&mut simulation, H));
-        let effort = simulation.system().structures()[0].effort().copied().unwrap();
+        let effort = *simulation.system().effort();
         (effort.steps, effort.trials, simulation.system().bank().displacement().to_vec())
     };
     let (near, far) = (run(1e-3), run(1e-2));

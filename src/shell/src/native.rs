@@ -4,6 +4,8 @@ use std::time::{Duration, Instant};
 
 use tiprub_core::{
     Scene, Simulation, VariableTable,
+    settings::Scheme,
+    system::Effort,
     variables::{Causality, Kind, Variable},
 };
 
@@ -16,8 +18,12 @@ pub struct NativeRun {
     pub recording: Recording,
     /// Time spent stepping (not in initialisation or recording).
     pub stepping: Duration,
-    /// Internal steps done.
+    /// The longest that one communication step took.
+    pub slowest: Duration,
+    /// Internal steps done, of all blades together where each takes its own.
     pub internal_steps: u64,
+    /// What a tolerance has taken, where there is one.
+    pub effort: Option<Effort>,
     /// Warnings of the initialisation, of the run and of the schedule.
     pub warnings: Vec<String>,
 }
@@ -44,7 +50,7 @@ pub fn run(
     simulation.initialise(schedule.start).map_err(in_scene)?;
     let outputs = Outputs::of(simulation.table());
     let mut recording = Recording::with_columns(outputs.names.clone(), schedule.count + 1)?;
-    let (mut stepping, mut internal_steps) = (Duration::ZERO, 0);
+    let (mut stepping, mut slowest) = (Duration::ZERO, Duration::ZERO);
     for index in 0..=schedule.count {
         let time = schedule.time(index);
         recording.times.push(time);
@@ -52,19 +58,16 @@ pub fn run(
         progress(index);
         if index < schedule.count {
             let clock = Instant::now();
-            simulation.begin_step(time, schedule.time(index + 1) - time).map_err(in_scene)?;
-            loop {
-                internal_steps += 1;
-                if simulation.advance().map_err(in_scene)?.finished {
-                    break;
-                }
-            }
-            stepping += clock.elapsed();
+            simulation.do_step(time, schedule.time(index + 1) - time).map_err(in_scene)?;
+            let taken = clock.elapsed();
+            (stepping, slowest) = (stepping + taken, slowest.max(taken));
         }
     }
     let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
     warnings.extend(simulation.take_notes());
-    Ok(NativeRun { recording, stepping, internal_steps, warnings })
+    let system = simulation.system();
+    let effort = (system.settings().scheme == Scheme::Galerkin).then(|| *system.effort());
+    Ok(NativeRun { recording, stepping, slowest, internal_steps: system.steps_taken(), effort, warnings })
 }
 
 /// All numeric outputs as they are now, in the order of the table.

@@ -13,10 +13,10 @@ use tiprub_shell::{Result, console::Console};
 use crate::convergence::{
     Refined, Runner,
     coarsen::coarsened,
-    divisions,
-    refine::{Direction, Level},
+    refine::{Direction, Level, OF_CLEARANCE, SECONDS, goes_by_tolerance, with_division},
     truncate::{Form, truncated},
 };
+use crate::error::own::own_division;
 
 /// Least ratio of two changes of the displacements that lets the rest be estimated.
 const SHRINKING: f64 = 1.3;
@@ -135,18 +135,23 @@ fn direction(title: &str, unit: &'static str, levels: Vec<Level>) -> Direction {
 
 fn steps(scene: &Scene, own: u32, divisions: [u32; 3]) -> Direction {
     let interval = scene.settings.experiment.communication_step;
+    let tolerant = goes_by_tolerance(scene);
     let level = |division: u32| {
-        let mut scene = scene.clone();
-        if division != own {
-            scene.settings.time.step = interval / f64::from(division);
-        }
-        Level { value: interval / f64::from(division), own: division == own, scene, division }
+        let changed = if division == own { scene.clone() } else { with_division(scene, division) };
+        let whole = if tolerant { 1.0 } else { interval };
+        Level { value: whole / f64::from(division), own: division == own, scene: changed, division }
     };
-    direction("internal step", "s", divisions.map(level).into())
+    let (title, unit) = if tolerant { ("tolerance", OF_CLEARANCE) } else { ("internal step", SECONDS) };
+    direction(title, unit, divisions.map(level).into())
 }
 
-/// Of the steps: from longer ones, or from shorter ones where there are no longer ones, or they are refused.
+/// Of the steps: from longer ones, or from shorter ones where there are no longer ones, or they are refused. Of a tolerance: from smaller
+/// ones, a decade apart, since errors follow it in steps.
 fn of_steps(scene: &Scene, own: u32, runner: &Runner) -> Result<Estimate> {
+    if goes_by_tolerance(scene) {
+        let decades = [1, 10, 100].map(|times| own.saturating_mul(times));
+        return Ok(Estimate::of("steps", &runner.as_it_is(steps(scene, own, decades))?));
+    }
     if own >= 4 {
         let coarser = runner.as_it_is(steps(scene, own, [own.div_ceil(4), own.div_ceil(2), own]))?;
         if coarser.runs.iter().all(std::result::Result::is_ok) {
@@ -207,7 +212,7 @@ pub fn estimates(
             .into());
     }
     let runner = Runner::new(settings, samples, console);
-    let division = divisions(scene.settings.experiment.communication_step, scene.settings.time.step);
+    let division = own_division(scene);
     let mut found = vec![of_steps(scene, division, &runner)?];
     for (name, direction) in [("modes", modes(scene, division)), ("patches", patches(scene, division))] {
         found.push(match direction {

@@ -14,8 +14,8 @@ use tiprub_study as study;
 use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
 use crate::{
-    bases, beside, conjugacy, convergence, cube, error, estimates, inputs, modes, refinement, stability, stage,
-    tolerance, witness,
+    bases, beside, conjugacy, convergence, cube, error, estimates, inputs, modes, refinement, scatter, stability,
+    stage, tolerance, witness,
 };
 
 /// Evidence for tiprub: studies of the models that ship and of standard problems.
@@ -71,6 +71,8 @@ pub enum Command {
     Tolerance(StudyCommon),
     /// Any scene of blades without coupling in a rigid casing beside a stepper that shares only the matrices with the product.
     Beside(BesideArguments),
+    /// Errors of steps by a tolerance on random rubs, energy over very many switches, random contact problems.
+    Scatter(StudyCommon),
     /// Reduced blades against a full finite-element model with steps and contact of its own, without any reduction.
     Witness(StudyCommon),
 }
@@ -216,6 +218,7 @@ impl Cli {
             Command::Bases(common) => ("bases", common),
             Command::Tolerance(common) => ("tolerance", common),
             Command::Beside(arguments) => ("beside", &arguments.common),
+            Command::Scatter(common) => ("scatter", common),
             Command::Witness(common) => ("witness", common),
         };
         let directory = commands::study::directory(name, common);
@@ -244,6 +247,7 @@ impl Cli {
             Command::Bases(common) => bases::study(common, console),
             Command::Tolerance(common) => tolerance::study(common, console),
             Command::Beside(arguments) => beside::study(arguments, console),
+            Command::Scatter(common) => scatter::study(common, console),
             Command::Witness(common) => witness::study(common, console),
             Command::Stability(_) => unreachable!("`run` has answered it"),
         }

@@ -5,7 +5,7 @@
 //! - `cube`, `stage`, `convergence`, `modes`: what the paper's figures show of the models that ship;
 //! - `beside`: any scene of blades beside an independent stepper;
 //! - `witness`: reduced blades against full finite elements; `bases`: what a blade is reduced to;
-//! - `tolerance`: steps by a tolerance beside steps of one length;
+//! - `tolerance`: steps by a tolerance beside steps of one length; `scatter`: the same on random rubs and sectors;
 //! - `conjugacy`: forces, moments and work on both sides of contacts; `inputs`: what the communication step does.
 
 #![warn(unreachable_pub)]
@@ -20,6 +20,7 @@ mod estimates;
 mod inputs;
 mod modes;
 mod refinement;
+mod scatter;
 mod stability;
 mod stage;
 mod tolerance;

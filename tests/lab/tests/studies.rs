@@ -203,7 +203,8 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1, "something stays");
         told
     };
-    for name in ["convergence", "modes", "cube", "stage", "error", "inputs", "witness", "bases", "tolerance"] {
+    for name in ["convergence", "modes", "cube", "stage", "error", "inputs", "witness", "bases", "tolerance", "scatter"]
+    {
         let told = refuse(&[name, "--quick", "--out", "file/out"], 1);
         assert!(told.contains("file/out: cannot create the directory"), "{told}");
     }
@@ -294,6 +295,21 @@ fn any_scene_of_blades_meets_a_witness_of_its_own() {
     let output = command.current_dir(root.path()).args(["beside", &whirl, "--out", "none"]).output().unwrap();
     let told = String::from_utf8(output.stderr).unwrap();
     assert!(!output.status.success() && told.contains("whirl") && told.contains("a shaft that moves"), "{told}");
+}
+
+#[test]
+fn the_quick_study_of_random_rubs_keeps_tolerance_and_energy() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "scatter", &[]);
+    only_no(&json, &[]);
+    let results = &json["results"];
+    assert!(results["rubs"].as_u64().unwrap() >= 6, "{results:#}");
+    assert!(results["energy"].as_array().unwrap().iter().all(|one| one["switches"].as_u64() >= Some(2000)));
+    assert!(results["problems"].as_array().unwrap().iter().all(|one| one["trials"].as_u64() >= Some(5000)));
+    assert_eq!(fs::read_to_string(root.path().join("out/scatter.md")).unwrap().lines().count(), 6 + 5 + 5 + 10 + 3 + 4);
+    let [flown, spans, rub] =
+        [0, 1, 2].map(|index: usize| results["milliseconds_of_long_steps"][index].as_f64().unwrap());
+    assert!(flown < 0.1 * spans && spans < rub, "{results:#}");
 }
 
 #[test]

@@ -152,7 +152,7 @@ impl Rows {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::galerkin::level::Level;
+    use crate::galerkin::advance::Advance;
     use tiprub_test_models::Random;
 
     /// Decaying vibration stays within reach, and without damping goes there.
@@ -170,19 +170,17 @@ mod tests {
             let mut state = SectorState::new(count, 1);
             state.position.iter_mut().for_each(|q| *q = random.signed());
             state.velocity.iter_mut().for_each(|v| *v = 3e3 * random.signed());
-            let (mut reach, mut now, mut rate) = (vec![0.0; LANES], vec![0.0; LANES], vec![0.0; LANES]);
-            rows.reach(&state, &mut [&mut reach]);
+            let (mut reach, mut now) = (Sums::new(count, 1), Sums::new(count, 1));
+            rows.reach(&state, &mut reach);
+            let (reach, mut advance) = (reach.three(0, 0, 1), Advance::new(count, 1));
             let mut most = [0.0_f64; 3];
             for _ in 0..1500 {
-                rows.now(&state, &mut [&mut now, &mut rate]);
-                (0..3).for_each(|row| most[row] = most[row].max(now[row].abs()));
-                for (mode, table) in level.modes.iter().enumerate() {
-                    let (q, v) = (state.position[mode], state.velocity[mode]);
-                    let of = |row: [f64; 5]| row[0] * q + row[1] * v;
-                    (state.position[mode], state.velocity[mode]) = (of(table.end[0]), of(table.end[1]));
-                }
+                rows.now(&state, &mut now);
+                let moved = now.three(0, 0, 1);
+                (0..3).for_each(|row| most[row] = most[row].max(moved[row].abs()));
+                advance.freely(&level, &mut state);
             }
-            for (most, reach) in most.into_iter().zip(&reach) {
+            for (most, reach) in most.into_iter().zip(reach) {
                 assert!(most <= reach * (1.0 + 1e-12), "case {case}: {most} beyond {reach}");
                 assert!(count > 1 || ratio > 0.0 || most > 0.999 * reach, "case {case}: {most} of {reach}");
             }

@@ -6,6 +6,7 @@ use super::level::{Level, Modes};
 use super::rows::Rows;
 use super::state::SectorState;
 use super::trial::{Kind, Obstacle, Trial, Verdict};
+use crate::persist::persist_fields;
 
 /// Halvings of the span that a step may have.
 pub const HALVINGS: usize = 10;
@@ -41,6 +42,11 @@ impl Tables {
     }
 }
 
+/// The shortest step of spans of length `span` (s).
+pub fn shortest(span: f64) -> f64 {
+    halved(span, HALVINGS)
+}
+
 /// `span` halved so many times (s).
 fn halved(span: f64, halvings: usize) -> f64 {
     libm::ldexp(span, -i32::try_from(halvings).unwrap_or(i32::MAX))
@@ -51,6 +57,8 @@ fn halved(span: f64, halvings: usize) -> f64 {
 pub struct Effort {
     /// Steps taken.
     pub steps: u64,
+    /// Those of them in which nothing was in reach, without a trial.
+    pub flights: u64,
     /// Trials, those taken included.
     pub trials: u64,
     /// Contact problems without a solution found.
@@ -63,6 +71,15 @@ pub struct Effort {
     pub factorisations: u64,
 }
 
+persist_fields!(Effort { steps, flights, trials, unsolved, constant, missed, factorisations });
+
+impl Effort {
+    /// Steps tried, with contact or without.
+    pub fn tried(&self) -> u64 {
+        self.trials + self.flights
+    }
+}
+
 /// How exactly a sector is marched.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Demand {
@@ -70,6 +87,8 @@ pub struct Demand {
     pub tolerance: f64,
     /// Gaps of contacts that count as closed (m).
     pub precision: f64,
+    /// No more are tried ([`Effort::tried`]).
+    pub most: u64,
 }
 
 /// A step that is taken.
@@ -103,9 +122,14 @@ pub trait Witness: Obstacle {
     fn took(&mut self, step: &Taken);
 }
 
-/// No step is short enough for contacts to have a solution.
+/// Why a span is not marched to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Unsolved;
+pub enum Stopped {
+    /// No step is short enough for contacts to have a solution.
+    Unsolved,
+    /// More steps would have to be tried than are allowed.
+    Exhausted,
+}
 
 /// Marches sectors over spans, one after the other; allocates only when made.
 #[derive(Debug, Clone)]
@@ -126,10 +150,15 @@ impl Marcher {
         self.trial.find_start(&tables.rows, state)
     }
 
+    /// How far the rows of a sector can be from where they rest while nothing pushes (m).
+    pub fn reach(&mut self, tables: &Tables, state: &SectorState) -> &[f64] {
+        self.trial.reach(&tables.rows, state)
+    }
+
     /// March `state` over a span.
     ///
     /// # Errors
-    /// [`Unsolved`]; the state is then where the last step taken left it.
+    /// [`Stopped`]; the state is then where the last step taken left it.
     pub fn march(
         &mut self,
         tables: &Tables,
@@ -137,11 +166,15 @@ impl Marcher {
         witness: &mut impl Witness,
         demand: Demand,
         effort: &mut Effort,
-    ) -> Result<(), Unsolved> {
+    ) -> Result<(), Stopped> {
         const WHOLE: u64 = 1 << HALVINGS;
         let mut done = 0_u64;
         self.trial.forget();
         while done < WHOLE {
+            // The shortest may take two.
+            if effort.tried() + u64::from(state.level == HALVINGS) >= demand.most {
+                return Err(Stopped::Exhausted);
+            }
             let level = state.level;
             let units = WHOLE >> level;
             let (from, length) = (share(done, WHOLE), share(units, WHOLE));
@@ -153,7 +186,7 @@ impl Marcher {
                 witness.flew(self.advance.freely(table, state));
                 self.trial.forget();
                 state.looked = false;
-                (effort.steps, done) = (effort.steps + 1, done + units);
+                (effort.steps, effort.flights, done) = (effort.steps + 1, effort.flights + 1, done + units);
                 state.level -= usize::from(level > 0 && done.is_multiple_of(2 * units));
                 continue;
             }
@@ -168,7 +201,7 @@ impl Marcher {
                 continue;
             }
             if !verdict.solved {
-                return Err(Unsolved);
+                return Err(Stopped::Unsolved);
             }
             effort.missed += u64::from(verdict.error > demand.tolerance);
             self.take((table, kind), tables, state, witness, &verdict);

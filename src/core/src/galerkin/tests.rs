@@ -163,7 +163,7 @@ fn run(modes: &Modes, mut wall: Wall, span: f64, spans: usize, tolerance: f64, s
     let sum = |(kinetic, strain): (f64, f64)| kinetic + strain;
     let start = sum(state.energies(&modes.frequencies, &modes.residual));
     let (mut effort, mut displacements, mut residual, mut most) = (Effort::default(), Vec::new(), 0.0_f64, start);
-    let demand = Demand { tolerance, precision: 1e-15 };
+    let demand = Demand { tolerance, precision: 1e-15, most: u64::MAX };
     let mut energy = start;
     for n in 0..spans {
         (wall.start, wall.span) = (span * f64::from(u32::try_from(n).unwrap()), span);

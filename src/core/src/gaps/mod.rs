@@ -154,6 +154,16 @@ impl GapLaw {
         }
     }
 
+    /// The gap that a node which stays within `reach` (m, own directions) of where it rests keeps at least on a way to `end` that
+    /// is linear in time, while the rotor turns by `turn` against the shape (rad): that of the narrowest place at the narrowest time,
+    /// less the reach. `None` where that is not known, or not met on the way (m).
+    pub fn least(&self, at: At<'_>, end: &Drive, turn: f64, reach: [f64; 3]) -> Option<f64> {
+        match self {
+            Self::Revolution(law) => law.least(at, end, turn, reach),
+            Self::Fixed(_) | Self::Spline(_) | Self::Open(_) => None,
+        }
+    }
+
     /// Smallest radial clearance, or fixed gap, above 0 (m); infinite where there is none.
     pub fn clearance(&self) -> f64 {
         let all = match self {

@@ -134,6 +134,23 @@ impl RevolutionGap {
         !self.shaft_moves && drive.shape_factor >= 0.0 && left > 0.0
     }
 
+    /// See [`super::GapLaw::least`].
+    pub(super) fn least(&self, at: At<'_>, end: &Drive, turn: f64, reach: [f64; 3]) -> Option<f64> {
+        let (node, start) = (at.node, at.drive);
+        let factors = [start.shape_factor, end.shape_factor];
+        let round = self.surface == Surface::Circular || factors.iter().all(|one| *one == 0.0);
+        if self.shaft_moves || !(round || turn.abs() >= std::f64::consts::TAU && factors.iter().all(|one| *one >= 0.0))
+        {
+            return None;
+        }
+        let opening = |drive: &Drive| drive.gap_offset + drive.radius_change;
+        let shape = |factor: f64| if round { 0.0 } else { factor * self.surface.least() };
+        let clearance = self.layout.clearances[at.index % self.layout.lanes] + opening(start).min(opening(end));
+        let slope = self.slopes[node];
+        let left = clearance + shape(factors[0]).min(shape(factors[1])) - reach[0] - slope.abs() * reach[2];
+        Some(left / (1.0 + slope * slope).sqrt())
+    }
+
     /// Angle of a displaced node about the shaft's centre (rad).
     fn angle(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
         self.layout.angles[at.index] + at.drive.rotor_angle + moved[1] * self.layout.per_radius[at.node]

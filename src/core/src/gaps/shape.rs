@@ -70,6 +70,19 @@ impl Surface {
         }
     }
 
+    /// A bound that s stays above everywhere, which it reaches where it is given in closed form (m).
+    pub fn least(&self) -> f64 {
+        match self {
+            Self::Circular => 0.0,
+            Self::Lobes { amplitude, .. } => -amplitude.abs(),
+            Self::TwoLobe { height, .. } => -height.max(0.0),
+            Self::Table { knots, curvature } => {
+                let lowest = knots.iter().fold(f64::INFINITY, |lowest, knot| lowest.min(knot[0]));
+                lowest - 0.125 * curvature * self.angular_scale() * self.angular_scale()
+            }
+        }
+    }
+
     /// Angle over which the shape changes noticeably (rad): a step of the rotor must stay below it.
     pub fn angular_scale(&self) -> f64 {
         match self {

@@ -52,6 +52,7 @@ impl SceneSettings {
         for (index, contact) in self.contacts.iter().enumerate() {
             contact.validate(self, &format!("contact[{}]", index + 1))?;
         }
+        within("time.steps_at_most", f64::from(self.time.steps_at_most.unwrap_or(0)), 0.0, ranges::STEPS)?;
         if let Some(tolerance) = self.time.tolerance {
             within("time.tolerance", tolerance, ranges::TOLERANCE[0], ranges::TOLERANCE[1])?;
         }

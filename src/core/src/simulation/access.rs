@@ -113,13 +113,14 @@ impl Simulation {
         check_range(variable, value)
     }
 
-    /// Set an integer or enumeration parameter.
+    /// Set an integer or enumeration parameter. Another bound on the number of steps holds from the next communication step on.
     ///
     /// # Errors
     /// As [`Simulation::set_real`].
     pub fn set_integer(&mut self, reference: u32, value: i32) -> Result<()> {
         self.check_integer(reference, value)?;
         self.values[reference as usize] = f64::from(value);
+        self.make_room();
         Ok(())
     }
 
@@ -130,7 +131,8 @@ impl Simulation {
     pub fn check_integer(&self, reference: u32, value: i32) -> Result<()> {
         self.expect_kind(reference, "integer", |kind| matches!(kind, Kind::Integer | Kind::Enumeration(_)))?;
         let (_, name, _) = self.settable(reference)?;
-        let Kind::Enumeration(choices) = self.table.locate(reference)?.0.kind else { return Ok(()) };
+        let (variable, _) = self.table.locate(reference)?;
+        let Kind::Enumeration(choices) = variable.kind else { return check_range(variable, f64::from(value)) };
         let item = usize::try_from(value).unwrap_or(0);
         if (1..=choices.items.len()).contains(&item) {
             return Ok(());

@@ -37,7 +37,8 @@ impl Simulation {
                 self.compiled.structure_name(structure),
                 "Use less friction, another internal step or the solver coulomb",
             ),
-            StepFailure::NonFinite => (String::new(), String::new()),
+            // Told otherwise.
+            StepFailure::NonFinite | StepFailure::Exhausted => (String::new(), String::new()),
             StepFailure::Implausible { structure, sector } => (
                 format!(
                     "a contact node of {} is displaced by more than a tenth of its radius, is as deep inside the casing, or meets a \

@@ -10,6 +10,7 @@ mod inputs;
 mod limits;
 mod loads;
 mod outputs;
+mod pace;
 mod patches;
 mod plan;
 mod slave_surface;
@@ -79,6 +80,10 @@ struct Communication {
     count: u64,
     /// Internal steps done.
     done: u64,
+    /// Steps tried before ([`System::steps_tried`]).
+    tried: u64,
+    /// Most to be tried, 0 for any number.
+    most: u64,
 }
 
 impl Communication {
@@ -116,6 +121,8 @@ pub struct Simulation {
     rotors: Vec<RotorAngle>,
     /// Prescribed motion at the end of the internal step under way, per contact pair.
     drives: Vec<Drive>,
+    /// By how much the rotor turns against the shape in free flight, per contact pair (rad).
+    turns: Vec<f64>,
     /// Share of the friction heat that goes into what carries the surface, per pair.
     slave_shares: Vec<f64>,
     window: Window,
@@ -134,6 +141,12 @@ pub struct Simulation {
     limits: Option<limits::Limits>,
     /// Length of every saved state (bytes).
     state_size: usize,
+    /// State to go back to where a communication step takes too many internal steps; empty where nothing bounds them.
+    mark: Vec<u8>,
+    /// Whether the communication step under way may end early.
+    partial: bool,
+    /// Most internal steps tried within a communication step since the start.
+    most_tried: u64,
     /// Energies of each set of structures that can feel each other; where the ledger is kept.
     energies: Vec<SetEnergy>,
     /// Kinetic plus strain energy of each set at the start (J).
@@ -180,6 +193,7 @@ impl Simulation {
             inputs,
             rotors: vec![RotorAngle::default(); bodies],
             drives: vec![Drive::default(); pairs],
+            turns: vec![0.0; pairs],
             slave_shares: vec![1.0; pairs],
             compiled,
             system,
@@ -194,6 +208,9 @@ impl Simulation {
             told: limits::Told::new(bodies, carriers),
             limits: None,
             state_size: 0,
+            mark: Vec::new(),
+            partial: false,
+            most_tried: 0,
             energies,
             initial_energies,
         };
@@ -228,13 +245,16 @@ impl Simulation {
         self.follow_reference_speeds(&self.speeds())?;
         self.warnings = self.check_limits(&parameters)?;
         self.warn_of_sticking(&parameters);
+        self.warn_of_tolerance(&parameters);
         self.begin_telling(&parameters);
-        self.apply_methods(&parameters);
         self.rest(&parameters);
+        self.apply_methods(&parameters);
+        self.make_room();
         self.time = start_time;
         self.initial_time = start_time;
-        self.communication = Communication { start: start_time, length: 0.0, count: 1, done: 1 };
+        self.communication = Communication { start: start_time, count: 1, done: 1, ..Communication::default() };
         self.previous_length = 0.0;
+        self.most_tried = 0;
         for body in 0..self.rotors.len() {
             self.rotors[body] = RotorAngle::new(self.value_of(Quantity::InitialAngle, body));
         }
@@ -259,7 +279,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Scheme, solver and friction of the parameters.
+    /// Scheme, solver and friction of the parameters; damping is that of the structures by now.
     fn apply_methods(&mut self, parameters: &limits::Parameters) {
         self.system.set_methods(parameters.scheme, parameters.solver);
         self.system.prepare_spans(parameters.step, parameters.tolerance);
@@ -461,7 +481,7 @@ impl Simulation {
         self.system.structures_mut().iter_mut().for_each(|structure| structure.modes_mut().rest());
         self.rotors.fill(RotorAngle::default());
         self.communication = Communication::default();
-        self.previous_length = 0.0;
+        (self.previous_length, self.most_tried) = (0.0, 0);
         (self.time, self.initial_time) = (0.0, 0.0);
         self.warnings.clear();
         self.notes.clear();

@@ -141,7 +141,23 @@ impl View<'_> {
 
     #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
     pub fn internal_steps(&self) -> f64 {
-        self.system.steps() as f64
+        self.system.steps_taken() as f64
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
+    pub fn trials(&self) -> f64 {
+        self.system.steps_tried() as f64
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
+    pub fn missed(&self) -> f64 {
+        self.system.effort().missed as f64
+    }
+
+    /// Within one communication step.
+    #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
+    pub fn most_tried(&self) -> f64 {
+        self.simulation.most_tried as f64
     }
 
     /// What the coating of a pair tells; nothing without one.

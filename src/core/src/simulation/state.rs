@@ -11,10 +11,10 @@ use crate::variables::{Causality, Kind, Variable};
 use crate::{Error, Result, shown};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 9;
+const VERSION: u64 = 10;
 const CHECKSUM_BYTES: usize = 8;
 
-persist_fields!(Communication { start, length, count, done });
+persist_fields!(Communication { start, length, count, done, tried, most });
 
 impl Persist for Phase {
     fn save(&self, writer: &mut Writer) {
@@ -135,6 +135,7 @@ impl Simulation {
         self.initial_energies.save(writer);
         self.communication.save(writer);
         self.previous_length.save(writer);
+        self.most_tried.save(writer);
         self.inputs.save(writer);
         self.rotors.save(writer);
         self.window.save(writer);
@@ -167,6 +168,7 @@ impl Simulation {
         self.initial_energies.check(reader);
         take(&mut lead.communication, reader);
         self.previous_length.check(reader);
+        self.most_tried.check(reader);
         // What inputs may hold is looked at where they are read.
         let others = reader.infinite();
         take(&mut lead.inputs, reader);
@@ -201,7 +203,7 @@ impl Simulation {
         if lead.phase == Phase::Created {
             return if lead.time.is_finite() { Ok(()) } else { damaged("its time is not finite") };
         }
-        let Communication { start, length, count, done } = lead.communication;
+        let Communication { start, length, count, done, .. } = lead.communication;
         #[expect(clippy::cast_precision_loss, reason = "checked to be at most 2^53")]
         let number = count as f64;
         let (ends, within) = match lead.phase {
@@ -312,12 +314,50 @@ impl Simulation {
 
     /// Take over a state that was looked at.
     fn read(&mut self, reader: &mut Reader) {
+        self.read_values(reader);
+        // What the step takes from parameters follows from the restored values.
+        let parameters = self.parameters();
+        self.rest(&parameters);
+        self.apply_methods(&parameters);
+        self.system.restore(reader);
+        if self.phase != Phase::Created {
+            self.renew_limits();
+        }
+        self.make_room();
+        if self.phase == Phase::Stepping {
+            self.set_mark();
+        }
+    }
+
+    /// Here is what [`Simulation::withdraw`] goes back to. Does not allocate.
+    pub(super) fn set_mark(&mut self) {
+        let mut mark = std::mem::take(&mut self.mark);
+        if !mark.is_empty() {
+            self.write(&mut Writer::new(&mut mark));
+        }
+        self.mark = mark;
+    }
+
+    /// Back to the mark, with the same parameters. Does not allocate.
+    pub(super) fn withdraw(&mut self) {
+        let mark = std::mem::take(&mut self.mark);
+        let reader = &mut Reader::new(&mark);
+        // Magic, version, scene.
+        [0_u64; 3].restore(reader);
+        self.read_values(reader);
+        self.system.restore(reader);
+        self.mark = mark;
+    }
+
+    /// All of a state but that of the system.
+    fn read_values(&mut self, reader: &mut Reader) {
         self.phase.restore(reader);
         self.time.restore(reader);
         self.initial_time.restore(reader);
         self.initial_energies.restore(reader);
         self.communication.restore(reader);
         self.previous_length.restore(reader);
+        self.most_tried.restore(reader);
         self.inputs.restore(reader);
         self.rotors.restore(reader);
         self.window.restore(reader);
@@ -325,14 +365,6 @@ impl Simulation {
         self.previous.restore(reader);
         // Followed already.
         self.rotors.iter().for_each(|_| 0.0_f64.restore(reader));
-        // What the step takes from parameters follows from the restored values.
-        let parameters = self.parameters();
-        self.apply_methods(&parameters);
-        self.rest(&parameters);
-        self.system.restore(reader);
-        if self.phase != Phase::Created {
-            self.renew_limits();
-        }
     }
 }
 
@@ -362,6 +394,7 @@ fn is_possible(variable: &Variable, value: f64) -> bool {
             let item = whole(value).and_then(|item| usize::try_from(item).ok());
             item.is_some_and(|item| (1..=choices.items.len()).contains(&item))
         }
+        Kind::Integer if settable => whole(value).is_some() && check_range(variable, value).is_ok(),
         Kind::Integer | Kind::Enumeration(_) => whole(value).is_some(),
         Kind::String => true,
     }

@@ -5,6 +5,7 @@ use super::loads::fill_centrifugal;
 use super::{Communication, MOST_STEPS, Phase, Progress, Simulation, TIME_TOLERANCE, same_step};
 use crate::laws::coating::Coating;
 use crate::settings::Scheme;
+use crate::system::StepFailure;
 use crate::{Error, Result, ranges, shown};
 
 /// A run is warned of once u_θ²/2r is this share of the clearance.
@@ -19,8 +20,21 @@ impl Simulation {
     /// Begin a communication step of length H from the current time, landing exactly on `current_time + step_size`.
     ///
     /// # Errors
-    /// Step size not positive and finite, or `current_time` further than 1e-3·H from [`Simulation::time`].
+    /// Step size not positive and finite, or `current_time` further than 1e-3·H from [`Simulation::time`];
+    /// [`Error::Exhausted`] where it takes more internal steps than are allowed.
     pub fn begin_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
+        self.begin(current_time, step_size, false)
+    }
+
+    /// The same, but the step may end where the internal steps allowed are used up ([`Simulation::end_step_early`]).
+    ///
+    /// # Errors
+    /// As [`Simulation::begin_step`].
+    pub fn begin_partial_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
+        self.begin(current_time, step_size, true)
+    }
+
+    fn begin(&mut self, current_time: f64, step_size: f64, partial: bool) -> Result<()> {
         match self.phase {
             Phase::Ready => {}
             Phase::Failed => return Err(failed_before()),
@@ -45,6 +59,14 @@ impl Simulation {
         let step = if keeps { self.system.step_size() } else { step };
         let hold = self.holds();
         self.check_motions(step, step_size)?;
+        let most = self.steps_at_most();
+        if !partial && !self.is_marched() && most > 0 && count > most {
+            return Err(self.exhausted(step_size, most));
+        }
+        self.partial = partial;
+        if most > 0 {
+            self.set_mark();
+        }
         // Nothing is refused from here on.
         if !keeps {
             self.system.set_step(step);
@@ -61,7 +83,8 @@ impl Simulation {
         self.tell(step, step_size);
         self.previous.copy_from_slice(&self.values);
         self.previous_length = self.communication.length;
-        self.communication = Communication { start: current_time, length: step_size, count, done: 0 };
+        let tried = self.system.steps_tried();
+        self.communication = Communication { start: current_time, length: step_size, count, done: 0, tried, most };
         self.window.open(self.system.structures());
         self.phase = Phase::Stepping;
         Ok(())
@@ -190,15 +213,22 @@ impl Simulation {
     /// March one internal step of the communication step begun. Inputs may be set between calls.
     ///
     /// # Errors
-    /// Non-finite state; the simulation must then be reset or restored.
+    /// Non-finite state; the simulation must then be reset or restored. [`Error::Exhausted`] where the internal steps allowed are used
+    /// up: the simulation is then as if the communication step had not begun, or, where it may end early, where the last internal step
+    /// done has left it ([`Simulation::is_stepping`]).
     pub fn advance(&mut self) -> Result<Progress> {
         if self.phase != Phase::Stepping {
             return Err(Error::invalid("doStep", "no communication step is under way", "Begin a step first"));
         }
+        self.allow_steps()?;
+        if self.partial && self.communication.done > 0 && self.communication.most > 0 {
+            // With the inputs set meanwhile.
+            self.set_mark();
+        }
         let next = self.communication.done + 1;
         let (offset, time) = (self.communication.offset(next), self.communication.time(next));
         let before = self.communication.offset(self.communication.done);
-        if self.system.settings().scheme == Scheme::Galerkin {
+        if self.is_marched() {
             let start = self.communication.time(self.communication.done);
             for pair in 0..self.drives.len() {
                 let middle = self.drive(pair, 0.5 * (before + offset), 0.5 * (start + time));
@@ -207,8 +237,10 @@ impl Simulation {
         }
         self.find_drives(offset, time);
         self.load(before);
-        if let Err(failure) = self.system.step(&self.drives) {
-            return Err(self.fail(failure, time));
+        match self.system.step(&self.drives) {
+            Ok(()) => {}
+            Err(StepFailure::Exhausted) => return Err(self.give_up()),
+            Err(failure) => return Err(self.fail(failure, time)),
         }
         self.window.add(&self.system, &self.compiled.patches, self.system.step_size());
         self.communication.done = next;
@@ -249,6 +281,8 @@ impl Simulation {
             return Err(self.fail(failure, time));
         }
         self.note_curved(time);
+        self.note_missed(time);
+        self.most_tried = self.most_tried.max(self.system.steps_tried() - self.communication.tried);
         for (angle, rotor) in self.rotors.iter_mut().zip(&self.inputs.rotors) {
             angle.rebase(&rotor.speed, offset);
         }
@@ -346,12 +380,13 @@ impl Simulation {
         self.finish(offset, time)
     }
 
-    /// `begin_step`, then `advance` to the end.
+    /// `begin_step`, [`Simulation::fly_ahead`], then `advance` to the end.
     ///
     /// # Errors
     /// As those two.
     pub fn do_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
         self.begin_step(current_time, step_size)?;
+        self.fly_ahead();
         while !self.advance()?.finished {}
         Ok(())
     }

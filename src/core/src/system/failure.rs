@@ -65,6 +65,8 @@ pub enum StepFailure {
         /// What motion can explain of it (m).
         explained: f64,
     },
+    /// More steps would have to be tried than are allowed.
+    Exhausted,
     /// The contact problem of a sector has no solution within the pivoting limit.
     Unsolved {
         /// Structure.

@@ -1,13 +1,16 @@
 //! One span of time by continuous Galerkin: each sector by itself, in steps of its own.
 
+mod flight;
+
 use super::facing::{Course, Facing, Record};
 use super::growth::Growth;
 use super::posed::Member;
 use super::{ContactEvent, Pair, StepFailure, Structure, System};
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::sectors::Sectors;
+use crate::galerkin::flight::Flight;
 use crate::galerkin::level::Modes;
-use crate::galerkin::sector::{Demand, Effort, Marcher, Tables};
+use crate::galerkin::sector::{Demand, Effort, Marcher, Stopped, Tables};
 use crate::galerkin::state::SectorState;
 use crate::gaps::Drive;
 use crate::gaps::wrench::Wrench;
@@ -21,11 +24,12 @@ const PRECISION: f64 = 1e-4;
 #[derive(Debug, Clone)]
 pub struct Galerkin {
     tables: Vec<Tables>,
+    /// Of each table.
+    flights: Vec<Flight>,
     marcher: Marcher,
     state: SectorState,
     record: Record,
     demand: Demand,
-    effort: Effort,
     /// Smallest gap of each node and lane within the span (m).
     lowest: Vec<f64>,
 }
@@ -34,21 +38,16 @@ impl Galerkin {
     /// Of a structure whose modes are `bank`, for spans up to `longest` (s) and errors of `tolerance` (m).
     fn new(bank: &ModalBank, nodes: usize, pairs: usize, longest: f64, tolerance: f64) -> Self {
         let modes = bank.model().dynamic_modes(Scheme::Galerkin);
-        let tables = (0..bank.sets()).map(|set| Tables::new(modes_of(bank, set, modes), longest)).collect();
+        let kinds: Vec<Modes> = (0..bank.sets()).map(|set| modes_of(bank, set, modes)).collect();
         Self {
-            tables,
+            flights: kinds.iter().map(Flight::new).collect(),
+            tables: kinds.into_iter().map(|kind| Tables::new(kind, longest)).collect(),
             marcher: Marcher::new(modes, nodes),
             state: SectorState::new(modes, nodes),
             record: Record::new(nodes, pairs),
-            demand: Demand { tolerance, precision: PRECISION * tolerance },
-            effort: Effort::default(),
+            demand: Demand { tolerance, precision: PRECISION * tolerance, most: u64::MAX },
             lowest: vec![f64::INFINITY; nodes * bank.lanes()],
         }
-    }
-
-    /// What has been done so far.
-    pub fn effort(&self) -> &Effort {
-        &self.effort
     }
 
     /// Smallest gaps within the last span (m), `[node · lanes + lane]`.
@@ -112,6 +111,7 @@ impl System {
         for index in 0..self.structures.len() {
             let set = self.sets.of(index);
             let Some(mut galerkin) = self.structures[index].galerkin.take() else { continue };
+            galerkin.demand.most = self.most_tried;
             let outcome = self.march_structure(index, set, &mut galerkin, span);
             self.structures[index].galerkin = Some(galerkin);
             outcome?;
@@ -141,9 +141,9 @@ impl System {
         for (course, pair) in galerkin.record.courses.iter_mut().zip(pairs.iter()) {
             *course = Course::new(pair.drive_before(), (&pair.middle.0, pair.middle.1), pair.drive_now(), span);
         }
-        let factorisations = galerkin.effort.factorisations;
+        let factorisations = counted.effort.factorisations;
         for sector in 0..structure.modes().sectors() {
-            structure.march_sector(index, sector, galerkin, pairs)?;
+            structure.march_sector((index, sector), galerkin, pairs, &mut counted.effort)?;
             let work = galerkin.record.work;
             let ledger = &mut counted.ledgers[set];
             let turnover = work.shaft.abs() + work.whirl.abs() + work.shift.abs() + work.casing.abs();
@@ -170,7 +170,7 @@ impl System {
                 }
             }
         }
-        counted.factorisations += galerkin.effort.factorisations - factorisations;
+        counted.factorisations += counted.effort.factorisations - factorisations;
         Ok(())
     }
 }
@@ -200,13 +200,13 @@ impl Structure {
     /// March one sector, and write its state.
     fn march_sector(
         &mut self,
-        number: usize,
-        sector: usize,
+        (number, sector): (usize, usize),
         galerkin: &mut Galerkin,
         pairs: &mut [Pair],
+        effort: &mut Effort,
     ) -> Result<(), StepFailure> {
         let lanes = self.lanes();
-        let Galerkin { tables, marcher, state, record, demand, effort, lowest } = galerkin;
+        let Galerkin { tables, marcher, state, record, demand, lowest, .. } = galerkin;
         let Some(bank) = self.bank() else { return Ok(()) };
         let tables = &tables[bank.set_number(sector)];
         bank.read_sector(sector, &mut state.position, &mut state.velocity);
@@ -226,7 +226,10 @@ impl Structure {
         if record.implausible {
             return Err(StepFailure::Implausible { structure: number, sector });
         }
-        outcome.map_err(|_| StepFailure::Unsolved { structure: number, sector })?;
+        outcome.map_err(|stopped| match stopped {
+            Stopped::Unsolved => StepFailure::Unsolved { structure: number, sector },
+            Stopped::Exhausted => StepFailure::Exhausted,
+        })?;
         (self.pace.bank[sector], self.pace.level[sector]) = (state.bank, state.level as u64);
         for node in 0..self.nodes() {
             let index = self.index(node, sector);

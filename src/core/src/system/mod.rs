@@ -20,6 +20,7 @@ mod work;
 use crate::dynamics::bank::BankOptions;
 use crate::dynamics::modal::ModalModel;
 use crate::dynamics::sectors::{SectorModel, Sectors};
+pub use crate::galerkin::sector::Effort;
 use crate::gaps::{Drive, GapLaw};
 use crate::history::Two;
 use crate::laws::coating::Coating;
@@ -63,6 +64,8 @@ pub struct SystemSettings {
 pub(crate) struct Counted {
     /// Internal steps done.
     pub steps: u64,
+    /// What marching sectors one by one has taken.
+    pub effort: Effort,
     pub factorisations: u64,
     /// Steps done when the gap two steps back was first one of steps of this size.
     pub witnessed: u64,
@@ -70,7 +73,7 @@ pub(crate) struct Counted {
     pub ledgers: Vec<Ledger>,
 }
 
-persist_fields!(Counted { steps, factorisations, witnessed, ledgers });
+persist_fields!(Counted { steps, effort, factorisations, witnessed, ledgers });
 
 /// Structures, the contact pairs between them, and which of the contacts can push each other.
 #[derive(Debug, Clone)]
@@ -85,6 +88,8 @@ pub struct System {
     pub(crate) counted: Counted,
     /// Energy of each set before a change of the step (J).
     mechanical: Vec<f64>,
+    /// No sector begins a step once so many have been tried.
+    most_tried: u64,
 }
 
 impl System {
@@ -136,6 +141,7 @@ impl System {
             events: Two { now: room(), before: room() },
             counted: Counted { ledgers: vec![Ledger::default(); sets.count()], ..Counted::default() },
             mechanical: vec![0.0; sets.count()],
+            most_tried: u64::MAX,
             sets,
             structures,
             pairs,
@@ -212,9 +218,29 @@ impl System {
         self.structures[0].modes().step()
     }
 
-    /// Internal steps done.
+    /// Internal steps done; spans where sectors are marched one by one.
     pub fn steps(&self) -> u64 {
         self.counted.steps
+    }
+
+    /// What marching sectors one by one has taken, all together.
+    pub fn effort(&self) -> &Effort {
+        &self.counted.effort
+    }
+
+    /// Steps taken, of all sectors together where each takes its own.
+    pub fn steps_taken(&self) -> u64 {
+        if self.settings.scheme == Scheme::Galerkin { self.counted.effort.steps } else { self.counted.steps }
+    }
+
+    /// Steps tried, those taken included.
+    pub fn steps_tried(&self) -> u64 {
+        if self.settings.scheme == Scheme::Galerkin { self.counted.effort.tried() } else { self.counted.steps }
+    }
+
+    /// Let no sector begin a step once so many have been tried ([`System::steps_tried`]).
+    pub(crate) fn allow(&mut self, most_tried: u64) {
+        self.most_tried = most_tried;
     }
 
     /// Small linear systems factorised by the contact solver.

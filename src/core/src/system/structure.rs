@@ -3,7 +3,7 @@
 use crate::dynamics::bank::{BankOptions, LANES, ModalBank};
 use crate::dynamics::modal::ModalModel;
 use crate::dynamics::sectors::{SectorModel, Sectors};
-use crate::galerkin::sector::{Effort, HALVINGS};
+use crate::galerkin::sector::HALVINGS;
 use crate::gaps::{Drive, GapLaw, Geometry, dot};
 use crate::history::History;
 use crate::persist::{Persist, Reader, Writer, persist_fields};
@@ -141,11 +141,6 @@ impl Structure {
     /// Smallest gaps within the last step (m), as far as its scheme looked, `[node · lanes + lane]`.
     pub fn lowest_gaps(&self) -> &[f64] {
         self.galerkin.as_ref().map_or(&self.history.gap.now, |galerkin| galerkin.lowest())
-    }
-
-    /// What marching its sectors has taken so far.
-    pub fn effort(&self) -> Option<&Effort> {
-        Some(self.galerkin.as_ref()?.effort())
     }
 
     /// Gap of one node of one sector (m).

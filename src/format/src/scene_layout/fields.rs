@@ -13,7 +13,7 @@ const fn field(
 }
 
 /// Every key, in file order.
-pub const FIELDS: [SceneField; 72] = [
+pub const FIELDS: [SceneField; 73] = [
     field("name", "text", None, "letters, digits, underscore; starts with a letter", "Name of the model."),
     field("description", "text", Some("empty"), "any", "One or a few sentences for the importer's catalogue."),
     field(
@@ -376,6 +376,14 @@ pub const FIELDS: [SceneField; 72] = [
         Some("1e-3"),
         "1e-9 to 0.1",
         "Error that a step of `galerkin` may make in displacements, as a share of the smallest clearance.",
+    ),
+    field(
+        "time.steps_at_most",
+        "whole number",
+        Some("0, any number"),
+        "0 to 1000000000",
+        "Most internal steps of one communication step. A step that would take more is not done, and can be repeated. Of `galerkin` \
+         steps of all blades together, those tried in vain included.",
     ),
     field(
         "time.input_interpolation",

@@ -28,6 +28,7 @@ pub fn scene_with_every_feature() -> SceneSettings {
     (scene.outputs.wear, scene.outputs.slave_displacement) = (true, true);
     scene.time.input_interpolation = InputInterpolation::Hold;
     scene.time.tolerance = Some(2e-3);
+    scene.time.steps_at_most = Some(5000);
     scene
 }
 

@@ -19,7 +19,7 @@ use std::time::Instant;
 use directions::directions;
 use limit::Limit;
 use march::{Marched, march};
-use refine::{Again, Direction, Level, Source};
+use refine::{Again, Direction, Level, Source, goes_by_tolerance};
 use tiprub_core::{Rom, Scene, rom::RubErrors};
 use tiprub_gallery::{rom_cache::RomCache, scene_source};
 use tiprub_shell::{Failure, Result, console::Console, sweep};
@@ -27,7 +27,6 @@ use tiprub_shell::{Failure, Result, console::Console, sweep};
 use super::Study;
 use crate::{
     arguments::ConvergenceArguments,
-    divisions,
     error::{
         case::Case,
         own::{Own, refuse_compared},
@@ -123,7 +122,7 @@ pub fn found(name: &str, scene: &Scene, asked: &Asked, console: &Console) -> Res
     one_rotor(&scene.settings)?;
     let case = Own::of(name, scene.clone(), asked.settings, (asked.window, asked.quick), console)?;
     let interval = case.interval();
-    let own = divisions(interval, scene.settings.time.step);
+    let own = case.own_division();
     let mut runner =
         Runner { settings: asked.settings, samples: case.samples(), threads: asked.threads, console, own: None };
     let clock = Instant::now();
@@ -152,7 +151,12 @@ pub fn found(name: &str, scene: &Scene, asked: &Asked, console: &Console) -> Res
 /// Say how long the runs will take, where that is long: as steps times sizes of the models, against the run of the scene as it stands.
 fn announce(directions: &[Direction], scene: &Scene, (own, seconds): (u32, f64), runner: &Runner) {
     let size = |scene: &Scene| scene.roms.iter().map(|rom| rom.total_order() as f64).sum::<f64>();
-    let cost = |level: &Level| f64::from(level.division) / f64::from(own) * size(&level.scene) / size(scene);
+    let steps = |level: &Level| match goes_by_tolerance(scene) {
+        // A decade doubles the steps.
+        true => (f64::from(level.division) / f64::from(own)).powf(0.3),
+        false => f64::from(level.division) / f64::from(own),
+    };
+    let cost = |level: &Level| steps(level) * size(&level.scene) / size(scene);
     let levels = directions.iter().flat_map(|direction| &direction.levels).filter(|level| !level.own);
     let runs: Vec<f64> = levels.map(cost).collect();
     let longest = runs.iter().fold(0.0, |most: f64, run| most.max(*run));

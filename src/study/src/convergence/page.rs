@@ -11,7 +11,7 @@ use tiprub_shell::Result;
 use super::{
     Found, Refined,
     march::{Marched, QUANTITIES},
-    refine::{Direction, SECONDS},
+    refine::{Direction, OF_CLEARANCE, SECONDS, goes_by_tolerance},
 };
 use crate::{Figure, Picture, Sheet, Statement, Study};
 
@@ -56,7 +56,11 @@ pub fn study(found: &Found) -> Result<Study> {
 }
 
 fn value(refined: &Refined, value: f64) -> String {
-    if refined.direction.unit == SECONDS { format!("{value:.4e} s") } else { format!("{value:.0}") }
+    match refined.direction.unit {
+        SECONDS => format!("{value:.4e} s"),
+        OF_CLEARANCE => format!("{value:.1e}"),
+        _ => format!("{value:.0}"),
+    }
 }
 
 /// What is compared: displacements and the quantities.
@@ -157,8 +161,11 @@ const HEADINGS: [&str; 13] = [
     "change of strain energy",
 ];
 
-/// The internal step of a level (s).
+/// The internal step of a level (s); empty where it goes by a tolerance.
 fn step(level: &super::Level) -> String {
+    if goes_by_tolerance(&level.scene) {
+        return String::new();
+    }
     let length = level.scene.settings.experiment.communication_step;
     format!("{:.4e}", length / f64::from(level.division))
 }
@@ -252,6 +259,7 @@ pub fn picture(refined: &Refined) -> Result<Picture> {
     };
     let x_label = match direction.unit {
         SECONDS => format!("{} (s)", direction.title),
+        OF_CLEARANCE => format!("{} (share of the clearance)", direction.title),
         unit if direction.title.starts_with(unit) => format!("{} (-)", direction.title),
         unit => format!("{unit}: {} (-)", direction.title),
     };

@@ -1,6 +1,6 @@
 //! What a direction is in which a scene can be refined, its levels, and where models that are reduced again come from.
 
-use tiprub_core::{Rom, Scene};
+use tiprub_core::{Rom, Scene, settings::Scheme};
 use tiprub_gallery::rom_cache::RomCache;
 use tiprub_model::rotor37::Tip;
 use tiprub_shell::{Result, console::Console};
@@ -30,13 +30,13 @@ pub trait Source {
 /// One setting of a direction.
 #[derive(Debug, Clone)]
 pub struct Level {
-    /// Internal step (s), number of modes, of contact nodes or of nodes of the mesh.
+    /// Internal step (s), tolerance, number of modes, of contact nodes or of nodes of the mesh.
     pub value: f64,
     /// Whether the scene is as it stands.
     pub own: bool,
     /// The scene.
     pub scene: Scene,
-    /// Internal steps per communication step.
+    /// Internal steps per communication step; one over the tolerance where the scene goes by one.
     pub division: u32,
 }
 
@@ -66,7 +66,7 @@ impl Direction {
     /// element.
     pub fn size(&self, value: f64) -> f64 {
         match self.unit {
-            SECONDS => value,
+            SECONDS | OF_CLEARANCE => value,
             MESH_NODES => value.powf(-0.5),
             MODES_KEPT => 1.0 / value,
             _ => 1.0 / (value - 1.0).max(0.5),
@@ -86,10 +86,30 @@ impl Direction {
         let mut finer = Self { shorter: Some(shorter), ..self.clone() };
         for level in &mut finer.levels {
             level.division = level.division.saturating_mul(shorter);
-            level.scene.settings.time.step /= f64::from(shorter);
+            if !goes_by_tolerance(&level.scene) {
+                level.scene.settings.time.step /= f64::from(shorter);
+            } else {
+                level.scene.settings.time.tolerance = Some(1.0 / f64::from(level.division));
+            }
         }
         finer
     }
+}
+
+/// Whether a tolerance takes the place of the step.
+pub(crate) fn goes_by_tolerance(scene: &Scene) -> bool {
+    scene.settings.time.scheme == Scheme::Galerkin
+}
+
+/// The scene with `division` internal steps per communication step, or a tolerance of one over that.
+pub(crate) fn with_division(scene: &Scene, division: u32) -> Scene {
+    let mut scene = scene.clone();
+    if goes_by_tolerance(&scene) {
+        scene.settings.time.tolerance = Some(1.0 / f64::from(division));
+    } else {
+        scene.settings.time.step = scene.settings.experiment.communication_step / f64::from(division);
+    }
+    scene
 }
 
 /// Name of the direction of steps.
@@ -100,6 +120,8 @@ pub const NODES: &str = "nodes";
 pub const MESH: &str = "mesh";
 /// Units of values.
 pub const SECONDS: &str = "s";
+/// Unit of tolerances.
+pub const OF_CLEARANCE: &str = "of the clearance";
 pub(super) const MODES_KEPT: &str = "modes";
 pub(super) const MESH_NODES: &str = "mesh nodes";
 

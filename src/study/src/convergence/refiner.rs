@@ -1,6 +1,6 @@
 //! Scenes at every level of a direction: other steps, modes, contact nodes, patches and meshes.
 
-use tiprub_core::{Rom, Scene, dynamics::modal::ModalModel, rom::Frame};
+use tiprub_core::{Rom, Scene, dynamics::modal::ModalModel, rom::Frame, settings::TOLERANCE};
 use tiprub_format::builtin_model;
 use tiprub_gallery::{
     builtin::{self, Other},
@@ -12,7 +12,10 @@ use tiprub_shell::{Failure, Result};
 use super::{
     coarsen::coarsened,
     nodes::{common_start, named_as, starting_with},
-    refine::{Again, Direction, Level, MESH, MESH_NODES, MODES_KEPT, Meshed, NODES, SECONDS, STEP, Source},
+    refine::{
+        Again, Direction, Level, MESH, MESH_NODES, MODES_KEPT, Meshed, NODES, OF_CLEARANCE, SECONDS, STEP, Source,
+        goes_by_tolerance, with_division,
+    },
     truncate::{Form, truncated},
 };
 use crate::{master, stability::asked::divided};
@@ -20,6 +23,8 @@ use crate::{master, stability::asked::divided};
 /// Internal steps, times the scene's own, the coarsest first.
 const STEPS: [f64; 5] = [4.0, 2.0, 1.0, 0.5, 0.25];
 const QUICK_STEPS: [f64; 3] = [2.0, 1.0, 0.5];
+/// Tolerances, times the scene's own, the coarsest first.
+const DECADES: [f64; 4] = [10.0, 1.0, 0.1, 0.01];
 /// Shares of the ROM's own modes.
 const FEWER: [f64; 3] = [0.25, 0.5, 0.75];
 const QUICK_FEWER: [f64; 1] = [0.5];
@@ -31,7 +36,7 @@ const SAME: f64 = 1e-6;
 /// Makes other models of a scene.
 pub(crate) struct Refiner<'a> {
     scene: &'a Scene,
-    /// Internal steps per communication step.
+    /// Internal steps per communication step, or one over the tolerance.
     own: u32,
     again: &'a Again<'a>,
     /// Of the mesh of the master, where it can be reduced again.
@@ -159,21 +164,25 @@ impl<'a> Refiner<'a> {
 
     pub(super) fn steps(&self) -> Direction {
         let shares = if self.again.quick { &QUICK_STEPS[..] } else { &STEPS[..] };
-        let interval = self.scene.settings.experiment.communication_step;
-        let step = divided(interval, self.scene.settings.time.step);
+        let time = &self.scene.settings.time;
+        let tolerant = goes_by_tolerance(self.scene);
+        let step = match tolerant {
+            true => time.tolerance.unwrap_or(TOLERANCE),
+            false => divided(self.scene.settings.experiment.communication_step, time.step),
+        };
+        // Tolerances a decade apart: errors follow them in steps.
+        let shares = if tolerant { DECADES.get(..shares.len()).unwrap_or(&DECADES) } else { shares };
         let mut divisions: Vec<u32> = shares.iter().map(|share| count(f64::from(self.own) / share)).collect();
         divisions.dedup();
         let level = |division: u32| {
-            let mut scene = self.scene.clone();
             // As it stands, to the last bit.
-            if division != self.own {
-                scene.settings.time.step = interval / f64::from(division);
-            }
+            let scene = if division == self.own { self.scene.clone() } else { with_division(self.scene, division) };
             let value = step * f64::from(self.own) / f64::from(division);
             Level { value, own: division == self.own, scene, division }
         };
         let levels = divisions.into_iter().map(level).collect();
-        Direction { levels, ..Direction::new(STEP, "internal step".into(), SECONDS) }
+        let (title, unit) = if tolerant { ("tolerance", OF_CLEARANCE) } else { ("internal step", SECONDS) };
+        Direction { levels, ..Direction::new(STEP, title.into(), unit) }
     }
 
     /// Modes of one structure: fewer of the ROM's own, more where it can be reduced again.

@@ -35,6 +35,14 @@ impl Full {
     pub const ALL: [Self; 4] = [Self::Film, Self::Bipotential, Self::Augmented, Self::Penalty];
 }
 
+/// Steps by a tolerance.
+pub const TOLERANT: Competitor = Competitor::Core(Scheme::Galerkin, Solver::Lcp);
+/// Its longest step (s), where communication steps are not shorter.
+pub const LONGEST: f64 = 8e-5;
+/// One over its tolerances that are compared.
+pub const TOLERANCES: [u32; 4] = [100, 1000, 10_000, 100_000];
+/// One over that of its finest run.
+pub const FINEST: u32 = 10_000_000;
 /// The method of the paper.
 pub const PAPER: Competitor = Competitor::Core(Scheme::CentralDifference, Solver::Film);
 /// The first reference and default of the product.
@@ -68,7 +76,7 @@ impl Family {
 impl Competitor {
     /// Everyone, the product's own first.
     pub fn all() -> Vec<Self> {
-        Self::reduced().into_iter().chain(Full::ALL.map(Self::Full)).collect()
+        Self::reduced().into_iter().chain([TOLERANT]).chain(Full::ALL.map(Self::Full)).collect()
     }
 
     /// Everyone who steps a reduced model, the product's own first.
@@ -91,12 +99,23 @@ impl Competitor {
     /// The equations it solves.
     pub fn family(self) -> Family {
         let Self::Core(scheme, solver) = self else { return Family::PLAIN };
-        Family { massless: scheme == Scheme::MasslessBoundary, sticking: solver == Solver::Coulomb }
+        Family { massless: scheme.is_massless(), sticking: solver == Solver::Coulomb }
+    }
+
+    /// Whether a tolerance takes the place of its step. What divides the sample then divides the smallest clearance.
+    pub fn is_by_tolerance(self) -> bool {
+        matches!(self, Self::Core(Scheme::Galerkin, _))
+    }
+
+    /// `h = 0.500 µs` of a step (s), or `tolerance 1e-3`.
+    pub fn setting(self, value: f64) -> String {
+        if self.is_by_tolerance() { format!("tolerance {value:.0e}") } else { format!("h = {:.3} µs", 1e6 * value) }
     }
 
     /// As in scene files, or in words.
     pub fn name(self) -> String {
         match self {
+            TOLERANT => "galerkin".into(),
             Self::Core(scheme, solver) => format!("{} + {}", scheme.name(), solver.name()),
             Self::Moreau => "Moreau-Jean, implicit".into(),
             Self::Augmented => "Newmark, augmented Lagrangian".into(),

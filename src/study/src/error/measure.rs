@@ -6,7 +6,7 @@ use tiprub_shell::{Failure, Result, console::Task};
 
 use super::{
     case::Case,
-    competitor::{Competitor, DEFAULT, Family},
+    competitor::{Competitor, DEFAULT, FINEST, Family, TOLERANT},
     run::{self, Trace},
 };
 
@@ -44,7 +44,7 @@ pub struct Row {
     pub size: usize,
     /// Who.
     pub competitor: Competitor,
-    /// Internal step (s).
+    /// Internal step (s); the tolerance of those that go by one.
     pub step: f64,
     /// How it went, or why it was refused or failed.
     pub outcome: Result<Figures, String>,
@@ -60,6 +60,8 @@ pub struct References {
     pub limits: Vec<(Family, Trace)>,
     /// Displacements and windowed impulses of the first two, relative.
     pub apart: [f64; 2],
+    /// Displacements of two schemes without mass of the contact nodes, relative, where one of them goes by a tolerance.
+    pub massless_apart: Option<f64>,
 }
 
 impl References {
@@ -172,7 +174,8 @@ pub fn measure(case: &dyn Case, repetitions: usize, task: &Task) -> Result<Measu
         for competitor in case.competitors(size) {
             for division in case.divisions_of(size, competitor) {
                 let outcome = judge(case, size, (competitor, division), own, truth, repetitions);
-                rows.push(Row { size, competitor, step: case.interval() / f64::from(division), outcome });
+                let whole = if competitor.is_by_tolerance() { 1.0 } else { case.interval() };
+                rows.push(Row { size, competitor, step: whole / f64::from(division), outcome });
                 tick();
             }
         }
@@ -199,9 +202,18 @@ fn refer(case: &dyn Case, size: usize) -> Result<References> {
     // Equations that are refused at this size have no limit; their rows say why.
     let limits =
         case.families(size).into_iter().map(|family| Some((family, trace(family.reference(), division).ok()?)));
+    let mut limits: Vec<(Family, Trace)> = limits.flatten().collect();
+    let tolerant = case.competitors(size).contains(&TOLERANT).then(|| trace(TOLERANT, FINEST).ok()).flatten();
+    let mut massless_apart = None;
+    if let Some(finest) = tolerant {
+        let other = limits.iter().position(|limit| limit.0 == Family::MASSLESS).map(|index| limits.swap_remove(index));
+        massless_apart = other.map(|(_, other)| apart(&other, &finest));
+        limits.push((Family::MASSLESS, finest));
+    }
     Ok(References {
         apart: [apart(&second, &first), windows_apart(&second, &first, case.impulse_window())],
-        limits: limits.flatten().collect(),
+        limits,
+        massless_apart,
         first,
         second,
     })

@@ -157,7 +157,7 @@ fn add(study: &mut Study, case: &dyn Case, found: &Measured) -> Vec<Table> {
     let mut all = vec![about.clone()];
     // With one size and no exact solution both are one.
     let kinds: &[Kind] =
-        if case.sizes().len() > 1 || case.exact().is_some() { &[Kind::OfTime, Kind::Total] } else { &[Kind::OfTime] };
+        if Kind::of_steps(case) == Kind::OfTime { &[Kind::OfTime, Kind::Total] } else { &[Kind::OfOwn] };
     for (&kind, name) in zip(kinds, case.figures()) {
         let (chart, sheet) = sheets::chart(case, found, kind);
         let (winners, costs) = (ranking::winners(case, found, kind), ranking::costs(case, found, kind));
@@ -190,7 +190,7 @@ fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> Stri
     let own = &found.references[standard];
     let size = case.sizes()[standard];
     let what = match kind {
-        Kind::OfTime => format!(
+        Kind::OfTime | Kind::OfOwn => format!(
             "{}: error of the steps alone at {size} {}: relative L2 of the displacements against {} at h = {:.2e} s. {} at h = {:.2e} s, {}, is \
              {:.1e} away.",
             case.title(),
@@ -210,13 +210,18 @@ fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> Stri
         own.away(family)
             .map_or_else(String::new, |away| format!(" {what} tends to a limit of its own, {away:.1e} away."))
     };
-    let limits = away(Family::MASSLESS, "massless-boundary") + &away(Family::STICKING, "coulomb");
+    let mut limits = away(Family::MASSLESS, "massless-boundary") + &away(Family::STICKING, "coulomb");
+    if let Some(apart) = own.massless_apart {
+        limits.push_str(&format!(
+            " galerkin tends to that of massless-boundary: two fine runs are {apart:.1e} apart. Every method is held against its own limit."
+        ));
+    }
     let refused = found.rows.iter().filter(|row| row.outcome.is_err()).count();
     let shown: usize = chart.all.iter().map(|each| each.points.len()).sum();
     format!(
         "{what}{} {} {shown} configurations; {refused} of this scene were refused or failed and stand in the table of all runs.",
-        if kind == Kind::OfTime { limits.as_str() } else { "" },
-        if kind == Kind::OfTime { case.description() } else { String::new() }
+        if kind == Kind::Total { "" } else { limits.as_str() },
+        if kind == Kind::Total { String::new() } else { case.description() }
     )
 }
 
@@ -229,6 +234,7 @@ fn statements(case: &dyn Case, found: &Measured) -> Vec<Statement> {
     let deepest = ran.iter().map(|figures| figures.penetration).fold(0.0, f64::max);
     let least = ran.iter().map(|figures| figures.adhesion).fold(0.0, f64::min);
     let mut all = meeting(case, found);
+    all.extend(massless(case, found));
     all.extend(limits(case, found));
     all.push(Statement {
         expected: format!("{title}: lcp neither penetrates nor pulls at any internal step of any run"),
@@ -268,6 +274,26 @@ fn meeting(case: &dyn Case, found: &Measured) -> Vec<Statement> {
             truncation.join(", "),
         ),
     ]
+}
+
+/// What has no mass of the contact nodes tends to a limit of its own, which two schemes share.
+fn massless(case: &dyn Case, found: &Measured) -> Vec<Statement> {
+    let (own, title) = (&found.references[case.standard()], case.title());
+    let Some(away) = own.away(Family::MASSLESS).filter(|_| Kind::of_steps(case) == Kind::OfOwn) else {
+        return Vec::new();
+    };
+    let between = Statement::remark(
+        format!("{title}: limits of the equations with mass of the contact nodes and without"),
+        format!("displacements {away:.1e} apart: that is of the model, and no error of the steps"),
+    );
+    let witness = own.massless_apart.map(|apart| {
+        Statement::tested(
+            format!("{title}: massless-boundary with fine steps and galerkin with a fine tolerance meet to {MEET:e}"),
+            apart < MEET,
+            format!("displacements {apart:.1e} apart"),
+        )
+    });
+    std::iter::once(between).chain(witness).collect()
 }
 
 /// What became of one step of central differences.

@@ -2,7 +2,7 @@
 
 use tiprub_core::{
     Scene,
-    settings::{Scheme, Solver},
+    settings::{Scheme, Solver, TOLERANCE},
     shown,
 };
 use tiprub_gallery::scene_source;
@@ -10,7 +10,7 @@ use tiprub_shell::{Failure, Result, console::Console, schedule::Schedule};
 
 use super::{
     case::Case,
-    competitor::{Competitor, DEFAULT, Family},
+    competitor::{Competitor, DEFAULT, Family, TOLERANCES, TOLERANT},
     run::{Run, Seen},
     scene::SceneRun,
     window,
@@ -22,12 +22,14 @@ const SHARES: [f64; 7] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 const QUICK_SHARES: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 /// Internal steps of the references, in multiples of the most that are tried.
 const FINER: u32 = 8;
+/// Halvings of the longest step of a scene that goes by a tolerance, until others can be compared.
+const MOST_HALVINGS: u32 = 12;
 /// Samples of the window where none is asked for.
 const SAMPLES: usize = 400;
 const QUICK_SAMPLES: usize = 100;
 
 /// What no start value may replace.
-const COMPARED: [&str; 3] = ["scheme", "solver", "internal_step_max"];
+const COMPARED: [&str; 4] = ["scheme", "solver", "internal_step_max", "tolerance"];
 
 /// Start values that a study varies itself.
 ///
@@ -50,6 +52,8 @@ pub struct Own {
     settings: Vec<(String, String)>,
     interval: f64,
     samples: usize,
+    /// Internal steps per communication step around which those of one length are tried.
+    base: u32,
     divisions: Vec<u32>,
     parting: Vec<f64>,
 }
@@ -77,15 +81,24 @@ impl Own {
         console: &Console,
     ) -> Result<Self> {
         let schedule = Schedule::new(&scene.settings.experiment, None, None)?;
-        let (interval, step) = (scene.settings.experiment.communication_step, scene.settings.time.step);
-        let own = f64::from(divisions(interval, step));
+        let interval = scene.settings.experiment.communication_step;
+        let base = base(&scene, settings, interval).map_err(|problem| Failure::new(name, problem, ""))?;
+        let own = f64::from(base);
         let shares = if quick { &QUICK_SHARES[..] } else { &SHARES[..] };
         let mut divisions: Vec<u32> = shares.iter().map(|share| count(share * own)).collect();
         divisions.dedup();
         let most = if quick { QUICK_SAMPLES } else { SAMPLES };
         let title = scene.settings.name.clone();
-        let mut case =
-            Self { title, scene, settings: settings.to_vec(), interval, samples: 0, divisions, parting: Vec::new() };
+        let mut case = Self {
+            title,
+            scene,
+            settings: settings.to_vec(),
+            interval,
+            samples: 0,
+            base,
+            divisions,
+            parting: Vec::new(),
+        };
         let refused = |problem| Failure::new(name, problem, "");
         let task = console.task("How long the scene can be followed", None);
         let touch = case.first_touch(count(own), schedule.count).map_err(refused)?;
@@ -122,9 +135,24 @@ impl Own {
         &self.settings
     }
 
-    /// Internal steps per communication step that the scene asks for.
+    /// Internal steps per communication step that the scene asks for, or one over its tolerance.
     pub fn own_division(&self) -> u32 {
-        divisions(self.interval, self.scene.settings.time.step)
+        own_division(&self.scene)
+    }
+
+    /// Internal steps per communication step, or one over the tolerance, that are tried with a competitor, ascending: around what the
+    /// scene asks for, by `shares` of it.
+    pub(super) fn tried(&self, competitor: Competitor, shares: &[f64]) -> Vec<u32> {
+        let mut all: Vec<u32> = match competitor.is_by_tolerance() {
+            true => TOLERANCES.to_vec(),
+            false => shares.iter().map(|share| count(share * f64::from(self.base))).collect(),
+        };
+        if competitor == self.method() {
+            all.push(self.own_division());
+        }
+        all.sort_unstable();
+        all.dedup();
+        all
     }
 
     /// Its scheme and solver.
@@ -140,7 +168,8 @@ impl Own {
         if (0..self.samples).any(|_| run.advance().is_err()) {
             return;
         }
-        let own = clock.elapsed().as_secs_f64() / f64::from(self.own_division());
+        // Of a tolerance as long as by steps of the base.
+        let own = clock.elapsed().as_secs_f64() / f64::from(self.base);
         let tried: u32 = self.divisions.iter().sum();
         let of_references = f64::from(self.reference_divisions(0).0) * (2 + self.families(0).len()) as f64;
         let of_competitors = f64::from(tried) * (self.competitors(0).len() * (1 + repetitions)) as f64;
@@ -159,6 +188,35 @@ impl Own {
         }
         Ok(most)
     }
+}
+
+/// Internal steps per communication step that a scene asks for, or one over its tolerance.
+pub(crate) fn own_division(scene: &Scene) -> u32 {
+    let time = &scene.settings.time;
+    match time.scheme {
+        Scheme::Galerkin => count(1.0 / time.tolerance.unwrap_or(TOLERANCE)),
+        _ => divisions(scene.settings.experiment.communication_step, time.step),
+    }
+}
+
+/// Internal steps per communication step (s) around which those of one length are tried: what the scene asks for; where it goes by a
+/// tolerance, a fourth of the longest step that the first reference takes without a refusal.
+fn base(scene: &Scene, settings: &[(String, String)], interval: f64) -> Result<u32, String> {
+    let own = divisions(interval, scene.settings.time.step);
+    if scene.settings.time.scheme != Scheme::Galerkin {
+        return Ok(own);
+    }
+    let Competitor::Core(scheme, solver) = DEFAULT else { return Ok(own) };
+    let mut refused = String::new();
+    for halvings in 0..MOST_HALVINGS {
+        let division = own << halvings;
+        let scene = SceneRun::changed(scene, (scheme, solver), interval / f64::from(division), 0.0);
+        match SceneRun::with_start_values(&scene, interval, division, settings) {
+            Ok(_) => return Ok(4 * division),
+            Err(problem) => refused = problem,
+        }
+    }
+    Err(refused)
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
@@ -223,10 +281,14 @@ impl Case for Own {
     }
 
     fn competitors(&self, _: usize) -> Vec<Competitor> {
-        Scheme::RECURRENCES
+        let steps = Scheme::RECURRENCES
             .into_iter()
-            .flat_map(|scheme| Solver::ALL.map(|solver| Competitor::Core(scheme, solver)))
-            .collect()
+            .flat_map(|scheme| Solver::ALL.map(|solver| Competitor::Core(scheme, solver)));
+        steps.chain([TOLERANT]).collect()
+    }
+
+    fn divisions_of(&self, _: usize, competitor: Competitor) -> Vec<u32> {
+        if competitor.is_by_tolerance() { self.tried(competitor, &[]) } else { self.divisions.clone() }
     }
 
     fn parting(&self) -> &[f64] {
@@ -253,8 +315,7 @@ impl Case for Own {
         perturbation: f64,
     ) -> Result<Box<dyn Run + 'a>, String> {
         let Competitor::Core(scheme, solver) = competitor else { return Err("not on a scene of one's own".into()) };
-        let step = self.interval / f64::from(division);
-        let scene = SceneRun::changed(&self.scene, (scheme, solver), step, perturbation);
+        let scene = SceneRun::by(&self.scene, (scheme, solver), self.interval, division, perturbation);
         Ok(Box::new(SceneRun::with_start_values(&scene, self.interval, division, &self.settings)?))
     }
 }

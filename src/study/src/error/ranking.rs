@@ -22,15 +22,24 @@ const ROUNDING: f64 = 1e-12;
 pub enum Kind {
     /// Of the steps alone, at the standard size.
     OfTime,
+    /// The same, against the limit of the equations that a competitor solves: those without mass of the contact nodes, or with sticking,
+    /// have another, and that is no error of the steps.
+    OfOwn,
     /// Against the truth, over all sizes.
     Total,
 }
 
 impl Kind {
+    /// Errors of the steps of a case: with one size and no exact solution each competitor has its own limit.
+    pub fn of_steps(case: &dyn Case) -> Self {
+        if case.sizes().len() > 1 || case.exact().is_some() { Self::OfTime } else { Self::OfOwn }
+    }
+
     /// The error of this kind.
     pub fn of(self, figures: &Figures) -> f64 {
         match self {
             Self::OfTime => figures.of_time,
+            Self::OfOwn => figures.of_own,
             Self::Total => figures.total,
         }
     }
@@ -47,10 +56,22 @@ pub fn readable(case: &dyn Case, measured: &Measured, kind: Kind) -> f64 {
     let apart = |size: usize| measured.references.get(size).map_or(0.0, |references| references.apart[0]);
     match (case.meeting(), kind) {
         (Some((distance, _)), _) => distance,
-        (None, Kind::OfTime) => apart(case.standard()),
+        (None, Kind::OfTime | Kind::OfOwn) => apart(case.standard()),
         (None, Kind::Total) if case.exact().is_some() => 0.0,
         (None, Kind::Total) => apart(measured.references.len().saturating_sub(1)),
     }
+}
+
+/// The same for one competitor: that of its own limit.
+pub fn readable_of(case: &dyn Case, measured: &Measured, kind: Kind, competitor: Competitor) -> f64 {
+    let own = || measured.references.get(case.standard())?.massless_apart;
+    let massless = kind == Kind::OfOwn && competitor.family().massless;
+    own().filter(|_| massless).unwrap_or_else(|| readable(case, measured, kind))
+}
+
+/// The rows of competitors whose limit is known well enough to tell this error.
+pub fn that_tell<'a>(case: &dyn Case, measured: &Measured, kind: Kind, rows: &[&'a Row], error: f64) -> Vec<&'a Row> {
+    rows.iter().copied().filter(|row| error >= readable_of(case, measured, kind, row.competitor)).collect()
 }
 
 /// The row of least time with at most this error, among those of a competitor or of all.
@@ -80,7 +101,7 @@ pub fn winners(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
     let rows = kind.rows(case, measured);
     let sizes = case.sizes();
     let what = match kind {
-        Kind::OfTime => format!(
+        Kind::OfTime | Kind::OfOwn => format!(
             "{}: cheapest for an error of the steps alone, at {} {}",
             case.title(),
             sizes[case.standard()],
@@ -90,30 +111,31 @@ pub fn winners(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
             format!("{}: cheapest for a total error, over all numbers of {}", case.title(), case.size_name())
         }
     };
-    let columns = ["error", "cheapest", case.size_name(), "h (µs)", "time", "the paper's method", "factor"];
+    let columns = ["error", "cheapest", case.size_name(), "step or tolerance", "time", "the paper's method", "factor"];
     let mut table = Table::new(what, columns);
     let readable = readable(case, measured, kind);
     for target in TARGETS {
-        if target < readable && cheapest(&rows, kind, None, target).is_some() {
+        let told = that_tell(case, measured, kind, &rows, target);
+        if told.is_empty() && cheapest(&rows, kind, None, target).is_some() {
             let why = format!("not to be read: the references are {readable:.1e} apart");
             let empty = std::iter::repeat_n(String::new(), table.columns.len() - 2);
             table.rows.push([format!("{target:.0e}"), why].into_iter().chain(empty).collect());
             continue;
         }
-        let paper = cheapest(&rows, kind, Some(PAPER), target);
+        let paper = cheapest(&told, kind, Some(PAPER), target);
         let text = |(row, figures): (&Row, &Figures)| {
             let size =
                 if kind == Kind::Total { format!("{} {}, ", sizes[row.size], case.size_name()) } else { String::new() };
-            format!("{} ({size}h = {:.3} µs)", seconds(figures.seconds), 1e6 * row.step)
+            format!("{} ({size}{})", seconds(figures.seconds), row.competitor.setting(row.step))
         };
         let paper_text = paper.map_or_else(|| "does not reach it".into(), text);
         let mut cells = vec![format!("{target:.0e}")];
-        cells.extend(match cheapest(&rows, kind, None, target) {
+        cells.extend(match cheapest(&told, kind, None, target) {
             None => ["nobody", "", "", ""].map(String::from).into_iter().chain([paper_text, String::new()]).collect(),
             Some((row, figures)) => vec![
                 row.competitor.name(),
                 sizes[row.size].to_string(),
-                format!("{:.3}", 1e6 * row.step),
+                row.competitor.setting(row.step),
                 seconds(figures.seconds),
                 paper_text,
                 paper.map_or_else(|| "-".into(), |(_, paper)| format!("{:.1}", paper.seconds / figures.seconds)),
@@ -127,17 +149,19 @@ pub fn winners(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
 /// What every competitor needs for every target.
 pub fn costs(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
     let rows = kind.rows(case, measured);
-    let of = if kind == Kind::OfTime { "the steps alone" } else { "all, modes included" };
+    let of = if kind == Kind::Total { "all, modes included" } else { "the steps alone" };
     let caption = format!("{}: time that every competitor needs for an error of {of}", case.title());
-    let mut table =
-        Table::new(caption, ["competitor", "1e-2", "1e-3", "1e-4", "least error", "largest h that ran (µs)"]);
-    let readable = readable(case, measured, kind);
+    let mut table = Table::new(
+        caption,
+        ["competitor", "1e-2", "1e-3", "1e-4", "least error", "largest step or tolerance that ran"],
+    );
     for competitor in Competitor::all() {
         let own: Vec<&Row> = rows.iter().copied().filter(|row| row.competitor == competitor).collect();
         let done = || own.iter().filter_map(|row| row.outcome.as_ref().ok().map(|figures| (row, figures)));
         if own.is_empty() {
             continue;
         }
+        let readable = readable_of(case, measured, kind, competitor);
         let mut cells = vec![competitor.name()];
         cells.extend(TARGETS.map(|target| match cheapest(&own, kind, None, target) {
             None => "-".into(),
@@ -151,7 +175,7 @@ pub fn costs(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
         }
         let least = done().map(|(_, figures)| kind.of(figures)).fold(f64::INFINITY, f64::min);
         let largest = done().map(|(row, _)| row.step).fold(0.0, f64::max);
-        cells.extend([format!("{least:.1e}"), format!("{:.3}", 1e6 * largest)]);
+        cells.extend([format!("{least:.1e}"), competitor.setting(largest)]);
         table.rows.push(cells);
     }
     table

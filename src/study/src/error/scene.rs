@@ -7,7 +7,10 @@ use tiprub_core::{
 };
 use tiprub_shell::native;
 
-use super::run::{Run, Seen};
+use super::{
+    competitor::{Competitor, LONGEST},
+    run::{Run, Seen},
+};
 
 /// A run of a scene.
 pub struct SceneRun {
@@ -69,6 +72,23 @@ impl SceneRun {
     ) -> Result<Self, String> {
         let scene = Self::changed(scene, (scheme, solver), interval / f64::from(division), perturbation);
         Self::with_start_values(&scene, interval, division, &[])
+    }
+
+    /// The scene by another method: with `division` internal steps in `interval` (s), or a tolerance of one over `division`; and a relative
+    /// change of clearances and velocities.
+    pub fn by(
+        scene: &Scene,
+        (scheme, solver): (Scheme, Solver),
+        interval: f64,
+        division: u32,
+        perturbation: f64,
+    ) -> Scene {
+        if !Competitor::Core(scheme, solver).is_by_tolerance() {
+            return Self::changed(scene, (scheme, solver), interval / f64::from(division), perturbation);
+        }
+        let mut scene = Self::changed(scene, (scheme, solver), LONGEST.min(interval), perturbation);
+        scene.settings.time.tolerance = Some(1.0 / f64::from(division));
+        scene
     }
 
     /// The scene with another method and internal step (s), and a relative change of clearances and velocities.
@@ -157,10 +177,14 @@ impl Run for SceneRun {
         let time = self.time();
         self.samples += 1;
         self.simulation.begin_step(time, self.interval).map_err(|error| error.to_string())?;
-        let step = self.interval / f64::from(self.division);
         loop {
             let progress = self.simulation.advance().map_err(|error| error.to_string())?;
             let system = self.simulation.system();
+            // Spans of those that go by a tolerance divide nothing.
+            let step = match system.settings().scheme {
+                Scheme::Galerkin => system.step_size(),
+                _ => self.interval / f64::from(self.division),
+            };
             let least = system.gaps().fold(f64::INFINITY, |least: f64, gap| least.min(*gap));
             seen.add(progress.time, step, system.events().iter().map(|event| event.normal), least);
             seen.shares.resize(self.unmoved.len(), 0.0);

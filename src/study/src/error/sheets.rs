@@ -11,9 +11,17 @@ use super::{
     chart::{Chart, Points},
     competitor::{Competitor, Family},
     measure::{Figures, Measured, Row},
-    ranking::{self, Kind, TARGETS, readable, seconds},
+    ranking::{self, Kind, TARGETS, seconds},
 };
 use crate::Sheet;
+
+/// Column of steps and tolerances.
+pub(super) const STEP: &str = "h (s) or tolerance";
+
+/// Key of the step, or tolerance, of a competitor.
+pub fn step_name(competitor: Competitor) -> &'static str {
+    if competitor.is_by_tolerance() { "tolerance" } else { "internal_step" }
+}
 
 /// Chart of one kind of error, and its numbers: a row per configuration, its error in the column of the competitor.
 pub fn chart(case: &dyn Case, found: &Measured, kind: Kind) -> (Chart, Sheet) {
@@ -21,11 +29,12 @@ pub fn chart(case: &dyn Case, found: &Measured, kind: Kind) -> (Chart, Sheet) {
     let mut chart = Chart {
         error_label: match kind {
             Kind::OfTime => "error of the steps, displacements (relative L2)".into(),
+            Kind::OfOwn => "error of the steps, displacements (relative L2), each to its own limit".into(),
             Kind::Total => "total error, displacements (relative L2)".into(),
         },
         all: Vec::new(),
-        joined: kind == Kind::OfTime,
-        readable: (kind == Kind::OfTime)
+        joined: kind != Kind::Total,
+        readable: (kind != Kind::Total)
             .then(|| (found.references[case.standard()].apart[0], "distance of the two references".into())),
     };
     let competitors: Vec<Competitor> = Competitor::all()
@@ -33,7 +42,7 @@ pub fn chart(case: &dyn Case, found: &Measured, kind: Kind) -> (Chart, Sheet) {
         .filter(|competitor| rows.iter().any(|row| row.competitor == *competitor))
         .collect();
     let mut sheet = Sheet::default();
-    sheet.columns.extend(["time (s)".to_owned(), case.size_name().to_owned(), "h (s)".to_owned()]);
+    sheet.columns.extend(["time (s)".to_owned(), case.size_name().to_owned(), STEP.to_owned()]);
     sheet.columns.extend(competitors.iter().map(|competitor| competitor.name()));
     for (column, &competitor) in competitors.iter().enumerate() {
         let mut points = Vec::new();
@@ -84,7 +93,7 @@ fn values(figures: &Figures) -> [Option<f64>; 11] {
 
 /// Every configuration as comma-separated values; refusals with their reason.
 pub fn csv(case: &dyn Case, found: &Measured) -> String {
-    let mut text = format!("competitor,{},h (s),{}\n", case.size_name(), NAMES.join(","));
+    let mut text = format!("competitor,{},{STEP},{}\n", case.size_name(), NAMES.join(","));
     for row in &found.rows {
         let _ = write!(text, "\"{}\",{},{}", row.competitor.name(), case.sizes()[row.size], shortest(row.step));
         let _ = match &row.outcome {
@@ -102,7 +111,7 @@ pub fn csv(case: &dyn Case, found: &Measured) -> String {
 
 /// Every configuration, for the page.
 pub fn rows(case: &dyn Case, found: &Measured) -> Table {
-    let mut columns = vec!["competitor".to_owned(), case.size_name().to_owned(), "h (µs)".to_owned()];
+    let mut columns = vec!["competitor".to_owned(), case.size_name().to_owned(), "step or tolerance".to_owned()];
     columns.extend(NAMES.map(String::from));
     let mut table = Table { caption: format!("All runs of {}", case.title()), columns, rows: Vec::new() };
     for row in &found.rows {
@@ -112,7 +121,7 @@ pub fn rows(case: &dyn Case, found: &Measured) -> Table {
 }
 
 fn cells(case: &dyn Case, row: &Row) -> Vec<String> {
-    let mut cells = vec![row.competitor.name(), case.sizes()[row.size].to_string(), format!("{:.4}", 1e6 * row.step)];
+    let mut cells = vec![row.competitor.name(), case.sizes()[row.size].to_string(), row.competitor.setting(row.step)];
     match &row.outcome {
         Ok(figures) => {
             let [time, rest @ ..] = values(figures);
@@ -142,6 +151,7 @@ pub fn references(case: &dyn Case, found: &Measured) -> Table {
         "displacements apart",
         "impulses apart",
         "massless-boundary away",
+        "galerkin from massless-boundary",
         "coulomb away",
         "reference from the truth",
     ];
@@ -155,6 +165,7 @@ pub fn references(case: &dyn Case, found: &Measured) -> Table {
             displacements,
             impulses,
             away(Family::MASSLESS),
+            own.massless_apart.map_or_else(|| "-".into(), |apart| format!("{apart:.1e}")),
             away(Family::STICKING),
             truncation,
         ]);
@@ -164,13 +175,13 @@ pub fn references(case: &dyn Case, found: &Measured) -> Table {
 
 /// The cheapest of the steps alone for an error, where it can be read.
 fn cheapest(case: &dyn Case, found: &Measured, target: f64) -> Value {
-    let rows = Kind::OfTime.rows(case, found);
-    let read = target >= readable(case, found, Kind::OfTime);
-    match ranking::cheapest(&rows, Kind::OfTime, None, target).filter(|_| read) {
+    let kind = Kind::of_steps(case);
+    let rows = ranking::that_tell(case, found, kind, &kind.rows(case, found), target);
+    match ranking::cheapest(&rows, kind, None, target) {
         None => json!({ "error": target }),
         Some((row, figures)) => json!({
-            "error": target, "competitor": row.competitor.name(), "internal_step": row.step, "seconds": figures.seconds,
-            "error_of_steps": figures.of_time,
+            "error": target, "competitor": row.competitor.name(), step_name(row.competitor): row.step, "seconds": figures.seconds,
+            "error_of_steps": kind.of(figures),
         }),
     }
 }
@@ -179,7 +190,7 @@ fn cheapest(case: &dyn Case, found: &Measured, target: f64) -> Value {
 pub fn to_json(case: &dyn Case, found: &Measured) -> Value {
     let rows = found.rows.iter().map(|row| {
         let mut object = json!({
-            "competitor": row.competitor.name(), "size": case.sizes()[row.size], "internal_step": row.step,
+            "competitor": row.competitor.name(), "size": case.sizes()[row.size], step_name(row.competitor): row.step,
         });
         match &row.outcome {
             Ok(figures) => {
@@ -211,6 +222,7 @@ pub fn to_json(case: &dyn Case, found: &Measured) -> Value {
         "window": case.interval() * case.samples() as f64,
         "references_apart": found.references.iter().map(|own| own.apart).collect::<Vec<_>>(),
         "massless_boundary_away": found.references.iter().map(|own| own.away(Family::MASSLESS)).collect::<Vec<_>>(),
+        "massless_apart": found.references.iter().map(|own| own.massless_apart).collect::<Vec<_>>(),
         "coulomb_away": found.references.iter().map(|own| own.away(Family::STICKING)).collect::<Vec<_>>(),
         "reference_from_truth": found.truncation,
         "cheapest": TARGETS.map(|target| cheapest(case, found, target)),

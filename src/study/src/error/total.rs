@@ -10,7 +10,14 @@ use tiprub_core::{
 };
 use tiprub_shell::{Result, console::Task};
 
-use super::{case::Case as _, clock, competitor::Competitor, own::Own, run::Run as _, scene::SceneRun};
+use super::{
+    case::Case as _,
+    clock,
+    competitor::{Competitor, TOLERANT},
+    own::Own,
+    run::Run as _,
+    scene::SceneRun,
+};
 use crate::{
     convergence::{
         Runner,
@@ -62,7 +69,7 @@ pub struct Row {
     pub model: usize,
     /// Who.
     pub competitor: Competitor,
-    /// Internal step (s).
+    /// Internal step (s); the tolerance of those that go by one.
     pub step: f64,
     /// Whether it is the scene as it stands.
     pub own: bool,
@@ -120,10 +127,10 @@ pub fn measure(case: &Own, again: &Again) -> Result<std::result::Result<Total, S
     let touching =
         if scene.roms[master(scene)].contact_nodes.iter().all(|node| node.area > 0.0) { "patches" } else { "nodes" };
     let Model { points, modes, .. } = Model::of(truth_scene, false);
-    let step = 1e6 * case.interval() / f64::from(division);
+    let step = case.method().setting(value(case, case.method(), division));
     let whose = if of_source { "" } else { ", the scene's own model, which is not reduced again" };
     let method = case.method().name();
-    let truth = format!("{points} {touching} and {modes} modes with {method} at h = {step:.3} µs{whose}");
+    let truth = format!("{points} {touching} and {modes} modes with {method} at {step}{whose}");
     Ok(Ok(Total { models, rows, truth, readable, touching, mesh }))
 }
 
@@ -171,27 +178,30 @@ fn true_run(case: &Own, scene: &Scene) -> std::result::Result<(u32, Marched), St
 fn competitors(case: &Own) -> Vec<Competitor> {
     let Competitor::Core(_, solver) = case.method() else { return Vec::new() };
     let solvers = if solver == Solver::Coulomb { &[Solver::Coulomb][..] } else { &[Solver::Lcp, Solver::Film] };
-    let all = Scheme::ALL.into_iter().flat_map(|scheme| solvers.iter().map(move |solver| (scheme, *solver)));
-    all.map(|(scheme, solver)| Competitor::Core(scheme, solver)).collect()
+    let all = Scheme::RECURRENCES.into_iter().flat_map(|scheme| solvers.iter().map(move |solver| (scheme, *solver)));
+    all.map(|(scheme, solver)| Competitor::Core(scheme, solver)).chain([TOLERANT]).collect()
+}
+
+/// Internal step (s), or tolerance.
+fn value(case: &Own, competitor: Competitor, division: u32) -> f64 {
+    (if competitor.is_by_tolerance() { 1.0 } else { case.interval() }) / f64::from(division)
 }
 
 fn rows(case: &Own, models: &[Model], truth: &Marched, task: &Task, quick: bool) -> Vec<Row> {
     let shares = if quick { &QUICK_SHARES[..] } else { &SHARES[..] };
     let own = case.own_division();
-    let mut divisions: Vec<u32> = shares.iter().map(|share| super::own::count(share * f64::from(own))).collect();
-    divisions.dedup();
     let competitors = competitors(case);
     let mut rows = Vec::new();
     for (index, model) in models.iter().enumerate() {
         for &competitor in &competitors {
-            for &division in &divisions {
+            for division in case.tried(competitor, shares) {
                 let found = observed(case, &model.scene, competitor, division);
                 let outcome = found.and_then(|(seconds, run)| match run.displacement_change(truth) {
                     Some(error) if error.is_finite() => Ok((seconds, error)),
                     _ => Err("its displacements cannot be compared with the truth".into()),
                 });
                 let own = model.own && competitor == case.method() && division == own;
-                rows.push(Row { model: index, competitor, step: case.interval() / f64::from(division), own, outcome });
+                rows.push(Row { model: index, competitor, step: value(case, competitor, division), own, outcome });
             }
         }
         task.line(&format!("{} of {} models", index + 1, models.len()));
@@ -207,7 +217,7 @@ fn observed(
     division: u32,
 ) -> std::result::Result<(f64, Marched), String> {
     let Competitor::Core(scheme, solver) = competitor else { return Err("not on a scene of one's own".into()) };
-    let scene = SceneRun::changed(scene, (scheme, solver), case.interval() / f64::from(division), 0.0);
+    let scene = SceneRun::by(scene, (scheme, solver), case.interval(), division, 0.0);
     let (observer, points) = Observed::of(&scene.roms[master(&scene)]);
     let mut times: Vec<f64> = Vec::new();
     loop {

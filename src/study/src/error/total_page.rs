@@ -8,6 +8,7 @@ use super::{
     chart::{Chart, Points, front},
     competitor::{Competitor, PAPER},
     ranking::seconds,
+    sheets::{STEP, step_name},
     total::{Model, Row, Total},
 };
 use crate::{Figure, Picture, Sheet, Statement};
@@ -31,7 +32,7 @@ impl Total {
     fn setting(&self, row: &Row) -> String {
         let model = &self.models[row.model];
         let (points, modes, touching) = (model.points, model.modes, self.touching);
-        format!("{points} {touching}, {modes} modes, {}, h = {:.3} µs", row.competitor.name(), 1e6 * row.step)
+        format!("{points} {touching}, {modes} modes, {}, {}", row.competitor.name(), row.competitor.setting(row.step))
     }
 
     /// Whether an error is too small to be told from that of the truth.
@@ -108,7 +109,7 @@ impl Total {
     }
 
     fn sheet(&self) -> Sheet {
-        let mut sheet = Sheet::new(["time (s)", "total error", "points", "modes", "h (s)", "scene's own (1 yes)"]);
+        let mut sheet = Sheet::new(["time (s)", "total error", "points", "modes", STEP, "scene's own (1 yes)"]);
         for (row, time, error) in self.ran() {
             let (model, own) = (&self.models[row.model], f64::from(u8::from(row.own)));
             sheet.rows.push(vec![time, error, model.points as f64, model.modes as f64, row.step, own]);
@@ -177,7 +178,7 @@ impl Total {
 
     /// Every setting as comma-separated values; refusals with their reason.
     pub fn csv(&self) -> String {
-        let mut text = format!("competitor,{},modes,h (s),time (s),total error,remark\n", self.touching);
+        let mut text = format!("competitor,{},modes,{STEP},time (s),total error,remark\n", self.touching);
         for row in &self.rows {
             let model = &self.models[row.model];
             let start =
@@ -205,7 +206,7 @@ impl Total {
             let model = &self.models[row.model];
             let (time, error) = row.outcome.as_ref().map_or((None, None), |(time, error)| (Some(time), Some(error)));
             json!({
-                "competitor": row.competitor.name(), self.touching: model.points, "modes": model.modes, "internal_step": row.step,
+                "competitor": row.competitor.name(), self.touching: model.points, "modes": model.modes, step_name(row.competitor): row.step,
                 "own": row.own, "seconds": time, "total_error": error, "refused": row.outcome.as_ref().err(),
             })
         };
@@ -222,14 +223,15 @@ impl Total {
 
 /// The cheapest settings for errors of the steps, as [`super::sheets::to_json`] has them, and in total.
 pub fn cheapest_csv(of_steps: &[Value], total: &Total) -> String {
-    let mut text = format!("error of,at most,competitor,{},modes,h (s),time (s),error\n", total.touching);
+    let mut text = format!("error of,at most,competitor,{},modes,{STEP},time (s),error\n", total.touching);
     for row in of_steps {
         let number = |name: &str| row[name].as_f64().map_or_else(String::new, shortest);
         let name = row["competitor"].as_str().map_or_else(String::new, |name| format!("\"{name}\""));
         let own = total.models.iter().find(|model| model.own).filter(|_| !name.is_empty());
         let [points, modes] =
             own.map_or([String::new(), String::new()], |own| [own.points, own.modes].map(|n| n.to_string()));
-        let [target, step, time, error] = ["error", "internal_step", "seconds", "error_of_steps"].map(number);
+        let [target, time, error] = ["error", "seconds", "error_of_steps"].map(number);
+        let step = ["internal_step", "tolerance"].map(number).concat();
         text.push_str(&format!("steps,{target},{name},{points},{modes},{step},{time},{error}\n"));
     }
     text + &TARGETS.map(|target| total.cheapest_row(target)).concat()

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use tiprub_core::{Scene, Simulation, shown, system::System, variables::Quantity};
+use tiprub_core::{Scene, Simulation, settings::Scheme, shown, system::System, variables::Quantity};
 use tiprub_shell::{Failure, Result, native};
 
 use super::{
@@ -167,12 +167,27 @@ impl Setup {
         Ok(Run { speed, outcome })
     }
 
+    /// Where a tolerance takes the place of the step, what is called that is how long blades may go unseen: at most `longest` (s).
+    fn shorten_spans(&self, simulation: &mut Simulation, longest: f64) -> tiprub_core::Result<()> {
+        let table = simulation.table();
+        let reference = |quantity| table.with_quantity(quantity).map(|variable| variable.reference);
+        let (Some(scheme), Some(step)) = (reference(Quantity::SchemeChoice), reference(Quantity::StepMax)) else {
+            return Ok(());
+        };
+        let marched = simulation.integer(scheme)? == Scheme::Galerkin as i32 + 1;
+        if marched && simulation.real(step)? > longest {
+            simulation.set_real(step, longest)?;
+        }
+        Ok(())
+    }
+
     fn response(&self, speed: f64) -> Result<Response> {
         let mut simulation = self.simulation(speed)?;
         let start = self.scene.settings.experiment.start;
-        simulation.initialise(start).map_err(|error| self.at(speed, error))?;
         // A whole number of samples per revolution: engine orders then lie in the middle of bins.
         let step = std::f64::consts::TAU / (speed * self.samples as f64);
+        self.shorten_spans(&mut simulation, step / LEAST_FACTOR).map_err(|error| self.at(speed, error))?;
+        simulation.initialise(start).map_err(|error| self.at(speed, error))?;
         // Each sample is made of several internal steps, so that there is something to filter.
         if let Some(variable) = simulation.table().with_quantity(Quantity::StepMax) {
             let (reference, coarsest) = (variable.reference, step / LEAST_FACTOR);

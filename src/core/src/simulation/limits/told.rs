@@ -26,6 +26,8 @@ pub struct Told {
     friction: Vec<usize>,
     /// Whether a displacement was that linear kinematics describes badly, of each structure that touches.
     pub(in crate::simulation) curved: Vec<bool>,
+    /// Whether a tolerance was missed.
+    pub(in crate::simulation) missed: bool,
 }
 
 impl Told {
@@ -37,6 +39,7 @@ impl Told {
             fastest: vec![0.0; bodies],
             friction: vec![0; bodies],
             curved: vec![false; bodies],
+            missed: false,
         }
     }
 }

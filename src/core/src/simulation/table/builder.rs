@@ -3,7 +3,7 @@
 use crate::laws::SOLVERS;
 use crate::ranges::{DAMPING, FRICTION, LONGEST_STEP, SHORTEST_STEP};
 use crate::schemes::SCHEMES;
-use crate::settings::{ContactSettings, SceneSettings, Scheme, TOLERANCE};
+use crate::settings::{ContactSettings, SceneSettings, TOLERANCE};
 use crate::simulation::outputs::Reader;
 use crate::simulation::units::{ANGLE, INPUT_INTERPOLATIONS, TIME};
 use crate::variables::{
@@ -155,7 +155,7 @@ impl Builder {
         (row.min, row.max) = (Some(0.0), Some(DAMPING));
     }
 
-    /// Internal step, scheme and solver.
+    /// Internal step, how many there may be, scheme and solver.
     pub fn methods(&mut self, settings: &SceneSettings) {
         let step = self.parameter(
             Quantity::StepMax,
@@ -167,15 +167,28 @@ impl Builder {
         (step.min, step.max) = (Some(SHORTEST_STEP), Some(LONGEST_STEP));
         (step.nominal, step.display) = (Some(settings.time.step), Some(1));
         let (scheme, solver) = (settings.time.scheme as i32 + 1, settings.contacts[0].solver as i32 + 1);
-        if settings.time.tolerance.is_some() || settings.time.scheme == Scheme::Galerkin {
+        if settings.takes_a_tolerance() {
             let text = "Error that a step of galerkin may make in displacements, as a share of the smallest clearance";
             let start = settings.time.tolerance.unwrap_or(TOLERANCE);
             let tolerance = self.parameter(Quantity::Tolerance, "tolerance", None, start, text);
             (tolerance.min, tolerance.max) = (Some(ranges::TOLERANCE[0]), Some(ranges::TOLERANCE[1]));
             tolerance.nominal = Some(start);
         }
+        if settings.bounds_steps() {
+            self.steps_at_most(settings);
+        }
         self.choice(Quantity::SchemeChoice, "scheme", &SCHEMES, scheme, "Time-stepping scheme");
         self.choice(Quantity::SolverChoice, "solver", &SOLVERS, solver, "Contact solver");
+    }
+
+    /// Most internal steps, which may change between communication steps.
+    fn steps_at_most(&mut self, settings: &SceneSettings) {
+        let text = "Most internal steps of one communication step, those tried in vain included (0: any number); a step that takes \
+                    more is discarded";
+        let most = self.parameter(Quantity::StepsAtMost, "steps_at_most", None, 0.0, text);
+        (most.kind, most.variability) = (Kind::Integer, Variability::Tunable);
+        (most.min, most.max) = (Some(0.0), Some(ranges::STEPS));
+        most.start = Some(Start::Integer(i32::try_from(settings.time.steps_at_most.unwrap_or(0)).unwrap_or(i32::MAX)));
     }
 
     /// How inputs run between communication points.

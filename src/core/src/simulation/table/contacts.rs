@@ -202,13 +202,34 @@ fn exists(parts: &Parts, name: &str) -> bool {
     }
 }
 
-/// Internal step in use and number of steps.
+/// Name, text, and the count.
+type Count = (&'static str, &'static str, fn(&View) -> f64);
+
+/// What a tolerance has taken since the start.
+const EFFORTS: [Count; 3] = [
+    ("internal_trials", "Internal steps tried since the start, those taken included, of all blades together", |view| {
+        view.trials()
+    }),
+    (
+        "internal_steps_most",
+        "Most internal steps tried within one communication step since the start, of all blades together",
+        |view| view.most_tried(),
+    ),
+    (
+        "missed_steps",
+        "Shortest steps of galerkin since the start that were taken although they miss the tolerance",
+        |view| view.missed(),
+    ),
+];
+
+/// Internal step in use and number of steps; with a tolerance, what it takes.
 pub fn internal_steps(table: &mut Builder, settings: &SceneSettings) {
+    let with_tolerance = settings.takes_a_tolerance();
     let internal = table.output(
         "internal_step",
         Span::Point,
         Some((&TIME, settings.time.step)),
-        "Internal time step in use",
+        if with_tolerance { "Internal time step in use; the longest of galerkin" } else { "Internal time step in use" },
         scalar(|view| view.system.step_size()),
     );
     (internal.variability, internal.quantity) = (Variability::Discrete, Quantity::InternalStep);
@@ -216,8 +237,15 @@ pub fn internal_steps(table: &mut Builder, settings: &SceneSettings) {
         "internal_steps",
         Span::Total,
         None,
-        "Internal steps done since the start",
+        if with_tolerance {
+            "Internal steps done since the start; with galerkin of all blades together"
+        } else {
+            "Internal steps done since the start"
+        },
         scalar(|view| view.internal_steps()),
     );
     steps.variability = Variability::Discrete;
+    for (name, text, read) in EFFORTS.into_iter().filter(|_| with_tolerance) {
+        table.output(name, Span::Total, None, text, scalar(read)).variability = Variability::Discrete;
+    }
 }

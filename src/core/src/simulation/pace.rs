@@ -1,0 +1,139 @@
+//! What internal steps a communication step takes: a bound on their number, a tolerance that is missed, flight over many at once.
+
+use super::limits::Parameters;
+use super::{Communication, Phase, Simulation};
+use crate::galerkin::sector::shortest;
+use crate::settings::Scheme;
+use crate::variables::Quantity;
+use crate::{Error, Result, shown};
+
+/// What shortest steps leave, as a share of the clearance per length (1/s): where errors stop to follow the tolerance. A blade with 18
+/// modes that rubs (`core/tests/galerkin.rs`) stays at 7e-7, 1.5e-7 and 7e-8 with longest steps of 80, 40 and 20 µs.
+const LEFT: f64 = 4.0;
+
+impl Simulation {
+    /// Whether sectors take steps of their own.
+    pub(super) fn is_marched(&self) -> bool {
+        self.system.settings().scheme == Scheme::Galerkin
+    }
+
+    /// Whether a communication step is under way.
+    pub fn is_stepping(&self) -> bool {
+        self.phase == Phase::Stepping
+    }
+
+    /// Most internal steps of a communication step, 0 for any number.
+    pub(super) fn steps_at_most(&self) -> u64 {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ 1e9")]
+        let most = self.value_of(Quantity::StepsAtMost, 0) as u64;
+        most
+    }
+
+    /// Room for the state to go back to, where it may be needed: how many steps the others take is known beforehand.
+    pub(super) fn make_room(&mut self) {
+        if self.steps_at_most() > 0 && self.is_marched() && self.mark.is_empty() {
+            self.mark = vec![0; self.state_size];
+        }
+    }
+
+    /// Before an internal step.
+    pub(super) fn allow_steps(&mut self) -> Result<()> {
+        let Communication { length, done, tried, most, .. } = self.communication;
+        if most == 0 {
+            self.system.allow(u64::MAX);
+        } else if self.is_marched() {
+            self.system.allow(tried + most);
+        } else if done >= most {
+            return Err(self.exhausted(length, most));
+        }
+        Ok(())
+    }
+
+    /// A communication step of length `length` (s) takes too many internal steps.
+    pub(super) fn exhausted(&self, length: f64, most: u64) -> Error {
+        let (of_whom, other) = if self.is_marched() {
+            (" tried by all blades together", "a larger tolerance")
+        } else {
+            ("", "a larger internal_step_max")
+        };
+        Error::Exhausted {
+            problem: format!(
+                "the communication step of {} s from t = {} s takes more internal steps{of_whom} than steps_at_most = {most}; it was \
+                 not done",
+                shown(length),
+                shown(self.time)
+            ),
+            remedy: format!(
+                "Repeat it with a shorter communication step, a larger steps_at_most (0: any number) or {other}"
+            ),
+        }
+    }
+
+    /// In the middle of an internal step no more are allowed: back to where it can be gone on from.
+    pub(super) fn give_up(&mut self) -> Error {
+        let (length, most) = (self.communication.length, self.communication.most);
+        self.withdraw();
+        self.exhausted(length, most)
+    }
+
+    /// A tolerance that shortest steps cannot keep where contacts open and close.
+    pub(super) fn warn_of_tolerance(&mut self, parameters: &Parameters) {
+        let step = self.compiled.expected_step(parameters.step);
+        let left = LEFT * shortest(step);
+        if parameters.scheme == Scheme::Galerkin && parameters.tolerance < left {
+            self.warnings.push(format!(
+                "tolerance {}: steps of galerkin are at least {} s long, a thousandth of the longest, which leaves errors of some \
+                 {left:.0e} where contacts open and close, whatever the tolerance. Use a smaller internal_step_max (time.step) or \
+                 communication step, or a larger tolerance",
+                shown(parameters.tolerance),
+                shown(shortest(step)),
+            ));
+        }
+    }
+
+    /// Tell of the first communication step in which a shortest step missed the tolerance.
+    pub(super) fn note_missed(&mut self, time: f64) {
+        let effort = self.system.effort();
+        if effort.missed == 0 || std::mem::replace(&mut self.told.missed, true) {
+            return;
+        }
+        self.note(format!(
+            "up to t = {} s {} of {} steps have missed the tolerance of {}: the shortest, {} s, a thousandth of the longest, were \
+             taken all the same. Use a smaller internal_step_max (time.step) than {} s or a larger tolerance; missed_steps counts \
+             those to come",
+            shown(time),
+            effort.missed,
+            effort.steps,
+            shown(self.value_of(Quantity::Tolerance, 0)),
+            shown(shortest(self.system.step_size())),
+            shown(self.value_of(Quantity::StepMax, 0))
+        ));
+    }
+
+    /// After the start of a communication step, for who does not look at internal steps: fly over all of them but the last, where sectors
+    /// take steps of their own, rest, and nothing comes near. The last is taken as ever, so that rates at its end are those of an
+    /// internal step. Else this does nothing.
+    pub fn fly_ahead(&mut self) {
+        let last = self.communication.count.saturating_sub(1);
+        if !self.is_stepping() || !self.is_marched() || self.communication.done > 0 || last < 2 {
+            return;
+        }
+        let (offset, time) = (self.communication.offset(last), self.communication.time(last));
+        for pair in 0..self.drives.len() {
+            let growth = self.growth(pair, [0.0, offset], [self.communication.start, time]);
+            if growth.elapsed[0] < growth.length {
+                return;
+            }
+            let body = self.compiled.plan.pairs[pair].body;
+            let (speed, angle) = (&self.inputs.rotors[body].speed, &self.rotors[body]);
+            let shape = &self.inputs.pairs[pair].shape_rotation;
+            self.turns[pair] =
+                angle.total(speed, offset) - angle.total(speed, 0.0) - (shape.at(offset) - shape.at(0.0));
+        }
+        self.find_drives(offset, time);
+        if self.system.fly(&self.drives, &self.turns, offset) {
+            self.window.add(&self.system, &self.compiled.patches, offset);
+            self.communication.done = last;
+        }
+    }
+}

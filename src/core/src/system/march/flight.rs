@@ -1,0 +1,84 @@
+//! Many spans at once: blades that rest, but for less than the tolerance, and that nothing comes near.
+
+use super::Galerkin;
+use crate::dynamics::sectors::Sectors;
+use crate::gaps::Drive;
+use crate::gaps::wrench::At;
+use crate::system::{Pair, Structure, System};
+
+impl System {
+    /// Fly for `length` (s) to the instant described by `drives`, rotors turned by `turns` against the shapes (rad), both one per pair;
+    /// on the way prescribed motion is linear in time, but for the rotor's. False where something may come near, or where blades swing
+    /// by more than the tolerance: nothing has moved then.
+    pub(crate) fn fly(&mut self, drives: &[Drive], turns: &[f64], length: f64) -> bool {
+        let Self { structures, pairs, .. } = self;
+        for structure in structures.iter_mut() {
+            let Some(mut galerkin) = structure.galerkin.take() else { return false };
+            let free = structure.is_free(&mut galerkin, pairs, (drives, turns));
+            structure.galerkin = Some(galerkin);
+            if !free {
+                return false;
+            }
+        }
+        for (pair, drive) in pairs.iter_mut().zip(drives) {
+            pair.go_to(drive, length);
+        }
+        for structure in structures {
+            let Some(mut galerkin) = structure.galerkin.take() else { continue };
+            let sectors = structure.fly(&mut galerkin, length);
+            structure.galerkin = Some(galerkin);
+            self.counted.effort.steps += sectors;
+            self.counted.effort.flights += sectors;
+        }
+        self.events.now.clear();
+        self.events.before.clear();
+        self.find_gaps(true);
+        self.counted.steps += 1;
+        true
+    }
+}
+
+impl Structure {
+    /// Whether no sector touches anything, swings by more than the tolerance or meets anything on the way; the smallest gaps are then
+    /// those of the way.
+    fn is_free(&self, galerkin: &mut Galerkin, pairs: &[Pair], (ends, turns): (&[Drive], &[f64])) -> bool {
+        let Galerkin { tables, marcher, state, demand, lowest, .. } = galerkin;
+        let Some(bank) = self.bank() else { return false };
+        (0..self.modes().sectors()).all(|sector| {
+            bank.read_sector(sector, &mut state.position, &mut state.velocity);
+            let reach = marcher.reach(&tables[bank.set_number(sector)], state);
+            reach.iter().all(|reach| *reach <= demand.tolerance)
+                && (0..self.nodes()).all(|node| {
+                    let index = self.index(node, sector);
+                    let Some(pair) = self.pair_of[node] else { return true };
+                    let at = At { node, index, drive: pairs[pair].drive_now() };
+                    let reach = std::array::from_fn(|component| reach[3 * node + component]);
+                    let least = pairs[pair].gap().least(at, &ends[pair], turns[pair], reach).unwrap_or(0.0);
+                    lowest[index] = least;
+                    self.history.multiplier[index] == 0.0 && least > 0.0
+                })
+        })
+    }
+
+    /// Take all sectors along; how many there are.
+    fn fly(&mut self, galerkin: &mut Galerkin, length: f64) -> u64 {
+        self.begin_span();
+        let sectors = self.modes().sectors();
+        let Galerkin { tables, flights, marcher, state, .. } = galerkin;
+        flights.iter_mut().for_each(|flight| flight.set_length(length));
+        state.forces.fill(0.0);
+        if let Sectors::Uncoupled(bank) = self.modes_mut() {
+            for sector in 0..sectors {
+                let set = bank.set_number(sector);
+                bank.read_sector(sector, &mut state.position, &mut state.velocity);
+                let loss = flights[set].take(&mut state.position, &mut state.velocity);
+                let moved = marcher.displacements(&tables[set], state);
+                bank.write_sector(sector, &state.position, &state.velocity, &state.forces, moved);
+                bank.lose(sector, loss);
+            }
+            bank.flush();
+        }
+        self.pace.level.fill(0);
+        sectors as u64
+    }
+}

@@ -1,0 +1,308 @@
+//! How well `galerkin` keeps its tolerance where nothing was chosen: random rubs, what is left at its shortest steps, energy over very many
+//! switches, random contact problems.
+
+mod sectors;
+
+use sectors::{Kept, Problems};
+use serde_json::{Value, json};
+use tiprub_core::{
+    Scene, Simulation,
+    settings::{Scheme, Shape},
+};
+use tiprub_shell::{
+    Result,
+    console::Console,
+    sweep::{self, processors},
+};
+use tiprub_study::{Statement, Study, arguments::StudyCommon, error::clock, machine};
+use tiprub_test_models::{GAP, Random, bumps, rich_blade};
+
+/// Sectors of the random rotors.
+const SECTORS: usize = 4;
+/// Communication step of all runs (s), and how many.
+const H: f64 = 8e-5;
+const STEPS: u32 = 100;
+/// Tolerances that are asked for, and those of the truth and of the study of what is left.
+const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
+const TRUTH: (f64, f64) = (2e-5, 1e-8);
+const SMALL: [f64; 4] = [1e-6, 1e-7, 1e-8, 1e-9];
+const LONGEST: [f64; 3] = [8e-5, 4e-5, 2e-5];
+/// Relative change of the clearance, and how far it may grow until a run is not followed any further.
+const PERTURBATION: f64 = 1e-12;
+const GROWN: f64 = 10.0;
+/// Rubs, switches, contact problems: of a quick study, and of a whole one.
+const RUBS: [usize; 2] = [12, 200];
+const SWITCHES: [u64; 2] = [2_000, 100_000];
+const TRIALS: [u64; 2] = [5_000, 1_000_000];
+
+/// A rub that nobody chose.
+fn random_rub(number: usize) -> Scene {
+    let mut random = Random(1 + 7919 * number as u64);
+    let mut scene = bumps(rich_blade(SECTORS));
+    scene.settings.structures[0].speed = random.within(300.0, 2000.0);
+    scene.settings.structures[0].damping_ratio = Some(random.scale(1e-4, 3e-2));
+    scene.settings.contacts[0].friction = random.within(0.0, 0.3);
+    scene.settings.surfaces[0].shape = if random.unit() < 0.5 {
+        Shape::TwoLobe {
+            depth: random.within(0.55, 0.9),
+            width: random.within(0.1, 0.3),
+            phase: random.within(0.0, 3.0),
+        }
+    } else {
+        let order = 1 + u32::try_from(random.below(6)).unwrap_or(0);
+        Shape::Lobes { amplitude: GAP * random.within(1.05, 1.5), order, phase: random.within(0.0, 3.0) }
+    };
+    scene
+}
+
+/// Displacements of all contact rows, communication step by communication step, and the steps that were missed and taken.
+struct Ran {
+    displacements: Vec<Vec<f64>>,
+    steps: [u64; 2],
+}
+
+fn run(scene: &Scene, (longest, tolerance): (f64, f64), perturbation: f64) -> tiprub_core::Result<Ran> {
+    let mut scene = scene.clone();
+    (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::Galerkin, longest);
+    scene.settings.time.tolerance = Some(tolerance);
+    run_of(scene, perturbation)
+}
+
+fn run_of(mut scene: Scene, perturbation: f64) -> tiprub_core::Result<Ran> {
+    scene.settings.contacts[0].gap *= 1.0 + perturbation;
+    let mut simulation = Simulation::new(&scene)?;
+    simulation.initialise(0.0)?;
+    let mut displacements = Vec::new();
+    for step in 0..STEPS {
+        simulation.do_step(f64::from(step) * H, H)?;
+        displacements.push(simulation.system().bank().displacement().to_vec());
+    }
+    let effort = simulation.system().effort();
+    Ok(Ran { displacements, steps: [effort.missed, effort.steps] })
+}
+
+/// Communication steps until a run of another scheme that starts almost like another has left it by ten times as much.
+fn followed(scene: &Scene) -> tiprub_core::Result<usize> {
+    let mut scene = scene.clone();
+    (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::ModalExact, 5e-7);
+    let (plain, other) = (run_of(scene.clone(), 0.0)?, run_of(scene, PERTURBATION)?);
+    let apart = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+    let mut all = plain.displacements.iter().zip(&other.displacements).map(apart);
+    Ok(all.position(|apart| apart > GROWN * PERTURBATION * GAP).unwrap_or(plain.displacements.len()))
+}
+
+fn apart(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
+    let pairs = || a.iter().zip(b).flat_map(|(a, b)| a.iter().zip(b));
+    let (square, size) = pairs().fold((0.0, 0.0), |(square, size), (a, b)| (square + (a - b) * (a - b), size + b * b));
+    (square / size).sqrt()
+}
+
+/// Errors of a rub over its tolerances; `None` where nothing touches, a run is refused, or it cannot be followed for long enough.
+fn errors(number: &usize) -> Result<Option<[f64; 4]>> {
+    let scene = random_rub(*number);
+    let Ok(window) = followed(&scene) else { return Ok(None) };
+    let Ok(truth) = run(&scene, TRUTH, 0.0) else { return Ok(None) };
+    let Some(first) = truth.displacements.iter().position(|all| all.iter().any(|u| *u != 0.0)) else { return Ok(None) };
+    if window < first + 3 {
+        return Ok(None);
+    }
+    let mut found = [0.0; 4];
+    for (found, tolerance) in found.iter_mut().zip(TOLERANCES) {
+        let Ok(ran) = run(&scene, (H, tolerance), 0.0) else { return Ok(None) };
+        *found = apart(&ran.displacements[..window], &truth.displacements[..window]) / tolerance;
+    }
+    Ok(Some(found))
+}
+
+/// Median and 95 % of sorted values.
+fn quantiles(sorted: &[f64]) -> [f64; 3] {
+    let last = sorted.len().saturating_sub(1);
+    [last / 2, last * 95 / 100, last].map(|index| sorted.get(index).copied().unwrap_or(f64::NAN))
+}
+
+fn table(head: &[&str], rows: &[Vec<String>]) -> String {
+    let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+    let head: Vec<String> = head.iter().map(|cell| (*cell).to_owned()).collect();
+    let rows: String = rows.iter().map(|row| line(row)).collect();
+    format!("{}|{}\n{rows}", line(&head), "---|".repeat(head.len()))
+}
+
+/// The study.
+///
+/// # Errors
+/// A run that is refused.
+pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
+    let which = usize::from(!arguments.quick);
+    let numbers: Vec<usize> = (0..RUBS[which]).collect();
+    let task = console.task("Random rubs", Some(numbers.len() as u64));
+    let found = sweep::sweep(&numbers, processors(), errors, |done| task.at(done as u64))?;
+    drop(task);
+    let followed: Vec<[f64; 4]> = found.into_iter().flatten().collect();
+    let mut ratios: [Vec<f64>; 4] = std::array::from_fn(|index| followed.iter().map(|one| one[index]).collect());
+    ratios.iter_mut().for_each(|one| one.sort_by(f64::total_cmp));
+    let of_ratios = ratios.each_ref().map(|one| quantiles(one));
+    let left = left()?;
+    let kept: Vec<Option<Kept>> =
+        [1e-3, 1e-6, 1e-7].map(|tolerance| sectors::energy(tolerance, SWITCHES[which])).to_vec();
+    let problems: Vec<Problems> = [2, 3]
+        .into_iter()
+        .flat_map(|degree| [0.0, 0.15, 0.3, 0.6].map(|friction| sectors::problems(degree, friction, TRIALS[which])))
+        .collect();
+    let mission = mission(if arguments.quick { 1 } else { 10 })
+        .map_err(|error| tiprub_shell::Failure::from_core("a mission", error))?;
+    Ok(Study {
+        name: "scatter",
+        title: "A tolerance on what nobody chose".into(),
+        summary: "Random rubs of four blades with three contact nodes: relative L2 error of displacements against the tolerance. What is left \
+                  at the shortest steps. Energy over very many switches, and contact problems of random sectors."
+            .into(),
+        facts: machine::facts(),
+        statements: statements(&of_ratios, &kept, &problems),
+        figures: Vec::new(),
+        results: json!({
+            "rubs": followed.len(),
+            "milliseconds_of_long_steps": mission,
+            "error_over_tolerance": of_ratios,
+            "left": left.iter().map(|(longest, tolerance, error, steps)| json!([longest, tolerance, error, steps])).collect::<Vec<_>>(),
+            "energy": kept.iter().flatten().map(|one| json!({
+                "tolerance": one.tolerance, "switches": one.switches, "most": one.most, "left": one.left,
+                "steps": one.effort.steps, "constant": one.effort.constant,
+            })).collect::<Vec<Value>>(),
+            "problems": problems.iter().map(|one| json!({
+                "degree": one.degree, "friction": one.friction, "trials": one.trials, "unsolved": one.unsolved,
+                "given_up": one.given_up,
+            })).collect::<Vec<_>>(),
+        }),
+        files: vec![(
+            "scatter.md".into(),
+            "the tables of the guide".into(),
+            tables(&of_ratios, &left, (&kept, &problems), mission).into_bytes(),
+        )],
+    })
+}
+
+/// What shortest steps leave: longest step (s), tolerance, error, steps missed and taken.
+type Left = (f64, f64, f64, [u64; 2]);
+
+fn left() -> Result<Vec<Left>> {
+    let scene = bumps(rich_blade(SECTORS));
+    let told = |error: tiprub_core::Error| tiprub_shell::Failure::from_core("what is left", error);
+    let truth = run(&scene, (1e-5, 1e-9), 0.0).map_err(told)?;
+    let mut all = Vec::new();
+    for longest in LONGEST {
+        for tolerance in SMALL {
+            let ran = run(&scene, (longest, tolerance), 0.0).map_err(told)?;
+            all.push((longest, tolerance, apart(&ran.displacements, &truth.displacements), ran.steps));
+        }
+    }
+    Ok(all)
+}
+
+/// Length of a communication step of a mission (s), how far the casing is open (m), and where it rubs.
+const LONG: f64 = 0.1;
+const WIDE: [f64; 2] = [5e-4, 5e-5];
+
+/// Milliseconds of a communication step of 36 blades: flown over, span by span, and with a rub.
+fn mission(steps: u32) -> tiprub_core::Result<[f64; 3]> {
+    let mut scene = bumps(rich_blade(36));
+    scene.settings.surfaces[0].ramp_time = 0.0;
+    (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::Galerkin, H);
+    let mut simulation = Simulation::new(&scene)?;
+    let open = |simulation: &mut Simulation, wide: f64| match simulation.table().find("casing_radius_change") {
+        Some(row) => simulation.set_real(row.reference, wide),
+        None => Ok(()),
+    };
+    open(&mut simulation, WIDE[0])?;
+    simulation.initialise(0.0)?;
+    let (mut step, mut taken) = (0_u32, [0.0; 3]);
+    for (which, (wide, count)) in [(WIDE[0], 100 * steps), (WIDE[0], steps), (WIDE[1], steps)].into_iter().enumerate() {
+        open(&mut simulation, wide)?;
+        let before = clock::now();
+        for _ in 0..count {
+            if which == 1 {
+                simulation.begin_step(f64::from(step) * LONG, LONG)?;
+                while !simulation.advance()?.finished {}
+            } else {
+                simulation.do_step(f64::from(step) * LONG, LONG)?;
+            }
+            step += 1;
+        }
+        taken[which] = 1e3 * (clock::now() - before).as_secs_f64() / f64::from(count);
+    }
+    Ok(taken)
+}
+
+fn statements(ratios: &[[f64; 3]; 4], kept: &[Option<Kept>], problems: &[Problems]) -> Vec<Statement> {
+    let worst =
+        ratios.iter().fold([0.0_f64; 2], |most, [median, most_of, _]| [most[0].max(*median), most[1].max(*most_of)]);
+    let gained = kept.iter().flatten().fold(0.0, |most: f64, one| most.max(one.most - 1.0));
+    let given_up: u64 = problems.iter().map(|one| one.given_up).sum();
+    let plain: u64 = problems.iter().filter(|one| one.friction == 0.0).map(|one| one.unsolved).sum();
+    vec![
+        Statement::tested(
+            "Half of the random rubs are within their tolerance, 95 % within three times it".to_owned(),
+            worst[0] < 1.0 && worst[1] < 3.0,
+            format!("median {:.2}, 95 % {:.2} at the worst tolerance", worst[0], worst[1]),
+        ),
+        Statement::tested(
+            "Switches never leave more energy than there was".to_owned(),
+            kept.iter().all(Option::is_some) && gained < 1e-9,
+            format!("gain of at most {gained:.0e}"),
+        ),
+        Statement::tested(
+            "Without friction every contact problem has a solution that is found".to_owned(),
+            plain == 0,
+            format!("{plain} had none"),
+        ),
+        Statement::remark("Random sectors that no step was short enough for".to_owned(), format!("{given_up} spans")),
+    ]
+}
+
+fn tables(
+    ratios: &[[f64; 3]; 4],
+    left: &[Left],
+    (kept, problems): (&[Option<Kept>], &[Problems]),
+    mission: [f64; 3],
+) -> String {
+    let ratios: Vec<Vec<String>> = TOLERANCES
+        .iter()
+        .zip(ratios)
+        .map(|(tolerance, of)| {
+            std::iter::once(format!("{tolerance:e}")).chain(of.map(|one| format!("{one:.2}"))).collect()
+        })
+        .collect();
+    let left: Vec<Vec<String>> = left
+        .chunks(SMALL.len())
+        .map(|row| {
+            let cell = |(_, _, error, [missed, steps]): &Left| format!("{error:.1e} ({missed} of {steps})");
+            std::iter::once(format!("{} µs", (1e6 * row[0].0).round())).chain(row.iter().map(cell)).collect()
+        })
+        .collect();
+    let kept: Vec<Vec<String>> = kept
+        .iter()
+        .flatten()
+        .map(|one| {
+            let of = [one.switches, one.effort.steps, one.effort.constant].map(|count| count.to_string());
+            let shares = [format!("{:.1e}", one.most - 1.0), format!("{:.4}", one.left)];
+            std::iter::once(format!("{:e} m", one.tolerance)).chain(of).chain(shares).collect()
+        })
+        .collect();
+    let problems: Vec<Vec<String>> = problems
+        .iter()
+        .map(|one| {
+            let counts = [one.trials, one.unsolved, one.given_up].map(|count| count.to_string());
+            [one.degree.to_string(), one.friction.to_string()].into_iter().chain(counts).collect()
+        })
+        .collect();
+    [
+        table(&["tolerance", "median of error over tolerance", "95 %", "most"], &ratios),
+        table(&["longest step", "tolerance 1e-6", "1e-7", "1e-8", "1e-9"], &left),
+        table(
+            &["tolerance", "switches", "steps", "with constant force", "most energy, less one", "energy left"],
+            &kept,
+        ),
+        table(&["degree", "µ", "problems", "unsolved at first", "given up"], &problems),
+        table(&["flown over", "by spans", "with a rub"], &[mission.map(|time| format!("{time:.3} ms")).to_vec()]),
+    ]
+    .join("\n")
+}

@@ -1,0 +1,146 @@
+//! Random sectors against a wall, without a scene: energy over very many switches, contact problems without a solution.
+
+use nalgebra::DMatrix;
+use tiprub_core::galerkin::{
+    level::{Level, Modes},
+    sector::{Demand, Effort, Marcher, Tables, Taken, Witness},
+    state::SectorState,
+    trial::{Kind, Obstacle},
+};
+use tiprub_test_models::Random;
+
+/// Modes from some hundred to some 10⁵ rad/s, what as many beyond leave, and `stiff` times that of a local flexibility.
+fn modes(count: usize, nodes: usize, stiff: f64, random: &mut Random) -> Modes {
+    let rows = 3 * nodes;
+    let shapes = random.matrix(rows, 2 * count) * 3.0;
+    let frequency = |mode: usize| 900.0 * (1.0 + (mode as f64).powf(1.5));
+    let mut residual = DMatrix::identity(rows, rows) * (2e-9 * stiff);
+    for mode in count..2 * count {
+        residual += shapes.column(mode) * shapes.column(mode).transpose() / frequency(mode).powi(2);
+    }
+    Modes {
+        frequencies: (0..count).map(frequency).collect(),
+        damping_ratios: vec![0.0; count],
+        shapes: shapes.columns(0, count).into_owned(),
+        residual,
+    }
+}
+
+/// A plane across x at a place, that slides along y.
+struct Wall {
+    place: f64,
+    friction: f64,
+    /// Steps in which a node opens or closes.
+    switches: u64,
+    /// Energy that constant forces have lost (J).
+    dropped: f64,
+}
+
+impl Obstacle for Wall {
+    fn gap(&mut self, _: usize, _: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
+        (self.place - moved[0], [-1.0, 0.0, 0.0])
+    }
+
+    fn direction(&mut self, _: usize, _: usize, _: [f64; 3], _: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
+        [normal[0], -self.friction, 0.0]
+    }
+}
+
+impl Witness for Wall {
+    fn go(&mut self, _: f64, _: f64, _: &Level, _: Kind) {}
+
+    fn is_clear(&self, _: f64, _: f64, reach: &[f64]) -> bool {
+        reach.iter().step_by(3).all(|reach| *reach < self.place)
+    }
+
+    fn flew(&mut self, _: f64) {}
+
+    fn took(&mut self, step: &Taken) {
+        self.dropped += step.dropped;
+        let points = 0..=step.trial.points();
+        for node in 0..step.trial.nodes() {
+            let pushing = points.clone().filter(|point| step.trial.multiplier(*point, node) > 0.0).count();
+            self.switches += u64::from(pushing > 0 && pushing < points.clone().count());
+        }
+    }
+}
+
+/// Energy of a sector without damping, friction and motion of the wall.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Kept {
+    pub(super) tolerance: f64,
+    pub(super) switches: u64,
+    /// Most at the end of any span, and at the end, relative to the start.
+    pub(super) most: f64,
+    pub(super) left: f64,
+    pub(super) effort: Effort,
+}
+
+/// March until so many contacts have opened or closed.
+pub(super) fn energy(tolerance: f64, switches: u64) -> Option<Kept> {
+    let (span, nodes, count) = (4e-5, 2, 10);
+    let modes = modes(count, nodes, 1.0, &mut Random(11));
+    let mut tables = Tables::new(modes.clone(), span);
+    tables.set_span(span);
+    let (mut state, mut marcher) = (SectorState::new(count, nodes), Marcher::new(count, nodes));
+    for (mode, v) in state.velocity.iter_mut().enumerate() {
+        *v = 0.5 / (mode + 1) as f64;
+    }
+    let mut wall = Wall { place: 1e-4, friction: 0.0, switches: 0, dropped: 0.0 };
+    state.gaps.fill(wall.place);
+    let energy = |state: &SectorState| {
+        let (kinetic, strain) = state.energies(&modes.frequencies, &modes.residual);
+        kinetic + strain
+    };
+    let (start, mut most, mut effort) = (energy(&state), 0.0_f64, Effort::default());
+    let demand = Demand { tolerance, precision: 1e-15, most: u64::MAX };
+    while wall.switches < switches {
+        marcher.march(&tables, &mut state, &mut wall, demand, &mut effort).ok()?;
+        most = most.max(energy(&state));
+    }
+    Some(Kept { tolerance, switches: wall.switches, most: most / start, left: energy(&state) / start, effort })
+}
+
+/// Contact problems that came up.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Problems {
+    pub(super) degree: usize,
+    pub(super) friction: f64,
+    pub(super) trials: u64,
+    /// Without a solution found, halved then.
+    pub(super) unsolved: u64,
+    /// Spans in which no step was short enough.
+    pub(super) given_up: u64,
+}
+
+/// Random sectors with random motion at a wall, span by span, until `trials` contact problems of one degree were tried.
+pub(super) fn problems(degree: usize, friction: f64, trials: u64) -> Problems {
+    let mut random = Random(7 + degree as u64);
+    let mut found = Problems { degree, friction, ..Problems::default() };
+    while found.trials < trials {
+        let nodes = 1 + random.below(3);
+        let count = 4 + random.below(9);
+        // Little residual flexibility leaves degree 2.
+        let modes = modes(count, nodes, random.scale(1e-3, 10.0), &mut random);
+        let span = random.scale(5e-6, 8e-5);
+        let mut tables = Tables::new(modes, span);
+        if tables.levels[0].basis.degree != degree {
+            continue;
+        }
+        tables.set_span(span);
+        let mut marcher = Marcher::new(count, nodes);
+        for _ in 0..20 {
+            let mut state = SectorState::new(count, nodes);
+            state.velocity.iter_mut().for_each(|v| *v = random.signed());
+            let mut wall = Wall { place: 2e-5 * random.unit(), friction, switches: 0, dropped: 0.0 };
+            state.gaps.fill(wall.place);
+            let (mut effort, demand) =
+                (Effort::default(), Demand { tolerance: 1e-7, precision: 1e-13, most: u64::MAX });
+            let outcome = (0..4).try_for_each(|_| marcher.march(&tables, &mut state, &mut wall, demand, &mut effort));
+            found.given_up += u64::from(outcome.is_err());
+            found.trials += effort.trials;
+            found.unsolved += effort.unsolved;
+        }
+    }
+    found
+}
