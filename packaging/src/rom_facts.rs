@@ -295,6 +295,7 @@ impl RomFacts {
                 "area": node.area, "length": node.length,
             })).collect::<Vec<_>>(),
             "damping_ratio": rom.damping_ratio,
+            "contact_rows": rom.rows(),
             "contact_grid": rom.extras.grid.map(|grid| json!({
                 "around": grid.around, "along": grid.along, "closed": grid.closed,
             })),
@@ -324,7 +325,8 @@ impl RomFacts {
             "response_hz": rom.checks.response_frequencies,
             "response_deviation_percent": rom.checks.response_deviation,
             "rub_errors": rom.checks.rub_errors.as_ref().map(|errors| json!({
-                "found_on": errors.found_on, "modes": errors.modes, "patches": errors.patches, "mesh": errors.mesh,
+                "found_on": errors.found_on, "modes": errors.modes, "patches": errors.patches, "rows": errors.rows,
+                "mesh": errors.mesh,
             })),
         })
     }

@@ -124,6 +124,7 @@ impl Other {
         let tip = match self.tip {
             Tip::Nodes(count) => format!("nodes-{count}"),
             Tip::Patches(count) => format!("patches-{count}"),
+            Tip::Rows([count, rows]) => format!("patches-{count}x{rows}"),
         };
         format!("{name}-modes-{:.3}-{tip}-mesh-{:.3}", self.modes, self.mesh)
     }
@@ -153,7 +154,7 @@ pub fn refined(name: &str, other: Other, cache: &RomCache, console: &Console) ->
             let (name, options) = stage(name == STAGE_COARSE);
             let kind = match other.tip {
                 Tip::Nodes(_) => options.kind,
-                Tip::Patches(_) => ReductionKind::FreeInterface,
+                Tip::Patches(_) | Tip::Rows(_) => ReductionKind::FreeInterface,
             };
             let sector = SectorOptions { counts: stage_mesh(options.sector.counts, other.mesh), ..options.sector };
             let options = StageOptions { modes: families(options.modes), tip: other.tip, kind, sector, ..options };

@@ -67,6 +67,7 @@ impl Found {
             found_on: format!("{}, {:.2} ms", self.names[1], 1e3 * self.window.0),
             modes: refine::modes_of(index).and_then(of),
             patches: of(refine::NODES),
+            rows: of(refine::ROWS),
             mesh: of(refine::MESH),
         });
         rom

@@ -98,6 +98,8 @@ impl Direction {
 pub const STEP: &str = "step";
 /// Name of the direction of contact nodes or patches.
 pub const NODES: &str = "nodes";
+/// Name of the direction of rows of patches across the thickness.
+pub const ROWS: &str = "rows";
 /// Name of the direction of meshes.
 pub const MESH: &str = "mesh";
 /// Units of values.
@@ -138,6 +140,7 @@ pub fn directions(scene: &Scene, own: u32, again: &Again) -> Result<Vec<Directio
         all.push(refiner.modes(index, name)?);
     }
     all.push(refiner.nodes()?);
+    all.extend(refiner.rows()?);
     if let Some(structure) = scene.settings.structures.get(MODES.len()) {
         all.push(Direction {
             missing: format!("the study refines {} structures", MODES.len()),

@@ -10,9 +10,9 @@ use tiprub_model::rotor37::Tip;
 use tiprub_shell::{Failure, Result};
 
 use super::{
-    coarsen::coarsened,
+    coarsen::{coarsened, fewer_rows},
     nodes::{common_start, named_as, starting_with},
-    refine::{Again, Direction, Level, MESH, MESH_NODES, MODES_KEPT, Meshed, NODES, SECONDS, STEP, Source},
+    refine::{Again, Direction, Level, MESH, MESH_NODES, MODES_KEPT, Meshed, NODES, ROWS, SECONDS, STEP, Source},
     truncate::{Form, truncated},
 };
 use crate::{master, stability::asked::divided};
@@ -26,6 +26,8 @@ const QUICK_FEWER: [f64; 1] = [0.5];
 /// More of them, where the model can be reduced again.
 const MORE: [f64; 2] = [1.5, 2.0];
 const QUICK_MORE: [f64; 1] = [1.5];
+/// Rows of patches across the thickness: sides, and the middle between them.
+const MOST_ROWS: usize = 3;
 /// Two models are one where their frequencies and contact nodes agree to this (relative).
 const SAME: f64 = 1e-6;
 /// Makes other models of a scene.
@@ -91,16 +93,20 @@ impl<'a> Refiner<'a> {
         scene
     }
 
-    /// Fixed-interface modes and contact nodes of the master.
+    /// Fixed-interface modes of the master, and its contact nodes along the chord.
     fn own_counts(&self) -> (usize, usize) {
         let rom = &self.scene.roms[master(self.scene)];
-        (rom.order().saturating_sub(rom.contact_map.nrows()), rom.contact_nodes.len())
+        (rom.order().saturating_sub(rom.contact_map.nrows()), rom.contact_nodes.len() / rom.rows())
     }
 
-    /// So many nodes, or patches where the master has such.
+    /// So many nodes along the chord, or patches in its rows where the master has such.
     fn tip(&self, count: usize) -> Tip {
+        self.tip_in_rows(count, self.scene.roms[master(self.scene)].rows())
+    }
+
+    fn tip_in_rows(&self, count: usize, rows: usize) -> Tip {
         let nodes = &self.scene.roms[master(self.scene)].contact_nodes;
-        if nodes.iter().all(|node| node.area > 0.0) { Tip::Patches(count) } else { Tip::Nodes(count) }
+        if nodes.iter().all(|node| node.area > 0.0) { Tip::patches([count, rows]) } else { Tip::Nodes(count) }
     }
 
     /// From the source, with the damping of the scene's ROM: a command line may propose another.
@@ -210,7 +216,8 @@ impl<'a> Refiner<'a> {
     }
 
     fn more_modes(&self, index: usize, own: usize, factor: f64) -> Option<Result<Rom>> {
-        let (nodes, master) = (self.scene.roms[index].contact_nodes.len(), index == master(self.scene));
+        let rom = &self.scene.roms[index];
+        let (nodes, master) = (rom.contact_nodes.len() / rom.rows(), index == master(self.scene));
         let again = match self.again.source.filter(|_| master) {
             Some(source) => {
                 self.reduced(source, None, [count(factor * own as f64) as usize, nodes]).map(|found| found.rom)
@@ -233,7 +240,7 @@ impl<'a> Refiner<'a> {
         let mut direction = Direction::new(NODES, title, "nodes");
         let builtin = self.with_chord();
         let (modes, own) = self.own_counts();
-        let patches = matches!(self.tip(own), Tip::Patches(_));
+        let patches = !matches!(self.tip(own), Tip::Nodes(_));
         if patches {
             (direction.title, direction.unit) = (format!("contact patches of {}", structure.name), "patches");
             self.fewer_patches(&mut direction);
@@ -301,14 +308,62 @@ impl<'a> Refiner<'a> {
                     return;
                 }
             }
-            let patches = rom.contact_nodes.len();
+            let patches = rom.contact_nodes.len() / rom.rows();
             direction.levels.insert(0, self.level(patches as f64, false, self.with_rom(index, rom.clone())));
         }
     }
 
+    /// Rows of patches of the master across the thickness of its tip; none of contact nodes.
+    pub(super) fn rows(&self) -> Result<Option<Direction>> {
+        let index = master(self.scene);
+        let (modes, along) = self.own_counts();
+        let (rom, own) = (&self.scene.roms[index], self.scene.roms[index].rows());
+        if matches!(self.tip(along), Tip::Nodes(_)) {
+            return Ok(None);
+        }
+        let title = format!("rows of contact patches of {}, across the thickness", self.scene.settings.structures[index].name);
+        let mut direction = Direction::new(ROWS, title, "rows");
+        let fewer = (1..own).filter_map(|rows| Some((rows, fewer_rows(rom, rows).ok()?)));
+        for (rows, rom) in fewer {
+            direction.levels.push(self.level(rows as f64, false, self.with_rom(index, rom)));
+        }
+        direction.levels.push(self.level(own as f64, true, self.scene.clone()));
+        let start = match common_start(self.scene, index) {
+            Ok(start) => start,
+            Err(why) => {
+                direction.misses(why);
+                return Ok(Some(direction));
+            }
+        };
+        for rows in own + 1..=MOST_ROWS {
+            let tip = self.tip_in_rows(along, rows);
+            let found = match (self.again.source, self.with_chord()) {
+                (Some(source), _) => source.reduce(None, modes, tip, self.again.console).map(|found| found.rom),
+                (None, Some(name)) => self.built_in_with(&name, tip, 1.0),
+                (None, None) => {
+                    direction.misses(no_source("more rows of patches", rom));
+                    break;
+                }
+            };
+            match found {
+                Ok(found) => {
+                    let found = starting_with(&start, Rom { damping_ratio: rom.damping_ratio, ..found });
+                    direction.levels.push(self.level(rows as f64, false, self.with_rom(index, found)));
+                }
+                // A mesh tells no more rows apart than it does.
+                Err(failure) => direction.misses(format!("{rows} rows: {failure}")),
+            }
+        }
+        Ok(Some(direction))
+    }
+
     /// A model that ships, with another tip or mesh.
     fn built_in(&self, name: &str, nodes: usize, mesh: f64) -> Result<Rom> {
-        let other = Other { modes: 1.0, tip: self.tip(nodes), mesh: mesh * self.again.mesh };
+        self.built_in_with(name, self.tip(nodes), mesh)
+    }
+
+    fn built_in_with(&self, name: &str, tip: Tip, mesh: f64) -> Result<Rom> {
+        let other = Other { modes: 1.0, tip, mesh: mesh * self.again.mesh };
         let found = builtin::refined(name, other, self.again.cache, self.again.console);
         found.unwrap_or_else(|| Err(Failure::new(name, "no such model", "")))
     }
