@@ -114,7 +114,9 @@ impl Rotor37Arguments {
             }),
             tip: match (self.contact_nodes, self.contact_patches, defaults.tip.counts()) {
                 (Some(nodes), ..) => Tip::Nodes(nodes),
-                (None, patches, [own, rows]) => Tip::patches([patches.unwrap_or(own), self.contact_rows.unwrap_or(rows)]),
+                (None, patches, [own, rows]) => {
+                    Tip::patches([patches.unwrap_or(own), self.contact_rows.unwrap_or(rows)])
+                }
             },
             kind: KindChoice::kind(self.kind, !of_the_paper),
             modes: self.modes.unwrap_or(defaults.modes),

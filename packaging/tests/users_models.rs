@@ -270,16 +270,22 @@ fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     let names: Vec<String> =
         project.rom("named.rom.safetensors").contact_nodes.into_iter().map(|node| node.name).collect();
     assert_eq!(names, ["a_row_1", "b_row_1", "a_row_2", "b_row_2"]);
-    let scene =
-        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37.toml")).unwrap();
-    let scene = scene.replace("builtin:rotor37", "read.rom.safetensors").replace("modal-exact", "massless-boundary");
+    // The scene that ships with rows, around the coarse blade.
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37-rows.toml");
+    let scene = fs::read_to_string(path).unwrap().replace("builtin:rotor37-rows", "read.rom.safetensors");
     project.write("scene.toml", &scene);
     let run = project.succeed("run scene.toml --stop 0.003 --estimate");
     assert!(run["last"]["friction_loss"].as_f64().unwrap() > 100.0, "{run:#}");
     let why = run["estimated_errors"]["rows"]["unknown"].as_str().unwrap();
     assert!(why.contains("two rows of patches do not tell") && why.contains("--contact-rows 3"), "{why}");
     let coating = "\n[contact.coating]\nthickness = 2e-3\nmodulus = 1e9\nyield_stress = 5e6\nhardening = 1e8\ncells_around = 720\ncells_along = 5\n";
-    project.write("coated.toml", &scene.replace("\n[time]", &format!("{coating}\n[time]")).replace("massless-boundary", "modal-exact"));
+    project.write(
+        "coated.toml",
+        &scene
+            .replace("\n[time]", &format!("{coating}\n[time]"))
+            .replace("galerkin", "modal-exact")
+            .replace("8.0e-5", "5.0e-7"),
+    );
     let told = project.fail("run coated.toml --stop 0.001", 1);
     assert!(told.contains("contact[1].coating: excludes a ROM whose contact patches are in rows"), "{told}");
     for (line, told, code) in [

@@ -184,8 +184,7 @@ fn rotor37(options: &Rotor37Options, console: &Console) -> Result<Reduced> {
     let reduced = Reduced::general(reduction::rotor37(options, console)?, Some("hub"));
     let (MeshCounts { chord, thickness, .. }, [patches, rows]) = (options.mesh, options.tip.counts());
     let is_patch = !matches!(options.tip, Tip::Nodes(_));
-    let narrow =
-        (is_patch && patches > chord + 1).then(|| users_model::narrow(patches, chord as f64, chord + 1));
+    let narrow = (is_patch && patches > chord + 1).then(|| users_model::narrow(patches, chord as f64, chord + 1));
     let narrow_rows = (rows > thickness + 1).then(|| users_model::narrow_rows(rows, thickness));
     Ok(Reduced { warnings: narrow.into_iter().chain(narrow_rows).collect(), ..reduced })
 }

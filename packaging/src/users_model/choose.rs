@@ -55,7 +55,11 @@ pub fn tips(
     let patch_count = tips.contact_patches.or_else(|| automatic.then(|| default_patches(tips, &tip)));
     if let (Some(_), None) = (tips.contact_rows, patch_count) {
         let problem = "rows are of patches, and contact is at the nodes of the set";
-        return Err(Failure::usage("--contact-rows", problem, "Say how many patches along the chord: --contact-patches 9"));
+        return Err(Failure::usage(
+            "--contact-rows",
+            problem,
+            "Say how many patches along the chord: --contact-patches 9",
+        ));
     }
     let contact = if let Some(count) = patch_count {
         patches(imported, &free, [count, tips.contact_rows.unwrap_or(1)], &tips.contact_names)?

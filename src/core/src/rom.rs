@@ -279,23 +279,6 @@ impl Rom {
         self.validate_harmonics(remedy)
     }
 
-    /// Rows of contact patches across the thickness, one where nothing is said.
-    pub fn rows(&self) -> usize {
-        self.extras.rows.unwrap_or(1)
-    }
-
-    fn validate_rows(&self, remedy: &str) -> Result<()> {
-        let Some(rows) = self.extras.rows else { return Ok(()) };
-        let nodes = self.contact_nodes.len();
-        let patches = self.contact_nodes.iter().all(|node| node.area > 0.0);
-        if rows >= 2 && nodes.is_multiple_of(rows) && patches && self.extras.grid.is_none() {
-            return Ok(());
-        }
-        let what = if patches { "patches" } else { "contact nodes, not patches with areas" };
-        let problem = format!("{rows} rows of {nodes} {what}; two or more of equally many patches are rows");
-        Err(Error::invalid("ROM metadata `contact_rows`", problem, remedy))
-    }
-
     /// Lengths in metres, of a machine.
     fn validate_place(&self, what: &str, node: &ContactNode, remedy: &str) -> Result<()> {
         let finite = node.position.iter().all(|value| value.is_finite());

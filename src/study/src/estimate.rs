@@ -197,7 +197,7 @@ fn patches(scene: &Scene, division: u32) -> std::result::Result<Direction, Strin
 }
 
 /// One and two of three rows across the thickness; fewer rows do not tell what more would change.
-fn rows(scene: &Scene, division: u32) -> std::result::Result<Direction, String> {
+pub(crate) fn rows(scene: &Scene, division: u32) -> std::result::Result<Direction, String> {
     let master = crate::master(scene);
     let rom = &scene.roms[master];
     if rom.contact_nodes.iter().any(|patch| patch.area <= 0.0) {
@@ -205,7 +205,8 @@ fn rows(scene: &Scene, division: u32) -> std::result::Result<Direction, String> 
     }
     let own = rom.rows();
     if own < 3 {
-        let all = if own == 1 { "one row of patches, over the whole thickness, does" } else { "two rows of patches do" };
+        let all =
+            if own == 1 { "one row of patches, over the whole thickness, does" } else { "two rows of patches do" };
         return Err(format!(
             "{all} not tell what more would change: a ROM with --contact-rows 3 does, and `tiprub study convergence` where it can \
              reduce again"
@@ -245,7 +246,8 @@ pub fn estimates(
     let runner = Runner::new(settings, samples, console);
     let division = divisions(scene.settings.experiment.communication_step, scene.settings.time.step);
     let mut found = vec![of_steps(scene, division, &runner)?];
-    let own = [("modes", modes(scene, division)), ("patches", patches(scene, division)), ("rows", rows(scene, division))];
+    let own =
+        [("modes", modes(scene, division)), ("patches", patches(scene, division)), ("rows", rows(scene, division))];
     for (name, direction) in own {
         found.push(match direction {
             Ok(direction) => Estimate::of(name, &runner.as_it_is(direction)?),

@@ -143,11 +143,11 @@ impl Size {
         let ([few, many], finest) = (self.patches, self.divisions[2]);
         let refined = self.divisions.iter().map(|division| (Touching::Patches(few, 1), *division));
         let sides = self.divisions[1..].iter().map(|division| (Touching::Sides, *division));
-        let points = (2..=self.rows).map(|each| (Touching::Points(each), finest));
+        let points = (2..=self.rows).map(|each| (Touching::Points(each), self.divisions[1]));
         let rows = (2..=self.rows).map(|rows| (few, rows));
         let more = [(many, 1), (many, 2)].into_iter().filter(|(_, rows)| self.rows > *rows);
         let others = rows.chain(more).map(|(count, rows)| (Touching::Patches(count, rows), finest));
-        refined.chain(sides).chain(points).chain(others).chain([(Touching::Nodes(3), finest)]).collect()
+        refined.chain(sides).chain(points).chain(others).chain([(Touching::Nodes(3), self.divisions[1])]).collect()
     }
 }
 

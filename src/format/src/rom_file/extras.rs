@@ -34,7 +34,9 @@ impl Reader<'_> {
         let Some(text) = metadata.get(ROWS) else { return Ok(None) };
         match text.trim().parse::<usize>() {
             Ok(rows) => Ok(Some(rows).filter(|rows| *rows != 1)),
-            Err(_) => Err(self.error(format!("metadata `{ROWS}`"), format!("{text:?} is no whole number"), WRITE_AGAIN)),
+            Err(_) => {
+                Err(self.error(format!("metadata `{ROWS}`"), format!("{text:?} is no whole number"), WRITE_AGAIN))
+            }
         }
     }
 

@@ -113,6 +113,12 @@ impl Default for Rotor37Options {
 }
 
 impl Rotor37Options {
+    /// As it ships, with the patches in two rows, which stand at the sides of the tip.
+    pub fn in_rows() -> Self {
+        let [patches, _] = Self::default().tip.counts();
+        Self { tip: Tip::Rows([patches, 2]), ..Self::default() }
+    }
+
     /// The paper's kind of model: Craig and Bampton's modes, three contact nodes.
     pub fn paper() -> Self {
         Self {

@@ -110,7 +110,7 @@ mod tests {
                 assert!((low - 0.02..high + 0.02).contains(&part.tip.slope), "{part:?}, {low} to {high}");
             }
         }
-        // Three faces of nine nodes: the outline has all but the four corners and mid-side nodes between faces.
+        // Of three faces in a row: all nodes but the middles of the two edges between them.
         let outline = Part::outline(&blade.mesh, tip);
         assert_eq!(outline.len(), tip.len() - 2, "{outline:?}");
         assert!(outline.iter().all(|part| (low - 0.02..high + 0.02).contains(&part.tip.slope)), "{outline:?}");

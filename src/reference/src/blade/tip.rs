@@ -80,7 +80,8 @@ impl Part {
                 for (index, &first) in corners.iter().enumerate() {
                     let second = corners[(index + 1) % corners.len()];
                     let (a, b) = (element.nodes[first], element.nodes[second]);
-                    let edge = element.kind.edges().iter().position(|ends| ends.contains(&first) && ends.contains(&second));
+                    let edge =
+                        element.kind.edges().iter().position(|ends| ends.contains(&first) && ends.contains(&second));
                     let middle = edge.and_then(|edge| element.nodes.get(element.kind.corner_count() + edge));
                     sides.entry([a.min(b), a.max(b)]).or_insert((0, middle.copied())).0 += 1;
                 }
@@ -88,7 +89,8 @@ impl Part {
         }
         let once = sides.iter().filter(|(_, (faces, _))| *faces == 1);
         let nodes: BTreeSet<usize> = once.flat_map(|(ends, (_, middle))| ends.iter().copied().chain(*middle)).collect();
-        let known: Vec<(f64, f64)> = Self::points(mesh, set, 3).iter().map(|part| (part.axial(mesh), part.tip.slope)).collect();
+        let known: Vec<(f64, f64)> =
+            Self::points(mesh, set, 3).iter().map(|part| (part.axial(mesh), part.tip.slope)).collect();
         let slope = |node: usize| {
             let away = |(axial, _): &&(f64, f64)| (axial - mesh.nodes[node][2]).abs();
             known.iter().min_by(|a, b| away(a).total_cmp(&away(b))).map_or(0.0, |(_, slope)| *slope)

@@ -1,7 +1,7 @@
 //! What refining a scene changes: its internal step, the modes of its structures, the contact nodes and the mesh of its blades, one at a
 //! time; where each sequence goes, and with it the error of the scene as it stands.
 //!
-//! [`refine`] finds the directions, `refiner` the scenes at every level, `nodes` which of a refined model's nodes touch, [`truncate`] takes modes
+//! [`refine`] finds the directions, `refiner` the scenes at every level, `rows` those of rows across the thickness, `nodes` which of a refined model's nodes touch, [`truncate`] takes modes
 //! away from any ROM, [`mod@march`] runs and compares, [`limit`] extrapolates, [`page`] draws and tells.
 
 pub mod coarsen;
@@ -11,6 +11,7 @@ mod nodes;
 pub mod page;
 pub mod refine;
 pub(crate) mod refiner;
+mod rows;
 pub mod truncate;
 
 use std::time::Instant;

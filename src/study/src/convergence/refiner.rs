@@ -10,9 +10,9 @@ use tiprub_model::rotor37::Tip;
 use tiprub_shell::{Failure, Result};
 
 use super::{
-    coarsen::{coarsened, fewer_rows},
+    coarsen::coarsened,
     nodes::{common_start, named_as, starting_with},
-    refine::{Again, Direction, Level, MESH, MESH_NODES, MODES_KEPT, Meshed, NODES, ROWS, SECONDS, STEP, Source},
+    refine::{Again, Direction, Level, MESH, MESH_NODES, MODES_KEPT, Meshed, NODES, SECONDS, STEP, Source},
     truncate::{Form, truncated},
 };
 use crate::{master, stability::asked::divided};
@@ -26,16 +26,14 @@ const QUICK_FEWER: [f64; 1] = [0.5];
 /// More of them, where the model can be reduced again.
 const MORE: [f64; 2] = [1.5, 2.0];
 const QUICK_MORE: [f64; 1] = [1.5];
-/// Rows of patches across the thickness: sides, and the middle between them.
-const MOST_ROWS: usize = 3;
 /// Two models are one where their frequencies and contact nodes agree to this (relative).
 const SAME: f64 = 1e-6;
 /// Makes other models of a scene.
 pub(crate) struct Refiner<'a> {
-    scene: &'a Scene,
+    pub(super) scene: &'a Scene,
     /// Internal steps per communication step.
     own: u32,
-    again: &'a Again<'a>,
+    pub(super) again: &'a Again<'a>,
     /// Of the mesh of the master, where it can be reduced again.
     mesh_nodes: Option<usize>,
 }
@@ -83,28 +81,28 @@ impl<'a> Refiner<'a> {
         factors.iter().map_while(with).collect()
     }
 
-    fn level(&self, value: f64, own: bool, scene: Scene) -> Level {
+    pub(super) fn level(&self, value: f64, own: bool, scene: Scene) -> Level {
         Level { value, own, scene, division: self.own }
     }
 
-    fn with_rom(&self, index: usize, rom: Rom) -> Scene {
+    pub(super) fn with_rom(&self, index: usize, rom: Rom) -> Scene {
         let mut scene = self.scene.clone();
         scene.roms[index] = rom;
         scene
     }
 
     /// Fixed-interface modes of the master, and its contact nodes along the chord.
-    fn own_counts(&self) -> (usize, usize) {
+    pub(super) fn own_counts(&self) -> (usize, usize) {
         let rom = &self.scene.roms[master(self.scene)];
         (rom.order().saturating_sub(rom.contact_map.nrows()), rom.contact_nodes.len() / rom.rows())
     }
 
     /// So many nodes along the chord, or patches in its rows where the master has such.
-    fn tip(&self, count: usize) -> Tip {
+    pub(super) fn tip(&self, count: usize) -> Tip {
         self.tip_in_rows(count, self.scene.roms[master(self.scene)].rows())
     }
 
-    fn tip_in_rows(&self, count: usize, rows: usize) -> Tip {
+    pub(super) fn tip_in_rows(&self, count: usize, rows: usize) -> Tip {
         let nodes = &self.scene.roms[master(self.scene)].contact_nodes;
         if nodes.iter().all(|node| node.area > 0.0) { Tip::patches([count, rows]) } else { Tip::Nodes(count) }
     }
@@ -117,7 +115,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// The master where it is a model that ships and whose contact nodes and mesh can be chosen anew.
-    fn with_chord(&self) -> Option<String> {
+    pub(super) fn with_chord(&self) -> Option<String> {
         let structure = &self.scene.settings.structures[master(self.scene)];
         builtin_model(&self.scene.settings, structure).filter(|name| builtin::has_chord(name))
     }
@@ -313,56 +311,12 @@ impl<'a> Refiner<'a> {
         }
     }
 
-    /// Rows of patches of the master across the thickness of its tip; none of contact nodes.
-    pub(super) fn rows(&self) -> Result<Option<Direction>> {
-        let index = master(self.scene);
-        let (modes, along) = self.own_counts();
-        let (rom, own) = (&self.scene.roms[index], self.scene.roms[index].rows());
-        if matches!(self.tip(along), Tip::Nodes(_)) {
-            return Ok(None);
-        }
-        let title = format!("rows of contact patches of {}, across the thickness", self.scene.settings.structures[index].name);
-        let mut direction = Direction::new(ROWS, title, "rows");
-        let fewer = (1..own).filter_map(|rows| Some((rows, fewer_rows(rom, rows).ok()?)));
-        for (rows, rom) in fewer {
-            direction.levels.push(self.level(rows as f64, false, self.with_rom(index, rom)));
-        }
-        direction.levels.push(self.level(own as f64, true, self.scene.clone()));
-        let start = match common_start(self.scene, index) {
-            Ok(start) => start,
-            Err(why) => {
-                direction.misses(why);
-                return Ok(Some(direction));
-            }
-        };
-        for rows in own + 1..=MOST_ROWS {
-            let tip = self.tip_in_rows(along, rows);
-            let found = match (self.again.source, self.with_chord()) {
-                (Some(source), _) => source.reduce(None, modes, tip, self.again.console).map(|found| found.rom),
-                (None, Some(name)) => self.built_in_with(&name, tip, 1.0),
-                (None, None) => {
-                    direction.misses(no_source("more rows of patches", rom));
-                    break;
-                }
-            };
-            match found {
-                Ok(found) => {
-                    let found = starting_with(&start, Rom { damping_ratio: rom.damping_ratio, ..found });
-                    direction.levels.push(self.level(rows as f64, false, self.with_rom(index, found)));
-                }
-                // A mesh tells no more rows apart than it does.
-                Err(failure) => direction.misses(format!("{rows} rows: {failure}")),
-            }
-        }
-        Ok(Some(direction))
-    }
-
     /// A model that ships, with another tip or mesh.
     fn built_in(&self, name: &str, nodes: usize, mesh: f64) -> Result<Rom> {
         self.built_in_with(name, self.tip(nodes), mesh)
     }
 
-    fn built_in_with(&self, name: &str, tip: Tip, mesh: f64) -> Result<Rom> {
+    pub(super) fn built_in_with(&self, name: &str, tip: Tip, mesh: f64) -> Result<Rom> {
         let other = Other { modes: 1.0, tip, mesh: mesh * self.again.mesh };
         let found = builtin::refined(name, other, self.again.cache, self.again.console);
         found.unwrap_or_else(|| Err(Failure::new(name, "no such model", "")))
@@ -419,7 +373,7 @@ impl<'a> Refiner<'a> {
 }
 
 /// Why a ROM from a file stays as it is; coupled sectors are chosen in whole families, which a ROM does not tell.
-fn no_source(what: &str, rom: &Rom) -> String {
+pub(super) fn no_source(what: &str, rom: &Rom) -> String {
     if rom.is_cyclic() {
         return format!(
             "{what} are fixed in the ROM file; of coupled sectors only the disk that ships is reduced again"
