@@ -121,7 +121,7 @@ fn rows_of_patches_across_the_thickness_add_up() {
             assert!((all(&both, node) - all(&[patch], node)).abs() < 1e-12 * area, "patch {index}, node {node}");
         }
         let share = both[0].area / both[1].area;
-        assert!((share - 1.0).abs() < 0.02, "patch {index}: {share}");
+        assert!((share - 1.0).abs() < 0.05, "patch {index}: {share}");
     }
 }
 
