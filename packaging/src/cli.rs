@@ -137,8 +137,8 @@ pub struct RunArguments {
     /// Start value of an input or parameter; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
-    /// Also estimate what steps, modes and patches leave, from coarser runs of the same scene: some ten runs more. What the mesh leaves is told
-    /// where the ROM has it (`tiprub study convergence --into`).
+    /// Also estimate what steps, modes and patches along the chord leave, and rows of three across the thickness, from coarser runs of the same
+    /// scene: some ten runs more. What the mesh leaves is told where the ROM has it (`tiprub study convergence --into`).
     #[arg(long)]
     pub estimate: bool,
     /// Where built-in models are kept.

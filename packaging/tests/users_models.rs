@@ -256,6 +256,14 @@ fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     assert_eq!((&own["rom"]["contact_rows"], &read["rom"]["contact_rows"]), (&2.into(), &2.into()));
     let [own, read] = ["own.rom.safetensors", "read.rom.safetensors"].map(|name| project.rom(name));
     assert_eq!([own.rows(), read.rows()], [2, 2]);
+    for (contact, told) in
+        [("--contact-rows 2", "rows across the thickness 2\n"), ("", "1: the sides of the tip do not touch")]
+    {
+        let line = format!("{common} --contact-patches 4 {contact} --force -o told.rom.safetensors");
+        let output = project.run(&line);
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(text.contains(told), "{line}: {text}");
+    }
     for (own, read) in own.contact_nodes.iter().zip(&read.contact_nodes) {
         assert_eq!(own.name, read.name);
         assert!(own.position.iter().zip(read.position).all(|(a, b)| (a - b).abs() < 1e-9), "{own:?} {read:?}");
@@ -281,7 +289,7 @@ fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     let coating = "\n[contact.coating]\nthickness = 2e-3\nmodulus = 1e9\nyield_stress = 5e6\nhardening = 1e8\ncells_around = 720\ncells_along = 5\n";
     project.write(
         "coated.toml",
-        &scene
+        scene
             .replace("\n[time]", &format!("{coating}\n[time]"))
             .replace("galerkin", "modal-exact")
             .replace("8.0e-5", "5.0e-7"),
