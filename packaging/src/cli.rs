@@ -21,6 +21,7 @@ use crate::{
     after_help = "Examples:\n  tiprub demo\n  tiprub run builtin:rotor37 --csv rub.csv\n  \
                   tiprub package scene.toml -o out/\n\n\
                   Scenes that ship:\n  builtin:rotor37           rotor 37 in a rigid casing with two bumps\n  \
+                  builtin:rotor37-rows      with contact at both sides of the tip\n  \
                   builtin:rotor37-paper     with the model and the method of the paper\n  \
                   builtin:flexible-casing   in an elastic casing with heat, friction power per patch\n  \
                   builtin:abradable         wearing the coating of a rigid casing\n  \
@@ -136,8 +137,8 @@ pub struct RunArguments {
     /// Start value of an input or parameter; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
-    /// Also estimate what steps, modes and patches leave, from coarser runs of the same scene: some ten runs more. What the mesh leaves is told
-    /// where the ROM has it (`tiprub study convergence --into`).
+    /// Also estimate what steps, modes and patches along the chord leave, and rows of three across the thickness, from coarser runs of the same
+    /// scene: some ten runs more. What the mesh leaves is told where the ROM has it (`tiprub study convergence --into`).
     #[arg(long)]
     pub estimate: bool,
     /// Where built-in models are kept.
@@ -293,6 +294,11 @@ mod tests {
             ("reduce cube --kind free-interface".into(), false),
             ("reduce stage --coarse --contact-patches 5 --kind craig-bampton".into(), true),
             ("reduce stage --contact-patches 5 --contact-nodes 3".into(), false),
+            ("reduce stage --contact-patches 5 --contact-rows 2".into(), true),
+            ("reduce stage --contact-rows 2".into(), false),
+            ("reduce rotor37 --contact-rows 2".into(), true),
+            (format!("reduce blade {own} --contact-rows 2"), true),
+            (format!("reduce blade {own} --contact-nodes 3 --contact-rows 2"), false),
             ("reduce stage-casing --coarse --contact-grid 14x3".into(), true),
             ("reduce stage-casing --thickness 0.003".into(), false),
             ("reduce cube --static-responses 3".into(), false),

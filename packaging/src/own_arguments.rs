@@ -194,7 +194,11 @@ pub struct TipOptions {
     /// 9 without a contact set, fewer where elements are wider].
     #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
     pub contact_patches: Option<usize>,
-    /// Names of the contact nodes or patches, by growing z [default: tip_1,tip_2,...].
+    /// Rows of patches across the thickness, from side to side: with two or more a tip that tilts touches with its sides [default: 1].
+    #[arg(long, value_name = "R", conflicts_with = "contact_nodes")]
+    pub contact_rows: Option<usize>,
+    /// Names of the contact nodes or patches along the chord, by growing z; of patches in rows NAME_row_1, NAME_row_2, ... [default:
+    /// tip_1,tip_2,... and patch_1,patch_2,...].
     #[arg(long, value_name = "NAME,NAME,...", value_delimiter = ',', value_parser = identifier)]
     pub contact_names: Vec<String>,
 }

@@ -54,7 +54,7 @@ pub enum Model {
     Casing(Box<CasingArguments>),
     /// The NASA rotor 37 blade that ships with tiprub.
     #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  \
-                            tiprub reduce rotor37 --contact-patches 17 --modes 120 --mesh 32x2x40 -o fine.rom.safetensors")]
+                            tiprub reduce rotor37 --contact-patches 17 --contact-rows 2 --modes 120 --mesh 32x2x40 -o fine.rom.safetensors")]
     Rotor37(Rotor37Arguments),
     /// The disk with 56 blades that ships.
     #[command(after_help = "Example:\n  tiprub reduce stage --coarse --inp sector.inp --vtk sector.vtu")]
@@ -85,6 +85,9 @@ pub struct Rotor37Arguments {
     /// Contact patches along the tip chord, over the whole thickness [default: 9].
     #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
     pub contact_patches: Option<usize>,
+    /// Rows of these across the thickness, from side to side: with two or more a tip that tilts touches with its sides [default: 1].
+    #[arg(long, value_name = "R", conflicts_with = "contact_nodes")]
+    pub contact_rows: Option<usize>,
     /// Which modes are kept [default: free-interface; craig-bampton with --contact-nodes].
     #[arg(long, value_enum)]
     pub kind: Option<KindChoice>,
@@ -109,7 +112,12 @@ impl Rotor37Arguments {
                 let [chord, thickness, span] = size.0;
                 MeshCounts { chord, thickness, span }
             }),
-            tip: tip(self.contact_nodes, self.contact_patches).unwrap_or(defaults.tip),
+            tip: match (self.contact_nodes, self.contact_patches, defaults.tip.counts()) {
+                (Some(nodes), ..) => Tip::Nodes(nodes),
+                (None, patches, [own, rows]) => {
+                    Tip::patches([patches.unwrap_or(own), self.contact_rows.unwrap_or(rows)])
+                }
+            },
             kind: KindChoice::kind(self.kind, !of_the_paper),
             modes: self.modes.unwrap_or(defaults.modes),
             spin: self.spin,
@@ -118,16 +126,16 @@ impl Rotor37Arguments {
     }
 }
 
-fn tip(nodes: Option<usize>, patches: Option<usize>) -> Option<Tip> {
-    patches.map(Tip::Patches).or(nodes.map(Tip::Nodes))
-}
-
 impl StageArguments {
     /// Name and options of the disk asked for.
     pub fn options(&self) -> (&'static str, StageOptions) {
         let (name, defaults) = builtin::stage(self.coarse);
         let options = StageOptions {
-            tip: tip(self.contact_nodes, self.contact_patches).unwrap_or(defaults.tip),
+            tip: match (self.contact_nodes, self.contact_patches) {
+                (Some(nodes), _) => Tip::Nodes(nodes),
+                (None, Some(patches)) => Tip::patches([patches, self.contact_rows.unwrap_or(1)]),
+                (None, None) => defaults.tip,
+            },
             kind: KindChoice::kind(self.kind, self.contact_patches.is_some()),
             modes: self.modes.map_or(defaults.modes, ModeSelection::Families),
             ..defaults
@@ -151,6 +159,9 @@ pub struct StageArguments {
     /// Contact patches along the tip chord, over the whole thickness, instead of nodes.
     #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
     pub contact_patches: Option<usize>,
+    /// Rows of these across the thickness, from side to side [default: 1].
+    #[arg(long, value_name = "R", requires = "contact_patches")]
+    pub contact_rows: Option<usize>,
     /// Which modes are kept [default: craig-bampton; free-interface with --contact-patches].
     #[arg(long, value_enum)]
     pub kind: Option<KindChoice>,

@@ -174,6 +174,7 @@ impl RomFacts {
             };
             let _ = writeln!(text, "    {:<24}{place}", node.name);
         }
+        text.push_str(&rows_text(rom));
         let _ = writeln!(text, "  damping ratio             {}", rom.damping_ratio);
         text.push_str(&extras_text(rom));
         let _ = writeln!(text, "  largest frequency         {:.6e} rad/s", self.largest_angular_frequency);
@@ -295,6 +296,7 @@ impl RomFacts {
                 "area": node.area, "length": node.length,
             })).collect::<Vec<_>>(),
             "damping_ratio": rom.damping_ratio,
+            "contact_rows": rom.rows(),
             "contact_grid": rom.extras.grid.map(|grid| json!({
                 "around": grid.around, "along": grid.along, "closed": grid.closed,
             })),
@@ -324,7 +326,8 @@ impl RomFacts {
             "response_hz": rom.checks.response_frequencies,
             "response_deviation_percent": rom.checks.response_deviation,
             "rub_errors": rom.checks.rub_errors.as_ref().map(|errors| json!({
-                "found_on": errors.found_on, "modes": errors.modes, "patches": errors.patches, "mesh": errors.mesh,
+                "found_on": errors.found_on, "modes": errors.modes, "patches": errors.patches, "rows": errors.rows,
+                "mesh": errors.mesh,
             })),
         })
     }
@@ -370,6 +373,18 @@ pub(crate) fn order_text(rom: &Rom) -> String {
     let (low, high) = orders.fold((usize::MAX, 0), |(low, high), order| (low.min(order), high.max(order)));
     let each = if low == high { format!("{low}") } else { format!("{low} to {high}") };
     format!("{each} per nodal diameter, {} of the whole disk", rom.total_order())
+}
+
+/// Rows of patches around an axis, for people; nothing for contact nodes.
+fn rows_text(rom: &Rom) -> String {
+    if rom.frame == Frame::Cartesian || rom.contact_nodes.iter().any(|node| node.area <= 0.0) {
+        return String::new();
+    }
+    let alone = match rom.rows() {
+        1 => ": the sides of the tip do not touch by themselves (two rows stand there, --contact-rows 2)",
+        _ => "",
+    };
+    format!("  rows across the thickness {}{alone}\n", rom.rows())
 }
 
 /// Spin and heat, for people; nothing for a ROM without.

@@ -7,7 +7,7 @@ use tiprub_gallery::{builtin, reduction};
 use tiprub_model::{
     Rotor37Options,
     casing::{CLAMPED, Support},
-    rotor37::Tip,
+    rotor37::{MeshCounts, Tip},
     stage::sector_mesh,
 };
 use tiprub_shell::{
@@ -182,13 +182,11 @@ fn stage_casing(arguments: &StageCasingArguments, console: &Console) -> Result<R
 
 fn rotor37(options: &Rotor37Options, console: &Console) -> Result<Reduced> {
     let reduced = Reduced::general(reduction::rotor37(options, console)?, Some("hub"));
-    let (chord, most) = (options.mesh.chord, options.mesh.chord + 1);
-    let narrow = |patches: usize| users_model::narrow(patches, chord as f64, most);
-    let warning = match options.tip {
-        Tip::Patches(patches) if patches > most => Some(narrow(patches)),
-        _ => None,
-    };
-    Ok(Reduced { warnings: warning.into_iter().collect(), ..reduced })
+    let (MeshCounts { chord, thickness, .. }, [patches, rows]) = (options.mesh, options.tip.counts());
+    let is_patch = !matches!(options.tip, Tip::Nodes(_));
+    let narrow = (is_patch && patches > chord + 1).then(|| users_model::narrow(patches, chord as f64, chord + 1));
+    let narrow_rows = (rows > thickness + 1).then(|| users_model::narrow_rows(rows, thickness));
+    Ok(Reduced { warnings: narrow.into_iter().chain(narrow_rows).collect(), ..reduced })
 }
 
 /// Share (%) by which frequencies or growth at speed may be off without a warning.

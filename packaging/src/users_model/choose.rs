@@ -4,7 +4,7 @@ use tiprub_model::{
     FeModel,
     casing::GridNodes,
     cyclic::{CyclicBoundary, PairingReport},
-    patches::{FoundTip, contact_patches, find_tip},
+    patches::{FoundTip, find_tip, row_name, tip_patches},
     read::{ContactChoice, Imported, choose_contact_nodes, set_counts},
     reduce::ContactPoint,
 };
@@ -53,8 +53,16 @@ pub fn tips(
     let (free, by_number, tip) = candidates(imported, asked, &fixed)?;
     let automatic = asked.contact_set.is_none() && tips.contact_nodes.is_none();
     let patch_count = tips.contact_patches.or_else(|| automatic.then(|| default_patches(tips, &tip)));
+    if let (Some(_), None) = (tips.contact_rows, patch_count) {
+        let problem = "rows are of patches, and contact is at the nodes of the set";
+        return Err(Failure::usage(
+            "--contact-rows",
+            problem,
+            "Say how many patches along the chord: --contact-patches 9",
+        ));
+    }
     let contact = if let Some(count) = patch_count {
-        patches(imported, &free, count, &tips.contact_names)?
+        patches(imported, &free, [count, tips.contact_rows.unwrap_or(1)], &tips.contact_names)?
     } else {
         // Nodes given one by one are all meant.
         let count = tips.contact_nodes.or(by_number.then_some(free.len()));
@@ -88,7 +96,12 @@ fn default_patches(tips: &TipOptions, tip: &Option<(FoundTip, bool)>) -> usize {
 }
 
 /// Patches of the faces whose nodes are all in the contact set.
-fn patches(imported: &Imported, set: &[usize], count: usize, names: &[String]) -> Result<Vec<ContactPoint>> {
+fn patches(
+    imported: &Imported,
+    set: &[usize],
+    [count, rows]: [usize; 2],
+    names: &[String],
+) -> Result<Vec<ContactPoint>> {
     let Some((mesh, _)) = &imported.model.mesh else {
         let problem = "patches are made of the faces of a mesh";
         return Err(Failure::usage("--contact-patches", problem, "Give a mesh file, or ask for --contact-nodes"));
@@ -97,8 +110,9 @@ fn patches(imported: &Imported, set: &[usize], count: usize, names: &[String]) -
         let problem = format!("{} names for {count} contact patches", names.len());
         return Err(Failure::usage("--contact-names", problem, "Give one name for each, by growing z"));
     }
-    let name = |index: usize| names.get(index).cloned().unwrap_or_else(|| format!("patch_{}", index + 1));
-    contact_patches(mesh, set, count, name).map_err(failure)
+    let along = |index: usize| names.get(index).cloned().unwrap_or_else(|| format!("patch_{}", index + 1));
+    let name = |index: usize| row_name(&along(index % count), index / count, rows);
+    tip_patches(mesh, set, [count, rows], name).map_err(failure)
 }
 
 /// Edges and middle of a tip of patches, whose displacements the ROM is to tell; none of contact nodes, which tell theirs.

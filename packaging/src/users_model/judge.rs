@@ -1,7 +1,10 @@
 //! What of a model that was read cannot be meant, and what is asked about.
 
 use tiprub_core::Rom;
-use tiprub_model::read::{Imported, plausibility};
+use tiprub_model::{
+    read::{Imported, plausibility},
+    reduce::ContactPoint,
+};
 use tiprub_shell::{Failure, Result};
 
 use super::choose::{Chosen, PATCHES};
@@ -70,11 +73,15 @@ pub fn contact_warnings(chosen: &Chosen) -> Vec<String> {
     }
     let on_tip = chosen.contact.iter().all(|point| tip.nodes.binary_search(&point.node).is_ok());
     let (count, edges) = (chosen.contact.len(), tip.chord / tip.edge);
-    let patches = chosen.contact.iter().filter(|point| !point.patch.is_empty()).count();
+    let rows = ContactPoint::rows(&chosen.contact).unwrap_or(1);
+    let patches = chosen.contact.iter().filter(|point| !point.patch.is_empty()).count() / rows;
     if patches > 0 || !on_tip {
         warnings.extend(single(chosen));
         if on_tip && patches > tip.at_most(patches) {
             warnings.push(narrow(patches, edges.round(), tip.at_most(patches)));
+        }
+        if on_tip && rows > tip.across + 1 {
+            warnings.push(narrow_rows(rows, tip.across));
         }
     } else if count == 1 || edges > REFINED * (count - 1) as f64 {
         let nodes = if count == 1 { "a single node".to_owned() } else { format!("{count} nodes") };
@@ -92,6 +99,15 @@ pub fn narrow(patches: usize, edges: f64, most: usize) -> String {
     format!(
         "{patches} contact patches along about {edges:.0} edges of elements: patches narrower than elements share what these can do, and their \
          forces say more than the mesh knows; ask for {most} at most (--contact-patches {most}), or refine the tip"
+    )
+}
+
+/// More rows than the elements of a tip tell apart across its thickness.
+pub fn narrow_rows(rows: usize, elements: usize) -> String {
+    let (plural, most) = (if elements == 1 { "" } else { "s" }, elements + 1);
+    format!(
+        "{rows} rows of contact patches across {elements} element{plural}: rows narrower than elements share what these can do, and their forces \
+         say more than the mesh knows; ask for {most} at most (--contact-rows {most}), or refine the tip"
     )
 }
 

@@ -4,7 +4,7 @@ mod choose;
 mod describe;
 mod judge;
 
-pub use judge::narrow;
+pub use judge::{narrow, narrow_rows};
 
 use std::{
     cell::RefCell,
@@ -84,11 +84,13 @@ impl<'a> BladeSource<'a> {
 
 impl refine::Source for BladeSource<'_> {
     fn reduce(&self, other: Option<usize>, modes: usize, tip: Tip, console: &Console) -> Result<Meshed> {
-        let (contact_nodes, contact_patches) = match tip {
-            Tip::Nodes(count) => (Some(count), None),
-            Tip::Patches(count) => (None, Some(count)),
+        let [count, rows] = tip.counts();
+        let tips = match tip {
+            Tip::Nodes(_) => TipOptions { contact_nodes: Some(count), ..TipOptions::default() },
+            Tip::Patches(_) | Tip::Rows(_) => {
+                TipOptions { contact_patches: Some(count), contact_rows: Some(rows), ..TipOptions::default() }
+            }
         };
-        let tips = TipOptions { contact_nodes, contact_patches, ..TipOptions::default() };
         let kept = KeptOptions { modes: Some(modes), ..KeptOptions::default() };
         let file = other.and_then(|other| self.others.get(other)).map(PathBuf::as_path).or(self.file);
         let found = blade(file, self.options, (&tips, kept), console)?;

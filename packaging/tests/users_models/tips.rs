@@ -54,6 +54,73 @@ fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     }
 }
 
+/// Rows of patches across the thickness of an exported mesh: those of the blade itself, with a row in every name and their number in the ROM.
+#[test]
+fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
+    let project = Project::new(&[]);
+    let line = "reduce rotor37 --mesh 6x2x4 --inp blade.inp --contact-patches 4 --contact-rows 2 --modes 20 -o own.rom.safetensors";
+    let own = project.succeed(line);
+    assert!(own["rom"]["origin"].as_str().unwrap().contains("forces on 8 patches in 2 rows and 20"), "{own:#}");
+    let common = "reduce blade blade.inp --contact-set TIP --clamp-set HUB --sectors 36 --modes 20";
+    let read = project.succeed(&format!("{common} --contact-patches 4 --contact-rows 2 -o read.rom.safetensors"));
+    assert_eq!((&own["rom"]["contact_rows"], &read["rom"]["contact_rows"]), (&2.into(), &2.into()));
+    let [own, read] = ["own.rom.safetensors", "read.rom.safetensors"].map(|name| project.rom(name));
+    assert_eq!([own.rows(), read.rows()], [2, 2]);
+    for (contact, told) in
+        [("--contact-rows 2", "rows across the thickness 2\n"), ("", "1: the sides of the tip do not touch")]
+    {
+        let line = format!("{common} --contact-patches 4 {contact} --force -o told.rom.safetensors");
+        let output = project.run(&line);
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(text.contains(told), "{line}: {text}");
+    }
+    for (own, read) in own.contact_nodes.iter().zip(&read.contact_nodes) {
+        assert_eq!(own.name, read.name);
+        assert!(own.position.iter().zip(read.position).all(|(a, b)| (a - b).abs() < 1e-9), "{own:?} {read:?}");
+    }
+    let [first, last] = [&own.contact_nodes[0], &own.contact_nodes[7]];
+    assert_eq!([first.name.as_str(), last.name.as_str()], ["patch_1_row_1", "patch_4_row_2"]);
+    // The sides of the tip, not thirds of its thickness: rθ apart by the mesh's own sides, which lines of patches follow.
+    let across = own.contact_nodes[6].position[1] - own.contact_nodes[2].position[1];
+    assert!((2e-3..2e-2).contains(&across.abs()), "{across}");
+    let named = format!("{common} --contact-patches 2 --contact-rows 2 --contact-names a,b -o named.rom.safetensors");
+    project.succeed(&named);
+    let names: Vec<String> =
+        project.rom("named.rom.safetensors").contact_nodes.into_iter().map(|node| node.name).collect();
+    assert_eq!(names, ["a_row_1", "b_row_1", "a_row_2", "b_row_2"]);
+    // The scene that ships with rows, around the coarse blade.
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37-rows.toml");
+    let scene = fs::read_to_string(path).unwrap().replace("builtin:rotor37-rows", "read.rom.safetensors");
+    project.write("scene.toml", &scene);
+    let run = project.succeed("run scene.toml --stop 0.003 --estimate");
+    assert!(run["last"]["friction_loss"].as_f64().unwrap() > 100.0, "{run:#}");
+    let why = run["estimated_errors"]["rows"]["unknown"].as_str().unwrap();
+    assert!(why.contains("two rows of patches do not tell") && why.contains("--contact-rows 3"), "{why}");
+    let coating = "\n[contact.coating]\nthickness = 2e-3\nmodulus = 1e9\nyield_stress = 5e6\nhardening = 1e8\ncells_around = 720\ncells_along = 5\n";
+    project.write(
+        "coated.toml",
+        scene
+            .replace("\n[time]", &format!("{coating}\n[time]"))
+            .replace("galerkin", "modal-exact")
+            .replace("8.0e-5", "5.0e-7"),
+    );
+    let told = project.fail("run coated.toml --stop 0.001", 1);
+    assert!(told.contains("contact[1].coating: excludes a ROM whose contact patches are in rows"), "{told}");
+    for (line, told, code) in [
+        ("reduce rotor37 --contact-rows 2 --contact-nodes 3".to_owned(), "cannot be used with", 2),
+        ("reduce stage --contact-rows 2".to_owned(), "--contact-patches", 2),
+        (format!("{common} --contact-rows 2 -o no.rom"), "Say how many patches along the chord", 2),
+        (
+            format!("{common} --contact-patches 4 --contact-rows 14 -o no.rom"),
+            "14 rows of 4 are none, or more than the",
+            1,
+        ),
+        ("reduce rotor37 --mesh 6x1x4 --contact-patches 4 --contact-rows 0".to_owned(), "0 rows of 4 are none", 1),
+    ] {
+        assert!(project.fail(&line, code).contains(told), "{line}: {}", project.fail(&line, code));
+    }
+}
+
 /// The tip is found where no set names it: the nodes of the set TIP, of every kind of element; five patches, free-interface modes.
 #[test]
 fn the_tip_of_a_mesh_is_found_and_told() {
@@ -111,6 +178,8 @@ fn contact_at_points_of_a_fine_tip_is_warned_of() {
         ("blade_hex20.inp --contact-patches 7", None),
         ("blade_hex20.inp --contact-patches 9", Some("9 contact patches along about 6 edges of elements")),
         ("blade_tet10.msh --contact-set TIP --contact-patches 12", Some("12 contact patches along about")),
+        ("blade_hex20.inp --contact-patches 7 --contact-rows 3", None),
+        ("blade_hex20.inp --contact-patches 7 --contact-rows 4", Some("4 rows of contact patches across 2 elements")),
     ] {
         let told = warned(line);
         match wanted {

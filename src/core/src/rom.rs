@@ -61,8 +61,10 @@ pub struct RubErrors {
     pub found_on: String,
     /// By the number of modes; `None` where it is not known.
     pub modes: Option<f64>,
-    /// By the number of contact patches or nodes.
+    /// By the number of contact patches or nodes along the chord.
     pub patches: Option<f64>,
+    /// By the number of rows of patches across the thickness.
+    pub rows: Option<f64>,
     /// By the mesh.
     pub mesh: Option<f64>,
 }
@@ -163,6 +165,9 @@ pub struct RomExtras {
     pub watched: Option<Watched>,
     /// What the coordinates stand for.
     pub basis: Basis,
+    /// The contact patches are in so many rows across the thickness of the tip, one row after the other, each as the others along the chord;
+    /// `None` for one row, or nodes.
+    pub rows: Option<usize>,
 }
 
 /// Reduced-order model of one structure.
@@ -269,6 +274,7 @@ impl Rom {
         self.validate_spin(remedy)?;
         self.validate_thermal(remedy)?;
         self.validate_grid()?;
+        self.validate_rows(remedy)?;
         self.validate_watched(remedy)?;
         self.validate_harmonics(remedy)
     }

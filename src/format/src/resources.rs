@@ -76,6 +76,7 @@ fn needed(structure: &StructureSettings, rom: &Rom, settings: &SceneSettings) ->
         // Its displacements are outputs of watched sectors.
         watched: rom.extras.watched.clone().filter(|_| !settings.outputs.watched_sectors.is_empty()),
         basis: rom.extras.basis,
+        rows: rom.extras.rows,
     }
 }
 

@@ -6,7 +6,7 @@ pub(crate) const ROM_FORMAT: &str = "tiprub-rom";
 /// written in the first form that holds it, for older readers.
 pub(crate) const ROM_FORMAT_VERSIONS: [&str; 2] = ["1", "2"];
 /// Arrays and metadata of format 2.
-pub(crate) const SECOND_RELEASE: [&str; 11] = [
+pub(crate) const SECOND_RELEASE: [&str; 12] = [
     "contact_areas",
     "contact_lengths",
     "flexibility_deviation",
@@ -16,6 +16,7 @@ pub(crate) const SECOND_RELEASE: [&str; 11] = [
     "watched_positions",
     "watched_names",
     "basis",
+    "contact_rows",
     "rub_errors",
     "rub_errors_found_on",
 ];
@@ -219,7 +220,7 @@ const fn entry(name: &'static str, default: Option<&'static str>, description: &
 }
 
 /// Every metadata entry.
-pub const METADATA: [MetadataLayout; 16] = [
+pub const METADATA: [MetadataLayout; 17] = [
     entry("format", None, "Always `tiprub-rom`."),
     entry("format_version", None, "`1`, or `2` with anything that format 2 added, below."),
     entry("name", None, "Name of the structure."),
@@ -254,9 +255,15 @@ pub const METADATA: [MetadataLayout; 16] = [
          format 2.",
     ),
     entry(
+        "contact_rows",
+        Some("1"),
+        "Rows of contact patches across the thickness of the tip: patch row·(nodes/rows) + i is the i-th along the chord of its row, rows from \
+         side to side; format 2.",
+    ),
+    entry(
         "rub_errors",
         Some(""),
-        "What the reduction leaves of a rub, as far as it is known: `modes=0.01,patches=0.02,mesh=0.03`, relative errors of the \
+        "What the reduction leaves of a rub, as far as it is known: `modes=0.01,patches=0.02,rows=0.1,mesh=0.03`, relative errors of the \
          displacements of the tip; format 2.",
     ),
     entry("rub_errors_found_on", Some(""), "The scene that these were found on, in words; format 2."),

@@ -99,7 +99,8 @@ fn of_the_first_format(rom: &Rom) -> Rom {
 }
 
 fn rub_errors() -> RubErrors {
-    RubErrors { found_on: "a light rub, 4 ms".into(), modes: Some(0.0125), patches: None, mesh: Some(1.0 / 3.0) }
+    let found_on = "a light rub, 4 ms".into();
+    RubErrors { found_on, modes: Some(0.0125), patches: None, rows: Some(0.23), mesh: Some(1.0 / 3.0) }
 }
 
 #[test]
@@ -136,7 +137,7 @@ fn a_file_is_of_the_first_format_that_holds_it() {
     let plain = of_the_first_format(&full);
     let version = |rom: &Rom| Loose::of(rom).entries["format_version"].clone();
     assert_eq!(version(&plain), "1");
-    let with: [fn(&mut Rom, &Rom); 7] = [
+    let with: [fn(&mut Rom, &Rom); 8] = [
         |rom, full| rom.extras.watched.clone_from(&full.extras.watched),
         |rom, full| rom.extras.basis = full.extras.basis,
         |rom, full| rom.checks.response_frequencies.clone_from(&full.checks.response_frequencies),
@@ -144,6 +145,10 @@ fn a_file_is_of_the_first_format_that_holds_it() {
         |rom, full| rom.contact_nodes[1].area = full.contact_nodes[1].area,
         |rom, full| rom.contact_nodes[1].length = full.contact_nodes[1].length,
         |rom, _| rom.checks.rub_errors = Some(rub_errors()),
+        |rom, full| {
+            rom.contact_nodes.clone_from(&full.contact_nodes);
+            (rom.extras.grid, rom.extras.rows) = (None, Some(2));
+        },
     ];
     for change in with {
         let mut rom = plain.clone();
@@ -178,10 +183,10 @@ proptest! {
         seed in 0..u64::MAX / 2, order in 1..7usize, patches in 1..5usize, has in prop::array::uniform5(any::<bool>()),
     ) {
         let mut rom = complete(seed, order, patches);
-        let RomExtras { spin, thermal, grid, harmonics, watched, basis } = rom.extras;
+        let RomExtras { spin, thermal, grid, harmonics, watched, basis, rows } = rom.extras;
         rom.extras = RomExtras {
             spin: spin.filter(|_| has[0]), thermal: thermal.filter(|_| has[1]), grid: grid.filter(|_| has[2]), harmonics,
-            watched: watched.filter(|_| has[3]), basis,
+            watched: watched.filter(|_| has[3]), basis, rows,
         };
         if has[4] {
             rom = of_the_first_format(&rom);
@@ -191,6 +196,29 @@ proptest! {
         prop_assert_eq!(&again, &rom);
         prop_assert_eq!(write_rom(&again), bytes);
     }
+}
+
+/// Rows of patches are whole rows of two or more, of patches with areas; one row is none.
+#[test]
+fn rows_of_patches_fit_the_patches() {
+    let mut rom = complete(7, 3, 1);
+    (rom.extras.grid, rom.extras.rows) = (None, Some(2));
+    let nodes = rom.contact_nodes.len();
+    assert!(nodes.is_multiple_of(2));
+    let with = |rom: &Rom, rows: &str| {
+        let mut file = Loose::of(rom);
+        file.entries.insert("contact_rows".into(), rows.into());
+        read_rom(&file.bytes(), "rom")
+    };
+    assert_eq!(with(&rom, " 2 ").unwrap().rows(), 2);
+    assert_eq!(with(&rom, "1").unwrap().extras.rows, None);
+    let more = (nodes + 1).to_string();
+    for (rows, told) in [("two", "no whole number"), ("0", "0 rows of"), (more.as_str(), "are rows")] {
+        let error = with(&rom, rows).unwrap_err().to_string();
+        assert!(error.contains("`contact_rows`") && error.contains(told), "{error}");
+    }
+    rom.contact_nodes[0].area = 0.0;
+    assert!(with(&rom, "2").unwrap_err().to_string().contains("not patches with areas"));
 }
 
 /// A rectangle of 4 x 3 nodes with free edges, in a Cartesian frame.

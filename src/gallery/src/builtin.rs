@@ -36,11 +36,15 @@ pub const CUBE: &str = "cube";
 /// Its rings.
 pub const RINGS: [(&str, Side); 2] = [("ring-left", Side::Left), ("ring-right", Side::Right)];
 
+/// Rotor 37 with two rows of patches, which stand at the sides of its tip.
+pub(crate) const ROWS: &str = "rotor37-rows";
+
 /// Every name that [`rom`] knows.
 #[cfg(test)]
-pub(crate) const NAMES: [&str; 10] = [
+pub(crate) const NAMES: [&str; 11] = [
     "rotor37",
     "rotor37-spin",
+    ROWS,
     CASING37,
     STAGE,
     STAGE_CASING,
@@ -63,7 +67,7 @@ pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom
         cache.get(name, &model, console, &|| Ok(model.reduce(console)?.0.rom))
     };
     Some(match name {
-        "rotor37" => blade(None),
+        "rotor37" | ROWS => blade(None),
         "rotor37-spin" => blade(Some(DESIGN_SPEED)),
         CASING37 => {
             let options = CasingOptions::default();
@@ -94,9 +98,13 @@ fn plain(name: &str) -> &str {
     name.strip_suffix(PAPER_SUFFIX).unwrap_or(name)
 }
 
-/// The blade as it ships, or as the paper has it.
+/// The blade as it ships, with rows of patches, or as the paper has it.
 fn rotor37(name: &str) -> Rotor37Options {
-    if name.ends_with(PAPER_SUFFIX) { Rotor37Options::paper() } else { Rotor37Options::default() }
+    match name {
+        name if name.ends_with(PAPER_SUFFIX) => Rotor37Options::paper(),
+        ROWS => Rotor37Options::in_rows(),
+        _ => Rotor37Options::default(),
+    }
 }
 
 /// Whether the contact nodes of a model can be chosen anew by their number: blades along their chord.
@@ -124,6 +132,7 @@ impl Other {
         let tip = match self.tip {
             Tip::Nodes(count) => format!("nodes-{count}"),
             Tip::Patches(count) => format!("patches-{count}"),
+            Tip::Rows([count, rows]) => format!("patches-{count}x{rows}"),
         };
         format!("{name}-modes-{:.3}-{tip}-mesh-{:.3}", self.modes, self.mesh)
     }
@@ -147,13 +156,13 @@ pub fn refined(name: &str, other: Other, cache: &RomCache, console: &Console) ->
         keep(&options, &|| Ok(reduction::rotor37(&options, console)?.rom))
     };
     Some(match plain(name) {
-        "rotor37" => of_blade(None),
+        "rotor37" | ROWS => of_blade(None),
         "rotor37-spin" => of_blade(Some(DESIGN_SPEED)),
         name @ (STAGE | STAGE_COARSE) => {
             let (name, options) = stage(name == STAGE_COARSE);
             let kind = match other.tip {
                 Tip::Nodes(_) => options.kind,
-                Tip::Patches(_) => ReductionKind::FreeInterface,
+                Tip::Patches(_) | Tip::Rows(_) => ReductionKind::FreeInterface,
             };
             let sector = SectorOptions { counts: stage_mesh(options.sector.counts, other.mesh), ..options.sector };
             let options = StageOptions { modes: families(options.modes), tip: other.tip, kind, sector, ..options };
@@ -187,7 +196,7 @@ pub fn refined(name: &str, other: Other, cache: &RomCache, console: &Console) ->
 /// A factor that leaves no element.
 pub fn mesh_nodes(name: &str, mesh: f64) -> Option<Result<usize>> {
     let nodes = match plain(name) {
-        "rotor37" | "rotor37-spin" => {
+        "rotor37" | "rotor37-spin" | ROWS => {
             blade_mesh(rotor37_mesh(rotor37(name).mesh, mesh)).map(|blade| blade.mesh.nodes.len())
         }
         name @ (STAGE | STAGE_COARSE) => {

@@ -25,8 +25,9 @@ pub(crate) const STAGE_SCENE: &str = include_str!("../scenes/stage.toml");
 pub const CUBE_SCENE: &str = include_str!("../scenes/cube-between-rings.toml");
 
 /// Scenes that ship with tiprub: what stands behind `builtin:`, and the text.
-pub const BUILTIN_SCENES: [(&str, &str); 6] = [
+pub const BUILTIN_SCENES: [(&str, &str); 7] = [
     ("rotor37", ROTOR37_SCENE),
+    ("rotor37-rows", include_str!("../scenes/rotor37-rows.toml")),
     ("rotor37-paper", ROTOR37_PAPER_SCENE),
     ("flexible-casing", include_str!("../scenes/flexible-casing.toml")),
     ("abradable", include_str!("../scenes/abradable.toml")),

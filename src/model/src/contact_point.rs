@@ -18,12 +18,19 @@ pub struct ContactPoint {
     pub area: f64,
     /// Length along the chord that it stands for (m); 0 for a node.
     pub length: f64,
+    /// Row across the thickness, from 0; all points of a row follow each other.
+    pub row: usize,
 }
 
 impl ContactPoint {
     /// A node alone.
     pub fn at(name: impl Into<String>, node: usize, meridional_slope: f64) -> Self {
-        Self { name: name.into(), node, patch: Vec::new(), meridional_slope, area: 0.0, length: 0.0 }
+        Self { name: name.into(), node, patch: Vec::new(), meridional_slope, area: 0.0, length: 0.0, row: 0 }
+    }
+
+    /// Number of rows across the thickness that points are in, where there are several.
+    pub fn rows(points: &[Self]) -> Option<usize> {
+        points.iter().map(|point| point.row + 1).max().filter(|rows| *rows > 1)
     }
 
     /// Nodes and weights.

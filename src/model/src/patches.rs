@@ -12,6 +12,8 @@ mod tip;
 
 use std::collections::HashMap;
 
+use nalgebra::DMatrix;
+
 use crate::contact_point::ContactPoint;
 use crate::element::ElementKind;
 use crate::mesh::{Element, Mesh};
@@ -24,6 +26,8 @@ pub use tip::{FoundTip, find_tip};
 
 /// Every face is divided into so many parts in both directions: hat functions have kinks.
 const PARTS: usize = 4;
+/// Patches depend on each other below this share of the largest eigenvalue of their weights' products.
+const DEPENDENT: f64 = 1e-9;
 /// Gauss-Legendre points and weights of a part, on 0 to 1.
 const GAUSS: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
 
@@ -40,12 +44,16 @@ pub fn contact_patches(
     tip_patches(mesh, set, [count, 1], name)
 }
 
-/// The same in rows across the thickness, one row after the other. A tip that tilts touches with one of its sides: the mean over the
-/// thickness does not see it, and forces on that mean do not bend the blade. With hat functions h_k along the chord and h_l across, 0 to 1
-/// between the sides of the tip's outline, the weights are w_p = ∫ h_k h_l N_p dA / ∫ h_k h_l dA.
+/// The same in rows across the thickness, one row after the other, by growing angle at the tip's chord. A tip that tilts touches with one of
+/// its sides: the mean over the thickness does not see it, and forces on that mean do not bend the blade.
+///
+/// With hat functions h_k along the chord and χ_l across, 0 to 1 between the sides of the tip's outline, the weights are
+/// w_p = ∫ h_k χ_l N_p dA / ∫ h_k χ_l dA. Hat functions h_l across would leave the outermost rows within the tip, two of them at its thirds.
+/// Their duals χ_l with ∫ χ_l h_m = δ_lm ∫ h_l add up to one as they do, and rows stand where the hats have their peaks: the outermost are the
+/// sides of the tip. A tip that stays straight across its thickness stays outside of all that two rows stay outside of.
 ///
 /// # Errors
-/// Those of [`contact_patches`]; no rows, or more than the tip has nodes across.
+/// Those of [`contact_patches`]; no rows, or more than the nodes of the tip tell apart.
 pub fn tip_patches(
     mesh: &Mesh,
     set: &[usize],
@@ -62,22 +70,61 @@ pub fn tip_patches(
     }
     if rows == 0 || count * rows > set.len() {
         let problem = format!("{rows} rows of {count} are none, or more than the {} nodes of the tip", set.len());
-        return Err(Error::invalid("rows of contact patches", problem, "Ask for another number, or refine the tip"));
+        return Err(rows_refused(problem));
     }
     let outline = Outline::new(mesh, &faces, &places);
+    let duals = duals(rows);
     let products = |position: [f64; 3]| -> Vec<(usize, f64)> {
         let along = hats(places.share_along(position), count);
         if rows == 1 {
             return along.to_vec();
         }
         let across = hats(outline.share_across(places.developed(position)), rows);
-        across.iter().flat_map(|(l, b)| along.map(|(k, a)| (l * count + k, a * b))).collect()
+        let dual = |row: usize| across.iter().map(|(other, hat)| duals[(row, *other)] * hat).sum::<f64>();
+        (0..rows).flat_map(|row| along.map(|(k, hat)| (row * count + k, hat * dual(row)))).collect()
     };
     let weights = weights(mesh, (set, faces), count * rows, products)?;
+    if rows > 1 && !independent(&weights) {
+        let problem = format!("{rows} rows of {count} follow from each other by the nodes that the tip has across");
+        return Err(rows_refused(problem));
+    }
     let patches = weights.into_iter().enumerate();
-    let length =
-        |patch: usize| places.length() * share_of_chord(patch % count, count) * share_of_chord(patch / count, rows);
-    Ok(patches.map(|(patch, weights)| point(mesh, set, &places, (&weights, length(patch)), name(patch))).collect())
+    let length = |patch: usize| places.length() * share_of_chord(patch % count, count);
+    let point = |(patch, weights): (usize, Vec<f64>)| {
+        let found = point(mesh, set, &places, (&weights, length(patch)), name(patch));
+        ContactPoint { row: patch / count, ..found }
+    };
+    Ok(patches.map(point).collect())
+}
+
+/// Names of patches along the chord, that of each row of its own: `patch_5_row_2`.
+pub fn row_name(along: &str, row: usize, rows: usize) -> String {
+    if rows == 1 { along.to_owned() } else { format!("{along}_row_{}", row + 1) }
+}
+
+fn rows_refused(problem: String) -> Error {
+    Error::invalid("rows of contact patches", problem, "Ask for fewer rows, or refine the tip across its thickness")
+}
+
+/// Duals of hat functions in hat functions: row l of ∫ h_l (∫ h h)⁻¹.
+fn duals(rows: usize) -> DMatrix<f64> {
+    let share = |row: usize| share_of_chord(row, rows);
+    let product = |i: usize, j: usize| match (i.abs_diff(j), rows) {
+        (0, 1) => 1.0,
+        (0, _) => 2.0 / 3.0 * share(i),
+        (1, _) => 1.0 / (6.0 * (rows - 1) as f64),
+        _ => 0.0,
+    };
+    let inverse = DMatrix::from_fn(rows, rows, product).try_inverse().unwrap_or_else(|| DMatrix::identity(rows, rows));
+    DMatrix::from_fn(rows, rows, |i, j| share(i) * inverse[(i, j)])
+}
+
+/// Whether no patch follows from the others.
+fn independent(weights: &[Vec<f64>]) -> bool {
+    let size = |weights: &[f64]| weights.iter().map(|weight| weight * weight).sum::<f64>().sqrt();
+    let scaled = DMatrix::from_fn(weights.len(), weights[0].len(), |i, j| weights[i][j] / size(&weights[i]));
+    let gram = (&scaled * scaled.transpose()).symmetric_eigenvalues();
+    gram.min() > DEPENDENT * gram.max()
 }
 
 /// A grid of patches over a face of a body, rows along the first of two directions (unit vectors), in growing place along the second. With hat

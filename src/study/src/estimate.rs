@@ -1,5 +1,5 @@
-//! What steps, modes and patches of a scene leave, estimated from coarser runs: a scene alone is needed, no mesh and no truth. What the mesh
-//! leaves stands in the ROM, where somebody has found it (`tiprub study convergence --into`).
+//! What steps, modes, patches along the chord and rows of them across the thickness leave, estimated from coarser runs: a scene alone is
+//! needed, no mesh and no truth. What the mesh leaves stands in the ROM, where somebody has found it (`tiprub study convergence --into`).
 //!
 //! Three levels of a direction, each about twice as fine as the one before, the scene's own the finest: changes c₁ and c₂ from level
 //! to level. Where they shrink as a power, r = c₁/c₂ tells which, and c₂/(r − 1) is what all further refinement would change; r counts
@@ -12,7 +12,7 @@ use tiprub_shell::{Result, console::Console};
 
 use crate::convergence::{
     Refined, Runner,
-    coarsen::coarsened,
+    coarsen::{coarsened, fewer_rows},
     refine::{Direction, Level, OF_CLEARANCE, SECONDS, goes_by_tolerance, with_division},
     truncate::{Form, truncated},
 };
@@ -23,13 +23,20 @@ const SHRINKING: f64 = 1.3;
 /// Least and largest ratio of changes later on. Steps go at first order through contact, whatever long ones promise: all further changes
 /// together are as large as the last. Modes go at first order at least, patches at nearly the second: their hat functions follow a
 /// smooth pressure.
-const LATER: [(&str, [f64; 2]); 3] =
-    [("steps", [2.0, 2.0]), ("modes", [2.0, f64::INFINITY]), ("patches", [3.0, f64::INFINITY])];
+const LATER: [(&str, [f64; 2]); 4] = [
+    ("steps", [2.0, 2.0]),
+    ("modes", [2.0, f64::INFINITY]),
+    ("patches", [3.0, f64::INFINITY]),
+    ("rows", [3.0, f64::INFINITY]),
+];
+/// What directions are called in words, where their names do not do.
+const WORDS: [(&str, &str); 2] =
+    [("patches", "patches along the chord"), ("rows", "rows of patches across the thickness")];
 
 /// What one direction leaves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
-    /// `steps`, `modes`, `patches` or `mesh`.
+    /// `steps`, `modes`, `patches`, `rows` or `mesh`.
     pub direction: &'static str,
     /// Of the displacements (relative L2), or why it is not known. Of impulse and work the truth is too often passed by chance for
     /// estimates to hold.
@@ -49,6 +56,7 @@ impl Estimate {
         let known = match self.direction {
             "modes" => errors.modes,
             "patches" => errors.patches,
+            "rows" => errors.rows,
             "mesh" => errors.mesh,
             _ => None,
         };
@@ -87,11 +95,15 @@ impl Estimate {
         (self.direction.to_owned(), value)
     }
 
+    fn words(&self) -> &'static str {
+        WORDS.iter().find(|(name, _)| *name == self.direction).map_or(self.direction, |(_, words)| words)
+    }
+
     /// "modes 1.2 %"; "mesh unknown".
     pub fn told(&self) -> String {
         match self.left {
-            Ok(left) => format!("{} {:.2} %", self.direction, 100.0 * left),
-            Err(_) => format!("{} unknown", self.direction),
+            Ok(left) => format!("{} {:.2} %", self.words(), 100.0 * left),
+            Err(_) => format!("{} unknown", self.words()),
         }
     }
 }
@@ -110,7 +122,7 @@ pub fn told(estimates: &[Estimate]) -> String {
     let mut text = format!("estimated error of the displacements: {}", all.join(", "));
     let of_rom = |one: &&Estimate| one.found_on.is_some();
     if let Some(found_on) = estimates.iter().find_map(|one| one.found_on.as_ref()) {
-        let which: Vec<&str> = estimates.iter().filter(of_rom).map(|one| one.direction).collect();
+        let which: Vec<&str> = estimates.iter().filter(of_rom).map(Estimate::words).collect();
         let found_on = if found_on.is_empty() { "an unnamed rub" } else { found_on };
         text.push_str(&format!(" ({} as the ROM has it, found on {found_on})", which.join(" and ")));
     }
@@ -123,7 +135,7 @@ pub fn of_rom(rom: &Rom) -> Vec<Estimate> {
         return Vec::new();
     }
     let steps = Estimate::unknown("steps", "they are of a run, not of a ROM: `tiprub run --estimate` tells");
-    let others = ["modes", "patches", "mesh"].map(|direction| {
+    let others = ["modes", "patches", "rows", "mesh"].map(|direction| {
         Estimate::unknown(direction, "nobody has found it: `tiprub study convergence --into` does").or_of(rom)
     });
     [steps].into_iter().chain(others).collect()
@@ -179,13 +191,38 @@ fn modes(scene: &Scene, division: u32) -> std::result::Result<Direction, String>
 
 fn patches(scene: &Scene, division: u32) -> std::result::Result<Direction, String> {
     let master = crate::master(scene);
-    let own = scene.roms[master].contact_nodes.len();
+    let along = |rom: &Rom| rom.contact_nodes.len() / rom.rows();
+    let own = along(&scene.roms[master]);
     let half = coarsened(&scene.roms[master])?;
     let quarter = coarsened(&half)?;
-    let levels = [quarter, half].map(|rom| with_rom(scene, master, rom.contact_nodes.len(), rom, division));
+    let levels = [quarter, half].map(|rom| with_rom(scene, master, along(&rom), rom, division));
     let mut levels = Vec::from(levels);
     levels.push(Level { value: own as f64, own: true, scene: scene.clone(), division });
     Ok(direction("contact patches", "patches", levels))
+}
+
+/// One and two of three rows across the thickness; fewer rows do not tell what more would change.
+pub(crate) fn rows(scene: &Scene, division: u32) -> std::result::Result<Direction, String> {
+    let master = crate::master(scene);
+    let rom = &scene.roms[master];
+    if rom.contact_nodes.iter().any(|patch| patch.area <= 0.0) {
+        return Err("contact is at nodes, which say nothing of the sides of the tip".into());
+    }
+    let own = rom.rows();
+    if own < 3 {
+        let all =
+            if own == 1 { "one row of patches, over the whole thickness, does" } else { "two rows of patches do" };
+        return Err(format!(
+            "{all} not tell what more would change: a ROM with --contact-rows 3 does, and `tiprub study convergence` where it can \
+             reduce again"
+        ));
+    }
+    let mut levels = Vec::new();
+    for fewer in [1, 2] {
+        levels.push(with_rom(scene, master, fewer, fewer_rows(rom, fewer)?, division));
+    }
+    levels.push(Level { value: own as f64, own: true, scene: scene.clone(), division });
+    Ok(direction("rows of contact patches", "rows", levels))
 }
 
 fn with_rom(scene: &Scene, index: usize, value: usize, rom: Rom, division: u32) -> Level {
@@ -207,14 +244,16 @@ pub fn estimates(
 ) -> Result<Vec<Estimate>> {
     if let Err(several) = crate::one_rotor(&scene.settings) {
         let why = several.to_string();
-        return Ok(["steps", "modes", "patches", "mesh"]
+        return Ok(["steps", "modes", "patches", "rows", "mesh"]
             .map(|direction| Estimate::unknown(direction, why.as_str()))
             .into());
     }
     let runner = Runner::new(settings, samples, console);
     let division = own_division(scene);
     let mut found = vec![of_steps(scene, division, &runner)?];
-    for (name, direction) in [("modes", modes(scene, division)), ("patches", patches(scene, division))] {
+    let own =
+        [("modes", modes(scene, division)), ("patches", patches(scene, division)), ("rows", rows(scene, division))];
+    for (name, direction) in own {
         found.push(match direction {
             Ok(direction) => Estimate::of(name, &runner.as_it_is(direction)?),
             Err(why) => Estimate::unknown(name, why),
@@ -268,19 +307,25 @@ mod tests {
         let mut rom = reduce_rotor37(&options, &|_| {}).unwrap().rom;
         assert!(of_rom(&rom).is_empty());
         let found_on = "a light rub".to_owned();
-        rom.checks.rub_errors = Some(RubErrors { found_on, modes: None, patches: Some(0.02), mesh: Some(0.05) });
+        rom.checks.rub_errors =
+            Some(RubErrors { found_on, modes: None, patches: Some(0.02), rows: None, mesh: Some(0.05) });
         let known = Estimate { direction: "patches", left: Ok(0.01), found_on: None };
         let all = [Estimate::unknown("modes", "refused"), known.clone(), Estimate::unknown("mesh", "no other")];
         let all = all.map(|estimate| estimate.or_of(&rom));
         assert_eq!(all[1], known, "what the run tells stays");
         let told = told(&all);
         assert!(
-            told.ends_with("modes unknown, patches 1.00 %, mesh 5.00 % (mesh as the ROM has it, found on a light rub)"),
+            told.ends_with(
+                "modes unknown, patches along the chord 1.00 %, mesh 5.00 % (mesh as the ROM has it, found on a light rub)"
+            ),
             "{told}"
         );
         let told = super::told(&of_rom(&rom));
         assert!(
-            told.contains("steps unknown, modes unknown, patches 2.00 %, mesh 5.00 % (patches and mesh as"),
+            told.contains(
+                "steps unknown, modes unknown, patches along the chord 2.00 %, rows of patches across the thickness unknown, mesh \
+                 5.00 % (patches along the chord and mesh as"
+            ),
             "{told}"
         );
     }

@@ -1,4 +1,4 @@
-//! Contact grids: what a surface can be laid through.
+//! Contact grids, what a surface can be laid through; rows of contact patches.
 
 use super::{ContactGrid, ContactNode, Frame, Rom};
 use crate::{Error, Result};
@@ -7,6 +7,23 @@ use crate::{Error, Result};
 const SAME_NODE: f64 = 1e-9;
 
 impl Rom {
+    /// Rows of contact patches across the thickness, one where nothing is said.
+    pub fn rows(&self) -> usize {
+        self.extras.rows.unwrap_or(1)
+    }
+
+    pub(super) fn validate_rows(&self, remedy: &str) -> Result<()> {
+        let Some(rows) = self.extras.rows else { return Ok(()) };
+        let nodes = self.contact_nodes.len();
+        let patches = self.contact_nodes.iter().all(|node| node.area > 0.0);
+        if rows >= 2 && nodes.is_multiple_of(rows) && patches && self.extras.grid.is_none() {
+            return Ok(());
+        }
+        let what = if patches { "patches" } else { "contact nodes, not patches with areas" };
+        let problem = format!("{rows} rows of {nodes} {what}; two or more of equally many patches are rows");
+        Err(Error::invalid("ROM metadata `contact_rows`", problem, remedy))
+    }
+
     /// Check that the contact nodes are the grid that the ROM says they are.
     pub(super) fn validate_grid(&self) -> Result<()> {
         let Some(grid) = self.extras.grid else { return Ok(()) };

@@ -286,6 +286,14 @@ static ROMS: &[Rule] = &[
         "they say how each patch expands the structure",
         "Reduce it with thermal patches, or leave thermal out",
     ),
+    excludes(
+        &[COATING],
+        ("a ROM whose contact patches are in rows across the thickness", |at| {
+            at.master_rom().is_some_and(|rom| rom.rows() > 1)
+        }),
+        "a row of cells is worn by what it sees between two patches along the axis, and patches of several rows would take turns",
+        "Reduce it with one row of patches (without --contact-rows), or remove the coating",
+    ),
     needs(
         &[LOAD],
         ("a contact grid in the ROM", |at| at.rom().extras.grid.is_some()),

@@ -11,6 +11,9 @@ use crate::{Result, suggestion};
 /// Third word of a contact grid with free edges all around.
 const OPEN: &str = "open";
 
+/// Metadata entry of the rows of patches.
+const ROWS: &str = "contact_rows";
+
 /// Values of the metadata entry `basis`.
 const BASES: [(&str, Basis); 2] = [("craig-bampton", Basis::FixedInterface), ("free-interface", Basis::FreeInterface)];
 
@@ -23,7 +26,18 @@ impl Reader<'_> {
             harmonics: Vec::new(),
             watched: self.watched(arrays, metadata, order)?,
             basis: self.basis(metadata)?,
+            rows: self.rows(metadata)?,
         })
+    }
+
+    fn rows(&self, metadata: &Metadata) -> Result<Option<usize>> {
+        let Some(text) = metadata.get(ROWS) else { return Ok(None) };
+        match text.trim().parse::<usize>() {
+            Ok(rows) => Ok(Some(rows).filter(|rows| *rows != 1)),
+            Err(_) => {
+                Err(self.error(format!("metadata `{ROWS}`"), format!("{text:?} is no whole number"), WRITE_AGAIN))
+            }
+        }
     }
 
     fn basis(&self, metadata: &Metadata) -> Result<Basis> {
@@ -175,5 +189,6 @@ pub(super) fn metadata(extras: &RomExtras) -> Vec<(&'static str, String)> {
     let watched = extras.watched.as_ref().map(|watched| ("watched_names", names(&watched.points)));
     let told = BASES.iter().find(|(_, basis)| *basis == extras.basis && extras.basis != Basis::default());
     let basis = told.map(|(name, _)| ("basis", (*name).to_owned()));
-    speed.into_iter().chain(grid).chain(watched).chain(basis).collect()
+    let rows = extras.rows.map(|rows| (ROWS, rows.to_string()));
+    speed.into_iter().chain(grid).chain(watched).chain(basis).chain(rows).collect()
 }

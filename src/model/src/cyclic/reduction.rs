@@ -196,7 +196,12 @@ fn assembled(
         contact_map: first.contact_map.map(|value| value.re),
         contact_nodes: contact.iter().map(|point| contact_node(model, point)).collect(),
         checks,
-        extras: RomExtras { harmonics: rest.collect(), basis: options.kind.basis(), ..RomExtras::default() },
+        extras: RomExtras {
+            harmonics: rest.collect(),
+            basis: options.kind.basis(),
+            rows: ContactPoint::rows(contact),
+            ..RomExtras::default()
+        },
     };
     rom.validate()?;
     Ok(CyclicReduction {

@@ -14,6 +14,9 @@ const OUTWARD: f64 = core::f64::consts::FRAC_1_SQRT_2;
 /// Share of the radius by which another face may lie below the tip at its axial position and still be as far out.
 const AS_FAR_OUT: f64 = 1e-3;
 
+/// Share of the chord at which elements across it are counted: near its middle, on no line of a regular mesh.
+const MIDDLE: f64 = 0.4931;
+
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundTip {
@@ -23,6 +26,8 @@ pub struct FoundTip {
     pub faces: usize,
     /// Number of places along its chord that nodes stand at.
     pub places: usize,
+    /// Number of elements across its thickness, in the middle of its chord.
+    pub across: usize,
     /// Length along its chord (m).
     pub chord: f64,
     /// Median length of the edges of its faces (m).
@@ -87,9 +92,23 @@ pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
         return Err(not_found(problem, "This is no tip of a blade: check clamped nodes and axis"));
     }
     let places = Places::new(&mesh.nodes, &nodes);
+    let across = elements_across(mesh, &own, &places);
     let (places, chord) = (places.stations(), places.chord_length());
     let (edge, axial) = (median_edge(mesh, &own), extent(mesh, &nodes, |[_, _, z]| z));
-    Ok(FoundTip { faces: own.len(), nodes, places, chord, edge, radius, axial, elsewhere })
+    Ok(FoundTip { faces: own.len(), nodes, places, across, chord, edge, radius, axial, elsewhere })
+}
+
+/// Faces that a line across the chord meets in its middle; of triangles two in a layer.
+fn elements_across(mesh: &Mesh, faces: &[&Face], places: &Places) -> usize {
+    let along = |node: usize| places.share_along(mesh.nodes[node]);
+    let meets = |face: &Face| {
+        let ends = face.corner_nodes().into_iter().map(along);
+        let [low, high] = ends.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
+        (low..high).contains(&MIDDLE)
+    };
+    let halves = |face: &&&Face| if face.corners.len() == 3 { 1 } else { 2 };
+    let met = faces.iter().filter(|face| meets(face)).map(|face| halves(&face)).sum::<usize>();
+    met.div_ceil(2).max(1)
 }
 
 /// Corners and mid-side nodes of faces, ascending.

@@ -59,7 +59,7 @@ pub(super) fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: Fram
 /// What is held where fixed-interface modes are found, for the ROM's origin.
 pub(crate) fn interface(contact: &[ContactPoint]) -> String {
     let patches = contact.iter().filter(|point| !point.patch.is_empty()).count();
-    let of = if patches > 0 { format!(" of {patches} patches") } else { String::new() };
+    let of = if patches > 0 { format!(" of {patches} patches{}", in_rows(contact)) } else { String::new() };
     format!("{} interface degrees of freedom{of}", 3 * contact.len())
 }
 
@@ -67,8 +67,12 @@ pub(crate) fn interface(contact: &[ContactPoint]) -> String {
 pub(crate) fn responses(contact: &[ContactPoint]) -> String {
     match contact.iter().filter(|point| !point.patch.is_empty()).count() {
         0 => format!("static responses to forces on {} contact nodes", contact.len()),
-        patches => format!("static responses to forces on {patches} patches"),
+        patches => format!("static responses to forces on {patches} patches{}", in_rows(contact)),
     }
+}
+
+fn in_rows(contact: &[ContactPoint]) -> String {
+    ContactPoint::rows(contact).map_or(String::new(), |rows| format!(" in {rows} rows"))
 }
 
 /// What the full model is made of, and how many of its nodes are clamped.
@@ -145,7 +149,7 @@ pub(super) fn build_rom(
         contact_map: DMatrix::identity(boundary, order),
         contact_nodes: contact.iter().map(|point| contact_node(&full.nodes, point, options.frame)).collect(),
         checks,
-        extras: RomExtras { basis: options.kind.basis(), ..RomExtras::default() },
+        extras: RomExtras { basis: options.kind.basis(), rows: ContactPoint::rows(contact), ..RomExtras::default() },
     }
 }
 

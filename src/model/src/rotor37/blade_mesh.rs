@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{Section, SurfacePoint, sections};
 use crate::element::ElementKind;
 use crate::mesh::{Element, Mesh};
-use crate::patches::contact_patches;
+use crate::patches::{contact_patches, row_name, tip_patches};
 use crate::reduce::ContactPoint;
 use crate::{Error, Result};
 
@@ -85,6 +85,15 @@ impl BladeMesh {
     /// Those of [`contact_patches`](crate::patches::contact_patches).
     pub fn contact_patches(&self, count: usize) -> Result<Vec<ContactPoint>> {
         contact_patches(&self.mesh, self.mesh.set("tip")?, count, |index| format!("patch_{}", index + 1))
+    }
+
+    /// The same in rows across the thickness, side to side: `patch_1_row_1`, `patch_2_row_1`, ...
+    ///
+    /// # Errors
+    /// Those of [`tip_patches`](crate::patches::tip_patches).
+    pub fn contact_rows(&self, [count, rows]: [usize; 2]) -> Result<Vec<ContactPoint>> {
+        let name = |index: usize| row_name(&format!("patch_{}", index % count + 1), index / count, rows);
+        tip_patches(&self.mesh, self.mesh.set("tip")?, [count, rows], name)
     }
 
     /// `count` contact nodes spread along the tip's mid-thickness line: `leading_edge`, `tip_2`, ..., `trailing_edge`,

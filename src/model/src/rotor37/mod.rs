@@ -56,6 +56,26 @@ pub enum Tip {
     Nodes(usize),
     /// So many patches along the chord, over the whole thickness.
     Patches(usize),
+    /// So many along the chord, in so many rows across the thickness, the outermost at its sides.
+    Rows([usize; 2]),
+}
+
+impl Tip {
+    /// So many patches along the chord, in so many rows; one row is over the whole thickness.
+    pub fn patches(counts: [usize; 2]) -> Self {
+        match counts {
+            [count, 1] => Self::Patches(count),
+            counts => Self::Rows(counts),
+        }
+    }
+
+    /// Nodes or patches along the chord, and rows of them across the thickness.
+    pub fn counts(self) -> [usize; 2] {
+        match self {
+            Self::Nodes(count) | Self::Patches(count) => [count, 1],
+            Self::Rows(counts) => counts,
+        }
+    }
 }
 
 /// What to build.
@@ -93,6 +113,12 @@ impl Default for Rotor37Options {
 }
 
 impl Rotor37Options {
+    /// As it ships, with the patches in two rows, which stand at the sides of the tip.
+    pub fn in_rows() -> Self {
+        let [patches, _] = Self::default().tip.counts();
+        Self { tip: Tip::Rows([patches, 2]), ..Self::default() }
+    }
+
     /// The paper's kind of model: Craig and Bampton's modes, three contact nodes.
     pub fn paper() -> Self {
         Self {
@@ -119,6 +145,7 @@ pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Resul
     let (contact, watched) = match options.tip {
         Tip::Nodes(count) => (blade.contact_points(count)?, Vec::new()),
         Tip::Patches(count) => (blade.contact_patches(count)?, blade.contact_points(WATCHED)?),
+        Tip::Rows(counts) => (blade.contact_rows(counts)?, blade.contact_points(WATCHED)?),
     };
     report(listener, Stage::Mesh, 1, 1);
     let clamped = blade.mesh.set("hub")?.to_vec();

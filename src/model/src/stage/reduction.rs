@@ -88,6 +88,7 @@ pub fn stage_model(options: &StageOptions, listener: Listener<'_>) -> Result<Sta
     let contact = match options.tip {
         Tip::Nodes(count) => sector.contact_points(count)?,
         Tip::Patches(count) => sector.contact_patches(count)?,
+        Tip::Rows(counts) => sector.contact_rows(counts)?,
     };
     report(listener, Stage::Mesh, 1, 1);
     let origin = format!("Parametric stage of {} sectors, bore clamped", options.sector.geometry.sectors);

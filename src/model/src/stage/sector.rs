@@ -3,7 +3,7 @@
 use super::geometry::SectorGeometry;
 use crate::element::ElementKind;
 use crate::mesh::Mesh;
-use crate::patches::contact_patches;
+use crate::patches::{contact_patches, row_name, tip_patches};
 use crate::reduce::ContactPoint;
 use crate::rotor37::{place_name, spread_contact};
 use crate::{Error, Result};
@@ -180,5 +180,14 @@ impl SectorMesh {
     /// Those of [`contact_patches`].
     pub fn contact_patches(&self, count: usize) -> Result<Vec<ContactPoint>> {
         contact_patches(&self.mesh, self.mesh.set("TIP")?, count, |index| place_name(index, count))
+    }
+
+    /// The same in rows across the thickness, side to side.
+    ///
+    /// # Errors
+    /// Those of [`tip_patches`].
+    pub fn contact_rows(&self, [count, rows]: [usize; 2]) -> Result<Vec<ContactPoint>> {
+        let name = |index: usize| row_name(&place_name(index % count, count), index / count, rows);
+        tip_patches(&self.mesh, self.mesh.set("TIP")?, [count, rows], name)
     }
 }

@@ -110,6 +110,10 @@ mod tests {
                 assert!((low - 0.02..high + 0.02).contains(&part.tip.slope), "{part:?}, {low} to {high}");
             }
         }
+        // Of three faces in a row: all nodes but the middles of the two edges between them.
+        let outline = Part::outline(&blade.mesh, tip);
+        assert_eq!(outline.len(), tip.len() - 2, "{outline:?}");
+        assert!(outline.iter().all(|part| (low - 0.02..high + 0.02).contains(&part.tip.slope)), "{outline:?}");
         let full = Blade::new(&blade.mesh, &Material::steel(), blade.mesh.set("hub").unwrap()).unwrap();
         let parts = Part::points(&blade.mesh, tip, 1);
         let steps = Steps { interval: 1e-5, division: 4, samples: 40 };

@@ -1,5 +1,7 @@
 //! Where contact is asked for: means over patches, or points of the faces.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use tiprub_model::Mesh;
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Element;
@@ -66,6 +68,39 @@ impl Part {
         let slope = total(|[dr, dz]| dr * dz) / total(|[_, dz]| dz * dz);
         let nodes = element.nodes.iter().zip(shape.values).filter(|(_, value)| value.abs() > 1e-12);
         Self { tip: Tip { radius, angle, slope }, shares: nodes.map(|(node, value)| (*node, value, angle)).collect() }
+    }
+
+    /// All nodes of the outline of the faces whose nodes are in the set (ascending), ends of the tip included, on the slope of the nearest of
+    /// Gauss's points.
+    pub fn outline(mesh: &Mesh, set: &[usize]) -> Vec<Self> {
+        let mut sides: BTreeMap<[usize; 2], (usize, Option<usize>)> = BTreeMap::new();
+        for element in &mesh.elements {
+            let within = |corner: &usize| set.binary_search(&element.nodes[*corner]).is_ok();
+            for corners in element.kind.faces().iter().filter(|corners| corners.iter().all(within)) {
+                for (index, &first) in corners.iter().enumerate() {
+                    let second = corners[(index + 1) % corners.len()];
+                    let (a, b) = (element.nodes[first], element.nodes[second]);
+                    let edge =
+                        element.kind.edges().iter().position(|ends| ends.contains(&first) && ends.contains(&second));
+                    let middle = edge.and_then(|edge| element.nodes.get(element.kind.corner_count() + edge));
+                    sides.entry([a.min(b), a.max(b)]).or_insert((0, middle.copied())).0 += 1;
+                }
+            }
+        }
+        let once = sides.iter().filter(|(_, (faces, _))| *faces == 1);
+        let nodes: BTreeSet<usize> = once.flat_map(|(ends, (_, middle))| ends.iter().copied().chain(*middle)).collect();
+        let known: Vec<(f64, f64)> =
+            Self::points(mesh, set, 3).iter().map(|part| (part.axial(mesh), part.tip.slope)).collect();
+        let slope = |node: usize| {
+            let away = |(axial, _): &&(f64, f64)| (axial - mesh.nodes[node][2]).abs();
+            known.iter().min_by(|a, b| away(a).total_cmp(&away(b))).map_or(0.0, |(_, slope)| *slope)
+        };
+        nodes.into_iter().map(|node| Self::mean(&mesh.nodes, [(node, 1.0)].into_iter(), slope(node))).collect()
+    }
+
+    /// Axial position (m).
+    fn axial(&self, mesh: &Mesh) -> f64 {
+        self.shares.iter().map(|(node, weight, _)| weight * mesh.nodes[*node][2]).sum()
     }
 
     /// With the tip's angles counted from elsewhere (rad).

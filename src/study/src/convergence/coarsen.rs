@@ -7,21 +7,61 @@ use tiprub_core::{
     rom::{ContactNode, Frame, Harmonic},
 };
 
-/// The ROM with every other patch, each with half of its two neighbours.
+/// The ROM with every other patch along the chord, each with half of its two neighbours.
 ///
 /// # Errors
 /// Why there is none: contact nodes, or a number of patches that is not 3, 5, 7, ...
 pub fn coarsened(rom: &Rom) -> Result<Rom, String> {
-    let patches = &rom.contact_nodes;
-    if patches.iter().any(|patch| patch.area <= 0.0) {
+    let along = along(rom)?;
+    if along < 3 || along.is_multiple_of(2) {
+        return Err(format!("{along} patches have no half: 3, 5, 7, ... do"));
+    }
+    let shares = DMatrix::identity(rom.rows(), rom.rows()).kronecker(&shares(along));
+    let kept = along.div_ceil(2);
+    made(rom, &shares, rom.rows(), |row| (row / kept) * along + 2 * (row % kept), "")
+}
+
+/// The ROM with fewer rows of patches across the thickness, one of any or two of three: duals of hat functions that are sums of more are sums
+/// of the duals of these.
+///
+/// # Errors
+/// Why there is none: contact nodes, one row, or rows that these are no sums of.
+pub fn fewer_rows(rom: &Rom, rows: usize) -> Result<Rom, String> {
+    let along = along(rom)?;
+    let shares = row_shares(rom.rows(), rows).ok_or_else(|| format!("{} rows do not tell of {rows}", rom.rows()))?;
+    let shares = shares.kronecker(&DMatrix::identity(along, along));
+    made(rom, &shares, rows, |row| row, &format!(" in {rows} rows"))
+}
+
+/// Patches along the chord.
+fn along(rom: &Rom) -> Result<usize, String> {
+    if rom.contact_nodes.iter().any(|patch| patch.area <= 0.0) {
         return Err("contact is at nodes, of which no coarser ones follow".into());
     }
-    if patches.len() < 3 || patches.len().is_multiple_of(2) {
-        return Err(format!("{} patches have no half: 3, 5, 7, ... do", patches.len()));
+    Ok(rom.contact_nodes.len() / rom.rows())
+}
+
+/// Shares of rows, as integrals over them, in fewer rows.
+fn row_shares(own: usize, fewer: usize) -> Option<DMatrix<f64>> {
+    match (own, fewer) {
+        (2.., 1) => Some(DMatrix::from_element(1, own, 1.0)),
+        // χ_k = Σ c_kl χ_l of three, c_kl being ∫ χ_k h_l over ∫ h_l: the duals of two are 2 − 3s and 3s − 1.
+        (3, 2) => Some(DMatrix::from_row_slice(2, 3, &[1.5, 0.5, -0.5, -0.5, 0.5, 1.5])),
+        _ => None,
     }
-    let kept = patches.len().div_ceil(2);
-    let areas: Vec<f64> = patches.iter().map(|patch| patch.area).collect();
-    let (shares, weights) = (shares(patches.len()), weights(&areas));
+}
+
+/// The ROM with `rows` rows of sums of its patches; `middle` is the old patch that gives a new one its name and place.
+fn made(
+    rom: &Rom,
+    shares: &DMatrix<f64>,
+    rows: usize,
+    middle: impl Fn(usize) -> usize,
+    told: &str,
+) -> Result<Rom, String> {
+    let areas: Vec<f64> = rom.contact_nodes.iter().map(|patch| patch.area).collect();
+    let weights = weighted(shares, &areas);
+    let kept = shares.nrows();
     let mut found = rom.clone();
     found.contact_map = mapped(&weights, &rom.contact_map);
     found.extras.harmonics = rom
@@ -30,8 +70,11 @@ pub fn coarsened(rom: &Rom) -> Result<Rom, String> {
         .iter()
         .map(|own| Harmonic { contact_map: mapped(&weights, &own.contact_map), ..own.clone() })
         .collect();
-    found.contact_nodes = (0..kept).map(|row| patch(rom, row, &weights, &shares)).collect();
-    found.origin = format!("{}; {kept} patches of its {}", rom.origin, patches.len());
+    found.contact_nodes = (0..kept).map(|row| patch(rom, (row, middle(row)), &weights, shares)).collect();
+    let lengths = rows as f64 / rom.rows() as f64;
+    found.contact_nodes.iter_mut().for_each(|patch| patch.length *= lengths);
+    found.extras.rows = Some(rows).filter(|rows| *rows > 1);
+    found.origin = format!("{}; {kept} patches{told} of its {}", rom.origin, areas.len());
     found.checks.flexibility_deviation.clear();
     found.checks.rub_errors = None;
     found.validate().map_err(|error| error.to_string())?;
@@ -47,9 +90,9 @@ fn shares(patches: usize) -> DMatrix<f64> {
     })
 }
 
-/// Displacements of every other patch of those with these areas (m²).
-fn weights(areas: &[f64]) -> DMatrix<f64> {
-    let mut weights = shares(areas.len());
+/// Displacements of sums of patches with these areas (m²).
+fn weighted(shares: &DMatrix<f64>, areas: &[f64]) -> DMatrix<f64> {
+    let mut weights = shares.clone();
     for mut row in weights.row_iter_mut() {
         let area: f64 = row.iter().zip(areas).map(|(share, area)| share * area).sum();
         row.iter_mut().zip(areas).for_each(|(weight, own)| *weight *= own / area);
@@ -60,17 +103,24 @@ fn weights(areas: &[f64]) -> DMatrix<f64> {
 /// Patches that models with 3, 5, 9, 17, ... of them have in common.
 pub(super) const COMMON: usize = 3;
 
-/// Displacements of the [`COMMON`] patches from those of a tip; `None` of contact nodes and of other numbers of patches.
-pub(super) fn common(patches: &[ContactNode]) -> Option<DMatrix<f64>> {
+/// Displacements of the [`COMMON`] patches over the whole thickness from those of a tip; `None` of contact nodes and of other numbers of
+/// patches.
+pub(super) fn common(patches: &[ContactNode], rows: usize) -> Option<DMatrix<f64>> {
     let mut areas: Vec<f64> = patches.iter().map(|patch| patch.area).collect();
     if areas.iter().any(|area| *area <= 0.0) {
         return None;
     }
-    let mut map = DMatrix::identity(areas.len(), areas.len());
+    let sums = |shares: &DMatrix<f64>, areas: &[f64]| -> Vec<f64> {
+        shares.row_iter().map(|row| row.iter().zip(areas).map(|(share, area)| share * area).sum()).collect()
+    };
+    let along = areas.len() / rows;
+    let whole = DMatrix::from_element(1, rows, 1.0).kronecker(&DMatrix::identity(along, along));
+    let mut map = weighted(&whole, &areas);
+    areas = sums(&whole, &areas);
     while areas.len() > COMMON && !areas.len().is_multiple_of(2) {
-        map = weights(&areas) * map;
         let shares = shares(areas.len());
-        areas = shares.row_iter().map(|row| row.iter().zip(&areas).map(|(share, area)| share * area).sum()).collect();
+        map = weighted(&shares, &areas) * map;
+        areas = sums(&shares, &areas);
     }
     (areas.len() == COMMON).then_some(map)
 }
@@ -84,9 +134,9 @@ fn mapped<T: ComplexField<RealField = f64>>(weights: &DMatrix<f64>, map: &DMatri
 }
 
 /// Where a coarser patch is: the mean of its parts.
-fn patch(rom: &Rom, row: usize, weights: &DMatrix<f64>, shares: &DMatrix<f64>) -> ContactNode {
+fn patch(rom: &Rom, (row, middle): (usize, usize), weights: &DMatrix<f64>, shares: &DMatrix<f64>) -> ContactNode {
     let patches = &rom.contact_nodes;
-    let middle = &patches[2 * row];
+    let middle = &patches[middle];
     let sum = |weights: &DMatrix<f64>, value: &dyn Fn(&ContactNode) -> f64| -> f64 {
         patches.iter().enumerate().map(|(index, patch)| weights[(row, index)] * value(patch)).sum()
     };
@@ -143,11 +193,53 @@ mod tests {
         assert!(off < 5e-3, "{off:e}");
         assert!(coarsened(&of(2)).unwrap_err().contains("2 patches"));
         // What patches have in common is the same by one step or by two.
-        let [of_fine, of_coarse] = [&fine, &found].map(|rom| common(&rom.contact_nodes).unwrap());
+        let [of_fine, of_coarse] = [&fine, &found].map(|rom| common(&rom.contact_nodes, 1).unwrap());
         let areas: Vec<f64> = fine.contact_nodes.iter().map(|patch| patch.area).collect();
         assert_eq!(of_fine.shape(), (COMMON, 9));
-        assert!((&of_fine - of_coarse * weights(&areas)).amax() < 1e-14);
+        assert!((&of_fine - of_coarse * weighted(&shares(9), &areas)).amax() < 1e-14);
         assert!(of_fine.row_iter().all(|row| (row.sum() - 1.0).abs() < 1e-14));
-        assert!(common(&fine.contact_nodes[..8]).is_none() && common(&fine.contact_nodes[..7]).is_none());
+        assert!(common(&fine.contact_nodes[..8], 1).is_none() && common(&fine.contact_nodes[..7], 1).is_none());
+    }
+
+    /// Duals of hat functions are nested across the thickness, and hats along the chord within each row.
+    #[test]
+    fn fewer_rows_of_patches_are_those_of_the_reduction_with_fewer() {
+        let of = |counts: [usize; 2]| {
+            let options = Rotor37Options {
+                mesh: MeshCounts { chord: 8, thickness: 2, span: 2 },
+                tip: Tip::patches(counts),
+                kind: ReductionKind::FreeInterface,
+                modes: 6,
+                ..Rotor37Options::paper()
+            };
+            reduce_rotor37(&options, &|_| {}).unwrap().rom
+        };
+        let flexibility = |rom: &Rom| {
+            let inverse = rom.stiffness.clone().try_inverse().unwrap();
+            &rom.contact_map * inverse * rom.contact_map.transpose()
+        };
+        let three = of([5, 3]);
+        let two = fewer_rows(&three, 2).unwrap();
+        let one = fewer_rows(&two, 1).unwrap();
+        assert_eq!(fewer_rows(&three, 1).unwrap().rows(), 1);
+        for (found, expected) in [
+            (&two, of([5, 2])),
+            (&one, of([5, 1])),
+            (&fewer_rows(&three, 1).unwrap(), of([5, 1])),
+            (&coarsened(&two).unwrap(), of([3, 2])),
+        ] {
+            assert_eq!((found.rows(), found.contact_nodes.len()), (expected.rows(), expected.contact_nodes.len()));
+            for (a, b) in found.contact_nodes.iter().zip(&expected.contact_nodes) {
+                let off = (a.area / b.area - 1.0).abs().max((a.length / b.length - 1.0).abs());
+                assert!(off < 1e-2 && (a.position[0] / b.position[0] - 1.0).abs() < 1e-4, "{a:?} {b:?}");
+            }
+            let off = (flexibility(found) - flexibility(&expected)).amax() / flexibility(&expected).amax();
+            assert!(off < 1e-2, "{off:e}");
+        }
+        assert!(fewer_rows(&one, 1).is_err() && fewer_rows(&two, 3).unwrap_err().contains("2 rows do not tell of 3"));
+        let [of_three, of_one] = [&three, &one].map(|rom| common(&rom.contact_nodes, rom.rows()).unwrap());
+        let sums = DMatrix::from_element(1, 3, 1.0).kronecker(&DMatrix::identity(5, 5));
+        let areas: Vec<f64> = three.contact_nodes.iter().map(|patch| patch.area).collect();
+        assert!((of_three - of_one * weighted(&sums, &areas)).amax() < 1e-14);
     }
 }

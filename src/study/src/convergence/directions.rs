@@ -19,6 +19,7 @@ pub fn directions(scene: &Scene, own: u32, again: &Again) -> Result<Vec<Directio
         all.push(refiner.modes(index, name)?);
     }
     all.push(refiner.nodes()?);
+    all.extend(refiner.rows()?);
     if let Some(structure) = scene.settings.structures.get(MODES.len()) {
         all.push(Direction {
             missing: format!("the study refines {} structures", MODES.len()),

@@ -106,7 +106,7 @@ impl Observed {
         if let Some(watched) = &rom.extras.watched {
             return (Self::Watched, watched.points.clone());
         }
-        match common(&rom.contact_nodes) {
+        match common(&rom.contact_nodes, rom.rows()) {
             Some(map) => {
                 let name = |number: usize| format!("patch_{number}_of_{COMMON}");
                 let points = (1..=COMMON).map(|number| ContactNode { name: name(number), ..ContactNode::default() });

@@ -1,7 +1,8 @@
 //! What refining a scene changes: its internal step, the modes of its structures, the contact nodes and the mesh of its blades, one at a
 //! time; where each sequence goes, and with it the error of the scene as it stands.
 //!
-//! [`mod@directions`] finds the directions ([`refine`] says what one is), `refiner` the scenes at every level, `nodes` which of a refined model's nodes touch, [`truncate`] takes modes
+//! [`mod@directions`] finds the directions ([`refine`] says what one is), `refiner` the scenes at every level, `rows` those of rows across
+//! the thickness, `nodes` which of a refined model's nodes touch, [`truncate`] takes modes
 //! away from any ROM, [`mod@march`] runs and compares, [`limit`] extrapolates, [`page`] draws and tells.
 
 pub mod coarsen;
@@ -12,6 +13,7 @@ mod nodes;
 pub mod page;
 pub mod refine;
 pub(crate) mod refiner;
+mod rows;
 pub mod truncate;
 
 use std::time::Instant;
@@ -69,6 +71,7 @@ impl Found {
             found_on: format!("{}, {:.2} ms", self.names[1], 1e3 * self.window.0),
             modes: refine::modes_of(index).and_then(of),
             patches: of(refine::NODES),
+            rows: of(refine::ROWS),
             mesh: of(refine::MESH),
         });
         rom

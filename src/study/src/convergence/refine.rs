@@ -116,6 +116,8 @@ pub(crate) fn with_division(scene: &Scene, division: u32) -> Scene {
 pub const STEP: &str = "step";
 /// Name of the direction of contact nodes or patches.
 pub const NODES: &str = "nodes";
+/// Name of the direction of rows of patches across the thickness.
+pub const ROWS: &str = "rows";
 /// Name of the direction of meshes.
 pub const MESH: &str = "mesh";
 /// Units of values.

@@ -35,10 +35,10 @@ const QUICK_MORE: [f64; 1] = [1.5];
 const SAME: f64 = 1e-6;
 /// Makes other models of a scene.
 pub(crate) struct Refiner<'a> {
-    scene: &'a Scene,
+    pub(super) scene: &'a Scene,
     /// Internal steps per communication step, or one over the tolerance.
     own: u32,
-    again: &'a Again<'a>,
+    pub(super) again: &'a Again<'a>,
     /// Of the mesh of the master, where it can be reduced again.
     mesh_nodes: Option<usize>,
 }
@@ -86,26 +86,30 @@ impl<'a> Refiner<'a> {
         factors.iter().map_while(with).collect()
     }
 
-    fn level(&self, value: f64, own: bool, scene: Scene) -> Level {
+    pub(super) fn level(&self, value: f64, own: bool, scene: Scene) -> Level {
         Level { value, own, scene, division: self.own }
     }
 
-    fn with_rom(&self, index: usize, rom: Rom) -> Scene {
+    pub(super) fn with_rom(&self, index: usize, rom: Rom) -> Scene {
         let mut scene = self.scene.clone();
         scene.roms[index] = rom;
         scene
     }
 
-    /// Fixed-interface modes and contact nodes of the master.
-    fn own_counts(&self) -> (usize, usize) {
+    /// Fixed-interface modes of the master, and its contact nodes along the chord.
+    pub(super) fn own_counts(&self) -> (usize, usize) {
         let rom = &self.scene.roms[master(self.scene)];
-        (rom.order().saturating_sub(rom.contact_map.nrows()), rom.contact_nodes.len())
+        (rom.order().saturating_sub(rom.contact_map.nrows()), rom.contact_nodes.len() / rom.rows())
     }
 
-    /// So many nodes, or patches where the master has such.
-    fn tip(&self, count: usize) -> Tip {
+    /// So many nodes along the chord, or patches in its rows where the master has such.
+    pub(super) fn tip(&self, count: usize) -> Tip {
+        self.tip_in_rows(count, self.scene.roms[master(self.scene)].rows())
+    }
+
+    pub(super) fn tip_in_rows(&self, count: usize, rows: usize) -> Tip {
         let nodes = &self.scene.roms[master(self.scene)].contact_nodes;
-        if nodes.iter().all(|node| node.area > 0.0) { Tip::Patches(count) } else { Tip::Nodes(count) }
+        if nodes.iter().all(|node| node.area > 0.0) { Tip::patches([count, rows]) } else { Tip::Nodes(count) }
     }
 
     /// From the source, with the damping of the scene's ROM: a command line may propose another.
@@ -116,7 +120,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// The master where it is a model that ships and whose contact nodes and mesh can be chosen anew.
-    fn with_chord(&self) -> Option<String> {
+    pub(super) fn with_chord(&self) -> Option<String> {
         let structure = &self.scene.settings.structures[master(self.scene)];
         builtin_model(&self.scene.settings, structure).filter(|name| builtin::has_chord(name))
     }
@@ -219,7 +223,8 @@ impl<'a> Refiner<'a> {
     }
 
     fn more_modes(&self, index: usize, own: usize, factor: f64) -> Option<Result<Rom>> {
-        let (nodes, master) = (self.scene.roms[index].contact_nodes.len(), index == master(self.scene));
+        let rom = &self.scene.roms[index];
+        let (nodes, master) = (rom.contact_nodes.len() / rom.rows(), index == master(self.scene));
         let again = match self.again.source.filter(|_| master) {
             Some(source) => {
                 self.reduced(source, None, [count(factor * own as f64) as usize, nodes]).map(|found| found.rom)
@@ -242,7 +247,7 @@ impl<'a> Refiner<'a> {
         let mut direction = Direction::new(NODES, title, "nodes");
         let builtin = self.with_chord();
         let (modes, own) = self.own_counts();
-        let patches = matches!(self.tip(own), Tip::Patches(_));
+        let patches = !matches!(self.tip(own), Tip::Nodes(_));
         if patches {
             (direction.title, direction.unit) = (format!("contact patches of {}", structure.name), "patches");
             self.fewer_patches(&mut direction);
@@ -310,14 +315,18 @@ impl<'a> Refiner<'a> {
                     return;
                 }
             }
-            let patches = rom.contact_nodes.len();
+            let patches = rom.contact_nodes.len() / rom.rows();
             direction.levels.insert(0, self.level(patches as f64, false, self.with_rom(index, rom.clone())));
         }
     }
 
     /// A model that ships, with another tip or mesh.
     fn built_in(&self, name: &str, nodes: usize, mesh: f64) -> Result<Rom> {
-        let other = Other { modes: 1.0, tip: self.tip(nodes), mesh: mesh * self.again.mesh };
+        self.built_in_with(name, self.tip(nodes), mesh)
+    }
+
+    pub(super) fn built_in_with(&self, name: &str, tip: Tip, mesh: f64) -> Result<Rom> {
+        let other = Other { modes: 1.0, tip, mesh: mesh * self.again.mesh };
         let found = builtin::refined(name, other, self.again.cache, self.again.console);
         found.unwrap_or_else(|| Err(Failure::new(name, "no such model", "")))
     }
@@ -373,7 +382,7 @@ impl<'a> Refiner<'a> {
 }
 
 /// Why a ROM from a file stays as it is; coupled sectors are chosen in whole families, which a ROM does not tell.
-fn no_source(what: &str, rom: &Rom) -> String {
+pub(super) fn no_source(what: &str, rom: &Rom) -> String {
     if rom.is_cyclic() {
         return format!(
             "{what} are fixed in the ROM file; of coupled sectors only the disk that ships is reduced again"

@@ -85,6 +85,12 @@ impl<'a> Place<'a> {
         self.under().map(|index| &self.settings.structures[index])
     }
 
+    /// Of the master of a contact.
+    pub(super) fn master_rom(&self) -> Option<&'a Rom> {
+        let name = &self.contact().master;
+        self.settings.structures.iter().position(|structure| structure.name == *name).map(|index| &self.roms[index])
+    }
+
     pub(super) fn carrier_rom(&self) -> Option<&'a Rom> {
         self.under().map(|index| &self.roms[index])
     }

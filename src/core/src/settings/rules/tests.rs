@@ -176,6 +176,10 @@ const OF_ROTORS: &[(&str, Change)] = &[
         couple(&mut scene.roms[0]);
     }),
     ("structure[2].thermal: needs thermal loads", |scene| scene.settings.structures[1].thermal = true),
+    ("contact[1].coating: excludes a ROM whose contact patches are in rows", |scene| {
+        scene.settings.contacts[0].coating = coating();
+        scene.roms[0].extras.rows = Some(2);
+    }),
     ("structure[2].load: needs a contact grid", |scene| {
         scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 1.0, phase: 0.0 });
         scene.roms[1].extras.grid = None;
