@@ -324,7 +324,7 @@ impl RomFacts {
             "response_hz": rom.checks.response_frequencies,
             "response_deviation_percent": rom.checks.response_deviation,
             "rub_errors": rom.checks.rub_errors.as_ref().map(|errors| json!({
-                "found_on": errors.found_on, "modes": errors.modes, "patches": errors.patches, "mesh": errors.mesh,
+                "found_on": errors.found_on, "modes": errors.modes, "patches": errors.patches, "mesh": errors.mesh, "thickness": errors.thickness,
             })),
         })
     }

@@ -65,6 +65,15 @@ pub struct RubErrors {
     pub patches: Option<f64>,
     /// By the mesh.
     pub mesh: Option<f64>,
+    /// By contact as a mean over the thickness, against contact at points of the faces.
+    pub thickness: Option<f64>,
+}
+
+impl RubErrors {
+    /// Whether none is known.
+    pub fn is_empty(&self) -> bool {
+        [self.modes, self.patches, self.mesh, self.thickness].iter().all(Option::is_none)
+    }
 }
 
 /// How well the reduced model stands for the full one. Empty vectors where a ROM came from elsewhere.

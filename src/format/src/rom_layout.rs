@@ -256,8 +256,8 @@ pub const METADATA: [MetadataLayout; 16] = [
     entry(
         "rub_errors",
         Some(""),
-        "What the reduction leaves of a rub, as far as it is known: `modes=0.01,patches=0.02,mesh=0.03`, relative errors of the \
-         displacements of the tip; format 2.",
+        "What the reduction leaves of a rub, as far as it is known: `modes=0.01,patches=0.02,mesh=0.03,thickness=0.2`, relative errors of \
+         the displacements of the tip; `thickness` is that of contact as a mean over the thickness; format 2.",
     ),
     entry("rub_errors_found_on", Some(""), "The scene that these were found on, in words; format 2."),
     entry("units", Some(""), "Text for the reader of the file: one line per array."),

@@ -99,7 +99,13 @@ fn of_the_first_format(rom: &Rom) -> Rom {
 }
 
 fn rub_errors() -> RubErrors {
-    RubErrors { found_on: "a light rub, 4 ms".into(), modes: Some(0.0125), patches: None, mesh: Some(1.0 / 3.0) }
+    RubErrors {
+        found_on: "a light rub, 4 ms".into(),
+        modes: Some(0.0125),
+        patches: None,
+        mesh: Some(1.0 / 3.0),
+        thickness: None,
+    }
 }
 
 #[test]
@@ -113,7 +119,8 @@ fn what_a_reduction_leaves_of_a_rub_is_kept_as_far_as_it_is_known() {
     // Nothing known is nothing written.
     assert_eq!(write_rom(&with(Some(RubErrors { found_on: "nothing".into(), ..RubErrors::default() }))), plain);
     let none = RubErrors { found_on: String::new(), patches: Some(0.0), ..rub_errors() };
-    for errors in [rub_errors(), none] {
+    let across = RubErrors { thickness: Some(0.18), ..rub_errors() };
+    for errors in [rub_errors(), none, across] {
         let rom = with(Some(errors));
         assert_eq!(read_rom(&write_rom(&rom), "rom").unwrap(), rom);
     }

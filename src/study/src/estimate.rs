@@ -7,7 +7,7 @@
 //! may be refused: then shorter ones are tried, and c₁ + c₂/(r − 1) is left.
 
 use serde_json::{Value, json};
-use tiprub_core::{Rom, Scene};
+use tiprub_core::{Rom, Scene, rom::RubErrors};
 use tiprub_shell::{Result, console::Console};
 
 use crate::convergence::{
@@ -26,10 +26,13 @@ const SHRINKING: f64 = 1.3;
 const LATER: [(&str, [f64; 2]); 3] =
     [("steps", [2.0, 2.0]), ("modes", [2.0, f64::INFINITY]), ("patches", [3.0, f64::INFINITY])];
 
+/// Contact as a mean over the thickness of the tip, against contact at points of its faces: no run tells it.
+const THICKNESS: &str = "across the thickness";
+
 /// What one direction leaves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
-    /// `steps`, `modes`, `patches` or `mesh`.
+    /// `steps`, `modes`, `patches`, `mesh` or [`THICKNESS`].
     pub direction: &'static str,
     /// Of the displacements (relative L2), or why it is not known. Of impulse and work the truth is too often passed by chance for
     /// estimates to hold.
@@ -50,6 +53,7 @@ impl Estimate {
             "modes" => errors.modes,
             "patches" => errors.patches,
             "mesh" => errors.mesh,
+            THICKNESS => errors.thickness,
             _ => None,
         };
         match known {
@@ -104,6 +108,17 @@ fn ratio(before: f64, last: f64, [least, most]: [f64; 2]) -> Option<f64> {
     (before >= SHRINKING * last).then(|| (before / last).clamp(least, most))
 }
 
+/// What a ROM says of its modes, patches and mesh, in one line; `None` where it says nothing.
+pub fn told_of_rom(estimates: &[Estimate]) -> Option<String> {
+    let of_model: Vec<Estimate> = estimates.iter().filter(|one| one.direction != "steps").cloned().collect();
+    (!of_model.is_empty()).then(|| told(&of_model))
+}
+
+/// Names and values for programs.
+pub fn json_of(estimates: &[Estimate]) -> Value {
+    estimates.iter().map(Estimate::json).collect::<serde_json::Map<_, _>>().into()
+}
+
 /// One line for reports.
 pub fn told(estimates: &[Estimate]) -> String {
     let all: Vec<String> = estimates.iter().map(Estimate::told).collect();
@@ -119,14 +134,20 @@ pub fn told(estimates: &[Estimate]) -> String {
 
 /// What a ROM says of itself; empty where it says nothing.
 pub fn of_rom(rom: &Rom) -> Vec<Estimate> {
-    if rom.checks.rub_errors.is_none() {
+    if rom.checks.rub_errors.as_ref().is_none_or(RubErrors::is_empty) {
         return Vec::new();
     }
     let steps = Estimate::unknown("steps", "they are of a run, not of a ROM: `tiprub run --estimate` tells");
     let others = ["modes", "patches", "mesh"].map(|direction| {
         Estimate::unknown(direction, "nobody has found it: `tiprub study convergence --into` does").or_of(rom)
     });
-    [steps].into_iter().chain(others).collect()
+    [steps].into_iter().chain(others).chain(across(rom)).collect()
+}
+
+/// What a ROM says of contact across the thickness.
+fn across(rom: &Rom) -> Option<Estimate> {
+    let known = Estimate::unknown(THICKNESS, "no run tells it").or_of(rom);
+    known.left.is_ok().then_some(known)
 }
 
 fn direction(title: &str, unit: &'static str, levels: Vec<Level>) -> Direction {
@@ -220,12 +241,11 @@ pub fn estimates(
         "a ROM does not tell of other meshes: `tiprub study convergence SCENE --into ROM` finds it and writes it there",
     ));
     let rom = &scene.roms[crate::master(scene)];
-    Ok(found.into_iter().map(|estimate| estimate.or_of(rom)).collect())
+    Ok(found.into_iter().map(|estimate| estimate.or_of(rom)).chain(across(rom)).collect())
 }
 
 #[cfg(test)]
 mod tests {
-    use tiprub_core::rom::RubErrors;
     use tiprub_model::{
         Rotor37Options, reduce_rotor37,
         rotor37::{MeshCounts, Tip},
@@ -263,7 +283,8 @@ mod tests {
         let mut rom = reduce_rotor37(&options, &|_| {}).unwrap().rom;
         assert!(of_rom(&rom).is_empty());
         let found_on = "a light rub".to_owned();
-        rom.checks.rub_errors = Some(RubErrors { found_on, modes: None, patches: Some(0.02), mesh: Some(0.05) });
+        rom.checks.rub_errors =
+            Some(RubErrors { found_on, modes: None, patches: Some(0.02), mesh: Some(0.05), thickness: None });
         let known = Estimate { direction: "patches", left: Ok(0.01), found_on: None };
         let all = [Estimate::unknown("modes", "refused"), known.clone(), Estimate::unknown("mesh", "no other")];
         let all = all.map(|estimate| estimate.or_of(&rom));
@@ -278,5 +299,10 @@ mod tests {
             told.contains("steps unknown, modes unknown, patches 2.00 %, mesh 5.00 % (patches and mesh as"),
             "{told}"
         );
+        rom.checks.rub_errors = Some(RubErrors { thickness: Some(0.18), ..RubErrors::default() });
+        let told = super::told(&of_rom(&rom));
+        assert!(told.contains("mesh unknown, across the thickness 18.00 % (across the thickness as the ROM"), "{told}");
+        rom.checks.rub_errors = Some(RubErrors { found_on: "nothing".into(), ..RubErrors::default() });
+        assert!(of_rom(&rom).is_empty());
     }
 }

@@ -9,7 +9,7 @@ use crate::{Result, suggestion};
 const ERRORS: &str = "rub_errors";
 const FOUND_ON: &str = "rub_errors_found_on";
 /// What leaves an error.
-const DIRECTIONS: [&str; 3] = ["modes", "patches", "mesh"];
+const DIRECTIONS: [&str; 4] = ["modes", "patches", "mesh", "thickness"];
 
 impl Reader<'_> {
     pub(super) fn rub_errors(&self, metadata: &Metadata) -> Result<Option<RubErrors>> {
@@ -20,7 +20,7 @@ impl Reader<'_> {
             }
             return Ok(None);
         };
-        let mut found = [None; 3];
+        let mut found = [None; 4];
         for part in text.split(',') {
             let (name, value) = part.split_once('=').unwrap_or((part, ""));
             let place = DIRECTIONS.iter().position(|direction| *direction == name.trim());
@@ -41,14 +41,15 @@ impl Reader<'_> {
                 }
             }
         }
-        let [modes, patches, mesh] = found;
-        Ok(Some(RubErrors { found_on: metadata.get(FOUND_ON).cloned().unwrap_or_default(), modes, patches, mesh }))
+        let ([modes, patches, mesh, thickness], found_on) =
+            (found, metadata.get(FOUND_ON).cloned().unwrap_or_default());
+        Ok(Some(RubErrors { found_on, modes, patches, mesh, thickness }))
     }
 }
 
 /// The entries; none where nothing is known.
 pub(super) fn metadata(errors: &RubErrors) -> Vec<(&'static str, String)> {
-    let known = DIRECTIONS.iter().zip([errors.modes, errors.patches, errors.mesh]);
+    let known = DIRECTIONS.iter().zip([errors.modes, errors.patches, errors.mesh, errors.thickness]);
     let known: Vec<String> = known.filter_map(|(name, error)| Some(format!("{name}={}", error?))).collect();
     if known.is_empty() {
         return Vec::new();

@@ -89,7 +89,8 @@ mod tests {
         let of = |start: &&str| ContactSettings { nodes: Some((*start).into()), ..contact.clone() };
         scene.settings.contacts = pairs.iter().map(of).collect();
         let (cache, source) = (RomCache::off(), Some(&Blade as &dyn Source));
-        let again = Again { source, cache: &cache, mesh: 1.0, quick: true, console: &console };
+        let again =
+            Again { source, cache: &cache, mesh: 1.0, finest_tip: 4, only: &[], quick: true, console: &console };
         let [_, modes, nodes, mesh] = directions(&scene, 1, &again).unwrap().try_into().unwrap();
         [modes, nodes, mesh]
     }

@@ -100,6 +100,8 @@ pub const STEP: &str = "step";
 pub const NODES: &str = "nodes";
 /// Name of the direction of meshes.
 pub const MESH: &str = "mesh";
+/// Spaces between contact points of the finest tip, times the scene's own.
+pub const FINEST_TIP: usize = 4;
 /// Units of values.
 pub const SECONDS: &str = "s";
 pub(super) const MODES_KEPT: &str = "modes";
@@ -121,6 +123,10 @@ pub struct Again<'a> {
     pub cache: &'a RomCache,
     /// Mesh of the scene's model where it ships: 1, or what its elements along the edges are multiplied with.
     pub mesh: f64,
+    /// Spaces between contact points of the finest tip, times its own; 2 of few levels.
+    pub finest_tip: usize,
+    /// Names of the directions; empty for all.
+    pub only: &'a [String],
     /// Few levels.
     pub quick: bool,
     /// For progress.
@@ -133,17 +139,25 @@ pub struct Again<'a> {
 /// A source that does not give the ROM of the scene, and what its reduction refuses.
 pub fn directions(scene: &Scene, own: u32, again: &Again) -> Result<Vec<Direction>> {
     let refiner = Refiner::checked(scene, own, again)?;
-    let mut all = vec![refiner.steps()];
-    for (index, name) in (0..scene.roms.len()).zip(MODES) {
+    let asked = |name: &str| again.only.is_empty() || again.only.iter().any(|only| only == name);
+    let mut all = Vec::new();
+    if asked(STEP) {
+        all.push(refiner.steps());
+    }
+    for (index, name) in (0..scene.roms.len()).zip(MODES).filter(|(_, name)| asked(name)) {
         all.push(refiner.modes(index, name)?);
     }
-    all.push(refiner.nodes()?);
-    if let Some(structure) = scene.settings.structures.get(MODES.len()) {
+    if asked(NODES) {
+        all.push(refiner.nodes()?);
+    }
+    if let Some(structure) = scene.settings.structures.get(MODES.len()).filter(|_| again.only.is_empty()) {
         all.push(Direction {
             missing: format!("the study refines {} structures", MODES.len()),
             ..Direction::new("modes-more", format!("modes of {} and those after it", structure.name), MODES_KEPT)
         });
     }
-    all.push(refiner.meshes()?);
+    if asked(MESH) {
+        all.push(refiner.meshes()?);
+    }
     Ok(all)
 }
