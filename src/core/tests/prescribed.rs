@@ -13,7 +13,7 @@ use tiprub_core::gaps::{Drive, FixedGap, GapLaw};
 use tiprub_core::rom::Watched;
 use tiprub_core::settings::{Interpolation, LoadSettings, Scheme, Shape, Solver, SplineSettings};
 use tiprub_core::system::{Carrier, PairParts, StructureParts, System, SystemSettings};
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, element, go, lattice, move_on, real, reference, set, started};
 
 const SECTORS: usize = 5;

@@ -386,3 +386,29 @@ fn picture(
         format!("Error of {quantity} against the limit, over {label}; scenes from 0 in the order of the legend.");
     Ok(Some(Figure { name, caption, picture: Picture::plot(&plot)?, sheet }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_stage_is_refined_with_the_nodes_that_it_ships_with_and_with_patches() {
+        let all = standards().unwrap();
+        let of = |name: &str| all.iter().find(|standard| standard.name == name).unwrap();
+        let shipped = builtin::stage(false).1.tip;
+        for (name, friction) in [("stage-nodes", FRICTION), ("stage-nodes-smooth", 0.0)] {
+            let standard = of(name);
+            assert_eq!(
+                (standard.other.unwrap().0, standard.settings.contacts[0].friction),
+                (shipped, friction),
+                "{name}"
+            );
+        }
+        // Five patches up to 33, as far as the mesh has places.
+        let Some((Tip::Patches(own), _)) = of("stage").other else { panic!("patches") };
+        assert_eq!(of("stage").finest_tip * (own - 1) + 1, 33);
+        let names: std::collections::BTreeSet<&str> = PICTURES.iter().flat_map(|(.., names)| *names).collect();
+        assert_eq!(names.len(), 3 * PICTURES.len(), "a picture is written over another");
+        assert!(all.iter().all(|standard| FAMILIES.contains(&standard.family)));
+    }
+}
