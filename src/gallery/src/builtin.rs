@@ -63,7 +63,7 @@ pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom
     let disk = |coarse| {
         let model = DiskModel::new(coarse);
         let rom = cache.get(name, &model, console, &|| Ok(model.reduce(console)?.0.rom))?;
-        Ok(known::told(&model, rom))
+        Ok(known::told(&model.options, rom))
     };
     Some(match name {
         "rotor37" => blade(None),
