@@ -37,7 +37,7 @@ pub fn check(command: &Command) -> Result<()> {
             StudyCommand::Map(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),
             StudyCommand::Convergence(own) => {
                 let read = scene(&own.study.scene).into_iter().chain(own.from.files()).collect::<Vec<_>>();
-                apart(&read, &Vec::from_iter(Named::option("--into", &own.study.into)))?;
+                outputs(&read, &Vec::from_iter(Named::option("--into", &own.study.into)))?;
                 study(&own.study.scene, own.study.common.out.as_deref(), own.from.files())
             }
             StudyCommand::Stability(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path, process::Command};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 fn tiprub(directory: &Path, cache: &str, arguments: &[&str]) -> (String, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
@@ -157,6 +157,15 @@ fn a_scene_that_goes_by_a_tolerance_is_studied_like_others() {
 fn totals(total: &Value, cheapest: &str) {
     let number = |row: &Value, name: &str| row[name].as_f64().unwrap();
     assert!(total["truth"].as_str().unwrap().starts_with("5 nodes and 40 modes"), "{total:#}");
+    assert_eq!(
+        [&total["refined"], &total["not_refined"]],
+        [&json!(["steps", "modes", "nodes"]), &json!(["mesh"])],
+        "{total:#}"
+    );
+    // The model that ships tells what was found of it.
+    let known = &total["estimates_of_rom"];
+    assert!(known["patches"]["displacements"] == 0.34 && known["mesh"]["unknown"].is_string(), "{known:#}");
+    assert!(known["modes"]["found_on"].as_str().unwrap().contains("light rub of rotor 37"), "{known:#}");
     let rows = total["rows"].as_array().unwrap();
     let ran: Vec<&Value> = rows.iter().filter(|row| row["refused"].is_null()).collect();
     let of = |modes: u64| {
@@ -177,6 +186,33 @@ fn totals(total: &Value, cheapest: &str) {
     assert!(
         lines.len() == 7 && lines[1].starts_with("steps,0.01,") && lines[4].starts_with("total,1e-1,"),
         "{cheapest}"
+    );
+}
+
+/// Of a ROM from a file no finer model is known: no error of it is a total one, and what the ROM says of itself stands beside.
+fn errors_of_a_file(root: &Path, told: &str) {
+    let json: Value = serde_json::from_str(told).unwrap();
+    let of = &json["results"]["own_model"];
+    assert_eq!([&of["refined"], &of["not_refined"]], [&json!(["steps"]), &json!(["modes", "nodes", "mesh"])], "{of:#}");
+    assert!(of["truth"].as_str().unwrap().contains("the scene's own model") && of["readable"].is_null(), "{of:#}");
+    assert!(of["estimates_of_rom"]["modes"]["displacements"].is_number(), "{of:#}");
+    let statement = |about: &str| {
+        let all = json["statements"].as_array().unwrap();
+        let found = all.iter().find(|one| one["expected"].as_str().unwrap().contains(about));
+        found.unwrap_or_else(|| panic!("{about}: {all:#?}"))["found"].as_str().unwrap().to_owned()
+    };
+    statement(
+        "own-model error of the steps of the scene as it stands (refined: steps; not refined: modes, nodes, mesh)",
+    );
+    assert!(statement("what its ROM says of itself").contains("found on rotor37_rub"));
+    for name in ["index.html", "results.json", "cheapest.csv", "own-model.csv", "tables.md"] {
+        let text = fs::read_to_string(root.join("study-error").join(name)).unwrap().to_lowercase();
+        assert!(!text.contains("total"), "{name}: {:?}", text.split("total").next().unwrap().lines().last());
+    }
+    assert!(
+        fs::read_to_string(root.join("study-error/scene-own-model.svg"))
+            .unwrap()
+            .contains("own-model error of the steps")
     );
 }
 
@@ -316,12 +352,30 @@ fn the_study_of_convergence_refines_what_it_can_and_says_what_it_cannot() {
     let values = |direction: &Value| -> Vec<f64> {
         direction["levels"].as_array().unwrap().iter().map(|level| level["value"].as_f64().unwrap()).collect()
     };
-    let alone = study(&[])["results"]["directions"].clone();
+    let scope = study(&[])["results"].clone();
+    let alone = &scope["directions"];
     assert_eq!([values(&alone[0]), values(&alone[1])], [vec![2e-6, 1e-6, 5e-7], vec![2.0, 4.0]]);
     assert!(values(&alone[2]).is_empty());
     for direction in [1, 2, 3] {
         assert!(alone[direction]["not_refined"].as_str().unwrap().contains("--mesh FILE"), "{alone:#}");
     }
+    assert_eq!(scope["refined"], json!(["internal step"]));
+    assert_eq!(scope["coarser_only"], json!(["modes of rotor"]));
+    assert_eq!(scope["not_refined"], json!(["contact nodes of rotor", "mesh of rotor"]));
+    let page = fs::read_to_string(root.path().join("out/index.html")).unwrap();
+    let told = "finer than the scene: internal step; coarser ones only: modes of rotor; not at all: contact nodes of rotor, mesh of rotor";
+    assert!(page.contains(told) && !page.to_lowercase().contains("total"), "{told}");
+    // Nothing to write is told, where nothing was found; directories of files are made, as those of all outputs are.
+    let (text, _) = tiprub(
+        root.path(),
+        "",
+        &["study", "convergence", "own.toml", "--quick", "--quiet", "--out", "out", "--into", "new/at.rom"],
+    );
+    let none =
+        text.contains("warning: new/at.rom is the ROM as it was: no error by its modes, patches or mesh was found");
+    let kept = fs::read(root.path().join("new/at.rom")).unwrap()
+        == fs::read(root.path().join("coarse.rom.safetensors")).unwrap();
+    assert!(none && kept && !text.contains("unknown"), "{text}");
     let whole = study(&[&MESH[..], &["--sectors", "36"]].concat());
     let found = &whole["results"]["directions"];
     assert_eq!([values(&found[1]), values(&found[2])], [vec![2.0, 4.0, 6.0], vec![2.0, 3.0]]);
@@ -338,7 +392,7 @@ fn the_study_of_convergence_refines_what_it_can_and_says_what_it_cannot() {
         .collect()
     };
     let all = standing(found);
-    assert!(all.len() == 3 && all.iter().all(|one| *one == all[0]) && all[0] == standing(&alone)[0], "{all:?}");
+    assert!(all.len() == 3 && all.iter().all(|one| *one == all[0]) && all[0] == standing(alone)[0], "{all:?}");
     // A change is to the next run; the step changes least of all.
     let change = |direction: &Value, level: usize, name: &str| {
         direction["levels"][level]["changes_to_next"][name].as_f64().unwrap()
@@ -413,6 +467,10 @@ fn what_the_mesh_leaves_is_found_and_goes_with_the_rom() {
     // A ROM that nobody asked about tells nothing, and is the file that it was.
     assert!(!told(&["run", "own.toml", "--stop", "1e-4", "--quiet"]).contains("estimated error"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+    errors_of_a_file(
+        root.path(),
+        &told(&["study", "error", "known.toml", "--quick", "--json", "--quiet", "--window", "2e-3"]),
+    );
     let again = ["study", "convergence", "own.toml", "--quick", "--into", "known.rom.safetensors"];
     let output = command.current_dir(root.path()).args(again).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
@@ -455,6 +513,8 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         let told = refuse(&["study", name, "builtin:rotor37", "--quick", "--out", "file/out"], 1);
         assert!(told.contains("file/out: cannot create the directory"), "{told}");
     }
+    let told = refuse(&["study", "convergence", "builtin:rotor37", "--quick", "--into", "file/at.rom"], 1);
+    assert!(told.contains("file: cannot create the directory"), "{told}");
     let told = refuse(&["study", "map", "builtin:cube-between-rings"], 2);
     assert!(told.contains("`cube`, flies freely") && told.contains("rotating master"), "{told}");
     for name in ["stage", "modes", "cube", "conjugacy", "inputs"] {

@@ -47,10 +47,16 @@ def test_patches_have_pressures_and_watched_points(shipped, tiprub):
     refined = shipped.name == "rotor37"
     assert ("blade[1].normal_pressure[9]" in shipped.last) == refined
     assert ("blade[1].radial_displacement[3]" in shipped.last) == refined
+    assert ("blade[1].watched_clearance[3]" in shipped.last) == refined
     force = [name for name in shipped.names if name.startswith("blade[1].normal_force[")]
     assert len(force) == (9 if refined else 3)
     if not refined:
         return
+    # At rest edges and middle are as far from the casing as the patches next to them; in the rub they tell what a patch does not.
+    at = lambda row, name, index: row[1 + shipped.names.index(f"blade[1].{name}[{index}]")]
+    for point, patch in ((1, 1), (2, 5), (3, 9)):
+        assert at(shipped.rows[0], "watched_clearance", point) == pytest.approx(at(shipped.rows[0], "clearance", patch), rel=0.1)
+    assert max(abs(at(row, "watched_clearance", 1) - at(row, "clearance", 1)) for row in shipped.rows) > 1e-6
     # A force over the area and over the length that the ROM says a patch stands for.
     [rom] = tiprub("inspect", f"builtin:{shipped.name}")["scene"]["roms"]
     patch = rom["contact_nodes"][4]

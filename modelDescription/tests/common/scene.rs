@@ -1,5 +1,6 @@
 //! A scene with every option on, small blades in a small flexible casing, and what each option is.
 
+use tiprub_core::rom::Watched;
 use tiprub_core::settings::*;
 use tiprub_core::{Rom, Scene, VariableTable};
 use tiprub_model_description::{Description, Experiment};
@@ -34,6 +35,8 @@ pub fn complete() -> Scene {
 pub fn rigid() -> Scene {
     let mut rom = models::blade(36);
     rom.extras.spin = Some(models::spin(rom.order()));
+    let points = ["edge_1", "edge_2"].map(|name| models::node(name, rom.contact_nodes[0].position, 0.0)).to_vec();
+    rom.extras.watched = Some(Watched { map: rom.contact_map.rows(0, 3 * points.len()).into_owned(), points });
     let mut scene = models::bumps(rom);
     let settings = &mut scene.settings;
     settings.structures[0].speed = 1800.0;
@@ -55,7 +58,7 @@ pub fn rigid() -> Scene {
 pub type Switch = (&'static str, fn(&mut Scene));
 
 /// Every option that adds variables, in a scene with a flexible casing.
-pub const OPTIONS: [Switch; 19] = [
+pub const OPTIONS: [Switch; 20] = [
     ("`tolerance`, or the scheme `galerkin`", |scene| scene.settings.time.tolerance = None),
     ("`motion = \"rotating\"`", |scene| {
         let rotor = &mut scene.settings.structures[0];
@@ -84,6 +87,7 @@ pub const OPTIONS: [Switch; 19] = [
         scene.settings.outputs.wear = false;
     }),
     ("`watched_sectors`", |scene| scene.settings.outputs.watched_sectors.clear()),
+    ("watched points of the ROM", |scene| scene.roms[0].extras.watched = None),
     ("`all_sectors = true`", |scene| scene.settings.outputs.all_sectors = false),
     ("`nodal_diameters`", |scene| scene.settings.outputs.nodal_diameters = None),
     ("`energies = true`", |scene| scene.settings.outputs.energies = false),

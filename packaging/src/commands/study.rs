@@ -10,7 +10,7 @@ use tiprub_shell::{
 use tiprub_study::{
     Study,
     arguments::StudyCommon,
-    convergence::{self, refine::Source},
+    convergence::{self, Judged, refine::Source},
     error, estimate, map, output, stability,
 };
 
@@ -54,12 +54,23 @@ fn convergence(own: &ConvergenceCommand, console: &Console) -> Result<Outcome> {
         check_target(path, own.study.force)?;
     }
     let source = BladeSource::of(&own.from);
-    let (study, rom) = convergence::study(&own.study, given.then_some(&source as &dyn Source), console)?;
+    let (study, Judged { rom, known }) =
+        convergence::study(&own.study, given.then_some(&source as &dyn Source), console)?;
     let mut outcome = output::write(&study, &directory)?;
     if let Some(path) = &own.study.into {
         output_file::write(path, tiprub_format::write_rom(&rom))?;
         outcome.json["rom"] = shown_path(path).into();
-        outcome.text.push_str(&format!("\nwritten: {}\n{}", path.display(), estimate::told(&estimate::of_rom(&rom))));
+        outcome.text.push_str(&format!("\nwritten: {}", path.display()));
+        if known {
+            outcome.text.push_str(&format!("\n{}", estimate::told(&estimate::of_rom(&rom))));
+        } else {
+            let warning = format!(
+                "{} is the ROM as it was: no error by its modes, patches or mesh was found, for the reasons above",
+                path.display()
+            );
+            outcome.text.push_str(&format!("\nwarning: {warning}"));
+            outcome.json["warnings"] = vec![warning].into();
+        }
     }
     Ok(outcome)
 }

@@ -69,6 +69,13 @@ pub struct RubErrors {
     pub mesh: Option<f64>,
 }
 
+impl RubErrors {
+    /// Whether none is known.
+    pub fn is_empty(&self) -> bool {
+        [self.modes, self.patches, self.rows, self.mesh].iter().all(Option::is_none)
+    }
+}
+
 /// How well the reduced model stands for the full one. Empty vectors where a ROM came from elsewhere.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RomChecks {

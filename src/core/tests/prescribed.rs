@@ -10,14 +10,17 @@ use tiprub_core::dynamics::sectors::SectorModel;
 use tiprub_core::gaps::open::{OpenGap, OpenSurface};
 use tiprub_core::gaps::surface_spline::SurfaceSpline;
 use tiprub_core::gaps::{Drive, FixedGap, GapLaw};
+use tiprub_core::rom::Watched;
 use tiprub_core::settings::{Interpolation, LoadSettings, Scheme, Shape, Solver, SplineSettings};
 use tiprub_core::system::{Carrier, PairParts, StructureParts, System, SystemSettings};
-use tiprub_core::{Rom, Scene, Simulation};
-use tiprub_test_models::{self as models, go, lattice, move_on, real, reference, set, started};
+use tiprub_core::{Scene, Simulation};
+use tiprub_test_models::{self as models, element, go, lattice, move_on, real, reference, set, started};
 
 const SECTORS: usize = 5;
 const SLOPE: f64 = -0.2;
 const LOBES: (f64, u32, f64) = (8e-5, 3, 0.4);
+/// Watched points: how far inside the cone (m), angle (rad), axial position (m).
+const WATCHED: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [3e-4, 0.013, 0.011], [0.0, 0.05, 0.031], [0.02, -0.1, 0.018]];
 const GAPS: [f64; SECTORS] = [5e-4, 5.3e-4, 4.8e-4, 5.1e-4, 5.6e-4];
 
 /// Blades with conical tips in a casing of lobes that can be moved in every way.
@@ -26,6 +29,9 @@ fn movable() -> Scene {
     for node in &mut scene.roms[0].contact_nodes {
         (node.position[0], node.meridional_slope) = (0.25 + SLOPE * node.position[2], SLOPE);
     }
+    let place = |[inside, theta, z]: [f64; 3]| models::node("point", [0.25 + SLOPE * z - inside, theta, z], 0.0);
+    let map = DMatrix::zeros(3 * WATCHED.len(), scene.roms[0].order());
+    scene.roms[0].extras.watched = Some(Watched { map, points: WATCHED.map(place).to_vec() });
     (scene.settings.structures[0].whirl, scene.settings.structures[0].axial_shift) = (true, true);
     let (amplitude, order, phase) = LOBES;
     scene.settings.surfaces[0].shape = Shape::Lobes { amplitude, order, phase };
@@ -35,10 +41,9 @@ fn movable() -> Scene {
     scene
 }
 
-/// Distance of a node from the cone with lobes, in Cartesian coordinates, for the values of [`INPUTS`].
-fn distance(rom: &Rom, node: usize, sector: usize, values: [f64; 8]) -> f64 {
+/// Distance of a point of a sector from the cone with lobes, in Cartesian coordinates, for the values of [`INPUTS`].
+fn distance([radius, theta, z]: [f64; 3], sector: usize, values: [f64; 8]) -> f64 {
     let [offset, change, factor, rotation, whirl_x, whirl_y, shift, start] = values;
-    let [radius, theta, z] = rom.contact_nodes[node].position;
     let angle = theta + TAU * sector as f64 / SECTORS as f64 + start;
     let [x, y, z] = [radius * angle.cos() + whirl_x, radius * angle.sin() + whirl_y, z + shift];
     let (amplitude, order, phase) = LOBES;
@@ -87,13 +92,24 @@ fn gaps_are_distances_in_space_whatever_moves_casing_and_shaft() {
             simulation.initialise(0.0).unwrap_or_else(|error| panic!("{kind}, {moved:?}: {error}"));
             let (mut error, mut effect) = (0.0_f64, 0.0_f64);
             for (node, sector) in (0..3).flat_map(|node| (0..SECTORS).map(move |sector| (node, sector))) {
-                let exact = distance(&scene.roms[0], node, sector, values);
+                let place = scene.roms[0].contact_nodes[node].position;
+                let exact = distance(place, sector, values);
                 error = error.max((simulation.system().gap(node, sector) - exact).abs());
-                effect = effect.max((exact - distance(&scene.roms[0], node, sector, unmoved)).abs());
+                effect = effect.max((exact - distance(place, sector, unmoved)).abs());
                 let watched =
                     reference(&simulation, &format!("blade[{}].clearance", sector + 1)) + u32::try_from(node).unwrap();
                 let shown = simulation.real(watched).unwrap();
                 assert_eq!(shown.to_bits(), simulation.system().gap(node, sector).to_bits());
+            }
+            let watched = &scene.roms[0].extras.watched.as_ref().unwrap().points;
+            for (point, sector) in (0..WATCHED.len()).flat_map(|point| (0..SECTORS).map(move |sector| (point, sector)))
+            {
+                let name = format!("blade[{}].watched_clearance", sector + 1);
+                let found = element(&simulation, &name, u32::try_from(point).unwrap());
+                // Far inside the surface is curved under the point that is nearest.
+                let curved = 1e-2 * WATCHED[point][0];
+                let off = (found - distance(watched[point].position, sector, values)).abs();
+                assert!(off < 1e-6 + curved, "{kind}, {moved:?}, {name}[{point}]: {found:e} is off by {off:e}");
             }
             println!("{kind}, {moved:?}: gaps move by {effect:.1e} m, off by {error:.1e} m");
             let has_none = values.map(f64::to_bits) == unmoved.map(f64::to_bits);
@@ -101,6 +117,62 @@ fn gaps_are_distances_in_space_whatever_moves_casing_and_shaft() {
             assert!(error < 1e-6, "{kind}, {moved:?}: {error:e}");
         }
     }
+}
+
+/// A point at the place of a contact node, with its motion, in a rub: the gap of a node is linear in what contact moves, that of a point is
+/// not.
+#[test]
+fn a_point_at_a_contact_node_has_its_clearance_in_a_rub() {
+    type Kind = (&'static str, fn(&mut Scene));
+    let kinds: [Kind; 3] = [
+        ("revolution", |_| {}),
+        ("spline", |scene| scene.settings.surfaces[0].spline = Some(SplineSettings::default())),
+        ("flexible casing", models::flexible),
+    ];
+    for (kind, change) in kinds {
+        let mut scene = models::rub(SECTORS);
+        let rom = &mut scene.roms[0];
+        rom.contact_nodes.iter_mut().for_each(|node| node.position[0] += SLOPE * node.position[2]);
+        rom.extras.watched = Some(Watched { map: rom.contact_map.clone(), points: rom.contact_nodes.clone() });
+        change(&mut scene);
+        let mut simulation = started(&scene);
+        let (mut off, mut moved, mut touched) = (0.0_f64, 0.0_f64, false);
+        let at_rest = element(&simulation, "blade[2].clearance", 1);
+        for _ in 0..60 {
+            go(&mut simulation, 5e-5);
+            touched |= real(&simulation, "normal_impulse") > 0.0;
+            for (sector, node) in [(1, 0), (1, 1), (1, 2), (2, 0), (2, 1), (2, 2)] {
+                let of = |name: &str| element(&simulation, &format!("blade[{sector}].{name}"), node);
+                off = off.max((of("watched_clearance") - of("clearance")).abs());
+                moved = moved.max((of("clearance") - at_rest).abs());
+            }
+        }
+        println!("{kind}: off by {off:.1e} m of {moved:.1e} m");
+        assert!(touched && moved > 0.5 * at_rest && off < 1e-8, "{kind}: {touched}, {off:e} of {moved:e}");
+    }
+}
+
+/// Two pairs of one rotor: a point is held against the surface of the contact node next to it; without friction or watched sectors there
+/// is nothing to pay for.
+#[test]
+fn a_point_faces_the_surface_of_the_contact_node_next_to_it() {
+    let mut scene = movable();
+    scene.settings.contacts[0].nodes = Some("leading".into());
+    scene.settings.contacts[0].sector_gaps.clear();
+    let (mut contact, mut surface) = (scene.settings.contacts[0].clone(), scene.settings.surfaces[0].clone());
+    (contact.nodes, contact.slave, contact.gap) = (Some("trailing".into()), "other".into(), 9e-4);
+    (surface.name, surface.shape) = ("other".into(), Shape::Circular {});
+    scene.settings.contacts.push(contact);
+    scene.settings.surfaces.push(surface);
+    let simulation = started(&scene);
+    let of = |point: u32| element(&simulation, "blade[1].watched_clearance", point);
+    let normal = (1.0 + SLOPE * SLOPE).sqrt();
+    assert!((of(2) - 9e-4 / normal).abs() < 1e-9, "{:e}", of(2));
+    assert!((of(0) - element(&simulation, "blade[1].clearance", 0)).abs() < 1e-15, "{:e}", of(0));
+    // Next to mid-chord, which meets nothing.
+    assert_eq!([of(1), of(3)], [1e9; 2]);
+    scene.settings.outputs.watched_sectors.clear();
+    assert!(started(&scene).table().find("blade[1].watched_clearance").is_none());
 }
 
 /// Circular frequency of the radial, tangential and axial mode, and displacement per unit of each.

@@ -114,7 +114,8 @@ fn what_a_reduction_leaves_of_a_rub_is_kept_as_far_as_it_is_known() {
     // Nothing known is nothing written.
     assert_eq!(write_rom(&with(Some(RubErrors { found_on: "nothing".into(), ..RubErrors::default() }))), plain);
     let none = RubErrors { found_on: String::new(), patches: Some(0.0), ..rub_errors() };
-    for errors in [rub_errors(), none] {
+    let across = RubErrors { rows: None, mesh: None, ..rub_errors() };
+    for errors in [rub_errors(), none, across] {
         let rom = with(Some(errors));
         assert_eq!(read_rom(&write_rom(&rom), "rom").unwrap(), rom);
     }

@@ -18,6 +18,7 @@ use tiprub_model::{
 use tiprub_shell::{Result, console::Console};
 
 use crate::{
+    known,
     reduction::{self, with_progress},
     rom_cache::RomCache,
 };
@@ -60,11 +61,13 @@ pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom
     let (whole, name) = (name, plain(name));
     let blade = |spin| {
         let options = Rotor37Options { spin, ..rotor37(whole) };
-        cache.get(whole, &options, console, &|| Ok(reduction::rotor37(&options, console)?.rom))
+        let rom = cache.get(whole, &options, console, &|| Ok(reduction::rotor37(&options, console)?.rom))?;
+        Ok(known::told(&options, rom))
     };
     let disk = |coarse| {
         let model = DiskModel::new(coarse);
-        cache.get(name, &model, console, &|| Ok(model.reduce(console)?.0.rom))
+        let rom = cache.get(name, &model, console, &|| Ok(model.reduce(console)?.0.rom))?;
+        Ok(known::told(&model.options, rom))
     };
     Some(match name {
         "rotor37" | ROWS => blade(None),

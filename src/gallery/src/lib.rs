@@ -5,6 +5,7 @@
 
 #![warn(unreachable_pub)]
 pub mod builtin;
+mod known;
 pub mod reduction;
 pub mod rom_cache;
 pub mod scene_source;

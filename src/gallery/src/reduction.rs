@@ -14,6 +14,8 @@ use tiprub_model::{
 };
 use tiprub_shell::{Failure, Result, console::Console};
 
+use crate::known;
+
 const STAGES: [Stage; 7] = [
     Stage::Mesh,
     Stage::Assembly,
@@ -29,7 +31,8 @@ const STAGES: [Stage; 7] = [
 /// # Errors
 /// Counts that the mesh cannot serve, and whatever the reduction refuses.
 pub fn rotor37(options: &Rotor37Options, console: &Console) -> Result<Reduction> {
-    with_progress("Reducing rotor 37", console, &|listener| reduce_rotor37(options, listener))
+    let reduction = with_progress("Reducing rotor 37", console, &|listener| reduce_rotor37(options, listener))?;
+    Ok(Reduction { rom: known::told(options, reduction.rom), ..reduction })
 }
 
 /// Reduce a casing, showing stage and share done.

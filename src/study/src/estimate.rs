@@ -7,7 +7,7 @@
 //! may be refused: then shorter ones are tried, and c₁ + c₂/(r − 1) is left.
 
 use serde_json::{Value, json};
-use tiprub_core::{Rom, Scene};
+use tiprub_core::{Rom, Scene, rom::RubErrors};
 use tiprub_shell::{Result, console::Console};
 
 use crate::convergence::{
@@ -116,6 +116,17 @@ fn ratio(before: f64, last: f64, [least, most]: [f64; 2]) -> Option<f64> {
     (before >= SHRINKING * last).then(|| (before / last).clamp(least, most))
 }
 
+/// What a ROM says of its modes, patches and mesh, in one line; `None` where it says nothing.
+pub fn told_of_rom(estimates: &[Estimate]) -> Option<String> {
+    let of_model: Vec<Estimate> = estimates.iter().filter(|one| one.direction != "steps").cloned().collect();
+    (!of_model.is_empty()).then(|| told(&of_model))
+}
+
+/// Names and values for programs.
+pub fn json_of(estimates: &[Estimate]) -> Value {
+    estimates.iter().map(Estimate::json).collect::<serde_json::Map<_, _>>().into()
+}
+
 /// One line for reports.
 pub fn told(estimates: &[Estimate]) -> String {
     let all: Vec<String> = estimates.iter().map(Estimate::told).collect();
@@ -131,7 +142,7 @@ pub fn told(estimates: &[Estimate]) -> String {
 
 /// What a ROM says of itself; empty where it says nothing.
 pub fn of_rom(rom: &Rom) -> Vec<Estimate> {
-    if rom.checks.rub_errors.is_none() {
+    if rom.checks.rub_errors.as_ref().is_none_or(RubErrors::is_empty) {
         return Vec::new();
     }
     let steps = Estimate::unknown("steps", "they are of a run, not of a ROM: `tiprub run --estimate` tells");
@@ -269,7 +280,6 @@ pub fn estimates(
 
 #[cfg(test)]
 mod tests {
-    use tiprub_core::rom::RubErrors;
     use tiprub_model::{
         Rotor37Options, reduce_rotor37,
         rotor37::{MeshCounts, Tip},
@@ -328,5 +338,10 @@ mod tests {
             ),
             "{told}"
         );
+        rom.checks.rub_errors = Some(RubErrors { rows: Some(0.28), ..RubErrors::default() });
+        let told = super::told(&of_rom(&rom));
+        assert!(told.contains("rows of patches across the thickness 28.00 %, mesh unknown (rows of"), "{told}");
+        rom.checks.rub_errors = Some(RubErrors { found_on: "nothing".into(), ..RubErrors::default() });
+        assert!(of_rom(&rom).is_empty());
     }
 }

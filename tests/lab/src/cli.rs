@@ -105,6 +105,9 @@ pub struct RefinementArguments {
     /// Only this scene, such as rotor37-light or stage-smooth; may be given several times.
     #[arg(long = "scene", value_name = "SCENE")]
     pub scenes: Vec<String>,
+    /// Only this direction; may be given several times.
+    #[arg(long = "direction", value_name = "DIRECTION", value_parser = ["step", "modes", "modes-2", "nodes", "mesh"])]
+    pub directions: Vec<String>,
     /// Runs at the same time [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,

@@ -19,7 +19,7 @@ use tiprub_model::rotor37::Tip;
 use tiprub_shell::{Failure, Result, console::Console, sweep};
 use tiprub_study::{
     Figure, Picture, Sheet, Statement, Study,
-    convergence::{self, Asked, Found, Refined, limit::Limit, page},
+    convergence::{self, Asked, Found, Refined, limit::Limit, page, refine},
 };
 
 use crate::cli::RefinementArguments;
@@ -29,17 +29,27 @@ const LIGHT: f64 = 0.6;
 const HEAVY: f64 = 1.0;
 /// Friction coefficient of the scenes with friction.
 const FRICTION: f64 = 0.15;
-/// Patches of a blade of the stage, which ships with three nodes, and the mesh of its sector, so that the one that ships is the finest of four: to
-/// reduce a finer one takes many minutes.
-const STAGE: (usize, f64) = (5, core::f64::consts::FRAC_1_SQRT_2);
+/// Scenes that are drawn together.
+const FAMILIES: [&str; 2] = ["rotor37", "stage"];
+/// Tips of a blade of the stage: five patches, and the three nodes that it ships with.
+const STAGE_TIPS: [(Tip, &str, &str); 2] =
+    [(Tip::Patches(5), "stage", "5 patches"), (Tip::Nodes(3), "stage-nodes", "3 contact nodes")];
+/// The mesh of its sector, so that the one that ships is the finest of four: to reduce a finer one takes many minutes.
+const STAGE_MESH: f64 = core::f64::consts::FRAC_1_SQRT_2;
+/// Spaces between contact points of the finest tip of the stage, times those of the scene: 33 patches, or as many as its mesh has places for.
+const STAGE_FINEST: usize = 8;
 
 /// One scene of the study.
 struct Standard {
-    name: &'static str,
-    title: &'static str,
+    name: String,
+    title: String,
+    /// Of which pictures it is in: `rotor37` or `stage`.
+    family: &'static str,
     settings: SceneSettings,
-    /// Patches and mesh of the structure that touches, instead of what the scene names.
-    other: Option<(usize, f64)>,
+    /// Tip and mesh of the structure that touches, instead of what the scene names.
+    other: Option<(Tip, f64)>,
+    /// Spaces between contact points of the finest tip, times its own.
+    finest_tip: usize,
 }
 
 fn standards() -> Result<Vec<Standard>> {
@@ -53,12 +63,22 @@ fn standards() -> Result<Vec<Standard>> {
         let mut settings = scene_source::settings("builtin:rotor37")?;
         settings.contacts[0].friction = friction;
         settings.surfaces[0].shape = Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
-        all.push(Standard { name, title, settings, other: None });
+        let (name, title) = (name.into(), title.into());
+        all.push(Standard { name, title, family: FAMILIES[0], settings, other: None, finest_tip: refine::FINEST_TIP });
     }
-    for (friction, name, title) in [(0.0, "stage-smooth", "stage, µ = 0"), (FRICTION, "stage", "stage, µ = 0.15")] {
-        let mut settings = scene_source::settings("builtin:stage")?;
-        settings.contacts[0].friction = friction;
-        all.push(Standard { name, title, settings, other: Some(STAGE) });
+    for (tip, name, touching) in STAGE_TIPS {
+        for (friction, ending) in [(0.0, "-smooth"), (FRICTION, "")] {
+            let mut settings = scene_source::settings("builtin:stage")?;
+            settings.contacts[0].friction = friction;
+            all.push(Standard {
+                name: format!("{name}{ending}"),
+                title: format!("stage, {touching}, µ = {friction}"),
+                family: FAMILIES[1],
+                settings,
+                other: Some((tip, STAGE_MESH)),
+                finest_tip: STAGE_FINEST,
+            });
+        }
     }
     Ok(all)
 }
@@ -69,8 +89,8 @@ impl Standard {
             let missing = || Failure::new(&structure.rom, "no such model", "");
             let name = tiprub_format::builtin_model(&self.settings, structure).ok_or_else(missing)?;
             let found = match self.other.filter(|_| index == 0) {
-                Some((patches, mesh)) => {
-                    let other = Other { modes: 1.0, tip: Tip::Patches(patches), mesh };
+                Some((tip, mesh)) => {
+                    let other = Other { modes: 1.0, tip, mesh };
                     builtin::refined(&name, other, cache, console)
                 }
                 None => builtin::rom(&name, cache, console),
@@ -84,8 +104,9 @@ impl Standard {
 
 /// What was found of a scene, or why it does not run.
 struct Case {
-    title: &'static str,
-    name: &'static str,
+    title: String,
+    name: String,
+    family: &'static str,
     found: std::result::Result<Found, String>,
     seconds: f64,
 }
@@ -98,10 +119,10 @@ pub(crate) fn study(arguments: &RefinementArguments, console: &Console) -> Resul
     let cache = arguments.common.cache.cache();
     let quick = arguments.common.quick;
     let asked =
-        |standard: &Standard| arguments.scenes.is_empty() || arguments.scenes.iter().any(|one| one == standard.name);
+        |standard: &Standard| arguments.scenes.is_empty() || arguments.scenes.iter().any(|one| *one == standard.name);
     let mut cases = Vec::new();
     for standard in standards()?.iter().filter(|standard| asked(standard)) {
-        console.say(standard.title);
+        console.say(&standard.title);
         let clock = std::time::Instant::now();
         let scene = standard.scene(&cache, console)?;
         let of = Asked {
@@ -112,13 +133,16 @@ pub(crate) fn study(arguments: &RefinementArguments, console: &Console) -> Resul
             source: None,
             cache: cache.clone(),
             mesh: standard.other.map_or(1.0, |(_, mesh)| mesh),
+            finest_tip: standard.finest_tip,
+            only: &arguments.directions,
         };
-        let found = convergence::found(standard.name, &scene, &of, console).map_err(|failure| failure.to_string());
+        let found = convergence::found(&standard.name, &scene, &of, console).map_err(|failure| failure.to_string());
         let seconds = clock.elapsed().as_secs_f64();
-        cases.push(Case { title: standard.title, name: standard.name, found, seconds });
+        let (title, name) = (standard.title.clone(), standard.name.clone());
+        cases.push(Case { title, name, family: standard.family, found, seconds });
     }
     if cases.is_empty() {
-        let names = standards()?.iter().map(|standard| standard.name).collect::<Vec<_>>().join(", ");
+        let names = standards()?.into_iter().map(|standard| standard.name).collect::<Vec<_>>().join(", ");
         return Err(Failure::usage("--scene", "no such scene", format!("Give some of {names}")));
     }
     let mut figures = pictures(&cases)?;
@@ -146,7 +170,7 @@ pub(crate) fn study(arguments: &RefinementArguments, console: &Console) -> Resul
 
 fn statements(case: &Case) -> Vec<Statement> {
     match &case.found {
-        Err(why) => vec![Statement::remark(case.title, format!("does not run, after {:.0} s: {why}", case.seconds))],
+        Err(why) => vec![Statement::remark(&case.title, format!("does not run, after {:.0} s: {why}", case.seconds))],
         Ok(found) => {
             let all = page::statements(found).into_iter();
             all.map(|one| Statement { expected: format!("{}: {}", case.title, one.expected), ..one }).collect()
@@ -154,16 +178,9 @@ fn statements(case: &Case) -> Vec<Statement> {
     }
 }
 
-const HEADINGS: [&str; 8] = [
-    "refined",
-    "value",
-    "displacements",
-    "impulse (N·s)",
-    "error",
-    "friction work or strain energy (J)",
-    "error",
-    "step (µs)",
-];
+/// Headings of a table; the sixth is the [energy].
+const HEADINGS: [&str; 7] =
+    ["refined", "value", "displacements", "impulse (N·s)", "error", "friction work or strain energy (J)", "error"];
 
 /// "1.2 %"; in brackets how far it is from the finest level, where no limit is read.
 fn percent(error: Option<f64>, to_finest: Option<f64>) -> String {
@@ -187,12 +204,14 @@ fn energy(refined: &Refined) -> usize {
 fn rows(refined: &Refined) -> Vec<Vec<String>> {
     let energy = energy(refined);
     let direction = &refined.direction;
-    let title = direction.title.clone();
+    let title = match direction.shorter {
+        Some(factor) => format!("{} (1/{factor} of the step)", direction.title),
+        None => direction.title.clone(),
+    };
     let value =
         |value: f64| if direction.unit == "s" { format!("{:.3} µs", 1e6 * value) } else { format!("{value:.0}") };
     let levels = direction.levels.iter().zip(&refined.runs).map(|(level, run)| {
         let own = if level.own { " (the scene)" } else { "" };
-        let step = 1e6 * level.scene.settings.experiment.communication_step / f64::from(level.division);
         let mut row = vec![title.clone(), format!("{}{own}", value(level.value))];
         match run {
             Ok(run) => {
@@ -205,7 +224,6 @@ fn rows(refined: &Refined) -> Vec<Vec<String>> {
                 std::iter::once(format!("refused: {}", first_words(why))).chain(["", "", "", ""].map(String::from)),
             ),
         }
-        row.push(format!("{step:.3}"));
         row
     });
     let limits = refined.limits();
@@ -225,7 +243,6 @@ fn rows(refined: &Refined) -> Vec<Vec<String>> {
         short(limits[0]),
         limit(energy - 1),
         short(limits[energy - 1]),
-        String::new(),
     ];
     levels.chain((direction.levels.len() > 2).then_some(last)).collect()
 }
@@ -241,7 +258,13 @@ fn tables(case: &Case) -> Vec<Table> {
     let caption =
         format!("{}: {}, {:.2} ms, {:.0} s for all", case.title, found.method, 1e3 * found.window.0, case.seconds);
     let directions = found.refined.iter().filter(|refined| refined.direction.levels.len() > 1);
-    vec![Table { rows: directions.flat_map(rows).collect(), ..Table::new(caption, HEADINGS) }]
+    let mut headings = HEADINGS;
+    headings[5] = if found.refined.iter().any(|refined| energy(refined) == 2) {
+        "friction work (J)"
+    } else {
+        "strain energy (J)"
+    };
+    vec![Table { rows: directions.flat_map(rows).collect(), ..Table::new(caption, headings) }]
 }
 
 /// Error of the scene as it stands: a row per scene, a column per direction.
@@ -257,7 +280,7 @@ fn summary(cases: &[Case]) -> Table {
             percent(own.and_then(|refined| refined.own_errors()?[0]), None)
         };
         let cells = ["step", "modes", "nodes", "mesh"].map(of);
-        table.rows.push(std::iter::once(case.title.to_owned()).chain(cells).collect());
+        table.rows.push(std::iter::once(case.title.clone()).chain(cells).collect());
     }
     table
 }
@@ -267,44 +290,125 @@ fn markdown(cases: &[Case]) -> String {
     all.map(|table| table.to_markdown() + "\n").collect()
 }
 
-/// A picture per direction, a curve per scene: errors of the displacements.
+/// What pictures show of a direction, in the order of their names.
+const DRAWN: [&str; 3] = ["displacements (L2)", "impulse", "friction work (strain energy, µ = 0)"];
+/// Family, direction, label of its values, names of the pictures.
+const PICTURES: [(&str, &str, &str, [&str; 3]); 8] = [
+    (
+        FAMILIES[0],
+        refine::NODES,
+        "contact patches (-)",
+        ["refinement-patches", "refinement-patches-impulse", "refinement-patches-work"],
+    ),
+    (FAMILIES[0], "modes", "modes (-)", ["refinement-modes", "refinement-modes-impulse", "refinement-modes-work"]),
+    (
+        FAMILIES[0],
+        refine::MESH,
+        "mesh nodes (-)",
+        ["refinement-mesh", "refinement-mesh-impulse", "refinement-mesh-work"],
+    ),
+    (
+        FAMILIES[0],
+        refine::STEP,
+        "internal step (s)",
+        ["refinement-step", "refinement-step-impulse", "refinement-step-work"],
+    ),
+    (
+        FAMILIES[1],
+        refine::NODES,
+        "contact patches or nodes (-)",
+        ["refinement-stage-patches", "refinement-stage-patches-impulse", "refinement-stage-patches-work"],
+    ),
+    (
+        FAMILIES[1],
+        "modes",
+        "families of modes of the disk (-)",
+        ["refinement-stage-modes", "refinement-stage-modes-impulse", "refinement-stage-modes-work"],
+    ),
+    (
+        FAMILIES[1],
+        refine::MESH,
+        "mesh nodes (-)",
+        ["refinement-stage-mesh", "refinement-stage-mesh-impulse", "refinement-stage-mesh-work"],
+    ),
+    (
+        FAMILIES[1],
+        refine::STEP,
+        "internal step (s)",
+        ["refinement-stage-step", "refinement-stage-step-impulse", "refinement-stage-step-work"],
+    ),
+];
+
+/// Pictures per family of scenes and direction, a curve per scene.
 fn pictures(cases: &[Case]) -> Result<Vec<Figure>> {
     let mut figures = Vec::new();
-    for (direction, name, label) in [
-        ("nodes", "refinement-patches", "contact patches (-)"),
-        ("modes", "refinement-modes", "modes (-)"),
-        ("mesh", "refinement-mesh", "mesh nodes (-)"),
-        ("step", "refinement-step", "internal step (s)"),
-    ] {
-        let (mut series, mut sheet) =
-            (Vec::new(), Sheet::new(["scene", "value", "displacements", "impulse", "work or energy"]));
-        for (case, number) in cases.iter().zip(0_u32..) {
-            let Ok(found) = &case.found else { continue };
-            let Some(refined) = found.refined.iter().find(|refined| refined.direction.name == direction) else {
-                continue;
-            };
-            let mut points = Vec::new();
-            for (level, run) in refined.ran() {
-                let errors = page::drawn(refined, run);
-                let known = |index: usize| errors[index].unwrap_or(f64::NAN);
-                points.push((level.value, known(0)));
-                sheet.rows.push(vec![f64::from(number), level.value, known(0), known(1), known(energy(refined))]);
-            }
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let how = if refined.rest().is_some() { "" } else { " (to the finest)" };
-            series.push(Series::line(format!("{}{how}", case.title), points));
+    for (family, direction, label, names) in PICTURES {
+        let of_family: Vec<&Case> = cases.iter().filter(|case| case.family == family).collect();
+        for (number, name) in names.into_iter().enumerate() {
+            figures.extend(picture(&of_family, (direction, label), number, name)?);
         }
-        let plot = Plot {
-            height: 300,
-            logarithmic: true,
-            logarithmic_x: true,
-            marked: true,
-            ..Plot::new(label, "error of the displacements (L2)", series)
-        };
-        let caption = format!(
-            "Error of the displacements against the limit: {label}; numbers of the scenes from 0 in the order of the legend."
-        );
-        figures.push(Figure { name, caption, picture: Picture::plot(&plot)?, sheet });
     }
     Ok(figures)
+}
+
+/// Errors of one quantity over the levels of a direction; `None` where no scene has them.
+fn picture(
+    cases: &[&Case],
+    (direction, label): (&str, &str),
+    number: usize,
+    name: &'static str,
+) -> Result<Option<Figure>> {
+    let (mut series, mut sheet) = (Vec::new(), Sheet::new(["scene", "value", "error"]));
+    let quantity = DRAWN[number];
+    for (case, scene) in cases.iter().zip(0_u32..) {
+        let Ok(found) = &case.found else { continue };
+        let Some(refined) = found.refined.iter().find(|refined| refined.direction.name == direction) else { continue };
+        let index = if number == 2 { energy(refined) } else { number };
+        let known = |run| page::drawn(refined, run)[index].unwrap_or(f64::NAN);
+        let mut points: Vec<_> = refined.ran().into_iter().map(|(level, run)| (level.value, known(run))).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        sheet.rows.extend(points.iter().map(|(value, error)| vec![f64::from(scene), *value, *error]));
+        let read = refined.own_errors().is_some_and(|errors| errors[index].is_some());
+        let how = if read { "" } else { " (to the finest)" };
+        series.push(Series::line(format!("{}{how}", case.title), points));
+    }
+    if sheet.rows.is_empty() {
+        return Ok(None);
+    }
+    let plot = Plot {
+        height: 300,
+        logarithmic: true,
+        logarithmic_x: true,
+        marked: true,
+        ..Plot::new(label, format!("error of {quantity}"), series)
+    };
+    let caption =
+        format!("Error of {quantity} against the limit, over {label}; scenes from 0 in the order of the legend.");
+    Ok(Some(Figure { name, caption, picture: Picture::plot(&plot)?, sheet }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_stage_is_refined_with_the_nodes_that_it_ships_with_and_with_patches() {
+        let all = standards().unwrap();
+        let of = |name: &str| all.iter().find(|standard| standard.name == name).unwrap();
+        let shipped = builtin::stage(false).1.tip;
+        for (name, friction) in [("stage-nodes", FRICTION), ("stage-nodes-smooth", 0.0)] {
+            let standard = of(name);
+            assert_eq!(
+                (standard.other.unwrap().0, standard.settings.contacts[0].friction),
+                (shipped, friction),
+                "{name}"
+            );
+        }
+        // Five patches up to 33, as far as the mesh has places.
+        let Some((Tip::Patches(own), _)) = of("stage").other else { panic!("patches") };
+        assert_eq!(of("stage").finest_tip * (own - 1) + 1, 33);
+        let names: std::collections::BTreeSet<&str> = PICTURES.iter().flat_map(|(.., names)| *names).collect();
+        assert_eq!(names.len(), 3 * PICTURES.len(), "a picture is written over another");
+        assert!(all.iter().all(|standard| FAMILIES.contains(&standard.family)));
+    }
 }

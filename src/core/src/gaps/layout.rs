@@ -27,7 +27,15 @@ impl Layout {
     /// # Errors
     /// Wrong number of clearances.
     pub fn new(rom: &Rom, clearances: &[f64], lanes: usize) -> Result<Self> {
-        let sectors = rom.sectors;
+        let places: Vec<[f64; 3]> = rom.contact_nodes.iter().map(|node| node.position).collect();
+        Self::of_places(&places, rom.sectors, clearances, lanes)
+    }
+
+    /// The same of points at these places (m, rad, m) of a sector.
+    ///
+    /// # Errors
+    /// Wrong number of clearances.
+    pub fn of_places(places: &[[f64; 3]], sectors: usize, clearances: &[f64], lanes: usize) -> Result<Self> {
         if clearances.len() != sectors {
             return Err(Error::invalid(
                 "contact.sector_gaps",
@@ -35,22 +43,21 @@ impl Layout {
                 "Give one gap (m) per sector, or remove the line to use `gap` for all",
             ));
         }
-        let mut angles = vec![0.0; rom.contact_nodes.len() * lanes];
-        for (node, contact) in rom.contact_nodes.iter().enumerate() {
+        let mut angles = vec![0.0; places.len() * lanes];
+        for (node, [_, angle, _]) in places.iter().enumerate() {
             for sector in 0..sectors {
-                angles[node * lanes + sector] = contact.position[1] + sector_angle(sector, sectors);
+                angles[node * lanes + sector] = angle + sector_angle(sector, sectors);
             }
         }
         // Padding lanes are infinitely far away.
         let mut padded = vec![f64::INFINITY; lanes];
         padded[..sectors].copy_from_slice(clearances);
-        let nodes = || rom.contact_nodes.iter();
         Ok(Self {
             lanes,
             angles,
-            radii: nodes().map(|node| node.position[0]).collect(),
-            per_radius: nodes().map(|node| 1.0 / node.position[0]).collect(),
-            axial: nodes().map(|node| node.position[2]).collect(),
+            radii: places.iter().map(|place| place[0]).collect(),
+            per_radius: places.iter().map(|place| 1.0 / place[0]).collect(),
+            axial: places.iter().map(|place| place[2]).collect(),
             clearances: padded,
         })
     }

@@ -61,6 +61,21 @@ impl RevolutionGap {
         Self { nodes, ..self }
     }
 
+    /// Contact nodes that meet the surface.
+    pub fn members(&self) -> &[usize] {
+        &self.nodes
+    }
+
+    /// Meridional slope per contact node of the structure, as the surface has it.
+    pub fn slopes(&self) -> &[f64] {
+        &self.slopes
+    }
+
+    /// Points at other places instead of contact nodes, with the slopes of the surface there.
+    pub fn of_points(self, layout: Layout, slopes: Vec<f64>) -> Self {
+        Self { nodes: (0..layout.nodes()).collect(), layout, slopes, ..self }
+    }
+
     /// Let whirl and axial shift of the shaft act.
     pub fn with_moving_shaft(self, shaft_moves: bool) -> Self {
         let room = || vec![0.0; if shaft_moves { self.layout.lanes } else { 0 }];

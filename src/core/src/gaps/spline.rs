@@ -78,7 +78,7 @@ impl SplineGap {
     }
 
     /// Move the control points: shape factor, and displacements `moved` (m, three per control point; empty = rigid).
-    fn follow(&mut self, factor: f64, moved: &[f64]) {
+    pub fn follow(&mut self, factor: f64, moved: &[f64]) {
         if moved.is_empty() && (self.shape.is_empty() || factor.to_bits() == self.factor.to_bits()) {
             return;
         }
@@ -151,6 +151,20 @@ impl SplineGap {
         let point = frame.fixed(place);
         let start = guess.map_or_else(|| self.surface.locate(point), |place| self.surface.advance(place, self.turned));
         (self.surface.project(point, start), frame)
+    }
+
+    /// Points at other places instead of contact nodes.
+    pub fn of_points(self, layout: Layout) -> Self {
+        Self { nodes: (0..layout.nodes()).collect(), layout, ..self }
+    }
+
+    /// Gap (m) of one node displaced by `moved` (m) to the surface as it is now; infinite beyond its edges.
+    pub fn gap_of_one(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
+        match self.project(at, moved, None).0 {
+            Projection::Found { gap, .. } => gap,
+            Projection::BeyondEdge { .. } => NOTHING_TO_TOUCH,
+            Projection::Lost => f64::NAN,
+        }
     }
 
     /// Gap (m), unit normal and place of one node displaced by `moved` (m); the surface is rigid.

@@ -379,7 +379,7 @@ impl Compiled {
     }
 
     /// The gap function of a pair.
-    fn gap(&self, pair: usize) -> Result<GapLaw> {
+    pub(super) fn gap(&self, pair: usize) -> Result<GapLaw> {
         let plan = &self.plan.pairs[pair];
         if self.bodies[plan.body].translations.is_some() {
             return self.open_gap(plan);

@@ -18,6 +18,7 @@ mod state;
 mod stepping;
 mod table;
 mod units;
+mod watched;
 mod window;
 
 use crate::gaps::Drive;
@@ -29,6 +30,7 @@ use compile::Compiled;
 use drive::{Input, RotorAngle};
 pub use inputs::Courses;
 use inputs::{CarrierInputs, Inputs, PairInputs, RotorInputs};
+use watched::WatchedGaps;
 use window::Window;
 
 /// Communication points may differ from the simulation's own time by this fraction of H (rounding in the importer).
@@ -126,6 +128,7 @@ pub struct Simulation {
     /// Share of the friction heat that goes into what carries the surface, per pair.
     slave_shares: Vec<f64>,
     window: Window,
+    watched_gaps: WatchedGaps,
     communication: Communication,
     /// Length of the step before the last (s), 0 before there was one.
     previous_length: f64,
@@ -172,6 +175,7 @@ impl Simulation {
         let (table, readers) = table::build(scene)?;
         let system = compiled.system()?;
         let window = Window::new(system.structures(), &compiled.patches);
+        let watched_gaps = WatchedGaps::new(&compiled)?;
         let sets = system.sets().count();
         let (energies, initial_energies) = (vec![SetEnergy::default(); sets], vec![0.0; sets]);
         let (bodies, pairs, carriers) = (compiled.bodies.len(), compiled.plan.pairs.len(), compiled.carriers.len());
@@ -198,6 +202,7 @@ impl Simulation {
             compiled,
             system,
             window,
+            watched_gaps,
             communication: Communication::default(),
             previous_length: 0.0,
             time: 0.0,

@@ -87,6 +87,7 @@ impl Simulation {
             let variable = self.table.with_quantity_of(Quantity::HeatToSlave, pair);
             self.slave_shares[pair] = variable.map_or(1.0, |variable| self.values[variable.reference as usize]);
         }
+        self.find_watched();
         let mut values = std::mem::take(&mut self.values);
         let (system, window) = (&self.system, &self.window);
         let ledger = system.ledger();
@@ -254,6 +255,11 @@ impl View<'_> {
         self.simulation.watched_row(body, 3 * point + axis, sector)
     }
 
+    /// Clearance of a watched point of a sector (m).
+    pub fn watched_clearance(&self, body: usize, sector: usize, point: usize) -> f64 {
+        self.simulation.watched_gaps.clearance(body, point, sector)
+    }
+
     /// |(2/N) Σ_b u_b e^(−i n θ_b)| (1/N for n = 0 and n = N/2) of the radial displacement of the middle node.
     pub fn nodal_diameters(&self, body: usize, out: &mut [f64]) {
         let modes = self.modes(body);
@@ -283,7 +289,7 @@ impl Simulation {
         rows.flat_map(|(body, row)| (0..sectors(body)).map(move |sector| self.watched_row(body, row, sector))).collect()
     }
 
-    fn watched_row(&self, body: usize, row: usize, sector: usize) -> f64 {
+    pub(super) fn watched_row(&self, body: usize, row: usize, sector: usize) -> f64 {
         let (modes, shapes) = (self.system.structures()[body].modes(), self.compiled.bodies[body].watched.row(row));
         shapes.iter().enumerate().map(|(mode, shape)| shape * modes.modal_state(mode, sector).0).sum()
     }

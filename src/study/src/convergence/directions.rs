@@ -4,7 +4,7 @@ use tiprub_core::Scene;
 use tiprub_shell::Result;
 
 use super::{
-    refine::{Again, Direction, MODES, MODES_KEPT},
+    refine::{Again, Direction, MESH, MODES, MODES_KEPT, NODES, ROWS, STEP},
     refiner::Refiner,
 };
 
@@ -14,18 +14,28 @@ use super::{
 /// A source that does not give the ROM of the scene, and what its reduction refuses.
 pub fn directions(scene: &Scene, own: u32, again: &Again) -> Result<Vec<Direction>> {
     let refiner = Refiner::checked(scene, own, again)?;
-    let mut all = vec![refiner.steps()];
-    for (index, name) in (0..scene.roms.len()).zip(MODES) {
+    let asked = |name: &str| again.only.is_empty() || again.only.iter().any(|only| only == name);
+    let mut all = Vec::new();
+    if asked(STEP) {
+        all.push(refiner.steps());
+    }
+    for (index, name) in (0..scene.roms.len()).zip(MODES).filter(|(_, name)| asked(name)) {
         all.push(refiner.modes(index, name)?);
     }
-    all.push(refiner.nodes()?);
-    all.extend(refiner.rows()?);
-    if let Some(structure) = scene.settings.structures.get(MODES.len()) {
+    if asked(NODES) {
+        all.push(refiner.nodes()?);
+    }
+    if asked(ROWS) {
+        all.extend(refiner.rows()?);
+    }
+    if let Some(structure) = scene.settings.structures.get(MODES.len()).filter(|_| again.only.is_empty()) {
         all.push(Direction {
             missing: format!("the study refines {} structures", MODES.len()),
             ..Direction::new("modes-more", format!("modes of {} and those after it", structure.name), MODES_KEPT)
         });
     }
-    all.push(refiner.meshes()?);
+    if asked(MESH) {
+        all.push(refiner.meshes()?);
+    }
     Ok(all)
 }

@@ -33,6 +33,7 @@ use crate::{
         case::Case,
         own::{Own, refuse_compared},
     },
+    estimate::{self, Estimate},
     master, one_rotor,
 };
 
@@ -56,25 +57,40 @@ pub struct Found {
     pub method: String,
     /// All directions.
     pub refined: Vec<Refined>,
+    /// What the ROM of the master said of itself before; empty where it said nothing.
+    pub of_rom: Vec<Estimate>,
+}
+
+/// A ROM with what a study found of it.
+#[derive(Debug)]
+pub struct Judged {
+    /// The ROM.
+    pub rom: Rom,
+    /// Whether an error was found that a ROM carries.
+    pub known: bool,
 }
 
 impl Found {
-    /// The ROM of the master with its errors on this scene.
-    pub fn with_errors(&self, scene: &Scene) -> Rom {
+    /// The ROM of the master with its errors on this scene; as it was where none was found.
+    pub fn with_errors(&self, scene: &Scene) -> Judged {
         let index = master(scene);
         let of = |name: &str| {
             let refined = self.refined.iter().find(|refined| refined.direction.name == name)?;
             refined.own_errors()?[0]
         };
         let mut rom = scene.roms[index].clone();
-        rom.checks.rub_errors = Some(RubErrors {
+        let found = RubErrors {
             found_on: format!("{}, {:.2} ms", self.names[1], 1e3 * self.window.0),
             modes: refine::modes_of(index).and_then(of),
             patches: of(refine::NODES),
             rows: of(refine::ROWS),
             mesh: of(refine::MESH),
-        });
-        rom
+        };
+        if found.is_empty() {
+            return Judged { rom, known: false };
+        }
+        rom.checks.rub_errors = Some(found);
+        Judged { rom, known: true }
     }
 }
 
@@ -82,13 +98,19 @@ impl Found {
 ///
 /// # Errors
 /// The scene cannot be read or does not run, or a model cannot be reduced again.
-pub fn study(arguments: &ConvergenceArguments, source: Option<&dyn Source>, console: &Console) -> Result<(Study, Rom)> {
+pub fn study(
+    arguments: &ConvergenceArguments,
+    source: Option<&dyn Source>,
+    console: &Console,
+) -> Result<(Study, Judged)> {
     refuse_compared(&arguments.set)?;
     let cache = arguments.common.cache.cache();
     let scene = scene_source::load(&arguments.scene, &cache, console)?;
     let asked = Asked {
         cache,
         mesh: 1.0,
+        finest_tip: refine::FINEST_TIP,
+        only: &[],
         settings: &arguments.set,
         window: arguments.window,
         quick: arguments.common.quick,
@@ -115,6 +137,10 @@ pub struct Asked<'a> {
     pub cache: RomCache,
     /// Mesh of the master where it ships: 1, or what its elements along the edges are multiplied with.
     pub mesh: f64,
+    /// Spaces between contact points of the finest tip, times its own.
+    pub finest_tip: usize,
+    /// Names of the directions; empty for all.
+    pub only: &'a [String],
 }
 
 /// Everything about the scene called `name`.
@@ -136,7 +162,15 @@ pub fn found(name: &str, scene: &Scene, asked: &Asked, console: &Console) -> Res
     let directions = directions(
         scene,
         own,
-        &Again { source: asked.source, cache: &asked.cache, mesh: asked.mesh, quick: asked.quick, console },
+        &Again {
+            source: asked.source,
+            cache: &asked.cache,
+            mesh: asked.mesh,
+            finest_tip: asked.finest_tip,
+            only: asked.only,
+            quick: asked.quick,
+            console,
+        },
     )?;
     announce(&directions, scene, (own, seconds), &runner);
     let mut refined = Vec::new();
@@ -148,6 +182,7 @@ pub fn found(name: &str, scene: &Scene, asked: &Asked, console: &Console) -> Res
         window: (interval * case.samples() as f64, case.samples()),
         method: crate::error_study::name((scene.settings.time.scheme, scene.settings.contacts[0].solver)),
         refined,
+        of_rom: estimate::of_rom(&scene.roms[master(scene)]),
     })
 }
 

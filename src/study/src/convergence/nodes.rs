@@ -92,7 +92,8 @@ mod tests {
         let of = |start: &&str| ContactSettings { nodes: Some((*start).into()), ..contact.clone() };
         scene.settings.contacts = pairs.iter().map(of).collect();
         let (cache, source) = (RomCache::off(), Some(&Blade as &dyn Source));
-        let again = Again { source, cache: &cache, mesh: 1.0, quick: true, console: &console };
+        let again =
+            Again { source, cache: &cache, mesh: 1.0, finest_tip: 4, only: &[], quick: true, console: &console };
         let [_, modes, nodes, mesh] = directions(&scene, 1, &again).unwrap().try_into().unwrap();
         [modes, nodes, mesh]
     }
@@ -110,6 +111,26 @@ mod tests {
         assert_eq!(names(&mesh), [own, own], "{:?}", mesh.missing);
         assert!(mesh.levels[0].own && mesh.levels[0].value < mesh.levels[1].value && !mesh.levels[1].own);
         assert!(mesh.size(mesh.levels[0].value) > mesh.size(mesh.levels[1].value));
+    }
+
+    /// Tips as fine as asked, as far as the mesh has places for them; what it has none for is told. Only what is asked is made.
+    #[test]
+    fn finer_tips_end_where_the_mesh_has_no_more_places() {
+        let console = Console::new(true, false);
+        let scene =
+            scene_source::rotor37_scene_with(Blade.reduce(None, 4, Tip::Nodes(3), &console).unwrap().rom).unwrap();
+        let (cache, only) = (RomCache::off(), ["nodes".to_owned()]);
+        let of = |finest_tip| {
+            let source = Some(&Blade as &dyn Source);
+            let again =
+                Again { source, cache: &cache, mesh: 1.0, finest_tip, only: &only, quick: false, console: &console };
+            let [nodes] = directions(&scene, 1, &again).unwrap().try_into().unwrap();
+            let levels = nodes.levels.iter().map(|level| level.value).collect::<Vec<_>>();
+            (levels, nodes.missing)
+        };
+        assert_eq!(of(4), (vec![2.0, 3.0, 5.0, 9.0], String::new()));
+        let (levels, missing) = of(8);
+        assert!(levels == [2.0, 3.0, 5.0, 9.0] && missing.starts_with("17 nodes: "), "{levels:?} {missing}");
     }
 
     #[test]

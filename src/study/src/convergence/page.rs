@@ -13,7 +13,7 @@ use super::{
     march::{Marched, QUANTITIES},
     refine::{Direction, OF_CLEARANCE, SECONDS, goes_by_tolerance},
 };
-use crate::{Figure, Picture, Sheet, Statement, Study};
+use crate::{Figure, Picture, Sheet, Statement, Study, estimate};
 
 /// Largest change by the next refinement that is called small.
 const SMALL: f64 = 0.05;
@@ -96,6 +96,7 @@ pub fn statements(found: &Found) -> Vec<Statement> {
     let mut all: Vec<Statement> = found.refined.iter().filter_map(error).collect();
     all.extend(found.refined.iter().filter_map(small));
     all.extend(worst(found));
+    all.extend(scope(found));
     for refined in found.refined.iter().filter(|refined| !refined.direction.missing.is_empty()) {
         let title = &refined.direction.title;
         all.push(Statement::remark(format!("Not refined: {title}"), refined.direction.missing.clone()));
@@ -140,9 +141,45 @@ fn worst(found: &Found) -> Option<Statement> {
     let all = found.refined.iter().filter_map(|refined| Some((most(refined)?, &refined.direction.title)));
     let (change, title) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(Statement::remark(
-        "The direction that changes most at the scene's own setting",
+        "The direction that changes most at the scene's own setting, of those that have other levels here",
         format!("{title}: {:.2} %", 100.0 * change),
     ))
+}
+
+/// Titles of the directions with a level finer than the scene that ran, of those with coarser ones only, and of the others.
+fn directions(found: &Found) -> [Vec<&str>; 3] {
+    let which = |refined: &Refined| {
+        let ran = refined.ran();
+        let own = ran.iter().position(|(level, _)| level.own);
+        match own {
+            Some(own) if own + 1 < ran.len() => 0,
+            Some(own) if own > 0 => 1,
+            _ => 2,
+        }
+    };
+    [0, 1, 2].map(|kind| {
+        found
+            .refined
+            .iter()
+            .filter(|refined| which(refined) == kind)
+            .map(|refined| refined.direction.title.as_str())
+            .collect()
+    })
+}
+
+/// What was refined and what not: the errors above are of nothing else. Beside it what the ROM says of itself.
+fn scope(found: &Found) -> Vec<Statement> {
+    let [finer, coarser, not] = directions(found).map(|titles| titles.join(", "));
+    let parts = [("finer than the scene: ", finer), ("coarser ones only: ", coarser), ("not at all: ", not)];
+    let parts: Vec<String> = parts
+        .into_iter()
+        .filter(|(_, titles)| !titles.is_empty())
+        .map(|(what, titles)| format!("{what}{titles}"))
+        .collect();
+    let refined = Statement::remark("What was refined; no error of another direction is in these", parts.join("; "));
+    let told = estimate::told_of_rom(&found.of_rom);
+    let of_rom = told.map(|told| Statement::remark("What the ROM of the scene says of itself", told));
+    std::iter::once(refined).chain(of_rom).collect()
 }
 
 const HEADINGS: [&str; 13] = [
@@ -326,7 +363,9 @@ pub fn results(found: &Found) -> Value {
             "not_refined": (!refined.direction.missing.is_empty()).then_some(&refined.direction.missing),
         })
     };
+    let [finer, coarser, not_refined] = self::directions(found);
     json!({
+        "refined": finer, "coarser_only": coarser, "not_refined": not_refined, "estimates_of_rom": estimate::json_of(&found.of_rom),
         "scene": found.names[0],
         "window": shown(found.window.0),
         "directions": found.refined.iter().map(direction).collect::<Vec<_>>(),

@@ -120,6 +120,8 @@ pub const NODES: &str = "nodes";
 pub const ROWS: &str = "rows";
 /// Name of the direction of meshes.
 pub const MESH: &str = "mesh";
+/// Spaces between contact points of the finest tip, times the scene's own.
+pub const FINEST_TIP: usize = 4;
 /// Units of values.
 pub const SECONDS: &str = "s";
 /// Unit of tolerances.
@@ -144,6 +146,10 @@ pub struct Again<'a> {
     pub cache: &'a RomCache,
     /// Mesh of the scene's model where it ships: 1, or what its elements along the edges are multiplied with.
     pub mesh: f64,
+    /// Spaces between contact points of the finest tip, times its own; 2 of few levels.
+    pub finest_tip: usize,
+    /// Names of the directions; empty for all.
+    pub only: &'a [String],
     /// Few levels.
     pub quick: bool,
     /// For progress.

@@ -273,12 +273,11 @@ impl<'a> Refiner<'a> {
                 return Ok(direction);
             }
         };
-        let mut counts = vec![own, 2 * own - 1];
+        let most = if self.again.quick { 2 } else { self.again.finest_tip };
+        let factors = std::iter::successors(Some(1), |factor| Some(2 * factor)).take_while(|factor| *factor <= most);
+        let mut counts: Vec<usize> = factors.map(|factor| factor * (own - 1) + 1).collect();
         if !patches {
             counts.push(2);
-        }
-        if !self.again.quick {
-            counts.push(4 * own - 3);
         }
         counts.sort_unstable();
         counts.dedup();
@@ -297,7 +296,7 @@ impl<'a> Refiner<'a> {
                     direction.levels.push(self.level(nodes as f64, false, scene));
                 }
                 // A mesh has no more nodes than it has.
-                Err(failure) => direction.misses(format!("{nodes} nodes: {failure}")),
+                Err(failure) => direction.misses(format!("{nodes} {}: {failure}", direction.unit)),
             }
         }
         Ok(direction)

@@ -108,7 +108,8 @@ mod tests {
         let (console, cache) = (Console::new(true, false), RomCache::off());
         let found = |rows: usize, source: Option<&dyn Source>| {
             let scene = scene(rows);
-            let again = Again { source, cache: &cache, mesh: 1.0, quick: true, console: &console };
+            let again =
+                Again { source, cache: &cache, mesh: 1.0, finest_tip: 4, only: &[], quick: true, console: &console };
             let direction = Refiner::checked(&scene, 1, &again).unwrap().rows().unwrap().unwrap();
             let of = |level: &crate::convergence::refine::Level| {
                 let rom = &level.scene.roms[0];

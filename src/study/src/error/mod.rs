@@ -33,7 +33,7 @@ use tiprub_shell::{Result, console::Console};
 use super::{Figure, Picture, Statement, Study};
 use crate::{
     arguments::ErrorArguments,
-    convergence::refine::{Again, Source},
+    convergence::refine::{Again, FINEST_TIP, Source},
 };
 
 /// How far apart the two references of a scene may be.
@@ -49,28 +49,46 @@ pub fn study(arguments: &ErrorArguments, source: Option<&dyn Source>, console: &
     let (title, all) = (case.title().to_owned(), measure::count(&case));
     case.announce(if quick { 1 } else { run::REPETITIONS }, console);
     // First: what cannot be reduced again is told before the long work.
-    let total = total::measure(&case, &Again { source, cache: &cache, mesh: 1.0, quick, console })?;
+    let total = total::measure(
+        &case,
+        &Again { source, cache: &cache, mesh: 1.0, finest_tip: FINEST_TIP, only: &[], quick, console },
+    )?;
     let summary = format!(
         "Every time scheme and contact solver on {}, at steps on both sides of the one it asks for ({all} runs); and other numbers of contact \
-         points and modes, against one truth with more of both.",
-        arguments.scene
+         points and modes, against {}.",
+        arguments.scene,
+        if total.as_ref().is_ok_and(|total| total.finer == [true; 2]) {
+            "one truth with more of both"
+        } else {
+            "one truth"
+        }
     );
     let mut study = of_cases(vec![Box::new(case)], &[], (quick, summary), console)?;
     match total {
-        Err(why) => study.statements.push(Statement::remark(format!("{title}: total errors are not told"), why)),
+        Err(why) => study
+            .statements
+            .push(Statement::remark(format!("{title}: errors of modes, contact points and mesh are not told"), why)),
         Ok(total) => {
             let mut statements = total.statements(&title);
             statements.append(&mut study.statements);
             study.statements = statements;
             study.figures.push(total.figure(&title));
-            study.results["total"] = total.to_json();
+            study.results[total.key()] = total.to_json();
             let of_steps = study.results["scenes"][0]["cheapest"].as_array().cloned().unwrap_or_default();
             let cheapest = total_page::cheapest_csv(&of_steps, &total);
             for (name, meaning, text) in [
-                ("total.csv", "every setting with its total error", total.csv()),
-                ("cheapest.csv", "the cheapest setting for errors of the steps and in total", cheapest),
+                (
+                    format!("{}.csv", total.key().replace('_', "-")),
+                    format!("every setting with its {}", total.name()),
+                    total.csv(),
+                ),
+                (
+                    "cheapest.csv".into(),
+                    format!("the cheapest setting for errors of the steps, and by its {}", total.name()),
+                    cheapest,
+                ),
             ] {
-                study.files.push((name.into(), meaning.into(), text.into_bytes()));
+                study.files.push((name, meaning, text.into_bytes()));
             }
         }
     }
@@ -156,8 +174,8 @@ fn add(study: &mut Study, case: &dyn Case, found: &Measured) -> Vec<Table> {
     let about = sheets::references(case, found);
     let mut all = vec![about.clone()];
     // With one size and no exact solution both are one.
-    let kinds: &[Kind] =
-        if Kind::of_steps(case) == Kind::OfTime { &[Kind::OfTime, Kind::Total] } else { &[Kind::OfOwn] };
+    let of_steps = Kind::of_steps(case);
+    let kinds: &[Kind] = if sheets::has_total(case) { &[of_steps, Kind::Total] } else { &[of_steps] };
     for (&kind, name) in zip(kinds, case.figures()) {
         let (chart, sheet) = sheets::chart(case, found, kind);
         let (winners, costs) = (ranking::winners(case, found, kind), ranking::costs(case, found, kind));

@@ -59,51 +59,52 @@ pub fn chart(case: &dyn Case, found: &Measured, kind: Kind) -> (Chart, Sheet) {
     (chart, sheet)
 }
 
-/// Names of the figures of a run, and what they are.
-const NAMES: [&str; 12] = [
-    "time (s)",
-    "error of the steps",
-    "error against the own limit",
-    "total error",
-    "impulse of the steps",
-    "total impulse",
-    "energy",
-    "ledger",
-    "penetration (m)",
-    "least force (N)",
-    "release",
-    "remark",
+/// A figure of a run: its name, its key for programs, whether it is against a finer model than the case's own, and its value.
+type Named = (&'static str, &'static str, bool, fn(&Figures) -> Option<f64>);
+
+const FIGURES: [Named; 11] = [
+    ("time (s)", "seconds", false, |figures| Some(figures.seconds)),
+    ("error of the steps", "error_of_steps", false, |figures| Some(figures.of_time)),
+    ("error against the own limit", "error_of_own_limit", false, |figures| Some(figures.of_own)),
+    ("total error", "total_error", true, |figures| Some(figures.total)),
+    ("impulse of the steps", "impulse_error_of_steps", false, |figures| Some(figures.impulse)),
+    ("total impulse", "total_impulse_error", true, |figures| Some(figures.impulse_total)),
+    ("energy", "energy_error", false, |figures| Some(figures.energy)),
+    ("ledger", "ledger_residual", false, |figures| figures.residual),
+    ("penetration (m)", "penetration", false, |figures| Some(figures.penetration)),
+    ("least force (N)", "least_force", false, |figures| Some(figures.adhesion)),
+    ("release", "release_error", false, |figures| figures.release),
 ];
 
-fn values(figures: &Figures) -> [Option<f64>; 11] {
-    [
-        Some(figures.seconds),
-        Some(figures.of_time),
-        Some(figures.of_own),
-        Some(figures.total),
-        Some(figures.impulse),
-        Some(figures.impulse_total),
-        Some(figures.energy),
-        figures.residual,
-        Some(figures.penetration),
-        Some(figures.adhesion),
-        figures.release,
-    ]
+/// Whether a case has models finer than its own, or an exact solution: without them there are no total errors.
+pub fn has_total(case: &dyn Case) -> bool {
+    case.sizes().len() > 1 || case.exact().is_some()
+}
+
+/// The figures that a case has.
+fn told(case: &dyn Case) -> impl Iterator<Item = &'static Named> {
+    let has_total = has_total(case);
+    FIGURES.iter().filter(move |(_, _, total, _)| has_total || !total)
 }
 
 /// Every configuration as comma-separated values; refusals with their reason.
 pub fn csv(case: &dyn Case, found: &Measured) -> String {
-    let mut text = format!("competitor,{},{STEP},{}\n", case.size_name(), NAMES.join(","));
+    let names: Vec<&str> = told(case).map(|figure| figure.0).collect();
+    let mut text = format!("competitor,{},{STEP},{},remark\n", case.size_name(), names.join(","));
     for row in &found.rows {
         let _ = write!(text, "\"{}\",{},{}", row.competitor.name(), case.sizes()[row.size], shortest(row.step));
         let _ = match &row.outcome {
             Ok(figures) => {
-                for value in values(figures) {
-                    let _ = write!(text, ",{}", value.map_or_else(String::new, |value| format!("{value:.4e}")));
+                for figure in told(case) {
+                    let _ = write!(
+                        text,
+                        ",{}",
+                        (figure.3)(figures).map_or_else(String::new, |value| format!("{value:.4e}"))
+                    );
                 }
                 writeln!(text, ",")
             }
-            Err(problem) => writeln!(text, ",,,,,,,,,,,,\"{}\"", problem.replace('"', "'")),
+            Err(problem) => writeln!(text, "{}\"{}\"", ",".repeat(names.len() + 1), problem.replace('"', "'")),
         };
     }
     text
@@ -112,7 +113,7 @@ pub fn csv(case: &dyn Case, found: &Measured) -> String {
 /// Every configuration, for the page.
 pub fn rows(case: &dyn Case, found: &Measured) -> Table {
     let mut columns = vec!["competitor".to_owned(), case.size_name().to_owned(), "step or tolerance".to_owned()];
-    columns.extend(NAMES.map(String::from));
+    columns.extend(told(case).map(|figure| figure.0.to_owned()).chain(["remark".to_owned()]));
     let mut table = Table { caption: format!("All runs of {}", case.title()), columns, rows: Vec::new() };
     for row in &found.rows {
         table.rows.push(cells(case, row));
@@ -124,13 +125,13 @@ fn cells(case: &dyn Case, row: &Row) -> Vec<String> {
     let mut cells = vec![row.competitor.name(), case.sizes()[row.size].to_string(), row.competitor.setting(row.step)];
     match &row.outcome {
         Ok(figures) => {
-            let [time, rest @ ..] = values(figures);
-            cells.push(time.map_or_else(String::new, seconds));
+            cells.push(seconds(figures.seconds));
+            let rest = told(case).skip(1).map(|figure| (figure.3)(figures));
             cells.extend(rest.map(|value| value.map_or_else(String::new, |value| format!("{value:.1e}"))));
             cells.push(String::new());
         }
         Err(problem) => {
-            cells.extend(std::iter::repeat_n(String::new(), NAMES.len() - 1));
+            cells.extend(told(case).map(|_| String::new()));
             cells.push(problem.clone());
         }
     }
@@ -194,21 +195,8 @@ pub fn to_json(case: &dyn Case, found: &Measured) -> Value {
         });
         match &row.outcome {
             Ok(figures) => {
-                let keys = [
-                    "seconds",
-                    "error_of_steps",
-                    "error_of_own_limit",
-                    "total_error",
-                    "impulse_error_of_steps",
-                    "total_impulse_error",
-                    "energy_error",
-                    "ledger_residual",
-                    "penetration",
-                    "least_force",
-                    "release_error",
-                ];
-                for (key, value) in keys.into_iter().zip(values(figures)) {
-                    object[key] = json!(value);
+                for (_, key, _, value) in told(case) {
+                    object[key] = json!(value(figures));
                 }
             }
             Err(problem) => object["refused"] = json!(problem),

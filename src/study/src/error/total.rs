@@ -1,6 +1,7 @@
 //! Total error against run time of a scene: other steps, schemes, numbers of patches and of modes, against one truth with more of all.
 //!
-//! Models with fewer patches and modes follow from the ROM itself; those with more are reduced again, where that is possible. All are held
+//! Models with fewer patches and modes follow from the ROM itself; those with more are reduced again, where that is possible. Where it is
+//! not, the truth has the modes and patches of the scene: the errors are then of the steps, and are called so. All are held
 //! against one truth, by what their tips have in common (watched points, or patches that all have). Time is that of the steps: a
 //! model is as cheap as it is small. A mesh costs no run time: what it leaves is told beside the others.
 
@@ -27,6 +28,7 @@ use crate::{
         refiner::Refiner,
         truncate::{Form, truncated},
     },
+    estimate::{self, Estimate},
     master,
 };
 
@@ -90,6 +92,10 @@ pub struct Total {
     pub readable: Option<f64>,
     /// `patches` or `nodes`.
     pub touching: &'static str,
+    /// Whether the truth has more modes than the scene, and more contact points.
+    pub finer: [bool; 2],
+    /// What the ROM says of itself; empty where it says nothing.
+    pub of_rom: Vec<Estimate>,
     /// What the mesh leaves, or why that is not known.
     pub mesh: std::result::Result<f64, String>,
 }
@@ -126,12 +132,15 @@ pub fn measure(case: &Own, again: &Again) -> Result<std::result::Result<Total, S
     let mesh = mesh(case, &refiner, again)?;
     let touching =
         if scene.roms[master(scene)].contact_nodes.iter().all(|node| node.area > 0.0) { "patches" } else { "nodes" };
+    let own = Model::of(scene.clone(), true);
     let Model { points, modes, .. } = Model::of(truth_scene, false);
+    let finer = [modes > own.modes, points > own.points];
+    let of_rom = estimate::of_rom(&scene.roms[master(scene)]);
     let step = case.method().setting(value(case, case.method(), division));
     let whose = if of_source { "" } else { ", the scene's own model, which is not reduced again" };
     let method = case.method().name();
     let truth = format!("{points} {touching} and {modes} modes with {method} at {step}{whose}");
-    Ok(Ok(Total { models, rows, truth, readable, touching, mesh }))
+    Ok(Ok(Total { models, rows, truth, readable, touching, finer, of_rom, mesh }))
 }
 
 /// The scene's model and coarser ones: patches and modes halved, and halved again, each with each.

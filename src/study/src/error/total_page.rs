@@ -11,12 +11,41 @@ use super::{
     sheets::{STEP, step_name},
     total::{Model, Row, Total},
 };
-use crate::{Figure, Picture, Sheet, Statement};
+use crate::{Figure, Picture, Sheet, Statement, estimate};
 
 /// Errors that are asked for.
 pub const TARGETS: [f64; 3] = [1e-1, 1e-2, 1e-3];
 
 impl Total {
+    /// What errors against the truth are called: total ones are those that modes and contact points have a part in.
+    pub fn name(&self) -> &'static str {
+        match (self.finer, self.touching) {
+            ([true, true], _) => "total error",
+            ([true, false], _) => "error of steps and modes",
+            ([false, true], "patches") => "error of steps and patches",
+            ([false, true], _) => "error of steps and contact nodes",
+            ([false, false], _) => "own-model error of the steps",
+        }
+    }
+
+    /// The same in names of files and of results.
+    pub fn key(&self) -> &'static str {
+        if self.finer == [true; 2] { "total" } else { "own_model" }
+    }
+
+    /// What the truth has finer than the scene, and what not.
+    pub fn directions(&self) -> [Vec<&'static str>; 2] {
+        let all =
+            [("steps", true), ("modes", self.finer[0]), (self.touching, self.finer[1]), ("mesh", self.mesh.is_ok())];
+        [true, false].map(|which| all.iter().filter(|(_, finer)| *finer == which).map(|(name, _)| *name).collect())
+    }
+
+    /// The same in words.
+    pub fn scope(&self) -> String {
+        let [refined, not] = self.directions().map(|all| all.join(", "));
+        if not.is_empty() { format!("refined: {refined}") } else { format!("refined: {refined}; not refined: {not}") }
+    }
+
     /// Settings that ran, with time (s) and error.
     fn ran(&self) -> impl Iterator<Item = (&Row, f64, f64)> {
         self.rows.iter().filter_map(|row| row.outcome.as_ref().ok().map(|(seconds, error)| (row, *seconds, *error)))
@@ -47,8 +76,8 @@ impl Total {
 
     fn winners(&self, title: &str) -> Table {
         let columns =
-            ["total error", "cheapest setting", "time", "its error", "with that of the mesh", "the paper's method"];
-        let mut table = Table::new(format!("{title}: cheapest setting for a total error"), columns);
+            [self.name(), "cheapest setting", "time", "its error", "with that of the mesh", "the paper's method"];
+        let mut table = Table::new(format!("{title}: cheapest setting, {} ({})", self.name(), self.scope()), columns);
         for target in TARGETS {
             let paper = self.cheapest(target, Some(PAPER));
             let paper = paper.map_or("does not reach it".into(), |(_, time, _)| seconds(time));
@@ -70,8 +99,8 @@ impl Total {
     fn best(&self, title: &str) -> Table {
         let points: Vec<(f64, f64)> = self.ran().map(|(_, time, error)| (time, error)).collect();
         let mut table = Table::new(
-            format!("{title}: settings that no other beats in both time and total error"),
-            ["setting", "time", "total error"],
+            format!("{title}: settings that no other beats in both time and {}", self.name()),
+            ["setting", "time", self.name()],
         );
         for (time, error) in front(&points) {
             let row = self.ran().find(|(_, own_time, own_error)| (*own_time, *own_error) == (time, error));
@@ -81,7 +110,7 @@ impl Total {
     }
 
     fn all(&self, title: &str) -> Table {
-        let mut table = Table::new(format!("{title}: all settings"), ["setting", "time", "total error", "remark"]);
+        let mut table = Table::new(format!("{title}: all settings"), ["setting", "time", self.name(), "remark"]);
         for row in &self.rows {
             let own = if row.own { "the scene as it stands" } else { "" };
             table.rows.push(match &row.outcome {
@@ -101,7 +130,7 @@ impl Total {
             }
         }
         Chart {
-            error_label: "total error, displacements (relative L2)".into(),
+            error_label: format!("{}, displacements (relative L2)", self.name()),
             all,
             joined: false,
             readable: self.readable.map(|least| (least, "what the truth leaves".into())),
@@ -109,7 +138,7 @@ impl Total {
     }
 
     fn sheet(&self) -> Sheet {
-        let mut sheet = Sheet::new(["time (s)", "total error", "points", "modes", STEP, "scene's own (1 yes)"]);
+        let mut sheet = Sheet::new(["time (s)", self.name(), "points", "modes", STEP, "scene's own (1 yes)"]);
         for (row, time, error) in self.ran() {
             let (model, own) = (&self.models[row.model], f64::from(u8::from(row.own)));
             sheet.rows.push(vec![time, error, model.points as f64, model.modes as f64, row.step, own]);
@@ -129,10 +158,13 @@ impl Total {
             Err(why) => format!("What the mesh leaves is not in it ({why})"),
         };
         Figure {
-            name: "scene-total",
+            name: if self.finer == [true; 2] { "scene-total" } else { "scene-own-model" },
             caption: format!(
-                "{title}: total error of the displacements at other steps, schemes, numbers of {} and of modes, against {}. {mesh}.",
-                self.touching, self.truth
+                "{title}: {} (displacements) at other steps, schemes, numbers of {} and of modes, against {}; {}. {mesh}.",
+                self.name(),
+                self.touching,
+                self.truth,
+                self.scope()
             ),
             picture: Picture { svg: chart.to_svg(), html },
             sheet: self.sheet(),
@@ -145,9 +177,12 @@ impl Total {
         if let Some((row, time, error)) = self.ran().find(|(row, ..)| row.own) {
             let found = format!("{error:.1e} in {} of stepping ({})", seconds(time), self.setting(row));
             all.push(Statement::remark(
-                format!("{title}: total error of the scene as it stands, without the mesh"),
+                format!("{title}: {} of the scene as it stands ({})", self.name(), self.scope()),
                 found,
             ));
+        }
+        if let Some(told) = estimate::told_of_rom(&self.of_rom) {
+            all.push(Statement::remark(format!("{title}: what its ROM says of itself"), told));
         }
         for target in TARGETS {
             let found = match self.cheapest(target, None) {
@@ -161,7 +196,7 @@ impl Total {
                 Some((row, time, error)) => format!("{}: {}, error {error:.1e}", seconds(time), self.setting(row)),
             };
             all.push(Statement::remark(
-                format!("{title}: cheapest for a total error of {target:.0e}, without the mesh"),
+                format!("{title}: cheapest, {} at most {target:.0e} ({})", self.name(), self.scope()),
                 found,
             ));
         }
@@ -172,13 +207,13 @@ impl Total {
             Err(why) => format!("not known: {why}"),
         };
         all.push(Statement::remark(format!("{title}: what the mesh leaves"), found));
-        all.push(Statement::remark(format!("{title}: the truth of total errors"), self.truth.clone()));
+        all.push(Statement::remark(format!("{title}: the truth of these errors"), self.truth.clone()));
         all
     }
 
     /// Every setting as comma-separated values; refusals with their reason.
     pub fn csv(&self) -> String {
-        let mut text = format!("competitor,{},modes,{STEP},time (s),total error,remark\n", self.touching);
+        let mut text = format!("competitor,{},modes,{STEP},time (s),{},remark\n", self.touching, self.name());
         for row in &self.rows {
             let model = &self.models[row.model];
             let start =
@@ -194,20 +229,23 @@ impl Total {
     /// The cheapest setting for a target as comma-separated values.
     fn cheapest_row(&self, target: f64) -> String {
         let Some((row, time, error)) = self.cheapest(target, None).filter(|_| !self.hidden(target)) else {
-            return format!("total,{target:e},,,,,,\n");
+            return format!("{},{target:e},,,,,,\n", self.key());
         };
         let (Model { points, modes, .. }, name) = (&self.models[row.model], row.competitor.name());
-        format!("total,{target:e},\"{name}\",{points},{modes},{},{time:.4e},{error:.4e}\n", shortest(row.step))
+        let key = self.key();
+        format!("{key},{target:e},\"{name}\",{points},{modes},{},{time:.4e},{error:.4e}\n", shortest(row.step))
     }
 
     /// For programs.
     pub fn to_json(&self) -> Value {
+        let error_name = if self.finer == [true; 2] { "total_error" } else { "error" };
+        let [refined, not_refined] = self.directions();
         let row = |row: &Row| {
             let model = &self.models[row.model];
             let (time, error) = row.outcome.as_ref().map_or((None, None), |(time, error)| (Some(time), Some(error)));
             json!({
                 "competitor": row.competitor.name(), self.touching: model.points, "modes": model.modes, step_name(row.competitor): row.step,
-                "own": row.own, "seconds": time, "total_error": error, "refused": row.outcome.as_ref().err(),
+                "own": row.own, "seconds": time, error_name: error, "refused": row.outcome.as_ref().err(),
             })
         };
         let cheapest = |target: f64| {
@@ -215,13 +253,14 @@ impl Total {
             json!({ "error": target, "setting": found.map(|(found, ..)| row(found)) })
         };
         json!({
+            "what": self.name(), "refined": refined, "not_refined": not_refined, "estimates_of_rom": estimate::json_of(&self.of_rom),
             "truth": self.truth, "readable": self.readable, "mesh": self.mesh.as_ref().ok(), "mesh_unknown": self.mesh.as_ref().err(),
             "cheapest": TARGETS.map(cheapest), "rows": self.rows.iter().map(row).collect::<Vec<_>>(),
         })
     }
 }
 
-/// The cheapest settings for errors of the steps, as [`super::sheets::to_json`] has them, and in total.
+/// The cheapest settings for errors of the steps, as [`super::sheets::to_json`] has them, and against the truth of `total`.
 pub fn cheapest_csv(of_steps: &[Value], total: &Total) -> String {
     let mut text = format!("error of,at most,competitor,{},modes,{STEP},time (s),error\n", total.touching);
     for row in of_steps {

@@ -86,7 +86,7 @@ fn watch(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
 /// Components of displacements in both frames.
 const COMPONENTS: [[&str; 3]; 2] = [["radial", "tangential", "axial"], ["x", "y", "z"]];
 
-/// Displacements of the points that a ROM has beside its contact nodes.
+/// Displacements and clearances of the points that a ROM has beside its contact nodes.
 fn watched_points(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
     let Some(watched) = &body.rom.extras.watched else { return };
     let names: Vec<&str> = watched.points.iter().map(|point| point.name.as_str()).collect();
@@ -98,6 +98,19 @@ fn watched_points(table: &mut Builder, parts: &Parts, body: &Body, sector: usize
             table.output(format!("blade[{sector}].{name}_displacement"), Span::Point, nominal(parts, body), text, read);
         (row.dimension, row.display) = (Some(names.len()), Some(1));
     }
+    if body.rom.frame == Frame::Cartesian {
+        return;
+    }
+    let index = body.index;
+    let text = format!(
+        "Clearance of watched points normal to the casing at the communication point ({}){}",
+        names.join(", "),
+        untouched(parts, body)
+    );
+    let read = each(move |view, point| view.watched_clearance(index, sector - 1, point));
+    let name = format!("blade[{sector}].watched_clearance");
+    let row = table.output(name, Span::Point, nominal(parts, body), text, read);
+    (row.dimension, row.display) = (Some(names.len()), Some(1));
 }
 
 /// A force over what a patch stands for: name, words, unit, nominal value, and the extent of a contact node.

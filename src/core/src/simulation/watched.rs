@@ -1,0 +1,199 @@
+//! Clearance of watched points: the gap of a point that touches nothing to the surface that it faces, at communication points.
+//!
+//! A point faces the surface that the contact node nearest to it meets. Its gap is that of a contact node at its place, at the
+//! displacements of the instant. A surface of revolution runs parallel to the tip contour, which is known at the contact nodes: between
+//! two of them it is the cubic with their radii and slopes (straight where a ROM has no slopes), beyond them straight. A point off the contour is as much nearer or farther.
+
+use crate::gaps::layout::Layout;
+use crate::gaps::wrench::At;
+use crate::gaps::{GapLaw, RevolutionGap};
+use crate::rom::{ContactNode, Watched};
+use crate::system::{Pair, System};
+use crate::variables::NO_CLEARANCE;
+use crate::{Result, Rom};
+
+use super::Simulation;
+use super::compile::Compiled;
+
+/// Watched points of a structure that face one surface.
+#[derive(Debug, Clone)]
+struct Facing {
+    body: usize,
+    pair: usize,
+    /// Which of the watched points these are.
+    points: Vec<usize>,
+    /// The gap function, of all watched points of the structure.
+    law: GapLaw,
+    /// Of each watched point.
+    raised: Raised,
+}
+
+/// How far points stand outside of where a gap function has them (m), and by how much larger arcs are there.
+type Raised = Vec<(f64, f64)>;
+
+/// Clearances of the watched points of all structures in the watched sectors.
+#[derive(Debug, Clone, Default)]
+pub struct WatchedGaps {
+    facing: Vec<Facing>,
+    /// Sectors that are watched (0-based).
+    sectors: Vec<usize>,
+    /// Of each structure (m), `[point · watched sectors + watched sector]`.
+    clearances: Vec<Vec<f64>>,
+}
+
+impl WatchedGaps {
+    /// At rest nothing is known yet.
+    ///
+    /// # Errors
+    /// Those of the gap functions.
+    pub fn new(compiled: &Compiled) -> Result<Self> {
+        let watched = &compiled.scene.settings.outputs.watched_sectors;
+        let sectors: Vec<usize> = watched.iter().map(|sector| sector - 1).collect();
+        let points = |body| compiled.body(body).1.extras.watched.as_ref().map_or(0, |watched| watched.points.len());
+        let bodies = 0..compiled.bodies.len();
+        let mut gaps = Self {
+            clearances: bodies.map(|body| vec![NO_CLEARANCE; points(body) * sectors.len()]).collect(),
+            facing: Vec::new(),
+            sectors,
+        };
+        if gaps.sectors.is_empty() {
+            return Ok(gaps);
+        }
+        for (pair, plan) in compiled.plan.pairs.iter().enumerate() {
+            let rom = compiled.body(plan.body).1;
+            let Some(watched) = &rom.extras.watched else { continue };
+            let nearest = |point: &ContactNode| plan.nodes.contains(&nearest(&rom.contact_nodes, point));
+            let points: Vec<usize> =
+                (0..watched.points.len()).filter(|index| nearest(&watched.points[*index])).collect();
+            if points.is_empty() {
+                continue;
+            }
+            if let Some((law, raised)) = of_points(compiled.gap(pair)?, rom, watched)? {
+                gaps.facing.push(Facing { body: plan.body, pair, points, law, raised });
+            }
+        }
+        Ok(gaps)
+    }
+
+    /// Of a watched sector (0-based) of a structure (m).
+    pub fn clearance(&self, body: usize, point: usize, sector: usize) -> f64 {
+        let place = self.sectors.iter().position(|watched| *watched == sector);
+        place.map_or(NO_CLEARANCE, |place| self.clearances[body][point * self.sectors.len() + place])
+    }
+
+    /// Of the instant that a simulation has reached.
+    fn find(&mut self, simulation: &Simulation) {
+        for facing in &mut self.facing {
+            let of_rom = simulation.system.structures()[facing.body].modes().sectors();
+            let pair = &simulation.system.pairs()[facing.pair];
+            facing.follow(&simulation.system, pair);
+            for (place, sector) in self.sectors.iter().copied().enumerate().filter(|(_, sector)| *sector < of_rom) {
+                for index in 0..facing.points.len() {
+                    let (body, point) = (facing.body, facing.points[index]);
+                    let moved = [0, 1, 2].map(|axis| simulation.watched_row(body, 3 * point + axis, sector));
+                    let gap = facing.gap(pair, (point, sector), moved);
+                    self.clearances[body][point * self.sectors.len() + place] = gap.min(NO_CLEARANCE);
+                }
+            }
+        }
+    }
+}
+
+impl Facing {
+    /// Take the surface to where it is now.
+    fn follow(&mut self, system: &System, pair: &Pair) {
+        let GapLaw::Spline(law) = &mut self.law else { return };
+        let carried = pair.carrier().map_or(&[][..], |carrier| {
+            let points = law.surface.control_points().len();
+            &system.structures()[carrier.structure].modes().displacement()[carrier.first_row..][..3 * points]
+        });
+        law.follow(pair.drive_now().shape_factor, carried);
+    }
+
+    /// Gap (m) of a point of a sector displaced by `moved` (m).
+    fn gap(&mut self, pair: &Pair, (point, sector): (usize, usize), moved: [f64; 3]) -> f64 {
+        let (drive, lanes) = (pair.drive_now(), self.law.layout().map_or(1, |layout| layout.lanes));
+        let (outwards, longer) = self.raised[point];
+        let at = At { node: point, index: point * lanes + sector, drive };
+        let moved = [moved[0] + outwards, moved[1] / longer, moved[2]];
+        match &mut self.law {
+            GapLaw::Spline(law) => law.gap_of_one(at, moved),
+            law => law.of_one(at, moved).0,
+        }
+    }
+}
+
+impl Simulation {
+    /// Clearances of watched points at the instant reached.
+    pub(super) fn find_watched(&mut self) {
+        if self.watched_gaps.facing.is_empty() {
+            return;
+        }
+        let mut gaps = std::mem::take(&mut self.watched_gaps);
+        gaps.find(self);
+        self.watched_gaps = gaps;
+    }
+}
+
+/// The gap function of watched points, and how they stand to it; `None` where there is no surface around an axis.
+fn of_points(law: GapLaw, rom: &Rom, watched: &Watched) -> Result<Option<(GapLaw, Raised)>> {
+    let mut places: Vec<[f64; 3]> = watched.points.iter().map(|point| point.position).collect();
+    let on_contour = |law: &RevolutionGap| -> Vec<(f64, f64)> {
+        places.iter().map(|place| contour(&rom.contact_nodes, law.slopes(), law.members(), place[2])).collect()
+    };
+    let around = |places: &[[f64; 3]], layout: &Layout| {
+        Layout::of_places(places, rom.sectors, &layout.clearances[..rom.sectors], layout.lanes)
+    };
+    Ok(match law {
+        GapLaw::Revolution(law) => {
+            let contour = on_contour(&law);
+            let mut raised = Vec::with_capacity(places.len());
+            for (place, (radius, _)) in places.iter_mut().zip(&contour) {
+                raised.push((place[0] - radius, place[0] / radius));
+                place[0] = *radius;
+            }
+            let layout = around(&places, &law.layout)?;
+            let slopes = contour.into_iter().map(|(_, slope)| slope).collect();
+            Some((GapLaw::Revolution(law.of_points(layout, slopes)), raised))
+        }
+        GapLaw::Spline(law) => {
+            let layout = around(&places, &law.layout)?;
+            Some((GapLaw::Spline(Box::new(law.of_points(layout))), vec![(0.0, 1.0); places.len()]))
+        }
+        GapLaw::Fixed(_) | GapLaw::Open(_) => None,
+    })
+}
+
+/// The contact node that is nearest to a point around an axis.
+fn nearest(nodes: &[ContactNode], point: &ContactNode) -> usize {
+    let off = |node: &ContactNode| {
+        let ([r, angle, z], [radius, other, axial]) = (node.position, point.position);
+        let chord = 2.0 * libm::sin(0.5 * (angle - other));
+        (r - radius) * (r - radius) + r * radius * chord * chord + (z - axial) * (z - axial)
+    };
+    let all = nodes.iter().map(off).enumerate();
+    all.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(index, _)| index)
+}
+
+/// Radius (m) of the tip contour at an axial position (m), from those of the contact nodes of a pair, and the slope that the surface has
+/// there, whose own at the nodes are `slopes`.
+fn contour(nodes: &[ContactNode], slopes: &[f64], members: &[usize], z: f64) -> (f64, f64) {
+    let axial = |node: usize| nodes[node].position[2];
+    let below = members.iter().copied().filter(|node| axial(*node) <= z).max_by(|a, b| axial(*a).total_cmp(&axial(*b)));
+    let above = members.iter().copied().filter(|node| axial(*node) > z).min_by(|a, b| axial(*a).total_cmp(&axial(*b)));
+    let (low, high) = match (below, above) {
+        (Some(low), Some(high)) => (low, high),
+        (Some(one), None) | (None, Some(one)) => (one, one),
+        (None, None) => return (1.0, 0.0),
+    };
+    let ends = [low, high];
+    let ([from, to], own) = (ends.map(|node| nodes[node].position[0]), ends.map(|node| nodes[node].meridional_slope));
+    let (length, rise) = (axial(high) - axial(low), to - from);
+    if length <= 0.0 {
+        return (from + own[0] * (z - axial(low)), slopes[low]);
+    }
+    let t = (z - axial(low)) / length;
+    let [first, last] = if own.iter().all(|slope| *slope == 0.0) { [rise; 2] } else { own.map(|slope| slope * length) };
+    let bent = t * (first + t * (3.0 * rise - 2.0 * first - last + t * (first + last - 2.0 * rise)));
+    (from + bent, slopes[low] + t * (slopes[high] - slopes[low]))
+}

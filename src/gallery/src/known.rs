@@ -1,0 +1,130 @@
+//! What refinement leaves of rubs of the models that ship, found once with long runs: their ROMs carry it.
+//!
+//! A row is of one model, with all of its options. A model with other options has none: nothing here is said of it.
+//!
+//! Origin of the figures: `lab refinement`, 2026-11-23, version 0.1.0; rows across the thickness `lab witness`, 2026-11-23, version
+//! 0.1.0 (against refined contact at points of the faces); of the paper's model `lab bases`, 2026-11-22, version 0.1.0.
+
+use core::fmt::Debug;
+
+use tiprub_core::{Rom, rom::RubErrors};
+use tiprub_model::{
+    Rotor37Options,
+    cyclic::ModeSelection,
+    reduce::ReductionKind,
+    rotor37::{MeshCounts, Tip},
+    stage::{SectorCounts, SectorOptions, StageOptions},
+};
+
+/// One model that ships with what was found of it.
+struct Row {
+    /// Its options as they were, in debug form.
+    options: String,
+    /// The rub, in words.
+    found_on: &'static str,
+    /// Relative errors of the displacements: by modes, patches, rows of them across the thickness, and mesh.
+    errors: [Option<f64>; 4],
+}
+
+/// All rows.
+fn rows() -> [Row; 3] {
+    let rotor37 = Rotor37Options {
+        mesh: MeshCounts { chord: 24, thickness: 2, span: 40 },
+        tip: Tip::Patches(9),
+        kind: ReductionKind::FreeInterface,
+        modes: 80,
+        ..Rotor37Options::paper()
+    };
+    let paper = Rotor37Options {
+        mesh: MeshCounts { chord: 16, thickness: 2, span: 20 },
+        tip: Tip::Nodes(3),
+        kind: ReductionKind::FixedInterface,
+        modes: 20,
+        ..Rotor37Options::paper()
+    };
+    let counts =
+        SectorCounts { chord: 12, span: 18, thickness: 1, side: 2, overhang: 2, rim: 3, web: [6, 12], bore: [2, 2] };
+    let stage = StageOptions {
+        sector: SectorOptions { counts, ..SectorOptions::default() },
+        tip: Tip::Nodes(3),
+        kind: ReductionKind::FixedInterface,
+        modes: ModeSelection::Families(25),
+        ..StageOptions::default()
+    };
+    [
+        Row {
+            options: format!("{stage:?}"),
+            found_on: "first 9.5 ms of the rub of the stage with friction 0.15: nodes on a mesh with 0.7 times the elements, the mesh with \
+                       five patches; later nodes leave far more",
+            errors: [None, Some(0.102), None, Some(0.0068)],
+        },
+        Row {
+            options: format!("{rotor37:?}"),
+            found_on: "light rub of rotor 37 with friction 0.15, 4.73 ms (rows: one blade of it, 2.3 ms)",
+            errors: [Some(0.0176), Some(0.0311), Some(0.28), Some(0.0557)],
+        },
+        Row {
+            options: format!("{paper:?}"),
+            found_on: "light rub of rotor 37 with friction 0.15, one revolution, three nodes against nine patches",
+            errors: [Some(0.047), Some(0.34), None, None],
+        },
+    ]
+}
+
+/// The ROM of a model with these options, with what is known of it.
+pub(crate) fn told(options: &dyn Debug, mut rom: Rom) -> Rom {
+    let options = format!("{options:?}");
+    let known = rows().into_iter().find(|row| row.options == options);
+    rom.checks.rub_errors = known.map(|row| {
+        let [modes, patches, rows, mesh] = row.errors;
+        RubErrors { found_on: row.found_on.into(), modes, patches, rows, mesh }
+    });
+    rom
+}
+
+#[cfg(test)]
+mod tests {
+    use tiprub_shell::console::Console;
+
+    use super::*;
+    use crate::reduction;
+
+    /// With other defaults a row is of no model any more: renew the figures.
+    #[test]
+    fn the_blade_that_ships_has_a_row_and_a_blade_with_other_options_has_none() {
+        let own = Rotor37Options::default();
+        let console = Console::new(true, false);
+        let small = Rotor37Options {
+            mesh: MeshCounts { chord: 2, thickness: 1, span: 2 },
+            tip: Tip::Nodes(2),
+            modes: 2,
+            ..Rotor37Options::paper()
+        };
+        let rom = reduction::rotor37(&small, &console).unwrap().rom;
+        assert_eq!(rom.checks.rub_errors, None);
+        let rom = told(&own, rom);
+        let errors = rom.checks.rub_errors.clone().expect("a row of the blade that ships");
+        assert!(
+            errors.found_on.contains("light rub") && errors.mesh.is_some() && errors.rows == Some(0.28),
+            "{errors:?}"
+        );
+        assert!(
+            told(&Rotor37Options::paper(), rom.clone())
+                .checks
+                .rub_errors
+                .is_some_and(|errors| errors.patches == Some(0.34))
+        );
+        let stage = told(&StageOptions::default(), rom.clone()).checks.rub_errors;
+        assert!(stage.is_some_and(|errors| errors.patches == Some(0.102) && errors.rows.is_none()));
+        assert_eq!(told(&StageOptions::coarse(), rom.clone()).checks.rub_errors, None);
+        let mesh = MeshCounts { span: own.mesh.span + 2, ..own.mesh };
+        for other in [
+            Rotor37Options { modes: 81, ..own.clone() },
+            Rotor37Options { tip: Tip::Patches(17), ..own.clone() },
+            Rotor37Options { mesh, ..own.clone() },
+            Rotor37Options { kind: ReductionKind::FixedInterface, ..own },
+        ] {
+            assert_eq!(told(&other, rom.clone()).checks.rub_errors, None, "{other:?}");
+        }
+    }
+}
