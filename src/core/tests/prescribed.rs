@@ -170,7 +170,7 @@ fn a_point_faces_the_surface_of_the_contact_node_next_to_it() {
     assert!((of(2) - 9e-4 / normal).abs() < 1e-9, "{:e}", of(2));
     assert!((of(0) - element(&simulation, "blade[1].clearance", 0)).abs() < 1e-15, "{:e}", of(0));
     // Next to mid-chord, which meets nothing.
-    assert_eq!([of(1), of(3)], [1e9; 2]);
+    assert!(of(1) >= 1e9 && of(3) >= 1e9, "{:e} {:e}", of(1), of(3));
     scene.settings.outputs.watched_sectors.clear();
     assert!(started(&scene).table().find("blade[1].watched_clearance").is_none());
 }

@@ -118,8 +118,7 @@ struct Case {
 pub(crate) fn study(arguments: &RefinementArguments, console: &Console) -> Result<Study> {
     let cache = arguments.common.cache.cache();
     let quick = arguments.common.quick;
-    let asked =
-        |standard: &Standard| arguments.scenes.is_empty() || arguments.scenes.iter().any(|one| *one == standard.name);
+    let asked = |standard: &Standard| arguments.scenes.is_empty() || arguments.scenes.contains(&standard.name);
     let mut cases = Vec::new();
     for standard in standards()?.iter().filter(|standard| asked(standard)) {
         console.say(&standard.title);

@@ -15,6 +15,9 @@ use crate::{Result, Rom};
 use super::Simulation;
 use super::compile::Compiled;
 
+/// How far a point stands outside of where its gap function has it (m), and by how much larger arcs are there.
+type Raised = (f64, f64);
+
 /// Watched points of a structure that face one surface.
 #[derive(Debug, Clone)]
 struct Facing {
@@ -25,11 +28,8 @@ struct Facing {
     /// The gap function, of all watched points of the structure.
     law: GapLaw,
     /// Of each watched point.
-    raised: Raised,
+    raised: Vec<Raised>,
 }
-
-/// How far points stand outside of where a gap function has them (m), and by how much larger arcs are there.
-type Raised = Vec<(f64, f64)>;
 
 /// Clearances of the watched points of all structures in the watched sectors.
 #[derive(Debug, Clone, Default)]
@@ -136,7 +136,7 @@ impl Simulation {
 }
 
 /// The gap function of watched points, and how they stand to it; `None` where there is no surface around an axis.
-fn of_points(law: GapLaw, rom: &Rom, watched: &Watched) -> Result<Option<(GapLaw, Raised)>> {
+fn of_points(law: GapLaw, rom: &Rom, watched: &Watched) -> Result<Option<(GapLaw, Vec<Raised>)>> {
     let mut places: Vec<[f64; 3]> = watched.points.iter().map(|point| point.position).collect();
     let on_contour = |law: &RevolutionGap| -> Vec<(f64, f64)> {
         places.iter().map(|place| contour(&rom.contact_nodes, law.slopes(), law.members(), place[2])).collect()
@@ -193,7 +193,7 @@ fn contour(nodes: &[ContactNode], slopes: &[f64], members: &[usize], z: f64) -> 
         return (from + own[0] * (z - axial(low)), slopes[low]);
     }
     let t = (z - axial(low)) / length;
-    let [first, last] = if own.iter().all(|slope| *slope == 0.0) { [rise; 2] } else { own.map(|slope| slope * length) };
+    let [first, last] = if own[0] == 0.0 && own[1] == 0.0 { [rise; 2] } else { own.map(|slope| slope * length) };
     let bent = t * (first + t * (3.0 * rise - 2.0 * first - last + t * (first + last - 2.0 * rise)));
     (from + bent, slopes[low] + t * (slopes[high] - slopes[low]))
 }

@@ -58,7 +58,7 @@ mod tests {
         Rotor37Options, reduce_rotor37,
         rotor37::{MeshCounts, Tip},
     };
-    use tiprub_shell::{Result, console::Console};
+    use tiprub_shell::{Failure, Result, console::Console};
 
     use super::*;
     use crate::convergence::{
@@ -73,7 +73,8 @@ mod tests {
         fn reduce(&self, other: Option<usize>, modes: usize, tip: Tip, _: &Console) -> Result<Meshed> {
             let mesh = MeshCounts { chord: 4, thickness: 1, span: if other.is_some() { 8 } else { 4 } };
             let options = Rotor37Options { mesh, tip, modes, ..Rotor37Options::paper() };
-            let found = reduce_rotor37(&options, &|_| {}).unwrap();
+            let found =
+                reduce_rotor37(&options, &|_| {}).map_err(|error| Failure::new("blade", error.to_string(), ""))?;
             Ok(Meshed { rom: found.rom, nodes: found.nodes })
         }
 
@@ -128,9 +129,14 @@ mod tests {
             let levels = nodes.levels.iter().map(|level| level.value).collect::<Vec<_>>();
             (levels, nodes.missing)
         };
-        assert_eq!(of(4), (vec![2.0, 3.0, 5.0, 9.0], String::new()));
-        let (levels, missing) = of(8);
-        assert!(levels == [2.0, 3.0, 5.0, 9.0] && missing.starts_with("17 nodes: "), "{levels:?} {missing}");
+        let made = vec![2.0, 3.0, 5.0];
+        assert_eq!(of(2), (made.clone(), String::new()));
+        for (finest, refused) in [(4, 1), (8, 2)] {
+            let (levels, missing) = of(finest);
+            assert_eq!(levels, made);
+            let told = ["9 nodes: ", "17 nodes: "].iter().filter(|count| missing.contains(*count)).count();
+            assert!(told == refused && missing.contains("outside 2..=5"), "{missing}");
+        }
     }
 
     #[test]
