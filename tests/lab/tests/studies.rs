@@ -241,13 +241,15 @@ fn the_quick_study_of_the_witness_meets_reduced_models() {
     let json = study(root.path(), "witness", &[]);
     only_no(&json, &["The default model is nearer"]);
     let rows = json["results"]["runs"].as_array().unwrap();
-    assert_eq!(rows.len(), 8 + 4);
+    assert_eq!(rows.len(), 9 + 4);
     let row = |start: &str| rows.iter().find(|row| row["run"].as_str().unwrap().starts_with(start)).unwrap();
     for name in ["more modes", "two rows, more modes"] {
         let own = &row(name)["same_contact"];
         assert!(own["displacements"].as_f64().unwrap() < 0.01 && own["impulse"].as_f64().unwrap() < 0.01, "{own}");
-        assert!(row(name)["points"]["displacements"].as_f64().unwrap() > 0.1, "{rows:#?}");
+        assert!(row(name)["sides"]["displacements"].as_f64().unwrap() > 0.1, "{rows:#?}");
     }
+    let impulse = |name: &str| row(name)["sides"]["impulse"].as_f64().unwrap();
+    assert!(impulse("two rows, more modes") < 0.07 && impulse("more modes") > 0.2, "{rows:#?}");
     assert!(row("full model")["friction_work"].as_f64().unwrap() > 5.0);
     assert!(json["results"]["refused"].as_array().unwrap().is_empty());
 }
