@@ -76,7 +76,10 @@ pub(super) struct Kept {
     pub(super) effort: Effort,
 }
 
-/// March until so many contacts have opened or closed.
+/// Steps tried per switch, until a sector is taken to have come to rest.
+const MOST_TRIED: u64 = 100;
+
+/// March until so many contacts have opened or closed, or nothing touches any more.
 pub(super) fn energy(tolerance: f64, switches: u64) -> Option<Kept> {
     let (span, nodes, count) = (4e-5, 2, 10);
     let modes = modes(count, nodes, 1.0, &mut Random(11));
@@ -94,7 +97,8 @@ pub(super) fn energy(tolerance: f64, switches: u64) -> Option<Kept> {
     };
     let (start, mut most, mut effort) = (energy(&state), 0.0_f64, Effort::default());
     let demand = Demand { tolerance, precision: 1e-15, most: u64::MAX };
-    while wall.switches < switches {
+    // What switches lose may end contact for good.
+    while wall.switches < switches && effort.tried() < MOST_TRIED * switches {
         marcher.march(&tables, &mut state, &mut wall, demand, &mut effort).ok()?;
         most = most.max(energy(&state));
     }
