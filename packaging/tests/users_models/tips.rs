@@ -2,7 +2,9 @@
 
 use std::{fs, path::Path};
 
-use super::{Project, data};
+use serde_json::Value;
+
+use super::{Project, data, guide};
 
 /// Patches over the whole tip of an exported mesh: those of the blade itself; a scene runs with them.
 #[test]

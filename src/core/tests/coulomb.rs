@@ -387,7 +387,7 @@ fn contacts_that_hardly_yield_sideways_are_solved() {
     for case in 0..200 {
         let (contacts, stiff) = (1 + lcg.below(12), 10.0_f64.powi(-1 - case % 6));
         let (mut w, mut free) = random_problem(&mut lcg, contacts, 0);
-        let sideways = |row: usize| if row % 3 == 0 { 1.0 } else { stiff };
+        let sideways = |row: usize| if row.is_multiple_of(3) { 1.0 } else { stiff };
         for i in 0..3 * contacts {
             free[i] *= sideways(i);
             (0..3 * contacts).for_each(|j| w[(i, j)] *= sideways(i) * sideways(j));

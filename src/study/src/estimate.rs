@@ -13,10 +13,10 @@ use tiprub_shell::{Result, console::Console};
 use crate::convergence::{
     Refined, Runner,
     coarsen::coarsened,
-    divisions,
     refine::{Direction, Level},
     truncate::{Form, truncated},
 };
+use crate::divisions;
 
 /// Least ratio of two changes of the displacements that lets the rest be estimated.
 const SHRINKING: f64 = 1.3;
