@@ -265,7 +265,6 @@ fn the_spin_arrays_have_the_same_bits_on_any_number_of_threads() {
 #[test]
 fn other_reductions_hold_as_well() {
     use ReductionKind::{FixedInterface, FreeInterface};
-    let mesh = MeshCounts { chord: 8, thickness: 1, span: 10 };
     for (tip, kind, modes) in [
         (Tip::Patches(5), FixedInterface, 20),
         (Tip::Nodes(3), FixedInterface, 40),
