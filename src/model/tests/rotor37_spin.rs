@@ -271,15 +271,8 @@ fn other_reductions_hold_as_well() {
         (Tip::Patches(5), FreeInterface, 20),
         (Tip::Nodes(3), FreeInterface, 20),
     ] {
-        let options = Rotor37Options {
-            mesh,
-            tip,
-            kind,
-            modes,
-            checked_modes: 6,
-            spin: Some(DESIGN_SPEED),
-            ..Rotor37Options::paper()
-        };
+        let options =
+            Rotor37Options { tip, kind, modes, checked_modes: 6, spin: Some(DESIGN_SPEED), ..Rotor37Options::paper() };
         for check in reduce_rotor37(&options, &silent).unwrap().spin_checks {
             let (frequencies, growth) = (check.frequency_deviation(), check.growth_deviation());
             println!("{tip:?}, {kind:?}, {modes} modes, {} rad/s: {frequencies:.3?} %, {growth:.3} %", check.speed);
