@@ -265,22 +265,14 @@ fn the_spin_arrays_have_the_same_bits_on_any_number_of_threads() {
 #[test]
 fn other_reductions_hold_as_well() {
     use ReductionKind::{FixedInterface, FreeInterface};
-    let mesh = MeshCounts { chord: 8, thickness: 1, span: 10 };
     for (tip, kind, modes) in [
         (Tip::Patches(5), FixedInterface, 20),
         (Tip::Nodes(3), FixedInterface, 40),
         (Tip::Patches(5), FreeInterface, 20),
         (Tip::Nodes(3), FreeInterface, 20),
     ] {
-        let options = Rotor37Options {
-            mesh,
-            tip,
-            kind,
-            modes,
-            checked_modes: 6,
-            spin: Some(DESIGN_SPEED),
-            ..Rotor37Options::paper()
-        };
+        let options =
+            Rotor37Options { tip, kind, modes, checked_modes: 6, spin: Some(DESIGN_SPEED), ..Rotor37Options::paper() };
         for check in reduce_rotor37(&options, &silent).unwrap().spin_checks {
             let (frequencies, growth) = (check.frequency_deviation(), check.growth_deviation());
             println!("{tip:?}, {kind:?}, {modes} modes, {} rad/s: {frequencies:.3?} %, {growth:.3} %", check.speed);
