@@ -6,23 +6,44 @@ use super::Faces;
 use crate::mesh::Mesh;
 use crate::places::Places;
 
+/// Straight parts that a curved edge is taken as.
+const PARTS: usize = 8;
+
+/// The parabola through the ends and the mid-side node of an edge, in straight parts.
+fn curved([first, last]: [[f64; 2]; 2], middle: [f64; 2]) -> Vec<[[f64; 2]; 2]> {
+    let at = |part: usize| -> [f64; 2] {
+        let s = part as f64 / PARTS as f64;
+        let [a, m, b] = [(1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)];
+        std::array::from_fn(|i| a * first[i] + m * middle[i] + b * last[i])
+    };
+    (0..PARTS).map(|part| [at(part), at(part + 1)]).collect()
+}
+
 /// Edges that belong to a single face of the tip: places along the chord and across it of both ends (m).
 pub(super) struct Outline(Vec<[[f64; 2]; 2]>);
 
 impl Outline {
     pub(super) fn new(mesh: &Mesh, faces: &Faces<'_>, places: &Places) -> Self {
-        let mut count: HashMap<[usize; 2], usize> = HashMap::new();
+        let mut count: HashMap<[usize; 2], (usize, Option<usize>)> = HashMap::new();
         for (element, corners) in faces {
             for (index, &corner) in corners.iter().enumerate() {
-                let (a, b) = (element.nodes[corner], element.nodes[corners[(index + 1) % corners.len()]]);
-                *count.entry([a.min(b), a.max(b)]).or_default() += 1;
+                let next = corners[(index + 1) % corners.len()];
+                let (a, b) = (element.nodes[corner], element.nodes[next]);
+                let edge = element.kind.edges().iter().position(|ends| ends.contains(&corner) && ends.contains(&next));
+                let middle = edge.and_then(|edge| element.nodes.get(element.kind.corner_count() + edge)).copied();
+                count.entry([a.min(b), a.max(b)]).or_insert((0, middle)).0 += 1;
             }
         }
-        let mut edges: Vec<[usize; 2]> =
-            count.into_iter().filter(|(_, faces)| *faces == 1).map(|(edge, _)| edge).collect();
+        let once = count.into_iter().filter(|(_, (faces, _))| *faces == 1);
+        let mut edges: Vec<([usize; 2], Option<usize>)> = once.map(|(ends, (_, middle))| (ends, middle)).collect();
         // Sums must not depend on the order of a hash table.
         edges.sort_unstable();
-        Self(edges.into_iter().map(|ends| ends.map(|node| places.developed(mesh.nodes[node]))).collect())
+        let place = |node: usize| places.developed(mesh.nodes[node]);
+        let chords = |(ends, middle): ([usize; 2], Option<usize>)| match middle {
+            Some(middle) => curved(ends.map(place), place(middle)),
+            None => vec![ends.map(place)],
+        };
+        Self(edges.into_iter().flat_map(chords).collect())
     }
 
     /// How far across a point stands, 0 to 1 between the sides there.
