@@ -21,7 +21,7 @@ use crate::{
     after_help = "Examples:\n  tiprub demo\n  tiprub run builtin:rotor37 --csv rub.csv\n  \
                   tiprub package scene.toml -o out/\n\n\
                   Scenes that ship:\n  builtin:rotor37           rotor 37 in a rigid casing with two bumps\n  \
-                  builtin:rotor37-rows      with contact at both sides of the tip\n  \
+                  builtin:rotor37-one-row   with contact as a mean over the thickness of the tip\n  \
                   builtin:rotor37-paper     with the model and the method of the paper\n  \
                   builtin:flexible-casing   in an elastic casing with heat, friction power per patch\n  \
                   builtin:abradable         wearing the coating of a rigid casing\n  \

@@ -77,7 +77,7 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
     let mut watch = Stopwatch::default();
 
     let library = watch.measure("building the FMU library", || library::load(arguments.library.as_deref(), console))?;
-    let reduction = watch.measure("reducing the blade", || reduction::rotor37(&Rotor37Options::default(), console))?;
+    let reduction = watch.measure("reducing the blade", || reduction::rotor37(&Rotor37Options::in_rows(), console))?;
     let scene = write_inputs(directory, &reduction, &scene_text)?;
     let schedule = Schedule::new(&scene.settings.experiment, None, None)?;
 

@@ -27,7 +27,7 @@ struct Row {
 }
 
 /// All rows.
-fn rows() -> [Row; 3] {
+fn rows() -> [Row; 4] {
     let rotor37 = Rotor37Options {
         mesh: MeshCounts { chord: 24, thickness: 2, span: 40 },
         tip: Tip::Patches(9),
@@ -62,6 +62,12 @@ fn rows() -> [Row; 3] {
             options: format!("{rotor37:?}"),
             found_on: "light rub of rotor 37 with friction 0.15, 4.73 ms (rows: one blade of it, 2.3 ms)",
             errors: [Some(0.0176), Some(0.0311), Some(0.28), Some(0.0557)],
+        },
+        // Of two rows nobody has refined the other directions: those of one.
+        Row {
+            options: format!("{:?}", Rotor37Options { tip: Tip::Rows([9, 2]), ..rotor37.clone() }),
+            found_on: "light rub of rotor 37 with friction 0.15, 4.73 ms, with one row of patches",
+            errors: [Some(0.0176), Some(0.0311), None, Some(0.0557)],
         },
         Row {
             options: format!("{paper:?}"),
@@ -114,6 +120,8 @@ mod tests {
                 .rub_errors
                 .is_some_and(|errors| errors.patches == Some(0.34))
         );
+        let two = told(&Rotor37Options::in_rows(), rom.clone()).checks.rub_errors;
+        assert!(two.is_some_and(|errors| errors.rows.is_none() && errors.mesh == Some(0.0557)));
         let stage = told(&StageOptions::default(), rom.clone()).checks.rub_errors;
         assert!(stage.is_some_and(|errors| errors.patches == Some(0.102) && errors.rows.is_none()));
         assert_eq!(told(&StageOptions::coarse(), rom.clone()).checks.rub_errors, None);

@@ -14,6 +14,8 @@ use crate::{builtin, rom_cache::RomCache};
 
 /// The scene of the demo, as a user would write it.
 pub const ROTOR37_SCENE: &str = include_str!("../scenes/rotor37.toml");
+/// The same with one row of patches and steps of one length.
+pub const ROTOR37_ONE_ROW_SCENE: &str = include_str!("../scenes/rotor37-one-row.toml");
 
 /// The same rub with the paper's model and method.
 pub const ROTOR37_PAPER_SCENE: &str = include_str!("../scenes/rotor37-paper.toml");
@@ -27,7 +29,7 @@ pub const CUBE_SCENE: &str = include_str!("../scenes/cube-between-rings.toml");
 /// Scenes that ship with tiprub: what stands behind `builtin:`, and the text.
 pub const BUILTIN_SCENES: [(&str, &str); 7] = [
     ("rotor37", ROTOR37_SCENE),
-    ("rotor37-rows", include_str!("../scenes/rotor37-rows.toml")),
+    ("rotor37-one-row", ROTOR37_ONE_ROW_SCENE),
     ("rotor37-paper", ROTOR37_PAPER_SCENE),
     ("flexible-casing", include_str!("../scenes/flexible-casing.toml")),
     ("abradable", include_str!("../scenes/abradable.toml")),
@@ -139,13 +141,13 @@ fn builtin_scene(name: &str, text: &str, reduce: &dyn Fn(&str) -> Option<Result<
     Ok(Scene { settings, roms })
 }
 
-/// The scene of the demo around a blade reduced before.
+/// [`ROTOR37_ONE_ROW_SCENE`] around a blade reduced before.
 ///
 /// # Errors
 /// Never with the scene that ships.
 pub fn rotor37_scene_with(rom: Rom) -> Result<Scene> {
     let rom = RefCell::new(Some(rom));
-    builtin_scene("builtin:rotor37", ROTOR37_SCENE, &|_| rom.borrow_mut().take().map(Ok))
+    builtin_scene("builtin:rotor37-one-row", ROTOR37_ONE_ROW_SCENE, &|_| rom.borrow_mut().take().map(Ok))
 }
 
 /// The scene of the stage, or the same with coarse models.

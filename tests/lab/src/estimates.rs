@@ -94,7 +94,7 @@ struct Rub {
 
 fn rubs(quick: bool, console: &Console) -> Result<Vec<Rub>> {
     let mut found = Vec::new();
-    let base = scene_source::settings("builtin:rotor37")?;
+    let base = scene_source::settings("builtin:rotor37-one-row")?;
     for (group, number) in GROUPS.iter().zip(1..) {
         let roms = roms(group, console)?;
         let all = group.depths.iter().flat_map(|depth| group.frictions.iter().map(move |friction| (*depth, *friction)));

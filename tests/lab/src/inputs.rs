@@ -124,7 +124,7 @@ fn courses(arguments: &StudyCommon, console: &Console) -> Result<Vec<Course>> {
             scene.roms[0].clone_from(&load("builtin:rotor37-paper")?.roms[0]);
             Ok(scene)
         };
-        (of_nodes("builtin:rotor37")?, of_nodes("builtin:flexible-casing")?)
+        (of_nodes("builtin:rotor37-one-row")?, of_nodes("builtin:flexible-casing")?)
     };
     let with = |scene: &Scene, change: fn(&mut Scene)| {
         let mut scene = scene.clone();

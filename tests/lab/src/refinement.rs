@@ -60,7 +60,7 @@ fn standards() -> Result<Vec<Standard>> {
         (0.0, HEAVY, "rotor37-heavy-smooth", "rotor 37, heavy rub, µ = 0"),
         (FRICTION, HEAVY, "rotor37-heavy", "rotor 37, heavy rub, µ = 0.15"),
     ] {
-        let mut settings = scene_source::settings("builtin:rotor37")?;
+        let mut settings = scene_source::settings("builtin:rotor37-one-row")?;
         settings.contacts[0].friction = friction;
         settings.surfaces[0].shape = Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
         let (name, title) = (name.into(), title.into());

@@ -230,7 +230,7 @@ impl Setting {
 
     /// The scene around a reduced model.
     fn scene(&self, reduced: &Reduced) -> Result<Scene> {
-        let mut settings = scene_source::settings("builtin:rotor37")?;
+        let mut settings = scene_source::settings("builtin:rotor37-one-row")?;
         let surface = &mut settings.surfaces[0];
         surface.ramp_time = 0.0;
         if let Shape::TwoLobe { phase, .. } = &mut surface.shape {
@@ -251,7 +251,7 @@ impl Setting {
     /// The full model; energy that its steps lose or make beside what contact supplies.
     fn run_witness(&self, touching: Touching, division: u32) -> Result<(Marched, f64)> {
         let told = |error| failure("the full blade", error);
-        let settings = scene_source::settings("builtin:rotor37")?;
+        let settings = scene_source::settings("builtin:rotor37-one-row")?;
         let Shape::TwoLobe { depth, width, .. } = settings.surfaces[0].shape else {
             return Err(Failure::new("study witness", "the scene has no bumps", ""));
         };

@@ -69,9 +69,9 @@ impl Modes {
     }
 
     /// Largest degree whose contact problems are solvable without friction at all steps between half of `step` (s) and it: 3 where
-    /// G ⪰ 0.04 h² Σ φφᵀ over ωh < 4.25, else 2. (0.0233 is where the first counter-example was found.)
+    /// G ⪰ 0.04 h² Σ φφᵀ over ωh < 4.3, else 2. (0.0233 is where the first counter-example was found.)
     pub fn degree_at(&self, step: f64) -> usize {
-        let slow = |mode: usize| if self.frequencies[mode] * step < 8.5 { 0.04 * step * step } else { 0.0 };
+        let slow = |mode: usize| if self.frequencies[mode] * step < 8.6 { 0.04 * step * step } else { 0.0 };
         let (needed, rows) = (self.weighted(slow), self.rows());
         let rounding = DMatrix::identity(rows, rows) * (1e-12 * needed.trace());
         if (&self.residual - needed + rounding).cholesky().is_some() { 3 } else { 2 }
