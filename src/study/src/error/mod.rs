@@ -72,7 +72,11 @@ pub fn study(arguments: &ErrorArguments, source: Option<&dyn Source>, console: &
             let mut statements = total.statements(&title);
             statements.append(&mut study.statements);
             study.statements = statements;
-            study.figures.push(total.figure(&title));
+            let figure = total.figure(&title);
+            if let Some((.., text)) = study.files.iter_mut().find(|(name, ..)| name == "tables.md") {
+                text.extend_from_slice(format!("\n![{title}]({}.svg)\n", figure.name).as_bytes());
+            }
+            study.figures.push(figure);
             study.results[total.key()] = total.to_json();
             let of_steps = study.results["scenes"][0]["cheapest"].as_array().cloned().unwrap_or_default();
             let cheapest = total_page::cheapest_csv(&of_steps, &total);
@@ -150,7 +154,9 @@ fn guide_page(facts: &[(String, String)]) -> String {
 /// A scene's part of it.
 fn section(case: &dyn Case, tables: &[Table]) -> String {
     let title = case.title();
-    let pictures: String = case.figures().iter().map(|figure| format!("![{title}]({figure}.svg)\n\n")).collect();
+    let drawn = if sheets::has_total(case) { 2 } else { 1 };
+    let pictures: String =
+        case.figures().iter().take(drawn).map(|figure| format!("![{title}]({figure}.svg)\n\n")).collect();
     // Captions on the page of all scenes begin with the scene.
     let own = |table: &Table| {
         let caption =
