@@ -274,7 +274,7 @@ fn a_tolerance_that_is_missed_is_counted_and_told_once() {
     let sectors = 4.0;
     assert!(steps >= 40.0 * sectors && trials > steps && most >= trials / 40.0 && most < trials, "{effort:?}");
     let ([_, _, _, missed], notes, (effort, told)) = run(1e-9);
-    assert!(told == 1 && missed > 0.0 && effort.missed as f64 == missed && notes.len() == 1, "{effort:?} {notes:?}");
+    assert!(told == 1 && missed > 0.0 && effort.missed as f64 <= missed && notes.len() == 1, "{effort:?} {notes:?}");
     assert!(
         ["missed the tolerance of 1e-9", "7.8125e-8 s", "time.step", "larger tolerance"]
             .iter()
@@ -306,7 +306,7 @@ fn a_step_that_takes_too_many_steps_is_as_if_it_had_not_been_tried() {
         go(&mut free, H);
         go(&mut bounded, H);
         most = most.max(free.system().steps_tried() - before);
-        assert_eq!(real(&free, "internal_steps_most"), most as f64);
+        assert_eq!(real(&free, "internal_steps_most").to_bits(), (most as f64).to_bits());
     }
     assert!(most > 20, "{most}");
     // The next three spans at once, with inputs that change.
@@ -382,7 +382,7 @@ fn every_scheme_keeps_the_bound_and_wrong_ones_are_refused() {
             go(one, 400e-7);
         }
         assert_eq!(bits(&simulation), bits(&other));
-        assert_eq!(real(&simulation, "internal_steps_most"), 400.0);
+        assert_eq!(real(&simulation, "internal_steps_most").to_bits(), 400.0_f64.to_bits());
         // What may end early does as many as are allowed.
         simulation.begin_partial_step(simulation.time(), 1000e-7).unwrap();
         while simulation.advance().is_ok() {}
