@@ -191,10 +191,10 @@ mod tests {
     use tiprub_core::rom::{Frame, Harmonic, RomChecks, RomExtras};
 
     use super::*;
-    use tiprub_gallery::scene_source::ROTOR37_SCENE;
+    use tiprub_gallery::scene_source::ROTOR37_ONE_ROW_SCENE;
 
     fn scene(change: impl FnOnce(&mut Scene)) -> Scene {
-        let settings = tiprub_format::parse_scene(ROTOR37_SCENE, "scene").unwrap();
+        let settings = tiprub_format::parse_scene(ROTOR37_ONE_ROW_SCENE, "scene").unwrap();
         let mut scene = Scene { settings, roms: Vec::new() };
         change(&mut scene);
         scene

@@ -66,7 +66,7 @@ fn every_block_from_a_test_is_held_by_it() {
 #[test]
 fn the_first_run_at_halved_steps() {
     for step in [0.5, 0.25, 0.125] {
-        let lines = run(&format!("tiprub run builtin:rotor37 --set internal_step_max={step}e-6"));
+        let lines = run(&format!("tiprub run builtin:rotor37-one-row --set internal_step_max={step}e-6"));
         let number = |name: &str| {
             let line =
                 lines.iter().find(|line| line.trim_start().starts_with(name)).unwrap_or_else(|| panic!("{name}"));
@@ -85,7 +85,7 @@ fn the_first_run_at_halved_steps() {
 #[test]
 fn the_first_run_with_points_and_patches() {
     let root = tempfile::tempdir().unwrap();
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37.toml");
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37-one-row.toml");
     let scene = fs::read_to_string(shipped).unwrap();
     assert!(scene.contains("modal-exact") && scene.contains("step = 5.0e-7 "));
     let scene = scene.replace("modal-exact", "massless-boundary");

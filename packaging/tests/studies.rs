@@ -227,7 +227,7 @@ fn own_scene(root: &Path) {
 
 /// The scene that ships around another blade, of few contact nodes, which longer steps do.
 fn around(rom: &str) -> String {
-    with_rom("rotor37", rom)
+    with_rom("rotor37-one-row", rom)
 }
 
 fn with_rom(scene: &str, rom: &str) -> String {

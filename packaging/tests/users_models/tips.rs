@@ -34,7 +34,7 @@ fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     let (own, read) = (flexibility(&own), flexibility(&read));
     assert!((own.view((0, 0), (12, 12)) - read.view((0, 0), (12, 12))).amax() < 1e-7 * own.amax());
     let scene =
-        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37.toml")).unwrap();
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37-one-row.toml")).unwrap();
     project.write(
         "scene.toml",
         scene.replace("builtin:rotor37", "read.rom.safetensors").replace("modal-exact", "massless-boundary"),
@@ -89,7 +89,7 @@ fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
         project.rom("named.rom.safetensors").contact_nodes.into_iter().map(|node| node.name).collect();
     assert_eq!(names, ["a_row_1", "b_row_1", "a_row_2", "b_row_2"]);
     // The scene that ships with rows, around the coarse blade.
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37-rows.toml");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37.toml");
     let scene = fs::read_to_string(path).unwrap().replace("builtin:rotor37-rows", "read.rom.safetensors");
     project.write("scene.toml", &scene);
     let run = project.succeed("run scene.toml --stop 0.003 --estimate");
