@@ -460,7 +460,7 @@ fn what_the_mesh_leaves_is_found_and_goes_with_the_rom() {
     let inspected: Value = serde_json::from_str(&told(&["inspect", "known.rom.safetensors", "--json"])).unwrap();
     let errors = &inspected["rom"]["rub_errors"];
     assert_eq!(errors["mesh"].as_f64(), found, "{errors}");
-    assert!(errors["found_on"].as_str().unwrap().starts_with("rotor37_rub, "), "{errors}");
+    assert!(errors["found_on"].as_str().unwrap().starts_with("rotor37_rub_one_row, "), "{errors}");
     fs::write(root.path().join("known.toml"), around("known.rom.safetensors")).unwrap();
     let run = told(&["run", "known.toml", "--stop", "1e-4", "--quiet"]);
     let last = run.lines().rfind(|line| line.starts_with("estimated error")).unwrap();

@@ -213,7 +213,9 @@ impl Demo<'_> {
             text.push_str(&format!("  {name:<26} 1 %: {}   0.1 %: {}\n", cost(1e-2), cost(1e-3)));
         }
         let apart = 100.0 * self.study.massless_apart;
-        text.push_str(&format!("  (massless-boundary against its own limit, {apart:.1} % from that of the others)\n"));
+        text.push_str(&format!(
+            "  (galerkin and massless-boundary against their own limit, {apart:.1} % from that of the others)\n"
+        ));
         text
     }
 

@@ -34,7 +34,8 @@ fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     let (own, read) = (flexibility(&own), flexibility(&read));
     assert!((own.view((0, 0), (12, 12)) - read.view((0, 0), (12, 12))).amax() < 1e-7 * own.amax());
     let scene =
-        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37-one-row.toml")).unwrap();
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37-one-row.toml"))
+            .unwrap();
     project.write(
         "scene.toml",
         scene.replace("builtin:rotor37", "read.rom.safetensors").replace("modal-exact", "massless-boundary"),

@@ -1,4 +1,4 @@
-//! Error against run time of a scene: every scheme and contact solver at several internal steps, against references.
+//! Error against run time of a scene: every scheme and contact solver at several internal steps or tolerances, against references.
 //!
 //! References are stepped with an internal step far below the others. Two of them, one with each scheme that gives
 //! every mode its inertia, stand for the same equations; how far they are apart says down to which error the study can be
@@ -21,14 +21,17 @@ use crate::error::{
 
 /// Internal steps per communication step that are compared.
 const DIVISIONS: [u32; 6] = [2, 5, 10, 20, 40, 80];
+/// One over the tolerances that are compared.
+const TOLERANCES: [u32; 6] = [100, 300, 1000, 3000, 10_000, 100_000];
 /// Internal steps per communication step of the references.
 const REFERENCE_DIVISION: u32 = 640;
 
 /// Scheme and solver.
 pub type Method = (Scheme, Solver);
 
-/// The default first, its relative without inertia of the contact nodes, and the paper's last.
-pub const METHODS: [Method; 5] = [
+/// By a tolerance first, then steps of one length: those without inertia of the contact nodes and with it, the paper's last.
+pub const METHODS: [Method; 6] = [
+    (Scheme::Galerkin, Solver::Lcp),
     (Scheme::ModalExact, Solver::Lcp),
     (Scheme::MasslessBoundary, Solver::Lcp),
     (Scheme::ModalExact, Solver::Film),
@@ -54,7 +57,7 @@ pub struct Errors {
 pub struct Row {
     /// Scheme and solver.
     pub method: Method,
-    /// Internal step h (s).
+    /// Internal step h (s), or the tolerance.
     pub step: f64,
     /// Median processor time of stepping (s) and errors, or why the run was refused or failed.
     pub outcome: Result<(f64, Errors), String>,
@@ -75,9 +78,19 @@ pub struct ErrorStudy {
     pub rows: Vec<Row>,
 }
 
+/// Whether a method goes by a tolerance.
+pub fn by_tolerance((scheme, solver): Method) -> bool {
+    Competitor::Core(scheme, solver).is_by_tolerance()
+}
+
+/// Internal steps per communication step, or one over tolerances.
+fn divisions(method: Method) -> &'static [u32] {
+    if by_tolerance(method) { &TOLERANCES } else { &DIVISIONS }
+}
+
 /// Number of runs a study makes, for progress.
 pub fn runs() -> u64 {
-    (METHODS.len() * DIVISIONS.len() + 3) as u64
+    (METHODS.iter().map(|method| divisions(*method).len()).sum::<usize>() + 3) as u64
 }
 
 /// Study `scene` over `window` (s from its start) with the communication step of its experiment.
@@ -91,7 +104,7 @@ pub fn study(scene: &Scene, window: f64, task: &Task) -> Result<ErrorStudy> {
         let trace = trace(scene, method, REFERENCE_DIVISION, steps);
         trace.map_err(|problem| Failure::new("error study", format!("the reference run failed: {problem}"), ""))
     };
-    let exact = reference(METHODS[0])?;
+    let exact = reference((Scheme::ModalExact, Solver::Lcp))?;
     task.at(1);
     let other = reference((Scheme::CentralDifference, Solver::Lcp))?;
     task.at(2);
@@ -99,10 +112,11 @@ pub fn study(scene: &Scene, window: f64, task: &Task) -> Result<ErrorStudy> {
     task.at(3);
     let mut rows = Vec::new();
     for method in METHODS {
-        for division in DIVISIONS {
-            let equations = if method.0 == Scheme::MasslessBoundary { &massless } else { &exact };
-            let outcome = measure(scene, method, division, steps, equations);
-            rows.push(Row { method, step: length / f64::from(division), outcome });
+        for division in divisions(method) {
+            let without_mass = matches!(method.0, Scheme::MasslessBoundary | Scheme::Galerkin);
+            let outcome = measure(scene, method, *division, steps, if without_mass { &massless } else { &exact });
+            let range = if by_tolerance(method) { 1.0 } else { length };
+            rows.push(Row { method, step: range / f64::from(*division), outcome });
             task.at(3 + rows.len() as u64);
         }
     }
@@ -135,7 +149,8 @@ fn measure(scene: &Scene, method: Method, division: u32, steps: usize, exact: &T
 
 fn start(scene: &Scene, method: Method, division: u32) -> Result<Box<dyn Run>, String> {
     let length = scene.settings.experiment.communication_step;
-    Ok(Box::new(SceneRun::new(scene, method, length, division, 0.0)?))
+    let scene = SceneRun::by(scene, method, length, division, 0.0);
+    Ok(Box::new(SceneRun::with_start_values(&scene, length, division, &[])?))
 }
 
 fn trace(scene: &Scene, method: Method, division: u32, steps: usize) -> Result<Trace, String> {
@@ -145,6 +160,11 @@ fn trace(scene: &Scene, method: Method, division: u32, steps: usize) -> Result<T
 /// Name of a method as in scene files.
 pub fn name((scheme, solver): Method) -> String {
     Competitor::Core(scheme, solver).name()
+}
+
+/// What [`Row::step`] is.
+fn setting(method: Method) -> &'static str {
+    if by_tolerance(method) { "tolerance" } else { "internal_step" }
 }
 
 impl ErrorStudy {
@@ -159,11 +179,11 @@ impl ErrorStudy {
     pub fn to_json(&self) -> Value {
         let rows = self.rows.iter().map(|row| match &row.outcome {
             Ok((time, errors)) => json!({
-                "method": name(row.method), "internal_step": row.step, "seconds": time,
+                "method": name(row.method), setting(row.method): row.step, "seconds": time,
                 "displacement_error": errors.displacement, "impulse_error": errors.impulse,
                 "penetration": errors.penetration, "adhesion": errors.adhesion,
             }),
-            Err(problem) => json!({ "method": name(row.method), "internal_step": row.step, "refused": problem }),
+            Err(problem) => json!({ "method": name(row.method), setting(row.method): row.step, "refused": problem }),
         });
         json!({
             "window": self.window,
