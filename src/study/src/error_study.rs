@@ -20,11 +20,11 @@ use crate::error::{
 };
 
 /// Internal steps per communication step that are compared.
-const DIVISIONS: [u32; 6] = [2, 5, 10, 20, 40, 80];
+const DIVISIONS: [u32; 5] = [2, 5, 10, 20, 40];
 /// One over the tolerances that are compared.
-const TOLERANCES: [u32; 6] = [100, 300, 1000, 3000, 10_000, 100_000];
+const TOLERANCES: [u32; 5] = [100, 300, 1000, 10_000, 100_000];
 /// Internal steps per communication step of the references.
-const REFERENCE_DIVISION: u32 = 640;
+const REFERENCE_DIVISION: u32 = 320;
 
 /// Scheme and solver.
 pub type Method = (Scheme, Solver);
