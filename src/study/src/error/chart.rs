@@ -237,8 +237,8 @@ mod tests {
         for competitor in Competitor::all() {
             assert!(svg.contains(&escape(&competitor.name())), "{}", competitor.name());
         }
-        // Two points and the legend, for each of the three schemes with lcp and for the bi-potential on the full model.
-        assert_eq!(svg.matches("<circle").count(), 12);
+        // Two points and the legend, for each of the four schemes with lcp and for the bi-potential on the full model.
+        assert_eq!(svg.matches("<circle").count(), 15);
         assert!(svg.contains("1e-4") && svg.contains("distance of the two") && !svg.contains("NaN"));
     }
 }
