@@ -517,6 +517,18 @@ fn outputs_of_a_span_are_those_of_many_steps() {
     }
 }
 
+#[test]
+fn without_friction_there_is_no_heat() {
+    let mut simulation = Simulation::new(&scene(Scheme::Galerkin, H, 1e-3)).unwrap();
+    set(&mut simulation, "friction_coefficient", 0.0);
+    simulation.initialise(0.0).unwrap();
+    (0..STEPS).for_each(|_| go(&mut simulation, H));
+    let ledger = simulation.system().ledger();
+    let (kinetic, strain) = simulation.system().energies();
+    assert_eq!(real(&simulation, "friction_loss").to_bits(), 0.0_f64.to_bits());
+    assert!(kinetic + strain > 0.0 && ledger.residual(kinetic + strain).abs() < 1e-12 * ledger.scale());
+}
+
 /// A second surface, never met: the tolerance is a share of the smallest clearance, whatever the others are.
 #[test]
 fn a_wide_clearance_does_not_loosen_the_tolerance() {

@@ -321,7 +321,7 @@ impl Facing<'_> {
         let (trial, basis) = (step.trial, &step.level.basis);
         let (mut tally, mut work) = (self.record.tallies[node], self.record.work);
         let (drives, motions) = (&self.record.drives[pair], &self.record.motions[pair]);
-        let gap = self.pairs[pair].gap();
+        let (gap, slides) = (self.pairs[pair].gap(), self.pairs[pair].friction() != 0.0);
         for i in (0..=trial.points()).filter(|i| trial.multiplier(*i, node) != 0.0) {
             let normal_force = trial.multiplier(i, node);
             let at = self.at(node, &drives[i].0);
@@ -329,7 +329,9 @@ impl Facing<'_> {
             let (place, motion) = (self.record.places[i][node], &motions[i]);
             let point = gap.contact_point(at, moved, place);
             self.record.implausible |= !gap.is_plausible(node, trial.gap(i, node), normal);
-            let tangential: [f64; 3] = std::array::from_fn(|c| force[c] - normal_force * normal[c]);
+            // Without friction it is what the normal has turned since the force was found: work of curvature, not heat.
+            let tangential: [f64; 3] =
+                std::array::from_fn(|c| if slides { force[c] - normal_force * normal[c] } else { 0.0 });
             let wrench = gap.wrench(at, point, force);
             let length = step.level.step
                 * if step.kind == Kind::Constant { f64::from(u8::from(i == 1)) } else { basis.weights[i] };
