@@ -2,8 +2,8 @@
 //!
 //! A row is of one model, with all of its options. A model with other options has none: nothing here is said of it.
 //!
-//! Origin of the figures: `lab refinement`, 2026-11-23, version 0.1.0; rows across the thickness `lab witness`, 2026-11-23, version
-//! 0.1.0 (against refined contact at points of the faces); of the paper's model `lab bases`, 2026-11-22, version 0.1.0.
+//! Origin of the figures: `lab refinement`, 2026-11-23, version 0.1.0; rows across the thickness `tiprub run` with
+//! one row and with 17 × 3 patches, 2026-11-23, version 0.1.0, as the guide's chapter on trust tells; of the paper's model `lab bases`, 2026-11-22, version 0.1.0.
 
 use core::fmt::Debug;
 
@@ -60,7 +60,7 @@ fn rows() -> [Row; 4] {
         },
         Row {
             options: format!("{rotor37:?}"),
-            found_on: "light rub of rotor 37 with friction 0.15, 4.73 ms (rows: one blade of it, 2.3 ms)",
+            found_on: "light rub of rotor 37 with friction 0.15, 4.73 ms (rows: first revolution, blade 1)",
             errors: [Some(0.0176), Some(0.0311), Some(0.28), Some(0.0557)],
         },
         // Of two rows nobody has refined the other directions: those of one.

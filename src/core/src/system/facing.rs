@@ -6,7 +6,7 @@ use crate::galerkin::basis::{Basis, MOST, POINTS};
 use crate::galerkin::compliance::Lanes;
 use crate::galerkin::level::Level;
 use crate::galerkin::sector::{Taken, Witness};
-use crate::galerkin::trial::{Kind, Obstacle, three};
+use crate::galerkin::trial::{Kind, Obstacle, one_by_one, three};
 use crate::gaps::GapLaw;
 use crate::gaps::revolution::Instants;
 use crate::gaps::surface_spline::ClosestPoint;
@@ -218,12 +218,7 @@ impl Obstacle for Facing<'_> {
         {
             return law.of_lanes(&mut self.record.instants, moved, gaps, normals);
         }
-        for lane in 0..lanes.len() {
-            let (point, node) = lanes.place(lane);
-            let (gap, normal) = self.gap(node, point, lanes.three(moved, lane));
-            gaps[lane] = gap;
-            lanes.set(normals, lane, normal);
-        }
+        one_by_one(self, lanes, moved, gaps, normals);
     }
 
     fn direction(

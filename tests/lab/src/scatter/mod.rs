@@ -114,10 +114,10 @@ fn errors(number: &usize) -> Result<Option<[f64; 4]>> {
     Ok(Some(found))
 }
 
-/// Median and 95 % of sorted values.
+/// Median, 95 % and most of sorted values: the smallest value that so many are not above.
 fn quantiles(sorted: &[f64]) -> [f64; 3] {
-    let last = sorted.len().saturating_sub(1);
-    [last / 2, last * 95 / 100, last].map(|index| sorted.get(index).copied().unwrap_or(f64::NAN))
+    let rank = |percent: usize| (sorted.len() * percent).div_ceil(100).saturating_sub(1);
+    [rank(50), rank(95), rank(100)].map(|index| sorted.get(index).copied().unwrap_or(f64::NAN))
 }
 
 fn table(head: &[&str], rows: &[Vec<String>]) -> String {

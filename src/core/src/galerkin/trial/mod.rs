@@ -24,12 +24,7 @@ pub trait Obstacle {
 
     /// Gaps (m) and normals at all points but the first; arrays of [`Lanes`].
     fn gaps(&mut self, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
-        for lane in 0..lanes.len() {
-            let (point, node) = lanes.place(lane);
-            let (gap, normal) = self.gap(node, point, lanes.three(moved, lane));
-            gaps[lane] = gap;
-            lanes.set(normals, lane, normal);
-        }
+        one_by_one(self, lanes, moved, gaps, normals);
     }
 
     /// Force per unit of λ on the node, friction included, at velocity `velocity` of its vibration (m/s).
@@ -41,6 +36,22 @@ pub trait Obstacle {
         velocity: [f64; 3],
         normal: [f64; 3],
     ) -> [f64; 3];
+}
+
+/// [`Obstacle::gaps`] by [`Obstacle::gap`] of every lane.
+pub fn one_by_one(
+    obstacle: &mut (impl Obstacle + ?Sized),
+    lanes: Lanes,
+    moved: &[f64],
+    gaps: &mut [f64],
+    normals: &mut [f64],
+) {
+    for lane in 0..lanes.len() {
+        let (point, node) = lanes.place(lane);
+        let (gap, normal) = obstacle.gap(node, point, lanes.three(moved, lane));
+        gaps[lane] = gap;
+        lanes.set(normals, lane, normal);
+    }
 }
 
 /// What is used to step: all points, or a constant force and the end alone.
