@@ -7,7 +7,7 @@ use tiprub_core::{Rom, plausibility, rom::Frame, stability};
 use tiprub_shell::{Failure, Result};
 use tiprub_study::{
     estimate,
-    stability::structure::{Sliding, StepLimit, Structure},
+    stability::structure::{Digging, Sliding, StepLimit, Structure},
 };
 
 /// Modes that a warning of the checks is about: those that blade-tip contact excites most. Of coupled sectors the first
@@ -42,6 +42,8 @@ pub struct RomFacts {
     /// Largest friction coefficient (in steps of 0.05, up to 2) for which the contact problem with all nodes of one
     /// sector closed has a unique solution at h = 1/ω_max, for slip in both directions; `None` if not even for 0.
     pub solvable_friction: Option<f64>,
+    /// The least friction with which closed contact that slides digs in, in the sense of the scene's speed where that is known.
+    pub digging: Option<Digging>,
     /// Internal step of every scheme below which all are accepted, with the contact given.
     pub step_limits: Vec<StepLimit>,
     /// The contact they hold for, where it was given.
@@ -83,6 +85,7 @@ impl RomFacts {
             largest_angular_frequency: structure.highest(),
             central_difference_limit: limits.fold(f64::INFINITY, f64::min),
             solvable_friction: structure.solvable_friction(),
+            digging: structure.digs_in(sliding.map_or(0.0, |sliding| sliding.speed)),
             step_limits: structure.step_limits(sliding),
             sliding,
         })
@@ -182,6 +185,8 @@ impl RomFacts {
         if rom.frame == Frame::Cylindrical {
             let friction = self.solvable_friction.map_or("none".into(), |value| format!("{value}"));
             let _ = writeln!(text, "  contact solvable up to µ  {friction} (all nodes closed, tried up to 2)");
+            let digging = self.digging_text();
+            let _ = writeln!(text, "  digs in above µ*          {digging}");
         }
         self.write_frequencies(&mut text);
         self.write_checks(&mut text);
@@ -204,6 +209,14 @@ impl RomFacts {
                 "\n  response at the contact nodes: at rest within {rest:.1e} % of the full model, up to {last:.0} Hz within {forced:.1e} %"
             );
         }
+    }
+
+    /// "0.080 (closed at tip_2, nodal diameter 0, sliding in +θ)".
+    pub(crate) fn digging_text(&self) -> String {
+        let told = |Digging { friction, closed, sense }: &Digging| {
+            format!("{friction:.3} (closed at {closed}, sliding in {})", ["+θ", "−θ"][*sense])
+        };
+        self.digging.as_ref().map_or("none".to_owned(), told)
     }
 
     /// What the limits hold for.
@@ -315,6 +328,9 @@ impl RomFacts {
                 "modal-exact_resolves_all_modes_up_to": self.central_difference_limit,
             },
             "solvable_up_to_friction": self.solvable_friction,
+            "digs_in_above": self.digging.as_ref().map(|digging| json!({
+                "friction": digging.friction, "closed": digging.closed, "sense": if digging.sense == 0 { 1 } else { -1 },
+            })),
             "checks": self.checks().iter().map(|row| json!({
                 "full_hz": row.full,
                 "reduced_hz": row.reduced,

@@ -79,9 +79,9 @@ pub fn tip_patches(
         if rows == 1 {
             return along.to_vec();
         }
-        let across = hats(outline.share_across(places.developed(position)), rows);
-        let dual = |row: usize| across.iter().map(|(other, hat)| duals[(row, *other)] * hat).sum::<f64>();
-        (0..rows).flat_map(|row| along.map(|(k, hat)| (row * count + k, hat * dual(row)))).collect()
+        let across = all_duals(&duals, &hats(outline.share_across(places.developed(position)), rows));
+        let row = |(row, dual): (usize, &f64)| along.map(|(k, hat)| (row * count + k, hat * dual));
+        across.iter().enumerate().flat_map(row).collect()
     };
     let weights = weights(mesh, (set, faces), count * rows, products)?;
     if rows > 1 && !independent(&weights) {
@@ -119,6 +119,11 @@ fn duals(rows: usize) -> DMatrix<f64> {
     DMatrix::from_fn(rows, rows, |i, j| share(i) * inverse[(i, j)])
 }
 
+/// Values of all duals at a place, from those of the hats there.
+fn all_duals(duals: &DMatrix<f64>, hats: &[(usize, f64)]) -> Vec<f64> {
+    (0..duals.nrows()).map(|row| hats.iter().map(|(other, hat)| duals[(row, *other)] * hat).sum()).collect()
+}
+
 /// Whether no patch follows from the others.
 fn independent(weights: &[Vec<f64>]) -> bool {
     let size = |weights: &[f64]| weights.iter().map(|weight| weight * weight).sum::<f64>().sqrt();
@@ -127,9 +132,11 @@ fn independent(weights: &[Vec<f64>]) -> bool {
     gram.min() > DEPENDENT * gram.max()
 }
 
-/// A grid of patches over a face of a body, rows along the first of two directions (unit vectors), in growing place along the second. With hat
-/// functions h_k and h_l along both, each 0 to 1 between the outermost nodes of the set, patch (k, l) has the weights
-/// w_p = ∫ h_k h_l N_p dA / ∫ h_k h_l dA over the nodes p: products of hats add up to one, as hats do.
+/// A grid of patches over a face of a body, rows along the first of two directions (unit vectors), in growing place along the second. With the
+/// duals χ_k and χ_l of hat functions along both, each 0 to 1 between the outermost nodes of the set, patch (k, l) has the weights
+/// w_p = ∫ χ_k χ_l N_p dA / ∫ χ_k χ_l dA over the nodes p: products of duals add up to one, as duals do. So patches stand where the hats have their
+/// peaks, the outermost on the edges of the face: a flat face meets what is curved with its edges first. As many as there are nodes on a
+/// grid of linear elements are the nodes.
 ///
 /// # Errors
 /// [`Error::Invalid`] for no patches, more than the face has places for, or a set without a whole outer face of an element.
@@ -160,12 +167,18 @@ pub fn face_patches(
             ));
         }
     }
+    let duals = counts.map(duals);
     let products = |position: [f64; 3]| {
         let [first, second] = [0, 1].map(|axis| {
             let [low, high] = ends[axis];
-            hats((along(position, axis) - low) / (high - low), counts[axis])
+            let hats = hats((along(position, axis) - low) / (high - low), counts[axis]);
+            all_duals(&duals[axis], &hats)
         });
-        second.iter().flat_map(|(l, b)| first.map(|(k, a)| (l * counts[0] + k, a * b))).collect()
+        second
+            .iter()
+            .enumerate()
+            .flat_map(|(l, b)| first.iter().enumerate().map(move |(k, a)| (l * counts[0] + k, a * b)))
+            .collect()
     };
     let weights = weights(mesh, (set, faces), counts[0] * counts[1], products)?;
     let named = |(patch, weights): (usize, Vec<f64>)| {

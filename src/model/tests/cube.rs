@@ -166,20 +166,34 @@ fn patch_rows() -> DMatrix<f64> {
     rows
 }
 
-/// A grid of hats stands at thirds of a side with two of them, at a sixth, a half and five sixths with three.
+/// Duals stand where hats have their peaks, on the edges of the face too; on a grid of linear elements that has no more nodes they are these.
 #[test]
-fn patches_of_a_face_stand_where_their_hats_do() {
+fn patches_of_a_face_stand_on_its_edges() {
     let rom = patched(ReductionKind::FreeInterface, Some(4)).rom;
     assert_eq!(rom.contact_nodes.len(), 12);
     let (start, side) = (cube_of(4).nodes[0][1], 0.05);
     for (index, node) in rom.contact_nodes.iter().enumerate() {
         let sign = if index < 6 { -1.0 } else { 1.0 };
-        let y = start + side * [1.0 / 6.0, 0.5, 5.0 / 6.0][index % 6 / 2];
-        let z = side * [1.0 / 3.0 - 0.5, 2.0 / 3.0 - 0.5][index % 2];
+        let y = start + side * [0.0, 0.5, 1.0][index % 6 / 2];
+        let z = side * [-0.5, 0.5][index % 2];
         let off = node.position.iter().zip([0.5 * sign * side, y, z]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off < 1e-14, "{node:?}: {off:e}");
     }
     assert_eq!((rom.contact_nodes[0].name.as_str(), rom.contact_nodes[11].name.as_str()), ("left_1", "right_6"));
+    let all = CubeOptions { elements: 4, patches: Some([5, 5]), ..CubeOptions::default() };
+    let nodes = reduce_cube(&CubeOptions { patches: None, ..all.clone() }, &silent).unwrap().rom;
+    let patches = reduce_cube(&all, &silent).unwrap().rom;
+    for (node, patch) in nodes.contact_nodes.iter().zip(&patches.contact_nodes) {
+        let apart = node.position.iter().zip(patch.position).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < 1e-13 && patch.area > 0.0, "{node:?} {patch:?}");
+    }
+    // What contact meets well above the rigid motions: C (K + s M)⁻¹ Cᵀ.
+    let [nodes, patches] = [nodes, patches].map(|rom| {
+        let shift = rom.stiffness.trace() / rom.mass.trace();
+        let whole = (&rom.stiffness + shift * &rom.mass).cholesky().unwrap();
+        &rom.contact_map * whole.solve(&rom.contact_map.transpose())
+    });
+    equal(&patches, &nodes, 1e-9);
 }
 
 /// What contact forces do beside accelerating the cube, at rest in the frame that flies with it, is that of the full model with any number of modes.
@@ -239,7 +253,7 @@ fn forced_responses_of_a_free_cube_converge_faster_with_free_interface_modes() {
         let fixed = error(ReductionKind::FixedInterface, modes);
         let free = error(ReductionKind::FreeInterface, modes);
         told!("| {modes} | {fixed} | {free} |");
-        assert!(free < 0.5 * fixed && free < 0.5 * last, "{modes}: {fixed:e} {free:e}");
+        assert!(free < 0.5 * fixed && free < 0.55 * last, "{modes}: {fixed:e} {free:e}");
         last = free;
     }
     guide::hold("cargo test -p tiprub-model --test cube");

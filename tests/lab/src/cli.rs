@@ -56,7 +56,7 @@ pub enum Command {
     /// Blades against an oval casing, rigid and flexible, over a range of speeds.
     Stage(StageArguments),
     /// The cube between two rings: the product against independent methods on the full model.
-    Cube(StudyCommon),
+    Cube(CubeArguments),
     /// Forces and moments on both sides of contacts, torque against the work of the shaft, and the ledger, over all features.
     Conjugacy(StudyCommon),
     /// What the communication step does to a whirling shaft and other inputs that move, ramped, with derivatives, and held.
@@ -88,6 +88,17 @@ pub struct EstimatesArguments {
     pub common: StudyCommon,
 }
 
+/// Arguments of `lab cube`.
+#[derive(Debug, Args)]
+pub struct CubeArguments {
+    /// Only the faces of the cube as patches: a minute.
+    #[arg(long)]
+    pub patches_only: bool,
+    /// What all studies take.
+    #[command(flatten)]
+    pub common: StudyCommon,
+}
+
 /// Arguments of `lab beside`.
 #[derive(Debug, Args)]
 pub struct BesideArguments {
@@ -106,7 +117,7 @@ pub struct RefinementArguments {
     #[arg(long = "scene", value_name = "SCENE")]
     pub scenes: Vec<String>,
     /// Only this direction; may be given several times.
-    #[arg(long = "direction", value_name = "DIRECTION", value_parser = ["step", "modes", "modes-2", "nodes", "mesh"])]
+    #[arg(long = "direction", value_name = "DIRECTION", value_parser = ["step", "modes", "modes-2", "nodes", "rows", "mesh"])]
     pub directions: Vec<String>,
     /// Runs at the same time [default: one per processor].
     #[arg(long, value_name = "N")]
@@ -213,7 +224,7 @@ impl Cli {
             Command::Convergence(common) => ("convergence", common),
             Command::Modes(arguments) => ("modes", &arguments.common),
             Command::Stage(arguments) => ("stage", &arguments.common),
-            Command::Cube(common) => ("cube", common),
+            Command::Cube(arguments) => ("cube", &arguments.common),
             Command::Conjugacy(common) => ("conjugacy", common),
             Command::Inputs(common) => ("inputs", common),
             Command::Estimates(arguments) => ("estimates", &arguments.common),
@@ -242,7 +253,7 @@ impl Cli {
                 modes::study(&reduction, &mesh, arguments.speed, arguments.common.quick)
             }
             Command::Stage(arguments) => stage::study(arguments, console),
-            Command::Cube(common) => cube::study(common, console),
+            Command::Cube(arguments) => cube::study(arguments, console),
             Command::Conjugacy(common) => conjugacy::study(common.quick),
             Command::Inputs(common) => inputs::study(common, console),
             Command::Estimates(arguments) => estimates::study(arguments, console),

@@ -19,7 +19,12 @@ use tiprub_model::rotor37::Tip;
 use tiprub_shell::{Failure, Result, console::Console, sweep};
 use tiprub_study::{
     Figure, Picture, Sheet, Statement, Study,
-    convergence::{self, Asked, Found, Refined, limit::Limit, page, refine},
+    convergence::{
+        self, Asked, Found, Refined,
+        limit::Limit,
+        page,
+        refine::{self, Direction},
+    },
 };
 
 use crate::cli::RefinementArguments;
@@ -31,6 +36,8 @@ const HEAVY: f64 = 1.0;
 const FRICTION: f64 = 0.15;
 /// Scenes that are drawn together.
 const FAMILIES: [&str; 2] = ["rotor37", "stage"];
+/// What is in no picture.
+const APART: &str = "apart";
 /// Tips of a blade of the stage: five patches, and the three nodes that it ships with.
 const STAGE_TIPS: [(Tip, &str, &str); 2] =
     [(Tip::Patches(5), "stage", "5 patches"), (Tip::Nodes(3), "stage-nodes", "3 contact nodes")];
@@ -43,7 +50,7 @@ const STAGE_FINEST: usize = 8;
 struct Standard {
     name: String,
     title: String,
-    /// Of which pictures it is in: `rotor37` or `stage`.
+    /// Of which pictures it is in: `rotor37` or `stage`, or none.
     family: &'static str,
     settings: SceneSettings,
     /// Tip and mesh of the structure that touches, instead of what the scene names.
@@ -59,12 +66,14 @@ fn standards() -> Result<Vec<Standard>> {
         (FRICTION, LIGHT, "rotor37-light", "rotor 37, light rub, µ = 0.15"),
         (0.0, HEAVY, "rotor37-heavy-smooth", "rotor 37, heavy rub, µ = 0"),
         (FRICTION, HEAVY, "rotor37-heavy", "rotor 37, heavy rub, µ = 0.15"),
+        (FRICTION, LIGHT, "rotor37-one-row", "rotor 37, one row, light rub, µ = 0.15"),
     ] {
-        let mut settings = scene_source::settings("builtin:rotor37-one-row")?;
+        let one_row = name.ends_with("one-row");
+        let mut settings = scene_source::settings(if one_row { "builtin:rotor37-one-row" } else { "builtin:rotor37" })?;
         settings.contacts[0].friction = friction;
         settings.surfaces[0].shape = Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
-        let (name, title) = (name.into(), title.into());
-        all.push(Standard { name, title, family: FAMILIES[0], settings, other: None, finest_tip: refine::FINEST_TIP });
+        let (name, title, family) = (name.into(), title.into(), if one_row { APART } else { FAMILIES[0] });
+        all.push(Standard { name, title, family, settings, other: None, finest_tip: refine::FINEST_TIP });
     }
     for (tip, name, touching) in STAGE_TIPS {
         for (friction, ending) in [(0.0, "-smooth"), (FRICTION, "")] {
@@ -199,16 +208,29 @@ fn energy(refined: &Refined) -> usize {
     if refined.ran().iter().any(|(_, run)| run.friction_work > 0.0) { 2 } else { 4 }
 }
 
+/// What is refined, in a word or two.
+fn short(direction: &Direction) -> &str {
+    match direction.name {
+        refine::STEP if direction.unit == refine::OF_CLEARANCE => "tolerance",
+        refine::NODES => direction.unit,
+        "modes-2" => "modes of the casing",
+        name => name,
+    }
+}
+
 /// The levels of a direction with their errors, and its limit.
 fn rows(refined: &Refined) -> Vec<Vec<String>> {
     let energy = energy(refined);
     let direction = &refined.direction;
     let title = match direction.shorter {
-        Some(factor) => format!("{} (1/{factor} of the step)", direction.title),
-        None => direction.title.clone(),
+        Some(factor) => format!("{} (1/{factor} of the step)", short(direction)),
+        None => short(direction).to_owned(),
     };
-    let value =
-        |value: f64| if direction.unit == "s" { format!("{:.3} µs", 1e6 * value) } else { format!("{value:.0}") };
+    let value = |value: f64| match direction.unit {
+        refine::SECONDS => format!("{:.3} µs", 1e6 * value),
+        refine::OF_CLEARANCE => format!("{value:.0e}"),
+        _ => format!("{value:.0}"),
+    };
     let levels = direction.levels.iter().zip(&refined.runs).map(|(level, run)| {
         let own = if level.own { " (the scene)" } else { "" };
         let mut row = vec![title.clone(), format!("{}{own}", value(level.value))];
@@ -270,7 +292,7 @@ fn tables(case: &Case) -> Vec<Table> {
 fn summary(cases: &[Case]) -> Table {
     let mut table = Table::new(
         "Error of the scene as it stands, of the displacements (relative L2)",
-        ["scene", "steps", "modes", "patches", "mesh"],
+        ["scene", "steps", "modes", "patches", "rows", "mesh"],
     );
     for case in cases {
         let Ok(found) = &case.found else { continue };
@@ -278,7 +300,7 @@ fn summary(cases: &[Case]) -> Table {
             let own = found.refined.iter().find(|refined| refined.direction.name == name);
             percent(own.and_then(|refined| refined.own_errors()?[0]), None)
         };
-        let cells = ["step", "modes", "nodes", "mesh"].map(of);
+        let cells = [refine::STEP, "modes", refine::NODES, refine::ROWS, refine::MESH].map(of);
         table.rows.push(std::iter::once(case.title.clone()).chain(cells).collect());
     }
     table
@@ -292,11 +314,11 @@ fn markdown(cases: &[Case]) -> String {
 /// What pictures show of a direction, in the order of their names.
 const DRAWN: [&str; 3] = ["displacements (L2)", "impulse", "friction work (strain energy, µ = 0)"];
 /// Family, direction, label of its values, names of the pictures.
-const PICTURES: [(&str, &str, &str, [&str; 3]); 8] = [
+const PICTURES: [(&str, &str, &str, [&str; 3]); 10] = [
     (
         FAMILIES[0],
         refine::NODES,
-        "contact patches (-)",
+        "contact patches along the chord (-)",
         ["refinement-patches", "refinement-patches-impulse", "refinement-patches-work"],
     ),
     (FAMILIES[0], "modes", "modes (-)", ["refinement-modes", "refinement-modes-impulse", "refinement-modes-work"]),
@@ -309,8 +331,20 @@ const PICTURES: [(&str, &str, &str, [&str; 3]); 8] = [
     (
         FAMILIES[0],
         refine::STEP,
-        "internal step (s)",
+        "tolerance (of the clearance)",
         ["refinement-step", "refinement-step-impulse", "refinement-step-work"],
+    ),
+    (
+        FAMILIES[0],
+        refine::ROWS,
+        "rows of contact patches across the thickness (-)",
+        ["refinement-rows", "refinement-rows-impulse", "refinement-rows-work"],
+    ),
+    (
+        FAMILIES[1],
+        refine::ROWS,
+        "rows of contact patches across the thickness (-)",
+        ["refinement-stage-rows", "refinement-stage-rows-impulse", "refinement-stage-rows-work"],
     ),
     (
         FAMILIES[1],
@@ -408,6 +442,9 @@ mod tests {
         assert_eq!(of("stage").finest_tip * (own - 1) + 1, 33);
         let names: std::collections::BTreeSet<&str> = PICTURES.iter().flat_map(|(.., names)| *names).collect();
         assert_eq!(names.len(), 3 * PICTURES.len(), "a picture is written over another");
-        assert!(all.iter().all(|standard| FAMILIES.contains(&standard.family)));
+        assert!(all.iter().all(|standard| FAMILIES.contains(&standard.family) || standard.family == APART));
+        // The scene that ships has two rows, and the other one is held beside it.
+        let rows = |name: &str| of(name).settings.structures[0].rom.clone();
+        assert_eq!(["rotor37-light", "rotor37-one-row"].map(rows), ["builtin:rotor37-rows", "builtin:rotor37"]);
     }
 }

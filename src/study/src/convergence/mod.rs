@@ -35,6 +35,7 @@ use crate::{
     },
     estimate::{self, Estimate},
     master, one_rotor,
+    stability::structure::Structure,
 };
 
 /// One direction with the runs of its levels.
@@ -44,6 +45,8 @@ pub struct Refined {
     pub direction: Direction,
     /// A run per level, or why it is refused.
     pub runs: Vec<std::result::Result<Marched, String>>,
+    /// Per level: friction coefficient beyond which the closed tip digs in; `None` where there is none, and without friction.
+    pub digging: Vec<Option<f64>>,
 }
 
 /// Everything that was found of a scene.
@@ -222,7 +225,7 @@ impl<'a> Runner<'a> {
 
     /// Run a direction with the steps that it says.
     pub(crate) fn as_it_is(&self, direction: Direction) -> Result<Refined> {
-        Ok(Refined { runs: self.runs(&direction)?, direction })
+        Ok(Refined { runs: self.runs(&direction)?, digging: vec![None; direction.levels.len()], direction })
     }
 
     /// Run a direction. A ROM with more modes or nodes may ask for a shorter step than the scene's: then all of its levels take one.
@@ -234,10 +237,25 @@ impl<'a> Runner<'a> {
             let runs = self.runs(&finer)?;
             if runs.iter().all(std::result::Result::is_ok) {
                 direction = finer;
-                return Ok(Refined { direction, runs });
+                return Ok(Refined { digging: self.digging(&direction)?, direction, runs });
             }
         }
-        Ok(Refined { direction, runs })
+        Ok(Refined { digging: self.digging(&direction)?, direction, runs })
+    }
+
+    /// What friction the master's tip digs in with, level by level; it is of the model, not of the steps.
+    fn digging(&self, direction: &Direction) -> Result<Vec<Option<f64>>> {
+        let of = |level: &Level| {
+            let (index, scene) = (master(&level.scene), &level.scene);
+            let (rom, settings) = (&scene.roms[index], &scene.settings.structures[index]);
+            let rubs = scene.settings.contacts.iter().any(|contact| contact.friction > 0.0);
+            let found = Structure::new(rom, rom.damping_ratio, 0.0).ok().filter(|_| rubs);
+            Ok(found.and_then(|structure| Some(structure.digs_in(settings.speed)?.friction)))
+        };
+        match direction.name == refine::STEP {
+            true => Ok(vec![None; direction.levels.len()]),
+            false => sweep::sweep(&direction.levels, self.threads, of, |_| ()),
+        }
     }
 
     fn runs(&self, direction: &Direction) -> Result<Vec<std::result::Result<Marched, String>>> {

@@ -96,6 +96,7 @@ pub fn statements(found: &Found) -> Vec<Statement> {
     let mut all: Vec<Statement> = found.refined.iter().filter_map(error).collect();
     all.extend(found.refined.iter().filter_map(small));
     all.extend(worst(found));
+    all.extend(found.refined.iter().filter_map(digging));
     all.extend(scope(found));
     for refined in found.refined.iter().filter(|refined| !refined.direction.missing.is_empty()) {
         let title = &refined.direction.title;
@@ -110,6 +111,20 @@ pub fn statements(found: &Found) -> Vec<Statement> {
         }
     }
     all
+}
+
+/// Level by level the friction beyond which the closed tip digs in, where there is one.
+fn digging(refined: &Refined) -> Option<Statement> {
+    let levels = refined.direction.levels.iter().zip(&refined.digging);
+    let known = levels.map(|(level, least)| {
+        let told = least.map_or("none".to_owned(), |least| format!("{least:.3}"));
+        format!("{} with {}", told, value(refined, level.value))
+    });
+    let found = known.collect::<Vec<_>>().join(", ");
+    let some = refined.digging.iter().any(Option::is_some);
+    some.then(|| {
+        Statement::remark(format!("Friction above which the closed tip digs in (µ*), by {}", title(refined)), found)
+    })
 }
 
 /// "modes of rotor", and with which step where it is not the scene's.
@@ -340,10 +355,11 @@ fn figure(refined: &Refined) -> Result<Figure> {
 pub fn results(found: &Found) -> Value {
     let level = |refined: &Refined| {
         let mut changes = refined.changes().into_iter();
-        let levels = refined.direction.levels.iter().zip(&refined.runs);
-        let each = |(level, run): (&super::Level, &std::result::Result<super::Marched, String>)| match run {
+        let levels = refined.direction.levels.iter().zip(&refined.runs).zip(&refined.digging);
+        type Reached = std::result::Result<Marched, String>;
+        let each = |((level, run), digging): ((&super::Level, &Reached), &Option<f64>)| match run {
             Ok(run) => json!({
-                "value": level.value, "own": level.own, "impulse": run.impulse, "friction_work": run.friction_work,
+                "value": level.value, "own": level.own, "digs_in_above": digging, "impulse": run.impulse, "friction_work": run.friction_work,
                 "peak_force": run.peak_force, "strain_energy": run.strain_energy,
                 "changes_to_next": changes.next().map(|changes| json!({
                     "displacements": changes[0], "impulse": changes[1], "friction_work": changes[2], "peak_force": changes[3],

@@ -16,6 +16,7 @@ use super::{
         Again, Direction, Level, MESH, MESH_NODES, MODES_KEPT, Meshed, NODES, OF_CLEARANCE, SECONDS, STEP, Source,
         goes_by_tolerance, with_division,
     },
+    rows::MOST_ROWS,
     truncate::{Form, truncated},
 };
 use crate::{master, stability::asked::divided};
@@ -57,33 +58,38 @@ impl<'a> Refiner<'a> {
         Ok(refiner)
     }
 
-    /// The scene with so many times its modes and spaces between contact points, factor by factor as far as its mesh has them; none where the
-    /// master cannot be reduced again.
+    /// The scene with so many times its modes and spaces between contact points, and with more rows of patches, factor by factor as far as its mesh
+    /// has them; none where the master cannot be reduced again.
     pub(crate) fn finer(&self, factors: &[usize]) -> Vec<Scene> {
+        let own = self.scene.roms[master(self.scene)].rows();
+        // A row more, then as many as tell how straight the tip stays; a mesh tells no more rows apart than it does.
+        let rows = |factor: usize| (own..=MOST_ROWS.min(own + factor / 2).max(own)).rev();
+        factors.iter().map_while(|factor| rows(*factor).find_map(|rows| self.finer_in_rows(*factor, rows))).collect()
+    }
+
+    fn finer_in_rows(&self, factor: usize, rows: usize) -> Option<Scene> {
         let index = master(self.scene);
         let own = &self.scene.roms[index];
         let (modes, points) = self.own_counts();
         let start = common_start(self.scene, index);
-        let with = |factor: &usize| {
-            let tip = self.tip(if start.is_ok() { factor * (points - 1) + 1 } else { points });
-            let found = match (self.again.source, self.with_chord()) {
-                (Some(source), _) => {
-                    source.reduce(None, factor * modes, tip, self.again.console).map(|found| found.rom)
-                }
-                (None, Some(name)) => {
-                    let other = Other { modes: *factor as f64, tip, mesh: self.again.mesh };
-                    builtin::refined(&name, other, self.again.cache, self.again.console)?
-                }
-                (None, None) => return None,
-            };
-            let rom = Rom { damping_ratio: own.damping_ratio, ..found.ok()? };
-            let rom = match &start {
-                Ok(start) => starting_with(start, rom),
-                Err(_) => named_as(own, rom),
-            };
-            Some(self.with_rom(index, rom))
+        let tip = match start.is_ok() {
+            true => self.tip_in_rows(factor * (points - 1) + 1, rows),
+            false => self.tip(points),
         };
-        factors.iter().map_while(with).collect()
+        let found = match (self.again.source, self.with_chord()) {
+            (Some(source), _) => source.reduce(None, factor * modes, tip, self.again.console).map(|found| found.rom),
+            (None, Some(name)) => {
+                let other = Other { modes: factor as f64, tip, mesh: self.again.mesh };
+                builtin::refined(&name, other, self.again.cache, self.again.console)?
+            }
+            (None, None) => return None,
+        };
+        let rom = Rom { damping_ratio: own.damping_ratio, ..found.ok()? };
+        let rom = match &start {
+            Ok(start) => starting_with(start, rom),
+            Err(_) => named_as(own, rom),
+        };
+        Some(self.with_rom(index, rom))
     }
 
     pub(super) fn level(&self, value: f64, own: bool, scene: Scene) -> Level {

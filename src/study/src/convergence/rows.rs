@@ -13,7 +13,7 @@ use super::{
 use crate::master;
 
 /// Sides, and the middle between them.
-const MOST_ROWS: usize = 3;
+pub(super) const MOST_ROWS: usize = 3;
 
 impl Refiner<'_> {
     /// Fewer rows follow from the ROM itself, more where it can be reduced again; none of contact nodes.

@@ -55,13 +55,9 @@ pub fn study(arguments: &ErrorArguments, source: Option<&dyn Source>, console: &
     )?;
     let summary = format!(
         "Every time scheme and contact solver on {}, at steps on both sides of the one it asks for ({all} runs); and other numbers of contact \
-         points and modes, against {}.",
+         points, of rows of them and of modes, against {}.",
         arguments.scene,
-        if total.as_ref().is_ok_and(|total| total.finer == [true; 2]) {
-            "one truth with more of both"
-        } else {
-            "one truth"
-        }
+        if total.as_ref().is_ok_and(|total| total.is_total()) { "one truth with more of all" } else { "one truth" }
     );
     let mut study = of_cases(vec![Box::new(case)], &[], (quick, summary), console)?;
     match total {

@@ -1,6 +1,7 @@
-//! Total error against run time of a scene: other steps, schemes, numbers of patches and of modes, against one truth with more of all.
+//! Total error against run time of a scene: other steps, schemes, numbers of patches, of rows of them and of modes, against one truth with more of
+//! all.
 //!
-//! Models with fewer patches and modes follow from the ROM itself; those with more are reduced again, where that is possible. Where it is
+//! Models with fewer patches, rows and modes follow from the ROM itself; those with more are reduced again, where that is possible. Where it is
 //! not, the truth has the modes and patches of the scene: the errors are then of the steps, and are called so. All are held
 //! against one truth, by what their tips have in common (watched points, or patches that all have). Time is that of the steps: a
 //! model is as cheap as it is small. A mesh costs no run time: what it leaves is told beside the others.
@@ -22,7 +23,7 @@ use super::{
 use crate::{
     convergence::{
         Runner,
-        coarsen::coarsened,
+        coarsen::{coarsened, fewer_rows},
         march::{Marched, Observed},
         refine::Again,
         refiner::Refiner,
@@ -48,8 +49,10 @@ const MOST_RUNS: usize = 5;
 /// A model of the scene.
 #[derive(Debug)]
 pub struct Model {
-    /// Contact patches or nodes.
+    /// Contact nodes, or patches along the chord.
     pub points: usize,
+    /// Rows of patches across the thickness.
+    pub rows: usize,
     /// Modes of the structure that touches.
     pub modes: usize,
     /// Whether it is the scene's.
@@ -60,7 +63,14 @@ pub struct Model {
 impl Model {
     fn of(scene: Scene, own: bool) -> Self {
         let rom = &scene.roms[master(&scene)];
-        Self { points: rom.contact_nodes.len(), modes: Form::of(rom).modes(rom), own, scene }
+        let rows = rom.rows();
+        Self { points: rom.contact_nodes.len() / rows, rows, modes: Form::of(rom).modes(rom), own, scene }
+    }
+
+    /// "9 × 2 patches", "3 nodes".
+    pub(super) fn tip(&self, touching: &str) -> String {
+        let rows = if self.rows == 1 { String::new() } else { format!(" × {}", self.rows) };
+        format!("{}{rows} {touching}", self.points)
     }
 }
 
@@ -92,8 +102,9 @@ pub struct Total {
     pub readable: Option<f64>,
     /// `patches` or `nodes`.
     pub touching: &'static str,
-    /// Whether the truth has more modes than the scene, and more contact points.
-    pub finer: [bool; 2],
+    /// Whether the truth has more modes than the scene, more contact points along the chord, and more rows of them; nodes have no rows, and count
+    /// as refined.
+    pub finer: [bool; 3],
     /// What the ROM says of itself; empty where it says nothing.
     pub of_rom: Vec<Estimate>,
     /// What the mesh leaves, or why that is not known.
@@ -133,17 +144,18 @@ pub fn measure(case: &Own, again: &Again) -> Result<std::result::Result<Total, S
     let touching =
         if scene.roms[master(scene)].contact_nodes.iter().all(|node| node.area > 0.0) { "patches" } else { "nodes" };
     let own = Model::of(scene.clone(), true);
-    let Model { points, modes, .. } = Model::of(truth_scene, false);
-    let finer = [modes > own.modes, points > own.points];
+    let finest = Model::of(truth_scene, false);
+    let modes = finest.modes;
+    let finer = [modes > own.modes, finest.points > own.points, finest.rows > own.rows || touching == "nodes"];
     let of_rom = estimate::of_rom(&scene.roms[master(scene)]);
     let step = case.method().setting(value(case, case.method(), division));
     let whose = if of_source { "" } else { ", the scene's own model, which is not reduced again" };
     let method = case.method().name();
-    let truth = format!("{points} {touching} and {modes} modes with {method} at {step}{whose}");
+    let truth = format!("{} and {modes} modes with {method} at {step}{whose}", finest.tip(touching));
     Ok(Ok(Total { models, rows, truth, readable, touching, finer, of_rom, mesh }))
 }
 
-/// The scene's model and coarser ones: patches and modes halved, and halved again, each with each.
+/// The scene's model and coarser ones: patches and modes halved, and halved again, each with each; fewer rows with all patches along the chord.
 fn coarser(scene: &Scene, quick: bool) -> Vec<Model> {
     let index = master(scene);
     let halvings = if quick { 1 } else { COARSER };
@@ -153,6 +165,8 @@ fn coarser(scene: &Scene, quick: bool) -> Vec<Model> {
     });
     let mut tips = vec![scene.roms[index].clone()];
     tips.extend(halved);
+    let own = &scene.roms[index];
+    tips.extend((1..own.rows()).filter_map(|rows| fewer_rows(own, rows).ok()));
     let own_modes = Form::of(&tips[0]).modes(&tips[0]);
     let mut models = Vec::new();
     for (tip, rom) in tips.into_iter().enumerate() {

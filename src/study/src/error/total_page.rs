@@ -17,27 +17,37 @@ use crate::{Figure, Picture, Sheet, Statement, estimate};
 pub const TARGETS: [f64; 3] = [1e-1, 1e-2, 1e-3];
 
 impl Total {
-    /// What errors against the truth are called: total ones are those that modes and contact points have a part in.
-    pub fn name(&self) -> &'static str {
-        match (self.finer, self.touching) {
-            ([true, true], _) => "total error",
-            ([true, false], _) => "error of steps and modes",
-            ([false, true], "patches") => "error of steps and patches",
-            ([false, true], _) => "error of steps and contact nodes",
-            ([false, false], _) => "own-model error of the steps",
+    /// What errors against the truth are called: total ones are those that modes, contact points and their rows have a part in.
+    pub fn name(&self) -> String {
+        let points = if self.touching == "nodes" { "contact nodes" } else { self.touching };
+        let rows = self.finer[2] && self.touching != "nodes";
+        let all = [("modes", self.finer[0]), (points, self.finer[1]), ("rows", rows)];
+        let parts: Vec<&str> = all.iter().filter(|(_, finer)| *finer).map(|(name, _)| *name).collect();
+        match parts.as_slice() {
+            _ if self.is_total() => "total error".into(),
+            [] => "own-model error of the steps".into(),
+            [one] => format!("error of steps and {one}"),
+            [first, second, ..] => format!("error of steps, {first} and {second}"),
         }
+    }
+
+    /// Whether nothing of the model but its mesh is left out.
+    pub fn is_total(&self) -> bool {
+        self.finer == [true; 3]
     }
 
     /// The same in names of files and of results.
     pub fn key(&self) -> &'static str {
-        if self.finer == [true; 2] { "total" } else { "own_model" }
+        if self.is_total() { "total" } else { "own_model" }
     }
 
-    /// What the truth has finer than the scene, and what not.
+    /// What the truth has finer than the scene, and what not; nodes have no rows.
     pub fn directions(&self) -> [Vec<&'static str>; 2] {
+        let [modes, points, rows] = self.finer;
         let all =
-            [("steps", true), ("modes", self.finer[0]), (self.touching, self.finer[1]), ("mesh", self.mesh.is_ok())];
-        [true, false].map(|which| all.iter().filter(|(_, finer)| *finer == which).map(|(name, _)| *name).collect())
+            [("steps", true), ("modes", modes), (self.touching, points), ("rows", rows), ("mesh", self.mesh.is_ok())];
+        let all = all.iter().filter(|(name, _)| *name != "rows" || self.touching != "nodes");
+        [true, false].map(|which| all.clone().filter(|(_, finer)| *finer == which).map(|(name, _)| *name).collect())
     }
 
     /// The same in words.
@@ -60,8 +70,8 @@ impl Total {
     /// "5 patches, 40 modes, modal-exact + lcp, h = 1.000 µs".
     fn setting(&self, row: &Row) -> String {
         let model = &self.models[row.model];
-        let (points, modes, touching) = (model.points, model.modes, self.touching);
-        format!("{points} {touching}, {modes} modes, {}, {}", row.competitor.name(), row.competitor.setting(row.step))
+        let (tip, modes) = (model.tip(self.touching), model.modes);
+        format!("{tip}, {modes} modes, {}, {}", row.competitor.name(), row.competitor.setting(row.step))
     }
 
     /// Whether an error is too small to be told from that of the truth.
@@ -75,8 +85,9 @@ impl Total {
     }
 
     fn winners(&self, title: &str) -> Table {
+        let name = self.name();
         let columns =
-            [self.name(), "cheapest setting", "time", "its error", "with that of the mesh", "the paper's method"];
+            [name.as_str(), "cheapest setting", "time", "its error", "with that of the mesh", "the paper's method"];
         let mut table = Table::new(format!("{title}: cheapest setting, {} ({})", self.name(), self.scope()), columns);
         for target in TARGETS {
             let paper = self.cheapest(target, Some(PAPER));
@@ -100,7 +111,7 @@ impl Total {
         let points: Vec<(f64, f64)> = self.ran().map(|(_, time, error)| (time, error)).collect();
         let mut table = Table::new(
             format!("{title}: settings that no other beats in both time and {}", self.name()),
-            ["setting", "time", self.name()],
+            ["setting", "time", self.name().as_str()],
         );
         for (time, error) in front(&points) {
             let row = self.ran().find(|(_, own_time, own_error)| (*own_time, *own_error) == (time, error));
@@ -110,7 +121,8 @@ impl Total {
     }
 
     fn all(&self, title: &str) -> Table {
-        let mut table = Table::new(format!("{title}: all settings"), ["setting", "time", self.name(), "remark"]);
+        let mut table =
+            Table::new(format!("{title}: all settings"), ["setting", "time", self.name().as_str(), "remark"]);
         for row in &self.rows {
             let own = if row.own { "the scene as it stands" } else { "" };
             table.rows.push(match &row.outcome {
@@ -138,10 +150,12 @@ impl Total {
     }
 
     fn sheet(&self) -> Sheet {
-        let mut sheet = Sheet::new(["time (s)", self.name(), "points", "modes", STEP, "scene's own (1 yes)"]);
+        let mut sheet =
+            Sheet::new(["time (s)", self.name().as_str(), "points", "rows", "modes", STEP, "scene's own (1 yes)"]);
         for (row, time, error) in self.ran() {
             let (model, own) = (&self.models[row.model], f64::from(u8::from(row.own)));
-            sheet.rows.push(vec![time, error, model.points as f64, model.modes as f64, row.step, own]);
+            let [points, rows, modes] = [model.points, model.rows, model.modes].map(|count| count as f64);
+            sheet.rows.push(vec![time, error, points, rows, modes, row.step, own]);
         }
         sheet
     }
@@ -158,11 +172,12 @@ impl Total {
             Err(why) => format!("What the mesh leaves is not in it ({why})"),
         };
         Figure {
-            name: if self.finer == [true; 2] { "scene-total" } else { "scene-own-model" },
+            name: if self.is_total() { "scene-total" } else { "scene-own-model" },
             caption: format!(
-                "{title}: {} (displacements) at other steps, schemes, numbers of {} and of modes, against {}; {}. {mesh}.",
+                "{title}: {} (displacements) at other steps, schemes, numbers of {}{} and of modes, against {}; {}. {mesh}.",
                 self.name(),
                 self.touching,
+                if self.touching == "nodes" { "" } else { ", of their rows" },
                 self.truth,
                 self.scope()
             ),
@@ -213,11 +228,11 @@ impl Total {
 
     /// Every setting as comma-separated values; refusals with their reason.
     pub fn csv(&self) -> String {
-        let mut text = format!("competitor,{},modes,{STEP},time (s),{},remark\n", self.touching, self.name());
+        let mut text = format!("competitor,{},rows,modes,{STEP},time (s),{},remark\n", self.touching, self.name());
         for row in &self.rows {
             let model = &self.models[row.model];
-            let start =
-                format!("\"{}\",{},{},{}", row.competitor.name(), model.points, model.modes, shortest(row.step));
+            let Model { points, rows, modes, .. } = model;
+            let start = format!("\"{}\",{points},{rows},{modes},{}", row.competitor.name(), shortest(row.step));
             text.push_str(&match &row.outcome {
                 Ok((time, error)) => format!("{start},{time:.4e},{error:.4e},\n"),
                 Err(why) => format!("{start},,,\"{}\"\n", why.replace('"', "'")),
@@ -229,22 +244,22 @@ impl Total {
     /// The cheapest setting for a target as comma-separated values.
     fn cheapest_row(&self, target: f64) -> String {
         let Some((row, time, error)) = self.cheapest(target, None).filter(|_| !self.hidden(target)) else {
-            return format!("{},{target:e},,,,,,\n", self.key());
+            return format!("{},{target:e},,,,,,,\n", self.key());
         };
-        let (Model { points, modes, .. }, name) = (&self.models[row.model], row.competitor.name());
+        let (Model { points, rows, modes, .. }, name) = (&self.models[row.model], row.competitor.name());
         let key = self.key();
-        format!("{key},{target:e},\"{name}\",{points},{modes},{},{time:.4e},{error:.4e}\n", shortest(row.step))
+        format!("{key},{target:e},\"{name}\",{points},{rows},{modes},{},{time:.4e},{error:.4e}\n", shortest(row.step))
     }
 
     /// For programs.
     pub fn to_json(&self) -> Value {
-        let error_name = if self.finer == [true; 2] { "total_error" } else { "error" };
+        let error_name = if self.is_total() { "total_error" } else { "error" };
         let [refined, not_refined] = self.directions();
         let row = |row: &Row| {
             let model = &self.models[row.model];
             let (time, error) = row.outcome.as_ref().map_or((None, None), |(time, error)| (Some(time), Some(error)));
             json!({
-                "competitor": row.competitor.name(), self.touching: model.points, "modes": model.modes, step_name(row.competitor): row.step,
+                "competitor": row.competitor.name(), self.touching: model.points, "rows": model.rows, "modes": model.modes, step_name(row.competitor): row.step,
                 "own": row.own, "seconds": time, error_name: error, "refused": row.outcome.as_ref().err(),
             })
         };
@@ -262,16 +277,17 @@ impl Total {
 
 /// The cheapest settings for errors of the steps, as [`super::sheets::to_json`] has them, and against the truth of `total`.
 pub fn cheapest_csv(of_steps: &[Value], total: &Total) -> String {
-    let mut text = format!("error of,at most,competitor,{},modes,{STEP},time (s),error\n", total.touching);
+    let mut text = format!("error of,at most,competitor,{},rows,modes,{STEP},time (s),error\n", total.touching);
     for row in of_steps {
         let number = |name: &str| row[name].as_f64().map_or_else(String::new, shortest);
         let name = row["competitor"].as_str().map_or_else(String::new, |name| format!("\"{name}\""));
         let own = total.models.iter().find(|model| model.own).filter(|_| !name.is_empty());
-        let [points, modes] =
-            own.map_or([String::new(), String::new()], |own| [own.points, own.modes].map(|n| n.to_string()));
+        let [points, rows, modes] = own.map_or([String::new(), String::new(), String::new()], |own| {
+            [own.points, own.rows, own.modes].map(|n| n.to_string())
+        });
         let [target, time, error] = ["error", "seconds", "error_of_steps"].map(number);
         let step = ["internal_step", "tolerance"].map(number).concat();
-        text.push_str(&format!("steps,{target},{name},{points},{modes},{step},{time},{error}\n"));
+        text.push_str(&format!("steps,{target},{name},{points},{rows},{modes},{step},{time},{error}\n"));
     }
     text + &TARGETS.map(|target| total.cheapest_row(target)).concat()
 }

@@ -8,7 +8,7 @@ use tiprub_core::{
     rom::Frame,
     settings::Scheme,
     shown,
-    stability::{self, ContactDirections, Fastest, Growth, judged::Judged, massless::MasslessCheck},
+    stability::{self, ContactDirections, Fastest, Growth, digging, judged::Judged, massless::MasslessCheck},
 };
 
 use super::seek::{Sought, TRIED, seek};
@@ -98,6 +98,17 @@ impl Rates {
     }
 }
 
+/// Where a tip digs in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Digging {
+    /// Friction coefficient µ* beyond which no force holds closed contact that slides.
+    pub friction: f64,
+    /// Names of the closed nodes, of coupled sectors with the nodal diameter.
+    pub closed: String,
+    /// Sense of slip: 0 along +θ, 1 along −θ.
+    pub sense: usize,
+}
+
 /// A structure by itself.
 #[derive(Debug)]
 pub struct Structure<'a> {
@@ -175,6 +186,27 @@ impl<'a> Structure<'a> {
         Some(Rates { growth, physical, closed })
     }
 
+    /// The least friction with which closed contact that slides digs in, of all sets of closed nodes and of the senses of a speed (rad/s), both
+    /// where it is 0. `None` where no friction does, of what flies freely, and of a ROM that does not say where the other body is.
+    pub fn digs_in(&self, speed: f64) -> Option<Digging> {
+        if self.rom.frame == Frame::Cartesian {
+            return None;
+        }
+        let mut least: Option<Digging> = None;
+        for sense in (Sliding { friction: 1.0, speed }).senses() {
+            for nodes in self.combinations() {
+                for model in 0..self.models.len() {
+                    let (seen, directions) = self.seen(model, &nodes, sense);
+                    let own = digging::least_friction(&seen, &directions).unwrap_or(f64::INFINITY);
+                    if own < least.as_ref().map_or(f64::INFINITY, |least| least.friction) {
+                        least = Some(Digging { friction: own, closed: self.named(&nodes, model), sense });
+                    }
+                }
+            }
+        }
+        least
+    }
+
     /// Growth without the mass of the contact nodes where the model allows.
     fn physical(
         &self,
@@ -194,7 +226,10 @@ impl<'a> Structure<'a> {
     fn named(&self, nodes: &[usize], model: usize) -> String {
         let names: Vec<&str> = nodes.iter().map(|node| self.rom.contact_nodes[*node].name.as_str()).collect();
         let diameter = if self.rom.is_cyclic() { format!(", nodal diameter {model}") } else { String::new() };
-        format!("{}{diameter}", names.join(", "))
+        match names.as_slice() {
+            [first, .., last] if names.len() > ALL_COMBINATIONS_UP_TO => format!("{first} to {last}{diameter}"),
+            names => format!("{}{diameter}", names.join(", ")),
+        }
     }
 
     /// One model and the directions of nodes closed on it: of both parts of a nodal diameter.

@@ -21,7 +21,9 @@ use tiprub_shell::{
     Failure, Result,
     console::{Console, Task},
 };
-use tiprub_study::{Statement, Study, arguments::StudyCommon, machine};
+use tiprub_study::{Statement, Study, machine};
+
+use crate::cli::CubeArguments;
 
 /// The paper's flight, and the slower one of its energies.
 const FAST: f64 = 100.0;
@@ -66,9 +68,15 @@ impl Flown {
 ///
 /// # Errors
 /// The models cannot be made. A method that fails is a result.
-pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
+pub(crate) fn study(arguments: &CubeArguments, console: &Console) -> Result<Study> {
+    let CubeArguments { patches_only, common: arguments } = arguments;
     let quick = arguments.quick;
     let scene = scene_source::load("builtin:cube-between-rings", &arguments.cache.cache(), console)?;
+    if *patches_only {
+        let fast = Flight { speed: FAST, friction: FRICTION };
+        let end = quick.then_some(QUICK_END);
+        return Ok(of_patches(&Patches::new(&scene, (&fast, FRICTIONLESS), end, (&arguments.cache.cache(), console))?));
+    }
     let all = [(FAST, FRICTION), (FAST, 0.0), (SLOW, FRICTION), (SLOW, 0.0)]
         .map(|(speed, friction)| Flight { speed, friction });
     let flights = if quick { &all[..1] } else { &all[..] };
@@ -85,6 +93,20 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     let end = quick.then_some(QUICK_END);
     let patches = Patches::new(&scene, (&all[0], FRICTIONLESS), end, (&arguments.cache.cache(), console))?;
     report(&scene, &flown, &sizes, &patches, quick)
+}
+
+/// The study of patches alone.
+fn of_patches(patches: &Patches) -> Study {
+    Study {
+        name: "cube",
+        title: "A cube between two rings, its faces as patches".into(),
+        summary: "The shipped simulation with patches in place of the nodes of the cube's faces.".into(),
+        facts: machine::facts(),
+        statements: patches.statements(),
+        figures: Vec::new(),
+        results: json!({ "patches": patches.json() }),
+        files: vec![("tables.md".into(), "the table, as Markdown".into(), patches.markdown().into_bytes())],
+    }
 }
 
 fn fly(flight: &Flight, scene: &Scene, quick: bool, facets: bool, (task, done): (&Task, &mut u64)) -> Result<Flown> {
