@@ -38,13 +38,15 @@ const FRICTION: f64 = 0.15;
 const FAMILIES: [&str; 2] = ["rotor37", "stage"];
 /// What is in no picture.
 const APART: &str = "apart";
-/// Tips of a blade of the stage: five patches, and the three nodes that it ships with.
+/// Tips of a blade of the stage: two rows of patches, and three nodes.
 const STAGE_TIPS: [(Tip, &str, &str); 2] =
-    [(Tip::Patches(5), "stage", "5 patches"), (Tip::Nodes(3), "stage-nodes", "3 contact nodes")];
+    [(Tip::Rows([9, 2]), "stage", "9 × 2 patches"), (Tip::Nodes(3), "stage-nodes", "3 contact nodes")];
+/// Friction coefficients of the stage: none, less than its tip digs in with, and more.
+const STAGE_FRICTIONS: [(f64, &str); 3] = [(0.0, "-smooth"), (0.05, ""), (FRICTION, "-digging")];
 /// The mesh of its sector, so that the one that ships is the finest of four: to reduce a finer one takes many minutes.
 const STAGE_MESH: f64 = core::f64::consts::FRAC_1_SQRT_2;
 /// Spaces between contact points of the finest tip of the stage, times those of the scene: 33 patches, or as many as its mesh has places for.
-const STAGE_FINEST: usize = 8;
+const STAGE_FINEST: usize = 2;
 
 /// One scene of the study.
 struct Standard {
@@ -76,7 +78,7 @@ fn standards() -> Result<Vec<Standard>> {
         all.push(Standard { name, title, family, settings, other: None, finest_tip: refine::FINEST_TIP });
     }
     for (tip, name, touching) in STAGE_TIPS {
-        for (friction, ending) in [(0.0, "-smooth"), (FRICTION, "")] {
+        for (friction, ending) in STAGE_FRICTIONS {
             let mut settings = scene_source::settings("builtin:stage")?;
             settings.contacts[0].friction = friction;
             all.push(Standard {

@@ -13,7 +13,7 @@ mod nodes;
 pub mod page;
 pub mod refine;
 pub(crate) mod refiner;
-mod rows;
+pub(crate) mod rows;
 pub mod truncate;
 
 use std::time::Instant;

@@ -65,7 +65,7 @@ impl Refiner<'_> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use tiprub_core::Scene;
     use tiprub_gallery::{rom_cache::RomCache, scene_source};
     use tiprub_model::{
@@ -80,7 +80,7 @@ mod tests {
     use crate::convergence::refine::{Again, Meshed, Source};
 
     /// A coarse blade with patches.
-    struct Blade;
+    pub(crate) struct Blade;
 
     impl Source for Blade {
         fn reduce(&self, _: Option<usize>, modes: usize, tip: Tip, _: &Console) -> Result<Meshed> {
@@ -88,7 +88,8 @@ mod tests {
             let kind = ReductionKind::FreeInterface;
             let found = reduce_rotor37(&Rotor37Options { mesh, tip, modes, kind, ..Rotor37Options::paper() }, &|_| {});
             let found = found.unwrap();
-            Ok(Meshed { rom: found.rom, nodes: found.nodes })
+            // A few blades do.
+            Ok(Meshed { rom: Rom { sectors: 3, ..found.rom }, nodes: found.nodes })
         }
 
         fn others(&self) -> usize {
@@ -96,7 +97,7 @@ mod tests {
         }
     }
 
-    fn scene(rows: usize) -> Scene {
+    pub(crate) fn scene(rows: usize) -> Scene {
         let rom = Blade.reduce(None, 6, Tip::patches([3, rows]), &Console::new(true, false)).unwrap().rom;
         let mut scene = scene_source::rotor37_scene_with(rom).unwrap();
         scene.settings.structures[0].rom = "own.rom.safetensors".into();
@@ -124,6 +125,31 @@ mod tests {
         assert_eq!((levels, missing.as_str()), (vec![(1, false), (2, false), (3, true)], ""));
         let (levels, missing) = found(2, None);
         assert!(levels == [(1, false), (2, true)] && missing.contains("more rows of patches are fixed"), "{missing}");
+    }
+
+    /// Of finer models the first has a row more, the next as many as tell how straight the tip stays, as far as its mesh has places for them.
+    #[test]
+    fn finer_models_have_more_rows() {
+        let (console, cache) = (Console::new(true, false), RomCache::off());
+        for (rows, finer) in [(1, [(5, 2), (9, 3)]), (2, [(5, 3), (9, 3)]), (3, [(5, 3), (9, 3)])] {
+            let scene = scene(rows);
+            let again = Again {
+                source: Some(&Blade),
+                cache: &cache,
+                mesh: 1.0,
+                finest_tip: 4,
+                only: &[],
+                quick: true,
+                console: &console,
+            };
+            let found = Refiner::checked(&scene, 1, &again).unwrap().finer(&[2, 4]);
+            let tips: Vec<(usize, usize)> = found
+                .iter()
+                .map(|scene| &scene.roms[0])
+                .map(|rom| (rom.contact_nodes.len() / rom.rows(), rom.rows()))
+                .collect();
+            assert_eq!(tips, finer);
+        }
     }
 
     /// What three rows tell, fewer do not.

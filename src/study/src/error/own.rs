@@ -200,23 +200,34 @@ pub(crate) fn own_division(scene: &Scene) -> u32 {
 }
 
 /// Internal steps per communication step (s) around which those of one length are tried: what the scene asks for; where it goes by a
-/// tolerance, a fourth of the longest step that the first reference takes without a refusal.
+/// tolerance, a fourth of the longest step that the first reference takes without a refusal, or less.
 fn base(scene: &Scene, settings: &[(String, String)], interval: f64) -> Result<u32, String> {
     let own = divisions(interval, scene.settings.time.step);
     if scene.settings.time.scheme != Scheme::Galerkin {
         return Ok(own);
     }
     let Competitor::Core(scheme, solver) = DEFAULT else { return Ok(own) };
-    let mut refused = String::new();
-    for halvings in 0..MOST_HALVINGS {
-        let division = own << halvings;
+    around(own, |division| {
         let scene = SceneRun::changed(scene, (scheme, solver), interval / f64::from(division), 0.0);
-        match SceneRun::with_start_values(&scene, interval, division, settings) {
-            Ok(_) => return Ok(4 * division),
-            Err(problem) => refused = problem,
-        }
-    }
-    Err(refused)
+        SceneRun::with_start_values(&scene, interval, division, settings).map(|_| ())
+    })
+}
+
+/// Four times the least division by halvings of `own` that is accepted; where that is refused itself, since growth by friction comes in bands,
+/// halved on until it is accepted too.
+fn around(own: u32, accepted: impl Fn(u32) -> Result<(), String>) -> Result<u32, String> {
+    let mut refused = String::new();
+    let mut first = |from: u32| {
+        (from..MOST_HALVINGS + 2).map(|halvings| own << halvings).find(|division| match accepted(*division) {
+            Ok(()) => true,
+            Err(problem) => {
+                refused = problem;
+                false
+            }
+        })
+    };
+    let found = first(0).and_then(|longest| first((longest / own).ilog2() + 2));
+    found.ok_or(refused)
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
@@ -317,5 +328,22 @@ impl Case for Own {
         let Competitor::Core(scheme, solver) = competitor else { return Err("not on a scene of one's own".into()) };
         let scene = SceneRun::by(&self.scene, (scheme, solver), self.interval, division, perturbation);
         Ok(Box::new(SceneRun::with_start_values(&scene, self.interval, division, &self.settings)?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a blade with two rows of patches a step may be accepted of which a fourth is refused.
+    #[test]
+    fn steps_are_tried_around_one_that_is_accepted() {
+        let of = |accepted: &dyn Fn(u32) -> bool| {
+            around(1, |division| if accepted(division) { Ok(()) } else { Err(format!("{division} is refused")) })
+        };
+        assert_eq!(of(&|_| true), Ok(4));
+        assert_eq!(of(&|division| division >= 8), Ok(32));
+        assert_eq!(of(&|division| division == 8 || division > 40), Ok(64));
+        assert_eq!(of(&|_| false), Err("8192 is refused".into()));
     }
 }

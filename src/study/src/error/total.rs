@@ -275,3 +275,37 @@ fn mesh(case: &Own, refiner: &Refiner, again: &Again) -> Result<std::result::Res
     let error = refined.own_errors().and_then(|errors| errors[0]);
     Ok(error.ok_or_else(|| "changes from mesh to mesh do not shrink, or a run is refused".into()))
 }
+
+#[cfg(test)]
+mod tests {
+    use tiprub_gallery::rom_cache::RomCache;
+    use tiprub_shell::console::Console;
+
+    use super::*;
+    use crate::convergence::rows::tests::{Blade, scene};
+
+    /// One row is held against more, two are taken apart into one, and where none can be added the error is not called total.
+    #[test]
+    fn rows_are_part_of_a_total_error() {
+        let (console, cache) = (Console::new(true, false), RomCache::off());
+        let total = |rows: usize, source: Option<&dyn crate::convergence::refine::Source>| {
+            let case = Own::of("a blade", scene(rows), &[], (Some(1.2e-3), true), &console).unwrap();
+            let again =
+                Again { source, cache: &cache, mesh: 1.0, finest_tip: 4, only: &[], quick: true, console: &console };
+            measure(&case, &again).unwrap().unwrap()
+        };
+        let one = total(1, Some(&Blade));
+        assert!(one.truth.starts_with("5 × 2 patches and 12 modes") && one.is_total(), "{}", one.truth);
+        assert_eq!(one.directions()[0], ["steps", "modes", "patches", "rows"]);
+        let error =
+            |total: &Total| total.rows.iter().find(|row| row.own).and_then(|row| row.outcome.clone().ok()).unwrap().1;
+        let three = total(3, Some(&Blade));
+        assert!(!three.is_total() && three.name() == "error of steps, modes and patches", "{}", three.name());
+        assert!(error(&three) < error(&one), "{} {}", error(&three), error(&one));
+        assert_eq!(three.models.iter().map(|model| model.tip("")).collect::<std::collections::BTreeSet<_>>().len(), 4);
+        let own = total(2, None);
+        assert_eq!(own.directions()[1], ["modes", "patches", "rows", "mesh"]);
+        assert_eq!(own.name(), "own-model error of the steps");
+        assert!(own.models.iter().any(|model| model.tip("patches") == "3 patches"));
+    }
+}

@@ -368,3 +368,39 @@ fn closed_contacts(rom: &Rom, slip_sign: f64) -> ContactDirections {
     });
     directions.collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use tiprub_core::Simulation;
+    use tiprub_gallery::scene_source;
+    use tiprub_model::{
+        cyclic::ModeSelection,
+        reduce::ReductionKind,
+        rotor37::Tip,
+        stage::{StageOptions, reduce_stage},
+    };
+
+    use super::*;
+
+    /// What the structure says by itself is what the start of a run warns of, and of less friction it does not.
+    #[test]
+    fn a_tip_digs_in_with_the_friction_that_a_run_warns_of() {
+        let options = StageOptions {
+            tip: Tip::Patches(3),
+            kind: ReductionKind::FreeInterface,
+            modes: ModeSelection::Count(4),
+            ..StageOptions::coarse()
+        };
+        let rom = reduce_stage(&options, &|_| {}).unwrap().rom;
+        let found = Structure::new(&rom, rom.damping_ratio, 0.0).unwrap().digs_in(1000.0).unwrap();
+        let mut scene = scene_source::rotor37_scene_with(rom).unwrap();
+        let mut warned = |share: f64| {
+            scene.settings.contacts[0].friction = share * found.friction;
+            let mut simulation = Simulation::new(&scene).unwrap();
+            simulation.initialise(0.0).unwrap();
+            simulation.warnings().iter().any(|warning| warning.contains(&format!("µ* = {:.3}", found.friction)))
+        };
+        assert!(warned(1.05) && !warned(0.95), "{found:?}");
+        assert!(found.sense == 0 && (0.01..2.0).contains(&found.friction), "{found:?}");
+    }
+}
