@@ -208,8 +208,9 @@ fn the_other_sense_is_told_of_when_the_rotor_turns_that_way() {
 /// What is too large to be looked at is told, and only where friction makes it matter.
 #[test]
 fn growth_that_is_not_looked_at_is_told() {
-    let told = |modes: usize, friction: f64| {
+    let told = |scheme: Scheme, modes: usize, friction: f64| {
         let mut scene = models::rub(2);
+        scene.settings.time.scheme = scheme;
         let own = scene.roms[0].order();
         let rom = &mut scene.roms[0];
         let frequency = |mode: usize| 2e4 + 50.0 * mode as f64;
@@ -223,7 +224,10 @@ fn growth_that_is_not_looked_at_is_told() {
         let simulation = models::started(&scene);
         simulation.warnings().iter().any(|text| text.contains("is not looked at with"))
     };
-    assert_eq!([told(151, 0.1), told(151, 0.0), told(150, 0.1)], [true, false, false]);
+    for scheme in [Scheme::ModalExact, Scheme::Galerkin] {
+        let found = [told(scheme, 151, 0.1), told(scheme, 151, 0.0), told(scheme, 150, 0.1)];
+        assert_eq!(found, [true, false, false], "{scheme:?}");
+    }
 }
 
 /// What a shorter step is refused for, a longer one is too; the step that the refusal names is taken.

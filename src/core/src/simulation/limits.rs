@@ -251,7 +251,7 @@ impl Compiled {
         if parameters.scheme == Scheme::Galerkin {
             // Its steps are as short as its contact problems and its energy ask for: there is physics to tell, and nothing to refuse.
             return BodyLimits {
-                outcome: Ok(Vec::new()),
+                outcome: Ok(at.not_looked_at().into_iter().collect()),
                 senses: [Some(at.physics(0, expected)), Some(at.physics(1, expected))],
                 closing: Closing::new(self, body),
                 massless: MasslessLimit::NONE,
