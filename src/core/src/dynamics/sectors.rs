@@ -81,6 +81,8 @@ impl Sectors {
         rest[mut]();
         /// Modal loads of the next step, of every sector or of nodal diameter 0; to be set before [`Sectors::predict`].
         loads_mut[mut]() -> &mut [f64];
+        /// Displacements of now become those before.
+        begin_span[mut]();
         /// Predict one step without contact (eq. 9 of the paper) and recover the contact displacements.
         predict[mut](with_loss: bool);
         /// Kinetic and strain energy of all sectors (J), in the quantity the scheme conserves.

@@ -118,6 +118,12 @@ impl Advance {
         self.finish::<TERMS>(level, state)
     }
 
+    /// The same where what acts on all modes is known: coefficients of θᵃ.
+    pub fn driven(&mut self, level: &Level, state: &mut SectorState, modal: &[Vec<f64>; MOST]) -> f64 {
+        self.modal.iter_mut().zip(modal).for_each(|(own, modal)| own[..modal.len()].copy_from_slice(modal));
+        self.finish::<TERMS>(level, state)
+    }
+
     fn finish<const COUNT: usize>(&mut self, level: &Level, state: &mut SectorState) -> f64 {
         let [a, b, c] = &self.modal;
         let losses = level.damped.then_some(&mut self.losses[..]);

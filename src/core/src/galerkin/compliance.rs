@@ -112,6 +112,9 @@ impl Compliance {
     /// Add up the columns of points 1 … s.
     pub fn hold(&mut self) {
         self.held.fill(0.0);
+        if self.held.is_empty() {
+            return;
+        }
         for columns in self.columns.chunks_exact(self.held.len()).skip(1) {
             self.held.iter_mut().zip(columns).for_each(|(held, column)| *held += column);
         }

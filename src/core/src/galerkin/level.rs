@@ -2,7 +2,9 @@
 
 use super::basis::{Basis, MOST, POINTS};
 use super::compliance::{Compliance, Lanes};
+use super::kernels::PADDED;
 use super::response::{Response, TERMS, by_points};
+use super::trial::Kind;
 use nalgebra::DMatrix;
 
 /// Modes with inertia and residual flexibility of a sector, seen at its contact rows (three per contact node).
@@ -27,6 +29,12 @@ impl Modes {
     /// Without any mode.
     pub fn is_empty(&self) -> bool {
         self.frequencies.is_empty()
+    }
+
+    /// A mode before this one with its frequency and damping ratio: its neighbour, or the real part of its pair in a row of lanes.
+    fn twin(&self, mode: usize) -> Option<usize> {
+        let of = |mode: usize| [self.frequencies[mode].to_bits(), self.damping_ratios[mode].to_bits()];
+        [1, PADDED].into_iter().filter_map(|back| mode.checked_sub(back)).find(|twin| of(*twin) == of(mode))
     }
 
     /// Number of contact rows.
@@ -99,6 +107,13 @@ impl ModeSteps {
         }
     }
 
+    /// What one mode does another does as well.
+    fn copy(&mut self, from: usize, to: usize) {
+        let rows = self.points.as_flattened_mut().iter_mut();
+        let rows = rows.chain(self.end.as_flattened_mut()).chain(self.loss.as_flattened_mut());
+        rows.for_each(|row| row[to] = row[from]);
+    }
+
     fn set(&mut self, mode: usize, response: &Response, at: &[[f64; TERMS]; MOST]) {
         for (point, terms) in self.points.iter_mut().zip(at) {
             (point[0][mode], point[1][mode]) = (terms[0], terms[1]);
@@ -110,6 +125,15 @@ impl ModeSteps {
             rows.iter_mut().zip(terms).for_each(|(row, term)| row[mode] = *term);
         }
     }
+}
+
+/// What forces at the points of a step do to a mode at these points.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Influence {
+    /// `[i - 1][k]`: displacement at point i per modal force at point k.
+    pub points: [[f64; POINTS]; MOST],
+    /// Displacement at the end per modal force that is constant.
+    pub constant: f64,
 }
 
 /// Tables of one length of the step.
@@ -128,7 +152,7 @@ pub struct Level {
     /// Whether any mode is damped.
     pub damped: bool,
     /// Displacement of each mode at point i per force at point k, and at the end per constant force.
-    scratch: Vec<([[f64; POINTS]; MOST], f64)>,
+    pub influence: Vec<Influence>,
     block: DMatrix<f64>,
 }
 
@@ -143,33 +167,46 @@ impl Level {
             constant: Compliance::new(Lanes { points: 1, nodes }),
             damped: false,
             basis: Basis::new(degree),
-            scratch: vec![([[0.0; POINTS]; MOST], 0.0); modes.len()],
+            influence: vec![Influence::default(); modes.len()],
             block: DMatrix::zeros(modes.rows(), modes.rows()),
+        }
+    }
+
+    /// What forces of a kind do.
+    pub fn compliance_of(&self, kind: Kind) -> &Compliance {
+        match kind {
+            Kind::Polynomial => &self.compliance,
+            Kind::Constant => &self.constant,
         }
     }
 
     /// Fill the tables for step h (s). Does not allocate.
     pub fn set_step(&mut self, modes: &Modes, step: f64) {
-        let Self { basis, scratch, block, .. } = self;
+        let Self { basis, influence, block, .. } = self;
         self.step = step;
         self.damped = modes.damping_ratios.iter().any(|ratio| *ratio > 0.0);
-        let ratios = modes.frequencies.iter().zip(&modes.damping_ratios);
-        for (mode, (by, (frequency, ratio))) in scratch.iter_mut().zip(ratios).enumerate() {
-            let response = Response::new(*frequency, *ratio, step);
+        for mode in 0..modes.len() {
+            if let Some(twin) = modes.twin(mode) {
+                influence[mode] = influence[twin];
+                self.modes.copy(twin, mode);
+                continue;
+            }
+            let response = Response::new(modes.frequencies[mode], modes.damping_ratios[mode], step);
             let at = response.at_points(basis);
-            *by = (at.map(|terms| by_points(&terms, basis)), response.position[2]);
+            let points = at.map(|terms| by_points(&terms, basis));
+            influence[mode] = Influence { points, constant: response.position[2] };
             self.modes.set(mode, &response, &at);
         }
         for i in 1..=basis.degree {
             for k in 0..basis.count() {
-                modes.weigh(|mode| scratch[mode].0[i - 1][k], block);
+                modes.weigh(|mode| influence[mode].points[i - 1][k], block);
                 if k == i {
                     *block += &modes.residual;
                 }
                 self.compliance.set(i, k, block);
             }
         }
-        modes.weigh(|mode| scratch[mode].1, block);
+        modes.weigh(|mode| influence[mode].constant, block);
         *block += &modes.residual;
         self.constant.set(1, 1, block);
         self.compliance.hold();

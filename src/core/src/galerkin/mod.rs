@@ -11,6 +11,7 @@ pub mod compliance;
 pub mod flight;
 pub mod kernels;
 pub mod level;
+pub mod march;
 pub mod response;
 pub mod rows;
 pub mod sector;
@@ -18,3 +19,4 @@ pub mod state;
 #[cfg(test)]
 mod tests;
 pub mod trial;
+pub mod whole;

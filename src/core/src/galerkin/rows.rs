@@ -71,14 +71,14 @@ impl Rows {
         let (nodes, count) = (modes.rows() / 3, modes.len());
         let stride = modes.rows().next_multiple_of(PADDED);
         let mut by_mode = vec![0.0; stride * count];
-        for (entries, shape) in by_mode.chunks_exact_mut(stride).zip(modes.shapes.column_iter()) {
+        for (entries, shape) in by_mode.chunks_exact_mut(stride.max(1)).zip(modes.shapes.column_iter()) {
             for (row, value) in shape.iter().enumerate() {
                 entries[(row % 3) * nodes + row / 3] = *value;
             }
         }
         let padded = count.next_multiple_of(PADDED);
         let mut by_row = vec![0.0; padded * modes.rows()];
-        for (entries, shapes) in by_row.chunks_exact_mut(padded).zip(modes.shapes.row_iter()) {
+        for (entries, shapes) in by_row.chunks_exact_mut(padded.max(1)).zip(modes.shapes.row_iter()) {
             entries.iter_mut().zip(shapes.iter()).for_each(|(entry, shape)| *entry = *shape);
         }
         let rates = modes.frequencies.iter().zip(&modes.damping_ratios);

@@ -3,6 +3,7 @@
 use super::advance::Advance;
 use super::basis::MOST;
 use super::level::{Level, Modes};
+use super::march::{Marched, Step, march};
 use super::rows::Rows;
 use super::state::SectorState;
 use super::trial::{Kind, Obstacle, Trial, Verdict};
@@ -10,10 +11,6 @@ use crate::persist::persist_fields;
 
 /// Halvings of the span that a step may have.
 pub const HALVINGS: usize = 10;
-/// Below this share of the tolerance the next step is twice as long.
-const LENGTHEN: f64 = 1.0 / 32.0;
-/// Nearness between points is looked at down to this step (s).
-const SHORTEST_LOOK: f64 = 2.5e-6;
 
 /// Tables of one kind of sector: spans of one length halved again and again. All have one degree.
 #[derive(Debug, Clone)]
@@ -28,9 +25,13 @@ pub struct Tables {
 impl Tables {
     /// For spans up to `longest` (s); [`Tables::set_span`] comes before the first.
     pub fn new(modes: Modes, longest: f64) -> Self {
-        // Spans may be shorter than the longest: all lengths down to a thousandth of the shortest step are looked at.
-        let degree = (0..2 * HALVINGS).map(|halvings| modes.degree_at(halved(longest, halvings))).min();
-        let levels = (0..=HALVINGS).map(|_| Level::new(&modes, degree.unwrap_or(MOST))).collect();
+        let degree = modes.degree_up_to(longest);
+        Self::of_degree(modes, degree)
+    }
+
+    /// The same of a degree that is known to do.
+    pub fn of_degree(modes: Modes, degree: usize) -> Self {
+        let levels = (0..=HALVINGS).map(|_| Level::new(&modes, degree)).collect();
         Self { rows: Rows::new(&modes), levels, modes }
     }
 
@@ -39,6 +40,14 @@ impl Tables {
         for (halvings, level) in self.levels.iter_mut().enumerate() {
             level.set_step(&self.modes, halved(span, halvings));
         }
+    }
+}
+
+impl Modes {
+    /// Largest degree that does for spans up to `longest` (s). They may be shorter: all lengths down to a thousandth of the shortest
+    /// step are looked at.
+    pub fn degree_up_to(&self, longest: f64) -> usize {
+        (0..2 * HALVINGS).map(|halvings| self.degree_at(halved(longest, halvings))).min().unwrap_or(MOST)
     }
 }
 
@@ -167,123 +176,66 @@ impl Marcher {
         demand: Demand,
         effort: &mut Effort,
     ) -> Result<(), Stopped> {
-        const WHOLE: u64 = 1 << HALVINGS;
-        let mut done = 0_u64;
         self.trial.forget();
-        while done < WHOLE {
-            // The shortest may take two.
-            if effort.tried() + u64::from(state.level == HALVINGS) >= demand.most {
-                return Err(Stopped::Exhausted);
-            }
-            let level = state.level;
-            let units = WHOLE >> level;
-            let (from, length) = (share(done, WHOLE), share(units, WHOLE));
-            let table = &tables.levels[level];
-            let shortest = level == HALVINGS;
-            if state.multipliers.iter().all(|value| *value == 0.0)
-                && witness.is_clear(from, length, self.trial.reach(&tables.rows, state))
-            {
-                witness.flew(self.advance.freely(table, state));
-                self.trial.forget();
-                state.looked = false;
-                (effort.steps, effort.flights, done) = (effort.steps + 1, effort.flights + 1, done + units);
-                state.level -= usize::from(level > 0 && done.is_multiple_of(2 * units));
-                continue;
-            }
-            let (verdict, kind) = self.try_step((table, from, length), tables, state, witness, demand, effort);
-            let refused = !verdict.solved
-                || (kind == Kind::Polynomial
-                    && (verdict.error > demand.tolerance
-                        || (verdict.near && table.step > SHORTEST_LOOK)
-                        || (verdict.switches && verdict.switched > state.bank)));
-            if refused && !shortest {
-                state.level += 1;
-                continue;
-            }
-            if !verdict.solved {
-                return Err(Stopped::Unsolved);
-            }
-            effort.missed += u64::from(verdict.error > demand.tolerance);
-            self.take((table, kind), tables, state, witness, &verdict);
-            effort.steps += 1;
-            done += units;
-            let even = done.is_multiple_of(2 * units);
-            if level > 0 && even && kind == Kind::Polynomial && verdict.error < LENGTHEN * demand.tolerance {
-                state.level -= 1;
-            }
-        }
-        Ok(())
-    }
-
-    /// Try one step; the shortest with a constant force where a polynomial cannot be taken.
-    fn try_step(
-        &mut self,
-        (table, from, length): (&Level, f64, f64),
-        tables: &Tables,
-        state: &SectorState,
-        witness: &mut impl Witness,
-        demand: Demand,
-        effort: &mut Effort,
-    ) -> (Verdict, Kind) {
-        let mut run = |kind: Kind, witness: &mut _, effort: &mut Effort| {
-            Witness::go(witness, from, length, table, kind);
-            let verdict = self.trial.run((table, kind), &tables.rows, state, witness, demand.precision);
-            effort.trials += 1;
-            effort.factorisations += verdict.factorisations as u64;
-            effort.unsolved += u64::from(!verdict.solved);
-            verdict
-        };
-        let verdict = run(Kind::Polynomial, witness, effort);
-        let affordable = verdict.solved && !(verdict.switches && verdict.switched > state.bank);
-        if state.level < HALVINGS || affordable {
-            return (verdict, Kind::Polynomial);
-        }
-        effort.constant += 1;
-        (run(Kind::Constant, witness, effort), Kind::Constant)
-    }
-
-    /// The state goes to the end of the step that has been tried last.
-    fn take(
-        &mut self,
-        (level, kind): (&Level, Kind),
-        tables: &Tables,
-        state: &mut SectorState,
-        witness: &mut impl Witness,
-        verdict: &Verdict,
-    ) {
-        let dropped = if kind == Kind::Constant { self.dropped(tables, state) } else { 0.0 };
-        let (trial, basis) = (&self.trial, &level.basis);
-        let damping_loss = self.advance.under((level, &tables.rows), state, |node| trial.polynomial(basis, kind, node));
-        state.bank += match kind {
-            Kind::Polynomial if verdict.switches => -verdict.switched,
-            Kind::Polynomial => 0.0,
-            Kind::Constant => dropped + self.closed(),
-        };
-        witness.took(&Taken { level, kind, trial: &self.trial, damping_loss, dropped });
-        self.trial.leave(state);
-    }
-
-    /// ½ΔfᵀGΔf (J).
-    fn dropped(&self, tables: &Tables, state: &SectorState) -> f64 {
-        let change = |row: usize| self.trial.force(1, row / 3)[row % 3] - state.forces[row];
-        let residual = tables.rows.residual();
-        let rows = 0..residual.nrows();
-        0.5 * rows
-            .clone()
-            .map(|i| change(i) * rows.clone().map(|k| residual[(i, k)] * change(k)).sum::<f64>())
-            .sum::<f64>()
-    }
-
-    /// What contacts that close under a constant force lose: λ times the gap there was (J).
-    fn closed(&self) -> f64 {
-        let trial = &self.trial;
-        let lost = |node: usize| trial.multiplier(1, node) * (trial.gap(0, node) - trial.gap(1, node));
-        (0..trial.nodes()).filter(|node| trial.multiplier(1, *node) > 0.0).map(lost).sum()
+        march(&mut Alone { marcher: self, tables, state, witness, precision: demand.precision }, demand, effort)
     }
 }
 
-/// Small counts as a share.
-#[expect(clippy::cast_precision_loss, reason = "below 2^HALVINGS")]
-fn share(part: u64, whole: u64) -> f64 {
-    part as f64 / whole as f64
+/// One sector that steps by itself.
+struct Alone<'a, W> {
+    marcher: &'a mut Marcher,
+    tables: &'a Tables,
+    state: &'a mut SectorState,
+    witness: &'a mut W,
+    precision: f64,
+}
+
+impl<W: Witness> Marched for Alone<'_, W> {
+    fn pace(&mut self) -> (&mut f64, &mut usize) {
+        (&mut self.state.bank, &mut self.state.level)
+    }
+
+    fn length(&self, level: usize) -> f64 {
+        self.tables.levels[level].step
+    }
+
+    fn count(&self) -> u64 {
+        1
+    }
+
+    fn fly(&mut self, step: Step) -> bool {
+        let Self { marcher: Marcher { trial, advance }, tables, state, witness, .. } = self;
+        if state.multipliers.iter().any(|value| *value != 0.0)
+            || !witness.is_clear(step.from, step.length, trial.reach(&tables.rows, state))
+        {
+            return false;
+        }
+        witness.flew(advance.freely(&tables.levels[step.level], state));
+        trial.forget();
+        state.looked = false;
+        true
+    }
+
+    fn attempt(&mut self, step: Step, kind: Kind) -> Verdict {
+        let table = &self.tables.levels[step.level];
+        self.witness.go(step.from, step.length, table, kind);
+        self.marcher.trial.run((table, kind), &self.tables.rows, self.state, self.witness, self.precision)
+    }
+
+    fn take(&mut self, step: Step, kind: Kind, verdict: &Verdict) -> f64 {
+        let Self { marcher, tables, state, witness, .. } = self;
+        let level = &tables.levels[step.level];
+        let dropped = if kind == Kind::Constant { marcher.trial.dropped(tables.rows.residual(), state) } else { 0.0 };
+        let (trial, basis) = (&marcher.trial, &level.basis);
+        let damping_loss =
+            marcher.advance.under((level, &tables.rows), state, |node| trial.polynomial(basis, kind, node));
+        let left = match kind {
+            Kind::Polynomial if verdict.switches => -verdict.switched,
+            Kind::Polynomial => 0.0,
+            Kind::Constant => dropped + trial.closed(),
+        };
+        witness.took(&Taken { level, kind, trial, damping_loss, dropped });
+        marcher.trial.leave(state);
+        left
+    }
 }

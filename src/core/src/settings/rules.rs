@@ -34,8 +34,6 @@ const fn excludes(features: &'static [Fact], other: Other, because: &'static str
 
 const FREE: Other = ("a free master", |at| at.is_free());
 const ALL_FREE: Other = ("a scene of free masters only", |at| at.contacts().all(|at| at.is_free()));
-const COUPLED_SECTORS: Other =
-    ("a ROM whose sectors are coupled by harmonics", |at| at.roms.iter().any(Rom::is_cyclic));
 const COUPLED: Other = ("a ROM whose sectors are coupled by harmonics", |at| at.rom().is_cyclic());
 
 /// Of structures, surfaces and contacts.
@@ -189,15 +187,11 @@ static METHODS: &[Rule] = &[
     ),
     excludes(
         &[GALERKIN],
-        ("a surface that a structure carries and deforms", |at| at.contacts().any(|at| at.carrier().is_some())),
-        "sectors step by themselves, and such a surface moves under all of them together",
-        "Use \"modal-exact\", or a rigid surface",
-    ),
-    excludes(
-        &[GALERKIN],
-        COUPLED_SECTORS,
-        "sectors step by themselves, and a disk moves all of them together",
-        "Use \"modal-exact\", or a ROM of uncoupled sectors",
+        ("`structure.thermal` or `structure.load`", |at| {
+            at.settings.structures.iter().any(|own| own.thermal || own.load.is_some())
+        }),
+        "its tables are those of modes that are loaded by contact alone",
+        "Use \"modal-exact\", or leave the loads out",
     ),
     excludes(
         &[GALERKIN],

@@ -264,9 +264,7 @@ impl Simulation {
             self.rotors[body] = RotorAngle::new(self.value_of(Quantity::InitialAngle, body));
         }
         self.find_drives(0.0, start_time);
-        for structure in self.system.structures_mut() {
-            structure.set_step(parameters.scheme, parameters.step);
-        }
+        self.system.set_first_step(parameters.step);
         self.inputs.start();
         self.settle();
         self.launch();

@@ -51,9 +51,17 @@ impl System {
                 self.counted.ledgers[set].step_change.add(change);
                 self.counted.ledgers[set].turnover.add(change.abs());
             }
+            self.together.iter_mut().for_each(|together| together.set_span(step));
         } else {
-            self.structures.iter_mut().for_each(|structure| structure.set_step(scheme, step));
+            self.set_first_step(step);
         }
+    }
+
+    /// Use step size `step` (s) from here without regard to the state, before the first step.
+    pub fn set_first_step(&mut self, step: f64) {
+        let scheme = self.settings.scheme;
+        self.structures.iter_mut().for_each(|structure| structure.set_step(scheme, step));
+        self.together.iter_mut().for_each(|together| together.set_span(step));
     }
 
     /// Kinetic and strain energy of all structures at this instant (J): ½q̇ᵀMq̇ with the velocity of the instant, ½qᵀKq. Between
@@ -225,6 +233,9 @@ impl System {
                 structure.set_step(self.settings.scheme, step);
             }
             structure.restore(reader);
+        }
+        if step > 0.0 {
+            self.together.iter_mut().for_each(|together| together.set_span(step));
         }
         self.pairs.iter_mut().for_each(|pair| pair.state_mut().restore(reader));
         self.groups.iter_mut().for_each(|group| group.law_mut().restore(reader));

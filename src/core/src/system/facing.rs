@@ -1,6 +1,7 @@
 //! One sector facing its surfaces over a span of time: gaps at any instant, and what contacts did.
 
 use super::growth::Growth;
+use super::march::casing::{Casing, Spot};
 use super::pair::Pair;
 use crate::galerkin::basis::{Basis, MOST, POINTS};
 use crate::galerkin::compliance::Lanes;
@@ -128,7 +129,7 @@ pub struct Record {
     /// Motion of each pair over the span.
     pub courses: Vec<Course>,
     /// At the points of the step being tried, pair by pair.
-    drives: Vec<[(Drive, Motion); POINTS]>,
+    pub drives: Vec<[(Drive, Motion); POINTS]>,
     /// Motion that forces at each point of the step taken work on, pair by pair.
     motions: Vec<[Motion; POINTS]>,
     places: [Vec<ClosestPoint>; POINTS],
@@ -155,6 +156,25 @@ impl Record {
         }
     }
 
+    /// Where a node is on a surface that is carried, at a point of the step.
+    fn spot<'a>(&self, (node, point): (usize, usize), (pair, of): (usize, &'a Pair), index: usize) -> Option<Spot<'a>> {
+        let frame = of.frame(index, self.drives[pair][point].0.rotor_angle);
+        Some(Spot { surface: of.carried()?, place: self.places[point][node], frame })
+    }
+
+    /// Prescribed motion of a span (s) that the pairs are at the end of.
+    pub fn set_out(&mut self, pairs: &[Pair], span: f64) {
+        for (course, pair) in self.courses.iter_mut().zip(pairs) {
+            *course = Course::new(pair.drive_before(), (&pair.middle.0, pair.middle.1), pair.drive_now(), span);
+        }
+    }
+
+    /// Nodes are guessed to be where they were at the start of the step.
+    pub fn stay(&mut self) {
+        let [first, rest @ ..] = &mut self.places;
+        rest.iter_mut().for_each(|places| places.copy_from_slice(first));
+    }
+
     /// A sector begins its span with its nodes at the places told.
     pub fn begin(&mut self, place_of: impl Fn(usize) -> ClosestPoint) {
         for (node, place) in self.places[0].iter_mut().enumerate() {
@@ -165,8 +185,20 @@ impl Record {
     }
 }
 
+/// Structures that carry the surfaces a sector faces, over a step of a level.
+pub struct Ground<'a> {
+    pub casings: &'a mut [Casing],
+    /// Which of them carries the surface of each pair.
+    pub casing_of: &'a [Option<usize>],
+    pub level: usize,
+    pub kind: Kind,
+    pub lanes: Lanes,
+}
+
 /// A sector of a structure facing its surfaces.
 pub struct Facing<'a> {
+    /// What carries them, if anything does.
+    pub ground: Option<Ground<'a>>,
     pub pairs: &'a mut [Pair],
     /// Pair of each node.
     pub pair_of: &'a [Option<usize>],
@@ -177,6 +209,25 @@ pub struct Facing<'a> {
 }
 
 impl Facing<'_> {
+    /// What a structure tells of the place where a node is on the surface that it carries, at a point of the step.
+    fn on_ground<T>(&self, node: usize, point: usize, tell: impl Fn(&Casing, Spot) -> T) -> Option<T> {
+        let ground = self.ground.as_ref()?;
+        let pair = self.pair_of[node]?;
+        let casing = ground.casing_of[pair]?;
+        let spot = self.record.spot((node, point), (pair, &self.pairs[pair]), node * self.lanes + self.sector)?;
+        Some(tell(&ground.casings[casing], spot))
+    }
+
+    /// The same, of what is told to it.
+    pub fn tell_ground(&mut self, node: usize, point: usize, tell: impl FnOnce(&mut Casing, Spot)) {
+        let (Some(ground), Some(pair)) = (&mut self.ground, self.pair_of[node]) else { return };
+        let Some(casing) = ground.casing_of[pair] else { return };
+        let index = node * self.lanes + self.sector;
+        if let Some(spot) = self.record.spot((node, point), (pair, &self.pairs[pair]), index) {
+            tell(&mut ground.casings[casing], spot);
+        }
+    }
+
     fn at<'b>(&self, node: usize, drive: &'b Drive) -> At<'b> {
         At { node, index: node * self.lanes + self.sector, drive }
     }
@@ -236,8 +287,30 @@ impl Obstacle for Facing<'_> {
         }
         let at = self.at(node, &self.record.drives[pair][point].0);
         let rigid = gap.sliding_velocity(node, at.index, at.drive, moved);
-        let slip = gap.slip_direction(std::array::from_fn(|i| rigid[i] + velocity[i]), normal);
+        let ground = self.on_ground(node, point, |casing, spot| casing.velocity_at(spot)).unwrap_or_default();
+        let slip = gap.slip_direction(std::array::from_fn(|i| rigid[i] + velocity[i] - ground[i]), normal);
         std::array::from_fn(|i| normal[i] - friction * slip[i])
+    }
+
+    fn look(&mut self, lanes: Lanes, normals: &[f64]) -> bool {
+        let Some(Ground { casings, lanes: of_ground, .. }) = &mut self.ground else { return false };
+        *of_ground = lanes;
+        casings.iter_mut().for_each(Casing::look_away);
+        for lane in 0..lanes.len() {
+            let (point, node) = lanes.place(lane);
+            let normal = lanes.three(normals, lane);
+            self.tell_ground(node, point, |casing, spot| casing.look(lane, spot, normal));
+        }
+        true
+    }
+
+    fn give(&mut self, lane: usize, direction: [f64; 3], given: &mut [f64]) {
+        given.fill(0.0);
+        let Some(Ground { casings, casing_of, level, kind, lanes }) = &mut self.ground else { return };
+        let casing = self.pair_of[lanes.place(lane).1].and_then(|pair| casing_of[pair]);
+        if let Some(casing) = casing {
+            casings[casing].give((*level, *kind), *lanes, lane, direction, given);
+        }
     }
 }
 
@@ -290,7 +363,7 @@ impl Witness for Facing<'_> {
 }
 
 /// Weights of the work of forces at point i: S_ik, or those of a constant force.
-fn work_weights(basis: &Basis, kind: Kind, i: usize) -> [f64; POINTS] {
+pub fn work_weights(basis: &Basis, kind: Kind, i: usize) -> [f64; POINTS] {
     match kind {
         Kind::Polynomial => basis.work[i],
         Kind::Constant if i == 1 => [-1.0, 1.0, 0.0, 0.0],
@@ -347,6 +420,8 @@ impl Facing<'_> {
                 open += weights[k] * trial.gap(k, node);
             }
             let (spin, shaft) = (gap.spin_motion(at, point, motion), gap.shaft_motion(at, point, motion));
+            let ground = self.on_ground(node, i, |casing, spot| casing.worked_at(spot, i)).unwrap_or_default();
+            there = std::array::from_fn(|c| there[c] - ground[c]);
             let slip: [f64; 3] = std::array::from_fn(|c| there[c] + spin[c] + shaft[c]);
             let heat = -dot(tangential, slip);
             work.shaft -= dot(force, spin);

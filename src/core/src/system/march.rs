@@ -1,8 +1,10 @@
 //! One span of time by continuous Galerkin: each sector by itself, in steps of its own.
 
+pub(super) mod casing;
 mod flight;
+pub(super) mod together;
 
-use super::facing::{Course, Facing, Record};
+use super::facing::{Facing, Record, Worked};
 use super::growth::Growth;
 use super::posed::Member;
 use super::{ContactEvent, Pair, StepFailure, Structure, System};
@@ -10,12 +12,15 @@ use crate::dynamics::bank::ModalBank;
 use crate::dynamics::sectors::Sectors;
 use crate::galerkin::flight::Flight;
 use crate::galerkin::level::Modes;
+use crate::galerkin::march::march;
 use crate::galerkin::sector::{Demand, Effort, Marcher, Stopped, Tables};
 use crate::galerkin::state::SectorState;
 use crate::gaps::Drive;
 use crate::gaps::wrench::Wrench;
+use crate::ledger::Ledger;
 use crate::settings::Scheme;
 use nalgebra::DMatrix;
+use together::Together;
 
 /// Contacts count as closed within this share of the tolerance.
 const PRECISION: f64 = 1e-4;
@@ -30,8 +35,6 @@ pub struct Galerkin {
     state: SectorState,
     record: Record,
     demand: Demand,
-    /// Smallest gap of each node and lane within the span (m).
-    lowest: Vec<f64>,
 }
 
 impl Galerkin {
@@ -46,13 +49,7 @@ impl Galerkin {
             state: SectorState::new(modes, nodes),
             record: Record::new(nodes, pairs),
             demand: Demand { tolerance, precision: PRECISION * tolerance, most: u64::MAX },
-            lowest: vec![f64::INFINITY; nodes * bank.lanes()],
         }
-    }
-
-    /// Smallest gaps within the last span (m), `[node · lanes + lane]`.
-    pub fn lowest(&self) -> &[f64] {
-        &self.lowest
     }
 
     /// Tables for spans of length `span` (s).
@@ -82,16 +79,36 @@ impl System {
     /// Make room for marching spans up to `longest` (s) within `tolerance` of the smallest clearance of each structure; only before
     /// [`System::start`]. Allocates.
     pub fn prepare_spans(&mut self, longest: f64, tolerance: f64) {
-        for index in 0..self.structures.len() {
-            let clearance =
-                self.pairs.iter().filter(|pair| pair.structure() == index).map(|pair| pair.gap().clearance());
-            let clearance = clearance.fold(f64::INFINITY, f64::min);
-            let pairs = self.pairs.len();
-            let structure = &mut self.structures[index];
-            let nodes = structure.nodes();
-            let made = structure.bank().filter(|_| self.settings.scheme == Scheme::Galerkin && nodes > 0);
-            let made = made.map(|bank| Box::new(Galerkin::new(bank, nodes, pairs, longest, tolerance * clearance)));
-            structure.galerkin = made;
+        self.together.clear();
+        for structure in &mut self.structures {
+            (structure.galerkin, structure.lowest_in_span) = (None, Vec::new());
+        }
+        if self.settings.scheme != Scheme::Galerkin {
+            return;
+        }
+        for set in 0..self.sets.count() {
+            let members = self.sets.members(set).to_vec();
+            let own = |pair: &&Pair| members.contains(&pair.structure());
+            let clearance = |pairs: &mut dyn Iterator<Item = &Pair>| {
+                tolerance * pairs.map(|pair| pair.gap().clearance()).fold(f64::INFINITY, f64::min)
+            };
+            let moved_by_all = |one: &usize| self.structures[*one].modes().coupled().is_some();
+            if members.iter().any(moved_by_all) || self.pairs.iter().filter(own).any(|pair| pair.carrier().is_some()) {
+                let tolerance = clearance(&mut self.pairs.iter().filter(own));
+                let parts = (&self.structures[..], &self.pairs[..]);
+                self.together.push(Together::new(set, &members, parts, longest, tolerance));
+            } else {
+                for index in members {
+                    let tolerance = clearance(&mut self.pairs.iter().filter(|pair| pair.structure() == index));
+                    let (structure, pairs) = (&mut self.structures[index], self.pairs.len());
+                    let (nodes, bank) = (structure.nodes(), structure.bank());
+                    let made = bank.filter(|_| nodes > 0).map(|bank| Galerkin::new(bank, nodes, pairs, longest, tolerance));
+                    structure.galerkin = made.map(Box::new);
+                }
+            }
+        }
+        for structure in self.structures.iter_mut().filter(|structure| structure.nodes() > 0) {
+            structure.lowest_in_span = vec![f64::INFINITY; structure.gaps().len()];
         }
     }
 
@@ -116,12 +133,14 @@ impl System {
             self.structures[index].galerkin = Some(galerkin);
             outcome?;
         }
+        let mut together = std::mem::take(&mut self.together);
+        let outcome = together.iter_mut().try_for_each(|together| self.march_together(together, span));
+        self.together = together;
+        outcome?;
         self.find_gaps(true);
         for structure in &mut self.structures {
-            if let Some(galerkin) = &mut structure.galerkin {
-                let ends = galerkin.lowest.iter_mut().zip(&structure.history.gap.now);
-                ends.for_each(|(lowest, gap)| *lowest = lowest.min(*gap));
-            }
+            let ends = structure.lowest_in_span.iter_mut().zip(&structure.history.gap.now);
+            ends.for_each(|(lowest, gap)| *lowest = lowest.min(*gap));
         }
         self.check_edges()?;
         self.counted.steps += 1;
@@ -138,40 +157,83 @@ impl System {
         let Self { structures, pairs, events, counted, .. } = self;
         let structure = &mut structures[index];
         structure.begin_span();
-        for (course, pair) in galerkin.record.courses.iter_mut().zip(pairs.iter()) {
-            *course = Course::new(pair.drive_before(), (&pair.middle.0, pair.middle.1), pair.drive_now(), span);
-        }
+        galerkin.record.set_out(pairs, span);
         let factorisations = counted.effort.factorisations;
         for sector in 0..structure.modes().sectors() {
             structure.march_sector((index, sector), galerkin, pairs, &mut counted.effort)?;
-            let work = galerkin.record.work;
-            let ledger = &mut counted.ledgers[set];
-            let turnover = work.shaft.abs() + work.whirl.abs() + work.shift.abs() + work.casing.abs();
-            for (sum, term) in [
-                (&mut ledger.shaft_work, work.shaft),
-                (&mut ledger.whirl_work, work.whirl),
-                (&mut ledger.shift_work, work.shift),
-                (&mut ledger.casing_work, work.casing),
-                (&mut ledger.friction_loss, work.heat),
-                (&mut ledger.impact_loss, work.closing + work.dropped),
-                (
-                    &mut ledger.curvature_work,
-                    work.exact + work.heat + work.closing - (work.shaft + work.whirl + work.shift + work.casing),
-                ),
-                (&mut ledger.turnover, turnover),
-            ] {
-                sum.add(term);
-            }
-            for (node, pair) in structure.pair_of.iter().enumerate() {
-                let (tally, Some(pair)) = (&galerkin.record.tallies[node], *pair) else { continue };
-                if tally.normal > 0.0 {
-                    let member = Member { structure: index, pair, node, sector, index: structure.index(node, sector) };
-                    events.now.push(event(member, tally, span));
-                }
-            }
+            enter_work(&mut counted.ledgers[set], &galerkin.record.work);
+            enter_events(structure, (index, sector), &galerkin.record, span, &mut events.now);
         }
         counted.factorisations += counted.effort.factorisations - factorisations;
         Ok(())
+    }
+
+    /// Sectors that step together.
+    fn march_together(&mut self, together: &mut Together, span: f64) -> Result<(), StepFailure> {
+        let Self { structures, pairs, events, counted, sets, .. } = self;
+        sets.members(together.set).iter().for_each(|one| structures[*one].begin_span());
+        together.sectors.iter_mut().for_each(|one| one.record.set_out(pairs, span));
+        let demand = Demand { most: self.most_tried, ..together.demand };
+        let factorisations = counted.effort.factorisations;
+        let mut marching = together.begin(structures, pairs);
+        let outcome = march(&mut marching, demand, &mut counted.effort);
+        marching.finish();
+        counted.factorisations += counted.effort.factorisations - factorisations;
+        for one in &together.sectors {
+            if one.record.implausible {
+                return Err(StepFailure::Implausible { structure: one.structure, sector: one.sector });
+            }
+        }
+        let first = together.sectors.first().map_or((0, 0), |one| (one.structure, one.sector));
+        outcome.map_err(|stopped| failure(stopped, first))?;
+        for one in &together.sectors {
+            enter_work(&mut counted.ledgers[together.set], &one.record.work);
+            let structure = &structures[one.structure];
+            enter_events(structure, (one.structure, one.sector), &one.record, span, &mut events.now);
+        }
+        Ok(())
+    }
+}
+
+/// Why a sector is not marched to the end.
+fn failure(stopped: Stopped, (structure, sector): (usize, usize)) -> StepFailure {
+    match stopped {
+        Stopped::Unsolved => StepFailure::Unsolved { structure, sector },
+        Stopped::Exhausted => StepFailure::Exhausted,
+    }
+}
+
+/// What contacts of a sector did over a span goes to the ledger.
+fn enter_work(ledger: &mut Ledger, work: &Worked) {
+    let moved = work.shaft + work.whirl + work.shift + work.casing;
+    for (sum, term) in [
+        (&mut ledger.shaft_work, work.shaft),
+        (&mut ledger.whirl_work, work.whirl),
+        (&mut ledger.shift_work, work.shift),
+        (&mut ledger.casing_work, work.casing),
+        (&mut ledger.friction_loss, work.heat),
+        (&mut ledger.impact_loss, work.closing + work.dropped),
+        (&mut ledger.curvature_work, work.exact + work.heat + work.closing - moved),
+        (&mut ledger.turnover, work.shaft.abs() + work.whirl.abs() + work.shift.abs() + work.casing.abs()),
+    ] {
+        sum.add(term);
+    }
+}
+
+/// Its contacts become events.
+fn enter_events(
+    structure: &Structure,
+    (index, sector): (usize, usize),
+    record: &Record,
+    span: f64,
+    events: &mut Vec<ContactEvent>,
+) {
+    for (node, pair) in structure.pair_of.iter().enumerate() {
+        let (tally, Some(pair)) = (&record.tallies[node], *pair) else { continue };
+        if tally.normal > 0.0 {
+            let member = Member { structure: index, pair, node, sector, index: structure.index(node, sector) };
+            events.push(event(member, tally, span));
+        }
     }
 }
 
@@ -192,9 +254,7 @@ impl Structure {
     fn begin_span(&mut self) {
         self.history.gap.shift();
         self.history.geometry.shift();
-        if let Sectors::Uncoupled(bank) = self.modes_mut() {
-            bank.begin_span();
-        }
+        self.modes.begin_span();
     }
 
     /// March one sector, and write its state.
@@ -206,39 +266,22 @@ impl Structure {
         effort: &mut Effort,
     ) -> Result<(), StepFailure> {
         let lanes = self.lanes();
-        let Galerkin { tables, marcher, state, record, demand, lowest, .. } = galerkin;
+        let Galerkin { tables, marcher, state, record, demand, .. } = galerkin;
         let Some(bank) = self.bank() else { return Ok(()) };
         let tables = &tables[bank.set_number(sector)];
         bank.read_sector(sector, &mut state.position, &mut state.velocity);
-        for node in 0..self.nodes() {
-            let index = self.index(node, sector);
-            state.multipliers[node] = self.history.multiplier[index];
-            state.gaps[node] = self.history.gap.before[index];
-            state.normals[3 * node..3 * node + 3].copy_from_slice(&self.history.geometry.before.normal_at(index));
-            state.forces[3 * node..3 * node + 3].copy_from_slice(&self.three(&self.history.force.now, node, sector));
-        }
-        state.looked = true;
+        self.read_contacts(sector, state);
         (state.bank, state.level) = (self.pace.bank[sector], self.pace.level_of(sector));
         let places = &self.history.geometry.before;
         record.begin(|node| places.place_at(node * lanes + sector));
-        let mut facing = Facing { pairs, pair_of: &self.pair_of, lanes, sector, record };
+        let mut facing = Facing { ground: None, pairs, pair_of: &self.pair_of, lanes, sector, record };
         let outcome = marcher.march(tables, state, &mut facing, *demand, effort);
         if record.implausible {
             return Err(StepFailure::Implausible { structure: number, sector });
         }
-        outcome.map_err(|stopped| match stopped {
-            Stopped::Unsolved => StepFailure::Unsolved { structure: number, sector },
-            Stopped::Exhausted => StepFailure::Exhausted,
-        })?;
+        outcome.map_err(|stopped| failure(stopped, (number, sector)))?;
         (self.pace.bank[sector], self.pace.level[sector]) = (state.bank, state.level as u64);
-        for node in 0..self.nodes() {
-            let index = self.index(node, sector);
-            self.history.multiplier[index] = state.multipliers[node];
-            lowest[index] = record.tallies[node].lowest;
-            for component in 0..3 {
-                self.history.force.now[(3 * node + component) * lanes + sector] = state.forces[3 * node + component];
-            }
-        }
+        self.write_contacts(sector, state, |node| record.tallies[node].lowest);
         if let Sectors::Uncoupled(bank) = self.modes_mut() {
             let moved = marcher.displacements(tables, state);
             bank.write_sector(sector, &state.position, &state.velocity, &state.forces, moved);

@@ -30,6 +30,7 @@ use crate::settings::{Scheme, Solver};
 pub use event::ContactEvent;
 pub use failure::StepFailure;
 use group::Reach;
+use march::together::Together;
 pub(crate) use group::{Found, Group};
 pub use growth::Growth;
 pub use pair::{Carrier, Pair, PairParts};
@@ -83,6 +84,8 @@ pub struct System {
     /// Those of the first sets, in their order.
     pub(crate) groups: Vec<Group>,
     sets: Sets,
+    /// Sets whose sectors are marched together.
+    together: Vec<Together>,
     pub(crate) settings: SystemSettings,
     pub(crate) events: Two<Vec<ContactEvent>>,
     pub(crate) counted: Counted,
@@ -141,6 +144,7 @@ impl System {
             events: Two { now: room(), before: room() },
             counted: Counted { ledgers: vec![Ledger::default(); sets.count()], ..Counted::default() },
             mechanical: vec![0.0; sets.count()],
+            together: Vec::new(),
             most_tried: u64::MAX,
             sets,
             structures,

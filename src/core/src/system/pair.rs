@@ -160,6 +160,13 @@ impl Pair {
         Some((self.parts.gap.spline()?, carrier))
     }
 
+    /// The surface is as with this factor of its shape and rows of its carrier displaced so (m).
+    pub(super) fn bend(&mut self, factor: f64, rows: &[f64]) {
+        let (Some(carrier), GapLaw::Spline(law)) = (self.parts.carrier, &mut self.parts.gap) else { return };
+        let points = law.surface.control_points().len();
+        law.follow(factor, &rows[carrier.first_row..][..3 * points]);
+    }
+
     /// Gaps of its nodes at the displacements of now; `warm`: closest points are sought from those of the step before.
     pub(crate) fn find_gaps(&mut self, structures: &mut [Structure], warm: bool) {
         let Self { parts: PairParts { structure, gap, carrier, .. }, prescribed, .. } = self;

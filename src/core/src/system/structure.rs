@@ -4,6 +4,7 @@ use crate::dynamics::bank::{BankOptions, LANES, ModalBank};
 use crate::dynamics::modal::ModalModel;
 use crate::dynamics::sectors::{SectorModel, Sectors};
 use crate::galerkin::sector::HALVINGS;
+use crate::galerkin::state::SectorState;
 use crate::gaps::{Drive, GapLaw, Geometry, dot};
 use crate::history::History;
 use crate::persist::{Persist, Reader, Writer, persist_fields};
@@ -17,7 +18,7 @@ const LEAST_PENETRATION: f64 = 1e-150;
 /// A structure of a scene. Rows of its modes are three per contact node, or three per control point of the surfaces it carries.
 #[derive(Debug, Clone)]
 pub struct Structure {
-    modes: Sectors,
+    pub(super) modes: Sectors,
     /// Lanes of a row of the sectors.
     lanes: usize,
     /// Pair that each contact node belongs to.
@@ -32,6 +33,8 @@ pub struct Structure {
     pub(super) pace: Pace,
     /// Tables and scratch of that scheme.
     pub(super) galerkin: Option<Box<Galerkin>>,
+    /// Smallest gaps within the last span where a scheme looks within it (m), `[node · lanes + lane]`; else empty.
+    pub(super) lowest_in_span: Vec<f64>,
 }
 
 /// How sectors are marched by continuous Galerkin.
@@ -73,6 +76,7 @@ impl Structure {
             delayed: Vec::new(),
             pace: Pace::new(modes.sectors()),
             galerkin: None,
+            lowest_in_span: Vec::new(),
             pair_of,
             lanes: modes.lanes(),
             modes,
@@ -91,6 +95,7 @@ impl Structure {
             delayed: vec![0.0; model.len()],
             pace: Pace::default(),
             galerkin: None,
+            lowest_in_span: Vec::new(),
             lanes: modes.lanes(),
             modes,
         }
@@ -140,7 +145,7 @@ impl Structure {
 
     /// Smallest gaps within the last step (m), as far as its scheme looked, `[node · lanes + lane]`.
     pub fn lowest_gaps(&self) -> &[f64] {
-        self.galerkin.as_ref().map_or(&self.history.gap.now, |galerkin| galerkin.lowest())
+        if self.lowest_in_span.is_empty() { &self.history.gap.now } else { &self.lowest_in_span }
     }
 
     /// Gap of one node of one sector (m).
@@ -168,6 +173,31 @@ impl Structure {
     /// Modal forces on its surfaces found in the last step; empty where it carries none.
     pub fn contact_force(&self) -> &[f64] {
         &self.delayed
+    }
+
+    /// Contacts of a sector as they are, before a span.
+    pub(super) fn read_contacts(&self, sector: usize, state: &mut SectorState) {
+        for node in 0..self.nodes() {
+            let index = self.index(node, sector);
+            state.multipliers[node] = self.history.multiplier[index];
+            state.gaps[node] = self.history.gap.before[index];
+            state.normals[3 * node..3 * node + 3].copy_from_slice(&self.history.geometry.before.normal_at(index));
+            state.forces[3 * node..3 * node + 3].copy_from_slice(&self.three(&self.history.force.now, node, sector));
+        }
+        state.looked = true;
+    }
+
+    /// Contacts of a sector as they are after it, and the smallest gap of each node on the way (m).
+    pub(super) fn write_contacts(&mut self, sector: usize, state: &SectorState, lowest: impl Fn(usize) -> f64) {
+        for node in 0..self.nodes() {
+            let index = self.index(node, sector);
+            self.history.multiplier[index] = state.multipliers[node];
+            self.lowest_in_span[index] = lowest(node);
+            for component in 0..3 {
+                self.history.force.now[(3 * node + component) * self.lanes + sector] =
+                    state.forces[3 * node + component];
+            }
+        }
     }
 
     /// Three components of a node of a sector from an array over rows.

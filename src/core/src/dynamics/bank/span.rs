@@ -49,6 +49,16 @@ impl ModalBank {
         }
     }
 
+    /// Write q and q̇ of all modes of a single structure, those without inertia included, and displacements of the rows (m).
+    pub fn write_all(&mut self, position: &[f64], velocity: &[f64], rows: &[f64]) {
+        for (mode, (q, v)) in position.iter().zip(velocity).enumerate() {
+            let index = self.index(mode, 0);
+            (self.state.position[index], self.state.increment[index]) = (*q, v * self.step);
+        }
+        let lanes = self.lanes();
+        rows.iter().enumerate().for_each(|(row, moved)| self.state.displacement[row * lanes] = *moved);
+    }
+
     /// Add to the damping loss of a sector (J).
     pub fn lose(&mut self, sector: usize, loss: f64) {
         self.state.loss[sector] += loss;

@@ -20,7 +20,11 @@ impl CyclicBank {
                 let (frequency, ratio) = (diameter.frequencies[mode], diameter.damping_ratios[mode]);
                 let dynamic = mode < diameter.dynamic_modes(scheme);
                 self.velocities[n * self.modes + mode] =
-                    if dynamic { Velocity::new(frequency, ratio, step) } else { Velocity::default() };
+                    match scheme {
+                        _ if !dynamic => Velocity::default(),
+                        Scheme::Galerkin => Velocity::of_state(step),
+                        _ => Velocity::new(frequency, ratio, step),
+                    };
                 let (lane, lanes) = (n % LANES, &mut self.lane_coefficients[n / LANES * self.modes + mode]);
                 (lanes.beta[lane], lanes.kappa[lane], lanes.loss[lane]) = (k.beta, k.kappa, k.loss);
                 (lanes.compliance[lane], lanes.delayed[lane]) = (k.compliance, k.delayed);
@@ -72,6 +76,11 @@ impl CyclicBank {
     /// Carry the state from the step size in use to `new_step` under the last contact forces (`forces[row · lanes +
     /// sector]`, N) and the modal loads, then use the new coefficients.
     pub fn resample(&mut self, scheme: Scheme, new_step: f64, forces: &[f64]) {
+        if scheme == Scheme::Galerkin {
+            let ratio = new_step / self.step;
+            self.state.increment.as_flattened_mut().as_flattened_mut().iter_mut().for_each(|d| *d *= ratio);
+            return self.set_step(scheme, new_step);
+        }
         self.gather_forces(forces);
         for nodal_diameter in 0..self.model.diameters.len() {
             for mode in 0..self.model.diameters[nodal_diameter].dynamic_modes(self.scheme) {

@@ -1,6 +1,7 @@
 //! Energies of the modes, and what damping takes of them.
 
 use super::CyclicBank;
+use crate::settings::Scheme;
 
 impl CyclicBank {
     /// Kinetic and strain energy of the disk (J), in the quantity the scheme conserves (see [`crate::schemes`]).
@@ -37,12 +38,14 @@ impl CyclicBank {
     /// Kinetic and strain energy of the modes of one nodal diameter (J).
     pub fn diameter_energies(&self, nodal_diameter: usize) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
+        // Of an instant, or between two.
+        let lag = if self.scheme == Scheme::Galerkin { 0.0 } else { 1.0 };
         for mode in 0..self.model.diameters[nodal_diameter].len() {
             let k = &self.coefficients[nodal_diameter * self.modes + mode];
             let (position, increment) = self.modal_state(nodal_diameter, mode);
             for part in 0..2 {
                 kinetic += k.inertia * (increment[part] * increment[part]);
-                strain += k.spring * (position[part] * (position[part] - increment[part]));
+                strain += k.spring * (position[part] * (position[part] - lag * increment[part]));
             }
         }
         (kinetic, strain)

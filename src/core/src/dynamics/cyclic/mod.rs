@@ -12,6 +12,7 @@ mod energy;
 mod fourier;
 mod model;
 mod pass;
+mod span;
 #[cfg(test)]
 mod tests;
 
@@ -240,7 +241,10 @@ impl CyclicBank {
         let (index, lane) = self.index(nodal_diameter, mode);
         self.state.unapplied = false;
         for part in 0..if self.model.is_real(nodal_diameter) { 1 } else { 2 } {
-            let increment = free_increment(frequency, ratio, position[part], velocity[part], self.step);
+            let increment = match self.scheme {
+                Scheme::Galerkin => velocity[part] * self.step,
+                _ => free_increment(frequency, ratio, position[part], velocity[part], self.step),
+            };
             self.state.position[index][part][lane] = position[part];
             self.state.increment[index][part][lane] = increment;
         }

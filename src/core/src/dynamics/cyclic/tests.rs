@@ -3,7 +3,7 @@
 use super::*;
 use nalgebra::{Complex, DMatrix};
 
-fn model(sectors: usize, nodes: usize) -> CyclicModel {
+pub(super) fn model(sectors: usize, nodes: usize) -> CyclicModel {
     let diameter = |n: usize| {
         // Fewer modes for some nodal diameters than for others.
         let modes = 3 * nodes + 4 - n % 3;

@@ -31,9 +31,10 @@ pub struct Verdict {
 
 impl Trial {
     /// Error, switches, and near misses of a step that is solved.
-    pub(super) fn judge(&mut self, level: &Level, rows: &Rows, verdict: &mut Verdict) {
+    pub fn judge(&mut self, level: &Level, rows: &Rows, verdict: &mut Verdict) {
         let (basis, count) = (&level.basis, level.basis.count());
         self.impulses.fill(0.0);
+        (verdict.switches, verdict.switched, verdict.near, verdict.error) = (false, 0.0, false, 0.0);
         let mut pushed = false;
         for node in 0..self.nodes() {
             let pushes = |point: usize| self.multiplier(point, node) > 0.0;

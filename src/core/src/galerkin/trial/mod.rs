@@ -1,6 +1,7 @@
 //! One step of one sector, tried: contact forces at the points, gaps there, and how good they are.
 
 mod judgement;
+mod together;
 
 use super::basis::{Basis, MOST};
 use super::compliance::{Compliance, Lanes};
@@ -10,6 +11,7 @@ use super::rows::{Rows, Sums};
 use super::state::SectorState;
 use crate::dynamics::dispatch::InstructionSet;
 use crate::laws::active_set::ContactSolver;
+use nalgebra::DMatrix;
 pub use judgement::Verdict;
 
 /// Most evaluations of the gaps of one trial.
@@ -36,6 +38,16 @@ pub trait Obstacle {
         velocity: [f64; 3],
         normal: [f64; 3],
     ) -> [f64; 3];
+
+    /// Contacts at all points but the first are about to be solved, with these normals: get ready to tell how what is touched gives
+    /// way. False where it does not.
+    fn look(&mut self, _lanes: Lanes, _normals: &[f64]) -> bool {
+        false
+    }
+
+    /// By how much what is touched gives way at all lanes (m, along their normals, away from the node) per λ of one with the force
+    /// `direction` per λ; only after [`Obstacle::look`] has said that it does.
+    fn give(&mut self, _lane: usize, _direction: [f64; 3], _given: &mut [f64]) {}
 }
 
 /// [`Obstacle::gaps`] by [`Obstacle::gap`] of every lane.
@@ -95,6 +107,9 @@ pub struct Trial {
     /// Displacements and gaps of all lanes per λ of each.
     columns: Vec<f64>,
     closing: Vec<f64>,
+    /// Of what is touched, where it gives way.
+    given: Vec<f64>,
+    gives: bool,
     solver: ContactSolver,
     instructions: InstructionSet,
     /// Unknowns of the problem: lanes.
@@ -144,6 +159,8 @@ impl Trial {
             forces: three(),
             columns: vec![0.0; lanes.len() * 3 * lanes.width()],
             closing: vec![0.0; lanes.len() * lanes.width()],
+            given: width(),
+            gives: false,
             solver: ContactSolver::new(lanes.len()),
             instructions: InstructionSet::detect(),
             members: Vec::with_capacity(lanes.len()),
@@ -210,9 +227,8 @@ impl Trial {
         obstacle: &mut impl Obstacle,
         precision: f64,
     ) -> Verdict {
-        let compliance = if kind == Kind::Constant { &level.constant } else { &level.compliance };
-        self.lanes = compliance.lanes();
-        self.begin((level, kind), rows, state);
+        let compliance = level.compliance_of(kind);
+        self.begin((level, kind), Some(rows), state);
         if !state.looked {
             self.find_start(rows, state);
             for node in 0..self.nodes() {
@@ -222,7 +238,7 @@ impl Trial {
         let mut verdict = Verdict::default();
         for pass in 0..PASSES {
             let (lowest, largest) = self.find_gaps(obstacle);
-            let rests = self.multipliers[..self.lanes.len()].iter().all(|value| *value == 0.0);
+            let rests = self.rests();
             if lowest.is_nan() {
                 return verdict;
             }
@@ -271,24 +287,19 @@ impl Trial {
         reach
     }
 
-    /// Where the rows go without forces at points 1 … s, and a guess of these: as at the start.
-    fn begin(&mut self, (level, kind): (&Level, Kind), rows: &Rows, state: &SectorState) {
+    /// Where the rows go without forces at points 1 … s, unless somebody else knows (no `rows`), and a guess of these: as at the start.
+    pub fn begin(&mut self, (level, kind): (&Level, Kind), rows: Option<&Rows>, state: &SectorState) {
+        let compliance = level.compliance_of(kind);
+        self.lanes = compliance.lanes();
         let (begun, lanes) = (&mut self.begun, self.lanes);
         begun.forces.copy_from_slice(&state.forces);
         begun.multipliers.copy_from_slice(&state.multipliers);
         begun.gaps.copy_from_slice(&state.gaps);
         begun.normals.copy_from_slice(&state.normals);
-        let degree = level.basis.degree;
-        let points = if kind == Kind::Constant { degree - 1..degree } else { 0..degree };
-        rows.free(level, state, points, &mut self.sums);
-        let (nodes, width) = (lanes.nodes, lanes.width());
-        for (point, sums) in self.sums.rows[..lanes.points].iter().enumerate() {
-            for component in 0..3 {
-                let target = &mut self.free[component * width + point * nodes..][..nodes];
-                target.copy_from_slice(&sums[component * nodes..][..nodes]);
-            }
+        let (nodes, stride) = (lanes.nodes, 3 * lanes.width());
+        if let Some(rows) = rows {
+            self.move_freely((level, kind), rows, state);
         }
-        let stride = 3 * width;
         self.pushed[..stride].fill(0.0);
         self.forces[..stride].fill(0.0);
         self.taken.clear();
@@ -298,8 +309,7 @@ impl Trial {
             self.amounts.push(*force);
         }
         if !self.taken.is_empty() {
-            let compliance = if kind == Kind::Constant { &level.constant } else { &level.compliance };
-            if kind == Kind::Polynomial {
+            if kind == Kind::Polynomial && rows.is_some() {
                 self.combine(compliance.columns(), stride);
                 self.free[..stride].iter_mut().zip(&self.pushed).for_each(|(free, pushed)| *free += pushed);
             }
@@ -307,6 +317,20 @@ impl Trial {
         }
         for point in 0..lanes.points {
             self.multipliers[point * nodes..][..nodes].copy_from_slice(&state.multipliers);
+        }
+    }
+
+    /// Displacements of the rows without any force.
+    fn move_freely(&mut self, (level, kind): (&Level, Kind), rows: &Rows, state: &SectorState) {
+        let degree = level.basis.degree;
+        let points = if kind == Kind::Constant { degree - 1..degree } else { 0..degree };
+        rows.free(level, state, points, &mut self.sums);
+        let (nodes, width) = (self.lanes.nodes, self.lanes.width());
+        for (point, sums) in self.sums.rows[..self.lanes.points].iter().enumerate() {
+            for component in 0..3 {
+                let target = &mut self.free[component * width + point * nodes..][..nodes];
+                target.copy_from_slice(&sums[component * nodes..][..nodes]);
+            }
         }
     }
 
@@ -318,11 +342,24 @@ impl Trial {
     }
 
     /// Displacements under the forces of now, and gaps there: the smallest, and the largest of a contact that pushes.
-    fn find_gaps(&mut self, obstacle: &mut impl Obstacle) -> (f64, f64) {
+    pub fn find_gaps(&mut self, obstacle: &mut impl Obstacle) -> (f64, f64) {
+        self.move_rows();
         let (lanes, stride) = (self.lanes, 3 * self.lanes.width());
-        let Self { free, pushed, moved, gaps, normals, .. } = self;
-        self.instructions.run(Add { a: &free[..stride], b: &pushed[..stride], to: &mut moved[..stride] });
+        let Self { moved, gaps, normals, .. } = self;
         obstacle.gaps(lanes, &moved[..stride], &mut gaps[..lanes.width()], &mut normals[..stride]);
+        self.extremes()
+    }
+
+    /// Displacements under the forces of now.
+    pub fn move_rows(&mut self) {
+        let stride = 3 * self.lanes.width();
+        let Self { free, pushed, moved, .. } = self;
+        self.instructions.run(Add { a: &free[..stride], b: &pushed[..stride], to: &mut moved[..stride] });
+    }
+
+    /// The smallest gap, and the largest of a contact that pushes.
+    pub fn extremes(&self) -> (f64, f64) {
+        let lanes = self.lanes;
         let (mut lowest, mut largest) = (f64::INFINITY, 0.0_f64);
         for (gap, multiplier) in self.gaps[..lanes.len()].iter().zip(&self.multipliers) {
             lowest = if gap.is_nan() || lowest.is_nan() { f64::NAN } else { lowest.min(*gap) };
@@ -334,7 +371,7 @@ impl Trial {
     }
 
     /// 0 ≤ λ ⟂ g ≥ 0 at all points and nodes: of those that penetrate or push first, then of those that these make penetrate.
-    fn solve(&mut self, compliance: &Compliance, obstacle: &mut impl Obstacle, verdict: &mut Verdict) -> bool {
+    pub fn solve(&mut self, compliance: &Compliance, obstacle: &mut impl Obstacle, verdict: &mut Verdict) -> bool {
         let (lanes, width) = (self.lanes, self.lanes.width());
         let Self { gaps, normals, pushed, without, .. } = self;
         self.instructions.run(Withdraw {
@@ -343,6 +380,7 @@ impl Trial {
             moved: &pushed[..3 * width],
             to: &mut without[..width],
         });
+        self.gives = obstacle.look(lanes, &self.normals[..3 * width]);
         self.members.clear();
         for lane in 0..lanes.len() {
             self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
@@ -398,6 +436,14 @@ impl Trial {
             column: &mut self.columns[lane * 3 * width..][..3 * width],
             closing: &mut self.closing[lane * width..][..width],
         });
+        if self.gives {
+            obstacle.give(lane, direction, &mut self.given[..width]);
+            let closing = &mut self.closing[lane * width..][..width];
+            let now = self.multipliers[lane];
+            for ((given, closing), without) in self.given.iter().zip(closing).zip(&mut self.without) {
+                (*closing, *without) = (*closing + given, *without - now * given);
+            }
+        }
     }
 
     /// The problem of the members.
@@ -432,6 +478,11 @@ impl Trial {
         found
     }
 
+    /// Whether anything pushes.
+    pub fn rests(&self) -> bool {
+        self.multipliers[..self.lanes.len()].iter().all(|value| *value == 0.0)
+    }
+
     /// Coefficients of θᵃ of the force on a node (N), projected on degree s − 1; none where nothing pushes.
     pub fn polynomial(&self, basis: &Basis, kind: Kind, node: usize) -> Option<[[f64; 3]; MOST]> {
         let mut sums = [[0.0; 3]; MOST];
@@ -448,6 +499,22 @@ impl Trial {
             }
         }
         pushed.then_some(sums)
+    }
+
+    /// ½ΔfᵀGΔf of a constant force against the one before (J), by G of all rows (m/N).
+    pub fn dropped(&self, residual: &DMatrix<f64>, state: &SectorState) -> f64 {
+        let change = |row: usize| self.force(1, row / 3)[row % 3] - state.forces[row];
+        let rows = 0..residual.nrows();
+        0.5 * rows
+            .clone()
+            .map(|i| change(i) * rows.clone().map(|k| residual[(i, k)] * change(k)).sum::<f64>())
+            .sum::<f64>()
+    }
+
+    /// What contacts that close under a constant force lose: λ times the gap there was (J).
+    pub fn closed(&self) -> f64 {
+        let lost = |node: usize| self.multiplier(1, node) * (self.gap(0, node) - self.gap(1, node));
+        (0..self.nodes()).filter(|node| self.multiplier(1, *node) > 0.0).map(lost).sum()
     }
 
     /// The state goes to the end of the step: forces, gaps and normals there.

@@ -14,8 +14,9 @@ impl System {
         let Self { structures, pairs, .. } = self;
         for structure in structures.iter_mut() {
             let Some(mut galerkin) = structure.galerkin.take() else { return false };
-            let free = structure.is_free(&mut galerkin, pairs, (drives, turns));
-            structure.galerkin = Some(galerkin);
+            let mut lowest = std::mem::take(&mut structure.lowest_in_span);
+            let free = structure.is_free(&mut galerkin, &mut lowest, pairs, (drives, turns));
+            (structure.galerkin, structure.lowest_in_span) = (Some(galerkin), lowest);
             if !free {
                 return false;
             }
@@ -41,8 +42,14 @@ impl System {
 impl Structure {
     /// Whether no sector touches anything, swings by more than the tolerance or meets anything on the way; the smallest gaps are then
     /// those of the way.
-    fn is_free(&self, galerkin: &mut Galerkin, pairs: &[Pair], (ends, turns): (&[Drive], &[f64])) -> bool {
-        let Galerkin { tables, marcher, state, demand, lowest, .. } = galerkin;
+    fn is_free(
+        &self,
+        galerkin: &mut Galerkin,
+        lowest: &mut [f64],
+        pairs: &[Pair],
+        (ends, turns): (&[Drive], &[f64]),
+    ) -> bool {
+        let Galerkin { tables, marcher, state, demand, .. } = galerkin;
         let Some(bank) = self.bank() else { return false };
         (0..self.modes().sectors()).all(|sector| {
             bank.read_sector(sector, &mut state.position, &mut state.velocity);

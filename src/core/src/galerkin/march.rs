@@ -1,0 +1,112 @@
+//! A span of time in steps as long as the tolerance and the energy allow, of one sector or of all that step together.
+
+use super::sector::{Demand, Effort, HALVINGS, Stopped};
+use super::trial::{Kind, Verdict};
+
+/// Below this share of the tolerance the next step is twice as long.
+const LENGTHEN: f64 = 1.0 / 32.0;
+/// Nearness between points is looked at down to this step (s).
+const SHORTEST_LOOK: f64 = 2.5e-6;
+
+/// A step within a span: its level, and where it begins and how long it is as shares of the span.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// How often the span is halved.
+    pub level: usize,
+    /// Start.
+    pub from: f64,
+    /// Length.
+    pub length: f64,
+}
+
+/// What is marched.
+pub trait Marched {
+    /// Energy left by contacts that opened and closed (J), and level of the next step; both go on from step to step.
+    fn pace(&mut self) -> (&mut f64, &mut usize);
+
+    /// Length of steps of a level (s).
+    fn length(&self, level: usize) -> f64;
+
+    /// How many sectors this is.
+    fn count(&self) -> u64;
+
+    /// Take the step without a trial, if nothing can touch on the way.
+    fn fly(&mut self, step: Step) -> bool;
+
+    /// Try a step.
+    fn attempt(&mut self, step: Step, kind: Kind) -> Verdict;
+
+    /// Take the step that was tried last; what contacts leave to those to come (J).
+    fn take(&mut self, step: Step, kind: Kind, verdict: &Verdict) -> f64;
+}
+
+/// March over a span.
+///
+/// # Errors
+/// [`Stopped`]; the state is then where the last step taken left it.
+pub fn march(body: &mut impl Marched, demand: Demand, effort: &mut Effort) -> Result<(), Stopped> {
+    const WHOLE: u64 = 1 << HALVINGS;
+    let (count, mut done) = (body.count(), 0_u64);
+    while done < WHOLE {
+        let level = *body.pace().1;
+        // The shortest may take two.
+        if effort.tried() + count * u64::from(level == HALVINGS) >= demand.most {
+            return Err(Stopped::Exhausted);
+        }
+        let units = WHOLE >> level;
+        let step = Step { level, from: share(done, WHOLE), length: share(units, WHOLE) };
+        if body.fly(step) {
+            (effort.steps, effort.flights, done) = (effort.steps + count, effort.flights + count, done + units);
+            *body.pace().1 -= usize::from(level > 0 && done.is_multiple_of(2 * units));
+            continue;
+        }
+        let (verdict, kind) = attempt(body, step, effort);
+        let refused = !verdict.solved
+            || (kind == Kind::Polynomial
+                && (verdict.error > demand.tolerance
+                    || (verdict.near && body.length(level) > SHORTEST_LOOK)
+                    || (verdict.switches && verdict.switched > *body.pace().0)));
+        if refused && level < HALVINGS {
+            *body.pace().1 += 1;
+            continue;
+        }
+        if !verdict.solved {
+            return Err(Stopped::Unsolved);
+        }
+        effort.missed += count * u64::from(verdict.error > demand.tolerance);
+        let left = body.take(step, kind, &verdict);
+        *body.pace().0 += left;
+        (effort.steps, done) = (effort.steps + count, done + units);
+        let even = done.is_multiple_of(2 * units);
+        if level > 0 && even && kind == Kind::Polynomial && verdict.error < LENGTHEN * demand.tolerance {
+            *body.pace().1 -= 1;
+        }
+    }
+    Ok(())
+}
+
+/// Try one step; the shortest with a constant force where a polynomial cannot be taken.
+fn attempt(body: &mut impl Marched, step: Step, effort: &mut Effort) -> (Verdict, Kind) {
+    let count = body.count();
+    let mut run = |body: &mut _, kind: Kind| {
+        let verdict = Marched::attempt(body, step, kind);
+        effort.trials += count;
+        effort.factorisations += verdict.factorisations as u64;
+        effort.unsolved += u64::from(!verdict.solved);
+        verdict
+    };
+    let verdict = run(body, Kind::Polynomial);
+    let affordable = verdict.solved && !(verdict.switches && verdict.switched > *body.pace().0);
+    if step.level < HALVINGS || affordable {
+        return (verdict, Kind::Polynomial);
+    }
+    let verdict = run(body, Kind::Constant);
+    effort.constant += count;
+    (verdict, Kind::Constant)
+}
+
+/// Small counts as a share.
+#[expect(clippy::cast_precision_loss, reason = "below 2^HALVINGS")]
+fn share(part: u64, whole: u64) -> f64 {
+    part as f64 / whole as f64
+}

@@ -1,0 +1,55 @@
+//! Sectors that are tried together: they move each other, or a surface that all of them touch.
+
+use super::Trial;
+use crate::galerkin::state::SectorState;
+
+impl Trial {
+    /// Displacements (m) and velocities (m/s) of the rows at the start, which somebody else knows.
+    pub fn start_at(&mut self, of_row: impl Fn(usize) -> [f64; 2]) {
+        for (row, (moved, velocity)) in self.start.iter_mut().zip(&mut self.velocities).enumerate() {
+            [*moved, *velocity] = of_row(row);
+        }
+        self.known = true;
+    }
+
+    /// Gaps at the start where nobody has looked; `gap` of a node displaced so (m).
+    pub fn look_at_start(&mut self, state: &SectorState, mut gap: impl FnMut(usize, [f64; 3]) -> f64) {
+        if !state.looked {
+            for node in 0..self.nodes() {
+                self.begun.gaps[node] = gap(node, super::three(&self.start, node));
+            }
+        }
+    }
+
+    /// A guess of forces: those of the start at all points.
+    pub fn guess(&mut self, state: &SectorState) {
+        for lane in 0..self.lanes.len() {
+            let (_, node) = self.lanes.place(lane);
+            self.lanes.set(&mut self.forces, lane, super::three(&state.forces, node));
+        }
+    }
+
+    /// Somebody else knows displacements under the forces of now (m), of a node at point 1 … s: those of others are what is left.
+    pub fn carry(&mut self, of: impl Fn(usize, usize) -> [f64; 3]) {
+        for lane in 0..self.lanes.len() {
+            let (point, node) = self.lanes.place(lane);
+            let (all, own) = (of(point, node), self.lanes.three(&self.pushed, lane));
+            self.lanes.set(&mut self.free, lane, [0, 1, 2].map(|i| all[i] - own[i]));
+        }
+    }
+
+    /// Gaps (m) and normals at point 1 … s, of nodes at their displacements of now (m).
+    pub fn look_at(&mut self, point: usize, mut gap: impl FnMut(usize, [f64; 3]) -> (f64, [f64; 3])) {
+        for node in 0..self.nodes() {
+            let lane = self.lanes.at(point, node);
+            let (gap, normal) = gap(node, self.lanes.three(&self.moved, lane));
+            self.gaps[lane] = gap;
+            self.lanes.set(&mut self.normals, lane, normal);
+        }
+    }
+
+    /// Impulses that the step leaves out on the rows of a node (N·s), once it is judged.
+    pub fn impulse(&self, node: usize) -> [f64; 3] {
+        super::three(&self.impulses, node)
+    }
+}

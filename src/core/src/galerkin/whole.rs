@@ -1,0 +1,302 @@
+//! A body that several sectors move, or whose surface they touch: a disk, or a casing. All of its modes over one step, under forces at
+//! the points of that step.
+
+use super::advance::Advance;
+use super::basis::{MOST, POINTS};
+use super::level::{Influence, Modes};
+use super::sector::Tables;
+use super::state::SectorState;
+use super::trial::Kind;
+use nalgebra::DMatrix;
+
+/// Modal coordinates of a body: those with inertia, those that follow forces at once, and places without a mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coordinates {
+    /// ω of those with inertia (rad/s), 0 of the others.
+    pub frequencies: Vec<f64>,
+    /// ξ.
+    pub damping_ratios: Vec<f64>,
+    /// 1 with inertia, else 0.
+    pub inertia: Vec<f64>,
+    /// 1/ω² of those that follow at once (s²), else 0.
+    pub softness: Vec<f64>,
+}
+
+impl Coordinates {
+    /// Of modes whose first `dynamic` have inertia.
+    pub fn new(frequencies: &[f64], damping_ratios: &[f64], dynamic: usize) -> Self {
+        let of = |with: fn(f64) -> f64, without: fn(f64) -> f64| -> Vec<f64> {
+            let value = |(mode, w): (usize, &f64)| if mode < dynamic { with(*w) } else { without(*w) };
+            frequencies.iter().enumerate().map(value).collect()
+        };
+        Self {
+            frequencies: of(|w| w, |_| 0.0),
+            damping_ratios: damping_ratios.to_vec(),
+            inertia: of(|_| 1.0, |_| 0.0),
+            softness: of(|_| 0.0, |w| 1.0 / (w * w)),
+        }
+    }
+
+    /// Modes with inertia as they are seen at rows, with the flexibility of the others there. `shapes` (rows × coordinates, 1/√kg).
+    pub fn seen_at(&self, shapes: &DMatrix<f64>) -> Modes {
+        let (mut dynamic, rows) = (shapes.clone(), shapes.nrows());
+        let mut residual = DMatrix::zeros(rows, rows);
+        for (mode, softness) in self.softness.iter().enumerate() {
+            let shape = shapes.column(mode);
+            if *softness > 0.0 {
+                residual.ger(*softness, &shape, &shape, 1.0);
+            }
+            dynamic.column_mut(mode).scale_mut(self.inertia[mode]);
+        }
+        Modes {
+            frequencies: self.frequencies.clone(),
+            damping_ratios: self.damping_ratios.clone(),
+            shapes: dynamic,
+            residual,
+        }
+    }
+}
+
+/// State, tables and scratch of a body; allocates only when made.
+#[derive(Debug, Clone)]
+pub struct Whole {
+    coordinates: Coordinates,
+    tables: Tables,
+    state: SectorState,
+    advance: Advance,
+    /// Modal forces at points 0 … s.
+    forces: [Vec<f64>; POINTS],
+    /// Coefficients of θᵃ of what acts on modes with inertia.
+    polynomial: [Vec<f64>; MOST],
+    /// Coordinates at points 1 … s without forces, and at points 0 … s with them.
+    free: [Vec<f64>; MOST],
+    at: [Vec<f64>; POINTS],
+    /// Damping loss since it was collected (J).
+    loss: f64,
+}
+
+impl Whole {
+    /// With polynomials of degree `degree`; [`Whole::set_span`] comes before the first step.
+    pub fn new(coordinates: Coordinates, degree: usize) -> Self {
+        let count = coordinates.inertia.len();
+        let zeros = || vec![0.0; count];
+        let tables = Tables::of_degree(coordinates.seen_at(&DMatrix::zeros(0, count)), degree);
+        Self {
+            tables,
+            coordinates,
+            state: SectorState::new(count, 0),
+            advance: Advance::new(count, 0),
+            forces: std::array::from_fn(|_| zeros()),
+            polynomial: std::array::from_fn(|_| zeros()),
+            free: std::array::from_fn(|_| zeros()),
+            at: std::array::from_fn(|_| zeros()),
+            loss: 0.0,
+        }
+    }
+
+    /// Tables for spans of length `span` (s).
+    pub fn set_span(&mut self, span: f64) {
+        self.tables.set_span(span);
+    }
+
+    /// Number of coordinates.
+    pub fn len(&self) -> usize {
+        self.coordinates.inertia.len()
+    }
+
+    /// Without any.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Its coordinates.
+    pub fn coordinates(&self) -> &Coordinates {
+        &self.coordinates
+    }
+
+    /// q and q̇ of now; to be set where there is inertia.
+    pub fn state_mut(&mut self) -> [&mut [f64]; 2] {
+        [&mut self.state.position, &mut self.state.velocity]
+    }
+
+    /// q̇ of now.
+    pub fn velocity(&self) -> &[f64] {
+        &self.state.velocity
+    }
+
+    /// Modal forces at point 0 … s.
+    pub fn forces_mut(&mut self, point: usize) -> &mut [f64] {
+        &mut self.forces[point]
+    }
+
+    /// Coordinates at point 0 … s of the step that is tried, under the forces there.
+    pub fn at(&self, point: usize) -> &[f64] {
+        &self.at[point]
+    }
+
+    /// Displacement of the coordinates at points per force at points.
+    pub fn influence(&self, level: usize) -> &[Influence] {
+        &self.tables.levels[level].influence
+    }
+
+    /// Modes without inertia have no state.
+    pub fn keep_inertia(&mut self) {
+        for (mode, inertia) in self.coordinates.inertia.iter().enumerate() {
+            self.state.position[mode] *= inertia;
+            self.state.velocity[mode] *= inertia;
+        }
+    }
+
+    /// Coordinates of now, under the forces set at point 0.
+    pub fn settle(&mut self) {
+        for (mode, at) in self.at[0].iter_mut().enumerate() {
+            *at = self.state.position[mode] + self.coordinates.softness[mode] * self.forces[0][mode];
+        }
+    }
+
+    /// A step of a level begins: coordinates without forces after its start.
+    pub fn begin(&mut self, level: usize, kind: Kind) {
+        let Self { tables, state, free, .. } = self;
+        let table = &tables.levels[level];
+        let points = if kind == Kind::Constant { table.basis.degree - 1..table.basis.degree } else { 0..table.basis.degree };
+        for (free, [a, b]) in free.iter_mut().zip(&table.modes.points[points]) {
+            let modes = a.iter().zip(b).zip(state.position.iter().zip(&state.velocity));
+            free.iter_mut().zip(modes).for_each(|(free, ((a, b), (q, v)))| *free = a * q + b * v);
+        }
+    }
+
+    /// Coordinates at the points under the forces set there.
+    pub fn push(&mut self, level: usize, kind: Kind) {
+        let Self { coordinates, tables, forces, free, at, .. } = self;
+        let table = &tables.levels[level];
+        let points = if kind == Kind::Constant { 1 } else { table.basis.degree };
+        for i in 1..=points {
+            let (target, free) = (&mut at[i], &free[i - 1]);
+            for (mode, target) in target.iter_mut().enumerate() {
+                let influence = &table.influence[mode];
+                let pushed = if kind == Kind::Constant {
+                    influence.constant * forces[1][mode]
+                } else {
+                    (0..=points).map(|k| influence.points[i - 1][k] * forces[k][mode]).sum()
+                };
+                *target =
+                    free[mode] + coordinates.inertia[mode] * pushed + coordinates.softness[mode] * forces[i][mode];
+            }
+        }
+    }
+
+    /// The step is taken: the state goes to its end, whose forces become those of the start.
+    pub fn take(&mut self, level: usize, kind: Kind) {
+        let Self { coordinates, tables, state, forces, polynomial, advance, .. } = self;
+        let table = &tables.levels[level];
+        let basis = &table.basis;
+        let points = if kind == Kind::Constant { 1 } else { basis.degree };
+        for (a, polynomial) in polynomial.iter_mut().enumerate() {
+            for (mode, value) in polynomial.iter_mut().enumerate() {
+                *value = coordinates.inertia[mode]
+                    * match kind {
+                        Kind::Constant if a == 0 => forces[1][mode],
+                        Kind::Constant => 0.0,
+                        Kind::Polynomial => (0..=points).map(|k| basis.projection[a][k] * forces[k][mode]).sum(),
+                    };
+            }
+        }
+        let [first, rest @ ..] = forces;
+        first.copy_from_slice(&rest[points - 1]);
+        self.loss += advance.driven(table, state, polynomial);
+    }
+
+    /// A step without any force.
+    pub fn fly(&mut self, level: usize) {
+        self.loss += self.advance.freely(&self.tables.levels[level], &mut self.state);
+    }
+
+    /// Damping loss since the last call (J).
+    pub fn collect_loss(&mut self) -> f64 {
+        std::mem::take(&mut self.loss)
+    }
+
+    /// ½ΔpᵀGΔp of the coordinates that follow at once, of the change to a constant force (J).
+    pub fn dropped(&self) -> f64 {
+        let change = self.forces[1].iter().zip(&self.forces[0]).map(|(new, old)| new - old);
+        0.5 * change.zip(&self.coordinates.softness).map(|(change, softness)| change * change * softness).sum::<f64>()
+    }
+
+    /// Largest amplitude of each coordinate from now on while nothing pushes.
+    pub fn amplitudes(&self, to: &mut [f64]) {
+        for (mode, to) in to.iter_mut().enumerate() {
+            let (w, ratio) = (self.coordinates.frequencies[mode], self.coordinates.damping_ratios[mode]);
+            let (q, v) = (self.state.position[mode], self.state.velocity[mode]);
+            let turned = if v == 0.0 && q == 0.0 { 0.0 } else { (v + ratio * w * q) / (w * (1.0 - ratio * ratio).sqrt()) };
+            *to = (q * q + turned * turned).sqrt();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tiprub_test_models::Random;
+
+    /// Forces at the points do the work Σ p_i S_ik q_k on a body; kept as energy or lost to damping to round-off. And steps of any
+    /// length go where those half as long go, if forces are polynomials.
+    #[test]
+    fn work_on_a_body_is_its_energy_and_what_damping_takes() {
+        let mut random = Random(11);
+        for case in 0..120 {
+            let degree = 1 + case % MOST;
+            let frequencies: Vec<f64> = (0..7).map(|_| random.scale(1e3, 3e5)).collect();
+            let ratios: Vec<f64> = (0..7).map(|_| random.of(&[0.0, 0.01, 0.2])).collect();
+            let mut whole = Whole::new(Coordinates::new(&frequencies, &ratios, 5), degree);
+            whole.set_span(4e-5);
+            whole.state_mut()[0][..5].iter_mut().for_each(|q| *q = 1e-5 * random.signed());
+            whole.state_mut()[1][..5].iter_mut().for_each(|v| *v = random.signed());
+            let energy = |whole: &Whole| -> f64 {
+                let (q, v) = (&whole.state.position, &whole.state.velocity);
+                let of = |m: usize| v[m] * v[m] + (frequencies[m] * q[m]).powi(2);
+                let held = |m: usize| whole.coordinates.softness[m] * whole.forces[0][m].powi(2);
+                0.5 * (0..7).map(|m| of(m) + held(m)).sum::<f64>()
+            };
+            for _ in 0..4 {
+                let level = random.below(4);
+                let kind = if random.below(4) == 0 { Kind::Constant } else { Kind::Polynomial };
+                let before = energy(&whole);
+                whole.settle();
+                whole.begin(level, kind);
+                let points = if kind == Kind::Constant { 1 } else { degree };
+                for point in 1..=points {
+                    whole.forces_mut(point).iter_mut().for_each(|p| *p = 1e4 * random.signed());
+                }
+                whole.push(level, kind);
+                let basis = whole.tables.levels[level].basis.clone();
+                let mut work = 0.0;
+                for m in 0..7 {
+                    for i in 0..=points {
+                        for k in 0..=points {
+                            let weight = match kind {
+                                Kind::Polynomial => basis.work[i][k],
+                                Kind::Constant if i == 1 => [-1.0, 1.0][k],
+                                Kind::Constant => 0.0,
+                            };
+                            work += whole.forces[i][m] * weight * whole.at(k)[m];
+                        }
+                    }
+                }
+                if kind == Kind::Constant {
+                    work -= whole.dropped();
+                }
+                let end = whole.at(points).to_vec();
+                whole.take(level, kind);
+                let loss = whole.collect_loss();
+                let after = energy(&whole);
+                let scale = before + after + work.abs();
+                assert!((after - before - work + loss).abs() < 1e-11 * scale, "case {case} {kind:?}: {work:e} {loss:e}");
+                assert!(loss >= -1e-13 * scale);
+                for (m, end) in end.iter().enumerate() {
+                    let found = whole.state.position[m] + whole.coordinates.softness[m] * whole.forces[0][m];
+                    assert!((found - end).abs() < 1e-12 * (end.abs() + 1e-6), "case {case}: {found:e} {end:e}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,585 @@
+//! Sectors that step together: those of one disk, and those that touch a surface which a structure carries.
+
+use super::casing::{Casing, coordinates};
+use super::{modes_of, PRECISION};
+use crate::dynamics::bank::ModalBank;
+use crate::dynamics::cyclic::CyclicBank;
+use crate::dynamics::sectors::Sectors;
+use crate::galerkin::advance::Advance;
+use crate::galerkin::basis::{MOST, POINTS};
+use crate::galerkin::compliance::Lanes;
+use crate::galerkin::level::Modes;
+use crate::galerkin::march::{Marched, Step};
+use crate::galerkin::sector::{Demand, Tables, Taken, Witness};
+use crate::galerkin::state::SectorState;
+use crate::galerkin::trial::{Kind, Obstacle, Trial, Verdict};
+use crate::galerkin::whole::Whole;
+use crate::system::facing::{Facing, Ground, Record, work_weights};
+use crate::settings::Scheme;
+use crate::system::{Pair, Structure};
+
+/// Most evaluations of the gaps of one trial: others move as well.
+const PASSES: usize = 12;
+
+/// Scratch and tables of a set of structures whose sectors step together; allocates only when made.
+#[derive(Debug, Clone)]
+pub struct Together {
+    /// The set.
+    pub set: usize,
+    pub sectors: Vec<One>,
+    disks: Vec<Disk>,
+    casings: Vec<Casing>,
+    /// Which of these carries the surface of each pair.
+    casing_of: Vec<Option<usize>>,
+    /// Of each touching structure.
+    tables: Vec<Vec<Tables>>,
+    pub demand: Demand,
+    bank: f64,
+    level: usize,
+    /// Length of the spans that the tables are for (s).
+    span: f64,
+}
+
+/// One sector of a touching structure.
+#[derive(Debug, Clone)]
+pub struct One {
+    pub structure: usize,
+    pub sector: usize,
+    /// Tables of its structure, and which of them are its own.
+    table: [usize; 2],
+    /// Its disk, if its modes are those of one.
+    disk: Option<usize>,
+    trial: Trial,
+    state: SectorState,
+    advance: Advance,
+    pub record: Record,
+}
+
+/// A disk of coupled sectors.
+#[derive(Debug, Clone)]
+struct Disk {
+    structure: usize,
+    whole: Whole,
+    /// Displacements of all contact rows at the points of the step (m), and velocities at its start (m/s), `[row][lane of sector]`.
+    moved: [Vec<f64>; POINTS],
+    velocity: Vec<f64>,
+    /// How all rows of any sector see the size of a coordinate; how far they can be from where they rest.
+    sizes: Vec<f64>,
+    amplitudes: Vec<f64>,
+    reach: Vec<f64>,
+    /// Of the step that is judged (m).
+    error: f64,
+}
+
+/// Everything that is not scratch.
+struct World<'a> {
+    structures: &'a mut [Structure],
+    pairs: &'a mut [Pair],
+}
+
+/// What is marched.
+pub struct Marching<'a> {
+    together: &'a mut Together,
+    world: World<'a>,
+}
+
+impl Together {
+    /// Of the structures of a set, for spans up to `longest` (s) and errors of `tolerance` (m).
+    pub fn new(
+        set: usize,
+        members: &[usize],
+        (structures, pairs): (&[Structure], &[Pair]),
+        longest: f64,
+        tolerance: f64,
+    ) -> Self {
+        let touching: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() > 0).collect();
+        let carrying: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() == 0).collect();
+        let kinds: Vec<Vec<Modes>> = touching.iter().map(|one| kinds_of(structures[*one].modes())).collect();
+        let banks: Vec<&ModalBank> = carrying.iter().filter_map(|one| structures[*one].bank()).collect();
+        let degree = |modes: &Modes| modes.degree_up_to(longest);
+        let carried = banks.iter().map(|bank| degree(&coordinates(bank).seen_at(&bank.model().contact_modes)));
+        let degree = kinds.iter().flatten().map(degree).chain(carried).min().unwrap_or(MOST);
+        let nodes = touching.iter().map(|one| structures[*one].nodes()).max().unwrap_or(0);
+        let lanes = Lanes { points: MOST, nodes };
+        let casings: Vec<Casing> =
+            carrying.iter().zip(banks).map(|(one, bank)| Casing::new(*one, bank, degree, lanes)).collect();
+        let place = |structure: usize| casings.iter().position(|casing| casing.structure == structure);
+        let disk = |one: &usize| structures[*one].modes().coupled().map(|bank| Disk::new(*one, bank, degree));
+        let disks: Vec<Disk> = touching.iter().filter_map(disk).collect();
+        let mut sectors = Vec::new();
+        for (number, structure) in touching.iter().enumerate() {
+            let of = &structures[*structure];
+            let disk = disks.iter().position(|disk| disk.structure == *structure);
+            for sector in 0..of.modes().sectors() {
+                let kind = of.bank().map_or(0, |bank| bank.set_number(sector));
+                let modes = if disk.is_some() { 0 } else { kinds[number][kind].len() };
+                sectors.push(One {
+                    structure: *structure,
+                    sector,
+                    table: [number, kind],
+                    disk,
+                    trial: Trial::new(modes, of.nodes()),
+                    state: SectorState::new(modes, of.nodes()),
+                    advance: Advance::new(modes, of.nodes()),
+                    record: Record::new(of.nodes(), pairs.len()),
+                });
+            }
+        }
+        let made = |kinds: Vec<Modes>| kinds.into_iter().map(|kind| Tables::of_degree(kind, degree)).collect();
+        Self {
+            set,
+            sectors,
+            disks,
+            casing_of: pairs.iter().map(|pair| place(pair.carrier()?.structure)).collect(),
+            casings,
+            tables: kinds.into_iter().map(made).collect(),
+            demand: Demand { tolerance, precision: PRECISION * tolerance, most: u64::MAX },
+            bank: 0.0,
+            level: 0,
+            span: 0.0,
+        }
+    }
+
+    /// Tables for spans of length `span` (s).
+    pub fn set_span(&mut self, span: f64) {
+        if span.to_bits() == self.span.to_bits() {
+            return;
+        }
+        self.span = span;
+        self.tables.iter_mut().flatten().for_each(|tables| tables.set_span(span));
+        let wholes = self.disks.iter_mut().map(|disk| &mut disk.whole);
+        wholes.chain(self.casings.iter_mut().map(|casing| &mut casing.whole)).for_each(|whole| whole.set_span(span));
+    }
+
+    /// To be marched from where the structures are.
+    pub fn begin<'a>(&'a mut self, structures: &'a mut [Structure], pairs: &'a mut [Pair]) -> Marching<'a> {
+        for one in &mut self.sectors {
+            let structure = &structures[one.structure];
+            structure.read_contacts(one.sector, &mut one.state);
+            if let Some(bank) = structure.bank() {
+                bank.read_sector(one.sector, &mut one.state.position, &mut one.state.velocity);
+            }
+            one.trial.forget();
+            let (places, lanes, sector) = (&structure.history.geometry.before, structure.lanes(), one.sector);
+            one.record.begin(|node| places.place_at(node * lanes + sector));
+        }
+        for disk in &mut self.disks {
+            let structure = &mut structures[disk.structure];
+            disk.read(structure);
+        }
+        for casing in &mut self.casings {
+            let structure = &structures[casing.structure];
+            let Some(bank) = structure.bank() else { continue };
+            let dynamic = casing.whole.coordinates().inertia.iter().filter(|inertia| **inertia > 0.0).count();
+            let [position, velocity] = casing.whole.state_mut();
+            bank.read_sector(0, &mut position[..dynamic], &mut velocity[..dynamic]);
+            casing.whole.forces_mut(0).copy_from_slice(&structure.delayed);
+        }
+        let first = self.sectors.first().map(|one| &structures[one.structure].pace);
+        (self.bank, self.level) = first.map_or((0.0, 0), |pace| (pace.bank[0], pace.level_of(0)));
+        let mut marching = Marching { together: self, world: World { structures, pairs } };
+        marching.find_start();
+        marching
+    }
+}
+
+/// Modes of the sectors, kind by kind.
+fn kinds_of(modes: &Sectors) -> Vec<Modes> {
+    match modes {
+        Sectors::Uncoupled(bank) => {
+            let count = bank.model().dynamic_modes(Scheme::Galerkin);
+            (0..bank.sets()).map(|set| modes_of(bank, set, count)).collect()
+        }
+        Sectors::Coupled(bank) => {
+            let (coordinates, shapes) = bank.coordinates_of();
+            vec![coordinates.seen_at(&shapes)]
+        }
+    }
+}
+
+impl Disk {
+    fn new(structure: usize, bank: &CyclicBank, degree: usize) -> Self {
+        let (coordinates, shapes) = bank.coordinates_of();
+        let rows = bank.rows() * bank.lanes();
+        Self {
+            structure,
+            moved: std::array::from_fn(|_| vec![0.0; rows]),
+            velocity: vec![0.0; rows],
+            sizes: bank.sizes(&shapes),
+            amplitudes: vec![0.0; coordinates.inertia.len()],
+            reach: vec![0.0; bank.rows()],
+            error: 0.0,
+            whole: Whole::new(coordinates, degree),
+        }
+    }
+
+    fn read(&mut self, structure: &mut Structure) {
+        let (forces, lanes, nodes) = (&structure.history.force.now, structure.lanes(), structure.nodes());
+        let Sectors::Coupled(bank) = &mut structure.modes else { return };
+        bank.read_all(self.whole.state_mut());
+        self.whole.keep_inertia();
+        let sectors = bank.sectors();
+        let all = (0..sectors).flat_map(|sector| (0..nodes).map(move |node| (sector, node)));
+        let force = |(sector, node): (usize, usize)| {
+            (sector, node, [0, 1, 2].map(|component| forces[(3 * node + component) * lanes + sector]))
+        };
+        let pushing = all.map(force).filter(|(.., force)| force.iter().any(|component| *component != 0.0));
+        bank.modal_forces(pushing, self.whole.forces_mut(0));
+    }
+
+    /// How far the rows of any sector can be from where they rest while nothing pushes (m).
+    fn find_reach(&mut self, bank: &CyclicBank) {
+        self.whole.amplitudes(&mut self.amplitudes);
+        bank.reach(&self.amplitudes, &self.sizes, &mut self.reach);
+    }
+}
+
+impl One {
+    /// It faces its surfaces.
+    fn facing<'a>(
+        &'a mut self,
+        (structures, pairs): (&'a [Structure], &'a mut [Pair]),
+        ground: Option<Ground<'a>>,
+    ) -> (Facing<'a>, &'a mut Trial, &'a mut SectorState) {
+        let structure = &structures[self.structure];
+        let (pair_of, lanes) = (&structure.pair_of[..], structure.lanes());
+        let facing = Facing { ground, pairs, pair_of, lanes, sector: self.sector, record: &mut self.record };
+        (facing, &mut self.trial, &mut self.state)
+    }
+}
+
+impl Marching<'_> {
+    /// A sector facing its surfaces, and the surfaces' structures at a step.
+    fn each(
+        &mut self,
+        (step, kind): (Step, Kind),
+        mut to: impl FnMut(&mut Facing, (&mut Trial, &mut SectorState), &Tables, Option<&mut Disk>),
+    ) {
+        let Together { sectors, casings, casing_of, tables, disks, .. } = &mut *self.together;
+        for one in sectors {
+            let ground = (!casings.is_empty()).then_some(Ground {
+                casings,
+                casing_of,
+                level: step.level,
+                kind,
+                lanes: Lanes { points: 0, nodes: 0 },
+            });
+            let (tables, disk) = (&tables[one.table[0]][one.table[1]], one.disk.map(|disk| &mut disks[disk]));
+            let (mut facing, trial, state) = one.facing((self.world.structures, self.world.pairs), ground);
+            to(&mut facing, (trial, state), tables, disk);
+        }
+    }
+
+    /// Displacements and velocities of what several sectors see, at the start of a step.
+    fn find_start(&mut self) {
+        let Together { disks, casings, .. } = &mut *self.together;
+        for disk in disks {
+            disk.whole.settle();
+            if let Sectors::Coupled(bank) = &mut self.world.structures[disk.structure].modes {
+                bank.rows_of(disk.whole.at(0), &mut disk.moved[0]);
+                bank.rows_of(disk.whole.velocity(), &mut disk.velocity);
+            }
+        }
+        for casing in casings {
+            casing.whole.settle();
+            casing.recover(0..=0);
+            casing.find_velocity();
+        }
+        let sectors = &mut self.together.sectors;
+        for one in sectors {
+            let table = &self.together.tables[one.table[0]][one.table[1]];
+            match one.disk.map(|disk| &self.together.disks[disk]) {
+                None => {
+                    one.trial.find_start(&table.rows, &one.state);
+                }
+                Some(disk) => {
+                    let (lanes, sector) = (self.world.structures[one.structure].lanes(), one.sector);
+                    let place = |row: usize| row * lanes + sector;
+                    one.trial.start_at(|row| [disk.moved[0][place(row)], disk.velocity[place(row)]]);
+                }
+            }
+        }
+    }
+
+    /// A step begins: prescribed motion at its points, motion without forces, and a guess of these.
+    fn prepare(&mut self, step: Step, kind: Kind) {
+        for disk in &mut self.together.disks {
+            disk.whole.begin(step.level, kind);
+        }
+        for casing in &mut self.together.casings {
+            casing.whole.begin(step.level, kind);
+        }
+        self.each((step, kind), |facing, (trial, state), tables, disk| {
+            let level = &tables.levels[step.level];
+            facing.go(step.from, step.length, level, kind);
+            facing.record.stay();
+            trial.begin((level, kind), disk.is_none().then_some(&tables.rows), state);
+            trial.guess(state);
+            trial.look_at_start(state, |node, moved| facing.gap(node, 0, moved).0);
+        });
+    }
+
+    /// Everything moves under the forces of now.
+    fn push(&mut self, step: Step, kind: Kind, points: usize) {
+        let Together { disks, sectors, .. } = &mut *self.together;
+        for (number, disk) in disks.iter_mut().enumerate() {
+            let Sectors::Coupled(bank) = &mut self.world.structures[disk.structure].modes else { continue };
+            let lanes = bank.lanes();
+            for point in 1..=points {
+                let own = sectors.iter().filter(|one| one.disk == Some(number));
+                let pushing = own.flat_map(|one| {
+                    let nodes = (0..one.trial.nodes()).filter(|node| one.trial.multiplier(point, *node) != 0.0);
+                    nodes.map(|node| (one.sector, node, one.trial.force(point, node)))
+                });
+                bank.modal_forces(pushing, disk.whole.forces_mut(point));
+            }
+            disk.whole.push(step.level, kind);
+            for point in 1..=points {
+                bank.rows_of(disk.whole.at(point), &mut disk.moved[point]);
+            }
+            for one in sectors.iter_mut().filter(|one| one.disk == Some(number)) {
+                let (moved, sector) = (&disk.moved, one.sector);
+                one.trial.carry(|point, node| [0, 1, 2].map(|i| moved[point][(3 * node + i) * lanes + sector]));
+            }
+        }
+        if self.together.casings.is_empty() {
+            return;
+        }
+        for casing in &mut self.together.casings {
+            (1..=points).for_each(|point| casing.whole.forces_mut(point).fill(0.0));
+        }
+        self.each((step, kind), |facing, (trial, _), _, _| {
+            for (point, node) in (1..=points).flat_map(|point| (0..trial.nodes()).map(move |node| (point, node))) {
+                if trial.multiplier(point, node) != 0.0 {
+                    let force = trial.force(point, node);
+                    facing.tell_ground(node, point, |casing, spot| casing.react(spot, point, force));
+                }
+            }
+        });
+        for casing in &mut self.together.casings {
+            casing.whole.push(step.level, kind);
+            casing.recover(1..=points);
+        }
+    }
+
+    /// Gaps at all points: the smallest, the largest of a contact that pushes, and whether nothing does.
+    fn find_gaps(&mut self, step: Step, kind: Kind, points: usize) -> (f64, f64, bool) {
+        if self.together.casings.is_empty() {
+            self.each((step, kind), |facing, (trial, _), _, _| {
+                trial.find_gaps(facing);
+            });
+        } else {
+            self.each((step, kind), |_, (trial, _), _, _| trial.move_rows());
+            for point in 1..=points {
+                self.bend_surfaces(point);
+                self.each((step, kind), |facing, (trial, _), _, _| {
+                    trial.look_at(point, |node, moved| facing.gap(node, point, moved));
+                });
+            }
+        }
+        let mut found = (f64::INFINITY, 0.0_f64, true);
+        for one in &self.together.sectors {
+            let (lowest, largest) = one.trial.extremes();
+            let least = if lowest.is_nan() || found.0.is_nan() { f64::NAN } else { found.0.min(lowest) };
+            found = (least, found.1.max(largest), found.2 && one.trial.rests());
+        }
+        found
+    }
+
+    /// Surfaces that are carried are as at a point of the step.
+    fn bend_surfaces(&mut self, point: usize) {
+        let Together { casings, casing_of, sectors, .. } = &*self.together;
+        for (number, pair) in self.world.pairs.iter_mut().enumerate() {
+            let Some(casing) = casing_of[number].map(|casing| &casings[casing]) else { continue };
+            let Some(one) = sectors.iter().find(|one| one.structure == pair.structure()) else { continue };
+            pair.bend(one.record.drives[number][point].0.shape_factor, casing.moved(point));
+        }
+    }
+
+    /// Forces that close what penetrates, sector by sector.
+    fn solve(&mut self, step: Step, kind: Kind, verdict: &mut Verdict) -> bool {
+        let mut solved = true;
+        self.each((step, kind), |facing, (trial, _), tables, _| {
+            let (lowest, _) = trial.extremes();
+            if solved && (lowest < 0.0 || !trial.rests()) {
+                solved = trial.solve(tables.levels[step.level].compliance_of(kind), facing, verdict);
+            }
+        });
+        solved
+    }
+
+    /// Error, switches and near misses of all.
+    fn judge(&mut self, step: Step, points: usize, verdict: &mut Verdict) {
+        self.together.casings.iter_mut().for_each(Casing::clear_impulses);
+        self.together.disks.iter_mut().for_each(|disk| disk.error = 0.0);
+        self.each((step, Kind::Polynomial), |facing, (trial, _), tables, disk| {
+            let mut own = Verdict::default();
+            trial.judge(&tables.levels[step.level], &tables.rows, &mut own);
+            match disk {
+                // What one sector leaves all of them swing by.
+                Some(disk) => disk.error = disk.error.hypot(own.error),
+                None => verdict.error = verdict.error.max(own.error),
+            }
+            verdict.switches |= own.switches;
+            verdict.switched += own.switched;
+            verdict.near |= own.near;
+            for node in 0..trial.nodes() {
+                let impulse = trial.impulse(node);
+                if impulse.iter().any(|component| *component != 0.0) {
+                    facing.tell_ground(node, points, |casing, spot| casing.add_impulse(spot, impulse));
+                }
+            }
+        });
+        let errors = self.together.casings.iter().map(Casing::error);
+        let errors = errors.chain(self.together.disks.iter().map(|disk| disk.error));
+        verdict.error = errors.fold(verdict.error, f64::max);
+    }
+
+    /// The state goes back to the structures.
+    pub fn finish(self) {
+        let Self { together, world: World { structures, .. } } = self;
+        for one in &mut together.sectors {
+            let structure = &mut structures[one.structure];
+            structure.write_contacts(one.sector, &one.state, |node| one.record.tallies[node].lowest);
+            (structure.pace.bank[one.sector], structure.pace.level[one.sector]) = (together.bank, together.level as u64);
+            let table = &together.tables[one.table[0]][one.table[1]];
+            if let (None, Sectors::Uncoupled(bank)) = (one.disk, &mut structure.modes) {
+                let (state, loss) = (&one.state, one.record.work.damping);
+                let moved = one.trial.find_start(&table.rows, state);
+                bank.write_sector(one.sector, &state.position, &state.velocity, &state.forces, moved);
+                bank.lose(one.sector, loss);
+            }
+        }
+        for disk in &mut together.disks {
+            if let Sectors::Coupled(bank) = &mut structures[disk.structure].modes {
+                bank.write_all(disk.whole.at(0), disk.whole.velocity());
+                bank.lose(disk.whole.collect_loss());
+            }
+        }
+        for casing in &mut together.casings {
+            let structure = &mut structures[casing.structure];
+            structure.delayed.copy_from_slice(casing.whole.forces_mut(0));
+            if let Sectors::Uncoupled(bank) = &mut structure.modes {
+                bank.write_all(casing.whole.at(0), casing.whole.velocity(), casing.moved(0));
+                bank.lose(0, casing.whole.collect_loss());
+            }
+        }
+    }
+}
+
+impl Marched for Marching<'_> {
+    fn pace(&mut self) -> (&mut f64, &mut usize) {
+        (&mut self.together.bank, &mut self.together.level)
+    }
+
+    fn length(&self, level: usize) -> f64 {
+        self.together.tables[0][0].levels[level].step
+    }
+
+    fn count(&self) -> u64 {
+        self.together.sectors.len() as u64
+    }
+
+    fn fly(&mut self, step: Step) -> bool {
+        let pushed = |one: &One| one.state.multipliers.iter().any(|value| *value != 0.0);
+        if !self.together.casings.is_empty() || self.together.sectors.iter().any(pushed) {
+            return false;
+        }
+        for disk in &mut self.together.disks {
+            if let Some(bank) = self.world.structures[disk.structure].modes.coupled() {
+                disk.find_reach(bank);
+            }
+        }
+        let mut clear = true;
+        self.each((step, Kind::Polynomial), |facing, _, _, disk| {
+            clear = clear && disk.is_some_and(|disk| facing.is_clear(step.from, step.length, &disk.reach));
+        });
+        if !clear {
+            return false;
+        }
+        self.together.disks.iter_mut().for_each(|disk| disk.whole.fly(step.level));
+        self.together.sectors.iter_mut().for_each(|one| one.state.looked = false);
+        self.find_start();
+        true
+    }
+
+    fn attempt(&mut self, step: Step, kind: Kind) -> Verdict {
+        self.prepare(step, kind);
+        let points = if kind == Kind::Constant { 1 } else { self.together.tables[0][0].levels[step.level].basis.degree };
+        let (precision, mut verdict) = (self.together.demand.precision, Verdict::default());
+        for pass in 0..PASSES {
+            self.push(step, kind, points);
+            let (lowest, largest, rests) = self.find_gaps(step, kind, points);
+            if lowest.is_nan() {
+                return verdict;
+            }
+            if (rests && lowest >= 0.0) || (pass > 0 && lowest >= -precision && largest <= precision) {
+                verdict.solved = true;
+                break;
+            }
+            if pass + 1 == PASSES || !self.solve(step, kind, &mut verdict) {
+                return verdict;
+            }
+        }
+        if kind == Kind::Polynomial {
+            self.judge(step, points, &mut verdict);
+        }
+        verdict
+    }
+
+    fn take(&mut self, step: Step, kind: Kind, verdict: &Verdict) -> f64 {
+        let level = &self.together.tables[0][0].levels[step.level];
+        let points = if kind == Kind::Constant { 1 } else { level.basis.degree };
+        let basis = level.basis.clone();
+        for casing in &mut self.together.casings {
+            casing.weigh(points, |i| work_weights(&basis, kind, i));
+        }
+        let (mut dropped, mut closed) = (0.0, 0.0);
+        for whole in self.together.wholes() {
+            dropped += if kind == Kind::Constant { whole.dropped() } else { 0.0 };
+        }
+        let mut of_wholes = dropped;
+        self.each((step, kind), |facing, (trial, state), tables, disk| {
+            let own = if kind == Kind::Constant && disk.is_none() { trial.dropped(tables.rows.residual(), state) } else { 0.0 };
+            closed += if kind == Kind::Constant { trial.closed() } else { 0.0 };
+            dropped += own;
+            let level = &tables.levels[step.level];
+            facing.took(&Taken { level, kind, trial, damping_loss: 0.0, dropped: own + std::mem::take(&mut of_wholes) });
+        });
+        self.go_on(step, kind);
+        match kind {
+            Kind::Polynomial if verdict.switches => -verdict.switched,
+            Kind::Polynomial => 0.0,
+            Kind::Constant => dropped + closed,
+        }
+    }
+}
+
+impl Marching<'_> {
+    /// All states go to the end of the step.
+    fn go_on(&mut self, step: Step, kind: Kind) {
+        for one in &mut self.together.sectors {
+            if one.disk.is_none() {
+                let tables = &self.together.tables[one.table[0]][one.table[1]];
+                let (level, trial) = (&tables.levels[step.level], &one.trial);
+                let basis = &level.basis;
+                let forces = |node| trial.polynomial(basis, kind, node);
+                one.record.work.damping += one.advance.under((level, &tables.rows), &mut one.state, forces);
+            }
+            one.trial.leave(&mut one.state);
+        }
+        self.together.wholes_mut().for_each(|whole| whole.take(step.level, kind));
+        self.find_start();
+    }
+}
+
+impl Together {
+    fn wholes(&self) -> impl Iterator<Item = &Whole> {
+        self.disks.iter().map(|disk| &disk.whole).chain(self.casings.iter().map(|casing| &casing.whole))
+    }
+
+    fn wholes_mut(&mut self) -> impl Iterator<Item = &mut Whole> {
+        let disks = self.disks.iter_mut().map(|disk| &mut disk.whole);
+        disks.chain(self.casings.iter_mut().map(|casing| &mut casing.whole))
+    }
+}
