@@ -8,7 +8,7 @@ mod guide;
 
 use counting::allocations_of;
 use guide::told;
-use tiprub_core::settings::{OutputSettings, Scheme, Shape, SplineSettings, TimeSettings};
+use tiprub_core::settings::{LoadSettings, OutputSettings, Scheme, Shape, SplineSettings, TimeSettings};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::disk::Disk;
 use tiprub_test_models::{
@@ -114,8 +114,20 @@ type Change = fn(&mut Scene);
 
 type Feature = (&'static str, f64, Change, fn(&mut Simulation, f64));
 
-const FEATURES: [Feature; 7] = [
+const FEATURES: [Feature; 8] = [
     ("flexible casing", 1e-3, flexible, still),
+    (
+        "flexible casing under a load that turns",
+        1e-3,
+        |scene| {
+            flexible(scene);
+            scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 1e3, phase: 0.2 });
+        },
+        |simulation, time| {
+            set(simulation, "casing_load_amplitude", 1e3 * (1.0 + (900.0 * time).sin()));
+            set(simulation, "casing_load_phase", 0.2 + 200.0 * time);
+        },
+    ),
     ("lobes", 1e-4, |scene| scene.settings.contacts[0].friction = 0.0, still),
     ("mistuned", 1e-4, |scene| scene.settings.structures[0].frequency_factors = vec![1.0, 0.97, 1.03, 1.01], still),
     (

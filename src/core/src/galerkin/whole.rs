@@ -2,8 +2,9 @@
 //! the points of that step.
 
 use super::advance::Advance;
-use super::basis::{MOST, POINTS};
+use super::basis::{Basis, MOST, POINTS};
 use super::level::{Influence, Modes};
+use super::march::Step;
 use super::sector::Tables;
 use super::state::SectorState;
 use super::trial::Kind;
@@ -71,8 +72,13 @@ pub struct Whole {
     /// Coordinates at points 1 … s without forces, and at points 0 … s with them.
     free: [Vec<f64>; MOST],
     at: [Vec<f64>; POINTS],
-    /// Damping loss since it was collected (J).
+    /// Modal loads beside contact at the start and the end of the span, linear in between, and at the points of the step; of modes with
+    /// inertia. Empty where nothing loads it.
+    loads: [Vec<f64>; 2],
+    loads_at: [Vec<f64>; POINTS],
+    /// Damping loss, and work of loads, since they were collected (J).
     loss: f64,
+    load_work: f64,
 }
 
 impl Whole {
@@ -90,8 +96,25 @@ impl Whole {
             polynomial: std::array::from_fn(|_| zeros()),
             free: std::array::from_fn(|_| zeros()),
             at: std::array::from_fn(|_| zeros()),
+            loads: [Vec::new(), Vec::new()],
+            loads_at: std::array::from_fn(|_| Vec::new()),
             loss: 0.0,
+            load_work: 0.0,
         }
+    }
+
+    /// The same with modal loads beside contact.
+    #[must_use]
+    pub fn loaded(mut self) -> Self {
+        let count = self.len();
+        let [start, end] = &mut self.loads;
+        [start, end].into_iter().chain(&mut self.loads_at).for_each(|loads| loads.resize(count, 0.0));
+        self
+    }
+
+    /// Modal loads at the start and the end of the span.
+    pub fn loads_mut(&mut self) -> &mut [Vec<f64>; 2] {
+        &mut self.loads
     }
 
     /// Tables for spans of length `span` (s).
@@ -154,15 +177,50 @@ impl Whole {
         }
     }
 
-    /// A step of a level begins: coordinates without forces after its start.
-    pub fn begin(&mut self, level: usize, kind: Kind) {
-        let Self { tables, state, free, .. } = self;
-        let table = &tables.levels[level];
-        let points = if kind == Kind::Constant { table.basis.degree - 1..table.basis.degree } else { 0..table.basis.degree };
-        for (free, [a, b]) in free.iter_mut().zip(&table.modes.points[points]) {
+    /// A step begins: coordinates without forces after its start, and with loads.
+    pub fn begin(&mut self, step: Step, kind: Kind) {
+        self.find_loads(step, kind);
+        let Self { coordinates, tables, state, free, loads_at, .. } = self;
+        let table = &tables.levels[step.level];
+        let degree = table.basis.degree;
+        let points = if kind == Kind::Constant { degree - 1..degree } else { 0..degree };
+        for (point, (free, [a, b])) in free.iter_mut().zip(&table.modes.points[points]).enumerate() {
             let modes = a.iter().zip(b).zip(state.position.iter().zip(&state.velocity));
             free.iter_mut().zip(modes).for_each(|(free, ((a, b), (q, v)))| *free = a * q + b * v);
+            for (mode, load) in loads_at[0].iter().enumerate() {
+                let influence = &table.influence[mode];
+                let pushed = match kind {
+                    Kind::Constant => influence.constant * load,
+                    Kind::Polynomial => (0..=degree).map(|k| influence.points[point][k] * loads_at[k][mode]).sum(),
+                };
+                free[mode] += coordinates.inertia[mode] * pushed;
+            }
         }
+    }
+
+    /// Loads at the points of a step; under a constant force their mean.
+    fn find_loads(&mut self, step: Step, kind: Kind) {
+        let Self { coordinates, tables, loads: [start, end], loads_at, .. } = self;
+        let basis = &tables.levels[step.level].basis;
+        for (point, loads) in loads_at[..basis.count()].iter_mut().enumerate() {
+            let within = if kind == Kind::Constant { 0.5 } else { basis.points[point] };
+            let theta = step.from + step.length * within;
+            for (mode, load) in loads.iter_mut().enumerate() {
+                *load = coordinates.inertia[mode] * (start[mode] + theta * (end[mode] - start[mode]));
+            }
+        }
+    }
+
+    /// Work of the loads over a step (J).
+    fn work_of_loads(&self, basis: &Basis, kind: Kind) -> f64 {
+        let of = |mode: usize| -> f64 {
+            if kind == Kind::Constant {
+                return self.loads_at[0][mode] * (self.at[1][mode] - self.at[0][mode]);
+            }
+            let moved = |i: usize| (0..basis.count()).map(|k| basis.work[i][k] * self.at[k][mode]).sum::<f64>();
+            (0..basis.count()).map(|i| self.loads_at[i][mode] * moved(i)).sum()
+        };
+        (0..self.loads[0].len()).map(of).sum()
     }
 
     /// Coordinates at the points under the forces set there.
@@ -187,17 +245,19 @@ impl Whole {
 
     /// The step is taken: the state goes to its end, whose forces become those of the start.
     pub fn take(&mut self, level: usize, kind: Kind) {
-        let Self { coordinates, tables, state, forces, polynomial, advance, .. } = self;
+        self.load_work += self.work_of_loads(&self.tables.levels[level].basis, kind);
+        let Self { coordinates, tables, state, forces, polynomial, advance, loads_at, .. } = self;
         let table = &tables.levels[level];
         let basis = &table.basis;
         let points = if kind == Kind::Constant { 1 } else { basis.degree };
         for (a, polynomial) in polynomial.iter_mut().enumerate() {
             for (mode, value) in polynomial.iter_mut().enumerate() {
+                let all = |k: usize| forces[k][mode] + loads_at[k].get(mode).copied().unwrap_or(0.0);
                 *value = coordinates.inertia[mode]
                     * match kind {
-                        Kind::Constant if a == 0 => forces[1][mode],
+                        Kind::Constant if a == 0 => all(1),
                         Kind::Constant => 0.0,
-                        Kind::Polynomial => (0..=points).map(|k| basis.projection[a][k] * forces[k][mode]).sum(),
+                        Kind::Polynomial => (0..=points).map(|k| basis.projection[a][k] * all(k)).sum(),
                     };
             }
         }
@@ -214,6 +274,11 @@ impl Whole {
     /// Damping loss since the last call (J).
     pub fn collect_loss(&mut self) -> f64 {
         std::mem::take(&mut self.loss)
+    }
+
+    /// Work of loads since the last call (J).
+    pub fn collect_load_work(&mut self) -> f64 {
+        std::mem::take(&mut self.load_work)
     }
 
     /// ½ΔpᵀGΔp of the coordinates that follow at once, of the change to a constant force (J).
@@ -247,7 +312,7 @@ mod tests {
             let degree = 1 + case % MOST;
             let frequencies: Vec<f64> = (0..7).map(|_| random.scale(1e3, 3e5)).collect();
             let ratios: Vec<f64> = (0..7).map(|_| random.of(&[0.0, 0.01, 0.2])).collect();
-            let mut whole = Whole::new(Coordinates::new(&frequencies, &ratios, 5), degree);
+            let mut whole = Whole::new(Coordinates::new(&frequencies, &ratios, 5), degree).loaded();
             whole.set_span(4e-5);
             whole.state_mut()[0][..5].iter_mut().for_each(|q| *q = 1e-5 * random.signed());
             whole.state_mut()[1][..5].iter_mut().for_each(|v| *v = random.signed());
@@ -262,7 +327,9 @@ mod tests {
                 let kind = if random.below(4) == 0 { Kind::Constant } else { Kind::Polynomial };
                 let before = energy(&whole);
                 whole.settle();
-                whole.begin(level, kind);
+                let [from, length] = [0.25, 0.5_f64.powi(i32::try_from(level).unwrap())];
+                whole.loads_mut().iter_mut().flatten().for_each(|load| *load = 1e4 * random.signed());
+                whole.begin(Step { level, from, length }, kind);
                 let points = if kind == Kind::Constant { 1 } else { degree };
                 for point in 1..=points {
                     whole.forces_mut(point).iter_mut().for_each(|p| *p = 1e4 * random.signed());
@@ -288,6 +355,7 @@ mod tests {
                 let end = whole.at(points).to_vec();
                 whole.take(level, kind);
                 let loss = whole.collect_loss();
+                work += whole.collect_load_work();
                 let after = energy(&whole);
                 let scale = before + after + work.abs();
                 assert!((after - before - work + loss).abs() < 1e-11 * scale, "case {case} {kind:?}: {work:e} {loss:e}");

@@ -187,14 +187,6 @@ static METHODS: &[Rule] = &[
     ),
     excludes(
         &[GALERKIN],
-        ("`structure.thermal` or `structure.load`", |at| {
-            at.settings.structures.iter().any(|own| own.thermal || own.load.is_some())
-        }),
-        "its tables are those of modes that are loaded by contact alone",
-        "Use \"modal-exact\", or leave the loads out",
-    ),
-    excludes(
-        &[GALERKIN],
         ("`structure.spin`", |at| at.settings.structures.iter().any(|own| own.spin != SpinSettings::default())),
         "its tables are those of modes that keep their stiffness and are loaded by contact alone",
         "Use \"modal-exact\", or leave the effects of spin out",

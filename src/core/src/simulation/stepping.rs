@@ -237,6 +237,10 @@ impl Simulation {
         }
         self.find_drives(offset, time);
         self.load(before);
+        if self.is_marched() {
+            self.system.begin_loads();
+            self.load(offset);
+        }
         match self.system.step(&self.drives) {
             Ok(()) => {}
             Err(StepFailure::Exhausted) => return Err(self.give_up()),

@@ -117,6 +117,15 @@ impl System {
         self.pairs[pair].middle = (*drive, growth);
     }
 
+    /// Modal loads of now are those at the start of the span to come.
+    pub fn begin_loads(&mut self) {
+        for structure in &mut self.structures {
+            if let Sectors::Uncoupled(bank) = structure.modes_mut() {
+                bank.begin_loads();
+            }
+        }
+    }
+
     /// One span to the instant described by `drives`, one per pair.
     pub(crate) fn march(&mut self, drives: &[Drive]) -> Result<(), StepFailure> {
         let span = self.step_size();
@@ -177,7 +186,7 @@ impl System {
         let factorisations = counted.effort.factorisations;
         let mut marching = together.begin(structures, pairs);
         let outcome = march(&mut marching, demand, &mut counted.effort);
-        marching.finish();
+        let load_work = marching.finish();
         counted.factorisations += counted.effort.factorisations - factorisations;
         for one in &together.sectors {
             if one.record.implausible {
@@ -186,6 +195,9 @@ impl System {
         }
         let first = together.sectors.first().map_or((0, 0), |one| (one.structure, one.sector));
         outcome.map_err(|stopped| failure(stopped, first))?;
+        let ledger = &mut counted.ledgers[together.set];
+        ledger.load_work.add(load_work);
+        ledger.turnover.add(load_work.abs());
         for one in &together.sectors {
             enter_work(&mut counted.ledgers[together.set], &one.record.work);
             let structure = &structures[one.structure];

@@ -59,6 +59,26 @@ impl ModalBank {
         rows.iter().enumerate().for_each(|(row, moved)| self.state.displacement[row * lanes] = *moved);
     }
 
+    /// Whether there are modal loads beside contact.
+    pub fn is_loaded(&self) -> bool {
+        self.options.loads
+    }
+
+    /// Modal loads of now are those at the start of a span.
+    pub fn begin_loads(&mut self) {
+        if self.options.loads {
+            self.state.modal_load_before.copy_from_slice(&self.modal_load);
+        }
+    }
+
+    /// Those at its start and at its end; nothing where there are none.
+    pub fn read_loads(&self, [start, end]: &mut [Vec<f64>; 2]) {
+        if self.options.loads {
+            start.copy_from_slice(&self.state.modal_load_before);
+            end.copy_from_slice(&self.modal_load);
+        }
+    }
+
     /// Add to the damping loss of a sector (J).
     pub fn lose(&mut self, sector: usize, loss: f64) {
         self.state.loss[sector] += loss;

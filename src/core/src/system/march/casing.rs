@@ -70,7 +70,7 @@ impl Casing {
             along: vec![0.0; lanes.len() * modes],
             facing: vec![false; lanes.len()],
             force: vec![0.0; modes],
-            whole: Whole::new(coordinates, degree),
+            whole: if bank.is_loaded() { Whole::new(coordinates, degree).loaded() } else { Whole::new(coordinates, degree) },
         }
     }
 

@@ -174,6 +174,7 @@ impl Together {
             let [position, velocity] = casing.whole.state_mut();
             bank.read_sector(0, &mut position[..dynamic], &mut velocity[..dynamic]);
             casing.whole.forces_mut(0).copy_from_slice(&structure.delayed);
+            bank.read_loads(casing.whole.loads_mut());
         }
         let first = self.sectors.first().map(|one| &structures[one.structure].pace);
         (self.bank, self.level) = first.map_or((0.0, 0), |pace| (pace.bank[0], pace.level_of(0)));
@@ -304,10 +305,10 @@ impl Marching<'_> {
     /// A step begins: prescribed motion at its points, motion without forces, and a guess of these.
     fn prepare(&mut self, step: Step, kind: Kind) {
         for disk in &mut self.together.disks {
-            disk.whole.begin(step.level, kind);
+            disk.whole.begin(step, kind);
         }
         for casing in &mut self.together.casings {
-            casing.whole.begin(step.level, kind);
+            casing.whole.begin(step, kind);
         }
         self.each((step, kind), |facing, (trial, state), tables, disk| {
             let level = &tables.levels[step.level];
@@ -435,8 +436,9 @@ impl Marching<'_> {
         verdict.error = errors.fold(verdict.error, f64::max);
     }
 
-    /// The state goes back to the structures.
-    pub fn finish(self) {
+    /// The state goes back to the structures. Work of loads on the way (J).
+    pub fn finish(self) -> f64 {
+        let mut load_work = 0.0;
         let Self { together, world: World { structures, .. } } = self;
         for one in &mut together.sectors {
             let structure = &mut structures[one.structure];
@@ -462,8 +464,11 @@ impl Marching<'_> {
             if let Sectors::Uncoupled(bank) = &mut structure.modes {
                 bank.write_all(casing.whole.at(0), casing.whole.velocity(), casing.moved(0));
                 bank.lose(0, casing.whole.collect_loss());
+                bank.begin_loads();
             }
+            load_work += casing.whole.collect_load_work();
         }
+        load_work
     }
 }
 
