@@ -217,8 +217,7 @@ fn a_disk_of_coupled_sectors_is_what_it_is_as_one_structure() {
         };
         let exact = of(disk.whole(), 1e-7);
         for tolerance in [1e-3, 1e-5, 1e-7] {
-            let [together, alone] =
-                [disk.cyclic(), disk.whole()].map(|rom| apart(&of(rom, tolerance), &exact));
+            let [together, alone] = [disk.cyclic(), disk.whole()].map(|rom| apart(&of(rom, tolerance), &exact));
             println!("{sectors} sectors, tolerance {tolerance:e}: {together:.1e}, as one structure {alone:.1e}");
             assert!(together < 6.0 * tolerance.max(1e-6), "{sectors} sectors, {tolerance:e}: {together:e}");
         }

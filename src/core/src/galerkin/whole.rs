@@ -292,7 +292,8 @@ impl Whole {
         for (mode, to) in to.iter_mut().enumerate() {
             let (w, ratio) = (self.coordinates.frequencies[mode], self.coordinates.damping_ratios[mode]);
             let (q, v) = (self.state.position[mode], self.state.velocity[mode]);
-            let turned = if v == 0.0 && q == 0.0 { 0.0 } else { (v + ratio * w * q) / (w * (1.0 - ratio * ratio).sqrt()) };
+            let turned =
+                if v == 0.0 && q == 0.0 { 0.0 } else { (v + ratio * w * q) / (w * (1.0 - ratio * ratio).sqrt()) };
             *to = (q * q + turned * turned).sqrt();
         }
     }
@@ -358,7 +359,10 @@ mod tests {
                 work += whole.collect_load_work();
                 let after = energy(&whole);
                 let scale = before + after + work.abs();
-                assert!((after - before - work + loss).abs() < 1e-11 * scale, "case {case} {kind:?}: {work:e} {loss:e}");
+                assert!(
+                    (after - before - work + loss).abs() < 1e-11 * scale,
+                    "case {case} {kind:?}: {work:e} {loss:e}"
+                );
                 assert!(loss >= -1e-13 * scale);
                 for (m, end) in end.iter().enumerate() {
                     let found = whole.state.position[m] + whole.coordinates.softness[m] * whole.forces[0][m];

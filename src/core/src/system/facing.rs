@@ -292,11 +292,11 @@ impl Obstacle for Facing<'_> {
         std::array::from_fn(|i| normal[i] - friction * slip[i])
     }
 
-    fn look(&mut self, lanes: Lanes, normals: &[f64]) -> bool {
+    fn look(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
         let Some(Ground { casings, lanes: of_ground, .. }) = &mut self.ground else { return false };
         *of_ground = lanes;
         casings.iter_mut().for_each(Casing::look_away);
-        for lane in 0..lanes.len() {
+        for lane in (0..lanes.len()).filter(|lane| chosen[*lane]) {
             let (point, node) = lanes.place(lane);
             let normal = lanes.three(normals, lane);
             self.tell_ground(node, point, |casing, spot| casing.look(lane, spot, normal));

@@ -102,7 +102,8 @@ impl System {
                     let tolerance = clearance(&mut self.pairs.iter().filter(|pair| pair.structure() == index));
                     let (structure, pairs) = (&mut self.structures[index], self.pairs.len());
                     let (nodes, bank) = (structure.nodes(), structure.bank());
-                    let made = bank.filter(|_| nodes > 0).map(|bank| Galerkin::new(bank, nodes, pairs, longest, tolerance));
+                    let made =
+                        bank.filter(|_| nodes > 0).map(|bank| Galerkin::new(bank, nodes, pairs, longest, tolerance));
                     structure.galerkin = made.map(Box::new);
                 }
             }

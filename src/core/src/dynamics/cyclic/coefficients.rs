@@ -19,12 +19,11 @@ impl CyclicBank {
                 self.coefficients[n * self.modes + mode] = k;
                 let (frequency, ratio) = (diameter.frequencies[mode], diameter.damping_ratios[mode]);
                 let dynamic = mode < diameter.dynamic_modes(scheme);
-                self.velocities[n * self.modes + mode] =
-                    match scheme {
-                        _ if !dynamic => Velocity::default(),
-                        Scheme::Galerkin => Velocity::of_state(step),
-                        _ => Velocity::new(frequency, ratio, step),
-                    };
+                self.velocities[n * self.modes + mode] = match scheme {
+                    _ if !dynamic => Velocity::default(),
+                    Scheme::Galerkin => Velocity::of_state(step),
+                    _ => Velocity::new(frequency, ratio, step),
+                };
                 let (lane, lanes) = (n % LANES, &mut self.lane_coefficients[n / LANES * self.modes + mode]);
                 (lanes.beta[lane], lanes.kappa[lane], lanes.loss[lane]) = (k.beta, k.kappa, k.loss);
                 (lanes.compliance[lane], lanes.delayed[lane]) = (k.compliance, k.delayed);

@@ -29,12 +29,8 @@ impl CyclicBank {
     pub fn coordinates_of(&self) -> (Coordinates, DMatrix<f64>) {
         let count = self.coordinates();
         let nothing = || vec![0.0; count];
-        let mut found = Coordinates {
-            frequencies: nothing(),
-            damping_ratios: nothing(),
-            inertia: nothing(),
-            softness: nothing(),
-        };
+        let mut found =
+            Coordinates { frequencies: nothing(), damping_ratios: nothing(), inertia: nothing(), softness: nothing() };
         let mut shapes = DMatrix::zeros(self.rows, count);
         for (n, diameter) in self.model.diameters.iter().enumerate() {
             let dynamic = diameter.dynamic_modes(Scheme::Galerkin);
@@ -148,16 +144,25 @@ mod tests {
             bank.set_step(Scheme::Galerkin, 1e-5);
             let (coordinates, shapes) = bank.coordinates_of();
             let (count, lanes, rows) = (bank.coordinates(), bank.lanes(), bank.rows());
-            let at: Vec<f64> = (0..count)
-                .map(|i| if coordinates.inertia[i] + coordinates.softness[i] > 0.0 { (1.7 * i as f64).sin() } else { 0.0 })
-                .collect();
+            let at: Vec<f64> =
+                (0..count)
+                    .map(|i| {
+                        if coordinates.inertia[i] + coordinates.softness[i] > 0.0 {
+                            (1.7 * i as f64).sin()
+                        } else {
+                            0.0
+                        }
+                    })
+                    .collect();
             let mut values = vec![0.0; rows * lanes];
             bank.rows_of(&at, &mut values);
             for row in 0..rows {
                 let seen: f64 = shapes.row(row).iter().zip(&at).map(|(shape, q)| shape * q).sum();
                 assert!((seen - values[row * lanes]).abs() < 1e-12 * (1.0 + seen.abs()));
             }
-            let force = |sector: usize, node: usize| [0, 1, 2].map(|c| (sector as f64 + 2.3 * node as f64 + f64::from(c)).cos());
+            let force = |sector: usize, node: usize| {
+                [0, 1, 2].map(|c| (sector as f64 + 2.3 * node as f64 + f64::from(c)).cos())
+            };
             let all: Vec<_> =
                 (0..sectors).flat_map(|s| (0..rows / 3).map(move |node| (s, node, force(s, node)))).collect();
             let work: f64 = all

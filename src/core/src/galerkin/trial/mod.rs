@@ -11,8 +11,8 @@ use super::rows::{Rows, Sums};
 use super::state::SectorState;
 use crate::dynamics::dispatch::InstructionSet;
 use crate::laws::active_set::ContactSolver;
-use nalgebra::DMatrix;
 pub use judgement::Verdict;
+use nalgebra::DMatrix;
 
 /// Most evaluations of the gaps of one trial.
 const PASSES: usize = 6;
@@ -39,9 +39,9 @@ pub trait Obstacle {
         normal: [f64; 3],
     ) -> [f64; 3];
 
-    /// Contacts at all points but the first are about to be solved, with these normals: get ready to tell how what is touched gives
-    /// way. False where it does not.
-    fn look(&mut self, _lanes: Lanes, _normals: &[f64]) -> bool {
+    /// Contacts at the lanes chosen are about to be solved, with these normals: get ready to tell how what is touched gives way there.
+    /// False where it does not.
+    fn look(&mut self, _lanes: Lanes, _chosen: &[bool], _normals: &[f64]) -> bool {
         false
     }
 
@@ -380,10 +380,12 @@ impl Trial {
             moved: &pushed[..3 * width],
             to: &mut without[..width],
         });
-        self.gives = obstacle.look(lanes, &self.normals[..3 * width]);
         self.members.clear();
         for lane in 0..lanes.len() {
             self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
+        }
+        self.gives = obstacle.look(lanes, &self.chosen, &self.normals[..3 * width]);
+        for lane in 0..lanes.len() {
             if self.chosen[lane] {
                 self.choose(lane, compliance, obstacle);
             }

@@ -142,13 +142,6 @@ const OF_ROTORS: &[(&str, Change)] = &[
         scene.settings.preset = Preset::Paper;
         scene.settings.time.scheme = Scheme::CentralDifference;
     }),
-    ("time.scheme: `galerkin` excludes a surface that a structure carries", |scene| {
-        scene.settings.time.scheme = Scheme::Galerkin;
-    }),
-    ("parameter `scheme`: `galerkin` excludes a ROM whose sectors", |scene| {
-        galerkin(&mut scene.settings);
-        couple(&mut scene.roms[0]);
-    }),
     ("time.scheme: `galerkin` excludes `structure.spin`", |scene| {
         galerkin(&mut scene.settings);
         scene.settings.structures[0].spin.growth = true;

@@ -1,10 +1,12 @@
 //! A structure that carries surfaces, over the steps of the sectors that touch them.
 
 use crate::dynamics::bank::ModalBank;
+use crate::dynamics::dispatch::InstructionSet;
 use crate::galerkin::basis::POINTS;
 use crate::galerkin::compliance::Lanes;
-use crate::galerkin::whole::{Coordinates, Whole};
+use crate::galerkin::kernels::{Combine, PADDED};
 use crate::galerkin::trial::Kind;
+use crate::galerkin::whole::{Coordinates, Whole};
 use crate::gaps::frame::Frame;
 use crate::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
 use crate::settings::Scheme;
@@ -28,8 +30,13 @@ pub struct Casing {
     pub structure: usize,
     /// Its modes.
     pub whole: Whole,
-    /// `[row][mode]` of the rows that move control points.
+    /// `[row][mode]` of the rows that move control points, modes filled up to whole registers.
     shapes: Vec<f64>,
+    /// `[mode][row]`, rows filled up to whole registers.
+    by_mode: Vec<f64>,
+    /// 0, 1, 2, … of all modes.
+    all: Vec<usize>,
+    instructions: InstructionSet,
     /// Displacements of these rows at the points of the step (m), and velocities at its start (m/s).
     moved: [Vec<f64>; POINTS],
     velocity: Vec<f64>,
@@ -38,10 +45,11 @@ pub struct Casing {
     /// δ² per squared impulse on each mode: ½ mean φ²/ω².
     error_form: Vec<f64>,
     impulses: Vec<f64>,
-    /// Modes as each lane sees them along x, y, z of its node, and along its normal; lanes that face this structure.
+    /// Modes as each lane sees them in fixed directions, and along its normal; lanes that face this structure, and their directions.
     seen: [Vec<f64>; 3],
     along: Vec<f64>,
     facing: Vec<bool>,
+    frames: Vec<Frame>,
     /// Modes under a unit of λ of one lane.
     force: Vec<f64>,
 }
@@ -51,26 +59,39 @@ impl Casing {
     pub fn new(structure: usize, bank: &ModalBank, degree: usize, lanes: Lanes) -> Self {
         let coordinates = coordinates(bank);
         let (modes, rows) = (bank.modes(), bank.rows());
-        let shapes: Vec<f64> = (0..rows).flat_map(|row| bank.contact_row(row).to_vec()).collect();
+        let (stride, padded) = (modes.next_multiple_of(PADDED), rows.next_multiple_of(PADDED));
+        let (mut shapes, mut by_mode) = (vec![0.0; rows * stride], vec![0.0; padded * modes]);
+        for (row, mode) in (0..rows).flat_map(|row| (0..modes).map(move |mode| (row, mode))) {
+            let shape = bank.contact_row(row)[mode];
+            (shapes[row * stride + mode], by_mode[mode * padded + row]) = (shape, shape);
+        }
         let lowest = coordinates.frequencies.iter().copied().filter(|w| *w > 0.0).fold(f64::INFINITY, f64::min);
         #[expect(clippy::cast_precision_loss, reason = "some hundreds of rows")]
         let of_mode = |mode: usize| {
-            let square: f64 = (0..rows).map(|row| shapes[row * modes + mode].powi(2)).sum();
+            let square: f64 = (0..rows).map(|row| shapes[row * stride + mode].powi(2)).sum();
             0.5 * coordinates.inertia[mode] * square / rows as f64 / coordinates.frequencies[mode].max(lowest).powi(2)
         };
         Self {
             error_form: (0..modes).map(of_mode).collect(),
             structure,
             shapes,
-            moved: std::array::from_fn(|_| vec![0.0; rows]),
-            velocity: vec![0.0; rows],
-            worked: std::array::from_fn(|_| vec![0.0; rows]),
+            by_mode,
+            all: (0..modes).collect(),
+            instructions: InstructionSet::detect(),
+            moved: std::array::from_fn(|_| vec![0.0; padded]),
+            velocity: vec![0.0; padded],
+            worked: std::array::from_fn(|_| vec![0.0; padded]),
             impulses: vec![0.0; modes],
-            seen: std::array::from_fn(|_| vec![0.0; lanes.len() * modes]),
-            along: vec![0.0; lanes.len() * modes],
+            seen: std::array::from_fn(|_| vec![0.0; lanes.len() * stride]),
+            along: vec![0.0; lanes.len() * stride],
             facing: vec![false; lanes.len()],
-            force: vec![0.0; modes],
-            whole: if bank.is_loaded() { Whole::new(coordinates, degree).loaded() } else { Whole::new(coordinates, degree) },
+            frames: vec![Frame::FIXED; lanes.len()],
+            force: vec![0.0; stride],
+            whole: if bank.is_loaded() {
+                Whole::new(coordinates, degree).loaded()
+            } else {
+                Whole::new(coordinates, degree)
+            },
         }
     }
 
@@ -79,16 +100,24 @@ impl Casing {
         &self.moved[point]
     }
 
-    /// The rows at the points `points` of the step, under the forces set there.
-    pub fn recover(&mut self, points: std::ops::RangeInclusive<usize>) {
-        for point in points {
-            rows_of(&self.shapes, self.whole.at(point), &mut self.moved[point]);
+    /// The rows at the points 1 … `points` of the step, under the forces set there.
+    pub fn recover(&mut self, points: usize) {
+        let Self { by_mode, all, moved: [_, one, two, three], whole, instructions, .. } = self;
+        let (table, stride, columns) = (&by_mode[..], one.len(), &all[..]);
+        let [a, b, c] = [1, 2, 3].map(|point| whole.at(point));
+        match points {
+            1 => instructions.run(Combine { table, stride, columns, coefficients: [a], sums: [one] }),
+            2 => instructions.run(Combine { table, stride, columns, coefficients: [a, b], sums: [one, two] }),
+            _ => instructions.run(Combine { table, stride, columns, coefficients: [a, b, c], sums: [one, two, three] }),
         }
     }
 
-    /// Velocities of the rows at the start of the step.
-    pub fn find_velocity(&mut self) {
-        rows_of(&self.shapes, self.whole.velocity(), &mut self.velocity);
+    /// Displacements and velocities of the rows at the start of a step.
+    pub fn find_start(&mut self) {
+        let Self { by_mode, all, moved: [start, ..], velocity, whole, instructions, .. } = self;
+        let (table, stride, columns) = (&by_mode[..], start.len(), &all[..]);
+        let coefficients = [whole.at(0), whole.velocity()];
+        instructions.run(Combine { table, stride, columns, coefficients, sums: [start, velocity] });
     }
 
     /// Velocity of a place at the start of the step (m/s), in the directions of the node.
@@ -114,7 +143,8 @@ impl Casing {
 
     /// The reaction to a force on a node at a place, at point i.
     pub fn react(&mut self, spot: Spot, i: usize, force: [f64; 3]) {
-        add_transposed(&self.shapes, spot, force.map(|f| -f), self.whole.forces_mut(i));
+        self.find_force(spot, force);
+        self.whole.forces_mut(i).iter_mut().zip(&self.force).for_each(|(sum, force)| *sum -= force);
     }
 
     /// Forget impulses, or add one on a node at a place (N·s).
@@ -124,7 +154,19 @@ impl Casing {
 
     /// See [`Casing::clear_impulses`].
     pub fn add_impulse(&mut self, spot: Spot, impulse: [f64; 3]) {
-        add_transposed(&self.shapes, spot, impulse, &mut self.impulses);
+        self.find_force(spot, impulse);
+        self.impulses.iter_mut().zip(&self.force).for_each(|(sum, force)| *sum += force);
+    }
+
+    /// Force on the modes by one at a place, in the directions of the node.
+    fn find_force(&mut self, spot: Spot, force: [f64; 3]) {
+        let (around, fixed) = (Around::new(spot), spot.frame.fixed(force));
+        let rows: [usize; 48] = std::array::from_fn(|i| around.rows[i / 3] + i % 3);
+        let amounts: [f64; 48] = std::array::from_fn(|i| around.weights[i / 3] * fixed[i % 3]);
+        let (stride, columns, coefficients) =
+            (self.force.len(), &rows[..3 * around.count], [&amounts[..3 * around.count]]);
+        let sums = [&mut self.force[..]];
+        self.instructions.run(Combine { table: &self.shapes, stride, columns, coefficients, sums });
     }
 
     /// The displacement that these leave (m).
@@ -139,20 +181,22 @@ impl Casing {
 
     /// A lane of the sector that is solved faces a place, with this normal.
     pub fn look(&mut self, lane: usize, spot: Spot, normal: [f64; 3]) {
-        let modes = self.force.len();
-        self.facing[lane] = true;
-        let Self { seen, shapes, along, .. } = self;
-        let window = lane * modes..(lane + 1) * modes;
+        let padded = self.force.len();
+        (self.facing[lane], self.frames[lane]) = (true, spot.frame);
+        let around = Around::new(spot);
+        let window = lane * padded..(lane + 1) * padded;
+        let Self { seen, shapes, along, instructions, .. } = self;
+        let count = around.count;
         for (component, seen) in seen.iter_mut().enumerate() {
-            let mut unit = [0.0; 3];
-            unit[component] = 1.0;
-            let seen = &mut seen[window.clone()];
-            seen.fill(0.0);
-            add_transposed(shapes, spot, unit, seen);
+            let rows: [usize; 16] = std::array::from_fn(|i| around.rows[i] + component);
+            let (columns, coefficients) = (&rows[..count], [&around.weights[..count]]);
+            let sums = [&mut seen[window.clone()]];
+            instructions.run(Combine { table: shapes, stride: padded, columns, coefficients, sums });
         }
         let [x, y, z] = seen.each_ref().map(|seen| &seen[window.clone()]);
+        let [a, b, c] = spot.frame.fixed(normal);
         for (mode, along) in along[window.clone()].iter_mut().enumerate() {
-            *along = normal[0] * x[mode] + normal[1] * y[mode] + normal[2] * z[mode];
+            *along = a * x[mode] + b * y[mode] + c * z[mode];
         }
     }
 
@@ -168,25 +212,54 @@ impl Casing {
         if !self.facing[lane] {
             return;
         }
-        let modes = self.force.len();
-        let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * modes..][..modes]);
+        let padded = self.force.len();
+        let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * padded..][..padded]);
         let (k, _) = lanes.place(lane);
+        let [a, b, c] = self.frames[lane].fixed(direction);
         let (influence, coordinates) = (self.whole.influence(level), self.whole.coordinates());
         for i in 1..=lanes.points {
-            for (mode, force) in self.force.iter_mut().enumerate() {
-                let by = &influence[mode];
-                let inert = coordinates.inertia[mode]
-                    * if kind == Kind::Constant { by.constant } else { by.points[i - 1][k] };
+            for (mode, by) in influence.iter().enumerate() {
+                let inert =
+                    coordinates.inertia[mode] * if kind == Kind::Constant { by.constant } else { by.points[i - 1][k] };
                 let soft = if i == k { coordinates.softness[mode] } else { 0.0 };
-                *force = (inert + soft) * (direction[0] * x[mode] + direction[1] * y[mode] + direction[2] * z[mode]);
+                self.force[mode] = (inert + soft) * (a * x[mode] + b * y[mode] + c * z[mode]);
             }
             for node in (0..lanes.nodes).filter(|node| self.facing[lanes.at(i, *node)]) {
                 let other = lanes.at(i, node);
-                let along = &self.along[other * modes..][..modes];
-                given[other] += along.iter().zip(&self.force).map(|(along, force)| along * force).sum::<f64>();
+                given[other] += dot_of(&self.along[other * padded..][..padded], &self.force);
             }
         }
     }
+}
+
+/// Rows of the control points that make a place, and their weights.
+struct Around {
+    rows: [usize; 16],
+    weights: [f64; 16],
+    count: usize,
+}
+
+impl Around {
+    fn new(spot: Spot) -> Self {
+        let (surface, carrier) = spot.surface;
+        let mut found = Self { rows: [0; 16], weights: [0.0; 16], count: 0 };
+        for (index, weight) in surface.weights(spot.place).iter() {
+            (found.rows[found.count], found.weights[found.count]) = (carrier.first_row + 3 * index, weight);
+            found.count += 1;
+        }
+        found
+    }
+}
+
+/// Scalar product in eight parts.
+fn dot_of(a: &[f64], b: &[f64]) -> f64 {
+    let mut parts = [0.0; PADDED];
+    for (a, b) in a.as_chunks::<PADDED>().0.iter().zip(b.as_chunks::<PADDED>().0) {
+        for i in 0..PADDED {
+            parts[i] += a[i] * b[i];
+        }
+    }
+    parts.iter().sum()
 }
 
 /// Modes of a structure that carries surfaces.
@@ -194,12 +267,6 @@ pub fn coordinates(bank: &ModalBank) -> Coordinates {
     let model = bank.model();
     let dynamic = model.dynamic_modes(Scheme::Galerkin);
     Coordinates::new(&model.frequencies, &model.damping_ratios, dynamic)
-}
-
-fn rows_of(shapes: &[f64], coordinates: &[f64], rows: &mut [f64]) {
-    for (row, shape) in rows.iter_mut().zip(shapes.chunks_exact(coordinates.len())) {
-        *row = shape.iter().zip(coordinates).map(|(shape, q)| shape * q).sum();
-    }
 }
 
 /// Values of rows at a place, in the directions of the node.
@@ -212,16 +279,4 @@ fn at(spot: Spot, rows: &[f64]) -> [f64; 3] {
         }
     }
     spot.frame.local(sum)
-}
-
-/// Forces on modes by one at a place, in the directions of the node, added to `modal`.
-fn add_transposed(shapes: &[f64], spot: Spot, force: [f64; 3], modal: &mut [f64]) {
-    let ((surface, carrier), modes) = (spot.surface, modal.len());
-    let fixed = spot.frame.fixed(force);
-    for (index, weight) in surface.weights(spot.place).iter() {
-        for (component, force) in fixed.iter().enumerate() {
-            let shapes = &shapes[(carrier.first_row + 3 * index + component) * modes..][..modes];
-            modal.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += weight * force * shape);
-        }
-    }
 }

@@ -1,7 +1,7 @@
 //! Sectors that step together: those of one disk, and those that touch a surface which a structure carries.
 
 use super::casing::{Casing, coordinates};
-use super::{modes_of, PRECISION};
+use super::{PRECISION, modes_of};
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::cyclic::CyclicBank;
 use crate::dynamics::sectors::Sectors;
@@ -14,8 +14,8 @@ use crate::galerkin::sector::{Demand, Tables, Taken, Witness};
 use crate::galerkin::state::SectorState;
 use crate::galerkin::trial::{Kind, Obstacle, Trial, Verdict};
 use crate::galerkin::whole::Whole;
-use crate::system::facing::{Facing, Ground, Record, work_weights};
 use crate::settings::Scheme;
+use crate::system::facing::{Facing, Ground, Record, work_weights};
 use crate::system::{Pair, Structure};
 
 /// Most evaluations of the gaps of one trial: others move as well.
@@ -283,8 +283,7 @@ impl Marching<'_> {
         }
         for casing in casings {
             casing.whole.settle();
-            casing.recover(0..=0);
-            casing.find_velocity();
+            casing.find_start();
         }
         let sectors = &mut self.together.sectors;
         for one in sectors {
@@ -359,7 +358,7 @@ impl Marching<'_> {
         });
         for casing in &mut self.together.casings {
             casing.whole.push(step.level, kind);
-            casing.recover(1..=points);
+            casing.recover(points);
         }
     }
 
@@ -443,7 +442,8 @@ impl Marching<'_> {
         for one in &mut together.sectors {
             let structure = &mut structures[one.structure];
             structure.write_contacts(one.sector, &one.state, |node| one.record.tallies[node].lowest);
-            (structure.pace.bank[one.sector], structure.pace.level[one.sector]) = (together.bank, together.level as u64);
+            (structure.pace.bank[one.sector], structure.pace.level[one.sector]) =
+                (together.bank, together.level as u64);
             let table = &together.tables[one.table[0]][one.table[1]];
             if let (None, Sectors::Uncoupled(bank)) = (one.disk, &mut structure.modes) {
                 let (state, loss) = (&one.state, one.record.work.damping);
@@ -462,7 +462,8 @@ impl Marching<'_> {
             let structure = &mut structures[casing.structure];
             structure.delayed.copy_from_slice(casing.whole.forces_mut(0));
             if let Sectors::Uncoupled(bank) = &mut structure.modes {
-                bank.write_all(casing.whole.at(0), casing.whole.velocity(), casing.moved(0));
+                let rows = &casing.moved(0)[..bank.rows()];
+                bank.write_all(casing.whole.at(0), casing.whole.velocity(), rows);
                 bank.lose(0, casing.whole.collect_loss());
                 bank.begin_loads();
             }
@@ -510,7 +511,8 @@ impl Marched for Marching<'_> {
 
     fn attempt(&mut self, step: Step, kind: Kind) -> Verdict {
         self.prepare(step, kind);
-        let points = if kind == Kind::Constant { 1 } else { self.together.tables[0][0].levels[step.level].basis.degree };
+        let points =
+            if kind == Kind::Constant { 1 } else { self.together.tables[0][0].levels[step.level].basis.degree };
         let (precision, mut verdict) = (self.together.demand.precision, Verdict::default());
         for pass in 0..PASSES {
             self.push(step, kind, points);
@@ -545,11 +547,21 @@ impl Marched for Marching<'_> {
         }
         let mut of_wholes = dropped;
         self.each((step, kind), |facing, (trial, state), tables, disk| {
-            let own = if kind == Kind::Constant && disk.is_none() { trial.dropped(tables.rows.residual(), state) } else { 0.0 };
+            let own = if kind == Kind::Constant && disk.is_none() {
+                trial.dropped(tables.rows.residual(), state)
+            } else {
+                0.0
+            };
             closed += if kind == Kind::Constant { trial.closed() } else { 0.0 };
             dropped += own;
             let level = &tables.levels[step.level];
-            facing.took(&Taken { level, kind, trial, damping_loss: 0.0, dropped: own + std::mem::take(&mut of_wholes) });
+            facing.took(&Taken {
+                level,
+                kind,
+                trial,
+                damping_loss: 0.0,
+                dropped: own + std::mem::take(&mut of_wholes),
+            });
         });
         self.go_on(step, kind);
         match kind {
