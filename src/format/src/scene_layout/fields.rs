@@ -368,7 +368,7 @@ pub const FIELDS: [SceneField; 73] = [
         "number, s",
         None,
         "1e-12 to 1",
-        "Largest internal step; the step used divides the communication step evenly. Of `galerkin` the longest step of a blade.",
+        "Largest internal step; the step used divides the communication step evenly. Of `galerkin` the longest step.",
     ),
     field(
         "time.tolerance",
