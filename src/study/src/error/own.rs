@@ -15,7 +15,7 @@ use super::{
     scene::SceneRun,
     window,
 };
-use crate::{arguments::ErrorArguments, divisions};
+use crate::{arguments::ErrorArguments, convergence::refine::goes_by_tolerance, divisions};
 
 /// Internal steps tried, as multiples of the number that the scene asks for.
 const SHARES: [f64; 7] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
@@ -24,6 +24,8 @@ const QUICK_SHARES: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 const FINER: u32 = 8;
 /// Halvings of the longest step of a scene that goes by a tolerance, until others can be compared.
 const MOST_HALVINGS: u32 = 12;
+/// Times that steps of a scene that goes by a tolerance are halved again where one is refused on its way.
+const MOST_DOUBLINGS: u32 = 3;
 /// Samples of the window where none is asked for.
 const SAMPLES: usize = 400;
 const QUICK_SAMPLES: usize = 100;
@@ -83,10 +85,6 @@ impl Own {
         let schedule = Schedule::new(&scene.settings.experiment, None, None)?;
         let interval = scene.settings.experiment.communication_step;
         let base = base(&scene, settings, interval).map_err(|problem| Failure::new(name, problem, ""))?;
-        let own = f64::from(base);
-        let shares = if quick { &QUICK_SHARES[..] } else { &SHARES[..] };
-        let mut divisions: Vec<u32> = shares.iter().map(|share| count(share * own)).collect();
-        divisions.dedup();
         let most = if quick { QUICK_SAMPLES } else { SAMPLES };
         let title = scene.settings.name.clone();
         let mut case = Self {
@@ -96,14 +94,26 @@ impl Own {
             interval,
             samples: 0,
             base,
-            divisions,
+            divisions: divisions_around(base, quick),
             parting: Vec::new(),
         };
         let refused = |problem| Failure::new(name, problem, "");
         let task = console.task("How long the scene can be followed", None);
-        let touch = case.first_touch(count(own), schedule.count).map_err(refused)?;
-        let asked = window.map_or(touch + most, |window| count(window / interval) as usize);
-        let samples = asked.clamp(1, schedule.count);
+        let (touch, samples) = loop {
+            match case.follow((window, most), schedule.count) {
+                Ok((touch, samples, parting)) => {
+                    case.parting = parting;
+                    break (touch, samples);
+                }
+                // Growth by friction comes in bands, and what it does while contact is closed is known only then.
+                Err(_) if goes_by_tolerance(&case.scene) && case.base < base << MOST_DOUBLINGS => {
+                    case.base *= 2;
+                    case.divisions = divisions_around(case.base, quick);
+                }
+                Err(problem) => return Err(refused(problem)),
+            }
+        };
+        drop(task);
         if touch >= samples {
             let problem = if touch < schedule.count {
                 let when = shown(interval * touch as f64);
@@ -113,8 +123,6 @@ impl Own {
             };
             return Err(Failure::new(name, problem, "Give a longer --window, or a scene that rubs"));
         }
-        case.parting = window::parting(&case, count(2.0 * own), samples).map_err(refused)?;
-        drop(task);
         case.samples = window::samples(&case.parting, samples);
         if case.samples == 0 {
             let problem = "runs that differ by almost nothing part within the first communication step".into();
@@ -124,7 +132,25 @@ impl Own {
     }
 }
 
+/// Internal steps per communication step that are tried around `base`, ascending.
+fn divisions_around(base: u32, quick: bool) -> Vec<u32> {
+    let shares = if quick { &QUICK_SHARES[..] } else { &SHARES[..] };
+    let mut divisions: Vec<u32> = shares.iter().map(|share| count(share * f64::from(base))).collect();
+    divisions.dedup();
+    divisions
+}
+
 impl Own {
+    /// The sample of the first contact, the samples of a `window` (s), or of `most` beyond that contact, and how far runs part over them; the
+    /// experiment has `all`.
+    fn follow(&self, (window, most): (Option<f64>, usize), all: usize) -> Result<(usize, usize, Vec<f64>), String> {
+        let touch = self.first_touch(self.base, all)?;
+        let asked = window.map_or(touch + most, |window| count(window / self.interval) as usize);
+        let samples = asked.clamp(1, all);
+        let parting = if touch < samples { window::parting(self, 2 * self.base, samples)? } else { Vec::new() };
+        Ok((touch, samples, parting))
+    }
+
     /// The scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
@@ -200,34 +226,23 @@ pub(crate) fn own_division(scene: &Scene) -> u32 {
 }
 
 /// Internal steps per communication step (s) around which those of one length are tried: what the scene asks for; where it goes by a
-/// tolerance, a fourth of the longest step that the first reference takes without a refusal, or less.
+/// tolerance, a fourth of the longest step that the first reference starts with.
 fn base(scene: &Scene, settings: &[(String, String)], interval: f64) -> Result<u32, String> {
     let own = divisions(interval, scene.settings.time.step);
     if scene.settings.time.scheme != Scheme::Galerkin {
         return Ok(own);
     }
     let Competitor::Core(scheme, solver) = DEFAULT else { return Ok(own) };
-    around(own, |division| {
-        let scene = SceneRun::changed(scene, (scheme, solver), interval / f64::from(division), 0.0);
-        SceneRun::with_start_values(&scene, interval, division, settings).map(|_| ())
-    })
-}
-
-/// Four times the least division by halvings of `own` that is accepted; where that is refused itself, since growth by friction comes in bands,
-/// halved on until it is accepted too.
-fn around(own: u32, accepted: impl Fn(u32) -> Result<(), String>) -> Result<u32, String> {
     let mut refused = String::new();
-    let mut first = |from: u32| {
-        (from..MOST_HALVINGS + 2).map(|halvings| own << halvings).find(|division| match accepted(*division) {
-            Ok(()) => true,
-            Err(problem) => {
-                refused = problem;
-                false
-            }
-        })
-    };
-    let found = first(0).and_then(|longest| first((longest / own).ilog2() + 2));
-    found.ok_or(refused)
+    for halvings in 0..MOST_HALVINGS {
+        let division = own << halvings;
+        let scene = SceneRun::changed(scene, (scheme, solver), interval / f64::from(division), 0.0);
+        match SceneRun::with_start_values(&scene, interval, division, settings) {
+            Ok(_) => return Ok(4 * division),
+            Err(problem) => refused = problem,
+        }
+    }
+    Err(refused)
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
@@ -333,17 +348,26 @@ impl Case for Own {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use tiprub_model::rotor37::Tip;
+    use tiprub_shell::console::Console;
 
-    /// Of a blade with two rows of patches a step may be accepted of which a fourth is refused.
+    use super::*;
+    use crate::convergence::{
+        refine::Source as _,
+        rows::tests::{Blade, scene},
+    };
+
+    /// Of two rows of patches a step may start that is refused when they touch: growth by friction comes in bands.
     #[test]
-    fn steps_are_tried_around_one_that_is_accepted() {
-        let of = |accepted: &dyn Fn(u32) -> bool| {
-            around(1, |division| if accepted(division) { Ok(()) } else { Err(format!("{division} is refused")) })
-        };
-        assert_eq!(of(&|_| true), Ok(4));
-        assert_eq!(of(&|division| division >= 8), Ok(32));
-        assert_eq!(of(&|division| division == 8 || division > 40), Ok(64));
-        assert_eq!(of(&|_| false), Err("8192 is refused".into()));
+    fn a_scene_by_a_tolerance_is_followed_with_steps_that_are_not_refused_on_its_way() {
+        let console = Console::new(true, false);
+        let mut scene = scene(2);
+        scene.roms[0] = Blade.reduce(None, 10, Tip::patches([5, 2]), &console).unwrap().rom;
+        scene.settings.contacts[0].friction = 0.4;
+        (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::Galerkin, 8e-5);
+        let first = base(&scene, &[], 1e-5).unwrap();
+        let case = Own::of("a blade", scene, &[], (Some(1.5e-3), true), &console).unwrap();
+        assert!(case.base > first && case.first_touch(first, 150).is_err(), "{first} {}", case.base);
+        assert_eq!(case.divisions, [case.base / 2, case.base, 2 * case.base, 4 * case.base]);
     }
 }
