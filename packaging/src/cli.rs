@@ -26,6 +26,7 @@ use crate::{
                   builtin:flexible-casing   in an elastic casing with heat, friction power per patch\n  \
                   builtin:abradable         wearing the coating of a rigid casing\n  \
                   builtin:stage             56 coupled blades in an oval elastic casing\n  \
+                  builtin:stage-nodes       with contact at three nodes and more friction\n  \
                   builtin:cube-between-rings  a cube that flies through two clamped rings\n\n\
                   Exit codes: 0 done, 1 the work failed, 2 the command line is wrong."
 )]

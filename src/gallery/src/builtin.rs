@@ -23,8 +23,10 @@ use crate::{
     rom_cache::RomCache,
 };
 
-/// The bladed disk of the stage.
+/// The bladed disk of the stage, with contact nodes as the paper's.
 pub(crate) const STAGE: &str = "stage";
+/// The same with two rows of patches.
+pub(crate) const STAGE_ROWS: &str = "stage-rows";
 /// The casing of the stage.
 pub(crate) const STAGE_CASING: &str = "stage-casing";
 /// The same two on coarse meshes, for tests and first looks: shapes alike, frequencies some percent off.
@@ -42,12 +44,13 @@ pub(crate) const ROWS: &str = "rotor37-rows";
 
 /// Every name that [`rom`] knows.
 #[cfg(test)]
-pub(crate) const NAMES: [&str; 11] = [
+pub(crate) const NAMES: [&str; 12] = [
     "rotor37",
     "rotor37-spin",
     ROWS,
     CASING37,
     STAGE,
+    STAGE_ROWS,
     STAGE_CASING,
     STAGE_COARSE,
     STAGE_CASING_COARSE,
@@ -64,8 +67,8 @@ pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom
         let rom = cache.get(whole, &options, console, &|| Ok(reduction::rotor37(&options, console)?.rom))?;
         Ok(known::told(&options, rom))
     };
-    let disk = |coarse| {
-        let model = DiskModel::new(coarse);
+    let disk = || {
+        let model = DiskModel::named(name);
         let rom = cache.get(name, &model, console, &|| Ok(model.reduce(console)?.0.rom))?;
         Ok(known::told(&model.options, rom))
     };
@@ -76,8 +79,7 @@ pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom
             let options = CasingOptions::default();
             cache.get(name, &options, console, &|| Ok(reduction::casing(&options, console)?.rom))
         }
-        STAGE => disk(false),
-        STAGE_COARSE => disk(true),
+        STAGE | STAGE_ROWS | STAGE_COARSE => disk(),
         STAGE_CASING | STAGE_CASING_COARSE => {
             let options = stage_casing(name == STAGE_CASING_COARSE);
             let title = "Reducing the casing of the stage";
@@ -112,7 +114,7 @@ fn rotor37(name: &str) -> Rotor37Options {
 
 /// Whether the contact nodes of a model can be chosen anew by their number: blades along their chord.
 pub fn has_chord(name: &str) -> bool {
-    name.starts_with("rotor37") || [STAGE, STAGE_COARSE].contains(&plain(name))
+    name.starts_with("rotor37") || [STAGE, STAGE_ROWS, STAGE_COARSE].contains(&plain(name))
 }
 
 /// Meshes of blades beside the one that ships: numbers of elements along the edges, as factors on its own, the coarsest first.
@@ -161,10 +163,10 @@ pub fn refined(name: &str, other: Other, cache: &RomCache, console: &Console) ->
     Some(match plain(name) {
         "rotor37" | ROWS => of_blade(None),
         "rotor37-spin" => of_blade(Some(DESIGN_SPEED)),
-        name @ (STAGE | STAGE_COARSE) => {
-            let (name, options) = stage(name == STAGE_COARSE);
+        name @ (STAGE | STAGE_ROWS | STAGE_COARSE) => {
+            let (name, options) = stage_named(name);
             let kind = match other.tip {
-                Tip::Nodes(_) => options.kind,
+                Tip::Nodes(_) => StageOptions::default().kind,
                 Tip::Patches(_) | Tip::Rows(_) => ReductionKind::FreeInterface,
             };
             let sector = SectorOptions { counts: stage_mesh(options.sector.counts, other.mesh), ..options.sector };
@@ -202,8 +204,8 @@ pub fn mesh_nodes(name: &str, mesh: f64) -> Option<Result<usize>> {
         "rotor37" | "rotor37-spin" | ROWS => {
             blade_mesh(rotor37_mesh(rotor37(name).mesh, mesh)).map(|blade| blade.mesh.nodes.len())
         }
-        name @ (STAGE | STAGE_COARSE) => {
-            let sector = stage(name == STAGE_COARSE).1.sector;
+        name @ (STAGE | STAGE_ROWS | STAGE_COARSE) => {
+            let sector = stage_named(name).1.sector;
             let options = SectorOptions { counts: stage_mesh(sector.counts, mesh), ..sector };
             sector_mesh(&options).map(|sector| sector.mesh.nodes.len())
         }
@@ -251,6 +253,19 @@ pub fn stage(coarse: bool) -> (&'static str, StageOptions) {
     }
 }
 
+/// The disk of this name; of every other that of the paper's size.
+fn stage_named(name: &str) -> (&'static str, StageOptions) {
+    match name {
+        STAGE_ROWS => (STAGE_ROWS, stage_in_rows()),
+        name => stage(name == STAGE_COARSE),
+    }
+}
+
+/// Of the paper's size, with nine patches along the chord in two rows, which stand at the sides of the tips.
+pub fn stage_in_rows() -> StageOptions {
+    StageOptions { tip: Tip::Rows([9, 2]), kind: ReductionKind::FreeInterface, ..StageOptions::default() }
+}
+
 /// The bladed disk of the stage, of the paper's size or coarse.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiskModel {
@@ -262,6 +277,12 @@ impl DiskModel {
     /// What is reduced; nothing is done yet.
     pub fn new(coarse: bool) -> Self {
         let (name, options) = stage(coarse);
+        Self { name, options }
+    }
+
+    /// The disk of a name that ships.
+    fn named(name: &str) -> Self {
+        let (name, options) = stage_named(name);
         Self { name, options }
     }
 

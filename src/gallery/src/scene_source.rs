@@ -20,20 +20,21 @@ pub const ROTOR37_ONE_ROW_SCENE: &str = include_str!("../scenes/rotor37-one-row.
 /// The same rub with the paper's model and method.
 pub const ROTOR37_PAPER_SCENE: &str = include_str!("../scenes/rotor37-paper.toml");
 
-/// Coupled blades in an oval flexible casing.
-pub(crate) const STAGE_SCENE: &str = include_str!("../scenes/stage.toml");
+/// Coupled blades in an oval flexible casing, each with three contact nodes, as the paper's.
+pub(crate) const STAGE_NODES_SCENE: &str = include_str!("../scenes/stage-nodes.toml");
 
 /// A cube that flies between two rings.
 pub const CUBE_SCENE: &str = include_str!("../scenes/cube-between-rings.toml");
 
 /// Scenes that ship with tiprub: what stands behind `builtin:`, and the text.
-pub const BUILTIN_SCENES: [(&str, &str); 7] = [
+pub const BUILTIN_SCENES: [(&str, &str); 8] = [
     ("rotor37", ROTOR37_SCENE),
     ("rotor37-one-row", ROTOR37_ONE_ROW_SCENE),
     ("rotor37-paper", ROTOR37_PAPER_SCENE),
     ("flexible-casing", include_str!("../scenes/flexible-casing.toml")),
     ("abradable", include_str!("../scenes/abradable.toml")),
-    ("stage", STAGE_SCENE),
+    ("stage", include_str!("../scenes/stage.toml")),
+    ("stage-nodes", STAGE_NODES_SCENE),
     ("cube-between-rings", CUBE_SCENE),
 ];
 
@@ -150,7 +151,7 @@ pub fn rotor37_scene_with(rom: Rom) -> Result<Scene> {
     builtin_scene("builtin:rotor37-one-row", ROTOR37_ONE_ROW_SCENE, &|_| rom.borrow_mut().take().map(Ok))
 }
 
-/// The scene of the stage, or the same with coarse models.
+/// The scene of the stage with contact nodes, or the same with coarse models.
 ///
 /// # Errors
 /// Never with what ships.
@@ -160,7 +161,7 @@ pub fn stage_scene(coarse: bool, cache: &RomCache, console: &Console) -> Result<
         let model = builtin::rom(&format!("{name}{suffix}"), cache, console)?;
         Some(model.map_err(|failure| failure.to_string()))
     };
-    builtin_scene("builtin:stage", STAGE_SCENE, &reduce)
+    builtin_scene("builtin:stage-nodes", STAGE_NODES_SCENE, &reduce)
 }
 
 /// The embedded scene as text, with its ROM read from `rom_file` and the stop time replaced.

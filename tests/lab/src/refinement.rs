@@ -45,7 +45,7 @@ const STAGE_TIPS: [(Tip, &str, &str); 2] =
 const STAGE_FRICTIONS: [(f64, &str); 3] = [(0.0, "-smooth"), (0.05, ""), (FRICTION, "-digging")];
 /// The mesh of its sector, so that the one that ships is the finest of four: to reduce a finer one takes many minutes.
 const STAGE_MESH: f64 = core::f64::consts::FRAC_1_SQRT_2;
-/// Spaces between contact points of the finest tip of the stage, times those of the scene: 33 patches, or as many as its mesh has places for.
+/// Spaces between contact points of the finest tip of the stage, times those of the scene: its mesh has places for 17 patches.
 const STAGE_FINEST: usize = 2;
 
 /// One scene of the study.
@@ -79,7 +79,8 @@ fn standards() -> Result<Vec<Standard>> {
     }
     for (tip, name, touching) in STAGE_TIPS {
         for (friction, ending) in STAGE_FRICTIONS {
-            let mut settings = scene_source::settings("builtin:stage")?;
+            let scene = if matches!(tip, Tip::Nodes(_)) { "builtin:stage-nodes" } else { "builtin:stage" };
+            let mut settings = scene_source::settings(scene)?;
             settings.contacts[0].friction = friction;
             all.push(Standard {
                 name: format!("{name}{ending}"),
@@ -427,21 +428,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_stage_is_refined_with_the_nodes_that_it_ships_with_and_with_patches() {
+    fn the_stage_is_refined_as_it_ships_and_with_nodes() {
         let all = standards().unwrap();
         let of = |name: &str| all.iter().find(|standard| standard.name == name).unwrap();
-        let shipped = builtin::stage(false).1.tip;
-        for (name, friction) in [("stage-nodes", FRICTION), ("stage-nodes-smooth", 0.0)] {
-            let standard = of(name);
-            assert_eq!(
-                (standard.other.unwrap().0, standard.settings.contacts[0].friction),
-                (shipped, friction),
-                "{name}"
-            );
+        let friction = |name: &str| of(name).settings.contacts[0].friction;
+        for (names, tip) in [
+            (["stage-smooth", "stage", "stage-digging"], builtin::stage_in_rows().tip),
+            (["stage-nodes-smooth", "stage-nodes", "stage-nodes-digging"], builtin::stage(false).1.tip),
+        ] {
+            assert!(names.iter().all(|name| of(name).other.unwrap().0 == tip), "{names:?}");
         }
-        // Five patches up to 33, as far as the mesh has places.
-        let Some((Tip::Patches(own), _)) = of("stage").other else { panic!("patches") };
-        assert_eq!(of("stage").finest_tip * (own - 1) + 1, 33);
+        let shipped = |name: &str| scene_source::settings(name).unwrap().contacts[0].friction;
+        assert_eq!(
+            [friction("stage"), friction("stage-nodes-digging")],
+            ["builtin:stage", "builtin:stage-nodes"].map(shipped)
+        );
         let names: std::collections::BTreeSet<&str> = PICTURES.iter().flat_map(|(.., names)| *names).collect();
         assert_eq!(names.len(), 3 * PICTURES.len(), "a picture is written over another");
         assert!(all.iter().all(|standard| FAMILIES.contains(&standard.family) || standard.family == APART));
