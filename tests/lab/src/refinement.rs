@@ -431,14 +431,14 @@ mod tests {
     fn the_stage_is_refined_as_it_ships_and_with_nodes() {
         let all = standards().unwrap();
         let of = |name: &str| all.iter().find(|standard| standard.name == name).unwrap();
-        let friction = |name: &str| of(name).settings.contacts[0].friction;
+        let friction = |name: &str| of(name).settings.contacts[0].friction.to_bits();
         for (names, tip) in [
             (["stage-smooth", "stage", "stage-digging"], builtin::stage_in_rows().tip),
             (["stage-nodes-smooth", "stage-nodes", "stage-nodes-digging"], builtin::stage(false).1.tip),
         ] {
             assert!(names.iter().all(|name| of(name).other.unwrap().0 == tip), "{names:?}");
         }
-        let shipped = |name: &str| scene_source::settings(name).unwrap().contacts[0].friction;
+        let shipped = |name: &str| scene_source::settings(name).unwrap().contacts[0].friction.to_bits();
         assert_eq!(
             [friction("stage"), friction("stage-nodes-digging")],
             ["builtin:stage", "builtin:stage-nodes"].map(shipped)
