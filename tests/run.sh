@@ -1,11 +1,15 @@
 #!/bin/sh
-# All tests: Rust (workspace, release), then Python (FMPy) against the packaged FMUs of rotor 37.
+# All tests: Rust (workspace, release), and beside them Python (FMPy) against the packaged FMUs of rotor 37.
 # Works from any directory; ends with pytest's summary line; exit code 1 on any failure.
+#
+# What one core does alone (the library in one unit of code, pytest) runs beside what fills the others; its words are kept
+# in target/tests-logs and told when it has ended.
 set -u
 
 here=$(CDPATH= cd -- "$(dirname -- "$0")" && pwd)
 root=$(dirname -- "$here")
 venv=$root/target/tests-venv
+logs=$root/target/tests-logs
 failed=0
 
 section() {
@@ -13,43 +17,73 @@ section() {
 }
 
 cd "$root" || exit 1
+mkdir -p "$logs" || exit 1
+. packaging/remap.sh
+
+library() {
+    CARGO_ENCODED_RUSTFLAGS=$library_flags cargo build -p tiprub-fmi --profile fmu --target-dir target/product "$@"
+}
+
+libraries() {
+    library --features test-panic &&
+        cp target/product/fmu/libtiprub_fmi.so target/product/test_panic.so &&
+        library
+}
+
+python_environment() {
+    stamp=$venv/requirements.txt
+    if ! cmp -s "$here/requirements.txt" "$stamp"; then
+        rm -rf "$venv"
+        python3 -m venv "$venv" &&
+            "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$here/requirements.txt" &&
+            cp "$here/requirements.txt" "$stamp" || return 1
+    fi
+    echo "ready: $("$venv/bin/python" --version), $(grep -c == "$here/requirements.txt") pinned packages"
+}
+
+# The words of a job, which has ended with the status $2.
+told() {
+    cat "$logs/$1"
+    [ "$2" -eq 0 ]
+}
+
+libraries > "$logs/library" 2>&1 &
+library_job=$!
+python_environment > "$logs/environment" 2>&1 &
+environment_job=$!
+trap 'kill "$library_job" "$environment_job" 2> /dev/null' INT TERM
+
+section "Rust: cargo test --workspace --release --tests, compiled"
+cargo test --workspace --release --tests --no-run || failed=1
 
 section "FMU library, as it ships and with a panic on request: cargo build"
-. packaging/remap.sh
-library() {
-    CARGO_ENCODED_RUSTFLAGS=$library_flags \
-        cargo build -p tiprub-fmi --profile fmu --target-dir target/product "$@" || exit 1
-}
-library --features test-panic
-cp target/product/fmu/libtiprub_fmi.so target/product/test_panic.so || exit 1
-library
-TIPRUB_LIBRARY=$root/target/product/fmu/libtiprub_fmi.so
-TIPRUB_LIBRARY_TEST_PANIC=$root/target/product/test_panic.so
-export TIPRUB_LIBRARY TIPRUB_LIBRARY_TEST_PANIC
-
-section "Rust: cargo test --workspace --release"
-cargo test --workspace --release || failed=1
-
-section "Command line: cargo build"
-cargo build --release || exit 1
-TIPRUB=$root/target/release/tiprub
-export TIPRUB
+wait "$library_job"
+told library $? || exit 1
 
 section "Python environment: $venv"
-stamp=$venv/requirements.txt
-if ! cmp -s "$here/requirements.txt" "$stamp"; then
-    rm -rf "$venv"
-    python3 -m venv "$venv" || exit 1
-    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$here/requirements.txt" || exit 1
-    cp "$here/requirements.txt" "$stamp" || exit 1
-fi
-echo "ready: $("$venv/bin/python" --version), $(grep -c == "$here/requirements.txt") pinned packages"
+wait "$environment_job"
+told environment $? || exit 1
+
+[ "$failed" -eq 0 ] || exit 1
+TIPRUB_LIBRARY=$root/target/product/fmu/libtiprub_fmi.so
+TIPRUB_LIBRARY_TEST_PANIC=$root/target/product/test_panic.so
+# The command line that the tests in Rust run, too.
+TIPRUB=$root/target/release/tiprub
+export TIPRUB_LIBRARY TIPRUB_LIBRARY_TEST_PANIC TIPRUB
+
+"$venv/bin/python" -m pytest -p no:cacheprovider "$here/python" > "$logs/pytest" 2>&1 &
+pytest_job=$!
+trap 'kill "$pytest_job" 2> /dev/null' INT TERM
+
+section "Rust: cargo test --workspace --release --tests"
+cargo test --workspace --release --tests || failed=1
 
 if [ "$failed" -ne 0 ]; then
     echo "the Rust tests failed, see above"
 fi
 
 section "Python: pytest tests/python"
-"$venv/bin/python" -m pytest -p no:cacheprovider "$here/python" || failed=1
+wait "$pytest_job"
+told pytest $? || failed=1
 
 exit "$failed"

@@ -57,8 +57,8 @@ fn every_block_from_a_test_is_held_by_it() {
         let mut words = test.split(' ');
         let (package, file) = (words.next().unwrap(), words.nth(1).unwrap());
         let folder = folders.iter().find(|folder| folder.0 == package).unwrap_or_else(|| panic!("{page}: {command}")).1;
-        let source = fs::read_to_string(root.join(folder).join("tests").join(format!("{file}.rs"))).unwrap();
-        assert!(source.contains(&format!("guide::hold(\"{command}\")")), "{page}: {command}");
+        let holds = format!("guide::hold(\"{command}\")");
+        assert!(book::sources(&root.join(folder).join("tests"), file).contains(&holds), "{page}: {command}");
     }
 }
 

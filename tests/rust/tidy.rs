@@ -85,3 +85,20 @@ fn the_library_is_only_a_shared_library() {
     );
     assert!(!manifest.contains("default = "), "no feature is on in the shipped library");
 }
+
+/// `tests/run.sh` runs no examples of docstrings, since there are none: one that is code would never be compiled.
+#[test]
+fn no_docstring_holds_code_that_nobody_runs() {
+    let mut files = Vec::new();
+    for folder in ["src", "fmi", "modelDescription", "packaging", "tests"] {
+        sources(&root().join(folder), &mut files);
+    }
+    assert!(files.len() > 300);
+    for path in files {
+        let text = std::fs::read_to_string(&path).expect("a source file");
+        let lines = text.lines().map(str::trim_start).filter(|line| line.starts_with("///") || line.starts_with("//!"));
+        let fences = lines.map(|line| line[3..].trim()).filter(|line| line.starts_with("```")).step_by(2);
+        let code: Vec<_> = fences.filter(|fence| *fence != "```text").collect();
+        assert!(code.is_empty(), "{}: {code:?} is compiled by no test", path.display());
+    }
+}

@@ -239,7 +239,16 @@ fn every_command_shown_is_one() {
     }
 }
 
-/// `cargo test -p PACKAGE --test NAME` and `--example NAME` name files that are there.
+/// The sources of a test or an example of this name: its file, or all files of its folder.
+pub fn sources(folder: &Path, name: &str) -> String {
+    if let Ok(text) = fs::read_to_string(folder.join(format!("{name}.rs"))) {
+        return text;
+    }
+    let Ok(entries) = fs::read_dir(folder.join(name)) else { return String::new() };
+    entries.filter_map(|entry| fs::read_to_string(entry.unwrap().path()).ok()).collect()
+}
+
+/// `cargo test -p PACKAGE --test NAME` and `--example NAME` name what is there.
 #[test]
 fn every_test_and_example_named_is_there() {
     let mut count = 0;
@@ -254,16 +263,14 @@ fn every_test_and_example_named_is_there() {
                 continue;
             };
             for at in 0..words.len() {
-                let test = after("--test", at).map(|name| folder.join("tests").join(format!("{name}.rs")));
-                let example = after("--example", at).map(|name| {
-                    let file = folder.join("examples").join(format!("{name}.rs"));
-                    if file.exists() { file } else { folder.join("examples").join(name).join("main.rs") }
-                });
-                let Some(file) = test.or(example) else { continue };
                 // The package of whole-product tests has them beside its library.
-                let file = if package == Some("tiprub-tests") { folder.join(file.file_name().unwrap()) } else { file };
+                let tests = if package == Some("tiprub-tests") { folder.clone() } else { folder.join("tests") };
+                let test = after("--test", at).map(|name| (tests, name));
+                let example = after("--example", at).map(|name| (folder.join("examples"), name));
+                let Some((folder, name)) = test.or(example) else { continue };
                 count += 1;
-                assert!(file.exists(), "{}: `{line}`: there is no {}", page.display(), file.display());
+                let found = sources(&folder, name);
+                assert!(!found.is_empty(), "{}: `{line}`: there is no {name} in {}", page.display(), folder.display());
             }
         }
     }

@@ -1,0 +1,45 @@
+//! The list of libraries inside the FMU, against cargo's own dependency tree.
+
+use std::{collections::BTreeSet, process::Command};
+
+/// (crate, licence) of everything `package` links, itself included, without procedural macros (they run in the compiler).
+fn linked(package: &str) -> BTreeSet<(String, String)> {
+    let output = Command::new(env!("CARGO"))
+        .args([
+            "tree",
+            "--offline",
+            "--edges",
+            "normal,no-proc-macro",
+            "--prefix",
+            "none",
+            "--format",
+            "{p}|{l}",
+            "--package",
+            package,
+        ])
+        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).unwrap();
+    text.lines()
+        .map(|line| {
+            let (package, license) = line.split_once('|').unwrap();
+            let name = package.split_whitespace().next().unwrap();
+            (name.to_string(), license.trim_end_matches(" (*)").to_string())
+        })
+        .collect()
+}
+
+#[test]
+fn the_list_of_contained_libraries_is_complete() {
+    let listed = include_str!("../../assets/third-party.txt");
+    let linked = linked("tiprub-fmi").into_iter().filter(|(name, _)| !name.starts_with("tiprub-"));
+    let lines: String = linked.map(|(name, license)| format!("{name:<20} {license}\n")).collect();
+    let (head, body) = listed.split_once("\n\n").unwrap();
+    assert!(head.contains("licenses"));
+    assert_eq!(
+        body, lines,
+        "packaging/assets/third-party.txt: replace the list after the blank line by the right side"
+    );
+}

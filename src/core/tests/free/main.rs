@@ -1,0 +1,7 @@
+//! Free structures: how they move, and what is refused.
+
+#[path = "../common/counting.rs"]
+mod counting;
+
+mod flight;
+mod refusals;

@@ -1,0 +1,371 @@
+//! Which steps and which friction are refused, what is told of them, and that what is taken is sound.
+
+use crate::blades::{crowded, energy, on_a_ring, round, with_step};
+use nalgebra::DMatrix;
+use tiprub_core::dynamics::modal::ModalModel;
+use tiprub_core::settings::{Scheme, Solver, TimeSettings};
+use tiprub_core::{Scene, Simulation};
+use tiprub_test_models::{self as models, bits, disk, go, real, reference, saved, set, try_started};
+
+/// The largest usable step that a refusal names (s).
+fn usable_step(scene: Scene) -> f64 {
+    let message = try_started(&with_step(scene, 1e-3)).unwrap_err().to_string();
+    let number = message.split("`internal_step_max`) below ").nth(1).and_then(|text| text.split(' ').next());
+    number.and_then(|text| text.parse().ok()).unwrap_or_else(|| panic!("{message}"))
+}
+
+#[test]
+fn massless_boundary_knows_the_stiffest_blade() {
+    let tuned = usable_step(round(Scheme::MasslessBoundary));
+    let mut scene = round(Scheme::MasslessBoundary);
+    scene.settings.structures[0].frequency_factors = vec![1.0; 12];
+    scene.settings.structures[0].frequency_factors[7] = 1.3;
+    let mistuned = usable_step(scene);
+    assert!((mistuned * 1.3 / tuned - 1.0).abs() < 1e-4, "{mistuned:e} of {tuned:e}");
+}
+
+/// Communication steps may become longer than the one that the start expects.
+#[test]
+fn a_step_beyond_that_of_massless_boundary_is_refused_on_the_way() {
+    let usable = usable_step(round(Scheme::MasslessBoundary));
+    let mut scene = with_step(round(Scheme::MasslessBoundary), 1e-4);
+    scene.settings.experiment.communication_step = 0.2 * usable;
+    let mut simulation = try_started(&scene).unwrap();
+    for share in [0.2, 0.99] {
+        go(&mut simulation, share * usable);
+    }
+    let told = simulation.do_step(simulation.time(), 1.01 * usable).unwrap_err().to_string();
+    assert!(told.contains("massless-boundary with an internal step"), "{told}");
+    go(&mut simulation, 0.99 * usable);
+}
+
+#[test]
+fn pressed_blades_gain_no_energy_at_the_largest_step_of_massless_boundary() {
+    for factor in [1.0, 1.3] {
+        let mut scene = round(Scheme::MasslessBoundary);
+        scene.settings.structures[0].frequency_factors = vec![factor; 12];
+        scene.settings.structures[0].damping_ratio = Some(1e-3);
+        let step = 0.999 * usable_step(scene.clone());
+        let mut simulation = try_started(&with_step(scene, step)).unwrap();
+        assert!(simulation.warnings().iter().any(|text| text.contains("gain energy")), "{:?}", simulation.warnings());
+        let mut most: f64 = 0.0;
+        for index in 0..10_000 {
+            set(&mut simulation, "casing_radius_change", -4.2e-4 * (f64::from(index) * step / 2e-3).min(1.0));
+            go(&mut simulation, step);
+            most = most.max(energy(&simulation));
+        }
+        let (gained, supplied) = (-real(&simulation, "impact_loss"), real(&simulation, "external_work"));
+        println!(
+            "factor {factor}, h = {step:.3e} s: largest energy {most:.3} J, {supplied:.3} J supplied, {gained:.1e} J by impacts"
+        );
+        assert!(gained < 0.01 * supplied && most < 1.01 * supplied);
+    }
+}
+
+/// One blade presses on a ring whose modes are raised up to where the step that the blade allows passes over them: they count.
+#[test]
+fn a_stiff_casing_gains_no_energy_at_the_largest_step_of_massless_boundary() {
+    for (raised, seen) in [(1.0, 1.0), (10.0, 1.0), (10.0, 4.0), (60.0, 10.0)] {
+        let mut scene = on_a_ring(round(Scheme::MasslessBoundary));
+        scene.settings.contacts[0].sector_gaps = vec![2e-3; 12];
+        scene.settings.contacts[0].sector_gaps[0] = 3.56e-4;
+        scene.settings.structures.iter_mut().for_each(|structure| structure.damping_ratio = Some(1e-3));
+        scene.roms[1].stiffness *= raised * raised;
+        scene.roms[1].contact_map *= seen;
+        let step = 0.999 * usable_step(scene.clone());
+        let mut simulation = try_started(&with_step(scene, step)).unwrap();
+        let (mut most, mut supplied) = (0.0_f64, 0.0_f64);
+        for index in 0..5000 {
+            set(&mut simulation, "casing_radius_change", -4.2e-4 * (f64::from(index) * step / 2e-3).min(1.0));
+            go(&mut simulation, step);
+            most = most.max(energy(&simulation));
+            supplied = supplied.max(real(&simulation, "external_work"));
+        }
+        let gained = -real(&simulation, "impact_loss");
+        println!(
+            "{raised}, {seen}: h = {step:.3e} s, {most:.3} J at most, {supplied:.3} J supplied, {gained:.1e} J by impacts"
+        );
+        assert!(gained < 0.01 * supplied && most < 1.01 * supplied, "{raised}, {seen}");
+    }
+}
+
+#[test]
+fn flutter_is_told_with_massless_boundary_as_with_modal_exact() {
+    let rate = |scheme| {
+        let mut scene = with_step(round(scheme), 2e-7);
+        scene.settings.contacts[0].friction = 0.15;
+        let warnings = try_started(&scene).unwrap().warnings().to_vec();
+        let number =
+            warnings.iter().find_map(|text| text.split("grows by ").nth(1)?.split(' ').next()).map(str::to_owned);
+        let number = number.unwrap_or_else(|| panic!("{scheme:?}: {warnings:?}"));
+        assert_eq!(warnings.iter().filter(|text| text.contains("flutter")).count(), 1, "{warnings:?}");
+        number.parse::<f64>().unwrap()
+    };
+    let (massless, exact) = (rate(Scheme::MasslessBoundary), rate(Scheme::ModalExact));
+    println!("growth rates {massless} and {exact} 1/s");
+    assert!((massless / exact - 1.0).abs() < 0.02);
+}
+
+#[test]
+fn a_restored_state_brings_the_limits_of_its_own_parameters() {
+    let mut scene = with_step(round(Scheme::CentralDifference), 1e-3);
+    scene.settings.experiment.communication_step = 1e-6;
+    scene.settings.contacts[0].solver = Solver::Lcp;
+    let mut simulation = try_started(&scene).unwrap();
+    simulation.do_step(0.0, 1e-6).unwrap();
+    let state = saved(&simulation);
+    let expected = simulation.do_step(1e-6, 1e-4).unwrap_err().to_string();
+    assert!(expected.contains("ω_max"), "{expected}");
+    let mut fresh = Simulation::new(&scene).unwrap();
+    let mut other = Simulation::new(&scene).unwrap();
+    other.set_integer(reference(&other, "scheme"), 2).unwrap();
+    other.initialise(0.0).unwrap();
+    for instance in [&mut fresh, &mut other] {
+        instance.restore_state(&state).unwrap();
+        let found = instance.do_step(1e-6, 1e-4).map_err(|error| error.to_string());
+        assert_eq!(found, Err(expected.clone()));
+    }
+}
+
+#[test]
+fn a_refused_friction_leaves_the_limits_of_the_one_in_use() {
+    // Growth by friction forbids the longer step, at which central differences are stable otherwise.
+    let (short, long) = (1e-6, 5e-5 / 7.0);
+    let mut scene = models::rub(3);
+    scene.settings.time = TimeSettings { scheme: Scheme::CentralDifference, step: 1.0, ..TimeSettings::default() };
+    scene.settings.experiment.communication_step = short;
+    let mut simulation = try_started(&scene).unwrap();
+    let mut twin = simulation.clone();
+    let friction = reference(&simulation, "friction_coefficient");
+    let refused =
+        [0.9, 1.4, 1.9, 2.0].into_iter().filter(|value| simulation.set_real(friction, *value).is_err()).count();
+    assert!(refused == 4, "a friction is accepted: the test would show nothing");
+    for length in [short, long, short, long, 0.5 * short] {
+        let outcomes = [&mut simulation, &mut twin].map(|one| one.do_step(one.time(), length));
+        assert_eq!(outcomes[0], outcomes[1]);
+        let grows = outcomes[1].as_ref().is_err_and(|error| error.to_string().contains("grows"));
+        assert_eq!(grows, length > short, "{:?}", outcomes[1]);
+    }
+    assert_eq!(bits(&simulation), bits(&twin));
+}
+
+#[test]
+fn warnings_hold_for_the_step_that_is_taken_and_are_told_once() {
+    let mut scene = with_step(models::rub(3), 8e-6);
+    scene.settings.contacts[0].friction = 0.0;
+    // ω_max·h = 2 lies at 7.96e-6 s.
+    scene.settings.experiment.communication_step = 5e-6;
+    let mut simulation = try_started(&scene).unwrap();
+    assert!(simulation.warnings().is_empty(), "{:?}", simulation.warnings());
+    let mut told = Vec::new();
+    for length in [5e-6, 7.9e-6, 8e-6, 8e-6, 4e-6, 1.6e-5] {
+        go(&mut simulation, length);
+        told.push(simulation.take_notes().join("; "));
+    }
+    assert!(told[2].contains("8.000e-6"), "{told:?}");
+    assert_eq!(told.iter().filter(|text| !text.is_empty()).count(), 1, "{told:?}");
+    // Told at the start for the step to expect, it is told again when the step is materially longer.
+    let mut scene = with_step(scene, 2e-5);
+    scene.settings.experiment.communication_step = 1e-5;
+    let mut simulation = try_started(&scene).unwrap();
+    assert!(simulation.warnings().join(" ").contains("1.000e-5"), "{:?}", simulation.warnings());
+    let steps = [1e-5, 1.1e-5, 2e-5, 1e-5, 2e-5];
+    let told = steps.map(|length| {
+        go(&mut simulation, length);
+        simulation.take_notes().len()
+    });
+    assert_eq!(told, [0, 0, 1, 0, 0]);
+}
+
+#[test]
+fn the_other_sense_is_told_of_when_the_rotor_turns_that_way() {
+    // Slip in one sense only makes this blade flutter.
+    let mut scene = with_step(models::rub(3), 1e-6);
+    let flutters = |scene: &Scene| {
+        let warnings = try_started(scene).unwrap().warnings().to_vec();
+        warnings.iter().filter(|text| text.contains("flutter")).count()
+    };
+    scene.settings.structures[0].speed = -1300.0;
+    let backwards = flutters(&scene);
+    scene.settings.structures[0].speed = 1300.0;
+    let forwards = flutters(&scene);
+    assert!(backwards > 0, "{backwards} {forwards}");
+    let mut simulation = try_started(&scene).unwrap();
+    let other = simulation.if_reversed();
+    assert_eq!(other.len(), backwards);
+    simulation.do_step(0.0, 1e-6).unwrap();
+    assert!(simulation.take_notes().is_empty());
+    for (speed, expected) in [(-1300.0, backwards), (1300.0, 0), (-1300.0, 0)] {
+        set(&mut simulation, "speed", speed);
+        go(&mut simulation, 1e-6);
+        assert_eq!(simulation.take_notes().len(), expected, "{speed}");
+    }
+}
+
+/// What is too large to be looked at is told, and only where friction makes it matter.
+#[test]
+fn growth_that_is_not_looked_at_is_told() {
+    let told = |scheme: Scheme, modes: usize, friction: f64| {
+        let mut scene = models::rub(2);
+        scene.settings.time.scheme = scheme;
+        let own = scene.roms[0].order();
+        let rom = &mut scene.roms[0];
+        let frequency = |mode: usize| 2e4 + 50.0 * mode as f64;
+        let entry = |row: usize| if row < own { rom.stiffness[(row, row)] } else { frequency(row).powi(2) };
+        let stiffness = DMatrix::from_fn(modes, modes, |i, j| if i == j { entry(i) } else { 0.0 });
+        rom.contact_map = rom.contact_map.clone().resize_horizontally(modes, 0.0);
+        rom.mass = rom.mass.clone().resize(modes, modes, 0.0);
+        (own..modes).for_each(|mode| rom.mass[(mode, mode)] = 1.0);
+        rom.stiffness = stiffness;
+        scene.settings.contacts[0].friction = friction;
+        let simulation = models::started(&scene);
+        simulation.warnings().iter().any(|text| text.contains("is not looked at with"))
+    };
+    for scheme in [Scheme::ModalExact, Scheme::Galerkin] {
+        let found = [told(scheme, 151, 0.1), told(scheme, 151, 0.0), told(scheme, 150, 0.1)];
+        assert_eq!(found, [true, false, false], "{scheme:?}");
+    }
+}
+
+/// What a shorter step is refused for, a longer one is too; the step that the refusal names is taken.
+#[test]
+fn steps_that_add_growth_are_refused_from_one_length_on() {
+    let mut named = 0;
+    for (seed, nodes) in (1..13).zip([2, 3, 1].into_iter().cycle()) {
+        let plain = crowded(nodes, 12, seed);
+        let highest = ModalModel::from_rom(&plain.roms[0], 0.0).unwrap().largest_frequency();
+        for scheme in [Scheme::ModalExact, Scheme::CentralDifference] {
+            let at = |step: f64| {
+                let mut scene = with_step(plain.clone(), step);
+                scene.settings.time.scheme = scheme;
+                scene.settings.contacts[0].friction = 0.3;
+                scene.settings.structures[0].damping_ratio = Some(1e-3);
+                try_started(&scene).map(drop).map_err(|error| error.to_string())
+            };
+            let mut refused = None;
+            for octave in 0..10 {
+                let outcome = at(0.1 / highest * f64::from(1 << octave));
+                assert!(refused.is_none() || outcome.is_err(), "{seed}, {scheme:?}: {refused:?}");
+                let Err(message) = outcome else { continue };
+                if let Some((_, rest)) = message.split_once("too long for friction") {
+                    let step = rest.split("`internal_step_max`) to ").nth(1).and_then(|text| text.split(' ').next());
+                    if let Some(step) = step {
+                        named += 1;
+                        assert_eq!(at(step.parse().unwrap()), Ok(()), "{message}");
+                    }
+                    refused = Some(message);
+                }
+            }
+        }
+    }
+    assert!(named > 0);
+}
+
+/// Remedies work under the preset, and name the keys of the scene.
+#[test]
+fn remedies_are_those_that_the_preset_leaves() {
+    let mut scene = with_step(round(Scheme::CentralDifference), 1e-5);
+    let told = |scene: &Scene| try_started(scene).unwrap_err().to_string();
+    let plain = told(&scene);
+    assert!(plain.contains("`time.step`") && plain.contains("modal-exact"), "{plain}");
+    scene.settings.preset = tiprub_core::settings::Preset::Paper;
+    scene.settings.contacts[0].solver = Solver::Film;
+    let paper = told(&scene);
+    assert!(paper.contains("leave `preset` out") && !paper.contains("modal-exact"), "{paper}");
+}
+
+/// A blade that friction bends into the casing: the warning names the µ* above which it does, and there is one only.
+#[test]
+fn digging_in_is_told_with_its_friction() {
+    // A node on one leaning spring: w_nn/w_nt = cot of its lean.
+    let place = models::node("tip", [models::RADIUS, 0.0, 0.0], 0.0);
+    let shape =
+        |row: usize, mode: usize| [[0.5, 1.0, 0.0], [1.0, -0.5, 0.0], [0.0, 0.0, 1.0], [0.1, 0.1, 0.0]][mode][row];
+    let mut rom = models::modal("leaning", &[1000.0, 4000.0, 5000.0, 9000.0], shape, vec![place]);
+    rom.damping_ratio = 0.005;
+    let mut told = Vec::new();
+    for speed in [1300.0, -1300.0] {
+        let mut scene = with_step(models::round(rom.clone()), 1e-7);
+        scene.settings.structures[0].speed = speed;
+        scene.settings.contacts[0].friction = 0.9;
+        let warnings = try_started(&scene).unwrap().warnings().to_vec();
+        assert!(warnings.len() <= 1, "{warnings:?}");
+        told.extend(warnings);
+    }
+    // Σ φ_r²/ω² over Σ φ_r φ_θ/ω², in units of the first.
+    let [along, across] = [(0.25 + 1.0 / 16.0 + 0.01 / 81.0), (0.5 - 0.5 / 16.0 + 0.01 / 81.0)];
+    let expected = format!("µ* = {:.3}", along / across);
+    // It does so without swinging, and nothing else grows.
+    let told = told.iter().filter(|text| text.contains("digs in")).collect::<Vec<_>>();
+    assert!(told.len() == 1 && told[0].contains(&expected), "{expected}: {told:?}");
+    assert!(told[0].contains("1/s and 0 Hz") && !told[0].contains("flutter"), "{told:?}");
+}
+
+/// A casing that turns as it yields: under one blade its part of W is the rank-one matrix c(1 − µτ), whatever the angle.
+#[test]
+fn what_a_casing_does_to_solvability_is_told_with_its_place() {
+    let told = |turned: f64, friction: f64| {
+        let mut ring = models::ring(36, 3);
+        let shape = |row: usize, _: usize| [1.0, turned, 0.0][row % 3];
+        let turning = models::modal("ring", &[3000.0], shape, ring.contact_nodes.clone());
+        (ring.mass, ring.stiffness, ring.contact_map) = (turning.mass, turning.stiffness, turning.contact_map);
+        ring.extras.thermal = None;
+        let mut scene = round(Scheme::ModalExact);
+        models::on_ring(&mut scene, ring, 0.01);
+        scene.settings.contacts[0].friction = friction;
+        let warnings = try_started(&scene).unwrap().warnings().to_vec();
+        warnings.into_iter().filter(|text| text.contains("casing's part")).collect::<Vec<_>>()
+    };
+    for (turned, friction) in [(6.0, 0.15), (0.0, 0.15), (1e3, 0.0)] {
+        assert!(told(turned, friction).is_empty(), "{:?}", told(turned, friction));
+    }
+    for turned in [7.0, -7.0] {
+        let told = told(turned, 0.15);
+        assert!(told.len() == 1 && told[0].contains("-1.00e0 of the largest, at θ = 0.00 rad"), "{told:?}");
+    }
+}
+
+/// Blades of four nodes, of many alone and together: what grows most when all are closed is told of all.
+#[test]
+fn growth_of_many_nodes_together_is_told_of_them_all() {
+    let (mut alone, mut together) = (0, 0);
+    for seed in 1..12 {
+        let mut scene = with_step(crowded(4, 16, seed), 1e-7);
+        scene.settings.contacts[0].friction = 0.5;
+        let Ok(simulation) = try_started(&scene) else { continue };
+        for text in simulation.warnings().iter().filter(|text| text.contains("flutter")) {
+            *(if text.contains("closed at node_1 to node_4") { &mut together } else { &mut alone }) += 1;
+        }
+    }
+    assert!(together > 0 && alone > 0, "{together}, {alone}");
+}
+
+/// The number of blades that is told may press on the casing at once, each adding as much as the first.
+#[test]
+fn massless_boundary_tells_how_many_blades_may_press_at_once() {
+    let told = |blades: usize, share: f64| {
+        let mut scene = on_a_ring(round(Scheme::MasslessBoundary));
+        scene.roms[0] = models::rich_blade(blades);
+        scene.roms[1].contact_map *= 4.0;
+        let step = share * usable_step(scene.clone());
+        let warnings = try_started(&with_step(scene, step)).unwrap().warnings().to_vec();
+        let many = warnings.iter().find_map(|text| text.split("stable for up to ").nth(1)?.split(' ').next());
+        many.map(|many| many.parse::<usize>().unwrap())
+    };
+    let many = told(200, 0.9).unwrap();
+    assert!((1..200).contains(&many), "{many}");
+    assert_eq!([told(many, 0.9), told(many + 1, 0.9)], [None, Some(many)]);
+}
+
+/// Of coupled sectors the sense of the start alone is looked at: the other takes as long again.
+#[test]
+fn the_other_sense_of_a_disk_is_told_to_be_unknown() {
+    let mut simulation = models::started(&disk::with_rotor(disk::Disk::random(6, 1, 9, 0.25, 6).cyclic()));
+    assert!(simulation.if_reversed().is_empty(), "{:?}", simulation.if_reversed());
+    for (speed, expected) in [(1300.0, 0), (-1300.0, 1), (1300.0, 0), (-1300.0, 0)] {
+        set(&mut simulation, "speed", speed);
+        go(&mut simulation, 1e-6);
+        let told = simulation.take_notes();
+        assert_eq!(told.iter().filter(|text| text.contains("was not looked at")).count(), expected, "{told:?}");
+    }
+}

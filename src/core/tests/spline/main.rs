@@ -1,0 +1,10 @@
+//! Surfaces through data points: the spline, open edges, forces on them.
+
+#[path = "../common/casings.rs"]
+mod casings;
+#[path = "../../../../tests/guide.rs"]
+mod guide;
+
+mod conjugacy;
+mod open_surface;
+mod spline;

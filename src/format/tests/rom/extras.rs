@@ -1,0 +1,367 @@
+//! What only some ROM files hold: spin, heat, contact grid.
+
+use crate::loose::Loose;
+use nalgebra::DMatrix;
+use proptest::prelude::*;
+use sha2::{Digest, Sha256};
+use tiprub_core::Rom;
+use tiprub_core::rom::{Basis, ContactGrid, ContactNode, Frame, Patch, RomExtras, RubErrors, Spin, Thermal, Watched};
+use tiprub_format::{read_rom, write_rom};
+use tiprub_test_models::{node, structure};
+
+const AROUND: usize = 6;
+const ALONG: usize = 2;
+
+/// A ring of 6 x 2 contact nodes with `order` coordinates; `value` gives its numbers one by one.
+fn ring(order: usize, value: &mut dyn FnMut() -> f64) -> Rom {
+    let nodes = AROUND * ALONG;
+    let place = |index: usize| {
+        [0.25, (index % AROUND) as f64 * std::f64::consts::TAU / AROUND as f64, (index / AROUND) as f64 * 0.02]
+    };
+    let contact_nodes = (0..nodes).map(|index| node(format!("n{index}"), place(index), 0.0)).collect();
+    let map = DMatrix::from_fn(3 * nodes, order, |_, _| value());
+    let (mass, stiffness) = (DMatrix::identity(order, order), DMatrix::identity(order, order) * 1e6);
+    let ring = structure("ring", mass, stiffness, map, contact_nodes);
+    Rom { frame: Frame::Cylindrical, damping_ratio: 0.001, origin: "by hand".into(), ..ring }
+}
+
+fn spin(order: usize, value: &mut dyn FnMut() -> f64) -> Spin {
+    let mut square = |sign: f64| {
+        let matrix = DMatrix::from_fn(order, order, |_, _| value());
+        (&matrix + matrix.transpose() * sign) * 0.5
+    };
+    Spin {
+        stiffness_speed2: square(1.0),
+        stiffness_speed4: square(1.0) * 1e-9,
+        coriolis: square(-1.0),
+        centrifugal_load: (0..order).map(|_| value()).collect(),
+        centrifugal_load_speed4: (0..order).map(|_| value()).collect(),
+        largest_speed: 1800.0 + value(),
+    }
+}
+
+fn thermal(order: usize, patches: usize, value: &mut dyn FnMut() -> f64) -> Thermal {
+    let patch = |value: &mut dyn FnMut() -> f64| {
+        let (angle, axial) = (value(), value());
+        Patch { angle: [angle, angle + 1.0 + value()], axial: [axial, axial + 1.0 + value().abs()] }
+    };
+    Thermal {
+        loads: DMatrix::from_fn(order, patches, |_, _| value()),
+        patches: (0..patches).map(|_| patch(value)).collect(),
+    }
+}
+
+/// Numbers in (-1, 1), one after the other.
+fn numbers(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        f64::from(u32::try_from(state >> 32).unwrap()) / f64::from(u32::MAX) * 1.999 - 0.9995
+    }
+}
+
+fn complete(seed: u64, order: usize, patches: usize) -> Rom {
+    let mut value = numbers(seed);
+    let mut rom = ring(order, &mut value);
+    rom.extras.spin = Some(spin(order, &mut value));
+    rom.extras.thermal = Some(thermal(order, patches, &mut value));
+    rom.extras.grid = Some(ContactGrid { around: AROUND, along: ALONG, closed: true });
+    let point = |(index, name): (usize, &str)| ContactNode {
+        name: name.into(),
+        position: [0.25, 0.1 * index as f64, value()],
+        ..ContactNode::default()
+    };
+    let points: Vec<ContactNode> = ["leading_edge", "mid_chord"].into_iter().enumerate().map(point).collect();
+    rom.extras.watched = Some(Watched { map: DMatrix::from_fn(6, order, |_, _| value()), points });
+    rom.extras.basis = Basis::FreeInterface;
+    (rom.checks.response_frequencies, rom.checks.response_deviation) = (vec![100.0, 2e3], vec![0.1, value()]);
+    rom.checks.flexibility_deviation = vec![1e-9; rom.contact_nodes.len()];
+    for node in &mut rom.contact_nodes {
+        (node.area, node.length) = (value().abs(), value().abs());
+    }
+    rom
+}
+
+/// What format 1 has no place for, left out.
+fn of_the_first_format(rom: &Rom) -> Rom {
+    let mut rom = rom.clone();
+    (rom.extras.watched, rom.extras.basis) = (None, Basis::default());
+    rom.checks.response_frequencies.clear();
+    rom.checks.response_deviation.clear();
+    rom.checks.flexibility_deviation.clear();
+    rom.contact_nodes.iter_mut().for_each(|node| (node.area, node.length) = (0.0, 0.0));
+    rom
+}
+
+fn rub_errors() -> RubErrors {
+    let found_on = "a light rub, 4 ms".into();
+    RubErrors { found_on, modes: Some(0.0125), patches: None, rows: Some(0.23), mesh: Some(1.0 / 3.0) }
+}
+
+#[test]
+fn what_a_reduction_leaves_of_a_rub_is_kept_as_far_as_it_is_known() {
+    let with = |errors: Option<RubErrors>| {
+        let mut rom = of_the_first_format(&complete(3, 4, 2));
+        rom.checks.rub_errors = errors;
+        rom
+    };
+    let plain = write_rom(&with(None));
+    // Nothing known is nothing written.
+    assert_eq!(write_rom(&with(Some(RubErrors { found_on: "nothing".into(), ..RubErrors::default() }))), plain);
+    let none = RubErrors { found_on: String::new(), patches: Some(0.0), ..rub_errors() };
+    let across = RubErrors { rows: None, mesh: None, ..rub_errors() };
+    for errors in [rub_errors(), none, across] {
+        let rom = with(Some(errors));
+        assert_eq!(read_rom(&write_rom(&rom), "rom").unwrap(), rom);
+    }
+    for (text, told) in [
+        ("modes=0.1,nodes=0.2", "\"nodes=0.2\" names nothing"),
+        ("modes=0.1,modes=0.2", "\"modes=0.2\" is not one number from 0 on"),
+        ("mesh=-1", "\"mesh=-1\" is not one number"),
+        ("mesh=NaN", "\"mesh=NaN\" is not one number"),
+        ("patches", "\"patches\" is not one number"),
+    ] {
+        refused(|file| drop(file.entries.insert("rub_errors".into(), text.into())), &["metadata `rub_errors`", told]);
+    }
+    let alone = |file: &mut Loose| drop(file.entries.insert("rub_errors_found_on".into(), "a rub".into()));
+    refused(alone, &["metadata `rub_errors_found_on`: given without `rub_errors`"]);
+}
+
+#[test]
+fn a_file_is_of_the_first_format_that_holds_it() {
+    let full = complete(3, 4, 2);
+    let plain = of_the_first_format(&full);
+    let version = |rom: &Rom| Loose::of(rom).entries["format_version"].clone();
+    assert_eq!(version(&plain), "1");
+    let with: [fn(&mut Rom, &Rom); 8] = [
+        |rom, full| rom.extras.watched.clone_from(&full.extras.watched),
+        |rom, full| rom.extras.basis = full.extras.basis,
+        |rom, full| rom.checks.response_frequencies.clone_from(&full.checks.response_frequencies),
+        |rom, full| rom.checks.flexibility_deviation.clone_from(&full.checks.flexibility_deviation),
+        |rom, full| rom.contact_nodes[1].area = full.contact_nodes[1].area,
+        |rom, full| rom.contact_nodes[1].length = full.contact_nodes[1].length,
+        |rom, _| rom.checks.rub_errors = Some(rub_errors()),
+        |rom, full| {
+            rom.contact_nodes.clone_from(&full.contact_nodes);
+            (rom.extras.grid, rom.extras.rows) = (None, Some(2));
+        },
+    ];
+    for change in with {
+        let mut rom = plain.clone();
+        change(&mut rom, &full);
+        assert_eq!((version(&rom).as_str(), read_rom(&write_rom(&rom), "rom").unwrap()), ("2", rom));
+    }
+}
+
+#[test]
+fn watched_points_come_whole_and_only_where_they_can() {
+    let rom = complete(5, 3, 1);
+    let refused = |change: &dyn Fn(&mut Loose)| {
+        let mut file = Loose::of(&rom);
+        change(&mut file);
+        read_rom(&file.bytes(), "rom").unwrap_err().to_string()
+    };
+    let told = refused(&|file| drop(file.arrays.remove("watched_positions")));
+    assert!(told.contains("`watched_positions`") && told.contains("`watched_map`"), "{told}");
+    let told = refused(&|file| drop(file.entries.insert("watched_names".into(), "a,a".into())));
+    assert!(told.contains("`watched_names`") && told.contains("twice"), "{told}");
+    let told = refused(&|file| drop(file.entries.insert("basis".into(), "free_interface".into())));
+    assert!(told.contains("`basis`") && told.contains("free-interface"), "{told}");
+    let mut negative = rom.clone();
+    negative.contact_nodes[0].area = -1e-6;
+    let told = read_rom(&write_rom(&negative), "rom").unwrap_err().to_string();
+    assert!(told.contains("`contact_areas`, node 1"), "{told}");
+}
+
+proptest! {
+    #[test]
+    fn extras_survive_writing_and_reading_bit_for_bit(
+        seed in 0..u64::MAX / 2, order in 1..7usize, patches in 1..5usize, has in prop::array::uniform5(any::<bool>()),
+    ) {
+        let mut rom = complete(seed, order, patches);
+        let RomExtras { spin, thermal, grid, harmonics, watched, basis, rows } = rom.extras;
+        rom.extras = RomExtras {
+            spin: spin.filter(|_| has[0]), thermal: thermal.filter(|_| has[1]), grid: grid.filter(|_| has[2]), harmonics,
+            watched: watched.filter(|_| has[3]), basis, rows,
+        };
+        if has[4] {
+            rom = of_the_first_format(&rom);
+        }
+        let bytes = write_rom(&rom);
+        let again = read_rom(&bytes, "rom").unwrap();
+        prop_assert_eq!(&again, &rom);
+        prop_assert_eq!(write_rom(&again), bytes);
+    }
+}
+
+/// Rows of patches are whole rows of two or more, of patches with areas; one row is none.
+#[test]
+fn rows_of_patches_fit_the_patches() {
+    let mut rom = complete(7, 3, 1);
+    (rom.extras.grid, rom.extras.rows) = (None, Some(2));
+    let nodes = rom.contact_nodes.len();
+    assert!(nodes.is_multiple_of(2));
+    let with = |rom: &Rom, rows: &str| {
+        let mut file = Loose::of(rom);
+        file.entries.insert("contact_rows".into(), rows.into());
+        read_rom(&file.bytes(), "rom")
+    };
+    assert_eq!(with(&rom, " 2 ").unwrap().rows(), 2);
+    assert_eq!(with(&rom, "1").unwrap().extras.rows, None);
+    let more = (nodes + 1).to_string();
+    for (rows, told) in [("two", "no whole number"), ("0", "0 rows of"), (more.as_str(), "are rows")] {
+        let error = with(&rom, rows).unwrap_err().to_string();
+        assert!(error.contains("`contact_rows`") && error.contains(told), "{error}");
+    }
+    rom.contact_nodes[0].area = 0.0;
+    assert!(with(&rom, "2").unwrap_err().to_string().contains("not patches with areas"));
+}
+
+/// A rectangle of 4 x 3 nodes with free edges, in a Cartesian frame.
+fn panel(order: usize, value: &mut dyn FnMut() -> f64) -> Rom {
+    let mut rom = ring(order, value);
+    rom.frame = Frame::Cartesian;
+    for (index, node) in rom.contact_nodes.iter_mut().enumerate() {
+        node.position = [(index % 4) as f64 * 0.01, (index / 4) as f64 * 0.02, 0.001 * value()];
+    }
+    rom.extras.grid = Some(ContactGrid { around: 4, along: 3, closed: false });
+    rom
+}
+
+#[test]
+fn an_open_grid_says_so_in_a_third_word() {
+    let mut value = numbers(11);
+    let rom = panel(5, &mut value);
+    let mut file = Loose::of(&rom);
+    assert_eq!(file.entries["contact_grid"], "4,3,open");
+    assert_eq!(read_rom(&file.bytes(), "panel").unwrap(), rom);
+    file.entries.insert("contact_grid".into(), " 4 , 3 , open ".into());
+    assert_eq!(read_rom(&file.bytes(), "panel").unwrap(), rom);
+    for (text, part) in [
+        ("4,3", "a closed contact grid needs a cylindrical frame"),
+        ("4,3,shut", "is not two whole numbers with a comma between them, or these and `,open`"),
+        ("4,3,open,open", "or these and `,open`"),
+        ("5,3,open", "5 around x 3 along"),
+        ("12,1,open", "at least 2 x 2"),
+    ] {
+        file.entries.insert("contact_grid".into(), text.into());
+        let message = read_rom(&file.bytes(), "panel.rom").unwrap_err().to_string();
+        assert!(message.starts_with("panel.rom: ") && message.contains(part), "{text}: {message}");
+    }
+    refused(|file| drop(file.entries.insert("contact_grid".into(), "6,2,open".into())), &["needs a Cartesian frame"]);
+}
+
+/// Written by the release before there were extras.
+#[test]
+fn a_file_without_extras_is_what_it_always_was() {
+    let mut value = numbers(5);
+    let bytes = write_rom(&ring(3, &mut value));
+    let digest: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+    assert_eq!(
+        (bytes.len(), digest.as_str()),
+        (2392, "d97baeef343c74d1d34917d6b55eb51abd1011bf1a3b2eb47abda1920d904261")
+    );
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    for name in ["stiffness_speed2", "coriolis", "centrifugal", "thermal", "largest_speed", "contact_grid"] {
+        assert!(!text.contains(name), "{name}");
+    }
+}
+
+#[test]
+fn units_are_listed_for_the_arrays_in_the_file() {
+    let units = |rom: &Rom| {
+        let bytes = write_rom(rom);
+        let (_, header) = safetensors::SafeTensors::read_metadata(&bytes).unwrap();
+        header.metadata().as_ref().unwrap()["units"].clone()
+    };
+    let mut rom = complete(3, 2, 2);
+    assert!(units(&rom).contains("\nstiffness_speed4 [n, n]: kg s^2\n"), "{}", units(&rom));
+    assert!(units(&rom).contains("\nthermal_patches [patches, 4]: rad, rad, m, m\n"), "{}", units(&rom));
+    assert!(units(&of_the_first_format(&rom)).ends_with("\nthermal_patches [patches, 4]: rad, rad, m, m"));
+    rom.extras.spin = None;
+    assert!(units(&rom).contains("thermal_loads") && !units(&rom).contains("speed"), "{}", units(&rom));
+}
+
+#[track_caller]
+fn refused(change: impl FnOnce(&mut Loose), parts: &[&str]) {
+    let mut file = Loose::of(&complete(9, 2, 2));
+    assert_eq!(read_rom(&file.bytes(), "ring.rom").unwrap(), complete(9, 2, 2));
+    change(&mut file);
+    let message = read_rom(&file.bytes(), "ring.rom").unwrap_err().to_string();
+    for part in ["ring.rom: "].iter().chain(parts) {
+        assert!(message.contains(part), "{part:?} is not in {message:?}");
+    }
+}
+
+#[test]
+fn groups_of_arrays_are_all_there_or_none() {
+    for name in ["stiffness_speed2", "stiffness_speed4", "coriolis", "centrifugal_load", "centrifugal_load_speed4"] {
+        let missing = format!("array `{name}`: missing, although `");
+        refused(|file| drop(file.arrays.remove(name)), &[&missing, "Give all of `stiffness_speed2`, "]);
+    }
+    for (name, other) in [("thermal_loads", "thermal_patches"), ("thermal_patches", "thermal_loads")] {
+        let missing = format!("array `{name}`: missing, although `{other}` is there");
+        refused(|file| drop(file.arrays.remove(name)), &[&missing]);
+    }
+    refused(|file| drop(file.entries.remove("largest_speed")), &["metadata `largest_speed`: missing", "(rad/s)"]);
+    let without = |file: &mut Loose| file.arrays.retain(|name, _| !name.contains("speed") && !name.starts_with('c'));
+    refused(
+        |file| {
+            let kept = ["contact_map", "contact_positions", "contact_meridional_slopes"];
+            let kept = kept.map(|name| (name.to_owned(), file.arrays[name].clone()));
+            without(file);
+            file.arrays.extend(kept);
+        },
+        &["metadata `largest_speed`: given without the array `stiffness_speed2`"],
+    );
+}
+
+#[test]
+fn wrong_shapes_are_refused_by_name() {
+    for name in ["stiffness_speed2", "stiffness_speed4", "coriolis"] {
+        let shape = format!("array `{name}`: shape [4, 1] found, [2, 2] expected");
+        refused(|file| file.array(name).0 = vec![4, 1], &[&shape]);
+        let dimensions = format!("array `{name}`: shape [4] found, [n, n] expected");
+        refused(|file| file.array(name).0 = vec![4], &[&dimensions]);
+    }
+    let parts = ["array `centrifugal_load`: shape [2, 1] found, [n] expected"];
+    refused(|file| file.array("centrifugal_load").0 = vec![2, 1], &parts);
+    let parts = ["array `thermal_patches`: shape [4, 2] found, [4, 4] expected", "two angles and two axial"];
+    refused(|file| file.array("thermal_patches").0 = vec![4, 2], &parts);
+    let parts = ["array `thermal_loads`: shape [1, 4] found, [2, 2] expected"];
+    refused(|file| file.array("thermal_loads").0 = vec![1, 4], &parts);
+    refused(|file| drop(file.arrays.insert("thermal_load".into(), (vec![1], vec![0.0]))), &["`thermal_loads`?"]);
+}
+
+#[test]
+fn values_that_cannot_be_are_refused() {
+    refused(|file| file.array("stiffness_speed2").1[1] += 1.0, &["array `stiffness_speed2`: not symmetric"]);
+    refused(|file| file.array("coriolis").1[0] += 1.0, &["array `coriolis`: not skew-symmetric"]);
+    refused(|file| file.array("centrifugal_load").1[0] = f64::NAN, &["array `centrifugal_load`"]);
+    refused(|file| file.array("thermal_loads").1[0] = f64::INFINITY, &["array `thermal_loads`"]);
+    refused(|file| file.array("thermal_patches").1[5] = -9.0, &["array `thermal_patches`, patch 2", "are no patch"]);
+    for speed in ["0", "-1", "inf", "NaN"] {
+        let change = |file: &mut Loose| drop(file.entries.insert("largest_speed".into(), speed.into()));
+        refused(change, &["ROM metadata `largest_speed`", "not a finite speed > 0"]);
+    }
+    let entry = |name: &'static str, text: &'static str| {
+        move |file: &mut Loose| drop(file.entries.insert(name.into(), text.into()))
+    };
+    refused(entry("largest_speed", "fast"), &["metadata `largest_speed`: \"fast\" is not such a number"]);
+    for text in ["", "6", "6,2,1", "6,2,open,", "open", "6x2", "-6,2", "6.0,2", "99999999999999999999,2"] {
+        refused(entry("contact_grid", text), &["metadata `contact_grid`", "is not two whole numbers with a comma"]);
+    }
+    refused(entry("contact_grid", "2,6"), &["metadata `contact_grid`: 2 around x 6 along"]);
+    refused(entry("contact_grid", "18446744073709551615,2"), &["metadata `contact_grid`"]);
+    refused(entry("contact_grid", "4,3"), &["metadata `contact_grid`", "is not at its place of the grid"]);
+    refused(entry("sectors", "3"), &["metadata `contact_grid`", "one sector"]);
+    let spaces = |file: &mut Loose| drop(file.entries.insert("contact_grid".into(), " 6 , 2 ".into()));
+    let mut file = Loose::of(&complete(9, 2, 2));
+    spaces(&mut file);
+    assert_eq!(
+        read_rom(&file.bytes(), "ring").unwrap().extras.grid,
+        Some(ContactGrid { around: 6, along: 2, closed: true })
+    );
+}

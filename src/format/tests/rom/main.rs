@@ -1,0 +1,8 @@
+//! ROM files.
+
+#[path = "../common/loose.rs"]
+mod loose;
+
+mod cyclic;
+mod extras;
+mod file;

@@ -1,0 +1,10 @@
+//! Elements, alone and assembled, against closed forms.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod convergence;
+mod every;
+mod incompatible;
+mod large_displacements;
+mod ordering;

@@ -1,0 +1,4 @@
+//! The stage: blades and casing.
+
+mod blades;
+mod casing;

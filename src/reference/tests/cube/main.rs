@@ -1,0 +1,7 @@
+//! The cube between two rings: scene, methods, codes of others.
+
+mod compare;
+mod film_contacts;
+mod methods;
+mod outside;
+mod scene;

@@ -1,0 +1,96 @@
+//! Codes of others on the cube between two rings beside methods b and c. Their meshes are the same; element matrices, contact
+//! search, normals, friction and tangents are theirs. Tables: `tests/data`, with the commands they come from.
+
+use tiprub_reference::compare::{Agreement, agreement};
+use tiprub_reference::cube::history::History;
+use tiprub_reference::cube::outside;
+use tiprub_reference::cube::scene::{Mass, Scene, Setting};
+use tiprub_reference::methods::{Method, Run, augmented};
+use tiprub_reference::surface::SurfaceKind;
+
+fn facets(friction: f64) -> Setting {
+    Setting { surface: SurfaceKind::Facets, mass: Mass::Consistent, friction, ..Setting::default() }
+}
+
+fn table(text: &str) -> History {
+    outside::read(text, Setting::default().speed).unwrap()
+}
+
+/// A method run as long as a table, and recorded as often.
+fn run(method: Method, friction: f64, step: f64, theirs: &History) -> History {
+    let stride = (1..).find(|k| (*k as f64 + 0.5) * step > theirs.step).unwrap();
+    let scene = Scene::new(facets(friction)).unwrap();
+    let end = theirs.times[theirs.times.len() - 1] + step;
+    method.run(&scene, &Run { step, end, stride, snapshots: vec![] }).unwrap()
+}
+
+fn spring(penalty: f64, corners: f64) -> Method {
+    Method::Augmented(augmented::Options { penalty, corners, tolerance: 1.0 })
+}
+
+/// Compare up to two windows of force before the end of a table.
+fn compare(name: &str, a: &History, b: &History, end: f64) -> Agreement {
+    let found = agreement(a, b, Setting::default().speed, end - 4e-5, end);
+    println!("{name}: {found:?}");
+    found
+}
+
+fn assert_within(found: &Agreement, bounds: [f64; 3], name: &str) {
+    for (part, (apart, bound)) in ["u1x", "slowing", "u1z"].iter().zip(found.touching.iter().zip(bounds)) {
+        assert!(*apart < bound, "{name}: {part} {apart}");
+    }
+}
+
+/// End of the contact of node 1 (s).
+const TOUCHING: f64 = 3.58e-4;
+
+/// GetFEM's rays, normals and tangents with Newmark's method without friction against c with the same contact stiffness.
+#[test]
+fn getfem_has_the_same_contact_without_friction() {
+    let theirs = table(include_str!("../data/cube_getfem_newmark.csv"));
+    let found = compare("c and GetFEM, µ = 0", &theirs, &run(spring(9.42e7, 1.0), 0.0, 2e-6, &theirs), TOUCHING);
+    assert_within(&found, [2e-5; 3], "GetFEM");
+    assert!(found.windows < 1e-4 && found.impulse.abs() < 1e-5 && found.left_impulse.abs() < 1e-5, "{found:?}");
+}
+
+/// The same with its Coulomb law and 5e8 N/m a node, µ = 0.15: nodes rebound from the springs, one by one.
+#[test]
+fn getfem_has_the_same_penalty_and_friction() {
+    let theirs = table(include_str!("../data/cube_getfem_penalty.csv"));
+    let found = compare("c and GetFEM", &theirs, &run(spring(5e8, 1.0), 0.15, 1e-6, &theirs), TOUCHING);
+    assert_within(&found, [2e-3, 1e-3, 1e-3], "GetFEM");
+    assert!(found.windows < 0.015 && found.impulse.abs() < 2e-3, "{found:?}");
+    assert!(found.left_impulse.abs() < 1e-3 && found.exit.abs() < 2e-5, "{found:?}");
+}
+
+/// The same with 1e11 N/m a node, so that gaps close to 20 nm, in b's time stepping, against b.
+#[test]
+fn getfem_holds_gaps_like_the_bipotential() {
+    let theirs = table(include_str!("../data/cube_getfem_held.csv"));
+    let end = theirs.times[theirs.times.len() - 1];
+    let found = compare("b and GetFEM", &theirs, &run(Method::Bipotential, 0.15, 1e-6, &theirs), end);
+    assert!(found.contact.iter().all(|apart| *apart < 4e-4), "{found:?}");
+    assert!(found.windows < 1e-3 && found.left_impulse.abs() < 5e-4, "{found:?}");
+}
+
+/// CalculiX with small strains against c with the stiffness that CalculiX has: 1e12 Pa/m over its areas.
+#[test]
+fn calculix_has_the_same_contact_with_small_strains() {
+    let theirs = table(include_str!("../data/cube_calculix_small.csv"));
+    let found = compare("c and CalculiX", &theirs, &run(spring(1e8, 0.75), 0.0, 2e-6, &theirs), 3.6e-4);
+    assert_within(&found, [2.5e-3, 2e-3, 1.5e-3], "CalculiX");
+    assert!(found.windows < 0.02 && found.impulse.abs() < 0.015, "{found:?}");
+}
+
+/// Finite strains with one contact stiffness: CalculiX and GetFEM agree with each other, small strains do not.
+#[test]
+fn finite_strains_are_what_keeps_calculix_apart() {
+    let calculix = table(include_str!("../data/cube_calculix.csv"));
+    let getfem = table(include_str!("../data/cube_getfem_stvk.csv"));
+    let together = compare("CalculiX and GetFEM", &calculix, &getfem, 3.6e-4);
+    assert_within(&together, [2.5e-3, 2e-3, 1.5e-3], "CalculiX and GetFEM");
+    let small = run(spring(1e8, 0.75), 0.0, 2e-6, &calculix);
+    let apart = compare("CalculiX and small strains", &calculix, &small, 3.6e-4);
+    assert!((0.03..0.045).contains(&apart.touching[1]), "{apart:?}");
+    assert!((0.03..0.045).contains(&apart.touching[2]), "{apart:?}");
+}

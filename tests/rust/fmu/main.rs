@@ -1,0 +1,10 @@
+//! The FMU library through its C ABIs: what it exports, the call order, steps, saved states, and hosts that break the rules.
+
+mod call_order;
+mod exports;
+mod features;
+mod host;
+mod hostile;
+mod panics;
+mod states;
+mod stepping;
