@@ -3,6 +3,9 @@
 use tiprub_core::settings::*;
 use tiprub_format::{FIELDS, parse_scene, write_scene};
 
+use crate::common;
+use crate::features;
+
 #[test]
 fn a_scene_with_every_feature_survives_writing_and_reading() {
     let scene = features::scene_with_every_feature();

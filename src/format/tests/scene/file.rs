@@ -4,6 +4,8 @@ use proptest::prelude::*;
 use tiprub_core::settings::*;
 use tiprub_format::{Error, builtin_model, parse_scene, write_scene};
 
+use crate::common;
+
 const GOOD: &str = r#"name = "demo"
 [[structure]]
 name = "rotor"

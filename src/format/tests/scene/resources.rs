@@ -12,6 +12,8 @@ use tiprub_format::{
 };
 use tiprub_test_models::{node, structure};
 
+use crate::common;
+
 fn rom() -> Rom {
     let stiffness = DMatrix::from_row_slice(2, 2, &[3e6, -1e6, -1e6, 4e6]);
     let map = DMatrix::from_row_slice(3, 2, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
