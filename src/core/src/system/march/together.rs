@@ -53,6 +53,8 @@ pub struct One {
     state: SectorState,
     advance: Advance,
     pub record: Record,
+    /// Nothing pushes it, and its gaps are wider than others penetrate: others move it by less in a step.
+    far: bool,
 }
 
 /// A disk of coupled sectors.
@@ -122,6 +124,7 @@ impl Together {
                     state: SectorState::new(modes, of.nodes()),
                     advance: Advance::new(modes, of.nodes()),
                     record: Record::new(of.nodes(), pairs.len()),
+                    far: false,
                 });
             }
         }
@@ -250,14 +253,25 @@ impl One {
 }
 
 impl Marching<'_> {
-    /// A sector facing its surfaces, and the surfaces' structures at a step.
+    /// All sectors, facing their surfaces and the surfaces' structures at a step; none is far any more.
     fn each(
         &mut self,
+        at: (Step, Kind),
+        to: impl FnMut(&mut Facing, (&mut Trial, &mut SectorState), &Tables, Option<&mut Disk>),
+    ) {
+        self.together.sectors.iter_mut().for_each(|one| one.far = false);
+        self.each_of(false, at, to);
+    }
+
+    /// The same of sectors that are far, or are not.
+    fn each_of(
+        &mut self,
+        far: bool,
         (step, kind): (Step, Kind),
         mut to: impl FnMut(&mut Facing, (&mut Trial, &mut SectorState), &Tables, Option<&mut Disk>),
     ) {
         let Together { sectors, casings, casing_of, tables, disks, .. } = &mut *self.together;
-        for one in sectors {
+        for one in sectors.iter_mut().filter(|one| one.far == far) {
             let ground = (!casings.is_empty()).then_some(Ground {
                 casings,
                 casing_of,
@@ -348,7 +362,7 @@ impl Marching<'_> {
         for casing in &mut self.together.casings {
             (1..=points).for_each(|point| casing.whole.forces_mut(point).fill(0.0));
         }
-        self.each((step, kind), |facing, (trial, _), _, _| {
+        self.each_of(false, (step, kind), |facing, (trial, _), _, _| {
             for (point, node) in (1..=points).flat_map(|point| (0..trial.nodes()).map(move |node| (point, node))) {
                 if trial.multiplier(point, node) != 0.0 {
                     let force = trial.force(point, node);
@@ -362,26 +376,45 @@ impl Marching<'_> {
         }
     }
 
-    /// Gaps at all points: the smallest, the largest of a contact that pushes, and whether nothing does.
-    fn find_gaps(&mut self, step: Step, kind: Kind, points: usize) -> (f64, f64, bool) {
+    /// Gaps at all points, of sectors that are far or are not: the smallest, the largest of a contact that pushes, and whether nothing does.
+    fn find_gaps(&mut self, step: Step, kind: Kind, points: usize, far: bool) -> (f64, f64, bool) {
         if self.together.casings.is_empty() {
-            self.each((step, kind), |facing, (trial, _), _, _| {
+            self.each_of(far, (step, kind), |facing, (trial, _), _, _| {
                 trial.find_gaps(facing);
             });
         } else {
-            self.each((step, kind), |_, (trial, _), _, _| trial.move_rows());
+            self.each_of(far, (step, kind), |_, (trial, _), _, _| trial.move_rows());
             for point in 1..=points {
                 self.bend_surfaces(point);
-                self.each((step, kind), |facing, (trial, _), _, _| {
+                self.each_of(far, (step, kind), |facing, (trial, _), _, _| {
                     trial.look_at(point, |node, moved| facing.gap(node, point, moved));
                 });
             }
         }
         let mut found = (f64::INFINITY, 0.0_f64, true);
-        for one in &self.together.sectors {
+        for one in self.together.sectors.iter().filter(|one| one.far == far) {
             let (lowest, largest) = one.trial.extremes();
             let least = if lowest.is_nan() || found.0.is_nan() { f64::NAN } else { found.0.min(lowest) };
             found = (least, found.1.max(largest), found.2 && one.trial.rests());
+        }
+        found
+    }
+
+    /// Tell sectors that are far from those that may touch, where the lowest gap is `lowest` (m).
+    fn tell_apart(&mut self, lowest: f64) {
+        for one in &mut self.together.sectors {
+            one.far = one.trial.rests() && one.trial.extremes().0 > -lowest;
+        }
+    }
+
+    /// Sectors that are far are looked at again. True where one of them touches; it is far no more.
+    fn look_again(&mut self, step: Step, kind: Kind, points: usize) -> bool {
+        let (lowest, ..) = self.find_gaps(step, kind, points, true);
+        // What is no number is found out by the next look at all that are near.
+        let found = lowest.is_nan() || lowest < 0.0;
+        for one in self.together.sectors.iter_mut().filter(|one| one.far) {
+            let lowest = one.trial.extremes().0;
+            one.far = lowest >= 0.0;
         }
         found
     }
@@ -399,7 +432,7 @@ impl Marching<'_> {
     /// Forces that close what penetrates, sector by sector.
     fn solve(&mut self, step: Step, kind: Kind, verdict: &mut Verdict) -> bool {
         let mut solved = true;
-        self.each((step, kind), |facing, (trial, _), tables, _| {
+        self.each_of(false, (step, kind), |facing, (trial, _), tables, _| {
             let (lowest, _) = trial.extremes();
             if solved && (lowest < 0.0 || !trial.rests()) {
                 solved = trial.solve(tables.levels[step.level].compliance_of(kind), facing, verdict);
@@ -516,13 +549,18 @@ impl Marched for Marching<'_> {
         let (precision, mut verdict) = (self.together.demand.precision, Verdict::default());
         for pass in 0..PASSES {
             self.push(step, kind, points);
-            let (lowest, largest, rests) = self.find_gaps(step, kind, points);
+            let (lowest, largest, rests) = self.find_gaps(step, kind, points, false);
             if lowest.is_nan() {
                 return verdict;
             }
-            if (rests && lowest >= 0.0) || (pass > 0 && lowest >= -precision && largest <= precision) {
+            if ((rests && lowest >= 0.0) || (pass > 0 && lowest >= -precision && largest <= precision))
+                && !self.look_again(step, kind, points)
+            {
                 verdict.solved = true;
                 break;
+            }
+            if pass == 0 {
+                self.tell_apart(lowest.min(-precision));
             }
             if pass + 1 == PASSES || !self.solve(step, kind, &mut verdict) {
                 return verdict;
