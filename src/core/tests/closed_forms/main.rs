@@ -9,6 +9,5 @@ mod bouncing_bar;
 mod drift;
 mod orders;
 mod prescribed;
-mod spin;
 mod stops;
 mod waves;

@@ -65,16 +65,18 @@ const INPUTS: [(&str, f64, f64); 8] = [
     ("initial_rotor_angle", 0.0, 0.3),
 ];
 
+type Kind = (&'static str, fn(&mut Scene));
+/// Each kind of surface.
+const KINDS: [Kind; 3] = [
+    ("revolution", |_| {}),
+    ("spline", |scene| scene.settings.surfaces[0].spline = Some(SplineSettings::default())),
+    ("flexible casing", models::flexible),
+];
+
 /// Each kind of surface, each input alone and all of them together.
 #[test]
 fn gaps_are_distances_in_space_whatever_moves_casing_and_shaft() {
-    type Kind = (&'static str, fn(&mut Scene));
-    let kinds: [Kind; 3] = [
-        ("revolution", |_| {}),
-        ("spline", |scene| scene.settings.surfaces[0].spline = Some(SplineSettings::default())),
-        ("flexible casing", models::flexible),
-    ];
-    for (kind, change) in kinds {
+    for (kind, change) in KINDS {
         let mut scene = movable();
         change(&mut scene);
         let template = Simulation::new(&scene).unwrap();
@@ -123,13 +125,7 @@ fn gaps_are_distances_in_space_whatever_moves_casing_and_shaft() {
 /// not.
 #[test]
 fn a_point_at_a_contact_node_has_its_clearance_in_a_rub() {
-    type Kind = (&'static str, fn(&mut Scene));
-    let kinds: [Kind; 3] = [
-        ("revolution", |_| {}),
-        ("spline", |scene| scene.settings.surfaces[0].spline = Some(SplineSettings::default())),
-        ("flexible casing", models::flexible),
-    ];
-    for (kind, change) in kinds {
+    for (kind, change) in KINDS {
         let mut scene = models::rub(SECTORS);
         let rom = &mut scene.roms[0];
         rom.contact_nodes.iter_mut().for_each(|node| node.position[0] += SLOPE * node.position[2]);

@@ -1,12 +1,11 @@
 //! What a scene may ask for, in all combinations: the ledger, states, laws of mechanics, no allocation.
 
-#[path = "../common/checks.rs"]
-mod checks;
 #[path = "../common/counting.rs"]
 mod counting;
 
 mod apart;
 mod casing;
+mod checks;
 mod coating;
 mod cyclic;
 mod cyclic_features;

@@ -6,18 +6,7 @@ use tiprub_core::variables::{Causality, Kind, Variability};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, disk, go, lattice, real, reference, started};
 
-/// What a scene of a hundred steps of 0.1 ms is refused with.
-fn refusal(scene: &Scene) -> String {
-    let run = || {
-        let mut simulation = Simulation::new(scene)?;
-        simulation.initialise(0.0)?;
-        for _ in 0..100 {
-            simulation.do_step(simulation.time(), 1e-4)?;
-        }
-        Ok::<_, tiprub_core::Error>(())
-    };
-    run().expect_err("it was not refused").to_string()
-}
+use crate::blades::refusal;
 
 #[test]
 fn a_rotor_that_skips_over_the_lobes_is_refused_and_can_go_on_slower() {

@@ -26,20 +26,20 @@ fn bumps() -> Scene {
     scene
 }
 
-fn held(mut scene: Scene) -> Scene {
+pub fn held(mut scene: Scene) -> Scene {
     scene.settings.time.input_interpolation = InputInterpolation::Hold;
     scene
 }
 
 /// A round casing around a shaft that whirls.
-fn whirling() -> Scene {
+pub fn whirling() -> Scene {
     let mut scene = bumps();
     scene.settings.surfaces[0].shape = Shape::Circular {};
     scene.settings.structures[0].whirl = true;
     scene
 }
 
-fn spinning_rom() -> Rom {
+pub fn spinning_rom() -> Rom {
     let mut rom = models::rich_blade(6);
     rom.extras.spin = Some(models::spin(rom.order()));
     rom

@@ -5,18 +5,7 @@ use tiprub_core::settings::Shape;
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, started};
 
-/// What a scene of a hundred steps of 0.1 ms is refused with.
-fn refusal(scene: &Scene) -> String {
-    let run = || {
-        let mut simulation = Simulation::new(scene)?;
-        simulation.initialise(0.0)?;
-        for _ in 0..100 {
-            simulation.do_step(simulation.time(), 1e-4)?;
-        }
-        Ok::<_, tiprub_core::Error>(())
-    };
-    run().expect_err("it was not refused").to_string()
-}
+use crate::blades::refusal;
 
 /// Every number of a scene and its ROM, beyond the table of ranges.
 #[test]

@@ -2,24 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use crate::loose::Loose;
+use crate::loose::{Loose, numbers};
 use nalgebra::{Complex, DMatrix};
 use proptest::prelude::*;
 use tiprub_core::Rom;
 use tiprub_core::rom::{Frame, Harmonic, RomChecks, RomExtras};
 use tiprub_format::{read_rom, write_rom};
 use tiprub_test_models::{node, structure};
-
-/// Numbers in (-1, 1), one after the other.
-fn numbers(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    move || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        f64::from(u32::try_from(state >> 32).unwrap()) / f64::from(u32::MAX) * 1.999 - 0.9995
-    }
-}
 
 /// Hermitian, positive definite, exactly its own adjoint; real where nothing can travel.
 fn hermitian(order: usize, real: bool, value: &mut dyn FnMut() -> f64) -> DMatrix<Complex<f64>> {
@@ -60,36 +49,10 @@ fn disk(seed: u64, sectors: usize, nodes: usize, order: impl Fn(usize) -> usize)
     Rom { sectors, frame: Frame::Cylindrical, damping_ratio: 0.005, checks, extras, ..rom }
 }
 
-proptest! {
-    #[test]
-    fn coupled_sectors_survive_writing_and_reading_bit_for_bit(
-        seed in 0..u64::MAX / 2, sectors in 1..9usize, nodes in 1..4usize, orders in prop::collection::vec(1..5usize, 5),
-    ) {
-        let rom = disk(seed, sectors, nodes, |number| orders[number]);
-        let bytes = write_rom(&rom);
-        let again = read_rom(&bytes, "rom").unwrap();
-        prop_assert_eq!(&again, &rom);
-        prop_assert_eq!(write_rom(&again), bytes);
-    }
-
-    #[test]
-    fn any_changed_byte_is_refused_or_harmless(
-        seed in 0..u64::MAX / 2, at in any::<prop::sample::Index>(), change in 1..=255u8,
-    ) {
-        let rom = disk(seed, 5, 1, |_| 2);
-        let mut bytes = write_rom(&rom);
-        let index = at.index(bytes.len());
-        bytes[index] ^= change;
-        if let Ok(read) = read_rom(&bytes, "rom") {
-            prop_assert_eq!(read, rom);
-        }
-    }
-
-    #[test]
-    fn any_truncation_is_refused(seed in 0..u64::MAX / 2, at in any::<prop::sample::Index>()) {
-        let bytes = write_rom(&disk(seed, 6, 2, |number| 1 + number));
-        prop_assert!(read_rom(&bytes[..at.index(bytes.len())], "rom").is_err());
-    }
+/// Disks of all sizes, with any orders.
+pub fn disks() -> impl Strategy<Value = Rom> {
+    (0..u64::MAX / 2, 1..9usize, 1..4usize, prop::collection::vec(1..5usize, 5))
+        .prop_map(|(seed, sectors, nodes, orders)| disk(seed, sectors, nodes, |number| orders[number]))
 }
 
 /// Real and imaginary part lie beside each other, last; rows before columns.
@@ -141,14 +104,7 @@ fn units_of_the_arrays_are_told_once_for_all_nodal_diameters() {
 
 #[track_caller]
 fn refused(sectors: usize, change: impl FnOnce(&mut Loose), parts: &[&str]) {
-    let rom = disk(9, sectors, 1, |_| 2);
-    let mut file = Loose::of(&rom);
-    assert_eq!(read_rom(&file.bytes(), "disk.rom").unwrap(), rom);
-    change(&mut file);
-    let message = read_rom(&file.bytes(), "disk.rom").unwrap_err().to_string();
-    for part in ["disk.rom: "].iter().chain(parts) {
-        assert!(message.contains(part), "{part:?} is not in {message:?}");
-    }
+    crate::loose::refused(&disk(9, sectors, 1, |_| 2), change, parts);
 }
 
 #[test]

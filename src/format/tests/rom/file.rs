@@ -6,16 +6,13 @@ use tiprub_core::Rom;
 use tiprub_core::rom::{ContactNode, Frame, RomChecks};
 use tiprub_format::{Error, read_rom, write_rom};
 
-/// Deterministic numbers in (-1, 1) from a seed: matrices need many, and proptest's own vectors are slow to shrink.
+use crate::cyclic::disks;
+use crate::extras::with_extras;
+
+/// So many numbers in (-1, 1).
 fn numbers(seed: u64, count: usize) -> Vec<f64> {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    let next = |_| {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        f64::from(u32::try_from(state >> 32).unwrap()) / f64::from(u32::MAX) * 2.0 - 1.0
-    };
-    (0..count).map(next).collect()
+    let mut next = crate::loose::numbers(seed);
+    (0..count).map(|_| next()).collect()
 }
 
 fn random_rom(seed: u64, order: usize, nodes: usize, modes: usize, text: String) -> Rom {
@@ -51,9 +48,11 @@ fn random_rom(seed: u64, order: usize, nodes: usize, modes: usize, text: String)
     }
 }
 
+/// Of all kinds.
 fn roms() -> impl Strategy<Value = Rom> {
-    (0..u64::MAX / 2, 1..8usize, 1..5usize, 0..6usize, ".*")
-        .prop_map(|(seed, order, nodes, modes, text)| random_rom(seed, order, nodes, modes, text))
+    let plain = (0..u64::MAX / 2, 1..8usize, 1..5usize, 0..6usize, ".*")
+        .prop_map(|(seed, order, nodes, modes, text)| random_rom(seed, order, nodes, modes, text));
+    prop_oneof![plain, disks(), with_extras()]
 }
 
 fn header_length(bytes: &[u8]) -> usize {
@@ -61,6 +60,8 @@ fn header_length(bytes: &[u8]) -> usize {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { cases: 3 * 256, ..ProptestConfig::default() })]
+
     #[test]
     fn a_rom_survives_writing_and_reading_bit_for_bit(rom in roms()) {
         let bytes = write_rom(&rom);

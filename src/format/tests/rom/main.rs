@@ -1,8 +1,6 @@
 //! ROM files.
 
-#[path = "../common/loose.rs"]
-mod loose;
-
 mod cyclic;
 mod extras;
 mod file;
+mod loose;

@@ -4,11 +4,11 @@ use core::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix};
 use tiprub_core::Rom;
-use tiprub_model::cyclic::CyclicBoundary;
+use tiprub_model::cyclic::{CyclicBoundary, CyclicOptions, ModeSelection};
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::{Element, Mesh};
 use tiprub_model::progress::silent;
-use tiprub_model::reduce::ContactPoint;
+use tiprub_model::reduce::{ContactPoint, ReductionKind};
 use tiprub_model::{FeModel, Material};
 
 use super::{division, linear};
@@ -117,4 +117,15 @@ pub fn pencils(rom: &Rom) -> Vec<[DMatrix<Complex<f64>>; 3]> {
 /// How often a mode of nodal diameter n is there in the disk.
 pub fn copies(nodal_diameter: usize, sectors: usize) -> usize {
     if nodal_diameter == 0 || 2 * nodal_diameter == sectors { 1 } else { 2 }
+}
+
+/// Of a reduction after Craig and Bampton.
+pub fn options(modes: ModeSelection, checked_modes: usize) -> CyclicOptions {
+    CyclicOptions {
+        name: "disk".into(),
+        kind: ReductionKind::FixedInterface,
+        modes,
+        checked_modes,
+        damping_ratio: 0.005,
+    }
 }

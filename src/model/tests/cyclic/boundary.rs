@@ -1,11 +1,11 @@
 //! Pairing of the faces of a sector, and what is refused.
 
-use crate::common::disk::{COARSE, Counts, boundary, model, sector, tips};
-use tiprub_model::cyclic::{CyclicBoundary, CyclicOptions, ModeSelection, PairingReport, reduce_cyclic, whole_disk};
+use crate::common::disk::{COARSE, Counts, boundary, model, options, sector, tips};
+use tiprub_model::cyclic::{CyclicBoundary, ModeSelection, PairingReport, reduce_cyclic, whole_disk};
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Mesh;
 use tiprub_model::progress::silent;
-use tiprub_model::reduce::{ContactPoint, ReductionKind};
+use tiprub_model::reduce::ContactPoint;
 
 const SECTORS: usize = 7;
 
@@ -105,13 +105,7 @@ fn no_tolerance_pairs_the_faces_of_another_number_of_sectors() {
 fn contact_on_a_face_and_loose_structures_are_refused() {
     let mesh = coarse();
     let (faces, bore) = (boundary(&mesh, SECTORS), mesh.set("BORE").unwrap().to_vec());
-    let options = CyclicOptions {
-        name: "w".into(),
-        kind: ReductionKind::FixedInterface,
-        modes: ModeSelection::Count(2),
-        checked_modes: 2,
-        damping_ratio: 0.0,
-    };
+    let options = options(ModeSelection::Count(2), 2);
     let refusal = |clamped: &[usize], contact: &[ContactPoint]| {
         reduce_cyclic(&model(mesh.clone()), clamped, contact, &faces, &options, &silent).unwrap_err().to_string()
     };
@@ -139,13 +133,7 @@ fn contact_on_a_face_and_loose_structures_are_refused() {
 fn clamping_one_face_node_clamps_its_partner() {
     let mesh = coarse();
     let (faces, bore) = (boundary(&mesh, SECTORS), mesh.set("BORE").unwrap().to_vec());
-    let options = CyclicOptions {
-        name: "w".into(),
-        kind: ReductionKind::FixedInterface,
-        modes: ModeSelection::Count(2),
-        checked_modes: 2,
-        damping_ratio: 0.0,
-    };
+    let options = options(ModeSelection::Count(2), 2);
     let high = mesh.set("HIGH").unwrap();
     let one_side: Vec<usize> = bore.iter().copied().filter(|node| !high.contains(node)).collect();
     assert!(one_side.len() < bore.len());
@@ -177,13 +165,7 @@ fn the_disk_is_closed() {
 #[test]
 fn two_sectors_held_at_two_points_can_turn_about_the_line_through_them() {
     let mesh = sector(ElementKind::Hex8, 2, Counts { around: 5, ..COARSE });
-    let options = CyclicOptions {
-        name: "w".into(),
-        kind: ReductionKind::FixedInterface,
-        modes: ModeSelection::Count(2),
-        checked_modes: 0,
-        damping_ratio: 0.0,
-    };
+    let options = options(ModeSelection::Count(2), 0);
     let faces = boundary(&mesh, 2);
     let inner =
         *mesh.set("BORE").unwrap().iter().find(|node| !faces.pairs.iter().flatten().any(|n| n == *node)).unwrap();

@@ -1,6 +1,6 @@
 //! Checks of a cyclic reduction, choice of modes, and properties of its matrices.
 
-use crate::common::disk::{COARSE, Counts, boundary, copies, model, pencils, sector, tips};
+use crate::common::disk::{COARSE, Counts, boundary, copies, model, options, pencils, sector, tips};
 use tiprub_core::rom::{Frame, RomChecks};
 use tiprub_model::Material;
 use tiprub_model::cyclic::{
@@ -10,16 +10,6 @@ use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Mesh;
 use tiprub_model::progress::{Progress, silent};
 use tiprub_model::reduce::{ContactPoint, ReductionKind, ReductionOptions, reduce};
-
-fn options(modes: ModeSelection, checked_modes: usize) -> CyclicOptions {
-    CyclicOptions {
-        name: "disk".into(),
-        kind: ReductionKind::FixedInterface,
-        modes,
-        checked_modes,
-        damping_ratio: 0.005,
-    }
-}
 
 fn reduced(mesh: &Mesh, sectors: usize, clamped: bool, options: &CyclicOptions) -> CyclicReduction {
     let clamped = if clamped { mesh.set("BORE").unwrap() } else { &[] };

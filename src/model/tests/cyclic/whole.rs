@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use crate::common::disk::{COARSE, Counts, boundary, copies, model, pencils, sector, tips};
+use crate::common::disk::{COARSE, Counts, boundary, copies, model, options, pencils, sector, tips};
 use faer::Mat;
 use nalgebra::{Complex, DMatrix, DVector};
 use tiprub_model::assembly::free_dofs;
@@ -11,18 +11,8 @@ use tiprub_model::cyclic::{CyclicOptions, CyclicReduction, ModeSelection, reduce
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Mesh;
 use tiprub_model::progress::silent;
-use tiprub_model::reduce::{ReductionKind, full_modes};
+use tiprub_model::reduce::full_modes;
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
-
-fn options(modes: ModeSelection, checked_modes: usize) -> CyclicOptions {
-    CyclicOptions {
-        name: "disk".into(),
-        kind: ReductionKind::FixedInterface,
-        modes,
-        checked_modes,
-        damping_ratio: 0.005,
-    }
-}
 
 fn reduced(mesh: &Mesh, sectors: usize, contact: usize, options: &CyclicOptions) -> CyclicReduction {
     let boundary = boundary(mesh, sectors);

@@ -1,7 +1,5 @@
 //! Twelve blades in a round casing, and what a test asks of them.
 
-#![allow(dead_code, reason = "each test binary uses its part")]
-
 use tiprub_core::settings::{Scheme, Shape, TimeSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, real};
@@ -45,4 +43,17 @@ pub fn crowded(nodes: usize, modes: usize, seed: u64) -> Scene {
     let mut scene = models::round(rom);
     scene.settings.experiment.communication_step = 1e-5;
     scene
+}
+
+/// What a scene of a hundred steps of 0.1 ms is refused with.
+pub fn refusal(scene: &Scene) -> String {
+    let run = || {
+        let mut simulation = Simulation::new(scene)?;
+        simulation.initialise(0.0)?;
+        for _ in 0..100 {
+            simulation.do_step(simulation.time(), 1e-4)?;
+        }
+        Ok::<_, tiprub_core::Error>(())
+    };
+    run().expect_err("it was not refused").to_string()
 }

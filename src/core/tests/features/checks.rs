@@ -3,7 +3,7 @@
 use tiprub_core::Simulation;
 use tiprub_test_models::{bits, go, real, reference, saved, set_element};
 
-use super::counting;
+use crate::counting;
 
 /// Inputs that change from step to step, wherever the scene has them.
 pub fn disturb(simulation: &mut Simulation, index: u32) {

@@ -8,6 +8,8 @@ use tiprub_core::settings::{InputInterpolation, Scheme, Shape};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::{self as models, real, saved, set, slope, started};
 
+use crate::inputs::{held, spinning_rom, whirling};
+
 const SPEED: f64 = 1800.0;
 const RESTING: f64 = 5000.0;
 /// Entry of G: the whirl of a point mass is turned by Ωg.
@@ -118,26 +120,6 @@ fn whirl_goes_on_over_changes_of_step() {
         );
         assert!(alone < 8e-5, "{alone:e}");
     }
-}
-
-fn held(mut scene: Scene) -> Scene {
-    scene.settings.time.input_interpolation = InputInterpolation::Hold;
-    scene
-}
-
-/// A round casing around a shaft that whirls.
-fn whirling() -> Scene {
-    let mut scene = models::rub(6);
-    (scene.settings.time.step, scene.settings.surfaces[0].ramp_time) = (1e-6, 0.0);
-    scene.settings.surfaces[0].shape = Shape::Circular {};
-    scene.settings.structures[0].whirl = true;
-    scene
-}
-
-fn spinning_rom() -> Rom {
-    let mut rom = models::rich_blade(6);
-    rom.extras.spin = Some(models::spin(rom.order()));
-    rom
 }
 
 /// Growth: one blade under Ω²c, as a speed that jumps and as the same speed ramped.

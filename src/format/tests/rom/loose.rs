@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use tiprub_core::Rom;
-use tiprub_format::write_rom;
+use tiprub_format::{read_rom, write_rom};
 
 /// Arrays (shape, values in row-major order) and metadata.
 pub struct Loose {
@@ -43,5 +43,28 @@ impl Loose {
         }
         let header = serde_json::Value::Object(header).to_string();
         [u64::try_from(header.len()).unwrap().to_le_bytes().as_slice(), header.as_bytes(), &data].concat()
+    }
+}
+
+/// Numbers in (-1, 1), one after the other: matrices need many, and proptest's own vectors are slow to shrink.
+pub fn numbers(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        f64::from(u32::try_from(state >> 32).unwrap()) / f64::from(u32::MAX) * 1.999 - 0.9995
+    }
+}
+
+/// The file of `rom` is read as it; changed, it is refused with words that hold all `parts`.
+#[track_caller]
+pub fn refused(rom: &Rom, change: impl FnOnce(&mut Loose), parts: &[&str]) {
+    let mut file = Loose::of(rom);
+    assert_eq!(read_rom(&file.bytes(), "of.rom").unwrap(), *rom);
+    change(&mut file);
+    let message = read_rom(&file.bytes(), "of.rom").unwrap_err().to_string();
+    for part in ["of.rom: "].iter().chain(parts) {
+        assert!(message.contains(part), "{part:?} is not in {message:?}");
     }
 }
