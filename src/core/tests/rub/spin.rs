@@ -4,8 +4,8 @@ use nalgebra::DMatrix;
 use tiprub_core::dynamics::bank::{BankOptions, ModalBank};
 use tiprub_core::dynamics::modal::{ModalModel, ModalSpin};
 use tiprub_core::schemes::free_increment;
-use tiprub_core::settings::{InputInterpolation, Scheme, Shape};
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::settings::Scheme;
+use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, real, saved, set, slope, started};
 
 use crate::inputs::{held, spinning_rom, whirling};
