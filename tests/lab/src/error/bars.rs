@@ -8,7 +8,7 @@ use tiprub_reference::{
 
 use super::{
     case::Case,
-    competitor::{Competitor, Family},
+    competitor::{Competitor, Family, TOLERANT},
     outside::{OutsideRun, Softness},
     rods::CoreRod,
     run::{Run, Trace},
@@ -225,8 +225,10 @@ impl Case for Bars {
         (division, division)
     }
 
+    /// The others have weight, which a step by a tolerance has no tables for.
     fn competitors(&self, _: usize) -> Vec<Competitor> {
-        Competitor::reduced()
+        let tolerant = (self.problem == Problem::Carpenter).then_some(TOLERANT);
+        Competitor::reduced().into_iter().chain(tolerant).collect()
     }
 
     fn start<'a>(

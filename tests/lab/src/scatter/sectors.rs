@@ -148,3 +148,71 @@ pub(super) fn problems(degree: usize, friction: f64, trials: u64) -> Problems {
     }
     found
 }
+
+/// How many solutions contact problems have.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Solutions {
+    pub(super) degree: usize,
+    pub(super) friction: f64,
+    pub(super) problems: u64,
+    pub(super) none: u64,
+    pub(super) several: u64,
+}
+
+/// Solutions of 0 ≤ λ ⟂ g + Wλ ≥ 0: every set of closed points is tried.
+fn count_solutions(w: &DMatrix<f64>, gaps: &[f64]) -> usize {
+    let size = gaps.len();
+    let scale = gaps.iter().fold(0.0, |most: f64, gap| most.max(gap.abs()));
+    let holds = |set: usize| {
+        let members: Vec<usize> = (0..size).filter(|lane| set >> lane & 1 == 1).collect();
+        if members.is_empty() {
+            return gaps.iter().all(|gap| *gap >= 0.0);
+        }
+        let held = DMatrix::from_fn(members.len(), members.len(), |i, k| w[(members[i], members[k])]);
+        let right = nalgebra::DVector::from_iterator(members.len(), members.iter().map(|lane| -gaps[*lane]));
+        let Some(forces) = held.lu().solve(&right) else { return false };
+        let gap =
+            |lane: usize| gaps[lane] + members.iter().zip(forces.iter()).map(|(k, f)| w[(lane, *k)] * f).sum::<f64>();
+        forces.iter().all(|force| *force > 0.0)
+            && (0..size).all(|lane| set >> lane & 1 == 1 || gap(lane) > -1e-12 * scale)
+    };
+    (0..1_usize << size).filter(|set| holds(*set)).count()
+}
+
+/// Contact problems of one and two nodes in random motion without forces, on a step of random length.
+pub(super) fn solutions(degree: usize, friction: f64, problems: u64) -> Solutions {
+    let mut random = Random(70 + degree as u64);
+    let mut found = Solutions { degree, friction, ..Solutions::default() };
+    while found.problems < problems {
+        let (nodes, count) = (1 + random.below(2), 4 + random.below(9));
+        let modes = modes(count, nodes, random.scale(1e-3, 10.0), &mut random);
+        let step = random.scale(5e-6, 8e-5);
+        if modes.degree_at(step) != degree {
+            continue;
+        }
+        let mut level = Level::new(&modes, degree);
+        level.set_step(&modes, step);
+        let lanes = level.compliance.lanes();
+        // Displacement along x per force (−1, −µ) opens by as much less.
+        let w = DMatrix::from_fn(lanes.len(), lanes.len(), |row, column| {
+            let [x, y, _] = level.compliance.of_lane(column);
+            x[row] + friction * y[row]
+        });
+        for _ in 0..20 {
+            let velocities: Vec<f64> = (0..count).map(|_| random.signed()).collect();
+            let place = 2e-5 * random.unit();
+            let gaps: Vec<f64> = (0..lanes.len())
+                .map(|lane| {
+                    let (point, node) = lanes.place(lane);
+                    let moved = |mode: usize| modes.shapes[(3 * node, mode)] * level.modes.points[point - 1][1][mode];
+                    place - (0..count).map(|mode| moved(mode) * velocities[mode]).sum::<f64>()
+                })
+                .collect();
+            let solutions = count_solutions(&w, &gaps);
+            found.problems += 1;
+            found.none += u64::from(solutions == 0);
+            found.several += u64::from(solutions > 1);
+        }
+    }
+    found
+}

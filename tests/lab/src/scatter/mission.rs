@@ -1,0 +1,108 @@
+//! Long missions: communication steps far longer than a rub's, most of them without contact.
+
+use super::H;
+use tiprub_core::{Simulation, settings::Scheme};
+use tiprub_study::error::clock;
+use tiprub_test_models::{bumps, rich_blade};
+
+/// Length of a communication step (s), and how far the casing is open (m): away, and where it rubs.
+const LONG: f64 = 0.1;
+const WIDE: [f64; 2] = [5e-4, 5e-5];
+/// Communication steps of an hour, and of them those of the rub in its middle.
+const HOUR: u32 = 36_000;
+const RUBBING: u32 = 100;
+
+/// A machine of 36 blades, and the communication steps that it has done.
+struct Machine {
+    simulation: Simulation,
+    done: u32,
+}
+
+impl Machine {
+    fn new() -> tiprub_core::Result<Self> {
+        let mut scene = bumps(rich_blade(36));
+        scene.settings.surfaces[0].ramp_time = 0.0;
+        (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::Galerkin, H);
+        let mut machine = Self { simulation: Simulation::new(&scene)?, done: 0 };
+        machine.open(WIDE[0])?;
+        machine.simulation.initialise(0.0)?;
+        Ok(machine)
+    }
+
+    fn open(&mut self, wide: f64) -> tiprub_core::Result<()> {
+        match self.simulation.table().find("casing_radius_change") {
+            Some(row) => self.simulation.set_real(row.reference, wide),
+            None => Ok(()),
+        }
+    }
+
+    /// Processor time (s) of so many communication steps, span by span where asked.
+    fn go(&mut self, count: u32, by_spans: bool) -> tiprub_core::Result<f64> {
+        let before = clock::now();
+        for _ in 0..count {
+            let start = f64::from(self.done) * LONG;
+            if by_spans {
+                self.simulation.begin_step(start, LONG)?;
+                while !self.simulation.advance()?.finished {}
+            } else {
+                self.simulation.do_step(start, LONG)?;
+            }
+            self.done += 1;
+        }
+        Ok((clock::now() - before).as_secs_f64())
+    }
+}
+
+/// Milliseconds of a communication step: flown over, span by span, and with a rub.
+pub(super) fn long_steps(steps: u32) -> tiprub_core::Result<[f64; 3]> {
+    let mut machine = Machine::new()?;
+    let mut taken = [0.0; 3];
+    let kinds = [(WIDE[0], 100 * steps, false), (WIDE[0], steps, true), (WIDE[1], steps, false)];
+    for (taken, (wide, count, by_spans)) in taken.iter_mut().zip(kinds) {
+        machine.open(wide)?;
+        *taken = 1e3 * machine.go(count, by_spans)? / f64::from(count);
+    }
+    Ok(taken)
+}
+
+/// An hour with a rub in its middle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mission {
+    /// Communication steps, and those of them in the rub.
+    pub(super) steps: u32,
+    pub(super) rubbing: u32,
+    /// Processor time (s) without the rub, and of it.
+    pub(super) seconds: [f64; 2],
+    /// Steps of all blades in the rub, and those tried.
+    pub(super) internal: u64,
+    pub(super) trials: u64,
+    /// Friction heat (J).
+    pub(super) friction: f64,
+    /// Residual of the ledger, relative to what was exchanged.
+    pub(super) residual: f64,
+}
+
+/// A `part`th of an hour.
+pub(super) fn hour(part: u32) -> tiprub_core::Result<Mission> {
+    let (steps, rubbing) = (HOUR / part, RUBBING / part);
+    let mut machine = Machine::new()?;
+    let quiet = (steps - rubbing) / 2;
+    let before = machine.go(quiet, false)?;
+    let effort = *machine.simulation.system().effort();
+    machine.open(WIDE[1])?;
+    let rub = machine.go(rubbing, false)?;
+    let after = *machine.simulation.system().effort();
+    machine.open(WIDE[0])?;
+    let rest = machine.go(steps - rubbing - quiet, false)?;
+    let system = machine.simulation.system();
+    let (ledger, (kinetic, strain)) = (system.ledger(), system.energies());
+    Ok(Mission {
+        steps,
+        rubbing,
+        seconds: [before + rest, rub],
+        internal: after.steps - effort.steps,
+        trials: after.trials - effort.trials,
+        friction: ledger.friction_loss.value(),
+        residual: ledger.residual(kinetic + strain).abs() / ledger.scale(),
+    })
+}
