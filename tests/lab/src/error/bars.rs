@@ -8,7 +8,7 @@ use tiprub_reference::{
 
 use super::{
     case::Case,
-    competitor::{Competitor, Family, TOLERANT},
+    competitor::{Competitor, Family},
     outside::{OutsideRun, Softness},
     rods::CoreRod,
     run::{Run, Trace},
@@ -225,10 +225,8 @@ impl Case for Bars {
         (division, division)
     }
 
-    /// The others have weight, which a step by a tolerance has no tables for.
     fn competitors(&self, _: usize) -> Vec<Competitor> {
-        let tolerant = (self.problem == Problem::Carpenter).then_some(TOLERANT);
-        Competitor::reduced().into_iter().chain(tolerant).collect()
+        Competitor::reduced()
     }
 
     fn start<'a>(

@@ -53,10 +53,10 @@ impl CoreRod {
         })
     }
 
-    /// Start a run, refused as a scene would be. By a tolerance the interval is one span, and one over the division the tolerance.
+    /// Start a run, refused as a scene would be.
     ///
     /// # Errors
-    /// Steps beyond the limit of the scheme, with numbers; loads where a tolerance takes the place of a step.
+    /// Steps beyond the limit of the scheme, with numbers.
     pub(crate) fn run(
         &self,
         (scheme, solver): (Scheme, Solver),
@@ -64,11 +64,6 @@ impl CoreRod {
         division: u32,
         perturbation: f64,
     ) -> Result<RodRun<'_>, String> {
-        let marched = scheme == Scheme::Galerkin;
-        if marched && self.load.iter().any(|load| *load != 0.0) {
-            return Err("galerkin has no loads but those of contact".into());
-        }
-        let (tolerance, division) = (1.0 / f64::from(division), if marched { 1 } else { division });
         let step = interval / f64::from(division);
         stability::check_step(self.model.largest_frequency(), scheme, step).map_err(|error| error.to_string())?;
         if scheme == Scheme::MasslessBoundary && step >= self.massless_limit.usable {
@@ -79,7 +74,6 @@ impl CoreRod {
         let settings = SystemSettings { scheme, solver, ledger: true };
         let bank = BankOptions { loads: true, ..BankOptions::default() };
         let mut system = System::alone(SectorModel::Uncoupled(&self.model, 1), bank, law, 0.0, settings);
-        system.prepare_spans(step, tolerance);
         system.set_step(step);
         for mode in 0..self.model.len() {
             let dynamic = mode < self.model.dynamic_modes(scheme);
