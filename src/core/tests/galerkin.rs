@@ -183,7 +183,7 @@ fn every_combination_keeps_its_books_and_agrees_with_massless_boundary() {
             "{name}: massless-boundary {distance:.1e}, tolerance 1e-3 {error:.1e}, residual {:.0e}, torque {torque:.0e}, lowest {:.0e}, impulse {:.2}",
             exact.residual, exact.lowest, exact.impulse
         );
-        assert!(exact.impulse > 1.0 && exact.residual < 1e-11 && distance < distance_allowed && error < 3e-3, "{name}");
+        assert!(exact.impulse > 1.0 && exact.residual < 1e-12 && distance < distance_allowed && error < 3e-3, "{name}");
         assert!(torque < 1e-9 && exact.lowest > -1e-8, "{name}");
     }
 }

@@ -50,7 +50,8 @@ pub fn march(body: &mut impl Marched, demand: Demand, effort: &mut Effort) -> Re
     while done < WHOLE {
         let level = *body.pace().1;
         // The shortest may take two.
-        if effort.tried() + count * u64::from(level == HALVINGS) >= demand.most {
+        let next = count * if level == HALVINGS { 2 } else { 1 };
+        if effort.tried().saturating_add(next) > demand.most {
             return Err(Stopped::Exhausted);
         }
         let units = WHOLE >> level;

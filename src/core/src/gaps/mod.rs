@@ -175,6 +175,12 @@ impl GapLaw {
         all.iter().copied().filter(|clearance| *clearance > 0.0).fold(f64::INFINITY, f64::min)
     }
 
+    /// What rounding leaves of a gap (m), where it is a distance of points that are far from the origin.
+    pub fn rounding(&self) -> f64 {
+        let Self::Spline(law) = self else { return 0.0 };
+        64.0 * f64::EPSILON * law.layout.radii.iter().fold(0.0, |most: f64, radius| most.max(*radius))
+    }
+
     /// Angle over which the casing shape changes noticeably (rad).
     pub fn angular_scale(&self) -> f64 {
         match self {

@@ -119,6 +119,17 @@ pub struct Worked {
     pub dropped: f64,
 }
 
+/// Which place of a node on a surface that is carried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// That at the start of the step.
+    Begun,
+    /// The closest point of now.
+    Now,
+    /// Where its force has been handed over.
+    Acted,
+}
+
 /// What is kept from span to span, and scratch: allocates only when made.
 #[derive(Debug, Clone)]
 pub struct Record {
@@ -133,6 +144,8 @@ pub struct Record {
     /// Motion that forces at each point of the step taken work on, pair by pair.
     motions: Vec<[Motion; POINTS]>,
     places: [Vec<ClosestPoint>; POINTS],
+    /// Where forces have been handed to structures that carry surfaces: places of the pass before that in which gaps hold.
+    acted: [Vec<ClosestPoint>; POINTS],
     instants: Instants,
     /// All nodes at all points are in `instants`, before the surface of this pair.
     lanes_of: Option<usize>,
@@ -150,6 +163,7 @@ impl Record {
             drives: vec![[<(Drive, Motion)>::default(); POINTS]; pairs],
             motions: vec![[Motion::default(); POINTS]; pairs],
             places: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
+            acted: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             instants: Instants::new(Lanes { points: MOST, nodes }.width()),
             lanes_of: None,
             implausible: false,
@@ -157,9 +171,25 @@ impl Record {
     }
 
     /// Where a node is on a surface that is carried, at a point of the step.
-    fn spot<'a>(&self, (node, point): (usize, usize), (pair, of): (usize, &'a Pair), index: usize) -> Option<Spot<'a>> {
+    fn spot<'a>(
+        &self,
+        (node, point): (usize, usize),
+        (pair, of): (usize, &'a Pair),
+        index: usize,
+        when: Place,
+    ) -> Option<Spot<'a>> {
         let frame = of.frame(index, self.drives[pair][point].0.rotor_angle);
-        Some(Spot { surface: of.carried()?, place: self.places[point][node], frame })
+        let place = match when {
+            Place::Begun => self.places[0][node],
+            Place::Now => self.places[point][node],
+            Place::Acted => self.acted[point][node],
+        };
+        Some(Spot { surface: of.carried()?, place, frame })
+    }
+
+    /// The force on a node at a point of the step is handed over where the node is now.
+    pub fn act(&mut self, node: usize, point: usize) {
+        self.acted[point][node] = self.places[point][node];
     }
 
     /// Prescribed motion of a span (s) that the pairs are at the end of.
@@ -210,11 +240,12 @@ pub struct Facing<'a> {
 
 impl Facing<'_> {
     /// What a structure tells of the place where a node is on the surface that it carries, at a point of the step.
-    fn on_ground<T>(&self, node: usize, point: usize, tell: impl Fn(&Casing, Spot) -> T) -> Option<T> {
+    fn on_ground<T>(&self, (node, point): (usize, usize), when: Place, tell: impl Fn(&Casing, Spot) -> T) -> Option<T> {
         let ground = self.ground.as_ref()?;
         let pair = self.pair_of[node]?;
         let casing = ground.casing_of[pair]?;
-        let spot = self.record.spot((node, point), (pair, &self.pairs[pair]), node * self.lanes + self.sector)?;
+        let index = node * self.lanes + self.sector;
+        let spot = self.record.spot((node, point), (pair, &self.pairs[pair]), index, when)?;
         Some(tell(&ground.casings[casing], spot))
     }
 
@@ -223,7 +254,7 @@ impl Facing<'_> {
         let (Some(ground), Some(pair)) = (&mut self.ground, self.pair_of[node]) else { return };
         let Some(casing) = ground.casing_of[pair] else { return };
         let index = node * self.lanes + self.sector;
-        if let Some(spot) = self.record.spot((node, point), (pair, &self.pairs[pair]), index) {
+        if let Some(spot) = self.record.spot((node, point), (pair, &self.pairs[pair]), index, Place::Now) {
             tell(&mut ground.casings[casing], spot);
         }
     }
@@ -287,7 +318,7 @@ impl Obstacle for Facing<'_> {
         }
         let at = self.at(node, &self.record.drives[pair][point].0);
         let rigid = gap.sliding_velocity(node, at.index, at.drive, moved);
-        let ground = self.on_ground(node, point, |casing, spot| casing.velocity_at(spot)).unwrap_or_default();
+        let ground = self.on_ground((node, point), Place::Begun, |casing, spot| casing.velocity_at(spot)).unwrap_or_default();
         let slip = gap.slip_direction(std::array::from_fn(|i| rigid[i] + velocity[i] - ground[i]), normal);
         std::array::from_fn(|i| normal[i] - friction * slip[i])
     }
@@ -357,8 +388,10 @@ impl Witness for Facing<'_> {
                 self.enter(step, node, pair);
             }
         }
-        let [first, rest @ ..] = &mut self.record.places;
-        first.copy_from_slice(&rest[step.trial.points() - 1]);
+        for places in [&mut self.record.places, &mut self.record.acted] {
+            let [first, rest @ ..] = places;
+            first.copy_from_slice(&rest[step.trial.points() - 1]);
+        }
     }
 }
 
@@ -420,7 +453,7 @@ impl Facing<'_> {
                 open += weights[k] * trial.gap(k, node);
             }
             let (spin, shaft) = (gap.spin_motion(at, point, motion), gap.shaft_motion(at, point, motion));
-            let ground = self.on_ground(node, i, |casing, spot| casing.worked_at(spot, i)).unwrap_or_default();
+            let ground = self.on_ground((node, i), Place::Acted, |casing, spot| casing.worked_at(spot, i)).unwrap_or_default();
             there = std::array::from_fn(|c| there[c] - ground[c]);
             let slip: [f64; 3] = std::array::from_fn(|c| there[c] + spin[c] + shaft[c]);
             let heat = -dot(tangential, slip);

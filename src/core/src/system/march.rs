@@ -38,8 +38,8 @@ pub struct Galerkin {
 }
 
 impl Galerkin {
-    /// Of a structure whose modes are `bank`, for spans up to `longest` (s) and errors of `tolerance` (m).
-    fn new(bank: &ModalBank, nodes: usize, pairs: usize, longest: f64, tolerance: f64) -> Self {
+    /// Of a structure whose modes are `bank`, for spans up to `longest` (s) and errors of `tolerance` (m), with gaps rounded by `rounding` (m).
+    fn new(bank: &ModalBank, nodes: usize, pairs: usize, longest: f64, [tolerance, rounding]: [f64; 2]) -> Self {
         let modes = bank.model().dynamic_modes(Scheme::Galerkin);
         let kinds: Vec<Modes> = (0..bank.sets()).map(|set| modes_of(bank, set, modes)).collect();
         Self {
@@ -48,7 +48,7 @@ impl Galerkin {
             marcher: Marcher::new(modes, nodes),
             state: SectorState::new(modes, nodes),
             record: Record::new(nodes, pairs),
-            demand: Demand { tolerance, precision: PRECISION * tolerance, most: u64::MAX },
+            demand: Demand { tolerance, precision: (PRECISION * tolerance).max(rounding), most: u64::MAX },
         }
     }
 
@@ -99,11 +99,13 @@ impl System {
                 self.together.push(Together::new(set, &members, parts, longest, tolerance));
             } else {
                 for index in members {
-                    let tolerance = clearance(&mut self.pairs.iter().filter(|pair| pair.structure() == index));
+                    let own = || self.pairs.iter().filter(|pair| pair.structure() == index);
+                    let rounding = own().map(|pair| pair.gap().rounding()).fold(0.0, f64::max);
+                    let errors = [clearance(&mut own()), rounding];
                     let (structure, pairs) = (&mut self.structures[index], self.pairs.len());
                     let (nodes, bank) = (structure.nodes(), structure.bank());
                     let made =
-                        bank.filter(|_| nodes > 0).map(|bank| Galerkin::new(bank, nodes, pairs, longest, tolerance));
+                        bank.filter(|_| nodes > 0).map(|bank| Galerkin::new(bank, nodes, pairs, longest, errors));
                     structure.galerkin = made.map(Box::new);
                 }
             }
@@ -194,8 +196,7 @@ impl System {
                 return Err(StepFailure::Implausible { structure: one.structure, sector: one.sector });
             }
         }
-        let first = together.sectors.first().map_or((0, 0), |one| (one.structure, one.sector));
-        outcome.map_err(|stopped| failure(stopped, first))?;
+        outcome.map_err(|stopped| together.failure(stopped))?;
         let ledger = &mut counted.ledgers[together.set];
         ledger.load_work.add(load_work);
         ledger.turnover.add(load_work.abs());

@@ -1,7 +1,7 @@
 //! Sectors that step together: those of one disk, and those that touch a surface which a structure carries.
 
 use super::casing::{Casing, coordinates};
-use super::{PRECISION, modes_of};
+use super::{PRECISION, failure, modes_of};
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::cyclic::CyclicBank;
 use crate::dynamics::sectors::Sectors;
@@ -10,16 +10,18 @@ use crate::galerkin::basis::{MOST, POINTS};
 use crate::galerkin::compliance::Lanes;
 use crate::galerkin::level::Modes;
 use crate::galerkin::march::{Marched, Step};
-use crate::galerkin::sector::{Demand, Tables, Taken, Witness};
+use crate::galerkin::sector::{Demand, Stopped, Tables, Taken, Witness};
 use crate::galerkin::state::SectorState;
 use crate::galerkin::trial::{Kind, Obstacle, Trial, Verdict};
 use crate::galerkin::whole::Whole;
 use crate::settings::Scheme;
 use crate::system::facing::{Facing, Ground, Record, work_weights};
-use crate::system::{Pair, Structure};
+use crate::system::{Pair, StepFailure, Structure};
 
 /// Most evaluations of the gaps of one trial: others move as well.
-const PASSES: usize = 12;
+const PASSES: usize = 16;
+/// Passes end closer to closed gaps than those of one sector, whose last is exact but for curvature: others have moved since.
+const CLOSE: f64 = 1e-2;
 
 /// Scratch and tables of a set of structures whose sectors step together; allocates only when made.
 #[derive(Debug, Clone)]
@@ -38,6 +40,10 @@ pub struct Together {
     level: usize,
     /// Length of the spans that the tables are for (s).
     span: f64,
+    /// No step of the span has been taken.
+    fresh: bool,
+    /// The sector that a step has failed for, and whether its gap is no number.
+    failed: Option<(usize, bool)>,
 }
 
 /// One sector of a touching structure.
@@ -101,6 +107,8 @@ impl Together {
         let degree = |modes: &Modes| modes.degree_up_to(longest);
         let carried = banks.iter().map(|bank| degree(&coordinates(bank).seen_at(&bank.model().contact_modes)));
         let degree = kinds.iter().flatten().map(degree).chain(carried).min().unwrap_or(MOST);
+        let own = pairs.iter().filter(|pair| touching.contains(&pair.structure()));
+        let rounding = own.map(|pair| pair.gap().rounding()).fold(0.0, f64::max);
         let nodes = touching.iter().map(|one| structures[*one].nodes()).max().unwrap_or(0);
         let lanes = Lanes { points: MOST, nodes };
         let casings: Vec<Casing> =
@@ -136,10 +144,12 @@ impl Together {
             casing_of: pairs.iter().map(|pair| place(pair.carrier()?.structure)).collect(),
             casings,
             tables: kinds.into_iter().map(made).collect(),
-            demand: Demand { tolerance, precision: PRECISION * tolerance, most: u64::MAX },
+            demand: Demand { tolerance, precision: (CLOSE * PRECISION * tolerance).max(rounding), most: u64::MAX },
             bank: 0.0,
             level: 0,
             span: 0.0,
+            fresh: true,
+            failed: None,
         }
     }
 
@@ -152,6 +162,18 @@ impl Together {
         self.tables.iter_mut().flatten().for_each(|tables| tables.set_span(span));
         let wholes = self.disks.iter_mut().map(|disk| &mut disk.whole);
         wholes.chain(self.casings.iter_mut().map(|casing| &mut casing.whole)).for_each(|whole| whole.set_span(span));
+    }
+
+    /// Why it is not marched to the end.
+    pub fn failure(&self, stopped: Stopped) -> StepFailure {
+        let (index, is_lost) = self.failed.unwrap_or((0, false));
+        let Some(One { structure, sector, .. }) = self.sectors.get(index) else { return StepFailure::NonFinite };
+        let (structure, sector) = (*structure, *sector);
+        match stopped {
+            // The surface is nowhere near.
+            Stopped::Unsolved if is_lost => StepFailure::Implausible { structure, sector },
+            _ => failure(stopped, (structure, sector)),
+        }
     }
 
     /// To be marched from where the structures are.
@@ -176,10 +198,10 @@ impl Together {
             let dynamic = casing.whole.coordinates().inertia.iter().filter(|inertia| **inertia > 0.0).count();
             let [position, velocity] = casing.whole.state_mut();
             bank.read_sector(0, &mut position[..dynamic], &mut velocity[..dynamic]);
-            casing.whole.forces_mut(0).copy_from_slice(&structure.delayed);
             bank.read_loads(casing.whole.loads_mut());
         }
         let first = self.sectors.first().map(|one| &structures[one.structure].pace);
+        (self.fresh, self.failed) = (true, None);
         (self.bank, self.level) = first.map_or((0.0, 0), |pace| (pace.bank[0], pace.level_of(0)));
         let mut marching = Marching { together: self, world: World { structures, pairs } };
         marching.find_start();
@@ -331,6 +353,26 @@ impl Marching<'_> {
             trial.guess(state);
             trial.look_at_start(state, |node, moved| facing.gap(node, 0, moved).0);
         });
+        if self.together.fresh {
+            // What was handed over before is handed over where nodes are found to be at the start of the span.
+            self.react(0..=0, (step, kind));
+        }
+    }
+
+    /// Forces at some points of the step are handed to what carries surfaces.
+    fn react(&mut self, points: std::ops::RangeInclusive<usize>, at: (Step, Kind)) {
+        for casing in &mut self.together.casings {
+            points.clone().for_each(|point| casing.whole.forces_mut(point).fill(0.0));
+        }
+        self.each_of(false, at, |facing, (trial, _), _, _| {
+            for (point, node) in points.clone().flat_map(|point| (0..trial.nodes()).map(move |node| (point, node))) {
+                if trial.multiplier(point, node) != 0.0 {
+                    let force = trial.force(point, node);
+                    facing.record.act(node, point);
+                    facing.tell_ground(node, point, |casing, spot| casing.react(spot, point, force));
+                }
+            }
+        });
     }
 
     /// Everything moves under the forces of now.
@@ -359,17 +401,7 @@ impl Marching<'_> {
         if self.together.casings.is_empty() {
             return;
         }
-        for casing in &mut self.together.casings {
-            (1..=points).for_each(|point| casing.whole.forces_mut(point).fill(0.0));
-        }
-        self.each_of(false, (step, kind), |facing, (trial, _), _, _| {
-            for (point, node) in (1..=points).flat_map(|point| (0..trial.nodes()).map(move |node| (point, node))) {
-                if trial.multiplier(point, node) != 0.0 {
-                    let force = trial.force(point, node);
-                    facing.tell_ground(node, point, |casing, spot| casing.react(spot, point, force));
-                }
-            }
-        });
+        self.react(1..=points, (step, kind));
         for casing in &mut self.together.casings {
             casing.whole.push(step.level, kind);
             casing.recover(points);
@@ -429,15 +461,24 @@ impl Marching<'_> {
         }
     }
 
+    /// The first sector of which this holds is what the step fails for.
+    fn blame(&mut self, holds: impl Fn(&One) -> bool, is_lost: bool) {
+        self.together.failed = self.together.sectors.iter().position(holds).map(|index| (index, is_lost));
+    }
+
     /// Forces that close what penetrates, sector by sector.
     fn solve(&mut self, step: Step, kind: Kind, verdict: &mut Verdict) -> bool {
-        let mut solved = true;
+        let (mut solved, mut failed) = (true, None);
         self.each_of(false, (step, kind), |facing, (trial, _), tables, _| {
             let (lowest, _) = trial.extremes();
             if solved && (lowest < 0.0 || !trial.rests()) {
                 solved = trial.solve(tables.levels[step.level].compliance_of(kind), facing, verdict);
+                failed = (!solved).then_some(facing.sector);
             }
         });
+        if let Some(sector) = failed {
+            self.blame(|one| one.sector == sector && !one.far, false);
+        }
         solved
     }
 
@@ -551,6 +592,7 @@ impl Marched for Marching<'_> {
             self.push(step, kind, points);
             let (lowest, largest, rests) = self.find_gaps(step, kind, points, false);
             if lowest.is_nan() {
+                self.blame(|one| one.trial.extremes().0.is_nan(), true);
                 return verdict;
             }
             if ((rests && lowest >= 0.0) || (pass > 0 && lowest >= -precision && largest <= precision))
@@ -562,7 +604,11 @@ impl Marched for Marching<'_> {
             if pass == 0 {
                 self.tell_apart(lowest.min(-precision));
             }
-            if pass + 1 == PASSES || !self.solve(step, kind, &mut verdict) {
+            if pass + 1 == PASSES {
+                self.blame(|one| one.trial.extremes().0 <= lowest || one.trial.extremes().1 >= largest, false);
+                return verdict;
+            }
+            if !self.solve(step, kind, &mut verdict) {
                 return verdict;
             }
         }
@@ -572,7 +618,7 @@ impl Marched for Marching<'_> {
         verdict
     }
 
-    fn take(&mut self, step: Step, kind: Kind, verdict: &Verdict) -> f64 {
+    fn take(&mut self, step: Step, kind: Kind, _: &Verdict) -> f64 {
         let level = &self.together.tables[0][0].levels[step.level];
         let points = if kind == Kind::Constant { 1 } else { level.basis.degree };
         let basis = level.basis.clone();
@@ -580,6 +626,7 @@ impl Marched for Marching<'_> {
             casing.weigh(points, |i| work_weights(&basis, kind, i));
         }
         let (mut dropped, mut closed) = (0.0, 0.0);
+        let before: f64 = self.together.sectors.iter().map(|one| one.record.work.closing).sum();
         for whole in self.together.wholes() {
             dropped += if kind == Kind::Constant { whole.dropped() } else { 0.0 };
         }
@@ -602,17 +649,16 @@ impl Marched for Marching<'_> {
             });
         });
         self.go_on(step, kind);
-        match kind {
-            Kind::Polynomial if verdict.switches => -verdict.switched,
-            Kind::Polynomial => 0.0,
-            Kind::Constant => dropped + closed,
-        }
+        // What gaps within the precision of contacts that stay closed give is paid as well.
+        let after: f64 = self.together.sectors.iter().map(|one| one.record.work.closing).sum();
+        if kind == Kind::Constant { dropped + closed } else { after - before }
     }
 }
 
 impl Marching<'_> {
     /// All states go to the end of the step.
     fn go_on(&mut self, step: Step, kind: Kind) {
+        self.together.fresh = false;
         for one in &mut self.together.sectors {
             if one.disk.is_none() {
                 let tables = &self.together.tables[one.table[0]][one.table[1]];
