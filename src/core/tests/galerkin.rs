@@ -224,6 +224,71 @@ fn a_disk_of_coupled_sectors_is_what_it_is_as_one_structure() {
     }
 }
 
+/// A tolerance that asks for nothing: books close all the same, and nothing is above what was put in.
+#[test]
+fn an_elastic_casing_and_blades_at_rest_get_no_energy_from_nowhere() {
+    let mut scene = scene(Scheme::Galerkin, H, 0.1);
+    flexible(&mut scene);
+    scene.settings.contacts[0].friction = 0.0;
+    (scene.settings.structures[0].speed, scene.settings.structures[0].damping_ratio) = (0.0, Some(0.0));
+    scene.settings.structures[1].damping_ratio = Some(0.0);
+    scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 1.2, width: 0.15, phase: 0.0 };
+    let mut simulation = started(&scene);
+    let mut most = 0.0_f64;
+    for _ in 0..300 {
+        go(&mut simulation, H);
+        let of = |name: &str| real(&simulation, name);
+        let energy = of("kinetic_energy") + of("strain_energy");
+        most = most.max(energy);
+        assert!(of("energy_residual_relative").abs() < 1e-12, "{:e}", of("energy_residual_relative"));
+        let given = of("external_work") + of("curvature_work");
+        assert!(of("impact_loss") >= -1e-12 * most && energy <= given + 1e-12 * most, "{energy:e} {given:e}");
+    }
+    assert!(most > 0.1, "{most}");
+}
+
+/// Slip that is small against what casings and blades swing by, and gaps that cannot be closer than rounding.
+#[test]
+fn slow_rotors_and_smallest_tolerances_find_their_contacts() {
+    for (speed, tolerance, carried) in
+        [(0.0, 1e-4, true), (30.0, 1e-4, true), (1300.0, 1e-9, true), (1300.0, 1e-9, false)]
+    {
+        let mut scene = scene(Scheme::Galerkin, H, tolerance);
+        if carried {
+            flexible(&mut scene);
+        } else {
+            scene.settings.surfaces[0].spline = Some(SplineSettings::default());
+        }
+        scene.settings.structures[0].speed = speed;
+        scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 0.9, width: 0.15, phase: 0.0 };
+        scene.settings.surfaces[0].ramp_time = 2e-4;
+        let mut simulation = started(&scene);
+        (0..20).for_each(|_| go(&mut simulation, H));
+        assert!(simulation.system().ledger().turnover.value() > 1e-6, "{speed} {tolerance:e} {carried}");
+    }
+}
+
+#[test]
+fn sectors_that_step_together_keep_the_bound_on_steps() {
+    let mut scene = scene(Scheme::Galerkin, H, 1e-4);
+    flexible(&mut scene);
+    for most in [1, 3, 4, 7, 90] {
+        let mut simulation = started(&scene);
+        bound(&mut simulation, most).unwrap();
+        let mut done = 0;
+        for _ in 0..40 {
+            let before = simulation.system().steps_tried();
+            let time = simulation.time();
+            if simulation.do_step(time, H).is_err() {
+                break;
+            }
+            done += 1;
+            assert!(simulation.system().steps_tried() - before <= u64::try_from(most).unwrap());
+        }
+        assert_eq!(done > 0, most >= 4, "{most}");
+    }
+}
+
 #[test]
 fn what_is_not_sound_is_refused_by_name() {
     let cases: [(&str, Change); 3] = [

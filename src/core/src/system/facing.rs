@@ -318,7 +318,8 @@ impl Obstacle for Facing<'_> {
         }
         let at = self.at(node, &self.record.drives[pair][point].0);
         let rigid = gap.sliding_velocity(node, at.index, at.drive, moved);
-        let ground = self.on_ground((node, point), Place::Begun, |casing, spot| casing.velocity_at(spot)).unwrap_or_default();
+        let ground =
+            self.on_ground((node, point), Place::Begun, |casing, spot| casing.velocity_at(spot)).unwrap_or_default();
         let slip = gap.slip_direction(std::array::from_fn(|i| rigid[i] + velocity[i] - ground[i]), normal);
         std::array::from_fn(|i| normal[i] - friction * slip[i])
     }
@@ -453,7 +454,8 @@ impl Facing<'_> {
                 open += weights[k] * trial.gap(k, node);
             }
             let (spin, shaft) = (gap.spin_motion(at, point, motion), gap.shaft_motion(at, point, motion));
-            let ground = self.on_ground((node, i), Place::Acted, |casing, spot| casing.worked_at(spot, i)).unwrap_or_default();
+            let ground =
+                self.on_ground((node, i), Place::Acted, |casing, spot| casing.worked_at(spot, i)).unwrap_or_default();
             there = std::array::from_fn(|c| there[c] - ground[c]);
             let slip: [f64; 3] = std::array::from_fn(|c| there[c] + spin[c] + shaft[c]);
             let heat = -dot(tangential, slip);
