@@ -1,7 +1,8 @@
 //! One sector facing its surfaces over a span of time: gaps at any instant, and what contacts did.
 
+use super::carrier::Spot;
 use super::growth::Growth;
-use super::march::casing::{Casing, Spot};
+use super::march::casing::Casing;
 use super::pair::Pair;
 use crate::galerkin::basis::{Basis, MOST, POINTS};
 use crate::galerkin::compliance::Lanes;

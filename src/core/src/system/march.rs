@@ -1,6 +1,7 @@
 //! One span of time by continuous Galerkin: each sector by itself, in steps of its own.
 
 pub(super) mod casing;
+mod disk;
 mod flight;
 pub(super) mod together;
 

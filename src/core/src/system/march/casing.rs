@@ -8,20 +8,9 @@ use crate::galerkin::kernels::{Combine, PADDED};
 use crate::galerkin::trial::Kind;
 use crate::galerkin::whole::{Coordinates, Whole};
 use crate::gaps::frame::Frame;
-use crate::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
 use crate::settings::Scheme;
-use crate::system::Carrier;
-
-/// A place on a surface, as the node sees it that touches there.
-#[derive(Debug, Clone, Copy)]
-pub struct Spot<'a> {
-    /// The surface, and where it is carried.
-    pub surface: (&'a SurfaceSpline, Carrier),
-    /// The place.
-    pub place: ClosestPoint,
-    /// Directions of the node.
-    pub frame: Frame,
-}
+use crate::system::carrier::Spot;
+use crate::system::pair::at_place;
 
 /// Tables, state and scratch of such a structure.
 #[derive(Debug, Clone)]
@@ -122,12 +111,12 @@ impl Casing {
 
     /// Velocity of a place at the start of the step (m/s), in the directions of the node.
     pub fn velocity_at(&self, spot: Spot) -> [f64; 3] {
-        at(spot, &self.velocity)
+        at_place(spot.surface, spot.place, spot.frame, |row| self.velocity[row])
     }
 
     /// What a force at point i of the step works on there (m), in the directions of the node.
     pub fn worked_at(&self, spot: Spot, i: usize) -> [f64; 3] {
-        at(spot, &self.worked[i])
+        at_place(spot.surface, spot.place, spot.frame, |row| self.worked[i][row])
     }
 
     /// Weigh displacements at the points for the work of forces there, with the weights of point i.
@@ -267,16 +256,4 @@ pub fn coordinates(bank: &ModalBank) -> Coordinates {
     let model = bank.model();
     let dynamic = model.dynamic_modes(Scheme::Galerkin);
     Coordinates::new(&model.frequencies, &model.damping_ratios, dynamic)
-}
-
-/// Values of rows at a place, in the directions of the node.
-fn at(spot: Spot, rows: &[f64]) -> [f64; 3] {
-    let (surface, carrier) = spot.surface;
-    let mut sum = [0.0; 3];
-    for (index, weight) in surface.weights(spot.place).iter() {
-        for (component, sum) in sum.iter_mut().enumerate() {
-            *sum += weight * rows[carrier.first_row + 3 * index + component];
-        }
-    }
-    spot.frame.local(sum)
 }

@@ -1,12 +1,12 @@
 //! Sectors that step together: those of one disk, and those that touch a surface which a structure carries.
 
 use super::casing::{Casing, coordinates};
+use super::disk::Disk;
 use super::{PRECISION, failure, modes_of};
 use crate::dynamics::bank::ModalBank;
-use crate::dynamics::cyclic::CyclicBank;
 use crate::dynamics::sectors::Sectors;
 use crate::galerkin::advance::Advance;
-use crate::galerkin::basis::{MOST, POINTS};
+use crate::galerkin::basis::MOST;
 use crate::galerkin::compliance::Lanes;
 use crate::galerkin::level::Modes;
 use crate::galerkin::march::{Marched, Step};
@@ -61,22 +61,6 @@ pub struct One {
     pub record: Record,
     /// Nothing pushes it, and its gaps are wider than others penetrate: others move it by less in a step.
     far: bool,
-}
-
-/// A disk of coupled sectors.
-#[derive(Debug, Clone)]
-struct Disk {
-    structure: usize,
-    whole: Whole,
-    /// Displacements of all contact rows at the points of the step (m), and velocities at its start (m/s), `[row][lane of sector]`.
-    moved: [Vec<f64>; POINTS],
-    velocity: Vec<f64>,
-    /// How all rows of any sector see the size of a coordinate; how far they can be from where they rest.
-    sizes: Vec<f64>,
-    amplitudes: Vec<f64>,
-    reach: Vec<f64>,
-    /// Of the step that is judged (m).
-    error: f64,
 }
 
 /// Everything that is not scratch.
@@ -220,43 +204,6 @@ fn kinds_of(modes: &Sectors) -> Vec<Modes> {
             let (coordinates, shapes) = bank.coordinates_of();
             vec![coordinates.seen_at(&shapes)]
         }
-    }
-}
-
-impl Disk {
-    fn new(structure: usize, bank: &CyclicBank, degree: usize) -> Self {
-        let (coordinates, shapes) = bank.coordinates_of();
-        let rows = bank.rows() * bank.lanes();
-        Self {
-            structure,
-            moved: std::array::from_fn(|_| vec![0.0; rows]),
-            velocity: vec![0.0; rows],
-            sizes: bank.sizes(&shapes),
-            amplitudes: vec![0.0; coordinates.inertia.len()],
-            reach: vec![0.0; bank.rows()],
-            error: 0.0,
-            whole: Whole::new(coordinates, degree),
-        }
-    }
-
-    fn read(&mut self, structure: &mut Structure) {
-        let (forces, lanes, nodes) = (&structure.history.force.now, structure.lanes(), structure.nodes());
-        let Sectors::Coupled(bank) = &mut structure.modes else { return };
-        bank.read_all(self.whole.state_mut());
-        self.whole.keep_inertia();
-        let sectors = bank.sectors();
-        let all = (0..sectors).flat_map(|sector| (0..nodes).map(move |node| (sector, node)));
-        let force = |(sector, node): (usize, usize)| {
-            (sector, node, [0, 1, 2].map(|component| forces[(3 * node + component) * lanes + sector]))
-        };
-        let pushing = all.map(force).filter(|(.., force)| force.iter().any(|component| *component != 0.0));
-        bank.modal_forces(pushing, self.whole.forces_mut(0));
-    }
-
-    /// How far the rows of any sector can be from where they rest while nothing pushes (m).
-    fn find_reach(&mut self, bank: &CyclicBank) {
-        self.whole.amplitudes(&mut self.amplitudes);
-        bank.reach(&self.amplitudes, &self.sizes, &mut self.reach);
     }
 }
 
