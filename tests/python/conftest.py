@@ -17,6 +17,8 @@ from fmpy import extract, read_model_description
 from importers import Two, Three
 
 ROOT = Path(__file__).resolve().parents[2]
+# Models that ship are kept where the tests in Rust keep them: each is reduced once for all tests, and the user's stay alone.
+os.environ["TIPRUB_CACHE"] = str(ROOT / "target" / "tmp")
 
 
 @pytest.fixture(scope="session")
