@@ -164,6 +164,11 @@ impl Marcher {
         self.trial.reach(&tables.rows, state)
     }
 
+    /// See [`Trial::entered`].
+    pub fn entered(&self) -> Option<usize> {
+        self.trial.entered()
+    }
+
     /// March `state` over a span.
     ///
     /// # Errors

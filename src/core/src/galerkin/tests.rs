@@ -3,7 +3,7 @@
 use super::level::{Level, Modes};
 use super::sector::{Demand, Effort, Marcher, Tables, Taken, Witness};
 use super::state::SectorState;
-use super::trial::{Kind, Obstacle};
+use super::trial::{Kind, Obstacle, Sliding};
 use nalgebra::DMatrix;
 
 /// Numbers between −1 and 1.
@@ -81,7 +81,7 @@ impl Obstacle for Wall {
         (self.place(self.times[point]) - moved[0], [-1.0, 0.0, 0.0])
     }
 
-    fn direction(&mut self, _: usize, _: usize, _: [f64; 3], _: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
+    fn direction(&mut self, _: usize, _: usize, &Sliding { normal, .. }: &Sliding) -> [f64; 3] {
         [normal[0], -self.friction, 0.0]
     }
 }

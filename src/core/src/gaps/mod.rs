@@ -164,21 +164,28 @@ impl GapLaw {
         }
     }
 
-    /// Smallest radial clearance, or fixed gap, above 0 (m); infinite where there is none.
+    /// Smallest radial clearance, or fixed gap, above 0 (m); infinite where there is none. Of open surfaces a thousandth of the smallest
+    /// extent.
     pub fn clearance(&self) -> f64 {
         let all = match self {
             Self::Fixed(law) => &law.gaps,
             Self::Revolution(law) => &law.layout.clearances,
             Self::Spline(law) => &law.layout.clearances,
-            Self::Open(_) => return f64::INFINITY,
+            Self::Open(law) => return law.clearance(),
         };
         all.iter().copied().filter(|clearance| *clearance > 0.0).fold(f64::INFINITY, f64::min)
     }
 
     /// What rounding leaves of a gap (m), where it is a distance of points that are far from the origin.
     pub fn rounding(&self) -> f64 {
-        let Self::Spline(law) = self else { return 0.0 };
-        64.0 * f64::EPSILON * law.layout.radii.iter().fold(0.0, |most: f64, radius| most.max(*radius))
+        let largest = |all: &mut dyn Iterator<Item = f64>| all.fold(0.0, f64::max);
+        let far = match self {
+            Self::Fixed(_) | Self::Revolution(_) => 0.0,
+            Self::Spline(law) => largest(&mut law.layout.radii.iter().copied()),
+            // Its displacements are those of all its flight.
+            Self::Open(law) => 8.0 * largest(&mut law.positions().iter().map(|place| dot(*place, *place).sqrt())),
+        };
+        64.0 * f64::EPSILON * far
     }
 
     /// Angle over which the casing shape changes noticeably (rad).
@@ -204,14 +211,19 @@ impl GapLaw {
         }
     }
 
-    /// Gap (m), unit normal and place of one node displaced by `moved` (m, own directions) against what nothing deforms; a place
-    /// only on surfaces around an axis through data points.
-    pub fn of_one(&mut self, at: At<'_>, moved: [f64; 3]) -> (f64, [f64; 3], ClosestPoint) {
+    /// Gap (m), unit normal and place of one node displaced by `moved` (m, own directions) against a surface as it is now; a place
+    /// only on surfaces through data points. On open ones it is sought from `guess`, if there is one.
+    pub fn of_one(
+        &mut self,
+        at: At<'_>,
+        moved: [f64; 3],
+        guess: Option<ClosestPoint>,
+    ) -> (f64, [f64; 3], ClosestPoint) {
         let (gap, normal) = match self {
             Self::Fixed(law) => (law.gaps[at.node] + dot(law.normals[at.node], moved), law.normals[at.node]),
             Self::Revolution(law) => law.of_one(at, moved),
             Self::Spline(law) => return law.of_one(at, moved),
-            Self::Open(_) => (f64::NAN, [0.0; 3]),
+            Self::Open(law) => return law.of_one(at.node, moved, guess),
         };
         (gap, normal, ClosestPoint::default())
     }
@@ -235,6 +247,15 @@ impl GapLaw {
             Self::Revolution(law) => law.evaluate(drive, displacement, geometry, gap),
             Self::Spline(law) => law.evaluate(drive, displacement, moved, guess, geometry, gap),
             Self::Open(law) => law.evaluate(displacement, moved, guess, geometry, gap),
+        }
+    }
+
+    /// The surface is as with this factor of its shape and control points displaced by `moved` (m, three per control point).
+    pub fn bend(&mut self, factor: f64, moved: &[f64]) {
+        match self {
+            Self::Fixed(_) | Self::Revolution(_) => {}
+            Self::Spline(law) => law.follow(factor, moved),
+            Self::Open(law) => law.surface.follow(moved),
         }
     }
 

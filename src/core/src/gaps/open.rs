@@ -8,6 +8,13 @@ use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use super::{Geometry, dot};
 use crate::ranges::SMALL;
 
+/// [`OpenGap::clearance`] as a share of the largest displacement that counts as small.
+const CLEARANCE: f64 = 1e-2;
+
+/// How far behind a surface, continued beyond its edge, a node may have been: share of its way in the step, since the surface
+/// may bend, and of the largest displacement that counts as small.
+const BEHIND_EDGE: [f64; 2] = [1e-3, 1e-6];
+
 /// A surface through the contact grid of a structure, in fixed directions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenSurface {
@@ -27,7 +34,7 @@ impl OpenSurface {
     }
 
     /// Displace the control points by `moved` (m, three per control point); a rigid surface is moved by nothing.
-    fn follow(&mut self, moved: &[f64]) {
+    pub(super) fn follow(&mut self, moved: &[f64]) {
         if moved.is_empty() {
             return;
         }
@@ -102,26 +109,49 @@ impl OpenGap {
         gap: &mut [f64],
     ) {
         self.surface.follow(moved);
-        let surface = &self.surface.surface;
         for &node in &self.nodes {
-            let point = std::array::from_fn(|i| self.positions[node][i] + displacement[3 * node + i]);
-            let start = guess.map_or_else(|| surface.locate(point), |places| places[node]);
-            let mut found = surface.project(point, start);
-            if found == Projection::Lost {
-                found = surface.project(point, surface.locate(point));
-            }
-            let (value, place, normal) = match found {
-                Projection::Found { place, normal, gap, .. } => (gap, place, normal),
-                Projection::BeyondEdge { place } => (NOTHING_TO_TOUCH, place, [0.0; 3]),
-                // Found out by the caller: the state is not what the model describes any more.
-                Projection::Lost => (f64::NAN, start, [0.0; 3]),
-            };
+            let moved = std::array::from_fn(|i| displacement[3 * node + i]);
+            let (value, normal, place) = self.of_one(node, moved, guess.map(|places| places[node]));
             gap[node] = value;
             geometry.places[node] = place;
             for (component, value) in normal.into_iter().enumerate() {
                 geometry.normal[component][node] = value;
             }
         }
+    }
+
+    /// Gap (m), normal and place of one node displaced by `moved` (m) before the surface as it is now. A gap that is no number is found
+    /// out by the caller: the state is not what the model describes any more.
+    pub(super) fn of_one(
+        &self,
+        node: usize,
+        moved: [f64; 3],
+        guess: Option<ClosestPoint>,
+    ) -> (f64, [f64; 3], ClosestPoint) {
+        let surface = &self.surface.surface;
+        let point = std::array::from_fn(|i| self.positions[node][i] + moved[i]);
+        let start = guess.unwrap_or_else(|| surface.locate(point));
+        let mut found = surface.project(point, start);
+        if found == Projection::Lost {
+            found = surface.project(point, surface.locate(point));
+        }
+        match found {
+            Projection::Found { place, normal, gap, .. } => (gap, normal, place),
+            Projection::BeyondEdge { place } => (NOTHING_TO_TOUCH, [0.0; 3], place),
+            Projection::Lost => (f64::NAN, [0.0; 3], start),
+        }
+    }
+
+    /// What stands in place of a clearance, which nothing that flies has: a thousandth of the smallest extent (m).
+    pub(super) fn clearance(&self) -> f64 {
+        CLEARANCE * self.largest
+    }
+
+    /// Whether a node that now has this gap (m) was behind the surface, continued beyond its edge, before it moved by `moved` against it
+    /// (m).
+    pub fn was_behind(&self, moved: [f64; 3], normal: [f64; 3], gap: f64) -> bool {
+        let (approach, travel) = (dot(moved, normal), dot(moved, moved).sqrt());
+        gap - approach < -(BEHIND_EDGE[0] * travel + BEHIND_EDGE[1] * self.largest)
     }
 
     /// Whether the contact nodes have moved against each other by more than what counts as small: displacements less

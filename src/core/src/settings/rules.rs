@@ -181,12 +181,6 @@ static METHODS: &[Rule] = &[
     ),
     excludes(
         &[GALERKIN],
-        ("a free master", |at| at.contacts().any(|at| at.is_free())),
-        "closest points on open surfaces are sought from the step before, and its steps are not everybody's",
-        "Use \"modal-exact\" or \"central-difference\"",
-    ),
-    excludes(
-        &[GALERKIN],
         ("`structure.spin`", |at| at.settings.structures.iter().any(|own| own.spin != SpinSettings::default())),
         "its tables are those of modes that keep their stiffness and are loaded by contact alone",
         "Use \"modal-exact\", or leave the effects of spin out",
@@ -205,7 +199,9 @@ static METHODS: &[Rule] = &[
     ),
     needs(
         &[GALERKIN],
-        ("a clearance above 0", |at| at.contacts().all(|at| at.contact().nominal_gap() > 0.0)),
+        ("a clearance above 0 of what does not fly", |at| {
+            at.contacts().all(|at| at.is_free() || at.contact().nominal_gap() > 0.0)
+        }),
         "its tolerance is a share of the clearance",
         "Give the contact a `gap`, or use \"modal-exact\"",
     ),

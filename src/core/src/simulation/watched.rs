@@ -118,7 +118,7 @@ impl Facing {
         let moved = [moved[0] + outwards, moved[1] / longer, moved[2]];
         match &mut self.law {
             GapLaw::Spline(law) => law.gap_of_one(at, moved),
-            law => law.of_one(at, moved).0,
+            law => law.of_one(at, moved, None).0,
         }
     }
 }

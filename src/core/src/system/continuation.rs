@@ -3,9 +3,9 @@
 use super::pair::When;
 use super::posed::Member;
 use super::{Bodies, ContactEvent, Pair, StepFailure, Structure, System, sum_of};
+use crate::gaps::GapLaw;
 use crate::gaps::surface_spline::ClosestPoint;
 use crate::gaps::wrench::At;
-use crate::gaps::{GapLaw, dot};
 use crate::history::History;
 use crate::persist::{Persist, Reader, Writer};
 
@@ -13,9 +13,6 @@ use crate::persist::{Persist, Reader, Writer};
 const FORCE_REACH: f64 = 4.0;
 /// Gaps are closed up to this share of what says nothing ([`GapLaw::indifferent`]).
 const CLOSED: f64 = 1e-9;
-/// How far behind a surface, continued beyond its edge, a node may have been: share of its way in the step, since the surface
-/// may bend, and of the largest displacement that counts as small.
-const BEHIND_EDGE: [f64; 2] = [1e-3, 1e-6];
 /// Curvature work beyond this share of all energy exchanged is more than an error of truncation.
 const MOST_CURVATURE: f64 = 0.5;
 
@@ -133,9 +130,7 @@ impl System {
                 if gap < 0.0 && before.is_infinite() {
                     let at = Member { structure, pair: number, node, sector: 0, index: node };
                     let moved = bodies.pose(at).slip_of_deformation();
-                    let approach = dot(moved, of.history.geometry.now.normal_at(node));
-                    let travel = dot(moved, moved).sqrt();
-                    if gap - approach < -(BEHIND_EDGE[0] * travel + BEHIND_EDGE[1] * open.largest()) {
+                    if open.was_behind(moved, of.history.geometry.now.normal_at(node), gap) {
                         return Err(StepFailure::BehindEdge { structure, node });
                     }
                 }

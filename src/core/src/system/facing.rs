@@ -1,19 +1,24 @@
 //! One sector facing its surfaces over a span of time: gaps at any instant, and what contacts did.
 
+use super::StepFailure;
 use super::carrier::Spot;
 use super::growth::Growth;
 use super::march::casing::Casing;
 use super::pair::Pair;
-use crate::galerkin::basis::{Basis, MOST, POINTS};
+use crate::galerkin::basis::{MOST, POINTS};
 use crate::galerkin::compliance::Lanes;
 use crate::galerkin::level::Level;
 use crate::galerkin::sector::{Taken, Witness};
-use crate::galerkin::trial::{Kind, Obstacle, one_by_one, three};
+use crate::galerkin::trial::{Kind, Obstacle, Sliding, Trial, one_by_one, three};
 use crate::gaps::GapLaw;
 use crate::gaps::revolution::Instants;
 use crate::gaps::surface_spline::ClosestPoint;
 use crate::gaps::wrench::{At, Motion, Wrench};
 use crate::gaps::{Drive, dot};
+
+/// Contacts of a trial are solved this often before their directions of sliding stay as they are: a node that next to does not slide would
+/// turn them from one time to the next.
+const LOOKS: usize = 3;
 
 /// How prescribed motion of a pair goes on over a span: from where it was, quadratic in time through the middle and the end. Inputs
 /// are linear in time and the angle of the rotor quadratic, so that this is exact; what grows in otherwise is the shape.
@@ -147,11 +152,16 @@ pub struct Record {
     places: [Vec<ClosestPoint>; POINTS],
     /// Where forces have been handed to structures that carry surfaces: places of the pass before that in which gaps hold.
     acted: [Vec<ClosestPoint>; POINTS],
+    /// How nodes slide along open surfaces at the points (m), and how often that has been asked in this trial.
+    slips: [Vec<[f64; 3]>; POINTS],
+    looks: usize,
     instants: Instants,
     /// All nodes at all points are in `instants`, before the surface of this pair.
     lanes_of: Option<usize>,
     /// A contact that small displacements cannot describe.
     pub implausible: bool,
+    /// A node that has come over a free edge and was behind the surface already.
+    pub behind_edge: Option<usize>,
 }
 
 impl Record {
@@ -165,9 +175,12 @@ impl Record {
             motions: vec![[Motion::default(); POINTS]; pairs],
             places: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             acted: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
+            slips: std::array::from_fn(|_| vec![[0.0; 3]; nodes]),
+            looks: 0,
             instants: Instants::new(Lanes { points: MOST, nodes }.width()),
             lanes_of: None,
             implausible: false,
+            behind_edge: None,
         }
     }
 
@@ -193,6 +206,14 @@ impl Record {
         self.acted[point][node] = self.places[point][node];
     }
 
+    /// What a span of this structure and sector ends with.
+    pub fn check(&self, (structure, sector): (usize, usize)) -> Result<(), StepFailure> {
+        if self.implausible {
+            return Err(StepFailure::Implausible { structure, sector });
+        }
+        self.behind_edge.map_or(Ok(()), |node| Err(StepFailure::BehindEdge { structure, node }))
+    }
+
     /// Prescribed motion of a span (s) that the pairs are at the end of.
     pub fn set_out(&mut self, pairs: &[Pair], span: f64) {
         for (course, pair) in self.courses.iter_mut().zip(pairs) {
@@ -212,7 +233,7 @@ impl Record {
             *place = place_of(node);
         }
         self.tallies.fill(Tally::NOTHING);
-        (self.work, self.implausible) = (Worked::default(), false);
+        (self.work, self.implausible, self.behind_edge) = (Worked::default(), false, None);
     }
 }
 
@@ -290,7 +311,7 @@ impl Obstacle for Facing<'_> {
     fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
         let Some(pair) = self.pair_of[node] else { return (f64::INFINITY, [0.0; 3]) };
         let at = self.at(node, &self.record.drives[pair][point].0);
-        let (gap, normal, place) = self.pairs[pair].gap_mut().of_one(at, moved);
+        let (gap, normal, place) = self.pairs[pair].gap_mut().of_one(at, moved, Some(self.record.places[point][node]));
         self.record.places[point][node] = place;
         (gap, normal)
     }
@@ -304,28 +325,37 @@ impl Obstacle for Facing<'_> {
         one_by_one(self, lanes, moved, gaps, normals);
     }
 
-    fn direction(
-        &mut self,
-        node: usize,
-        point: usize,
-        moved: [f64; 3],
-        velocity: [f64; 3],
-        normal: [f64; 3],
-    ) -> [f64; 3] {
-        let Some(pair) = self.pair_of[node] else { return normal };
-        let (friction, gap) = (self.pairs[pair].friction(), self.pairs[pair].gap());
+    fn direction(&mut self, node: usize, point: usize, sliding: &Sliding) -> [f64; 3] {
+        let Some(pair) = self.pair_of[node] else { return sliding.normal };
+        let friction = self.pairs[pair].friction();
         if friction == 0.0 {
-            return normal;
+            return sliding.normal;
         }
-        let at = self.at(node, &self.record.drives[pair][point].0);
-        let rigid = gap.sliding_velocity(node, at.index, at.drive, moved);
-        let ground =
-            self.on_ground((node, point), Place::Begun, |casing, spot| casing.velocity_at(spot)).unwrap_or_default();
-        let slip = gap.slip_direction(std::array::from_fn(|i| rigid[i] + velocity[i] - ground[i]), normal);
-        std::array::from_fn(|i| normal[i] - friction * slip[i])
+        if matches!(self.pairs[pair].gap(), GapLaw::Open(_)) && self.record.looks <= LOOKS {
+            let ground = self.on_ground((node, point), Place::Now, |casing, spot| casing.way_at(spot, point));
+            let ground = ground.unwrap_or_default();
+            self.record.slips[point][node] = std::array::from_fn(|c| sliding.way[c] - ground[c]);
+        }
+        let gap = self.pairs[pair].gap();
+        let slip = if matches!(gap, GapLaw::Open(_)) {
+            self.record.slips[point][node]
+        } else {
+            let at = self.at(node, &self.record.drives[pair][point].0);
+            let rigid = gap.sliding_velocity(node, at.index, at.drive, sliding.moved);
+            let ground = self.on_ground((node, point), Place::Begun, |casing, spot| casing.velocity_at(spot));
+            let ground = ground.unwrap_or_default();
+            std::array::from_fn(|i| rigid[i] + sliding.velocity[i] - ground[i])
+        };
+        let slip = gap.slip_direction(slip, sliding.normal);
+        std::array::from_fn(|i| sliding.normal[i] - friction * slip[i])
+    }
+
+    fn turns(&self) -> bool {
+        self.pairs.iter().any(|pair| matches!(pair.gap(), GapLaw::Open(_)) && pair.friction() != 0.0)
     }
 
     fn look(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
+        self.record.looks += 1;
         let Some(Ground { casings, lanes: of_ground, .. }) = &mut self.ground else { return false };
         *of_ground = lanes;
         casings.iter_mut().for_each(Casing::look_away);
@@ -356,6 +386,7 @@ impl Witness for Facing<'_> {
                 *drive = course.at(from + length * theta);
             }
         }
+        self.record.looks = 0;
         self.record.lanes_of = self.enter_lanes(Lanes { points: count - 1, nodes: self.pair_of.len() });
     }
 
@@ -386,6 +417,10 @@ impl Witness for Facing<'_> {
             let gaps = (1..=points).map(|point| step.trial.gap(point, node));
             let tally = &mut self.record.tallies[node];
             tally.lowest = gaps.fold(tally.lowest, f64::min);
+            let comes = (1..=points).find(|i| step.trial.multiplier(*i, node) > 0.0);
+            if comes.is_some_and(|i| self.was_behind(step.trial, node, pair, i)) {
+                self.record.behind_edge = Some(node);
+            }
             if (0..=points).any(|point| step.trial.multiplier(point, node) > 0.0) {
                 self.enter(step, node, pair);
             }
@@ -397,22 +432,32 @@ impl Witness for Facing<'_> {
     }
 }
 
-/// Weights of the work of forces at point i: S_ik, or those of a constant force.
-pub fn work_weights(basis: &Basis, kind: Kind, i: usize) -> [f64; POINTS] {
-    match kind {
-        Kind::Polynomial => basis.work[i],
-        Kind::Constant if i == 1 => [-1.0, 1.0, 0.0, 0.0],
-        Kind::Constant => [0.0; POINTS],
-    }
-}
-
 impl Facing<'_> {
+    /// Whether a node that touches at point `i` had nothing to touch before, and was behind the surface, continued beyond its edge.
+    fn was_behind(&self, trial: &Trial, node: usize, pair: usize, i: usize) -> bool {
+        let GapLaw::Open(open) = self.pairs[pair].gap() else { return false };
+        if trial.gap(i - 1, node).is_finite() {
+            return false;
+        }
+        let (now, before) = (trial.displacement(i, node), trial.displacement(i - 1, node));
+        let ground = self.on_ground((node, i), Place::Now, |casing, spot| {
+            let [now, before] = [i, i - 1].map(|point| casing.moved_at(spot, point));
+            std::array::from_fn(|c| now[c] - before[c])
+        });
+        let ground: [f64; 3] = ground.unwrap_or_default();
+        open.was_behind(
+            std::array::from_fn(|c| now[c] - before[c] - ground[c]),
+            trial.normal(i, node),
+            trial.gap(i, node),
+        )
+    }
+
     /// Σ_k S_ik of the prescribed motion of a pair at the points, for each point i of the step.
     fn weigh_motions(&mut self, step: &Taken) {
         let points = 0..=step.trial.points();
         for (motions, drives) in self.record.motions.iter_mut().zip(&self.record.drives) {
             for i in points.clone() {
-                let weights = work_weights(&step.level.basis, step.kind, i);
+                let weights = step.kind.work_weights(&step.level.basis, i);
                 let terms = points.clone().map(|k| drives[k].1.less(&drives[0].1).over(weights[k]));
                 motions[i] = terms.fold(Motion::default(), |sum, term| sum.since(&term));
             }
@@ -447,7 +492,7 @@ impl Facing<'_> {
                 tally.wrench.moment[c] += length * wrench.moment[c];
                 tally.wrench.point[c] += length * normal_force * wrench.point[c];
             }
-            let weights = work_weights(basis, step.kind, i);
+            let weights = step.kind.work_weights(basis, i);
             let (mut there, mut open) = ([0.0; 3], 0.0);
             for k in (0..=trial.points()).filter(|k| weights[*k] != 0.0) {
                 let displaced = trial.displacement(k, node);

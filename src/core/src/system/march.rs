@@ -150,6 +150,7 @@ impl System {
         let outcome = together.iter_mut().try_for_each(|together| self.march_together(together, span));
         self.together = together;
         outcome?;
+        self.check_travel()?;
         self.find_gaps(true);
         for structure in &mut self.structures {
             let ends = structure.lowest_in_span.iter_mut().zip(&structure.history.gap.now);
@@ -192,11 +193,7 @@ impl System {
         let outcome = march(&mut marching, demand, &mut counted.effort);
         let load_work = marching.finish();
         counted.factorisations += counted.effort.factorisations - factorisations;
-        for one in &together.sectors {
-            if one.record.implausible {
-                return Err(StepFailure::Implausible { structure: one.structure, sector: one.sector });
-            }
-        }
+        together.sectors.iter().try_for_each(|one| one.record.check((one.structure, one.sector)))?;
         outcome.map_err(|stopped| together.failure(stopped))?;
         let ledger = &mut counted.ledgers[together.set];
         ledger.load_work.add(load_work);
@@ -210,11 +207,12 @@ impl System {
     }
 }
 
-/// Why a sector is not marched to the end.
-fn failure(stopped: Stopped, (structure, sector): (usize, usize)) -> StepFailure {
-    match stopped {
-        Stopped::Unsolved => StepFailure::Unsolved { structure, sector },
-        Stopped::Exhausted => StepFailure::Exhausted,
+/// Why a sector is not marched to the end; `entered`: a node that had nothing to touch before, and is inside an open surface.
+fn failure(stopped: Stopped, (structure, sector): (usize, usize), entered: Option<usize>) -> StepFailure {
+    match (stopped, entered) {
+        (Stopped::Unsolved, Some(node)) => StepFailure::BehindEdge { structure, node },
+        (Stopped::Unsolved, None) => StepFailure::Unsolved { structure, sector },
+        (Stopped::Exhausted, _) => StepFailure::Exhausted,
     }
 }
 
@@ -291,10 +289,9 @@ impl Structure {
         record.begin(|node| places.place_at(node * lanes + sector));
         let mut facing = Facing { ground: None, pairs, pair_of: &self.pair_of, lanes, sector, record };
         let outcome = marcher.march(tables, state, &mut facing, *demand, effort);
-        if record.implausible {
-            return Err(StepFailure::Implausible { structure: number, sector });
-        }
-        outcome.map_err(|stopped| failure(stopped, (number, sector)))?;
+        record.check((number, sector))?;
+        let entered = marcher.entered();
+        outcome.map_err(|stopped| failure(stopped, (number, sector), entered))?;
         (self.pace.bank[sector], self.pace.level[sector]) = (state.bank, state.level as u64);
         self.write_contacts(sector, state, |node| record.tallies[node].lowest);
         if let Sectors::Uncoupled(bank) = self.modes_mut() {

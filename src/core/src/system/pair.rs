@@ -162,9 +162,9 @@ impl Pair {
 
     /// The surface is as with this factor of its shape and rows of its carrier displaced so (m).
     pub(super) fn bend(&mut self, factor: f64, rows: &[f64]) {
-        let (Some(carrier), GapLaw::Spline(law)) = (self.parts.carrier, &mut self.parts.gap) else { return };
-        let points = law.surface.control_points().len();
-        law.follow(factor, &rows[carrier.first_row..][..3 * points]);
+        let Some(carrier) = self.parts.carrier else { return };
+        let points = self.parts.gap.spline().map_or(0, |surface| surface.control_points().len());
+        self.parts.gap.bend(factor, &rows[carrier.first_row..][..3 * points]);
     }
 
     /// Gaps of its nodes at the displacements of now; `warm`: closest points are sought from those of the step before.

@@ -4,4 +4,5 @@
 mod counting;
 
 mod flight;
+mod marched;
 mod refusals;

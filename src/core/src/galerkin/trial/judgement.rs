@@ -44,6 +44,8 @@ impl Trial {
                 continue;
             }
             pushed = true;
+            // What comes over a free edge is looked at closely.
+            verdict.near |= (1..count).any(|point| pushes(point) && self.gap(point - 1, node) == f64::INFINITY);
             let mut forces = [[0.0; 3]; POINTS];
             forces[..count].iter_mut().enumerate().for_each(|(point, force)| *force = self.force(point, node));
             for component in 0..3 {

@@ -3,7 +3,7 @@
 mod judgement;
 mod together;
 
-use super::basis::{Basis, MOST};
+use super::basis::{Basis, MOST, POINTS};
 use super::compliance::{Compliance, Lanes};
 use super::kernels::{Add, AddProduct, Column, Combine, Withdraw};
 use super::level::Level;
@@ -29,15 +29,13 @@ pub trait Obstacle {
         one_by_one(self, lanes, moved, gaps, normals);
     }
 
-    /// Force per unit of λ on the node, friction included, at velocity `velocity` of its vibration (m/s).
-    fn direction(
-        &mut self,
-        node: usize,
-        point: usize,
-        moved: [f64; 3],
-        velocity: [f64; 3],
-        normal: [f64; 3],
-    ) -> [f64; 3];
+    /// Whether directions of sliding turn within a step, and ask for [`Sliding::way`].
+    fn turns(&self) -> bool {
+        false
+    }
+
+    /// Force per unit of λ on the node, friction included.
+    fn direction(&mut self, node: usize, point: usize, sliding: &Sliding) -> [f64; 3];
 
     /// Contacts at the lanes chosen are about to be solved, with these normals: get ready to tell how what is touched gives way there.
     /// False where it does not.
@@ -48,6 +46,20 @@ pub trait Obstacle {
     /// By how much what is touched gives way at all lanes (m, along their normals, away from the node) per λ of one with the force
     /// `direction` per λ; only after [`Obstacle::look`] has said that it does.
     fn give(&mut self, _lane: usize, _direction: [f64; 3], _given: &mut [f64]) {}
+}
+
+/// How a node slides at a point of the step.
+#[derive(Debug, Clone, Copy)]
+pub struct Sliding {
+    /// Its displacement (m).
+    pub moved: [f64; 3],
+    /// Velocity of its vibration at the start of the step (m/s).
+    pub velocity: [f64; 3],
+    /// What a force at this point works on, Σ_k S_ik ũ_k (m), as far as modes with inertia go there; 0 where nobody asks
+    /// ([`Obstacle::turns`]).
+    pub way: [f64; 3],
+    /// Unit normal at the point.
+    pub normal: [f64; 3],
 }
 
 /// [`Obstacle::gaps`] by [`Obstacle::gap`] of every lane.
@@ -73,6 +85,17 @@ pub enum Kind {
     Polynomial,
     /// The force is what it is at the end: dissipative whatever opens or closes.
     Constant,
+}
+
+impl Kind {
+    /// Weights of the work of forces at point i: S_ik, or those of a constant force.
+    pub fn work_weights(self, basis: &Basis, i: usize) -> [f64; POINTS] {
+        match self {
+            Self::Polynomial => basis.work[i],
+            Self::Constant if i == 1 => [-1.0, 1.0, 0.0, 0.0],
+            Self::Constant => [0.0; POINTS],
+        }
+    }
 }
 
 /// Three values of a node.
@@ -120,6 +143,10 @@ pub struct Trial {
     amounts: Vec<f64>,
     sums: Sums<MOST>,
     reach: (Sums<1>, Vec<f64>),
+    /// Weights of the work of forces at each point.
+    ways: [[f64; POINTS]; POINTS],
+    /// Displacements at each point without the residual flexibility (m), where they are asked for.
+    inert: [Vec<f64>; POINTS],
     /// Impulses left out (N·s), and what the error makes of them (m²/(N·s)).
     impulses: Vec<f64>,
     left: Vec<f64>,
@@ -169,6 +196,8 @@ impl Trial {
             amounts: Vec::with_capacity(3 * lanes.len()),
             sums: Sums::new(modes, nodes),
             reach: (Sums::new(modes, nodes), rows()),
+            ways: [[0.0; POINTS]; POINTS],
+            inert: std::array::from_fn(|_| rows()),
             impulses: rows(),
             left: rows(),
         }
@@ -248,7 +277,7 @@ impl Trial {
                 break;
             }
             self.find_start(rows, state);
-            if pass + 1 == PASSES || !self.solve(compliance, obstacle, &mut verdict) {
+            if pass + 1 == PASSES || !self.solve((compliance, rows.residual()), obstacle, &mut verdict) {
                 return verdict;
             }
         }
@@ -290,6 +319,7 @@ impl Trial {
     /// Where the rows go without forces at points 1 … s, unless somebody else knows (no `rows`), and a guess of these: as at the start.
     pub fn begin(&mut self, (level, kind): (&Level, Kind), rows: Option<&Rows>, state: &SectorState) {
         let compliance = level.compliance_of(kind);
+        self.ways = std::array::from_fn(|i| kind.work_weights(&level.basis, i));
         self.lanes = compliance.lanes();
         let (begun, lanes) = (&mut self.begun, self.lanes);
         begun.forces.copy_from_slice(&state.forces);
@@ -301,7 +331,9 @@ impl Trial {
             self.move_freely((level, kind), rows, state);
         }
         self.pushed[..stride].fill(0.0);
-        self.forces[..stride].fill(0.0);
+        for lane in 0..lanes.len() {
+            lanes.set(&mut self.forces, lane, three(&state.forces, lanes.place(lane).1));
+        }
         self.taken.clear();
         self.amounts.clear();
         for (column, force) in state.forces.iter().enumerate().filter(|(_, force)| **force != 0.0) {
@@ -371,7 +403,15 @@ impl Trial {
     }
 
     /// 0 ≤ λ ⟂ g ≥ 0 at all points and nodes: of those that penetrate or push first, then of those that these make penetrate.
-    pub fn solve(&mut self, compliance: &Compliance, obstacle: &mut impl Obstacle, verdict: &mut Verdict) -> bool {
+    pub fn solve(
+        &mut self,
+        (compliance, residual): (&Compliance, &DMatrix<f64>),
+        obstacle: &mut impl Obstacle,
+        verdict: &mut Verdict,
+    ) -> bool {
+        if obstacle.turns() {
+            self.find_inert(residual);
+        }
         let (lanes, width) = (self.lanes, self.lanes.width());
         let Self { gaps, normals, pushed, without, .. } = self;
         self.instructions.run(Withdraw {
@@ -423,12 +463,39 @@ impl Trial {
         true
     }
 
+    /// What modes with inertia move by at the points.
+    ///
+    /// Not what nodes move by: without mass they go to and fro with the force, much faster than they slide.
+    fn find_inert(&mut self, residual: &DMatrix<f64>) {
+        for point in 0..=self.lanes.points {
+            for node in 0..self.lanes.nodes {
+                let (force, moved) = (self.force(point, node), self.displacement(point, node));
+                for c in 0..3 {
+                    (self.impulses[3 * node + c], self.inert[point][3 * node + c]) = (-force[c], moved[c]);
+                }
+            }
+            let y = &mut self.inert[point];
+            self.instructions.run(AddProduct { matrix: residual, x: &self.impulses, y });
+        }
+    }
+
+    /// What a force on a node at a point works on (m).
+    fn way(&self, point: usize, node: usize) -> [f64; 3] {
+        let terms = self.ways[point].iter().zip(&self.inert);
+        terms.fold([0.0; 3], |way, (weight, inert)| std::array::from_fn(|c| way[c] + weight * inert[3 * node + c]))
+    }
+
     /// A lane becomes an unknown: the direction of its force, and what that moves.
     fn choose(&mut self, lane: usize, compliance: &Compliance, obstacle: &mut impl Obstacle) {
         let (lanes, width) = (self.lanes, self.lanes.width());
         let (point, node) = lanes.place(lane);
-        let (moved, normal) = (lanes.three(&self.moved, lane), lanes.three(&self.normals, lane));
-        let direction = obstacle.direction(node, point, moved, three(&self.velocities, node), normal);
+        let sliding = Sliding {
+            moved: lanes.three(&self.moved, lane),
+            velocity: three(&self.velocities, node),
+            way: self.way(point, node),
+            normal: lanes.three(&self.normals, lane),
+        };
+        let direction = obstacle.direction(node, point, &sliding);
         lanes.set(&mut self.directions, lane, direction);
         self.members.push(lane);
         self.instructions.run(Column {
@@ -478,6 +545,12 @@ impl Trial {
             }
         }
         found
+    }
+
+    /// A node that had nothing to touch at the start of the step and is inside something now.
+    pub fn entered(&self) -> Option<usize> {
+        let inside = |node: &usize| (1..=self.points()).any(|point| self.gap(point, *node) < 0.0);
+        (0..self.nodes()).find(|node| self.begun.gaps[*node] == f64::INFINITY && inside(node))
     }
 
     /// Whether anything pushes.

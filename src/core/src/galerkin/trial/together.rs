@@ -21,14 +21,6 @@ impl Trial {
         }
     }
 
-    /// A guess of forces: those of the start at all points.
-    pub fn guess(&mut self, state: &SectorState) {
-        for lane in 0..self.lanes.len() {
-            let (_, node) = self.lanes.place(lane);
-            self.lanes.set(&mut self.forces, lane, super::three(&state.forces, node));
-        }
-    }
-
     /// Somebody else knows displacements under the forces of now (m), of a node at point 1 … s: those of others are what is left.
     pub fn carry(&mut self, of: impl Fn(usize, usize) -> [f64; 3]) {
         for lane in 0..self.lanes.len() {

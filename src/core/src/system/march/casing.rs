@@ -31,6 +31,8 @@ pub struct Casing {
     velocity: Vec<f64>,
     /// Of each point of the step taken: what forces there work on, Σ_k S_ik of the displacements (m).
     worked: [Vec<f64>; POINTS],
+    /// Weights of the work of forces at each point of the step that is tried.
+    pub ways: [[f64; POINTS]; POINTS],
     /// δ² per squared impulse on each mode: ½ mean φ²/ω².
     error_form: Vec<f64>,
     impulses: Vec<f64>,
@@ -70,6 +72,7 @@ impl Casing {
             moved: std::array::from_fn(|_| vec![0.0; padded]),
             velocity: vec![0.0; padded],
             worked: std::array::from_fn(|_| vec![0.0; padded]),
+            ways: [[0.0; POINTS]; POINTS],
             impulses: vec![0.0; modes],
             seen: std::array::from_fn(|_| vec![0.0; lanes.len() * stride]),
             along: vec![0.0; lanes.len() * stride],
@@ -114,17 +117,28 @@ impl Casing {
         at_place(spot.surface, spot.place, spot.frame, |row| self.velocity[row])
     }
 
+    /// What a force at point i of the step that is tried works on at a place (m), in the directions of the node.
+    pub fn way_at(&self, spot: Spot, i: usize) -> [f64; 3] {
+        let (weights, moved) = (&self.ways[i], &self.moved);
+        let way = |row: usize| weights.iter().zip(moved).map(|(weight, moved)| weight * moved[row]).sum::<f64>();
+        at_place(spot.surface, spot.place, spot.frame, way)
+    }
+
+    /// Displacement of a place at a point of the step (m), in the directions of the node.
+    pub fn moved_at(&self, spot: Spot, point: usize) -> [f64; 3] {
+        at_place(spot.surface, spot.place, spot.frame, |row| self.moved[point][row])
+    }
+
     /// What a force at point i of the step works on there (m), in the directions of the node.
     pub fn worked_at(&self, spot: Spot, i: usize) -> [f64; 3] {
         at_place(spot.surface, spot.place, spot.frame, |row| self.worked[i][row])
     }
 
-    /// Weigh displacements at the points for the work of forces there, with the weights of point i.
-    pub fn weigh(&mut self, points: usize, weights: impl Fn(usize) -> [f64; POINTS]) {
-        for i in 0..=points {
-            let weights = weights(i);
-            let Self { worked, moved, .. } = self;
-            for (row, worked) in worked[i].iter_mut().enumerate() {
+    /// Weigh displacements at the points for the work of forces there.
+    pub fn weigh(&mut self, points: usize) {
+        let Self { worked, moved, ways, .. } = self;
+        for (worked, weights) in worked.iter_mut().zip(ways).take(points + 1) {
+            for (row, worked) in worked.iter_mut().enumerate() {
                 *worked = (0..=points).map(|k| weights[k] * moved[k][row]).sum();
             }
         }

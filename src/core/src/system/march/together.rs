@@ -15,7 +15,7 @@ use crate::galerkin::state::SectorState;
 use crate::galerkin::trial::{Kind, Obstacle, Trial, Verdict};
 use crate::galerkin::whole::Whole;
 use crate::settings::Scheme;
-use crate::system::facing::{Facing, Ground, Record, work_weights};
+use crate::system::facing::{Facing, Ground, Record};
 use crate::system::{Pair, StepFailure, Structure};
 
 /// Most evaluations of the gaps of one trial: others move as well.
@@ -151,12 +151,14 @@ impl Together {
     /// Why it is not marched to the end.
     pub fn failure(&self, stopped: Stopped) -> StepFailure {
         let (index, is_lost) = self.failed.unwrap_or((0, false));
-        let Some(One { structure, sector, .. }) = self.sectors.get(index) else { return StepFailure::NonFinite };
+        let Some(One { structure, sector, trial, .. }) = self.sectors.get(index) else {
+            return StepFailure::NonFinite;
+        };
         let (structure, sector) = (*structure, *sector);
         match stopped {
             // The surface is nowhere near.
             Stopped::Unsolved if is_lost => StepFailure::Implausible { structure, sector },
-            _ => failure(stopped, (structure, sector)),
+            _ => failure(stopped, (structure, sector), trial.entered()),
         }
     }
 
@@ -289,15 +291,16 @@ impl Marching<'_> {
         for disk in &mut self.together.disks {
             disk.whole.begin(step, kind);
         }
+        let basis = &self.together.tables[0][0].levels[step.level].basis;
         for casing in &mut self.together.casings {
             casing.whole.begin(step, kind);
+            casing.ways = std::array::from_fn(|i| kind.work_weights(basis, i));
         }
         self.each((step, kind), |facing, (trial, state), tables, disk| {
             let level = &tables.levels[step.level];
             facing.go(step.from, step.length, level, kind);
             facing.record.stay();
             trial.begin((level, kind), disk.is_none().then_some(&tables.rows), state);
-            trial.guess(state);
             trial.look_at_start(state, |node, moved| facing.gap(node, 0, moved).0);
         });
         if self.together.fresh {
@@ -419,7 +422,8 @@ impl Marching<'_> {
         self.each_of(false, (step, kind), |facing, (trial, _), tables, _| {
             let (lowest, _) = trial.extremes();
             if solved && (lowest < 0.0 || !trial.rests()) {
-                solved = trial.solve(tables.levels[step.level].compliance_of(kind), facing, verdict);
+                let parts = (tables.levels[step.level].compliance_of(kind), tables.rows.residual());
+                solved = trial.solve(parts, facing, verdict);
                 failed = (!solved).then_some(facing.sector);
             }
         });
@@ -568,10 +572,7 @@ impl Marched for Marching<'_> {
     fn take(&mut self, step: Step, kind: Kind, _: &Verdict) -> f64 {
         let level = &self.together.tables[0][0].levels[step.level];
         let points = if kind == Kind::Constant { 1 } else { level.basis.degree };
-        let basis = level.basis.clone();
-        for casing in &mut self.together.casings {
-            casing.weigh(points, |i| work_weights(&basis, kind, i));
-        }
+        self.together.casings.iter_mut().for_each(|casing| casing.weigh(points));
         let (mut dropped, mut closed) = (0.0, 0.0);
         let before: f64 = self.together.sectors.iter().map(|one| one.record.work.closing).sum();
         for whole in self.together.wholes() {

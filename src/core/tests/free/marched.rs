@@ -1,0 +1,222 @@
+//! Free bodies by a tolerance: an impact in closed form, momentum and energy, convergence, states that continue.
+
+use crate::counting::allocations_of;
+use lattice::*;
+use nalgebra::DMatrix;
+use tiprub_core::settings::*;
+use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_test_models::{bits, go, lattice, node, real, saved, started, structure};
+
+/// Communication step (s).
+const H: f64 = 2e-5;
+/// Mass of the body on springs (kg), their stiffness (N/m), its velocity (m/s) and its distance from the wall (m).
+const MASS: f64 = 0.1;
+const STIFFNESS: f64 = 1e7;
+const VELOCITY: f64 = 1.0;
+const DISTANCE: f64 = 3e-4;
+
+/// Mass where each of four springs ends (kg).
+const END: f64 = 1e-9;
+
+/// A mass on four springs, with next to no mass where they end.
+fn sprung() -> Rom {
+    let order = 15;
+    let mass = DMatrix::from_fn(order, order, |i, j| match (i == j, i) {
+        (true, 0..3) => MASS,
+        (true, _) => END,
+        _ => 0.0,
+    });
+    let mut stiffness = DMatrix::zeros(order, order);
+    for (of, axis) in (1..5).flat_map(|of| (0..3).map(move |axis| (of, axis))) {
+        let (core, own) = (axis, 3 * of + axis);
+        for (row, column, sign) in [(core, core, 1.0), (own, own, 1.0), (core, own, -1.0), (own, core, -1.0)] {
+            stiffness[(row, column)] += sign * 0.25 * STIFFNESS;
+        }
+    }
+    let map = DMatrix::from_fn(12, order, |row, column| f64::from(u8::from(column == row + 3)));
+    let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)];
+    let nodes = corners.iter().enumerate();
+    let nodes =
+        nodes.map(|(n, (y, z))| node(&format!("left_{n}"), [0.0, 0.5 * SIDE * y, 0.5 * SIDE * z], 0.0)).collect();
+    structure("sprung", mass, stiffness, map, nodes)
+}
+
+fn marched(mut scene: Scene, tolerance: f64, friction: f64) -> Scene {
+    scene = with(scene, friction, Solver::Lcp, Scheme::Galerkin);
+    (scene.settings.time.step, scene.settings.time.tolerance) = (H, Some(tolerance));
+    scene
+}
+
+/// It touches for half a period and leaves as fast as it came, less what friction takes along the wall: 2µ of it.
+#[test]
+fn a_mass_on_springs_leaves_a_wall_after_half_a_period() {
+    let frequency = (STIFFNESS / MASS).sqrt();
+    let along = 3.0;
+    for friction in [0.0, 0.2] {
+        let mut errors = Vec::new();
+        for tolerance in [1e-2, 1e-3, 1e-4] {
+            let thrown = scene(sprung(), &[(Side::Left, DISTANCE)], false, [-VELOCITY, along, 0.0]);
+            let mut scene = marched(thrown, tolerance, friction);
+            scene.settings.surfaces[0].rigid = true;
+            let (mut simulation, mut impulse) = (started(&scene), 0.0);
+            // By then the body is where it would be without the wall for half a period in its middle.
+            let steps = 40;
+            for _ in 0..steps {
+                go(&mut simulation, H);
+                impulse += H * vector(&simulation, "force")[0];
+            }
+            let [x, y, _] = vector(&simulation, "block.displacement");
+            let [vx, vy, _] = vector(&simulation, "block.velocity");
+            let (time, touch) = (simulation.time(), DISTANCE / VELOCITY);
+            let left = time - touch - std::f64::consts::PI / frequency;
+            assert!(left > 1e-4, "it has not left: {left}");
+            assert!((impulse - (MASS + 4.0 * END) * (VELOCITY + vx)).abs() < 1e-12, "{impulse} N·s");
+            // ∫ of the velocity along the wall: friction takes µ times what the wall gives.
+            let lost = friction * (x + VELOCITY * time);
+            let off = [x - (VELOCITY * left - DISTANCE), y - (along * time - lost)].map(f64::abs);
+            // A thousandth of the extent is what the tolerance is a share of.
+            errors.push(off[0].max(off[1]) / (tolerance * 1e-3 * SIDE));
+            let speeds = [vx - VELOCITY, vy - (along - friction * (vx + VELOCITY))].map(f64::abs);
+            assert!(speeds[0] < 0.2 * tolerance && speeds[1] < 1e-11, "µ {friction}, {tolerance}: {speeds:?}");
+            assert!(real(&simulation, "energy_residual_relative").abs() < 1e-12);
+        }
+        println!("µ {friction}: error over tolerance {errors:.2?}");
+        assert!(errors.iter().all(|error| *error < 3.0), "µ {friction}: {errors:?}");
+    }
+}
+
+/// The block with contact nodes on its faces alone: what is between them keeps its inertia.
+fn faces(centre: [f64; 3]) -> Rom {
+    let mut rom = block(centre, 3e6);
+    let kept: Vec<usize> =
+        (0..rom.contact_nodes.len()).filter(|node| !rom.contact_nodes[*node].name.starts_with("core")).collect();
+    rom.contact_map = DMatrix::from_fn(3 * kept.len(), rom.order(), |row, column| {
+        rom.contact_map[(3 * kept[row / 3] + row % 3, column)]
+    });
+    rom.contact_nodes = kept.iter().map(|node| rom.contact_nodes[*node].clone()).collect();
+    rom
+}
+
+/// Scenes in which something happens, and for how many steps.
+fn events() -> Vec<(&'static str, Scene, usize)> {
+    let thrown = scene(faces([0.0; 3]), &[(Side::Left, 0.0203), (Side::Right, 0.021)], false, [-6.0, 30.0, 4.0]);
+    let distance = 0.5 * SIDE - 3e-4;
+    let plates = [(Side::Left, distance), (Side::Right, distance)];
+    let squeezed = scene(faces([0.0, 0.045, 0.0]), &plates, true, [0.0, -40.0, 0.0]);
+    let mut rigid = squeezed.clone();
+    rigid.settings.surfaces[1].rigid = true;
+    vec![("bounces", thrown, 30), ("squeezed", squeezed, 75), ("one side rigid", rigid, 65)]
+}
+
+#[test]
+fn momentum_and_energy_are_kept_within_every_tolerance() {
+    let total: f64 = places().map(node_mass).sum();
+    let size = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    for (name, scene, steps) in events() {
+        for (friction, tolerance) in [(0.0, 1e-2), (0.0, 1e-4), (0.2, 1e-2), (0.2, 1e-4)] {
+            let mut simulation = started(&marched(scene.clone(), tolerance, friction));
+            let (start, mut impulse, mut exchanged) = (vector(&simulation, "block.velocity"), [0.0; 3], 0.0_f64);
+            let (mut off, mut residual, mut most) = (0.0_f64, 0.0_f64, 0.0_f64);
+            for _ in 0..steps {
+                go(&mut simulation, H);
+                let force = vector(&simulation, "force");
+                impulse = std::array::from_fn(|i| impulse[i] + H * force[i]);
+                exchanged += H * size(force);
+                let velocity = vector(&simulation, "block.velocity");
+                off = off.max(size(std::array::from_fn(|i| total * (velocity[i] - start[i]) - impulse[i])));
+                residual = residual.max(real(&simulation, "energy_residual_relative").abs());
+                let energy = real(&simulation, "kinetic_energy") + real(&simulation, "strain_energy");
+                most = most.max(energy / (0.5 * total * size(start).powi(2)));
+            }
+            let off = off / (exchanged + total * size(start));
+            let curvature = real(&simulation, "curvature_work") / (0.5 * total * size(start).powi(2));
+            println!(
+                "{name}, µ {friction}, {tolerance:e}: momentum {off:.1e}, ledger {residual:.1e}, most energy {most:.6}, curvature \
+                 {curvature:.1e}, steps {}",
+                simulation.system().steps_tried()
+            );
+            assert!(exchanged > 0.02 * total * 10.0, "{name}: hardly anything happened, {exchanged} N·s");
+            assert!(off < 1e-12 && residual < 1e-12, "{name}, {friction}, {tolerance}: {off:e}, {residual:e}");
+        }
+    }
+}
+
+/// Displacements of all contact nodes at communication points, without the flight (m).
+fn flown(scene: &Scene, steps: usize) -> Vec<f64> {
+    let mut simulation = started(scene);
+    let velocity = scene.settings.structures[0].velocity;
+    let mut found = Vec::new();
+    for _ in 0..steps {
+        go(&mut simulation, H);
+        let (time, bank) = (simulation.time(), simulation.system().bank());
+        found.extend(bank.displacement().iter().enumerate().map(|(row, value)| value - time * velocity[row % 3]));
+    }
+    found
+}
+
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    let square = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
+    (square(&mut a.iter().zip(b).map(|(a, b)| a - b)) / square(&mut b.iter().copied())).sqrt()
+}
+
+/// What remains goes down with the tolerance, on plates that give way, with friction.
+#[test]
+fn the_error_follows_the_tolerance() {
+    for (name, scene, steps) in events() {
+        for friction in [0.0, 0.2] {
+            let run = |tolerance: f64| flown(&marched(scene.clone(), tolerance, friction), steps);
+            let exact = run(1e-7);
+            let mean_square = exact.iter().map(|value| value * value).sum::<f64>() / exact.len() as f64;
+            // A thousandth of the extent is what the tolerance is a share of.
+            let errors = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6]
+                .map(|tolerance| apart(&run(tolerance), &exact) * mean_square.sqrt() / (tolerance * 1e-3 * SIDE));
+            println!("{name}, µ {friction}: error over tolerance {errors:.2?}");
+            assert!(errors.iter().all(|error| *error < 1.0), "{name}, µ {friction}: {errors:?}");
+        }
+    }
+}
+
+/// The same body by other equations: with the mass of its contact nodes. Both tend to the same flight, but for that mass.
+#[test]
+fn light_contact_nodes_fly_as_massless_ones() {
+    let mut thrown = scene(sprung(), &[(Side::Left, DISTANCE)], false, [-VELOCITY, 3.0, 0.0]);
+    thrown.settings.structures[1].damping_ratio = Some(0.0);
+    let by_steps = |h: f64| {
+        let mut scene = with(thrown.clone(), 0.2, Solver::Lcp, Scheme::ModalExact);
+        scene.settings.time.step = h;
+        flown(&scene, 40)
+    };
+    let marched = flown(&marched(thrown.clone(), 1e-5, 0.2), 40);
+    let errors = [4e-8, 1e-8].map(|h| apart(&by_steps(h), &marched));
+    println!("modal-exact from galerkin {errors:?}");
+    assert!(errors[1] < 0.6 * errors[0] && errors[1] < 1e-4, "{errors:?}");
+}
+
+#[test]
+fn a_saved_flight_goes_on_with_the_same_bits_and_allocates_nothing() {
+    let (_, scene, steps) = events().swap_remove(1);
+    let scene = marched(scene, 1e-3, 0.2);
+    let mut simulation = started(&scene);
+    (0..steps / 3).for_each(|_| go(&mut simulation, H));
+    let state = saved(&simulation);
+    let mut other = Simulation::new(&scene).unwrap();
+    other.restore_state(&state).unwrap();
+    let count = allocations_of(|| {
+        (0..steps / 2).for_each(|_| simulation.do_step(simulation.time(), H).unwrap());
+    });
+    (0..steps / 2).for_each(|_| go(&mut other, H));
+    assert_eq!(bits(&simulation), bits(&other));
+    assert_eq!(count, 0);
+    assert!(simulation.system().factorisations() > 100, "nothing touched");
+}
+
+/// Over a free edge, and behind the surface already.
+#[test]
+fn what_comes_over_an_edge_behind_the_surface_ends_the_run() {
+    let distance = 0.5 * SIDE - 3e-3;
+    let plates = [(Side::Left, distance), (Side::Right, distance)];
+    let scene = marched(scene(faces([0.0, 0.12, 0.0]), &plates, false, [0.0, -40.0, 0.0]), 1e-3, 0.0);
+    let mut simulation = started(&scene);
+    let error = (0..200).find_map(|_| simulation.do_step(simulation.time(), H).err()).unwrap().to_string();
+    assert!(error.contains("edge"), "{error}");
+}
