@@ -70,6 +70,18 @@ pub fn block(centre: [f64; 3], k: f64) -> Rom {
     rom("block", mass, stiffness, nodes)
 }
 
+/// The block with contact nodes on its faces alone: what is between them keeps its inertia.
+pub fn faces(centre: [f64; 3]) -> Rom {
+    let mut rom = block(centre, 3e6);
+    let kept: Vec<usize> =
+        (0..rom.contact_nodes.len()).filter(|node| !rom.contact_nodes[*node].name.starts_with("core")).collect();
+    rom.contact_map = DMatrix::from_fn(3 * kept.len(), rom.order(), |row, column| {
+        rom.contact_map[(3 * kept[row / 3] + row % 3, column)]
+    });
+    rom.contact_nodes = kept.iter().map(|node| rom.contact_nodes[*node].clone()).collect();
+    rom
+}
+
 /// Which side of the block a plate is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {

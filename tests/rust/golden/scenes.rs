@@ -167,7 +167,13 @@ fn bodies() -> Vec<Scene> {
     for surface in &mut facets.settings.surfaces {
         surface.spline = Some(SplineSettings { interpolation: Interpolation::Facets, ..SplineSettings::default() });
     }
+    let distance = 0.5 * lattice::SIDE - 3e-4;
+    let plates = [(Side::Left, distance), (Side::Right, distance)];
+    let faces = lattice::scene(lattice::faces([0.0, 0.045, 0.0]), &plates, true, [0.0, -40.0, 0.0]);
+    let mut marched = with(faces, Solver::Lcp, Galerkin);
+    marched.settings.time.step = 2e-5;
     vec![
+        named("body_galerkin", marched),
         named("body_film", with(thrown.clone(), Solver::Film, Scheme::CentralDifference)),
         named("body_coulomb", with(thrown, Solver::Coulomb, Scheme::ModalExact)),
         named("body_between_rings", with(lattice::squeezed(), Solver::Lcp, Scheme::ModalExact)),

@@ -375,7 +375,8 @@ pub const FIELDS: [SceneField; 73] = [
         "number",
         Some("1e-3"),
         "1e-9 to 0.1",
-        "Error that a step of `galerkin` may make in displacements, as a share of the smallest clearance.",
+        "Error that a step of `galerkin` may make in displacements, as a share of the smallest clearance; with free masters of a \
+         thousandth of the smallest extent.",
     ),
     field(
         "time.steps_at_most",

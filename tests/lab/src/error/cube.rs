@@ -11,7 +11,7 @@ use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
     case::Case,
-    competitor::{Competitor, Family, Full},
+    competitor::{Competitor, Family, Full, TOLERANCES, TOLERANT},
     full::{FullRun, without_flight},
     measure::apart,
     run::{self, Run, Seen, Trace},
@@ -148,6 +148,8 @@ impl Case for Cube {
     fn divisions_of(&self, size: usize, competitor: Competitor) -> Vec<u32> {
         match competitor {
             Competitor::Full(method) => self.full_divisions(method).to_vec(),
+            TOLERANT if self.quick => TOLERANCES[..2].to_vec(),
+            TOLERANT => TOLERANCES.to_vec(),
             _ => self.divisions(size),
         }
     }
@@ -180,6 +182,8 @@ impl Case for Cube {
     /// Methods on the full model once: they know of no modes.
     fn competitors(&self, size: usize) -> Vec<Competitor> {
         let takes_part = |competitor: &Competitor| match competitor {
+            // The solution for a tolerance is sought at one size.
+            &TOLERANT => size == self.standard(),
             Competitor::Core(..) => true,
             Competitor::Full(method) => size == self.standard() && !self.full_divisions(*method).is_empty(),
             _ => false,
@@ -196,9 +200,8 @@ impl Case for Cube {
     ) -> std::result::Result<Box<dyn Run + 'a>, String> {
         Ok(match competitor {
             Competitor::Core(scheme, solver) => {
-                let mut scene = self.sizes[size].1.clone();
-                scene.settings.structures[0].velocity[1] *= 1.0 + perturbation;
-                let run = SceneRun::new(&scene, (scheme, solver), INTERVAL, division, 0.0)?;
+                let scene = SceneRun::by(&self.sizes[size].1, (scheme, solver), INTERVAL, division, perturbation);
+                let run = SceneRun::with_start_values(&scene, INTERVAL, division, &[])?;
                 Box::new(Flight { run, speed: self.speed })
             }
             Competitor::Full(method) => Box::new(FullRun::new(&self.full, method, (INTERVAL, self.samples), division)?),
