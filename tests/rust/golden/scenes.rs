@@ -170,7 +170,7 @@ fn bodies() -> Vec<Scene> {
     let distance = 0.5 * lattice::SIDE - 3e-4;
     let plates = [(Side::Left, distance), (Side::Right, distance)];
     let faces = lattice::scene(lattice::faces([0.0, 0.045, 0.0]), &plates, true, [0.0, -40.0, 0.0]);
-    let mut marched = with(faces, Solver::Lcp, Galerkin);
+    let mut marched = with(faces, Solver::Lcp, Scheme::Galerkin);
     marched.settings.time.step = 2e-5;
     vec![
         named("body_galerkin", marched),
