@@ -8,7 +8,8 @@ use tiprub_reference::{
 
 use super::{
     case::Case,
-    competitor::{Competitor, Family},
+    competitor::{Competitor, Family, TOLERANCES, TOLERANT},
+    marched::RodMarch,
     outside::{OutsideRun, Softness},
     rods::CoreRod,
     run::{Run, Trace},
@@ -226,7 +227,11 @@ impl Case for Bars {
     }
 
     fn competitors(&self, _: usize) -> Vec<Competitor> {
-        Competitor::reduced()
+        Competitor::reduced().into_iter().chain([TOLERANT]).collect()
+    }
+
+    fn divisions_of(&self, size: usize, competitor: Competitor) -> Vec<u32> {
+        if competitor == TOLERANT { TOLERANCES.to_vec() } else { self.divisions(size) }
     }
 
     fn start<'a>(
@@ -238,6 +243,10 @@ impl Case for Bars {
     ) -> Result<Box<dyn Run + 'a>, String> {
         let (size, interval) = (&self.sizes[size], self.interval);
         Ok(match competitor {
+            TOLERANT => {
+                let tolerance = 1.0 / f64::from(division);
+                Box::new(RodMarch::new(&size.massless, interval, tolerance, perturbation))
+            }
             Competitor::Core(scheme, solver) => {
                 let massless = competitor.family().massless;
                 let rod = if massless { &size.massless } else { &size.core };

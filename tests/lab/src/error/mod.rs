@@ -3,6 +3,7 @@
 pub(crate) mod bars;
 pub(crate) mod cube;
 pub(crate) mod full;
+pub(crate) mod marched;
 pub(crate) mod outside;
 pub(crate) mod rods;
 pub(crate) mod rotor;

@@ -14,16 +14,18 @@ use tiprub_test_models::{node, structure};
 use super::run::{Run, Seen};
 
 /// Normal of the one contact: the structure's first direction closes the gap.
-const NORMAL: [f64; 3] = [-1.0, 0.0, 0.0];
+pub(super) const NORMAL: [f64; 3] = [-1.0, 0.0, 0.0];
 
 /// A rod prepared for the core.
 #[derive(Debug, Clone)]
 pub(crate) struct CoreRod {
-    model: ModalModel,
-    load: Vec<f64>,
-    start: [Vec<f64>; 2],
-    gap: f64,
-    whole: bool,
+    pub(super) model: ModalModel,
+    pub(super) load: Vec<f64>,
+    pub(super) start: [Vec<f64>; 2],
+    pub(super) gap: f64,
+    pub(super) whole: bool,
+    /// What tolerances are shares of (m): the gap, or the largest displacement at the start.
+    pub(super) length: f64,
     /// Largest step that closed contact allows massless-boundary (s).
     massless_limit: massless::MasslessLimit,
 }
@@ -47,6 +49,7 @@ impl CoreRod {
             load: model.modal_load(rod.load.as_slice()),
             start: [amplitudes(&rod.displacement), amplitudes(&rod.velocity)],
             gap: rod.gap,
+            length: if whole { rod.displacement.amax() } else { rod.gap },
             massless_limit: check.limit(1.0).unwrap_or(massless::MasslessLimit::NONE),
             model,
             whole,
@@ -82,6 +85,14 @@ impl CoreRod {
         }
         system.start(&[Drive::default()]);
         Ok(RodRun { rod: self, system, division, step })
+    }
+
+    /// Displacement and velocity of a mode by its load alone at a time (s): at rest, or rigid motion from rest.
+    pub(super) fn loaded(&self, mode: usize, time: f64) -> [f64; 2] {
+        match (self.model.frequencies[mode], self.load[mode]) {
+            (0.0, load) => [0.5 * load * time * time, load * time],
+            (frequency, load) => [load / (frequency * frequency), 0.0],
+        }
     }
 
     /// The core takes a start without loads: the velocity that gives its first increment what the load adds to it.

@@ -5,7 +5,7 @@ use tiprub_core::galerkin::{
     level::{Level, Modes},
     sector::{Demand, Effort, Marcher, Tables, Taken, Witness},
     state::SectorState,
-    trial::{Kind, Obstacle},
+    trial::{Kind, Obstacle, Sliding},
 };
 use tiprub_test_models::Random;
 
@@ -41,8 +41,8 @@ impl Obstacle for Wall {
         (self.place - moved[0], [-1.0, 0.0, 0.0])
     }
 
-    fn direction(&mut self, _: usize, _: usize, _: [f64; 3], _: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
-        [normal[0], -self.friction, 0.0]
+    fn direction(&mut self, _: usize, _: usize, sliding: &Sliding) -> [f64; 3] {
+        [sliding.normal[0], -self.friction, 0.0]
     }
 }
 

@@ -1,0 +1,215 @@
+//! Rods by a tolerance: a sector against a fixed obstacle, marched without a scene around it.
+//!
+//! What constant loads do without contact is known: static displacement, and a parabola of rigid motion. The rest has no loads.
+
+use nalgebra::{DMatrix, DVector};
+use tiprub_core::{
+    dynamics::modal::ModalModel,
+    galerkin::{
+        level::{Level, Modes},
+        sector::{Demand, Effort, Marcher, Tables, Taken, Witness},
+        state::SectorState,
+        trial::{Kind, Obstacle, Sliding},
+    },
+    settings::Scheme,
+};
+
+use super::{
+    rods::{CoreRod, NORMAL},
+    run::{Run, Seen},
+};
+
+/// Gaps of contacts count as closed within this share of the tolerance, and what rounding leaves of lengths (m).
+const PRECISION: [f64; 2] = [1e-4, 1e-15];
+/// Points of a step.
+const POINTS: usize = 4;
+
+/// The obstacle, and what has touched it.
+struct Ground {
+    gap: f64,
+    /// Displacement of the contact by loads alone: at the start (m), and its acceleration (m/s²).
+    loaded: [f64; 2],
+    /// Where the span begins, and how long it is (s).
+    span: [f64; 2],
+    times: [f64; POINTS],
+    seen: Seen,
+}
+
+impl Ground {
+    fn gap_at(&self, time: f64, moved: f64) -> f64 {
+        self.gap - (moved + self.loaded[0] + 0.5 * self.loaded[1] * time * time)
+    }
+}
+
+impl Obstacle for Ground {
+    fn gap(&mut self, _: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
+        (self.gap_at(self.times[point], moved[0]), NORMAL)
+    }
+
+    fn direction(&mut self, _: usize, _: usize, _: &Sliding) -> [f64; 3] {
+        NORMAL
+    }
+}
+
+impl Witness for Ground {
+    fn go(&mut self, from: f64, length: f64, level: &Level, kind: Kind) {
+        for (point, time) in self.times.iter_mut().enumerate() {
+            let theta = match kind {
+                Kind::Constant => f64::from(u8::from(point > 0)),
+                Kind::Polynomial => level.basis.points.get(point).copied().unwrap_or(1.0),
+            };
+            *time = self.span[0] + self.span[1] * (from + length * theta);
+        }
+    }
+
+    fn is_clear(&self, _: f64, _: f64, _: &[f64]) -> bool {
+        false
+    }
+
+    fn flew(&mut self, _: f64) {}
+
+    fn took(&mut self, step: &Taken) {
+        let length = step.level.step;
+        for point in 0..=step.trial.points() {
+            let force = step.trial.multiplier(point, 0);
+            let weight = match step.kind {
+                Kind::Constant => f64::from(u8::from(point == 1)),
+                Kind::Polynomial => step.level.basis.weights[point],
+            };
+            self.seen.impulse += weight * length * force;
+            self.seen.adhesion = self.seen.adhesion.min(force);
+            if force != 0.0 {
+                self.seen.last_force = self.times[point];
+            }
+            if point > 0 {
+                self.seen.penetration = self.seen.penetration.max(-step.trial.gap(point, 0));
+            }
+        }
+    }
+}
+
+/// A run of a rod.
+pub(crate) struct RodMarch<'a> {
+    rod: &'a CoreRod,
+    dynamic: usize,
+    tables: Tables,
+    state: SectorState,
+    marcher: Marcher,
+    ground: Ground,
+    demand: Demand,
+    effort: Effort,
+}
+
+impl<'a> RodMarch<'a> {
+    /// In spans of `interval` (s), within `tolerance` of the rod's length of reference.
+    pub(crate) fn new(rod: &'a CoreRod, interval: f64, tolerance: f64, perturbation: f64) -> Self {
+        let model = &rod.model;
+        let dynamic = model.dynamic_modes(Scheme::Galerkin);
+        let modes = modes_of(model, dynamic);
+        let mut state = SectorState::new(dynamic, 1);
+        for mode in 0..dynamic {
+            let loaded = rod.loaded(mode, 0.0)[0];
+            (state.position[mode], state.velocity[mode]) = (rod.start[0][mode] - loaded, rod.start[1][mode]);
+        }
+        let seen_by = |mode: usize| model.contact_modes[(0, mode)];
+        let loaded = (0..model.len()).map(|mode| seen_by(mode) * rod.loaded(mode, 0.0)[0]).sum();
+        let rigid = (0..model.len()).filter(|mode| model.frequencies[*mode] == 0.0);
+        let acceleration = rigid.map(|mode| seen_by(mode) * rod.load[mode]).sum();
+        let ground = Ground {
+            gap: rod.gap * (1.0 + perturbation),
+            loaded: [loaded, acceleration],
+            span: [0.0, interval],
+            times: [0.0; POINTS],
+            seen: Seen::nothing(),
+        };
+        // What is closed at the start is carried from then on.
+        let moved: f64 = (0..dynamic).map(|mode| seen_by(mode) * state.position[mode]).sum();
+        let gap = ground.gap_at(0.0, moved);
+        if gap < 0.0 {
+            state.multipliers[0] = -gap / modes.residual[(0, 0)];
+            state.forces[0] = state.multipliers[0] * NORMAL[0];
+        }
+        state.gaps[0] = gap.max(0.0);
+        state.normals.copy_from_slice(&NORMAL);
+        let mut tables = Tables::new(modes, interval);
+        tables.set_span(interval);
+        let tolerance = tolerance * rod.length;
+        let precision = (PRECISION[0] * tolerance).max(PRECISION[1] * rod.length);
+        Self {
+            rod,
+            dynamic,
+            tables,
+            state,
+            marcher: Marcher::new(dynamic, 1),
+            ground,
+            demand: Demand { tolerance, precision, most: u64::MAX },
+            effort: Effort::default(),
+        }
+    }
+
+    /// Modal displacements and velocities, loads and contact forces included.
+    fn modal(&self) -> [DVector<f64>; 2] {
+        let (model, time) = (&self.rod.model, self.ground.span[0]);
+        let both = |mode: usize| {
+            let [moved, speed] = self.rod.loaded(mode, time);
+            if mode < self.dynamic {
+                return [self.state.position[mode] + moved, self.state.velocity[mode] + speed];
+            }
+            let force: f64 = (0..3).map(|row| model.contact_modes[(row, mode)] * self.state.forces[row]).sum();
+            [moved + force / model.frequencies[mode].powi(2), 0.0]
+        };
+        [0, 1].map(|of| DVector::from_fn(model.len(), |mode, _| both(mode)[of]))
+    }
+}
+
+/// Modes with inertia, and what the others give way by.
+fn modes_of(model: &ModalModel, dynamic: usize) -> Modes {
+    let mut residual = DMatrix::zeros(3, 3);
+    for mode in dynamic..model.len() {
+        let shape = model.contact_modes.column(mode);
+        residual += shape * shape.transpose() / model.frequencies[mode].powi(2);
+    }
+    Modes {
+        frequencies: model.frequencies[..dynamic].to_vec(),
+        damping_ratios: vec![0.0; dynamic],
+        shapes: model.contact_modes.columns(0, dynamic).into_owned(),
+        residual,
+    }
+}
+
+impl Run for RodMarch<'_> {
+    fn advance(&mut self) -> Result<(), String> {
+        let Self { tables, state, marcher, ground, demand, effort, .. } = self;
+        let marched = marcher.march(tables, state, ground, *demand, effort);
+        ground.span[0] += ground.span[1];
+        marched.map_err(|stopped| format!("{stopped:?} at t = {} s", ground.span[0]))
+    }
+
+    fn watch(&mut self, seen: &mut Seen) -> Result<(), String> {
+        self.ground.seen.next();
+        self.advance()?;
+        *seen = self.ground.seen.clone();
+        Ok(())
+    }
+
+    fn displacements(&self) -> Vec<f64> {
+        let [position, _] = self.modal();
+        if self.rod.whole {
+            return (&self.rod.model.shapes * position).iter().copied().collect();
+        }
+        vec![(self.rod.model.contact_modes.row(0) * position)[0]]
+    }
+
+    fn energy(&self) -> f64 {
+        let ([position, velocity], frequencies) = (self.modal(), &self.rod.model.frequencies);
+        let of = |mode: usize| {
+            let (q, v) = (position[mode], velocity[mode]);
+            0.5 * (v * v + (frequencies[mode] * q).powi(2)) - self.rod.load[mode] * q
+        };
+        (0..frequencies.len()).map(of).sum()
+    }
+
+    fn residual(&self) -> Option<f64> {
+        None
+    }
+}
