@@ -2,6 +2,8 @@
 
 #[path = "../common/counting.rs"]
 mod counting;
+#[path = "../../../../tests/guide.rs"]
+mod guide;
 
 mod flight;
 mod marched;

@@ -1,6 +1,7 @@
 //! Free bodies by a tolerance: an impact in closed form, momentum and energy, convergence, states that continue.
 
 use crate::counting::allocations_of;
+use crate::guide::{self, told};
 use lattice::*;
 use nalgebra::DMatrix;
 use tiprub_core::settings::*;
@@ -37,7 +38,7 @@ fn sprung() -> Rom {
     let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)];
     let nodes = corners.iter().enumerate();
     let nodes =
-        nodes.map(|(n, (y, z))| node(&format!("left_{n}"), [0.0, 0.5 * SIDE * y, 0.5 * SIDE * z], 0.0)).collect();
+        nodes.map(|(n, (y, z))| node(format!("left_{n}"), [0.0, 0.5 * SIDE * y, 0.5 * SIDE * z], 0.0)).collect();
     structure("sprung", mass, stiffness, map, nodes)
 }
 
@@ -147,6 +148,8 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
     (square(&mut a.iter().zip(b).map(|(a, b)| a - b)) / square(&mut b.iter().copied())).sqrt()
 }
 
+const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
+
 /// What remains goes down with the tolerance, on plates that give way, with friction.
 #[test]
 fn the_error_follows_the_tolerance() {
@@ -156,12 +159,14 @@ fn the_error_follows_the_tolerance() {
             let exact = run(1e-7);
             let mean_square = exact.iter().map(|value| value * value).sum::<f64>() / exact.len() as f64;
             // A thousandth of the extent is what the tolerance is a share of.
-            let errors = [1e-2, 1e-3, 1e-4, 1e-5]
+            let errors = TOLERANCES
                 .map(|tolerance| apart(&run(tolerance), &exact) * mean_square.sqrt() / (tolerance * 1e-3 * SIDE));
-            println!("{name}, µ {friction}: error over tolerance {errors:.2?}");
+            told!("{name}, µ {friction}: error over tolerance {errors:?}");
             assert!(errors.iter().all(|error| *error < 1.0), "{name}, µ {friction}: {errors:?}");
         }
     }
+    told!("tolerances {TOLERANCES:?}");
+    guide::hold("cargo test --release -p tiprub-core --test free marched -- --nocapture");
 }
 
 /// The same body by other equations: with the mass of its contact nodes. Both tend to the same flight, but for that mass.
