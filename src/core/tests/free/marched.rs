@@ -166,7 +166,7 @@ fn the_error_follows_the_tolerance() {
         }
     }
     told!("tolerances {TOLERANCES:?}");
-    guide::hold("cargo test --release -p tiprub-core --test free marched -- --nocapture");
+    guide::hold("cargo test -p tiprub-core --test free marched");
 }
 
 /// The same body by other equations: with the mass of its contact nodes. Both tend to the same flight, but for that mass.
