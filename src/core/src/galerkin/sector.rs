@@ -47,7 +47,8 @@ impl Modes {
     /// Largest degree that does for spans up to `longest` (s). They may be shorter: all lengths down to a thousandth of the shortest
     /// step are looked at.
     pub fn degree_up_to(&self, longest: f64) -> usize {
-        (0..2 * HALVINGS).map(|halvings| self.degree_at(halved(longest, halvings))).min().unwrap_or(MOST)
+        let lengths = (0..2 * HALVINGS).map(|halvings| halved(longest, halvings));
+        if lengths.into_iter().all(|length| self.allows_cubics(length)) { MOST } else { MOST - 1 }
     }
 }
 

@@ -187,7 +187,7 @@ pub(super) fn solutions(degree: usize, friction: f64, problems: u64) -> Solution
         let (nodes, count) = (1 + random.below(2), 4 + random.below(9));
         let modes = modes(count, nodes, random.scale(1e-3, 10.0), &mut random);
         let step = random.scale(5e-6, 8e-5);
-        if modes.degree_at(step) != degree {
+        if modes.allows_cubics(step) != (degree == 3) {
             continue;
         }
         let mut level = Level::new(&modes, degree);
