@@ -5,6 +5,8 @@ use super::trial::{Kind, Verdict};
 
 /// Below this share of the tolerance the next step is twice as long.
 const LENGTHEN: f64 = 1.0 / 32.0;
+/// Steps that would pay into a bank which is not spent are halved down to this level.
+const SAVED: usize = 3;
 /// Nearness between points is looked at down to this step (s).
 const SHORTEST_LOOK: f64 = 2.5e-6;
 
@@ -66,7 +68,8 @@ pub fn march(body: &mut impl Marched, demand: Demand, effort: &mut Effort) -> Re
             || (kind == Kind::Polynomial
                 && (verdict.error > demand.tolerance
                     || (verdict.near && body.length(level) > SHORTEST_LOOK)
-                    || (verdict.switches && verdict.switched > *body.pace().0)));
+                    || (verdict.switches && verdict.switched > *body.pace().0)
+                    || (verdict.switched < 0.0 && level < SAVED && *body.pace().0 > 0.0)));
         if refused && level < HALVINGS {
             *body.pace().1 += 1;
             continue;
