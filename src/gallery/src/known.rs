@@ -27,7 +27,7 @@ struct Row {
 }
 
 /// All rows.
-fn rows() -> [Row; 4] {
+fn rows() -> [Row; 5] {
     let rotor37 = Rotor37Options {
         mesh: MeshCounts { chord: 24, thickness: 2, span: 40 },
         tip: Tip::Patches(9),
@@ -57,6 +57,14 @@ fn rows() -> [Row; 4] {
             found_on: "first 9.5 ms of the rub of the stage with friction 0.15: nodes on a mesh with 0.7 times the elements, the mesh with \
                        five patches; later nodes leave far more",
             errors: [None, Some(0.102), None, Some(0.0068)],
+        },
+        Row {
+            options: format!(
+                "{:?}",
+                StageOptions { tip: Tip::Rows([9, 2]), kind: ReductionKind::FreeInterface, ..stage }
+            ),
+            found_on: "first 9.4 ms of the rub of the stage with friction 0.05, modes on a mesh with 0.7 times the elements",
+            errors: [Some(0.0014), None, None, Some(0.0084)],
         },
         Row {
             options: format!("{rotor37:?}"),
@@ -92,7 +100,7 @@ mod tests {
     use tiprub_shell::console::Console;
 
     use super::*;
-    use crate::reduction;
+    use crate::{builtin::stage_in_rows, reduction};
 
     /// With other defaults a row is of no model any more: renew the figures.
     #[test]
@@ -123,7 +131,12 @@ mod tests {
         assert!(two.is_some_and(|errors| errors.rows == Some(0.0046) && errors.mesh == Some(0.0485)));
         let stage = told(&StageOptions::default(), rom.clone()).checks.rub_errors;
         assert!(stage.is_some_and(|errors| errors.patches == Some(0.102) && errors.rows.is_none()));
-        assert_eq!(told(&StageOptions::coarse(), rom.clone()).checks.rub_errors, None);
+        let stage = told(&stage_in_rows(), rom.clone()).checks.rub_errors;
+        assert!(stage.is_some_and(|errors| errors.modes == Some(0.0014) && errors.mesh == Some(0.0084)));
+        let wider = StageOptions { tip: Tip::Rows([5, 2]), ..stage_in_rows() };
+        for other in [StageOptions::coarse(), wider] {
+            assert_eq!(told(&other, rom.clone()).checks.rub_errors, None, "{other:?}");
+        }
         let mesh = MeshCounts { span: own.mesh.span + 2, ..own.mesh };
         for other in [
             Rotor37Options { modes: 81, ..own.clone() },
