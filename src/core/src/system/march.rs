@@ -5,9 +5,10 @@ mod disk;
 mod flight;
 pub(super) mod together;
 
-use super::facing::{Facing, Record, Worked};
+use super::facing::Facing;
 use super::growth::Growth;
 use super::posed::Member;
+use super::record::{Record, Tally, Worked};
 use super::{ContactEvent, Pair, StepFailure, Structure, System};
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::sectors::Sectors;
@@ -251,7 +252,7 @@ fn enter_events(
 }
 
 /// A contact of a span by its means over it.
-fn event(at: Member, tally: &super::facing::Tally, span: f64) -> ContactEvent {
+fn event(at: Member, tally: &Tally, span: f64) -> ContactEvent {
     let mean = |values: [f64; 3]| values.map(|value| value / span);
     let wrench = Wrench {
         point: tally.wrench.point.map(|value| value / tally.normal),

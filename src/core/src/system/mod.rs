@@ -11,6 +11,7 @@ mod growth;
 mod march;
 mod pair;
 mod posed;
+mod record;
 mod sets;
 mod small;
 mod structure;

@@ -1,6 +1,8 @@
 //! One step of one sector, tried: contact forces at the points, gaps there, and how good they are.
 
+mod found;
 mod judgement;
+mod obstacle;
 mod together;
 
 use super::basis::{Basis, MOST, POINTS};
@@ -13,70 +15,12 @@ use crate::dynamics::dispatch::InstructionSet;
 use crate::laws::active_set::ContactSolver;
 pub use judgement::Verdict;
 use nalgebra::DMatrix;
+pub use obstacle::{Obstacle, Sliding, one_by_one};
 
 /// Most evaluations of the gaps of one trial.
 const PASSES: usize = 6;
 /// Gaps this far below zero, as a share of the largest, are rounding.
 const ROUNDING: f64 = 1e-13;
-
-/// What the nodes of a sector may touch, at the points of the step that is tried.
-pub trait Obstacle {
-    /// Gap (m; infinite where there is nothing to touch) and unit normal to the node displaced by `moved` (m), at a point of the step.
-    fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]);
-
-    /// Gaps (m) and normals at all points but the first; arrays of [`Lanes`].
-    fn gaps(&mut self, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
-        one_by_one(self, lanes, moved, gaps, normals);
-    }
-
-    /// Whether directions of sliding turn within a step, and ask for [`Sliding::way`].
-    fn turns(&self) -> bool {
-        false
-    }
-
-    /// Force per unit of λ on the node, friction included.
-    fn direction(&mut self, node: usize, point: usize, sliding: &Sliding) -> [f64; 3];
-
-    /// Contacts at the lanes chosen are about to be solved, with these normals: get ready to tell how what is touched gives way there.
-    /// False where it does not.
-    fn look(&mut self, _lanes: Lanes, _chosen: &[bool], _normals: &[f64]) -> bool {
-        false
-    }
-
-    /// By how much what is touched gives way at all lanes (m, along their normals, away from the node) per λ of one with the force
-    /// `direction` per λ; only after [`Obstacle::look`] has said that it does.
-    fn give(&mut self, _lane: usize, _direction: [f64; 3], _given: &mut [f64]) {}
-}
-
-/// How a node slides at a point of the step.
-#[derive(Debug, Clone, Copy)]
-pub struct Sliding {
-    /// Its displacement (m).
-    pub moved: [f64; 3],
-    /// Velocity of its vibration at the start of the step (m/s).
-    pub velocity: [f64; 3],
-    /// What a force at this point works on, Σ_k S_ik ũ_k (m), as far as modes with inertia go there; 0 where nobody asks
-    /// ([`Obstacle::turns`]).
-    pub way: [f64; 3],
-    /// Unit normal at the point.
-    pub normal: [f64; 3],
-}
-
-/// [`Obstacle::gaps`] by [`Obstacle::gap`] of every lane.
-pub fn one_by_one(
-    obstacle: &mut (impl Obstacle + ?Sized),
-    lanes: Lanes,
-    moved: &[f64],
-    gaps: &mut [f64],
-    normals: &mut [f64],
-) {
-    for lane in 0..lanes.len() {
-        let (point, node) = lanes.place(lane);
-        let (gap, normal) = obstacle.gap(node, point, lanes.three(moved, lane));
-        gaps[lane] = gap;
-        lanes.set(normals, lane, normal);
-    }
-}
 
 /// What is used to step: all points, or a constant force and the end alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -201,45 +145,6 @@ impl Trial {
             impulses: rows(),
             left: rows(),
         }
-    }
-
-    /// Number of points at which forces are sought: s, or 1 where the force is constant.
-    pub fn points(&self) -> usize {
-        self.lanes.points
-    }
-
-    /// Number of contact nodes.
-    pub fn nodes(&self) -> usize {
-        self.lanes.nodes
-    }
-
-    /// λ of a node at point 0 … s (N).
-    pub fn multiplier(&self, point: usize, node: usize) -> f64 {
-        if point == 0 { self.begun.multipliers[node] } else { self.multipliers[self.lanes.at(point, node)] }
-    }
-
-    /// Force on it (N).
-    pub fn force(&self, point: usize, node: usize) -> [f64; 3] {
-        if point == 0 { three(&self.begun.forces, node) } else { self.lane(&self.forces, point, node) }
-    }
-
-    /// Its gap (m).
-    pub fn gap(&self, point: usize, node: usize) -> f64 {
-        if point == 0 { self.begun.gaps[node] } else { self.gaps[self.lanes.at(point, node)] }
-    }
-
-    /// Its unit normal.
-    pub fn normal(&self, point: usize, node: usize) -> [f64; 3] {
-        if point == 0 { three(&self.begun.normals, node) } else { self.lane(&self.normals, point, node) }
-    }
-
-    /// Its displacement (m); at the start only where something pushes.
-    pub fn displacement(&self, point: usize, node: usize) -> [f64; 3] {
-        if point == 0 { three(&self.start, node) } else { self.lane(&self.moved, point, node) }
-    }
-
-    fn lane(&self, values: &[f64], point: usize, node: usize) -> [f64; 3] {
-        self.lanes.three(values, self.lanes.at(point, node))
     }
 
     /// The state is another one than that of the last trial.
@@ -545,64 +450,5 @@ impl Trial {
             }
         }
         found
-    }
-
-    /// A node that had nothing to touch at the start of the step and is inside something now.
-    pub fn entered(&self) -> Option<usize> {
-        let inside = |node: &usize| (1..=self.points()).any(|point| self.gap(point, *node) < 0.0);
-        (0..self.nodes()).find(|node| self.begun.gaps[*node] == f64::INFINITY && inside(node))
-    }
-
-    /// Whether anything pushes.
-    pub fn rests(&self) -> bool {
-        self.multipliers[..self.lanes.len()].iter().all(|value| *value == 0.0)
-    }
-
-    /// Coefficients of θᵃ of the force on a node (N), projected on degree s − 1; none where nothing pushes.
-    pub fn polynomial(&self, basis: &Basis, kind: Kind, node: usize) -> Option<[[f64; 3]; MOST]> {
-        let mut sums = [[0.0; 3]; MOST];
-        if kind == Kind::Constant {
-            sums[0] = self.force(1, node);
-            return (self.multiplier(1, node) > 0.0).then_some(sums);
-        }
-        let mut pushed = false;
-        for point in (0..basis.count()).filter(|point| self.multiplier(*point, node) > 0.0) {
-            pushed = true;
-            let force = self.force(point, node);
-            for (sum, weights) in sums.iter_mut().zip(&basis.projection) {
-                sum.iter_mut().zip(force).for_each(|(sum, force)| *sum += weights[point] * force);
-            }
-        }
-        pushed.then_some(sums)
-    }
-
-    /// ½ΔfᵀGΔf of a constant force against the one before (J), by G of all rows (m/N).
-    pub fn dropped(&self, residual: &DMatrix<f64>, state: &SectorState) -> f64 {
-        let change = |row: usize| self.force(1, row / 3)[row % 3] - state.forces[row];
-        let rows = 0..residual.nrows();
-        0.5 * rows
-            .clone()
-            .map(|i| change(i) * rows.clone().map(|k| residual[(i, k)] * change(k)).sum::<f64>())
-            .sum::<f64>()
-    }
-
-    /// What contacts that close under a constant force lose: λ times the gap there was (J).
-    pub fn closed(&self) -> f64 {
-        let lost = |node: usize| self.multiplier(1, node) * (self.gap(0, node) - self.gap(1, node));
-        (0..self.nodes()).filter(|node| self.multiplier(1, *node) > 0.0).map(lost).sum()
-    }
-
-    /// The state goes to the end of the step: forces, gaps and normals there.
-    pub fn leave(&mut self, state: &mut SectorState) {
-        let points = self.points();
-        for node in 0..self.nodes() {
-            let (force, normal) = (self.force(points, node), self.normal(points, node));
-            state.forces[3 * node..3 * node + 3].copy_from_slice(&force);
-            state.normals[3 * node..3 * node + 3].copy_from_slice(&normal);
-            state.multipliers[node] = self.multiplier(points, node);
-            state.gaps[node] = self.gap(points, node);
-        }
-        state.looked = true;
-        self.forget();
     }
 }

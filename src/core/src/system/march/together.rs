@@ -15,7 +15,8 @@ use crate::galerkin::state::SectorState;
 use crate::galerkin::trial::{Kind, Obstacle, Trial, Verdict};
 use crate::galerkin::whole::Whole;
 use crate::settings::Scheme;
-use crate::system::facing::{Facing, Ground, Record};
+use crate::system::facing::{Facing, Ground};
+use crate::system::record::Record;
 use crate::system::{Pair, StepFailure, Structure};
 
 /// Most evaluations of the gaps of one trial: others move as well.

@@ -1,0 +1,106 @@
+//! What a trial has found: forces, gaps and displacements of the nodes at the points, and where it leaves the state.
+
+use super::{Kind, Trial, three};
+use crate::galerkin::basis::{Basis, MOST};
+use crate::galerkin::state::SectorState;
+use nalgebra::DMatrix;
+
+impl Trial {
+    /// Number of points at which forces are sought: s, or 1 where the force is constant.
+    pub fn points(&self) -> usize {
+        self.lanes.points
+    }
+
+    /// Number of contact nodes.
+    pub fn nodes(&self) -> usize {
+        self.lanes.nodes
+    }
+
+    /// λ of a node at point 0 … s (N).
+    pub fn multiplier(&self, point: usize, node: usize) -> f64 {
+        if point == 0 { self.begun.multipliers[node] } else { self.multipliers[self.lanes.at(point, node)] }
+    }
+
+    /// Force on it (N).
+    pub fn force(&self, point: usize, node: usize) -> [f64; 3] {
+        if point == 0 { three(&self.begun.forces, node) } else { self.lane(&self.forces, point, node) }
+    }
+
+    /// Its gap (m).
+    pub fn gap(&self, point: usize, node: usize) -> f64 {
+        if point == 0 { self.begun.gaps[node] } else { self.gaps[self.lanes.at(point, node)] }
+    }
+
+    /// Its unit normal.
+    pub fn normal(&self, point: usize, node: usize) -> [f64; 3] {
+        if point == 0 { three(&self.begun.normals, node) } else { self.lane(&self.normals, point, node) }
+    }
+
+    /// Its displacement (m); at the start only where something pushes.
+    pub fn displacement(&self, point: usize, node: usize) -> [f64; 3] {
+        if point == 0 { three(&self.start, node) } else { self.lane(&self.moved, point, node) }
+    }
+
+    fn lane(&self, values: &[f64], point: usize, node: usize) -> [f64; 3] {
+        self.lanes.three(values, self.lanes.at(point, node))
+    }
+
+    /// A node that had nothing to touch at the start of the step and is inside something now.
+    pub fn entered(&self) -> Option<usize> {
+        let inside = |node: &usize| (1..=self.points()).any(|point| self.gap(point, *node) < 0.0);
+        (0..self.nodes()).find(|node| self.begun.gaps[*node] == f64::INFINITY && inside(node))
+    }
+
+    /// Whether anything pushes.
+    pub fn rests(&self) -> bool {
+        self.multipliers[..self.lanes.len()].iter().all(|value| *value == 0.0)
+    }
+
+    /// Coefficients of θᵃ of the force on a node (N), projected on degree s − 1; none where nothing pushes.
+    pub fn polynomial(&self, basis: &Basis, kind: Kind, node: usize) -> Option<[[f64; 3]; MOST]> {
+        let mut sums = [[0.0; 3]; MOST];
+        if kind == Kind::Constant {
+            sums[0] = self.force(1, node);
+            return (self.multiplier(1, node) > 0.0).then_some(sums);
+        }
+        let mut pushed = false;
+        for point in (0..basis.count()).filter(|point| self.multiplier(*point, node) > 0.0) {
+            pushed = true;
+            let force = self.force(point, node);
+            for (sum, weights) in sums.iter_mut().zip(&basis.projection) {
+                sum.iter_mut().zip(force).for_each(|(sum, force)| *sum += weights[point] * force);
+            }
+        }
+        pushed.then_some(sums)
+    }
+
+    /// ½ΔfᵀGΔf of a constant force against the one before (J), by G of all rows (m/N).
+    pub fn dropped(&self, residual: &DMatrix<f64>, state: &SectorState) -> f64 {
+        let change = |row: usize| self.force(1, row / 3)[row % 3] - state.forces[row];
+        let rows = 0..residual.nrows();
+        0.5 * rows
+            .clone()
+            .map(|i| change(i) * rows.clone().map(|k| residual[(i, k)] * change(k)).sum::<f64>())
+            .sum::<f64>()
+    }
+
+    /// What contacts that close under a constant force lose: λ times the gap there was (J).
+    pub fn closed(&self) -> f64 {
+        let lost = |node: usize| self.multiplier(1, node) * (self.gap(0, node) - self.gap(1, node));
+        (0..self.nodes()).filter(|node| self.multiplier(1, *node) > 0.0).map(lost).sum()
+    }
+
+    /// The state goes to the end of the step: forces, gaps and normals there.
+    pub fn leave(&mut self, state: &mut SectorState) {
+        let points = self.points();
+        for node in 0..self.nodes() {
+            let (force, normal) = (self.force(points, node), self.normal(points, node));
+            state.forces[3 * node..3 * node + 3].copy_from_slice(&force);
+            state.normals[3 * node..3 * node + 3].copy_from_slice(&normal);
+            state.multipliers[node] = self.multiplier(points, node);
+            state.gaps[node] = self.gap(points, node);
+        }
+        state.looked = true;
+        self.forget();
+    }
+}

@@ -1,0 +1,62 @@
+//! What a sector may touch.
+
+use crate::galerkin::compliance::Lanes;
+
+/// What the nodes of a sector may touch, at the points of the step that is tried.
+pub trait Obstacle {
+    /// Gap (m; infinite where there is nothing to touch) and unit normal to the node displaced by `moved` (m), at a point of the step.
+    fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]);
+
+    /// Gaps (m) and normals at all points but the first; arrays of [`Lanes`].
+    fn gaps(&mut self, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
+        one_by_one(self, lanes, moved, gaps, normals);
+    }
+
+    /// Whether directions of sliding turn within a step, and ask for [`Sliding::way`].
+    fn turns(&self) -> bool {
+        false
+    }
+
+    /// Force per unit of λ on the node, friction included.
+    fn direction(&mut self, node: usize, point: usize, sliding: &Sliding) -> [f64; 3];
+
+    /// Contacts at the lanes chosen are about to be solved, with these normals: get ready to tell how what is touched gives way there.
+    /// False where it does not.
+    fn look(&mut self, _lanes: Lanes, _chosen: &[bool], _normals: &[f64]) -> bool {
+        false
+    }
+
+    /// By how much what is touched gives way at all lanes (m, along their normals, away from the node) per λ of one with the force
+    /// `direction` per λ; only after [`Obstacle::look`] has said that it does.
+    fn give(&mut self, _lane: usize, _direction: [f64; 3], _given: &mut [f64]) {}
+}
+
+/// How a node slides at a point of the step.
+#[derive(Debug, Clone, Copy)]
+pub struct Sliding {
+    /// Its displacement (m).
+    pub moved: [f64; 3],
+    /// Velocity of its vibration at the start of the step (m/s).
+    pub velocity: [f64; 3],
+    /// What a force at this point works on, Σ_k S_ik ũ_k (m), as far as modes with inertia go there; 0 where nobody asks
+    /// ([`Obstacle::turns`]).
+    pub way: [f64; 3],
+    /// Unit normal at the point.
+    pub normal: [f64; 3],
+}
+
+/// [`Obstacle::gaps`] by [`Obstacle::gap`] of every lane.
+pub fn one_by_one(
+    obstacle: &mut (impl Obstacle + ?Sized),
+    lanes: Lanes,
+    moved: &[f64],
+    gaps: &mut [f64],
+    normals: &mut [f64],
+) {
+    for lane in 0..lanes.len() {
+        let (point, node) = lanes.place(lane);
+        let (gap, normal) = obstacle.gap(node, point, lanes.three(moved, lane));
+        gaps[lane] = gap;
+        lanes.set(normals, lane, normal);
+    }
+}

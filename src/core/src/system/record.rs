@@ -1,0 +1,263 @@
+//! What is kept of one sector over a span of time: how prescribed motion goes on, where nodes are, what contacts did.
+
+use super::StepFailure;
+use super::carrier::Spot;
+use super::growth::Growth;
+use super::pair::Pair;
+use crate::galerkin::basis::{MOST, POINTS};
+use crate::galerkin::compliance::Lanes;
+use crate::gaps::Drive;
+use crate::gaps::revolution::Instants;
+use crate::gaps::surface_spline::ClosestPoint;
+use crate::gaps::wrench::{Motion, Wrench};
+
+/// How prescribed motion of a pair goes on over a span: from where it was, quadratic in time through the middle and the end. Inputs
+/// are linear in time and the angle of the rotor quadratic, so that this is exact; what grows in otherwise is the shape.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Course {
+    before: Drive,
+    /// Linear and quadratic part over the whole span.
+    parts: [Motion; 2],
+    growth: Growth,
+}
+
+impl Course {
+    /// From `before` through `middle` to `end`, a span of length `span` (s).
+    pub fn new(before: &Drive, (middle, growth): (&Drive, Growth), end: &Drive, span: f64) -> Self {
+        let half = Motion::between(before, middle, 0.5 * span);
+        let whole = Motion::between(before, end, span);
+        let linear = half.over(4.0).less(&whole);
+        let quadratic = whole.over(2.0).less(&half.over(4.0));
+        Self { before: *before, parts: [linear, quadratic], growth }
+    }
+
+    /// Whether nothing but the rotor moves.
+    pub fn only_turns(&self) -> bool {
+        self.parts.iter().all(|part| part.casing_rests() && part.shaft.iter().all(|along| *along == 0.0))
+    }
+
+    /// Motion from the start of the span to `theta` of it.
+    fn motion(&self, theta: f64) -> Motion {
+        let motion = self.parts[0].over(theta).since(&self.parts[1].over(theta * theta));
+        Motion { shape_factor: self.growth.at(theta) - self.before.shape_factor, ..motion }
+    }
+
+    /// Prescribed motion at `theta` of the span.
+    pub fn at(&self, theta: f64) -> (Drive, Motion) {
+        let motion = self.motion(theta);
+        let rate =
+            |part: fn(&Motion) -> f64| (part(&self.parts[0]) + 2.0 * theta * part(&self.parts[1])) / self.parts[0].step;
+        let before = &self.before;
+        let drive = Drive {
+            rotor_angle: before.rotor_angle + motion.turn,
+            speed: rate(|motion| motion.turn),
+            gap_offset: before.gap_offset + before.radius_change + motion.opening,
+            radius_change: 0.0,
+            shape_factor: before.shape_factor + motion.shape_factor,
+            shape_rotation: before.shape_rotation + motion.shape_rotation,
+            shaft: std::array::from_fn(|i| before.shaft[i] + motion.shaft[i]),
+            shaft_velocity: [rate(|m| m.shaft[0]), rate(|m| m.shaft[1]), rate(|m| m.shaft[2])],
+        };
+        (drive, motion)
+    }
+}
+
+/// What a node did over a span.
+#[derive(Debug, Clone, Copy)]
+pub struct Tally {
+    /// ∫λ dt (N·s).
+    pub normal: f64,
+    /// ∫|F_t| dt (N·s).
+    pub tangential: f64,
+    /// ∫F dt in the coordinates of the displacements (N·s).
+    pub force: [f64; 3],
+    /// ∫ of force and moment in fixed directions (N·s, N·m·s), and λ-weighted ∫ of the point (m·N·s).
+    pub wrench: Wrench,
+    /// Largest λ (N).
+    pub peak: f64,
+    /// Friction heat (J).
+    pub heat: f64,
+    /// Smallest gap at any point (m).
+    pub lowest: f64,
+}
+
+impl Tally {
+    pub const NOTHING: Self = Self {
+        normal: 0.0,
+        tangential: 0.0,
+        force: [0.0; 3],
+        wrench: Wrench { point: [0.0; 3], force: [0.0; 3], moment: [0.0; 3] },
+        peak: 0.0,
+        heat: 0.0,
+        lowest: f64::INFINITY,
+    };
+}
+
+/// Work of all contacts of a sector over a span (J).
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Worked {
+    /// Of the shaft.
+    pub shaft: f64,
+    /// Of whirl and of axial shift.
+    pub whirl: f64,
+    /// Of axial shift.
+    pub shift: f64,
+    /// Of the casing.
+    pub casing: f64,
+    /// Friction heat.
+    pub heat: f64,
+    /// Of gaps that close.
+    pub closing: f64,
+    /// On the structure.
+    pub exact: f64,
+    /// Damping loss.
+    pub damping: f64,
+    /// What constant forces lose against those before.
+    pub dropped: f64,
+}
+
+/// Which place of a node on a surface that is carried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// That at the start of the step.
+    Begun,
+    /// The closest point of now.
+    Now,
+    /// Where its force has been handed over.
+    Acted,
+}
+
+/// What is kept from span to span, and scratch: allocates only when made.
+#[derive(Debug, Clone)]
+pub struct Record {
+    /// Of each node.
+    pub tallies: Vec<Tally>,
+    /// Of all nodes.
+    pub work: Worked,
+    /// Motion of each pair over the span.
+    pub courses: Vec<Course>,
+    /// At the points of the step being tried, pair by pair.
+    pub drives: Vec<[(Drive, Motion); POINTS]>,
+    /// Motion that forces at each point of the step taken work on, pair by pair.
+    pub motions: Vec<[Motion; POINTS]>,
+    pub places: [Vec<ClosestPoint>; POINTS],
+    /// Where forces have been handed to structures that carry surfaces: places of the pass before that in which gaps hold.
+    pub acted: [Vec<ClosestPoint>; POINTS],
+    /// How nodes slide along open surfaces at the points (m), and how often that has been asked in this trial.
+    pub slips: [Vec<[f64; 3]>; POINTS],
+    pub looks: usize,
+    pub instants: Instants,
+    /// All nodes at all points are in `instants`, before the surface of this pair.
+    pub lanes_of: Option<usize>,
+    /// A contact that small displacements cannot describe.
+    pub implausible: bool,
+    /// A node that has come over a free edge and was behind the surface already.
+    pub behind_edge: Option<usize>,
+}
+
+impl Record {
+    /// Room for so many nodes and pairs.
+    pub fn new(nodes: usize, pairs: usize) -> Self {
+        Self {
+            tallies: vec![Tally::NOTHING; nodes],
+            work: Worked::default(),
+            courses: vec![Course::default(); pairs],
+            drives: vec![[<(Drive, Motion)>::default(); POINTS]; pairs],
+            motions: vec![[Motion::default(); POINTS]; pairs],
+            places: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
+            acted: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
+            slips: std::array::from_fn(|_| vec![[0.0; 3]; nodes]),
+            looks: 0,
+            instants: Instants::new(Lanes { points: MOST, nodes }.width()),
+            lanes_of: None,
+            implausible: false,
+            behind_edge: None,
+        }
+    }
+
+    /// Where a node is on a surface that is carried, at a point of the step.
+    pub fn spot<'a>(
+        &self,
+        (node, point): (usize, usize),
+        (pair, of): (usize, &'a Pair),
+        index: usize,
+        when: Place,
+    ) -> Option<Spot<'a>> {
+        let frame = of.frame(index, self.drives[pair][point].0.rotor_angle);
+        let place = match when {
+            Place::Begun => self.places[0][node],
+            Place::Now => self.places[point][node],
+            Place::Acted => self.acted[point][node],
+        };
+        Some(Spot { surface: of.carried()?, place, frame })
+    }
+
+    /// The force on a node at a point of the step is handed over where the node is now.
+    pub fn act(&mut self, node: usize, point: usize) {
+        self.acted[point][node] = self.places[point][node];
+    }
+
+    /// What a span of this structure and sector ends with.
+    pub fn check(&self, (structure, sector): (usize, usize)) -> Result<(), StepFailure> {
+        if self.implausible {
+            return Err(StepFailure::Implausible { structure, sector });
+        }
+        self.behind_edge.map_or(Ok(()), |node| Err(StepFailure::BehindEdge { structure, node }))
+    }
+
+    /// Prescribed motion of a span (s) that the pairs are at the end of.
+    pub fn set_out(&mut self, pairs: &[Pair], span: f64) {
+        for (course, pair) in self.courses.iter_mut().zip(pairs) {
+            *course = Course::new(pair.drive_before(), (&pair.middle.0, pair.middle.1), pair.drive_now(), span);
+        }
+    }
+
+    /// Nodes are guessed to be where they were at the start of the step.
+    pub fn stay(&mut self) {
+        let [first, rest @ ..] = &mut self.places;
+        rest.iter_mut().for_each(|places| places.copy_from_slice(first));
+    }
+
+    /// A sector begins its span with its nodes at the places told.
+    pub fn begin(&mut self, place_of: impl Fn(usize) -> ClosestPoint) {
+        for (node, place) in self.places[0].iter_mut().enumerate() {
+            *place = place_of(node);
+        }
+        self.tallies.fill(Tally::NOTHING);
+        (self.work, self.implausible, self.behind_edge) = (Worked::default(), false, None);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rotor that is run up on a shaft that is accelerated: places are those of the motion at any time, velocities its rates.
+    #[test]
+    fn a_course_moves_at_the_rates_that_it_tells() {
+        let span = 4e-5;
+        let at = |time: f64| Drive {
+            rotor_angle: 0.3 + 1300.0 * time + 4e6 * time * time,
+            speed: 1300.0 + 8e6 * time,
+            gap_offset: 2e-4 - 3.0 * time,
+            shaft: [0.2 * time, 1e-5 - 0.1 * time + 500.0 * time * time, -0.3 * time],
+            shaft_velocity: [0.2, -0.1 + 1000.0 * time, -0.3],
+            ..Drive::default()
+        };
+        let course = Course::new(&at(0.0), (&at(0.5 * span), Growth::default()), &at(span), span);
+        for place in 0..=8 {
+            let theta = 0.125 * f64::from(place);
+            let (found, expected) = (course.at(theta).0, at(theta * span));
+            let pairs = [
+                (found.rotor_angle, expected.rotor_angle, 1.0),
+                (found.speed, expected.speed, 1300.0),
+                (found.gap_offset, expected.gap_offset, 1e-4),
+            ];
+            let shaft = (0..3).map(|i| (found.shaft[i], expected.shaft[i], 1e-5));
+            let velocity = (0..3).map(|i| (found.shaft_velocity[i], expected.shaft_velocity[i], 0.1));
+            for (found, expected, size) in pairs.into_iter().chain(shaft).chain(velocity) {
+                assert!((found - expected).abs() < 1e-9 * size, "θ = {theta}: {found}, {expected}");
+            }
+        }
+    }
+}
