@@ -9,7 +9,7 @@ use std::{
 use serde_json::{Value, json};
 use tiprub_core::{
     Scene, Simulation,
-    settings::{ContactSettings, Motion, SceneSettings},
+    settings::{ContactSettings, Motion, SceneSettings, StructureSettings},
     variables::Causality,
 };
 use tiprub_fmi_host::{UnpackedFmu, entries, open_archive};
@@ -213,28 +213,7 @@ fn gap_text(contact: &ContactSettings) -> String {
 fn scene_text(settings: &SceneSettings) -> String {
     let colon = if settings.description.is_empty() { "" } else { ": " };
     let mut text = format!("scene {}{colon}{}\n", settings.name, settings.description);
-    for structure in &settings.structures {
-        // With a preset the model is another than the one written.
-        let model =
-            tiprub_format::builtin_model(settings, structure).map(|name| format!("{}{name}", scene_source::BUILTIN));
-        let motion = match structure.motion {
-            Motion::Rotating => {
-                format!("speed {} rad/s ({:.1} rpm)", structure.speed, structure.speed * 30.0 / std::f64::consts::PI)
-            }
-            Motion::Still => "stands still".into(),
-            Motion::Free => {
-                let [x, y, z] = structure.velocity;
-                format!("flies freely, starts at {x}, {y}, {z} m/s")
-            }
-        };
-        let _ = writeln!(
-            text,
-            "  structure     {} from {}, {motion}, damping ratio {}",
-            structure.name,
-            model.as_ref().unwrap_or(&structure.rom),
-            structure.damping_ratio.map_or("of the ROM".into(), |ratio| ratio.to_string())
-        );
-    }
+    settings.structures.iter().for_each(|structure| text.push_str(&structure_text(settings, structure)));
     // Gaps and surfaces of what flies freely are in the ROMs.
     let flies = |contact: &ContactSettings| {
         settings.master_of(contact).is_some_and(|structure| structure.motion == Motion::Free)
@@ -281,6 +260,28 @@ fn scene_text(settings: &SceneSettings) -> String {
         experiment.start, experiment.stop, experiment.communication_step
     );
     text
+}
+
+fn structure_text(settings: &SceneSettings, structure: &StructureSettings) -> String {
+    // With a preset the model is another than the one written.
+    let model =
+        tiprub_format::builtin_model(settings, structure).map(|name| format!("{}{name}", scene_source::BUILTIN));
+    let motion = match structure.motion {
+        Motion::Rotating => {
+            format!("speed {} rad/s ({:.1} rpm)", structure.speed, structure.speed * 30.0 / std::f64::consts::PI)
+        }
+        Motion::Still => "stands still".into(),
+        Motion::Free => {
+            let [x, y, z] = structure.velocity;
+            format!("flies freely, starts at {x}, {y}, {z} m/s")
+        }
+    };
+    format!(
+        "  structure     {} from {}, {motion}, damping ratio {}\n",
+        structure.name,
+        model.as_ref().unwrap_or(&structure.rom),
+        structure.damping_ratio.map_or("of the ROM".into(), |ratio| ratio.to_string())
+    )
 }
 
 #[cfg(test)]
