@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use nalgebra::{DMatrix, DVector};
+
 use crate::project::{Project, SCENE, json};
 
 #[test]
@@ -89,4 +91,33 @@ fn nothing_that_a_terminal_obeys_is_printed() {
             json(&output);
         }
     }
+}
+
+/// What comes up in a run is told beside the warnings of its start, and not among them once more.
+#[test]
+fn what_comes_up_in_a_run_is_told_once() {
+    let project = Project::new();
+    let path = project.path("small.rom.safetensors");
+    let mut rom = tiprub_format::read_rom(&fs::read(&path).unwrap(), "small").unwrap();
+    // A light contact node on the mass: galerkin leaves out the mass of contact nodes.
+    let stiff = |i: usize, j: usize| match (i == j, i / 3 + j / 3) {
+        (true, 0) => 2.4e8,
+        (true, _) => 2e8,
+        (false, _) if i % 3 == j % 3 => -2e8,
+        _ => 0.0,
+    };
+    rom.mass = DMatrix::from_diagonal(&DVector::from_fn(6, |i, _| [0.1, 1e-3][i / 3]));
+    rom.stiffness = DMatrix::from_fn(6, 6, stiff);
+    rom.contact_map = DMatrix::from_fn(3, 6, |i, j| f64::from(u8::from(3 + i == j)));
+    fs::write(&path, tiprub_format::write_rom(&rom)).unwrap();
+    let scene = SCENE
+        .replace("step = 1e-4", "scheme = \"galerkin\"\ntolerance = 1e-9\nstep = 8e-5")
+        .replace("amplitude = 2e-3", "amplitude = 1.1e-3");
+    fs::write(project.path("scene.toml"), scene).unwrap();
+    let output = project.run(&["run", "scene.toml", "--json", "--quiet"]);
+    let stderr = String::from_utf8(output.stderr.clone()).unwrap();
+    let told: Vec<&str> = stderr.lines().filter(|line| line.contains("have missed the tolerance")).collect();
+    assert!(output.status.success() && told.len() == 1, "{stderr}");
+    let shown: Vec<&str> = stderr.lines().filter_map(|line| line.strip_prefix("warning: ")).collect();
+    assert_eq!(json(&output)["warnings"], serde_json::json!(shown));
 }

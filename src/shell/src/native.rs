@@ -48,6 +48,8 @@ pub fn run(
         set(&mut simulation, variable, value)?;
     }
     simulation.initialise(schedule.start).map_err(in_scene)?;
+    // Those of the start: what comes up in the run is told by its notes.
+    let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
     let outputs = Outputs::of(simulation.table());
     let mut recording = Recording::with_columns(outputs.names.clone(), schedule.count + 1)?;
     let (mut stepping, mut slowest) = (Duration::ZERO, Duration::ZERO);
@@ -63,7 +65,6 @@ pub fn run(
             (stepping, slowest) = (stepping + taken, slowest.max(taken));
         }
     }
-    let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
     warnings.extend(simulation.take_notes());
     let system = simulation.system();
     let effort = (system.settings().scheme == Scheme::Galerkin).then(|| *system.effort());
