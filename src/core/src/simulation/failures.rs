@@ -78,6 +78,9 @@ impl Simulation {
                 ),
                 "Use a smaller internal step".to_owned(),
             ),
+            StepFailure::Pulls { structure, node, share } => {
+                (self.pulls(structure, node, share), self.against_pulling(structure))
+            }
             StepFailure::TooFast { structure } => (
                 format!(
                     "contact nodes of {} move by more than a tenth of the extent of the contact nodes in one internal step, and \

@@ -186,7 +186,7 @@ impl Compiled {
     }
 
     /// Largest factor on the frequencies of a structure.
-    fn stiffest(&self, body: usize) -> f64 {
+    pub(super) fn stiffest(&self, body: usize) -> f64 {
         self.body(body).0.frequency_factors.iter().fold(1.0, |largest: f64, factor| largest.max(*factor))
     }
 

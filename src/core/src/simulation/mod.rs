@@ -13,6 +13,7 @@ mod outputs;
 mod pace;
 mod patches;
 mod plan;
+mod pulling;
 mod slave_surface;
 mod state;
 mod stepping;

@@ -284,6 +284,7 @@ impl Simulation {
         if let Err(failure) = self.system.check_ledger() {
             return Err(self.fail(failure, time));
         }
+        self.check_pulling(time)?;
         self.note_curved(time);
         self.note_missed(time);
         self.most_tried = self.most_tried.max(self.system.steps_tried() - self.communication.tried);

@@ -65,6 +65,15 @@ pub enum StepFailure {
         /// What motion can explain of it (m).
         explained: f64,
     },
+    /// A law that looks once for penetration holds nodes closed that the others push away.
+    Pulls {
+        /// Structure.
+        structure: usize,
+        /// Contact node most pulled at.
+        node: usize,
+        /// Its impulse as a share of that of the node most pushed.
+        share: f64,
+    },
     /// More steps would have to be tried than are allowed.
     Exhausted,
     /// The contact problem of a sector has no solution within the pivoting limit.

@@ -11,6 +11,7 @@ mod growth;
 mod march;
 mod pair;
 mod posed;
+mod pulling;
 mod record;
 mod sets;
 mod small;

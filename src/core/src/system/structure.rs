@@ -10,6 +10,7 @@ use crate::history::History;
 use crate::persist::{Persist, Reader, Writer, persist_fields};
 use crate::settings::Scheme;
 use crate::system::march::Galerkin;
+use crate::system::pulling::Pulling;
 
 /// Penetrations below this are none (m): squares of what they lead to leave the range of double precision, and modes as small
 /// are flushed to rest.
@@ -25,6 +26,8 @@ pub struct Structure {
     pub(super) pair_of: Vec<Option<usize>>,
     /// Past of the contact nodes.
     pub(crate) history: History,
+    /// Impulses on the contact nodes, where forces may pull.
+    pub(super) pulling: Pulling,
     /// Smallest gap of each lane (m).
     pub(super) lowest: Vec<f64>,
     /// Modal contact force on its surfaces found in the last step (N·√kg⁻¹); empty where it carries none.
@@ -72,6 +75,7 @@ impl Structure {
         let rows = modes.rows() * modes.lanes();
         Self {
             history: History::new(Geometry::new(contacts, has_places), contacts, rows),
+            pulling: Pulling::new(pair_of.len()),
             lowest: vec![f64::INFINITY; modes.lanes()],
             delayed: Vec::new(),
             pace: Pace::new(modes.sectors()),
@@ -91,6 +95,7 @@ impl Structure {
         Self {
             history: History::new(Geometry::new(0, false), 0, rows),
             pair_of: Vec::new(),
+            pulling: Pulling::default(),
             lowest: Vec::new(),
             delayed: vec![0.0; model.len()],
             pace: Pace::default(),
@@ -213,6 +218,7 @@ impl Structure {
         self.modes.collect_loss();
         self.delayed.fill(0.0);
         self.history.clear();
+        self.pulling.clear();
         self.pace.bank.fill(0.0);
         self.pace.level.fill(0);
     }
@@ -327,6 +333,7 @@ impl Structure {
         self.modes.save(writer);
         self.delayed.save(writer);
         self.pace.save(writer);
+        self.pulling.save(writer);
         self.history.save(writer);
     }
 
@@ -335,6 +342,7 @@ impl Structure {
         self.modes.check(reader);
         self.delayed.check(reader);
         self.pace.check(reader);
+        self.pulling.check(reader);
         saved.restore(&mut reader.clone());
         self.history.check(reader);
     }
@@ -344,6 +352,7 @@ impl Structure {
         self.modes.restore(reader);
         self.delayed.restore(reader);
         self.pace.restore(reader);
+        self.pulling.restore(reader);
         self.history.restore(reader);
     }
 }

@@ -4,6 +4,7 @@ mod blades;
 mod extremes;
 mod inputs;
 mod limits;
+mod pulling;
 mod robustness;
 mod rub;
 mod spin;

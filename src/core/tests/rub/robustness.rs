@@ -356,8 +356,12 @@ fn without_friction_more_contact_nodes_than_modes_are_no_end_of_a_run() {
                 for index in 1..=60 {
                     let inward = 5e-4 * (0.5 - 0.5 * (f64::from(index) / 10.0).cos());
                     set(&mut simulation, "casing_radius_change", -inward);
-                    let ended = simulation.do_step(simulation.time(), 1e-5);
-                    ended.unwrap_or_else(|error| panic!("{name}, {index}: {error}"));
+                    if let Err(error) = simulation.do_step(simulation.time(), 1e-5) {
+                        // A solution there is, but one that pulls.
+                        let pulled = solver == Solver::Film && error.to_string().contains("film has pulled");
+                        assert!(pulled, "{name}, {index}: {error}");
+                        break;
+                    }
                     peak = peak.max(real(&simulation, "normal_force_peak"));
                 }
                 assert!(peak > 0.0, "{name} does not touch");

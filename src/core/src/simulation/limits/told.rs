@@ -26,6 +26,8 @@ pub struct Told {
     friction: Vec<usize>,
     /// Whether a displacement was that linear kinematics describes badly, of each structure that touches.
     pub(in crate::simulation) curved: Vec<bool>,
+    /// Whether contact nodes are pulled at, of each structure that touches.
+    pub(in crate::simulation) pulls: Vec<bool>,
     /// Whether a tolerance was missed.
     pub(in crate::simulation) missed: bool,
 }
@@ -39,6 +41,7 @@ impl Told {
             fastest: vec![0.0; bodies],
             friction: vec![0; bodies],
             curved: vec![false; bodies],
+            pulls: vec![false; bodies],
             missed: false,
         }
     }

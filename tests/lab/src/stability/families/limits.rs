@@ -30,10 +30,6 @@ fn step_limit() -> Vec<Case> {
     for (scheme, scheme_name) in SCHEMES {
         for (solver, solver_name) in SOLVERS {
             for (friction, model) in [(0.0, "tower"), (0.15, "tower"), (0.0, "blade"), (0.15, "blade")] {
-                // Three nodes that push each other apart: film, which looks once, need not come to the static solution.
-                if model == "blade" && solver == Solver::Film {
-                    continue;
-                }
                 for factor in FACTORS {
                     let name = format!("step-limit/{scheme_name}/{solver_name}/{model}/µ={friction}/h={factor}");
                     let against = "static contact, signs of the ledger";
@@ -42,6 +38,15 @@ fn step_limit() -> Vec<Case> {
                         Scheme::MasslessBoundary if factor > 1.0 => {
                             Expected::refused(["massless-boundary", "internal step"])
                         }
+                        // Three nodes that push each other apart: film, which looks once, need not come to the static solution.
+                        _ if solver == Solver::Film && model == "blade" => Expected::either_as(
+                            against,
+                            &[
+                                &["grows"],
+                                &["film", "pulled at contact node"],
+                                &["kinetic and strain energy", "does not resolve"],
+                            ],
+                        ),
                         _ if friction > 0.0 && model == "blade" => Expected::either(against, ["grows"]),
                         // A mode near ωh = π may come to hold energy that nobody supplied.
                         Scheme::ModalExact if factor > 1.0 => {

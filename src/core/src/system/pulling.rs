@@ -1,0 +1,84 @@
+//! How much contact nodes are pulled at: what a law that looks once for penetration makes of nodes that push each other apart.
+
+use super::System;
+use crate::persist::persist_fields;
+
+/// Impulses on the contact nodes of one structure since the start, of all its sectors together.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Pulling {
+    /// Internal steps in which a node touched.
+    touched: u64,
+    /// Of forces that push, and of those that pull, for each node (N s).
+    pushed: Vec<f64>,
+    pulled: Vec<f64>,
+}
+
+persist_fields!(Pulling { touched, pushed, pulled });
+
+impl Pulling {
+    /// Of so many nodes.
+    pub(super) fn new(nodes: usize) -> Self {
+        Self { touched: 0, pushed: vec![0.0; nodes], pulled: vec![0.0; nodes] }
+    }
+
+    /// Nothing has touched yet.
+    pub(super) fn clear(&mut self) {
+        self.touched = 0;
+        self.pushed.fill(0.0);
+        self.pulled.fill(0.0);
+    }
+
+    fn add(&mut self, node: usize, impulse: f64) {
+        let side = if impulse < 0.0 { &mut self.pulled } else { &mut self.pushed };
+        side[node] += impulse.abs();
+    }
+
+    /// The node most pulled at, and its impulse as a share of that of the node most pushed, once contact lasted for so many internal
+    /// steps; a single touch of two nodes tells nothing.
+    fn most(&self, steps: u64) -> Option<(usize, f64)> {
+        let pushed = self.pushed.iter().copied().fold(0.0, f64::max);
+        let (node, pulled) = self.pulled.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (self.touched >= steps && pulled > 0.0).then(|| (node, pulled / pushed))
+    }
+}
+
+impl System {
+    /// Enter the forces found in the step just done, where a law leaves some that pull.
+    pub(crate) fn count_pulling(&mut self) {
+        if self.groups.iter().all(|group| group.law().looks_again()) {
+            return;
+        }
+        let (step, mut last) = (self.step_size(), usize::MAX);
+        for event in &self.events.now {
+            let pulling = &mut self.structures[event.structure].pulling;
+            pulling.touched += u64::from(event.structure != last);
+            last = event.structure;
+            pulling.add(event.node, event.normal * step);
+        }
+    }
+
+    /// Of a structure that touches: the node most pulled at and the share of its impulse in that of the node most pushed, once contact
+    /// lasted for so many internal steps.
+    pub fn pulling(&self, structure: usize, steps: u64) -> Option<(usize, f64)> {
+        self.structures[structure].pulling.most(steps)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_counts_is_the_node_most_pulled_at_against_the_one_most_pushed() {
+        let mut pulling = Pulling::new(3);
+        assert_eq!(pulling.most(0), None);
+        for (node, impulse) in [(0, 3.0), (1, -0.5), (2, -0.25), (0, 1.0), (1, 2.0), (2, -0.5)] {
+            pulling.add(node, impulse);
+        }
+        pulling.touched = 4;
+        assert_eq!(pulling.most(4), Some((2, 0.75 / 4.0)));
+        assert_eq!(pulling.most(5), None);
+        pulling.clear();
+        assert_eq!((pulling.most(0), pulling), (None, Pulling::new(3)));
+    }
+}

@@ -1,0 +1,127 @@
+//! Film on contact nodes that push each other apart: it pulls at some, which is told, and ends a run where it is too much.
+
+use nalgebra::DMatrix;
+use tiprub_core::dynamics::modal::ModalModel;
+use tiprub_core::rom::Frame;
+use tiprub_core::settings::{Preset, Scheme, Solver};
+use tiprub_core::{Result, Scene, Simulation};
+use tiprub_test_models::{self as models, reference, saved, set, try_started};
+
+/// How far the casing closes on the tips (m).
+const DEPTH: f64 = 2e-5;
+/// Steps in which it does so, and in which it then stays.
+const STEPS: u32 = 400;
+/// Flexibility of the first node (m/N); of the second it is three times as large.
+const FLEXIBILITY: f64 = 1e-7;
+
+/// Two nodes on a blade, of which pressing one moves the other by `coupling` flexibilities: where it is more than 1, the first opens the
+/// second as both are pressed alike. The step has ω_max h = `product`. With `whole` masses in proportion to the stiffness a step sees
+/// nodes as statics does, however short; else each node is a mass.
+fn scene(coupling: f64, whole: bool, scheme: Scheme, product: f64) -> Scene {
+    let flexibility = DMatrix::from_row_slice(2, 2, &[1.0, coupling, coupling, 3.0]) * FLEXIBILITY;
+    let stiffness = flexibility.try_inverse().unwrap();
+    let mass = if whole { stiffness.scale(1e-8) } else { DMatrix::identity(2, 2) * 0.1 };
+    let map = DMatrix::from_fn(6, 2, |row, column| f64::from(u8::from(row == 3 * column)));
+    let place = |name: &str, axial: f64| models::node(name, [models::RADIUS, 0.0, axial], 0.0);
+    let mut rom = models::structure("pair", mass, stiffness, map, vec![place("front", 0.0), place("rear", 0.01)]);
+    (rom.frame, rom.sectors, rom.damping_ratio) = (Frame::Cylindrical, 2, 0.3);
+    let fastest = ModalModel::from_rom(&rom, 0.3).unwrap().largest_frequency();
+    let mut scene = models::round(rom);
+    scene.settings.contacts[0].solver = Solver::Film;
+    scene.settings.time.scheme = scheme;
+    scene.settings.time.step = product / fastest;
+    scene.settings.experiment.communication_step = scene.settings.time.step;
+    scene
+}
+
+/// Close the casing on both nodes, and hold it there.
+fn press(simulation: &mut Simulation, steps: std::ops::Range<u32>) -> Result<()> {
+    let step = simulation.real(reference(simulation, "internal_step_max"))?;
+    for index in steps {
+        let share = (f64::from(index + 1) / f64::from(STEPS)).min(1.0);
+        set(simulation, "casing_radius_change", -(models::GAP + DEPTH) * share);
+        simulation.do_step(f64::from(index) * step, step)?;
+    }
+    Ok(())
+}
+
+fn pressed(scene: &Scene) -> (Simulation, Result<()>) {
+    let mut simulation = try_started(scene).unwrap();
+    let outcome = press(&mut simulation, 0..2 * STEPS);
+    (simulation, outcome)
+}
+
+fn about_film(notes: Vec<String>) -> Vec<String> {
+    notes.into_iter().filter(|text| text.contains("film has pulled")).collect()
+}
+
+/// Steps that see each node by its own mass leave the second open, as statics does. Longer ones would close both, with the force of the
+/// second a third of that of the first, and pulling. So would all where masses couple the nodes as springs do.
+#[test]
+fn a_run_ends_where_film_pulls_and_goes_on_where_it_does_not() {
+    for (whole, scheme, product, pulls) in [
+        (false, Scheme::ModalExact, 0.5, false),
+        (false, Scheme::ModalExact, 1.9, false),
+        (false, Scheme::ModalExact, 3.0, true),
+        (false, Scheme::ModalExact, 5.0, true),
+        (false, Scheme::CentralDifference, 0.5, false),
+        (false, Scheme::CentralDifference, 1.9, false),
+        (true, Scheme::ModalExact, 0.5, true),
+        (true, Scheme::CentralDifference, 0.5, true),
+    ] {
+        let mut scene = scene(1.5, whole, scheme, product);
+        let (mut simulation, outcome) = pressed(&scene);
+        let case = format!("{whole} {scheme:?} {product}: {outcome:?}");
+        if pulls {
+            let told = outcome.unwrap_err().to_string();
+            let named = ["contact node rear", "with 33 % of the impulse", "solver = \"lcp\""];
+            assert!(named.iter().all(|part| told.contains(part)), "{told}");
+            assert_eq!(told.contains("`time.step`"), product > 2.0, "{told}");
+        } else {
+            assert!(outcome.is_ok(), "{case}");
+            let [front, rear] = [0, 1].map(|node| simulation.system().multiplier(node, 0));
+            assert!((front * FLEXIBILITY / DEPTH - 1.0).abs() < 1e-9 && rear.abs() < 1e-9 * front, "{case}");
+        }
+        assert_eq!(about_film(simulation.take_notes()), Vec::<String>::new(), "{case}");
+        // Complementarity looks again.
+        scene.settings.contacts[0].solver = Solver::Lcp;
+        let (simulation, outcome) = pressed(&scene);
+        assert!(outcome.is_ok() && simulation.system().multiplier(1, 0) >= 0.0, "{outcome:?}");
+    }
+}
+
+/// λ of nodes pressed alike are as 3 − c and 1 − c, c the coupling. The paper's method is stepped as it is.
+#[test]
+fn little_pulling_is_told_once_and_so_is_that_of_the_paper() {
+    for (coupling, preset, expected) in
+        [(1.02, Preset::None, None), (1.1, Preset::None, Some("with 5 %")), (1.5, Preset::Paper, Some("with 33 %"))]
+    {
+        let mut scene = scene(coupling, true, Scheme::CentralDifference, 1.0);
+        scene.settings.preset = preset;
+        let (mut simulation, outcome) = pressed(&scene);
+        assert!(outcome.is_ok(), "{outcome:?}");
+        let told = about_film(simulation.take_notes());
+        assert_eq!(told.len(), usize::from(expected.is_some()), "{told:?}");
+        for (text, share) in told.iter().zip(expected) {
+            assert!(text.contains(share) && text.contains("contact node rear"), "{text}");
+            let paper = preset == Preset::Paper;
+            assert!(text.contains("the run ends") != paper && text.contains("leave `preset` out") == paper, "{text}");
+        }
+    }
+}
+
+/// What was pulled so far is part of a state, and the next start has none.
+#[test]
+fn a_state_remembers_what_was_pulled() {
+    let scene = scene(1.5, true, Scheme::ModalExact, 1.0);
+    let (mut simulation, outcome) = pressed(&scene);
+    let expected = outcome.unwrap_err().to_string();
+    simulation.reset();
+    simulation.initialise(0.0).unwrap();
+    press(&mut simulation, 0..STEPS + 20).unwrap();
+    let mut other = try_started(&scene).unwrap();
+    other.restore_state(&saved(&simulation)).unwrap();
+    for one in [&mut simulation, &mut other] {
+        assert_eq!(press(one, STEPS + 20..2 * STEPS).unwrap_err().to_string(), expected);
+    }
+}
