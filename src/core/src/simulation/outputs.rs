@@ -260,18 +260,19 @@ impl View<'_> {
         self.simulation.watched_gaps.clearance(body, point, sector)
     }
 
-    /// |(2/N) Σ_b u_b e^(−i n θ_b)| (1/N for n = 0 and n = N/2) of the radial displacement of the middle node.
-    pub fn nodal_diameters(&self, body: usize, out: &mut [f64]) {
+    /// |(2/N) Σ_b u_b e^(−i n θ_b)| (1/N for n = 0 and n = N/2) of the radial displacement of the middle node, of rows of patches their mean.
+    pub fn nodal_diameters(&self, body: usize, rows: usize, out: &mut [f64]) {
         let modes = self.modes(body);
-        let sectors = modes.sectors();
-        let row = 3 * (modes.rows() / 6);
-        #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
+        let (sectors, along) = (modes.sectors(), modes.rows() / (3 * rows));
+        #[expect(clippy::cast_precision_loss, reason = "row and sector counts are far below 2^52")]
         for (diameter, value) in out.iter_mut().enumerate() {
             let (mut real, mut imaginary) = (0.0, 0.0);
             for sector in 0..sectors {
                 let (sine, cosine) = libm::sincos(diameter as f64 * sector_angle(sector, sectors));
-                real += modes.row(row, sector) * cosine;
-                imaginary += modes.row(row, sector) * sine;
+                let middle = |row: usize| modes.row(3 * (row * along + along / 2), sector);
+                let moved = (0..rows).map(middle).sum::<f64>() / rows as f64;
+                real += moved * cosine;
+                imaginary += moved * sine;
             }
             let weight = if diameter == 0 || 2 * diameter == sectors { 1.0 } else { 2.0 };
             *value = weight / sectors as f64 * libm::hypot(real, imaginary);

@@ -264,7 +264,7 @@ fn all_sectors(table: &mut Builder, parts: &Parts, body: &Body) {
 }
 
 fn nodal_diameters(table: &mut Builder, parts: &Parts, body: &Body, largest: usize) -> Result<()> {
-    let (index, sectors) = (body.index, body.rom.sectors);
+    let (index, sectors, rows) = (body.index, body.rom.sectors, body.rom.rows());
     if largest > sectors / 2 {
         let remedy = format!("Use at most {}", sectors / 2);
         return refuse("nodal_diameters", format!("{largest} with {sectors} sectors"), remedy);
@@ -273,8 +273,8 @@ fn nodal_diameters(table: &mut Builder, parts: &Parts, body: &Body, largest: usi
         "nodal_diameter_amplitude",
         Span::Point,
         nominal(parts, body),
-        "Amplitude of the radial displacement of the middle contact node per nodal diameter 0, 1, 2, …",
-        whole(move |view, out| view.nodal_diameters(index, out)),
+        "Amplitude of the radial displacement of the middle contact node, of rows of patches their mean, per nodal diameter 0, 1, 2, …",
+        whole(move |view, out| view.nodal_diameters(index, rows, out)),
     );
     (amplitude.dimension, amplitude.display) = (Some(largest + 1), Some(1));
     amplitude.quantity = Quantity::NodalDiameterAmplitude;
