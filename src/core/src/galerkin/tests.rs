@@ -221,8 +221,8 @@ fn errors_are_those_asked_for() {
     }
 }
 
-/// Whatever the tolerance, none ever has more. What is lost depends on chance: the lossy switches that come with a step. Half of the
-/// sectors lose little where the tolerance is small.
+/// Whatever the tolerance, none ever has more. What lossy switches pay in is spent, so that little is lost even where the tolerance asks for
+/// nothing.
 #[test]
 fn an_undamped_sector_never_has_more_energy_than_it_was_given() {
     let mut random = Random(11);
@@ -238,5 +238,5 @@ fn an_undamped_sector_never_has_more_energy_than_it_was_given() {
     });
     kept.iter_mut().for_each(|kept| kept.sort_by(f64::total_cmp));
     println!("share of the energy that is left: {kept:.4?}");
-    assert!(kept[1][5] > 0.99 && kept[1][5] > kept[0][5] && kept[0][0] > 0.5);
+    assert!(kept.iter().flatten().all(|share| *share > 0.998));
 }

@@ -35,7 +35,11 @@ impl Simulation {
             StepFailure::Unsolved { structure, .. } if is_free(structure) => self.unsolved(
                 structure,
                 self.compiled.structure_name(structure),
-                "Use less friction, another internal step or the solver coulomb",
+                if self.is_marched() {
+                    "Use less friction, another longest step, or the solver coulomb with modal-exact"
+                } else {
+                    "Use less friction, another internal step or the solver coulomb"
+                },
             ),
             // Told otherwise.
             StepFailure::NonFinite | StepFailure::Exhausted => (String::new(), String::new()),

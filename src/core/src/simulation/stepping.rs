@@ -332,6 +332,9 @@ impl Simulation {
         if !settings.ledger || settings.scheme == Scheme::MasslessBoundary {
             return Ok(());
         }
+        if self.is_marched() {
+            self.check_friction(time)?;
+        }
         let Some(set) = (0..self.energies.len()).find(|set| !self.has_its_energy(*set)) else { return Ok(()) };
         self.phase = Phase::Failed;
         Err(Error::Unstable {
@@ -348,6 +351,32 @@ impl Simulation {
                 self.system.step_size()
             ),
             remedy: "Use a smaller internal step (internal_step_max). Restore a saved state or reset first".to_owned(),
+        })
+    }
+
+    /// Friction takes. Along contact nodes without mass, whose way is not that of sliding alone, it can put energy in where sliding stops or
+    /// turns round: the ledger then closes over nonsense.
+    fn check_friction(&mut self, time: f64) -> Result<()> {
+        let gained = |set: &usize| {
+            let ledger = &self.system.ledgers()[*set];
+            ledger.friction_loss.value() < -ENERGY_SLACK * ledger.scale()
+        };
+        let Some(set) = (0..self.energies.len()).find(gained) else { return Ok(()) };
+        self.phase = Phase::Failed;
+        let ledger = &self.system.ledgers()[set];
+        Err(Error::Unstable {
+            problem: format!(
+                "at t = {} s (last good time {} s) friction{} has put {:.3e} J in, where it can only take, of {:.3e} J exchanged: sliding \
+                 stops or turns round, and this law knows no sticking",
+                shown(time),
+                shown(self.time),
+                self.of_set(set),
+                -ledger.friction_loss.value(),
+                ledger.scale()
+            ),
+            remedy: "Use the solver coulomb (with modal-exact), less friction, or a motion that keeps sliding. Restore a saved state or \
+                     reset first"
+                .to_owned(),
         })
     }
 

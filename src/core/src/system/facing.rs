@@ -277,7 +277,7 @@ impl Facing<'_> {
             for k in (0..=trial.points()).filter(|k| weights[*k] != 0.0) {
                 let displaced = trial.displacement(k, node);
                 there = std::array::from_fn(|c| there[c] + weights[k] * displaced[c]);
-                open += weights[k] * trial.gap(k, node);
+                open += weights[k] * trial.met(k, node);
             }
             let (spin, shaft) = (gap.spin_motion(at, point, motion), gap.shaft_motion(at, point, motion));
             let ground =

@@ -213,3 +213,67 @@ fn what_comes_over_an_edge_behind_the_surface_ends_the_run() {
     let error = (0..200).find_map(|_| simulation.do_step(simulation.time(), H).err()).unwrap().to_string();
     assert!(error.contains("edge"), "{error}");
 }
+
+/// Off the plates along z, while it touches.
+#[test]
+fn what_slides_off_an_edge_goes_on() {
+    let distance = 0.5 * SIDE - 1e-4;
+    let plates = [(Side::Left, distance), (Side::Right, distance)];
+    for friction in [0.0, 0.2] {
+        let scene = scene(faces([0.0, 0.075, 0.0]), &plates, false, [0.0, -40.0, 30.0]);
+        let mut simulation = started(&marched(scene, 1e-3, friction));
+        let mut touched = 0;
+        for step in 0..120 {
+            if let Err(error) = simulation.do_step(simulation.time(), H) {
+                panic!("step {step}: {error}");
+            }
+            touched += u32::from(vector(&simulation, "force") != [0.0; 3]);
+        }
+        let [_, _, z] = vector(&simulation, "block.displacement");
+        assert!(touched > 20 && z > 0.06, "{touched} {z}");
+        assert!(real(&simulation, "energy_residual_relative").abs() < 1e-12);
+    }
+}
+
+/// Thrown straight at a wall with much friction: nothing slides along it, and friction of sliding would put energy in.
+#[test]
+fn friction_that_puts_energy_in_ends_the_run() {
+    let mut found = Vec::new();
+    for velocity in [[-10.0, 0.0, 0.0], [-20.0, 3.0, 1.0]] {
+        let thrown = scene(faces([0.0; 3]), &[(Side::Left, 0.0201)], false, velocity);
+        let mut simulation = started(&marched(thrown, 1e-2, 0.9));
+        let start = real(&simulation, "kinetic_energy");
+        let mut ended = None;
+        for _ in 0..60 {
+            if let Err(error) = simulation.do_step(simulation.time(), H) {
+                ended = Some(error.to_string());
+                break;
+            }
+            let energy = real(&simulation, "kinetic_energy") + real(&simulation, "strain_energy");
+            assert!(energy < 1.02 * start, "{energy} J of {start} J");
+        }
+        found.push(ended);
+    }
+    println!("{found:?}");
+    assert!(
+        found.iter().flatten().all(|error| error.contains("friction") || error.contains("no solution")),
+        "{found:?}"
+    );
+}
+
+/// Too many contact nodes for its modes: those that follow at once leave some directions rigid.
+#[test]
+fn contact_without_flexibility_of_its_own_is_refused() {
+    let mut rom = faces([0.0; 3]);
+    let kept = 8;
+    rom.contact_map = rom.contact_map.rows(0, 3 * kept).into_owned();
+    rom.contact_nodes.truncate(kept);
+    for row in 0..3 {
+        let copy = rom.contact_map.row(row).into_owned();
+        rom.contact_map.set_row(3 + row, &copy);
+    }
+    let scene = marched(scene(rom, &[(Side::Left, 0.0203)], false, [-6.0, 30.0, 4.0]), 1e-3, 0.0);
+    let mut simulation = Simulation::new(&scene).unwrap();
+    let error = simulation.initialise(0.0).unwrap_err().to_string();
+    assert!(error.contains("no flexibility of their own"), "{error}");
+}

@@ -31,6 +31,12 @@ impl Trial {
         if point == 0 { self.begun.gaps[node] } else { self.gaps[self.lanes.at(point, node)] }
     }
 
+    /// The same where forces work on it: none where there is nothing to touch, beyond a free edge.
+    pub fn met(&self, point: usize, node: usize) -> f64 {
+        let gap = self.gap(point, node);
+        if gap == f64::INFINITY { 0.0 } else { gap }
+    }
+
     /// Its unit normal.
     pub fn normal(&self, point: usize, node: usize) -> [f64; 3] {
         if point == 0 { three(&self.begun.normals, node) } else { self.lane(&self.normals, point, node) }
@@ -86,7 +92,7 @@ impl Trial {
 
     /// What contacts that close under a constant force lose: λ times the gap there was (J).
     pub fn closed(&self) -> f64 {
-        let lost = |node: usize| self.multiplier(1, node) * (self.gap(0, node) - self.gap(1, node));
+        let lost = |node: usize| self.multiplier(1, node) * (self.met(0, node) - self.met(1, node));
         (0..self.nodes()).filter(|node| self.multiplier(1, *node) > 0.0).map(lost).sum()
     }
 

@@ -44,8 +44,8 @@ impl Trial {
                 continue;
             }
             pushed = true;
-            // What comes over a free edge is looked at closely.
-            verdict.near |= (1..count).any(|point| pushes(point) && self.gap(point - 1, node) == f64::INFINITY);
+            // What comes or goes over a free edge is looked at closely.
+            verdict.near |= (0..count).any(|point| self.gap(point, node) == f64::INFINITY);
             let mut forces = [[0.0; 3]; POINTS];
             forces[..count].iter_mut().enumerate().for_each(|(point, force)| *force = self.force(point, node));
             for component in 0..3 {
@@ -57,8 +57,8 @@ impl Trial {
             if !all {
                 verdict.switches = true;
                 let terms = (0..count).flat_map(|i| (0..count).map(move |k| (i, k)));
-                verdict.switched +=
-                    terms.map(|(i, k)| self.multiplier(i, node) * basis.work[i][k] * self.gap(k, node)).sum::<f64>();
+                let left = |(i, k): (usize, usize)| self.multiplier(i, node) * basis.work[i][k] * self.met(k, node);
+                verdict.switched += terms.map(left).sum::<f64>();
             }
         }
         if pushed {

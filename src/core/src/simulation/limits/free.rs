@@ -24,6 +24,8 @@ const PLACES: u32 = 48;
 const SPACING: f64 = 0.125;
 /// And at these parts of the step.
 const STEPS: [f64; 3] = [1.0, 0.25, 0.0625];
+/// Flexibility below this share of the largest is none.
+const RIGID: f64 = 1e-9;
 /// Eigenvalues above this (of a matrix with unit diagonal) are not negative.
 const ROUNDING: f64 = -1e-10;
 
@@ -44,7 +46,7 @@ impl Compiled {
         let flight = Flight { compiled: self, system, body, parameters };
         // What a step of galerkin cannot solve it halves.
         let outcome = match parameters.scheme {
-            Scheme::Galerkin => Ok(Vec::new()),
+            Scheme::Galerkin => self.check_following(body, model).map(|()| Vec::new()),
             _ => resolved.and_then(|()| flight.warnings(step)),
         };
         BodyLimits {
@@ -55,6 +57,35 @@ impl Compiled {
             casing: Vec::new(),
             unresolved: if parameters.scheme == Scheme::Galerkin { f64::INFINITY } else { unresolved },
         }
+    }
+}
+
+impl Compiled {
+    /// Contact nodes without mass need flexibility of their own, or what is pressed together has nowhere to go.
+    ///
+    /// # Errors
+    /// Modes that follow contact at once leave some direction of some contact nodes rigid.
+    fn check_following(&self, body: usize, model: &ModalModel) -> Result<()> {
+        let dynamic = model.dynamic_modes(Scheme::Galerkin);
+        let mut shapes = model.contact_modes.columns_range(dynamic..).into_owned();
+        for (mut shape, frequency) in shapes.column_iter_mut().zip(&model.frequencies[dynamic..]) {
+            shape /= *frequency;
+        }
+        let flexibility = (&shapes * shapes.transpose()).symmetric_eigenvalues();
+        let rigid = flexibility.iter().filter(|value| **value <= RIGID * flexibility.max()).count();
+        if rigid == 0 {
+            return Ok(());
+        }
+        Err(Error::invalid(
+            format!("time.scheme of {}", self.structure_name(body)),
+            format!(
+                "with galerkin the {} highest modes follow contact at once, and leave {rigid} of {} directions of the contact nodes no \
+                 flexibility of their own",
+                model.len() - dynamic,
+                flexibility.len()
+            ),
+            "Use fewer contact nodes or patches, a ROM of the kind free-interface, or modal-exact",
+        ))
     }
 }
 
