@@ -22,7 +22,7 @@ use crate::{Result, shown};
 
 /// Shares from which pulling is told, and from which it ends a run that is not the paper's.
 const TOLD: f64 = 0.03;
-const REFUSED: f64 = 0.1;
+const REFUSED: f64 = 0.2;
 /// Internal steps that contact must have lasted for: what a few of them do is soon outweighed.
 const LASTED: u64 = 100;
 

@@ -261,19 +261,14 @@ fn friction_that_puts_energy_in_ends_the_run() {
     );
 }
 
-/// Too many contact nodes for its modes: those that follow at once leave some directions rigid.
+/// The modes that follow contact at once leave some directions rigid. Of a body whose contact nodes are where all springs end they leave
+/// none.
 #[test]
-fn contact_without_flexibility_of_its_own_is_refused() {
-    let mut rom = faces([0.0; 3]);
-    let kept = 8;
-    rom.contact_map = rom.contact_map.rows(0, 3 * kept).into_owned();
-    rom.contact_nodes.truncate(kept);
-    for row in 0..3 {
-        let copy = rom.contact_map.row(row).into_owned();
-        rom.contact_map.set_row(3 + row, &copy);
-    }
-    let scene = marched(scene(rom, &[(Side::Left, 0.0203)], false, [-6.0, 30.0, 4.0]), 1e-3, 0.0);
-    let mut simulation = Simulation::new(&scene).unwrap();
-    let error = simulation.initialise(0.0).unwrap_err().to_string();
-    assert!(error.contains("no flexibility of their own"), "{error}");
+fn contact_without_flexibility_of_its_own_is_told() {
+    let told = |rom: Rom| {
+        let scene = scene(rom, &[(Side::Left, 0.0203)], false, [-6.0, 30.0, 4.0]);
+        let simulation = started(&marched(scene, 1e-3, 0.0));
+        simulation.warnings().iter().filter(|text| text.contains("no flexibility of their own")).count()
+    };
+    assert_eq!([told(faces([0.0; 3])), told(sprung())], [1, 0]);
 }

@@ -46,7 +46,7 @@ impl Compiled {
         let flight = Flight { compiled: self, system, body, parameters };
         // What a step of galerkin cannot solve it halves.
         let outcome = match parameters.scheme {
-            Scheme::Galerkin => self.check_following(body, model).map(|()| Vec::new()),
+            Scheme::Galerkin => Ok(self.rigid_directions(body, model).into_iter().collect()),
             _ => resolved.and_then(|()| flight.warnings(step)),
         };
         BodyLimits {
@@ -61,11 +61,9 @@ impl Compiled {
 }
 
 impl Compiled {
-    /// Contact nodes without mass need flexibility of their own, or what is pressed together has nowhere to go.
-    ///
-    /// # Errors
-    /// Modes that follow contact at once leave some direction of some contact nodes rigid.
-    fn check_following(&self, body: usize, model: &ModalModel) -> Result<()> {
+    /// Contact nodes without mass need flexibility of their own, or what is pressed together has nowhere to go: a warning where modes that
+    /// follow contact at once leave some directions of them rigid.
+    fn rigid_directions(&self, body: usize, model: &ModalModel) -> Option<String> {
         let dynamic = model.dynamic_modes(Scheme::Galerkin);
         let mut shapes = model.contact_modes.columns_range(dynamic..).into_owned();
         for (mut shape, frequency) in shapes.column_iter_mut().zip(&model.frequencies[dynamic..]) {
@@ -73,19 +71,16 @@ impl Compiled {
         }
         let flexibility = (&shapes * shapes.transpose()).symmetric_eigenvalues();
         let rigid = flexibility.iter().filter(|value| **value <= RIGID * flexibility.max()).count();
-        if rigid == 0 {
-            return Ok(());
-        }
-        Err(Error::invalid(
-            format!("time.scheme of {}", self.structure_name(body)),
+        (rigid > 0).then(|| {
             format!(
-                "with galerkin the {} highest modes follow contact at once, and leave {rigid} of {} directions of the contact nodes no \
-                 flexibility of their own",
+                "{}: with galerkin the {} highest modes follow contact at once, and leave {rigid} of {} directions of the contact nodes no \
+                 flexibility of their own: contact that needs one of them loses energy, whatever the tolerance. A ROM of the kind \
+                 free-interface, or fewer contact nodes or patches, have it",
+                self.structure_name(body),
                 model.len() - dynamic,
                 flexibility.len()
-            ),
-            "Use fewer contact nodes or patches, a ROM of the kind free-interface, or modal-exact",
-        ))
+            )
+        })
     }
 }
 
