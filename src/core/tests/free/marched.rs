@@ -225,7 +225,7 @@ fn what_slides_off_an_edge_goes_on() {
             if let Err(error) = simulation.do_step(simulation.time(), H) {
                 panic!("µ {friction}, step {step}: {error}");
             }
-            let touches = vector(&simulation, "force") != [0.0; 3];
+            let touches = vector(&simulation, "force").into_iter().any(|force| force != 0.0);
             let [_, _, z] = vector(&simulation, "block.displacement");
             (touched, both) = (touched + u32::from(touches), both + u32::from(touches && z > 6e-4));
         }
