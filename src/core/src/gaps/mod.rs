@@ -336,6 +336,11 @@ impl GapLaw {
         }
     }
 
+    /// Whether sliding takes any direction of the tangent plane, so that it turns within a step.
+    pub fn slides_anywhere(&self) -> bool {
+        matches!(self, Self::Open(_))
+    }
+
     /// Unit slip direction of the master in the tangent plane, from the predicted relative velocity (m/s); zero
     /// when nothing slides. On surfaces of revolution axial slip is neglected, as in section 4.3 of the paper.
     pub fn slip_direction(&self, velocity: [f64; 3], normal: [f64; 3]) -> [f64; 3] {

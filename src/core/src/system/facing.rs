@@ -111,14 +111,16 @@ impl Obstacle for Facing<'_> {
         if friction == 0.0 {
             return sliding.normal;
         }
-        if matches!(self.pairs[pair].gap(), GapLaw::Open(_)) && self.record.looks <= LOOKS {
-            let ground = self.on_ground((node, point), Place::Now, |casing, spot| casing.way_at(spot, point));
-            let ground = ground.unwrap_or_default();
-            self.record.slips[point][node] = std::array::from_fn(|c| sliding.way[c] - ground[c]);
-        }
         let gap = self.pairs[pair].gap();
-        let slip = if matches!(gap, GapLaw::Open(_)) {
-            self.record.slips[point][node]
+        let slip = if gap.slides_anywhere() {
+            let known = self.record.slips[point][node].filter(|_| self.record.looks > LOOKS);
+            let slip = known.unwrap_or_else(|| {
+                let ground = self.on_ground((node, point), Place::Now, |casing, spot| casing.way_at(spot, point));
+                let ground = ground.unwrap_or_default();
+                std::array::from_fn(|c| sliding.way[c] - ground[c])
+            });
+            self.record.slips[point][node] = Some(slip);
+            slip
         } else {
             let at = self.at(node, &self.record.drives[pair][point].0);
             let rigid = gap.sliding_velocity(node, at.index, at.drive, sliding.moved);
@@ -131,7 +133,7 @@ impl Obstacle for Facing<'_> {
     }
 
     fn turns(&self) -> bool {
-        self.pairs.iter().any(|pair| matches!(pair.gap(), GapLaw::Open(_)) && pair.friction() != 0.0)
+        self.pairs.iter().any(|pair| pair.gap().slides_anywhere() && pair.friction() != 0.0)
     }
 
     fn look(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
@@ -167,6 +169,7 @@ impl Witness for Facing<'_> {
             }
         }
         self.record.looks = 0;
+        self.record.slips.iter_mut().for_each(|slips| slips.fill(None));
         self.record.lanes_of = self.enter_lanes(Lanes { points: count - 1, nodes: self.pair_of.len() });
     }
 

@@ -143,8 +143,8 @@ pub struct Record {
     pub places: [Vec<ClosestPoint>; POINTS],
     /// Where forces have been handed to structures that carry surfaces: places of the pass before that in which gaps hold.
     pub acted: [Vec<ClosestPoint>; POINTS],
-    /// How nodes slide along open surfaces at the points (m), and how often that has been asked in this trial.
-    pub slips: [Vec<[f64; 3]>; POINTS],
+    /// How nodes slide along open surfaces at the points (m), of those that were asked for in this trial; and how often that was.
+    pub slips: [Vec<Option<[f64; 3]>>; POINTS],
     pub looks: usize,
     pub instants: Instants,
     /// All nodes at all points are in `instants`, before the surface of this pair.
@@ -166,7 +166,7 @@ impl Record {
             motions: vec![[Motion::default(); POINTS]; pairs],
             places: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             acted: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
-            slips: std::array::from_fn(|_| vec![[0.0; 3]; nodes]),
+            slips: std::array::from_fn(|_| vec![None; nodes]),
             looks: 0,
             instants: Instants::new(Lanes { points: MOST, nodes }.width()),
             lanes_of: None,

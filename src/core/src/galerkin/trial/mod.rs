@@ -91,6 +91,8 @@ pub struct Trial {
     ways: [[f64; POINTS]; POINTS],
     /// Displacements at each point without the residual flexibility (m), where they are asked for.
     inert: [Vec<f64>; POINTS],
+    /// Forces at one of them, turned round (N).
+    withdrawn: Vec<f64>,
     /// Impulses left out (N·s), and what the error makes of them (m²/(N·s)).
     impulses: Vec<f64>,
     left: Vec<f64>,
@@ -142,6 +144,7 @@ impl Trial {
             reach: (Sums::new(modes, nodes), rows()),
             ways: [[0.0; POINTS]; POINTS],
             inert: std::array::from_fn(|_| rows()),
+            withdrawn: rows(),
             impulses: rows(),
             left: rows(),
         }
@@ -376,11 +379,11 @@ impl Trial {
             for node in 0..self.lanes.nodes {
                 let (force, moved) = (self.force(point, node), self.displacement(point, node));
                 for c in 0..3 {
-                    (self.impulses[3 * node + c], self.inert[point][3 * node + c]) = (-force[c], moved[c]);
+                    (self.withdrawn[3 * node + c], self.inert[point][3 * node + c]) = (-force[c], moved[c]);
                 }
             }
             let y = &mut self.inert[point];
-            self.instructions.run(AddProduct { matrix: residual, x: &self.impulses, y });
+            self.instructions.run(AddProduct { matrix: residual, x: &self.withdrawn, y });
         }
     }
 
