@@ -215,8 +215,34 @@ impl Rom {
     /// # Errors
     /// [`Error::Invalid`] naming the array and the remedy.
     pub fn validate(&self) -> Result<()> {
-        let order = self.mass.nrows();
         let remedy = "Write the ROM again with `tiprub reduce`, or see the ROM file chapter of the user guide";
+        self.validate_shapes(remedy)?;
+        for (name, matrix) in [("mass", &self.mass), ("stiffness", &self.stiffness), ("contact_map", &self.contact_map)]
+        {
+            entries(name, matrix, if name == "contact_map" { ranges::MAP } else { ranges::MATRIX }, remedy)?;
+        }
+        for (index, node) in self.contact_nodes.iter().enumerate() {
+            self.validate_place(&format!("ROM array `contact_positions`, node {}", index + 1), node, remedy)?;
+            let what = format!("ROM array `contact_meridional_slopes`, node {}", index + 1);
+            ranges::at_most(&what, node.meridional_slope, ranges::SLOPE)?;
+            for (name, value, most) in [
+                ("contact_areas", node.area, ranges::POSITION * ranges::POSITION),
+                ("contact_lengths", node.length, ranges::POSITION),
+            ] {
+                ranges::within(&format!("ROM array `{name}`, node {}", index + 1), value, 0.0, most)?;
+            }
+        }
+        self.validate_definiteness(remedy)?;
+        self.validate_spin(remedy)?;
+        self.validate_thermal(remedy)?;
+        self.validate_grid()?;
+        self.validate_rows(remedy)?;
+        self.validate_watched(remedy)?;
+        self.validate_harmonics(remedy)
+    }
+
+    fn validate_shapes(&self, remedy: &str) -> Result<()> {
+        let order = self.mass.nrows();
         if order == 0 || self.mass.ncols() != order {
             return Err(Error::invalid(
                 "ROM array `mass`",
@@ -262,28 +288,7 @@ impl Rom {
                 remedy,
             ));
         }
-        for (name, matrix) in [("mass", &self.mass), ("stiffness", &self.stiffness), ("contact_map", &self.contact_map)]
-        {
-            entries(name, matrix, if name == "contact_map" { ranges::MAP } else { ranges::MATRIX }, remedy)?;
-        }
-        for (index, node) in self.contact_nodes.iter().enumerate() {
-            self.validate_place(&format!("ROM array `contact_positions`, node {}", index + 1), node, remedy)?;
-            let what = format!("ROM array `contact_meridional_slopes`, node {}", index + 1);
-            ranges::at_most(&what, node.meridional_slope, ranges::SLOPE)?;
-            for (name, value, most) in [
-                ("contact_areas", node.area, ranges::POSITION * ranges::POSITION),
-                ("contact_lengths", node.length, ranges::POSITION),
-            ] {
-                ranges::within(&format!("ROM array `{name}`, node {}", index + 1), value, 0.0, most)?;
-            }
-        }
-        self.validate_definiteness(remedy)?;
-        self.validate_spin(remedy)?;
-        self.validate_thermal(remedy)?;
-        self.validate_grid()?;
-        self.validate_rows(remedy)?;
-        self.validate_watched(remedy)?;
-        self.validate_harmonics(remedy)
+        Ok(())
     }
 
     /// Lengths in metres, of a machine.

@@ -126,3 +126,104 @@ fn with_one_coefficient_the_block_swings_about_the_friction_force() {
     assert!((middle / rest - 1.0).abs() < 1e-3);
     assert!((swing / (BELT / OMEGA) - 1.0).abs() < 5e-3);
 }
+
+/// Flexibility of the contact (m/N), the force of friction (N), and how fast the block begins (m/s).
+const FLEXIBILITY: f64 = 4e-6;
+const FORCE: f64 = 2.0;
+const THROWN: f64 = 0.5;
+
+/// The block on a belt that stands still, with a contact without mass that gives way by G: while it sticks its contact node u = q + Gf
+/// stays, where it slides f is that of friction. Where the node is at multiples of `every` (s).
+fn thrown_along(every: f64, count: usize) -> Vec<f64> {
+    let swing = |w: f64, q: f64, v: f64, s: f64| {
+        [q * (w * s).cos() + v / w * (w * s).sin(), v * (w * s).cos() - q * w * (w * s).sin()]
+    };
+    let stiff = (OMEGA * OMEGA + 1.0 / (MASS * FLEXIBILITY)).sqrt();
+    let share = 1.0 / (MASS * FLEXIBILITY * stiff * stiff);
+    let (mut q, mut v, mut u, mut force, mut start) = (0.0, THROWN, 0.0, 0.0, 0.0);
+    let mut sticks = true;
+    let mut positions = Vec::new();
+    while positions.len() < count {
+        let rest = if sticks { share * u } else { force / (MASS * OMEGA * OMEGA) };
+        let at = |s: f64| -> [f64; 2] {
+            let [x, w] = swing(if sticks { stiff } else { OMEGA }, q - rest, v, s);
+            [x + rest, w]
+        };
+        // Sticking ends where the force is that of sliding, and sliding where the block stops.
+        let left = |s: f64| if sticks { FORCE - (u - at(s)[0]).abs() / FLEXIBILITY } else { -force * at(s)[1] };
+        let (grain, end) = (1e-3 / stiff, every * count as f64 - start);
+        let mut high = grain;
+        while left(high) > 0.0 && high < end {
+            high += grain;
+        }
+        let mut low = high - grain;
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            *(if left(middle) > 0.0 { &mut low } else { &mut high }) = middle;
+        }
+        while positions.len() < count && every * (positions.len() + 1) as f64 <= start + high {
+            let s = every * (positions.len() + 1) as f64 - start;
+            positions.push(if sticks { u } else { at(s)[0] + FLEXIBILITY * force });
+        }
+        [q, v] = at(high);
+        (u, start) = (if sticks { u } else { q + FLEXIBILITY * force }, start + high);
+        force = if sticks { FORCE * (u - q).signum() } else { 0.0 };
+        sticks = !sticks;
+    }
+    positions
+}
+
+/// A block whose contact node has no mass, and a node that touches nothing: its gap is what a tolerance is a share of.
+fn by_tolerance(tolerance: f64, longest: f64) -> System {
+    let fast = 1e5;
+    let mut contact_modes = DMatrix::zeros(6, 7);
+    contact_modes[(0, 0)] = 1.0 / MASS.sqrt();
+    for row in 0..6 {
+        contact_modes[(row, row + 1)] = FLEXIBILITY.sqrt() * fast;
+    }
+    let model = ModalModel {
+        frequencies: [vec![OMEGA], vec![fast; 6]].concat(),
+        damping_ratios: vec![0.0; 7],
+        contact_modes,
+        shapes: DMatrix::identity(7, 7),
+        quasi_static: 6,
+    };
+    let law = GapLaw::Fixed(FixedGap {
+        normals: vec![[0.0, 0.0, 1.0]; 2],
+        gaps: vec![-FLEXIBILITY * FORCE / FRICTION, 1e-3],
+        sliding: vec![[0.0; 3]; 2],
+    });
+    let settings = SystemSettings { scheme: Scheme::Galerkin, solver: Solver::Coulomb, ledger: true };
+    let mut system = System::alone(SectorModel::Uncoupled(&model, 1), BankOptions::default(), law, FRICTION, settings);
+    system.prepare_spans(longest, tolerance);
+    system.set_step(longest);
+    system.bank_mut().set_modal_state(0, 0, 0.0, THROWN * MASS.sqrt());
+    system.start(&[Drive::default()]);
+    system
+}
+
+#[test]
+fn by_a_tolerance_a_flexible_contact_sticks_and_slips_as_its_closed_form() {
+    let (longest, count) = (2e-3, 500);
+    let exact = thrown_along(longest, count);
+    for tolerance in [1e-1, 1e-2, 1e-3, 1e-4, 1e-5] {
+        let mut system = by_tolerance(tolerance, longest);
+        let mut worst = 0.0_f64;
+        for exact in &exact {
+            system.step(&[Drive::default()]).unwrap();
+            worst = worst.max((system.bank().row(0, 0) - exact).abs());
+        }
+        let (error, effort) = (worst / 1e-3, *system.effort());
+        system.close_ledger();
+        let (kinetic, strain) = system.energies();
+        let residual = system.ledger().residual(kinetic + strain).abs() / system.ledger().scale();
+        let (steps, trials) = (effort.steps, effort.trials);
+        told!(
+            "tolerance {tolerance:.0e}: error {:.2} of it after {count} longest steps, {steps} steps, {trials} trials",
+            error / tolerance
+        );
+        // The first steps have no force to follow on.
+        assert!(error < 3.0 * tolerance && residual < 1e-12 && effort.missed < 5, "{effort:?}, {residual:e}");
+    }
+    guide::hold("cargo test -p tiprub-core --test belt");
+}

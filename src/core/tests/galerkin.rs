@@ -8,7 +8,7 @@ mod guide;
 
 use counting::allocations_of;
 use guide::told;
-use tiprub_core::settings::{LoadSettings, OutputSettings, Scheme, Shape, SplineSettings, TimeSettings};
+use tiprub_core::settings::{LoadSettings, OutputSettings, Scheme, Shape, Solver, SplineSettings, TimeSettings};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::disk::Disk;
 use tiprub_test_models::{
@@ -672,4 +672,32 @@ fn a_wide_clearance_does_not_loosen_the_tolerance() {
     let (near, far) = (run(1e-3), run(1e-2));
     assert!(near.1 > STEPS.into(), "{} trials", near.1);
     assert_eq!(near, far);
+}
+
+/// The solver that knows sticking, on a rub where all slides: it tends to what massless-boundary tends to with it, and errors are those
+/// asked for.
+#[test]
+fn friction_that_may_stick_goes_by_the_tolerance() {
+    for (name, change) in [("rigid", (|_: &mut Scene| {}) as Change), ("flexible", flexible)] {
+        let of = |scheme: Scheme, step: f64, tolerance: f64| {
+            let mut scene = scene(scheme, step, tolerance);
+            change(&mut scene);
+            scene.settings.contacts[0].solver = Solver::Coulomb;
+            run(&scene, still)
+        };
+        let exact = of(Scheme::Galerkin, 0.25 * H, 1e-6);
+        if name == "rigid" {
+            let far = |step: f64| apart(&of(Scheme::MasslessBoundary, step, 1e-3).displacements, &exact.displacements);
+            let (coarse, fine) = (far(2e-7), far(5e-8));
+            told!("coulomb, massless-boundary, h = 0.05 us: {fine:.1e}");
+            assert!(fine < 1e-5 && coarse > 2.0 * fine, "{coarse:e} {fine:e}");
+        }
+        for tolerance in [1e-2, 1e-3, 1e-4, 1e-5] {
+            let found = of(Scheme::Galerkin, H, tolerance);
+            let error = apart(&found.displacements, &exact.displacements);
+            told!("coulomb, {name}, tolerance {tolerance:.0e}: {error:.1e}, steps per blade {}", found.steps);
+            assert!(error < 1.5 * tolerance && found.residual < 1e-13, "{error:e} {:e}", found.residual);
+        }
+    }
+    guide::hold("cargo test -p tiprub-core --test galerkin");
 }

@@ -76,9 +76,12 @@ fn references() -> References {
 /// Call the function of that name: `function(arguments after the instance);` one by one.
 macro_rules! call {
     ($name:expr, $api:expr, $handle:expr; $($function:ident($($argument:expr),*);)*) => {
+        call! { $name, $api, $handle; $($function($($argument),*);)* else panic!("{} is not called", $name) }
+    };
+    ($name:expr, $api:expr, $handle:expr; $($function:ident($($argument:expr),*);)* else $other:expr) => {
         match $name {
             $(stringify!($function) => ($api.$function)($handle $(, $argument)*),)*
-            other => panic!("{other} is not called"),
+            _ => $other,
         }
     };
 }
@@ -224,6 +227,18 @@ unsafe fn call3(api: &Fmi3Api, h: *mut c_void, saved: (*mut c_void, &[u8]), name
             fmi3GetVariableDependencies(known.output, null_mut(), null_mut(), null_mut(), null_mut(), 0);
             fmi3GetDirectionalDerivative(output, 1, input, 1, &raw const value, 1, &raw mut real, 1);
             fmi3GetAdjointDerivative(output, 1, input, 1, &raw const value, 1, &raw mut real, 1);
+            else refused3(api, h, name, input)
+        }
+    }
+}
+
+/// The same of functions that a unit for co-simulation without events has no use for.
+unsafe fn refused3(api: &Fmi3Api, h: *mut c_void, name: &str, input: *const u32) -> i32 {
+    let (value, mut real, mut size) = (300.0, 0.0, 0);
+    let (mut a, mut b, mut c) = (false, false, false);
+    // SAFETY: all pointers are to single values, or not touched by refusing functions.
+    unsafe {
+        call! { name, api, h;
             fmi3EnterConfigurationMode();
             fmi3ExitConfigurationMode();
             fmi3EnterEventMode();

@@ -143,6 +143,8 @@ pub struct Influence {
 pub struct Level {
     /// h (s).
     pub step: f64,
+    /// The same as a share of the span.
+    pub share: f64,
     /// Points of the step.
     pub basis: Basis,
     /// Of all modes.
@@ -164,6 +166,7 @@ impl Level {
         let nodes = modes.rows() / 3;
         Self {
             step: 0.0,
+            share: 1.0,
             modes: ModeSteps::new(modes.len()),
             compliance: Compliance::new(Lanes { points: degree, nodes }),
             constant: Compliance::new(Lanes { points: 1, nodes }),

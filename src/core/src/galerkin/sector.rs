@@ -39,6 +39,7 @@ impl Tables {
     pub fn set_span(&mut self, span: f64) {
         for (halvings, level) in self.levels.iter_mut().enumerate() {
             level.set_step(&self.modes, halved(span, halvings));
+            level.share = halved(1.0, halvings);
         }
     }
 }
@@ -152,6 +153,13 @@ impl Marcher {
     /// Room for the modes and contact nodes of one sector.
     pub fn new(modes: usize, nodes: usize) -> Self {
         Self { trial: Trial::new(modes, nodes), advance: Advance::new(modes, nodes) }
+    }
+
+    /// The same where contacts may stick.
+    #[must_use]
+    pub fn sticking(mut self) -> Self {
+        self.trial = self.trial.sticking();
+        self
     }
 
     /// Displacements of the rows of a sector (m).

@@ -17,6 +17,8 @@ pub struct SectorState {
     pub gaps: Vec<f64>,
     /// Normals of the nodes.
     pub normals: Vec<f64>,
+    /// Slopes of the forces over the last step (N/s), where contacts may stick; else empty.
+    pub slopes: Vec<f64>,
     /// Whether gaps and normals are those of now: nobody looked at the end of free flight.
     pub looked: bool,
     /// Energy that contacts which opened or closed have left to those to come (J).
@@ -35,10 +37,18 @@ impl SectorState {
             multipliers: vec![0.0; nodes],
             gaps: vec![f64::INFINITY; nodes],
             normals: vec![0.0; 3 * nodes],
+            slopes: Vec::new(),
             looked: true,
             bank: 0.0,
             level: 0,
         }
+    }
+
+    /// The same where contacts may stick.
+    #[must_use]
+    pub fn sticking(mut self) -> Self {
+        self.slopes = vec![0.0; self.forces.len()];
+        self
     }
 
     /// Kinetic and strain energy (J), that of the residual flexibility included.

@@ -191,11 +191,11 @@ static METHODS: &[Rule] = &[
         "it seeks forces for gaps that close, and a coating takes force while they do",
         "Use \"modal-exact\", or remove the coating",
     ),
-    needs(
+    excludes(
         &[GALERKIN],
-        ("`contact.solver = \"lcp\"`", |at| at.solver == Solver::Lcp),
-        "it solves the complementarity of sliding contact at several instants at once",
-        "Use solver = \"lcp\"",
+        ("`contact.solver = \"film\"`", |at| at.solver == Solver::Film),
+        "it solves the complementarity of contact",
+        "Use solver = \"lcp\", or \"coulomb\"",
     ),
     needs(
         &[GALERKIN],

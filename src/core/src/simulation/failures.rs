@@ -36,7 +36,7 @@ impl Simulation {
                 structure,
                 self.compiled.structure_name(structure),
                 if self.is_marched() {
-                    "Use less friction, another longest step, or the solver coulomb with modal-exact"
+                    "Use less friction, another longest step, or the solver coulomb"
                 } else {
                     "Use less friction, another internal step or the solver coulomb"
                 },
@@ -63,17 +63,9 @@ impl Simulation {
                 ),
                 OUT_OF_REACH_REMEDY.to_owned(),
             ),
-            StepFailure::Unexplained { structure, node, sector, jump, explained } => (
-                format!(
-                    "the gap of contact node {} of {} has changed by {jump:.3e} m in two steps, where motion of node and casing \
-                     explains {explained:.3e} m: the work of this contact cannot be told",
-                    self.compiled.node_name(structure, node),
-                    self.sector_name(structure, sector)
-                ),
-                "Use a smaller internal step; if that does not help, the surface is folded or has more than one closest point \
-                 there"
-                    .to_owned(),
-            ),
+            StepFailure::Unexplained { structure, node, sector, jump, explained } => {
+                self.told_jump((structure, node, sector), jump, explained)
+            }
             StepFailure::Unbalanced { set, work, exchanged } => (
                 format!(
                     "contact forces{} have added {work:.3e} J that no input brings, of {exchanged:.3e} J exchanged: normals turn and \
@@ -93,20 +85,45 @@ impl Simulation {
                 ),
                 "Use a smaller internal step or a lower velocity".to_owned(),
             ),
-            StepFailure::BehindEdge { structure, node } => (
-                format!(
-                    "the contact node {} comes over the edge of a surface and is behind it already: what is at an edge is not \
-                     described, and pushing the node out would be an impact of arbitrary strength",
-                    self.compiled.node_name(structure, node)
-                ),
-                "Extend the contact grid to where nodes may come, or move one of the structures; check that S_t x S_s of each \
-                 contact grid points to the master"
-                    .to_owned(),
+            StepFailure::BehindEdge { structure, node } => self.told_edge(structure, node),
+            StepFailure::Unsolved { structure, sector } => self.unsolved(
+                structure,
+                &self.sector_name(structure, sector),
+                "Use less friction or another internal step",
             ),
-            StepFailure::Unsolved { structure, sector } => {
-                self.unsolved(structure, &self.sector_name(structure, sector), "Use less friction or another internal step")
-            }
         }
+    }
+
+    fn told_jump(
+        &self,
+        (structure, node, sector): (usize, usize, usize),
+        jump: f64,
+        explained: f64,
+    ) -> (String, String) {
+        (
+            format!(
+                "the gap of contact node {} of {} has changed by {jump:.3e} m in two steps, where motion of node and casing \
+                 explains {explained:.3e} m: the work of this contact cannot be told",
+                self.compiled.node_name(structure, node),
+                self.sector_name(structure, sector)
+            ),
+            "Use a smaller internal step; if that does not help, the surface is folded or has more than one closest point \
+             there"
+                .to_owned(),
+        )
+    }
+
+    fn told_edge(&self, structure: usize, node: usize) -> (String, String) {
+        (
+            format!(
+                "the contact node {} comes over the edge of a surface and is behind it already: what is at an edge is not \
+                 described, and pushing the node out would be an impact of arbitrary strength",
+                self.compiled.node_name(structure, node)
+            ),
+            "Extend the contact grid to where nodes may come, or move one of the structures; check that S_t x S_s of each \
+             contact grid points to the master"
+                .to_owned(),
+        )
     }
 
     /// No forces fulfil the conditions of contact. Friction can do that; without it only contacts that no motion opens at once.

@@ -374,7 +374,7 @@ impl Simulation {
                 -ledger.friction_loss.value(),
                 ledger.scale()
             ),
-            remedy: "Use the solver coulomb (with modal-exact), less friction, or a motion that keeps sliding. Restore a saved state or \
+            remedy: "Use the solver coulomb, less friction, or a motion that keeps sliding. Restore a saved state or \
                      reset first"
                 .to_owned(),
         })

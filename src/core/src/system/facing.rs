@@ -61,6 +61,13 @@ impl Facing<'_> {
         }
     }
 
+    /// What a lane faces, and the step that is solved.
+    fn under(&mut self, lane: usize) -> Option<(&mut Casing, (usize, Kind), Lanes)> {
+        let Ground { casings, casing_of, level, kind, lanes } = self.ground.as_mut()?;
+        let casing = self.pair_of[lanes.place(lane).1].and_then(|pair| casing_of[pair])?;
+        Some((&mut casings[casing], (*level, *kind), *lanes))
+    }
+
     fn at<'b>(&self, node: usize, drive: &'b Drive) -> At<'b> {
         At { node, index: node * self.lanes + self.sector, drive }
     }
@@ -151,11 +158,35 @@ impl Obstacle for Facing<'_> {
 
     fn give(&mut self, lane: usize, direction: [f64; 3], given: &mut [f64]) {
         given.fill(0.0);
-        let Some(Ground { casings, casing_of, level, kind, lanes }) = &mut self.ground else { return };
-        let casing = self.pair_of[lanes.place(lane).1].and_then(|pair| casing_of[pair]);
-        if let Some(casing) = casing {
-            casings[casing].give((*level, *kind), *lanes, lane, direction, given);
+        if let Some((casing, at, lanes)) = self.under(lane) {
+            casing.give(at, lanes, lane, direction, given);
         }
+    }
+
+    fn give_way(&mut self, lane: usize, force: [f64; 3], given: &mut [f64]) {
+        given.fill(0.0);
+        if let Some((casing, at, lanes)) = self.under(lane) {
+            casing.give_way(at, lanes, lane, force, given);
+        }
+    }
+
+    fn friction(&self, node: usize) -> f64 {
+        self.pair_of[node].map_or(0.0, |pair| self.pairs[pair].friction())
+    }
+
+    fn drift(&self, node: usize, moved: [f64; 3]) -> [f64; 3] {
+        let Some(pair) = self.pair_of[node] else { return [0.0; 3] };
+        let [(_, before), (drive, now), ..] = &self.record.drives[pair];
+        let (gap, motion) = (self.pairs[pair].gap(), now.less(before));
+        let at = self.at(node, drive);
+        let point = gap.contact_point(at, moved, self.record.places[1][node]);
+        let (spin, shaft) = (gap.spin_motion(at, point, &motion), gap.shaft_motion(at, point, &motion));
+        let ground = self.on_ground((node, 1), Place::Now, |casing, spot| {
+            let [now, before] = [1, 0].map(|instant| casing.moved_at(spot, instant));
+            std::array::from_fn(|c| now[c] - before[c])
+        });
+        let ground: [f64; 3] = ground.unwrap_or_default();
+        std::array::from_fn(|c| spin[c] + shaft[c] - ground[c])
     }
 }
 

@@ -20,7 +20,7 @@ use crate::galerkin::state::SectorState;
 use crate::gaps::Drive;
 use crate::gaps::wrench::Wrench;
 use crate::ledger::Ledger;
-use crate::settings::Scheme;
+use crate::settings::{Scheme, Solver};
 use nalgebra::DMatrix;
 use together::Together;
 
@@ -41,14 +41,27 @@ pub struct Galerkin {
 
 impl Galerkin {
     /// Of a structure whose modes are `bank`, for spans up to `longest` (s) and errors of `tolerance` (m), with gaps rounded by `rounding` (m).
-    fn new(bank: &ModalBank, nodes: usize, pairs: usize, longest: f64, [tolerance, rounding]: [f64; 2]) -> Self {
+    fn new(
+        bank: &ModalBank,
+        (nodes, pairs): (usize, usize),
+        (longest, sticks): (f64, bool),
+        [tolerance, rounding]: [f64; 2],
+    ) -> Self {
         let modes = bank.model().dynamic_modes(Scheme::Galerkin);
         let kinds: Vec<Modes> = (0..bank.sets()).map(|set| modes_of(bank, set, modes)).collect();
+        let (marcher, state) = (Marcher::new(modes, nodes), SectorState::new(modes, nodes));
+        let degree = |kind: &Modes| if sticks { 1 } else { kind.degree_up_to(longest) };
         Self {
             flights: kinds.iter().map(Flight::new).collect(),
-            tables: kinds.into_iter().map(|kind| Tables::new(kind, longest)).collect(),
-            marcher: Marcher::new(modes, nodes),
-            state: SectorState::new(modes, nodes),
+            tables: kinds
+                .into_iter()
+                .map(|kind| {
+                    let degree = degree(&kind);
+                    Tables::of_degree(kind, degree)
+                })
+                .collect(),
+            marcher: if sticks { marcher.sticking() } else { marcher },
+            state: if sticks { state.sticking() } else { state },
             record: Record::new(nodes, pairs),
             demand: Demand { tolerance, precision: (PRECISION * tolerance).max(rounding), most: u64::MAX },
         }
@@ -88,6 +101,7 @@ impl System {
         if self.settings.scheme != Scheme::Galerkin {
             return;
         }
+        let sticks = self.settings.solver == Solver::Coulomb;
         for set in 0..self.sets.count() {
             let members = self.sets.members(set).to_vec();
             let own = |pair: &&Pair| members.contains(&pair.structure());
@@ -98,7 +112,7 @@ impl System {
             if members.iter().any(moved_by_all) || self.pairs.iter().filter(own).any(|pair| pair.carrier().is_some()) {
                 let tolerance = clearance(&mut self.pairs.iter().filter(own));
                 let parts = (&self.structures[..], &self.pairs[..]);
-                self.together.push(Together::new(set, &members, parts, longest, tolerance));
+                self.together.push(Together::new(set, &members, parts, (longest, sticks), tolerance));
             } else {
                 for index in members {
                     let own = || self.pairs.iter().filter(|pair| pair.structure() == index);
@@ -106,9 +120,8 @@ impl System {
                     let errors = [clearance(&mut own()), rounding];
                     let (structure, pairs) = (&mut self.structures[index], self.pairs.len());
                     let (nodes, bank) = (structure.nodes(), structure.bank());
-                    let made =
-                        bank.filter(|_| nodes > 0).map(|bank| Galerkin::new(bank, nodes, pairs, longest, errors));
-                    structure.galerkin = made.map(Box::new);
+                    let made = |bank| Galerkin::new(bank, (nodes, pairs), (longest, sticks), errors);
+                    structure.galerkin = bank.filter(|_| nodes > 0).map(made).map(Box::new);
                 }
             }
         }

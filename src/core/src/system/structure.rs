@@ -47,13 +47,15 @@ pub struct Pace {
     pub bank: Vec<f64>,
     /// How often the span is halved.
     pub level: Vec<u64>,
+    /// Slopes of contact forces over the last step (N/s), `[row · lanes + lane]`.
+    pub slopes: Vec<f64>,
 }
 
-persist_fields!(Pace { bank, level });
+persist_fields!(Pace { bank, level, slopes });
 
 impl Pace {
-    fn new(sectors: usize) -> Self {
-        Self { bank: vec![0.0; sectors], level: vec![0; sectors] }
+    fn new(sectors: usize, contacts: usize) -> Self {
+        Self { bank: vec![0.0; sectors], level: vec![0; sectors], slopes: vec![0.0; 3 * contacts] }
     }
 
     /// How often the span of a sector is halved.
@@ -78,7 +80,7 @@ impl Structure {
             pulling: Pulling::new(pair_of.len()),
             lowest: vec![f64::INFINITY; modes.lanes()],
             delayed: Vec::new(),
-            pace: Pace::new(modes.sectors()),
+            pace: Pace::new(modes.sectors(), contacts),
             galerkin: None,
             lowest_in_span: Vec::new(),
             pair_of,
@@ -189,11 +191,17 @@ impl Structure {
             state.normals[3 * node..3 * node + 3].copy_from_slice(&self.history.geometry.before.normal_at(index));
             state.forces[3 * node..3 * node + 3].copy_from_slice(&self.three(&self.history.force.now, node, sector));
         }
+        for (row, slope) in state.slopes.iter_mut().enumerate() {
+            *slope = self.pace.slopes[row * self.lanes + sector];
+        }
         state.looked = true;
     }
 
     /// Contacts of a sector as they are after it, and the smallest gap of each node on the way (m).
     pub(super) fn write_contacts(&mut self, sector: usize, state: &SectorState, lowest: impl Fn(usize) -> f64) {
+        for (row, slope) in state.slopes.iter().enumerate() {
+            self.pace.slopes[row * self.lanes + sector] = *slope;
+        }
         for node in 0..self.nodes() {
             let index = self.index(node, sector);
             self.history.multiplier[index] = state.multipliers[node];
@@ -221,6 +229,7 @@ impl Structure {
         self.pulling.clear();
         self.pace.bank.fill(0.0);
         self.pace.level.fill(0);
+        self.pace.slopes.fill(0.0);
     }
 
     /// There was no step before: gaps and predictions are those of the start.

@@ -164,17 +164,7 @@ fn assembled(
     for (diameter, one) in nodal_diameters.iter_mut().zip(found) {
         diameter.shapes = one.shapes;
     }
-    let counts = match (choice.counts.iter().min(), choice.counts.iter().max()) {
-        (Some(least), Some(most)) if least < most => format!("{least} to {most}"),
-        (Some(least), _) => least.to_string(),
-        _ => "no".to_owned(),
-    };
-    let kept = match options.kind {
-        ReductionKind::FixedInterface => {
-            format!("cyclic Craig-Bampton with {} and {counts} fixed-interface modes", interface(contact))
-        }
-        ReductionKind::FreeInterface => format!("{} and {counts} free-interface modes", responses(contact)),
-    };
+    let kept = told_kept(options.kind, &choice.counts, contact);
     let origin = format!(
         "{}; one of {} sectors: {} nodes, {clamped} clamped, {} on each face; {kept} per nodal diameter",
         model.origin,
@@ -212,6 +202,21 @@ fn assembled(
         largest_angular_frequency: largest.max(0.0).sqrt(),
         notes: choice.note.into_iter().collect(),
     })
+}
+
+/// What a basis consists of, in words.
+fn told_kept(kind: ReductionKind, counts: &[usize], contact: &[ContactPoint]) -> String {
+    let counts = match (counts.iter().min(), counts.iter().max()) {
+        (Some(least), Some(most)) if least < most => format!("{least} to {most}"),
+        (Some(least), _) => least.to_string(),
+        _ => "no".to_owned(),
+    };
+    match kind {
+        ReductionKind::FixedInterface => {
+            format!("cyclic Craig-Bampton with {} and {counts} fixed-interface modes", interface(contact))
+        }
+        ReductionKind::FreeInterface => format!("{} and {counts} free-interface modes", responses(contact)),
+    }
 }
 
 fn contact_node(model: &FeModel, point: &ContactPoint) -> ContactNode {

@@ -316,20 +316,14 @@ fn tables(
             std::iter::once(format!("{:e} m", one.tolerance)).chain(of).chain(shares).collect()
         })
         .collect();
-    let problems: Vec<Vec<String>> = problems
-        .iter()
-        .map(|one| {
-            let counts = [one.trials, one.unsolved, one.given_up].map(|count| count.to_string());
-            [one.degree.to_string(), one.friction.to_string()].into_iter().chain(counts).collect()
-        })
-        .collect();
-    let solutions: Vec<Vec<String>> = solutions
-        .iter()
-        .map(|one| {
-            let counts = [one.problems, one.none, one.several].map(|count| count.to_string());
-            [one.degree.to_string(), one.friction.to_string()].into_iter().chain(counts).collect()
-        })
-        .collect();
+    let row = |degree: usize, friction: f64, counts: [usize; 3]| -> Vec<String> {
+        let counts = counts.map(|count| count.to_string());
+        [degree.to_string(), friction.to_string()].into_iter().chain(counts).collect()
+    };
+    let problems: Vec<Vec<String>> =
+        problems.iter().map(|one| row(one.degree, one.friction, [one.trials, one.unsolved, one.given_up])).collect();
+    let solutions: Vec<Vec<String>> =
+        solutions.iter().map(|one| row(one.degree, one.friction, [one.problems, one.none, one.several])).collect();
     let hour = vec![
         format!("{}, {}", hour.steps, hour.rubbing),
         format!("{:.2} s, {:.2} s", hour.seconds[0], hour.seconds[1]),

@@ -103,6 +103,9 @@ impl Trial {
             let (force, normal) = (self.force(points, node), self.normal(points, node));
             state.forces[3 * node..3 * node + 3].copy_from_slice(&force);
             state.normals[3 * node..3 * node + 3].copy_from_slice(&normal);
+            for (component, slope) in state.slopes.iter_mut().skip(3 * node).take(3).enumerate() {
+                *slope = (force[component] - self.begun.forces[3 * node + component]) * self.per_step;
+            }
             state.multipliers[node] = self.multiplier(points, node);
             state.gaps[node] = self.gap(points, node);
         }

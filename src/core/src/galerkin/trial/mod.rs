@@ -3,6 +3,7 @@
 mod found;
 mod judgement;
 mod obstacle;
+mod sticking;
 mod together;
 
 use super::basis::{Basis, MOST, POINTS};
@@ -16,6 +17,7 @@ use crate::laws::active_set::ContactSolver;
 pub use judgement::Verdict;
 use nalgebra::DMatrix;
 pub use obstacle::{Obstacle, Sliding, one_by_one};
+use sticking::Sticking;
 
 /// Most evaluations of the gaps of one trial.
 const PASSES: usize = 6;
@@ -96,6 +98,9 @@ pub struct Trial {
     /// Impulses left out (N·s), and what the error makes of them (m²/(N·s)).
     impulses: Vec<f64>,
     left: Vec<f64>,
+    /// Where contacts may stick; and 1/h of the step (1/s), 0 where its force does not follow on that before.
+    sticking: Option<Box<Sticking>>,
+    per_step: f64,
 }
 
 /// Forces, λ, gaps and normals of the nodes at the start.
@@ -105,6 +110,8 @@ struct Contacts {
     multipliers: Vec<f64>,
     gaps: Vec<f64>,
     normals: Vec<f64>,
+    /// Of forces over the last step (N/s), where contacts may stick.
+    slopes: Vec<f64>,
 }
 
 impl Trial {
@@ -119,7 +126,13 @@ impl Trial {
             velocities: rows(),
             known: false,
             now: Sums::new(modes, nodes),
-            begun: Contacts { forces: rows(), multipliers: vec![0.0; nodes], gaps: vec![0.0; nodes], normals: rows() },
+            begun: Contacts {
+                forces: rows(),
+                multipliers: vec![0.0; nodes],
+                gaps: vec![0.0; nodes],
+                normals: rows(),
+                slopes: Vec::new(),
+            },
             free: three(),
             pushed: three(),
             moved: three(),
@@ -147,7 +160,17 @@ impl Trial {
             withdrawn: rows(),
             impulses: rows(),
             left: rows(),
+            sticking: None,
+            per_step: 0.0,
         }
+    }
+
+    /// The same of contacts that may stick. Polynomials are of degree 1.
+    #[must_use]
+    pub fn sticking(mut self) -> Self {
+        self.sticking = Some(Box::new(Sticking::new(self.lanes.nodes)));
+        self.begun.slopes = vec![0.0; 3 * self.lanes.nodes];
+        self
     }
 
     /// The state is another one than that of the last trial.
@@ -190,7 +213,7 @@ impl Trial {
             }
         }
         if kind == Kind::Polynomial {
-            self.judge(level, rows, &mut verdict);
+            self.judge((level, rows), obstacle, &mut verdict);
         }
         verdict
     }
@@ -234,6 +257,8 @@ impl Trial {
         begun.multipliers.copy_from_slice(&state.multipliers);
         begun.gaps.copy_from_slice(&state.gaps);
         begun.normals.copy_from_slice(&state.normals);
+        begun.slopes.iter_mut().zip(&state.slopes).for_each(|(slope, before)| *slope = *before);
+        self.per_step = if kind == Kind::Polynomial { 1.0 / level.step } else { 0.0 };
         let (nodes, stride) = (lanes.nodes, 3 * lanes.width());
         if let Some(rows) = rows {
             self.move_freely((level, kind), rows, state);
@@ -317,6 +342,9 @@ impl Trial {
         obstacle: &mut impl Obstacle,
         verdict: &mut Verdict,
     ) -> bool {
+        if self.sticking.is_some() {
+            return self.solve_sticking(compliance, obstacle, verdict);
+        }
         if obstacle.turns() {
             self.find_inert(residual);
         }

@@ -29,6 +29,20 @@ pub trait Obstacle {
     /// By how much what is touched gives way at all lanes (m, along their normals, away from the node) per λ of one with the force
     /// `direction` per λ; only after [`Obstacle::look`] has said that it does.
     fn give(&mut self, _lane: usize, _direction: [f64; 3], _given: &mut [f64]) {}
+
+    /// The same in all three directions of each lane, under a `force` on one (N).
+    fn give_way(&mut self, _lane: usize, _force: [f64; 3], _given: &mut [f64]) {}
+
+    /// Coefficient µ of a node that may stick.
+    fn friction(&self, _node: usize) -> f64 {
+        0.0
+    }
+
+    /// What prescribed motion, and that of what it touches, add to its own over the step where it slides (m); it is displaced by `moved` at the
+    /// end (m).
+    fn drift(&self, _node: usize, _moved: [f64; 3]) -> [f64; 3] {
+        [0.0; 3]
+    }
 }
 
 /// How a node slides at a point of the step.

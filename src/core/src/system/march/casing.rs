@@ -212,25 +212,41 @@ impl Casing {
         direction: [f64; 3],
         given: &mut [f64],
     ) {
-        if !self.facing[lane] {
-            return;
-        }
         let padded = self.force.len();
-        let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * padded..][..padded]);
-        let (k, _) = lanes.place(lane);
-        let [a, b, c] = self.frames[lane].fixed(direction);
-        let (influence, coordinates) = (self.whole.influence(level), self.whole.coordinates());
         for i in 1..=lanes.points {
-            for (mode, by) in influence.iter().enumerate() {
-                let inert =
-                    coordinates.inertia[mode] * if kind == Kind::Constant { by.constant } else { by.points[i - 1][k] };
-                let soft = if i == k { coordinates.softness[mode] } else { 0.0 };
-                self.force[mode] = (inert + soft) * (a * x[mode] + b * y[mode] + c * z[mode]);
-            }
+            self.move_modes((level, kind), lanes, (i, lane), direction);
             for node in (0..lanes.nodes).filter(|node| self.facing[lanes.at(i, *node)]) {
                 let other = lanes.at(i, node);
                 given[other] += dot_of(&self.along[other * padded..][..padded], &self.force);
             }
+        }
+    }
+
+    /// The same in the directions of each lane, under a `force` on one at the end of the step (N), where that is all there is.
+    pub fn give_way(&mut self, at: (usize, Kind), lanes: Lanes, lane: usize, force: [f64; 3], given: &mut [f64]) {
+        let padded = self.force.len();
+        self.move_modes(at, lanes, (1, lane), force);
+        for other in (0..lanes.nodes).filter(|node| self.facing[*node]) {
+            let fixed = self.seen.each_ref().map(|seen| dot_of(&seen[other * padded..][..padded], &self.force));
+            lanes.set(given, other, self.frames[other].local(fixed));
+        }
+    }
+
+    /// How modes move at point i under a force on a lane, in its directions.
+    fn move_modes(&mut self, (level, kind): (usize, Kind), lanes: Lanes, (i, lane): (usize, usize), force: [f64; 3]) {
+        if !self.facing[lane] {
+            return self.force.fill(0.0);
+        }
+        let padded = self.force.len();
+        let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * padded..][..padded]);
+        let (k, _) = lanes.place(lane);
+        let [a, b, c] = self.frames[lane].fixed(force);
+        let (influence, coordinates) = (self.whole.influence(level), self.whole.coordinates());
+        for (mode, by) in influence.iter().enumerate() {
+            let inert =
+                coordinates.inertia[mode] * if kind == Kind::Constant { by.constant } else { by.points[i - 1][k] };
+            let soft = if i == k { coordinates.softness[mode] } else { 0.0 };
+            self.force[mode] = (inert + soft) * (a * x[mode] + b * y[mode] + c * z[mode]);
         }
     }
 }

@@ -82,14 +82,14 @@ impl Together {
         set: usize,
         members: &[usize],
         (structures, pairs): (&[Structure], &[Pair]),
-        longest: f64,
+        (longest, sticks): (f64, bool),
         tolerance: f64,
     ) -> Self {
         let touching: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() > 0).collect();
         let carrying: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() == 0).collect();
         let kinds: Vec<Vec<Modes>> = touching.iter().map(|one| kinds_of(structures[*one].modes())).collect();
         let banks: Vec<&ModalBank> = carrying.iter().filter_map(|one| structures[*one].bank()).collect();
-        let degree = |modes: &Modes| modes.degree_up_to(longest);
+        let degree = |modes: &Modes| if sticks { 1 } else { modes.degree_up_to(longest) };
         let carried = banks.iter().map(|bank| degree(&coordinates(bank).seen_at(&bank.model().contact_modes)));
         let degree = kinds.iter().flatten().map(degree).chain(carried).min().unwrap_or(MOST);
         let own = pairs.iter().filter(|pair| touching.contains(&pair.structure()));
@@ -108,13 +108,14 @@ impl Together {
             for sector in 0..of.modes().sectors() {
                 let kind = of.bank().map_or(0, |bank| bank.set_number(sector));
                 let modes = if disk.is_some() { 0 } else { kinds[number][kind].len() };
+                let (trial, state) = (Trial::new(modes, of.nodes()), SectorState::new(modes, of.nodes()));
                 sectors.push(One {
                     structure: *structure,
                     sector,
                     table: [number, kind],
                     disk,
-                    trial: Trial::new(modes, of.nodes()),
-                    state: SectorState::new(modes, of.nodes()),
+                    trial: if sticks { trial.sticking() } else { trial },
+                    state: if sticks { state.sticking() } else { state },
                     advance: Advance::new(modes, of.nodes()),
                     record: Record::new(of.nodes(), pairs.len()),
                     far: false,
@@ -440,7 +441,7 @@ impl Marching<'_> {
         self.together.disks.iter_mut().for_each(|disk| disk.error = 0.0);
         self.each((step, Kind::Polynomial), |facing, (trial, _), tables, disk| {
             let mut own = Verdict::default();
-            trial.judge(&tables.levels[step.level], &tables.rows, &mut own);
+            trial.judge((&tables.levels[step.level], &tables.rows), facing, &mut own);
             match disk {
                 // What one sector leaves all of them swing by.
                 Some(disk) => disk.error = disk.error.hypot(own.error),
@@ -448,6 +449,7 @@ impl Marching<'_> {
             }
             verdict.switches |= own.switches;
             verdict.switched += own.switched;
+            verdict.gained += own.gained;
             verdict.near |= own.near;
             for node in 0..trial.nodes() {
                 let impulse = trial.impulse(node);
@@ -570,7 +572,7 @@ impl Marched for Marching<'_> {
         verdict
     }
 
-    fn take(&mut self, step: Step, kind: Kind, _: &Verdict) -> f64 {
+    fn take(&mut self, step: Step, kind: Kind, verdict: &Verdict) -> f64 {
         let level = &self.together.tables[0][0].levels[step.level];
         let points = if kind == Kind::Constant { 1 } else { level.basis.degree };
         self.together.casings.iter_mut().for_each(|casing| casing.weigh(points));
@@ -600,7 +602,7 @@ impl Marched for Marching<'_> {
         self.go_on(step, kind);
         // What gaps within the precision of contacts that stay closed give is paid as well.
         let after: f64 = self.together.sectors.iter().map(|one| one.record.work.closing).sum();
-        if kind == Kind::Constant { dropped + closed } else { after - before }
+        if kind == Kind::Constant { dropped + closed } else { after - before - verdict.gained }
     }
 }
 

@@ -1,0 +1,248 @@
+//! Contacts that may stick: forces at the end of a step anywhere within the cone of friction.
+//!
+//! Polynomials are of degree 1 then, so that the slip of a node is what it moves along the surface over the step. With b the gap and the
+//! slip without its force and W the flexibility along normal and tangents, they are the problem of [`crate::laws::de_saxce`].
+
+use super::{Trial, Verdict, three};
+use crate::galerkin::compliance::{Compliance, Lanes};
+use crate::galerkin::kernels::{AddProduct, Combine};
+use crate::galerkin::trial::Obstacle;
+use crate::gaps::dot;
+use crate::laws::de_saxce::CoulombSolver;
+use crate::laws::tangents;
+use nalgebra::DMatrix;
+
+/// Slip is known to this share of what forces move.
+const ROUNDING: f64 = 1e-11;
+
+/// Unknowns and scratch.
+#[derive(Debug, Clone)]
+pub(super) struct Sticking {
+    solver: CoulombSolver,
+    /// Normal and tangents of each node.
+    axes: Vec<[[f64; 3]; 3]>,
+    /// Motion of all nodes against what they touch per force along each axis of each: columns of three rows of lanes.
+    columns: Vec<f64>,
+    /// The same of what they touch, and under the forces of now.
+    given: Vec<f64>,
+    under: Vec<f64>,
+}
+
+impl Sticking {
+    /// Room for so many nodes.
+    pub(super) fn new(nodes: usize) -> Self {
+        let stride = 3 * Lanes { points: 1, nodes }.width();
+        Self {
+            solver: CoulombSolver::new(nodes),
+            axes: vec![[[0.0; 3]; 3]; nodes],
+            columns: vec![0.0; 3 * nodes * stride],
+            given: vec![0.0; stride],
+            under: vec![0.0; stride],
+        }
+    }
+}
+
+impl Trial {
+    /// Forces that keep the law at the end of the step: of nodes that penetrate or push first, then of those that these make penetrate.
+    pub(super) fn solve_sticking(
+        &mut self,
+        compliance: &Compliance,
+        obstacle: &mut impl Obstacle,
+        verdict: &mut Verdict,
+    ) -> bool {
+        let Some(mut own) = self.sticking.take() else { return false };
+        let solved = self.seek(&mut own, compliance, obstacle, verdict);
+        self.sticking = Some(own);
+        if !solved {
+            return false;
+        }
+        self.taken.clear();
+        self.amounts.clear();
+        for node in 0..self.lanes.nodes {
+            let force = self.lanes.three(&self.forces, node);
+            for (component, force) in force.into_iter().enumerate().filter(|(_, force)| *force != 0.0) {
+                self.taken.push(3 * (self.lanes.nodes + node) + component);
+                self.amounts.push(force);
+            }
+        }
+        self.combine(compliance.columns(), compliance.stride());
+        true
+    }
+
+    fn seek(
+        &mut self,
+        own: &mut Sticking,
+        compliance: &Compliance,
+        obstacle: &mut impl Obstacle,
+        verdict: &mut Verdict,
+    ) -> bool {
+        let lanes = self.lanes;
+        self.members.clear();
+        for lane in 0..lanes.len() {
+            let pushed = dot(lanes.three(&self.normals, lane), lanes.three(&self.pushed, lane));
+            self.without[lane] = self.gaps[lane] - pushed;
+            self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
+        }
+        self.gives = obstacle.look(lanes, &self.chosen, &self.normals[..3 * lanes.width()]);
+        self.find_under(own, obstacle);
+        for lane in 0..lanes.len() {
+            if self.chosen[lane] {
+                self.choose_axes(own, lane, compliance, obstacle);
+            }
+        }
+        loop {
+            self.pose_sticking(own, obstacle);
+            let outcome = own.solver.solve(self.members.len());
+            verdict.factorisations += outcome.factorisations;
+            if !outcome.solved {
+                return false;
+            }
+            let found = self.choose_pressed(own, compliance, obstacle);
+            if !found {
+                break;
+            }
+        }
+        self.multipliers[..lanes.width()].fill(0.0);
+        self.forces[..3 * lanes.width()].fill(0.0);
+        for (member, lane) in self.members.iter().enumerate() {
+            let along = &own.solver.reactions[3 * member..][..3];
+            self.multipliers[*lane] = along[0];
+            let axes = &own.axes[*lane];
+            let force = std::array::from_fn(|c| (0..3).map(|axis| along[axis] * axes[axis][c]).sum());
+            lanes.set(&mut self.forces, *lane, if along[0] > 0.0 { force } else { [0.0; 3] });
+        }
+        true
+    }
+
+    /// How what is touched gives way under the forces of now.
+    fn find_under(&mut self, own: &mut Sticking, obstacle: &mut impl Obstacle) {
+        own.under.fill(0.0);
+        if !self.gives {
+            return;
+        }
+        for lane in (0..self.lanes.len()).filter(|lane| self.multipliers[*lane] > 0.0) {
+            obstacle.give_way(lane, self.lanes.three(&self.forces, lane), &mut own.given);
+            own.under.iter_mut().zip(&own.given).for_each(|(sum, given)| *sum += given);
+        }
+    }
+
+    /// A node becomes three unknowns.
+    fn choose_axes(&mut self, own: &mut Sticking, lane: usize, compliance: &Compliance, obstacle: &mut impl Obstacle) {
+        let (lanes, stride) = (self.lanes, compliance.stride());
+        let normal = lanes.three(&self.normals, lane);
+        let [first, second] = tangents(normal);
+        own.axes[lane] = [normal, first, second];
+        self.members.push(lane);
+        let columns = [0, 1, 2].map(|component| 3 * (lanes.nodes + lane) + component);
+        for axis in 0..3 {
+            let direction = own.axes[lane][axis];
+            let target = &mut own.columns[(3 * lane + axis) * stride..][..stride];
+            let (table, columns) = (compliance.columns(), &columns[..]);
+            let sums = [&mut *target];
+            self.instructions.run(Combine { table, stride, columns, coefficients: [&direction[..]], sums });
+            if self.gives {
+                obstacle.give_way(lane, direction, &mut own.given[..stride]);
+                target.iter_mut().zip(&own.given).for_each(|(moved, given)| *moved += given);
+            }
+        }
+    }
+
+    /// The problem of the members.
+    fn pose_sticking(&mut self, own: &mut Sticking, obstacle: &impl Obstacle) {
+        let (lanes, stride) = (self.lanes, 3 * self.lanes.width());
+        for (place, lane) in self.members.iter().enumerate() {
+            let slip = self.slip(*lane, obstacle);
+            let (pushed, under) = (lanes.three(&self.pushed, *lane), lanes.three(&own.under, *lane));
+            let without: [f64; 3] = std::array::from_fn(|c| slip[c] - pushed[c] - under[c]);
+            let [normal, first, second] = own.axes[*lane];
+            let free = [self.without[*lane] - dot(normal, under), dot(first, without), dot(second, without)];
+            own.solver.free[3 * place..][..3].copy_from_slice(&free);
+            own.solver.friction[place] = obstacle.friction(*lane);
+            let pushes = self.multipliers[*lane] > 0.0;
+            let force = if pushes { lanes.three(&self.forces, *lane) } else { [0.0; 3] };
+            for axis in 0..3 {
+                own.solver.reactions[3 * place + axis] = dot(own.axes[*lane][axis], force);
+                let column = &own.columns[(3 * lane + axis) * stride..][..stride];
+                for (row, other) in self.members.iter().enumerate() {
+                    let moved = lanes.three(column, *other);
+                    for (along, direction) in own.axes[*other].iter().enumerate() {
+                        own.solver.delassus[(3 * row + along, 3 * place + axis)] = dot(*direction, moved);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Choose nodes that the forces found push into what they may touch.
+    fn choose_pressed(&mut self, own: &mut Sticking, compliance: &Compliance, obstacle: &mut impl Obstacle) -> bool {
+        let (lanes, stride) = (self.lanes, 3 * self.lanes.width());
+        let scale = self.members.iter().fold(0.0_f64, |most, lane| most.max(self.gaps[*lane].abs()));
+        let members = self.members.len();
+        let mut found = false;
+        for lane in 0..lanes.len() {
+            if self.chosen[lane] || !self.gaps[lane].is_finite() {
+                continue;
+            }
+            let normal = lanes.three(&self.normals, lane);
+            let mut after = self.without[lane] - dot(normal, lanes.three(&own.under, lane));
+            for (place, member) in self.members[..members].iter().enumerate() {
+                for axis in 0..3 {
+                    let column = &own.columns[(3 * member + axis) * stride..][..stride];
+                    after += own.solver.reactions[3 * place + axis] * dot(normal, lanes.three(column, lane));
+                }
+            }
+            if after < -super::ROUNDING * scale {
+                self.chosen[lane] = true;
+                self.choose_axes(own, lane, compliance, obstacle);
+                found = true;
+            }
+        }
+        found
+    }
+
+    /// What a node moves over the step against what it touches (m).
+    fn slip(&self, node: usize, obstacle: &impl Obstacle) -> [f64; 3] {
+        let (now, before) = (self.displacement(1, node), three(&self.start, node));
+        let under = obstacle.drift(node, now);
+        std::array::from_fn(|c| now[c] - before[c] + under[c])
+    }
+
+    /// Energy that friction puts in over a step that is solved (J): the force at its start is not that of the slip to come.
+    pub fn find_gain(&self, obstacle: &impl Obstacle) -> f64 {
+        let (mut gain, mut moved) = (0.0, 0.0);
+        for node in (0..self.lanes.nodes).filter(|node| (0..2).any(|point| self.multiplier(point, *node) > 0.0)) {
+            let slip = self.slip(node, obstacle);
+            let pushed = self.lanes.three(&self.pushed, node);
+            for point in 0..2 {
+                let (force, normal) = (self.force(point, node), self.normal(point, node));
+                let multiplier = self.multiplier(point, node);
+                let tangential: [f64; 3] = std::array::from_fn(|c| force[c] - multiplier * normal[c]);
+                gain += 0.5 * dot(tangential, slip);
+                moved += dot(tangential, tangential).sqrt() * dot(pushed, pushed).sqrt();
+            }
+        }
+        if gain > ROUNDING * moved { gain } else { 0.0 }
+    }
+
+    /// How far nodes may have gone on and come back within a step (m): where sliding turns round they stick before. Four times that, as
+    /// where they stick lasts.
+    pub fn find_turn(&mut self, residual: &DMatrix<f64>, step: f64, obstacle: &impl Obstacle) -> f64 {
+        self.withdrawn.copy_from_slice(&self.velocities);
+        let (matrix, x, y) = (residual, &self.begun.slopes, &mut self.withdrawn);
+        self.instructions.run(AddProduct { matrix, x, y });
+        let touches = |node: &usize| (0..2).all(|point| self.multiplier(point, *node) > 0.0);
+        let turn = |node: usize| {
+            let (normal, slip) = (self.normal(1, node), self.slip(node, obstacle));
+            let under = obstacle.drift(node, self.displacement(1, node));
+            let first = three(&self.withdrawn, node);
+            let along: [f64; 3] = std::array::from_fn(|c| first[c] + under[c] / step);
+            let across = dot(along, normal);
+            let along: [f64; 3] = std::array::from_fn(|c| along[c] - across * normal[c]);
+            let speed = dot(along, along).sqrt();
+            // Speed at the end where it changes steadily.
+            let last = 2.0 * dot(slip, along) / (step * speed) - speed;
+            if last < 0.0 { 2.0 * step * last * last / (speed - last) } else { 0.0 }
+        };
+        (0..self.lanes.nodes).filter(touches).map(turn).fold(0.0, f64::max)
+    }
+}
