@@ -699,5 +699,5 @@ fn friction_that_may_stick_goes_by_the_tolerance() {
             assert!(error < 1.5 * tolerance && found.residual < 1e-13, "{error:e} {:e}", found.residual);
         }
     }
-    guide::hold("cargo test -p tiprub-core --test galerkin");
+    guide::hold("cargo test -p tiprub-core --test galerkin stick");
 }

@@ -254,6 +254,59 @@ fn friction_that_puts_energy_in_ends_the_run() {
     }
 }
 
+/// The same throws with a law that knows sticking: friction takes, and what remains goes down with the tolerance.
+#[test]
+fn with_sticking_friction_takes_energy_alone() {
+    for rigid in [true, false] {
+        let of = |tolerance: f64| {
+            let mut thrown = scene(faces([0.0; 3]), &[(Side::Left, 0.0201)], false, [-20.0, 3.0, 1.0]);
+            thrown.settings.surfaces[0].rigid = rigid;
+            let mut scene = marched(thrown, tolerance, 0.2);
+            scene.settings.contacts[0].solver = Solver::Coulomb;
+            scene
+        };
+        for tolerance in [1e-1, 1e-3] {
+            let mut simulation = started(&of(tolerance));
+            let start = real(&simulation, "kinetic_energy");
+            for step in 0..60 {
+                if let Err(error) = simulation.do_step(simulation.time(), H) {
+                    panic!("{rigid} {tolerance}, step {step}: {error}");
+                }
+                let energy = real(&simulation, "kinetic_energy") + real(&simulation, "strain_energy");
+                assert!(energy < (1.0 + 1e-9) * start, "{energy} J of {start} J");
+                assert!(real(&simulation, "energy_residual_relative").abs() < 1e-12);
+            }
+            let heat = simulation.system().ledger().friction_loss.value();
+            assert!(heat > 1e-3 * start, "{heat} J");
+        }
+        let exact = flown(&of(1e-5), 60);
+        let mean_square = exact.iter().map(|value| value * value).sum::<f64>() / exact.len() as f64;
+        let errors = [1e-1, 1e-2, 1e-3].map(|tolerance| {
+            apart(&flown(&of(tolerance), 60), &exact) * mean_square.sqrt() / (tolerance * 1e-3 * SIDE)
+        });
+        told!("sticking, rigid {rigid}: error over tolerance {errors:.1?}");
+        assert!(errors.iter().all(|error| *error < 6.0), "{errors:?}");
+    }
+}
+
+/// Slower along the wall than friction stops: by other equations, with the mass of its contact nodes, it sticks as well.
+#[test]
+fn what_sticks_flies_off_as_with_light_contact_nodes() {
+    let mut thrown = scene(sprung(), &[(Side::Left, DISTANCE)], false, [-VELOCITY, 0.05, 0.0]);
+    thrown.settings.structures[1].damping_ratio = Some(0.0);
+    let by_steps = |h: f64| {
+        let mut scene = with(thrown.clone(), 0.2, Solver::Coulomb, Scheme::ModalExact);
+        scene.settings.time.step = h;
+        flown(&scene, 40)
+    };
+    let mut scene = marched(thrown.clone(), 1e-4, 0.2);
+    scene.settings.contacts[0].solver = Solver::Coulomb;
+    let stuck = flown(&scene, 40);
+    let errors = [4e-8, 1e-8].map(|h| apart(&by_steps(h), &stuck));
+    println!("modal-exact from galerkin {errors:?}");
+    assert!(errors[1] < 0.6 * errors[0] && errors[1] < 1e-3, "{errors:?}");
+}
+
 /// The modes that follow contact at once leave some directions rigid. Of a body whose contact nodes are where all springs end they leave
 /// none.
 #[test]

@@ -150,7 +150,7 @@ const OF_ROTORS: &[(&str, Change)] = &[
         galerkin(&mut scene.settings);
         scene.settings.contacts[0].coating = coating();
     }),
-    ("time.scheme: `galerkin` needs `contact.solver", |scene| {
+    ("time.scheme: `galerkin` excludes `contact.solver", |scene| {
         galerkin(&mut scene.settings);
         scene.settings.contacts[0].solver = Solver::Film;
     }),
