@@ -73,12 +73,9 @@ fn references() -> References {
     }
 }
 
-/// Call the function of that name: `function(arguments after the instance);` one by one.
+/// Call the function of that name: `function(arguments after the instance);` one by one. None of them: the other.
 macro_rules! call {
-    ($name:expr, $api:expr, $handle:expr; $($function:ident($($argument:expr),*);)*) => {
-        call! { $name, $api, $handle; $($function($($argument),*);)* else panic!("{} is not called", $name) }
-    };
-    ($name:expr, $api:expr, $handle:expr; $($function:ident($($argument:expr),*);)* else $other:expr) => {
+    ($name:expr, $api:expr, $handle:expr, $other:expr; $($function:ident($($argument:expr),*);)*) => {
         match $name {
             $(stringify!($function) => ($api.$function)($handle $(, $argument)*),)*
             _ => $other,
@@ -98,7 +95,7 @@ fn call2(api: &Fmi2Api, slave: &fmi2::Slave<'_>, name: &str, known: References) 
     let (input, output, string, choice) = (&known.input, &known.output, &known.text, &known.choice);
     // SAFETY: all pointers are to single values, or NULL with a count of zero.
     unsafe {
-        call! { name, api, h;
+        call! { name, api, h, panic!("{name} is not called");
             fmi2SetDebugLogging(0, 0, null());
             fmi2SetupExperiment(0, 0.0, 0.0, 0, 0.0);
             fmi2EnterInitializationMode();
@@ -181,7 +178,7 @@ unsafe fn call3(api: &Fmi3Api, h: *mut c_void, saved: (*mut c_void, &[u8]), name
     let (mut a, mut b, mut c, mut size, mut copy) = (false, false, false, 0, bytes.to_vec());
     // SAFETY: all pointers are to single values, or NULL with a count of zero, or not touched by refusing functions.
     unsafe {
-        call! { name, api, h;
+        call! { name, api, h, refused3(api, h, name, input);
             fmi3SetDebugLogging(false, 0, null());
             fmi3EnterInitializationMode(false, 0.0, 0.0, false, 0.0);
             fmi3ExitInitializationMode();
@@ -227,7 +224,6 @@ unsafe fn call3(api: &Fmi3Api, h: *mut c_void, saved: (*mut c_void, &[u8]), name
             fmi3GetVariableDependencies(known.output, null_mut(), null_mut(), null_mut(), null_mut(), 0);
             fmi3GetDirectionalDerivative(output, 1, input, 1, &raw const value, 1, &raw mut real, 1);
             fmi3GetAdjointDerivative(output, 1, input, 1, &raw const value, 1, &raw mut real, 1);
-            else refused3(api, h, name, input)
         }
     }
 }
@@ -238,7 +234,7 @@ unsafe fn refused3(api: &Fmi3Api, h: *mut c_void, name: &str, input: *const u32)
     let (mut a, mut b, mut c) = (false, false, false);
     // SAFETY: all pointers are to single values, or not touched by refusing functions.
     unsafe {
-        call! { name, api, h;
+        call! { name, api, h, panic!("{name} is not called");
             fmi3EnterConfigurationMode();
             fmi3ExitConfigurationMode();
             fmi3EnterEventMode();

@@ -316,7 +316,7 @@ fn tables(
             std::iter::once(format!("{:e} m", one.tolerance)).chain(of).chain(shares).collect()
         })
         .collect();
-    let row = |degree: usize, friction: f64, counts: [usize; 3]| -> Vec<String> {
+    let row = |degree: usize, friction: f64, counts: [u64; 3]| -> Vec<String> {
         let counts = counts.map(|count| count.to_string());
         [degree.to_string(), friction.to_string()].into_iter().chain(counts).collect()
     };
